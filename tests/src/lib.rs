@@ -1,0 +1,1 @@
+//! Whole-system tests of mimu: see the files beside this one in `tests/`.
