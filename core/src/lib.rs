@@ -1,2 +1,17 @@
+//! What the device computes, on the device and on the PC alike: compensation of raw readings and
+//! the recursive estimation of a calibration.
+//!
+//! | module           | what it is                                                        |
+//! |------------------|-------------------------------------------------------------------|
+//! | [`compensation`] | inverse model, raw to SI: `x = C u + o` for gyro and accelerometer |
+//! | [`kalman`]       | bank of three four-state Kalman filters fed one scalar at a time  |
+//!
+//! Everything is generic over `f32` (the target's floating-point unit) and `f64` (the PC), without
+//! allocation, without `unsafe` and without a path to a panic. Parameters and state are different
+//! types: a calibration is immutable and serves any number of streams.
 #![no_std]
-//! core
+
+pub mod compensation;
+pub mod kalman;
+
+pub use nalgebra::RealField;
