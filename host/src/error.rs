@@ -45,7 +45,11 @@ impl Error {
         };
         // "(os error 2)" helps nobody who reads the sentence before it.
         let text = error.to_string();
-        let text = text.split(" (os error").next().unwrap_or_default().to_lowercase();
+        let text = text
+            .split(" (os error")
+            .next()
+            .unwrap_or_default()
+            .to_lowercase();
         Self::new(path.display(), text, remedy)
     }
 }

@@ -1,1 +1,31 @@
-//! Recordings.
+//! Recordings: reading them in a stream, writing them whole, and importing foreign files.
+//!
+//! A recording is a directory with `recording.toml` ([`Manifest`]) and `samples.csv` or
+//! `samples.parquet`. Four hours at 1 kHz are ordinary, so nothing here holds a whole file:
+//! [`Recording::for_each_batch`] hands rows over in order, a few thousand at a time.
+
+mod batch;
+mod cell;
+mod columns;
+mod csv_file;
+mod csv_writer;
+mod digest;
+mod import;
+mod in_order;
+mod manifest;
+mod parquet_file;
+mod parquet_writer;
+mod reader;
+#[cfg(test)]
+mod round_trip_tests;
+mod staging;
+mod writer;
+
+pub use batch::Batch;
+pub use columns::{Column, Columns, RAW_COLUMNS, REFERENCE_COLUMNS};
+pub use import::{
+    ColumnList, ImportOptions, ImportSummary, Role, Scale, Separator, SkippedLines, import,
+};
+pub use manifest::{Format, MANIFEST_FILE, Manifest, Rails, RawUnit, Reference, Source};
+pub use reader::{ReadSummary, Recording};
+pub use writer::{SampleFormat, Writer};

@@ -1,0 +1,612 @@
+//! A recording condensed to blocks of a tenth of a second, in one pass and bounded memory.
+//!
+//! Everything that an affine fit needs of fourteen million samples is their first two moments over
+//! short stretches, and for rotations the integral of the rate: 60 MB in place of 1.5 GB. What has to
+//! be known before a sample can be judged (where the rails are, what stillness means) is only known at the
+//! end, so a block also carries what is needed to take clipped samples out of its sums later.
+
+use crate::error::{Error, Result};
+use crate::recording::{Batch, RAW_COLUMNS, Recording};
+
+/// Length of a block, s. A tenth of the shortest dwell that is worth having; ten samples at 100 Hz.
+const BLOCK_S: f64 = 0.1;
+/// Smallest number of samples in a full block, for slow recordings.
+const BLOCK_MIN_ROWS: usize = 4;
+/// Longest stretch that one [`Increment`] integrates over, s: at 10 rad/s it turns by 0.1 rad, and
+/// what the second-order coning correction leaves is below 1e-5 rad.
+const INCREMENT_S: f64 = 0.01;
+/// A time step this many times the sample period is a gap.
+const GAP_PERIODS: f64 = 1.5;
+/// Gaps in more than this share of all rows are no gaps but another rate.
+const GAP_SHARE: f64 = 0.02;
+
+/// Moments of one raw channel over one block.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Moments {
+    /// Number of samples that are numbers.
+    pub n: u32,
+    /// Their mean, raw units.
+    pub mean: f64,
+    /// Sum of squared deviations from the mean.
+    pub m2: f64,
+    /// Smallest sample.
+    pub min: f64,
+    /// Largest sample.
+    pub max: f64,
+    /// How many samples equal `min`.
+    pub at_min: u32,
+    /// How many samples equal `max`.
+    pub at_max: u32,
+    /// Longest run of identical samples.
+    pub run: u32,
+    /// The value of that run.
+    pub run_value: f64,
+    /// Number of neighbours that are equal.
+    pub repeats: u32,
+}
+
+impl Moments {
+    fn of(samples: &[f64]) -> Self {
+        let mut n = 0u32;
+        let mut sum = 0.0;
+        let (mut min, mut max) = (f64::INFINITY, f64::NEG_INFINITY);
+        for &u in samples {
+            if u.is_finite() {
+                n += 1;
+                sum += u;
+                min = min.min(u);
+                max = max.max(u);
+            }
+        }
+        if n == 0 {
+            return Self::default();
+        }
+        let mean = sum / f64::from(n);
+        let (mut m2, mut at_min, mut at_max) = (0.0, 0, 0);
+        for &u in samples {
+            if u.is_finite() {
+                m2 += (u - mean) * (u - mean);
+                at_min += u32::from(u == min);
+                at_max += u32::from(u == max);
+            }
+        }
+        let (mut run, mut run_value, mut repeats, mut length) = (1, samples[0], 0, 1);
+        for pair in samples.windows(2) {
+            if pair[0] == pair[1] {
+                repeats += 1;
+                length += 1;
+                if length > run {
+                    (run, run_value) = (length, pair[1]);
+                }
+            } else {
+                length = 1;
+            }
+        }
+        Self {
+            n,
+            mean,
+            // A constant is constant: its mean may round to a neighbour.
+            m2: if min == max { 0.0 } else { m2 },
+            min,
+            max,
+            at_min,
+            at_max,
+            run,
+            run_value,
+            repeats,
+        }
+    }
+
+    /// These moments without the samples at `low` and `high`, and how many those were.
+    pub fn without_rails(&self, rails: Rails) -> (Self, u32) {
+        let mut kept = *self;
+        let mut masked = 0;
+        let ends = [
+            (rails.low, self.min, self.at_min),
+            (rails.high, self.max, self.at_max),
+        ];
+        for (rail, extreme, count) in ends {
+            if rail != Some(extreme) || masked == self.n {
+                continue;
+            }
+            let (n, k) = (f64::from(kept.n), f64::from(count));
+            masked += count;
+            if count >= kept.n {
+                kept.n = 0;
+                continue;
+            }
+            let mean = (n * kept.mean - k * extreme) / (n - k);
+            kept.m2 -= k * (extreme - kept.mean).powi(2) + (n - k) * (mean - kept.mean).powi(2);
+            kept.m2 = kept.m2.max(0.0);
+            kept.mean = mean;
+            kept.n -= count;
+        }
+        (kept, masked)
+    }
+}
+
+/// The values beyond which a converter cannot read, raw units.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Rails {
+    /// Lower rail, if it was reached.
+    pub low: Option<f64>,
+    /// Upper rail, if it was reached.
+    pub high: Option<f64>,
+}
+
+/// A reference or temperature channel over one block. Not a number where a sample has none.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Level {
+    /// Mean.
+    pub mean: f64,
+    /// Smallest.
+    pub min: f64,
+    /// Largest.
+    pub max: f64,
+}
+
+impl Level {
+    const UNKNOWN: Self = Self {
+        mean: f64::NAN,
+        min: f64::NAN,
+        max: f64::NAN,
+    };
+
+    fn of(samples: &[f64]) -> Self {
+        if samples.is_empty() {
+            return Self::UNKNOWN;
+        }
+        let first = samples[0];
+        let (mut sum, mut min, mut max) = (0.0, first, first);
+        for &x in samples {
+            sum += x - first;
+            min = min.min(x);
+            max = max.max(x);
+        }
+        // Measured from the first, so that the mean of a constant is that constant.
+        let mean = first + sum / samples.len() as f64;
+        if mean.is_finite() {
+            Self { mean, min, max }
+        } else {
+            Self::UNKNOWN
+        }
+    }
+}
+
+/// Consecutive samples of one step without a gap, a tenth of a second or less.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Block {
+    /// Data row of the first sample, from 0.
+    pub first_row: u64,
+    /// Number of samples.
+    pub rows: u32,
+    /// Instant of the first sample, s.
+    pub start_s: f64,
+    /// Instant of the last sample, s.
+    pub last_s: f64,
+    /// Step, or -1 in transit; 0 throughout when the recording has no steps.
+    pub step: i32,
+    /// Whether samples are missing between this block and the one before.
+    pub after_gap: bool,
+    /// Gyro x, y, z, accelerometer x, y, z, raw.
+    pub raw: [Moments; 6],
+    /// Known inputs: rates (deg/s), specific forces (m/s²).
+    pub reference: [Level; 6],
+    /// Temperature, °C.
+    pub temp_c: Level,
+}
+
+/// Integral of the raw gyro readings `u` over about 10 ms, from one sample instant to another, in a form that
+/// gives the rotation vector of any affine calibration of them to second order.
+///
+/// With `ω = C u + o` the rotation vector is (Bortz, second order)
+/// `φ = C a + o T + ½ cof(C) b + ½ (C d) × o`, cof(C) being the cofactor matrix.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Increment {
+    /// Instant at which it ends, s.
+    pub end_s: f64,
+    /// T, its length, s.
+    pub duration_s: f64,
+    /// a = ∫ u dt, raw·s.
+    pub integral: [f64; 3],
+    /// b = ∫ a(t) × u(t) dt, raw²·s².
+    pub coning: [f64; 3],
+    /// d = 2 ∫ a(t) dt - T a(T), raw·s².
+    pub moment: [f64; 3],
+    /// Whether all samples are there and are numbers: false across a gap.
+    pub whole: bool,
+}
+
+/// What one pass over a recording leaves.
+#[derive(Debug, Clone)]
+pub struct Condensed {
+    /// The blocks, in order.
+    pub blocks: Vec<Block>,
+    /// The integrals of the gyro, in order; empty unless they were asked for.
+    pub increments: Vec<Increment>,
+    /// Number of rows.
+    pub rows: u64,
+    /// Which of the six raw channels the recording has.
+    pub has_raw: [bool; 6],
+    /// Which of the six reference channels the recording has.
+    pub has_reference: [bool; 6],
+    /// Whether it has a `step` column.
+    pub has_steps: bool,
+    /// Sample period by the time stamps, gaps left out, s.
+    pub period_s: f64,
+    /// Number of gaps, and the time missing in all of them, s.
+    pub gaps: (u64, f64),
+    /// Rows left out because they repeat the row before.
+    pub duplicates: u64,
+    /// Samples of each raw channel that are not numbers.
+    pub missing: [u64; 6],
+    /// SHA-256 of the samples file, hexadecimal.
+    pub sha256: String,
+    /// What a person should know about this recording.
+    pub warnings: Vec<String>,
+}
+
+impl Condensed {
+    /// Reads `recording` once. `integrate`: also integrate the gyro, as rotations need it.
+    /// `progress` is told the share that is done.
+    pub fn read(recording: &Recording, integrate: bool, progress: impl Fn(f64)) -> Result<Self> {
+        let period = 1.0 / recording.manifest.sample_rate_hz;
+        let place = recording.samples.display().to_string();
+        let mut condenser = Condenser::new(period, integrate, place);
+        let summary = recording.for_each_batch(progress, |batch| condenser.push(batch))?;
+        let mut condensed = condenser.finish()?;
+        condensed.sha256 = summary.sha256;
+        condensed.warnings.splice(0..0, summary.warnings);
+        Ok(condensed)
+    }
+}
+
+/// Takes batches of samples in order and makes blocks of them.
+struct Condenser {
+    period_s: f64,
+    place: String,
+    block_rows: usize,
+    open: Batch,
+    open_after_gap: bool,
+    last: Option<(f64, i32)>,
+    integrator: Option<Integrator>,
+    steps: Steps,
+    out: Condensed,
+}
+
+/// Statistics of the time steps.
+#[derive(Default)]
+struct Steps {
+    regular: u64,
+    regular_s: f64,
+    longer: u64,
+    missing_s: f64,
+    shorter: u64,
+    first_odd: Option<(u64, f64)>,
+}
+
+impl Condenser {
+    fn new(period_s: f64, integrate: bool, place: String) -> Self {
+        Self {
+            period_s,
+            place,
+            block_rows: ((BLOCK_S / period_s).round() as usize).max(BLOCK_MIN_ROWS),
+            open: Batch::default(),
+            open_after_gap: false,
+            last: None,
+            integrator: integrate.then(|| Integrator::new(period_s)),
+            steps: Steps::default(),
+            out: Condensed {
+                blocks: Vec::new(),
+                increments: Vec::new(),
+                rows: 0,
+                has_raw: [false; 6],
+                has_reference: [false; 6],
+                has_steps: false,
+                period_s,
+                gaps: (0, 0.0),
+                duplicates: 0,
+                missing: [0; 6],
+                sha256: String::new(),
+                warnings: Vec::new(),
+            },
+        }
+    }
+
+    fn push(&mut self, batch: &Batch) -> Result<()> {
+        let rows = batch.t_s.len();
+        self.out.rows += rows as u64;
+        for c in 0..6 {
+            self.out.has_raw[c] |= !batch.raw[c].is_empty();
+            self.out.has_reference[c] |= !batch.reference[c].is_empty();
+        }
+        self.out.has_steps |= !batch.step.is_empty();
+        let mut from = 0;
+        for i in 0..rows {
+            let t = batch.t_s[i];
+            let step = batch.step.get(i).copied().unwrap_or(0);
+            let mut cut = false;
+            let mut gap = false;
+            if let Some((last_t, last_step)) = self.last {
+                let dt = t - last_t;
+                if !(dt > 0.0) {
+                    if dt == 0.0 && self.repeats_the_row_before(batch, i) {
+                        self.out.duplicates += 1;
+                        self.append(batch, from, i);
+                        from = i + 1;
+                        continue;
+                    }
+                    return Err(self.time_error(batch.first_row + i as u64, last_t, t));
+                }
+                gap = self.count(dt, batch.first_row + i as u64);
+                cut = gap || step != last_step;
+            }
+            let pending = self.open.t_s.len() + (i - from);
+            if cut || pending >= self.block_rows {
+                self.append(batch, from, i);
+                self.flush();
+                self.open_after_gap = gap;
+                from = i;
+            }
+            if let Some(integrator) = &mut self.integrator {
+                let u = [0, 1, 2].map(|c| batch.raw[c].get(i).copied().unwrap_or(f64::NAN));
+                self.out.increments.extend(integrator.push(t, u, gap));
+            }
+            self.last = Some((t, step));
+        }
+        self.append(batch, from, rows);
+        Ok(())
+    }
+
+    /// Whether row `i` says the same as the row before it in every raw channel.
+    fn repeats_the_row_before(&self, batch: &Batch, i: usize) -> bool {
+        (0..6).all(|c| {
+            let column = &batch.raw[c];
+            let before = match i {
+                0 => self.open.raw[c].last(),
+                _ => column.get(i - 1),
+            };
+            column.get(i) == before
+        })
+    }
+
+    fn time_error(&self, row: u64, before: f64, now: f64) -> Error {
+        let place = format!("{}, data row {}, t_s", self.place, row + 1);
+        if now.is_nan() {
+            Error::new(place, "the time is not a number", "give every row its time")
+        } else if now == before {
+            let problem = format!("two different rows have the time {now} s");
+            Error::new(
+                place,
+                problem,
+                "import again without the time column and with --rate-hz, if the rows are in order",
+            )
+        } else {
+            let problem = format!("time goes back from {before} s to {now} s");
+            Error::new(
+                place,
+                problem,
+                "sort the rows by time, or import the parts as recordings of their own",
+            )
+        }
+    }
+
+    /// Counts a time step; whether it is a gap.
+    fn count(&mut self, dt: f64, row: u64) -> bool {
+        let steps = &mut self.steps;
+        if dt > GAP_PERIODS * self.period_s {
+            steps.longer += 1;
+            steps.missing_s += dt - self.period_s;
+            steps.first_odd.get_or_insert((row, dt));
+            return true;
+        }
+        if dt < 0.5 * self.period_s {
+            steps.shorter += 1;
+            steps.first_odd.get_or_insert((row, dt));
+        }
+        steps.regular += 1;
+        steps.regular_s += dt;
+        false
+    }
+
+    /// Adds rows `from..to` of `batch` to the open block.
+    fn append(&mut self, batch: &Batch, from: usize, to: usize) {
+        if from >= to {
+            return;
+        }
+        let open = &mut self.open;
+        if open.t_s.is_empty() {
+            open.first_row = batch.first_row + from as u64;
+        }
+        open.t_s.extend_from_slice(&batch.t_s[from..to]);
+        if !batch.step.is_empty() {
+            open.step.extend_from_slice(&batch.step[from..to]);
+        }
+        let columns = open.raw.iter_mut().chain(&mut open.reference);
+        for (into, column) in columns.zip(batch.raw.iter().chain(&batch.reference)) {
+            if !column.is_empty() {
+                into.extend_from_slice(&column[from..to]);
+            }
+        }
+        if !batch.temp_c.is_empty() {
+            open.temp_c.extend_from_slice(&batch.temp_c[from..to]);
+        }
+    }
+
+    /// Condenses the open block.
+    fn flush(&mut self) {
+        let open = &mut self.open;
+        let (Some(&start_s), Some(&last_s)) = (open.t_s.first(), open.t_s.last()) else {
+            return;
+        };
+        let mut raw = [Moments::default(); 6];
+        for (c, column) in open.raw.iter().enumerate() {
+            if !column.is_empty() {
+                raw[c] = Moments::of(column);
+                self.out.missing[c] += column.len() as u64 - u64::from(raw[c].n);
+            }
+        }
+        self.out.blocks.push(Block {
+            first_row: open.first_row,
+            rows: open.t_s.len() as u32,
+            start_s,
+            last_s,
+            step: open.step.first().copied().unwrap_or(0),
+            after_gap: self.open_after_gap,
+            raw,
+            reference: [0, 1, 2, 3, 4, 5].map(|c| Level::of(&open.reference[c])),
+            temp_c: Level::of(&open.temp_c),
+        });
+        self.open_after_gap = false;
+        open.t_s.clear();
+        open.step.clear();
+        open.temp_c.clear();
+        for column in open.raw.iter_mut().chain(&mut open.reference) {
+            column.clear();
+        }
+    }
+
+    fn finish(mut self) -> Result<Condensed> {
+        self.flush();
+        let steps = &self.steps;
+        let (rate, all) = (1.0 / self.period_s, steps.regular + steps.longer);
+        if all == 0 {
+            return Err(Error::new(
+                &self.place,
+                "there is only one row",
+                "record for longer",
+            ));
+        }
+        let share = (steps.longer + steps.shorter) as f64 / all as f64;
+        if share > GAP_SHARE {
+            let (row, dt) = steps.first_odd.unwrap_or((0, f64::NAN));
+            let problem = format!(
+                "the rate is mixed: {:.0} % of the time steps do not fit sample_rate_hz = {rate}, the first is {dt:.6} s",
+                100.0 * share
+            );
+            let place = format!("{}, data row {}, t_s", self.place, row + 1);
+            return Err(Error::new(
+                place,
+                problem,
+                "correct sample_rate_hz, or resample to one rate",
+            ));
+        }
+        let period = steps.regular_s / steps.regular.max(1) as f64;
+        let off = period / self.period_s - 1.0;
+        if off.abs() > 0.02 {
+            let problem = format!(
+                "rows are {period:.6} s apart, sample_rate_hz = {rate} says {:.6} s",
+                self.period_s
+            );
+            return Err(Error::new(
+                format!("{}, t_s", self.place),
+                problem,
+                "correct sample_rate_hz or the unit of t_s",
+            ));
+        }
+        let out = &mut self.out;
+        if off.abs() > 1e-3 {
+            out.warnings.push(format!(
+                "the time stamps run at {:.3} Hz, {:+.2} % off the stated {rate} Hz; the stamps are used",
+                1.0 / period, -100.0 * off
+            ));
+        }
+        out.period_s = period;
+        out.gaps = (steps.longer, steps.missing_s);
+        if steps.longer > 0 {
+            let (row, _) = steps.first_odd.unwrap_or((0, 0.0));
+            out.warnings.push(format!(
+                "{} gaps, {:.3} s missing in all, the first before data row {}: nothing is integrated or averaged across them",
+                steps.longer, steps.missing_s, row + 1
+            ));
+        }
+        if out.duplicates > 0 {
+            out.warnings.push(format!(
+                "{} rows repeat the row before, time included: left out",
+                out.duplicates
+            ));
+        }
+        for (c, &missing) in out.missing.iter().enumerate() {
+            if missing > 0 {
+                out.warnings.push(format!(
+                    "{missing} samples of {} are empty or not a number: masked",
+                    RAW_COLUMNS[c]
+                ));
+            }
+        }
+        if let Some(integrator) = &mut self.integrator {
+            out.increments.extend(integrator.take());
+        }
+        Ok(self.out)
+    }
+}
+
+/// Integrates raw gyro samples to [`Increment`]s.
+struct Integrator {
+    longest_s: f64,
+    before: Option<(f64, [f64; 3])>,
+    open: Increment,
+    sum: [f64; 3],
+}
+
+impl Integrator {
+    const EMPTY: Increment = Increment {
+        end_s: 0.0,
+        duration_s: 0.0,
+        integral: [0.0; 3],
+        coning: [0.0; 3],
+        moment: [0.0; 3],
+        whole: true,
+    };
+
+    fn new(period_s: f64) -> Self {
+        Self {
+            // Half a period of slack, as time stamps jitter.
+            longest_s: INCREMENT_S.max(period_s) - 0.5 * period_s,
+            before: None,
+            open: Self::EMPTY,
+            sum: [0.0; 3],
+        }
+    }
+
+    /// Takes in a sample; an increment if one is complete.
+    fn push(&mut self, t: f64, u: [f64; 3], gap: bool) -> Option<Increment> {
+        let (t0, u0) = self.before.replace((t, u))?;
+        let dt = t - t0;
+        let open = &mut self.open;
+        if gap || !u.iter().chain(&u0).all(|x| x.is_finite()) {
+            open.whole = false;
+        }
+        // The rate runs straight from sample to sample: exact for its integral, and for its coning
+        // within one step dt²/6 u0 × u.
+        let within = cross(u0, u);
+        let a0 = open.integral;
+        let step = [0, 1, 2].map(|k| 0.5 * dt * (u0[k] + u[k]));
+        let across = cross(a0, step);
+        for k in 0..3 {
+            open.coning[k] += across[k] + dt * dt / 6.0 * within[k];
+            self.sum[k] += dt * a0[k] + dt * dt / 6.0 * (2.0 * u0[k] + u[k]);
+            open.integral[k] += step[k];
+        }
+        open.duration_s += dt;
+        open.end_s = t;
+        (open.duration_s >= self.longest_s)
+            .then(|| self.take())
+            .flatten()
+    }
+
+    fn take(&mut self) -> Option<Increment> {
+        let mut done = std::mem::replace(&mut self.open, Self::EMPTY);
+        let sum = std::mem::replace(&mut self.sum, [0.0; 3]);
+        done.moment = [0, 1, 2].map(|k| 2.0 * sum[k] - done.duration_s * done.integral[k]);
+        (done.duration_s > 0.0).then_some(done)
+    }
+}
+
+fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    ]
+}

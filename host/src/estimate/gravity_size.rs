@@ -1,0 +1,222 @@
+//! Accelerometer calibration from the size of gravity alone, over many poses.
+//!
+//! At rest `|C u + o| = g` in every pose (fang [14], xu [19] among many). A rotation of the whole leaves
+//! every size as it is, so the frame has to be chosen: C is lower triangular with a positive diagonal,
+//! that is, the body frame has its x axis along the sensor x and its xy plane through the sensor y, fang (13) with
+//! `Mp = 1`. Nine parameters, and at least nine poses; which way an axis is positive cannot be seen
+//! from sizes either and is taken from the raw readings.
+
+use mimu_core::compensation::Affine;
+use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, SVector, Vector3};
+
+use super::least_squares::{Linearized, Observability, excess_variance, minimize};
+use super::{AXES, Estimated, Failure, Observation};
+use crate::triad::{Covariance, Triad};
+
+/// Number of parameters: six of C, three of o.
+pub const PARAMETERS: usize = 9;
+
+/// Row and column of the six elements of C.
+const LOWER: [(usize, usize); 6] = [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2)];
+
+/// Readings in units in which a perfect sensor has C = 1 and o = 0.
+struct Sphere {
+    centre: Vector3<f64>,
+    radius: f64,
+}
+
+impl Sphere {
+    /// Sphere through the readings by linear least squares.
+    fn through(observations: &[Observation]) -> Option<Self> {
+        let mean =
+            observations.iter().map(|o| o.raw).sum::<Vector3<f64>>() / observations.len() as f64;
+        let unit = observations
+            .iter()
+            .map(|o| (o.raw - mean).norm())
+            .fold(0.0, f64::max);
+        let at = |i: usize| (observations[i].raw - mean) / unit;
+        let a = DMatrix::from_fn(observations.len(), 4, |i, j| {
+            if j == 3 { 1.0 } else { 2.0 * at(i)[j] }
+        });
+        let y = DVector::from_fn(observations.len(), |i, _| at(i).norm_squared());
+        let x = a.svd(true, true).solve(&y, 1e-12).ok()?;
+        let centre = Vector3::new(x[0], x[1], x[2]);
+        let radius = (x[3] + centre.norm_squared()).sqrt();
+        (radius.is_finite() && radius > 0.0).then_some(Self {
+            centre: mean + centre * unit,
+            radius: radius * unit,
+        })
+    }
+}
+
+/// Fits C and o to `|C u + o| = gravity` (m/s²) over all observations.
+pub fn estimate(observations: &[Observation], gravity: f64) -> Result<Estimated, Failure> {
+    let n = observations.len();
+    if n < PARAMETERS {
+        return Err(Failure::Undetermined {
+            parameters: format!(
+                "{} of the {PARAMETERS} accelerometer parameters",
+                PARAMETERS - n
+            ),
+            add: format!(
+                "{n} still poses can be used, and without a table at least {PARAMETERS} different ones are needed: add poses, each axis up and down and between"
+            ),
+        });
+    }
+    let sphere = Sphere::through(observations)
+        .ok_or_else(|| Failure::NoSolution("the dwell means do not lie on a sphere".into()))?;
+    let v: Vec<Vector3<f64>> = observations
+        .iter()
+        .map(|o| (o.raw - sphere.centre) / sphere.radius)
+        .collect();
+    let unpack = |p: &DVector<f64>| {
+        let mut c = Matrix3::zeros();
+        for (k, place) in LOWER.iter().enumerate() {
+            c[*place] = p[k];
+        }
+        (c, Vector3::new(p[6], p[7], p[8]))
+    };
+    // All in units of gravity, so that parameters and columns are of order one.
+    let evaluate = |p: &DVector<f64>, variances: &[f64]| {
+        let (c, o) = unpack(p);
+        let mut out = Linearized {
+            residuals: DVector::zeros(n),
+            jacobian: DMatrix::zeros(n, PARAMETERS),
+        };
+        for i in 0..n {
+            let f = c * v[i] + o;
+            let weight = variances[i].sqrt().recip();
+            let up = f / f.norm();
+            out.residuals[i] = weight * (f.norm() - 1.0);
+            for (k, (row, column)) in LOWER.iter().enumerate() {
+                out.jacobian[(i, k)] = weight * up[*row] * v[i][*column];
+            }
+            for k in 0..3 {
+                out.jacobian[(i, 6 + k)] = weight * up[k];
+            }
+        }
+        out
+    };
+    let noise = |p: &DVector<f64>| -> Vec<f64> {
+        let (c, o) = unpack(p);
+        let all: Vec<f64> = (0..n)
+            .map(|i| {
+                let up = (c * v[i] + o).normalize();
+                let along = c.transpose() * up / sphere.radius;
+                along.component_mul(&along).dot(&observations[i].variance)
+            })
+            .collect();
+        let floor = (1e-12 * all.iter().copied().fold(0.0, f64::max)).max(1e-24);
+        all.into_iter().map(|x| x.max(floor)).collect()
+    };
+    let lost = || Failure::NoSolution("the fit to the size of gravity does not converge".into());
+    let start = DVector::from_vec(vec![1.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]);
+    let shape = Observability::of(&evaluate(&start, &vec![1.0; n]).jacobian);
+    if !shape.is_complete() {
+        return Err(undetermined(&shape));
+    }
+    let (mut p, _) = minimize(start, |p| evaluate(p, &vec![1.0; n])).ok_or_else(lost)?;
+    let dof = (n - PARAMETERS) as f64;
+    let mut scatter = excess_variance(&[], &[], dof);
+    let mut variances = noise(&p);
+    let mut chi2 = None;
+    for _ in 0..30 {
+        let weights: Vec<f64> = variances.iter().map(|x| x + scatter.excess).collect();
+        (p, _) = minimize(p, |p| evaluate(p, &weights)).ok_or_else(lost)?;
+        variances = noise(&p);
+        let residuals: Vec<f64> = evaluate(&p, &vec![1.0; n])
+            .residuals
+            .iter()
+            .copied()
+            .collect();
+        let before = scatter.excess;
+        scatter = excess_variance(&residuals, &variances, dof);
+        chi2.get_or_insert(scatter.chi2);
+        if (scatter.excess - before).abs() <= 1e-6 * before {
+            break;
+        }
+    }
+    let weights: Vec<f64> = variances.iter().map(|x| x + scatter.excess).collect();
+    let last = evaluate(&p, &weights);
+    let shape = Observability::of(&evaluate(&p, &vec![1.0; n]).jacobian);
+    if !shape.is_complete() {
+        return Err(undetermined(&shape));
+    }
+    let covariance = (last.jacobian.transpose() * &last.jacobian)
+        .try_inverse()
+        .ok_or_else(|| Failure::NoSolution("the normal matrix is singular".into()))?;
+
+    // Back: x = g (C' (u - centre)/radius + o').
+    let (mut c, mut o) = unpack(&p);
+    let scale = gravity / sphere.radius;
+    let mut change = SMatrix::<f64, 12, 9>::zeros();
+    for (k, (row, column)) in LOWER.iter().enumerate() {
+        change[(3 * row + column, k)] = scale;
+        change[(9 + row, k)] = -scale * sphere.centre[*column];
+    }
+    for k in 0..3 {
+        change[(9 + k, 6 + k)] = gravity;
+    }
+    let nine = SMatrix::<f64, 9, 9>::from_fn(|i, j| covariance[(i, j)]);
+    let covariance: Covariance = change * nine * change.transpose();
+    // A row's sign cannot be seen: the raw reading decides, and flipping rows keeps sizes. What must not
+    // happen is a negative diagonal, which the start (the unit matrix) makes all but impossible.
+    let mut flips = SVector::<f64, 12>::repeat(1.0);
+    for row in 0..3 {
+        if c[(row, row)] < 0.0 {
+            c.row_mut(row).neg_mut();
+            o[row] = -o[row];
+            for k in 0..3 {
+                flips[3 * row + k] = -1.0;
+            }
+            flips[9 + row] = -1.0;
+        }
+    }
+    let flips = SMatrix::from_diagonal(&flips);
+    let matrix = c * scale;
+    let inverse = Affine {
+        matrix,
+        offset: o * gravity - matrix * sphere.centre,
+    };
+    // From units of gravity to m/s².
+    scatter.excess *= gravity * gravity;
+    scatter.chi2 = chi2.unwrap_or(scatter.chi2);
+    let triad = Triad::from_inverse(
+        inverse,
+        flips * covariance * flips,
+        scatter.coverage_factor(),
+    )
+    .ok_or_else(|| Failure::NoSolution("C is singular".into()))?;
+    Ok(Estimated {
+        triad,
+        scatter: vec![("size of gravity".into(), scatter)],
+        condition: shape.condition,
+    })
+}
+
+fn undetermined(shape: &Observability) -> Failure {
+    let name = |k: usize| match LOWER.get(k) {
+        Some((i, j)) => format!("C_{}{}", AXES[*i], AXES[*j]),
+        None => format!("o_{}", AXES[k - 6]),
+    };
+    let names: Vec<String> = shape.undetermined.iter().map(|(k, _)| name(*k)).collect();
+    // An axis that nothing distinguishes from the others is where the poses are missing.
+    let weak: Vec<&str> = (0..3)
+        .filter(|a| {
+            shape
+                .undetermined
+                .iter()
+                .any(|(k, _)| *k == 6 + a || LOWER.get(*k) == Some(&(*a, *a)))
+        })
+        .map(|a| AXES[a])
+        .collect();
+    let add = if weak.is_empty() {
+        "add poses between the axes (two or three axes off the vertical at once)".to_string()
+    } else {
+        format!("add poses with {} up, down and slanted", weak.join(", "))
+    };
+    Failure::Undetermined {
+        parameters: names.join(", "),
+        add,
+    }
+}

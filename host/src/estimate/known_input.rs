@@ -1,0 +1,485 @@
+//! Estimators for dwells whose input is known: a rate table, or a levelled cube.
+
+use mimu_core::compensation::Affine;
+use mimu_core::kalman::Bank;
+use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, Vector3};
+
+use super::least_squares::{Observability, Scatter, excess_variance, solve_with_excess};
+use super::{AXES, Estimated, Failure, Observation};
+use crate::triad::{Covariance, Triad};
+
+/// Two inputs are opposite if their sum is below this share of their size: a table's repeatability.
+const OPPOSITE_SHARE: f64 = 0.01;
+/// An input is along an axis if the rest of it is below this share.
+const ALONG_SHARE: f64 = 0.02;
+
+/// Size of the largest input; the unit in which designs are judged.
+fn span(observations: &[Observation]) -> f64 {
+    observations
+        .iter()
+        .map(|o| o.input.norm())
+        .fold(0.0, f64::max)
+        .max(f64::MIN_POSITIVE)
+}
+
+/// Rows `[1, x, y, z]`, inputs in units of `span`.
+fn design(observations: &[Observation], span: f64) -> DMatrix<f64> {
+    DMatrix::from_fn(observations.len(), 4, |i, j| match j {
+        0 => 1.0,
+        _ => observations[i].input[j - 1] / span,
+    })
+}
+
+/// Whether the inputs determine `[b, P1, P2, P3]`, fang (29), (30). The same for all three sensors.
+pub fn observability(observations: &[Observation]) -> Result<Observability, Failure> {
+    let found = Observability::of(&design(observations, span(observations)));
+    if found.is_complete() {
+        return Ok(found);
+    }
+    let inputs: Vec<&str> = (0..3)
+        .filter(|axis| found.undetermined.iter().any(|(k, _)| *k == axis + 1))
+        .map(|axis| AXES[axis])
+        .collect();
+    let bias = found.undetermined.iter().any(|(k, _)| *k == 0);
+    let mut parameters: Vec<String> = inputs
+        .iter()
+        .map(|a| {
+            format!("P_x{a}, P_y{a}, P_z{a} (scale factor {a} and the misalignments towards {a})")
+        })
+        .collect();
+    if bias {
+        parameters.insert(0, "the biases".into());
+    }
+    let axes = inputs.join(", ");
+    let add = if observations.len() < 4 {
+        format!(
+            "only {} dwells can be used, and 4 parameters a sensor need at least 4 different inputs",
+            observations.len()
+        )
+    } else if bias {
+        format!(
+            "no difference between bias and a constant input along {axes}: add dwells with the opposite input, or none, along {axes}"
+        )
+    } else {
+        format!("add dwells with inputs along {axes}, in both directions")
+    };
+    Err(Failure::Undetermined {
+        parameters: parameters.join(", "),
+        add,
+    })
+}
+
+/// Least squares in the forward form, fang (15), (17): `u = P x + b`, sensor by sensor.
+///
+/// The noisy reading is regressed on the known input, so that nothing is attenuated.
+pub fn least_squares(observations: &[Observation]) -> Result<Estimated, Failure> {
+    let observability = observability(observations)?;
+    let span = span(observations);
+    let design = design(observations, span);
+    let mut axes = Vec::new();
+    for axis in 0..3 {
+        let raw = DVector::from_fn(observations.len(), |i, _| observations[i].raw[axis]);
+        let variance = DVector::from_fn(observations.len(), |i, _| observations[i].variance[axis]);
+        let (solution, scatter) = solve_with_excess(&design, &raw, &positive(variance))
+            .ok_or_else(|| Failure::NoSolution("the design is singular".into()))?;
+        axes.push((solution.parameters, solution.covariance, scatter));
+    }
+    forward(&axes, span, observability.condition)
+}
+
+/// The Kalman bank of fang (23)-(28), fed the dwell means one scalar at a time with a diffuse prior.
+///
+/// Its noise is that of the dwell means; where the innovations' residual shows more, the bank is run again with
+/// the excess added, as in [`least_squares`], with which it agrees to rounding.
+pub fn kalman(observations: &[Observation]) -> Result<Estimated, Failure> {
+    let observability = observability(observations)?;
+    let span = span(observations);
+    let dof = observations.len() as f64 - 4.0;
+    let floor = Vector3::from_fn(|axis, _| {
+        let variances = observations.iter().map(|o| o.variance[axis]);
+        positive(DVector::from_iterator(observations.len(), variances)).max()
+    });
+    let run = |excess: &Vector3<f64>| {
+        let mut bank = Bank::<f64>::diffuse(&(floor + excess), 1.0);
+        for o in observations {
+            let noise = o.variance.map(|v| v.max(f64::MIN_POSITIVE)) + excess;
+            bank.update(&(o.input / span), &o.raw, &noise)
+                .map_err(|e| Failure::NoSolution(format!("dwell {}: {e}", o.dwell)))?;
+        }
+        Ok::<_, Failure>(bank)
+    };
+    let mut scatter = [Scatter {
+        excess: 0.0,
+        chi2: 0.0,
+        dof,
+    }; 3];
+    let mut bank = run(&Vector3::zeros())?;
+    for round in 0..30 {
+        let before = Vector3::from_fn(|i, _| scatter[i].excess);
+        for axis in 0..3 {
+            let mean = bank.axes[axis].mean();
+            let residuals: Vec<f64> = observations
+                .iter()
+                .map(|o| o.raw[axis] - mean[0] - mean.fixed_rows::<3>(1).dot(&(o.input / span)))
+                .collect();
+            let variances: Vec<f64> = observations
+                .iter()
+                .map(|o| o.variance[axis].max(f64::MIN_POSITIVE))
+                .collect();
+            let found = excess_variance(&residuals, &variances, dof);
+            let chi2 = if round == 0 {
+                found.chi2
+            } else {
+                scatter[axis].chi2
+            };
+            scatter[axis] = Scatter { chi2, ..found };
+        }
+        let now = Vector3::from_fn(|i, _| scatter[i].excess);
+        if (now - before).amax() <= 1e-6 * before.amax() {
+            break;
+        }
+        bank = run(&now)?;
+    }
+    let axes: Vec<_> = (0..3)
+        .map(|axis| {
+            let filter = &bank.axes[axis];
+            let mean = DVector::from_column_slice(filter.mean().as_slice());
+            let covariance = DMatrix::from_column_slice(4, 4, filter.covariance().as_slice());
+            (mean, covariance, scatter[axis])
+        })
+        .collect();
+    forward(&axes, span, observability.condition)
+}
+
+/// Puts `[b, P1, P2, P3]` of the three sensors (inputs in units of `span`) together.
+fn forward(
+    axes: &[(DVector<f64>, DMatrix<f64>, Scatter)],
+    span: f64,
+    condition: f64,
+) -> Result<Estimated, Failure> {
+    let mut model = Affine {
+        matrix: Matrix3::zeros(),
+        offset: Vector3::zeros(),
+    };
+    let mut covariance = Covariance::zeros();
+    for (axis, (parameters, of_axis, _)) in axes.iter().enumerate() {
+        // Where b, P1, P2, P3 of this sensor stand among the twelve.
+        let places = [9 + axis, 3 * axis, 3 * axis + 1, 3 * axis + 2];
+        let unit = [1.0, span, span, span];
+        model.offset[axis] = parameters[0];
+        for j in 0..3 {
+            model.matrix[(axis, j)] = parameters[j + 1] / span;
+        }
+        for i in 0..4 {
+            for j in 0..4 {
+                covariance[(places[i], places[j])] = of_axis[(i, j)] / (unit[i] * unit[j]);
+            }
+        }
+    }
+    let scatter: Vec<_> = axes
+        .iter()
+        .zip(AXES)
+        .map(|(a, name)| (name.to_string(), a.2))
+        .collect();
+    let triad = Triad::from_forward(model, covariance, widest(&scatter)).ok_or_else(|| {
+        Failure::NoSolution(
+            "the three sensors measure one plane only (singular scale-factor matrix)".into(),
+        )
+    })?;
+    Ok(Estimated {
+        triad,
+        scatter,
+        condition,
+    })
+}
+
+/// The largest factor from sigma to half of a 95 % interval among the groups.
+pub(super) fn widest(scatter: &[(String, Scatter)]) -> f64 {
+    scatter
+        .iter()
+        .map(|s| s.1.coverage_factor())
+        .fold(1.959_963_984_540_054, f64::max)
+}
+
+/// Variances, with a floor where a noiseless recording has none: 1e-12 of the largest, or of one.
+fn positive(variances: DVector<f64>) -> DVector<f64> {
+    let floor = 1e-12 * variances.max();
+    variances.map(|v| {
+        if v > floor {
+            v
+        } else if floor > 0.0 {
+            floor
+        } else {
+            1e-24
+        }
+    })
+}
+
+/// xu's inverse form for rates: C from the differences of opposite rates, (3)-(8), o from the readings at rest, (9)-(11).
+///
+/// Unweighted, as published. It regresses the known input on the noisy reading, which shrinks C by the
+/// ratio of noise variance to signal variance: below 1e-8 for dwell means of seconds, but not for single samples.
+/// The covariance is that of this estimator under the noise of the means, and correlates the rows, which share the
+/// readings.
+pub fn opposite_rates(observations: &[Observation]) -> Result<Estimated, Failure> {
+    observability(observations)?;
+    let mut free: Vec<&Observation> = observations.iter().collect();
+    let limit = OPPOSITE_SHARE * span(observations);
+    let (mut pairs, mut rest) = (Vec::new(), Vec::new());
+    while let Some(first) = free.pop() {
+        let size = first.input.norm();
+        if size < limit.min(1e-3 * span(observations)) {
+            rest.push(first);
+            continue;
+        }
+        let opposite = free
+            .iter()
+            .enumerate()
+            .map(|(i, o)| (i, (o.input + first.input).norm()))
+            .filter(|(_, sum)| *sum <= OPPOSITE_SHARE * size)
+            .min_by(|a, b| a.1.total_cmp(&b.1));
+        if let Some((i, _)) = opposite {
+            pairs.push((first, free.swap_remove(i)));
+        }
+    }
+    if rest.is_empty() {
+        return Err(Failure::Undetermined {
+            parameters: "o (xu (10))".into(),
+            add: "xu's form takes the offset from dwells at rest: add some, or use --method least-squares".into(),
+        });
+    }
+    let span = span(observations);
+    let differences = DMatrix::from_fn(pairs.len(), 3, |i, j| {
+        (pairs[i].0.input[j] - pairs[i].1.input[j]) / (2.0 * span)
+    });
+    let observability = Observability::of(&differences);
+    if !observability.is_complete() {
+        let axes: Vec<&str> = observability
+            .undetermined
+            .iter()
+            .map(|(k, _)| AXES[*k])
+            .collect();
+        return Err(Failure::Undetermined {
+            parameters: format!("C, for want of opposite rates about {}", axes.join(", ")),
+            add: "add the opposite of each rate, or use --method least-squares".into(),
+        });
+    }
+    let reading = DMatrix::from_fn(pairs.len(), 3, |i, j| pairs[i].0.raw[j] - pairs[i].1.raw[j]);
+    let known = DMatrix::from_fn(pairs.len(), 3, |i, j| {
+        pairs[i].0.input[j] - pairs[i].1.input[j]
+    });
+    let pseudo = (reading.transpose() * &reading)
+        .try_inverse()
+        .ok_or_else(|| Failure::NoSolution("the readings do not change with the rate".into()))?
+        * reading.transpose();
+    let c_transposed = &pseudo * &known;
+    let matrix = Matrix3::from_fn(|i, j| c_transposed[(j, i)]);
+    let at_rest = rest.iter().map(|o| o.raw).sum::<Vector3<f64>>() / rest.len() as f64;
+    let inverse = Affine {
+        matrix,
+        offset: -(matrix * at_rest),
+    };
+
+    // Errors of a difference in SI: C times the error of the readings.
+    let si =
+        |variance: Vector3<f64>| matrix * Matrix3::from_diagonal(&variance) * matrix.transpose();
+    let noise: Vec<Matrix3<f64>> = pairs
+        .iter()
+        .map(|(a, b)| si(a.variance + b.variance))
+        .collect();
+    let rest_noise =
+        si(rest.iter().map(|o| o.variance).sum::<Vector3<f64>>()
+            / (rest.len() * rest.len()) as f64);
+    let residual = &known - &reading * &c_transposed;
+    let dof = pairs.len() as f64 - 3.0;
+    let scatter: Vec<_> = (0..3)
+        .map(|axis| {
+            let r: Vec<f64> = residual.column(axis).iter().copied().collect();
+            let v: Vec<f64> = noise
+                .iter()
+                .map(|n| n[(axis, axis)].max(f64::MIN_POSITIVE))
+                .collect();
+            (AXES[axis].to_string(), excess_variance(&r, &v, dof))
+        })
+        .collect();
+    let covariance = rows_covariance(&pseudo, |p, r, s| {
+        noise[p][(r, s)] + if r == s { scatter[r].1.excess } else { 0.0 }
+    });
+    let mut full = Covariance::zeros();
+    full.fixed_view_mut::<9, 9>(0, 0).copy_from(&covariance);
+    // o_r = -c_r . G0: its errors come from c_r and from the readings at rest.
+    let mut by_c = SMatrix::<f64, 3, 9>::zeros();
+    for r in 0..3 {
+        for j in 0..3 {
+            by_c[(r, 3 * r + j)] = -at_rest[j];
+        }
+    }
+    let cross = by_c * covariance;
+    full.fixed_view_mut::<3, 9>(9, 0).copy_from(&cross);
+    full.fixed_view_mut::<9, 3>(0, 9)
+        .copy_from(&cross.transpose());
+    full.fixed_view_mut::<3, 3>(9, 9)
+        .copy_from(&(cross * by_c.transpose() + rest_noise));
+    let triad = Triad::from_inverse(inverse, full, widest(&scatter))
+        .ok_or_else(|| Failure::NoSolution("C is singular".into()))?;
+    Ok(Estimated {
+        triad,
+        scatter,
+        condition: observability.condition,
+    })
+}
+
+/// Covariance of three rows that are all estimated by `left` (3 or 4 by observations) when the errors of one
+/// observation are correlated across the rows as `noise(observation, row, row)` says. Row-major order, 3 a row.
+fn rows_covariance(
+    left: &DMatrix<f64>,
+    noise: impl Fn(usize, usize, usize) -> f64,
+) -> SMatrix<f64, 9, 9> {
+    SMatrix::from_fn(|a, b| {
+        let (r, i, s, j) = (a / 3, a % 3, b / 3, b % 3);
+        (0..left.ncols())
+            .map(|p| left[(i, p)] * noise(p, r, s) * left[(j, p)])
+            .sum()
+    })
+}
+
+/// xu's inverse form for poses, (12)-(16): `f = C u + o` by unweighted least squares over the readings.
+///
+/// See [`opposite_rates`] for what regressing on the noisy side means.
+pub fn inverse_form(observations: &[Observation]) -> Result<Estimated, Failure> {
+    let observability = observability(observations)?;
+    let n = observations.len();
+    // Centred and scaled, or the readings' common offset makes the normal matrix singular to rounding.
+    let centre = observations.iter().map(|o| o.raw).sum::<Vector3<f64>>() / n as f64;
+    let unit = observations
+        .iter()
+        .map(|o| (o.raw - centre).norm())
+        .fold(0.0, f64::max)
+        .max(f64::MIN_POSITIVE);
+    let design = DMatrix::from_fn(n, 4, |i, j| {
+        if j == 3 {
+            1.0
+        } else {
+            (observations[i].raw[j] - centre[j]) / unit
+        }
+    });
+    let left = (design.transpose() * &design)
+        .try_inverse()
+        .ok_or_else(|| Failure::NoSolution("the readings lie in one plane".into()))?
+        * design.transpose();
+    let known = DMatrix::from_fn(n, 3, |i, j| observations[i].input[j]);
+    let solution = &left * &known;
+    let matrix = Matrix3::from_fn(|i, j| solution[(j, i)] / unit);
+    let at_centre = Vector3::from_fn(|i, _| solution[(3, i)]);
+    let inverse = Affine {
+        matrix,
+        offset: at_centre - matrix * centre,
+    };
+    let noise: Vec<Matrix3<f64>> = observations
+        .iter()
+        .map(|o| matrix * Matrix3::from_diagonal(&o.variance) * matrix.transpose())
+        .collect();
+    let residual = &known - &design * &solution;
+    let scatter: Vec<_> = (0..3)
+        .map(|axis| {
+            let r: Vec<f64> = residual.column(axis).iter().copied().collect();
+            let v: Vec<f64> = noise
+                .iter()
+                .map(|m| m[(axis, axis)].max(f64::MIN_POSITIVE))
+                .collect();
+            (
+                AXES[axis].to_string(),
+                excess_variance(&r, &v, n as f64 - 4.0),
+            )
+        })
+        .collect();
+    // Covariance in the centred parameters, [c_r1 c_r2 c_r3 o_r] for each row, then to C and o.
+    let mut full = Covariance::zeros();
+    let place = |r: usize, i: usize| if i == 3 { 9 + r } else { 3 * r + i };
+    for r in 0..3 {
+        for s in 0..3 {
+            for i in 0..4 {
+                for j in 0..4 {
+                    full[(place(r, i), place(s, j))] = (0..n)
+                        .map(|p| {
+                            let extra = if r == s { scatter[r].1.excess } else { 0.0 };
+                            left[(i, p)] * (noise[p][(r, s)] + extra) * left[(j, p)]
+                        })
+                        .sum();
+                }
+            }
+        }
+    }
+    let mut change = SMatrix::<f64, 12, 12>::identity();
+    for r in 0..3 {
+        for j in 0..3 {
+            change[(3 * r + j, 3 * r + j)] = 1.0 / unit;
+            change[(9 + r, 3 * r + j)] = -centre[j] / unit;
+        }
+    }
+    let covariance = change * full * change.transpose();
+    let triad = Triad::from_inverse(inverse, covariance, widest(&scatter))
+        .ok_or_else(|| Failure::NoSolution("C is singular".into()))?;
+    Ok(Estimated {
+        triad,
+        scatter,
+        condition: observability.condition,
+    })
+}
+
+/// The classical six positions, as baseline: every axis up and down, or turned both ways. Scale factor
+/// `(u⁺ - u⁻) / (x⁺ - x⁻)` and bias `(u⁺ + u⁻) / 2` of each sensor by itself; misalignments are taken to be zero.
+pub fn six_positions(observations: &[Observation]) -> Result<Estimated, Failure> {
+    let mut model = Affine {
+        matrix: Matrix3::zeros(),
+        offset: Vector3::zeros(),
+    };
+    let mut covariance = Covariance::zeros();
+    for axis in 0..3 {
+        let mut ends = [(0.0, 0.0, 0.0, 0.0); 2]; // sums of reading, input, variance; number
+        let along = |o: &&Observation| {
+            let size = o.input.norm();
+            size > 1e-3 * span(observations)
+                && o.input[axis].abs() > size * (1.0 - ALONG_SHARE * ALONG_SHARE).sqrt()
+        };
+        for o in observations.iter().filter(along) {
+            let end = &mut ends[usize::from(o.input[axis] > 0.0)];
+            end.0 += o.raw[axis];
+            end.1 += o.input[axis];
+            end.2 += o.variance[axis];
+            end.3 += 1.0;
+        }
+        if ends.iter().any(|e| e.3 == 0.0) {
+            return Err(Failure::Undetermined {
+                parameters: format!("scale factor and bias {} (six-position method)", AXES[axis]),
+                add: format!(
+                    "add dwells with {0} along +{0} and -{0}, or use --method least-squares",
+                    AXES[axis]
+                ),
+            });
+        }
+        let [down, up] = ends.map(|e| (e.0 / e.3, e.1 / e.3, e.2 / (e.3 * e.3)));
+        let (width, middle) = (up.1 - down.1, up.1 + down.1);
+        let scale = (up.0 - down.0) / width;
+        model.matrix[(axis, axis)] = scale;
+        model.offset[axis] = 0.5 * (up.0 + down.0 - scale * middle);
+        // Bias at the middle of the two inputs, which is zero to the table's repeatability.
+        covariance[(4 * axis, 4 * axis)] = (up.2 + down.2) / (width * width);
+        covariance[(9 + axis, 9 + axis)] = 0.25 * (up.2 + down.2);
+        let both = 0.5 * (up.2 - down.2) / width;
+        covariance[(4 * axis, 9 + axis)] = both;
+        covariance[(9 + axis, 4 * axis)] = both;
+    }
+    let scatter = Scatter {
+        excess: 0.0,
+        chi2: 0.0,
+        dof: 0.0,
+    };
+    let triad = Triad::from_forward(model, covariance, scatter.coverage_factor())
+        .ok_or_else(|| Failure::NoSolution("a sensor does not respond".into()))?;
+    Ok(Estimated {
+        triad,
+        scatter: vec![("all".into(), scatter)],
+        condition: 1.0,
+    })
+}

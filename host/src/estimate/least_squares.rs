@@ -1,0 +1,319 @@
+//! Weighted least squares, linear and not, with covariance and observability.
+
+use nalgebra::{DMatrix, DVector};
+use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
+
+/// Condition number (columns scaled) from which on a parameter counts as undetermined: at 1e5 one part
+/// in 10⁵ of error in the input, what a good table has, becomes all of the parameter.
+pub const UNDETERMINED: f64 = 1e5;
+/// Condition number from which on a warning is due.
+pub const POORLY_DETERMINED: f64 = 1e3;
+
+/// Share of noise-only recordings in which [`excess_variance`] takes noise for more than noise.
+pub const EXCESS_FALSE_ALARM: f64 = 0.05;
+
+/// How well a design determines its parameters: rank and condition of fang (29), (30), where
+/// the state transition is the identity and the observability matrix is the design itself.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Observability {
+    /// Number of parameters.
+    pub parameters: usize,
+    /// Number of directions among them that are determined.
+    pub rank: usize,
+    /// Largest over smallest singular value of the scaled design.
+    pub condition: f64,
+    /// Which parameters enter the undetermined directions: index and share, the largest first.
+    pub undetermined: Vec<(usize, f64)>,
+}
+
+impl Observability {
+    /// Of a `design`, rows by parameters, whose columns are in comparable units.
+    pub fn of(design: &DMatrix<f64>) -> Self {
+        let parameters = design.ncols();
+        // The normal matrix has every direction, also those that too few rows leave out.
+        let eigen = (design.transpose() * design).symmetric_eigen();
+        let singular = eigen.eigenvalues.map(|v| v.max(0.0).sqrt());
+        let largest = singular.max();
+        let mut shares = vec![0.0_f64; parameters];
+        let mut rank = parameters;
+        // Squaring costs half of the digits: 1e-16 becomes 1e-8.
+        for (k, value) in singular.iter().enumerate() {
+            if !(*value * UNDETERMINED > largest) {
+                rank -= 1;
+                for (i, share) in shares.iter_mut().enumerate() {
+                    *share = share.max(eigen.eigenvectors[(i, k)].abs());
+                }
+            }
+        }
+        rank = rank.min(design.nrows());
+        let mut undetermined: Vec<_> = shares
+            .into_iter()
+            .enumerate()
+            .filter(|(_, s)| *s > 0.2)
+            .collect();
+        undetermined.sort_by(|a, b| b.1.total_cmp(&a.1));
+        let condition = if rank == parameters {
+            largest / singular.min()
+        } else {
+            f64::INFINITY
+        };
+        Self {
+            parameters,
+            rank,
+            condition,
+            undetermined,
+        }
+    }
+
+    /// Whether every parameter is determined.
+    pub fn is_complete(&self) -> bool {
+        self.rank == self.parameters
+    }
+}
+
+/// Solution of a weighted linear problem.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Solution {
+    /// Parameters.
+    pub parameters: DVector<f64>,
+    /// Their covariance.
+    pub covariance: DMatrix<f64>,
+    /// Observations less prediction, in the units of the observations.
+    pub residuals: DVector<f64>,
+}
+
+/// Solves `observations = design * parameters + noise` for independent noise with `variances`.
+///
+/// By QR of the whitened design: normal equations would square the condition. The design must have full rank
+/// ([`Observability::is_complete`]).
+pub fn solve(
+    design: &DMatrix<f64>,
+    observations: &DVector<f64>,
+    variances: &DVector<f64>,
+) -> Option<Solution> {
+    let weights = variances.map(|v| v.sqrt().recip());
+    let mut a = design.clone();
+    for (mut row, w) in a.row_iter_mut().zip(weights.iter()) {
+        row *= *w;
+    }
+    let y = observations.component_mul(&weights);
+    // Columns of very different units: scaled for QR, scaled back after.
+    let scale = DVector::from_iterator(
+        a.ncols(),
+        a.column_iter().map(|c| c.norm().max(f64::MIN_POSITIVE)),
+    );
+    for (mut column, s) in a.column_iter_mut().zip(scale.iter()) {
+        column /= *s;
+    }
+    let qr = a.qr();
+    let r_inverse = qr.r().try_inverse()?;
+    let parameters = (&r_inverse * qr.q().transpose() * y).component_div(&scale);
+    let mut covariance = &r_inverse * r_inverse.transpose();
+    for i in 0..scale.len() {
+        for j in 0..scale.len() {
+            covariance[(i, j)] /= scale[i] * scale[j];
+        }
+    }
+    let residuals = observations - design * &parameters;
+    Some(Solution {
+        parameters,
+        covariance,
+        residuals,
+    })
+}
+
+/// What scatter has, beside the noise that was known beforehand.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Scatter {
+    /// Variance beyond the known noise of each observation; zero if noise explains the residual.
+    pub excess: f64,
+    /// Sum of squared residuals over known variances.
+    pub chi2: f64,
+    /// Degrees of freedom.
+    pub dof: f64,
+}
+
+impl Scatter {
+    /// Factor from a sigma to half of a 95 % interval: normal while the noise is known beforehand, Student's
+    /// with the degrees of freedom when its size had to be found from the residual.
+    pub fn coverage_factor(&self) -> f64 {
+        if self.excess > 0.0 && self.dof >= 1.0 {
+            StudentsT::new(0.0, 1.0, self.dof).map_or(f64::NAN, |t| t.inverse_cdf(0.975))
+        } else {
+            1.959_963_984_540_054
+        }
+    }
+}
+
+/// Variance to add to the known `variances` so that `residuals` are as large as expected (Paule and
+/// Mandel): zero unless chi-square refuses the known noise at [`EXCESS_FALSE_ALARM`].
+///
+/// Added and not multiplied: what a model lacks is the same for a long dwell and a short one.
+pub fn excess_variance(residuals: &[f64], variances: &[f64], dof: f64) -> Scatter {
+    let chi2_at = |s: f64| {
+        residuals
+            .iter()
+            .zip(variances)
+            .map(|(r, v)| r * r / (v + s))
+            .sum::<f64>()
+    };
+    let chi2 = chi2_at(0.0);
+    let none = Scatter {
+        excess: 0.0,
+        chi2,
+        dof,
+    };
+    let Ok(distribution) = ChiSquared::new(dof) else {
+        return none;
+    };
+    if !(dof >= 1.0)
+        || !chi2.is_finite() && chi2.is_nan()
+        || chi2 <= distribution.inverse_cdf(1.0 - EXCESS_FALSE_ALARM)
+    {
+        return none;
+    }
+    let (mut low, mut high) = (0.0, residuals.iter().map(|r| r * r).sum::<f64>() / dof);
+    for _ in 0..100 {
+        let middle = 0.5 * (low + high);
+        if chi2_at(middle) > dof {
+            low = middle
+        } else {
+            high = middle
+        }
+    }
+    Scatter {
+        excess: high,
+        ..none
+    }
+}
+
+/// Solves a linear problem, adding the excess variance that its own residual shows, until both agree.
+pub fn solve_with_excess(
+    design: &DMatrix<f64>,
+    observations: &DVector<f64>,
+    variances: &DVector<f64>,
+) -> Option<(Solution, Scatter)> {
+    let dof = design.nrows() as f64 - design.ncols() as f64;
+    let mut solution = solve(design, observations, variances)?;
+    let mut scatter = excess_variance(solution.residuals.as_slice(), variances.as_slice(), dof);
+    let first = scatter;
+    for _ in 0..30 {
+        if scatter.excess == 0.0 {
+            break;
+        }
+        let before = scatter.excess;
+        solution = solve(design, observations, &variances.add_scalar(before))?;
+        scatter = excess_variance(solution.residuals.as_slice(), variances.as_slice(), dof);
+        if (scatter.excess - before).abs() <= 1e-6 * before {
+            break;
+        }
+    }
+    Some((
+        solution,
+        Scatter {
+            chi2: first.chi2,
+            ..scatter
+        },
+    ))
+}
+
+/// Residuals (whitened) and their derivatives at some parameters.
+pub struct Linearized {
+    /// Residuals in units of their sigma.
+    pub residuals: DVector<f64>,
+    /// Derivatives of the residuals, rows by parameters.
+    pub jacobian: DMatrix<f64>,
+}
+
+/// Minimizes the sum of squared residuals by Levenberg and Marquardt's method with Nielsen's damping.
+///
+/// Returns the parameters and their linearization there, `None` if it does not converge. Parameters should be of
+/// order one.
+pub fn minimize(
+    start: DVector<f64>,
+    mut evaluate: impl FnMut(&DVector<f64>) -> Linearized,
+) -> Option<(DVector<f64>, Linearized)> {
+    const ITERATIONS: usize = 200;
+    let mut at = start;
+    let mut here = evaluate(&at);
+    let mut cost = here.residuals.norm_squared();
+    let (mut damping, mut growth) = (1e-6, 2.0);
+    for _ in 0..ITERATIONS {
+        let normal = here.jacobian.transpose() * &here.jacobian;
+        let gradient = here.jacobian.transpose() * &here.residuals;
+        let mut damped = normal.clone();
+        for i in 0..at.len() {
+            damped[(i, i)] += damping * normal[(i, i)].max(f64::MIN_POSITIVE);
+        }
+        let step = -damped.cholesky()?.solve(&gradient);
+        let predicted = -(step.dot(&gradient) + 0.5 * (&here.jacobian * &step).norm_squared());
+        // What a step can still gain is below the rounding of the cost.
+        if !(predicted > 1e-14 * cost) {
+            return Some((at, here));
+        }
+        let next = &at + &step;
+        let there = evaluate(&next);
+        let next_cost = there.residuals.norm_squared();
+        let gain = 0.5 * (cost - next_cost) / predicted;
+        if gain > 0.0 {
+            (at, here, cost) = (next, there, next_cost);
+            damping *= (1.0 - (2.0 * gain - 1.0).powi(3)).max(1.0 / 3.0);
+            growth = 2.0;
+        } else if damping > 1e12 {
+            return Some((at, here));
+        } else {
+            damping = damping.max(1e-9) * growth;
+            growth *= 2.0;
+        }
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_column_that_is_never_excited_is_named() {
+        let design = DMatrix::from_row_slice(
+            4,
+            3,
+            &[1.0, 1.0, 0.0, 1.0, -1.0, 0.0, 1.0, 0.5, 0.0, 1.0, 0.0, 0.0],
+        );
+        let found = Observability::of(&design);
+        assert_eq!((found.rank, found.undetermined[0].0), (2, 2));
+        assert_eq!(found.undetermined.len(), 1);
+    }
+
+    #[test]
+    fn two_columns_that_cannot_be_told_apart_are_both_named() {
+        let design = DMatrix::from_row_slice(3, 3, &[1.0, 1.0, 0.3, 1.0, 1.0, -0.2, 1.0, 1.0, 0.7]);
+        let found = Observability::of(&design);
+        let mut named: Vec<_> = found.undetermined.iter().map(|u| u.0).collect();
+        named.sort_unstable();
+        assert_eq!((found.rank, named), (2, vec![0, 1]));
+    }
+
+    #[test]
+    fn excess_variance_makes_chi_square_its_expectation() {
+        let residuals = [3.0, -2.0, 4.0, -1.0, 2.5, -3.5];
+        let variances = [0.1, 0.2, 0.1, 0.3, 0.1, 0.2];
+        let scatter = excess_variance(&residuals, &variances, 4.0);
+        let chi2: f64 = residuals
+            .iter()
+            .zip(&variances)
+            .map(|(r, v)| r * r / (v + scatter.excess))
+            .sum();
+        assert!((chi2 - 4.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn rosenbrock_valley_is_followed_to_its_end() {
+        let (at, _) = minimize(DVector::from_vec(vec![-1.2, 1.0]), |p| Linearized {
+            residuals: DVector::from_vec(vec![1.0 - p[0], 10.0 * (p[1] - p[0] * p[0])]),
+            jacobian: DMatrix::from_row_slice(2, 2, &[-1.0, 0.0, -20.0 * p[0], 10.0]),
+        })
+        .unwrap();
+        assert!((at - DVector::from_vec(vec![1.0, 1.0])).norm() < 1e-7);
+    }
+}

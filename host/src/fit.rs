@@ -1,0 +1,729 @@
+//! From a recording to a calibration of both triads, judged on what it was not fitted to.
+
+use mimu_core::compensation::Affine;
+use nalgebra::{Matrix3, Vector3};
+use rayon::prelude::*;
+
+use crate::blocks::Condensed;
+use crate::dwell::{Dwells, Sensor, refuse_dead_channels};
+use crate::error::{Error, Result};
+use crate::estimate::least_squares::POORLY_DETERMINED;
+use crate::estimate::rotation::{IntegralNoise, Motion, Turn, direction_error};
+use crate::estimate::{Estimated, Failure, Observation, gravity_size, known_input, rotation};
+use crate::noise::Noise;
+use crate::recording::{Manifest, RawUnit, Recording, Reference};
+use crate::triad::Triad;
+
+/// How a triad with known input is estimated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Method {
+    /// Forward form, batch: fang (15), (17).
+    LeastSquares,
+    /// Forward form, recursive: fang (23)-(28).
+    Kalman,
+    /// Inverse form: xu (3)-(11) for the gyro, (12)-(16) for the accelerometer.
+    Xu,
+    /// Six positions: scale factors and biases only.
+    SixPositions,
+}
+
+/// What to fit and how to judge it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Options {
+    /// Estimator where the input is known.
+    pub method: Method,
+    /// Number of contiguous blocks that are left out in turn; 0: none.
+    pub holdout_blocks: usize,
+    /// See [`crate::dwell::STILL_FACTOR`].
+    pub still_factor: f64,
+}
+
+/// A recording, condensed, with its dwells and their noise.
+#[derive(Debug, Clone)]
+pub struct Prepared {
+    /// Its manifest.
+    pub manifest: Manifest,
+    /// What one pass left of it.
+    pub condensed: Condensed,
+    /// Its dwells.
+    pub dwells: Dwells,
+    /// Noise within them.
+    pub noise: Noise,
+    /// Path of the samples, for messages.
+    pub place: String,
+}
+
+impl Prepared {
+    /// Reads `recording` and finds its dwells. `progress` is told the share that is read.
+    pub fn read(recording: &Recording, still_factor: f64, progress: impl Fn(f64)) -> Result<Self> {
+        let manifest = recording.manifest.clone();
+        let integrate = manifest.reference == Reference::Gravity;
+        let condensed = Condensed::read(recording, integrate, progress)?;
+        let place = recording.samples.display().to_string();
+        refuse_dead_channels(&condensed, &place)?;
+        let dwells = Dwells::find(&condensed, &manifest, still_factor)?;
+        let noise = Noise::within(&dwells.list, &condensed);
+        Ok(Self {
+            manifest,
+            condensed,
+            dwells,
+            noise,
+            place,
+        })
+    }
+
+    /// Whether the recording has the channels of `sensor`.
+    pub fn has(&self, sensor: Sensor) -> bool {
+        sensor.channels().all(|c| self.condensed.has_raw[c])
+    }
+
+    /// Usable dwells of `sensor`; where there is a table, those with a known input.
+    pub fn observations(&self, sensor: Sensor) -> Vec<Observation> {
+        let table = self.manifest.reference == Reference::Table;
+        let usable = self
+            .dwells
+            .list
+            .iter()
+            .enumerate()
+            .filter(|(_, d)| d.fault(sensor).is_none());
+        usable
+            .filter_map(|(i, d)| {
+                let input = d.input(sensor);
+                (input.is_some() || !table).then(|| Observation {
+                    dwell: i,
+                    raw: d.raw_mean(sensor),
+                    variance: self.noise.of_mean(sensor, d),
+                    input: input.unwrap_or_else(|| Vector3::repeat(f64::NAN)),
+                })
+            })
+            .collect()
+    }
+
+    /// Turns between usable dwells, with the directions of gravity by `accel`; also how many could not be used and why.
+    pub fn turns(&self, accel: &Affine<f64>) -> (Vec<Turn<'_>>, Vec<String>) {
+        let increments = &self.condensed.increments;
+        let usable: Vec<usize> = (0..self.dwells.list.len())
+            .filter(|&i| {
+                Sensor::BOTH
+                    .iter()
+                    .all(|s| self.dwells.list[i].fault(*s).is_none())
+            })
+            .collect();
+        let (mut turns, mut refused) = (Vec::new(), Vec::new());
+        for pair in usable.windows(2) {
+            let (a, b) = (&self.dwells.list[pair[0]], &self.dwells.list[pair[1]]);
+            let from = increments.partition_point(|i| i.end_s <= a.last_s);
+            let to = increments.partition_point(|i| i.end_s < b.start_s) + 1;
+            let pieces = &increments[from.min(increments.len())..to.min(increments.len())];
+            let blocks = &self.condensed.blocks[a.blocks.end..b.blocks.start];
+            let why = if pieces.iter().any(|i| !i.whole) {
+                Some("samples are missing".to_string())
+            } else {
+                Sensor::Gyro.channels().find_map(|c| {
+                    let rails = self.dwells.rails[c];
+                    let at_rail = |m: &crate::blocks::Moments| {
+                        rails.low == Some(m.min) || rails.high == Some(m.max)
+                    };
+                    let axis = crate::estimate::AXES[c];
+                    if blocks.iter().any(|b| at_rail(&b.raw[c])) {
+                        Some(format!("gyro_{axis} is at its rail"))
+                    } else {
+                        // Hands do not keep a code for a tenth of a second while others move.
+                        let stuck = blocks
+                            .iter()
+                            .filter(|b| b.raw[c].n > 3 && b.raw[c].m2 == 0.0)
+                            .count();
+                        let alive = blocks.iter().any(|b| (0..3).any(|k| b.raw[k].m2 > 0.0));
+                        (stuck > blocks.len() / 2 && alive).then(|| format!("gyro_{axis} is stuck"))
+                    }
+                })
+            };
+            if let Some(why) = why {
+                refused.push(format!(
+                    "the turn from dwell {} to {} is not used: {why}",
+                    a.step, b.step
+                ));
+                continue;
+            }
+            let variance = |d: &crate::dwell::Dwell| {
+                let si = si_covariance(&accel.matrix, &self.noise.of_mean(Sensor::Accel, d));
+                si.trace() / 3.0
+            };
+            let g = self.manifest.gravity_mps2;
+            turns.push(Turn {
+                from: pair[0],
+                to: pair[1],
+                increments: pieces,
+                before: accel.apply(&a.raw_mean(Sensor::Accel)),
+                after: accel.apply(&b.raw_mean(Sensor::Accel)),
+                direction_variance: (variance(a) + variance(b)) / (g * g),
+                duration_s: pieces.iter().map(|i| i.duration_s).sum(),
+            });
+        }
+        (turns, refused)
+    }
+
+    /// Pairs of blocks in motion, for the first guess of the gyro.
+    fn motions(&self, accel: &Affine<f64>) -> Vec<Motion> {
+        let mut still = vec![false; self.condensed.blocks.len()];
+        for dwell in &self.dwells.list {
+            still[dwell.blocks.clone()].fill(true);
+        }
+        let mean = |i: usize, s: Sensor| {
+            let from = s.channels().start;
+            Vector3::from_fn(|k, _| self.condensed.blocks[i].raw[from + k].mean)
+        };
+        (1..still.len())
+            .filter(|&i| !still[i] && !self.condensed.blocks[i].after_gap)
+            .map(|i| {
+                let [before, after] = [i - 1, i].map(|i| accel.apply(&mean(i, Sensor::Accel)));
+                let centre = |i: usize| {
+                    let b = &self.condensed.blocks[i];
+                    0.5 * (b.start_s + b.last_s)
+                };
+                Motion {
+                    force: (before + after) * 0.5,
+                    change: after - before,
+                    raw: (mean(i - 1, Sensor::Gyro) + mean(i, Sensor::Gyro)) * 0.5,
+                    duration_s: centre(i) - centre(i - 1),
+                }
+            })
+            .filter(|m| m.change.iter().chain(&m.raw).all(|x| x.is_finite()))
+            .collect()
+    }
+
+    /// Noise of the gyro as integrals see it.
+    pub fn integral_noise(&self) -> IntegralNoise {
+        let mean = |part: fn(&crate::noise::AllanModel) -> f64| {
+            Sensor::Gyro
+                .channels()
+                .map(|c| part(&self.noise.channels[c]))
+                .sum::<f64>()
+                / 3.0
+        };
+        IntegralNoise {
+            white: mean(|m| m.white),
+            flicker: mean(|m| m.flicker),
+        }
+    }
+}
+
+/// Covariance in SI of independent raw readings with `variance`.
+pub fn si_covariance(matrix: &Matrix3<f64>, variance: &Vector3<f64>) -> Matrix3<f64> {
+    matrix * Matrix3::from_diagonal(variance) * matrix.transpose()
+}
+
+/// What an error figure is about.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Figure {
+    /// Compensated dwell mean less known input, over dwells and axes: SI of the sensor.
+    Input,
+    /// Size of the compensated dwell mean less gravity, m/s².
+    GravitySize,
+    /// Angle between the predicted and the measured direction of gravity after each turn, rad.
+    Direction,
+}
+
+impl Figure {
+    /// Unit of the figure.
+    pub fn unit(self, sensor: Sensor) -> &'static str {
+        match self {
+            Self::Direction => "rad",
+            _ => sensor.unit(),
+        }
+    }
+}
+
+/// One residual: where it is, and how large in sample and held out.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Residual {
+    /// Dwell, or the dwell that a turn ends in.
+    pub dwell: usize,
+    /// Vector residual: input error, direction error; for a size, the error stands first.
+    pub value: Vector3<f64>,
+    /// The same by a calibration that has not seen it. `None`: could not be held out.
+    pub held_out: Option<Vector3<f64>>,
+    /// Standard deviation that noise alone gives it (root mean square over its parts).
+    pub floor: f64,
+}
+
+/// Fit of one triad.
+#[derive(Debug, Clone)]
+pub struct SensorFit {
+    /// Which.
+    pub sensor: Sensor,
+    /// Calibration, scatter and condition.
+    pub estimated: Estimated,
+    /// What the error figures are about.
+    pub figure: Figure,
+    /// One for every dwell or turn that was used.
+    pub residuals: Vec<Residual>,
+    /// Number of dwells used.
+    pub dwells: usize,
+    /// Compensated gyro dwell means without a table, root mean square in sample and held out, rad/s.
+    pub static_rms: Option<(f64, Option<f64>)>,
+    /// Why blocks could not be held out.
+    pub not_held_out: Vec<String>,
+    /// What a person should know.
+    pub warnings: Vec<String>,
+}
+
+impl SensorFit {
+    /// Root mean square of the residuals: over axes where the input is known, of angle or size elsewhere.
+    pub fn rms(&self) -> f64 {
+        rms(self.figure, self.residuals.iter().map(|r| r.value))
+    }
+
+    /// The same of the held-out residuals; `None` if there are none.
+    pub fn held_out_rms(&self) -> Option<f64> {
+        let held = || self.residuals.iter().filter_map(|r| r.held_out);
+        (held().count() > 0).then(|| rms(self.figure, held()))
+    }
+
+    /// What [`Self::rms`] would be if noise were all.
+    pub fn noise_floor(&self) -> f64 {
+        rms(
+            Figure::GravitySize,
+            self.residuals
+                .iter()
+                .map(|r| Vector3::new(r.floor, 0.0, 0.0)),
+        )
+    }
+}
+
+fn rms(figure: Figure, values: impl Iterator<Item = Vector3<f64>>) -> f64 {
+    let (mut sum, mut n) = (0.0, 0.0);
+    for v in values {
+        sum += v.norm_squared();
+        n += match figure {
+            Figure::Input => 3.0,
+            Figure::GravitySize | Figure::Direction => 1.0,
+        };
+    }
+    (sum / n).sqrt()
+}
+
+/// Fit of a recording.
+#[derive(Debug, Clone)]
+pub struct Fit {
+    /// What was fitted.
+    pub prepared: Prepared,
+    /// How.
+    pub options: Options,
+    /// Gyro, then accelerometer, as far as there are any.
+    pub sensors: Vec<SensorFit>,
+    /// What a person should know of the recording.
+    pub warnings: Vec<String>,
+}
+
+impl Fit {
+    /// Fit of `sensor`.
+    pub fn sensor(&self, sensor: Sensor) -> Option<&SensorFit> {
+        self.sensors.iter().find(|s| s.sensor == sensor)
+    }
+}
+
+/// Fits both triads of a recording.
+pub fn fit(prepared: Prepared, options: Options) -> Result<Fit> {
+    let mut warnings = prepared.condensed.warnings.clone();
+    warnings.extend(prepared.dwells.warnings.iter().cloned());
+    warn_of_temperature(&prepared, &mut warnings);
+    let sensors = match prepared.manifest.reference {
+        Reference::Table => fit_known(&prepared, options, &mut warnings)?,
+        Reference::Gravity => fit_gravity(&prepared, options, &mut warnings)?,
+    };
+    Ok(Fit {
+        prepared,
+        options,
+        sensors,
+        warnings,
+    })
+}
+
+/// A bias of 0.1 deg/s per °C is ordinary for these sensors: five degrees are half a degree a second.
+const ISOTHERMAL_C: f64 = 5.0;
+
+fn warn_of_temperature(prepared: &Prepared, warnings: &mut Vec<String>) {
+    let temperatures = || {
+        prepared
+            .dwells
+            .list
+            .iter()
+            .map(|d| d.temp_c)
+            .filter(|t| t.is_finite())
+    };
+    let high = temperatures().fold(f64::NEG_INFINITY, f64::max);
+    let low = temperatures().fold(f64::INFINITY, f64::min);
+    if high - low > ISOTHERMAL_C {
+        warnings.push(format!(
+            "the dwells range from {low:.1} to {high:.1} °C, and the model has no temperature in it"
+        ));
+    }
+}
+
+/// The one of `blocks` contiguous blocks that item `i` of `n` falls into, in order of time: sizes differ by one
+/// at most, the larger blocks first (as k-fold cross-validation is commonly cut, so that figures compare).
+fn block_of(i: usize, n: usize, blocks: usize) -> usize {
+    let (small, larger) = (n / blocks, n % blocks);
+    let in_larger = larger * (small + 1);
+    if i < in_larger {
+        i / (small + 1)
+    } else {
+        larger + (i - in_larger) / small.max(1)
+    }
+}
+
+fn fit_known(
+    prepared: &Prepared,
+    options: Options,
+    warnings: &mut Vec<String>,
+) -> Result<Vec<SensorFit>> {
+    let mut sensors = Vec::new();
+    for sensor in Sensor::BOTH.into_iter().filter(|s| prepared.has(*s)) {
+        let observations = prepared.observations(sensor);
+        if observations.is_empty() {
+            warnings.push(format!(
+                "{sensor}: no usable dwell has a known input, so it is not calibrated"
+            ));
+            continue;
+        }
+        refuse_wrong_gravity(prepared, sensor, &observations)?;
+        let estimate = |o: &[Observation]| match (options.method, sensor) {
+            (Method::LeastSquares, _) => known_input::least_squares(o),
+            (Method::Kalman, _) => known_input::kalman(o),
+            (Method::Xu, Sensor::Gyro) => known_input::opposite_rates(o),
+            (Method::Xu, Sensor::Accel) => known_input::inverse_form(o),
+            (Method::SixPositions, _) => known_input::six_positions(o),
+        };
+        let estimated = match estimate(&observations) {
+            Ok(estimated) => estimated,
+            // A level cube tells nothing of the gyro, and a rate table not much of the accelerometer.
+            Err(failure)
+                if observations
+                    .iter()
+                    .all(|o| o.input == observations[0].input) =>
+            {
+                let _ = failure;
+                warnings.push(format!(
+                    "{sensor}: all dwells have the same input, so it is not calibrated"
+                ));
+                continue;
+            }
+            Err(failure) => return Err(failure.into_error(sensor)),
+        };
+        let error = |triad: &Triad, o: &Observation| triad.inverse.apply(&o.raw) - o.input;
+        let matrix = estimated.triad.inverse.matrix;
+        let mut residuals: Vec<Residual> = observations
+            .iter()
+            .map(|o| Residual {
+                dwell: o.dwell,
+                value: error(&estimated.triad, o),
+                held_out: None,
+                floor: (si_covariance(&matrix, &o.variance).trace() / 3.0).sqrt(),
+            })
+            .collect();
+        let n = observations.len();
+        let refits = refit(options.holdout_blocks.min(n), |block| {
+            let kept: Vec<_> = (0..n)
+                .filter(|&i| block_of(i, n, options.holdout_blocks.min(n)) != block)
+                .map(|i| observations[i])
+                .collect();
+            estimate(&kept)
+        });
+        let mut not_held_out = Vec::new();
+        for (block, refit) in refits.into_iter().enumerate() {
+            let members =
+                (0..n).filter(|&i| block_of(i, n, options.holdout_blocks.min(n)) == block);
+            match refit {
+                Ok(refit) => members.for_each(|i| {
+                    residuals[i].held_out = Some(error(&refit.triad, &observations[i]))
+                }),
+                Err(failure) => not_held_out.push(cannot_hold_out(block, failure, sensor)),
+            }
+        }
+        sensors.push(finish(
+            sensor,
+            estimated,
+            Figure::Input,
+            residuals,
+            n,
+            None,
+            not_held_out,
+        ));
+    }
+    if sensors.is_empty() {
+        return Err(Error::new(
+            &prepared.place,
+            "no sensor can be calibrated from this recording",
+            "give the dwells their inputs in the ref_ columns, or set reference = \"gravity\"",
+        ));
+    }
+    Ok(sensors)
+}
+
+/// Runs `estimate` for each block that is left out, side by side.
+fn refit<T: Send>(
+    blocks: usize,
+    estimate: impl Fn(usize) -> std::result::Result<T, Failure> + Sync + Send,
+) -> Vec<std::result::Result<T, Failure>> {
+    (0..blocks).into_par_iter().map(estimate).collect()
+}
+
+fn cannot_hold_out(block: usize, failure: Failure, sensor: Sensor) -> String {
+    let problem = failure.into_error(sensor).problem;
+    format!(
+        "block {} cannot be held out: without it {problem}",
+        block + 1
+    )
+}
+
+fn finish(
+    sensor: Sensor,
+    estimated: Estimated,
+    figure: Figure,
+    residuals: Vec<Residual>,
+    dwells: usize,
+    static_rms: Option<(f64, Option<f64>)>,
+    not_held_out: Vec<String>,
+) -> SensorFit {
+    let mut warnings = Vec::new();
+    if estimated.condition > POORLY_DETERMINED {
+        warnings.push(format!("{sensor}: the experiment determines some parameters poorly (condition {:.0}); their intervals say which", estimated.condition));
+    }
+    if estimated.triad.inverse.matrix.determinant() < 0.0 {
+        warnings.push(format!("{sensor}: the axes come out left-handed: one of them, of gyro or accelerometer, points the other way than its column says"));
+    }
+    for reason in &not_held_out {
+        warnings.push(format!("{sensor}: {reason}"));
+    }
+    SensorFit {
+        sensor,
+        estimated,
+        figure,
+        residuals,
+        dwells,
+        static_rms,
+        not_held_out,
+        warnings,
+    }
+}
+
+/// A recording in SI whose accelerometer reads one at rest is in g.
+fn refuse_wrong_gravity(
+    prepared: &Prepared,
+    sensor: Sensor,
+    observations: &[Observation],
+) -> Result<()> {
+    let g = prepared.manifest.gravity_mps2;
+    if sensor == Sensor::Accel && prepared.manifest.reference == Reference::Table {
+        let mut sizes: Vec<f64> = observations.iter().map(|o| o.input.norm()).collect();
+        sizes.sort_by(f64::total_cmp);
+        let typical = sizes[sizes.len() / 2];
+        if (0.8..1.2).contains(&typical) {
+            let problem = format!("the known forces have a size of {typical:.3}, so they are in g");
+            return Err(Error::new(
+                format!("{}, ref_force_*_mps2", prepared.place),
+                problem,
+                format!("write them in m/s² (times {g})"),
+            ));
+        }
+    }
+    if sensor == Sensor::Accel && prepared.manifest.raw_unit == RawUnit::Si {
+        let mut sizes: Vec<f64> = observations.iter().map(|o| o.raw.norm()).collect();
+        sizes.sort_by(f64::total_cmp);
+        let typical = sizes[sizes.len() / 2];
+        if (0.5..2.0).contains(&typical) {
+            let problem = format!(
+                "raw_unit = \"SI\", but at rest the accelerometer reads {typical:.3}, so it is in g"
+            );
+            return Err(Error::new(
+                &prepared.place,
+                problem,
+                format!("import it with --scale accel={g}"),
+            ));
+        }
+    }
+    Ok(())
+}
+
+fn fit_gravity(
+    prepared: &Prepared,
+    options: Options,
+    warnings: &mut Vec<String>,
+) -> Result<Vec<SensorFit>> {
+    let g = prepared.manifest.gravity_mps2;
+    if !prepared.has(Sensor::Accel) {
+        return Err(Error::new(
+            &prepared.place,
+            "there is no accelerometer, and gravity is the only reference",
+            "add accel_x, accel_y, accel_z, or give the gyro its rates in ref_rate_ columns (reference = \"table\")",
+        ));
+    }
+    let poses = prepared.observations(Sensor::Accel);
+    if poses.is_empty() {
+        return Err(Error::new(
+            &prepared.place,
+            "no dwell can be used for the accelerometer",
+            "see the warnings; hold the unit still for some seconds in every pose",
+        ));
+    }
+    refuse_wrong_gravity(prepared, Sensor::Accel, &poses)?;
+    let accel = gravity_size::estimate(&poses, g).map_err(|f| f.into_error(Sensor::Accel))?;
+    let all_dwells = prepared.dwells.list.len();
+    let blocks = options.holdout_blocks.min(poses.len());
+    let block = |dwell: usize| block_of(dwell, all_dwells, blocks);
+    let accel_refits = refit(blocks, |b| {
+        let kept: Vec<_> = poses
+            .iter()
+            .filter(|o| block(o.dwell) != b)
+            .copied()
+            .collect();
+        gravity_size::estimate(&kept, g)
+    });
+    let size_error = |triad: &Triad, o: &Observation| {
+        Vector3::new(triad.inverse.apply(&o.raw).norm() - g, 0.0, 0.0)
+    };
+    let residuals = poses
+        .iter()
+        .map(|o| {
+            let up = accel.triad.inverse.apply(&o.raw).normalize();
+            let covariance = si_covariance(&accel.triad.inverse.matrix, &o.variance);
+            let refit = accel_refits
+                .get(block(o.dwell))
+                .and_then(|r| r.as_ref().ok());
+            Residual {
+                dwell: o.dwell,
+                value: size_error(&accel.triad, o),
+                held_out: refit.map(|r| size_error(&r.triad, o)),
+                floor: up.dot(&(covariance * up)).sqrt(),
+            }
+        })
+        .collect();
+    let not_held_out = failures(&accel_refits, Sensor::Accel);
+    let mut sensors = Vec::new();
+    if prepared.has(Sensor::Gyro) {
+        sensors.extend(fit_turns(
+            prepared,
+            &accel,
+            &accel_refits,
+            &block,
+            warnings,
+        )?);
+    }
+    sensors.push(finish(
+        Sensor::Accel,
+        accel,
+        Figure::GravitySize,
+        residuals,
+        poses.len(),
+        None,
+        not_held_out,
+    ));
+    Ok(sensors)
+}
+
+fn failures(refits: &[std::result::Result<Estimated, Failure>], sensor: Sensor) -> Vec<String> {
+    let failed = refits
+        .iter()
+        .enumerate()
+        .filter_map(|(b, r)| r.as_ref().err().map(|f| (b, f)));
+    failed
+        .map(|(b, f)| cannot_hold_out(b, f.clone(), sensor))
+        .collect()
+}
+
+/// The gyro from the turns. A turn belongs to the block of the dwell that it ends in, and no turn that touches
+/// a dwell of a block is used while the block is left out.
+fn fit_turns(
+    prepared: &Prepared,
+    accel: &Estimated,
+    accel_refits: &[std::result::Result<Estimated, Failure>],
+    block: &(impl Fn(usize) -> usize + Sync),
+    warnings: &mut Vec<String>,
+) -> Result<Option<SensorFit>> {
+    let g = prepared.manifest.gravity_mps2;
+    let by_full = &accel.triad.inverse;
+    let (turns, refused) = prepared.turns(by_full);
+    warnings.extend(refused);
+    let rest = prepared.observations(Sensor::Gyro);
+    if turns.is_empty() {
+        warnings
+            .push("gyro: no turn lies between two usable dwells, so it is not calibrated".into());
+        return Ok(None);
+    }
+    let noise = prepared.integral_noise();
+    let motions = prepared.motions(by_full);
+    let gyro = rotation::estimate(&turns, &rest, noise, &motions, None, g)
+        .map_err(|f| f.into_error(Sensor::Gyro))?;
+    let refits = refit(accel_refits.len(), |b| {
+        let accel = accel_refits[b].as_ref().map_err(Clone::clone)?;
+        let (turns, _) = prepared.turns(&accel.triad.inverse);
+        let kept: Vec<_> = turns
+            .into_iter()
+            .filter(|t| block(t.from) != b && block(t.to) != b)
+            .collect();
+        let rest: Vec<_> = rest
+            .iter()
+            .filter(|o| block(o.dwell) != b)
+            .copied()
+            .collect();
+        rotation::estimate(&kept, &rest, noise, &[], Some(&gyro.triad.inverse), g)
+    });
+    let held_out = |t: &Turn| {
+        let b = block(t.to);
+        let (gyro, accel) = (
+            refits.get(b)?.as_ref().ok()?,
+            accel_refits[b].as_ref().ok()?,
+        );
+        let direction = |d: usize| {
+            accel
+                .triad
+                .inverse
+                .apply(&prepared.dwells.list[d].raw_mean(Sensor::Accel))
+        };
+        let turn = Turn {
+            before: direction(t.from),
+            after: direction(t.to),
+            ..*t
+        };
+        Some(direction_error(&turn, &gyro.triad.inverse))
+    };
+    let c = gyro.triad.inverse.matrix;
+    let mean_square = c.norm_squared() / 3.0;
+    let residuals = turns
+        .iter()
+        .map(|t| Residual {
+            dwell: t.to,
+            value: direction_error(t, &gyro.triad.inverse),
+            held_out: held_out(t),
+            floor: t.floor(mean_square, noise),
+        })
+        .collect();
+    let static_rms = |rate: &dyn Fn(&Observation) -> Option<Vector3<f64>>| {
+        let all: Vec<_> = rest.iter().filter_map(rate).collect();
+        (!all.is_empty()).then(|| rms(Figure::Input, all.into_iter()))
+    };
+    let in_sample = static_rms(&|o| Some(gyro.triad.inverse.apply(&o.raw)));
+    let held = static_rms(&|o| {
+        let refit = refits.get(block(o.dwell))?.as_ref().ok()?;
+        Some(refit.triad.inverse.apply(&o.raw))
+    });
+    let not_held_out = failures(&refits, Sensor::Gyro);
+    let wide = turns
+        .iter()
+        .map(|t| direction_error(t, &gyro.triad.inverse).norm())
+        .fold(0.0, f64::max);
+    let mut fit = finish(
+        Sensor::Gyro,
+        gyro,
+        Figure::Direction,
+        residuals,
+        rest.len(),
+        in_sample.map(|r| (r, held)),
+        not_held_out,
+    );
+    if wide > 20f64.to_radians() {
+        fit.warnings.push(format!("gyro: after one turn gravity is {:.0} degrees from where it is predicted; samples are missing or clipped, or the gyro's columns are not the gyro's", wide.to_degrees()));
+    }
+    Ok(Some(fit))
+}

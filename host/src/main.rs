@@ -1,0 +1,288 @@
+//! The command `mimu`: argument parsing and output around the library of the same name.
+
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use indicatif::{ProgressBar, ProgressStyle};
+use mimu::calibration::{Calibration, to_toml, write_whole};
+use mimu::dwell::STILL_FACTOR;
+use mimu::error::{Error, Result};
+use mimu::fit::{Method, Options, Prepared, fit};
+use mimu::recording::{
+    ColumnList, ImportOptions, RawUnit, Recording, Reference, SampleFormat, Scale, Separator,
+    import,
+};
+use mimu::report;
+use mimu::verify::verify;
+
+/// Calibration of inertial units made of analog MEMS sensors.
+///
+/// Exit status 0: done; 1: the data were refused, with one line that says what is wrong, where, and
+/// what to do; 2: wrong usage.
+#[derive(Parser)]
+#[command(name = "mimu", version, max_term_width = 100)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Make a recording of foreign files
+    Import(ImportArgs),
+    /// Calibrate the gyro and the accelerometer of a recording
+    Fit(FitArgs),
+    /// Judge a calibration by another recording
+    Verify(VerifyArgs),
+}
+
+#[derive(Args)]
+struct ImportArgs {
+    /// Text files (any separator) or Parquet; the later ones are joined onto the times of the first
+    #[arg(required = true)]
+    files: Vec<PathBuf>,
+    /// Columns of a file from the left (`t_s,accel_x,-`; `-` skips one), or by the names in its header
+    /// (`gyro_x=wx,t_s=time`); once for each file
+    ///
+    /// Known are t_s, step (numbers or labels), temp_c, gyro_x.., accel_x.., ref_rate_x_dps..,
+    /// ref_force_x_mps2.., and sample, an index from which the time follows with --rate-hz.
+    #[arg(long, value_name = "LIST")]
+    columns: Vec<ColumnList>,
+    /// Sample rate, Hz; without it, the inverse of the median time step
+    #[arg(long)]
+    rate_hz: Option<f64>,
+    /// Local gravity, m/s²
+    #[arg(long, default_value_t = 9.80665)]
+    gravity: f64,
+    /// Unit of the raw columns, after --scale: V, count or SI (rad/s and m/s²)
+    #[arg(long, value_name = "UNIT")]
+    raw_unit: RawUnit,
+    /// What is known of the input: table (ref_ columns or --inputs) or gravity (its size, at rest)
+    #[arg(long)]
+    reference: Reference,
+    /// Factor for a column, or for gyro or accel: `gyro=0.0174533`
+    #[arg(long, value_name = "COLUMN=FACTOR")]
+    scale: Vec<Scale>,
+    /// Name of the unit; without it, the name of the recording
+    #[arg(long)]
+    device: Option<String>,
+    /// Latitude, degrees
+    #[arg(long, allow_negative_numbers = true)]
+    latitude: Option<f64>,
+    /// CSV with the known input of each step: step, ref_rate_x_dps.., ref_force_x_mps2.., turn_x_deg..
+    #[arg(long, value_name = "FILE")]
+    inputs: Option<PathBuf>,
+    /// Separator of text files: comma, semicolon, tab or space; found out without it
+    #[arg(long)]
+    separator: Option<Separator>,
+    /// Format of the samples: parquet or csv
+    #[arg(long, default_value = "parquet")]
+    format: SampleFormat,
+    /// Replace an existing recording
+    #[arg(long)]
+    replace: bool,
+    /// Directory of the new recording
+    #[arg(short, value_name = "DIR")]
+    output: PathBuf,
+    #[command(flatten)]
+    json: JsonArgs,
+}
+
+#[derive(Args)]
+struct FitArgs {
+    /// Directory of the recording
+    recording: PathBuf,
+    /// Refit without each of N contiguous blocks of time and report the error on it
+    #[arg(long, value_name = "blocks=N", default_value = "blocks=4", value_parser = holdout)]
+    holdout: usize,
+    /// Estimator where the input is known
+    #[arg(long, value_enum, default_value_t = MethodArg::LeastSquares)]
+    method: MethodArg,
+    #[command(flatten)]
+    still: StillArgs,
+    /// List the dwells
+    #[arg(long)]
+    dwells: bool,
+    /// Calibration file to write
+    #[arg(short, value_name = "FILE")]
+    output: Option<PathBuf>,
+    #[command(flatten)]
+    json: JsonArgs,
+}
+
+#[derive(Args)]
+struct VerifyArgs {
+    /// Directory of the recording
+    recording: PathBuf,
+    /// Calibration file
+    #[arg(long, value_name = "FILE")]
+    calibration: PathBuf,
+    #[command(flatten)]
+    still: StillArgs,
+    #[command(flatten)]
+    json: JsonArgs,
+}
+
+#[derive(Args)]
+struct StillArgs {
+    /// Without a step column: largest variance of a still window, times that of the quietest
+    #[arg(long = "still", value_name = "FACTOR", default_value_t = STILL_FACTOR, value_parser = still)]
+    factor: f64,
+}
+
+#[derive(Args)]
+struct JsonArgs {
+    /// Write the result as JSON (`-`: to standard output, in place of the text)
+    #[arg(long = "json", value_name = "PATH")]
+    path: Option<PathBuf>,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum MethodArg {
+    /// Forward form, all dwells at once (fang)
+    LeastSquares,
+    /// Forward form, bank of Kalman filters (fang)
+    Kalman,
+    /// Inverse form, differences of opposite rates (xu)
+    Xu,
+    /// Scale factors and biases only, from six positions
+    SixPositions,
+}
+
+fn holdout(text: &str) -> std::result::Result<usize, String> {
+    let count = text.strip_prefix("blocks=").unwrap_or(text);
+    match count.parse() {
+        Ok(1) => Err("one block leaves nothing to fit to: at least 2, or 0 for none".into()),
+        Ok(n) if n <= 1000 => Ok(n),
+        _ => Err("write blocks=N with N from 2 to 1000, or blocks=0 for none".into()),
+    }
+}
+
+fn still(text: &str) -> std::result::Result<f64, String> {
+    match text.parse() {
+        Ok(f) if (1.0..=1e9).contains(&f) => Ok(f),
+        _ => Err("write a number of at least 1".into()),
+    }
+}
+
+fn main() -> ExitCode {
+    let done = match Cli::parse().command {
+        Command::Import(args) => run_import(args),
+        Command::Fit(args) => run_fit(&args),
+        Command::Verify(args) => run_verify(&args),
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("mimu: {error}");
+            ExitCode::from(1)
+        }
+    }
+}
+
+fn run_import(args: ImportArgs) -> Result<()> {
+    let options = ImportOptions {
+        columns: args.columns,
+        separator: args.separator,
+        rate_hz: args.rate_hz,
+        scales: args.scale,
+        device: args.device,
+        latitude_deg: args.latitude,
+        inputs: args.inputs,
+        format: args.format,
+        replace: args.replace,
+        ..ImportOptions::new(args.files, args.gravity, args.raw_unit, args.reference)
+    };
+    let bar = progress("importing");
+    let summary = import(&options, &args.output, |share| {
+        bar.set_position((share * 1000.0) as u64)
+    })?;
+    bar.finish_and_clear();
+    print(
+        &args.json,
+        &report::import_text(&summary),
+        &report::import_json(&summary),
+    )
+}
+
+fn run_fit(args: &FitArgs) -> Result<()> {
+    let options = Options {
+        method: match args.method {
+            MethodArg::LeastSquares => Method::LeastSquares,
+            MethodArg::Kalman => Method::Kalman,
+            MethodArg::Xu => Method::Xu,
+            MethodArg::SixPositions => Method::SixPositions,
+        },
+        holdout_blocks: args.holdout,
+        still_factor: args.still.factor,
+    };
+    let prepared = read(&args.recording, options.still_factor)?;
+    let fitted = fit(prepared, options)?;
+    let mut text = report::fit_text(&fitted);
+    if args.dwells {
+        text.push('\n');
+        text.push_str(&report::dwell_table(
+            &fitted.prepared.dwells.list,
+            &fitted.prepared.manifest,
+        ));
+    }
+    if let Some(path) = &args.output {
+        let now = jiff::Timestamp::now()
+            .round(jiff::Unit::Second)
+            .unwrap_or_default();
+        write_whole(path, &to_toml(&fitted, &now.to_string()))?;
+        text.push_str(&format!("\ncalibration: {}\n", path.display()));
+    }
+    print(&args.json, &text, &report::fit_json(&fitted))
+}
+
+fn run_verify(args: &VerifyArgs) -> Result<()> {
+    let calibration = Calibration::read(&args.calibration)?;
+    let prepared = read(&args.recording, args.still.factor)?;
+    let verified = verify(&prepared, &calibration)?;
+    print(
+        &args.json,
+        &report::verify_text(&verified),
+        &report::verify_json(&verified),
+    )
+}
+
+fn read(directory: &Path, still_factor: f64) -> Result<Prepared> {
+    let recording = Recording::open(directory)?;
+    let bar = progress("reading");
+    let prepared = Prepared::read(&recording, still_factor, |share| {
+        bar.set_position((share * 1000.0) as u64)
+    });
+    bar.finish_and_clear();
+    prepared
+}
+
+/// Progress in thousandths, on a terminal only.
+fn progress(what: &'static str) -> ProgressBar {
+    let bar = ProgressBar::new(1000).with_message(what);
+    if let Ok(style) = ProgressStyle::with_template("{msg} {bar:40} {percent:>3} % {eta}") {
+        bar.set_style(style);
+    }
+    bar
+}
+
+/// Prints the text, or writes the JSON and prints the text unless both would go to standard output.
+fn print(json: &JsonArgs, text: &str, value: &serde_json::Value) -> Result<()> {
+    let pretty = format!("{value:#}\n");
+    let shown = match json.path.as_deref() {
+        Some(path) if path == Path::new("-") => &pretty,
+        Some(path) => {
+            write_whole(path, &pretty)?;
+            text
+        }
+        None => text,
+    };
+    let mut out = std::io::stdout().lock();
+    match out.write_all(shown.as_bytes()).and_then(|()| out.flush()) {
+        // `mimu fit ... | head` is no error.
+        Err(e) if e.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
+        other => other.map_err(|e| Error::io(Path::new("standard output"), &e)),
+    }
+}

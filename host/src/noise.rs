@@ -1,0 +1,192 @@
+//! Noise of a dwell mean, from the Allan deviation within the dwells.
+//!
+//! A mean of n samples is not sigma/√n when the noise is correlated: the Allan variance at the length
+//! of the dwell is what two successive means differ by (fang (8), section 3).
+
+use nalgebra::Vector3;
+
+use crate::blocks::Condensed;
+use crate::dwell::{Dwell, Sensor};
+
+/// Allan variance of one raw channel as `N²/τ + B² + K² τ`: white noise, bias instability and rate
+/// random walk, each at least zero.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct AllanModel {
+    /// N², raw units squared times s.
+    pub white: f64,
+    /// Level of the flicker floor, raw units squared (that is (0.664 B)²).
+    pub flicker: f64,
+    /// K²/3, raw units squared per s.
+    pub walk: f64,
+}
+
+impl AllanModel {
+    /// Variance of the mean over `tau_s`, raw units squared.
+    pub fn variance(&self, tau_s: f64) -> f64 {
+        self.white / tau_s + self.flicker + self.walk * tau_s
+    }
+}
+
+/// Noise of the six raw channels of a unit at rest.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Noise {
+    /// Gyro x, y, z, accelerometer x, y, z.
+    pub channels: [AllanModel; 6],
+}
+
+impl Noise {
+    /// Pools the overlapping Allan variance within all usable dwells and fits the model to it.
+    pub fn within(dwells: &[Dwell], condensed: &Condensed) -> Self {
+        let mut channels = [AllanModel::default(); 6];
+        for sensor in Sensor::BOTH {
+            for c in sensor.channels() {
+                if condensed.has_raw[c] {
+                    let usable = dwells.iter().filter(|d| d.fault(sensor).is_none());
+                    channels[c] = of_channel(usable, condensed, c);
+                }
+            }
+        }
+        Self { channels }
+    }
+
+    /// Variances of the mean reading of `sensor` over `dwell`, raw units squared.
+    pub fn of_mean(&self, sensor: Sensor, dwell: &Dwell) -> Vector3<f64> {
+        let from = sensor.channels().start;
+        Vector3::from_fn(|i, _| {
+            // Masked samples are gone, and the mean is that of a shorter dwell.
+            let share = dwell.raw[from + i].n as f64 / dwell.rows as f64;
+            self.channels[from + i].variance(dwell.duration_s * share)
+        })
+    }
+}
+
+fn of_channel<'a>(
+    dwells: impl Iterator<Item = &'a Dwell>,
+    condensed: &Condensed,
+    c: usize,
+) -> AllanModel {
+    let rows = condensed.blocks.iter().map(|b| b.rows).max().unwrap_or(1);
+    let block_s = f64::from(rows) * condensed.period_s;
+    // Sum of squared differences and their number, by octave of block length.
+    let mut octaves: Vec<(f64, f64, f64)> = Vec::new();
+    for dwell in dwells {
+        let blocks = &condensed.blocks[dwell.blocks.clone()];
+        let means: Vec<f64> = blocks
+            .iter()
+            .filter(|b| b.rows == rows && b.raw[c].n > 0)
+            .map(|b| b.raw[c].mean)
+            .collect();
+        let mut sums = Vec::with_capacity(means.len() + 1);
+        sums.push(0.0);
+        for m in &means {
+            sums.push(sums[sums.len() - 1] + (m - means[0]));
+        }
+        for octave in 0.. {
+            let m = 1usize << octave;
+            if 2 * m > means.len() {
+                break;
+            }
+            if octaves.len() <= octave {
+                octaves.push((0.0, 0.0, 0.0));
+            }
+            let terms = means.len() + 1 - 2 * m;
+            let sum: f64 = (0..terms)
+                .map(|j| (sums[j + 2 * m] - 2.0 * sums[j + m] + sums[j]) / m as f64)
+                .map(|d| d * d)
+                .sum();
+            octaves[octave].0 += 0.5 * sum;
+            octaves[octave].1 += terms as f64;
+            // Differences that share no sample, as the weight of the point.
+            octaves[octave].2 += (means.len() / (2 * m)) as f64;
+        }
+    }
+    let points: Vec<(f64, f64, f64)> = octaves
+        .iter()
+        .enumerate()
+        .filter(|(_, o)| o.1 > 0.0)
+        .map(|(k, o)| (block_s * f64::from(1u32 << k), o.0 / o.1, o.2))
+        .collect();
+    fit(&points)
+}
+
+/// Weighted non-negative least squares of the three terms to `(tau, variance, weight)`.
+///
+/// Each point counts by its relative error, which is `1/√weight`; with three terms every subset can
+/// be tried, and the best one with positive coefficients is the non-negative solution.
+fn fit(points: &[(f64, f64, f64)]) -> AllanModel {
+    let mut best = (f64::INFINITY, AllanModel::default());
+    for subset in 1..8usize {
+        let terms: Vec<usize> = (0..3).filter(|k| subset & (1 << k) != 0).collect();
+        if terms.len() > points.len() {
+            continue;
+        }
+        let weigh = |p: &(f64, f64, f64)| p.2.sqrt() / p.1.max(f64::MIN_POSITIVE);
+        let basis = |tau: f64, k: usize| [1.0 / tau, 1.0, tau][k];
+        let a = nalgebra::DMatrix::from_fn(points.len(), terms.len(), |i, j| {
+            weigh(&points[i]) * basis(points[i].0, terms[j])
+        });
+        let y = nalgebra::DVector::from_fn(points.len(), |i, _| weigh(&points[i]) * points[i].1);
+        let Ok(x) = a.clone().svd(true, true).solve(&y, 1e-14) else {
+            continue;
+        };
+        if x.iter().any(|v| !(*v >= 0.0)) {
+            continue;
+        }
+        let cost = (a * &x - y).norm_squared();
+        if cost < best.0 {
+            let mut coefficients = [0.0; 3];
+            for (k, v) in terms.iter().zip(x.iter()) {
+                coefficients[*k] = *v;
+            }
+            let [white, flicker, walk] = coefficients;
+            best = (
+                cost,
+                AllanModel {
+                    white,
+                    flicker,
+                    walk,
+                },
+            );
+        }
+    }
+    best.1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn terms_that_made_a_curve_are_found_again() {
+        let truth = AllanModel {
+            white: 4e-6,
+            flicker: 1e-7,
+            walk: 2e-9,
+        };
+        let points: Vec<_> = (0..12)
+            .map(|k| 0.1 * f64::from(1 << k))
+            .map(|t| (t, truth.variance(t), 10.0))
+            .collect();
+        let found = fit(&points);
+        for (a, b) in [
+            (truth.white, found.white),
+            (truth.flicker, found.flicker),
+            (truth.walk, found.walk),
+        ] {
+            assert!((a / b - 1.0).abs() < 1e-9, "{found:?}");
+        }
+    }
+
+    #[test]
+    fn white_noise_alone_is_given_no_other_term() {
+        let points: Vec<_> = (0..6)
+            .map(|k| 0.1 * f64::from(1 << k))
+            .map(|t| (t, 4e-6 / t, 10.0))
+            .collect();
+        let found = fit(&points);
+        assert!(
+            (found.white / 4e-6 - 1.0).abs() < 1e-9 && found.variance(100.0) < 4.1e-8,
+            "{found:?}"
+        );
+    }
+}

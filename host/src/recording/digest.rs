@@ -1,0 +1,90 @@
+//! SHA-256 of files, beside the reading.
+
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+
+use sha2::{Digest, Sha256};
+
+use crate::error::{Error, Result};
+
+/// Runs `work` and, at the same time on a thread of its own, hashes the bytes of `path`; returns
+/// what `work` returns and the digest in hexadecimal, as `sha256sum` prints it.
+///
+/// The file is read twice, the second time from the page cache. The alternative, to pass the
+/// chunks of the readers on in file order, would make the slowest of the two hold up the other.
+pub(super) fn beside<T>(path: &Path, work: impl FnOnce() -> Result<T>) -> Result<(T, String)> {
+    /// Tells the hashing thread to stop when the reading ends in an error, or panics.
+    struct Stop<'a>(&'a AtomicBool, bool);
+    impl Drop for Stop<'_> {
+        fn drop(&mut self) {
+            self.0.store(self.1, Ordering::Relaxed);
+        }
+    }
+    let stop = AtomicBool::new(false);
+    thread::scope(|scope| {
+        let mut guard = Stop(&stop, true);
+        let digest = thread::Builder::new()
+            .name("sha256".to_owned())
+            .spawn_scoped(scope, || sha256_until(path, &stop))
+            .map_err(|error| Error::io(path, &error))?;
+        let done = work()?;
+        guard.1 = false;
+        drop(guard);
+        match digest.join() {
+            Ok(hex) => Ok((done, hex?)),
+            Err(_) => Err(super::in_order::broke_down(&path.display().to_string())),
+        }
+    })
+}
+
+/// Digest of a file in hexadecimal.
+pub(super) fn sha256(path: &Path) -> Result<String> {
+    sha256_until(path, &AtomicBool::new(false))
+}
+
+fn sha256_until(path: &Path, stop: &AtomicBool) -> Result<String> {
+    let mut file = File::open(path).map_err(|error| Error::io(path, &error))?;
+    let mut state = Sha256::new();
+    let mut buffer = vec![0; 1 << 18];
+    while !stop.load(Ordering::Relaxed) {
+        match file.read(&mut buffer) {
+            Ok(0) => break,
+            Ok(length) => state.update(&buffer[..length]),
+            Err(error) if error.kind() == std::io::ErrorKind::Interrupted => {}
+            Err(error) => return Err(Error::io(path, &error)),
+        }
+    }
+    let hex = |byte: &u8| {
+        let digit = |nibble: u8| char::from(b"0123456789abcdef"[usize::from(nibble)]);
+        [digit(byte >> 4), digit(byte & 15)]
+    };
+    Ok(state.finalize().iter().flat_map(hex).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_digest_is_that_of_the_standard() {
+        // FIPS 180-4 example: "abc".
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("abc");
+        std::fs::write(&path, "abc").unwrap();
+        let known = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
+        assert_eq!(sha256(&path).unwrap(), known);
+        assert_eq!(beside(&path, || Ok(7)).unwrap(), (7, known.to_owned()));
+    }
+
+    #[test]
+    fn a_failure_of_the_work_is_passed_on() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("x");
+        std::fs::write(&path, vec![0; 1 << 20]).unwrap();
+        let fail = || Err::<(), _>(Error::new("here", "no", "try"));
+        assert_eq!(beside(&path, fail).unwrap_err().problem, "no");
+    }
+}

@@ -1,0 +1,232 @@
+//! What the columns of a foreign file become, and by what they are multiplied.
+
+use std::fmt;
+use std::str::FromStr;
+
+use super::super::cell::shorten;
+use super::super::columns::Column;
+use crate::error::{Error, Result};
+
+/// What a column of a foreign file becomes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Role {
+    /// A column of the recording.
+    Column(Column),
+    /// A running number, from which the time follows with the sample rate.
+    Sample,
+}
+
+impl Role {
+    /// Every role there is.
+    pub fn all() -> impl Iterator<Item = Role> {
+        Column::all().map(Role::Column).chain([Role::Sample])
+    }
+
+    /// Name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Role::Column(column) => column.name(),
+            Role::Sample => "sample",
+        }
+    }
+
+    fn from_name(name: &str) -> Option<Role> {
+        Role::all().find(|role| role.name() == name)
+    }
+}
+
+/// The columns of one foreign file: by position, or by the names in its header.
+///
+/// As text: `t_s,accel_x,-,accel_y` by position, where `-` skips a column, or `gyro_x=wx,t_s=time`
+/// by name in any order.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum ColumnList {
+    /// Role of each column from the left; `None` skips it.
+    ByPosition(Vec<Option<Role>>),
+    /// Role and name in the header.
+    ByName(Vec<(Role, String)>),
+}
+
+impl ColumnList {
+    /// Roles that are given out.
+    pub fn roles(&self) -> Vec<Role> {
+        match self {
+            ColumnList::ByPosition(items) => items.iter().flatten().copied().collect(),
+            ColumnList::ByName(items) => items.iter().map(|(role, _)| *role).collect(),
+        }
+    }
+}
+
+impl FromStr for ColumnList {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        const PLACE: &str = "list of columns";
+        let mut positions = Vec::new();
+        let mut names = Vec::new();
+        for item in text.split(',').map(str::trim) {
+            let known = item.split_once('=').map_or(item, |(known, _)| known.trim());
+            let role = match known {
+                "-" => None,
+                _ => Some(Role::from_name(known).ok_or_else(|| {
+                    let all: Vec<&str> = Role::all().map(Role::name).collect();
+                    Error::new(
+                        PLACE,
+                        format!("{} is no column of a recording", shorten(known.as_bytes())),
+                        format!("write - to skip a column, or one of {}", all.join(", ")),
+                    )
+                })?),
+            };
+            let before = positions.iter().flatten();
+            if role.is_some()
+                && before
+                    .chain(names.iter().map(|(role, _)| role))
+                    .any(|&r| Some(r) == role)
+            {
+                let problem = format!("{known} is given twice");
+                return Err(Error::new(PLACE, problem, "write - to skip one of the two"));
+            }
+            match (item.split_once('='), role) {
+                (Some((_, name)), Some(role)) => names.push((role, name.trim().to_owned())),
+                _ => positions.push(role),
+            }
+        }
+        match (positions.is_empty(), names.is_empty()) {
+            (_, true) => Ok(ColumnList::ByPosition(positions)),
+            (true, false) => Ok(ColumnList::ByName(names)),
+            // Is a plain name among named ones meant by position or by name? Nobody can tell.
+            (false, false) => Err(Error::new(
+                PLACE,
+                "some columns are given by position and some by name",
+                "write all of them as name=header_name, or none",
+            )),
+        }
+    }
+}
+
+impl fmt::Display for ColumnList {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let items: Vec<String> = match self {
+            ColumnList::ByPosition(items) => items
+                .iter()
+                .map(|role| role.map_or("-", Role::name).to_owned())
+                .collect(),
+            ColumnList::ByName(items) => items
+                .iter()
+                .map(|(role, name)| format!("{}={name}", role.name()))
+                .collect(),
+        };
+        f.write_str(&items.join(","))
+    }
+}
+
+/// A factor for a column, or for the three of a sensor, as in `gyro=57.2958`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Scale {
+    /// `gyro`, `accel` or the name of a column.
+    target: String,
+    factor: f64,
+}
+
+impl Scale {
+    /// Whether `column` is to be multiplied.
+    fn applies_to(&self, column: Column) -> bool {
+        let name = column.name();
+        match self.target.as_str() {
+            "gyro" | "accel" => {
+                matches!(column, Column::Raw(_)) && name.starts_with(self.target.as_str())
+            }
+            target => name == target,
+        }
+    }
+
+    /// Product of the factors that apply to `column`.
+    pub(super) fn product(scales: &[Scale], column: Column) -> f64 {
+        let applicable = scales.iter().filter(|scale| scale.applies_to(column));
+        applicable.map(|scale| scale.factor).product()
+    }
+}
+
+impl FromStr for Scale {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        let refuse = |problem: String, remedy: &str| Err(Error::new("scale", problem, remedy));
+        let shown = shorten(text.as_bytes());
+        let Some((target, factor)) = text.split_once('=') else {
+            return refuse(
+                format!("{shown} has no factor"),
+                "write it like gyro=57.2958",
+            );
+        };
+        let target = target.trim();
+        let known = Column::from_name(target).is_some_and(|column| column != Column::Step);
+        if !known && target != "gyro" && target != "accel" {
+            return refuse(
+                format!("{shown} names no column of numbers"),
+                "scale gyro, accel, temp_c, t_s or a single column such as gyro_x",
+            );
+        }
+        match factor.trim().parse::<f64>() {
+            Ok(factor) if factor.is_finite() && factor != 0.0 => Ok(Scale {
+                target: target.to_owned(),
+                factor,
+            }),
+            _ => refuse(
+                format!("{shown} has no finite factor other than 0"),
+                "write it like gyro=57.2958",
+            ),
+        }
+    }
+}
+
+impl fmt::Display for Scale {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}={}", self.target, self.factor)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_list_of_columns_is_read_and_printed_alike() {
+        for text in [
+            "t_s,accel_x,-,accel_y",
+            "gyro_x=wx,t_s=time (ms)",
+            "sample,step",
+        ] {
+            assert_eq!(text.parse::<ColumnList>().unwrap().to_string(), text);
+        }
+    }
+
+    #[test]
+    fn unknown_doubled_and_mixed_columns_are_refused() {
+        for (text, word) in [
+            ("t_s,acc_x", "acc_x"),
+            ("t_s,gyro_x,t_s", "twice"),
+            ("t_s=a,t_s=b", "twice"),
+            ("t_s,gyro_x=wx", "by position and some by name"),
+            ("", "no column"),
+        ] {
+            let error = text.parse::<ColumnList>().unwrap_err().to_string();
+            assert!(error.contains(word), "{error}");
+        }
+    }
+
+    #[test]
+    fn factors_multiply_and_reach_the_axes_of_their_sensor_only() {
+        let scales: Vec<Scale> = ["gyro=2", "gyro_x=3", "t_s=0.001"]
+            .iter()
+            .map(|text| text.parse().unwrap())
+            .collect();
+        assert_eq!(Scale::product(&scales, Column::Raw(0)), 6.0);
+        assert_eq!(Scale::product(&scales, Column::Raw(1)), 2.0);
+        assert_eq!(Scale::product(&scales, Column::Raw(3)), 1.0);
+        assert_eq!(Scale::product(&scales, Column::Time), 0.001);
+        for text in ["gyro", "gyro=x", "gyro=0", "mag=1", "step=2", "gyro=inf"] {
+            assert!(text.parse::<Scale>().is_err(), "{text}");
+        }
+    }
+}

@@ -1,0 +1,146 @@
+//! What stands between the cells of a text file.
+
+use std::fmt;
+use std::str::FromStr;
+
+use super::super::cell::shorten;
+use crate::error::{Error, Result};
+
+/// What stands between two cells.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Separator {
+    /// `,`
+    Comma,
+    /// `;`
+    Semicolon,
+    /// A tab.
+    Tab,
+    /// Any number of blanks and tabs.
+    Whitespace,
+}
+
+impl Separator {
+    /// Finds the separator that cuts most of `lines` alike, into two cells at least.
+    pub(super) fn detect(lines: &[&[u8]]) -> Separator {
+        // Whitespace last, as blanks may follow any other; comma after semicolon, as numbers with
+        // decimal commas stand between semicolons, and are then refused in plain words.
+        let candidates = [
+            Separator::Tab,
+            Separator::Semicolon,
+            Separator::Comma,
+            Separator::Whitespace,
+        ];
+        let mut record = csv::ByteRecord::new();
+        let mut best = (0, Separator::Comma);
+        for candidate in candidates {
+            let mut widths: Vec<usize> = lines
+                .iter()
+                .map(|line| {
+                    candidate.split(line, &mut record);
+                    record.len()
+                })
+                .filter(|&width| width > 1)
+                .collect();
+            widths.sort_unstable();
+            let alike = widths.chunk_by(|a, b| a == b).map(<[usize]>::len).max();
+            let alike = alike.unwrap_or(0);
+            if 2 * alike > lines.len() {
+                return candidate;
+            }
+            if alike > best.0 {
+                best = (alike, candidate);
+            }
+        }
+        best.1
+    }
+
+    /// Splits `line` into `cells`; quotes keep a separator inside a cell.
+    pub(super) fn split(self, line: &[u8], cells: &mut csv::ByteRecord) {
+        cells.clear();
+        let delimiter = match self {
+            Separator::Comma => b',',
+            Separator::Semicolon => b';',
+            Separator::Tab => b'\t',
+            Separator::Whitespace => {
+                let words = line.split(u8::is_ascii_whitespace);
+                for word in words.filter(|word| !word.is_empty()) {
+                    cells.push_field(word);
+                }
+                return;
+            }
+        };
+        if memchr::memchr(b'"', line).is_none() {
+            for cell in line.split(|&byte| byte == delimiter) {
+                cells.push_field(cell.trim_ascii());
+            }
+            return;
+        }
+        let mut reader = csv::ReaderBuilder::new()
+            .has_headers(false)
+            .flexible(true)
+            .delimiter(delimiter)
+            .from_reader(line);
+        // Reading from memory cannot fail, and any bytes at all make a record.
+        let _ = reader.read_byte_record(cells);
+        cells.trim();
+    }
+}
+
+impl FromStr for Separator {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        match text {
+            "," | "comma" => Ok(Separator::Comma),
+            ";" | "semicolon" => Ok(Separator::Semicolon),
+            "\t" | "tab" => Ok(Separator::Tab),
+            " " | "whitespace" => Ok(Separator::Whitespace),
+            _ => Err(Error::new(
+                "separator",
+                format!("{} is not known", shorten(text.as_bytes())),
+                "write comma, semicolon, tab or whitespace",
+            )),
+        }
+    }
+}
+
+impl fmt::Display for Separator {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Separator::Comma => "comma",
+            Separator::Semicolon => "semicolon",
+            Separator::Tab => "tab",
+            Separator::Whitespace => "whitespace",
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_separator_is_the_one_that_cuts_most_lines_alike() {
+        for (lines, expected) in [
+            (
+                vec!["Fs,100", "a,b,c", "1,2,3", "4,5,6", "7,8,9"],
+                Separator::Comma,
+            ),
+            (vec!["1.0, 2.0, 3.0", "1.0, 2.0, 3.0"], Separator::Comma),
+            (vec!["1,5;2,5;3", "1,5;2,5;3"], Separator::Semicolon),
+            (vec!["1\t2\t3", "1\t\t3"], Separator::Tab),
+            (vec!["  1.0e0   2 3", " 4 5 6"], Separator::Whitespace),
+        ] {
+            let lines: Vec<&[u8]> = lines.iter().map(|line| line.as_bytes()).collect();
+            assert_eq!(Separator::detect(&lines), expected);
+        }
+        Separator::detect(&[]);
+    }
+
+    #[test]
+    fn quotes_keep_a_separator_inside_a_cell() {
+        let mut cells = csv::ByteRecord::new();
+        Separator::Comma.split(b" 1 ,\"a, b\",3", &mut cells);
+        assert_eq!(cells, vec!["1", "a, b", "3"]);
+    }
+}

@@ -1,0 +1,158 @@
+//! A recording on disk, read in a stream.
+
+use std::path::{Path, PathBuf};
+
+use super::batch::Batch;
+use super::columns::{Columns, Layout};
+use super::csv_file::{CHUNK, CsvFile};
+use super::digest;
+use super::manifest::{MANIFEST_FILE, Manifest};
+use super::parquet_file::{ParquetFile, SLICE};
+use crate::error::{Error, Result};
+
+/// A recording whose manifest and header have been checked; the samples are read by
+/// [`Recording::for_each_batch`].
+#[derive(Debug, Clone)]
+pub struct Recording {
+    /// Contents of `recording.toml`.
+    pub manifest: Manifest,
+    /// Directory that it is in.
+    pub directory: PathBuf,
+    /// `samples.csv` or `samples.parquet` in that directory.
+    pub samples: PathBuf,
+    /// Which of the optional columns there are.
+    pub columns: Columns,
+    /// One sentence for each thing that was ignored.
+    pub warnings: Vec<String>,
+    source: Samples,
+}
+
+#[derive(Debug, Clone)]
+enum Samples {
+    Csv(CsvFile),
+    Parquet(ParquetFile, Layout),
+}
+
+/// What a reading has found.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ReadSummary {
+    /// Rows read.
+    pub rows: u64,
+    /// SHA-256 of the samples file, as `sha256sum` prints it.
+    pub sha256: String,
+    /// One sentence for each thing that was ignored.
+    pub warnings: Vec<String>,
+}
+
+impl Recording {
+    /// Opens a recording: checks its manifest and the header of its samples, reads no row.
+    pub fn open(directory: &Path) -> Result<Recording> {
+        let manifest = directory.join(MANIFEST_FILE);
+        if !manifest.is_file() {
+            let (problem, remedy) = if !directory.exists() {
+                ("there is no such directory", "check the path")
+            } else if !directory.is_dir() {
+                (
+                    "this is a file, and a recording is a directory",
+                    "bring a foreign file in with `mimu import`",
+                )
+            } else {
+                (
+                    "the directory has no recording.toml",
+                    "bring foreign files in with `mimu import`",
+                )
+            };
+            return Err(Error::new(directory.display(), problem, remedy));
+        }
+        let manifest = Manifest::read(&manifest)?;
+        let csv = directory.join("samples.csv");
+        let parquet = directory.join("samples.parquet");
+        let (samples, source) = match (csv.exists(), parquet.exists()) {
+            (true, true) => {
+                return Err(Error::new(
+                    directory.display(),
+                    "there are both samples.csv and samples.parquet",
+                    "remove the one that is not meant",
+                ));
+            }
+            (false, false) => {
+                return Err(Error::new(
+                    directory.display(),
+                    "there is neither samples.csv nor samples.parquet",
+                    "add the samples, or import the recording again",
+                ));
+            }
+            (true, false) => {
+                let file = CsvFile::open(&csv)?;
+                (csv, Samples::Csv(file))
+            }
+            (false, true) => {
+                let file = ParquetFile::open(&parquet)?;
+                let names = file.names();
+                let layout = Layout::from_names(&names, &parquet.display().to_string())?;
+                for (name, _) in names.iter().zip(&layout.slots).filter(|(_, s)| s.is_some()) {
+                    if file.leaf(name)?.is_text() {
+                        return Err(Error::new(
+                            format!("{}, column {name}", parquet.display()),
+                            "the column holds text",
+                            "write it as DOUBLE, FLOAT, INT32 or INT64",
+                        ));
+                    }
+                }
+                (parquet, Samples::Parquet(file, layout))
+            }
+        };
+        let layout = match &source {
+            Samples::Csv(file) => &file.layout,
+            Samples::Parquet(_, layout) => layout,
+        };
+        Ok(Recording {
+            manifest,
+            directory: directory.to_owned(),
+            samples,
+            columns: layout.columns,
+            warnings: layout.warnings.clone(),
+            source,
+        })
+    }
+
+    /// Number of rows, where the file says it without being read: Parquet does.
+    pub fn rows(&self) -> Option<u64> {
+        match &self.source {
+            Samples::Csv(_) => None,
+            Samples::Parquet(file, _) => Some(file.rows()),
+        }
+    }
+
+    /// Hands all rows to `consume`, in order and on this thread, while other threads read and
+    /// parse the next ones; `progress` hears the share that is done, up to 1.
+    ///
+    /// An error is that of the first row that has one, in the words of an editor: rows of a CSV file
+    /// are its lines, counted from 1 with the header. An error of `consume` ends the reading.
+    pub fn for_each_batch(
+        &self,
+        progress: impl Fn(f64),
+        consume: impl FnMut(&Batch) -> Result<()>,
+    ) -> Result<ReadSummary> {
+        self.in_pieces(CHUNK, SLICE, progress, consume)
+    }
+
+    /// [`Recording::for_each_batch`] with pieces of a chosen size: bytes of CSV, rows of Parquet.
+    pub(super) fn in_pieces(
+        &self,
+        chunk: u64,
+        slice: usize,
+        progress: impl Fn(f64),
+        consume: impl FnMut(&Batch) -> Result<()>,
+    ) -> Result<ReadSummary> {
+        let (rows, sha256) = digest::beside(&self.samples, || match &self.source {
+            Samples::Csv(file) => file.for_each_batch(chunk, progress, consume),
+            Samples::Parquet(file, layout) => file.for_each_batch(layout, slice, progress, consume),
+        })?;
+        Ok(ReadSummary {
+            rows,
+            sha256,
+            warnings: self.warnings.clone(),
+        })
+    }
+}

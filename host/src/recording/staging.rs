@@ -1,0 +1,182 @@
+//! A directory that appears whole or not at all.
+
+use std::fs::{self, File};
+use std::io::{ErrorKind, Write};
+use std::path::{Path, PathBuf};
+
+use super::manifest::MANIFEST_FILE;
+use crate::error::{Error, Result};
+
+/// Files that a recording consists of; only these are ever deleted.
+const OWN_FILES: [&str; 3] = [MANIFEST_FILE, "samples.csv", "samples.parquet"];
+
+/// A directory under a temporary name beside the target, on the same file system, so that one
+/// rename makes it appear. It is removed when dropped.
+#[derive(Debug)]
+pub(super) struct Staging {
+    path: PathBuf,
+    target: PathBuf,
+    replace: bool,
+}
+
+impl Staging {
+    /// Creates the temporary directory, after checking that `target` can be written in the end.
+    pub fn create(target: &Path, replace: bool) -> Result<Staging> {
+        check_target(target, replace)?;
+        let path = sibling(target, "new")?;
+        Ok(Staging {
+            path,
+            target: target.to_owned(),
+            replace,
+        })
+    }
+
+    /// Where to write the files.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Where the directory will be.
+    pub fn target(&self) -> &Path {
+        &self.target
+    }
+
+    /// Writes a file and waits until it is on the disk.
+    pub fn write_file(&self, name: &str, bytes: &[u8]) -> Result<()> {
+        let path = self.path.join(name);
+        File::create(&path)
+            .and_then(|mut file| {
+                file.write_all(bytes)?;
+                file.sync_all()
+            })
+            .map_err(|error| Error::io(&path, &error))
+    }
+
+    /// Gives the directory its name.
+    pub fn publish(self) -> Result<()> {
+        // Looked at again: hours may have passed since the start.
+        check_target(&self.target, self.replace)?;
+        sync_directory(&self.path);
+        let old = if self.target.exists() {
+            // A directory with files in it cannot be renamed over; the old one steps aside first.
+            let aside = sibling(&self.target, "old")?;
+            let old = aside.join("recording");
+            fs::rename(&self.target, &old).map_err(|error| {
+                let _ = fs::remove_dir(&aside);
+                Error::io(&self.target, &error)
+            })?;
+            Some((aside, old))
+        } else {
+            None
+        };
+        if let Err(error) = fs::rename(&self.path, &self.target) {
+            if let Some((aside, old)) = old {
+                let _ = fs::rename(old, &self.target);
+                let _ = fs::remove_dir(aside);
+            }
+            return Err(Error::io(&self.target, &error));
+        }
+        sync_directory(&parent(&self.target));
+        if let Some((aside, _)) = old {
+            // The new recording stands; what cannot be removed of the old one does no harm.
+            let _ = fs::remove_dir_all(aside);
+        }
+        Ok(())
+    }
+}
+
+impl Drop for Staging {
+    fn drop(&mut self) {
+        // Gone already after a rename.
+        let _ = fs::remove_dir_all(&self.path);
+    }
+}
+
+fn check_target(target: &Path, replace: bool) -> Result<()> {
+    let refuse = |problem: &str, remedy: &str| Err(Error::new(target.display(), problem, remedy));
+    let metadata = match fs::symlink_metadata(target) {
+        Err(error) if error.kind() == ErrorKind::NotFound => {
+            let parent = parent(target);
+            if parent.is_dir() {
+                return Ok(());
+            }
+            let place = parent.display();
+            return Err(Error::new(
+                place,
+                "there is no such directory",
+                "create it first",
+            ));
+        }
+        Err(error) => return Err(Error::io(target, &error)),
+        Ok(metadata) => metadata,
+    };
+    if !metadata.is_dir() {
+        return refuse("there is a file of this name", "choose another name");
+    }
+    let entries = fs::read_dir(target).map_err(|error| Error::io(target, &error))?;
+    let mut names = Vec::new();
+    for entry in entries {
+        let entry = entry.map_err(|error| Error::io(target, &error))?;
+        names.push(entry.file_name().to_string_lossy().into_owned());
+    }
+    if !names.is_empty() && !replace {
+        return refuse(
+            "it exists already",
+            "choose another name, or replace it explicitly",
+        );
+    }
+    match names
+        .iter()
+        .find(|name| !OWN_FILES.contains(&name.as_str()))
+    {
+        None => Ok(()),
+        // What a person has put there is not for this program to delete.
+        Some(other) => refuse(
+            &format!("it holds {other}, which belongs to no recording"),
+            "move that elsewhere, or choose another name",
+        ),
+    }
+}
+
+fn parent(target: &Path) -> PathBuf {
+    match target.parent() {
+        Some(parent) if parent.as_os_str().is_empty() => PathBuf::from("."),
+        Some(parent) => parent.to_owned(),
+        None => PathBuf::from("."),
+    }
+}
+
+/// Creates an empty hidden directory beside `target`.
+fn sibling(target: &Path, purpose: &str) -> Result<PathBuf> {
+    let Some(name) = target.file_name() else {
+        return Err(Error::new(
+            target.display(),
+            "this is no name for a recording",
+            "give the path of a directory that does not exist yet",
+        ));
+    };
+    let parent = parent(target);
+    for attempt in 0..1000 {
+        let mut hidden = std::ffi::OsString::from(".");
+        hidden.push(name);
+        hidden.push(format!(".{purpose}-{}-{attempt}", std::process::id()));
+        let path = parent.join(hidden);
+        match fs::create_dir(&path) {
+            Ok(()) => return Ok(path),
+            Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
+            Err(error) => return Err(Error::io(&parent, &error)),
+        }
+    }
+    Err(Error::new(
+        parent.display(),
+        "left-over temporary directories are in the way",
+        "remove the hidden directories whose names end in -new or -old and a number",
+    ))
+}
+
+/// Makes a rename durable, where the system can: Windows cannot open a directory, and needs not.
+fn sync_directory(path: &Path) {
+    if let Ok(directory) = File::open(path) {
+        let _ = directory.sync_all();
+    }
+}

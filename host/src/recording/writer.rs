@@ -1,0 +1,163 @@
+//! Writing a recording: whole or not at all.
+
+use std::path::{Path, PathBuf};
+
+use super::batch::Batch;
+use super::columns::{Column, Columns};
+use super::csv_writer::CsvWriter;
+use super::manifest::{MANIFEST_FILE, Manifest};
+use super::parquet_writer::ParquetWriter;
+use super::staging::Staging;
+use crate::error::{Error, Result};
+
+/// File format of the samples.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum SampleFormat {
+    /// `samples.parquet`: a third of the size of CSV, and read several times as fast.
+    #[default]
+    Parquet,
+    /// `samples.csv`: for people and for small recordings.
+    Csv,
+}
+
+impl SampleFormat {
+    /// Name of the samples file.
+    pub fn file_name(self) -> &'static str {
+        match self {
+            SampleFormat::Parquet => "samples.parquet",
+            SampleFormat::Csv => "samples.csv",
+        }
+    }
+}
+
+impl std::str::FromStr for SampleFormat {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        match text {
+            "csv" => Ok(SampleFormat::Csv),
+            "parquet" => Ok(SampleFormat::Parquet),
+            _ => Err(Error::new(
+                "format of the samples",
+                format!("{} is not known", super::cell::shorten(text.as_bytes())),
+                "write csv or parquet",
+            )),
+        }
+    }
+}
+
+/// Writes a recording into a directory beside its target, which takes the target's name when all
+/// is written; dropped before [`Writer::finish`], it leaves nothing behind.
+#[derive(Debug)]
+pub struct Writer {
+    staging: Staging,
+    samples: Samples,
+    columns: Columns,
+    rows: u64,
+}
+
+#[derive(Debug)]
+enum Samples {
+    Csv(CsvWriter),
+    Parquet(Box<ParquetWriter>),
+}
+
+impl Writer {
+    /// Starts a recording at `target` with the given columns. An existing recording is refused, or with
+    /// `replace` taken away at the end; anything else that exists there is refused always.
+    pub fn create(
+        target: &Path,
+        columns: Columns,
+        format: SampleFormat,
+        replace: bool,
+    ) -> Result<Writer> {
+        if !columns.gyro && !columns.accel {
+            return Err(Error::new(
+                target.display(),
+                "a recording without a sensor is asked for",
+                "give the three columns of one sensor at least",
+            ));
+        }
+        let staging = Staging::create(target, replace)?;
+        let path = staging.path().join(format.file_name());
+        let samples = match format {
+            SampleFormat::Csv => Samples::Csv(CsvWriter::create(&path, columns)?),
+            SampleFormat::Parquet => {
+                Samples::Parquet(Box::new(ParquetWriter::create(&path, columns)?))
+            }
+        };
+        Ok(Writer {
+            staging,
+            samples,
+            columns,
+            rows: 0,
+        })
+    }
+
+    /// Appends rows. `batch.first_row` is not looked at: rows are numbered as they come.
+    pub fn write(&mut self, batch: &Batch) -> Result<()> {
+        let at = |row: usize| {
+            let row = self.rows + row as u64 + 1;
+            format!("{}, row {row}", self.staging.target().display())
+        };
+        if let Some(column) = batch.ragged(&self.columns) {
+            return Err(Error::new(
+                format!("{}, column {}", at(0), column.name()),
+                "the rows to write do not have the columns that were announced",
+                "report this: it is a mistake in the program",
+            ));
+        }
+        // What the reader refuses is not written either.
+        for column in self.columns.present() {
+            let values = batch.values(column).unwrap_or_default();
+            let bad = |v: &f64| v.is_infinite() || (column == Column::Time && v.is_nan());
+            if let Some(row) = values.iter().position(bad) {
+                return Err(Error::new(
+                    format!("{}, column {}", at(row), column.name()),
+                    format!("{} is no measurement", values[row]),
+                    "leave the value out where nothing was measured; every row needs its time",
+                ));
+            }
+        }
+        if let Some(row) = batch.step.iter().position(|&step| step < -1) {
+            return Err(Error::new(
+                format!("{}, column step", at(row)),
+                format!("{} is not the number of a step", batch.step[row]),
+                "number the steps 0, 1, 2 …; -1 is in transit",
+            ));
+        }
+        match &mut self.samples {
+            Samples::Csv(writer) => writer.write(batch)?,
+            Samples::Parquet(writer) => writer.write(batch)?,
+        }
+        self.rows += batch.len() as u64;
+        Ok(())
+    }
+
+    /// Rows written so far.
+    pub fn rows(&self) -> u64 {
+        self.rows
+    }
+
+    /// Writes the manifest, makes everything durable and gives the directory its name. Returns the
+    /// path of the recording.
+    pub fn finish(self, manifest: &Manifest) -> Result<PathBuf> {
+        let target = self.staging.target().to_owned();
+        manifest.check(&target.join(MANIFEST_FILE).display().to_string())?;
+        if self.rows == 0 {
+            return Err(Error::new(
+                target.display(),
+                "there is no row to write",
+                "a recording needs one row at least",
+            ));
+        }
+        match self.samples {
+            Samples::Csv(writer) => writer.finish()?,
+            Samples::Parquet(writer) => writer.finish()?,
+        }
+        self.staging
+            .write_file(MANIFEST_FILE, manifest.to_toml()?.as_bytes())?;
+        self.staging.publish()?;
+        Ok(target)
+    }
+}

@@ -1,0 +1,39 @@
+//! What a fit or a verification says, as JSON for programs and as text for people.
+//!
+//! Both hold the same numbers. JSON is SI throughout; the text uses degrees and mm/s² where a person reads.
+
+mod json;
+mod text;
+
+pub use json::{fit_json, import_json, verify_json};
+pub use text::{dwell_table, fit_text, import_text, verify_text};
+
+use crate::estimate::AXES;
+use crate::recording::RawUnit;
+
+/// Names of the twelve parameters of the inverse model, `C_xx` to `o_z`, in the order of the covariance.
+pub fn inverse_names() -> [String; 12] {
+    std::array::from_fn(|i| {
+        if i < 9 {
+            format!("C_{}{}", AXES[i / 3], AXES[i % 3])
+        } else {
+            format!("o_{}", AXES[i - 9])
+        }
+    })
+}
+
+/// Unit of a raw reading of a sensor whose SI unit is `si`.
+fn raw_unit(raw: RawUnit, si: &str) -> String {
+    match raw {
+        RawUnit::Si => si.to_string(),
+        other => other.to_string(),
+    }
+}
+
+/// Unit of a scale factor, raw per SI.
+fn scale_unit(raw: RawUnit, si: &str) -> String {
+    match raw {
+        RawUnit::Si => "1".to_string(),
+        other => format!("{other}/({si})"),
+    }
+}

@@ -1,0 +1,359 @@
+//! Results for people: fixed-width tables with units and intervals.
+
+use std::fmt::Write as _;
+
+use super::{raw_unit, scale_unit};
+use crate::dwell::{Dwell, Sensor};
+use crate::fit::{Figure, Fit, SensorFit};
+use crate::recording::{ImportSummary, Manifest, Reference};
+use crate::triad::{Angles, Estimate};
+use crate::verify::Verification;
+
+/// `value` to three significant digits without an exponent where that reads well.
+fn three(value: f64) -> String {
+    if value == 0.0 || !value.is_finite() {
+        return format!("{value}");
+    }
+    let digits = 2 - value.abs().log10().floor() as i32;
+    if (-3..=6).contains(&digits) {
+        format!("{value:.*}", digits.max(0) as usize)
+    } else {
+        format!("{value:.2e}")
+    }
+}
+
+/// `value ± half`, both to the second digit of `half`.
+fn plus_minus(value: f64, half: f64) -> String {
+    if !(half > 0.0) || !half.is_finite() {
+        return format!("{} (fixed)", three(value));
+    }
+    let digits = (1 - half.log10().floor() as i32).clamp(0, 9) as usize;
+    // Rounding may give -0.00.
+    let value = if value.abs() < 0.5 * 10f64.powi(-(digits as i32)) {
+        0.0
+    } else {
+        value
+    };
+    format!("{value:.digits$} ± {half:.digits$}")
+}
+
+/// Factor and unit in which a person reads a figure.
+fn readable(figure: Figure, sensor: Sensor) -> (f64, &'static str) {
+    match (figure, sensor) {
+        (Figure::Direction, _) => (1f64.to_degrees(), "deg"),
+        (_, Sensor::Gyro) => (1f64.to_degrees(), "deg/s"),
+        (_, Sensor::Accel) => (1e3, "mm/s²"),
+    }
+}
+
+fn counted(n: u64, noun: &str) -> String {
+    if n == 1 {
+        format!("1 {noun}")
+    } else {
+        format!("{n} {noun}s")
+    }
+}
+
+fn warn(out: &mut String, warnings: impl Iterator<Item = impl AsRef<str>>) {
+    for warning in warnings {
+        let _ = writeln!(out, "warning: {}", warning.as_ref());
+    }
+}
+
+/// Result of `mimu fit`.
+pub fn fit_text(fit: &Fit) -> String {
+    let mut out = String::new();
+    let (condensed, manifest) = (&fit.prepared.condensed, &fit.prepared.manifest);
+    let _ = writeln!(
+        out,
+        "{}: {} samples, {:.1} s at {:.2} Hz, gravity {} m/s²",
+        manifest.device,
+        condensed.rows,
+        condensed.rows as f64 * condensed.period_s,
+        1.0 / condensed.period_s,
+        manifest.gravity_mps2
+    );
+    let dwells = &fit.prepared.dwells;
+    let lengths = || dwells.list.iter().map(|d| d.duration_s);
+    let (shortest, longest) = (
+        lengths().fold(f64::INFINITY, f64::min),
+        lengths().fold(0.0, f64::max),
+    );
+    let n = dwells.list.len() as u64;
+    match dwells.detection {
+        None => {
+            let _ = writeln!(
+                out,
+                "{} by the step column, {shortest:.1} to {longest:.1} s long",
+                counted(n, "dwell")
+            );
+        }
+        Some(d) => {
+            let _ = writeln!(
+                out,
+                "{} found, {shortest:.1} to {longest:.1} s long",
+                counted(n, "dwell")
+            );
+            let _ = writeln!(
+                out,
+                "  still: variance over {:.1} s at most {} x that of the quietest twentieth in every channel;\n  {:.1} s left out at both ends; shorter than {} s not used",
+                d.window_s, d.still_factor, d.guard_s, d.shortest_s
+            );
+        }
+    }
+    for sensor in &fit.sensors {
+        let _ = writeln!(out);
+        sensor_text(&mut out, fit, sensor);
+    }
+    let warnings: Vec<_> = fit
+        .warnings
+        .iter()
+        .chain(fit.sensors.iter().flat_map(|s| &s.warnings))
+        .collect();
+    if !warnings.is_empty() {
+        let _ = writeln!(out);
+        warn(&mut out, warnings.into_iter());
+    }
+    out
+}
+
+fn sensor_text(out: &mut String, fit: &Fit, sensor: &SensorFit) {
+    let (factor, unit) = readable(sensor.figure, sensor.sensor);
+    let used = match sensor.figure {
+        Figure::Direction => format!(
+            "{} between {}",
+            counted(sensor.residuals.len() as u64, "turn"),
+            counted(sensor.dwells as u64, "dwell")
+        ),
+        _ => counted(sensor.dwells as u64, "dwell"),
+    };
+    let _ = writeln!(
+        out,
+        "{} ({used}, condition {})",
+        sensor.sensor,
+        three(sensor.estimated.condition)
+    );
+    let _ = writeln!(
+        out,
+        "  error: {}",
+        crate::calibration::figure(sensor.figure)
+    );
+    let mut line = |name: &str, value: Option<f64>, note: &str| {
+        let shown = value.map_or("-".into(), |v| format!("{} {unit}", three(v * factor)));
+        let _ = writeln!(out, "    {name:<12}{shown:>16}  {note}");
+    };
+    let blocks = fit.options.holdout_blocks;
+    if blocks > 0 {
+        let missing = sensor.not_held_out.len();
+        let note = match missing {
+            0 => format!("rms over {blocks} contiguous blocks"),
+            m if m == blocks => "no block can be left out, see the warnings".into(),
+            m => format!("rms over {} of {blocks} contiguous blocks", blocks - m),
+        };
+        line("held out", sensor.held_out_rms(), &note);
+    } else {
+        line("held out", None, "not asked for (--holdout blocks=4)");
+    }
+    line("in sample", Some(sensor.rms()), "rms");
+    line(
+        "noise floor",
+        Some(sensor.noise_floor()),
+        "rms if noise were all",
+    );
+    if let Some((rms, held)) = sensor.static_rms {
+        let shown = |v: f64| format!("{} deg/s", three(v.to_degrees()));
+        let _ = writeln!(out, "  calibrated rate at rest, rms over dwells and axes:");
+        if let Some(held) = held {
+            let _ = writeln!(out, "    {:<12}{:>16}", "held out", shown(held));
+        }
+        let _ = writeln!(out, "    {:<12}{:>16}", "in sample", shown(rms));
+    }
+    for (name, s) in &sensor.estimated.scatter {
+        if s.excess > 0.0 {
+            let (factor, unit) = match (sensor.figure, name.as_str()) {
+                (Figure::Direction, "rest") => (1f64.to_degrees(), "deg/s".to_string()),
+                (Figure::Direction | Figure::GravitySize, _) => (factor, unit.to_string()),
+                // Axes of the forward form are in raw units, of the inverse form in SI.
+                (Figure::Input, _) if matches!(fit.options.method, crate::fit::Method::Xu) => {
+                    (factor, unit.to_string())
+                }
+                (Figure::Input, _) => (
+                    1.0,
+                    raw_unit(fit.prepared.manifest.raw_unit, sensor.sensor.unit()),
+                ),
+            };
+            let _ = writeln!(
+                out,
+                "  noise does not explain the residual ({name}): {} {unit} more is there, and in the intervals",
+                three(s.excess.sqrt() * factor)
+            );
+        }
+    }
+    let triad = &sensor.estimated.triad;
+    let physical = triad.physical(Angles::Exact);
+    let (raw, si) = (fit.prepared.manifest.raw_unit, sensor.sensor.unit());
+    let _ = writeln!(out, "  {:<34}{:>22}{:>22}{:>22}   95 %", "", "x", "y", "z");
+    let mut table = |name: &str, unit: &str, triple: &[Estimate; 3], by: f64| {
+        let cells = triple.map(|e| plus_minus(e.value * by, triad.coverage_factor * e.sigma * by));
+        let label = format!("{name}, {unit}");
+        let _ = writeln!(
+            out,
+            "  {label:<34}{:>22}{:>22}{:>22}",
+            cells[0], cells[1], cells[2]
+        );
+    };
+    table("scale factor", &scale_unit(raw, si), &physical.scale, 1.0);
+    table("bias", &raw_unit(raw, si), &physical.bias, 1.0);
+    let degrees = 1f64.to_degrees();
+    let by_choice =
+        fit.prepared.manifest.reference == Reference::Gravity && sensor.sensor == Sensor::Accel;
+    if !by_choice {
+        table("misalignment", "deg", &physical.misalignment, degrees);
+    }
+    table(
+        "non-orthogonality yz, zy, zx",
+        "deg",
+        &physical.non_orthogonality,
+        degrees,
+    );
+}
+
+/// List of the dwells: `mimu fit --dwells`.
+pub fn dwell_table(dwells: &[Dwell], manifest: &Manifest) -> String {
+    let mut out = String::new();
+    let head = [
+        "gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z",
+    ];
+    let _ = write!(
+        out,
+        "{:>10} {:>9} {:>9} {:>8}",
+        "step", "first row", "start s", "length s"
+    );
+    for name in head {
+        let _ = write!(out, " {name:>10}");
+    }
+    let _ = writeln!(out, "  not used");
+    for d in dwells {
+        let name = manifest
+            .step_labels
+            .get(d.step as usize)
+            .cloned()
+            .unwrap_or_else(|| d.step.to_string());
+        let _ = write!(
+            out,
+            "{name:>10} {:>9} {:>9.2} {:>8.2}",
+            d.first_row + 1,
+            d.start_s,
+            d.duration_s
+        );
+        for mean in d.raw {
+            let _ = write!(
+                out,
+                " {:>10}",
+                if mean.n > 0 {
+                    six(mean.mean)
+                } else {
+                    "-".into()
+                }
+            );
+        }
+        let faults: Vec<String> = match (d.gyro_fault, d.accel_fault) {
+            (Some(a), Some(b)) if a == b => vec![a.to_string()],
+            (a, b) => a.into_iter().chain(b).map(|f| f.to_string()).collect(),
+        };
+        let _ = writeln!(out, "  {}", faults.join(", "));
+    }
+    out
+}
+
+/// Six significant digits.
+fn six(value: f64) -> String {
+    let digits = (5 - value.abs().max(1e-9).log10().floor() as i32).clamp(0, 6) as usize;
+    format!("{value:.digits$}")
+}
+
+/// Result of `mimu verify`.
+pub fn verify_text(verification: &Verification) -> String {
+    let mut out = String::new();
+    let _ = writeln!(
+        out,
+        "{:<7}{:>14}{:>14}{:>14}{:>14}{:>8}",
+        "", "uncalibrated", "calibrated", "largest", "noise floor", "over"
+    );
+    for s in &verification.sensors {
+        let (factor, unit) = readable(s.figure, s.sensor);
+        let [raw, rms, max, floor] = [s.rms_raw, s.rms, s.max, s.noise_floor]
+            .map(|v| format!("{} {unit}", three(v * factor)));
+        let noun = if s.figure == Figure::Direction {
+            "turns"
+        } else {
+            "dwells"
+        };
+        let _ = writeln!(
+            out,
+            "{:<7}{raw:>14}{rms:>14}{max:>14}{floor:>14}{:>8}",
+            s.sensor.name(),
+            format!("{} {noun}", s.count).as_str()
+        );
+        if let Some(rest) = s.static_rms {
+            let _ = writeln!(
+                out,
+                "{:<7}{:>14}{:>14}",
+                "",
+                "at rest",
+                format!("{} deg/s", three(rest.to_degrees()))
+            );
+        }
+    }
+    for s in &verification.sensors {
+        let _ = writeln!(
+            out,
+            "{}: {}, rms",
+            s.sensor,
+            crate::calibration::figure(s.figure)
+        );
+    }
+    warn(&mut out, verification.warnings.iter());
+    out
+}
+
+/// Result of `mimu import`.
+pub fn import_text(summary: &ImportSummary) -> String {
+    let mut out = String::new();
+    let _ = writeln!(
+        out,
+        "{}: {} at {} Hz",
+        summary.recording.display(),
+        counted(summary.rows, "row"),
+        summary.sample_rate_hz
+    );
+    let skipped = summary.skipped;
+    let counts = [
+        (skipped.header, "header line", "skipped"),
+        (skipped.comment, "comment line", "skipped"),
+        (skipped.blank, "empty line", "skipped"),
+        (
+            summary.dropped_outside,
+            "row",
+            "dropped: outside the time that all files cover",
+        ),
+        (
+            summary.dropped_in_gaps,
+            "row",
+            "dropped: in a gap of another file",
+        ),
+        (
+            summary.interpolated,
+            "row",
+            "interpolated from another file",
+        ),
+        (summary.empty_cells, "raw cell", "empty"),
+    ];
+    for (n, noun, what) in counts {
+        if n > 0 {
+            let _ = writeln!(out, "  {} {what}", counted(n, noun));
+        }
+    }
+    warn(&mut out, summary.warnings.iter());
+    out
+}

@@ -1,0 +1,275 @@
+//! Calibration of one triad: inverse and forward model, their covariances, and the physical quantities.
+
+use mimu_core::compensation::Affine;
+use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
+
+/// Covariance of twelve parameters, in the order of [`vector`].
+pub type Covariance = SMatrix<f64, 12, 12>;
+
+/// Twelve parameters of an affine model: matrix by rows (xx, xy, xz, yx, ...), then offset or bias.
+pub fn vector(matrix: &Matrix3<f64>, offset: &Vector3<f64>) -> SVector<f64, 12> {
+    SVector::from_fn(|i, _| {
+        if i < 9 {
+            matrix[(i / 3, i % 3)]
+        } else {
+            offset[i - 9]
+        }
+    })
+}
+
+/// Inverse of [`vector`].
+pub fn affine(parameters: &SVector<f64, 12>) -> Affine<f64> {
+    Affine {
+        matrix: Matrix3::from_fn(|i, j| parameters[3 * i + j]),
+        offset: Vector3::from_fn(|i, _| parameters[9 + i]),
+    }
+}
+
+/// The other direction of an affine model: of `y = A x + b` it is `x = A⁻¹ y - A⁻¹ b`. `None` if A is singular.
+pub fn invert(model: &Affine<f64>) -> Option<Affine<f64>> {
+    let matrix = model.matrix.try_inverse()?;
+    Some(Affine {
+        matrix,
+        offset: -(matrix * model.offset),
+    })
+}
+
+/// Derivatives of the parameters of the other direction by those of `model`.
+///
+/// With `B = A⁻¹` and `c = -B b`: `dB = -B dA B`, `dc = -B (dA c + db)`.
+fn inversion_jacobian(model: &Affine<f64>, inverse: &Affine<f64>) -> SMatrix<f64, 12, 12> {
+    let (b, c) = (&inverse.matrix, &inverse.offset);
+    let _ = model;
+    let mut jacobian = SMatrix::zeros();
+    for i in 0..3 {
+        for j in 0..3 {
+            let column = 3 * i + j;
+            for r in 0..3 {
+                for s in 0..3 {
+                    jacobian[(3 * r + s, column)] = -b[(r, i)] * b[(j, s)];
+                }
+                jacobian[(9 + r, column)] = -b[(r, i)] * c[j];
+            }
+        }
+        for r in 0..3 {
+            jacobian[(9 + r, 9 + i)] = -b[(r, i)];
+        }
+    }
+    jacobian
+}
+
+/// Calibration of one triad.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Triad {
+    /// Raw to SI, xu (1), (2): `x = C u + o`.
+    pub inverse: Affine<f64>,
+    /// Covariance of C by rows, then o.
+    pub inverse_covariance: Covariance,
+    /// SI to raw, fang (15), (17): `u = P x + b`, P = K M.
+    pub forward: Affine<f64>,
+    /// Covariance of P by rows, then b.
+    pub forward_covariance: Covariance,
+    /// Half of a 95 % interval in sigmas.
+    pub coverage_factor: f64,
+}
+
+impl Triad {
+    /// From the inverse model. `None` if C is singular.
+    pub fn from_inverse(
+        inverse: Affine<f64>,
+        covariance: Covariance,
+        coverage_factor: f64,
+    ) -> Option<Self> {
+        let forward = invert(&inverse)?;
+        let j = inversion_jacobian(&inverse, &forward);
+        Some(Self {
+            inverse,
+            inverse_covariance: covariance,
+            forward,
+            forward_covariance: j * covariance * j.transpose(),
+            coverage_factor,
+        })
+    }
+
+    /// From the forward model. `None` if P is singular.
+    pub fn from_forward(
+        forward: Affine<f64>,
+        covariance: Covariance,
+        coverage_factor: f64,
+    ) -> Option<Self> {
+        let inverse = invert(&forward)?;
+        let j = inversion_jacobian(&forward, &inverse);
+        Some(Self {
+            inverse,
+            inverse_covariance: j * covariance * j.transpose(),
+            forward,
+            forward_covariance: covariance,
+            coverage_factor,
+        })
+    }
+
+    /// Physical quantities, with sigmas by the derivatives of the decomposition.
+    pub fn physical(&self, angles: Angles) -> Physical {
+        let decompose = |p: &SVector<f64, 12>| Physical::vector_of(&affine(p), angles);
+        let at = vector(&self.forward.matrix, &self.forward.offset);
+        let values = decompose(&at);
+        let scale = self.forward.matrix.norm();
+        let mut jacobian = SMatrix::<f64, 12, 12>::zeros();
+        for k in 0..12 {
+            // Central differences: the steps' third-order remainder is 1e-12 of what is differentiated.
+            let step = if k < 9 { 1e-4 * scale } else { scale.max(1e-6) };
+            let (mut up, mut down) = (at, at);
+            up[k] += step;
+            down[k] -= step;
+            let slope = (decompose(&up) - decompose(&down)) / (2.0 * step);
+            jacobian.set_column(k, &slope);
+        }
+        let covariance = jacobian * self.forward_covariance * jacobian.transpose();
+        let sigma = |i: usize| covariance[(i, i)].max(0.0).sqrt();
+        let triple = |from: usize| {
+            [0, 1, 2].map(|i| Estimate {
+                value: values[from + i],
+                sigma: sigma(from + i),
+            })
+        };
+        Physical {
+            angles,
+            scale: triple(0),
+            misalignment: triple(3),
+            non_orthogonality: triple(6),
+            bias: triple(9),
+        }
+    }
+}
+
+/// A number with its sigma.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Estimate {
+    /// Value.
+    pub value: f64,
+    /// Standard deviation.
+    pub sigma: f64,
+}
+
+/// Whether angles are taken as small, as fang does, or exactly.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Angles {
+    /// First order in all angles, fang (14), (16), (18).
+    Small,
+    /// Rotations and directions exactly.
+    Exact,
+}
+
+/// The forward model as a person understands it: `P = K Mo Mp`.
+///
+/// # Conventions
+///
+/// * Package misalignment `Mp` turns the body frame into the frame of the sensors:
+///   `Mp = Rz(θz) Ry(θy) Rx(θx)`, rotations by the right-hand rule. Its first order is fang (12). (As printed,
+///   fang (9) and (10) turn the other way than (11), and their product does not give (12); here (12)
+///   holds.)
+/// * Non-orthogonality `Mo` is lower triangular (fang (13)): the sensor x lies along the frame's x, the sensor y in its
+///   xy plane turned by βyz towards x, and the sensor z is turned by βzy away from x and by βzx towards y.
+/// * Exactly, the rows of `Mo` have unit length, so that a scale factor is that along the sensor's own axis, and
+///   the sines of the β are the off-diagonal elements. To first order this is fang's form.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Physical {
+    /// How angles were taken.
+    pub angles: Angles,
+    /// Scale factors K of the sensors x, y, z: raw per SI.
+    pub scale: [Estimate; 3],
+    /// Package misalignment θx, θy, θz, rad.
+    pub misalignment: [Estimate; 3],
+    /// Non-orthogonality βyz, βzy, βzx, rad.
+    pub non_orthogonality: [Estimate; 3],
+    /// Bias of the sensors x, y, z, raw.
+    pub bias: [Estimate; 3],
+}
+
+impl Physical {
+    fn vector_of(forward: &Affine<f64>, angles: Angles) -> SVector<f64, 12> {
+        let p = &forward.matrix;
+        let (scale, theta, beta) = match angles {
+            Angles::Small => {
+                let m = Matrix3::from_fn(|i, j| p[(i, j)] / p[(i, i)]);
+                let theta = Vector3::new(-m[(1, 2)], m[(0, 2)], -m[(0, 1)]);
+                let beta = Vector3::new(
+                    m[(1, 0)] - theta.z,
+                    -m[(2, 0)] - theta.y,
+                    m[(2, 1)] - theta.x,
+                );
+                (p.diagonal(), theta, beta)
+            }
+            Angles::Exact => {
+                // P = L Q: Q' R' is the QR factorization of P'. Signs so that L has its diagonal
+                // positive, where P has: a sensor mounted backwards keeps a negative scale factor.
+                let qr = p.transpose().qr();
+                let (mut q, mut l) = (qr.q().transpose(), qr.r().transpose());
+                for k in 0..3 {
+                    if q[(k, k)] < 0.0 {
+                        q.row_mut(k).neg_mut();
+                        l.column_mut(k).neg_mut();
+                    }
+                }
+                let signs = Vector3::from_fn(|i, _| l[(i, i)].signum());
+                let scale = Vector3::from_fn(|i, _| signs[i] * l.row(i).norm());
+                let mo = Matrix3::from_fn(|i, j| l[(i, j)] / scale[i]);
+                // Rz Ry Rx has -sin θy at zx, cos θy sin θx at zy and cos θy sin θz at yx.
+                let theta = Vector3::new(
+                    q[(2, 1)].atan2(q[(2, 2)]),
+                    (-q[(2, 0)]).clamp(-1.0, 1.0).asin(),
+                    q[(1, 0)].atan2(q[(0, 0)]),
+                );
+                let beta = Vector3::new(mo[(1, 0)], -mo[(2, 0)], mo[(2, 1)]).map(f64::asin);
+                (scale, theta, beta)
+            }
+        };
+        let mut out = SVector::zeros();
+        for i in 0..3 {
+            out[i] = scale[i];
+            out[3 + i] = theta[i];
+            out[6 + i] = beta[i];
+            out[9 + i] = forward.offset[i];
+        }
+        out
+    }
+
+    /// Forward model `P, b` that these quantities describe: the way back, for checking by hand.
+    pub fn forward(&self) -> Affine<f64> {
+        let value = |e: &[Estimate; 3]| Vector3::from_fn(|i, _| e[i].value);
+        let (theta, beta) = (value(&self.misalignment), value(&self.non_orthogonality));
+        let m = match self.angles {
+            Angles::Small => Matrix3::new(
+                1.0,
+                -theta.z,
+                theta.y,
+                beta.x + theta.z,
+                1.0,
+                -theta.x,
+                -beta.y - theta.y,
+                beta.z + theta.x,
+                1.0,
+            ),
+            Angles::Exact => {
+                let s = beta.map(f64::sin);
+                let mo = Matrix3::new(
+                    1.0,
+                    0.0,
+                    0.0,
+                    s.x,
+                    (1.0 - s.x * s.x).sqrt(),
+                    0.0,
+                    -s.y,
+                    s.z,
+                    (1.0 - s.y * s.y - s.z * s.z).sqrt(),
+                );
+                let mp = nalgebra::Rotation3::from_euler_angles(theta.x, theta.y, theta.z);
+                mo * mp.matrix()
+            }
+        };
+        Affine {
+            matrix: Matrix3::from_diagonal(&value(&self.scale)) * m,
+            offset: value(&self.bias),
+        }
+    }
+}

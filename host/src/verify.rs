@@ -1,0 +1,221 @@
+//! Judging a calibration by another recording.
+
+use mimu_core::compensation::Affine;
+use nalgebra::{Matrix3, Vector3};
+
+use crate::calibration::Calibration;
+use crate::dwell::Sensor;
+use crate::error::{Error, Result};
+use crate::estimate::rotation::{Turn, direction_error};
+use crate::fit::{Figure, Prepared, si_covariance};
+use crate::recording::Reference;
+use crate::triad::Triad;
+
+/// What a calibration does to one triad of a recording. Figures as in [`Figure`].
+#[derive(Debug, Clone)]
+pub struct SensorVerification {
+    /// Which.
+    pub sensor: Sensor,
+    /// What the figures are about.
+    pub figure: Figure,
+    /// With one scale factor and one bias for all axes and no misalignment, what a
+    /// datasheet would give: the means of the calibration's own.
+    pub rms_raw: f64,
+    /// With the calibration.
+    pub rms: f64,
+    /// The largest error with the calibration.
+    pub max: f64,
+    /// If noise were all.
+    pub noise_floor: f64,
+    /// Compensated gyro dwell means without a table, rad/s.
+    pub static_rms: Option<f64>,
+    /// Number of dwells or turns judged.
+    pub count: usize,
+}
+
+/// What a calibration does to a recording.
+#[derive(Debug, Clone)]
+pub struct Verification {
+    /// Gyro, then accelerometer, as far as both the calibration and the recording have them.
+    pub sensors: Vec<SensorVerification>,
+    /// What a person should know.
+    pub warnings: Vec<String>,
+}
+
+/// Judges `calibration` by a recording.
+pub fn verify(prepared: &Prepared, calibration: &Calibration) -> Result<Verification> {
+    let manifest = &prepared.manifest;
+    let mut warnings = prepared.condensed.warnings.clone();
+    warnings.extend(prepared.dwells.warnings.iter().cloned());
+    if calibration.recording.raw_unit != manifest.raw_unit {
+        let problem = format!(
+            "its raw unit is {}, the calibration is for {}",
+            manifest.raw_unit, calibration.recording.raw_unit
+        );
+        return Err(Error::new(
+            &prepared.place,
+            problem,
+            "import it in the other unit, or use the calibration of this unit",
+        ));
+    }
+    if calibration.device != manifest.device {
+        warnings.push(format!(
+            "the calibration is for {:?}, the recording of {:?}",
+            calibration.device, manifest.device
+        ));
+    }
+    if calibration.recording.sha256 == prepared.condensed.sha256 {
+        warnings.push("this is the recording that the calibration was made from: the figures say nothing about new data".into());
+    }
+    let mut sensors = Vec::new();
+    for sensor in Sensor::BOTH {
+        let Some(triad) = calibration.triad(sensor) else {
+            continue;
+        };
+        if !prepared.has(sensor) {
+            continue;
+        }
+        let judged = match (manifest.reference, sensor) {
+            (Reference::Table, _) => known(prepared, sensor, &triad),
+            (Reference::Gravity, Sensor::Accel) => size(prepared, &triad),
+            (Reference::Gravity, Sensor::Gyro) => match calibration.triad(Sensor::Accel) {
+                Some(accel) => turns(prepared, &triad, &accel, &mut warnings),
+                None => None,
+            },
+        };
+        match judged {
+            Some(judged) => sensors.push(judged),
+            None => warnings.push(format!(
+                "{sensor}: the recording has nothing to judge it by"
+            )),
+        }
+    }
+    if sensors.is_empty() {
+        return Err(Error::new(
+            &prepared.place,
+            "the recording has nothing to judge this calibration by",
+            "record dwells with a known input, or poses and turns by hand",
+        ));
+    }
+    Ok(Verification { sensors, warnings })
+}
+
+/// The calibration of a unit whose sensors are all alike and perfectly mounted: every sensor with the mean scale factor
+/// and the mean bias of the three, along the axis that it is nearest to.
+pub fn nominal(triad: &Triad) -> Affine<f64> {
+    let p = &triad.forward.matrix;
+    let scale = (0..3).map(|i| p.row(i).norm()).sum::<f64>() / 3.0;
+    let bias = triad.forward.offset.sum() / 3.0;
+    let mut forward = Matrix3::zeros();
+    for i in 0..3 {
+        let axis = p.row(i).transpose().iamax();
+        forward[(i, axis)] = scale * p[(i, axis)].signum();
+    }
+    // Two sensors nearest to one axis are no triad: then as they come.
+    let matrix = forward
+        .try_inverse()
+        .unwrap_or_else(|| Matrix3::from_diagonal_element(1.0 / scale));
+    Affine {
+        matrix,
+        offset: -(matrix * Vector3::repeat(bias)),
+    }
+}
+
+fn rms(values: &[f64]) -> f64 {
+    (values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64).sqrt()
+}
+
+fn largest(values: &[f64]) -> f64 {
+    values.iter().map(|v| v.abs()).fold(0.0, f64::max)
+}
+
+fn known(prepared: &Prepared, sensor: Sensor, triad: &Triad) -> Option<SensorVerification> {
+    let observations = prepared.observations(sensor);
+    let errors = |model: &Affine<f64>| -> Vec<f64> {
+        observations
+            .iter()
+            .flat_map(|o| <[f64; 3]>::from(model.apply(&o.raw) - o.input))
+            .collect()
+    };
+    let floor: Vec<f64> = observations
+        .iter()
+        .map(|o| (si_covariance(&triad.inverse.matrix, &o.variance).trace() / 3.0).sqrt())
+        .collect();
+    let after = errors(&triad.inverse);
+    (!after.is_empty()).then(|| SensorVerification {
+        sensor,
+        figure: Figure::Input,
+        rms_raw: rms(&errors(&nominal(triad))),
+        rms: rms(&after),
+        max: largest(&after),
+        noise_floor: rms(&floor),
+        static_rms: None,
+        count: observations.len(),
+    })
+}
+
+fn size(prepared: &Prepared, triad: &Triad) -> Option<SensorVerification> {
+    let g = prepared.manifest.gravity_mps2;
+    let observations = prepared.observations(Sensor::Accel);
+    let errors = |model: &Affine<f64>| -> Vec<f64> {
+        observations
+            .iter()
+            .map(|o| model.apply(&o.raw).norm() - g)
+            .collect()
+    };
+    let floor: Vec<f64> = observations
+        .iter()
+        .map(|o| {
+            let up = triad.inverse.apply(&o.raw).normalize();
+            up.dot(&(si_covariance(&triad.inverse.matrix, &o.variance) * up))
+                .sqrt()
+        })
+        .collect();
+    let after = errors(&triad.inverse);
+    (!after.is_empty()).then(|| SensorVerification {
+        sensor: Sensor::Accel,
+        figure: Figure::GravitySize,
+        rms_raw: rms(&errors(&nominal(triad))),
+        rms: rms(&after),
+        max: largest(&after),
+        noise_floor: rms(&floor),
+        static_rms: None,
+        count: observations.len(),
+    })
+}
+
+fn turns(
+    prepared: &Prepared,
+    gyro: &Triad,
+    accel: &Triad,
+    warnings: &mut Vec<String>,
+) -> Option<SensorVerification> {
+    let (by_calibration, refused) = prepared.turns(&accel.inverse);
+    warnings.extend(refused);
+    let (by_nominal, _) = prepared.turns(&nominal(accel));
+    let errors = |turns: &[Turn], model: &Affine<f64>| -> Vec<f64> {
+        turns
+            .iter()
+            .map(|t| direction_error(t, model).norm())
+            .collect()
+    };
+    let noise = prepared.integral_noise();
+    let c2 = gyro.inverse.matrix.norm_squared() / 3.0;
+    let floor: Vec<f64> = by_calibration.iter().map(|t| t.floor(c2, noise)).collect();
+    let after = errors(&by_calibration, &gyro.inverse);
+    let rest: Vec<f64> = prepared
+        .observations(Sensor::Gyro)
+        .iter()
+        .flat_map(|o| <[f64; 3]>::from(gyro.inverse.apply(&o.raw)))
+        .collect();
+    (!after.is_empty()).then(|| SensorVerification {
+        sensor: Sensor::Gyro,
+        figure: Figure::Direction,
+        rms_raw: rms(&errors(&by_nominal, &nominal(gyro))),
+        rms: rms(&after),
+        max: largest(&after),
+        noise_floor: rms(&floor),
+        static_rms: Some(rms(&rest)),
+        count: by_calibration.len(),
+    })
+}
