@@ -75,7 +75,7 @@ pub(super) fn write_number(value: f64, text: &mut Vec<u8>) {
     if value.is_nan() {
         return;
     }
-    // Counts are whole; below 2^53 an i64 holds them exactly. Minus zero keeps its sign below.
+    // Counts are whole, and an i64 holds them exactly below 2^53. Minus zero keeps its sign below.
     if value.fract() == 0.0 && value.abs() < 9e15 && (value != 0.0 || value.is_sign_positive()) {
         return write_integer(value as i64, text);
     }
