@@ -18,11 +18,20 @@ const RATE_HZ: f64 = 1000.0;
 const DWELL_S: usize = 60;
 
 fn main() {
-    let hours: f64 = std::env::var("MIMU_BENCH_HOURS").ok().and_then(|h| h.parse().ok()).unwrap_or(4.0);
+    let hours: f64 = std::env::var("MIMU_BENCH_HOURS")
+        .ok()
+        .and_then(|h| h.parse().ok())
+        .unwrap_or(4.0);
     let rows = (hours * 3600.0 * RATE_HZ) as u64;
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR"));
-    println!("{:<34}{:>10}{:>9}{:>12}{:>11}", "", "file", "wall", "rate", "peak");
-    for (format, name) in [(SampleFormat::Parquet, "parquet"), (SampleFormat::Csv, "csv")] {
+    println!(
+        "{:<34}{:>10}{:>9}{:>12}{:>11}",
+        "", "file", "wall", "rate", "peak"
+    );
+    for (format, name) in [
+        (SampleFormat::Parquet, "parquet"),
+        (SampleFormat::Csv, "csv"),
+    ] {
         let path = folder.join(format!("four-hours-{hours}-{name}"));
         if Recording::open(&path).is_err() {
             simulate(&path, format, rows);
@@ -30,7 +39,13 @@ fn main() {
         let size = std::fs::metadata(path.join(format.file_name())).map_or(0, |m| m.len());
         let calibration = folder.join("bench.toml");
         let (wall, peak) = run(&["fit", path_str(&path), "-o", path_str(&calibration)]);
-        line(&format!("fit of {rows} rows from {name}"), size, wall, rows, peak);
+        line(
+            &format!("fit of {rows} rows from {name}"),
+            size,
+            wall,
+            rows,
+            peak,
+        );
     }
     by_hand(folder);
 }
@@ -84,7 +99,8 @@ fn by_hand(folder: &Path) {
         println!("recording by hand: skipped, no recordings (set MIMU_DATA)");
         return;
     }
-    let mut options = ImportOptions::new(files.to_vec(), 9.81744, RawUnit::Count, Reference::Gravity);
+    let mut options =
+        ImportOptions::new(files.to_vec(), 9.81744, RawUnit::Count, Reference::Gravity);
     options.columns = ["t_s,accel_x,accel_y,accel_z", "t_s,gyro_x,gyro_y,gyro_z"]
         .map(|list| list.parse::<ColumnList>().expect("known columns"))
         .to_vec();
@@ -93,7 +109,8 @@ fn by_hand(folder: &Path) {
     import(&options, &path, |_| ()).expect("the files are known to be good");
     let recording = Recording::open(&path).expect("just imported");
     let start = Instant::now();
-    let prepared = Prepared::read(&recording, mimu::dwell::STILL_FACTOR, |_| ()).expect("known to be good");
+    let prepared =
+        Prepared::read(&recording, mimu::dwell::STILL_FACTOR, |_| ()).expect("known to be good");
     let reading = start.elapsed();
     let start = Instant::now();
     let options = Options {
@@ -111,8 +128,14 @@ fn by_hand(folder: &Path) {
 
 /// A table that goes through rates and tilts; 13 columns, steps to be found from the inputs.
 fn simulate(path: &Path, format: SampleFormat, rows: u64) {
-    let columns = Columns { gyro: true, accel: true, reference: [true; 6], ..Columns::default() };
-    let mut writer = Writer::create(path, columns, format, true).expect("the build directory can be written");
+    let columns = Columns {
+        gyro: true,
+        accel: true,
+        reference: [true; 6],
+        ..Columns::default()
+    };
+    let mut writer =
+        Writer::create(path, columns, format, true).expect("the build directory can be written");
     let mut random = 0x6d69_6d75_u64;
     let mut noise = move || {
         random ^= random >> 12;
@@ -135,8 +158,13 @@ fn simulate(path: &Path, format: SampleFormat, rows: u64) {
         batch.t_s.push(row as f64 / RATE_HZ);
         for c in 0..6 {
             let other = input[3 * (c / 3) + (c + 1) % 3];
-            let (null, scale, sigma) = if c < 3 { (2.5, 0.005, 0.004) } else { (1.65, 0.08, 0.003) };
-            let volts = null + 0.01 * c as f64 + scale * (input[c] + 0.01 * other) + 3.4 * sigma * noise();
+            let (null, scale, sigma) = if c < 3 {
+                (2.5, 0.005, 0.004)
+            } else {
+                (1.65, 0.08, 0.003)
+            };
+            let volts =
+                null + 0.01 * c as f64 + scale * (input[c] + 0.01 * other) + 3.4 * sigma * noise();
             batch.raw[c].push((volts * 1e5).round() / 1e5);
             batch.reference[c].push(input[c]);
         }

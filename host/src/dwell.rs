@@ -136,6 +136,8 @@ pub struct Dwell {
     pub reference: [f64; 6],
     /// Mean temperature, °C, or not a number.
     pub temp_c: f64,
+    /// Whether it is a turn of known angle, of which only the mean rate is known.
+    pub turn: bool,
     /// Why it is not used for the gyro, if so.
     pub gyro_fault: Option<Fault>,
     /// Why it is not used for the accelerometer, if so.
@@ -209,7 +211,11 @@ impl Dwells {
             .enumerate()
             .map(|(i, (step, blocks))| {
                 let step = step.unwrap_or(i as i32);
-                dwell(condensed, step, blocks, &rails)
+                let turn = manifest.turn_steps.contains(&step);
+                Dwell {
+                    turn,
+                    ..dwell(condensed, step, blocks, &rails)
+                }
             })
             .collect();
         if list.is_empty() {
@@ -219,7 +225,7 @@ impl Dwells {
                 "hold the unit still for some seconds in every pose, or raise --still",
             ));
         }
-        judge(&mut list, condensed, manifest, detection.is_none());
+        judge(&mut list, condensed, detection.is_none());
         warn(&list, manifest, &mut warnings);
         Ok(Self {
             list,
@@ -460,13 +466,14 @@ fn dwell(condensed: &Condensed, step: i32, range: Range<usize>, rails: &[Rails; 
         raw,
         reference,
         temp_c: average(|b, _| b.temp_c, 0),
+        turn: false,
         gyro_fault: None,
         accel_fault: None,
     }
 }
 
 /// Finds out which dwells are no good for which sensor.
-fn judge(list: &mut [Dwell], condensed: &Condensed, manifest: &Manifest, given: bool) {
+fn judge(list: &mut [Dwell], condensed: &Condensed, given: bool) {
     for sensor in Sensor::BOTH {
         let channels = || sensor.channels().filter(|&c| condensed.has_raw[c]);
         let typical: Vec<f64> = channels()
@@ -480,7 +487,7 @@ fn judge(list: &mut [Dwell], condensed: &Condensed, manifest: &Manifest, given: 
             .collect::<Vec<_>>();
         for dwell in list.iter_mut() {
             // A turn of known angle has a known mean rate, and is anything but still.
-            let turn = manifest.turn_steps.contains(&dwell.step);
+            let turn = dwell.turn;
             let mut fault = None;
             for (k, c) in channels().enumerate() {
                 let mean = dwell.raw[c];

@@ -35,13 +35,16 @@ pub struct Noise {
 }
 
 impl Noise {
-    /// Pools the overlapping Allan variance within all usable dwells and fits the model to it.
+    /// Pools the overlapping Allan variance within all usable dwells at rest or at a constant rate, and fits the
+    /// model to it.
     pub fn within(dwells: &[Dwell], condensed: &Condensed) -> Self {
         let mut channels = [AllanModel::default(); 6];
         for sensor in Sensor::BOTH {
             for c in sensor.channels() {
                 if condensed.has_raw[c] {
-                    let usable = dwells.iter().filter(|d| d.fault(sensor).is_none());
+                    let usable = dwells
+                        .iter()
+                        .filter(|d| d.fault(sensor).is_none() && !d.turn);
                     channels[c] = of_channel(usable, condensed, c);
                 }
             }

@@ -1,6 +1,6 @@
 //! The known input of each step, from a table beside the samples.
 
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 
 use super::step_labels::StepLabels;
@@ -26,6 +26,8 @@ pub(super) struct Inputs {
     pub columns: [bool; 6],
     /// Whether it has an angle anywhere, so that the samples of each step must be counted.
     pub has_turns: bool,
+    /// Numbers of the steps met so far that are turns.
+    pub turns: BTreeSet<i32>,
     steps: HashMap<String, Step>,
 }
 
@@ -68,6 +70,7 @@ impl Inputs {
             path: path.to_owned(),
             columns: [false; 6],
             has_turns: false,
+            turns: BTreeSet::new(),
             steps: HashMap::new(),
         };
         while reader
@@ -195,6 +198,9 @@ impl Inputs {
             .unwrap_or_else(|| number.to_string());
         let step = self.steps.get_mut(&key)?;
         step.used = true;
+        if step.turn_deg.iter().any(|turn| !turn.is_nan()) {
+            self.turns.insert(number);
+        }
         let mut input = step.input;
         for (rate, turn) in input.iter_mut().zip(step.turn_deg) {
             if !turn.is_nan() {

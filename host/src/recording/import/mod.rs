@@ -89,6 +89,9 @@ pub fn import(
             sha256: digest::sha256(file)?,
         });
     }
+    if let Some(inputs) = &import.inputs {
+        manifest.turn_steps = inputs.turns.iter().copied().collect();
+    }
     manifest.step_labels = std::mem::take(&mut import.first.labels).into_labels();
     import.summary.recording = writer.finish(&manifest)?;
     Ok(import.summary)

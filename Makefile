@@ -1,0 +1,40 @@
+# Everything that a fresh machine with rustup, gcc and make needs to test, try and measure mimu.
+
+TOOLCHAIN := $(shell sed -n 's/^channel = "\(.*\)"/\1/p' rust-toolchain.toml)
+TARGET := thumbv7em-none-eabihf
+CARGO := cargo +$(TOOLCHAIN)
+
+.PHONY: help test demo bench fuzz audit toolchain
+
+help: ## this list
+	@sed -n 's/^\([a-z]*\):.*## /  make \1\t/p' Makefile
+
+# Automatic installation may be switched off, so it is asked for. The list makes a second run offline and quick.
+toolchain:
+	@rustup toolchain list | grep -q '^$(TOOLCHAIN)' \
+	  && rustup target list --toolchain $(TOOLCHAIN) --installed | grep -q $(TARGET) \
+	  && rustup component list --toolchain $(TOOLCHAIN) --installed | grep -q clippy \
+	  && rustup component list --toolchain $(TOOLCHAIN) --installed | grep -q rustfmt \
+	  || rustup toolchain install $(TOOLCHAIN) --profile minimal -c rustfmt -c clippy -t $(TARGET)
+
+test: toolchain ## formatting, lints, documentation, firmware, all tests
+	$(CARGO) fmt --all --check
+	$(CARGO) clippy --locked --all-targets -- -D warnings
+	$(CARGO) clippy --locked -p mimu-firmware --release --target $(TARGET) -- -D warnings
+	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --locked --no-deps
+	$(CARGO) build --locked -p mimu-firmware --release --target $(TARGET)
+	$(CARGO) test --locked
+
+demo: toolchain ## import and fit a recording: the best real one at hand, or the small one in tests/
+	$(CARGO) build --locked --release -p mimu
+	./tests/demo.sh target/release/mimu
+
+bench: toolchain ## rates and peak memory on four hours at 1 kHz
+	$(CARGO) bench --locked -p mimu --bench four_hours
+
+fuzz: toolchain ## mutated recordings, manifests and calibrations for ten minutes, or MIMU_FUZZ_SECONDS
+	MIMU_FUZZ_SECONDS=$${MIMU_FUZZ_SECONDS:-600} $(CARGO) test --locked --release -p mimu --test fuzz -- --nocapture
+
+audit: toolchain ## licences, advisories as far as the registry has them, duplicate dependencies
+	@command -v cargo-deny >/dev/null || $(CARGO) install --locked cargo-deny
+	cargo-deny --all-features check licenses bans sources

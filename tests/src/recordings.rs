@@ -1,0 +1,320 @@
+//! Recordings by other people: found, imported and fitted the way a user does it.
+
+use std::path::{Path, PathBuf};
+
+use mimu::error::Result;
+use mimu::fit::{Fit, Method, Options, Prepared, fit};
+use mimu::recording::{ImportOptions, RawUnit, Recording, Reference, import};
+use mimu_core::compensation::Affine;
+use nalgebra::{DMatrix, DVector, Matrix3, UnitQuaternion, Vector3};
+use tempfile::TempDir;
+
+/// The folder of the data set `name`, below `$MIMU_DATA` or beside the repository; `None`, and a line that says so,
+/// where the data are not.
+pub fn data_set(name: &str) -> Option<PathBuf> {
+    let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data");
+    let all = std::env::var_os("MIMU_DATA").map_or(beside, PathBuf::from);
+    let found = all.join(name);
+    if found.is_dir() {
+        return Some(found);
+    }
+    println!("skipped: no recordings (set MIMU_DATA)");
+    None
+}
+
+/// A foreign recording as its owner would describe it on the command line of `mimu import`.
+#[derive(Debug, Clone)]
+pub struct Foreign<'a> {
+    /// Files with their `--columns`.
+    pub files: Vec<(PathBuf, &'a str)>,
+    /// `--rate-hz`.
+    pub rate_hz: Option<f64>,
+    /// `--gravity`.
+    pub gravity_mps2: f64,
+    /// `--raw-unit`.
+    pub raw_unit: RawUnit,
+    /// `--scale`.
+    pub scales: &'a [&'a str],
+    /// Text of the file for `--inputs`; with it the reference is a table, without it gravity.
+    pub inputs: Option<&'a str>,
+}
+
+impl Foreign<'_> {
+    /// Imports it into `folder`.
+    pub fn import(&self, folder: &TempDir) -> Result<Recording> {
+        let (files, columns): (Vec<_>, Vec<_>) = self.files.iter().cloned().unzip();
+        let reference = match self.inputs {
+            Some(_) => Reference::Table,
+            None => Reference::Gravity,
+        };
+        let inputs = self.inputs.map(|text| {
+            let path = folder.path().join("inputs.csv");
+            std::fs::write(&path, text).expect("the temporary folder is writable");
+            path
+        });
+        let options = ImportOptions {
+            columns: columns.iter().map(|c| c.parse()).collect::<Result<_>>()?,
+            rate_hz: self.rate_hz,
+            scales: self
+                .scales
+                .iter()
+                .map(|s| s.parse())
+                .collect::<Result<_>>()?,
+            inputs,
+            ..ImportOptions::new(files, self.gravity_mps2, self.raw_unit, reference)
+        };
+        let out = folder.path().join("recording");
+        for warning in import(&options, &out, |_| {})?.warnings {
+            println!("import warns: {warning}");
+        }
+        Recording::open(&out)
+    }
+
+    /// Imports it, finds its dwells and fits it by `method`, judged by four blocks left out in turn.
+    pub fn fit(&self, method: Method) -> Result<Fit> {
+        let folder = TempDir::new().expect("there is a temporary folder");
+        let recording = self.import(&folder)?;
+        let options = Options {
+            method,
+            holdout_blocks: 4,
+            still_factor: mimu::dwell::STILL_FACTOR,
+        };
+        fit(
+            Prepared::read(&recording, options.still_factor, |_| {})?,
+            options,
+        )
+    }
+}
+
+/// `matrix = U Q` with U upper triangular, its diagonal positive, and Q orthogonal.
+///
+/// Where gravity is the only reference the frame is a convention: mimu's has a lower triangular matrix, others' an
+/// upper triangular one. `Q` takes mimu's frame into theirs.
+pub fn upper_triangular_frame(matrix: &Matrix3<f64>) -> (Matrix3<f64>, Matrix3<f64>) {
+    // Reversing rows and columns turns an upper triangle into a lower one, which the QR factorization of the transpose gives.
+    let reverse = Matrix3::new(0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0);
+    let qr = (reverse * matrix).transpose().qr();
+    let (mut q, mut u) = (
+        reverse * qr.q().transpose(),
+        reverse * qr.r().transpose() * reverse,
+    );
+    for k in 0..3 {
+        if u[(k, k)] < 0.0 {
+            u.column_mut(k).neg_mut();
+            q.row_mut(k).neg_mut();
+        }
+    }
+    (u, q)
+}
+
+/// Inverse models of accelerometer and gyro with their joint covariance, for carrying both to another convention.
+#[derive(Debug, Clone)]
+pub struct Models {
+    parameters: DVector<f64>,
+    covariance: DMatrix<f64>,
+    /// Half of a 95 % interval in sigmas: accelerometer, gyro.
+    pub coverage: [f64; 2],
+}
+
+impl Models {
+    /// Those of a fit with both sensors.
+    ///
+    /// The gyro is fitted in the frame that the accelerometer's estimate defines, as if that were exact, so the two
+    /// covariances are independent of each other.
+    pub fn of(fit: &Fit) -> Self {
+        use mimu::dwell::Sensor::{Accel, Gyro};
+        let triads = [Accel, Gyro].map(|s| {
+            &fit.sensor(s)
+                .expect("both sensors were recorded")
+                .estimated
+                .triad
+        });
+        let mut parameters = DVector::zeros(24);
+        let mut covariance = DMatrix::zeros(24, 24);
+        for (k, triad) in triads.iter().enumerate() {
+            let vector = mimu::triad::vector(&triad.inverse.matrix, &triad.inverse.offset);
+            parameters
+                .rows_mut(12 * k, 12)
+                .copy_from_slice(vector.as_slice());
+            for i in 0..12 {
+                for j in 0..12 {
+                    covariance[(12 * k + i, 12 * k + j)] = triad.inverse_covariance[(i, j)];
+                }
+            }
+        }
+        Self {
+            parameters,
+            covariance,
+            coverage: triads.map(|t| t.coverage_factor),
+        }
+    }
+
+    fn models(parameters: &DVector<f64>) -> [Affine<f64>; 2] {
+        [0, 12].map(|from| Affine {
+            matrix: Matrix3::from_fn(|i, j| parameters[from + 3 * i + j]),
+            offset: Vector3::from_fn(|i, _| parameters[from + 9 + i]),
+        })
+    }
+
+    /// Value and sigma of everything that `convention` makes of the inverse models of accelerometer and gyro.
+    pub fn in_convention(
+        &self,
+        convention: impl Fn(&Affine<f64>, &Affine<f64>) -> Vec<f64>,
+    ) -> Vec<(f64, f64)> {
+        let evaluate = |p: &DVector<f64>| {
+            let [accel, gyro] = Self::models(p);
+            DVector::from_vec(convention(&accel, &gyro))
+        };
+        let values = evaluate(&self.parameters);
+        let mut jacobian = DMatrix::zeros(values.len(), 24);
+        for k in 0..24 {
+            // A sigma: where the convention is not linear over it, neither is the interval.
+            let step = self.covariance[(k, k)].sqrt();
+            if step == 0.0 {
+                continue;
+            }
+            let (mut up, mut down) = (self.parameters.clone(), self.parameters.clone());
+            up[k] += step;
+            down[k] -= step;
+            jacobian.set_column(k, &((evaluate(&up) - evaluate(&down)) / (2.0 * step)));
+        }
+        let covariance = &jacobian * &self.covariance * jacobian.transpose();
+        (0..values.len())
+            .map(|i| (values[i], covariance[(i, i)].max(0.0).sqrt()))
+            .collect()
+    }
+}
+
+/// Samples as the foreign file has them, for integrating them without mimu.
+#[derive(Debug, Clone, Default)]
+pub struct Samples {
+    /// Time, s.
+    pub t_s: Vec<f64>,
+    /// Raw gyro readings.
+    pub gyro: Vec<Vector3<f64>>,
+    /// Raw accelerometer readings.
+    pub accel: Vec<Vector3<f64>>,
+}
+
+/// All numbers of a file with white space or commas between them, row by row; lines that hold none are left out.
+pub fn numbers(file: &Path) -> Vec<Vec<f64>> {
+    let text = std::fs::read_to_string(file).expect("the file was there a moment ago");
+    let row = |line: &str| {
+        let cells = line
+            .split(|c: char| c.is_whitespace() || c == ',')
+            .filter(|c| !c.is_empty());
+        cells.map(|c| c.parse().ok()).collect::<Option<Vec<f64>>>()
+    };
+    text.lines()
+        .filter_map(row)
+        .filter(|r| !r.is_empty())
+        .collect()
+}
+
+/// First row and row after the last of every dwell that both sensors can use.
+pub fn dwell_rows(fit: &Fit) -> Vec<std::ops::Range<usize>> {
+    let usable = fit.prepared.dwells.list.iter().filter(|d| {
+        mimu::dwell::Sensor::BOTH
+            .iter()
+            .all(|s| d.fault(*s).is_none())
+    });
+    usable
+        .map(|d| d.first_row as usize..(d.first_row + d.rows) as usize)
+        .collect()
+}
+
+impl Samples {
+    /// Rotation of the body from one sample to another, by a chain of quaternions with the mean rate of neighbours.
+    /// It takes a vector from the frame at `to` into that at `from`.
+    pub fn rotation(&self, gyro: &Affine<f64>, from: usize, to: usize) -> UnitQuaternion<f64> {
+        (from..to).fold(UnitQuaternion::identity(), |q, k| {
+            let rate = gyro.apply(&((self.gyro[k] + self.gyro[k + 1]) * 0.5));
+            q * UnitQuaternion::from_scaled_axis(rate * (self.t_s[k + 1] - self.t_s[k]))
+        })
+    }
+
+    /// Mean specific force over a dwell.
+    pub fn force(&self, accel: &Affine<f64>, dwell: &std::ops::Range<usize>) -> Vector3<f64> {
+        let sum: Vector3<f64> = self.accel[dwell.clone()].iter().sum();
+        accel.apply(&(sum / dwell.len() as f64))
+    }
+
+    /// Angle (rad) between the direction of gravity carried through each turn and that measured after it.
+    pub fn direction_errors(
+        &self,
+        dwells: &[std::ops::Range<usize>],
+        accel: &Affine<f64>,
+        gyro: &Affine<f64>,
+    ) -> Vec<f64> {
+        let turns = dwells.windows(2);
+        turns
+            .map(|pair| {
+                let turn = self.rotation(gyro, pair[0].end - 1, pair[1].start);
+                let predicted = turn.inverse() * self.force(accel, &pair[0]);
+                predicted.angle(&self.force(accel, &pair[1]))
+            })
+            .collect()
+    }
+}
+
+/// What `mimu verify` says of a calibration by other people.
+#[derive(Debug, Clone, Copy)]
+pub struct Verdict {
+    /// Size of gravity over dwell means, m/s².
+    pub size_mps2: f64,
+    /// Direction of gravity after turns, rad.
+    pub direction_rad: f64,
+    /// Rate at rest over dwell means, rad/s.
+    pub rest_rps: f64,
+}
+
+/// Judges the calibration `accel`, `gyro` (raw to SI) by the dwells and turns of `fit`.
+///
+/// It goes through the file format: what stands in a calibration by hand must be judged like one that was fitted.
+pub fn verdict(fit: &Fit, accel: &Affine<f64>, gyro: &Affine<f64>) -> Result<Verdict> {
+    use mimu::calibration::{Calibration, to_toml};
+    let mut calibration = Calibration::parse(&to_toml(fit, "2020-01-01T00:00:00Z"), "by hand")?;
+    let tables = [&mut calibration.accel, &mut calibration.gyro];
+    for (table, model) in tables.into_iter().zip([accel, gyro]) {
+        let table = table.as_mut().expect("both sensors were recorded");
+        table.C = [0, 1, 2].map(|i| [0, 1, 2].map(|j| model.matrix[(i, j)]));
+        table.o = model.offset.into();
+    }
+    let verified = mimu::verify::verify(&fit.prepared, &calibration)?;
+    let of = |s| {
+        let found = verified.sensors.iter().find(|v| v.sensor == s);
+        found.expect("both sensors can be judged")
+    };
+    let (accel, gyro) = (
+        of(mimu::dwell::Sensor::Accel),
+        of(mimu::dwell::Sensor::Gyro),
+    );
+    Ok(Verdict {
+        size_mps2: accel.rms,
+        direction_rad: gyro.rms,
+        rest_rps: gyro.static_rms.expect("judged by turns"),
+    })
+}
+
+/// Root mean square.
+pub fn rms(values: impl IntoIterator<Item = f64>) -> f64 {
+    let (sum, n) = values
+        .into_iter()
+        .fold((0.0, 0.0), |(sum, n), v| (sum + v * v, n + 1.0));
+    (sum / n).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_matrix_is_the_product_of_its_triangle_and_its_rotation() {
+        let matrix = Matrix3::new(2.0, 0.1, -0.2, 0.3, 1.5, 0.1, -0.1, 0.2, 1.8);
+        let (u, q) = upper_triangular_frame(&matrix);
+        assert!((u * q - matrix).norm() < 1e-14);
+        assert!((q * q.transpose() - Matrix3::identity()).norm() < 1e-14 && q.determinant() > 0.0);
+        let below = [u[(1, 0)], u[(2, 0)], u[(2, 1)]];
+        assert!(below.iter().all(|x| x.abs() < 1e-14) && u.diagonal().min() > 0.0);
+    }
+}
