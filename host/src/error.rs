@@ -57,8 +57,9 @@ impl Error {
 impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let line = format!("{}: {}; {}", self.place, self.problem, self.remedy);
-        // A file name or a cell may hold a line break; the promise is one line.
-        f.write_str(&line.replace(['\n', '\r'], " "))
+        // A file name or a cell may hold a line break, or what moves a terminal's cursor; the promise is one line.
+        let breaks = |c: char| c.is_control() || matches!(c, '\u{2028}' | '\u{2029}');
+        f.write_str(&line.replace(breaks, " "))
     }
 }
 

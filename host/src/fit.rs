@@ -197,7 +197,7 @@ impl Prepared {
         let mean = |part: fn(&crate::noise::AllanModel) -> f64| {
             Sensor::Gyro
                 .channels()
-                .map(|c| part(&self.noise.channels[c]))
+                .map(|c| part(&self.noise.channels[c].model))
                 .sum::<f64>()
                 / 3.0
         };
@@ -364,6 +364,9 @@ fn warn_of_temperature(prepared: &Prepared, warnings: &mut Vec<String>) {
 /// The one of `blocks` contiguous blocks that item `i` of `n` falls into, in order of time: sizes differ by one
 /// at most, the larger blocks first (as k-fold cross-validation is commonly cut, so that figures compare).
 fn block_of(i: usize, n: usize, blocks: usize) -> usize {
+    if blocks == 0 {
+        return 0;
+    }
     let (small, larger) = (n / blocks, n % blocks);
     let in_larger = larger * (small + 1);
     if i < in_larger {

@@ -17,10 +17,27 @@ use nalgebra::{Matrix3, Vector3};
 type Parameters = [f64; 21];
 
 const NAMES: [&str; 21] = [
-    "accel s_x %", "accel s_y %", "accel s_z %", "accel m_yz deg", "accel m_xy deg", "accel m_xz deg",
-    "accel b_x m/s2", "accel b_y m/s2", "accel b_z m/s2", "gyro s_x %", "gyro s_y %", "gyro s_z %",
-    "gyro m_yz deg", "gyro m_xy deg", "gyro m_xz deg", "gyro b_x deg/s", "gyro b_y deg/s", "gyro b_z deg/s",
-    "gyro eps_x deg", "gyro eps_y deg", "gyro eps_z deg",
+    "accel s_x %",
+    "accel s_y %",
+    "accel s_z %",
+    "accel m_yz deg",
+    "accel m_xy deg",
+    "accel m_xz deg",
+    "accel b_x m/s2",
+    "accel b_y m/s2",
+    "accel b_z m/s2",
+    "gyro s_x %",
+    "gyro s_y %",
+    "gyro s_z %",
+    "gyro m_yz deg",
+    "gyro m_xy deg",
+    "gyro m_xz deg",
+    "gyro b_x deg/s",
+    "gyro b_y deg/s",
+    "gyro b_z deg/s",
+    "gyro eps_x deg",
+    "gyro eps_y deg",
+    "gyro eps_z deg",
 ];
 
 /// The published table: a row for each parameter, a column for each unit.
@@ -82,10 +99,7 @@ fn column(table: &[[f64; 5]; 21], unit: usize) -> Parameters {
 fn fitted(unit: usize) -> Option<(Fit, Samples)> {
     let file = data_set("mikoff_mpu9150x5")?.join(format!("imu{unit}.log"));
     let foreign = Foreign {
-        files: vec![(
-            file.clone(),
-            "accel_x,accel_y,accel_z,gyro_x,gyro_y,gyro_z",
-        )],
+        files: vec![(file.clone(), "accel_x,accel_y,accel_z,gyro_x,gyro_y,gyro_z")],
         rate_hz: Some(100.0),
         gravity_mps2: 9.81,
         raw_unit: RawUnit::Si,
@@ -111,7 +125,11 @@ fn published_convention(accel: &Affine<f64>, gyro: &Affine<f64>) -> Vec<f64> {
     out.extend(&accel.offset);
     // P = (I + [eps x]) M: the three elements below the diagonal of (I + [eps x])^-1 P vanish.
     let p = gyro.matrix * frame.transpose();
-    let turned = |eps: &Vector3<f64>| (Matrix3::identity() + eps.cross_matrix()).try_inverse().unwrap();
+    let turned = |eps: &Vector3<f64>| {
+        (Matrix3::identity() + eps.cross_matrix())
+            .try_inverse()
+            .unwrap()
+    };
     let mut eps = Vector3::zeros();
     for _ in 0..20 {
         let below = turned(&eps) * p;
@@ -139,7 +157,17 @@ fn models(p: &Parameters) -> [Affine<f64>; 2] {
     let triple = |from: usize| Vector3::new(p[from], p[from + 1], p[from + 2]);
     let m = |from: usize| {
         let (s, a) = (triple(from) / 100.0, triple(from + 3).map(f64::to_radians));
-        Matrix3::new(1.0 + s.x, a.y, a.z, 0.0, 1.0 + s.y, a.x, 0.0, 0.0, 1.0 + s.z)
+        Matrix3::new(
+            1.0 + s.x,
+            a.y,
+            a.z,
+            0.0,
+            1.0 + s.y,
+            a.x,
+            0.0,
+            0.0,
+            1.0 + s.z,
+        )
     };
     let turn = Matrix3::identity() + triple(18).map(f64::to_radians).cross_matrix();
     let accel = Affine {
@@ -171,7 +199,9 @@ fn parameters_agree_with_the_published_ones() {
         let Some((fit, _)) = fitted(unit) else { return };
         let models = Models::of(&fit);
         let ours = models.in_convention(published_convention);
-        println!("\nunit {unit}              mimu   +-95 %   published  in sigmas    program  in sigmas");
+        println!(
+            "\nunit {unit}              mimu   +-95 %   published  in sigmas    program  in sigmas"
+        );
         let mut squares = [[0.0; 2]; 2];
         for (k, &(value, sigma)) in ours.iter().enumerate() {
             let sensor = usize::from(k >= 9);
@@ -187,35 +217,226 @@ fn parameters_agree_with_the_published_ones() {
                 off[0],
                 PROGRAM[k][unit],
                 off[1],
-                if off[1].abs() > models.coverage[sensor] {"  *"} else {""}
+                if off[1].abs() > models.coverage[sensor] {
+                    "  *"
+                } else {
+                    ""
+                }
             );
         }
         let r = |s: usize, t: usize, n: f64| (squares[s][t] / n as f64).sqrt();
-        println!("rms in sigmas: accel {:.2} {:.2}, gyro {:.2} {:.2}", r(0,0,9.0), r(0,1,9.0), r(1,0,12.0), r(1,1,12.0));
+        println!(
+            "rms in sigmas: accel {:.2} {:.2}, gyro {:.2} {:.2}",
+            r(0, 0, 9.0),
+            r(0, 1, 9.0),
+            r(1, 0, 12.0),
+            r(1, 1, 12.0)
+        );
     }
 }
 
 #[test]
 fn nobody_predicts_gravity_better_on_turns_that_were_held_out() {
-    println!("                     size of gravity mm/s2        direction after turns deg     by quaternions deg        rest deg/s");
-    println!("unit dwells turns  mimu held publ. prog.   mimu held publ. prog.   mimu publ. prog.  mimu publ. prog.");
+    println!(
+        "                     size of gravity mm/s2        direction after turns deg     by quaternions deg        rest deg/s"
+    );
+    println!(
+        "unit dwells turns  mimu held publ. prog.   mimu held publ. prog.   mimu publ. prog.  mimu publ. prog."
+    );
     for unit in UNITS {
-        let Some((fit, samples)) = fitted(unit) else { return };
+        let Some((fit, samples)) = fitted(unit) else {
+            return;
+        };
         let [a, g] = [Sensor::Accel, Sensor::Gyro].map(|s| fit.sensor(s).unwrap());
         let ours = [a, g].map(|s| s.estimated.triad.inverse);
-        let candidates = [ours, models(&column(&PUBLISHED, unit)), models(&column(&PROGRAM, unit))];
+        let candidates = [
+            ours,
+            models(&column(&PUBLISHED, unit)),
+            models(&column(&PROGRAM, unit)),
+        ];
         let dwells = dwell_rows(&fit);
         let v = candidates.map(|[a, g]| verdict(&fit, &a, &g).unwrap());
-        let q = candidates.map(|[a, g]| rms(samples.direction_errors(&dwells, &a, &g)).to_degrees());
-        println!("{unit} {} {} | {:.3} {:.3} {:.3} {:.3} | {:.4} {:.4} {:.4} {:.4} | {:.4} {:.4} {:.4} | {:.4} {:.4} {:.4}",
-            a.dwells, g.residuals.len(),
-            1e3*v[0].size_mps2, 1e3*a.held_out_rms().unwrap(), 1e3*v[1].size_mps2, 1e3*v[2].size_mps2,
-            v[0].direction_rad.to_degrees(), g.held_out_rms().unwrap().to_degrees(), v[1].direction_rad.to_degrees(), v[2].direction_rad.to_degrees(),
-            q[0],q[1],q[2],
-            v[0].rest_rps.to_degrees(), v[1].rest_rps.to_degrees(), v[2].rest_rps.to_degrees());
+        let q =
+            candidates.map(|[a, g]| rms(samples.direction_errors(&dwells, &a, &g)).to_degrees());
+        println!(
+            "{unit} {} {} | {:.3} {:.3} {:.3} {:.3} | {:.4} {:.4} {:.4} {:.4} | {:.4} {:.4} {:.4} | {:.4} {:.4} {:.4}",
+            a.dwells,
+            g.residuals.len(),
+            1e3 * v[0].size_mps2,
+            1e3 * a.held_out_rms().unwrap(),
+            1e3 * v[1].size_mps2,
+            1e3 * v[2].size_mps2,
+            v[0].direction_rad.to_degrees(),
+            g.held_out_rms().unwrap().to_degrees(),
+            v[1].direction_rad.to_degrees(),
+            v[2].direction_rad.to_degrees(),
+            q[0],
+            q[1],
+            q[2],
+            v[0].rest_rps.to_degrees(),
+            v[1].rest_rps.to_degrees(),
+            v[2].rest_rps.to_degrees()
+        );
         println!("{:?} {:?}", g.not_held_out, fit.warnings);
-        let rr: Vec<String> = g.residuals.iter().map(|r| format!("{:.2}/{:.2}", r.value.norm().to_degrees(), r.held_out.map_or(f64::NAN, |h| h.norm().to_degrees()))).collect();
+        let rr: Vec<String> = g
+            .residuals
+            .iter()
+            .map(|r| {
+                format!(
+                    "{:.2}/{:.2}",
+                    r.value.norm().to_degrees(),
+                    r.held_out.map_or(f64::NAN, |h| h.norm().to_degrees())
+                )
+            })
+            .collect();
         println!("{}", rr.join(" "));
         println!("{:?} {:?}", a.estimated.scatter, g.estimated.scatter);
+    }
+}
+
+#[test]
+#[ignore]
+fn explore() {
+    use nalgebra::{Rotation3, UnitQuaternion};
+    let stills = [10.0, 20.0, 50.0, 100.0, 200.0, 400.0];
+    let mut all = vec![];
+    for unit in UNITS {
+        let (fit, samples) = fitted(unit).unwrap();
+        let mut cands = vec![];
+        let mut evals = vec![];
+        for s in stills {
+            let folder = data_set("mikoff_mpu9150x5").unwrap();
+            let foreign = Foreign {
+                files: vec![(
+                    folder.join(format!("imu{unit}.log")),
+                    "accel_x,accel_y,accel_z,gyro_x,gyro_y,gyro_z",
+                )],
+                rate_hz: Some(100.0),
+                gravity_mps2: 9.81,
+                raw_unit: RawUnit::Si,
+                scales: &[],
+                inputs: None,
+            };
+            let tmp = tempfile::TempDir::new().unwrap();
+            let rec = foreign.import(&tmp).unwrap();
+            let f = mimu::fit::fit(
+                mimu::fit::Prepared::read(&rec, s, |_| {}).unwrap(),
+                mimu::fit::Options {
+                    method: Method::LeastSquares,
+                    holdout_blocks: 4,
+                    still_factor: s,
+                },
+            )
+            .unwrap();
+            let [a, g] = [Sensor::Accel, Sensor::Gyro].map(|x| f.sensor(x).unwrap());
+            let c = [a, g].map(|s| s.estimated.triad.inverse);
+            let p = published_convention(&c[0], &c[1]);
+            println!(
+                "unit {unit} still {s}: {}",
+                p.iter()
+                    .map(|x| format!("{x:.3}"))
+                    .collect::<Vec<_>>()
+                    .join(" ")
+            );
+            cands.push(c);
+            evals.push(dwell_rows(&f));
+        }
+        for (n, t) in [("publ", &PUBLISHED), ("prog", &PROGRAM)] {
+            println!(
+                "unit {unit} {n}: {}",
+                column(t, unit)
+                    .iter()
+                    .map(|x| format!("{x:.3}"))
+                    .collect::<Vec<_>>()
+                    .join(" ")
+            );
+            cands.push(models(&column(t, unit)));
+        }
+        for (e, s) in evals.iter().zip(stills) {
+            let q: Vec<String> = cands
+                .iter()
+                .map(|[a, g]| format!("{:.4}", rms(samples.direction_errors(e, a, g)).to_degrees()))
+                .collect();
+            let g: Vec<String> = cands
+                .iter()
+                .map(|[a, _]| {
+                    format!(
+                        "{:.2}",
+                        1e3 * rms(e.iter().map(|d| samples.force(a, d).norm() - 9.81))
+                    )
+                })
+                .collect();
+            println!(
+                "  on dwells at {s}: dir {} | size {}",
+                q.join(" "),
+                g.join(" ")
+            );
+        }
+        all.push((fit, samples, cands, evals));
+    }
+    // Are they rigid together?
+    for e in 0..stills.len() {
+        let n = all[0].2.len();
+        let mut full = vec![vec![]; n];
+        let mut size = vec![vec![]; n];
+        let mut used = 0;
+        for i in 0..5 {
+            for j in 0..i {
+                let (a, b) = (&all[i], &all[j]);
+                let ratio = b.1.t_s.len() as f64 / a.1.t_s.len() as f64;
+                let mut common = vec![];
+                for d in &a.3[e] {
+                    let c = (d.start + d.end) / 2;
+                    let m = (c as f64 * ratio) as usize;
+                    if let Some(o) = b.3[e].iter().find(|o| o.start + 20 < m && m + 20 < o.end) {
+                        common.push((d.clone(), o.clone(), c, m));
+                    }
+                }
+                for k in 0..n {
+                    let ([aa, ag], [ba, bg]) = (&a.2[k], &b.2[k]);
+                    let mut w = Matrix3::zeros();
+                    let mut pairs = vec![];
+                    for (d, o, _, _) in &common {
+                        let (x, y) = (a.1.force(aa, d).normalize(), b.1.force(ba, o).normalize());
+                        w += x * y.transpose();
+                        pairs.push((x, y));
+                    }
+                    let svd = w.svd(true, true);
+                    let (u, v) = (svd.u.unwrap(), svd.v_t.unwrap());
+                    let s = u
+                        * Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, (u * v).determinant()))
+                        * v;
+                    let s =
+                        UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(s));
+                    if k == 0 || k == 5 {
+                        println!(
+                            "{i} {j} still {} common {} mounting residual {:.3} deg",
+                            stills[e],
+                            common.len(),
+                            rms(pairs.iter().map(|(x, y)| x.angle(&(s * y)).to_degrees()))
+                        );
+                    }
+                    for p in common.windows(2) {
+                        let ra = a.1.rotation(ag, p[0].2, p[1].2);
+                        let rb = b.1.rotation(bg, p[0].3, p[1].3);
+                        full[k].push((ra.inverse() * (s * rb * s.inverse())).angle().to_degrees());
+                        size[k].push((ra.angle() - rb.angle()).to_degrees());
+                        used += 1;
+                    }
+                }
+            }
+        }
+        println!(
+            "still {} used {used} full {} | size {}",
+            stills[e],
+            full.iter()
+                .map(|v| format!("{:.4}", rms(v.iter().copied())))
+                .collect::<Vec<_>>()
+                .join(" "),
+            size.iter()
+                .map(|v| format!("{:.4}", rms(v.iter().copied())))
+                .collect::<Vec<_>>()
+                .join(" ")
+        );
     }
 }

@@ -15,6 +15,15 @@ pub(super) fn shorten(cell: &[u8]) -> String {
     format!("\"{short}\"")
 }
 
+/// Largest size of a number that can be a reading: no unit makes one larger, and squares of sums of these are
+/// far from overflowing.
+const LARGEST: f64 = 1e30;
+
+/// Whether `value` can be a reading. Not a number, an empty cell, can.
+pub(super) fn is_reading(value: f64) -> bool {
+    !(value.abs() > LARGEST)
+}
+
 /// Why a cell was refused.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Refusal {
@@ -30,14 +39,14 @@ impl Refusal {
 
 /// Number in a cell; NaN where it is empty or says so.
 ///
-/// An infinite one is refused: no sensor measures it, and it would pass every later sum unnoticed.
+/// An infinite or absurd one is refused: no sensor measures it, and it would pass every later sum unnoticed.
 pub(super) fn number(cell: &[u8]) -> Result<f64, Refusal> {
     let cell = cell.trim_ascii();
     if cell.is_empty() {
         return Ok(f64::NAN);
     }
     match fast_float2::parse::<f64, _>(cell) {
-        Ok(value) if value.is_infinite() => Err(infinite(&shorten(cell))),
+        Ok(value) if !is_reading(value) => Err(no_reading(value, &shorten(cell))),
         Ok(value) => Ok(value),
         Err(_) if cell.contains(&b',') => Err(Refusal::new(
             format!("{} is not a number", shorten(cell)),
@@ -50,12 +59,13 @@ pub(super) fn number(cell: &[u8]) -> Result<f64, Refusal> {
     }
 }
 
-/// What to say about an infinite value.
-pub(super) fn infinite(value: &str) -> Refusal {
-    Refusal::new(
-        format!("{value} is infinite"),
-        "leave the cell empty where nothing was measured",
-    )
+/// What to say about a value that is no reading, `shown` as in the file.
+pub(super) fn no_reading(value: f64, shown: &str) -> Refusal {
+    let problem = match value.is_infinite() {
+        true => format!("{shown} is infinite"),
+        false => format!("{shown} is too large for a reading"),
+    };
+    Refusal::new(problem, "leave the cell empty where nothing was measured")
 }
 
 /// What to say about a row without a time.
@@ -119,6 +129,8 @@ mod tests {
                     .contains("infinite")
             );
         }
+        assert!(number(b"1e31").unwrap_err().problem.contains("too large"));
+        assert_eq!(number(b"-1e30").unwrap(), -1e30);
         assert!(number(b"1,5").unwrap_err().remedy.contains("points"));
         assert!(number(b"0x12").unwrap_err().problem.contains("0x12"));
     }
