@@ -19,6 +19,8 @@ const INCREMENT_S: f64 = 0.01;
 const GAP_PERIODS: f64 = 1.5;
 /// Gaps in more than this share of all rows are no gaps but another rate.
 const GAP_SHARE: f64 = 0.02;
+/// After this many rows it is looked at whether blocks condense anything at all: what follows could fill the memory.
+const LOOK_AFTER: u64 = 100_000;
 
 /// Moments of one raw channel over one block.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -101,6 +103,13 @@ impl Moments {
     pub fn without_rails(&self, rails: Rails) -> (Self, u32) {
         let mut kept = *self;
         let mut masked = 0;
+        if rails.low.is_some_and(|rail| self.min < rail)
+            || rails.high.is_some_and(|rail| self.max > rail)
+        {
+            // Beyond a declared rail: which other samples are, the moments do not tell.
+            (kept.n, masked) = (0, self.n);
+            return (kept, masked);
+        }
         let ends = [
             (rails.low, self.min, self.at_min),
             (rails.high, self.max, self.at_max),
@@ -128,10 +137,19 @@ impl Moments {
 /// The values beyond which a converter cannot read, raw units.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Rails {
-    /// Lower rail, if it was reached.
+    /// Lower rail, if it was declared or reached.
     pub low: Option<f64>,
-    /// Upper rail, if it was reached.
+    /// Upper rail, if it was declared or reached.
     pub high: Option<f64>,
+}
+
+impl Rails {
+    /// Whether a sample of `moments` is at a rail, or beyond.
+    pub fn touched_by(&self, moments: &Moments) -> bool {
+        moments.n > 0
+            && (self.low.is_some_and(|rail| moments.min <= rail)
+                || self.high.is_some_and(|rail| moments.max >= rail))
+    }
 }
 
 /// A reference or temperature channel over one block. Not a number where a sample has none.
@@ -250,9 +268,9 @@ impl Condensed {
     /// Reads `recording` once. `integrate`: also integrate the gyro, as rotations need it.
     /// `progress` is told the share that is done.
     pub fn read(recording: &Recording, integrate: bool, progress: impl Fn(f64)) -> Result<Self> {
-        let period = 1.0 / recording.manifest.sample_rate_hz;
         let place = recording.samples.display().to_string();
-        let mut condenser = Condenser::new(period, integrate, place);
+        let rate = recording.manifest.sample_rate_hz;
+        let mut condenser = Condenser::new(rate, integrate, place);
         let summary = recording.for_each_batch(progress, |batch| condenser.push(batch))?;
         let mut condensed = condenser.finish()?;
         condensed.sha256 = summary.sha256;
@@ -263,6 +281,7 @@ impl Condensed {
 
 /// Takes batches of samples in order and makes blocks of them.
 struct Condenser {
+    rate_hz: f64,
     period_s: f64,
     place: String,
     block_rows: usize,
@@ -286,8 +305,10 @@ struct Steps {
 }
 
 impl Condenser {
-    fn new(period_s: f64, integrate: bool, place: String) -> Self {
+    fn new(rate_hz: f64, integrate: bool, place: String) -> Self {
+        let period_s = 1.0 / rate_hz;
         Self {
+            rate_hz,
             period_s,
             place,
             block_rows: ((BLOCK_S / period_s).round() as usize).max(BLOCK_MIN_ROWS),
@@ -355,6 +376,14 @@ impl Condenser {
             self.last = Some((t, step));
         }
         self.append(batch, from, rows);
+        if self.out.rows > LOOK_AFTER && self.out.blocks.len() as u64 > self.out.rows / 2 {
+            self.check_rate()?;
+            return Err(Error::new(
+                format!("{}, column step", self.place),
+                "the step changes in every other row or more often",
+                "give all rows of a dwell the same step, or leave the column out",
+            ));
+        }
         Ok(())
     }
 
@@ -366,7 +395,11 @@ impl Condenser {
                 0 => self.open.raw[c].last(),
                 _ => column.get(i - 1),
             };
-            column.get(i) == before
+            // Empty cells are alike, though not equal.
+            match (column.get(i), before) {
+                (Some(a), Some(b)) => a == b || a.is_nan() && b.is_nan(),
+                (a, b) => a == b,
+            }
         })
     }
 
@@ -466,31 +499,45 @@ impl Condenser {
         }
     }
 
+    /// Refuses time steps that mostly or often do not fit the rate.
+    fn check_rate(&self) -> Result<()> {
+        let steps = &self.steps;
+        let share = (steps.longer + steps.shorter) as f64 / (steps.regular + steps.longer) as f64;
+        if share <= GAP_SHARE {
+            return Ok(());
+        }
+        let (row, dt) = steps.first_odd.unwrap_or((0, f64::NAN));
+        let rate = self.rate_hz;
+        let (problem, remedy) = if share > 0.9 {
+            (
+                format!("the time steps do not fit sample_rate_hz = {rate}: the first is {dt:.6} s"),
+                "correct sample_rate_hz, or the unit of t_s",
+            )
+        } else {
+            (
+                format!(
+                    "the rate is mixed: {:.0} % of the time steps do not fit sample_rate_hz = {rate}, the first is {dt:.6} s",
+                    100.0 * share
+                ),
+                "correct sample_rate_hz, or resample to one rate",
+            )
+        };
+        let place = format!("{}, data row {}, t_s", self.place, row + 1);
+        Err(Error::new(place, problem, remedy))
+    }
+
     fn finish(mut self) -> Result<Condensed> {
         self.flush();
         let steps = &self.steps;
-        let (rate, all) = (1.0 / self.period_s, steps.regular + steps.longer);
-        if all == 0 {
+        let rate = self.rate_hz;
+        if steps.regular + steps.longer == 0 {
             return Err(Error::new(
                 &self.place,
                 "there is only one row",
                 "record for longer",
             ));
         }
-        let share = (steps.longer + steps.shorter) as f64 / all as f64;
-        if share > GAP_SHARE {
-            let (row, dt) = steps.first_odd.unwrap_or((0, f64::NAN));
-            let problem = format!(
-                "the rate is mixed: {:.0} % of the time steps do not fit sample_rate_hz = {rate}, the first is {dt:.6} s",
-                100.0 * share
-            );
-            let place = format!("{}, data row {}, t_s", self.place, row + 1);
-            return Err(Error::new(
-                place,
-                problem,
-                "correct sample_rate_hz, or resample to one rate",
-            ));
-        }
+        self.check_rate()?;
         let period = steps.regular_s / steps.regular.max(1) as f64;
         let off = period / self.period_s - 1.0;
         if off.abs() > 0.02 {
@@ -516,20 +563,24 @@ impl Condenser {
         if steps.longer > 0 {
             let (row, _) = steps.first_odd.unwrap_or((0, 0.0));
             out.warnings.push(format!(
-                "{} gaps, {:.3} s missing in all, the first before data row {}: nothing is integrated or averaged across them",
-                steps.longer, steps.missing_s, row + 1
+                "{}, {:.3} s missing in all, the first before data row {}: no turn is integrated across",
+                counted(steps.longer, "gap"), steps.missing_s, row + 1
             ));
         }
         if out.duplicates > 0 {
             out.warnings.push(format!(
-                "{} rows repeat the row before, time included: left out",
-                out.duplicates
+                "{} the same as the row before, time included: left out",
+                match out.duplicates {
+                    1 => "1 row is".into(),
+                    n => format!("{n} rows are"),
+                }
             ));
         }
         for (c, &missing) in out.missing.iter().enumerate() {
             if missing > 0 {
                 out.warnings.push(format!(
-                    "{missing} samples of {} are empty or not a number: masked",
+                    "{} of {} empty or not a number: masked",
+                    counted(missing, "sample"),
                     RAW_COLUMNS[c]
                 ));
             }
@@ -538,6 +589,15 @@ impl Condenser {
             out.increments.extend(integrator.take());
         }
         Ok(self.out)
+    }
+}
+
+/// `1 gap`, `2 gaps`.
+pub(crate) fn counted(n: u64, noun: &str) -> String {
+    if n == 1 {
+        format!("1 {noun}")
+    } else {
+        format!("{n} {noun}s")
     }
 }
 

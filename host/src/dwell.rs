@@ -219,11 +219,17 @@ impl Dwells {
             })
             .collect();
         if list.is_empty() {
-            return Err(Error::new(
-                "dwells",
-                "no stretch of the recording is still",
-                "hold the unit still for some seconds in every pose, or raise --still",
-            ));
+            let (problem, remedy) = match condensed.has_steps {
+                true => (
+                    "every row is in transit: its step is empty or -1",
+                    "number the dwells in the column step, or leave the column out to have them found",
+                ),
+                false => (
+                    "no stretch of the recording is still",
+                    "hold the unit still for some seconds in every pose, or raise --still",
+                ),
+            };
+            return Err(Error::new("dwells", problem, remedy));
         }
         judge(&mut list, condensed, detection.is_none());
         warn(&list, manifest, &mut warnings);
@@ -233,6 +239,26 @@ impl Dwells {
             rails,
             warnings,
         })
+    }
+}
+
+impl Dwells {
+    /// The dwells that are not used for `sensor`, as a remark: ` (not used: 3 too short, 1 accel_z saturated)`; empty
+    /// if all are used.
+    pub fn unused(&self, sensor: Sensor) -> String {
+        let mut counts: Vec<(String, usize)> = Vec::new();
+        for fault in self.list.iter().filter_map(|d| d.fault(sensor)) {
+            let name = fault.to_string();
+            match counts.iter_mut().find(|(known, _)| *known == name) {
+                Some((_, count)) => *count += 1,
+                None => counts.push((name, 1)),
+            }
+        }
+        let all: Vec<String> = counts.iter().map(|(f, n)| format!("{n} {f}")).collect();
+        match all.is_empty() {
+            true => String::new(),
+            false => format!(" (not used: {})", all.join(", ")),
+        }
     }
 }
 
@@ -564,7 +590,8 @@ fn warn(list: &[Dwell], manifest: &Manifest, warnings: &mut Vec<String>) {
         .sum();
     if clipped > 0 {
         warnings.push(format!(
-            "{clipped} samples within dwells lie at a rail of the converter: masked"
+            "{} within dwells at a rail of the converter: masked",
+            crate::blocks::counted(clipped, "sample")
         ));
     }
 }

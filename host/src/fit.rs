@@ -11,6 +11,7 @@ use crate::estimate::least_squares::POORLY_DETERMINED;
 use crate::estimate::rotation::{IntegralNoise, Motion, Turn, direction_error};
 use crate::estimate::{Estimated, Failure, Observation, gravity_size, known_input, rotation};
 use crate::noise::Noise;
+use crate::plausible;
 use crate::recording::{Manifest, RawUnit, Recording, Reference};
 use crate::triad::Triad;
 
@@ -61,7 +62,10 @@ impl Prepared {
         let condensed = Condensed::read(recording, integrate, progress)?;
         let place = recording.samples.display().to_string();
         refuse_dead_channels(&condensed, &place)?;
-        let dwells = Dwells::find(&condensed, &manifest, still_factor)?;
+        let dwells = Dwells::find(&condensed, &manifest, still_factor).map_err(|e| Error {
+            place: format!("{place}, {}", e.place),
+            ..e
+        })?;
         let noise = Noise::within(&dwells.list, &condensed);
         Ok(Self {
             manifest,
@@ -104,9 +108,8 @@ impl Prepared {
         let increments = &self.condensed.increments;
         let usable: Vec<usize> = (0..self.dwells.list.len())
             .filter(|&i| {
-                Sensor::BOTH
-                    .iter()
-                    .all(|s| self.dwells.list[i].fault(*s).is_none())
+                let dwell = &self.dwells.list[i];
+                !dwell.turn && Sensor::BOTH.iter().all(|s| dwell.fault(*s).is_none())
             })
             .collect();
         let (mut turns, mut refused) = (Vec::new(), Vec::new());
@@ -121,11 +124,8 @@ impl Prepared {
             } else {
                 Sensor::Gyro.channels().find_map(|c| {
                     let rails = self.dwells.rails[c];
-                    let at_rail = |m: &crate::blocks::Moments| {
-                        rails.low == Some(m.min) || rails.high == Some(m.max)
-                    };
                     let axis = crate::estimate::AXES[c];
-                    if blocks.iter().any(|b| at_rail(&b.raw[c])) {
+                    if blocks.iter().any(|b| rails.touched_by(&b.raw[c])) {
                         Some(format!("gyro_{axis} is at its rail"))
                     } else {
                         // Hands do not keep a code for a tenth of a second while others move.
@@ -328,10 +328,13 @@ pub fn fit(prepared: Prepared, options: Options) -> Result<Fit> {
     let mut warnings = prepared.condensed.warnings.clone();
     warnings.extend(prepared.dwells.warnings.iter().cloned());
     warn_of_temperature(&prepared, &mut warnings);
-    let sensors = match prepared.manifest.reference {
+    let mut sensors = match prepared.manifest.reference {
         Reference::Table => fit_known(&prepared, options, &mut warnings)?,
         Reference::Gravity => fit_gravity(&prepared, options, &mut warnings)?,
     };
+    for sensor in &mut sensors {
+        plausible::check(&prepared, sensor)?;
+    }
     Ok(Fit {
         prepared,
         options,

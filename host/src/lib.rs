@@ -11,6 +11,7 @@ pub mod error;
 pub mod estimate;
 pub mod fit;
 pub mod noise;
+mod plausible;
 pub mod recording;
 pub mod report;
 pub mod triad;

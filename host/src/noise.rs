@@ -220,7 +220,7 @@ mod tests {
         };
         let points: Vec<_> = (0..12)
             .map(|k| 0.1 * f64::from(1 << k))
-            .map(|t| (t, truth.variance(t), 10.0))
+            .map(|t| (t, truth.variance(t), 1e4))
             .collect();
         let found = fit(&points);
         for (a, b) in [

@@ -6,6 +6,7 @@ mod json;
 mod text;
 
 pub use json::{fit_json, import_json, verify_json};
+pub(crate) use text::three;
 pub use text::{dwell_table, fit_text, import_text, verify_text};
 
 use crate::estimate::AXES;

@@ -400,7 +400,9 @@ fn parse_plain(
         let text = rest.ok_or(RowFault::Width)?;
         if !matches!(slot, None | Some(Column::Step))
             && let Ok((value, used)) = fast_float2::parse_partial::<f64, _>(text)
-            && value.is_finite()
+            // Not a number must go the long way too: it may be the time.
+            && !value.is_nan()
+            && cell::is_reading(value)
             && (used == text.len() || text[used] == b',')
         {
             values[position].push(value);

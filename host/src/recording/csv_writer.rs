@@ -95,7 +95,7 @@ mod tests {
         #[test]
         fn a_written_number_reads_back_bit_for_bit(bits in any::<u64>()) {
             let value = f64::from_bits(bits);
-            prop_assume!(value.is_finite());
+            prop_assume!(value.is_finite() && super::super::cell::is_reading(value));
             let mut text = Vec::new();
             write_number(value, &mut text);
             let back = super::super::cell::number(&text).unwrap();

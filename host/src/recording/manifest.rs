@@ -13,6 +13,9 @@ pub const MANIFEST_FILE: &str = "recording.toml";
 /// Gravity on the Earth's surface with room to spare: 9.764 (Huascarán) to 9.834 (poles) m/s².
 const GRAVITY_RANGE: std::ops::RangeInclusive<f64> = 9.7..=9.9;
 
+/// No inertial sensor is slower or faster.
+const RATE_RANGE: std::ops::RangeInclusive<f64> = 0.01..=1e7;
+
 /// Version of the layout of a recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum Format {
@@ -231,11 +234,11 @@ impl Manifest {
     pub fn check(&self, place: &str) -> Result<()> {
         let at = |key: &str| format!("{place}, {key}");
         let rate = self.sample_rate_hz;
-        if !(rate.is_finite() && rate > 0.0) {
+        if !RATE_RANGE.contains(&rate) {
             return Err(Error::new(
                 at("sample_rate_hz"),
-                format!("{rate} is not a sample rate"),
-                "write the samples per second, greater than 0",
+                format!("{rate:?} is not a sample rate"),
+                "write the samples per second, from 0.01 to 10 million",
             ));
         }
         check_gravity(self.gravity_mps2, &at("gravity_mps2"))?;

@@ -291,11 +291,11 @@ fn decode_slice(
         }
         return Ok(Decoded::Steps(steps));
     }
-    let bad = |value: &f64| value.is_infinite() || (column == Column::Time && value.is_nan());
+    let bad = |value: &f64| !cell::is_reading(*value) || (column == Column::Time && value.is_nan());
     if let Some(row) = values.iter().position(bad) {
         let refusal = match values[row].is_nan() {
             true => cell::no_time(),
-            false => cell::infinite(&values[row].to_string()),
+            false => cell::no_reading(values[row], &format!("{:e}", values[row])),
         };
         return Err(fault(row, refusal));
     }

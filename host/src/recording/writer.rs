@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::batch::Batch;
+use super::cell::is_reading;
 use super::columns::{Column, Columns};
 use super::csv_writer::CsvWriter;
 use super::manifest::{MANIFEST_FILE, Manifest};
@@ -110,11 +111,11 @@ impl Writer {
         // What the reader refuses is not written either.
         for column in self.columns.present() {
             let values = batch.values(column).unwrap_or_default();
-            let bad = |v: &f64| v.is_infinite() || (column == Column::Time && v.is_nan());
+            let bad = |v: &f64| !is_reading(*v) || (column == Column::Time && v.is_nan());
             if let Some(row) = values.iter().position(bad) {
                 return Err(Error::new(
                     format!("{}, column {}", at(row), column.name()),
-                    format!("{} is no measurement", values[row]),
+                    format!("{:e} is no reading", values[row]),
                     "leave the value out where nothing was measured; every row needs its time",
                 ));
             }

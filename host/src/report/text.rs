@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use super::{raw_unit, scale_unit};
+use crate::blocks::counted;
 use crate::dwell::{Dwell, Sensor};
 use crate::fit::{Figure, Fit, SensorFit};
 use crate::recording::{ImportSummary, Manifest, Reference};
@@ -10,7 +11,7 @@ use crate::triad::{Angles, Estimate};
 use crate::verify::Verification;
 
 /// `value` to three significant digits without an exponent where that reads well.
-fn three(value: f64) -> String {
+pub(crate) fn three(value: f64) -> String {
     if value == 0.0 || !value.is_finite() {
         return format!("{value}");
     }
@@ -43,14 +44,6 @@ fn readable(figure: Figure, sensor: Sensor) -> (f64, &'static str) {
         (Figure::Direction, _) => (1f64.to_degrees(), "deg"),
         (_, Sensor::Gyro) => (1f64.to_degrees(), "deg/s"),
         (_, Sensor::Accel) => (1e3, "mm/s²"),
-    }
-}
-
-fn counted(n: u64, noun: &str) -> String {
-    if n == 1 {
-        format!("1 {noun}")
-    } else {
-        format!("{n} {noun}s")
     }
 }
 
@@ -277,7 +270,7 @@ pub fn verify_text(verification: &Verification) -> String {
     let mut out = String::new();
     let _ = writeln!(
         out,
-        "{:<7}{:>14}{:>14}{:>14}{:>14}{:>8}",
+        "{:<7}{:>14}{:>14}{:>14}{:>14}{:>12}",
         "", "uncalibrated", "calibrated", "largest", "noise floor", "over"
     );
     for s in &verification.sensors {
@@ -291,7 +284,7 @@ pub fn verify_text(verification: &Verification) -> String {
         };
         let _ = writeln!(
             out,
-            "{:<7}{raw:>14}{rms:>14}{max:>14}{floor:>14}{:>8}",
+            "{:<7}{raw:>14}{rms:>14}{max:>14}{floor:>14}{:>12}",
             s.sensor.name(),
             format!("{} {noun}", s.count).as_str()
         );

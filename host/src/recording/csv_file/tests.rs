@@ -250,7 +250,7 @@ proptest! {
 
     #[test]
     fn values_come_back_as_they_were_written(values in prop::collection::vec(any::<f64>(), 1..50), chunk in 1_u64..200) {
-        let finite: Vec<f64> = values.into_iter().map(|v| if v.is_infinite() { 0.0 } else { v }).collect();
+        let finite: Vec<f64> = values.into_iter().map(|v| if v.abs() > 1e30 { 0.0 } else { v }).collect();
         let mut text = "t_s,gyro_x,gyro_y,gyro_z\n".to_owned();
         for value in &finite {
             text.push_str(&format!("0,{value},{value:e},{value:?}\n"));

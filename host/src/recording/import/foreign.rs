@@ -9,6 +9,7 @@ use super::separator::Separator;
 use super::step_labels::StepLabels;
 use super::text_table::{Cells, TextTable};
 use crate::error::{Error, Result};
+use crate::recording::cell::{is_reading, no_reading, no_time};
 use crate::recording::columns::Column;
 
 /// How many time steps the sample period is the median of.
@@ -229,8 +230,11 @@ impl ForeignFile {
             Clock::Sample(cell, rate) => self.cells.numbers[cell] / rate,
             Clock::Rows(rate) => self.rows as f64 / rate,
         };
-        if !row.t_s.is_finite() {
-            let refusal = crate::recording::cell::no_time();
+        if row.t_s.is_nan() || !is_reading(row.t_s) {
+            let refusal = match row.t_s.is_nan() {
+                true => no_time(),
+                false => no_reading(row.t_s, &format!("a time of {:e} s", row.t_s)),
+            };
             return Err(Error::new(
                 self.place(number),
                 refusal.problem,
@@ -247,9 +251,12 @@ impl ForeignFile {
         row.values.clear();
         for &(cell, column, factor) in &self.values {
             let value = self.cells.numbers[cell] * factor;
-            if value.is_infinite() {
+            if !is_reading(value) {
                 let place = format!("{}, column {}", self.place(number), column.name());
-                let problem = format!("{} times {factor} is infinite", self.cells.numbers[cell]);
+                let problem = format!(
+                    "{:e} times {factor:e} is too large for a reading",
+                    self.cells.numbers[cell]
+                );
                 return Err(Error::new(place, problem, "correct the cell or the factor"));
             }
             row.values.push(value);

@@ -7,6 +7,7 @@ use parquet::data_type::ByteArray;
 use super::assignment::{ColumnList, Role};
 use super::text_table::Cells;
 use crate::error::{Error, Result};
+use crate::recording::cell::{is_reading, no_reading};
 use crate::recording::columns::Column;
 use crate::recording::csv_writer::write_number;
 use crate::recording::in_order::broke_down;
@@ -152,17 +153,11 @@ impl ParquetTable {
                 continue;
             }
             let value = column.values[self.at];
-            if value.is_infinite() {
-                return Err(Error::new(
-                    format!(
-                        "{}, row {}, column {}",
-                        self.path.display(),
-                        self.row + 1,
-                        column.name
-                    ),
-                    format!("{value} is infinite"),
-                    "leave the cell empty where nothing was measured",
-                ));
+            if !is_reading(value) {
+                let (path, row) = (self.path.display(), self.row + 1);
+                let place = format!("{path}, row {row}, column {}", column.name);
+                let refusal = no_reading(value, &format!("{value:e}"));
+                return Err(Error::new(place, refusal.problem, refusal.remedy));
             }
             if step {
                 write_number(value, &mut cells.step);
