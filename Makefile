@@ -20,9 +20,11 @@ toolchain:
 test: toolchain ## formatting, lints, documentation, firmware, all tests
 	$(CARGO) fmt --all --check
 	$(CARGO) clippy --locked --all-targets -- -D warnings
+	$(CARGO) clippy --locked -p mimu-no-panic --release --target $(TARGET) -- -D warnings
 	$(CARGO) clippy --locked -p mimu-firmware --release --target $(TARGET) -- -D warnings
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --locked --no-deps
 	$(CARGO) build --locked -p mimu-firmware --release --target $(TARGET)
+	./tests/no_panic/check.sh $(CARGO)
 	$(CARGO) test --locked
 
 demo: toolchain ## import and fit a recording: the best real one at hand, or the small one in tests/

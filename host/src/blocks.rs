@@ -510,7 +510,9 @@ impl Condenser {
         let rate = self.rate_hz;
         let (problem, remedy) = if share > 0.9 {
             (
-                format!("the time steps do not fit sample_rate_hz = {rate}: the first is {dt:.6} s"),
+                format!(
+                    "the time steps do not fit sample_rate_hz = {rate}: the first is {dt:.6} s"
+                ),
                 "correct sample_rate_hz, or the unit of t_s",
             )
         } else {

@@ -2,11 +2,12 @@
 
 use std::fmt::Write as _;
 use std::io::Write as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use mimu_core::compensation::Affine;
 use nalgebra::{Matrix3, Vector3};
 use serde::Deserialize;
+use tempfile::NamedTempFile;
 
 use crate::dwell::Sensor;
 use crate::error::{Error, Result};
@@ -163,11 +164,18 @@ impl Calibration {
     /// Parses and checks the text of a calibration file; `place` is its path.
     pub fn parse(text: &str, place: &str) -> Result<Self> {
         let calibration: Self = toml::from_str(text).map_err(|e| {
+            let message = e.message().trim();
+            // A missing key has the table that lacks it for its place.
             let line = e.span().map_or(1, |s| {
-                1 + text[..s.start.min(text.len())].matches('\n').count()
+                let before = text.get(..s.start).unwrap_or(text);
+                1 + before.matches('\n').count()
             });
-            let remedy = "correct the line, or fit the recording again";
-            Error::new(format!("{place}, line {line}"), e.message().trim(), remedy)
+            let remedy = if message.starts_with("missing field") {
+                "the file is cut or was edited: copy it again, or fit the recording again"
+            } else {
+                "correct the line, or fit the recording again"
+            };
+            Error::new(format!("{place}, line {line}"), message, remedy)
         })?;
         if calibration.format != FORMAT {
             let problem = format!(
@@ -190,11 +198,12 @@ impl Calibration {
                 .iter()
                 .flatten()
                 .chain(&table.o)
-                .chain(table.covariance.iter().flatten());
+                .chain(table.covariance.iter().flatten())
+                .chain([&table.interval_95]);
             if !numbers.into_iter().all(|x| x.is_finite()) {
                 return Err(Error::new(
                     place,
-                    "C, o or covariance has an entry that is not a number",
+                    "C, o, covariance or interval_95 has an entry that is not a number",
                     "fit the recording again",
                 ));
             }
@@ -216,13 +225,14 @@ impl Calibration {
                     "fit the recording again",
                 ));
             }
-            if calibration.triad(sensor).is_none() {
+            let Some(triad) = calibration.triad(sensor) else {
                 return Err(Error::new(
                     place,
                     "C is singular",
                     "fit the recording again",
                 ));
-            }
+            };
+            check_both_ways(table, &triad, &place)?;
         }
         if calibration.gyro.is_none() && calibration.accel.is_none() {
             return Err(Error::new(
@@ -252,6 +262,24 @@ impl Calibration {
         let covariance = Covariance::from_fn(|i, j| table.covariance[i][j]);
         Triad::from_inverse(inverse, covariance, table.interval_95)
     }
+}
+
+/// Refuses a file in which the two directions of the calibration disagree: one of them was edited.
+fn check_both_ways(table: &TriadTable, triad: &Triad, place: &str) -> Result<()> {
+    let (matrix, offset) = (triad.forward.matrix, triad.forward.offset);
+    let off_p = Matrix3::from_fn(|i, j| table.forward.P[i][j] - matrix[(i, j)]);
+    let off_b = Vector3::from(table.forward.b) - offset;
+    // Both are written to all their digits; what an inversion loses stays far below.
+    let alike = off_p.norm() <= 1e-6 * matrix.norm()
+        && off_b.norm() <= 1e-6 * (offset.norm() + matrix.norm());
+    if alike {
+        return Ok(());
+    }
+    Err(Error::new(
+        place,
+        "C and o are not the inverse of forward.P and forward.b: the file was edited",
+        "fit the recording again",
+    ))
 }
 
 /// Text of the calibration file for `fit`, made at `created` (RFC 3339).
@@ -473,14 +501,39 @@ fn quoted(text: &str) -> String {
     toml::Value::String(text.into()).to_string()
 }
 
-/// Writes `text` to `path` whole or not at all.
-pub fn write_whole(path: &Path, text: &str) -> Result<()> {
-    let folder = path
-        .parent()
-        .filter(|p| !p.as_os_str().is_empty())
-        .unwrap_or(Path::new("."));
+/// A result that is written, and has yet to appear under its name.
+#[derive(Debug)]
+pub struct Staged {
+    path: PathBuf,
+    file: Option<NamedTempFile>,
+    text: String,
+}
+
+/// Writes `text` beside `path`, so that whatever can fail fails before any file has appeared.
+pub fn stage(path: &Path, text: String) -> Result<Staged> {
     let failed = |e: std::io::Error| Error::io(path, &e);
-    let mut file = tempfile::NamedTempFile::new_in(folder).map_err(failed)?;
+    let path = path.to_owned();
+    match std::fs::metadata(&path) {
+        Ok(there) if there.is_dir() => {
+            let problem = "this is a directory, and a file is to be written";
+            return Err(Error::new(path.display(), problem, "name a file in it"));
+        }
+        // A device or a pipe is written to, never replaced: `/dev/null` has to stay what it is.
+        Ok(there) if !there.is_file() => {
+            let file = None;
+            return Ok(Staged { path, file, text });
+        }
+        _ => {}
+    }
+    let folder = folder(&path);
+    if !folder.is_dir() {
+        return Err(Error::new(
+            path.display(),
+            "its folder does not exist",
+            "create it, or check the path",
+        ));
+    }
+    let mut file = NamedTempFile::new_in(folder).map_err(failed)?;
     file.write_all(text.as_bytes()).map_err(failed)?;
     file.as_file().sync_all().map_err(failed)?;
     // Temporary files are private; a result is for everybody who may read the folder's other files.
@@ -490,6 +543,28 @@ pub fn write_whole(path: &Path, text: &str) -> Result<()> {
         let mode = std::fs::Permissions::from_mode(0o644);
         file.as_file().set_permissions(mode).map_err(failed)?;
     }
-    file.persist(path).map_err(|e| Error::io(path, &e.error))?;
-    Ok(())
+    let file = Some(file);
+    Ok(Staged { path, file, text })
+}
+
+impl Staged {
+    /// Folder that the file will be in, with its links resolved.
+    pub fn folder(&self) -> PathBuf {
+        let folder = folder(&self.path);
+        folder.canonicalize().unwrap_or_else(|_| folder.to_owned())
+    }
+
+    /// Gives the file its name.
+    pub fn publish(self) -> Result<()> {
+        match self.file {
+            Some(file) => file.persist(&self.path).map(drop).map_err(|e| e.error),
+            None => std::fs::write(&self.path, self.text),
+        }
+        .map_err(|e| Error::io(&self.path, &e))
+    }
+}
+
+fn folder(path: &Path) -> &Path {
+    let parent = path.parent().filter(|p| !p.as_os_str().is_empty());
+    parent.unwrap_or(Path::new("."))
 }

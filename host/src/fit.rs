@@ -89,7 +89,8 @@ impl Prepared {
             .list
             .iter()
             .enumerate()
-            .filter(|(_, d)| d.fault(sensor).is_none());
+            // A turn of known angle is no pose.
+            .filter(|(_, d)| d.fault(sensor).is_none() && (table || !d.turn));
         usable
             .filter_map(|(i, d)| {
                 let input = d.input(sensor);
@@ -171,7 +172,10 @@ impl Prepared {
         }
         let mean = |i: usize, s: Sensor| {
             let from = s.channels().start;
-            Vector3::from_fn(|k, _| self.condensed.blocks[i].raw[from + k].mean)
+            Vector3::from_fn(|k, _| match self.condensed.blocks[i].raw[from + k] {
+                moments if moments.n > 0 => moments.mean,
+                _ => f64::NAN,
+            })
         };
         (1..still.len())
             .filter(|&i| !still[i] && !self.condensed.blocks[i].after_gap)
@@ -190,6 +194,21 @@ impl Prepared {
             })
             .filter(|m| m.change.iter().chain(&m.raw).all(|x| x.is_finite()))
             .collect()
+    }
+
+    /// A failure of an estimator, with the place and with the dwells that it had to do without.
+    fn refused(&self, failure: Failure, sensor: Sensor) -> Error {
+        let Error {
+            place,
+            problem,
+            remedy,
+        } = failure.into_error(sensor);
+        let unused = self.dwells.unused(sensor);
+        Error::new(
+            format!("{}, {place}", self.place),
+            format!("{problem}{unused}"),
+            remedy,
+        )
     }
 
     /// Noise of the gyro as integrals see it.
@@ -385,11 +404,13 @@ fn fit_known(
     warnings: &mut Vec<String>,
 ) -> Result<Vec<SensorFit>> {
     let mut sensors = Vec::new();
+    let mut missing = Vec::new();
     for sensor in Sensor::BOTH.into_iter().filter(|s| prepared.has(*s)) {
         let observations = prepared.observations(sensor);
         if observations.is_empty() {
-            warnings.push(format!(
-                "{sensor}: no usable dwell has a known input, so it is not calibrated"
+            let unused = prepared.dwells.unused(sensor);
+            missing.push(format!(
+                "{sensor}: no usable dwell has a known input{unused}, so it is not calibrated"
             ));
             continue;
         }
@@ -410,12 +431,12 @@ fn fit_known(
                     .all(|o| o.input == observations[0].input) =>
             {
                 let _ = failure;
-                warnings.push(format!(
+                missing.push(format!(
                     "{sensor}: all dwells have the same input, so it is not calibrated"
                 ));
                 continue;
             }
-            Err(failure) => return Err(failure.into_error(sensor)),
+            Err(failure) => return Err(prepared.refused(failure, sensor)),
         };
         let error = |triad: &Triad, o: &Observation| triad.inverse.apply(&o.raw) - o.input;
         let matrix = estimated.triad.inverse.matrix;
@@ -460,10 +481,11 @@ fn fit_known(
     if sensors.is_empty() {
         return Err(Error::new(
             &prepared.place,
-            "no sensor can be calibrated from this recording",
-            "give the dwells their inputs in the ref_ columns, or set reference = \"gravity\"",
+            missing.join(", "),
+            "give dwells of a second and more their inputs in the ref_ columns, or set reference = \"gravity\" where there is no table",
         ));
     }
+    warnings.extend(missing);
     Ok(sensors)
 }
 
@@ -515,7 +537,7 @@ fn finish(
 }
 
 /// A recording in SI whose accelerometer reads one at rest is in g.
-fn refuse_wrong_gravity(
+pub(crate) fn refuse_wrong_gravity(
     prepared: &Prepared,
     sensor: Sensor,
     observations: &[Observation],
@@ -569,12 +591,16 @@ fn fit_gravity(
     if poses.is_empty() {
         return Err(Error::new(
             &prepared.place,
-            "no dwell can be used for the accelerometer",
-            "see the warnings; hold the unit still for some seconds in every pose",
+            format!(
+                "no dwell can be used for the accelerometer{}",
+                prepared.dwells.unused(Sensor::Accel)
+            ),
+            "hold the unit still for some seconds in every pose, within the sensor's range",
         ));
     }
     refuse_wrong_gravity(prepared, Sensor::Accel, &poses)?;
-    let accel = gravity_size::estimate(&poses, g).map_err(|f| f.into_error(Sensor::Accel))?;
+    let accel =
+        gravity_size::estimate(&poses, g).map_err(|f| prepared.refused(f, Sensor::Accel))?;
     let all_dwells = prepared.dwells.list.len();
     let blocks = options.holdout_blocks.min(poses.len());
     let block = |dwell: usize| block_of(dwell, all_dwells, blocks);
@@ -660,7 +686,7 @@ fn fit_turns(
     let noise = prepared.integral_noise();
     let motions = prepared.motions(by_full);
     let gyro = rotation::estimate(&turns, &rest, noise, &motions, None, g)
-        .map_err(|f| f.into_error(Sensor::Gyro))?;
+        .map_err(|f| prepared.refused(f, Sensor::Gyro))?;
     let refits = refit(accel_refits.len(), |b| {
         let accel = accel_refits[b].as_ref().map_err(Clone::clone)?;
         let (turns, _) = prepared.turns(&accel.triad.inverse);

@@ -6,13 +6,13 @@ use std::process::ExitCode;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
-use mimu::calibration::{Calibration, to_toml, write_whole};
+use mimu::calibration::{Calibration, Staged, stage, to_toml};
 use mimu::dwell::STILL_FACTOR;
 use mimu::error::{Error, Result};
 use mimu::fit::{Method, Options, Prepared, fit};
 use mimu::recording::{
-    ColumnList, ImportOptions, RawUnit, Recording, Reference, SampleFormat, Scale, Separator,
-    import,
+    ColumnList, ImportOptions, MANIFEST_FILE, RawUnit, Recording, Reference, SampleFormat, Scale,
+    Separator, import,
 };
 use mimu::report;
 use mimu::verify::verify;
@@ -195,6 +195,13 @@ fn run_import(args: ImportArgs) -> Result<()> {
         replace: args.replace,
         ..ImportOptions::new(args.files, args.gravity, args.raw_unit, args.reference)
     };
+    let inputs: Vec<&Path> = options
+        .files
+        .iter()
+        .chain(&options.inputs)
+        .map(|p| p.as_path())
+        .collect();
+    check_outputs(&[args.json.file()], &inputs)?;
     let bar = progress("importing");
     let summary = import(&options, &args.output, |share| {
         bar.set_position((share * 1000.0) as u64)
@@ -204,6 +211,7 @@ fn run_import(args: ImportArgs) -> Result<()> {
         &args.json,
         &report::import_text(&summary),
         &report::import_json(&summary),
+        None,
     )
 }
 
@@ -218,7 +226,8 @@ fn run_fit(args: &FitArgs) -> Result<()> {
         holdout_blocks: args.holdout,
         still_factor: args.still.factor,
     };
-    let prepared = read(&args.recording, options.still_factor)?;
+    let outputs = [args.output.as_deref(), args.json.file()];
+    let prepared = read(&args.recording, options.still_factor, &outputs, None)?;
     let fitted = fit(prepared, options)?;
     let mut text = report::fit_text(&fitted);
     if args.dwells {
@@ -228,35 +237,75 @@ fn run_fit(args: &FitArgs) -> Result<()> {
             &fitted.prepared.manifest,
         ));
     }
+    let mut calibration = None;
     if let Some(path) = &args.output {
         let now = jiff::Timestamp::now()
             .round(jiff::Unit::Second)
             .unwrap_or_default();
-        write_whole(path, &to_toml(&fitted, &now.to_string()))?;
+        calibration = Some(stage(path, to_toml(&fitted, &now.to_string()))?);
         text.push_str(&format!("\ncalibration: {}\n", path.display()));
     }
-    print(&args.json, &text, &report::fit_json(&fitted))
+    print(&args.json, &text, &report::fit_json(&fitted), calibration)
 }
 
 fn run_verify(args: &VerifyArgs) -> Result<()> {
     let calibration = Calibration::read(&args.calibration)?;
-    let prepared = read(&args.recording, args.still.factor)?;
+    let outputs = [args.json.file()];
+    let prepared = read(
+        &args.recording,
+        args.still.factor,
+        &outputs,
+        Some(&args.calibration),
+    )?;
     let verified = verify(&prepared, &calibration)?;
     print(
         &args.json,
         &report::verify_text(&verified),
         &report::verify_json(&verified),
+        None,
     )
 }
 
-fn read(directory: &Path, still_factor: f64) -> Result<Prepared> {
+/// Opens and reads a recording, after checking that the results can be written and take the place of no input.
+fn read(
+    directory: &Path,
+    still_factor: f64,
+    outputs: &[Option<&Path>],
+    calibration: Option<&Path>,
+) -> Result<Prepared> {
     let recording = Recording::open(directory)?;
+    let manifest = directory.join(MANIFEST_FILE);
+    let mut inputs: Vec<&Path> = vec![&manifest, &recording.samples];
+    inputs.extend(calibration);
+    check_outputs(outputs, &inputs)?;
     let bar = progress("reading");
     let prepared = Prepared::read(&recording, still_factor, |share| {
         bar.set_position((share * 1000.0) as u64)
     });
     bar.finish_and_clear();
     prepared
+}
+
+/// Refuses outputs that cannot be written, before the work, and those that would overwrite an input or each other.
+fn check_outputs(outputs: &[Option<&Path>], inputs: &[&Path]) -> Result<()> {
+    let mut taken: Vec<PathBuf> = inputs
+        .iter()
+        .filter_map(|p| p.canonicalize().ok())
+        .collect();
+    for path in outputs.iter().flatten() {
+        // Only a try: dropped, it leaves nothing.
+        let folder = stage(path, String::new())?.folder();
+        let name = path.file_name().unwrap_or_default();
+        let full = path.canonicalize().unwrap_or_else(|_| folder.join(name));
+        if !full.exists() || full.is_file() {
+            if taken.contains(&full) {
+                let problem = "this is an input, or another result goes there";
+                return Err(Error::new(path.display(), problem, "choose another name"));
+            }
+            taken.push(full);
+        }
+    }
+    Ok(())
 }
 
 /// Progress in thousandths, on a terminal only.
@@ -268,16 +317,29 @@ fn progress(what: &'static str) -> ProgressBar {
     bar
 }
 
-/// Prints the text, or writes the JSON and prints the text unless both would go to standard output.
-fn print(json: &JsonArgs, text: &str, value: &serde_json::Value) -> Result<()> {
+impl JsonArgs {
+    /// The file to write, if it is one.
+    fn file(&self) -> Option<&Path> {
+        self.path.as_deref().filter(|path| *path != Path::new("-"))
+    }
+}
+
+/// Prints the text, or writes the JSON and prints the text unless both would go to standard output. All files appear
+/// when all of them are written.
+fn print(
+    json: &JsonArgs,
+    text: &str,
+    value: &serde_json::Value,
+    calibration: Option<Staged>,
+) -> Result<()> {
     let pretty = format!("{value:#}\n");
-    let shown = match json.path.as_deref() {
-        Some(path) if path == Path::new("-") => &pretty,
-        Some(path) => {
-            write_whole(path, &pretty)?;
-            text
-        }
-        None => text,
+    let file = json.file().map(|path| stage(path, pretty.clone()));
+    for staged in calibration.into_iter().chain(file.transpose()?) {
+        staged.publish()?;
+    }
+    let shown = match (&json.path, json.file()) {
+        (Some(_), None) => &pretty,
+        _ => text,
     };
     let mut out = std::io::stdout().lock();
     match out.write_all(shown.as_bytes()).and_then(|()| out.flush()) {

@@ -24,7 +24,11 @@ const TURNED_DEG: f64 = 20.0;
 pub fn check(prepared: &Prepared, fit: &mut SensorFit) -> Result<()> {
     refuse_no_numbers(fit)?;
     refuse_unrelated(prepared, fit)?;
-    let found = [outliers(prepared, fit), unit(prepared, fit), turned(prepared, fit)];
+    let found = [
+        outliers(prepared, fit),
+        unit(prepared, fit),
+        turned(prepared, fit),
+    ];
     fit.warnings.extend(found.into_iter().flatten());
     Ok(())
 }

@@ -7,7 +7,7 @@ use crate::calibration::Calibration;
 use crate::dwell::Sensor;
 use crate::error::{Error, Result};
 use crate::estimate::rotation::{Turn, direction_error};
-use crate::fit::{Figure, Prepared, si_covariance};
+use crate::fit::{Figure, Prepared, refuse_wrong_gravity, si_covariance};
 use crate::recording::Reference;
 use crate::triad::Triad;
 
@@ -74,6 +74,10 @@ pub fn verify(prepared: &Prepared, calibration: &Calibration) -> Result<Verifica
         };
         if !prepared.has(sensor) {
             continue;
+        }
+        let observations = prepared.observations(sensor);
+        if !observations.is_empty() {
+            refuse_wrong_gravity(prepared, sensor, &observations)?;
         }
         let judged = match (manifest.reference, sensor) {
             (Reference::Table, _) => known(prepared, sensor, &triad),

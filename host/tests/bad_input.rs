@@ -27,11 +27,7 @@ const GYRO_P: Matrix = [
     [25.0, -66.0, 5105.0],
 ];
 const GYRO_B: Vector = [37.0, -61.0, 18.0];
-const ACCEL_P: Matrix = [
-    [1655.0, 0.0, 0.0],
-    [14.0, 1602.0, 0.0],
-    [-9.0, 21.0, 1640.0],
-];
+const ACCEL_P: Matrix = [[1655.0, 0.0, 0.0], [14.0, 1602.0, 0.0], [-9.0, 21.0, 1640.0]];
 const ACCEL_B: Vector = [-120.0, 64.0, 210.0];
 /// Standard deviation of the noise of one sample, counts.
 const GYRO_NOISE: f64 = 8.0;
@@ -210,10 +206,7 @@ fn by_hand_at(poses: usize, seed: u64, axis: impl Fn(&mut Random) -> Vector) -> 
     const POSE_S: f64 = 3.0;
     const TURN_S: f64 = 1.5;
     let mut random = Random(seed);
-    let mut out = Samples::new(
-        "gravity",
-        "t_s,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z",
-    );
+    let mut out = Samples::new("gravity", "t_s,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z");
     let mut attitude = Attitude([1.0, 0.0, 0.0, 0.0]);
     let time = |out: &Samples| vec![out.rows.len() as f64 / RATE_HZ];
     for pose in 0..poses {
@@ -312,30 +305,13 @@ impl Run {
     /// The line of a refusal, after checking that it is one and has its three parts.
     fn refusal(&self) -> &str {
         let line = self.stderr.strip_suffix('\n').unwrap_or(&self.stderr);
-        assert_eq!(
-            self.status,
-            Some(1),
-            "stderr: {line}\nstdout: {}",
-            self.stdout
-        );
-        assert!(
-            !line.is_empty() && !line.contains(char::is_control),
-            "{line:?}"
-        );
+        assert_eq!(self.status, Some(1), "stderr: {line}\nstdout: {}", self.stdout);
+        assert!(!line.is_empty() && !line.contains(char::is_control), "{line:?}");
         let told = line.strip_prefix("mimu: ").expect(line);
         let (place, rest) = told.split_once(": ").expect(line);
         let (problem, remedy) = rest.split_once("; ").expect(line);
-        assert!(
-            [place, problem, remedy]
-                .iter()
-                .all(|p| !p.trim().is_empty()),
-            "{line}"
-        );
-        assert!(
-            self.stdout.is_empty(),
-            "a refusal prints no result: {}",
-            self.stdout
-        );
+        assert!([place, problem, remedy].iter().all(|p| !p.trim().is_empty()), "{line}");
+        assert!(self.stdout.is_empty(), "a refusal prints no result: {}", self.stdout);
         line
     }
 
@@ -356,19 +332,14 @@ impl Run {
 
 fn warnings(result: &Value) -> Vec<String> {
     let all = result["warnings"].as_array().expect("warnings");
-    all.iter()
-        .map(|w| w.as_str().unwrap().to_string())
-        .collect()
+    all.iter().map(|w| w.as_str().unwrap().to_string()).collect()
 }
 
 fn warned(result: &Value, words: &[&str]) {
     let all = warnings(result);
     println!("    {}", all.join("\n    "));
     for word in words {
-        assert!(
-            all.iter().any(|w| w.contains(word)),
-            "{word:?} is not in: {all:#?}"
-        );
+        assert!(all.iter().any(|w| w.contains(word)), "{word:?} is not in: {all:#?}");
     }
 }
 
@@ -380,16 +351,11 @@ fn distance(result: &Value, sensor: &str) -> f64 {
     };
     let c = inverse(&p);
     let o = times(&c, &b).map(|x| -x);
-    let parameters = result["sensors"][sensor]["parameters"]
-        .as_array()
-        .expect(sensor);
+    let parameters = result["sensors"][sensor]["parameters"].as_array().expect(sensor);
     let mut worst: f64 = 0.0;
     for (i, row) in ["x", "y", "z"].iter().enumerate() {
         let mut check = |name: String, truth: f64| {
-            let found = parameters
-                .iter()
-                .find(|p| p["name"] == name.as_str())
-                .unwrap();
+            let found = parameters.iter().find(|p| p["name"] == name.as_str()).unwrap();
             let number = |key: &str| found[key].as_f64().expect("a number");
             let half = 0.5 * (number("upper") - number("lower"));
             // What is zero by the choice of frame has no interval.
@@ -410,11 +376,7 @@ fn distance(result: &Value, sensor: &str) -> f64 {
 fn right(result: &Value) {
     for sensor in ["gyro", "accel"] {
         let worst = distance(result, sensor);
-        assert!(
-            worst < 2.0,
-            "{sensor}: {worst} times half of the interval from the truth; {:#?}",
-            warnings(result)
-        );
+        assert!(worst < 2.0, "{sensor}: {worst} times half of the interval from the truth; {:#?}", warnings(result));
     }
 }
 
@@ -425,9 +387,7 @@ struct Place {
 
 impl Place {
     fn new() -> Self {
-        Self {
-            folder: tempfile::tempdir().unwrap(),
-        }
+        Self { folder: tempfile::tempdir().unwrap() }
     }
 
     fn with(samples: &Samples) -> Self {
@@ -457,9 +417,7 @@ impl Place {
     /// Names in the folder, sorted; hidden ones too.
     fn names(&self) -> Vec<String> {
         let entries = fs::read_dir(self.folder.path()).unwrap();
-        let mut names: Vec<_> = entries
-            .map(|e| e.unwrap().file_name().into_string().unwrap())
-            .collect();
+        let mut names: Vec<_> = entries.map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
         names.sort();
         names
     }
@@ -474,23 +432,10 @@ fn explore() {
             let v = run.json();
             for k in ["gyro", "accel"] {
                 let x = &v["sensors"][k];
-                if x.is_null() {
-                    println!("   {k}: none");
-                    continue;
-                }
-                println!(
-                    "   {k}: distance {:.2} rms {} held {} floor {} cond {} static {}",
-                    distance(&v, k),
-                    x["rms"],
-                    x["held_out_rms"],
-                    x["noise_floor"],
-                    x["condition"],
-                    x["static_rms"]
-                );
+                if x.is_null() { println!("   {k}: none"); continue; }
+                println!("   {k}: distance {:.2} rms {} held {} floor {} cond {} static {}", distance(&v, k), x["rms"], x["held_out_rms"], x["noise_floor"], x["condition"], x["static_rms"]);
             }
-            for w in warnings(&v) {
-                println!("   W {w}");
-            }
+            for w in warnings(&v) { println!("   W {w}"); }
         }
     };
     let hand = by_hand();
@@ -499,440 +444,88 @@ fn explore() {
     show("hand b0", &hand, &["--holdout", "blocks=0"]);
     show("hand b1000", &hand, &["--holdout", "blocks=1000"]);
     show("table", &table, &[]);
-    for m in ["kalman", "xu", "six-positions"] {
-        show(m, &table, &["--method", m]);
-    }
+    for m in ["kalman", "xu", "six-positions"] { show(m, &table, &["--method", m]); }
     show("table b0", &table, &["--holdout", "blocks=0"]);
-    let go = |name: &str, base: &Samples, f: &dyn Fn(&mut Samples)| {
-        let mut s = base.clone();
-        f(&mut s);
-        show(name, &s, &[]);
-    };
-    go("few nan hand", &hand, &|s| {
-        for r in [50, 340, 700] {
-            s.edit("accel_y", r..r + 3, |_| f64::NAN);
-        }
-        s.edit("gyro_x", 100..105, |_| f64::NAN);
-    });
-    go("nan in turn", &hand, &|s| {
-        let t = s.turn(3);
-        s.edit("gyro_x", t.start + 50..t.start + 53, |_| f64::NAN);
-    });
-    go("all nan accel_y", &hand, &|s| {
-        let a = s.all();
-        s.edit("accel_y", a, |_| f64::NAN);
-    });
-    go("time empty", &hand, &|s| {
-        s.edit("t_s", 77..78, |_| f64::NAN);
-    });
-    go("shuffled", &hand, &|s| {
-        let mut r = Random(5);
-        for i in (1..s.rows.len()).rev() {
-            let j = (r.bits() % (i as u64 + 1)) as usize;
-            s.rows.swap(i, j);
-        }
-    });
+    let go = |name: &str, base: &Samples, f: &dyn Fn(&mut Samples)| { let mut s = base.clone(); f(&mut s); show(name, &s, &[]); };
+    go("few nan hand", &hand, &|s| { for r in [50, 340, 700] { s.edit("accel_y", r..r+3, |_| f64::NAN); } s.edit("gyro_x", 100..105, |_| f64::NAN); });
+    go("nan in turn", &hand, &|s| { let t = s.turn(3); s.edit("gyro_x", t.start+50..t.start+53, |_| f64::NAN); });
+    go("all nan accel_y", &hand, &|s| { let a = s.all(); s.edit("accel_y", a, |_| f64::NAN); });
+    go("time empty", &hand, &|s| { s.edit("t_s", 77..78, |_| f64::NAN); });
+    go("shuffled", &hand, &|s| { let mut r = Random(5); for i in (1..s.rows.len()).rev() { let j = (r.bits() % (i as u64 + 1)) as usize; s.rows.swap(i, j); } });
     go("pair", &hand, &|s| s.rows.swap(500, 501));
-    go("dup", &hand, &|s| {
-        for i in [900, 500, 100] {
-            let r = s.rows[i].clone();
-            s.rows.insert(i, r);
-        }
-    });
-    go("dup nan", &hand, &|s| {
-        s.edit("accel_y", 100..101, |_| f64::NAN);
-        let r = s.rows[100].clone();
-        s.rows.insert(100, r);
-    });
-    go("repeat", &hand, &|s| {
-        let t = s.rows[100][0];
-        s.rows[101][0] = t;
-    });
+    go("dup", &hand, &|s| { for i in [900, 500, 100] { let r = s.rows[i].clone(); s.rows.insert(i, r); } });
+    go("dup nan", &hand, &|s| { s.edit("accel_y", 100..101, |_| f64::NAN); let r = s.rows[100].clone(); s.rows.insert(100, r); });
+    go("repeat", &hand, &|s| { let t = s.rows[100][0]; s.rows[101][0] = t; });
     go("wrong name", &hand, &|s| s.names[3] = "gyro_w".into());
-    go("swap sensors hand", &hand, &|s| {
-        for i in 1..4 {
-            s.names.swap(i, i + 3)
-        }
-    });
-    go("swap sensors table", &table, &|s| {
-        for i in 8..11 {
-            s.names.swap(i, i + 3)
-        }
-    });
+    go("swap sensors hand", &hand, &|s| for i in 1..4 { s.names.swap(i, i+3) });
+    go("swap sensors table", &table, &|s| for i in 8..11 { s.names.swap(i, i+3) });
     go("swap gyro_x accel_x hand", &hand, &|s| s.names.swap(1, 4));
-    go("swap gyro_x accel_x table", &table, &|s| {
-        s.names.swap(8, 11)
-    });
+    go("swap gyro_x accel_x table", &table, &|s| s.names.swap(8, 11));
     go("swap gyro_x y hand", &hand, &|s| s.names.swap(1, 2));
     go("swap accel_x y hand", &hand, &|s| s.names.swap(4, 5));
     go("swap gyro_x y table", &table, &|s| s.names.swap(8, 9));
-    go("half rate", &hand, &|s| {
-        let h = s.rows.len() / 2;
-        let mut k = 0;
-        s.rows.retain(|_| {
-            k += 1;
-            k < h || k % 2 == 0
-        });
-    });
-    for r in [
-        "200.0", "1000.0", "50.0", "99.0", "99.9", "101.5", "0.1", "1e300", "1e-300",
-    ] {
-        go(&format!("rate {r}"), &hand, &|s| s.set("sample_rate_hz", r));
-    }
-    go("t in ms", &hand, &|s| {
-        let a = s.all();
-        s.edit("t_s", a, |t| t * 1000.0)
-    });
-    go("gap dwell", &hand, &|s| {
-        let d = s.dwells[4].clone();
-        s.rows.drain(d.start + 100..d.start + 150);
-    });
-    go("gap turn", &hand, &|s| {
-        let d = s.turn(4);
-        s.rows.drain(d.start + 50..d.start + 70);
-    });
-    go("gap dwell table", &table, &|s| {
-        let d = s.dwells[4].clone();
-        s.rows.drain(d.start + 50..d.start + 90);
-    });
-    go("stuck all", &hand, &|s| {
-        let a = s.all();
-        s.edit("gyro_y", a, |_| 17.0)
-    });
-    go("stuck dwells", &hand, &|s| {
-        for k in [3, 4, 9] {
-            let a = s.dwells[k].clone();
-            let v = s.rows[a.start][s.column("accel_y")];
-            s.edit("accel_y", a, |_| v)
-        }
-    });
-    go("stuck dwells gyro", &hand, &|s| {
-        for k in [3, 4, 9] {
-            let a = s.dwells[k].clone();
-            let v = s.rows[a.start][s.column("gyro_y")];
-            s.edit("gyro_y", a, |_| v)
-        }
-    });
-    go("stuck turns gyro", &hand, &|s| {
-        for k in [3, 4, 9] {
-            let a = s.turn(k);
-            let v = s.rows[a.start][s.column("gyro_y")];
-            s.edit("gyro_y", a, |_| v)
-        }
-    });
-    go("stuck turns accel", &hand, &|s| {
-        for k in [3, 4, 9] {
-            let a = s.turn(k);
-            let v = s.rows[a.start][s.column("accel_y")];
-            s.edit("accel_y", a, |_| v)
-        }
-    });
-    go("stuck one third of turn", &hand, &|s| {
-        for k in [3, 4, 9] {
-            let a = s.turn(k);
-            let a = a.start + 50..a.start + 100;
-            let v = s.rows[a.start][s.column("gyro_y")];
-            s.edit("gyro_y", a, |_| v)
-        }
-    });
-    go("stuck table gyro", &table, &|s| {
-        for k in [3, 4, 9] {
-            let a = s.dwells[k].clone();
-            let v = s.rows[a.start][s.column("gyro_y")];
-            s.edit("gyro_y", a, |_| v)
-        }
-    });
-    go("stuck half", &hand, &|s| {
-        let a = s.rows.len() / 2..s.rows.len();
-        s.edit("gyro_y", a, |_| 17.0)
-    });
-    go("clip accel z", &hand, &|s| {
-        let a = s.all();
-        s.edit("accel_z", a, |u| u.min(14000.0))
-    });
-    go("clip accel z table", &table, &|s| {
-        let a = s.all();
-        s.edit("accel_z", a, |u| u.min(14000.0))
-    });
-    go("clip accel z mid noise table", &table, &|s| {
-        let a = s.all();
-        let m = 1640.0 * 9.81 + 210.0 + 4.0;
-        s.edit("accel_z", a, |u| u.min(f64::round(m)))
-    });
-    go("clip gyro", &hand, &|s| {
-        let a = s.all();
-        s.edit("gyro_z", a, |u| u.clamp(-6000.0, 6000.0))
-    });
-    go("clip gyro table", &table, &|s| {
-        let a = s.all();
-        s.edit("gyro_z", a, |u| u.clamp(-6000.0, 6000.0))
-    });
-    go("rails declared", &hand, &|s| {
-        let a = s.all();
-        s.edit("accel_z", a, |u| u.min(14000.0));
-        s.set("rails.accel", "[-32768.0, 14000.0]")
-    });
-    go("rails declared inside", &hand, &|s| {
-        s.set("rails.accel", "[-32768.0, 14000.0]")
-    });
-    go("rails declared mV", &hand, &|s| {
-        s.set("rails.accel", "[0.0, 3.3]")
-    });
+    go("half rate", &hand, &|s| { let h = s.rows.len()/2; let mut k = 0; s.rows.retain(|_| { k += 1; k < h || k % 2 == 0 }); });
+    for r in ["200.0", "1000.0", "50.0", "99.0", "99.9", "101.5", "0.1", "1e300", "1e-300"] { go(&format!("rate {r}"), &hand, &|s| s.set("sample_rate_hz", r)); }
+    go("t in ms", &hand, &|s| { let a = s.all(); s.edit("t_s", a, |t| t*1000.0) });
+    go("gap dwell", &hand, &|s| { let d = s.dwells[4].clone(); s.rows.drain(d.start+100..d.start+150); });
+    go("gap turn", &hand, &|s| { let d = s.turn(4); s.rows.drain(d.start+50..d.start+70); });
+    go("gap dwell table", &table, &|s| { let d = s.dwells[4].clone(); s.rows.drain(d.start+50..d.start+90); });
+    go("stuck all", &hand, &|s| { let a = s.all(); s.edit("gyro_y", a, |_| 17.0) });
+    go("stuck dwells", &hand, &|s| for k in [3,4,9] { let a = s.dwells[k].clone(); let v = s.rows[a.start][s.column("accel_y")]; s.edit("accel_y", a, |_| v) });
+    go("stuck dwells gyro", &hand, &|s| for k in [3,4,9] { let a = s.dwells[k].clone(); let v = s.rows[a.start][s.column("gyro_y")]; s.edit("gyro_y", a, |_| v) });
+    go("stuck turns gyro", &hand, &|s| for k in [3,4,9] { let a = s.turn(k); let v = s.rows[a.start][s.column("gyro_y")]; s.edit("gyro_y", a, |_| v) });
+    go("stuck turns accel", &hand, &|s| for k in [3,4,9] { let a = s.turn(k); let v = s.rows[a.start][s.column("accel_y")]; s.edit("accel_y", a, |_| v) });
+    go("stuck one third of turn", &hand, &|s| for k in [3,4,9] { let a = s.turn(k); let a = a.start+50..a.start+100; let v = s.rows[a.start][s.column("gyro_y")]; s.edit("gyro_y", a, |_| v) });
+    go("stuck table gyro", &table, &|s| for k in [3,4,9] { let a = s.dwells[k].clone(); let v = s.rows[a.start][s.column("gyro_y")]; s.edit("gyro_y", a, |_| v) });
+    go("stuck half", &hand, &|s| { let a = s.rows.len()/2..s.rows.len(); s.edit("gyro_y", a, |_| 17.0) });
+    go("clip accel z", &hand, &|s| { let a = s.all(); s.edit("accel_z", a, |u| u.min(14000.0)) });
+    go("clip accel z table", &table, &|s| { let a = s.all(); s.edit("accel_z", a, |u| u.min(14000.0)) });
+    go("clip accel z mid noise table", &table, &|s| { let a = s.all(); let m = 1640.0*9.81+210.0+4.0; s.edit("accel_z", a, |u| u.min(f64::round(m))) });
+    go("clip gyro", &hand, &|s| { let a = s.all(); s.edit("gyro_z", a, |u| u.clamp(-6000.0, 6000.0)) });
+    go("clip gyro table", &table, &|s| { let a = s.all(); s.edit("gyro_z", a, |u| u.clamp(-6000.0, 6000.0)) });
+    go("rails declared", &hand, &|s| { let a = s.all(); s.edit("accel_z", a, |u| u.min(14000.0)); s.set("rails.accel", "[-32768.0, 14000.0]") });
+    go("rails declared inside", &hand, &|s| { s.set("rails.accel", "[-32768.0, 14000.0]") });
+    go("rails declared mV", &hand, &|s| { s.set("rails.accel", "[0.0, 3.3]") });
     show("five poses", &by_hand_at(5, 1, Random::direction), &[]);
     show("nine poses", &by_hand_at(9, 1, Random::direction), &[]);
     show("ten poses", &by_hand_at(10, 1, Random::direction), &[]);
     show("plane poses", &by_hand_at(20, 1, |_| [1.0, 0.0, 0.0]), &[]);
     show("no z", &on_table_at(&[-90.0, 0.0, 90.0], &[0, 1]), &[]);
     show("one dir", &on_table_at(&[0.0, 30.0, 90.0], &[0, 1, 2]), &[]);
-    show(
-        "one dir xu",
-        &on_table_at(&[0.0, 30.0, 90.0], &[0, 1, 2]),
-        &["--method", "xu"],
-    );
-    show(
-        "one dir six",
-        &on_table_at(&[0.0, 30.0, 90.0], &[0, 1, 2]),
-        &["--method", "six-positions"],
-    );
+    show("one dir xu", &on_table_at(&[0.0, 30.0, 90.0], &[0, 1, 2]), &["--method", "xu"]);
+    show("one dir six", &on_table_at(&[0.0, 30.0, 90.0], &[0, 1, 2]), &["--method", "six-positions"]);
     show("no rates", &on_table_at(&[0.0], &[0, 1, 2]), &[]);
-    go("equal", &table, &|s| {
-        let a = s.all();
-        for (n, v) in [
-            ("ref_rate_x_dps", 1.0),
-            ("ref_rate_y_dps", 0.0),
-            ("ref_rate_z_dps", 0.0),
-            ("ref_force_x_mps2", 0.0),
-            ("ref_force_y_mps2", 0.0),
-            ("ref_force_z_mps2", 9.81),
-        ] {
-            s.edit(n, a.clone(), |_| v)
-        }
-    });
-    go("vibration", &table, &|s| {
-        let a = s.dwells[7].clone();
-        let c = s.column("accel_x");
-        for (k, r) in s.rows[a].iter_mut().enumerate() {
-            r[c] += 400.0 * (k as f64).sin();
-        }
-    });
-    go("vibration hand", &hand, &|s| {
-        let a = s.dwells[7].clone();
-        let c = s.column("accel_x");
-        for (k, r) in s.rows[a].iter_mut().enumerate() {
-            r[c] += 400.0 * (k as f64).sin();
-        }
-    });
-    go("never rests", &hand, &|s| {
-        let mut keep = Vec::new();
-        for k in 0..19 {
-            let t = s.turn(k);
-            keep.extend(t.start + 20..t.end - 20);
-        }
-        s.rows = keep.into_iter().map(|i| s.rows[i].clone()).collect();
-        for (i, r) in s.rows.iter_mut().enumerate() {
-            r[0] = i as f64 / 100.0;
-        }
-    });
-    go("tremor", &hand, &|s| {
-        let mut r = Random(9);
-        let mut v = [0.0; 6];
-        for row in &mut s.rows {
-            for c in 0..6 {
-                v[c] = 0.95 * v[c] + 100.0 * r.normal();
-                row[c + 1] += v[c];
-            }
-        }
-    });
-    go("ref in g", &table, &|s| {
-        let a = s.all();
-        for n in ["ref_force_x_mps2", "ref_force_y_mps2", "ref_force_z_mps2"] {
-            s.edit(n, a.clone(), |x| x / 9.81)
-        }
-    });
-    go("ref rad", &table, &|s| {
-        let a = s.all();
-        for n in ["ref_rate_x_dps", "ref_rate_y_dps", "ref_rate_z_dps"] {
-            s.edit(n, a.clone(), |x| x * PI / 180.0)
-        }
-    });
-    go("raw g SI hand", &hand, &|s| {
-        s.set("raw_unit", "\"SI\"");
-        let a = s.all();
-        for n in ["accel_x", "accel_y", "accel_z"] {
-            s.edit(n, a.clone(), |x| x / 1640.0 / 9.81)
-        }
-        for n in ["gyro_x", "gyro_y", "gyro_z"] {
-            s.edit(n, a.clone(), |x| x / 5000.0)
-        }
-    });
-    go("raw dps SI hand", &hand, &|s| {
-        s.set("raw_unit", "\"SI\"");
-        let a = s.all();
-        for n in ["accel_x", "accel_y", "accel_z"] {
-            s.edit(n, a.clone(), |x| x / 1640.0)
-        }
-        for n in ["gyro_x", "gyro_y", "gyro_z"] {
-            s.edit(n, a.clone(), |x| x / 5000.0 * 57.3)
-        }
-    });
-    go("counts as SI", &hand, &|s| {
-        s.set("raw_unit", "\"SI\"");
-    });
+    go("equal", &table, &|s| { let a = s.all(); for (n, v) in [("ref_rate_x_dps", 1.0), ("ref_rate_y_dps", 0.0), ("ref_rate_z_dps",0.0), ("ref_force_x_mps2",0.0),("ref_force_y_mps2", 0.0), ("ref_force_z_mps2", 9.81)] { s.edit(n, a.clone(), |_| v) } });
+    go("vibration", &table, &|s| { let a = s.dwells[7].clone(); let c = s.column("accel_x"); for (k, r) in s.rows[a].iter_mut().enumerate() { r[c] += 400.0*(k as f64).sin(); } });
+    go("vibration hand", &hand, &|s| { let a = s.dwells[7].clone(); let c = s.column("accel_x"); for (k, r) in s.rows[a].iter_mut().enumerate() { r[c] += 400.0*(k as f64).sin(); } });
+    go("never rests", &hand, &|s| { let mut keep = Vec::new(); for k in 0..19 { let t = s.turn(k); keep.extend(t.start+20..t.end-20); } s.rows = keep.into_iter().map(|i| s.rows[i].clone()).collect(); for (i, r) in s.rows.iter_mut().enumerate() { r[0] = i as f64/100.0; } });
+    go("tremor", &hand, &|s| { let mut r = Random(9); let mut v = [0.0; 6]; for row in &mut s.rows { for c in 0..6 { v[c] = 0.95*v[c] + 100.0*r.normal(); row[c+1] += v[c]; } } });
+    go("ref in g", &table, &|s| { let a = s.all(); for n in ["ref_force_x_mps2","ref_force_y_mps2", "ref_force_z_mps2"] { s.edit(n, a.clone(), |x| x/9.81) } });
+    go("ref rad", &table, &|s| { let a = s.all(); for n in ["ref_rate_x_dps","ref_rate_y_dps", "ref_rate_z_dps"] { s.edit(n, a.clone(), |x| x*PI/180.0) } });
+    go("raw g SI hand", &hand, &|s| { s.set("raw_unit", "\"SI\""); let a = s.all(); for n in ["accel_x","accel_y","accel_z"] { s.edit(n, a.clone(), |x| x/1640.0/9.81) } for n in ["gyro_x","gyro_y","gyro_z"] { s.edit(n, a.clone(), |x| x/5000.0) } });
+    go("raw dps SI hand", &hand, &|s| { s.set("raw_unit", "\"SI\""); let a = s.all(); for n in ["accel_x","accel_y","accel_z"] { s.edit(n, a.clone(), |x| x/1640.0) } for n in ["gyro_x","gyro_y","gyro_z"] { s.edit(n, a.clone(), |x| x/5000.0*57.3) } });
+    go("counts as SI", &hand, &|s| { s.set("raw_unit", "\"SI\""); });
     go("gravity 1", &hand, &|s| s.set("gravity_mps2", "1.0"));
-    go("table as gravity", &table, &|s| {
-        s.set("reference", "\"gravity\"")
-    });
+    go("table as gravity", &table, &|s| s.set("reference", "\"gravity\""));
     go("hand as table", &hand, &|s| s.set("reference", "\"table\""));
     go("unknown key", &hand, &|s| s.set("sample_rate", "3"));
-    go("no gyro", &hand, &|s| {
-        s.names.drain(1..4);
-        for r in &mut s.rows {
-            r.drain(1..4);
-        }
-    });
-    go("no accel", &hand, &|s| {
-        s.names.drain(4..7);
-        for r in &mut s.rows {
-            r.drain(4..7);
-        }
-    });
-    go("one step wrong ref sign", &table, &|s| {
-        let a = s.dwells[4].clone();
-        s.edit("ref_rate_x_dps", a, |x| -x)
-    });
-    go("step shifted by one", &table, &|s| {
-        let n = s.rows.len();
-        for i in (40..n).rev() {
-            for c in 1..8 {
-                s.rows[i][c] = s.rows[i - 40][c];
-            }
-        }
-    });
-    go("noiseless", &hand, &|s| s.set("device", "\"a\\nb\""));
-    go("huge", &hand, &|s| s.edit("accel_x", 100..101, |_| 1e308));
-    go("tiny", &hand, &|s| s.edit("accel_x", 100..101, |_| 1e-320));
-    go("outlier", &hand, &|s| s.edit("accel_x", 100..101, |_| 1e9));
-    go("outlier in turn gyro", &hand, &|s| {
-        let t = s.turn(2);
-        s.edit("gyro_x", t.start + 70..t.start + 71, |_| 32767.0)
-    });
-    show(
-        "twelve still rows",
-        &{
-            let mut s = hand.clone();
-            s.rows.truncate(12);
-            s
-        },
-        &[],
-    );
-    show(
-        "one row",
-        &{
-            let mut s = hand.clone();
-            s.rows.truncate(1);
-            s
-        },
-        &[],
-    );
-    show(
-        "one pose",
-        &{
-            let mut s = hand.clone();
-            s.rows.truncate(300);
-            s
-        },
-        &[],
-    );
-    go("steps every row", &table, &|s| {
-        let c = s.column("step");
-        for (i, r) in s.rows.iter_mut().enumerate() {
-            r[c] = i as f64;
-        }
-    });
-    go("all in transit", &table, &|s| {
-        let a = s.all();
-        s.edit("step", a, |_| -1.0)
-    });
-    go("short steps", &table, &|s| {
-        for d in s.dwells.clone() {
-            s.edit("step", d.start + 50..d.end, |_| -1.0)
-        }
-    });
-    go("big time offset", &hand, &|s| {
-        let a = s.all();
-        s.edit("t_s", a, |t| t + 1.7e9)
-    });
-    go("negative time", &hand, &|s| {
-        let a = s.all();
-        s.edit("t_s", a, |t| t - 1000.0)
-    });
-    go("time jump 1e15", &hand, &|s| {
-        let a = s.rows.len() / 2..s.rows.len();
-        s.edit("t_s", a, |t| t + 1e15)
-    });
-    go("time jump day", &hand, &|s| {
-        let a = s.rows.len() / 2..s.rows.len();
-        s.edit("t_s", a, |t| t + 86400.0)
-    });
-}
-
-#[test]
-fn coverage() {
-    for poses in [10, 12, 20] {
-        let mut inside = [[0usize; 2]; 2];
-        let mut all = [0usize; 2];
-        let mut worst = [0.0f64; 2];
-        for seed in 100..160 {
-            let run = Place::with(&by_hand_at(poses, seed, Random::direction))
-                .fit(&["--holdout", "blocks=2"]);
-            if run.status != Some(0) {
-                println!("{poses} {seed}: {}", run.stderr);
-                continue;
-            }
-            let v = run.json();
-            for (k, s) in ["gyro", "accel"].iter().enumerate() {
-                let (p, b) = if k == 0 {
-                    (GYRO_P, GYRO_B)
-                } else {
-                    (ACCEL_P, ACCEL_B)
-                };
-                let c = inverse(&p);
-                let o = times(&c, &b).map(|x| -x);
-                for q in v["sensors"][s]["parameters"]
-                    .as_array()
-                    .unwrap()
-                    .iter()
-                    .take(12)
-                {
-                    let n = q["name"].as_str().unwrap();
-                    let ix = |ch: char| "xyz".find(ch).unwrap();
-                    let ch: Vec<char> = n.chars().collect();
-                    let truth = if ch[0] == 'C' {
-                        c[ix(ch[2])][ix(ch[3])]
-                    } else {
-                        o[ix(ch[2])]
-                    };
-                    let half = 0.5 * (q["upper"].as_f64().unwrap() - q["lower"].as_f64().unwrap());
-                    if half == 0.0 {
-                        continue;
-                    }
-                    let d = (q["value"].as_f64().unwrap() - truth).abs() / half;
-                    all[k] += 1;
-                    inside[k][0] += usize::from(d < 1.0);
-                    inside[k][1] += usize::from(d < 2.0);
-                    worst[k] = worst[k].max(d);
-                }
-            }
-        }
-        for k in 0..2 {
-            println!(
-                "COVER {poses} poses {}: {:.3} within 1, {:.4} within 2, worst {:.2} of {}",
-                ["gyro", "accel"][k],
-                inside[k][0] as f64 / all[k] as f64,
-                inside[k][1] as f64 / all[k] as f64,
-                worst[k],
-                all[k]
-            );
-        }
-    }
+    go("no gyro", &hand, &|s| { s.names.drain(1..4); for r in &mut s.rows { r.drain(1..4); } });
+    go("no accel", &hand, &|s| { s.names.drain(4..7); for r in &mut s.rows { r.drain(4..7); } });
+    go("one step wrong ref sign", &table, &|s| { let a = s.dwells[4].clone(); s.edit("ref_rate_x_dps", a, |x| -x) });
+    go("step shifted by one", &table, &|s| { let n = s.rows.len(); for i in (40..n).rev() { for c in 1..8 { s.rows[i][c] = s.rows[i-40][c]; } } });
+    go("noiseless", &hand, &|s| { s.set("device", "\"a\\nb\"") });
+    go("huge", &hand, &|s| { s.edit("accel_x", 100..101, |_| 1e308) });
+    go("tiny", &hand, &|s| { s.edit("accel_x", 100..101, |_| 1e-320) });
+    go("outlier", &hand, &|s| { s.edit("accel_x", 100..101, |_| 1e9) });
+    go("outlier in turn gyro", &hand, &|s| { let t = s.turn(2); s.edit("gyro_x", t.start+70..t.start+71, |_| 32767.0) });
+    show("twelve still rows", &{ let mut s = hand.clone(); s.rows.truncate(12); s }, &[]);
+    show("one row", &{ let mut s = hand.clone(); s.rows.truncate(1); s }, &[]);
+    show("one pose", &{ let mut s = hand.clone(); s.rows.truncate(300); s }, &[]);
+    go("steps every row", &table, &|s| { let c = s.column("step"); for (i, r) in s.rows.iter_mut().enumerate() { r[c] = i as f64; } });
+    go("all in transit", &table, &|s| { let a = s.all(); s.edit("step", a, |_| -1.0) });
+    go("short steps", &table, &|s| { for d in s.dwells.clone() { s.edit("step", d.start+50..d.end, |_| -1.0) } });
+    go("big time offset", &hand, &|s| { let a = s.all(); s.edit("t_s", a, |t| t + 1.7e9) });
+    go("negative time", &hand, &|s| { let a = s.all(); s.edit("t_s", a, |t| t - 1000.0) });
+    go("time jump 1e15", &hand, &|s| { let a = s.rows.len()/2..s.rows.len(); s.edit("t_s", a, |t| t + 1e15) });
+    go("time jump day", &hand, &|s| { let a = s.rows.len()/2..s.rows.len(); s.edit("t_s", a, |t| t + 86400.0) });
 }
