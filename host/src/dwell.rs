@@ -176,6 +176,8 @@ pub struct Dwells {
     pub detection: Option<Detection>,
     /// Rails of the six channels, as declared or as found.
     pub rails: [Rails; 6],
+    /// Longest run of equal samples that chance explains, of the six channels; infinite where nothing can be told.
+    pub longest_run: [f64; 6],
     /// What a person should know.
     pub warnings: Vec<String>,
 }
@@ -199,7 +201,9 @@ impl Dwells {
     /// The dwells of a recording. `still_factor`: see [`STILL_FACTOR`].
     pub fn find(condensed: &Condensed, manifest: &Manifest, still_factor: f64) -> Result<Self> {
         let mut warnings = Vec::new();
-        let rails = rails(condensed, manifest, &mut warnings);
+        let longest_run = [0, 1, 2, 3, 4, 5]
+            .map(|c| longest_run_by_chance(condensed, c).unwrap_or(f64::INFINITY));
+        let rails = rails(condensed, manifest, &longest_run, &mut warnings);
         let (ranges, detection) = if condensed.has_steps {
             (by_step(condensed), None)
         } else {
@@ -231,12 +235,13 @@ impl Dwells {
             };
             return Err(Error::new("dwells", problem, remedy));
         }
-        judge(&mut list, condensed, detection.is_none());
+        judge(&mut list, condensed, &longest_run, detection.is_none());
         warn(&list, manifest, &mut warnings);
         Ok(Self {
             list,
             detection,
             rails,
+            longest_run,
             warnings,
         })
     }
@@ -288,7 +293,7 @@ fn by_stillness(
     if blocks.len() < width {
         let problem = format!(
             "the recording lasts {:.2} s, less than the {WINDOW_S} s in which stillness shows",
-            blocks.len() as f64 * block_s
+            condensed.rows as f64 * condensed.period_s
         );
         return Err(Error::new("dwells", problem, "record for longer"));
     }
@@ -499,7 +504,7 @@ fn dwell(condensed: &Condensed, step: i32, range: Range<usize>, rails: &[Rails; 
 }
 
 /// Finds out which dwells are no good for which sensor.
-fn judge(list: &mut [Dwell], condensed: &Condensed, given: bool) {
+fn judge(list: &mut [Dwell], condensed: &Condensed, longest_run: &[f64; 6], given: bool) {
     for sensor in Sensor::BOTH {
         let channels = || sensor.channels().filter(|&c| condensed.has_raw[c]);
         let typical: Vec<f64> = channels()
@@ -508,9 +513,6 @@ fn judge(list: &mut [Dwell], condensed: &Condensed, given: bool) {
                 quantile(&mut all, 0.5).unwrap_or(0.0)
             })
             .collect();
-        let longest_chance = channels()
-            .map(|c| longest_run_by_chance(condensed, c))
-            .collect::<Vec<_>>();
         for dwell in list.iter_mut() {
             // A turn of known angle has a known mean rate, and is anything but still.
             let turn = dwell.turn;
@@ -522,7 +524,7 @@ fn judge(list: &mut [Dwell], condensed: &Condensed, given: bool) {
                     Some(Fault::Missing(c))
                 } else if mean.clipped as f64 > CLIPPED_SHARE * dwell.rows as f64 {
                     Some(Fault::Saturated(c))
-                } else if constant && longest_chance[k].is_some_and(|n| mean.n as f64 > n) {
+                } else if constant && mean.n as f64 > longest_run[c] {
                     Some(Fault::Stuck(c))
                 } else if given
                     && !turn
@@ -613,7 +615,12 @@ fn longest_run_by_chance(condensed: &Condensed, c: usize) -> Option<f64> {
 
 /// Rails of the six channels: as declared, at the ends of a 16-bit code, or where the largest or smallest
 /// value of a whole recording is repeated more often in a row than chance allows.
-fn rails(condensed: &Condensed, manifest: &Manifest, warnings: &mut Vec<String>) -> [Rails; 6] {
+fn rails(
+    condensed: &Condensed,
+    manifest: &Manifest,
+    longest_run: &[f64; 6],
+    warnings: &mut Vec<String>,
+) -> [Rails; 6] {
     let mut rails = [Rails::default(); 6];
     for (c, rail) in rails.iter_mut().enumerate() {
         if !condensed.has_raw[c] {
@@ -638,9 +645,7 @@ fn rails(condensed: &Condensed, manifest: &Manifest, warnings: &mut Vec<String>)
         };
         let high = moments().map(|m| m.max).fold(f64::NEG_INFINITY, f64::max);
         let low = moments().map(|m| m.min).fold(f64::INFINITY, f64::min);
-        let Some(chance) = longest_run_by_chance(condensed, c) else {
-            continue;
-        };
+        let chance = longest_run[c];
         if low == high {
             continue;
         }

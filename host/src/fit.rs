@@ -129,13 +129,13 @@ impl Prepared {
                     if blocks.iter().any(|b| rails.touched_by(&b.raw[c])) {
                         Some(format!("gyro_{axis} is at its rail"))
                     } else {
-                        // Hands do not keep a code for a tenth of a second while others move.
-                        let stuck = blocks
-                            .iter()
-                            .filter(|b| b.raw[c].n > 3 && b.raw[c].m2 == 0.0)
-                            .count();
-                        let alive = blocks.iter().any(|b| (0..3).any(|k| b.raw[k].m2 > 0.0));
-                        (stuck > blocks.len() / 2 && alive).then(|| format!("gyro_{axis} is stuck"))
+                        // Hands do not keep a code for a tenth of a second.
+                        let chance = self.dwells.longest_run[c];
+                        let stuck = |m: &crate::blocks::Moments| {
+                            m.m2 == 0.0 && m.n > 3 && f64::from(m.n) > chance
+                        };
+                        let stuck = blocks.iter().any(|b| stuck(&b.raw[c]));
+                        stuck.then(|| format!("gyro_{axis} is stuck"))
                     }
                 })
             };

@@ -3,6 +3,7 @@
 //! Swapped columns, a wrong unit, one dwell with the wrong input: each leaves a trace, and each would otherwise end in a
 //! calibration file. What cannot be right is refused; what may be meant is a warning.
 
+use crate::blocks::counted;
 use crate::dwell::Sensor;
 use crate::error::{Error, Result};
 use crate::estimate::Failure;
@@ -75,16 +76,17 @@ fn refuse_unrelated(prepared: &Prepared, fit: &SensorFit) -> Result<()> {
         Figure::GravitySize => "the size of gravity",
         Figure::Direction => "the turns of gravity",
     };
+    let how = match share < 1.0 {
+        true => format!(": {:.0} % is left over", 100.0 * share),
+        false => " at all".to_string(),
+    };
     let worst = match worst_first(fit).first() {
-        Some(worst) => format!(", the most in dwell {}", name(prepared, worst)),
+        Some(worst) => format!(", dwell {} the least", name(prepared, worst)),
         None => String::new(),
     };
     Err(Error::new(
         format!("{}, {}", prepared.place, fit.sensor),
-        format!(
-            "the readings do not follow {against}: {:.0} % is left over{worst}",
-            100.0 * share
-        ),
+        format!("the readings do not follow {against}{how}{worst}"),
         "check that no columns are swapped and that every step has its own input",
     ))
 }
@@ -115,16 +117,15 @@ fn outliers(prepared: &Prepared, fit: &SensorFit) -> Option<String> {
     let bad: Vec<_> = sorted.iter().take_while(off).collect();
     let worst = bad.first()?;
     let names: Vec<String> = bad.iter().take(8).map(|r| name(prepared, r)).collect();
-    let what = match (fit.figure, bad.len()) {
-        (Figure::Direction, 1) => "the turn that ends in dwell",
-        (Figure::Direction, _) => "the turns that end in dwells",
-        (_, 1) => "dwell",
-        (_, _) => "dwells",
+    let what = match fit.figure {
+        Figure::Direction => "turn to dwell",
+        _ => "dwell",
     };
     let more = if bad.len() > names.len() { ", ..." } else { "" };
     Some(format!(
-        "{}: {what} {}{more} stand out: the error is up to {} {}, {:.0} times the median; look at them, as they widen all intervals",
+        "{}: {} ({what} {}{more}): off by up to {} {}, {:.0} times the median; look for the cause, as it widens all intervals",
         fit.sensor,
+        counted(bad.len() as u64, "outlier"),
         names.join(", "),
         three(worst.value.norm()),
         fit.figure.unit(fit.sensor),

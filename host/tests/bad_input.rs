@@ -529,3 +529,34 @@ fn explore() {
     go("time jump 1e15", &hand, &|s| { let a = s.rows.len()/2..s.rows.len(); s.edit("t_s", a, |t| t + 1e15) });
     go("time jump day", &hand, &|s| { let a = s.rows.len()/2..s.rows.len(); s.edit("t_s", a, |t| t + 86400.0) });
 }
+#[test]
+fn explore2() {
+    let show = |name: &str, s: &Samples, args: &[&str]| {
+        let run = Place::with(s).fit(args);
+        println!("== {name}: {:?} {}", run.status, run.stderr.trim());
+        if run.status == Some(0) {
+            let v = run.json();
+            for k in ["gyro", "accel"] {
+                let x = &v["sensors"][k];
+                if x.is_null() { println!("   {k}: none"); continue; }
+                println!("   {k}: distance {:.2} rms {} held {} floor {} cond {} static {} dwells {}", distance(&v, k), x["rms"], x["held_out_rms"], x["noise_floor"], x["condition"], x["static_rms"], x["dwells"]);
+            }
+            for w in warnings(&v) { println!("   W {w}"); }
+        }
+    };
+    for (name, f) in [("constant", (|_t: f64| 0.5) as fn(f64)->f64), ("slow mod", |t| 0.3+0.25*(t*0.5).sin()), ("fast mod", |t| 0.3+0.3*(t*2.0).sin()), ("stop go", |t| 0.4*(t*0.8).sin()), ("creep", |t| if (t % 4.5) < 3.0 { 0.03 } else { 1.2*(1.0-(2.0*PI*((t%4.5)-3.0)/1.5).cos()) })] {
+        let mut out = Samples::new("gravity", "t_s,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z");
+        let mut r = Random(4);
+        let mut a = Attitude([1.0,0.0,0.0,0.0]);
+        for k in 0..9000 {
+            let t = k as f64/100.0;
+            let axis = [ (0.13*t).sin(), (0.21*t+1.0).cos(), (0.17*t+2.0).sin() ];
+            let size = axis.iter().map(|a| a * a).sum::<f64>().sqrt();
+            let w = f(t);
+            let rate = axis.map(|x| x/size*w);
+            out.push(vec![t], &mut r, &rate, &a.gravity());
+            a = a.then(Attitude::about(axis, w*0.01));
+        }
+        show(name, &out, &[]);
+    }
+}

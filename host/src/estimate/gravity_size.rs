@@ -11,6 +11,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, SVector, Vector3};
 
 use super::least_squares::{Linearized, Observability, excess_variance, minimize};
 use super::{AXES, Estimated, Failure, Observation};
+use crate::blocks::counted;
 use crate::triad::{Covariance, Triad};
 
 /// Number of parameters: six of C, three of o.
@@ -49,6 +50,21 @@ impl Sphere {
     }
 }
 
+/// Extent of the readings across a plane over that along it, below which they lie in it.
+const FLAT: f64 = 0.01;
+
+/// The axis that the plane through the readings is across, if they lie in one: some sensor has not seen gravity.
+fn flat(observations: &[Observation]) -> Option<usize> {
+    let mean = observations.iter().map(|o| o.raw).sum::<Vector3<f64>>() / observations.len() as f64;
+    let products = observations
+        .iter()
+        .map(|o| (o.raw - mean) * (o.raw - mean).transpose());
+    let eigen = products.sum::<Matrix3<f64>>().symmetric_eigen();
+    let thin = eigen.eigenvalues.imin();
+    (eigen.eigenvalues[thin] < FLAT * FLAT * eigen.eigenvalues.max())
+        .then(|| eigen.eigenvectors.column(thin).iamax())
+}
+
 /// Fits C and o to `|C u + o| = gravity` (m/s²) over all observations.
 pub fn estimate(observations: &[Observation], gravity: f64) -> Result<Estimated, Failure> {
     let n = observations.len();
@@ -59,7 +75,17 @@ pub fn estimate(observations: &[Observation], gravity: f64) -> Result<Estimated,
                 PARAMETERS - n
             ),
             add: format!(
-                "{n} still poses can be used, and without a table at least {PARAMETERS} different ones are needed: add poses, each axis up and down and between"
+                "{} can be used, and without a table at least {PARAMETERS} different ones are needed: add poses, each axis up and down and between",
+                counted(n as u64, "still pose")
+            ),
+        });
+    }
+    if let Some(axis) = flat(observations) {
+        let axis = AXES[axis];
+        return Err(Failure::Undetermined {
+            parameters: format!("what the sensor {axis} measures"),
+            add: format!(
+                "all poses lie in one plane across {axis}: add poses with {axis} up, down and slanted, and check that the column accel_{axis} is what it says"
             ),
         });
     }

@@ -117,6 +117,8 @@ fn sensor_json(fit: &Fit, sensor: &SensorFit) -> Value {
         "figure": crate::calibration::figure(sensor.figure),
         "dwells": sensor.dwells,
         "condition": sensor.estimated.condition,
+        "interval_95": sensor.estimated.triad.coverage_factor,
+        "small_angle": small_angle(sensor),
         "scatter": scatter,
         "not_held_out": sensor.not_held_out,
         "residuals": residuals,
@@ -126,6 +128,18 @@ fn sensor_json(fit: &Fit, sensor: &SensorFit) -> Value {
         value["static_held_out_rms"] = json!(held_out);
     }
     value
+}
+
+/// Physical quantities to first order in the angles, fang (14): for comparison with what others publish.
+fn small_angle(sensor: &SensorFit) -> Value {
+    let physical = sensor.estimated.triad.physical(Angles::Small);
+    let both = |t: &[Estimate; 3]| json!({ "value": t.map(|e| e.value), "sigma": t.map(|e| e.sigma) });
+    json!({
+        "scale": both(&physical.scale),
+        "bias": both(&physical.bias),
+        "misalignment_rad": both(&physical.misalignment),
+        "non_orthogonality_yz_zy_zx_rad": both(&physical.non_orthogonality),
+    })
 }
 
 fn parameters(raw: RawUnit, sensor: &SensorFit) -> Vec<Parameter> {
