@@ -104,6 +104,15 @@ impl Prepared {
             .collect()
     }
 
+    /// Variances of the size of specific force over each of `poses` by noise, (m/s²)².
+    pub fn size_variances(&self, accel: &Affine<f64>, poses: &[Observation]) -> Vec<f64> {
+        let noise = Noise::of_size(&self.dwells.list, &self.condensed, accel);
+        poses
+            .iter()
+            .map(|o| noise.variance(self.dwells.list[o.dwell].duration_s))
+            .collect()
+    }
+
     /// Turns between usable dwells, with the directions of gravity by `accel`; also how many could not be used and why.
     pub fn turns(&self, accel: &Affine<f64>) -> (Vec<Turn<'_>>, Vec<String>) {
         let increments = &self.condensed.increments;
@@ -599,27 +608,30 @@ fn fit_gravity(
         ));
     }
     refuse_wrong_gravity(prepared, Sensor::Accel, &poses)?;
-    let accel =
-        gravity_size::estimate(&poses, g).map_err(|f| prepared.refused(f, Sensor::Accel))?;
+    let variances = |accel: &Affine<f64>| prepared.size_variances(accel, &poses);
+    let by_sphere = gravity_size::first_guess(&poses, g)
+        .map_or_else(|| vec![0.0; poses.len()], |a| variances(&a));
+    let accel = gravity_size::estimate(&poses, &by_sphere, g)
+        .map_err(|f| prepared.refused(f, Sensor::Accel))?;
+    let floors = variances(&accel.triad.inverse);
     let all_dwells = prepared.dwells.list.len();
     let blocks = options.holdout_blocks.min(poses.len());
     let block = |dwell: usize| block_of(dwell, all_dwells, blocks);
     let accel_refits = refit(blocks, |b| {
-        let kept: Vec<_> = poses
+        let kept = poses
             .iter()
-            .filter(|o| block(o.dwell) != b)
-            .copied()
-            .collect();
-        gravity_size::estimate(&kept, g)
+            .zip(&by_sphere)
+            .filter(|(o, _)| block(o.dwell) != b);
+        let (kept, variances): (Vec<_>, Vec<_>) = kept.map(|(o, v)| (*o, *v)).unzip();
+        gravity_size::estimate(&kept, &variances, g)
     });
     let size_error = |triad: &Triad, o: &Observation| {
         Vector3::new(triad.inverse.apply(&o.raw).norm() - g, 0.0, 0.0)
     };
     let residuals = poses
         .iter()
-        .map(|o| {
-            let up = accel.triad.inverse.apply(&o.raw).normalize();
-            let covariance = si_covariance(&accel.triad.inverse.matrix, &o.variance);
+        .zip(&floors)
+        .map(|(o, floor)| {
             let refit = accel_refits
                 .get(block(o.dwell))
                 .and_then(|r| r.as_ref().ok());
@@ -627,7 +639,7 @@ fn fit_gravity(
                 dwell: o.dwell,
                 value: size_error(&accel.triad, o),
                 held_out: refit.map(|r| size_error(&r.triad, o)),
-                floor: up.dot(&(covariance * up)).sqrt(),
+                floor: floor.sqrt(),
             }
         })
         .collect();

@@ -5,7 +5,9 @@
 
 use nalgebra::Vector3;
 
-use crate::blocks::Condensed;
+use mimu_core::compensation::Affine;
+
+use crate::blocks::{Block, Condensed};
 use crate::dwell::{Dwell, Sensor};
 
 /// Allan variance of one raw channel as `N²/τ + B² + K² τ`: white noise, bias instability and rate
@@ -74,11 +76,25 @@ impl Noise {
                     let usable = dwells
                         .iter()
                         .filter(|d| d.fault(sensor).is_none() && !d.turn);
-                    channels[c] = of_channel(usable, condensed, c);
+                    channels[c] = within(usable, condensed, |b| {
+                        (b.raw[c].n > 0).then_some(b.raw[c].mean)
+                    });
                 }
             }
         }
         Self { channels }
+    }
+
+    /// Noise of the size of specific force, m/s², as `accel` gives it: what a fit to the size of gravity sees. A unit that
+    /// creeps on its support tilts, which shows in the channels and not in the size.
+    pub fn of_size(dwells: &[Dwell], condensed: &Condensed, accel: &Affine<f64>) -> ChannelNoise {
+        let from = Sensor::Accel.channels().start;
+        let usable = dwells.iter().filter(|d| d.accel_fault.is_none() && !d.turn);
+        within(usable, condensed, |b| {
+            let raw = Vector3::from_fn(|i, _| b.raw[from + i].mean);
+            let all = (0..3).all(|i| b.raw[from + i].n > 0);
+            all.then(|| accel.apply(&raw).norm())
+        })
     }
 
     /// Variances of the mean reading of `sensor` over `dwell`, raw units squared.
@@ -92,10 +108,11 @@ impl Noise {
     }
 }
 
-fn of_channel<'a>(
+/// Noise of `value` of the blocks within `dwells`.
+fn within<'a>(
     dwells: impl Iterator<Item = &'a Dwell>,
     condensed: &Condensed,
-    c: usize,
+    value: impl Fn(&Block) -> Option<f64>,
 ) -> ChannelNoise {
     let rows = condensed.blocks.iter().map(|b| b.rows).max().unwrap_or(1);
     let block_s = f64::from(rows) * condensed.period_s;
@@ -105,8 +122,8 @@ fn of_channel<'a>(
         let blocks = &condensed.blocks[dwell.blocks.clone()];
         let means: Vec<f64> = blocks
             .iter()
-            .filter(|b| b.rows == rows && b.raw[c].n > 0)
-            .map(|b| b.raw[c].mean)
+            .filter(|b| b.rows == rows)
+            .filter_map(&value)
             .collect();
         let mut sums = Vec::with_capacity(means.len() + 1);
         sums.push(0.0);
@@ -160,34 +177,66 @@ const MISFIT_SIGMAS: f64 = 4.0;
 /// Points with fewer independent differences than this decide nothing: their variance is known to a half only.
 const CURVE_DIFFERENCES: f64 = 8.0;
 
-/// What a further term must lower chi-square by: significant at 0.5 %.
-const TERM_CHI2: f64 = 8.0;
+/// What a further term must lower the deviance by: significant at 0.5 %.
+const TERM_DEVIANCE: f64 = 8.0;
 
-/// Weighted non-negative least squares of the three terms to `(tau, variance, weight)`.
+/// Fits the three terms to `(tau, variance, number of independent differences)`, none of them negative.
 ///
-/// Each point counts by its relative error, which is `√(2/weight)`; with three terms every subset can be tried. A term
-/// that does not lower chi-square by [`TERM_CHI2`] is left out: taken whenever it is positive, the noise of the curve
-/// alone made the means of white noise 9 % too noisy.
+/// A variance of n differences is gamma distributed, and that likelihood is maximized (iterated least squares, weighted by
+/// the model). Weights by the measured variance would let one small value from two differences outweigh a hundred.
+/// With three terms every subset can be tried. A term that does not lower the deviance by [`TERM_DEVIANCE`] is left out:
+/// taken whenever it is positive, the noise of the curve alone made the means of white noise 9 % too noisy.
 fn fit(points: &[(f64, f64, f64)]) -> AllanModel {
+    let points: Vec<_> = points.iter().filter(|p| p.1 > 0.0).collect();
     let mut best = (f64::INFINITY, AllanModel::default());
     for subset in 1..8usize {
         let terms: Vec<usize> = (0..3).filter(|k| subset & (1 << k) != 0).collect();
         if terms.len() > points.len() {
             continue;
         }
-        let weigh = |p: &(f64, f64, f64)| (0.5 * p.2).sqrt() / p.1.max(f64::MIN_POSITIVE);
         let basis = |tau: f64, k: usize| [1.0 / tau, 1.0, tau][k];
         let a = nalgebra::DMatrix::from_fn(points.len(), terms.len(), |i, j| {
-            weigh(&points[i]) * basis(points[i].0, terms[j])
+            basis(points[i].0, terms[j])
         });
-        let y = nalgebra::DVector::from_fn(points.len(), |i, _| weigh(&points[i]) * points[i].1);
-        let Ok(x) = a.clone().svd(true, true).solve(&y, 1e-14) else {
-            continue;
-        };
-        if x.iter().any(|v| !(*v >= 0.0)) {
+        let y = nalgebra::DVector::from_fn(points.len(), |i, _| points[i].1);
+        let mut model = y.clone();
+        let mut x = nalgebra::DVector::zeros(terms.len());
+        for _ in 0..50 {
+            let weights = nalgebra::DVector::from_fn(points.len(), |i, _| {
+                (0.5 * points[i].2).sqrt() / model[i]
+            });
+            let mut weighted = a.clone();
+            for (mut row, w) in weighted.row_iter_mut().zip(weights.iter()) {
+                row *= *w;
+            }
+            // Columns differ by the square of the longest time: scaled, or the smallest is lost.
+            let scale: Vec<f64> = weighted.column_iter().map(|c| c.norm()).collect();
+            for (mut column, s) in weighted.column_iter_mut().zip(&scale) {
+                column /= *s;
+            }
+            let Ok(scaled) = weighted
+                .svd(true, true)
+                .solve(&y.component_mul(&weights), 1e-12)
+            else {
+                break;
+            };
+            let next = nalgebra::DVector::from_fn(terms.len(), |j, _| scaled[j] / scale[j]);
+            let done = (&next - &x).amax() <= 1e-9 * next.amax();
+            x = next;
+            model = (&a * &x).zip_map(&y, |m, v| m.max(1e-3 * v));
+            if done {
+                break;
+            }
+        }
+        if x.iter().any(|v| !(*v > 0.0)) {
             continue;
         }
-        let cost = (a * &x - y).norm_squared() + TERM_CHI2 * terms.len() as f64;
+        let deviance: f64 = points
+            .iter()
+            .zip(model.iter())
+            .map(|(p, m)| p.2 * (p.1 / m - 1.0 - (p.1 / m).ln()))
+            .sum();
+        let cost = deviance + TERM_DEVIANCE * terms.len() as f64;
         if cost < best.0 {
             let mut coefficients = [0.0; 3];
             for (k, v) in terms.iter().zip(x.iter()) {

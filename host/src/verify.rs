@@ -167,14 +167,8 @@ fn size(prepared: &Prepared, triad: &Triad) -> Option<SensorVerification> {
             .map(|o| model.apply(&o.raw).norm() - g)
             .collect()
     };
-    let floor: Vec<f64> = observations
-        .iter()
-        .map(|o| {
-            let up = triad.inverse.apply(&o.raw).normalize();
-            up.dot(&(si_covariance(&triad.inverse.matrix, &o.variance) * up))
-                .sqrt()
-        })
-        .collect();
+    let variances = prepared.size_variances(&triad.inverse, &observations);
+    let floor: Vec<f64> = variances.iter().map(|v| v.sqrt()).collect();
     let after = errors(&triad.inverse);
     (!after.is_empty()).then(|| SensorVerification {
         sensor: Sensor::Accel,

@@ -72,17 +72,20 @@ impl Foreign<'_> {
 
     /// Imports it, finds its dwells and fits it by `method`, judged by four blocks left out in turn.
     pub fn fit(&self, method: Method) -> Result<Fit> {
+        self.fit_where_still(method, mimu::dwell::STILL_FACTOR)
+    }
+
+    /// The same with `--still`.
+    pub fn fit_where_still(&self, method: Method, still_factor: f64) -> Result<Fit> {
         let folder = TempDir::new().expect("there is a temporary folder");
         let recording = self.import(&folder)?;
         let options = Options {
             method,
             holdout_blocks: 4,
-            still_factor: mimu::dwell::STILL_FACTOR,
+            still_factor,
         };
-        fit(
-            Prepared::read(&recording, options.still_factor, |_| {})?,
-            options,
-        )
+        let prepared = Prepared::read(&recording, still_factor, |_| {})?;
+        fit(prepared, options)
     }
 }
 

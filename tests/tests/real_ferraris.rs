@@ -25,14 +25,23 @@ fn inputs(turn_deg: Option<f64>) -> String {
     text.push('\n');
     let axes = ["x", "y", "z"];
     let along = |axis: usize, value: f64| -> String {
-        let cells: [String; 3] =
-            std::array::from_fn(|k| if k == axis { value.to_string() } else { "0".into() });
+        let cells: [String; 3] = std::array::from_fn(|k| {
+            if k == axis {
+                value.to_string()
+            } else {
+                "0".into()
+            }
+        });
         cells.join(",")
     };
     for (axis, name) in axes.iter().enumerate() {
         for (end, force) in [("p", GRAVITY), ("a", -GRAVITY)] {
             let _ = write!(text, "{name}_{end},{}", along(axis, force));
-            text += if turn_deg.is_some() { ",0,0,0,,,\n" } else { "\n" };
+            text += if turn_deg.is_some() {
+                ",0,0,0,,,\n"
+            } else {
+                "\n"
+            };
         }
     }
     if let Some(angle) = turn_deg {
@@ -59,8 +68,14 @@ impl Published {
         let matrix = |key: &str| Matrix3::from_fn(|i, j| number(&json[key][i][j]));
         let vector = |key: &str| Vector3::from_fn(|i, _| number(&json[key][i]));
         Self {
-            accel: Affine { matrix: matrix("K_a") * matrix("R_a"), offset: vector("b_a") },
-            gyro: Affine { matrix: matrix("K_g") * matrix("R_g") * turn_sign, offset: vector("b_g") },
+            accel: Affine {
+                matrix: matrix("K_a") * matrix("R_a"),
+                offset: vector("b_a"),
+            },
+            gyro: Affine {
+                matrix: matrix("K_g") * matrix("R_g") * turn_sign,
+                offset: vector("b_g"),
+            },
             k_ga: matrix("K_ga"),
         }
     }
@@ -129,8 +144,9 @@ fn annotated() -> Option<Session> {
             continue;
         };
         part.seconds += 1.0 / rate_hz;
-        part.accel
-            .push(Vector3::from_fn(|i, _| cells[2 + i].parse().expect("a number")));
+        part.accel.push(Vector3::from_fn(|i, _| {
+            cells[2 + i].parse().expect("a number")
+        }));
     }
     let foreign = Foreign {
         // The parts stand in the order of their names, so the running number of a sample is no time.
@@ -194,7 +210,11 @@ fn uninterrupted() -> Option<(Session, Samples)> {
         let label = ranges.iter().find(|(_, rows)| rows.contains(&k));
         let (g, a) = (samples.gyro[k], samples.accel[k]);
         let label = label.map_or("", |(name, _)| name);
-        let _ = writeln!(text, "{label},{k},{},{},{},{},{},{}", g.x, g.y, g.z, a.x, a.y, a.z);
+        let _ = writeln!(
+            text,
+            "{label},{k},{},{},{},{},{},{}",
+            g.x, g.y, g.z, a.x, a.y, a.z
+        );
     }
     let file = folder.path().join("labelled.csv");
     std::fs::write(&file, text).expect("the temporary folder is writable");
@@ -207,7 +227,10 @@ fn uninterrupted() -> Option<(Session, Samples)> {
         })
         .collect();
     let foreign = Foreign {
-        files: vec![(file, "step,sample,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z")],
+        files: vec![(
+            file,
+            "step,sample,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z",
+        )],
         rate_hz: Some(SESSION_RATE_HZ),
         gravity_mps2: GRAVITY,
         raw_unit: RawUnit::Count,
@@ -246,7 +269,13 @@ fn print_matrices(title: &str, ours: &Matrix3<f64>, theirs: &Matrix3<f64>) {
         let row = |m: &Matrix3<f64>, digits: usize| -> String {
             (0..3).map(|j| format!("{:9.digits$}", m[(i, j)])).collect()
         };
-        println!("{:>24}{}   {}   {}", "", row(ours, 4), row(theirs, 4), row(&(ours - theirs), 5));
+        println!(
+            "{:>24}{}   {}   {}",
+            "",
+            row(ours, 4),
+            row(theirs, 4),
+            row(&(ours - theirs), 5)
+        );
     }
 }
 
@@ -258,7 +287,11 @@ fn the_six_position_method_gives_the_diagonals_of_imucal() {
         println!("\n{name}: scale factor and bias by six positions");
         for i in 0..3 {
             let (s, b) = (ours.matrix[(i, i)], ours.offset[i]);
-            println!("{s:12.6} {:12.6}   {b:11.6} {:11.6}", theirs.matrix[(i, i)], theirs.offset[i]);
+            println!(
+                "{s:12.6} {:12.6}   {b:11.6} {:11.6}",
+                theirs.matrix[(i, i)],
+                theirs.offset[i]
+            );
             // Both are (u+ - u-)/2g and (u+ + u-)/2 of the same means: equal to the rounding of sums over a thousand samples.
             assert!((s - theirs.matrix[(i, i)]).abs() < 1e-9 * s, "{s}");
             assert!((b - theirs.offset[i]).abs() < 1e-9 * s * GRAVITY, "{b}");
@@ -273,7 +306,11 @@ fn least_squares_on_six_faces_is_imucals_matrix_and_the_mean_of_all_its_biases()
         let ours = forward(&fit, Sensor::Accel);
         let theirs = &session.published.accel;
         println!();
-        print_matrices(&format!("{name}: K_a R_a, counts per m/s^2"), &ours.matrix, &theirs.matrix);
+        print_matrices(
+            &format!("{name}: K_a R_a, counts per m/s^2"),
+            &ours.matrix,
+            &theirs.matrix,
+        );
         // Six opposite inputs are an orthogonal design, in which least squares takes the same differences as imucal. What is left
         // is weighting: the faces' lengths give their means variances that differ by some 0.1 % of the excess variance, and
         // that much of a residual of up to 17 counts on 2g.
@@ -281,7 +318,10 @@ fn least_squares_on_six_faces_is_imucals_matrix_and_the_mean_of_all_its_biases()
         assert!(worst < 2e-3, "{worst} counts per m/s^2");
         // imucal takes the bias of a sensor from the pair along it alone, least squares from all three pairs.
         let triad = &fit.sensor(Sensor::Accel).expect("fitted").estimated.triad;
-        println!("{:>24}bias: mimu    +-95 %    imucal   by pairs x, y, z", "");
+        println!(
+            "{:>24}bias: mimu    +-95 %    imucal   by pairs x, y, z",
+            ""
+        );
         for i in 0..3 {
             let pairs = ["x", "y", "z"].map(|a| {
                 let [p, n] = ["p", "a"].map(|end| session.part(&format!("{a}_{end}")).mean()[i]);
@@ -313,10 +353,21 @@ fn turns_give_imucals_gyro_once_its_term_in_specific_force_is_added_back() {
         let published = &session.published;
         println!();
         let per_degree = ours.matrix * 1f64.to_radians();
-        print_matrices(&format!("{name}: K_g R_g, counts per deg/s"), &per_degree, &published.gyro.matrix);
-        println!("{:>24}bias mimu {:.5} {:.5} {:.5}, imucal {:.5} {:.5} {:.5} counts", "",
-            ours.offset.x, ours.offset.y, ours.offset.z,
-            published.gyro.offset.x, published.gyro.offset.y, published.gyro.offset.z);
+        print_matrices(
+            &format!("{name}: K_g R_g, counts per deg/s"),
+            &per_degree,
+            &published.gyro.matrix,
+        );
+        println!(
+            "{:>24}bias mimu {:.5} {:.5} {:.5}, imucal {:.5} {:.5} {:.5} counts",
+            "",
+            ours.offset.x,
+            ours.offset.y,
+            ours.offset.z,
+            published.gyro.offset.x,
+            published.gyro.offset.y,
+            published.gyro.offset.z
+        );
         // Weighted by their lengths as long as noise explains them, as here, the rests give the mean of all their samples, which is
         // imucal's bias. Otherwise they are weighted evenly, and differ by up to their scatter, which is what sigma says.
         let triad = &fit.sensor(Sensor::Gyro).expect("fitted").estimated.triad;
@@ -331,21 +382,37 @@ fn turns_give_imucals_gyro_once_its_term_in_specific_force_is_added_back() {
         for (axis, letter) in ["x", "y", "z"].iter().enumerate() {
             let part = session.part(&format!("{letter}_rot"));
             let rate_dps = Vector3::ith(axis, session.turn_deg / part.seconds);
-            let force = invert(&published.accel).expect("regular").apply(&part.mean());
+            let force = invert(&published.accel)
+                .expect("regular")
+                .apply(&part.mean());
             let by_force = published.k_ga * force;
             term.set_column(axis, &(by_force / rate_dps[axis]));
             let reading = published.gyro.apply(&rate_dps) + by_force;
-            let ours = Affine { matrix: per_degree, offset: ours.offset }.apply(&rate_dps);
+            let ours = Affine {
+                matrix: per_degree,
+                offset: ours.offset,
+            }
+            .apply(&rate_dps);
             largest = largest.max((reading - ours).amax());
         }
-        println!("{:>24}readings of the turns agree to {largest:.1e} counts", "");
+        println!(
+            "{:>24}readings of the turns agree to {largest:.1e} counts",
+            ""
+        );
         assert!(largest < 1e-6, "{largest} counts");
-        let angle = (term.component_div(&per_degree.map(|_| 16.0))).amax().to_degrees();
+        let scale = per_degree.diagonal().map(f64::abs).mean();
+        let share = term.amax() / scale;
         let at_1g = (published.k_ga * GRAVITY).amax();
-        println!("{:>24}without K_ga: K_g R_g off by up to {:.4} counts per deg/s ({:.3} deg); K_ga is up to {:.3} counts ({:.1} mdeg/s) at 1 g",
-            "", term.amax(), angle, at_1g, 1e3 * at_1g / 16.4);
-        // One part in 5000 of the scale factor: a hundredth of what the axes of turns by hand are off.
-        assert!(term.amax() < 2e-4 * 16.4 * 2.0, "{term}");
+        println!(
+            "{:>24}without K_ga: K_g R_g off by up to {:.4} counts per deg/s ({:.3} deg); K_ga is up to {at_1g:.3} counts at 1 g ({:.1} mdeg/s)",
+            "",
+            term.amax(),
+            share.to_degrees(),
+            1e3 * at_1g / scale
+        );
+        // What the model without K_ga turns into scale factor and misalignment stays far below what turns by hand are good for:
+        // their axes are up to 1.5 degrees off.
+        assert!(share.to_degrees() < 0.05, "{term}");
     });
 }
 
@@ -356,35 +423,68 @@ fn moves_between_faces_that_no_fit_has_seen_are_predicted_as_well_as_by_imucal()
     };
     let fit = session.fit(true, Method::LeastSquares);
     let data = data_set("imucal_ferraris").expect("it was there");
-    let faces: Vec<_> = session_parts(&data).into_iter().filter(|(n, _)| !n.ends_with("rot")).collect();
+    let faces: Vec<_> = session_parts(&data)
+        .into_iter()
+        .filter(|(n, _)| !n.ends_with("rot"))
+        .collect();
     let rows: Vec<_> = faces.iter().map(|f| f.1.clone()).collect();
     let published = &session.published;
-    let per_radian = |m: &Affine<f64>| Affine { matrix: m.matrix * 1f64.to_degrees(), offset: m.offset };
+    let per_radian = |m: &Affine<f64>| Affine {
+        matrix: m.matrix * 1f64.to_degrees(),
+        offset: m.offset,
+    };
     let inverse = |m: &Affine<f64>| invert(m).expect("regular");
     let ours = [Sensor::Accel, Sensor::Gyro].map(|s| inverse(&forward(&fit, s)));
-    let theirs = [inverse(&published.accel), inverse(&per_radian(&published.gyro))];
+    let theirs = [
+        inverse(&published.accel),
+        inverse(&per_radian(&published.gyro)),
+    ];
     // imucal's whole model: the reading without K_ga f, sample by sample.
     let corrected = Samples {
-        gyro: samples.gyro.iter().zip(&samples.accel)
-            .map(|(u, a)| u - published.k_ga * theirs[0].apply(a)).collect(),
+        gyro: samples
+            .gyro
+            .iter()
+            .zip(&samples.accel)
+            .map(|(u, a)| u - published.k_ga * theirs[0].apply(a))
+            .collect(),
         ..samples.clone()
     };
     // The gyro against its own accelerometer, and against the other's, to tell the two sensors' shares apart.
     let columns = [
         ("mimu", samples.direction_errors(&rows, &ours[0], &ours[1])),
-        ("imucal", corrected.direction_errors(&rows, &theirs[0], &theirs[1])),
-        ("imucal less K_ga", samples.direction_errors(&rows, &theirs[0], &theirs[1])),
-        ("mimu gyro, imucal accel", samples.direction_errors(&rows, &theirs[0], &ours[1])),
+        (
+            "imucal",
+            corrected.direction_errors(&rows, &theirs[0], &theirs[1]),
+        ),
+        (
+            "imucal less K_ga",
+            samples.direction_errors(&rows, &theirs[0], &theirs[1]),
+        ),
+        (
+            "mimu gyro, imucal accel",
+            samples.direction_errors(&rows, &theirs[0], &ours[1]),
+        ),
     ];
     println!("\nangle between predicted and measured gravity, deg");
     for (k, pair) in faces.windows(2).enumerate() {
-        let cells: String = columns.iter().map(|(_, e)| format!("{:8.3}", e[k].to_degrees())).collect();
+        let cells: String = columns
+            .iter()
+            .map(|(_, e)| format!("{:8.3}", e[k].to_degrees()))
+            .collect();
         println!("{} -> {}{cells}", pair[0].0, pair[1].0);
     }
-    let all: Vec<f64> = columns.iter().map(|(_, e)| rms(e.iter().copied()).to_degrees()).collect();
+    let all: Vec<f64> = columns
+        .iter()
+        .map(|(_, e)| rms(e.iter().copied()).to_degrees())
+        .collect();
     for ((name, _), rms) in columns.iter().zip(&all) {
         println!("{rms:8.3} rms {name}");
     }
+    // Known from imucal's own program, with its own integration of the same rows: 0.729.
+    assert!((all[1] - 0.729).abs() < 0.002, "{} deg", all[1]);
+    // The two calibrations differ by a bias of the accelerometer of 3 counts, 0.08 degrees of direction, so that much either way is
+    // chance; the degree between x_p and x_a is in the sensors or the hand.
+    assert!(all[0] < all[1] + 0.08, "{} deg", all[0]);
 }
 
 #[test]
@@ -405,9 +505,14 @@ fn a_session_of_six_faces_taken_for_one_by_hand_is_refused_with_what_it_lacks() 
     };
     // Six faces up to a degree or two give six numbers: scale factors and biases. The three non-orthogonalities hang
     // on those degrees, and repeating a face adds none.
-    let error = foreign.fit(Method::LeastSquares).expect_err("it lacks slanted poses");
+    let error = foreign
+        .fit(Method::LeastSquares)
+        .expect_err("it lacks slanted poses");
     println!("{error}");
     for name in ["C_yx", "C_zx", "C_zy", "undetermined", "add poses"] {
-        assert!(error.to_string().contains(name), "{name} is not in: {error}");
+        assert!(
+            error.to_string().contains(name),
+            "{name} is not in: {error}"
+        );
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! Their model goes from SI to raw: accelerometer `M f + b` with M upper triangular, gyro `(I + [eps x]) (M w + b)`.
 
-use mimu::dwell::Sensor;
+use mimu::dwell::{STILL_FACTOR, Sensor};
 use mimu::fit::{Fit, Method};
 use mimu::recording::RawUnit;
 use mimu::triad::invert;
@@ -10,7 +10,7 @@ use mimu_core::compensation::Affine;
 use mimu_tests::recordings::{
     Foreign, Models, Samples, data_set, dwell_rows, numbers, rms, upper_triangular_frame, verdict,
 };
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 /// Parameters of one unit in the published convention and units: accelerometer s (%), m_yz m_xy m_xz (deg),
 /// b (m/s²), gyro s (%), m (deg), b (deg/s), eps (deg).
@@ -92,11 +92,21 @@ const PROGRAM: [[f64; 5]; 21] = [
 
 const UNITS: std::ops::Range<usize> = 0..5;
 
+/// The units lay in a hand, whose tremor the gyros show at ten to twenty times their noise and the accelerometers
+/// not at all. With this factor mimu finds the 22 or 23 rests that the program finds; by default it finds 17 or 18.
+const HAND_HELD: f64 = 400.0;
+
+/// The largest difference between the published table and what its own program computes, by kind of parameter: it
+/// predates the correction of an index that overwrote residuals, and its gyro biases are multiples of 0.001 rad/s.
+/// accelerometer s, m, b; gyro s, m, b, eps, three of each.
+const IRREPRODUCIBLE: [f64; 7] = [0.022, 0.0126, 0.002, 0.024, 0.0214, 0.0319, 0.0142];
+
 fn column(table: &[[f64; 5]; 21], unit: usize) -> Parameters {
     std::array::from_fn(|k| table[k][unit])
 }
 
-fn fitted(unit: usize) -> Option<(Fit, Samples)> {
+/// Fit and samples of one unit where it is still by `--still`.
+fn fitted(unit: usize, still_factor: f64) -> Option<(Fit, Samples)> {
     let file = data_set("mikoff_mpu9150x5")?.join(format!("imu{unit}.log"));
     let foreign = Foreign {
         files: vec![(file.clone(), "accel_x,accel_y,accel_z,gyro_x,gyro_y,gyro_z")],
@@ -106,7 +116,9 @@ fn fitted(unit: usize) -> Option<(Fit, Samples)> {
         scales: &[],
         inputs: None,
     };
-    let fit = foreign.fit(Method::LeastSquares).expect("it can be fitted");
+    let fit = foreign
+        .fit_where_still(Method::LeastSquares, still_factor)
+        .expect("it can be fitted");
     let rows = numbers(&file);
     let triple = |r: &[f64], from: usize| Vector3::new(r[from], r[from + 1], r[from + 2]);
     let samples = Samples {
@@ -193,250 +205,307 @@ fn the_published_convention_is_a_change_of_frame_only() {
     }
 }
 
-#[test]
-fn parameters_agree_with_the_published_ones() {
-    for unit in UNITS {
-        let Some((fit, _)) = fitted(unit) else { return };
-        let models = Models::of(&fit);
-        let ours = models.in_convention(published_convention);
-        println!(
-            "\nunit {unit}              mimu   +-95 %   published  in sigmas    program  in sigmas"
-        );
-        let mut squares = [[0.0; 2]; 2];
-        for (k, &(value, sigma)) in ours.iter().enumerate() {
-            let sensor = usize::from(k >= 9);
-            let off = [&PUBLISHED, &PROGRAM].map(|t| (t[k][unit] - value) / sigma);
-            for (s, o) in squares[sensor].iter_mut().zip(off) {
-                *s += o * o;
-            }
-            println!(
-                "{:14} {value:10.4} {:8.4} {:11.4} {:+10.2} {:10.4} {:+10.2}{}",
-                NAMES[k],
-                models.coverage[sensor] * sigma,
-                PUBLISHED[k][unit],
-                off[0],
-                PROGRAM[k][unit],
-                off[1],
-                if off[1].abs() > models.coverage[sensor] {
-                    "  *"
-                } else {
-                    ""
-                }
-            );
-        }
-        let r = |s: usize, t: usize, n: f64| (squares[s][t] / n as f64).sqrt();
-        println!(
-            "rms in sigmas: accel {:.2} {:.2}, gyro {:.2} {:.2}",
-            r(0, 0, 9.0),
-            r(0, 1, 9.0),
-            r(1, 0, 12.0),
-            r(1, 1, 12.0)
-        );
-    }
+fn in_units(unit: usize, table: &[[f64; 5]; 21]) -> [Affine<f64>; 2] {
+    models(&column(table, unit))
+}
+
+fn own(fit: &Fit) -> [Affine<f64>; 2] {
+    [Sensor::Accel, Sensor::Gyro].map(|s| {
+        let fit = fit.sensor(s).expect("both sensors were recorded");
+        fit.estimated.triad.inverse
+    })
 }
 
 #[test]
-fn nobody_predicts_gravity_better_on_turns_that_were_held_out() {
-    println!(
-        "                     size of gravity mm/s2        direction after turns deg     by quaternions deg        rest deg/s"
-    );
-    println!(
-        "unit dwells turns  mimu held publ. prog.   mimu held publ. prog.   mimu publ. prog.  mimu publ. prog."
-    );
+fn accelerometers_agree_with_the_published_ones_and_gyros_where_the_table_can_be_trusted() {
+    let (mut outside, mut gyro_outside) = (Vec::new(), 0);
     for unit in UNITS {
-        let Some((fit, samples)) = fitted(unit) else {
+        let Some((fit, _)) = fitted(unit, STILL_FACTOR) else {
             return;
         };
-        let [a, g] = [Sensor::Accel, Sensor::Gyro].map(|s| fit.sensor(s).unwrap());
-        let ours = [a, g].map(|s| s.estimated.triad.inverse);
-        let candidates = [
-            ours,
-            models(&column(&PUBLISHED, unit)),
-            models(&column(&PROGRAM, unit)),
-        ];
-        let dwells = dwell_rows(&fit);
-        let v = candidates.map(|[a, g]| verdict(&fit, &a, &g).unwrap());
-        let q =
-            candidates.map(|[a, g]| rms(samples.direction_errors(&dwells, &a, &g)).to_degrees());
+        let models = Models::of(&fit);
         println!(
-            "{unit} {} {} | {:.3} {:.3} {:.3} {:.3} | {:.4} {:.4} {:.4} {:.4} | {:.4} {:.4} {:.4} | {:.4} {:.4} {:.4}",
-            a.dwells,
-            g.residuals.len(),
-            1e3 * v[0].size_mps2,
-            1e3 * a.held_out_rms().unwrap(),
-            1e3 * v[1].size_mps2,
-            1e3 * v[2].size_mps2,
-            v[0].direction_rad.to_degrees(),
-            g.held_out_rms().unwrap().to_degrees(),
-            v[1].direction_rad.to_degrees(),
-            v[2].direction_rad.to_degrees(),
-            q[0],
-            q[1],
-            q[2],
-            v[0].rest_rps.to_degrees(),
-            v[1].rest_rps.to_degrees(),
-            v[2].rest_rps.to_degrees()
+            "\nunit {unit}               mimu  +-95 %   published in sigmas   its program in sigmas"
         );
-        println!("{:?} {:?}", g.not_held_out, fit.warnings);
-        let rr: Vec<String> = g
-            .residuals
-            .iter()
-            .map(|r| {
-                format!(
-                    "{:.2}/{:.2}",
-                    r.value.norm().to_degrees(),
-                    r.held_out.map_or(f64::NAN, |h| h.norm().to_degrees())
-                )
+        let ours = models.in_convention(published_convention);
+        for (k, &(value, sigma)) in ours.iter().enumerate() {
+            let interval = models.coverage[usize::from(k >= 9)] * sigma;
+            let tables = [PUBLISHED[k][unit], PROGRAM[k][unit]];
+            let [published, program] = tables.map(|t| (t - value) / sigma);
+            let far = (tables[0] - value).abs() > interval + IRREPRODUCIBLE[k / 3];
+            println!(
+                "{:15}{value:9.4} {interval:7.4} {:10.3} {published:+9.2} {:12.4} {program:+9.2}{}",
+                NAMES[k],
+                tables[0],
+                tables[1],
+                if far { "  outside" } else { "" }
+            );
+            gyro_outside += usize::from(far && k >= 9);
+            if far && k < 9 {
+                outside.push((unit, NAMES[k]));
+            }
+            // The program leaves 0.1 deg of each turn unexplained (rms), which over its 22 turns, of which a third sees a
+            // parameter well, is 0.04 deg or 0.06 % of it; three of that and mimu's own 0.1 are 0.2. Unit 1 is
+            // out of the question: the program takes six samples for a dwell, with 0.9 deg left in the turns before
+            // and after it. Biases: mimu's are those of seventy seconds at rest, the program's those of the turns alone, with 0.1 deg
+            // in 2.5 s each.
+            if k >= 9 && unit != 1 {
+                let limit = if (15..18).contains(&k) { 0.06 } else { 0.2 };
+                let off = (program * sigma).abs();
+                assert!(off < limit, "unit {unit}, {}: {off}", NAMES[k]);
+            }
+        }
+    }
+    println!(
+        "\noutside the interval and the table's irreproducibility: accel {} of 45, gyro {gyro_outside} of 60",
+        outside.len()
+    );
+    // The accelerometer's residual is noise, so the intervals hold as they stand: 2 of 45 are expected outside 95 %, and the
+    // two estimates have most of their samples in common.
+    assert!(outside.len() <= 2, "{outside:?}");
+}
+
+#[test]
+fn on_the_same_rests_sizes_of_gravity_are_closer_than_by_the_published_program() {
+    println!(
+        "                  size of gravity, mm/s^2          direction after turns, deg           at rest, deg/s"
+    );
+    println!(
+        "unit still rests  mimu held  publ. prog.    mimu  held   publ.  prog. (quaternions)     mimu publ. prog."
+    );
+    for unit in UNITS {
+        for still in [STILL_FACTOR, HAND_HELD] {
+            let Some((fit, samples)) = fitted(unit, still) else {
+                return;
+            };
+            let rests = dwell_rows(&fit);
+            let candidates = [
+                own(&fit),
+                in_units(unit, &PUBLISHED),
+                in_units(unit, &PROGRAM),
+            ];
+            let by_mimu = candidates.map(|[a, g]| verdict(&fit, &a, &g).expect("it can be judged"));
+            let by_quaternions =
+                candidates.map(|[a, g]| rms(samples.direction_errors(&rests, &a, &g)).to_degrees());
+            let held = [Sensor::Accel, Sensor::Gyro].map(|s| {
+                fit.sensor(s)
+                    .and_then(|f| f.held_out_rms())
+                    .expect("held out")
+            });
+            let size = by_mimu.map(|v| 1e3 * v.size_mps2);
+            let angle = by_mimu.map(|v| v.direction_rad.to_degrees());
+            let rate = by_mimu.map(|v| v.rest_rps.to_degrees());
+            println!(
+                "{unit:4} {still:5} {:5}  {:4.2} {:5.2} {:5.2} {:5.2}   {:.4} {:.4} {:.4} {:.4} ({:.4} {:.4} {:.4})  {:.4} {:.4} {:.4}",
+                rests.len(),
+                size[0],
+                1e3 * held[0],
+                size[1],
+                size[2],
+                angle[0],
+                held[1].to_degrees(),
+                angle[1],
+                angle[2],
+                by_quaternions[0],
+                by_quaternions[1],
+                by_quaternions[2],
+                rate[0],
+                rate[1],
+                rate[2],
+            );
+            for (a, b) in angle.iter().zip(&by_quaternions) {
+                // Two integrations of the same samples: mimu's begins and ends at the blocks' limits, up to a sample off, at a rate at rest of
+                // 5 deg/s at most (the bias of unit 3, 0.01 s of it), and takes the coning between samples.
+                assert!((a - b).abs() < 0.005, "{a} and {b} deg");
+            }
+            // In sample on both sides: an estimator that cannot do this is not minimizing.
+            assert!(
+                size[0] < size[2] && size[0] < size[1] && rate[0] < rate[2],
+                "unit {unit}"
+            );
+            // mimu holds the bias to the rests, which the program leaves out of account. That may cost a tenth of the angle in sample,
+            // and it is repaid on turns that neither has seen.
+            assert!(angle[0] < 1.1 * angle[2], "unit {unit}: {angle:?}");
+        }
+    }
+}
+
+/// A rest that two units have in common: the rows of both, and the row of both in its middle.
+struct Common {
+    rows: [std::ops::Range<usize>; 2],
+    middle: [usize; 2],
+}
+
+/// All clocks ran from switching on to off together, so a share of the rows is the same instant; at rest some tenths of a second do not matter.
+fn common(rests: [&[std::ops::Range<usize>]; 2], lengths: [usize; 2]) -> Vec<Common> {
+    let ratio = lengths[1] as f64 / lengths[0] as f64;
+    rests[0]
+        .iter()
+        .filter_map(|a| {
+            let middle = (a.start + a.end) / 2;
+            let there = (middle as f64 * ratio) as usize;
+            let b = rests[1]
+                .iter()
+                .find(|b| b.start + 20 < there && there + 20 < b.end)?;
+            Some(Common {
+                rows: [a.clone(), b.clone()],
+                middle: [middle, there],
             })
+        })
+        .collect()
+}
+
+/// Rotation that takes the directions `b` to the directions `a`, by least squares (Wahba).
+fn mounting(a: &[Vector3<f64>], b: &[Vector3<f64>]) -> UnitQuaternion<f64> {
+    let sum: Matrix3<f64> = a.iter().zip(b).map(|(a, b)| a * b.transpose()).sum();
+    let svd = sum.svd(true, true);
+    let (u, v) = (svd.u.expect("asked for"), svd.v_t.expect("asked for"));
+    let proper = Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, (u * v).determinant()));
+    UnitQuaternion::from_matrix(&(u * proper * v))
+}
+
+/// The five units lay on one board. What they say of its rotations must agree, heading included, and no calibration was fitted to that.
+#[test]
+fn units_on_one_board_agree_better_on_its_rotations_than_by_the_published_calibrations() {
+    let mut units = Vec::new();
+    for unit in UNITS {
+        let (Some((fit, samples)), Some((wide, _))) =
+            (fitted(unit, STILL_FACTOR), fitted(unit, HAND_HELD))
+        else {
+            return;
+        };
+        let (ours, program) = (own(&fit), in_units(unit, &PROGRAM));
+        let biased = |gyro: &Affine<f64>| {
+            let bias = -ours[1].matrix.try_inverse().expect("regular") * ours[1].offset;
+            Affine {
+                matrix: gyro.matrix,
+                offset: -gyro.matrix * bias,
+            }
+        };
+        let candidates = vec![
+            ("mimu", ours),
+            ("mimu --still 400", own(&wide)),
+            ("published", in_units(unit, &PUBLISHED)),
+            ("its program", program),
+            (
+                "its program, mimu's bias",
+                [program[0], biased(&program[1])],
+            ),
+        ];
+        units.push((dwell_rows(&wide), samples, candidates));
+    }
+    let names: Vec<&str> = units[0].2.iter().map(|c| c.0).collect();
+    let n = names.len();
+    let (mut turns, mut rotation, mut angle, mut gravity) = (
+        0,
+        vec![Vec::new(); n],
+        vec![Vec::new(); n],
+        vec![Vec::new(); n],
+    );
+    let mut by_unit = vec![vec![Vec::new(); n]; 5];
+    for i in UNITS {
+        for j in 0..i {
+            let [(rests_a, a, of_a), (rests_b, b, of_b)] = [&units[i], &units[j]];
+            let rests = common([rests_a, rests_b], [a.t_s.len(), b.t_s.len()]);
+            turns += rests.len() - 1;
+            for k in 0..n {
+                let ([accel_a, gyro_a], [accel_b, gyro_b]) = (&of_a[k].1, &of_b[k].1);
+                let up = |s: &Samples, m: &Affine<f64>, side: usize| -> Vec<Vector3<f64>> {
+                    rests
+                        .iter()
+                        .map(|r| s.force(m, &r.rows[side]).normalize())
+                        .collect()
+                };
+                let (up_a, up_b) = (up(a, accel_a, 0), up(b, accel_b, 1));
+                let mount = mounting(&up_a, &up_b);
+                gravity[k].extend(
+                    up_a.iter()
+                        .zip(&up_b)
+                        .map(|(a, b)| a.angle(&(mount * b)).to_degrees()),
+                );
+                for pair in rests.windows(2) {
+                    let turn_a = a.rotation(gyro_a, pair[0].middle[0], pair[1].middle[0]);
+                    let turn_b = b.rotation(gyro_b, pair[0].middle[1], pair[1].middle[1]);
+                    let off = (turn_a.inverse() * mount * turn_b * mount.inverse())
+                        .angle()
+                        .to_degrees();
+                    rotation[k].push(off);
+                    by_unit[i][k].push(off);
+                    by_unit[j][k].push(off);
+                    angle[k].push((turn_a.angle() - turn_b.angle()).to_degrees());
+                }
+            }
+        }
+    }
+    let all = |v: &[Vec<f64>]| -> Vec<f64> { v.iter().map(|v| rms(v.iter().copied())).collect() };
+    let (rotation, angle, gravity) = (all(&rotation), all(&angle), all(&gravity));
+    println!("\ndisagreement of two units, rms over {turns} rotations of 10 pairs, deg");
+    println!(
+        "                           rotation   its angle   gravity at rest   rotation by unit 0 1 2 3 4"
+    );
+    for k in 0..n {
+        let each: String = UNITS
+            .map(|u| format!(" {:.3}", rms(by_unit[u][k].iter().copied())))
             .collect();
-        println!("{}", rr.join(" "));
-        println!("{:?} {:?}", a.estimated.scatter, g.estimated.scatter);
+        println!(
+            "{:25} {:9.4} {:11.4} {:17.4}  {each}",
+            names[k], rotation[k], angle[k], gravity[k]
+        );
+    }
+    // The angle of a rotation depends on no mounting and on no accelerometer, so that it is the gyros that are compared.
+    assert!(
+        rotation[0] < rotation[3] && rotation[3] < rotation[2],
+        "{rotation:?}"
+    );
+    assert!(angle[0] < angle[3] && angle[3] < angle[2], "{angle:?}");
+    for (unit, of_unit) in by_unit.iter().enumerate() {
+        let [ours, program] = [0, 3].map(|k: usize| rms(of_unit[k].iter().copied()));
+        assert!(ours < program, "unit {unit}: {ours} and {program} deg");
     }
 }
 
 #[test]
-#[ignore]
-fn explore() {
-    use nalgebra::{Rotation3, UnitQuaternion};
-    let stills = [10.0, 20.0, 50.0, 100.0, 200.0, 400.0];
-    let mut all = vec![];
+fn errors_at_rests_that_were_refused_as_not_still_are_within_the_intervals() {
+    println!("size of gravity at rests in the hand, which mimu refuses by default, mm/s^2");
+    println!("unit rests   mimu  in sigmas   published  its program (both fitted to them)");
     for unit in UNITS {
-        let (fit, samples) = fitted(unit).unwrap();
-        let mut cands = vec![];
-        let mut evals = vec![];
-        for s in stills {
-            let folder = data_set("mikoff_mpu9150x5").unwrap();
-            let foreign = Foreign {
-                files: vec![(
-                    folder.join(format!("imu{unit}.log")),
-                    "accel_x,accel_y,accel_z,gyro_x,gyro_y,gyro_z",
-                )],
-                rate_hz: Some(100.0),
-                gravity_mps2: 9.81,
-                raw_unit: RawUnit::Si,
-                scales: &[],
-                inputs: None,
-            };
-            let tmp = tempfile::TempDir::new().unwrap();
-            let rec = foreign.import(&tmp).unwrap();
-            let f = mimu::fit::fit(
-                mimu::fit::Prepared::read(&rec, s, |_| {}).unwrap(),
-                mimu::fit::Options {
-                    method: Method::LeastSquares,
-                    holdout_blocks: 4,
-                    still_factor: s,
+        let (Some((fit, samples)), Some((wide, _))) =
+            (fitted(unit, STILL_FACTOR), fitted(unit, HAND_HELD))
+        else {
+            return;
+        };
+        let used = dwell_rows(&fit);
+        let refused: Vec<_> = dwell_rows(&wide)
+            .into_iter()
+            .filter(|d| used.iter().all(|u| u.end <= d.start || d.end <= u.start))
+            .collect();
+        let error = |accel: &Affine<f64>, rows| samples.force(accel, rows).norm() - 9.81;
+        let estimated = &fit.sensor(Sensor::Accel).expect("fitted").estimated;
+        let in_sigmas = rms(refused.iter().map(|rows| {
+            let raw = samples.force(
+                &Affine {
+                    matrix: Matrix3::identity(),
+                    offset: Vector3::zeros(),
                 },
-            )
-            .unwrap();
-            let [a, g] = [Sensor::Accel, Sensor::Gyro].map(|x| f.sensor(x).unwrap());
-            let c = [a, g].map(|s| s.estimated.triad.inverse);
-            let p = published_convention(&c[0], &c[1]);
-            println!(
-                "unit {unit} still {s}: {}",
-                p.iter()
-                    .map(|x| format!("{x:.3}"))
-                    .collect::<Vec<_>>()
-                    .join(" ")
+                rows,
             );
-            cands.push(c);
-            evals.push(dwell_rows(&f));
-        }
-        for (n, t) in [("publ", &PUBLISHED), ("prog", &PROGRAM)] {
-            println!(
-                "unit {unit} {n}: {}",
-                column(t, unit)
-                    .iter()
-                    .map(|x| format!("{x:.3}"))
-                    .collect::<Vec<_>>()
-                    .join(" ")
-            );
-            cands.push(models(&column(t, unit)));
-        }
-        for (e, s) in evals.iter().zip(stills) {
-            let q: Vec<String> = cands
-                .iter()
-                .map(|[a, g]| format!("{:.4}", rms(samples.direction_errors(e, a, g)).to_degrees()))
-                .collect();
-            let g: Vec<String> = cands
-                .iter()
-                .map(|[a, _]| {
-                    format!(
-                        "{:.2}",
-                        1e3 * rms(e.iter().map(|d| samples.force(a, d).norm() - 9.81))
-                    )
-                })
-                .collect();
-            println!(
-                "  on dwells at {s}: dir {} | size {}",
-                q.join(" "),
-                g.join(" ")
-            );
-        }
-        all.push((fit, samples, cands, evals));
-    }
-    // Are they rigid together?
-    for e in 0..stills.len() {
-        let n = all[0].2.len();
-        let mut full = vec![vec![]; n];
-        let mut size = vec![vec![]; n];
-        let mut used = 0;
-        for i in 0..5 {
-            for j in 0..i {
-                let (a, b) = (&all[i], &all[j]);
-                let ratio = b.1.t_s.len() as f64 / a.1.t_s.len() as f64;
-                let mut common = vec![];
-                for d in &a.3[e] {
-                    let c = (d.start + d.end) / 2;
-                    let m = (c as f64 * ratio) as usize;
-                    if let Some(o) = b.3[e].iter().find(|o| o.start + 20 < m && m + 20 < o.end) {
-                        common.push((d.clone(), o.clone(), c, m));
-                    }
-                }
-                for k in 0..n {
-                    let ([aa, ag], [ba, bg]) = (&a.2[k], &b.2[k]);
-                    let mut w = Matrix3::zeros();
-                    let mut pairs = vec![];
-                    for (d, o, _, _) in &common {
-                        let (x, y) = (a.1.force(aa, d).normalize(), b.1.force(ba, o).normalize());
-                        w += x * y.transpose();
-                        pairs.push((x, y));
-                    }
-                    let svd = w.svd(true, true);
-                    let (u, v) = (svd.u.unwrap(), svd.v_t.unwrap());
-                    let s = u
-                        * Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, (u * v).determinant()))
-                        * v;
-                    let s =
-                        UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(s));
-                    if k == 0 || k == 5 {
-                        println!(
-                            "{i} {j} still {} common {} mounting residual {:.3} deg",
-                            stills[e],
-                            common.len(),
-                            rms(pairs.iter().map(|(x, y)| x.angle(&(s * y)).to_degrees()))
-                        );
-                    }
-                    for p in common.windows(2) {
-                        let ra = a.1.rotation(ag, p[0].2, p[1].2);
-                        let rb = b.1.rotation(bg, p[0].3, p[1].3);
-                        full[k].push((ra.inverse() * (s * rb * s.inverse())).angle().to_degrees());
-                        size[k].push((ra.angle() - rb.angle()).to_degrees());
-                        used += 1;
-                    }
-                }
-            }
-        }
+            let up = estimated.triad.inverse.apply(&raw).normalize();
+            let by = mimu::triad::vector(&(up * raw.transpose()), &up);
+            let variance = by.dot(&(estimated.triad.inverse_covariance * by));
+            error(&estimated.triad.inverse, rows) / variance.sqrt()
+        }));
+        let [ours, published, program] = [
+            estimated.triad.inverse,
+            in_units(unit, &PUBLISHED)[0],
+            in_units(unit, &PROGRAM)[0],
+        ]
+        .map(|m| 1e3 * rms(refused.iter().map(|rows| error(&m, rows))));
         println!(
-            "still {} used {used} full {} | size {}",
-            stills[e],
-            full.iter()
-                .map(|v| format!("{:.4}", rms(v.iter().copied())))
-                .collect::<Vec<_>>()
-                .join(" "),
-            size.iter()
-                .map(|v| format!("{:.4}", rms(v.iter().copied())))
-                .collect::<Vec<_>>()
-                .join(" ")
+            "{unit:4} {:5} {ours:6.2} {in_sigmas:10.2} {published:11.2} {program:12.2}",
+            refused.len()
         );
+        // mimu is the worse one here: without these poses some directions of force are two thirds of the sphere away from the nearest pose.
+        // The intervals know it. Six errors of one sigma have an rms below 1.5 in 99 % of the cases.
+        assert!(in_sigmas < 1.5, "unit {unit}: {in_sigmas} sigmas");
     }
 }

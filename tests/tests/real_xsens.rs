@@ -6,8 +6,8 @@ use mimu::dwell::Sensor;
 use mimu::fit::{Fit, Method};
 use mimu::recording::RawUnit;
 use mimu_core::compensation::Affine;
-use mimu_tests::recordings::{Foreign, Models, data_set, upper_triangular_frame};
-use nalgebra::Vector3;
+use mimu_tests::recordings::{Foreign, Models, data_set, upper_triangular_frame, verdict};
+use nalgebra::{Matrix3, Vector3};
 
 /// IMU-TK: error over dwell means in mm/s² and direction error in degrees, in sample and held out.
 const IMU_TK_MMPS2: [f64; 2] = [1.116, 2.146];
@@ -15,31 +15,31 @@ const IMU_TK_DEG: [f64; 2] = [0.517, 0.607];
 
 /// IMU-TK's accelerometer, `x = T K (raw - b)`: 1/K in counts per m/s², T_xy T_xz T_yz, b in counts.
 const IMU_TK_ACCEL: [f64; 9] = [
-    414.458_9,
-    412.010_5,
-    414.648_7,
-    -0.003_359_299,
-    -0.008_906_395,
-    -0.021_334_119,
-    33124.182_6,
-    33275.179_4,
-    32364.415_6,
+    414.4589,
+    412.0105,
+    414.6487,
+    -0.003359299,
+    -0.008906395,
+    -0.021334119,
+    33124.1826,
+    33275.1794,
+    32364.4156,
 ];
 
 /// IMU-TK's gyro in the same form, T by rows without its diagonal: 1/K in counts per rad/s.
 const IMU_TK_GYRO: [f64; 12] = [
-    4777.955_8,
-    4764.206_6,
-    4773.657_4,
-    0.005_936_34,
-    0.001_111_009,
-    0.008_088_118,
-    -0.053_556_862,
-    0.025_306_721,
-    -0.002_551_303,
-    32777.139_9,
-    32459.802_9,
-    32511.847_5,
+    4777.9558,
+    4764.2066,
+    4773.6574,
+    0.00593634,
+    0.001111009,
+    0.008088118,
+    -0.053556862,
+    0.025306721,
+    -0.002551303,
+    32777.1399,
+    32459.8029,
+    32511.8475,
 ];
 
 fn fitted() -> Option<Fit> {
@@ -93,8 +93,8 @@ fn errors_in_sample_and_on_held_out_blocks_are_below_those_of_imu_tk() {
         1e3 * accel.noise_floor(),
         gyro.noise_floor().to_degrees()
     );
-    // IMU-TK in sample is the limit there. Where noise is least the hands are what is left, and a sixteenth
-    // more than today's 0.99, 1.56 and 0.534 is what a change of the dwells' limits by a tenth of a second costs.
+    // In sample the limit is IMU-TK's own figure. Held out it is what the accelerometer has been seen to reach with little to spare
+    // (1.56 mm/s^2; IMU-TK, given dwell means in place of its samples, reaches 1.57), and what just beats IMU-TK for the gyro.
     assert!(size[0] <= 1.1 && size[1] <= 1.6, "{size:?} mm/s^2");
     assert!(
         angle[0] <= IMU_TK_DEG[0] && angle[1] <= 0.60,
@@ -136,25 +136,63 @@ fn parameters_agree_with_those_of_imu_tk_in_its_own_frame() {
         .chain(gyro_names.iter().map(|n| ("gyro", *n)));
     let theirs = IMU_TK_ACCEL.iter().chain(&IMU_TK_GYRO);
     println!("parameter       mimu      +-95 %       IMU-TK   in sigmas");
-    let (mut outside, mut squares) = (0, [0.0; 2]);
+    let (mut far, mut squares, mut off) = (0, [0.0; 2], Vec::new());
     for (k, (((sensor, name), &(value, sigma)), theirs)) in names.zip(&ours).zip(theirs).enumerate()
     {
         let interval = models.coverage[usize::from(k >= 9)] * sigma;
-        let off = (theirs - value) / sigma;
-        squares[usize::from(k >= 9)] += off * off;
+        off.push((theirs - value) / sigma);
+        squares[usize::from(k >= 9)] += off[k] * off[k];
         let mark = if (theirs - value).abs() > interval {
-            outside += 1;
+            far += 1;
             "  outside"
         } else {
             ""
         };
-        println!("{sensor:5} {name:6} {value:11.5} {interval:10.5} {theirs:12.5} {off:+8.2}{mark}");
+        println!(
+            "{sensor:5} {name:6} {value:11.5} {interval:10.5} {theirs:12.5} {:+8.2}{mark}",
+            off[k]
+        );
     }
     let [accel, gyro] = [
         (squares[0] / 9.0_f64).sqrt(),
         (squares[1] / 12.0_f64).sqrt(),
     ];
-    println!("rms {accel:.2} sigmas (accel), {gyro:.2} sigmas (gyro); {outside} of 21 outside");
+    println!("rms {accel:.2} sigmas (accel), {gyro:.2} sigmas (gyro); {far} of 21 outside");
+    // Who is right about the gyro's bias? IMU-TK takes the first rest for it, mimu all of them.
+    let inverse = |k: &[f64], t: Matrix3<f64>, b: &[f64]| {
+        let matrix = t * Matrix3::from_diagonal(&Vector3::from_column_slice(k).map(f64::recip));
+        Affine {
+            matrix,
+            offset: -matrix * Vector3::from_column_slice(b),
+        }
+    };
+    let (a, g) = (&IMU_TK_ACCEL, &IMU_TK_GYRO);
+    let t_accel = Matrix3::new(1.0, a[3], a[4], 0.0, 1.0, a[5], 0.0, 0.0, 1.0);
+    let t_gyro = Matrix3::new(1.0, g[3], g[4], g[5], 1.0, g[6], g[7], g[8], 1.0);
+    let theirs = [
+        inverse(&a[..3], t_accel, &a[6..]),
+        inverse(&g[..3], t_gyro, &g[9..]),
+    ];
+    let own = [Sensor::Accel, Sensor::Gyro].map(|s| fit.sensor(s).unwrap().estimated.triad.inverse);
+    let [mimu, imu_tk] = [own, theirs].map(|[a, g]| verdict(&fit, &a, &g).unwrap());
+    println!("on mimu's dwells   size mm/s^2   direction deg   rate at rest deg/s");
+    for (name, v) in [("mimu", mimu), ("IMU-TK", imu_tk)] {
+        println!(
+            "{name:18} {:11.3} {:15.3} {:20.4}",
+            1e3 * v.size_mps2,
+            v.direction_rad.to_degrees(),
+            v.rest_rps.to_degrees()
+        );
+    }
+    assert!(mimu.rest_rps < imu_tk.rest_rps && mimu.direction_rad < imu_tk.direction_rad);
+    // Both have the same samples, so nine of nine within 95 % would be no surprise; one outside is chance, two are not. The gyro's
+    // biases are left out, being defined otherwise.
+    let outside = |from: usize, factor: f64| {
+        let nine = &off[from..from + 9];
+        nine.iter().filter(|o| o.abs() > factor).count()
+    };
+    let [accel_outside, gyro_outside] = [0, 9].map(|k| outside(k, models.coverage[k / 9]));
+    assert!(accel_outside <= 1 && gyro_outside <= 1, "{off:?}");
     let scale = Vector3::from_fn(|i, _| ours[i].0);
     for (ours, known) in scale.iter().zip([414.5, 412.0, 414.6]) {
         assert!((ours / known - 1.0).abs() < 0.005, "{ours} for {known}");

@@ -65,8 +65,24 @@ fn flat(observations: &[Observation]) -> Option<usize> {
         .then(|| eigen.eigenvectors.column(thin).iamax())
 }
 
+/// First guess, by the sphere through the readings: one scale factor for all axes. `None` if they lie on none.
+pub fn first_guess(observations: &[Observation], gravity: f64) -> Option<Affine<f64>> {
+    let sphere = Sphere::through(observations)?;
+    let matrix = Matrix3::from_diagonal_element(gravity / sphere.radius);
+    Some(Affine {
+        matrix,
+        offset: -(matrix * sphere.centre),
+    })
+}
+
 /// Fits C and o to `|C u + o| = gravity` (m/s²) over all observations.
-pub fn estimate(observations: &[Observation], gravity: f64) -> Result<Estimated, Failure> {
+///
+/// `variances` are those of the sizes by noise, (m/s²)², one for each observation.
+pub fn estimate(
+    observations: &[Observation],
+    variances: &[f64],
+    gravity: f64,
+) -> Result<Estimated, Failure> {
     let n = observations.len();
     if n < PARAMETERS {
         return Err(Failure::Undetermined {
@@ -123,18 +139,12 @@ pub fn estimate(observations: &[Observation], gravity: f64) -> Result<Estimated,
         }
         out
     };
-    let noise = |p: &DVector<f64>| -> Vec<f64> {
-        let (c, o) = unpack(p);
-        let all: Vec<f64> = (0..n)
-            .map(|i| {
-                let up = (c * v[i] + o).normalize();
-                let along = c.transpose() * up / sphere.radius;
-                along.component_mul(&along).dot(&observations[i].variance)
-            })
-            .collect();
-        let floor = (1e-12 * all.iter().copied().fold(0.0, f64::max)).max(1e-24);
-        all.into_iter().map(|x| x.max(floor)).collect()
-    };
+    // A noiseless recording has none; any positive number weighs all poses alike then.
+    let floor = (1e-12 * variances.iter().copied().fold(0.0, f64::max)).max(1e-24);
+    let variances: Vec<f64> = variances
+        .iter()
+        .map(|v| (v / (gravity * gravity)).max(floor))
+        .collect();
     let lost = || Failure::NoSolution("the fit to the size of gravity does not converge".into());
     let start = DVector::from_vec(vec![1.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]);
     let shape = Observability::of(&evaluate(&start, &vec![1.0; n]).jacobian);
@@ -144,12 +154,10 @@ pub fn estimate(observations: &[Observation], gravity: f64) -> Result<Estimated,
     let (mut p, _) = minimize(start, |p| evaluate(p, &vec![1.0; n])).ok_or_else(lost)?;
     let dof = (n - PARAMETERS) as f64;
     let mut scatter = excess_variance(&[], &[], dof);
-    let mut variances = noise(&p);
     let mut chi2 = None;
     for _ in 0..30 {
         let weights: Vec<f64> = variances.iter().map(|x| x + scatter.excess).collect();
         (p, _) = minimize(p, |p| evaluate(p, &weights)).ok_or_else(lost)?;
-        variances = noise(&p);
         let residuals: Vec<f64> = evaluate(&p, &vec![1.0; n])
             .residuals
             .iter()

@@ -389,7 +389,8 @@ pub fn estimate(
         // What each group keeps of its degrees of freedom: rows less what the parameters take up there.
         let leverage = |from: usize, rows: usize| {
             let j = last.jacobian.rows(from, rows);
-            (&j * &covariance * j.transpose()).trace()
+            // The trace of J C J' without the matrix, which for thousands of dwells would fill the memory.
+            (&j * &covariance).component_mul(&j).sum()
         };
         let before = groups;
         for (g, (from, rows)) in [(0, n_turns), (n_turns, n_rest)].into_iter().enumerate() {

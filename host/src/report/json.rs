@@ -133,7 +133,8 @@ fn sensor_json(fit: &Fit, sensor: &SensorFit) -> Value {
 /// Physical quantities to first order in the angles, fang (14): for comparison with what others publish.
 fn small_angle(sensor: &SensorFit) -> Value {
     let physical = sensor.estimated.triad.physical(Angles::Small);
-    let both = |t: &[Estimate; 3]| json!({ "value": t.map(|e| e.value), "sigma": t.map(|e| e.sigma) });
+    let both =
+        |t: &[Estimate; 3]| json!({ "value": t.map(|e| e.value), "sigma": t.map(|e| e.sigma) });
     json!({
         "scale": both(&physical.scale),
         "bias": both(&physical.bias),

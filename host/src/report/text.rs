@@ -185,15 +185,10 @@ fn sensor_text(out: &mut String, fit: &Fit, sensor: &SensorFit) {
     let triad = &sensor.estimated.triad;
     let physical = triad.physical(Angles::Exact);
     let (raw, si) = (fit.prepared.manifest.raw_unit, sensor.sensor.unit());
-    let _ = writeln!(out, "  {:<34}{:>22}{:>22}{:>22}   95 %", "", "x", "y", "z");
+    let mut rows = Vec::new();
     let mut table = |name: &str, unit: &str, triple: &[Estimate; 3], by: f64| {
         let cells = triple.map(|e| plus_minus(e.value * by, triad.coverage_factor * e.sigma * by));
-        let label = format!("{name}, {unit}");
-        let _ = writeln!(
-            out,
-            "  {label:<34}{:>22}{:>22}{:>22}",
-            cells[0], cells[1], cells[2]
-        );
+        rows.push((format!("{name}, {unit}"), cells));
     };
     table("scale factor", &scale_unit(raw, si), &physical.scale, 1.0);
     table("bias", &raw_unit(raw, si), &physical.bias, 1.0);
@@ -209,6 +204,16 @@ fn sensor_text(out: &mut String, fit: &Fit, sensor: &SensorFit) {
         &physical.non_orthogonality,
         degrees,
     );
+    let cells = rows.iter().flat_map(|(_, cells)| cells);
+    let width = 2 + cells.map(|c| c.chars().count()).max().unwrap_or(0);
+    let _ = writeln!(
+        out,
+        "  {:<34}{:>width$}{:>width$}{:>width$}   95 %",
+        "", "x", "y", "z"
+    );
+    for (label, [x, y, z]) in &rows {
+        let _ = writeln!(out, "  {label:<34}{x:>width$}{y:>width$}{z:>width$}");
+    }
 }
 
 /// List of the dwells: `mimu fit --dwells`.
