@@ -92,8 +92,8 @@ const PROGRAM: [[f64; 5]; 21] = [
 
 const UNITS: std::ops::Range<usize> = 0..5;
 
-/// The units lay in a hand, whose tremor the gyros show at ten to twenty times their noise and the accelerometers
-/// not at all. With this factor mimu finds the 22 or 23 rests that the program finds; by default it finds 17 or 18.
+/// The units lay in a hand for a quarter of their rests: a tremor that the gyros show at seven to fifteen times their noise and the
+/// accelerometers not at all. With this factor mimu finds 22 rests, as the program does within three; by default 17 or 18.
 const HAND_HELD: f64 = 400.0;
 
 /// The largest difference between the published table and what its own program computes, by kind of parameter: it
@@ -247,8 +247,8 @@ fn accelerometers_agree_with_the_published_ones_and_gyros_where_the_table_can_be
             // The program leaves 0.1 deg of each turn unexplained (rms), which over its 22 turns, of which a third sees a
             // parameter well, is 0.04 deg or 0.06 % of it; three of that and mimu's own 0.1 are 0.2. Unit 1 is
             // out of the question: the program takes six samples for a dwell, with 0.9 deg left in the turns before
-            // and after it. Biases: mimu's are those of seventy seconds at rest, the program's those of the turns alone, with 0.1 deg
-            // in 2.5 s each.
+            // and after it. Biases: mimu's are those of seventy seconds at rest, the program's
+            // those of the turns alone, with 0.1 deg left in 2.5 s each.
             if k >= 9 && unit != 1 {
                 let limit = if (15..18).contains(&k) { 0.06 } else { 0.2 };
                 let off = (program * sigma).abs();
@@ -314,8 +314,8 @@ fn on_the_same_rests_sizes_of_gravity_are_closer_than_by_the_published_program()
                 rate[2],
             );
             for (a, b) in angle.iter().zip(&by_quaternions) {
-                // Two integrations of the same samples: mimu's begins and ends at the blocks' limits, up to a sample off, at a rate at rest of
-                // 5 deg/s at most (the bias of unit 3, 0.01 s of it), and takes the coning between samples.
+                // Two integrations of the same samples: mimu's begins and ends at the limits of its blocks, up to a sample off
+                // at no more than 0.1 deg/s, and takes the coning between samples.
                 assert!((a - b).abs() < 0.005, "{a} and {b} deg");
             }
             // In sample on both sides: an estimator that cannot do this is not minimizing.
@@ -336,7 +336,7 @@ struct Common {
     middle: [usize; 2],
 }
 
-/// All clocks ran from switching on to off together, so a share of the rows is the same instant; at rest some tenths of a second do not matter.
+/// The files begin and end together, so the same share of the rows is the same instant; at rest some tenths of a second do not matter.
 fn common(rests: [&[std::ops::Range<usize>]; 2], lengths: [usize; 2]) -> Vec<Common> {
     let ratio = lengths[1] as f64 / lengths[0] as f64;
     rests[0]
@@ -504,8 +504,9 @@ fn errors_at_rests_that_were_refused_as_not_still_are_within_the_intervals() {
             "{unit:4} {:5} {ours:6.2} {in_sigmas:10.2} {published:11.2} {program:12.2}",
             refused.len()
         );
-        // mimu is the worse one here: without these poses some directions of force are two thirds of the sphere away from the nearest pose.
-        // The intervals know it. Six errors of one sigma have an rms below 1.5 in 99 % of the cases.
-        assert!(in_sigmas < 1.5, "unit {unit}: {in_sigmas} sigmas");
+        // mimu is the worse one here: without these poses the condition of its design is 4.5 in place of 2.6. The intervals know
+        // it. Five times six errors of one sigma stay below an rms of 1.86 in 99 % of the cases, if independent; these share nine
+        // parameters.
+        assert!(in_sigmas < 2.0, "unit {unit}: {in_sigmas} sigmas");
     }
 }
