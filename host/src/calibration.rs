@@ -12,7 +12,7 @@ use tempfile::NamedTempFile;
 use crate::dwell::Sensor;
 use crate::error::{Error, Result};
 use crate::fit::{Figure, Fit, SensorFit};
-use crate::recording::{RawUnit, Reference};
+use crate::recording::{RawUnit, Reference, read_text};
 use crate::triad::{Angles, Covariance, Triad};
 
 /// Version of the layout.
@@ -157,7 +157,7 @@ pub struct PhysicalTable {
 impl Calibration {
     /// Reads and checks a calibration file.
     pub fn read(path: &Path) -> Result<Self> {
-        let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, &e))?;
+        let text = read_text(path)?;
         Self::parse(&text, &path.display().to_string())
     }
 
@@ -362,13 +362,9 @@ fn write_sensor(out: &mut String, fit: &Fit, sensor: &SensorFit) -> std::fmt::Re
     writeln!(
         out,
         "C = {}",
-        matrix(|i, j| format!("{:?}", triad.inverse.matrix[(i, j)]))
+        matrix(|i, j| number(triad.inverse.matrix[(i, j)]))
     )?;
-    writeln!(
-        out,
-        "o = {}",
-        row(3, |i| format!("{:?}", triad.inverse.offset[i]))
-    )?;
+    writeln!(out, "o = {}", row(3, |i| number(triad.inverse.offset[i])))?;
     writeln!(
         out,
         "sigma_C = {}",
@@ -392,11 +388,7 @@ fn write_sensor(out: &mut String, fit: &Fit, sensor: &SensorFit) -> std::fmt::Re
     )?;
     writeln!(out, "covariance = [")?;
     for i in 0..12 {
-        writeln!(
-            out,
-            "  {},",
-            row(12, |j| format!("{:?}", covariance[(i, j)]))
-        )?;
+        writeln!(out, "  {},", row(12, |j| number(covariance[(i, j)])))?;
     }
     writeln!(out, "]")?;
     writeln!(
@@ -431,13 +423,9 @@ fn write_sensor(out: &mut String, fit: &Fit, sensor: &SensorFit) -> std::fmt::Re
     writeln!(
         out,
         "P = {}",
-        matrix(|i, j| format!("{:?}", triad.forward.matrix[(i, j)]))
+        matrix(|i, j| number(triad.forward.matrix[(i, j)]))
     )?;
-    writeln!(
-        out,
-        "b = {}",
-        row(3, |i| format!("{:?}", triad.forward.offset[i]))
-    )?;
+    writeln!(out, "b = {}", row(3, |i| number(triad.forward.offset[i])))?;
     let physical = triad.physical(Angles::Exact);
     writeln!(
         out,
@@ -466,7 +454,7 @@ fn write_sensor(out: &mut String, fit: &Fit, sensor: &SensorFit) -> std::fmt::Re
         writeln!(
             out,
             "{key} = {}{order}",
-            row(3, |i| format!("{:?}", triple[i].value * unit))
+            row(3, |i| number(triple[i].value * unit))
         )?;
         writeln!(
             out,
@@ -484,6 +472,11 @@ pub fn figure(figure: Figure) -> &'static str {
         Figure::GravitySize => "size of the compensated dwell mean less gravity",
         Figure::Direction => "angle between predicted and measured gravity after each turn",
     }
+}
+
+/// All digits, so that it is read back exactly; minus zero, which only puzzles, is zero.
+fn number(value: f64) -> String {
+    format!("{:?}", value + 0.0)
 }
 
 fn row(n: usize, cell: impl Fn(usize) -> String) -> String {

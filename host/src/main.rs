@@ -53,9 +53,9 @@ struct ImportArgs {
     /// Sample rate, Hz; without it, the inverse of the median time step
     #[arg(long)]
     rate_hz: Option<f64>,
-    /// Local gravity, m/s²
-    #[arg(long, default_value_t = 9.80665)]
-    gravity: f64,
+    /// Local gravity, m/s²; without it, normal gravity at sea level of --latitude, or 9.80665 and a warning
+    #[arg(long)]
+    gravity: Option<f64>,
     /// Unit of the raw columns, after --scale: V, count or SI (rad/s and m/s²)
     #[arg(long, value_name = "UNIT")]
     raw_unit: RawUnit,
@@ -183,6 +183,11 @@ fn main() -> ExitCode {
 }
 
 fn run_import(args: ImportArgs) -> Result<()> {
+    let (gravity, assumed) = match (args.gravity, args.latitude) {
+        (Some(gravity), _) => (gravity, None),
+        (None, Some(latitude)) => (normal_gravity(latitude), None),
+        (None, None) => (9.80665, Some("gravity is taken to be 9.80665 m/s²; it ranges from 9.78 at the equator to 9.83 at the poles, and every scale factor of the accelerometer with it: give --gravity or --latitude".to_string())),
+    };
     let options = ImportOptions {
         columns: args.columns,
         separator: args.separator,
@@ -193,7 +198,7 @@ fn run_import(args: ImportArgs) -> Result<()> {
         inputs: args.inputs,
         format: args.format,
         replace: args.replace,
-        ..ImportOptions::new(args.files, args.gravity, args.raw_unit, args.reference)
+        ..ImportOptions::new(args.files, gravity, args.raw_unit, args.reference)
     };
     let inputs: Vec<&Path> = options
         .files
@@ -203,16 +208,25 @@ fn run_import(args: ImportArgs) -> Result<()> {
         .collect();
     check_outputs(&[args.json.file()], &inputs)?;
     let bar = progress("importing");
-    let summary = import(&options, &args.output, |share| {
+    let mut summary = import(&options, &args.output, |share| {
         bar.set_position((share * 1000.0) as u64)
     })?;
     bar.finish_and_clear();
+    summary.warnings.extend(assumed);
     print(
         &args.json,
         &report::import_text(&summary),
         &report::import_json(&summary),
         None,
     )
+}
+
+/// Normal gravity at sea level, m/s² (WGS 84, Somigliana), at a latitude in degrees. Local gravity differs by some
+/// 3e-4 m/s², and by 3.1e-6 m/s² for each metre of height.
+fn normal_gravity(latitude_deg: f64) -> f64 {
+    let sin2 = latitude_deg.to_radians().sin().powi(2);
+    9.780_325_335_9 * (1.0 + 0.001_931_852_652_41 * sin2)
+        / (1.0 - 0.006_694_379_990_14 * sin2).sqrt()
 }
 
 fn run_fit(args: &FitArgs) -> Result<()> {
@@ -346,5 +360,22 @@ fn print(
         // `mimu fit ... | head` is no error.
         Err(e) if e.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
         other => other.map_err(|e| Error::io(Path::new("standard output"), &e)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn normal_gravity_is_that_of_the_ellipsoid_at_the_equator_and_the_poles() {
+        // NIMA TR8350.2, table 3.4.
+        assert!((normal_gravity(0.0) - 9.780_325_335_9).abs() < 1e-9);
+        assert!((normal_gravity(-90.0) - 9.832_184_937_8).abs() < 1e-8);
+    }
+
+    #[test]
+    fn arguments_are_consistent() {
+        <Cli as clap::CommandFactory>::command().debug_assert();
     }
 }

@@ -1418,7 +1418,7 @@ fn a_damaged_calibration_file_is_refused_with_its_place() {
         verify().refused(words);
     }
     fs::write(&path, [0xff, 0x00]).unwrap();
-    verify().refused(&["cal.toml"]);
+    verify().refused(&["cal.toml, line 1", "UTF-8"]);
     fs::remove_file(&path).unwrap();
     verify().refused(&["cal.toml", "no such file"]);
 }

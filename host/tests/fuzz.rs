@@ -336,6 +336,104 @@ fn mutate_words(text: &mut Vec<u8>, random: &mut Random) {
     }
 }
 
+/// What a sensor, or a program in between, may well write.
+const NUMBERS: &[f64] = &[
+    0.0,
+    -0.0,
+    1.0,
+    -1.0,
+    32767.0,
+    -32768.0,
+    1e9,
+    1e15,
+    -1e29,
+    1e30,
+    1e-12,
+    -1e-30,
+    1e-200,
+    1e-320,
+    f64::NAN,
+];
+
+/// Changes the numbers of a table and leaves it a table: what gets past the reader.
+fn mutate_numbers(text: &str, random: &mut Random) -> Vec<u8> {
+    let (header, body) = text.split_once('\n').unwrap();
+    let parse = |line: &str| {
+        line.split(',')
+            .map(|c| c.parse().unwrap_or(f64::NAN))
+            .collect()
+    };
+    let mut rows: Vec<Vec<f64>> = body.lines().map(parse).collect();
+    let mut header: Vec<&str> = header.split(',').collect();
+    for _ in 0..1 + random.below(4) {
+        let (from, length) = (random.below(rows.len()), 1 + random.below(rows.len()));
+        let to = match random.below(3) {
+            0 => from + 1,
+            1 => (from + 1 + length % 40).min(rows.len()),
+            _ => (from + length).min(rows.len()),
+        };
+        // Time and step are one column of two in fifteen, and worth more.
+        let column = if random.one_in(8) {
+            random.below(2)
+        } else {
+            random.below(header.len())
+        };
+        let odd = NUMBERS[random.below(NUMBERS.len())];
+        let value = rows[from][column];
+        let factor = [-1.0, 1e-3, 1e3, 1e-9, 1e9, 1e-40, 1e-160, 1e20][random.below(8)];
+        let other = random.below(header.len());
+        let whole = random.one_in(2);
+        let (from, to) = if whole { (0, rows.len()) } else { (from, to) };
+        match random.below(13) {
+            0 => rows[from..to].iter_mut().for_each(|r| r[column] = odd),
+            1 => rows[from..to].iter_mut().for_each(|r| r[column] = value),
+            2 => rows[from..to].iter_mut().for_each(|r| r[column] *= factor),
+            3 => rows[from..to].iter_mut().for_each(|r| r[column] += factor),
+            4 if !whole => drop(rows.drain(from..to)),
+            5 => rows[from..to]
+                .iter_mut()
+                .for_each(|r| r[column] = r[column].min(value)),
+            6 => rows[from..to].iter_mut().for_each(|r| r[column] = r[other]),
+            7 => rows[from..to]
+                .iter_mut()
+                .for_each(|r| r.swap(column, other)),
+            8 => rows[from..to]
+                .iter_mut()
+                .for_each(|r| r[column] = (r[column] / 1000.0).round()),
+            9 => rows
+                .iter_mut()
+                .skip(from % 7)
+                .step_by(7)
+                .for_each(|r| r[column] = odd),
+            10 => rows[from..to]
+                .iter_mut()
+                .for_each(|r| r[column] += factor * (random.uniform() - 0.5)),
+            11 => rows.truncate(to.max(2)),
+            _ if header.len() > 5 => {
+                header.remove(column);
+                rows.iter_mut().for_each(|r| drop(r.remove(column)));
+            }
+            _ => {}
+        }
+        if rows.is_empty() {
+            break;
+        }
+    }
+    let mut out = header.join(",");
+    for row in &rows {
+        let cell = |x: &f64| {
+            if x.is_nan() {
+                String::new()
+            } else {
+                format!("{x:?}")
+            }
+        };
+        out.push('\n');
+        out.push_str(&row.iter().map(cell).collect::<Vec<_>>().join(","));
+    }
+    out.into_bytes()
+}
+
 fn edit_column(
     text: &[u8],
     column: usize,
@@ -493,15 +591,14 @@ fn run(seeds: &Seeds, folder: &Path, random: &mut Random) -> std::result::Result
         0..=3 => {
             let (text, reference) = &seeds.csv[random.below(seeds.csv.len())];
             let mut manifest = manifest(reference);
-            if random.one_in(4) {
+            if random.one_in(10) {
                 manifest = mutate(&manifest, random);
             }
-            write_recording(
-                &recording,
-                &manifest,
-                "samples.csv",
-                &mutate(text.as_bytes(), random),
-            );
+            let samples = match random.one_in(3) {
+                true => mutate(text.as_bytes(), random),
+                false => mutate_numbers(text, random),
+            };
+            write_recording(&recording, &manifest, "samples.csv", &samples);
             fit_recording(&recording, options).map(Some)
         }
         4 => {
@@ -537,7 +634,10 @@ fn run(seeds: &Seeds, folder: &Path, random: &mut Random) -> std::result::Result
 }
 
 fn verify_mutated(seeds: &Seeds, recording: &Path, random: &mut Random) -> Result<()> {
-    let calibration = mutate(seeds.calibration.as_bytes(), random);
+    let mut calibration = seeds.calibration.clone().into_bytes();
+    if random.one_in(2) {
+        calibration = mutate(&calibration, random);
+    }
     let path = recording.with_file_name("cal.toml");
     fs::write(&path, calibration).unwrap();
     let calibration = Calibration::read(&path)?;
@@ -545,7 +645,7 @@ fn verify_mutated(seeds: &Seeds, recording: &Path, random: &mut Random) -> Resul
     let text = if random.one_in(2) {
         mutate(text.as_bytes(), random)
     } else {
-        text.clone().into_bytes()
+        mutate_numbers(text, random)
     };
     write_recording(recording, &manifest(reference), "samples.csv", &text);
     let prepared = Prepared::read(&Recording::open(recording)?, 10.0, |_| {})?;

@@ -187,18 +187,7 @@ impl Manifest {
 
     /// Reads and checks `recording.toml` at `path`.
     pub fn read(path: &Path) -> Result<Manifest> {
-        let bytes = std::fs::read(path).map_err(|error| Error::io(path, &error))?;
-        let text = String::from_utf8(bytes).map_err(|error| {
-            let line = 1 + error.as_bytes()[..error.utf8_error().valid_up_to()]
-                .iter()
-                .filter(|&&byte| byte == b'\n')
-                .count();
-            Error::new(
-                format!("{}, line {line}", path.display()),
-                "this is not UTF-8 text",
-                "save the file as UTF-8",
-            )
-        })?;
+        let text = read_text(path)?;
         Self::parse(&text, &path.display().to_string())
     }
 
@@ -276,6 +265,20 @@ impl Manifest {
             )
         })
     }
+}
+
+/// Reads a file that must be UTF-8, and says in which line it is not.
+pub(crate) fn read_text(path: &Path) -> Result<String> {
+    let bytes = std::fs::read(path).map_err(|error| Error::io(path, &error))?;
+    String::from_utf8(bytes).map_err(|error| {
+        let before = &error.as_bytes()[..error.utf8_error().valid_up_to()];
+        let line = 1 + before.iter().filter(|&&byte| byte == b'\n').count();
+        Error::new(
+            format!("{}, line {line}", path.display()),
+            "this is not UTF-8 text",
+            "save the file as UTF-8",
+        )
+    })
 }
 
 /// Checks that `gravity` (m/s²) is that of a place on Earth; `place` names where it was given.

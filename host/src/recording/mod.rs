@@ -26,6 +26,7 @@ pub use columns::{Column, Columns, RAW_COLUMNS, REFERENCE_COLUMNS};
 pub use import::{
     ColumnList, ImportOptions, ImportSummary, Role, Scale, Separator, SkippedLines, import,
 };
+pub(crate) use manifest::read_text;
 pub use manifest::{Format, MANIFEST_FILE, Manifest, Rails, RawUnit, Reference, Source};
 pub use reader::{ReadSummary, Recording};
 pub use writer::{SampleFormat, Writer};
