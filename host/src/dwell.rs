@@ -7,7 +7,7 @@
 use std::fmt;
 use std::ops::Range;
 
-use crate::blocks::{Condensed, Level, Moments, Rails};
+use crate::blocks::{Block, Condensed, Level, Moments, Rails};
 use crate::error::{Error, Result};
 use crate::recording::{Manifest, RAW_COLUMNS, Reference};
 
@@ -21,6 +21,11 @@ pub const SHORTEST_S: f64 = 1.0;
 /// Variance of a still window over the quietest, at most. Seven recordings by hand give the same
 /// dwells from 7 to 20; at 3 the hands that put a unit down split them, at 100 they join.
 pub const STILL_FACTOR: f64 = 10.0;
+/// What the gyro is allowed beyond that in recordings by hand with an accelerometer to watch as well. Hands tremble in angle:
+/// of 22 rests of each of five units, some had 50 to 230 times the quietest variance in the gyro while the accelerometer
+/// saw nothing, and without them the held-out error was threefold. The mean rate of a rest is what it turned by in all
+/// over its length, and the tremor leaves next to none.
+const GYRO_TREMOR: f64 = 30.0;
 /// Variance of a given step over the median of all steps, at most; a fivefold standard deviation.
 const STEP_FACTOR: f64 = 25.0;
 /// Share of clipped samples from which on a mean is refused: below, it moves by less than a tenth
@@ -191,8 +196,10 @@ pub struct Detection {
     pub guard_s: f64,
     /// Shortest dwell that is used, s.
     pub shortest_s: f64,
-    /// Largest variance of a still window, in units of `floor` squared.
+    /// Largest variance of a still window in the accelerometer, in units of `floor` squared.
     pub still_factor: f64,
+    /// The same in the gyro.
+    pub gyro_still_factor: f64,
     /// Standard deviation of one sample in the quietest twentieth of the recording, raw units.
     pub floor: [f64; 6],
 }
@@ -298,41 +305,44 @@ fn by_stillness(
         return Err(Error::new("dwells", problem, "record for longer"));
     }
     let channels: Vec<usize> = (0..6).filter(|&c| condensed.has_raw[c]).collect();
-    // Variance of every window of every channel; a gap within makes it unfit.
-    let windows: Vec<Option<[f64; 6]>> = (0..=blocks.len() - width)
-        .map(|i| {
-            let window = &blocks[i..i + width];
-            if window[1..].iter().any(|b| b.after_gap) {
-                return None;
-            }
-            let mut variance = [0.0; 6];
-            for &c in &channels {
-                let pooled = pool(window.iter().map(|b| b.raw[c]));
-                variance[c] = if pooled.n > 1 {
-                    pooled.m2 / f64::from(pooled.n - 1)
-                } else {
-                    f64::INFINITY
-                };
-            }
-            Some(variance)
-        })
-        .collect();
+    let windows = windows(blocks, width, &channels);
     let mut floor = [0.0; 6];
     for &c in &channels {
         let mut of_channel: Vec<f64> = windows
             .iter()
             .flatten()
-            .map(|w| w[c])
+            .map(|w| w.variance[c])
             .filter(|v| *v > 0.0)
             .collect();
         // A noiseless simulation has no floor: then anything that varies at all is motion.
         floor[c] = quantile(&mut of_channel, 0.05).unwrap_or(0.0);
     }
+    // A hand that holds still trembles in angle and not in force.
+    let by_hand = manifest.reference == Reference::Gravity && condensed.has_raw[3];
+    let gyro = if by_hand {
+        GYRO_TREMOR * factor
+    } else {
+        factor
+    };
+    let factors = [gyro, gyro, gyro, factor, factor, factor];
+    let quiet = |w: &Window| {
+        channels
+            .iter()
+            .all(|&c| w.variance[c] <= factors[c] * floor[c])
+    };
+    let at_rest: Vec<&Window> = windows.iter().flatten().filter(|w| quiet(w)).collect();
+    let rates = Sensor::Gyro
+        .channels()
+        .filter(|&c| by_hand && condensed.has_raw[c]);
+    let rates: Vec<_> = rates
+        .map(|c| (c, rate_at_rest(&at_rest, c, (factor * floor[c]).sqrt())))
+        .collect();
+    let turning = |w: &Window| rates.iter().any(|(c, range)| !range.contains(&w.mean[*c]));
     let spans = reference_spans(condensed);
     let mut still = vec![false; blocks.len()];
     for (i, window) in windows.iter().enumerate() {
-        let Some(variance) = window else { continue };
-        let quiet = channels.iter().all(|&c| variance[c] <= factor * floor[c]);
+        let Some(window) = window else { continue };
+        let quiet = quiet(window) && !turning(window);
         let constant = manifest.reference == Reference::Gravity
             || constant_input(blocks[i..i + width].iter().map(|b| &b.reference), &spans);
         if quiet && constant {
@@ -372,9 +382,52 @@ fn by_stillness(
         guard_s: guard as f64 * block_s,
         shortest_s: SHORTEST_S,
         still_factor: factor,
+        gyro_still_factor: gyro,
         floor: floor.map(f64::sqrt),
     };
     Ok((ranges, detection))
+}
+
+/// Mean and variance of the six raw channels over [`WINDOW_S`].
+struct Window {
+    mean: [f64; 6],
+    variance: [f64; 6],
+}
+
+/// The window that begins at each block; `None` where there is a gap in it.
+fn windows(blocks: &[Block], width: usize, channels: &[usize]) -> Vec<Option<Window>> {
+    let window = |window: &[Block]| {
+        let (mut mean, mut variance) = ([0.0; 6], [0.0; 6]);
+        for &c in channels {
+            let pooled = pool(window.iter().map(|b| b.raw[c]));
+            mean[c] = pooled.mean;
+            variance[c] = match pooled.n {
+                0 | 1 => f64::INFINITY,
+                n => pooled.m2 / f64::from(n - 1),
+            };
+        }
+        Window { mean, variance }
+    };
+    let whole = |w: &[Block]| !w[1..].iter().any(|b| b.after_gap);
+    blocks
+        .windows(width)
+        .map(|w| whole(w).then(|| window(w)))
+        .collect()
+}
+
+/// Mean readings of channel `c` that a window at rest may have: about the median of the windows that vary little, by
+/// `margin` and by five of their own deviations, which hold a drift of the bias.
+///
+/// A turn about the vertical does not show in the accelerometer, and a slow one hardly in the variance of the gyro.
+fn rate_at_rest(at_rest: &[&Window], c: usize, margin: f64) -> std::ops::RangeInclusive<f64> {
+    let mut means: Vec<f64> = at_rest.iter().map(|w| w.mean[c]).collect();
+    let Some(middle) = quantile(&mut means, 0.5) else {
+        return f64::NEG_INFINITY..=f64::INFINITY;
+    };
+    let mut deviations: Vec<f64> = means.iter().map(|m| (m - middle).abs()).collect();
+    let sigma = 1.4826 * quantile(&mut deviations, 0.5).unwrap_or(0.0);
+    let reach = margin + 5.0 * sigma;
+    middle - reach..=middle + reach
 }
 
 /// Largest less smallest value of each reference channel in the recording, by sensor.

@@ -177,6 +177,9 @@ const MISFIT_SIGMAS: f64 = 4.0;
 /// Points with fewer independent differences than this decide nothing: their variance is known to a half only.
 const CURVE_DIFFERENCES: f64 = 8.0;
 
+/// A smaller variance is none: the square of its weight would overflow.
+const SMALLEST: f64 = 1e-100;
+
 /// What a further term must lower the deviance by: significant at 0.5 %.
 const TERM_DEVIANCE: f64 = 8.0;
 
@@ -187,7 +190,7 @@ const TERM_DEVIANCE: f64 = 8.0;
 /// With three terms every subset can be tried. A term that does not lower the deviance by [`TERM_DEVIANCE`] is left out:
 /// taken whenever it is positive, the noise of the curve alone made the means of white noise 9 % too noisy.
 fn fit(points: &[(f64, f64, f64)]) -> AllanModel {
-    let points: Vec<_> = points.iter().filter(|p| p.1 > 0.0).collect();
+    let points: Vec<_> = points.iter().filter(|p| p.1 > SMALLEST).collect();
     let mut best = (f64::INFINITY, AllanModel::default());
     for subset in 1..8usize {
         let terms: Vec<usize> = (0..3).filter(|k| subset & (1 << k) != 0).collect();

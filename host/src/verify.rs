@@ -133,6 +133,26 @@ fn largest(values: &[f64]) -> f64 {
     values.iter().map(|v| v.abs()).fold(0.0, f64::max)
 }
 
+/// The figures of errors before and after; `None` if there is nothing to judge by. One of `floor` a dwell or turn.
+fn judged(
+    sensor: Sensor,
+    figure: Figure,
+    raw: &[f64],
+    after: &[f64],
+    floor: &[f64],
+) -> Option<SensorVerification> {
+    (!after.is_empty()).then(|| SensorVerification {
+        sensor,
+        figure,
+        rms_raw: rms(raw),
+        rms: rms(after),
+        max: largest(after),
+        noise_floor: rms(floor),
+        static_rms: None,
+        count: floor.len(),
+    })
+}
+
 fn known(prepared: &Prepared, sensor: Sensor, triad: &Triad) -> Option<SensorVerification> {
     let observations = prepared.observations(sensor);
     let errors = |model: &Affine<f64>| -> Vec<f64> {
@@ -146,16 +166,13 @@ fn known(prepared: &Prepared, sensor: Sensor, triad: &Triad) -> Option<SensorVer
         .map(|o| (si_covariance(&triad.inverse.matrix, &o.variance).trace() / 3.0).sqrt())
         .collect();
     let after = errors(&triad.inverse);
-    (!after.is_empty()).then(|| SensorVerification {
+    judged(
         sensor,
-        figure: Figure::Input,
-        rms_raw: rms(&errors(&nominal(triad))),
-        rms: rms(&after),
-        max: largest(&after),
-        noise_floor: rms(&floor),
-        static_rms: None,
-        count: observations.len(),
-    })
+        Figure::Input,
+        &errors(&nominal(triad)),
+        &after,
+        &floor,
+    )
 }
 
 fn size(prepared: &Prepared, triad: &Triad) -> Option<SensorVerification> {
@@ -170,16 +187,13 @@ fn size(prepared: &Prepared, triad: &Triad) -> Option<SensorVerification> {
     let variances = prepared.size_variances(&triad.inverse, &observations);
     let floor: Vec<f64> = variances.iter().map(|v| v.sqrt()).collect();
     let after = errors(&triad.inverse);
-    (!after.is_empty()).then(|| SensorVerification {
-        sensor: Sensor::Accel,
-        figure: Figure::GravitySize,
-        rms_raw: rms(&errors(&nominal(triad))),
-        rms: rms(&after),
-        max: largest(&after),
-        noise_floor: rms(&floor),
-        static_rms: None,
-        count: observations.len(),
-    })
+    judged(
+        Sensor::Accel,
+        Figure::GravitySize,
+        &errors(&nominal(triad)),
+        &after,
+        &floor,
+    )
 }
 
 fn turns(
@@ -206,14 +220,10 @@ fn turns(
         .iter()
         .flat_map(|o| <[f64; 3]>::from(gyro.inverse.apply(&o.raw)))
         .collect();
-    (!after.is_empty()).then(|| SensorVerification {
-        sensor: Sensor::Gyro,
-        figure: Figure::Direction,
-        rms_raw: rms(&errors(&by_nominal, &nominal(gyro))),
-        rms: rms(&after),
-        max: largest(&after),
-        noise_floor: rms(&floor),
+    let before = errors(&by_nominal, &nominal(gyro));
+    let judged = judged(Sensor::Gyro, Figure::Direction, &before, &after, &floor)?;
+    Some(SensorVerification {
         static_rms: Some(rms(&rest)),
-        count: by_calibration.len(),
+        ..judged
     })
 }

@@ -61,7 +61,8 @@ fn flat(observations: &[Observation]) -> Option<usize> {
         .map(|o| (o.raw - mean) * (o.raw - mean).transpose());
     let eigen = products.sum::<Matrix3<f64>>().symmetric_eigen();
     let thin = eigen.eigenvalues.imin();
-    (eigen.eigenvalues[thin] < FLAT * FLAT * eigen.eigenvalues.max())
+    // All readings equal are flat too.
+    (eigen.eigenvalues[thin] <= FLAT * FLAT * eigen.eigenvalues.max())
         .then(|| eigen.eigenvectors.column(thin).iamax())
 }
 
@@ -151,7 +152,12 @@ pub fn estimate(
     if !shape.is_complete() {
         return Err(undetermined(&shape));
     }
-    let (mut p, _) = minimize(start, |p| evaluate(p, &vec![1.0; n])).ok_or_else(lost)?;
+    let first = minimize(start.clone(), |p| evaluate(p, &vec![1.0; n]));
+    // Where nothing holds the angles between the sensors, the fit runs off towards C = 0 and |o| = g, which fits every pose.
+    let Some((mut p, _)) = first.filter(|(p, _)| is_triad(&unpack(p).0)) else {
+        let weak = weak_beside_scatter(&start, |p| evaluate(p, &vec![1.0; n]));
+        return Err(weak.map_or_else(lost, |shape| undetermined(&shape)));
+    };
     let dof = (n - PARAMETERS) as f64;
     let mut scatter = excess_variance(&[], &[], dof);
     let mut chi2 = None;
@@ -225,6 +231,59 @@ pub fn estimate(
         triad,
         scatter: vec![("size of gravity".into(), scatter)],
         condition: shape.condition,
+    })
+}
+
+/// Off-diagonal over diagonal element of C from which on this is no triad: 30 degrees from a right angle.
+const SKEWED: f64 = 0.5;
+
+/// Sigma, in units of gravity, from which on a parameter is not measured: 3 degrees, 5 %, 0.05 g. Assembly is better.
+const USELESS_SIGMA: f64 = 0.05;
+
+fn is_triad(c: &Matrix3<f64>) -> bool {
+    let mut off_diagonal = LOWER.iter().filter(|(i, j)| i != j);
+    off_diagonal.all(|&(i, j)| c[(i, j)].abs() < SKEWED * c[(i, i)].abs())
+}
+
+/// The parameters that the poses determine, but not beside their own scatter: six faces up to a degree or two. Scatter is
+/// that of scale factors and biases alone, which six faces do determine.
+fn weak_beside_scatter(
+    start: &DVector<f64>,
+    evaluate: impl Fn(&DVector<f64>) -> Linearized,
+) -> Option<Observability> {
+    let by_axis: Vec<usize> = (0..PARAMETERS)
+        .filter(|k| LOWER.get(*k).is_none_or(|(i, j)| i == j))
+        .collect();
+    let full = |q: &DVector<f64>| {
+        let mut p = start.clone();
+        for (k, value) in by_axis.iter().zip(q.iter()) {
+            p[*k] = *value;
+        }
+        p
+    };
+    let first = DVector::from_fn(by_axis.len(), |k, _| start[by_axis[k]]);
+    let (q, at) = minimize(first, |q| {
+        let all = evaluate(&full(q));
+        Linearized {
+            jacobian: all.jacobian.select_columns(&by_axis),
+            residuals: all.residuals,
+        }
+    })?;
+    let dof = at
+        .residuals
+        .len()
+        .checked_sub(by_axis.len())
+        .filter(|d| *d > 0)?;
+    let variance = at.residuals.norm_squared() / dof as f64;
+    let design = evaluate(&full(&q)).jacobian;
+    let covariance = (design.transpose() * &design).try_inverse()? * variance;
+    let undetermined: Vec<_> = (0..PARAMETERS)
+        .map(|k| (k, covariance[(k, k)].sqrt()))
+        .filter(|(_, sigma)| *sigma > USELESS_SIGMA)
+        .collect();
+    (!undetermined.is_empty()).then(|| Observability {
+        undetermined,
+        ..Observability::of(&design)
     })
 }
 

@@ -19,6 +19,7 @@ mod reader;
 #[cfg(test)]
 mod round_trip_tests;
 mod staging;
+mod strict_file;
 mod writer;
 
 pub use batch::Batch;

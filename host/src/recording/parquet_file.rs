@@ -20,6 +20,7 @@ use super::batch::Batch;
 use super::cell::{self, Refusal, shorten};
 use super::columns::{Column, Layout};
 use super::in_order::{broke_down, in_order, worker_count};
+use super::strict_file::StrictFile;
 use crate::error::{Error, Result};
 
 #[cfg(test)]
@@ -306,7 +307,7 @@ fn decode_slice(
 pub(super) struct Cursor {
     source: ParquetFile,
     leaf: Leaf,
-    file: Option<Arc<File>>,
+    file: Option<Arc<StrictFile>>,
     /// Row group that is read next.
     group: usize,
     reader: Option<ColumnReader>,
@@ -417,7 +418,7 @@ impl Cursor {
             Some(file) => file.clone(),
             // A handle of its own: the position of a shared one would move under the other threads.
             None => {
-                let file = Arc::new(File::open(&self.source.path)?);
+                let file = Arc::new(StrictFile(File::open(&self.source.path)?));
                 self.file.insert(file).clone()
             }
         };

@@ -60,6 +60,7 @@ fn detection(dwells: &Dwells) -> Value {
             "guard_s": d.guard_s,
             "shortest_s": d.shortest_s,
             "still_factor": d.still_factor,
+            "gyro_still_factor": d.gyro_still_factor,
             "floor_raw": d.floor,
         })
     })

@@ -89,8 +89,8 @@ pub fn fit_text(fit: &Fit) -> String {
             );
             let _ = writeln!(
                 out,
-                "  still: variance over {:.1} s at most {} x that of the quietest twentieth in every channel;\n  {:.1} s left out at both ends; shorter than {} s not used",
-                d.window_s, d.still_factor, d.guard_s, d.shortest_s
+                "  still: variance over {:.1} s at most that of the quietest twentieth times {} (accel), {} (gyro);\n  {:.1} s left out at both ends; shorter than {} s not used",
+                d.window_s, d.still_factor, d.gyro_still_factor, d.guard_s, d.shortest_s
             );
         }
     }
