@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use mimu::dwell::STILL_FACTOR;
 use mimu::error::Result;
 use mimu::fit::{Fit, Method, Options, Prepared, fit};
 use mimu::recording::{ImportOptions, RawUnit, Recording, Reference, import};
@@ -72,19 +73,14 @@ impl Foreign<'_> {
 
     /// Imports it, finds its dwells and fits it by `method`, judged by four blocks left out in turn.
     pub fn fit(&self, method: Method) -> Result<Fit> {
-        self.fit_where_still(method, mimu::dwell::STILL_FACTOR)
-    }
-
-    /// The same with `--still`.
-    pub fn fit_where_still(&self, method: Method, still_factor: f64) -> Result<Fit> {
         let folder = TempDir::new().expect("there is a temporary folder");
         let recording = self.import(&folder)?;
         let options = Options {
             method,
             holdout_blocks: 4,
-            still_factor,
+            still_factor: STILL_FACTOR,
         };
-        let prepared = Prepared::read(&recording, still_factor, |_| {})?;
+        let prepared = Prepared::read(&recording, STILL_FACTOR, |_| {})?;
         fit(prepared, options)
     }
 }
