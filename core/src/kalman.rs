@@ -81,7 +81,8 @@ impl<T: RealField + Copy> Sum<T> {
 }
 
 impl<T: RealField + Copy> Filter<T> {
-    /// Filter with prior mean `mean` and independent prior `variance`s (all positive).
+    /// Filter with prior mean `mean` and independent prior `variance`s. These must be positive: a filter with any other
+    /// is not one, and refuses what it is given.
     pub fn with_prior(mean: [T; STATES], variance: [T; STATES]) -> Self {
         Self {
             mean: mean.map(Sum::new),
@@ -141,32 +142,32 @@ impl<T: RealField + Copy> Filter<T> {
             + h[2] * self.mean[2].value
             + h[3] * self.mean[3].value;
         let innovation = raw - predicted;
-        // One test finds every not-a-number and infinity among raw, input, noise and state.
-        if !(innovation / a3).is_finite() {
+        // l is the factor by which a column of U moves, growth what W gains: f²/a.
+        let l = [-f[0] / noise, -f[1] / a0, -f[2] / a1, -f[3] / a2];
+        let growth = [-f[0] * l[0], -f[1] * l[1], -f[2] * l[2], -f[3] * l[3]];
+        // One test finds every not-a-number and infinity among raw, input, noise and state, and every overflow on the way.
+        let sum = growth[0] + growth[1] + growth[2] + growth[3];
+        if !(innovation / a3 + sum).is_finite() {
             return Err(Rejected::NotFinite);
         }
 
-        // b is the unscaled gain, grown column by column; l the factor by which a column of U moves.
-        let l0 = -f[0] / noise;
-        let l1 = -f[1] / a0;
+        // b is the unscaled gain, grown column by column.
         let b01 = v[0] + u01 * v[1];
-        let l2 = -f[2] / a1;
         let b02 = b01 + u02 * v[2];
         let b12 = v[1] + u12 * v[2];
-        let l3 = -f[3] / a2;
         let b03 = b02 + u03 * v[3];
         let b13 = b12 + u13 * v[3];
         let b23 = v[2] + u23 * v[3];
         self.upper = [
-            u01 + v[0] * l1,
-            u02 + b01 * l2,
-            u12 + v[1] * l2,
-            u03 + b02 * l3,
-            u13 + b12 * l3,
-            u23 + v[2] * l3,
+            u01 + v[0] * l[1],
+            u02 + b01 * l[2],
+            u12 + v[1] * l[2],
+            u03 + b02 * l[3],
+            u13 + b12 * l[3],
+            u23 + v[2] * l[3],
         ];
-        for ((w, f), l) in self.information.iter_mut().zip(f).zip([l0, l1, l2, l3]) {
-            w.add(-f * l);
+        for (w, growth) in self.information.iter_mut().zip(growth) {
+            w.add(growth);
         }
         let step = innovation / a3;
         for (mean, gain) in self.mean.iter_mut().zip([b03, b13, b23, v[3]]) {

@@ -140,3 +140,12 @@ fn single_precision_stays_positive_and_true_over_ten_million_updates() {
         assert!((ratio - 1.0).abs() < 0.05, "state {i}: {ratio}");
     }
 }
+
+#[test]
+fn an_input_that_overflows_single_precision_is_refused() {
+    let mut filter = Filter::<f32>::diffuse(1e-6, 1.0);
+    let before = filter;
+    let huge = Vector3::new(1e20_f32, 0.0, 0.0);
+    assert_eq!(filter.update(&huge, 2.5, 1e-6), Err(Rejected::NotFinite));
+    assert_eq!(filter, before);
+}

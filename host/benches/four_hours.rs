@@ -116,6 +116,7 @@ fn by_hand(folder: &Path) {
     let options = Options {
         method: Method::LeastSquares,
         holdout_blocks: 4,
+        only: None,
         still_factor: mimu::dwell::STILL_FACTOR,
     };
     fit(prepared, options).expect("known to be good");

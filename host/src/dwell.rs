@@ -158,6 +158,17 @@ impl Dwell {
         }
     }
 
+    /// Time over which the channels of `sensor` are averaged, s: masked samples are gone, and the mean is that of a shorter
+    /// dwell.
+    pub fn averaged_s(&self, sensor: Sensor) -> f64 {
+        let fewest = self.raw[sensor.channels()]
+            .iter()
+            .map(|m| m.n)
+            .min()
+            .unwrap_or(0);
+        self.duration_s * fewest as f64 / self.rows as f64
+    }
+
     /// Mean raw reading of `sensor`.
     pub fn raw_mean(&self, sensor: Sensor) -> nalgebra::Vector3<f64> {
         let from = sensor.channels().start;
@@ -456,6 +467,13 @@ fn reference_spans(condensed: &Condensed) -> [f64; 6] {
 /// but no ramp of the table.
 const CONSTANT_SHARE: f64 = 2e-3;
 
+/// And always while it moves by less than this, deg/s or m/s²: where nothing moves, the span is that of the jitter.
+const CONSTANT: [f64; 2] = [0.01, 1e-3];
+
+fn tolerance(c: usize, spans: &[f64; 6]) -> f64 {
+    (CONSTANT_SHARE * spans[c]).max(CONSTANT[c / 3])
+}
+
 fn constant_input<'a>(
     levels: impl Iterator<Item = &'a [Level; 6]> + Clone,
     spans: &[f64; 6],
@@ -467,14 +485,14 @@ fn constant_input<'a>(
             .map(|l| l.max)
             .fold(f64::NEG_INFINITY, f64::max);
         let low = known.map(|l| l.min).fold(f64::INFINITY, f64::min);
-        high - low <= CONSTANT_SHARE * spans[c]
+        high - low <= tolerance(c, spans)
     })
 }
 
 fn same_input(a: &[Level; 6], b: &[Level; 6], spans: &[f64; 6]) -> bool {
     (0..6).all(|c| {
         let unknown = [a[c].mean, b[c].mean].map(f64::is_nan);
-        unknown == [true; 2] || (a[c].mean - b[c].mean).abs() <= CONSTANT_SHARE * spans[c]
+        unknown == [true; 2] || (a[c].mean - b[c].mean).abs() <= tolerance(c, spans)
     })
 }
 

@@ -8,7 +8,7 @@ use crate::blocks::Condensed;
 use crate::dwell::{Dwells, Sensor, refuse_dead_channels};
 use crate::error::{Error, Result};
 use crate::estimate::least_squares::POORLY_DETERMINED;
-use crate::estimate::rotation::{IntegralNoise, Motion, Turn, direction_error};
+use crate::estimate::rotation::{Motion, Turn, direction_error};
 use crate::estimate::{Estimated, Failure, Observation, gravity_size, known_input, rotation};
 use crate::noise::Noise;
 use crate::plausible;
@@ -37,6 +37,14 @@ pub struct Options {
     pub holdout_blocks: usize,
     /// See [`crate::dwell::STILL_FACTOR`].
     pub still_factor: f64,
+    /// Calibrate this triad only. Without a table the gyro needs the accelerometer, which is then calibrated as well.
+    pub only: Option<Sensor>,
+}
+
+impl Options {
+    fn wants(&self, sensor: Sensor) -> bool {
+        self.only.is_none_or(|only| only == sensor)
+    }
 }
 
 /// A recording, condensed, with its dwells and their noise.
@@ -109,7 +117,7 @@ impl Prepared {
         let noise = Noise::of_size(&self.dwells.list, &self.condensed, accel);
         poses
             .iter()
-            .map(|o| noise.variance(self.dwells.list[o.dwell].duration_s))
+            .map(|o| noise.variance(self.dwells.list[o.dwell].averaged_s(Sensor::Accel)))
             .collect()
     }
 
@@ -160,14 +168,23 @@ impl Prepared {
                 si.trace() / 3.0
             };
             let g = self.manifest.gravity_mps2;
+            let duration_s: f64 = pieces.iter().map(|i| i.duration_s).sum();
+            // The integral is the mean times the duration.
+            let gyro = Sensor::Gyro.channels();
+            let rate_variance = gyro
+                .map(|c| self.noise.channels[c].variance(duration_s))
+                .sum::<f64>()
+                / 3.0;
             turns.push(Turn {
                 from: pair[0],
                 to: pair[1],
                 increments: pieces,
                 before: accel.apply(&a.raw_mean(Sensor::Accel)),
                 after: accel.apply(&b.raw_mean(Sensor::Accel)),
+                raw: [a, b].map(|d| d.raw_mean(Sensor::Accel)),
                 direction_variance: (variance(a) + variance(b)) / (g * g),
-                duration_s: pieces.iter().map(|i| i.duration_s).sum(),
+                integral_variance: duration_s * duration_s * rate_variance,
+                duration_s,
             });
         }
         (turns, refused)
@@ -218,21 +235,6 @@ impl Prepared {
             format!("{problem}{unused}"),
             remedy,
         )
-    }
-
-    /// Noise of the gyro as integrals see it.
-    pub fn integral_noise(&self) -> IntegralNoise {
-        let mean = |part: fn(&crate::noise::AllanModel) -> f64| {
-            Sensor::Gyro
-                .channels()
-                .map(|c| part(&self.noise.channels[c].model))
-                .sum::<f64>()
-                / 3.0
-        };
-        IntegralNoise {
-            white: mean(|m| m.white),
-            flicker: mean(|m| m.flicker),
-        }
     }
 }
 
@@ -414,7 +416,8 @@ fn fit_known(
 ) -> Result<Vec<SensorFit>> {
     let mut sensors = Vec::new();
     let mut missing = Vec::new();
-    for sensor in Sensor::BOTH.into_iter().filter(|s| prepared.has(*s)) {
+    let wanted = |s: &Sensor| prepared.has(*s) && options.wants(*s);
+    for sensor in Sensor::BOTH.into_iter().filter(wanted) {
         let observations = prepared.observations(sensor);
         if observations.is_empty() {
             let unused = prepared.dwells.unused(sensor);
@@ -434,19 +437,31 @@ fn fit_known(
         let estimated = match estimate(&observations) {
             Ok(estimated) => estimated,
             // A level cube tells nothing of the gyro, and a rate table not much of the accelerometer.
-            Err(failure)
+            Err(_)
                 if observations
                     .iter()
                     .all(|o| o.input == observations[0].input) =>
             {
-                let _ = failure;
                 missing.push(format!(
                     "{sensor}: all dwells have the same input, so it is not calibrated"
                 ));
                 continue;
             }
-            Err(failure) => return Err(prepared.refused(failure, sensor)),
+            Err(failure) => {
+                let mut error = prepared.refused(failure, sensor);
+                if let Some(other) = Sensor::BOTH.into_iter().find(|s| *s != sensor && wanted(s)) {
+                    error.remedy += &format!("; or fit the other one alone with --only {other}");
+                }
+                return Err(error);
+            }
         };
+        if observations
+            .iter()
+            .any(|o| prepared.dwells.list[o.dwell].turn)
+            && sensor == Sensor::Gyro
+        {
+            warnings.push("gyro: the turns are taken to be of exactly the stated angle about exactly the stated axis; what hands and table miss of that is in no interval".into());
+        }
         let error = |triad: &Triad, o: &Observation| triad.inverse.apply(&o.raw) - o.input;
         let matrix = estimated.triad.inverse.matrix;
         let mut residuals: Vec<Residual> = observations
@@ -506,6 +521,9 @@ fn refit<T: Send>(
     (0..blocks).into_par_iter().map(estimate).collect()
 }
 
+/// Fewer degrees of freedom than this show no error of the model.
+const FEW_DOF: f64 = 3.0;
+
 fn cannot_hold_out(block: usize, failure: Failure, sensor: Sensor) -> String {
     let problem = failure.into_error(sensor).problem;
     format!(
@@ -524,6 +542,15 @@ fn finish(
     not_held_out: Vec<String>,
 ) -> SensorFit {
     let mut warnings = Vec::new();
+    warnings.extend(
+        estimated
+            .notes
+            .iter()
+            .map(|note| format!("{sensor}: {note}")),
+    );
+    if estimated.scatter.iter().any(|(_, s)| s.dof < FEW_DOF) {
+        warnings.push(format!("{sensor}: hardly more dwells than parameters: nothing can contradict the model, and the intervals rest on the noise within dwells alone"));
+    }
     if estimated.condition > POORLY_DETERMINED {
         warnings.push(format!("{sensor}: the experiment determines some parameters poorly (condition {:.0}); their intervals say which", estimated.condition));
     }
@@ -645,7 +672,7 @@ fn fit_gravity(
         .collect();
     let not_held_out = failures(&accel_refits, Sensor::Accel);
     let mut sensors = Vec::new();
-    if prepared.has(Sensor::Gyro) {
+    if prepared.has(Sensor::Gyro) && options.wants(Sensor::Gyro) {
         sensors.extend(fit_turns(
             prepared,
             &accel,
@@ -695,9 +722,8 @@ fn fit_turns(
             .push("gyro: no turn lies between two usable dwells, so it is not calibrated".into());
         return Ok(None);
     }
-    let noise = prepared.integral_noise();
     let motions = prepared.motions(by_full);
-    let gyro = rotation::estimate(&turns, &rest, noise, &motions, None, g)
+    let gyro = rotation::estimate(&turns, &rest, &accel.triad, &motions, None, g)
         .map_err(|f| prepared.refused(f, Sensor::Gyro))?;
     let refits = refit(accel_refits.len(), |b| {
         let accel = accel_refits[b].as_ref().map_err(Clone::clone)?;
@@ -711,7 +737,8 @@ fn fit_turns(
             .filter(|o| block(o.dwell) != b)
             .copied()
             .collect();
-        rotation::estimate(&kept, &rest, noise, &[], Some(&gyro.triad.inverse), g)
+        let start = Some(&gyro.triad.inverse);
+        rotation::estimate(&kept, &rest, &accel.triad, &[], start, g)
     });
     let held_out = |t: &Turn| {
         let b = block(t.to);
@@ -740,7 +767,7 @@ fn fit_turns(
             dwell: t.to,
             value: direction_error(t, &gyro.triad.inverse),
             held_out: held_out(t),
-            floor: t.floor(mean_square, noise),
+            floor: t.floor(mean_square),
         })
         .collect();
     let static_rms = |rate: &dyn Fn(&Observation) -> Option<Vector3<f64>>| {

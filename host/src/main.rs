@@ -7,7 +7,7 @@ use std::process::ExitCode;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 use mimu::calibration::{Calibration, Staged, stage, to_toml};
-use mimu::dwell::STILL_FACTOR;
+use mimu::dwell::{STILL_FACTOR, Sensor};
 use mimu::error::{Error, Result};
 use mimu::fit::{Method, Options, Prepared, fit};
 use mimu::recording::{
@@ -100,6 +100,9 @@ struct FitArgs {
     /// Estimator where the input is known
     #[arg(long, value_enum, default_value_t = MethodArg::LeastSquares)]
     method: MethodArg,
+    /// Calibrate one of the two only: when the experiment does not determine the other
+    #[arg(long, value_enum, value_name = "SENSOR")]
+    only: Option<SensorArg>,
     #[command(flatten)]
     still: StillArgs,
     /// List the dwells
@@ -149,6 +152,12 @@ enum MethodArg {
     Xu,
     /// Scale factors and biases only, from six positions
     SixPositions,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum SensorArg {
+    Gyro,
+    Accel,
 }
 
 fn holdout(text: &str) -> std::result::Result<usize, String> {
@@ -239,6 +248,10 @@ fn run_fit(args: &FitArgs) -> Result<()> {
         },
         holdout_blocks: args.holdout,
         still_factor: args.still.factor,
+        only: args.only.map(|only| match only {
+            SensorArg::Gyro => Sensor::Gyro,
+            SensorArg::Accel => Sensor::Accel,
+        }),
     };
     let outputs = [args.output.as_deref(), args.json.file()];
     let prepared = read(&args.recording, options.still_factor, &outputs, None)?;

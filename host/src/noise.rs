@@ -100,11 +100,7 @@ impl Noise {
     /// Variances of the mean reading of `sensor` over `dwell`, raw units squared.
     pub fn of_mean(&self, sensor: Sensor, dwell: &Dwell) -> Vector3<f64> {
         let from = sensor.channels().start;
-        Vector3::from_fn(|i, _| {
-            // Masked samples are gone, and the mean is that of a shorter dwell.
-            let share = dwell.raw[from + i].n as f64 / dwell.rows as f64;
-            self.channels[from + i].variance(dwell.duration_s * share)
-        })
+        Vector3::from_fn(|i, _| self.channels[from + i].variance(dwell.averaged_s(sensor)))
     }
 }
 

@@ -114,7 +114,7 @@ fn outliers(prepared: &Prepared, fit: &SensorFit) -> Option<String> {
         let size = r.value.norm();
         size > OUTLIER * median && size > OUTLIER * r.floor
     };
-    let bad: Vec<_> = sorted.iter().take_while(off).collect();
+    let bad: Vec<_> = sorted.iter().filter(off).collect();
     let worst = bad.first()?;
     let names: Vec<String> = bad.iter().take(8).map(|r| name(prepared, r)).collect();
     let what = match fit.figure {

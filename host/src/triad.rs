@@ -34,12 +34,11 @@ pub fn invert(model: &Affine<f64>) -> Option<Affine<f64>> {
     })
 }
 
-/// Derivatives of the parameters of the other direction by those of `model`.
+/// Derivatives of the parameters of `inverse` by those of the model that it inverts.
 ///
 /// With `B = A⁻¹` and `c = -B b`: `dB = -B dA B`, `dc = -B (dA c + db)`.
-fn inversion_jacobian(model: &Affine<f64>, inverse: &Affine<f64>) -> SMatrix<f64, 12, 12> {
+fn inversion_jacobian(inverse: &Affine<f64>) -> SMatrix<f64, 12, 12> {
     let (b, c) = (&inverse.matrix, &inverse.offset);
-    let _ = model;
     let mut jacobian = SMatrix::zeros();
     for i in 0..3 {
         for j in 0..3 {
@@ -81,7 +80,7 @@ impl Triad {
         coverage_factor: f64,
     ) -> Option<Self> {
         let forward = invert(&inverse)?;
-        let j = inversion_jacobian(&inverse, &forward);
+        let j = inversion_jacobian(&forward);
         Some(Self {
             inverse,
             inverse_covariance: covariance,
@@ -98,7 +97,7 @@ impl Triad {
         coverage_factor: f64,
     ) -> Option<Self> {
         let inverse = invert(&forward)?;
-        let j = inversion_jacobian(&forward, &inverse);
+        let j = inversion_jacobian(&inverse);
         Some(Self {
             inverse,
             inverse_covariance: j * covariance * j.transpose(),
@@ -116,7 +115,7 @@ impl Triad {
         let scale = self.forward.matrix.norm();
         let mut jacobian = SMatrix::<f64, 12, 12>::zeros();
         for k in 0..12 {
-            // Central differences: the steps' third-order remainder is 1e-12 of what is differentiated.
+            // Central differences with steps of 1e-4: off by their square, 1e-9 of the slope.
             let step = if k < 9 { 1e-4 * scale } else { scale.max(1e-6) };
             let (mut up, mut down) = (at, at);
             up[k] += step;
@@ -164,10 +163,10 @@ pub enum Angles {
 ///
 /// # Conventions
 ///
-/// * Package misalignment `Mp` turns the body frame into the frame of the sensors:
-///   `Mp = Rz(θz) Ry(θy) Rx(θx)`, rotations by the right-hand rule. Its first order is fang (12). (As printed,
-///   fang (9) and (10) turn the other way than (11), and their product does not give (12); here (12)
-///   holds.)
+/// * Package misalignment `Mp = Rz(θz) Ry(θy) Rx(θx)`, rotations by the right-hand rule, takes components from the body
+///   frame to that of the sensors: seen from the sensors the body is turned by θ, so that for θz > 0 the sensor x
+///   leans away from the body's y. Its first order is fang (12). (As printed, fang (9) and (10) turn the
+///   other way than (11), and their product does not give (12); here (12) holds.)
 /// * Non-orthogonality `Mo` is lower triangular (fang (13)): the sensor x lies along the frame's x, the sensor y in its
 ///   xy plane turned by βyz towards x, and the sensor z is turned by βzy away from x and by βzx towards y.
 /// * Exactly, the rows of `Mo` have unit length, so that a scale factor is that along the sensor's own axis, and
@@ -201,15 +200,22 @@ impl Physical {
                 (p.diagonal(), theta, beta)
             }
             Angles::Exact => {
-                // P = L Q: Q' R' is the QR factorization of P'. Signs so that L has its diagonal
-                // positive, where P has: a sensor mounted backwards keeps a negative scale factor.
+                // P = L Q: Q' R' is the QR factorization of P'. The signs of the sensors are free, but Q has to be a
+                // rotation for its angles to mean anything: of the four choices that make it one, the one with the
+                // smallest turn. A sensor mounted backwards then has a negative scale factor.
                 let qr = p.transpose().qr();
                 let (mut q, mut l) = (qr.q().transpose(), qr.r().transpose());
+                let choices = (0..8u8)
+                    .map(|k| Vector3::from_fn(|i, _| if k & (1 << i) == 0 { 1.0 } else { -1.0 }));
+                let rotation = |s: &Vector3<f64>| s.product() * q.determinant() > 0.0;
+                let trace = |s: &Vector3<f64>| s.dot(&q.diagonal());
+                let flips = choices
+                    .filter(rotation)
+                    .max_by(|a, b| trace(a).total_cmp(&trace(b)))
+                    .unwrap_or_else(|| Vector3::repeat(1.0));
                 for k in 0..3 {
-                    if q[(k, k)] < 0.0 {
-                        q.row_mut(k).neg_mut();
-                        l.column_mut(k).neg_mut();
-                    }
+                    q.row_mut(k).scale_mut(flips[k]);
+                    l.column_mut(k).scale_mut(flips[k]);
                 }
                 let signs = Vector3::from_fn(|i, _| l[(i, i)].signum());
                 let scale = Vector3::from_fn(|i, _| signs[i] * l.row(i).norm());

@@ -211,9 +211,8 @@ fn turns(
             .map(|t| direction_error(t, model).norm())
             .collect()
     };
-    let noise = prepared.integral_noise();
     let c2 = gyro.inverse.matrix.norm_squared() / 3.0;
-    let floor: Vec<f64> = by_calibration.iter().map(|t| t.floor(c2, noise)).collect();
+    let floor: Vec<f64> = by_calibration.iter().map(|t| t.floor(c2)).collect();
     let after = errors(&by_calibration, &gyro.inverse);
     let rest: Vec<f64> = prepared
         .observations(Sensor::Gyro)

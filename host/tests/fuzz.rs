@@ -18,6 +18,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 use mimu::calibration::{Calibration, to_toml};
+use mimu::dwell::Sensor;
 use mimu::error::{Error, Result};
 use mimu::fit::{Fit, Method, Options, Prepared, fit};
 use mimu::recording::{
@@ -411,7 +412,9 @@ fn mutate_numbers(text: &str, random: &mut Random) -> Vec<u8> {
             11 => rows.truncate(to.max(2)),
             _ if header.len() > 5 => {
                 header.remove(column);
-                rows.iter_mut().for_each(|r| drop(r.remove(column)));
+                for row in &mut rows {
+                    row.remove(column);
+                }
             }
             _ => {}
         }
@@ -472,6 +475,7 @@ fn options(random: &mut Random) -> Options {
     Options {
         method: methods[if random.one_in(2) { 0 } else { random.below(4) }],
         holdout_blocks: [0, 2, 4, 1000][random.below(4)],
+        only: [None, None, Some(Sensor::Gyro), Some(Sensor::Accel)][random.below(4)],
         still_factor: [10.0, 1.0, 1e9][if random.one_in(2) { 0 } else { random.below(3) }],
     }
 }
@@ -507,6 +511,7 @@ impl Seeds {
         let options = Options {
             method: Method::LeastSquares,
             holdout_blocks: 4,
+            only: None,
             still_factor: 10.0,
         };
         let mut calibration = String::new();

@@ -78,6 +78,7 @@ impl Foreign<'_> {
         let options = Options {
             method,
             holdout_blocks: 4,
+            only: None,
             still_factor: STILL_FACTOR,
         };
         let prepared = Prepared::read(&recording, STILL_FACTOR, |_| {})?;

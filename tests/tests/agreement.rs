@@ -113,6 +113,38 @@ fn physical_quantities_make_the_forward_model_again() {
     }
 }
 
+/// Sensors soldered on in any orientation, left-handed ones and ones that point backwards included.
+#[test]
+fn exact_quantities_make_the_forward_model_again_in_any_mounting() {
+    for seed in 0..500 {
+        let mut random = Random::new(seed);
+        let unit = Unit::any(&mut random);
+        let mut triad = least_squares(&on_a_table(&unit, 1e30, &mut random))
+            .unwrap()
+            .triad;
+        let axis = nalgebra::Unit::new_normalize(Vector3::from_fn(|_, _| random.gaussian()));
+        let turn = nalgebra::Rotation3::from_axis_angle(&axis, random.within(std::f64::consts::PI));
+        let mirror = if seed % 2 == 0 { 1.0 } else { -1.0 };
+        triad.forward.matrix *= turn.matrix() * mirror;
+        let again = triad.physical(Angles::Exact).forward();
+        let off = (again.matrix - triad.forward.matrix).norm() / triad.forward.matrix.norm();
+        assert!(off < 1e-12, "{seed}: {off:e}");
+    }
+}
+
+/// A converter so coarse that a sensor keeps its code within dwells.
+#[test]
+fn a_channel_without_noise_is_fitted_by_filter_and_least_squares_alike() {
+    let unit = Unit::any(&mut Random::new(3));
+    let mut observations = on_a_table(&unit, 1000.0, &mut Random::new(4));
+    for o in &mut observations {
+        o.variance.y = 0.0;
+    }
+    let batch = least_squares(&observations).unwrap();
+    let recursive = kalman(&observations).unwrap();
+    assert!(apart(&batch.triad, &recursive.triad, &observations) < 1e-12);
+}
+
 /// Small and exact angles differ by products of angles: at 3 % each by about 1e-3, and no more.
 #[test]
 fn small_angles_are_exact_ones_to_first_order() {

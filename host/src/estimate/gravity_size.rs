@@ -231,6 +231,7 @@ pub fn estimate(
         triad,
         scatter: vec![("size of gravity".into(), scatter)],
         condition: shape.condition,
+        notes: Vec::new(),
     })
 }
 

@@ -10,6 +10,8 @@ use crate::triad::{Covariance, Triad};
 
 /// Two inputs are opposite if their sum is below this share of their size: a table's repeatability.
 const OPPOSITE_SHARE: f64 = 0.01;
+/// An input below this share of the largest is rest.
+const REST_SHARE: f64 = 1e-3;
 /// An input is along an axis if the rest of it is below this share.
 const ALONG_SHARE: f64 = 0.02;
 
@@ -95,14 +97,15 @@ pub fn kalman(observations: &[Observation]) -> Result<Estimated, Failure> {
     let observability = observability(observations)?;
     let span = span(observations);
     let dof = observations.len() as f64 - 4.0;
-    let floor = Vector3::from_fn(|axis, _| {
-        let variances = observations.iter().map(|o| o.variance[axis]);
-        positive(DVector::from_iterator(observations.len(), variances)).max()
+    let n = observations.len();
+    let known: [DVector<f64>; 3] = std::array::from_fn(|axis| {
+        positive(DVector::from_fn(n, |i, _| observations[i].variance[axis]))
     });
+    let floor = Vector3::from_fn(|axis, _| known[axis].max());
     let run = |excess: &Vector3<f64>| {
         let mut bank = Bank::<f64>::diffuse(&(floor + excess), 1.0);
-        for o in observations {
-            let noise = o.variance.map(|v| v.max(f64::MIN_POSITIVE)) + excess;
+        for (i, o) in observations.iter().enumerate() {
+            let noise = Vector3::from_fn(|axis, _| known[axis][i]) + excess;
             bank.update(&(o.input / span), &o.raw, &noise)
                 .map_err(|e| Failure::NoSolution(format!("dwell {}: {e}", o.dwell)))?;
         }
@@ -122,11 +125,7 @@ pub fn kalman(observations: &[Observation]) -> Result<Estimated, Failure> {
                 .iter()
                 .map(|o| o.raw[axis] - mean[0] - mean.fixed_rows::<3>(1).dot(&(o.input / span)))
                 .collect();
-            let variances: Vec<f64> = observations
-                .iter()
-                .map(|o| o.variance[axis].max(f64::MIN_POSITIVE))
-                .collect();
-            let found = excess_variance(&residuals, &variances, dof);
+            let found = excess_variance(&residuals, known[axis].as_slice(), dof);
             let chi2 = if round == 0 {
                 found.chi2
             } else {
@@ -190,6 +189,7 @@ fn forward(
         triad,
         scatter,
         condition,
+        notes: Vec::new(),
     })
 }
 
@@ -224,11 +224,10 @@ fn positive(variances: DVector<f64>) -> DVector<f64> {
 pub fn opposite_rates(observations: &[Observation]) -> Result<Estimated, Failure> {
     observability(observations)?;
     let mut free: Vec<&Observation> = observations.iter().collect();
-    let limit = OPPOSITE_SHARE * span(observations);
-    let (mut pairs, mut rest) = (Vec::new(), Vec::new());
+    let (mut pairs, mut rest, mut single) = (Vec::new(), Vec::new(), 0);
     while let Some(first) = free.pop() {
         let size = first.input.norm();
-        if size < limit.min(1e-3 * span(observations)) {
+        if size < REST_SHARE * span(observations) {
             rest.push(first);
             continue;
         }
@@ -238,8 +237,9 @@ pub fn opposite_rates(observations: &[Observation]) -> Result<Estimated, Failure
             .map(|(i, o)| (i, (o.input + first.input).norm()))
             .filter(|(_, sum)| *sum <= OPPOSITE_SHARE * size)
             .min_by(|a, b| a.1.total_cmp(&b.1));
-        if let Some((i, _)) = opposite {
-            pairs.push((first, free.swap_remove(i)));
+        match opposite {
+            Some((i, _)) => pairs.push((first, free.swap_remove(i))),
+            None => single += 1,
         }
     }
     if rest.is_empty() {
@@ -274,11 +274,12 @@ pub fn opposite_rates(observations: &[Observation]) -> Result<Estimated, Failure
         * reading.transpose();
     let c_transposed = &pseudo * &known;
     let matrix = Matrix3::from_fn(|i, j| c_transposed[(j, i)]);
-    let at_rest = rest.iter().map(|o| o.raw).sum::<Vector3<f64>>() / rest.len() as f64;
-    let inverse = Affine {
-        matrix,
-        offset: -(matrix * at_rest),
-    };
+    let count = rest.len() as f64;
+    let at_rest = rest.iter().map(|o| o.raw).sum::<Vector3<f64>>() / count;
+    // (9) and not (10): a dwell taken for rest may turn a little, and that is known.
+    let offsets: Vec<Vector3<f64>> = rest.iter().map(|o| o.input - matrix * o.raw).collect();
+    let offset = offsets.iter().sum::<Vector3<f64>>() / count;
+    let inverse = Affine { matrix, offset };
 
     // Errors of a difference in SI: C times the error of the readings.
     let si =
@@ -287,21 +288,41 @@ pub fn opposite_rates(observations: &[Observation]) -> Result<Estimated, Failure
         .iter()
         .map(|(a, b)| si(a.variance + b.variance))
         .collect();
-    let rest_noise =
-        si(rest.iter().map(|o| o.variance).sum::<Vector3<f64>>()
-            / (rest.len() * rest.len()) as f64);
+    let rest_variance: Vec<Matrix3<f64>> = rest.iter().map(|o| si(o.variance)).collect();
+    let mut rest_noise = rest_variance.iter().sum::<Matrix3<f64>>() / (count * count);
     let residual = &known - &reading * &c_transposed;
-    let dof = pairs.len() as f64 - 3.0;
-    let scatter: Vec<_> = (0..3)
+    let mut notes = Vec::new();
+    if single > 0 {
+        notes.push(format!(
+            "{single} rates have no opposite and are not used by --method xu"
+        ));
+    }
+    let scatter_of = |values: Vec<f64>, variances: &[Matrix3<f64>], axis: usize, dof: f64| {
+        let variances: Vec<f64> = variances
+            .iter()
+            .map(|v| v[(axis, axis)].max(f64::MIN_POSITIVE))
+            .collect();
+        excess_variance(&values, &variances, dof)
+    };
+    let mut scatter: Vec<_> = (0..3)
         .map(|axis| {
-            let r: Vec<f64> = residual.column(axis).iter().copied().collect();
-            let v: Vec<f64> = noise
-                .iter()
-                .map(|n| n[(axis, axis)].max(f64::MIN_POSITIVE))
-                .collect();
-            (AXES[axis].to_string(), excess_variance(&r, &v, dof))
+            let values = residual.column(axis).iter().copied().collect();
+            (
+                AXES[axis].to_string(),
+                scatter_of(values, &noise, axis, pairs.len() as f64 - 3.0),
+            )
         })
         .collect();
+    // The readings at rest scatter by themselves, and by what each dwell of a pair does.
+    for axis in 0..3 {
+        let values = offsets.iter().map(|o| o[axis] - offset[axis]).collect();
+        let of_rest = scatter_of(values, &rest_variance, axis, count - 1.0);
+        let excess = of_rest.excess.max(0.5 * scatter[axis].1.excess);
+        rest_noise[(axis, axis)] += excess / count;
+        if of_rest.excess > 0.0 {
+            scatter.push((format!("{} at rest", AXES[axis]), of_rest));
+        }
+    }
     let covariance = rows_covariance(&pseudo, |p, r, s| {
         noise[p][(r, s)] + if r == s { scatter[r].1.excess } else { 0.0 }
     });
@@ -326,6 +347,7 @@ pub fn opposite_rates(observations: &[Observation]) -> Result<Estimated, Failure
         triad,
         scatter,
         condition: observability.condition,
+        notes,
     })
 }
 
@@ -424,6 +446,7 @@ pub fn inverse_form(observations: &[Observation]) -> Result<Estimated, Failure> 
         triad,
         scatter,
         condition: observability.condition,
+        notes: Vec::new(),
     })
 }
 
@@ -435,8 +458,10 @@ pub fn six_positions(observations: &[Observation]) -> Result<Estimated, Failure>
         offset: Vector3::zeros(),
     };
     let mut covariance = Covariance::zeros();
+    let mut scatter = Vec::new();
     for axis in 0..3 {
         let mut ends = [(0.0, 0.0, 0.0, 0.0); 2]; // sums of reading, input, variance; number
+        let mut used = Vec::new();
         let along = |o: &&Observation| {
             let size = o.input.norm();
             size > 1e-3 * span(observations)
@@ -448,6 +473,7 @@ pub fn six_positions(observations: &[Observation]) -> Result<Estimated, Failure>
             end.1 += o.input[axis];
             end.2 += o.variance[axis];
             end.3 += 1.0;
+            used.push(o);
         }
         if ends.iter().any(|e| e.3 == 0.0) {
             return Err(Failure::Undetermined {
@@ -458,11 +484,24 @@ pub fn six_positions(observations: &[Observation]) -> Result<Estimated, Failure>
                 ),
             });
         }
-        let [down, up] = ends.map(|e| (e.0 / e.3, e.1 / e.3, e.2 / (e.3 * e.3)));
+        let [mut down, mut up] = ends.map(|e| (e.0 / e.3, e.1 / e.3, e.2 / (e.3 * e.3)));
         let (width, middle) = (up.1 - down.1, up.1 + down.1);
         let scale = (up.0 - down.0) / width;
         model.matrix[(axis, axis)] = scale;
         model.offset[axis] = 0.5 * (up.0 + down.0 - scale * middle);
+        // Repeated positions show what the noise does not.
+        let residuals: Vec<f64> = used
+            .iter()
+            .map(|o| o.raw[axis] - scale * o.input[axis] - model.offset[axis])
+            .collect();
+        let variances: Vec<f64> = used
+            .iter()
+            .map(|o| o.variance[axis].max(f64::MIN_POSITIVE))
+            .collect();
+        let of_axis = excess_variance(&residuals, &variances, used.len() as f64 - 2.0);
+        down.2 += of_axis.excess / ends[0].3;
+        up.2 += of_axis.excess / ends[1].3;
+        scatter.push((AXES[axis].to_string(), of_axis));
         // Bias at the middle of the two inputs, which is zero to the table's repeatability.
         covariance[(4 * axis, 4 * axis)] = (up.2 + down.2) / (width * width);
         covariance[(9 + axis, 9 + axis)] = 0.25 * (up.2 + down.2);
@@ -470,16 +509,12 @@ pub fn six_positions(observations: &[Observation]) -> Result<Estimated, Failure>
         covariance[(4 * axis, 9 + axis)] = both;
         covariance[(9 + axis, 4 * axis)] = both;
     }
-    let scatter = Scatter {
-        excess: 0.0,
-        chi2: 0.0,
-        dof: 0.0,
-    };
-    let triad = Triad::from_forward(model, covariance, scatter.coverage_factor())
+    let triad = Triad::from_forward(model, covariance, widest(&scatter))
         .ok_or_else(|| Failure::NoSolution("a sensor does not respond".into()))?;
     Ok(Estimated {
         triad,
-        scatter: vec![("all".into(), scatter)],
+        scatter,
         condition: 1.0,
+        notes: Vec::new(),
     })
 }

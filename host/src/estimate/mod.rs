@@ -39,6 +39,8 @@ pub struct Estimated {
     pub scatter: Vec<(String, Scatter)>,
     /// Condition number of the scaled design.
     pub condition: f64,
+    /// What a person should know.
+    pub notes: Vec<String>,
 }
 
 /// Why there is no estimate.
