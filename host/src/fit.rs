@@ -355,6 +355,15 @@ impl Fit {
 
 /// Fits both triads of a recording.
 pub fn fit(prepared: Prepared, options: Options) -> Result<Fit> {
+    if let Some(only) = options.only
+        && !prepared.has(only)
+    {
+        return Err(Error::new(
+            &prepared.place,
+            format!("there is no {only} to fit alone"),
+            format!("leave --only out, or add {only}_x, {only}_y, {only}_z"),
+        ));
+    }
     let mut warnings = prepared.condensed.warnings.clone();
     warnings.extend(prepared.dwells.warnings.iter().cloned());
     warn_of_temperature(&prepared, &mut warnings);

@@ -326,7 +326,7 @@ fn a_saturated_dwell_is_found_and_left_out() {
 /// Dwell means of correlated noise scatter by more than sigma over the root of n, and the Allan deviation knows.
 #[test]
 fn noise_of_a_dwell_mean_is_that_of_correlated_noise() {
-    let (rate_hz, dwell_s) = (100.0, 10.0);
+    let (rate_hz, dwell_s): (f64, f64) = (100.0, 10.0);
     let mut random = Random::new(3);
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("recording");
@@ -339,7 +339,7 @@ fn noise_of_a_dwell_mean_is_that_of_correlated_noise() {
     let mut batch = Batch::default();
     // First-order Gauss-Markov noise of 0.5 s: a mean over 10 s scatters by σ √(2·0.5/10), ten times as much as
     // σ/√1000.
-    let (keep, dwells) = ((-1.0 / (0.5 * rate_hz) as f64).exp(), 200);
+    let (keep, dwells) = ((-1.0 / (0.5 * rate_hz)).exp(), 200);
     let drive = f64::sqrt(1.0 - keep * keep);
     let mut state = [0.0; 3];
     for row in 0..(dwells as f64 * dwell_s * rate_hz) as usize {

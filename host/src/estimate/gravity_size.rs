@@ -1,6 +1,6 @@
 //! Accelerometer calibration from the size of gravity alone, over many poses.
 //!
-//! At rest `|C u + o| = g` in every pose (fang [14], xu [19] among many). A rotation of the whole leaves
+//! At rest `|C u + o| = g` in every pose (references 14 of fang and 19 of xu, among many). A rotation of the whole leaves
 //! every size as it is, so the frame has to be chosen: C is lower triangular with a positive diagonal,
 //! that is, the body frame has its x axis along the sensor x and its xy plane through the sensor y, fang (13) with
 //! `Mp = 1`. Nine parameters, and at least nine poses; which way an axis is positive cannot be seen

@@ -1,7 +1,7 @@
 //! Gyro calibration without a table: from the turns between dwells, and from the dwells themselves.
 //!
 //! Gravity is the reference. Carried along by the integrated gyro, the direction of gravity of one
-//! dwell must meet the direction measured in the next (xu [19], fang [12]); at rest the rate is zero.
+//! dwell must meet the direction measured in the next (references 19 of xu and 12 of fang); at rest the rate is zero.
 //! Both are fitted together, as the bias that the turns want and the readings at rest need not agree
 //! when the model lacks something. The frame is that of the accelerometer, so the full 3x3 matrix holds
 //! the alignment of gyro to accelerometer.
