@@ -1,7 +1,7 @@
 //! A recording condensed to blocks of a tenth of a second, in one pass and bounded memory.
 //!
 //! Everything that an affine fit needs of fourteen million samples is their first two moments over
-//! short stretches, and for rotations the integral of the rate: 60 MB in place of 1.5 GB. What has to
+//! short stretches, and for rotations the integral of the rate: 85 to 225 MB in place of 1.5 GB. What has to
 //! be known before a sample can be judged (where the rails are, what stillness means) is only known at the
 //! end, so a block also carries what is needed to take clipped samples out of its sums later.
 

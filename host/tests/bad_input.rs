@@ -1128,10 +1128,15 @@ fn steps_that_are_row_numbers_are_refused_before_they_fill_the_memory() {
 fn a_sensor_that_is_not_there_cannot_be_fitted_alone() {
     let mut samples = by_hand();
     samples.names.drain(1..4);
-    samples.rows.iter_mut().for_each(|row| drop(row.drain(1..4)));
+    samples
+        .rows
+        .iter_mut()
+        .for_each(|row| drop(row.drain(1..4)));
     let place = Place::with(&samples);
     assert!(place.fit(&[]).json()["sensors"]["gyro"].is_null());
-    place.fit(&["--only", "gyro"]).refused(&["samples.csv", "no gyro", "leave --only out"]);
+    place
+        .fit(&["--only", "gyro"])
+        .refused(&["samples.csv", "no gyro", "leave --only out"]);
     let result = Place::with(&on_table()).fit(&["--only", "accel"]).json();
     assert!(result["sensors"]["gyro"].is_null() && distance(&result, "accel") < 2.0);
 }

@@ -138,7 +138,7 @@ pub struct Manifest {
     pub gravity_mps2: f64,
     /// Unit of the raw columns.
     pub raw_unit: RawUnit,
-    /// Latitude in degrees, north positive: the Earth's rate in the table's frame follows from it.
+    /// Latitude in degrees, north positive. Kept with the recording; no fit takes the Earth's rate out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub latitude_deg: Option<f64>,
     /// What is known of the true input.
