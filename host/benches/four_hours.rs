@@ -7,7 +7,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-use mimu::fit::{Method, Options, Prepared, fit};
+use mimu::fit::{Method, Options, fit};
+use mimu::prepared::Prepared;
 use mimu::recording::{
     Batch, ColumnList, Columns, ImportOptions, Manifest, RawUnit, Recording, Reference,
     SampleFormat, Writer, import,
@@ -109,15 +110,15 @@ fn by_hand(folder: &Path) {
     import(&options, &path, |_| ()).expect("the files are known to be good");
     let recording = Recording::open(&path).expect("just imported");
     let start = Instant::now();
-    let prepared =
-        Prepared::read(&recording, mimu::dwell::STILL_FACTOR, |_| ()).expect("known to be good");
+    let prepared = Prepared::read(&recording, mimu::stillness::STILL_FACTOR, |_| ())
+        .expect("known to be good");
     let reading = start.elapsed();
     let start = Instant::now();
     let options = Options {
         method: Method::LeastSquares,
         holdout_blocks: 4,
         only: None,
-        still_factor: mimu::dwell::STILL_FACTOR,
+        still_factor: mimu::stillness::STILL_FACTOR,
     };
     fit(prepared, options).expect("known to be good");
     println!(

@@ -6,15 +6,13 @@
 //! end, so a block also carries what is needed to take clipped samples out of its sums later.
 
 use crate::error::{Error, Result};
+use crate::increment::{Increment, Integrator};
 use crate::recording::{Batch, RAW_COLUMNS, Recording};
 
 /// Length of a block, s. A tenth of the shortest dwell that is worth having; ten samples at 100 Hz.
 const BLOCK_S: f64 = 0.1;
 /// Smallest number of samples in a full block, for slow recordings.
 const BLOCK_MIN_ROWS: usize = 4;
-/// Longest stretch that one [`Increment`] integrates over, s: at 10 rad/s it turns by 0.1 rad, and
-/// what the second-order coning correction leaves is below 1e-5 rad.
-const INCREMENT_S: f64 = 0.01;
 /// A time step this many times the sample period is a gap.
 const GAP_PERIODS: f64 = 1.5;
 /// Gaps in more than this share of all rows are no gaps but another rate.
@@ -212,27 +210,6 @@ pub struct Block {
     pub reference: [Level; 6],
     /// Temperature, °C.
     pub temp_c: Level,
-}
-
-/// Integral of the raw gyro readings `u` over about 10 ms, from one sample instant to another, in a form that
-/// gives the rotation vector of any affine calibration of them to second order.
-///
-/// With `ω = C u + o` the rotation vector is (Bortz, second order)
-/// `φ = C a + o T + ½ cof(C) b + ½ (C d) × o`, cof(C) being the cofactor matrix.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Increment {
-    /// Instant at which it ends, s.
-    pub end_s: f64,
-    /// T, its length, s.
-    pub duration_s: f64,
-    /// a = ∫ u dt, raw·s.
-    pub integral: [f64; 3],
-    /// b = ∫ a(t) × u(t) dt, raw²·s².
-    pub coning: [f64; 3],
-    /// d = 2 ∫ a(t) dt - T a(T), raw·s².
-    pub moment: [f64; 3],
-    /// Whether all samples are there and are numbers: false across a gap.
-    pub whole: bool,
 }
 
 /// What one pass over a recording leaves.
@@ -601,74 +578,4 @@ pub(crate) fn counted(n: u64, noun: &str) -> String {
     } else {
         format!("{n} {noun}s")
     }
-}
-
-/// Integrates raw gyro samples to [`Increment`]s.
-struct Integrator {
-    longest_s: f64,
-    before: Option<(f64, [f64; 3])>,
-    open: Increment,
-    sum: [f64; 3],
-}
-
-impl Integrator {
-    const EMPTY: Increment = Increment {
-        end_s: 0.0,
-        duration_s: 0.0,
-        integral: [0.0; 3],
-        coning: [0.0; 3],
-        moment: [0.0; 3],
-        whole: true,
-    };
-
-    fn new(period_s: f64) -> Self {
-        Self {
-            // Half a period of slack, as time stamps jitter.
-            longest_s: INCREMENT_S.max(period_s) - 0.5 * period_s,
-            before: None,
-            open: Self::EMPTY,
-            sum: [0.0; 3],
-        }
-    }
-
-    /// Takes in a sample; an increment if one is complete.
-    fn push(&mut self, t: f64, u: [f64; 3], gap: bool) -> Option<Increment> {
-        let (t0, u0) = self.before.replace((t, u))?;
-        let dt = t - t0;
-        let open = &mut self.open;
-        if gap || !u.iter().chain(&u0).all(|x| x.is_finite()) {
-            open.whole = false;
-        }
-        // The rate runs straight from sample to sample: exact for its integral, and for its coning
-        // within one step dt²/6 u0 × u.
-        let within = cross(u0, u);
-        let a0 = open.integral;
-        let step = [0, 1, 2].map(|k| 0.5 * dt * (u0[k] + u[k]));
-        let across = cross(a0, step);
-        for k in 0..3 {
-            open.coning[k] += across[k] + dt * dt / 6.0 * within[k];
-            self.sum[k] += dt * a0[k] + dt * dt / 6.0 * (2.0 * u0[k] + u[k]);
-            open.integral[k] += step[k];
-        }
-        open.duration_s += dt;
-        open.end_s = t;
-        (open.duration_s >= self.longest_s)
-            .then(|| self.take())
-            .flatten()
-    }
-
-    fn take(&mut self) -> Option<Increment> {
-        let mut done = std::mem::replace(&mut self.open, Self::EMPTY);
-        let sum = std::mem::replace(&mut self.sum, [0.0; 3]);
-        done.moment = [0, 1, 2].map(|k| 2.0 * sum[k] - done.duration_s * done.integral[k]);
-        (done.duration_s > 0.0).then_some(done)
-    }
-}
-
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    ]
 }

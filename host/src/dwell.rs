@@ -7,33 +7,19 @@
 use std::fmt;
 use std::ops::Range;
 
-use crate::blocks::{Block, Condensed, Level, Moments, Rails};
+use crate::blocks::{Condensed, Level, Moments, Rails};
 use crate::error::{Error, Result};
-use crate::recording::{Manifest, RAW_COLUMNS, Reference};
+use crate::rails::{self, longest_run_by_chance};
+use crate::recording::{Manifest, RAW_COLUMNS};
+use crate::stillness::{self, Detection};
 
-/// Length of the window whose variance decides on stillness, s. Long enough that a slow turn shows in
-/// the accelerometer (0.5 degrees a second moves it by 30 times its noise), short enough for hands.
-pub const WINDOW_S: f64 = 1.0;
-/// Left out at both ends of a dwell that was found, s: stillness begins and ends within a window.
-pub const GUARD_S: f64 = 0.2;
 /// A dwell that is shorter is flagged and not used, s.
 pub const SHORTEST_S: f64 = 1.0;
-/// Variance of a still window over the quietest, at most. Seven recordings by hand give the same
-/// dwells from 7 to 20; at 3 the hands that put a unit down split them, at 100 they join.
-pub const STILL_FACTOR: f64 = 10.0;
-/// What the gyro is allowed beyond that in recordings by hand with an accelerometer to watch as well. Hands tremble in angle:
-/// of 22 rests of each of five units, some had 50 to 230 times the quietest variance in the gyro while the accelerometer
-/// saw nothing, and without them the held-out error was threefold. The mean rate of a rest is what it turned by in all
-/// over its length, and the tremor leaves next to none.
-const GYRO_TREMOR: f64 = 30.0;
 /// Variance of a given step over the median of all steps, at most; a fivefold standard deviation.
 const STEP_FACTOR: f64 = 25.0;
 /// Share of clipped samples from which on a mean is refused: below, it moves by less than a tenth
 /// of a standard deviation of one sample.
 const CLIPPED_SHARE: f64 = 0.01;
-/// Natural logarithm of the odds against a run of equal samples by chance in the whole recording.
-const RUN_LOG_ODDS: f64 = 14.0;
-
 /// A sensor triad.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sensor {
@@ -198,34 +184,17 @@ pub struct Dwells {
     pub warnings: Vec<String>,
 }
 
-/// The thresholds that found the dwells.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Detection {
-    /// Window of the variance, s.
-    pub window_s: f64,
-    /// Left out at both ends, s.
-    pub guard_s: f64,
-    /// Shortest dwell that is used, s.
-    pub shortest_s: f64,
-    /// Largest variance of a still window in the accelerometer, in units of `floor` squared.
-    pub still_factor: f64,
-    /// The same in the gyro.
-    pub gyro_still_factor: f64,
-    /// Standard deviation of one sample in the quietest twentieth of the recording, raw units.
-    pub floor: [f64; 6],
-}
-
 impl Dwells {
-    /// The dwells of a recording. `still_factor`: see [`STILL_FACTOR`].
+    /// The dwells of a recording. `still_factor`: see [`stillness::STILL_FACTOR`].
     pub fn find(condensed: &Condensed, manifest: &Manifest, still_factor: f64) -> Result<Self> {
         let mut warnings = Vec::new();
         let longest_run = [0, 1, 2, 3, 4, 5]
             .map(|c| longest_run_by_chance(condensed, c).unwrap_or(f64::INFINITY));
-        let rails = rails(condensed, manifest, &longest_run, &mut warnings);
+        let rails = rails::find(condensed, manifest, &longest_run, &mut warnings);
         let (ranges, detection) = if condensed.has_steps {
             (by_step(condensed), None)
         } else {
-            let (ranges, detection) = by_stillness(condensed, manifest, still_factor)?;
+            let (ranges, detection) = stillness::find(condensed, manifest, still_factor)?;
             (ranges, Some(detection))
         };
         let mut list: Vec<Dwell> = ranges
@@ -286,7 +255,7 @@ impl Dwells {
 }
 
 /// A stretch of blocks, with its step if that is given.
-type Stretch = (Option<i32>, Range<usize>);
+pub(crate) type Stretch = (Option<i32>, Range<usize>);
 
 fn by_step(condensed: &Condensed) -> Vec<Stretch> {
     let mut ranges: Vec<Stretch> = Vec::new();
@@ -300,204 +269,8 @@ fn by_step(condensed: &Condensed) -> Vec<Stretch> {
     ranges
 }
 
-fn by_stillness(
-    condensed: &Condensed,
-    manifest: &Manifest,
-    factor: f64,
-) -> Result<(Vec<Stretch>, Detection)> {
-    let blocks = &condensed.blocks;
-    let block_s = blocks.iter().map(|b| b.rows).max().unwrap_or(1) as f64 * condensed.period_s;
-    let width = ((WINDOW_S / block_s).round() as usize).max(2);
-    if blocks.len() < width {
-        let problem = format!(
-            "the recording lasts {:.2} s, less than the {WINDOW_S} s in which stillness shows",
-            condensed.rows as f64 * condensed.period_s
-        );
-        return Err(Error::new("dwells", problem, "record for longer"));
-    }
-    let channels: Vec<usize> = (0..6).filter(|&c| condensed.has_raw[c]).collect();
-    let windows = windows(blocks, width, &channels);
-    let mut floor = [0.0; 6];
-    for &c in &channels {
-        let mut of_channel: Vec<f64> = windows
-            .iter()
-            .flatten()
-            .map(|w| w.variance[c])
-            .filter(|v| *v > 0.0)
-            .collect();
-        // A noiseless simulation has no floor: then anything that varies at all is motion.
-        floor[c] = quantile(&mut of_channel, 0.05).unwrap_or(0.0);
-    }
-    // A hand that holds still trembles in angle and not in force.
-    let by_hand = manifest.reference == Reference::Gravity && condensed.has_raw[3];
-    let gyro = if by_hand {
-        GYRO_TREMOR * factor
-    } else {
-        factor
-    };
-    let factors = [gyro, gyro, gyro, factor, factor, factor];
-    let quiet = |w: &Window| {
-        channels
-            .iter()
-            .all(|&c| w.variance[c] <= factors[c] * floor[c])
-    };
-    let at_rest: Vec<&Window> = windows.iter().flatten().filter(|w| quiet(w)).collect();
-    let rates = Sensor::Gyro
-        .channels()
-        .filter(|&c| by_hand && condensed.has_raw[c]);
-    let rates: Vec<_> = rates
-        .map(|c| (c, rate_at_rest(&at_rest, c, (factor * floor[c]).sqrt())))
-        .collect();
-    let turning = |w: &Window| rates.iter().any(|(c, range)| !range.contains(&w.mean[*c]));
-    let spans = reference_spans(condensed);
-    let mut still = vec![false; blocks.len()];
-    for (i, window) in windows.iter().enumerate() {
-        let Some(window) = window else { continue };
-        let quiet = quiet(window) && !turning(window);
-        let constant = manifest.reference == Reference::Gravity
-            || constant_input(blocks[i..i + width].iter().map(|b| &b.reference), &spans);
-        if quiet && constant {
-            still[i..i + width].fill(true);
-        }
-    }
-    // Two steps of a table may follow each other without a still window being disturbed.
-    let guard = (GUARD_S / block_s).round() as usize;
-    let mut ranges = Vec::new();
-    let mut start = None;
-    for i in 0..=blocks.len() {
-        let open = i < blocks.len()
-            && still[i]
-            && (start.is_none()
-                || (!blocks[i].after_gap
-                    && same_input(&blocks[i - 1].reference, &blocks[i].reference, &spans)));
-        match (open, start) {
-            (true, None) => start = Some(i),
-            (false, Some(from)) => {
-                // At the ends of the recording nothing was set in motion.
-                let from = if from == 0 { 0 } else { from + guard };
-                let to = if i == blocks.len() {
-                    i
-                } else {
-                    i.saturating_sub(guard)
-                };
-                if to > from {
-                    ranges.push((None, from..to));
-                }
-                start = (i < blocks.len() && still[i]).then_some(i);
-            }
-            _ => {}
-        }
-    }
-    let detection = Detection {
-        window_s: width as f64 * block_s,
-        guard_s: guard as f64 * block_s,
-        shortest_s: SHORTEST_S,
-        still_factor: factor,
-        gyro_still_factor: gyro,
-        floor: floor.map(f64::sqrt),
-    };
-    Ok((ranges, detection))
-}
-
-/// Mean and variance of the six raw channels over [`WINDOW_S`].
-struct Window {
-    mean: [f64; 6],
-    variance: [f64; 6],
-}
-
-/// The window that begins at each block; `None` where there is a gap in it.
-fn windows(blocks: &[Block], width: usize, channels: &[usize]) -> Vec<Option<Window>> {
-    let window = |window: &[Block]| {
-        let (mut mean, mut variance) = ([0.0; 6], [0.0; 6]);
-        for &c in channels {
-            let pooled = pool(window.iter().map(|b| b.raw[c]));
-            mean[c] = pooled.mean;
-            variance[c] = match pooled.n {
-                0 | 1 => f64::INFINITY,
-                n => pooled.m2 / f64::from(n - 1),
-            };
-        }
-        Window { mean, variance }
-    };
-    let whole = |w: &[Block]| !w[1..].iter().any(|b| b.after_gap);
-    blocks
-        .windows(width)
-        .map(|w| whole(w).then(|| window(w)))
-        .collect()
-}
-
-/// Mean readings of channel `c` that a window at rest may have: about the median of the windows that vary little, by
-/// `margin` and by five of their own deviations, which hold a drift of the bias.
-///
-/// A turn about the vertical does not show in the accelerometer, and a slow one hardly in the variance of the gyro.
-fn rate_at_rest(at_rest: &[&Window], c: usize, margin: f64) -> std::ops::RangeInclusive<f64> {
-    let mut means: Vec<f64> = at_rest.iter().map(|w| w.mean[c]).collect();
-    let Some(middle) = quantile(&mut means, 0.5) else {
-        return f64::NEG_INFINITY..=f64::INFINITY;
-    };
-    let mut deviations: Vec<f64> = means.iter().map(|m| (m - middle).abs()).collect();
-    let sigma = 1.4826 * quantile(&mut deviations, 0.5).unwrap_or(0.0);
-    let reach = margin + 5.0 * sigma;
-    middle - reach..=middle + reach
-}
-
-/// Largest less smallest value of each reference channel in the recording, by sensor.
-fn reference_spans(condensed: &Condensed) -> [f64; 6] {
-    let mut spans = [0.0; 6];
-    for sensor in Sensor::BOTH {
-        let mut span: f64 = 0.0;
-        for c in sensor.channels() {
-            let levels = || {
-                condensed
-                    .blocks
-                    .iter()
-                    .map(move |b| &b.reference[c])
-                    .filter(|l| l.mean.is_finite())
-            };
-            let high = levels().map(|l| l.max).fold(f64::NEG_INFINITY, f64::max);
-            let low = levels().map(|l| l.min).fold(f64::INFINITY, f64::min);
-            span = span.max(high - low);
-        }
-        spans[sensor.channels()].fill(span);
-    }
-    spans
-}
-
-/// An input counts as constant while it moves by less than this share of its span: an encoder's noise,
-/// but no ramp of the table.
-const CONSTANT_SHARE: f64 = 2e-3;
-
-/// And always while it moves by less than this, deg/s or m/s²: where nothing moves, the span is that of the jitter.
-const CONSTANT: [f64; 2] = [0.01, 1e-3];
-
-fn tolerance(c: usize, spans: &[f64; 6]) -> f64 {
-    (CONSTANT_SHARE * spans[c]).max(CONSTANT[c / 3])
-}
-
-fn constant_input<'a>(
-    levels: impl Iterator<Item = &'a [Level; 6]> + Clone,
-    spans: &[f64; 6],
-) -> bool {
-    (0..6).all(|c| {
-        let known = levels.clone().map(|l| l[c]).filter(|l| l.mean.is_finite());
-        let high = known
-            .clone()
-            .map(|l| l.max)
-            .fold(f64::NEG_INFINITY, f64::max);
-        let low = known.map(|l| l.min).fold(f64::INFINITY, f64::min);
-        high - low <= tolerance(c, spans)
-    })
-}
-
-fn same_input(a: &[Level; 6], b: &[Level; 6], spans: &[f64; 6]) -> bool {
-    (0..6).all(|c| {
-        let unknown = [a[c].mean, b[c].mean].map(f64::is_nan);
-        unknown == [true; 2] || (a[c].mean - b[c].mean).abs() <= tolerance(c, spans)
-    })
-}
-
 /// Moments of several stretches taken together; extremes are not kept.
-fn pool(parts: impl Iterator<Item = Moments>) -> Moments {
+pub(crate) fn pool(parts: impl Iterator<Item = Moments>) -> Moments {
     parts.fold(Moments::default(), |a, b| {
         let n = a.n + b.n;
         if n == 0 {
@@ -515,7 +288,7 @@ fn pool(parts: impl Iterator<Item = Moments>) -> Moments {
 }
 
 /// The `share` quantile; reorders `values`.
-fn quantile(values: &mut [f64], share: f64) -> Option<f64> {
+pub(crate) fn quantile(values: &mut [f64], share: f64) -> Option<f64> {
     if values.is_empty() {
         return None;
     }
@@ -667,114 +440,4 @@ fn warn(list: &[Dwell], manifest: &Manifest, warnings: &mut Vec<String>) {
             crate::blocks::counted(clipped, "sample")
         ));
     }
-}
-
-/// Longest run of equal samples that chance explains in channel `c`, from how often neighbours are
-/// equal where the channel works. `None`: they mostly are, and nothing can be told.
-fn longest_run_by_chance(condensed: &Condensed, c: usize) -> Option<f64> {
-    let mut shares: Vec<f64> = condensed
-        .blocks
-        .iter()
-        .map(|b| b.raw[c])
-        .filter(|m| m.n > 1)
-        .map(|m| f64::from(m.repeats) / f64::from(m.n - 1))
-        .collect();
-    let share = quantile(&mut shares, 0.5)?.max(1e-3);
-    let odds = RUN_LOG_ODDS + (condensed.rows as f64).ln();
-    (share < 0.8).then(|| (1.0 + odds / -share.ln()).max(5.0))
-}
-
-/// Rails of the six channels: as declared, at the ends of a 16-bit code, or where the largest or smallest
-/// value of a whole recording is repeated more often in a row than chance allows.
-fn rails(
-    condensed: &Condensed,
-    manifest: &Manifest,
-    longest_run: &[f64; 6],
-    warnings: &mut Vec<String>,
-) -> [Rails; 6] {
-    let mut rails = [Rails::default(); 6];
-    for (c, rail) in rails.iter_mut().enumerate() {
-        if !condensed.has_raw[c] {
-            continue;
-        }
-        let declared = manifest
-            .rails
-            .and_then(|r| if c < 3 { r.gyro } else { r.accel });
-        if let Some([low, high]) = declared {
-            *rail = Rails {
-                low: Some(low),
-                high: Some(high),
-            };
-            continue;
-        }
-        let moments = || {
-            condensed
-                .blocks
-                .iter()
-                .map(move |b| b.raw[c])
-                .filter(|m| m.n > 0)
-        };
-        let high = moments().map(|m| m.max).fold(f64::NEG_INFINITY, f64::max);
-        let low = moments().map(|m| m.min).fold(f64::INFINITY, f64::min);
-        let chance = longest_run[c];
-        if low == high {
-            continue;
-        }
-        for (value, name) in [(high, "highest"), (low, "lowest")] {
-            // Blocks are short: a run goes on through those that hold nothing else.
-            let (mut longest, mut run) = (0.0_f64, 0.0);
-            for m in moments() {
-                if m.min == m.max && m.max == value {
-                    run += f64::from(m.n);
-                } else {
-                    run = 0.0;
-                    if m.run_value == value {
-                        longest = longest.max(f64::from(m.run));
-                    }
-                }
-                longest = longest.max(run);
-            }
-            if longest > chance {
-                warnings.push(format!(
-                    "{}: the {name} value {value} comes {longest} times in a row, chance explains {:.0}: taken for a rail",
-                    RAW_COLUMNS[c], chance.floor()
-                ));
-                if value == high {
-                    rail.high = Some(value)
-                } else {
-                    rail.low = Some(value)
-                }
-            }
-        }
-    }
-    rails
-}
-
-/// Refuses a recording in which a channel never changes.
-pub fn refuse_dead_channels(condensed: &Condensed, place: &str) -> Result<()> {
-    for c in 0..6 {
-        if !condensed.has_raw[c] {
-            continue;
-        }
-        let mut moments = condensed
-            .blocks
-            .iter()
-            .map(|b| b.raw[c])
-            .filter(|m| m.n > 0);
-        let Some(first) = moments.next() else {
-            return Err(Error::new(
-                format!("{place}, column {}", RAW_COLUMNS[c]),
-                "every cell is empty or not a number",
-                "leave the sensor's columns out, or import the right ones",
-            ));
-        };
-        if first.min == first.max && moments.all(|m| m.min == first.min && m.max == first.min) {
-            return Err(Error::new(
-                format!("{place}, column {}", RAW_COLUMNS[c]),
-                format!("the channel is stuck at {} throughout", first.min),
-                "check its wiring, or that the right column was imported",
-            ));
-        }
-    }
-    Ok(())
 }

@@ -1,8 +1,17 @@
 //! Calibration of inertial units made of analog MEMS sensors.
 //!
-//! A recording ([`recording`]) is condensed in one pass ([`blocks`]), its dwells are found ([`dwell`])
-//! and their noise measured ([`noise`]); an estimator ([`estimate`]) makes a calibration of each triad
-//! ([`triad`]) of them, which is judged on data it has not seen ([`fit`]).
+//! | in order of use | what                                                                          |
+//! |-----------------|-------------------------------------------------------------------------------|
+//! | [`recording`]   | files: reading in a stream, writing whole or not at all, importing            |
+//! | [`blocks`], [`increment`] | one pass over the samples condenses them to 0.1 s blocks and 10 ms integrals |
+//! | [`rails`], [`stillness`], [`dwell`] | which samples and which stretches can be averaged           |
+//! | [`noise`]       | how well a dwell mean is known                                                |
+//! | [`prepared`]    | all of these for one recording                                                |
+//! | [`estimate`]    | the estimators                                                                |
+//! | [`triad`]       | calibration of one triad: both directions, covariances, physical quantities   |
+//! | [`fit`], [`plausible`] | both triads, judged on what they have not seen; what cannot be right is refused |
+//! | [`calibration`], [`verify`] | the file, and judging it by another recording                     |
+//! | [`report`]      | all results as JSON and as text                                               |
 
 pub mod blocks;
 pub mod calibration;
@@ -10,9 +19,13 @@ pub mod dwell;
 pub mod error;
 pub mod estimate;
 pub mod fit;
+pub mod increment;
 pub mod noise;
-mod plausible;
+pub mod plausible;
+pub mod prepared;
+pub mod rails;
 pub mod recording;
 pub mod report;
+pub mod stillness;
 pub mod triad;
 pub mod verify;

@@ -7,14 +7,16 @@ use std::process::ExitCode;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 use mimu::calibration::{Calibration, Staged, stage, to_toml};
-use mimu::dwell::{STILL_FACTOR, Sensor};
+use mimu::dwell::Sensor;
 use mimu::error::{Error, Result};
-use mimu::fit::{Method, Options, Prepared, fit};
+use mimu::fit::{Method, Options, fit};
+use mimu::prepared::Prepared;
 use mimu::recording::{
     ColumnList, ImportOptions, MANIFEST_FILE, RawUnit, Recording, Reference, SampleFormat, Scale,
     Separator, import,
 };
 use mimu::report;
+use mimu::stillness::STILL_FACTOR;
 use mimu::verify::verify;
 
 /// Calibration of inertial units made of analog MEMS sensors.

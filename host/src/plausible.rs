@@ -7,7 +7,8 @@ use crate::blocks::counted;
 use crate::dwell::Sensor;
 use crate::error::{Error, Result};
 use crate::estimate::Failure;
-use crate::fit::{Figure, Prepared, Residual, SensorFit};
+use crate::fit::{Figure, Residual, SensorFit};
+use crate::prepared::Prepared;
 use crate::recording::{RawUnit, Reference};
 use crate::report::three;
 

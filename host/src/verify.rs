@@ -7,7 +7,8 @@ use crate::calibration::Calibration;
 use crate::dwell::Sensor;
 use crate::error::{Error, Result};
 use crate::estimate::rotation::{Turn, direction_error};
-use crate::fit::{Figure, Prepared, refuse_wrong_gravity, si_covariance};
+use crate::fit::{Figure, refuse_wrong_gravity};
+use crate::prepared::{Prepared, si_covariance};
 use crate::recording::Reference;
 use crate::triad::Triad;
 

@@ -20,7 +20,8 @@ use std::time::{Duration, Instant};
 use mimu::calibration::{Calibration, to_toml};
 use mimu::dwell::Sensor;
 use mimu::error::{Error, Result};
-use mimu::fit::{Fit, Method, Options, Prepared, fit};
+use mimu::fit::{Fit, Method, Options, fit};
+use mimu::prepared::Prepared;
 use mimu::recording::{
     ColumnList, ImportOptions, RawUnit, Recording, Reference, SampleFormat, import,
 };

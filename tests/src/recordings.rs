@@ -2,10 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use mimu::dwell::STILL_FACTOR;
 use mimu::error::Result;
-use mimu::fit::{Fit, Method, Options, Prepared, fit};
+use mimu::fit::{Fit, Method, Options, fit};
+use mimu::prepared::Prepared;
 use mimu::recording::{ImportOptions, RawUnit, Recording, Reference, import};
+use mimu::stillness::STILL_FACTOR;
 use mimu_core::compensation::Affine;
 use nalgebra::{DMatrix, DVector, Matrix3, UnitQuaternion, Vector3};
 use tempfile::TempDir;

@@ -2,15 +2,17 @@
 //! the cases, parameter by parameter.
 
 use mimu::blocks::Condensed;
-use mimu::dwell::{STILL_FACTOR, Sensor};
+use mimu::dwell::Sensor;
 use mimu::estimate::known_input::{
     inverse_form, kalman, least_squares, opposite_rates, six_positions,
 };
 use mimu::estimate::{Estimated, Failure, Observation};
-use mimu::fit::{Method, Options, Prepared, fit};
+use mimu::fit::{Method, Options, fit};
+use mimu::prepared::Prepared;
 use mimu::recording::{
     Batch, Columns, Manifest, RawUnit, Recording, Reference, SampleFormat, Writer,
 };
+use mimu::stillness::STILL_FACTOR;
 use mimu::triad::{Triad, vector};
 use mimu_tests::simulation::{ByHand, GRAVITY, Random, Sample, Unit, by_hand};
 use nalgebra::{Matrix3, SVector, Vector3};

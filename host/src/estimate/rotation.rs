@@ -11,7 +11,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, SVector, Vector3};
 
 use super::least_squares::{Linearized, Observability, Scatter, excess_variance, minimize};
 use super::{AXES, Estimated, Failure, Observation};
-use crate::blocks::Increment;
+use crate::increment::Increment;
 use crate::triad::{Covariance, Triad};
 
 /// Number of parameters: nine of C, three of o.

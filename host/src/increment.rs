@@ -1,0 +1,96 @@
+//! The raw gyro, integrated over about 10 ms at a time, before anything of its calibration is known.
+
+/// Longest stretch that one [`Increment`] integrates over, s: at 10 rad/s it turns by 0.1 rad, and
+/// what the second-order coning correction leaves is below 1e-5 rad.
+const INCREMENT_S: f64 = 0.01;
+
+/// Integral of the raw gyro readings `u` over about 10 ms, from one sample instant to another, in a form that
+/// gives the rotation vector of any affine calibration of them to second order.
+///
+/// With `ω = C u + o` the rotation vector is (Bortz, second order)
+/// `φ = C a + o T + ½ cof(C) b + ½ (C d) × o`, cof(C) being the cofactor matrix.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Increment {
+    /// Instant at which it ends, s.
+    pub end_s: f64,
+    /// T, its length, s.
+    pub duration_s: f64,
+    /// a = ∫ u dt, raw·s.
+    pub integral: [f64; 3],
+    /// b = ∫ a(t) × u(t) dt, raw²·s².
+    pub coning: [f64; 3],
+    /// d = 2 ∫ a(t) dt - T a(T), raw·s².
+    pub moment: [f64; 3],
+    /// Whether all samples are there and are numbers: false across a gap.
+    pub whole: bool,
+}
+
+/// Integrates raw gyro samples to [`Increment`]s.
+pub(crate) struct Integrator {
+    longest_s: f64,
+    before: Option<(f64, [f64; 3])>,
+    open: Increment,
+    sum: [f64; 3],
+}
+
+impl Integrator {
+    const EMPTY: Increment = Increment {
+        end_s: 0.0,
+        duration_s: 0.0,
+        integral: [0.0; 3],
+        coning: [0.0; 3],
+        moment: [0.0; 3],
+        whole: true,
+    };
+
+    pub fn new(period_s: f64) -> Self {
+        Self {
+            // Half a period of slack, as time stamps jitter.
+            longest_s: INCREMENT_S.max(period_s) - 0.5 * period_s,
+            before: None,
+            open: Self::EMPTY,
+            sum: [0.0; 3],
+        }
+    }
+
+    /// Takes in a sample; an increment if one is complete.
+    pub fn push(&mut self, t: f64, u: [f64; 3], gap: bool) -> Option<Increment> {
+        let (t0, u0) = self.before.replace((t, u))?;
+        let dt = t - t0;
+        let open = &mut self.open;
+        if gap || !u.iter().chain(&u0).all(|x| x.is_finite()) {
+            open.whole = false;
+        }
+        // The rate runs straight from sample to sample: exact for its integral, and for its coning
+        // within one step dt²/6 u0 × u.
+        let within = cross(u0, u);
+        let a0 = open.integral;
+        let step = [0, 1, 2].map(|k| 0.5 * dt * (u0[k] + u[k]));
+        let across = cross(a0, step);
+        for k in 0..3 {
+            open.coning[k] += across[k] + dt * dt / 6.0 * within[k];
+            self.sum[k] += dt * a0[k] + dt * dt / 6.0 * (2.0 * u0[k] + u[k]);
+            open.integral[k] += step[k];
+        }
+        open.duration_s += dt;
+        open.end_s = t;
+        (open.duration_s >= self.longest_s)
+            .then(|| self.take())
+            .flatten()
+    }
+
+    pub fn take(&mut self) -> Option<Increment> {
+        let mut done = std::mem::replace(&mut self.open, Self::EMPTY);
+        let sum = std::mem::replace(&mut self.sum, [0.0; 3]);
+        done.moment = [0, 1, 2].map(|k| 2.0 * sum[k] - done.duration_s * done.integral[k]);
+        (done.duration_s > 0.0).then_some(done)
+    }
+}
+
+fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    ]
+}
