@@ -23,7 +23,7 @@ pub(crate) fn longest_run_by_chance(condensed: &Condensed, c: usize) -> Option<f
     (share < 0.8).then(|| (1.0 + odds / -share.ln()).max(5.0))
 }
 
-/// Rails of the six channels: as declared, at the ends of a 16-bit code, or where the largest or smallest
+/// Rails of the six channels: as declared, or where the largest or smallest
 /// value of a whole recording is repeated more often in a row than chance allows.
 pub(crate) fn find(
     condensed: &Condensed,
