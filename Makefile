@@ -26,6 +26,7 @@ test: toolchain ## formatting, lints, documentation, firmware, all tests
 	$(CARGO) build --locked -p mimu-firmware --release --target $(TARGET)
 	./tests/no_panic/check.sh $(CARGO)
 	$(CARGO) test --locked
+	$(CARGO) test --locked -p mimu-firmware --lib
 
 demo: toolchain ## import and fit a recording: the best real one at hand, or the small one in tests/
 	$(CARGO) build --locked --release -p mimu

@@ -266,7 +266,7 @@ impl Calibration {
 
 /// Refuses a file in which the two directions of the calibration disagree: one of them was edited.
 fn check_both_ways(table: &TriadTable, triad: &Triad, place: &str) -> Result<()> {
-    let (matrix, offset) = (triad.forward.matrix, triad.forward.offset);
+    let (matrix, offset) = (triad.forward.matrix, triad.forward.bias);
     let off_p = Matrix3::from_fn(|i, j| table.forward.P[i][j] - matrix[(i, j)]);
     let off_b = Vector3::from(table.forward.b) - offset;
     // Both are written to all their digits; what an inversion loses stays far below.
@@ -425,7 +425,7 @@ fn write_sensor(out: &mut String, fit: &Fit, sensor: &SensorFit) -> std::fmt::Re
         "P = {}",
         matrix(|i, j| number(triad.forward.matrix[(i, j)]))
     )?;
-    writeln!(out, "b = {}", row(3, |i| number(triad.forward.offset[i])))?;
+    writeln!(out, "b = {}", row(3, |i| number(triad.forward.bias[i])))?;
     let physical = triad.physical(Angles::Exact);
     writeln!(
         out,

@@ -37,10 +37,10 @@ pub fn check(prepared: &Prepared, fit: &mut SensorFit) -> Result<()> {
 
 fn refuse_no_numbers(fit: &SensorFit) -> Result<()> {
     let triad = &fit.estimated.triad;
-    let models = [&triad.inverse, &triad.forward];
+    let models = triad.inverse.matrix.iter().chain(&triad.inverse.offset);
     let numbers = models
-        .iter()
-        .flat_map(|m| m.matrix.iter().chain(&m.offset))
+        .chain(&triad.forward.matrix)
+        .chain(&triad.forward.bias)
         .chain(&triad.inverse_covariance)
         .chain(&triad.forward_covariance)
         .chain([&triad.coverage_factor]);

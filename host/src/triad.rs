@@ -34,11 +34,10 @@ pub fn invert(model: &Affine<f64>) -> Option<Affine<f64>> {
     })
 }
 
-/// Derivatives of the parameters of `inverse` by those of the model that it inverts.
+/// Derivatives of the parameters `B, c` of one direction by those, `A, b`, of the other.
 ///
 /// With `B = A⁻¹` and `c = -B b`: `dB = -B dA B`, `dc = -B (dA c + db)`.
-fn inversion_jacobian(inverse: &Affine<f64>) -> SMatrix<f64, 12, 12> {
-    let (b, c) = (&inverse.matrix, &inverse.offset);
+fn inversion_jacobian(b: &Matrix3<f64>, c: &Vector3<f64>) -> SMatrix<f64, 12, 12> {
     let mut jacobian = SMatrix::zeros();
     for i in 0..3 {
         for j in 0..3 {
@@ -57,6 +56,39 @@ fn inversion_jacobian(inverse: &Affine<f64>) -> SMatrix<f64, 12, 12> {
     jacobian
 }
 
+/// Forward model of a triad, SI to raw: `u = P x + b`, fang (15), (17). A type of its own, so that it is not taken for the
+/// inverse one, which has the same twelve numbers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Forward {
+    /// P, raw per SI. Row: sensor. Column: axis of the body frame.
+    pub matrix: Matrix3<f64>,
+    /// b, raw.
+    pub bias: Vector3<f64>,
+}
+
+impl Forward {
+    /// Raw reading under the `input` (SI, body frame).
+    pub fn apply(&self, input: &Vector3<f64>) -> Vector3<f64> {
+        self.matrix * input + self.bias
+    }
+
+    /// The inverse model. `None` if P is singular.
+    pub fn inverse(&self) -> Option<Affine<f64>> {
+        invert(&Affine {
+            matrix: self.matrix,
+            offset: self.bias,
+        })
+    }
+
+    /// The forward model of an inverse one. `None` if C is singular.
+    pub fn of(inverse: &Affine<f64>) -> Option<Self> {
+        invert(inverse).map(|f| Self {
+            matrix: f.matrix,
+            bias: f.offset,
+        })
+    }
+}
+
 /// Calibration of one triad.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Triad {
@@ -65,7 +97,7 @@ pub struct Triad {
     /// Covariance of C by rows, then o.
     pub inverse_covariance: Covariance,
     /// SI to raw, fang (15), (17): `u = P x + b`, P = K M.
-    pub forward: Affine<f64>,
+    pub forward: Forward,
     /// Covariance of P by rows, then b.
     pub forward_covariance: Covariance,
     /// Half of a 95 % interval in sigmas.
@@ -79,8 +111,8 @@ impl Triad {
         covariance: Covariance,
         coverage_factor: f64,
     ) -> Option<Self> {
-        let forward = invert(&inverse)?;
-        let j = inversion_jacobian(&forward);
+        let forward = Forward::of(&inverse)?;
+        let j = inversion_jacobian(&forward.matrix, &forward.bias);
         Some(Self {
             inverse,
             inverse_covariance: covariance,
@@ -92,12 +124,12 @@ impl Triad {
 
     /// From the forward model. `None` if P is singular.
     pub fn from_forward(
-        forward: Affine<f64>,
+        forward: Forward,
         covariance: Covariance,
         coverage_factor: f64,
     ) -> Option<Self> {
-        let inverse = invert(&forward)?;
-        let j = inversion_jacobian(&inverse);
+        let inverse = forward.inverse()?;
+        let j = inversion_jacobian(&inverse.matrix, &inverse.offset);
         Some(Self {
             inverse,
             inverse_covariance: j * covariance * j.transpose(),
@@ -109,8 +141,17 @@ impl Triad {
 
     /// Physical quantities, with sigmas by the derivatives of the decomposition.
     pub fn physical(&self, angles: Angles) -> Physical {
-        let decompose = |p: &SVector<f64, 12>| Physical::vector_of(&affine(p), angles);
-        let at = vector(&self.forward.matrix, &self.forward.offset);
+        let decompose = |p: &SVector<f64, 12>| {
+            let Affine { matrix, offset } = affine(p);
+            Physical::vector_of(
+                &Forward {
+                    matrix,
+                    bias: offset,
+                },
+                angles,
+            )
+        };
+        let at = vector(&self.forward.matrix, &self.forward.bias);
         let values = decompose(&at);
         let scale = self.forward.matrix.norm();
         let mut jacobian = SMatrix::<f64, 12, 12>::zeros();
@@ -186,7 +227,7 @@ pub struct Physical {
 }
 
 impl Physical {
-    fn vector_of(forward: &Affine<f64>, angles: Angles) -> SVector<f64, 12> {
+    fn vector_of(forward: &Forward, angles: Angles) -> SVector<f64, 12> {
         let p = &forward.matrix;
         let (scale, theta, beta) = match angles {
             Angles::Small => {
@@ -235,13 +276,13 @@ impl Physical {
             out[i] = scale[i];
             out[3 + i] = theta[i];
             out[6 + i] = beta[i];
-            out[9 + i] = forward.offset[i];
+            out[9 + i] = forward.bias[i];
         }
         out
     }
 
     /// Forward model `P, b` that these quantities describe: the way back, for checking by hand.
-    pub fn forward(&self) -> Affine<f64> {
+    pub fn forward(&self) -> Forward {
         let value = |e: &[Estimate; 3]| Vector3::from_fn(|i, _| e[i].value);
         let (theta, beta) = (value(&self.misalignment), value(&self.non_orthogonality));
         let m = match self.angles {
@@ -273,9 +314,9 @@ impl Physical {
                 mo * mp.matrix()
             }
         };
-        Affine {
+        Forward {
             matrix: Matrix3::from_diagonal(&value(&self.scale)) * m,
-            offset: value(&self.bias),
+            bias: value(&self.bias),
         }
     }
 }

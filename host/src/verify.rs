@@ -110,7 +110,7 @@ pub fn verify(prepared: &Prepared, calibration: &Calibration) -> Result<Verifica
 pub fn nominal(triad: &Triad) -> Affine<f64> {
     let p = &triad.forward.matrix;
     let scale = (0..3).map(|i| p.row(i).norm()).sum::<f64>() / 3.0;
-    let bias = triad.forward.offset.sum() / 3.0;
+    let bias = triad.forward.bias.sum() / 3.0;
     let mut forward = Matrix3::zeros();
     for i in 0..3 {
         let axis = p.row(i).transpose().iamax();

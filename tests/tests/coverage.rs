@@ -35,7 +35,7 @@ impl Tally {
 
     /// Compares the forward model with the truth. What an estimator fixes (sigma zero) counts as inside.
     fn add(&mut self, triad: &Triad, truth: &SVector<f64, 12>) {
-        let found = vector(&triad.forward.matrix, &triad.forward.offset);
+        let found = vector(&triad.forward.matrix, &triad.forward.bias);
         self.runs += 1;
         for i in 0..12 {
             let sigma = triad.forward_covariance[(i, i)].sqrt();

@@ -260,7 +260,11 @@ fn on_both(check: impl Fn(&str, &Session)) {
 
 fn forward(fit: &Fit, sensor: Sensor) -> Affine<f64> {
     let fit = fit.sensor(sensor).expect("it was fitted");
-    fit.estimated.triad.forward
+    let forward = fit.estimated.triad.forward;
+    Affine {
+        matrix: forward.matrix,
+        offset: forward.bias,
+    }
 }
 
 fn print_matrices(title: &str, ours: &Matrix3<f64>, theirs: &Matrix3<f64>) {

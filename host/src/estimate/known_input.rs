@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, Vector3};
 
 use super::least_squares::{Observability, Scatter, excess_variance, solve_with_excess};
 use super::{AXES, Estimated, Failure, Observation};
-use crate::triad::{Covariance, Triad};
+use crate::triad::{Covariance, Forward, Triad};
 
 /// Two inputs are opposite if their sum is below this share of their size: a table's repeatability.
 const OPPOSITE_SHARE: f64 = 0.01;
@@ -156,16 +156,16 @@ fn forward(
     span: f64,
     condition: f64,
 ) -> Result<Estimated, Failure> {
-    let mut model = Affine {
+    let mut model = Forward {
         matrix: Matrix3::zeros(),
-        offset: Vector3::zeros(),
+        bias: Vector3::zeros(),
     };
     let mut covariance = Covariance::zeros();
     for (axis, (parameters, of_axis, _)) in axes.iter().enumerate() {
         // Where b, P1, P2, P3 of this sensor stand among the twelve.
         let places = [9 + axis, 3 * axis, 3 * axis + 1, 3 * axis + 2];
         let unit = [1.0, span, span, span];
-        model.offset[axis] = parameters[0];
+        model.bias[axis] = parameters[0];
         for j in 0..3 {
             model.matrix[(axis, j)] = parameters[j + 1] / span;
         }
@@ -453,9 +453,9 @@ pub fn inverse_form(observations: &[Observation]) -> Result<Estimated, Failure> 
 /// The classical six positions, as baseline: every axis up and down, or turned both ways. Scale factor
 /// `(u⁺ - u⁻) / (x⁺ - x⁻)` and bias `(u⁺ + u⁻) / 2` of each sensor by itself; misalignments are taken to be zero.
 pub fn six_positions(observations: &[Observation]) -> Result<Estimated, Failure> {
-    let mut model = Affine {
+    let mut model = Forward {
         matrix: Matrix3::zeros(),
-        offset: Vector3::zeros(),
+        bias: Vector3::zeros(),
     };
     let mut covariance = Covariance::zeros();
     let mut scatter = Vec::new();
@@ -488,11 +488,11 @@ pub fn six_positions(observations: &[Observation]) -> Result<Estimated, Failure>
         let (width, middle) = (up.1 - down.1, up.1 + down.1);
         let scale = (up.0 - down.0) / width;
         model.matrix[(axis, axis)] = scale;
-        model.offset[axis] = 0.5 * (up.0 + down.0 - scale * middle);
+        model.bias[axis] = 0.5 * (up.0 + down.0 - scale * middle);
         // Repeated positions show what the noise does not.
         let residuals: Vec<f64> = used
             .iter()
-            .map(|o| o.raw[axis] - scale * o.input[axis] - model.offset[axis])
+            .map(|o| o.raw[axis] - scale * o.input[axis] - model.bias[axis])
             .collect();
         let variances: Vec<f64> = used
             .iter()
