@@ -25,6 +25,18 @@ pub struct Increment {
     pub whole: bool,
 }
 
+impl Increment {
+    /// Nothing integrated yet.
+    pub(crate) const EMPTY: Self = Self {
+        end_s: 0.0,
+        duration_s: 0.0,
+        integral: [0.0; 3],
+        coning: [0.0; 3],
+        moment: [0.0; 3],
+        whole: true,
+    };
+}
+
 /// Integrates raw gyro samples to [`Increment`]s.
 pub(crate) struct Integrator {
     longest_s: f64,
@@ -34,21 +46,12 @@ pub(crate) struct Integrator {
 }
 
 impl Integrator {
-    const EMPTY: Increment = Increment {
-        end_s: 0.0,
-        duration_s: 0.0,
-        integral: [0.0; 3],
-        coning: [0.0; 3],
-        moment: [0.0; 3],
-        whole: true,
-    };
-
     pub fn new(period_s: f64) -> Self {
         Self {
             // Half a period of slack, as time stamps jitter.
             longest_s: INCREMENT_S.max(period_s) - 0.5 * period_s,
             before: None,
-            open: Self::EMPTY,
+            open: Increment::EMPTY,
             sum: [0.0; 3],
         }
     }
@@ -80,7 +83,7 @@ impl Integrator {
     }
 
     pub fn take(&mut self) -> Option<Increment> {
-        let mut done = std::mem::replace(&mut self.open, Self::EMPTY);
+        let mut done = std::mem::replace(&mut self.open, Increment::EMPTY);
         let sum = std::mem::replace(&mut self.sum, [0.0; 3]);
         done.moment = [0, 1, 2].map(|k| 2.0 * sum[k] - done.duration_s * done.integral[k]);
         (done.duration_s > 0.0).then_some(done)

@@ -194,6 +194,15 @@ fn recorded(samples: &[Sample], rate_hz: f64) -> Prepared {
     Prepared::read(&Recording::open(&path).unwrap(), STILL_FACTOR, |_| ()).unwrap()
 }
 
+fn options(holdout_blocks: usize) -> Options {
+    Options {
+        method: Method::LeastSquares,
+        holdout_blocks,
+        only: None,
+        still_factor: STILL_FACTOR,
+    }
+}
+
 /// The whole path of a recording by hand, dwells found, turns integrated. A gyro that is quiet beside its accelerometer shows
 /// whether the errors that all turns share, those of the accelerometer's calibration, are in its intervals.
 #[test]
@@ -205,12 +214,7 @@ fn intervals_hold_the_truth_where_only_gravity_is_known() {
             turn_s: 1.5,
             rate_hz: 200.0,
         };
-        let options = Options {
-            method: Method::LeastSquares,
-            holdout_blocks: 0,
-            only: None,
-            still_factor: STILL_FACTOR,
-        };
+        let options = options(0);
         let (mut gyro, mut accel) = (Tally::new(), Tally::new());
         for seed in 0..400 {
             let mut random = Random::new(seed);
@@ -241,12 +245,7 @@ fn held_out_error_of_a_perfect_model_is_the_noise_and_that_of_the_parameters() {
         turn_s: 1.5,
         rate_hz: 200.0,
     };
-    let options = Options {
-        method: Method::LeastSquares,
-        holdout_blocks: 4,
-        only: None,
-        still_factor: STILL_FACTOR,
-    };
+    let options = options(4);
     let mut ratios = [[0.0; 2]; 2];
     const RUNS: u64 = 20;
     for seed in 0..RUNS {
@@ -300,12 +299,7 @@ fn a_saturated_dwell_is_found_and_left_out() {
         .filter(|d| d.accel_fault.is_some())
         .count();
     assert!((1..6).contains(&saturated), "{saturated}");
-    let options = Options {
-        method: Method::LeastSquares,
-        holdout_blocks: 0,
-        only: None,
-        still_factor: STILL_FACTOR,
-    };
+    let options = options(0);
     let fitted = fit(prepared, options).unwrap();
     let accel = fitted.sensor(Sensor::Accel).unwrap();
     // Tight enough to see a clipped dwell: its mean is off by up to 0.03 V, or 0.4 m/s².

@@ -506,14 +506,7 @@ mod tests {
         let mut increments = Vec::new();
         let sample = |k: usize| rate(1e-3 * k as f64);
         for piece in 0..100 {
-            let mut open = Increment {
-                end_s: 0.0,
-                duration_s: 0.0,
-                integral: [0.0; 3],
-                coning: [0.0; 3],
-                moment: [0.0; 3],
-                whole: true,
-            };
+            let mut open = Increment::EMPTY;
             let (mut a, mut sum, mut b) =
                 (Vector3::zeros(), Vector3::zeros(), Vector3::<f64>::zeros());
             for k in 10 * piece..10 * piece + 10 {
