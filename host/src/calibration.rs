@@ -98,6 +98,8 @@ pub struct TriadTable {
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Judged {
+    /// How it was estimated.
+    pub estimator: String,
     /// What the figures are about.
     pub figure: String,
     /// Unit of the figures.
@@ -393,7 +395,8 @@ fn write_sensor(out: &mut String, fit: &Fit, sensor: &SensorFit) -> std::fmt::Re
     writeln!(out, "]")?;
     writeln!(
         out,
-        "\n[{name}.judged]\nfigure = \"{}\"",
+        "\n[{name}.judged]\nestimator = \"{}\"\nfigure = \"{}\"",
+        fit.estimator(sensor.sensor),
         figure(sensor.figure)
     )?;
     writeln!(

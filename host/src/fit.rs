@@ -40,6 +40,18 @@ pub struct Options {
     pub only: Option<Sensor>,
 }
 
+impl Method {
+    /// Name for people and files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::LeastSquares => "least squares",
+            Self::Kalman => "Kalman bank",
+            Self::Xu => "inverse form (xu)",
+            Self::SixPositions => "six positions",
+        }
+    }
+}
+
 impl Options {
     fn wants(&self, sensor: Sensor) -> bool {
         self.only.is_none_or(|only| only == sensor)
@@ -150,6 +162,15 @@ pub struct Fit {
 }
 
 impl Fit {
+    /// Name of the estimator of `sensor`.
+    pub fn estimator(&self, sensor: Sensor) -> &'static str {
+        match (self.prepared.manifest.reference, sensor) {
+            (Reference::Table, _) => self.options.method.name(),
+            (Reference::Gravity, Sensor::Accel) => "size of gravity",
+            (Reference::Gravity, Sensor::Gyro) => "turns and rests",
+        }
+    }
+
     /// Fit of `sensor`.
     pub fn sensor(&self, sensor: Sensor) -> Option<&SensorFit> {
         self.sensors.iter().find(|s| s.sensor == sensor)
@@ -415,7 +436,7 @@ pub(crate) fn refuse_wrong_gravity(
             return Err(Error::new(
                 &prepared.place,
                 problem,
-                format!("import it with --scale accel={g}"),
+                "import it with --scale accel=9.80665",
             ));
         }
     }

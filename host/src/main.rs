@@ -99,9 +99,9 @@ struct FitArgs {
     /// Refit without each of N contiguous blocks of time and report the error on it
     #[arg(long, value_name = "blocks=N", default_value = "blocks=4", value_parser = holdout)]
     holdout: usize,
-    /// Estimator where the input is known
-    #[arg(long, value_enum, default_value_t = MethodArg::LeastSquares)]
-    method: MethodArg,
+    /// Estimator where the input is known (reference = "table"); least-squares without it
+    #[arg(long, value_enum)]
+    method: Option<MethodArg>,
     /// Calibrate one of the two only: when the experiment does not determine the other
     #[arg(long, value_enum, value_name = "SENSOR")]
     only: Option<SensorArg>,
@@ -193,10 +193,14 @@ fn main() -> ExitCode {
     }
 }
 
+/// Sample rates below this are more likely a wrong unit of time.
+const SLOW_HZ: f64 = 5.0;
+
 fn run_import(args: ImportArgs) -> Result<()> {
     let (gravity, assumed) = match (args.gravity, args.latitude) {
         (Some(gravity), _) => (gravity, None),
         (None, Some(latitude)) => (normal_gravity(latitude), None),
+        (None, None) if args.reference == Reference::Table => (9.80665, None),
         (None, None) => (9.80665, Some("gravity is taken to be 9.80665 m/s²; it ranges from 9.78 at the equator to 9.83 at the poles, and every scale factor of the accelerometer with it: give --gravity or --latitude".to_string())),
     };
     let options = ImportOptions {
@@ -224,6 +228,12 @@ fn run_import(args: ImportArgs) -> Result<()> {
     })?;
     bar.finish_and_clear();
     summary.warnings.extend(assumed);
+    if summary.sample_rate_hz < SLOW_HZ {
+        summary.warnings.push(format!(
+            "{} Hz is slow for an inertial unit: if the times are in milliseconds, import with --scale t_s=0.001",
+            summary.sample_rate_hz
+        ));
+    }
     print(
         &args.json,
         &report::import_text(&summary),
@@ -243,10 +253,10 @@ fn normal_gravity(latitude_deg: f64) -> f64 {
 fn run_fit(args: &FitArgs) -> Result<()> {
     let options = Options {
         method: match args.method {
-            MethodArg::LeastSquares => Method::LeastSquares,
-            MethodArg::Kalman => Method::Kalman,
-            MethodArg::Xu => Method::Xu,
-            MethodArg::SixPositions => Method::SixPositions,
+            None | Some(MethodArg::LeastSquares) => Method::LeastSquares,
+            Some(MethodArg::Kalman) => Method::Kalman,
+            Some(MethodArg::Xu) => Method::Xu,
+            Some(MethodArg::SixPositions) => Method::SixPositions,
         },
         holdout_blocks: args.holdout,
         still_factor: args.still.factor,
@@ -257,6 +267,13 @@ fn run_fit(args: &FitArgs) -> Result<()> {
     };
     let outputs = [args.output.as_deref(), args.json.file()];
     let prepared = read(&args.recording, options.still_factor, &outputs, None)?;
+    if args.method.is_some() && prepared.manifest.reference == Reference::Gravity {
+        return Err(Error::new(
+            args.recording.display(),
+            "--method chooses between estimators for known inputs, and reference is \"gravity\"",
+            "leave --method out, or give the steps their inputs (reference = \"table\")",
+        ));
+    }
     let fitted = fit(prepared, options)?;
     let mut text = report::fit_text(&fitted);
     if args.dwells {

@@ -102,6 +102,12 @@ pub fn verify(prepared: &Prepared, calibration: &Calibration) -> Result<Verifica
             "record dwells with a known input, or poses and turns by hand",
         ));
     }
+    for s in sensors.iter().filter(|s| s.rms > s.rms_raw) {
+        warnings.push(format!(
+            "{}: worse than without calibration: is it that of this unit?",
+            s.sensor
+        ));
+    }
     Ok(Verification { sensors, warnings })
 }
 

@@ -110,6 +110,7 @@ fn sensor_json(fit: &Fit, sensor: &SensorFit) -> Value {
         })
         .collect();
     let mut value = json!({
+        "estimator": fit.estimator(sensor.sensor),
         "parameters": parameters(fit.prepared.manifest.raw_unit, sensor),
         "rms": sensor.rms(),
         "held_out_rms": sensor.held_out_rms(),

@@ -26,7 +26,7 @@ pub(crate) fn three(value: f64) -> String {
 /// `value ± half`, both to the second digit of `half`.
 fn plus_minus(value: f64, half: f64) -> String {
     if !(half > 0.0) || !half.is_finite() {
-        return format!("{} (fixed)", three(value));
+        return format!("{} (fixed)", three(value + 0.0));
     }
     let digits = (1 - half.log10().floor() as i32).clamp(0, 9) as usize;
     // Rounding may give -0.00.
@@ -72,21 +72,17 @@ pub fn fit_text(fit: &Fit) -> String {
         lengths().fold(f64::INFINITY, f64::min),
         lengths().fold(0.0, f64::max),
     );
+    let length = match (format!("{shortest:.1}"), format!("{longest:.1}")) {
+        (a, b) if a == b => format!("{a} s long"),
+        (a, b) => format!("{a} to {b} s long"),
+    };
     let n = dwells.list.len() as u64;
     match dwells.detection {
         None => {
-            let _ = writeln!(
-                out,
-                "{} by the step column, {shortest:.1} to {longest:.1} s long",
-                counted(n, "dwell")
-            );
+            let _ = writeln!(out, "{} by the step column, {length}", counted(n, "dwell"));
         }
         Some(d) => {
-            let _ = writeln!(
-                out,
-                "{} found, {shortest:.1} to {longest:.1} s long",
-                counted(n, "dwell")
-            );
+            let _ = writeln!(out, "{} found, {length}", counted(n, "dwell"));
             let _ = writeln!(
                 out,
                 "  still: variance over {:.1} s at most that of the quietest twentieth times {} (accel), {} (gyro);\n  {:.1} s left out at both ends; shorter than {} s not used",
@@ -122,8 +118,9 @@ fn sensor_text(out: &mut String, fit: &Fit, sensor: &SensorFit) {
     };
     let _ = writeln!(
         out,
-        "{} ({used}, condition {})",
+        "{} ({}, {used}, condition {})",
         sensor.sensor,
+        fit.estimator(sensor.sensor),
         three(sensor.estimated.condition)
     );
     let _ = writeln!(
@@ -135,7 +132,7 @@ fn sensor_text(out: &mut String, fit: &Fit, sensor: &SensorFit) {
         let shown = value.map_or("-".into(), |v| format!("{} {unit}", three(v * factor)));
         let _ = writeln!(out, "    {name:<12}{shown:>16}  {note}");
     };
-    let blocks = fit.options.holdout_blocks;
+    let blocks = fit.options.holdout_blocks.min(sensor.dwells);
     if blocks > 0 {
         let missing = sensor.not_held_out.len();
         let note = match missing {
@@ -188,7 +185,12 @@ fn sensor_text(out: &mut String, fit: &Fit, sensor: &SensorFit) {
     let mut rows = Vec::new();
     let mut table = |name: &str, unit: &str, triple: &[Estimate; 3], by: f64| {
         let cells = triple.map(|e| plus_minus(e.value * by, triad.coverage_factor * e.sigma * by));
-        rows.push((format!("{name}, {unit}"), cells));
+        // A ratio has no unit to show.
+        let label = match unit {
+            "1" => name.to_string(),
+            _ => format!("{name}, {unit}").replace("m/s^2", "m/s²"),
+        };
+        rows.push((label, cells));
     };
     table("scale factor", &scale_unit(raw, si), &physical.scale, 1.0);
     table("bias", &raw_unit(raw, si), &physical.bias, 1.0);
