@@ -181,8 +181,8 @@ where
         pac::ADC1.cr().modify(|w| w.set_adstart(true));
 
         // Saturating, and never back: when its 16-bit counter turns over, the HAL's clock can read
-        // 65.5 ms early for an instant. (It counts half turns by a compare interrupt, and takes the
-        // compare flag that its own initialisation raises for the first.) A stream that starts on
+        // 65.5 ms early for an instant. (It counts half turns by a compare interrupt; seen on the
+        // emulator, where its initialisation seems to raise the flag of the first.) A stream that starts on
         // such a reading ends at once for being late, and the next is right.
         let elapsed = started.saturating_duration_since(*self.first_start.get_or_insert(started));
         let number = elapsed.as_ticks().div_ceil(PERIOD.as_ticks()) as u32;
