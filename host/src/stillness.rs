@@ -5,15 +5,17 @@ use crate::dwell::{SHORTEST_S, Sensor, Stretch, pool, quantile};
 use crate::error::{Error, Result};
 use crate::recording::{Manifest, Reference};
 
-/// Length of the window whose variance decides on stillness, s. Long enough that a slow turn shows in
-/// the accelerometer (0.5 degrees a second moves it by 30 times its noise), short enough for hands.
+/// Length of the window whose variance decides on stillness, s. Long enough that a slow turn shows in the accelerometer: the
+/// force then runs straight by g ω, a variance of (g ω)²/12, which beside a noise of 7 mm/s² reaches [`STILL_FACTOR`] at
+/// 0.4 deg/s. Short enough for hands.
 pub const WINDOW_S: f64 = 1.0;
 
 /// Left out at both ends of a dwell that was found, s: stillness begins and ends within a window.
 pub const GUARD_S: f64 = 0.2;
 
-/// Variance of a still window over the quietest, at most. Seven recordings by hand give the same
-/// dwells from 7 to 20; at 3 the hands that put a unit down split them, at 100 they join.
+/// Variance of a still window over the quietest, at most. Of six recordings by hand, all give the same number of dwells from
+/// 15 to 30 (38, and 22 five times); at 10 one has a fragment more, too short to be used; at 7 and 5 some are split.
+/// Below the plateau and not in it, as what is let in goes into the means.
 pub const STILL_FACTOR: f64 = 10.0;
 
 /// What the gyro is allowed beyond that in recordings by hand with an accelerometer to watch as well. Hands tremble in angle:
