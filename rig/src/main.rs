@@ -1,0 +1,3 @@
+//! The command `mimu-rig`.
+
+fn main() {}
