@@ -13,7 +13,7 @@ use crate::dwell::Sensor;
 use crate::error::{Error, Result};
 use crate::fit::{Figure, Fit, SensorFit};
 use crate::recording::{RawUnit, Reference, read_text};
-use crate::triad::{Angles, Covariance, Triad};
+use crate::triad::{Angles, Forward};
 
 /// Version of the layout.
 const FORMAT: &str = "mimu-calibration/1";
@@ -80,8 +80,10 @@ pub struct TriadTable {
     pub sigma_C: [[f64; 3]; 3],
     /// Standard deviations of o.
     pub sigma_o: [f64; 3],
-    /// Half of a 95 % interval in standard deviations.
-    pub interval_95: f64,
+    /// Halves of the 95 % intervals of C.
+    pub interval_C: [[f64; 3]; 3],
+    /// Halves of the 95 % intervals of o.
+    pub interval_o: [f64; 3],
     /// Order of the covariance.
     pub parameters: Vec<String>,
     /// 12x12.
@@ -200,12 +202,11 @@ impl Calibration {
                 .iter()
                 .flatten()
                 .chain(&table.o)
-                .chain(table.covariance.iter().flatten())
-                .chain([&table.interval_95]);
+                .chain(table.covariance.iter().flatten());
             if !numbers.into_iter().all(|x| x.is_finite()) {
                 return Err(Error::new(
                     place,
-                    "C, o, covariance or interval_95 has an entry that is not a number",
+                    "C, o or covariance has an entry that is not a number",
                     "fit the recording again",
                 ));
             }
@@ -227,14 +228,15 @@ impl Calibration {
                     "fit the recording again",
                 ));
             }
-            let Some(triad) = calibration.triad(sensor) else {
+            let inverse = calibration.inverse(sensor);
+            let Some(forward) = inverse.as_ref().and_then(Forward::of) else {
                 return Err(Error::new(
                     place,
                     "C is singular",
                     "fit the recording again",
                 ));
             };
-            check_both_ways(table, &triad, &place)?;
+            check_both_ways(table, &forward, &place)?;
         }
         if calibration.gyro.is_none() && calibration.accel.is_none() {
             return Err(Error::new(
@@ -254,21 +256,19 @@ impl Calibration {
         }
     }
 
-    /// The calibration of `sensor`.
-    pub fn triad(&self, sensor: Sensor) -> Option<Triad> {
+    /// The inverse model of `sensor`.
+    pub fn inverse(&self, sensor: Sensor) -> Option<Affine<f64>> {
         let table = self.table(sensor)?;
-        let inverse = Affine {
+        Some(Affine {
             matrix: Matrix3::from_fn(|i, j| table.C[i][j]),
             offset: Vector3::from(table.o),
-        };
-        let covariance = Covariance::from_fn(|i, j| table.covariance[i][j]);
-        Triad::from_inverse(inverse, covariance, table.interval_95)
+        })
     }
 }
 
 /// Refuses a file in which the two directions of the calibration disagree: one of them was edited.
-fn check_both_ways(table: &TriadTable, triad: &Triad, place: &str) -> Result<()> {
-    let (matrix, offset) = (triad.forward.matrix, triad.forward.bias);
+fn check_both_ways(table: &TriadTable, forward: &Forward, place: &str) -> Result<()> {
+    let (matrix, offset) = (forward.matrix, forward.bias);
     let off_p = Matrix3::from_fn(|i, j| table.forward.P[i][j] - matrix[(i, j)]);
     let off_b = Vector3::from(table.forward.b) - offset;
     // Both are written to all their digits; what an inversion loses stays far below.
@@ -360,7 +360,9 @@ fn write_sensor(out: &mut String, fit: &Fit, sensor: &SensorFit) -> std::fmt::Re
         sensor.sensor.unit()
     )?;
     let covariance = &triad.inverse_covariance;
-    let sigma = |i: usize| covariance[(i, i)].max(0.0).sqrt();
+    let estimates = triad.inverse_estimates();
+    let sigma = |i: usize| estimates[i].sigma;
+    let interval = |i: usize| estimates[i].interval;
     writeln!(
         out,
         "C = {}",
@@ -377,10 +379,16 @@ fn write_sensor(out: &mut String, fit: &Fit, sensor: &SensorFit) -> std::fmt::Re
         "sigma_o = {}",
         row(3, |i| format!("{:.3e}", sigma(9 + i)))
     )?;
+    writeln!(out, "# halves of the 95 % intervals")?;
     writeln!(
         out,
-        "interval_95 = {:.4}  # half of a 95 % interval, in sigmas",
-        triad.coverage_factor
+        "interval_C = {}",
+        matrix(|i, j| format!("{:.3e}", interval(3 * i + j)))
+    )?;
+    writeln!(
+        out,
+        "interval_o = {}",
+        row(3, |i| format!("{:.3e}", interval(9 + i)))
     )?;
     let names = crate::report::inverse_names();
     writeln!(

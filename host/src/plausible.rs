@@ -42,8 +42,7 @@ fn refuse_no_numbers(fit: &SensorFit) -> Result<()> {
         .chain(&triad.forward.matrix)
         .chain(&triad.forward.bias)
         .chain(&triad.inverse_covariance)
-        .chain(&triad.forward_covariance)
-        .chain([&triad.coverage_factor]);
+        .chain(&triad.forward_covariance);
     if numbers.into_iter().all(|x| x.is_finite()) && fit.rms().is_finite() {
         return Ok(());
     }

@@ -2,6 +2,7 @@
 
 use mimu_core::compensation::Affine;
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
+use statrs::distribution::{ContinuousCDF, StudentsT};
 
 /// Covariance of twelve parameters, in the order of [`vector`].
 pub type Covariance = SMatrix<f64, 12, 12>;
@@ -89,6 +90,50 @@ impl Forward {
     }
 }
 
+/// What one group of residuals adds to the covariance of a calibration.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Part {
+    /// Covariance of matrix by rows, then offset or bias.
+    pub covariance: Covariance,
+    /// Degrees of freedom that its size was found with; infinite where the noise was known beforehand.
+    pub dof: f64,
+}
+
+/// Half of a 95 % interval around an estimate whose error is the sum of independent ones: the variance of each, and
+/// the degrees of freedom that it is known with.
+///
+/// The degrees of freedom of the sum are Welch and Satterthwaite's. One factor for all parameters, that of the group with
+/// the fewest, made xu's offsets hold the truth in all of the runs.
+pub fn half_width_95(contributions: impl Iterator<Item = (f64, f64)>) -> f64 {
+    let (mut variance, mut doubt) = (0.0, 0.0);
+    for (v, dof) in contributions {
+        variance += v;
+        doubt += v * v / dof;
+    }
+    let dof = if doubt > 0.0 {
+        (variance * variance / doubt).max(1.0)
+    } else {
+        f64::INFINITY
+    };
+    students_factor(dof) * variance.max(0.0).sqrt()
+}
+
+/// Half of a 95 % interval in sigmas, of Student's distribution.
+fn students_factor(dof: f64) -> f64 {
+    // From 100 degrees on the first terms of Abramowitz and Stegun (26.7.5): exact to 3e-6 there, and the library's search
+    // does not end where there are many more.
+    if dof < 100.0 {
+        StudentsT::new(0.0, 1.0, dof).map_or(f64::NAN, |t| t.inverse_cdf(0.975))
+    } else {
+        let z = NORMAL_95;
+        z + (z.powi(3) + z) / (4.0 * dof)
+            + (5.0 * z.powi(5) + 16.0 * z.powi(3) + 3.0 * z) / (96.0 * dof * dof)
+    }
+}
+
+/// Half of a 95 % interval of a normal variable, in sigmas.
+const NORMAL_95: f64 = 1.959_963_984_540_054;
+
 /// Calibration of one triad.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Triad {
@@ -100,42 +145,68 @@ pub struct Triad {
     pub forward: Forward,
     /// Covariance of P by rows, then b.
     pub forward_covariance: Covariance,
-    /// Half of a 95 % interval in sigmas.
-    pub coverage_factor: f64,
+    /// What `forward_covariance` is the sum of.
+    forward_parts: Vec<Part>,
 }
 
 impl Triad {
-    /// From the inverse model. `None` if C is singular.
-    pub fn from_inverse(
-        inverse: Affine<f64>,
-        covariance: Covariance,
-        coverage_factor: f64,
-    ) -> Option<Self> {
+    /// From the inverse model and the parts of its covariance. `None` if C is singular.
+    pub fn from_inverse(inverse: Affine<f64>, parts: Vec<Part>) -> Option<Self> {
         let forward = Forward::of(&inverse)?;
         let j = inversion_jacobian(&forward.matrix, &forward.bias);
+        let forward_parts: Vec<Part> = parts.iter().map(|p| p.seen_by(&j)).collect();
         Some(Self {
             inverse,
-            inverse_covariance: covariance,
+            inverse_covariance: sum(&parts),
             forward,
-            forward_covariance: j * covariance * j.transpose(),
-            coverage_factor,
+            forward_covariance: sum(&forward_parts),
+            forward_parts,
         })
     }
 
-    /// From the forward model. `None` if P is singular.
-    pub fn from_forward(
-        forward: Forward,
-        covariance: Covariance,
-        coverage_factor: f64,
-    ) -> Option<Self> {
+    /// From the forward model and the parts of its covariance. `None` if P is singular.
+    pub fn from_forward(forward: Forward, parts: Vec<Part>) -> Option<Self> {
         let inverse = forward.inverse()?;
         let j = inversion_jacobian(&inverse.matrix, &inverse.offset);
         Some(Self {
             inverse,
-            inverse_covariance: j * covariance * j.transpose(),
+            inverse_covariance: j * sum(&parts) * j.transpose(),
             forward,
-            forward_covariance: covariance,
-            coverage_factor,
+            forward_covariance: sum(&parts),
+            forward_parts: parts,
+        })
+    }
+
+    /// What the covariance of C and o is the sum of.
+    pub fn inverse_parts(&self) -> Vec<Part> {
+        let j = inversion_jacobian(&self.inverse.matrix, &self.inverse.offset);
+        self.forward_parts.iter().map(|p| p.seen_by(&j)).collect()
+    }
+
+    /// P by rows, then b, each with sigma and interval.
+    pub fn forward_estimates(&self) -> [Estimate; 12] {
+        let at = vector(&self.forward.matrix, &self.forward.bias);
+        self.estimates(&at, &SMatrix::identity())
+    }
+
+    /// C by rows, then o, each with sigma and interval.
+    pub fn inverse_estimates(&self) -> [Estimate; 12] {
+        let at = vector(&self.inverse.matrix, &self.inverse.offset);
+        let jacobian = inversion_jacobian(&self.inverse.matrix, &self.inverse.offset);
+        self.estimates(&at, &jacobian)
+    }
+
+    /// Functions of the forward parameters: their `values`, and the derivatives by P and b, one function a row.
+    fn estimates(&self, values: &SVector<f64, 12>, jacobian: &Covariance) -> [Estimate; 12] {
+        std::array::from_fn(|i| {
+            let by = jacobian.row(i);
+            let along = |c: &Covariance| (by * c * by.transpose())[0];
+            let parts = &self.forward_parts;
+            Estimate {
+                value: values[i],
+                sigma: along(&self.forward_covariance).max(0.0).sqrt(),
+                interval: half_width_95(parts.iter().map(|p| (along(&p.covariance), p.dof))),
+            }
         })
     }
 
@@ -164,14 +235,8 @@ impl Triad {
             let slope = (decompose(&up) - decompose(&down)) / (2.0 * step);
             jacobian.set_column(k, &slope);
         }
-        let covariance = jacobian * self.forward_covariance * jacobian.transpose();
-        let sigma = |i: usize| covariance[(i, i)].max(0.0).sqrt();
-        let triple = |from: usize| {
-            [0, 1, 2].map(|i| Estimate {
-                value: values[from + i],
-                sigma: sigma(from + i),
-            })
-        };
+        let all = self.estimates(&values, &jacobian);
+        let triple = |from: usize| [all[from], all[from + 1], all[from + 2]];
         Physical {
             angles,
             scale: triple(0),
@@ -182,13 +247,31 @@ impl Triad {
     }
 }
 
-/// A number with its sigma.
+/// A number with its uncertainty.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Estimate {
     /// Value.
     pub value: f64,
     /// Standard deviation.
     pub sigma: f64,
+    /// Half of a 95 % interval.
+    pub interval: f64,
+}
+
+impl Part {
+    /// The same in other parameters, of which `jacobian` holds the derivatives by these.
+    pub fn seen_by(&self, jacobian: &Covariance) -> Self {
+        Self {
+            covariance: jacobian * self.covariance * jacobian.transpose(),
+            dof: self.dof,
+        }
+    }
+}
+
+fn sum(parts: &[Part]) -> Covariance {
+    parts
+        .iter()
+        .fold(Covariance::zeros(), |sum, p| sum + p.covariance)
 }
 
 /// Whether angles are taken as small, as fang does, or exactly.
@@ -318,5 +401,27 @@ impl Physical {
             matrix: Matrix3::from_diagonal(&value(&self.scale)) * m,
             bias: value(&self.bias),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn students_factors_are_those_of_printed_tables() {
+        let table = [
+            (1.0, 12.7062),
+            (4.0, 2.7764),
+            (30.0, 2.0423),
+            (100.0, 1.9840),
+            (120.0, 1.9799),
+            (f64::INFINITY, 1.9600),
+        ];
+        for (dof, factor) in table {
+            assert!((students_factor(dof) - factor).abs() < 1e-4, "{dof}");
+        }
+        let library = StudentsT::new(0.0, 1.0, 100.0).unwrap().inverse_cdf(0.975);
+        assert!((students_factor(100.0) - library).abs() < 3e-6);
     }
 }

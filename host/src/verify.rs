@@ -10,7 +10,7 @@ use crate::estimate::rotation::{Turn, direction_error};
 use crate::fit::{Figure, refuse_wrong_gravity};
 use crate::prepared::{Prepared, si_covariance};
 use crate::recording::Reference;
-use crate::triad::Triad;
+use crate::triad::Forward;
 
 /// What a calibration does to one triad of a recording. Figures as in [`Figure`].
 #[derive(Debug, Clone)]
@@ -70,7 +70,7 @@ pub fn verify(prepared: &Prepared, calibration: &Calibration) -> Result<Verifica
     }
     let mut sensors = Vec::new();
     for sensor in Sensor::BOTH {
-        let Some(triad) = calibration.triad(sensor) else {
+        let Some(inverse) = calibration.inverse(sensor) else {
             continue;
         };
         if !prepared.has(sensor) {
@@ -81,10 +81,10 @@ pub fn verify(prepared: &Prepared, calibration: &Calibration) -> Result<Verifica
             refuse_wrong_gravity(prepared, sensor, &observations)?;
         }
         let judged = match (manifest.reference, sensor) {
-            (Reference::Table, _) => known(prepared, sensor, &triad),
-            (Reference::Gravity, Sensor::Accel) => size(prepared, &triad),
-            (Reference::Gravity, Sensor::Gyro) => match calibration.triad(Sensor::Accel) {
-                Some(accel) => turns(prepared, &triad, &accel, &mut warnings),
+            (Reference::Table, _) => known(prepared, sensor, &inverse),
+            (Reference::Gravity, Sensor::Accel) => size(prepared, &inverse),
+            (Reference::Gravity, Sensor::Gyro) => match calibration.inverse(Sensor::Accel) {
+                Some(accel) => turns(prepared, &inverse, &accel, &mut warnings),
                 None => None,
             },
         };
@@ -113,10 +113,12 @@ pub fn verify(prepared: &Prepared, calibration: &Calibration) -> Result<Verifica
 
 /// The calibration of a unit whose sensors are all alike and perfectly mounted: every sensor with the mean scale factor
 /// and the mean bias of the three, along the axis that it is nearest to.
-pub fn nominal(triad: &Triad) -> Affine<f64> {
-    let p = &triad.forward.matrix;
+///
+/// `None` if the calibration is singular.
+pub fn nominal(calibrated: &Affine<f64>) -> Option<Affine<f64>> {
+    let Forward { matrix: p, bias } = Forward::of(calibrated)?;
     let scale = (0..3).map(|i| p.row(i).norm()).sum::<f64>() / 3.0;
-    let bias = triad.forward.bias.sum() / 3.0;
+    let bias = bias.sum() / 3.0;
     let mut forward = Matrix3::zeros();
     for i in 0..3 {
         let axis = p.row(i).transpose().iamax();
@@ -126,10 +128,10 @@ pub fn nominal(triad: &Triad) -> Affine<f64> {
     let matrix = forward
         .try_inverse()
         .unwrap_or_else(|| Matrix3::from_diagonal_element(1.0 / scale));
-    Affine {
+    Some(Affine {
         matrix,
         offset: -(matrix * Vector3::repeat(bias)),
-    }
+    })
 }
 
 fn rms(values: &[f64]) -> f64 {
@@ -160,7 +162,11 @@ fn judged(
     })
 }
 
-fn known(prepared: &Prepared, sensor: Sensor, triad: &Triad) -> Option<SensorVerification> {
+fn known(
+    prepared: &Prepared,
+    sensor: Sensor,
+    calibrated: &Affine<f64>,
+) -> Option<SensorVerification> {
     let observations = prepared.observations(sensor);
     let errors = |model: &Affine<f64>| -> Vec<f64> {
         observations
@@ -170,19 +176,19 @@ fn known(prepared: &Prepared, sensor: Sensor, triad: &Triad) -> Option<SensorVer
     };
     let floor: Vec<f64> = observations
         .iter()
-        .map(|o| (si_covariance(&triad.inverse.matrix, &o.variance).trace() / 3.0).sqrt())
+        .map(|o| (si_covariance(&calibrated.matrix, &o.variance).trace() / 3.0).sqrt())
         .collect();
-    let after = errors(&triad.inverse);
+    let after = errors(calibrated);
     judged(
         sensor,
         Figure::Input,
-        &errors(&nominal(triad)),
+        &errors(&nominal(calibrated)?),
         &after,
         &floor,
     )
 }
 
-fn size(prepared: &Prepared, triad: &Triad) -> Option<SensorVerification> {
+fn size(prepared: &Prepared, calibrated: &Affine<f64>) -> Option<SensorVerification> {
     let g = prepared.manifest.gravity_mps2;
     let observations = prepared.observations(Sensor::Accel);
     let errors = |model: &Affine<f64>| -> Vec<f64> {
@@ -191,13 +197,13 @@ fn size(prepared: &Prepared, triad: &Triad) -> Option<SensorVerification> {
             .map(|o| model.apply(&o.raw).norm() - g)
             .collect()
     };
-    let variances = prepared.size_variances(&triad.inverse, &observations);
+    let variances = prepared.size_variances(calibrated, &observations);
     let floor: Vec<f64> = variances.iter().map(|v| v.sqrt()).collect();
-    let after = errors(&triad.inverse);
+    let after = errors(calibrated);
     judged(
         Sensor::Accel,
         Figure::GravitySize,
-        &errors(&nominal(triad)),
+        &errors(&nominal(calibrated)?),
         &after,
         &floor,
     )
@@ -205,28 +211,28 @@ fn size(prepared: &Prepared, triad: &Triad) -> Option<SensorVerification> {
 
 fn turns(
     prepared: &Prepared,
-    gyro: &Triad,
-    accel: &Triad,
+    gyro: &Affine<f64>,
+    accel: &Affine<f64>,
     warnings: &mut Vec<String>,
 ) -> Option<SensorVerification> {
-    let (by_calibration, refused) = prepared.turns(&accel.inverse);
+    let (by_calibration, refused) = prepared.turns(accel);
     warnings.extend(refused);
-    let (by_nominal, _) = prepared.turns(&nominal(accel));
+    let (by_nominal, _) = prepared.turns(&nominal(accel)?);
     let errors = |turns: &[Turn], model: &Affine<f64>| -> Vec<f64> {
         turns
             .iter()
             .map(|t| direction_error(t, model).norm())
             .collect()
     };
-    let c2 = gyro.inverse.matrix.norm_squared() / 3.0;
+    let c2 = gyro.matrix.norm_squared() / 3.0;
     let floor: Vec<f64> = by_calibration.iter().map(|t| t.floor(c2)).collect();
-    let after = errors(&by_calibration, &gyro.inverse);
+    let after = errors(&by_calibration, gyro);
     let rest: Vec<f64> = prepared
         .observations(Sensor::Gyro)
         .iter()
-        .flat_map(|o| <[f64; 3]>::from(gyro.inverse.apply(&o.raw)))
+        .flat_map(|o| <[f64; 3]>::from(gyro.apply(&o.raw)))
         .collect();
-    let before = errors(&by_nominal, &nominal(gyro));
+    let before = errors(&by_nominal, &nominal(gyro)?);
     let judged = judged(Sensor::Gyro, Figure::Direction, &before, &after, &floor)?;
     Some(SensorVerification {
         static_rms: Some(rms(&rest)),

@@ -7,6 +7,7 @@ use mimu::fit::{Fit, Method, Options, fit};
 use mimu::prepared::Prepared;
 use mimu::recording::{ImportOptions, RawUnit, Recording, Reference, import};
 use mimu::stillness::STILL_FACTOR;
+use mimu::triad::half_width_95;
 use mimu_core::compensation::Affine;
 use nalgebra::{DMatrix, DVector, Matrix3, UnitQuaternion, Vector3};
 use tempfile::TempDir;
@@ -113,8 +114,8 @@ pub fn upper_triangular_frame(matrix: &Matrix3<f64>) -> (Matrix3<f64>, Matrix3<f
 pub struct Models {
     parameters: DVector<f64>,
     covariance: DMatrix<f64>,
-    /// Half of a 95 % interval in sigmas: accelerometer, gyro.
-    pub coverage: [f64; 2],
+    /// What it is the sum of, and the degrees of freedom of each.
+    parts: Vec<(DMatrix<f64>, f64)>,
 }
 
 impl Models {
@@ -132,21 +133,24 @@ impl Models {
         });
         let mut parameters = DVector::zeros(24);
         let mut covariance = DMatrix::zeros(24, 24);
+        let mut parts = Vec::new();
         for (k, triad) in triads.iter().enumerate() {
             let vector = mimu::triad::vector(&triad.inverse.matrix, &triad.inverse.offset);
             parameters
                 .rows_mut(12 * k, 12)
                 .copy_from_slice(vector.as_slice());
-            for i in 0..12 {
-                for j in 0..12 {
-                    covariance[(12 * k + i, 12 * k + j)] = triad.inverse_covariance[(i, j)];
-                }
+            for part in triad.inverse_parts() {
+                let mut both = DMatrix::zeros(24, 24);
+                both.view_mut((12 * k, 12 * k), (12, 12))
+                    .copy_from(&part.covariance);
+                covariance += &both;
+                parts.push((both, part.dof));
             }
         }
         Self {
             parameters,
             covariance,
-            coverage: triads.map(|t| t.coverage_factor),
+            parts,
         }
     }
 
@@ -157,11 +161,11 @@ impl Models {
         })
     }
 
-    /// Value and sigma of everything that `convention` makes of the inverse models of accelerometer and gyro.
+    /// Value, sigma and half of a 95 % interval of everything that `convention` makes of the inverse models of accelerometer and gyro.
     pub fn in_convention(
         &self,
         convention: impl Fn(&Affine<f64>, &Affine<f64>) -> Vec<f64>,
-    ) -> Vec<(f64, f64)> {
+    ) -> Vec<(f64, f64, f64)> {
         let evaluate = |p: &DVector<f64>| {
             let [accel, gyro] = Self::models(p);
             DVector::from_vec(convention(&accel, &gyro))
@@ -179,9 +183,13 @@ impl Models {
             down[k] -= step;
             jacobian.set_column(k, &((evaluate(&up) - evaluate(&down)) / (2.0 * step)));
         }
-        let covariance = &jacobian * &self.covariance * jacobian.transpose();
         (0..values.len())
-            .map(|i| (values[i], covariance[(i, i)].max(0.0).sqrt()))
+            .map(|i| {
+                let by = jacobian.row(i);
+                let along = |c: &DMatrix<f64>| (by * c * by.transpose())[0];
+                let interval = half_width_95(self.parts.iter().map(|(c, dof)| (along(c), *dof)));
+                (values[i], along(&self.covariance).max(0.0).sqrt(), interval)
+            })
             .collect()
     }
 }

@@ -332,7 +332,7 @@ fn least_squares_on_six_faces_is_imucals_matrix_and_the_mean_of_all_its_biases()
                 0.5 * (p + n)
             });
             let b = ours.offset[i];
-            let interval = triad.coverage_factor * triad.forward_covariance[(9 + i, 9 + i)].sqrt();
+            let interval = triad.forward_estimates()[9 + i].interval;
             println!(
                 "{:>30}{b:10.4} {interval:9.2} {:9.4}   {:.2} {:.2} {:.2}",
                 "", theirs.offset[i], pairs[0], pairs[1], pairs[2]

@@ -222,8 +222,7 @@ fn accelerometers_agree_with_the_published_ones_and_gyros_where_the_table_can_be
             "\nunit {unit}               mimu  +-95 %   published in sigmas   its program in sigmas"
         );
         let ours = models.in_convention(published_convention);
-        for (k, &(value, sigma)) in ours.iter().enumerate() {
-            let interval = models.coverage[usize::from(k >= 9)] * sigma;
+        for (k, &(value, sigma, interval)) in ours.iter().enumerate() {
             let tables = [PUBLISHED[k][unit], PROGRAM[k][unit]];
             let [published, program] = tables.map(|t| (t - value) / sigma);
             let far = (tables[0] - value).abs() > interval + IRREPRODUCIBLE[k / 3];

@@ -137,9 +137,8 @@ fn parameters_agree_with_those_of_imu_tk_in_its_own_frame() {
     let theirs = IMU_TK_ACCEL.iter().chain(&IMU_TK_GYRO);
     println!("parameter       mimu      +-95 %       IMU-TK   in sigmas");
     let (mut far, mut squares, mut off) = (0, [0.0; 2], Vec::new());
-    for (k, (((sensor, name), &(value, sigma)), theirs)) in names.zip(&ours).zip(theirs).enumerate()
+    for (k, (((sensor, name), &(value, sigma, interval)), theirs)) in names.zip(&ours).zip(theirs).enumerate()
     {
-        let interval = models.coverage[usize::from(k >= 9)] * sigma;
         off.push((theirs - value) / sigma);
         squares[usize::from(k >= 9)] += off[k] * off[k];
         let mark = if (theirs - value).abs() > interval {
@@ -187,11 +186,12 @@ fn parameters_agree_with_those_of_imu_tk_in_its_own_frame() {
     assert!(mimu.rest_rps < imu_tk.rest_rps && mimu.direction_rad < imu_tk.direction_rad);
     // Both have the same samples, so nine of nine within 95 % would be no surprise; one outside is chance, two are not. The gyro's
     // biases are left out, being defined otherwise.
-    let outside = |from: usize, factor: f64| {
-        let nine = &off[from..from + 9];
-        nine.iter().filter(|o| o.abs() > factor).count()
+    let outside = |from: usize| {
+        let nine = from..from + 9;
+        nine.filter(|&k| off[k].abs() * ours[k].1 > ours[k].2)
+            .count()
     };
-    let [accel_outside, gyro_outside] = [0, 9].map(|k| outside(k, models.coverage[k / 9]));
+    let [accel_outside, gyro_outside] = [0, 9].map(outside);
     assert!(accel_outside <= 1 && gyro_outside <= 1, "{off:?}");
     let scale = Vector3::from_fn(|i, _| ours[i].0);
     for (ours, known) in scale.iter().zip([414.5, 412.0, 414.6]) {

@@ -12,7 +12,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, SVector, Vector3};
 use super::least_squares::{Linearized, Observability, excess_variance, minimize};
 use super::{AXES, Estimated, Failure, Observation};
 use crate::blocks::counted;
-use crate::triad::{Covariance, Triad};
+use crate::triad::{Covariance, Part, Triad};
 
 /// Number of parameters: six of C, three of o.
 pub const PARAMETERS: usize = 9;
@@ -223,8 +223,10 @@ pub fn estimate(
     scatter.chi2 = chi2.unwrap_or(scatter.chi2);
     let triad = Triad::from_inverse(
         inverse,
-        flips * covariance * flips,
-        scatter.coverage_factor(),
+        vec![Part {
+            covariance: flips * covariance * flips,
+            dof: scatter.variance_dof(),
+        }],
     )
     .ok_or_else(|| Failure::NoSolution("C is singular".into()))?;
     Ok(Estimated {

@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, Vector3};
 
 use super::least_squares::{Observability, Scatter, excess_variance, solve_with_excess};
 use super::{AXES, Estimated, Failure, Observation};
-use crate::triad::{Covariance, Forward, Triad};
+use crate::triad::{Covariance, Forward, Part, Triad};
 
 /// Two inputs are opposite if their sum is below this share of their size: a table's repeatability.
 const OPPOSITE_SHARE: f64 = 0.01;
@@ -160,8 +160,9 @@ fn forward(
         matrix: Matrix3::zeros(),
         bias: Vector3::zeros(),
     };
-    let mut covariance = Covariance::zeros();
-    for (axis, (parameters, of_axis, _)) in axes.iter().enumerate() {
+    let mut parts = Vec::new();
+    for (axis, (parameters, of_axis, scatter)) in axes.iter().enumerate() {
+        let mut covariance = Covariance::zeros();
         // Where b, P1, P2, P3 of this sensor stand among the twelve.
         let places = [9 + axis, 3 * axis, 3 * axis + 1, 3 * axis + 2];
         let unit = [1.0, span, span, span];
@@ -174,13 +175,17 @@ fn forward(
                 covariance[(places[i], places[j])] = of_axis[(i, j)] / (unit[i] * unit[j]);
             }
         }
+        parts.push(Part {
+            covariance,
+            dof: scatter.variance_dof(),
+        });
     }
     let scatter: Vec<_> = axes
         .iter()
         .zip(AXES)
         .map(|(a, name)| (name.to_string(), a.2))
         .collect();
-    let triad = Triad::from_forward(model, covariance, widest(&scatter)).ok_or_else(|| {
+    let triad = Triad::from_forward(model, parts).ok_or_else(|| {
         Failure::NoSolution(
             "the three sensors measure one plane only (singular scale-factor matrix)".into(),
         )
@@ -191,14 +196,6 @@ fn forward(
         condition,
         notes: Vec::new(),
     })
-}
-
-/// The largest factor from sigma to half of a 95 % interval among the groups.
-pub(super) fn widest(scatter: &[(String, Scatter)]) -> f64 {
-    scatter
-        .iter()
-        .map(|s| s.1.coverage_factor())
-        .fold(1.959_963_984_540_054, f64::max)
 }
 
 /// Variances, with a floor where a noiseless recording has none: 1e-12 of the largest, or of one.
@@ -313,11 +310,19 @@ pub fn opposite_rates(observations: &[Observation]) -> Result<Estimated, Failure
             )
         })
         .collect();
-    // The readings at rest scatter by themselves, and by what each dwell of a pair does.
+    // The readings at rest scatter by themselves: what pairs scatter by may be the table's rate.
+    let mut rest_dof = [f64::INFINITY; 3];
     for axis in 0..3 {
         let values = offsets.iter().map(|o| o[axis] - offset[axis]).collect();
         let of_rest = scatter_of(values, &rest_variance, axis, count - 1.0);
-        let excess = of_rest.excess.max(0.5 * scatter[axis].1.excess);
+        let of_pairs = scatter[axis].1;
+        // Where rest itself shows nothing, it may be for having been too few.
+        let (excess, dof) = if of_rest.excess > 0.0 {
+            (of_rest.excess, of_rest.variance_dof())
+        } else {
+            (0.5 * of_pairs.excess, of_pairs.variance_dof())
+        };
+        rest_dof[axis] = dof;
         rest_noise[(axis, axis)] += excess / count;
         if of_rest.excess > 0.0 {
             scatter.push((format!("{} at rest", AXES[axis]), of_rest));
@@ -326,22 +331,41 @@ pub fn opposite_rates(observations: &[Observation]) -> Result<Estimated, Failure
     let covariance = rows_covariance(&pseudo, |p, r, s| {
         noise[p][(r, s)] + if r == s { scatter[r].1.excess } else { 0.0 }
     });
-    let mut full = Covariance::zeros();
-    full.fixed_view_mut::<9, 9>(0, 0).copy_from(&covariance);
     // o_r = -c_r . G0: its errors come from c_r and from the readings at rest.
-    let mut by_c = SMatrix::<f64, 3, 9>::zeros();
+    let mut by_c = SMatrix::<f64, 12, 9>::zeros();
     for r in 0..3 {
         for j in 0..3 {
-            by_c[(r, 3 * r + j)] = -at_rest[j];
+            by_c[(3 * r + j, 3 * r + j)] = 1.0;
+            by_c[(9 + r, 3 * r + j)] = -at_rest[j];
         }
     }
-    let cross = by_c * covariance;
-    full.fixed_view_mut::<3, 9>(9, 0).copy_from(&cross);
-    full.fixed_view_mut::<9, 3>(0, 9)
-        .copy_from(&cross.transpose());
-    full.fixed_view_mut::<3, 3>(9, 9)
-        .copy_from(&(cross * by_c.transpose() + rest_noise));
-    let triad = Triad::from_inverse(inverse, full, widest(&scatter))
+    let parts = by_row(
+        |a, b| (a / 3 == b / 3).then_some(a / 3),
+        &covariance,
+        &scatter,
+    )
+    .into_iter()
+    .map(|(covariance, dof)| Part {
+        covariance: by_c * covariance * by_c.transpose(),
+        dof,
+    });
+    let of_rest = (0..3).map(|r| {
+        let mut covariance = Covariance::zeros();
+        covariance[(9 + r, 9 + r)] = rest_noise[(r, r)];
+        Part {
+            covariance,
+            dof: rest_dof[r],
+        }
+    });
+    let mut rest_between = Covariance::zeros();
+    rest_between
+        .fixed_view_mut::<3, 3>(9, 9)
+        .copy_from(&(rest_noise - Matrix3::from_diagonal(&rest_noise.diagonal())));
+    let known = Part {
+        covariance: rest_between,
+        dof: f64::INFINITY,
+    };
+    let triad = Triad::from_inverse(inverse, parts.chain(of_rest).chain([known]).collect())
         .ok_or_else(|| Failure::NoSolution("C is singular".into()))?;
     Ok(Estimated {
         triad,
@@ -349,6 +373,26 @@ pub fn opposite_rates(observations: &[Observation]) -> Result<Estimated, Failure
         condition: observability.condition,
         notes,
     })
+}
+
+/// Cuts a covariance into what belongs to one row of the model, whose size the row's scatter tells, and what
+/// correlates the rows, which is known beforehand. `row_of` says which row an element belongs to.
+fn by_row<const N: usize>(
+    row_of: impl Fn(usize, usize) -> Option<usize>,
+    covariance: &SMatrix<f64, N, N>,
+    scatter: &[(String, Scatter)],
+) -> Vec<(SMatrix<f64, N, N>, f64)> {
+    let of = |row: Option<usize>| {
+        SMatrix::from_fn(|a, b| {
+            if row_of(a, b) == row {
+                covariance[(a, b)]
+            } else {
+                0.0
+            }
+        })
+    };
+    let rows = (0..3).map(|r| (of(Some(r)), scatter[r].1.variance_dof()));
+    rows.chain([(of(None), f64::INFINITY)]).collect()
 }
 
 /// Covariance of three rows that are all estimated by `left` (3 or 4 by observations) when the errors of one
@@ -439,8 +483,12 @@ pub fn inverse_form(observations: &[Observation]) -> Result<Estimated, Failure> 
             change[(9 + r, 3 * r + j)] = -centre[j] / unit;
         }
     }
-    let covariance = change * full * change.transpose();
-    let triad = Triad::from_inverse(inverse, covariance, widest(&scatter))
+    let row = |a: usize| if a < 9 { a / 3 } else { a - 9 };
+    let parts = by_row(|a, b| (row(a) == row(b)).then(|| row(a)), &full, &scatter)
+        .into_iter()
+        .map(|(covariance, dof)| Part { covariance, dof }.seen_by(&change))
+        .collect();
+    let triad = Triad::from_inverse(inverse, parts)
         .ok_or_else(|| Failure::NoSolution("C is singular".into()))?;
     Ok(Estimated {
         triad,
@@ -457,9 +505,9 @@ pub fn six_positions(observations: &[Observation]) -> Result<Estimated, Failure>
         matrix: Matrix3::zeros(),
         bias: Vector3::zeros(),
     };
-    let mut covariance = Covariance::zeros();
-    let mut scatter = Vec::new();
+    let (mut parts, mut scatter) = (Vec::new(), Vec::new());
     for axis in 0..3 {
+        let mut covariance = Covariance::zeros();
         let mut ends = [(0.0, 0.0, 0.0, 0.0); 2]; // sums of reading, input, variance; number
         let mut used = Vec::new();
         let along = |o: &&Observation| {
@@ -508,8 +556,12 @@ pub fn six_positions(observations: &[Observation]) -> Result<Estimated, Failure>
         let both = 0.5 * (up.2 - down.2) / width;
         covariance[(4 * axis, 9 + axis)] = both;
         covariance[(9 + axis, 4 * axis)] = both;
+        parts.push(Part {
+            covariance,
+            dof: of_axis.variance_dof(),
+        });
     }
-    let triad = Triad::from_forward(model, covariance, widest(&scatter))
+    let triad = Triad::from_forward(model, parts)
         .ok_or_else(|| Failure::NoSolution("a sensor does not respond".into()))?;
     Ok(Estimated {
         triad,

@@ -1,7 +1,7 @@
 //! Weighted least squares, linear and not, with covariance and observability.
 
 use nalgebra::{DMatrix, DVector};
-use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
+use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 /// Condition number (columns scaled) from which on a parameter counts as undetermined: at 1e5 one part
 /// in 10⁵ of error in the input, what a good table has, becomes all of the parameter.
@@ -134,13 +134,13 @@ pub struct Scatter {
 }
 
 impl Scatter {
-    /// Factor from a sigma to half of a 95 % interval: normal while the noise is known beforehand, Student's
-    /// with the degrees of freedom when its size had to be found from the residual.
-    pub fn coverage_factor(&self) -> f64 {
+    /// Degrees of freedom of a variance that this scatter is part of: infinite while the noise is known beforehand,
+    /// those of the residual when its size had to be found from it.
+    pub fn variance_dof(&self) -> f64 {
         if self.excess > 0.0 && self.dof >= 1.0 {
-            StudentsT::new(0.0, 1.0, self.dof).map_or(f64::NAN, |t| t.inverse_cdf(0.975))
+            self.dof
         } else {
-            1.959_963_984_540_054
+            f64::INFINITY
         }
     }
 }

@@ -12,7 +12,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, SVector, Vector3};
 use super::least_squares::{Linearized, Observability, Scatter, excess_variance, minimize};
 use super::{AXES, Estimated, Failure, Observation};
 use crate::increment::Increment;
-use crate::triad::{Covariance, Triad};
+use crate::triad::{Covariance, Part, Triad};
 
 /// Number of parameters: nine of C, three of o.
 pub const PARAMETERS: usize = 12;
@@ -368,8 +368,8 @@ pub fn estimate(
     groups[0].excess = 0.5f64.to_radians().powi(2);
     groups[1].excess = r.rows(n_turns, n_rest).norm_squared() / n_rest as f64;
     let lost = || Failure::NoSolution("the fit of the gyro to the turns does not converge".into());
-    let mut covariance = DMatrix::zeros(PARAMETERS, PARAMETERS);
-    let mut shared = DMatrix::zeros(PARAMETERS, PARAMETERS);
+    let mut gain = DMatrix::zeros(PARAMETERS, 12);
+    let mut of_groups = [(); 2].map(|()| DMatrix::zeros(PARAMETERS, PARAMETERS));
     let mut condition = f64::INFINITY;
     for round in 0..30 {
         let variances = known(&p);
@@ -409,7 +409,7 @@ pub fn estimate(
             });
         }
         condition = shape.condition;
-        covariance = (last.jacobian.transpose() * &last.jacobian)
+        let covariance = (last.jacobian.transpose() * &last.jacobian)
             .try_inverse()
             .ok_or_else(|| Failure::NoSolution("the normal matrix is singular".into()))?;
         // What the accelerometer's calibration errs by is common to all turns: it goes into the parameters whole, and
@@ -419,8 +419,11 @@ pub fn estimate(
         for (mut row, weight) in weighted.row_iter_mut().zip(&weights) {
             row *= *weight;
         }
-        let gain = &covariance * last.jacobian.rows(0, n_turns).transpose() * weighted;
-        shared = &gain * &accel_covariance * gain.transpose();
+        gain = &covariance * last.jacobian.rows(0, n_turns).transpose() * weighted;
+        of_groups = [(0, n_turns), (n_turns, n_rest)].map(|(from, rows)| {
+            let j = last.jacobian.rows(from, rows);
+            &covariance * (j.transpose() * j) * &covariance
+        });
         let common = (&by * &accel_covariance).component_mul(&by).column_sum();
         let allowed: Vec<f64> = variances
             .iter()
@@ -459,19 +462,25 @@ pub fn estimate(
             change[(9 + i, 3 * i + k)] = -unit * at_rest[k];
         }
     }
-    let twelve = Covariance::from_fn(|i, j| covariance[(i, j)] + shared[(i, j)]);
+    let in_unit = |m: &DMatrix<f64>| Covariance::from_fn(|i, j| m[(i, j)]);
+    let own = of_groups.iter().zip(&groups).map(|(c, group)| Part {
+        covariance: in_unit(c),
+        dof: group.variance_dof(),
+    });
+    let gain = Covariance::from_fn(|i, j| gain[(i, j)]);
+    let of_accelerometer = accel.inverse_parts();
+    let shared = of_accelerometer.iter().map(|part| part.seen_by(&gain));
+    let parts = own.chain(shared).map(|part| part.seen_by(&change));
     let scatter: Vec<_> = ["turns", "rest"]
         .iter()
         .zip(groups)
         .map(|(n, g)| (n.to_string(), g))
         .collect();
-    let factor = super::known_input::widest(&scatter);
-    let triad = Triad::from_inverse(inverse, change * twelve * change.transpose(), factor)
-        .ok_or_else(|| {
-            Failure::NoSolution(
-                "C is singular: the gyro does not respond to turns about some axis".into(),
-            )
-        })?;
+    let triad = Triad::from_inverse(inverse, parts.collect()).ok_or_else(|| {
+        Failure::NoSolution(
+            "C is singular: the gyro does not respond to turns about some axis".into(),
+        )
+    })?;
     Ok(Estimated {
         triad,
         scatter,

@@ -119,7 +119,6 @@ fn sensor_json(fit: &Fit, sensor: &SensorFit) -> Value {
         "figure": crate::calibration::figure(sensor.figure),
         "dwells": sensor.dwells,
         "condition": sensor.estimated.condition,
-        "interval_95": sensor.estimated.triad.coverage_factor,
         "small_angle": small_angle(sensor),
         "scatter": scatter,
         "not_held_out": sensor.not_held_out,
@@ -148,36 +147,27 @@ fn small_angle(sensor: &SensorFit) -> Value {
 fn parameters(raw: RawUnit, sensor: &SensorFit) -> Vec<Parameter> {
     let triad = &sensor.estimated.triad;
     let si = sensor.sensor.unit();
-    let factor = triad.coverage_factor;
     let parameter = |name: String, e: Estimate, unit: String| Parameter {
         name,
         value: e.value,
         sigma: e.sigma,
-        lower: e.value - factor * e.sigma,
-        upper: e.value + factor * e.sigma,
+        lower: e.value - e.interval,
+        upper: e.value + e.interval,
         unit,
     };
     let inverse_unit = match raw {
         RawUnit::Si => "1".to_string(),
         other => format!("({si})/{other}"),
     };
-    let at = crate::triad::vector(&triad.inverse.matrix, &triad.inverse.offset);
+    let estimates = triad.inverse_estimates();
     let mut all = Vec::new();
     for (i, name) in inverse_names().into_iter().enumerate() {
-        let sigma = triad.inverse_covariance[(i, i)].max(0.0).sqrt();
         let unit = if i < 9 {
             inverse_unit.clone()
         } else {
             si.to_string()
         };
-        all.push(parameter(
-            name,
-            Estimate {
-                value: at[i],
-                sigma,
-            },
-            unit,
-        ));
+        all.push(parameter(name, estimates[i], unit));
     }
     let physical = triad.physical(Angles::Exact);
     for (i, axis) in AXES.iter().enumerate() {

@@ -184,7 +184,7 @@ fn sensor_text(out: &mut String, fit: &Fit, sensor: &SensorFit) {
     let (raw, si) = (fit.prepared.manifest.raw_unit, sensor.sensor.unit());
     let mut rows = Vec::new();
     let mut table = |name: &str, unit: &str, triple: &[Estimate; 3], by: f64| {
-        let cells = triple.map(|e| plus_minus(e.value * by, triad.coverage_factor * e.sigma * by));
+        let cells = triple.map(|e| plus_minus(e.value * by, e.interval * by));
         // A ratio has no unit to show.
         let label = match unit {
             "1" => name.to_string(),
