@@ -4,8 +4,41 @@
 //!
 //! | the experiment                 |                                                                   |
 //! |--------------------------------|-------------------------------------------------------------------|
-//! | [`motion`], [`rotation`]       | what passes from a carrier to the sensors                         |
+//! | [`plan`], [`located`]          | PLAN.toml; what to say of a line that is wrong                    |
+//! | [`place`]                      | gravity and the Earth's rotation                                  |
+//! | [`table`], [`axis`]            | a turntable with its flaws                                        |
+//! | [`hands`]                      | a person                                                          |
+//! | [`motion`], [`chain`], [`rotation`] | what passes from a carrier to the sensors                    |
+//! | [`record`]                     | recordings of it, in memory or as files                           |
+//!
+//! | the unit                       |                                                                   |
+//! |--------------------------------|-------------------------------------------------------------------|
+//! | [`mod@unit`], [`sensor`], [`filter`] | from motion and chamber to the voltages at the pins         |
+//! | [`noise`], [`thermal`]         | what disturbs every sensor                                        |
+//! | [`effects`]                    | what the affine model lacks, switched on one by one               |
+//! | [`converter`]                  | from the pins to the readings of a recording                      |
+//! | [`catalog`], [`rig_file`]      | sensors by their data sheets; RIG.toml, and the truth drawn by it |
+//! | [`ideal`]                      | forward models of papers, for Monte Carlo studies                 |
 
+pub mod axis;
+pub mod catalog;
+pub mod chain;
+pub(crate) mod controller;
+pub mod converter;
+pub mod effects;
+pub mod filter;
+pub mod hands;
+pub mod ideal;
+pub mod located;
 pub mod motion;
+pub mod noise;
+pub mod place;
+pub mod plan;
 pub mod random;
+pub mod record;
+pub mod rig_file;
 pub mod rotation;
+pub mod sensor;
+pub mod table;
+pub mod thermal;
+pub mod unit;

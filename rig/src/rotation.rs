@@ -34,8 +34,8 @@ pub fn norm(a: Vector) -> f64 {
     dot(a, a).sqrt()
 }
 
-/// Unit quaternion w, x, y, z: turns the components of a vector in the first frame into those in the second. An
-/// attitude turns body into level axes (east, north, up).
+/// Unit quaternion w, x, y, z: turns the components of a vector in the first frame into those in the
+/// second. An attitude turns body into level axes (east, north, up).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rotation([f64; 4]);
 
@@ -54,7 +54,8 @@ impl Rotation {
         Self([c, s * axis[0], s * axis[1], s * axis[2]])
     }
 
-    /// From four numbers, made a unit quaternion. Four independent normal numbers give any attitude, all equally likely.
+    /// From four numbers, made a unit quaternion. Four independent normal numbers give any attitude, all
+    /// equally likely.
     pub fn of(q: [f64; 4]) -> Self {
         let n = q.iter().map(|x| x * x).sum::<f64>().sqrt();
         Self(q.map(|x| x / n))
@@ -89,6 +90,24 @@ impl Rotation {
         let q = [x, y, z];
         let t = scale(2.0, cross(q, v));
         add(add(v, scale(w, t)), cross(q, t))
+    }
+
+    /// Followed by a turn about the axis x (0), y (1) or z (2) of the frame that it starts from, given by
+    /// sine and cosine of half the angle. Not made a unit quaternion anew: a dozen in a row stay within
+    /// rounding.
+    pub fn then_about_own<const AXIS: usize>(self, sine: f64, cosine: f64) -> Self {
+        let [w, v @ ..] = self.0;
+        let (j, k) = ((AXIS + 1) % 3, (AXIS + 2) % 3);
+        let mut q = [w * cosine - v[AXIS] * sine, 0.0, 0.0, 0.0];
+        q[1 + AXIS] = v[AXIS] * cosine + w * sine;
+        q[1 + j] = v[j] * cosine + v[k] * sine;
+        q[1 + k] = v[k] * cosine - v[j] * sine;
+        Self(q)
+    }
+
+    /// By the rotation vector: its direction is the axis, its length the angle in rad.
+    pub fn by(vector: Vector) -> Self {
+        Self::about(vector, norm(vector))
     }
 
     /// Axis (unit length) and angle (0 to π).

@@ -1,0 +1,327 @@
+//! What the affine model lacks: each effect from its physics, switched on by the rig file or drawn by a seed.
+//!
+//! Effects add: each works on the undisturbed motion and temperature, so the order in which they stand does
+//! not matter and two of them do what they do apart. What that leaves out is the effect of one on another, a
+//! product of two small numbers.
+//!
+//! An effect is one [`Spec`]: its id, the parameters with units and sizes, and a function that does it. Ids
+//! that start with `x_` stand on no list that an estimator could know.
+
+mod accel;
+mod drift;
+mod gyro;
+mod readout;
+mod supply;
+mod thermal;
+mod unlisted_accel;
+mod unlisted_gyro;
+
+use std::collections::BTreeMap;
+
+use crate::motion::Motion;
+use crate::random::Random;
+use crate::thermal::Temperatures;
+use crate::unit::{Pins, UnitTruth};
+
+/// Radians per second in a degree per second.
+pub(crate) const DPS: f64 = std::f64::consts::PI / 180.0;
+/// Standard gravity, m/s².
+pub(crate) const G: f64 = 9.80665;
+/// Temperature from which thermal errors count, °C.
+const REFERENCE_C: f64 = 25.0;
+
+/// All effects.
+const ALL: [&[Spec]; 8] = [
+    &gyro::SPECS,
+    &accel::SPECS,
+    &drift::SPECS,
+    &thermal::SPECS,
+    &readout::SPECS,
+    &supply::SPECS,
+    &unlisted_gyro::SPECS,
+    &unlisted_accel::SPECS,
+];
+
+/// What effects see at one instant: nothing of it is disturbed.
+pub struct Condition<'a> {
+    /// The motion of the board.
+    pub motion: &'a Motion,
+    /// Rate along each gyro's sensitive direction, rad/s.
+    pub gyro: [f64; 3],
+    /// Specific force at the board's origin along each accelerometer axis, m/s².
+    pub accel: [f64; 3],
+    /// Board and dies.
+    pub temperatures: Temperatures,
+    /// Time since the unit was switched on, s.
+    pub on_s: f64,
+}
+
+/// What effects add to the inputs.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Disturbance {
+    /// At each gyro, rad/s.
+    pub gyro: [f64; 3],
+    /// At each accelerometer axis, m/s².
+    pub accel: [f64; 3],
+}
+
+/// Layout of a parameter's numbers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Shape {
+    /// One number.
+    Scalar,
+    /// So many numbers; three are for the axes x, y, z.
+    List(usize),
+    /// Three rows of three; rows are the sensor's axes.
+    Matrix,
+    /// A matrix whose diagonal is 0.
+    Cross,
+}
+
+/// How a parameter that nobody stated is drawn.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Draw {
+    /// The amplitude of the effect: each number of either sign, between a half and three halves of this size.
+    /// None is near 0, so that an effect which is on is on.
+    Size(f64),
+    /// The form of the effect: between two positive numbers, evenly in the logarithm.
+    Between(f64, f64),
+}
+
+/// One parameter of an effect.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Parameter {
+    /// Key in the rig file, with the unit.
+    pub key: &'static str,
+    /// Numbers that it holds.
+    pub shape: Shape,
+    /// What it is when nobody states it.
+    pub draw: Draw,
+}
+
+/// One kind of effect.
+pub struct Spec {
+    /// Stable name.
+    pub id: &'static str,
+    /// What it does, in a line.
+    pub about: &'static str,
+    /// The size first, then those of its form.
+    pub parameters: &'static [Parameter],
+    build: fn(&Build) -> Active,
+}
+
+/// One effect of a unit, every parameter known.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EffectTruth {
+    /// Which.
+    pub id: &'static str,
+    /// Numbers of each parameter, row by row.
+    pub values: BTreeMap<&'static str, Vec<f64>>,
+}
+
+/// Something done at every step, with its memory.
+type Step<T> = Box<dyn FnMut(&Condition, &mut T) + Send>;
+
+/// An effect at work.
+pub enum Active {
+    /// Adds to the inputs of the sensors.
+    Input(Step<Disturbance>),
+    /// Changes the voltages at the pins.
+    ReadOut(Step<Pins>),
+}
+
+impl Active {
+    /// Its part in the disturbance.
+    pub fn disturb(&mut self, at: &Condition, add: &mut Disturbance) {
+        if let Self::Input(f) = self {
+            f(at, add);
+        }
+    }
+
+    /// Its part in the voltages.
+    pub fn read_out(&mut self, at: &Condition, pins: &mut Pins) {
+        if let Self::ReadOut(f) = self {
+            f(at, pins);
+        }
+    }
+}
+
+/// What the making of an effect can ask for.
+struct Build<'a> {
+    effect: &'a EffectTruth,
+    unit: &'a UnitTruth,
+    seed: u64,
+    dt_s: f64,
+}
+
+impl Build<'_> {
+    fn number(&self, key: &str) -> f64 {
+        self.effect.values[key][0]
+    }
+
+    fn list<const N: usize>(&self, key: &str) -> [f64; N] {
+        std::array::from_fn(|i| self.effect.values[key][i])
+    }
+
+    fn matrix(&self, key: &str) -> [[f64; 3]; 3] {
+        std::array::from_fn(|i| std::array::from_fn(|j| self.effect.values[key][3 * i + j]))
+    }
+
+    /// A stream of its own: no other draws change with it.
+    fn random(&self) -> Random {
+        Random::new(self.seed, self.effect.id)
+    }
+}
+
+/// An effect on the inputs.
+fn input(f: impl FnMut(&Condition, &mut Disturbance) + Send + 'static) -> Active {
+    Active::Input(Box::new(f))
+}
+
+/// An effect on the voltages.
+fn read_out(f: impl FnMut(&Condition, &mut Pins) + Send + 'static) -> Active {
+    Active::ReadOut(Box::new(f))
+}
+
+const fn scalar(key: &'static str, size: f64) -> Parameter {
+    sized(key, Shape::Scalar, size)
+}
+
+const fn axes(key: &'static str, size: f64) -> Parameter {
+    sized(key, Shape::List(3), size)
+}
+
+const fn matrix(key: &'static str, size: f64) -> Parameter {
+    sized(key, Shape::Matrix, size)
+}
+
+const fn sized(key: &'static str, shape: Shape, size: f64) -> Parameter {
+    let draw = Draw::Size(size);
+    Parameter { key, shape, draw }
+}
+
+const fn form(key: &'static str, low: f64, high: f64) -> Parameter {
+    Parameter {
+        key,
+        shape: Shape::Scalar,
+        draw: Draw::Between(low, high),
+    }
+}
+
+impl Shape {
+    /// How many numbers it has.
+    pub const fn numbers(self) -> usize {
+        match self {
+            Self::Scalar => 1,
+            Self::List(n) => n,
+            Self::Matrix | Self::Cross => 9,
+        }
+    }
+}
+
+impl Shape {
+    /// In words.
+    pub(crate) fn form(self) -> String {
+        match self {
+            Self::Scalar => "one number".to_owned(),
+            Self::List(n) => format!("a list of {n} numbers"),
+            Self::Matrix | Self::Cross => "three lists of three numbers".to_owned(),
+        }
+    }
+}
+
+impl Parameter {
+    /// Draws the numbers of this parameter of the effect `id`: its own stream, so that stating one leaves the
+    /// others.
+    fn draw(&self, id: &str, amplitude: f64, seed: u64) -> Vec<f64> {
+        let mut random = Random::new(seed, &format!("{id} {}", self.key));
+        let one = |i: usize| match self.draw {
+            Draw::Size(_) if self.shape == Shape::Cross && i.is_multiple_of(4) => 0.0,
+            Draw::Size(size) => {
+                let side = if random.uniform() < 0.5 { -1.0 } else { 1.0 };
+                side * amplitude * size * (0.5 + random.uniform())
+            }
+            Draw::Between(low, high) => low * (high / low).powf(random.uniform()),
+        };
+        (0..self.shape.numbers()).map(one).collect()
+    }
+}
+
+impl EffectTruth {
+    /// The effect with the stated numbers; the rest is drawn, its size `amplitude` times the usual one.
+    /// `None`: no such id.
+    pub fn draw(
+        id: &str,
+        stated: BTreeMap<&'static str, Vec<f64>>,
+        amplitude: f64,
+        seed: u64,
+    ) -> Option<Self> {
+        let spec = spec(id)?;
+        let values = spec.parameters.iter().map(|p| {
+            let drawn = || p.draw(spec.id, amplitude, seed);
+            (p.key, stated.get(p.key).cloned().unwrap_or_else(drawn))
+        });
+        Some(Self {
+            id: spec.id,
+            values: values.collect(),
+        })
+    }
+
+    /// Its parameters with their numbers.
+    pub fn parameters(&self) -> impl Iterator<Item = (&'static Parameter, &[f64])> {
+        let parameters = spec(self.id).map_or(&[][..], |s| s.parameters);
+        parameters
+            .iter()
+            .map(|p| (p, self.values[p.key].as_slice()))
+    }
+
+    /// Puts the effect to work in a unit.
+    pub(crate) fn activate(&self, unit: &UnitTruth, seed: u64, dt_s: f64) -> Active {
+        let spec = spec(self.id).expect("made from a spec");
+        (spec.build)(&Build {
+            effect: self,
+            unit,
+            seed,
+            dt_s,
+        })
+    }
+}
+
+/// Every kind of effect.
+pub fn specs() -> impl Iterator<Item = &'static Spec> {
+    ALL.into_iter().flatten()
+}
+
+/// The kind with this id.
+pub fn spec(id: &str) -> Option<&'static Spec> {
+    specs().find(|s| s.id == id)
+}
+
+/// Effects with these ids, all numbers drawn, sizes `amplitude` times the usual ones. Errors: an unknown id.
+pub fn draw(ids: &[&str], amplitude: f64, seed: u64) -> Result<Vec<EffectTruth>, String> {
+    let one = |id: &&str| {
+        EffectTruth::draw(id, BTreeMap::new(), amplitude, seed)
+            .ok_or_else(|| format!("no effect is called `{id}`; take one of `effects::specs`"))
+    };
+    ids.iter().map(one).collect()
+}
+
+/// `count` different ids, all equally likely.
+pub fn draw_ids(count: usize, seed: u64) -> Vec<&'static str> {
+    let mut random = Random::new(seed, "which effects");
+    let mut ids: Vec<_> = specs().map(|s| s.id).collect();
+    let mut drawn = Vec::new();
+    while drawn.len() < count && !ids.is_empty() {
+        let pick = (random.uniform() * ids.len() as f64) as usize;
+        drawn.push(ids.swap_remove(pick));
+    }
+    drawn
+}
+
+/// A decade around the usual size of an effect, in the unit of its first parameter.
+pub fn size_range(id: &str) -> Option<(f64, f64)> {
+    match spec(id)?.parameters[0].draw {
+        Draw::Size(size) => Some((size / 10_f64.sqrt(), size * 10_f64.sqrt())),
+        Draw::Between(..) => None,
+    }
+}

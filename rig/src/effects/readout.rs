@@ -1,0 +1,116 @@
+//! Errors of the converter, as changes of the voltage in front of an ideal one: they then act on an emulated
+//! converter too.
+
+use std::f64::consts::TAU;
+
+use super::{Active, Build, Parameter, Shape, Spec, axes, form, read_out, scalar, sized};
+use crate::sensor::TriadTruth;
+use crate::unit::Pins;
+
+/// Mismatch of the capacitors of the six top bits, in codes of 16 bits. Assumed: a few codes, the order of
+/// the integral nonlinearity that makers state for 16-bit converters in microcontrollers.
+const MISMATCH: [Parameter; 1] = [sized("bit_errors_lsb", Shape::List(6), 6.0)];
+
+pub(super) const SPECS: [Spec; 5] = [
+    Spec {
+        id: "gyro_readout_code",
+        about: "each of the six top bits of the code, when set, is worth so much more",
+        parameters: &MISMATCH,
+        build: |b| mismatch(b, &b.unit.gyro, |pins| &mut pins.gyro_v),
+    },
+    Spec {
+        id: "accel_readout_code",
+        about: "each of the six top bits of the code, when set, is worth so much more",
+        parameters: &MISMATCH,
+        build: |b| mismatch(b, &b.unit.accel, |pins| &mut pins.accel_v),
+    },
+    // A short on the converter's data bus. Size: a bit low enough to pass for noise.
+    Spec {
+        id: "x_code_stuck_bit",
+        about: "one bit of every code reads 0: the power of two nearest to the size, codes of 16 bits",
+        parameters: &[scalar("lsb", 16.0)],
+        build: |b| {
+            let bit = 1_i64 << b.number("lsb").abs().log2().round().clamp(0.0, 15.0) as u32;
+            let worth = move |code: i64| if code & bit != 0 { -bit as f64 } else { 0.0 };
+            let spans = [Span::new(b, &b.unit.gyro), Span::new(b, &b.unit.accel)];
+            read_out(move |_, pins| {
+                let reference = pins.converter_reference_v;
+                spans[0].shift(&mut pins.gyro_v, reference, worth);
+                spans[1].shift(&mut pins.accel_v, reference, worth);
+            })
+        },
+    },
+    // The mains' field in the loop between gyro and converter. The grid stays within a tenth of a hertz of
+    // 50.
+    Spec {
+        id: "x_mains_hum",
+        about: "gyro outputs carry a sine of this amplitude (digital: thousandths of a count)",
+        parameters: &[axes("mv", 5.0), form("frequency_hz", 49.9, 50.1)],
+        build: |b| hum(b, |pins| &mut pins.gyro_v),
+    },
+    // The host polls a full-speed USB bridge every millisecond by its own crystal, and the supply feels each
+    // poll: sampled at 1 kHz it becomes a slow wave.
+    Spec {
+        id: "x_usb_beat",
+        about: "accelerometer outputs carry a sine near 1 kHz of this amplitude (as x_mains_hum)",
+        parameters: &[axes("mv", 2.0), form("frequency_hz", 1000.002, 1000.05)],
+        build: |b| hum(b, |pins| &mut pins.accel_v),
+    },
+];
+
+/// Which outputs.
+type Outputs = fn(&mut Pins) -> &mut [f64; 3];
+
+/// Raw range of a converter, for codes of 16 bits.
+#[derive(Clone, Copy)]
+struct Span {
+    low: f64,
+    span: f64,
+    nominal_v: Option<f64>,
+}
+
+impl Span {
+    fn new(b: &Build, triad: &TriadTruth) -> Self {
+        Self {
+            low: triad.code_low,
+            span: triad.code_span,
+            nominal_v: triad.analog.then_some(b.unit.converter_reference.nominal_v),
+        }
+    }
+
+    /// Moves each output by the error, in codes, that its code has.
+    fn shift(&self, outputs: &mut [f64; 3], reference_v: f64, error: impl Fn(i64) -> f64) {
+        let true_span = self.span * self.nominal_v.map_or(1.0, |v| reference_v / v);
+        for v in outputs {
+            let code = ((*v - self.low) / true_span * 65536.0)
+                .round()
+                .clamp(0.0, 65535.0) as i64;
+            *v += true_span / 65536.0 * error(code);
+        }
+    }
+}
+
+fn mismatch(b: &Build, triad: &TriadTruth, outputs: Outputs) -> Active {
+    let errors = b.list::<6>("bit_errors_lsb");
+    let span = Span::new(b, triad);
+    read_out(move |_, pins| {
+        let reference = pins.converter_reference_v;
+        span.shift(outputs(pins), reference, |code| {
+            let set = |(i, e): (usize, &f64)| if code & (0x8000 >> i) != 0 { *e } else { 0.0 };
+            errors.iter().enumerate().map(set).sum()
+        });
+    })
+}
+
+fn hum(b: &Build, outputs: Outputs) -> Active {
+    let size = b.list::<3>("mv");
+    let frequency_hz = b.number("frequency_hz");
+    let phase = TAU * b.random().uniform();
+    read_out(move |at, pins| {
+        // Turns first: at 1 kHz and a day the phase itself would lose digits.
+        let wave = (TAU * (frequency_hz * at.motion.t_s).fract() + phase).sin();
+        for (v, size) in outputs(pins).iter_mut().zip(size) {
+            *v += 1e-3 * size * wave;
+        }
+    })
+}

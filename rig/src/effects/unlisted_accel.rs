@@ -1,0 +1,67 @@
+//! Accelerometer errors that stand on no list.
+
+use super::{DPS, G, Spec, axes, form, input};
+
+const MG: f64 = 1e-3 * G;
+
+pub(super) const SPECS: [Spec; 3] = [
+    // The supply of the board sags with rate in one gyro and changes the gain of another chip's amplifier.
+    // Size assumed.
+    Spec {
+        id: "x_accel_rotation_coupling",
+        about: "axis i: error = size · rate of axis i+1 · force of axis i+2, body axes",
+        parameters: &[axes("mg_per_100dps_g", 3.0)],
+        build: |b| {
+            let size = b
+                .list::<3>("mg_per_100dps_g")
+                .map(|s| MG * s / (100.0 * DPS * G));
+            input(move |at, add| {
+                for i in 0..3 {
+                    add.accel[i] +=
+                        size[i] * at.motion.rate[(i + 1) % 3] * at.motion.force[(i + 2) % 3];
+                }
+            })
+        },
+    },
+    // Glue between die and package gives way a little under load and keeps it: the play (backlash) operator.
+    // Size assumed.
+    Spec {
+        id: "x_accel_stress_hysteresis",
+        about: "error ±size by the direction in which the force last moved by more than twice the play",
+        parameters: &[axes("mg", 3.0), form("play_g", 0.1, 0.5)],
+        build: |b| {
+            let size = b.list::<3>("mg");
+            let play = G * b.number("play_g");
+            let mut rest: Option<[f64; 3]> = None;
+            input(move |at, add| {
+                let rest = rest.get_or_insert(at.accel);
+                for i in 0..3 {
+                    let f = at.accel[i];
+                    rest[i] = rest[i].clamp(f - play, f + play);
+                    add.accel[i] += MG * size[i] * (f - rest[i]) / play;
+                }
+            })
+        },
+    },
+    // Moulding relaxes in the logarithm of time. Size assumed.
+    Spec {
+        id: "x_accel_creep",
+        about: "bias = size · log10(1 + t / onset) since power-on",
+        parameters: &[axes("mg_per_decade", 2.0), form("onset_s", 10.0, 100.0)],
+        build: |b| {
+            let size = b.list::<3>("mg_per_decade");
+            let onset_s = b.number("onset_s");
+            input(move |at, add| {
+                // A unit that was always on has crept for ever: what is left of it is constant.
+                let decades = if at.on_s.is_finite() {
+                    (at.on_s / onset_s).ln_1p() / 10_f64.ln()
+                } else {
+                    0.0
+                };
+                for i in 0..3 {
+                    add.accel[i] += MG * size[i] * decades;
+                }
+            })
+        },
+    },
+];

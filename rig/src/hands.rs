@@ -1,0 +1,360 @@
+//! A person who turns the board by hand: no pose is met, no turn is straight, and something gets knocked.
+//!
+//! Attitude and position are twice differentiable everywhere, so that rate, angular acceleration and
+//! specific force are their exact derivatives.
+
+use std::f64::consts::TAU;
+
+use serde::{Deserialize, Serialize};
+
+use crate::chain::{Frame, Jet};
+use crate::motion::{Carrier, Instant, Motion};
+use crate::place::Place;
+use crate::plan::{Plan, Pose};
+use crate::random::Random;
+use crate::rotation::{Vector, scale};
+
+use choice::{Jolt, Turn, between, chosen};
+
+mod choice;
+
+/// How the person works. Ranges are lowest and highest, all between equally likely.
+///
+/// By default the board lies still during the dwells, in a cube, a fixture, or against a book.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct HandsTruth {
+    /// Whether the board stays in the hand during the dwells.
+    pub held: bool,
+    /// How far a pose misses its aim about each level axis, standard deviation.
+    pub aim_deg: f64,
+    /// Range of a turn's length, s.
+    pub turn_s: [f64; 2],
+    /// Range of the pause before and after a dwell, s.
+    pub pause_s: [f64; 2],
+    /// A dwell is up to this fraction longer than planned.
+    pub dwell_stretch: f64,
+    /// How far a turn leaves its axis about each axis across it, standard deviation.
+    pub wander_deg: f64,
+    /// How far apart the board is put down, standard deviation in each horizontal direction.
+    pub carry_mm: f64,
+    /// Height of the arc from pose to pose, mean. The lowest is half of it, the highest one and a half.
+    pub lift_mm: f64,
+    /// Board's origin from the point about which the hand turns it, board axes.
+    pub lever_mm: Vector,
+    /// Band of the tremor of a hand, Hz. Physiological tremor is at 8 to 12.
+    pub tremor_hz: [f64; 2],
+    /// Tremor along each axis, effective value.
+    pub tremor_mm: f64,
+    /// Tremor about each axis, effective value.
+    pub tremor_mrad: f64,
+    /// Band of the sway of a hand that holds still, Hz.
+    pub sway_hz: [f64; 2],
+    /// Sway along each axis, effective value.
+    pub sway_mm: f64,
+    /// Sway about each axis, effective value.
+    pub sway_mrad: f64,
+    /// Share of dwells with a knock in them.
+    pub jolt_probability: f64,
+    /// Length of a knock, s.
+    pub jolt_s: f64,
+    /// Displacement at the height of a knock, standard deviation along each axis.
+    pub jolt_mm: f64,
+    /// Turn at the height of a knock, standard deviation about each axis.
+    pub jolt_mrad: f64,
+}
+
+impl Default for HandsTruth {
+    fn default() -> Self {
+        Self {
+            held: false,
+            aim_deg: 3.0,
+            turn_s: [1.0, 3.0],
+            pause_s: [0.3, 1.5],
+            dwell_stretch: 0.3,
+            wander_deg: 15.0,
+            carry_mm: 100.0,
+            lift_mm: 80.0,
+            lever_mm: [20.0, -10.0, 15.0],
+            tremor_hz: [8.0, 12.0],
+            tremor_mm: 0.05,
+            tremor_mrad: 0.5,
+            sway_hz: [0.1, 0.6],
+            sway_mm: 2.0,
+            sway_mrad: 5.0,
+            jolt_probability: 0.05,
+            jolt_s: 0.05,
+            jolt_mm: 0.1,
+            jolt_mrad: 0.3,
+        }
+    }
+}
+
+impl HandsTruth {
+    /// Refuses what no person does, and names the key.
+    pub fn check(&self) -> Result<(), String> {
+        let refuse =
+            |key: &str, remedy: &str| Err(format!("hands: `{key}` makes no sense; {remedy}"));
+        for (key, [low, high], lowest) in [
+            ("turn_s", self.turn_s, 0.1),
+            ("pause_s", self.pause_s, 0.0),
+            ("tremor_hz", self.tremor_hz, 0.0),
+            ("sway_hz", self.sway_hz, 0.0),
+        ] {
+            if !(low >= lowest && high >= low && high.is_finite()) {
+                return refuse(
+                    key,
+                    &format!("give the lowest and the highest, {lowest} or more"),
+                );
+            }
+        }
+        for (key, size) in [
+            ("aim_deg", self.aim_deg),
+            ("dwell_stretch", self.dwell_stretch),
+            ("wander_deg", self.wander_deg),
+            ("carry_mm", self.carry_mm),
+            ("lift_mm", self.lift_mm),
+            ("tremor_mm", self.tremor_mm),
+            ("tremor_mrad", self.tremor_mrad),
+            ("sway_mm", self.sway_mm),
+            ("sway_mrad", self.sway_mrad),
+            ("jolt_mm", self.jolt_mm),
+            ("jolt_mrad", self.jolt_mrad),
+        ] {
+            if !(size >= 0.0 && size.is_finite()) {
+                return refuse(key, "give a size, zero or more");
+            }
+        }
+        if !(0.0..=1.0).contains(&self.jolt_probability) {
+            return refuse("jolt_probability", "give 0 to 1");
+        }
+        if !(self.jolt_s >= 0.001 && self.jolt_s.is_finite()) {
+            return refuse("jolt_s", "give seconds, 0.001 or more");
+        }
+        if !self.lever_mm.iter().all(|x| x.is_finite()) {
+            return refuse("lever_mm", "give three finite numbers");
+        }
+        Ok(())
+    }
+}
+
+/// Turn and displacement of the board beside the course of a turn.
+#[derive(Debug, Clone, Copy, Default)]
+struct Shift {
+    angle: [Jet; 3],
+    position: [Jet; 3],
+}
+
+impl Shift {
+    fn add(&mut self, other: &Self, weight: Jet) {
+        for i in 0..3 {
+            self.angle[i] = self.angle[i] + other.angle[i] * weight;
+            self.position[i] = self.position[i] + other.position[i] * weight;
+        }
+    }
+}
+
+/// Oscillation within a band: three sines on each of six channels, whose beat makes it come and go.
+#[derive(Debug, Clone)]
+struct Shake {
+    /// Angular frequency (rad/s), phase (rad), amplitude (rad, m): angles, then positions.
+    sines: [[[f64; 3]; 3]; 6],
+}
+
+impl Shake {
+    fn new(random: &mut Random, [low, high]: [f64; 2], mrad: f64, mm: f64) -> Self {
+        let sines = std::array::from_fn(|channel| {
+            // Sines of amplitude a have the effective value a √(3/2).
+            let amplitude = 1e-3 * if channel < 3 { mrad } else { mm } / 1.5_f64.sqrt();
+            std::array::from_fn(|_| {
+                let frequency = low + (high - low) * random.uniform();
+                [TAU * frequency, TAU * random.uniform(), amplitude]
+            })
+        });
+        Self { sines }
+    }
+
+    fn at(&self, t_s: f64) -> Shift {
+        let channel = |i: usize| {
+            self.sines[i]
+                .iter()
+                .fold(Jet::default(), |sum, &[frequency, phase, amplitude]| {
+                    let angle = Jet {
+                        value: frequency * t_s + phase,
+                        rate: frequency,
+                        acceleration: 0.0,
+                    };
+                    sum + angle.sin().times(amplitude)
+                })
+        };
+        Shift {
+            angle: std::array::from_fn(channel),
+            position: std::array::from_fn(|i| channel(3 + i)),
+        }
+    }
+}
+
+/// A person who carries out a plan.
+#[derive(Debug, Clone)]
+pub struct Hands {
+    place: Place,
+    turns: Vec<Turn>,
+    cursor: usize,
+    duration_s: f64,
+    held: bool,
+    lever: Vector,
+    tremor: Shake,
+    sway: Shake,
+    jolt_s: f64,
+    still: Option<(usize, Motion)>,
+}
+
+impl Hands {
+    /// The person `truth` about to carry out `plan`. The seed decides what goes how.
+    pub fn new(plan: &Plan, truth: &HandsTruth, seed: u64) -> Result<Self, String> {
+        truth.check()?;
+        let mut random = Random::new(seed, "hands");
+        let random = &mut random;
+        let tremor = Shake::new(random, truth.tremor_hz, truth.tremor_mrad, truth.tremor_mm);
+        let sway = Shake::new(random, truth.sway_hz, truth.sway_mrad, truth.sway_mm);
+        let mut turns: Vec<Turn> = Vec::new();
+        let mut end_s = 0.0;
+        for step in &plan.steps {
+            let poses = match step.pose {
+                Pose::Up(up) => vec![up],
+                Pose::Many(count) => chosen(count, random),
+            };
+            for up in poses {
+                for _ in 0..step.repeat {
+                    let at_s = if turns.is_empty() {
+                        plan.lead_in_s
+                    } else {
+                        end_s
+                    };
+                    let turn = Turn::draw(turns.last(), at_s, step, up, truth, random);
+                    end_s = turn.dwell[1] + between(truth.pause_s, random);
+                    turns.push(turn);
+                }
+            }
+        }
+        Ok(Self {
+            place: plan.place,
+            turns,
+            cursor: 0,
+            duration_s: end_s,
+            held: truth.held,
+            lever: scale(1e-3, truth.lever_mm),
+            tremor,
+            sway,
+            jolt_s: truth.jolt_s,
+            still: None,
+        })
+    }
+}
+
+impl Carrier for Hands {
+    fn duration_s(&self) -> f64 {
+        self.duration_s
+    }
+
+    fn at(&mut self, t_s: f64) -> Instant {
+        while self
+            .turns
+            .get(self.cursor + 1)
+            .is_some_and(|next| next.start_s <= t_s)
+        {
+            self.cursor += 1;
+        }
+        let turn = &self.turns[self.cursor];
+        let step = (t_s >= turn.dwell[0] && t_s < turn.dwell[1]).then_some(self.cursor as u32);
+        let turning = t_s < turn.start_s + turn.turn_s;
+        let jolt = turn
+            .jolt
+            .filter(|jolt| t_s >= jolt.start_s && t_s < jolt.start_s + self.jolt_s);
+        let lies = !self.held && !turning && jolt.is_none();
+        let motion = match self.still {
+            Some((at, still)) if lies && at == self.cursor => Motion { t_s, ..still },
+            _ => self.moving(turn, t_s, turning, jolt),
+        };
+        self.still = lies.then_some((self.cursor, motion));
+        Instant {
+            motion,
+            step,
+            stated_rate: None,
+            stated_force: None,
+        }
+    }
+}
+
+impl Hands {
+    fn moving(&self, turn: &Turn, t_s: f64, turning: bool, jolt: Option<Jolt>) -> Motion {
+        let part = |start_s: f64, length_s: f64| Jet {
+            value: (t_s - start_s) / length_s,
+            rate: 1.0 / length_s,
+            acceleration: 0.0,
+        };
+        let (done, detour) = if turning {
+            let part = part(turn.start_s, turn.turn_s);
+            (smooth_step(part), bump(part))
+        } else {
+            (Jet::constant(1.0), Jet::default())
+        };
+        let mut shift = Shift::default();
+        if self.held {
+            shift.add(&self.tremor.at(t_s), Jet::constant(1.0));
+            shift.add(&self.sway.at(t_s), Jet::constant(1.0));
+        } else if turning {
+            shift.add(&self.tremor.at(t_s), detour);
+        }
+        if let Some(jolt) = jolt {
+            let knock = Shift {
+                angle: jolt.angle.map(Jet::constant),
+                position: jolt.position.map(Jet::constant),
+            };
+            shift.add(&knock, bump(part(jolt.start_s, self.jolt_s)));
+        }
+        let [from, to] = turn.position;
+        for i in 0..3 {
+            shift.position[i] =
+                shift.position[i] + Jet::constant(from[i]) + done.times(to[i] - from[i]);
+        }
+        shift.position[2] = shift.position[2] + detour.times(turn.lift);
+        Frame::ground(&self.place)
+            .fixed(turn.from)
+            .about(turn.axis, done.times(turn.angle))
+            .about_own::<0>(detour.times(turn.wander[0]) + shift.angle[0])
+            .about_own::<1>(detour.times(turn.wander[1]) + shift.angle[1])
+            .about_own::<2>(shift.angle[2])
+            .motion(
+                t_s,
+                &self.place,
+                self.lever,
+                shift.position.map(|p| p.rate),
+                shift.position.map(|p| p.acceleration),
+            )
+    }
+}
+
+/// From 0 to 1 while the argument goes from 0 to 1, at rest and without acceleration at both ends: 10u³ -
+/// 15u⁴ + 6u⁵.
+fn smooth_step(part: Jet) -> Jet {
+    let u = part.value;
+    let v = u * (1.0 - u);
+    part.through([
+        u * u * u * (10.0 + u * (6.0 * u - 15.0)),
+        30.0 * v * v,
+        60.0 * v * (1.0 - 2.0 * u),
+    ])
+}
+
+/// From 0 to 1 and back while the argument goes from 0 to 1, at rest and without acceleration at both ends:
+/// (4u (1 - u))³.
+fn bump(part: Jet) -> Jet {
+    let u = part.value;
+    let (v, dv) = (u * (1.0 - u), 1.0 - 2.0 * u);
+    part.through([
+        64.0 * v * v * v,
+        192.0 * v * v * dv,
+        384.0 * v * (dv * dv - v),
+    ])
+}

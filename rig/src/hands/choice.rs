@@ -1,0 +1,117 @@
+//! What a person makes of a plan: which pose next, how it is met, how long everything takes.
+
+use super::HandsTruth;
+use crate::plan::{Step, attitude};
+use crate::random::Random;
+use crate::rotation::{Rotation, Vector, norm};
+
+/// From one pose to the next, and the rest there.
+#[derive(Debug, Clone)]
+pub(super) struct Turn {
+    pub(super) start_s: f64,
+    /// Length of the turn, s; 0 where the recording begins.
+    pub(super) turn_s: f64,
+    pub(super) from: Rotation,
+    /// Axis (unit, body axes before the turn) and angle (rad).
+    pub(super) axis: Vector,
+    pub(super) angle: f64,
+    /// Detour about body x and y, rad.
+    pub(super) wander: [f64; 2],
+    /// Before and after, level axes, m.
+    pub(super) position: [Vector; 2],
+    pub(super) lift: f64,
+    pub(super) dwell: [f64; 2],
+    pub(super) jolt: Option<Jolt>,
+}
+
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Jolt {
+    pub(super) start_s: f64,
+    pub(super) angle: Vector,
+    pub(super) position: Vector,
+}
+
+impl Turn {
+    /// The turn that begins at `at_s` and the dwell after it; without a `last` one just the dwell, from
+    /// `at_s` on.
+    pub(super) fn draw(
+        last: Option<&Turn>,
+        at_s: f64,
+        step: &Step,
+        up: Vector,
+        truth: &HandsTruth,
+        random: &mut Random,
+    ) -> Turn {
+        let from = last.map_or(attitude(up, 0.0), |last| {
+            last.from * Rotation::about(last.axis, last.angle)
+        });
+        let aim = match step.heading {
+            Some(heading) => attitude(up, heading),
+            // The nearest way to get it upright, and then about any.
+            None => {
+                let upright = Rotation::between(from.turn(up), [0.0, 0.0, 1.0]) * from;
+                Rotation::about([0.0, 0.0, 1.0], 0.5 * random.normal()) * upright
+            }
+        };
+        let mut normal = |size: f64| size * random.normal();
+        let to = Rotation::by([0; 3].map(|_| normal(truth.aim_deg.to_radians()))) * aim;
+        let spot = [
+            normal(1e-3 * truth.carry_mm),
+            normal(1e-3 * truth.carry_mm),
+            0.0,
+        ];
+        let wander = [0; 2].map(|_| normal(truth.wander_deg.to_radians()));
+        let knock = Jolt {
+            start_s: 0.0,
+            angle: [0; 3].map(|_| normal(1e-3 * truth.jolt_mrad)),
+            position: [0; 3].map(|_| normal(1e-3 * truth.jolt_mm)),
+        };
+        let (turn_s, pause_s) = (
+            between(truth.turn_s, random),
+            between(truth.pause_s, random),
+        );
+        let lift = 1e-3 * truth.lift_mm * (0.5 + random.uniform());
+        let length_s = step.dwell_s * (1.0 + truth.dwell_stretch * random.uniform());
+        let jolted = random.uniform() < truth.jolt_probability && length_s > truth.jolt_s;
+        let when = random.uniform();
+        // The board lies at the first pose from the beginning, and no turn leads there.
+        let (from, turn_s, dwell_s) = match last {
+            Some(_) => (from, turn_s, at_s + turn_s + pause_s),
+            None => (to, 0.0, at_s),
+        };
+        let (axis, angle) = (from.inverse() * to).axis_angle();
+        Turn {
+            start_s: if last.is_some() { at_s } else { 0.0 },
+            turn_s,
+            from,
+            axis,
+            angle,
+            wander,
+            position: [last.map_or(spot, |last| last.position[1]), spot],
+            lift,
+            dwell: [dwell_s, dwell_s + length_s],
+            jolt: jolted.then_some(Jolt {
+                start_s: dwell_s + when * (length_s - truth.jolt_s),
+                ..knock
+            }),
+        }
+    }
+}
+
+pub(super) fn between([low, high]: [f64; 2], random: &mut Random) -> f64 {
+    low + (high - low) * random.uniform()
+}
+
+/// What a person takes for all directions: faces, edges, corners of a cube, and from then on anyhow.
+pub(super) fn chosen(count: u32, random: &mut Random) -> Vec<Vector> {
+    let mut cube: Vec<Vector> = (0..27)
+        .map(|k| [k % 3, k / 3 % 3, k / 9].map(|i| f64::from(i) - 1.0))
+        .filter(|v| norm(*v) > 0.0)
+        .collect();
+    cube.sort_by(|a, b| norm(*a).total_cmp(&norm(*b)));
+    let anyhow = std::iter::repeat_with(|| random.attitude().turn([0.0, 0.0, 1.0]));
+    cube.into_iter()
+        .chain(anyhow)
+        .take(count as usize)
+        .collect()
+}

@@ -1,0 +1,220 @@
+//! The plan of an experiment, `PLAN.toml`: what the designer writes, a person reads, and the bench carries
+//! out.
+
+use std::ops::Range;
+use std::path::Path;
+
+use serde::Deserialize;
+
+use crate::located::Source;
+use crate::place::Place;
+use crate::rotation::{Rotation, Vector};
+
+mod reading;
+
+/// A checked plan.
+#[derive(Debug, Clone)]
+pub struct Plan {
+    source: Source,
+    /// Unit under test.
+    pub device: String,
+    /// Samples a second.
+    pub sample_rate_hz: f64,
+    /// How the samples are to be stored.
+    pub samples: Samples,
+    /// What carries the board.
+    pub carrier: CarriedBy,
+    /// Whether the recording numbers the dwells.
+    pub numbered: bool,
+    /// Where the bench stands.
+    pub place: Place,
+    /// Chamber temperature: time (s, increasing) and °C at each breakpoint. Read it with [`Plan::chamber_c`].
+    pub chamber: Vec<[f64; 2]>,
+    /// Time at the first pose before the first dwell, powered, s.
+    pub lead_in_s: f64,
+    /// What to do, in order.
+    pub steps: Vec<Step>,
+}
+
+/// Storage of samples.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Samples {
+    /// Apache Parquet.
+    Parquet,
+    /// Comma-separated values.
+    Csv,
+}
+
+/// What carries the board through the plan.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum CarriedBy {
+    /// A turntable.
+    Table,
+    /// A person.
+    Hands,
+}
+
+/// One `[[step]]`: a pose or many, each with `repeat` dwells.
+#[derive(Debug, Clone)]
+pub struct Step {
+    /// Where up is.
+    pub pose: Pose,
+    /// Turn about the vertical from the body's nominal heading, rad. A person only aims at it.
+    pub heading: Option<f64>,
+    /// Rate about the vertical during the dwell, by the outer axis, rad/s.
+    pub rate: f64,
+    /// Rate about the body's z axis during the dwell, by the inner axis, rad/s.
+    pub spin: f64,
+    /// Length of each dwell, s.
+    pub dwell_s: f64,
+    /// Dwells in a row at each pose.
+    pub repeat: u32,
+    at: Places,
+}
+
+/// Pose of a step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Pose {
+    /// Body direction that points up, unit vector.
+    Up(Vector),
+    /// So many poses: spread evenly by a table, chosen as people do by hand.
+    Many(u32),
+}
+
+/// Where in the file the values of a step stand.
+#[derive(Debug, Clone)]
+struct Places {
+    pose: Range<usize>,
+    heading: Range<usize>,
+    rate: Range<usize>,
+    spin: Range<usize>,
+}
+
+/// What a table can do, for [`Plan::check`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Limits {
+    /// Whether there is an outer (vertical) axis.
+    pub outer: bool,
+    /// Range of the middle axis, rad: zero with the body's z axis up.
+    pub middle: [f64; 2],
+    /// Highest rates of the outer and the inner axis, rad/s.
+    pub rate: [f64; 2],
+}
+
+/// Sine of the angle between the inner axis and the vertical below which they are one axis.
+pub(crate) const UPRIGHT: f64 = 1e-9;
+
+impl Limits {
+    /// Whether the middle axis gets to an angle, rad, rounding apart.
+    pub fn reaches(&self, angle: f64) -> bool {
+        angle >= self.middle[0] - 1e-9 && angle <= self.middle[1] + 1e-9
+    }
+}
+
+impl Plan {
+    /// Reads a plan from a file.
+    pub fn read(path: &Path) -> Result<Self, String> {
+        Self::parse(Source::read(path)?)
+    }
+
+    /// Chamber temperature at a time (s), °C: linear between the breakpoints, held outside, 25 °C without
+    /// any.
+    pub fn chamber_c(&self, t_s: f64) -> f64 {
+        let after = self.chamber.partition_point(|[t, _]| *t <= t_s);
+        match (
+            after.checked_sub(1).map(|i| self.chamber[i]),
+            self.chamber.get(after),
+        ) {
+            (Some([t0, c0]), Some([t1, c1])) => c0 + (c1 - c0) * (t_s - t0) / (t1 - t0),
+            (Some([_, c]), None) | (None, Some(&[_, c])) => c,
+            (None, None) => 25.0,
+        }
+    }
+
+    /// Refuses what a table cannot do, in one line that names the step's line and the limit.
+    pub fn check(&self, limits: &Limits) -> Result<(), String> {
+        for step in &self.steps {
+            if let Pose::Up(up) = step.pose {
+                let (middle, _) = tilt(up);
+                if !limits.reaches(middle) && !limits.reaches(-middle) {
+                    return Err(self.source.error(
+                        &step.at.pose,
+                        format_args!(
+                            "`up` needs the middle axis at {:.1} degrees, and the table has {:.1} to {:.1}",
+                            middle.to_degrees(),
+                            limits.middle[0].to_degrees(),
+                            limits.middle[1].to_degrees()
+                        ),
+                        "take a pose within reach, or remount the unit",
+                    ));
+                }
+                if !limits.outer {
+                    let upright = up[0].hypot(up[1]) < UPRIGHT;
+                    let remedy = "use `spin_dps`, or turn the inner axis upright (`up` along z)";
+                    if step.rate != 0.0 && !upright {
+                        let problem = "`rate_dps` is about the vertical, where the table has no axis in this pose";
+                        return Err(self.source.error(&step.at.rate, problem, remedy));
+                    }
+                    if step.heading.is_some_and(|h| h != 0.0) && !upright {
+                        let problem = "`heading_deg` needs an outer axis, and the table has none";
+                        return Err(self.source.error(&step.at.heading, problem, "leave it out"));
+                    }
+                }
+            } else if !limits.outer && step.rate != 0.0 {
+                let problem =
+                    "`rate_dps` is about the vertical, where the table has no axis in most poses";
+                return Err(self.source.error(&step.at.rate, problem, "use `spin_dps`"));
+            }
+            let (outer, inner) = if limits.outer {
+                (step.rate, step.spin)
+            } else {
+                (0.0, step.rate.abs() + step.spin.abs())
+            };
+            for (rate, limit, at, key) in [
+                (outer, limits.rate[0], &step.at.rate, "rate_dps"),
+                (inner, limits.rate[1], &step.at.spin, "spin_dps"),
+            ] {
+                if rate.abs() > limit * (1.0 + 1e-12) {
+                    return Err(self.source.error(
+                        at,
+                        format_args!(
+                            "`{key}`: {} is more than the table's {}",
+                            shown(rate.abs()),
+                            shown(limit)
+                        ),
+                        "slow down",
+                    ));
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Degrees as the plan has them: without the rounding errors of radians.
+fn shown(angle: f64) -> f64 {
+    (1e6 * angle.to_degrees()).round() / 1e6
+}
+
+/// Attitude (body into level axes) with the body direction `up` (unit vector) upright, turned by `heading`
+/// (rad) about the vertical: `Rz(heading) Rx(m) Rz(i)` with up = (sin m sin i, sin m cos i, cos m), m from
+/// 0 to π, and i = 0 where up is along z.
+pub fn attitude(up: Vector, heading: f64) -> Rotation {
+    let (middle, inner) = tilt(up);
+    Rotation::about([0.0, 0.0, 1.0], heading)
+        * Rotation::about([1.0, 0.0, 0.0], middle)
+        * Rotation::about([0.0, 0.0, 1.0], inner)
+}
+
+/// The angles m and i of [`attitude`], rad.
+pub(crate) fn tilt(up: Vector) -> (f64, f64) {
+    let across = up[0].hypot(up[1]);
+    let inner = if across < UPRIGHT {
+        0.0
+    } else {
+        up[0].atan2(up[1])
+    };
+    (across.atan2(up[2]), inner)
+}

@@ -1,0 +1,322 @@
+//! Reading and checking `PLAN.toml`: every refusal names the file and the line.
+
+use std::fmt::Display;
+use std::ops::Range;
+
+use serde::Deserialize;
+use toml::Spanned;
+
+use super::{CarriedBy, Places, Plan, Pose, Samples, Step};
+use crate::located::Source;
+use crate::place::Place;
+use crate::rotation::{Vector, norm, scale};
+
+/// Longest recording, s: a plan that asks for more has a wrong unit in it.
+const LONGEST_S: f64 = 48.0 * 3600.0;
+/// Most dwells in one plan, for the same reason.
+const MOST_DWELLS: u64 = 100_000;
+/// What people write for a key.
+const SYNONYMS: [(&str, &str); 16] = [
+    ("chamber_temp", "chamber_c"),
+    ("temp", "chamber_c"),
+    ("temperature", "chamber_c"),
+    ("duration", "dwell_s"),
+    ("time", "dwell_s"),
+    ("hold", "dwell_s"),
+    ("position", "up"),
+    ("direction", "up"),
+    ("heading", "heading_deg"),
+    ("yaw", "heading_deg"),
+    ("speed", "rate_dps"),
+    ("omega", "rate_dps"),
+    ("rate", "sample_rate_hz"),
+    ("fs", "sample_rate_hz"),
+    ("g", "gravity_mps2"),
+    ("lat", "latitude_deg"),
+];
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawPlan {
+    format: Spanned<String>,
+    #[serde(default = "unit")]
+    device: Spanned<String>,
+    sample_rate_hz: Spanned<f64>,
+    samples: Option<Samples>,
+    carrier: CarriedBy,
+    steps: Option<bool>,
+    latitude_deg: Option<Spanned<f64>>,
+    gravity_mps2: Option<Spanned<f64>>,
+    #[serde(default)]
+    chamber_c: Vec<Spanned<[f64; 2]>>,
+    lead_in_s: Option<Spanned<f64>>,
+    #[serde(default)]
+    step: Vec<Spanned<RawStep>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawStep {
+    up: Option<Spanned<Vector>>,
+    poses: Option<Spanned<u32>>,
+    heading_deg: Option<Spanned<f64>>,
+    rate_dps: Option<Spanned<f64>>,
+    spin_dps: Option<Spanned<f64>>,
+    dwell_s: Spanned<f64>,
+    repeat: Option<Spanned<u32>>,
+}
+
+fn unit() -> Spanned<String> {
+    Spanned::new(0..0, "unit".to_owned())
+}
+
+impl Plan {
+    /// Reads a plan. An error is one line: the file, the line, what is wrong, what to do.
+    pub fn parse(source: Source) -> Result<Self, String> {
+        let raw: RawPlan = source.parse(&SYNONYMS)?;
+        let reader = Reader { source: &source };
+        if raw.format.get_ref() != "mimu-plan/1" {
+            return Err(source.error(
+                &raw.format.span(),
+                format_args!("format \"{}\" is not a plan's", raw.format.get_ref()),
+                "give a plan, with format = \"mimu-plan/1\"",
+            ));
+        }
+        if raw.device.get_ref().trim().is_empty() {
+            return Err(source.error(
+                &raw.device.span(),
+                "`device` has no name",
+                "name the unit, or leave the key out",
+            ));
+        }
+        let sample_rate_hz =
+            reader.within("sample_rate_hz", &raw.sample_rate_hz, [1.0, 20_000.0], "Hz")?;
+        let latitude_deg = match &raw.latitude_deg {
+            Some(value) => reader.within("latitude_deg", value, [-90.0, 90.0], "degrees")?,
+            None => 45.0,
+        };
+        let gravity = match &raw.gravity_mps2 {
+            // Normal gravity on the ellipsoid is 9.780 to 9.832; mountains take 0.02 away.
+            Some(value) => Some(reader.within("gravity_mps2", value, [9.7, 9.9], "m/s²")?),
+            None => None,
+        };
+        let lead_in_s = match &raw.lead_in_s {
+            Some(value) => reader.within("lead_in_s", value, [0.0, LONGEST_S], "s")?,
+            None => 0.0,
+        };
+        if raw.step.is_empty() {
+            return Err(source.error(
+                &(usize::MAX..usize::MAX),
+                "there is no step",
+                "add a `[[step]]` with `up` and `dwell_s`",
+            ));
+        }
+        let steps = raw
+            .step
+            .iter()
+            .map(|step| reader.step(step, raw.carrier, sample_rate_hz))
+            .collect::<Result<Vec<_>, _>>()?;
+        reader.length(lead_in_s, &steps)?;
+        Ok(Self {
+            device: raw.device.get_ref().clone(),
+            sample_rate_hz,
+            samples: raw.samples.unwrap_or(Samples::Parquet),
+            carrier: raw.carrier,
+            numbered: raw.steps.unwrap_or(raw.carrier == CarriedBy::Table),
+            place: Place::new(latitude_deg, gravity),
+            chamber: reader.chamber(&raw.chamber_c)?,
+            lead_in_s,
+            steps,
+            source,
+        })
+    }
+}
+
+/// What is checked after parsing.
+struct Reader<'a> {
+    source: &'a Source,
+}
+
+impl Reader<'_> {
+    fn within(
+        &self,
+        key: &str,
+        value: &Spanned<f64>,
+        [low, high]: [f64; 2],
+        unit: &str,
+    ) -> Result<f64, String> {
+        let x = *value.get_ref();
+        if x >= low && x <= high {
+            return Ok(x);
+        }
+        let problem = format!("`{key}` is {x}");
+        Err(self.source.error(
+            &value.span(),
+            problem,
+            format_args!("give {low} to {high} {unit}"),
+        ))
+    }
+
+    fn finite(&self, key: &str, value: &Option<Spanned<f64>>) -> Result<f64, String> {
+        match value {
+            Some(value) if value.get_ref().is_finite() => Ok(*value.get_ref()),
+            Some(value) => Err(self.source.error(
+                &value.span(),
+                format_args!("`{key}` is {}", value.get_ref()),
+                "give a finite number",
+            )),
+            None => Ok(0.0),
+        }
+    }
+
+    fn step(
+        &self,
+        raw: &Spanned<RawStep>,
+        carrier: CarriedBy,
+        sample_rate_hz: f64,
+    ) -> Result<Step, String> {
+        let (at, raw) = (raw.span(), raw.get_ref());
+        let place = |value: Option<Range<usize>>| value.unwrap_or(at.clone());
+        let refuse = |at: &Range<usize>, problem: &dyn Display, remedy: &str| {
+            Err(self.source.error(at, problem, remedy))
+        };
+        let (pose, pose_at) = match (&raw.up, &raw.poses) {
+            (Some(up), None) => {
+                let v = *up.get_ref();
+                let largest = v.iter().fold(0.0, |a: f64, x| a.max(x.abs()));
+                if !v.iter().all(|x| x.is_finite()) {
+                    return refuse(&up.span(), &"`up` is not finite", "give three numbers");
+                }
+                if largest == 0.0 {
+                    let remedy = "give the body direction that points up, as [0.0, 0.0, 1.0]";
+                    return refuse(&up.span(), &"`up` has no length", remedy);
+                }
+                // First by the largest: squares of 1e200 are infinite.
+                let v = v.map(|x| x / largest);
+                (Pose::Up(scale(1.0 / norm(v), v)), up.span())
+            }
+            (None, Some(poses)) => {
+                if *poses.get_ref() == 0 {
+                    return refuse(&poses.span(), &"`poses` is 0", "give one or more");
+                }
+                (Pose::Many(*poses.get_ref()), poses.span())
+            }
+            (Some(_), Some(poses)) => {
+                return refuse(
+                    &poses.span(),
+                    &"`up` and `poses` in one step",
+                    "keep one of them",
+                );
+            }
+            (None, None) => {
+                let remedy = "add the body direction that points up, or `poses = ...`";
+                return refuse(&at, &"`up` is missing", remedy);
+            }
+        };
+        let dwell_s = *raw.dwell_s.get_ref();
+        if !(dwell_s.is_finite() && dwell_s * sample_rate_hz >= 1.0) {
+            let problem = format!("`dwell_s` is {dwell_s}");
+            return refuse(
+                &raw.dwell_s.span(),
+                &problem,
+                "give the dwell in seconds, a sample or longer",
+            );
+        }
+        let repeat = raw.repeat.as_ref().map_or(1, |r| *r.get_ref());
+        if let Some(r) = &raw.repeat
+            && repeat == 0
+        {
+            return refuse(
+                &r.span(),
+                &"`repeat` is 0",
+                "give one or more, or remove the step",
+            );
+        }
+        for (key, value) in [("rate_dps", &raw.rate_dps), ("spin_dps", &raw.spin_dps)] {
+            if let (Some(value), CarriedBy::Hands) = (value, carrier) {
+                let problem = format!("`{key}` by hand: nobody turns at a steady rate");
+                return refuse(
+                    &value.span(),
+                    &problem,
+                    "remove it, or set `carrier = \"table\"`",
+                );
+            }
+        }
+        Ok(Step {
+            pose,
+            heading: match &raw.heading_deg {
+                Some(_) => Some(self.finite("heading_deg", &raw.heading_deg)?.to_radians()),
+                None => None,
+            },
+            rate: self.finite("rate_dps", &raw.rate_dps)?.to_radians(),
+            spin: self.finite("spin_dps", &raw.spin_dps)?.to_radians(),
+            dwell_s,
+            repeat,
+            at: Places {
+                heading: place(raw.heading_deg.as_ref().map(Spanned::span)),
+                rate: place(raw.rate_dps.as_ref().map(Spanned::span)),
+                spin: place(
+                    raw.spin_dps
+                        .as_ref()
+                        .or(raw.rate_dps.as_ref())
+                        .map(Spanned::span),
+                ),
+                pose: pose_at,
+            },
+        })
+    }
+
+    /// Refuses more than the longest recording, at the step where it becomes too long. Transit is not
+    /// counted.
+    fn length(&self, lead_in_s: f64, steps: &[Step]) -> Result<(), String> {
+        let (mut seconds, mut dwells) = (lead_in_s, 0_u64);
+        for step in steps {
+            let count = match step.pose {
+                Pose::Up(_) => u64::from(step.repeat),
+                Pose::Many(poses) => u64::from(poses) * u64::from(step.repeat),
+            };
+            seconds += count as f64 * step.dwell_s;
+            dwells += count;
+            if seconds > LONGEST_S || dwells > MOST_DWELLS {
+                return Err(self.source.error(
+                    &step.at.pose,
+                    format_args!(
+                        "with this step there are {dwells} dwells, {:.1} h of them",
+                        seconds / 3600.0
+                    ),
+                    format_args!(
+                        "stay within {MOST_DWELLS} dwells and {} h (`dwell_s` is in seconds)",
+                        LONGEST_S / 3600.0
+                    ),
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    fn chamber(&self, raw: &[Spanned<[f64; 2]>]) -> Result<Vec<[f64; 2]>, String> {
+        let mut last = f64::NEG_INFINITY;
+        for point in raw {
+            let [t, c] = *point.get_ref();
+            if !(t.is_finite() && t > last) {
+                let problem = format!("`chamber_c`: time {t} s does not come after the one before");
+                return Err(self.source.error(
+                    &point.span(),
+                    problem,
+                    "give [time in s, °C] pairs in order of time",
+                ));
+            }
+            // Beyond what chambers and silicon stand; 298 is a temperature in kelvins.
+            if !(-100.0..=200.0).contains(&c) {
+                let problem = format!("`chamber_c`: {c} °C at {t} s");
+                return Err(self.source.error(
+                    &point.span(),
+                    problem,
+                    "give -100 to 200 degrees Celsius",
+                ));
+            }
+            last = t;
+        }
+        Ok(raw.iter().map(|point| *point.get_ref()).collect())
+    }
+}

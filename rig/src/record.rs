@@ -1,0 +1,127 @@
+//! Recordings: a plan carried out with a unit of known truth, sample by sample in memory or as a folder on
+//! disk.
+
+mod folder;
+mod storage;
+
+use std::path::{Path, PathBuf};
+
+use crate::converter::{Converter, Readings};
+use crate::hands::Hands;
+use crate::motion::{Carrier, Instant};
+use crate::plan::{CarriedBy, Plan, Samples};
+use crate::rig_file::RigTruth;
+use crate::table::Table;
+use crate::unit::Unit;
+
+/// One sample: what was true, and what the device reports.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Row {
+    /// Motion, step, and what the table states.
+    pub instant: Instant,
+    /// Raw readings.
+    pub readings: Readings,
+}
+
+/// A plan being carried out: an iterator over its samples.
+pub struct Run<'a> {
+    plan: &'a Plan,
+    carrier: Box<dyn Carrier>,
+    unit: Unit,
+    converter: Converter,
+    next: usize,
+    count: usize,
+}
+
+/// Carries out a plan in memory. The same plan, truth and seed give the same samples, bit by bit.
+///
+/// Errors: the plan asks for what the table cannot do, or the truth has a table or hands that cannot be.
+pub fn samples<'a>(plan: &'a Plan, truth: &RigTruth, seed: u64) -> Result<Run<'a>, String> {
+    let mut at = plan.clone();
+    if !truth.earth_rate {
+        at.place.rotation = 0.0;
+    }
+    let carrier: Box<dyn Carrier> = match plan.carrier {
+        CarriedBy::Table => Box::new(Table::new(&at, &truth.table)?),
+        CarriedBy::Hands => Box::new(Hands::new(&at, &truth.hands, seed)?),
+    };
+    Ok(Run {
+        plan,
+        // All before the end. The ends of dwells are sums: a rounding error beyond a sample is none.
+        count: (carrier.duration_s() * plan.sample_rate_hz - 1e-6).ceil() as usize,
+        carrier,
+        unit: Unit::new(&truth.unit, seed, 1.0 / plan.sample_rate_hz),
+        converter: Converter::new(&truth.converter, &truth.unit, seed),
+        next: 0,
+    })
+}
+
+impl Iterator for Run<'_> {
+    type Item = Row;
+
+    fn next(&mut self) -> Option<Row> {
+        if self.next == self.count {
+            return None;
+        }
+        // Not by adding up: the thousandth of a second has no exact sum.
+        let t_s = self.next as f64 / self.plan.sample_rate_hz;
+        self.next += 1;
+        let instant = self.carrier.at(t_s);
+        let pins = self.unit.step(&instant.motion, self.plan.chamber_c(t_s));
+        Some(Row {
+            instant,
+            readings: self.converter.read(&pins),
+        })
+    }
+
+    fn size_hint(&self) -> (usize, Option<usize>) {
+        let left = self.count - self.next;
+        (left, Some(left))
+    }
+}
+
+impl ExactSizeIterator for Run<'_> {}
+
+/// Where a recording goes.
+#[derive(Debug, Clone)]
+pub struct Output {
+    /// Folder of the recording.
+    pub folder: PathBuf,
+    /// File of the truth. Nothing but the judge of a test reads it, and so it does not stand in the folder.
+    pub truth: PathBuf,
+    /// How the samples are stored.
+    pub samples: Samples,
+    /// Whether a recording and a truth that are there may be replaced.
+    pub replace: bool,
+}
+
+impl Output {
+    /// Into `folder`, the truth beside it (`folder.truth.toml`), stored as the plan says; nothing is
+    /// replaced.
+    pub fn new(folder: &Path, plan: &Plan) -> Result<Self, String> {
+        let Some(name) = folder.file_name() else {
+            return Err(format!(
+                "{}: has no name of its own; give a folder to make",
+                folder.display()
+            ));
+        };
+        let mut truth = name.to_owned();
+        truth.push(".truth.toml");
+        Ok(Self {
+            folder: folder.to_owned(),
+            truth: folder.with_file_name(truth),
+            samples: plan.samples,
+            replace: false,
+        })
+    }
+}
+
+/// Carries out a plan and writes the recording, whole or not at all, and the truth beside it. Returns the
+/// number of samples.
+pub fn write(plan: &Plan, truth: &RigTruth, seed: u64, output: &Output) -> Result<usize, String> {
+    folder::check(output)?;
+    let run = samples(plan, truth, seed)?;
+    let count = run.len();
+    folder::write(plan, truth, seed, run, output)?;
+    Ok(count)
+}

@@ -1,0 +1,202 @@
+//! The folder of a recording and the file of its truth: there whole, or not there.
+
+use std::fmt::Display;
+use std::fs;
+use std::io;
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+use tempfile::TempDir;
+
+use super::{Output, Run, storage};
+use crate::converter::RawUnit;
+use crate::plan::{CarriedBy, Plan, Samples};
+use crate::rig_file::{self, RigTruth};
+
+/// Format of `recording.toml`.
+const FORMAT: &str = "mimu-recording/1";
+/// All that a recording may have in it.
+const FILES: [&str; 3] = ["recording.toml", "samples.csv", "samples.parquet"];
+
+/// `recording.toml`.
+#[derive(Serialize)]
+struct Recording<'a> {
+    format: &'a str,
+    device: &'a str,
+    sample_rate_hz: f64,
+    gravity_mps2: f64,
+    raw_unit: RawUnit,
+    /// Left out where the Earth does not turn: who reads it takes the Earth's rate out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    latitude_deg: Option<f64>,
+    reference: &'a str,
+}
+
+fn said(path: &Path, problem: impl Display, remedy: &str) -> String {
+    format!("{}: {problem}; {remedy}", path.display())
+}
+
+/// The folder in which `path` stands.
+fn parent(path: &Path) -> &Path {
+    match path.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    }
+}
+
+/// Refuses places where nothing can or must be written, before any time is spent.
+pub(super) fn check(output: &Output) -> Result<(), String> {
+    let Output { folder, truth, .. } = output;
+    for path in [folder, truth] {
+        if !parent(path).is_dir() {
+            return Err(said(
+                path,
+                "the folder that it is to stand in is not there",
+                "make it first",
+            ));
+        }
+    }
+    if truth.starts_with(folder) {
+        let remedy = "write it elsewhere: who reads the recording must not see it";
+        return Err(said(
+            truth,
+            "the truth would stand in the recording",
+            remedy,
+        ));
+    }
+    if folder.symlink_metadata().is_ok() {
+        if !is_recording(folder) {
+            return Err(said(
+                folder,
+                "is there and is no recording",
+                "give another name",
+            ));
+        }
+        if !output.replace {
+            return Err(said(
+                folder,
+                "is there already",
+                "give another name, or --replace",
+            ));
+        }
+    }
+    if truth.symlink_metadata().is_ok() {
+        if !has_format(truth, rig_file::FORMAT) {
+            return Err(said(
+                truth,
+                "is there and is no truth",
+                "give another name with --truth",
+            ));
+        }
+        if !output.replace {
+            return Err(said(
+                truth,
+                "is there already",
+                "give another name with --truth, or --replace",
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// Whether a TOML file says that it is of a format.
+fn has_format(path: &Path, format: &str) -> bool {
+    #[derive(Deserialize)]
+    struct Head {
+        format: String,
+    }
+    let head = fs::read_to_string(path)
+        .ok()
+        .and_then(|text| toml::from_str::<Head>(&text).ok());
+    head.is_some_and(|head| head.format == format)
+}
+
+/// Whether a folder is a recording and nothing else, so that nobody misses anything of it.
+fn is_recording(folder: &Path) -> bool {
+    let Ok(entries) = fs::read_dir(folder) else {
+        return false;
+    };
+    let known = |name: &std::ffi::OsStr| FILES.iter().any(|file| name == *file);
+    has_format(&folder.join(FILES[0]), FORMAT)
+        && entries.flatten().all(|entry| known(&entry.file_name()))
+}
+
+/// Writes everything beside its place first and then moves it there.
+pub(super) fn write(
+    plan: &Plan,
+    truth: &RigTruth,
+    seed: u64,
+    run: Run,
+    output: &Output,
+) -> Result<(), String> {
+    let Output {
+        folder,
+        truth: truth_path,
+        ..
+    } = output;
+    let failed = |path: &Path| {
+        let path = path.to_owned();
+        move |e: io::Error| {
+            said(
+                &path,
+                format_args!("cannot be written: {e}"),
+                "see to space and permissions",
+            )
+        }
+    };
+    let unfinished = |path: &Path| {
+        tempfile::Builder::new()
+            .prefix(".unfinished-")
+            .tempdir_in(parent(path))
+            .map_err(failed(path))
+    };
+    let (beside, truth_beside) = (unfinished(folder)?, unfinished(truth_path)?);
+    let (new, new_truth) = (
+        beside.path().join("recording"),
+        truth_beside.path().join("truth.toml"),
+    );
+    fs::create_dir(&new).map_err(failed(folder))?;
+    let head = Recording {
+        format: FORMAT,
+        device: &plan.device,
+        sample_rate_hz: plan.sample_rate_hz,
+        gravity_mps2: plan.place.gravity,
+        raw_unit: truth.converter.raw_unit,
+        latitude_deg: truth.earth_rate.then_some(plan.place.latitude_deg),
+        reference: match plan.carrier {
+            CarriedBy::Table => "table",
+            CarriedBy::Hands => "gravity",
+        },
+    };
+    let head = toml::to_string(&head).expect("numbers and texts only");
+    fs::write(new.join(FILES[0]), head).map_err(failed(folder))?;
+    let stored = match output.samples {
+        Samples::Csv => storage::csv(&new.join(FILES[1]), plan, run),
+        Samples::Parquet => storage::parquet(&new.join(FILES[2]), plan, run),
+    };
+    stored.map_err(failed(folder))?;
+    let name = folder.file_name().unwrap_or_default().to_string_lossy();
+    let text = format!(
+        "# The truth of the recording {name}, made with seed {seed}. As a rig file, with the same plan and seed, it\n\
+         # makes the same samples again. It judges estimates; whatever makes them must not read it.\n\n{}",
+        truth.file.to_toml()
+    );
+    fs::write(&new_truth, text).map_err(failed(truth_path))?;
+    put(&beside, &new, folder).map_err(failed(folder))?;
+    fs::rename(&new_truth, truth_path).map_err(failed(truth_path))
+}
+
+/// Moves a finished folder to its place; what stood there goes away with the temporary folder.
+fn put(beside: &TempDir, new: &Path, folder: &Path) -> io::Result<()> {
+    let old = beside.path().join("old");
+    let there = folder.exists();
+    if there {
+        fs::rename(folder, &old)?;
+    }
+    fs::rename(new, folder).inspect_err(|_| {
+        // Nothing has come of it: what was there goes back.
+        if there {
+            let _ = fs::rename(&old, folder);
+        }
+    })
+}

@@ -1,0 +1,284 @@
+//! RIG.toml: a unit, its converter and what carries it, format "mimu-rig/1".
+//!
+//! Everything is optional. [`RigTruth::resolve`] draws what is not stated from a seed, within the tolerances
+//! of the data sheets. Its result is again such a file in which nothing is left to draw: the truth of a
+//! recording, and the way to make it again.
+//!
+//! "raw" in a key is V or counts, "si" is rad/s for gyros and m/s² for accelerometers.
+
+mod check;
+mod effect;
+mod lines;
+mod resolve;
+
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use crate::converter::RawUnit;
+use crate::hands::HandsTruth;
+use crate::located::Source;
+use crate::rotation::Vector;
+use crate::table::TableTruth;
+use crate::unit::TemperatureSensor;
+
+pub use resolve::RigTruth;
+
+/// What the key `format` must be.
+pub const FORMAT: &str = "mimu-rig/1";
+
+/// Words that people use for keys.
+const SYNONYMS: [(&str, &str); 6] = [
+    ("scale", "sensitivity_raw_per_si"),
+    ("scale_factor", "sensitivity_raw_per_si"),
+    ("bias", "null_raw"),
+    ("offset", "null_raw"),
+    ("divider", "gyro_divider"),
+    ("accelerometer", "accel"),
+];
+
+/// A rig file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RigFile {
+    /// "mimu-rig/1".
+    pub format: String,
+    /// Whether the Earth turns. Default: it does.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub earth_rate: Option<bool>,
+    /// So many effects besides the stated ones, drawn by the seed from all there are. The truth states them
+    /// instead.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub draw_effects: Option<usize>,
+    /// The sensors.
+    #[serde(default)]
+    pub unit: UnitFile,
+    /// Heat.
+    #[serde(default)]
+    pub thermal: ThermalFile,
+    /// The converter.
+    #[serde(default)]
+    pub converter: ConverterFile,
+    /// The turntable, if the plan has one.
+    #[serde(default)]
+    pub table: TableTruth,
+    /// The person, if the plan has one.
+    #[serde(default)]
+    pub hands: HandsTruth,
+    /// What the affine model lacks.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub effect: Vec<EffectFile>,
+}
+
+/// Sensors by the catalog: one for all axes, or one for each.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(untagged, expecting = "the name of a sensor, or a list of three")]
+pub enum Parts {
+    /// Three alike.
+    One(String),
+    /// Axes x, y, z.
+    Each([String; 3]),
+}
+
+/// `[unit]`.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct UnitFile {
+    /// Default: ADXRS300.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub gyro: Option<Parts>,
+    /// Default: MMA7260QT.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub accel: Option<Parts>,
+    /// Default: the dies where the gyros have TEMP pins (ADXRS300), else the board.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub temperature: Option<TemperatureSensor>,
+    /// Constant error of the reported temperature, K. Default: drawn within 2.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub temperature_offset_c: Option<f64>,
+    /// Noise of the reported temperature, standard deviation of one sample, K. Default 0.02.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub temperature_noise_c: Option<f64>,
+    /// True voltage of each gyro's reference pin, V.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub gyro_reference_v: Option<[f64; 3]>,
+    /// Constant error of the accelerometer's supply. Default: drawn within 5000.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub supply_error_ppm: Option<f64>,
+    /// Drift of the accelerometer's supply with the board's temperature. Default 0.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub supply_ppm_per_c: Option<f64>,
+    /// Noise of the accelerometer's supply, standard deviation of one sample. Default 0.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub supply_noise_ppm: Option<f64>,
+    /// Axes of the gyros.
+    pub gyro_axes: AxesFile,
+    /// Axes of the accelerometer.
+    pub accel_axes: AxesFile,
+    /// A forward model in place of the gyros' directions, sensitivities and nulls.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub gyro_affine: Option<AffineFile>,
+    /// A forward model in place of the accelerometer's directions, sensitivities and nulls.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub accel_affine: Option<AffineFile>,
+}
+
+/// `[unit.gyro_axes]`, `[unit.accel_axes]`: one number for each axis. The default of each is drawn by the
+/// data sheet.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct AxesFile {
+    /// Sensitive directions, body axes, any length. Rows are axes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub directions: Option<[Vector; 3]>,
+    /// Sensitivity, V or counts per rad/s or m/s².
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sensitivity_raw_per_si: Option<[f64; 3]>,
+    /// Output at no input.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub null_raw: Option<[f64; 3]>,
+    /// -3 dB of the part.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bandwidth_hz: Option<[f64; 3]>,
+    /// -3 dB of the filter behind it; inf is none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rc_hz: Option<f64>,
+    /// Coefficient N of the Allan deviation, rad/s/√Hz or m/s²/√Hz.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub white_si: Option<[f64; 3]>,
+    /// Coefficient B of the Allan deviation, rad/s or m/s². The floor is 0.664 of it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub instability_si: Option<[f64; 3]>,
+    /// Coefficient K of the Allan deviation, rad/s/√s or m/s²/√s.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub walk_si: Option<[f64; 3]>,
+    /// Noise of each single reading behind the filters, standard deviation. Default 0.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub white_per_sample: Option<[f64; 3]>,
+    /// Lowest output.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub low_raw: Option<f64>,
+    /// Highest output.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub high_raw: Option<f64>,
+}
+
+/// `[unit.gyro_affine]`, `[unit.accel_affine]`: `raw = matrix · input + bias`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct AffineFile {
+    /// Raw per SI; rows are sensors, columns body axes.
+    pub matrix: [Vector; 3],
+    /// Raw.
+    pub bias: Vector,
+}
+
+/// `[thermal]`: see [`crate::thermal::ThermalTruth`].
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ThermalFile {
+    /// Default: drawn from 200 to 400.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub board_lag_s: Option<f64>,
+    /// Default: drawn from 3 to 8.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub die_lag_s: Option<[f64; 4]>,
+    /// Default: drawn from 3 to 6.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub board_heating_c: Option<f64>,
+    /// Default: by the catalog, within a fifth.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub die_heating_c: Option<[f64; 4]>,
+    /// Switched on so long before the recording; inf is warmed up. Default 0.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub on_before_s: Option<f64>,
+}
+
+/// `[converter]`: see [`crate::converter::ConverterTruth`].
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ConverterFile {
+    /// Default 16.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bits: Option<u32>,
+    /// Nominal reference. Default 3.3.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reference_v: Option<f64>,
+    /// Constant error of the true reference. Default: drawn within 5000.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reference_error_ppm: Option<f64>,
+    /// Drift of the true reference with the board's temperature. Default 0.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reference_ppm_per_c: Option<f64>,
+    /// Noise of the true reference, standard deviation of one sample. Default 0.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reference_noise_ppm: Option<f64>,
+    /// Default: as much as fits the gyros' highest output under the reference, in twentieths.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub gyro_divider: Option<f64>,
+    /// Default: the same for the accelerometer.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub accel_divider: Option<f64>,
+    /// Default 4.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub conversions: Option<u32>,
+    /// Default 1.5 (assumed).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub noise_codes: Option<f64>,
+    /// Default: false.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub take_out_reference: Option<bool>,
+    /// Default: V where both kinds of sensor are analog, else count.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub raw_unit: Option<RawUnit>,
+}
+
+/// `[[effect]]`: the id, and whichever of its parameters are not to be drawn.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct EffectFile {
+    /// See [`crate::effects::specs`].
+    pub id: String,
+    /// By the keys of its kind: numbers, lists, or lists of three lists.
+    #[serde(flatten)]
+    pub parameters: toml::Table,
+}
+
+impl Default for RigFile {
+    fn default() -> Self {
+        Self {
+            format: FORMAT.to_owned(),
+            earth_rate: None,
+            draw_effects: None,
+            unit: UnitFile::default(),
+            thermal: ThermalFile::default(),
+            converter: ConverterFile::default(),
+            table: TableTruth::default(),
+            hands: HandsTruth::default(),
+            effect: Vec::new(),
+        }
+    }
+}
+
+impl RigFile {
+    /// Reads and checks a file. Errors: one line with file, line, problem and remedy.
+    pub fn read(path: &Path) -> Result<Self, String> {
+        Self::parse(&Source::read(path)?)
+    }
+
+    /// Checks a text. Errors: as [`RigFile::read`].
+    pub fn parse(source: &Source) -> Result<Self, String> {
+        let file: Self = source.parse(&SYNONYMS)?;
+        match file.check() {
+            Ok(()) => Ok(file),
+            Err(bad) => {
+                let lines: lines::Lines = source.parse(&[])?;
+                Err(source.error(&lines.find(&bad.path), bad.problem, bad.remedy))
+            }
+        }
+    }
+
+    /// The file as text.
+    pub fn to_toml(&self) -> String {
+        toml::to_string(self).expect("numbers, texts and lists only")
+    }
+}

@@ -1,0 +1,315 @@
+//! From a rig file and a seed to the truth.
+
+use std::array::from_fn;
+
+use super::{AxesFile, EffectFile, RigFile};
+use crate::catalog::{Kind, Sensor};
+use crate::converter::{ConverterTruth, RawUnit};
+use crate::effects::{EffectTruth, draw_ids};
+use crate::hands::HandsTruth;
+use crate::noise::Coefficients;
+use crate::random::Random;
+use crate::rotation::{Rotation, Vector, add, norm, scale};
+use crate::sensor::{AxisTruth, TriadTruth};
+use crate::table::TableTruth;
+use crate::thermal::ThermalTruth;
+use crate::unit::{TemperatureSensor, TemperatureTruth, UnitTruth, VoltageTruth};
+
+/// Everything that is true of a bench.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RigTruth {
+    /// The same as a rig file in which nothing is left to draw.
+    pub file: RigFile,
+    /// Whether the Earth turns.
+    pub earth_rate: bool,
+    /// The sensors.
+    pub unit: UnitTruth,
+    /// The converter.
+    pub converter: ConverterTruth,
+    /// The turntable.
+    pub table: TableTruth,
+    /// The person.
+    pub hands: HandsTruth,
+}
+
+impl RigTruth {
+    /// Draws what the file does not state. Each quantity has a stream of its own: stating one leaves the
+    /// others as they were.
+    ///
+    /// Errors: a file put together in memory that [`RigFile::parse`] would refuse.
+    pub fn resolve(file: &RigFile, seed: u64) -> Result<Self, String> {
+        let said = |bad: super::check::Bad| {
+            format!("rig file, `{}`: {}; {}", bad.path, bad.problem, bad.remedy)
+        };
+        file.check().map_err(said)?;
+        let mut file = file.clone();
+        let random = |cause: &str| Random::new(seed, cause);
+        let gyro = file.sensors(Kind::Gyro).map_err(said)?;
+        let accel = file.sensors(Kind::Accel).map_err(said)?;
+
+        let effects = effects(&mut file, seed).map_err(said)?;
+        let earth_rate = *file.earth_rate.get_or_insert(true);
+        let unit = &mut file.unit;
+        let affine = unit.gyro_affine.as_ref().map(|a| (a.matrix, a.bias));
+        let mut gyro_truth = triad(&mut unit.gyro_axes, gyro, affine.is_some(), "gyro", seed);
+        if let Some((matrix, bias)) = affine {
+            gyro_truth.set_affine(&matrix, &bias);
+        }
+        let affine = unit.accel_affine.as_ref().map(|a| (a.matrix, a.bias));
+        let mut accel_truth = triad(&mut unit.accel_axes, accel, affine.is_some(), "accel", seed);
+        if let Some((matrix, bias)) = affine {
+            accel_truth.set_affine(&matrix, &bias);
+        }
+
+        let gyro_reference_nominal_v = gyro[0].reference_v.unwrap_or(0.0);
+        // Of the catalog's parts those with a reference pin have a TEMP pin too.
+        let dies = gyro[0].reference_v.is_some();
+        if dies {
+            unit.gyro_reference_v.get_or_insert_with(|| {
+                let mut r = random("gyro reference pins");
+                gyro.map(|s| {
+                    gyro_reference_nominal_v + r.within(s.reference_tolerance_v.unwrap_or(0.0))
+                })
+            });
+        }
+        let gyro_reference_v = unit.gyro_reference_v.unwrap_or_default();
+        let usual = if dies {
+            TemperatureSensor::Dies
+        } else {
+            TemperatureSensor::Board
+        };
+        let temperature = TemperatureTruth {
+            at: *unit.temperature.get_or_insert(usual),
+            offset_c: *unit
+                .temperature_offset_c
+                .get_or_insert_with(|| random("temperature offset").within(2.0)),
+            noise_c: *unit.temperature_noise_c.get_or_insert(0.02),
+        };
+        let supply = VoltageTruth {
+            nominal_v: accel[0].supply_v,
+            error: 1e-6
+                * *unit
+                    .supply_error_ppm
+                    .get_or_insert_with(|| random("supply error").within(5000.0)),
+            per_c: 1e-6 * *unit.supply_ppm_per_c.get_or_insert(0.0),
+            noise: 1e-6 * *unit.supply_noise_ppm.get_or_insert(0.0),
+        };
+
+        let c = &mut file.converter;
+        let nominal_v = *c.reference_v.get_or_insert(3.3);
+        let error = || random("converter reference error").within(5000.0);
+        let converter_reference = VoltageTruth {
+            nominal_v,
+            error: 1e-6 * *c.reference_error_ppm.get_or_insert_with(error),
+            per_c: 1e-6 * *c.reference_ppm_per_c.get_or_insert(0.0),
+            noise: 1e-6 * *c.reference_noise_ppm.get_or_insert(0.0),
+        };
+        let divider = |triad: &TriadTruth| {
+            let highest = triad.axes.iter().map(|a| a.high).fold(nominal_v, f64::max);
+            if triad.analog {
+                (20.0 * nominal_v / highest).floor() / 20.0
+            } else {
+                1.0
+            }
+        };
+        let analog = gyro_truth.analog && accel_truth.analog;
+        let converter = ConverterTruth {
+            bits: *c.bits.get_or_insert(16),
+            gyro_divider: *c.gyro_divider.get_or_insert(divider(&gyro_truth)),
+            accel_divider: *c.accel_divider.get_or_insert(divider(&accel_truth)),
+            conversions: *c.conversions.get_or_insert(4),
+            noise_codes: *c.noise_codes.get_or_insert(1.5),
+            take_out_reference: *c.take_out_reference.get_or_insert(false),
+            raw_unit: *c
+                .raw_unit
+                .get_or_insert(if analog { RawUnit::V } else { RawUnit::Count }),
+        };
+        for (triad, divider) in [
+            (&mut gyro_truth, converter.gyro_divider),
+            (&mut accel_truth, converter.accel_divider),
+        ] {
+            (triad.code_low, triad.code_span) = if triad.analog {
+                (0.0, nominal_v / divider)
+            } else {
+                (-32768.0, 65536.0)
+            };
+        }
+
+        let thermal = thermal(&mut file, [gyro[0], gyro[1], gyro[2], accel[0]], seed);
+        let (table, hands) = (file.table.clone(), file.hands.clone());
+        Ok(Self {
+            file,
+            earth_rate,
+            unit: UnitTruth {
+                gyro: gyro_truth,
+                accel: accel_truth,
+                thermal,
+                temperature,
+                supply,
+                converter_reference,
+                gyro_reference_nominal_v,
+                gyro_reference_v,
+                effects,
+            },
+            converter,
+            table,
+            hands,
+        })
+    }
+}
+
+/// Draws the effects, and writes them into the file.
+fn effects(file: &mut RigFile, seed: u64) -> Result<Vec<EffectTruth>, super::check::Bad> {
+    let count = file.draw_effects.take().unwrap_or(0);
+    let stated = file.effect.len();
+    let drawn = draw_ids(count + stated, seed).into_iter();
+    let new: Vec<_> = drawn
+        .filter(|id| file.effect.iter().all(|e| e.id != *id))
+        .take(count)
+        .collect();
+    file.effect.extend(new.into_iter().map(|id| EffectFile {
+        id: id.to_owned(),
+        parameters: toml::Table::new(),
+    }));
+    let mut truths = Vec::new();
+    for (i, effect) in file.effect.iter_mut().enumerate() {
+        let numbers = effect.numbers(i)?;
+        let truth = EffectTruth::draw(&effect.id, numbers, 1.0, seed).expect("the id was checked");
+        *effect = EffectFile::from(&truth);
+        truths.push(truth);
+    }
+    Ok(truths)
+}
+
+fn thermal(file: &mut RigFile, parts: [&Sensor; 4], seed: u64) -> ThermalTruth {
+    let random = |cause: &str| Random::new(seed, cause);
+    let t = &mut file.thermal;
+    ThermalTruth {
+        board_lag_s: *t
+            .board_lag_s
+            .get_or_insert_with(|| 300.0 + random("board lag").within(100.0)),
+        die_lag_s: *t.die_lag_s.get_or_insert_with(|| {
+            let mut r = random("die lag");
+            from_fn(|_| 5.5 + r.within(2.5))
+        }),
+        board_heating_c: *t
+            .board_heating_c
+            .get_or_insert_with(|| 4.5 + random("board heating").within(1.5)),
+        die_heating_c: *t.die_heating_c.get_or_insert_with(|| {
+            let mut r = random("die heating");
+            parts.map(|s| s.heating_c * (1.0 + r.within(0.2)))
+        }),
+        on_before_s: *t.on_before_s.get_or_insert(0.0),
+    }
+}
+
+/// Axes by the catalog, what is stated aside. With a forward model the directions, sensitivities and nulls
+/// stay open.
+fn triad(
+    file: &mut AxesFile,
+    parts: [&Sensor; 3],
+    open: bool,
+    name: &str,
+    seed: u64,
+) -> TriadTruth {
+    let si = parts[0].kind.si();
+    let random = |cause: &str| Random::new(seed, &format!("{name} {cause}"));
+    // Noise differs from part to part; how much, no data sheet says.
+    let noise = |slot: &mut Option<[f64; 3]>, cause: &str, typical: [f64; 3]| {
+        *slot.get_or_insert_with(|| {
+            let mut r = random(cause);
+            typical.map(|x| x * (1.0 + r.within(0.2)))
+        })
+    };
+    let white = noise(
+        &mut file.white_si,
+        "white",
+        parts.map(|s| si * s.noise_density / 2_f64.sqrt()),
+    );
+    let instability = noise(
+        &mut file.instability_si,
+        "instability",
+        parts.map(|s| si * s.instability),
+    );
+    let walk = noise(&mut file.walk_si, "walk", parts.map(|s| si * s.walk));
+    let white_per_sample = *file.white_per_sample.get_or_insert([0.0; 3]);
+    let bandwidth_hz = *file
+        .bandwidth_hz
+        .get_or_insert(from_fn(|i| parts[i].bandwidth_hz[i]));
+    let rc_hz = *file.rc_hz.get_or_insert(parts[0].rc_hz);
+    let low = *file.low_raw.get_or_insert(parts[0].low);
+    let high = *file.high_raw.get_or_insert(parts[0].high);
+
+    let (mut directions, mut sensitivity, mut null) = ([[0.0; 3]; 3], [0.0; 3], [0.0; 3]);
+    if !open {
+        directions = *file
+            .directions
+            .get_or_insert_with(|| draw_directions(parts, &mut random("directions")));
+        sensitivity = *file.sensitivity_raw_per_si.get_or_insert_with(|| {
+            let mut r = random("sensitivity");
+            parts.map(|s| s.sensitivity / si * (1.0 + r.within(s.sensitivity_tolerance)))
+        });
+        null = *file.null_raw.get_or_insert_with(|| {
+            let mut r = random("null");
+            parts.map(|s| s.null + r.within(s.null_tolerance))
+        });
+    }
+    TriadTruth {
+        axes: from_fn(|i| AxisTruth {
+            direction: unit(directions[i]),
+            sensitivity: sensitivity[i],
+            null: null[i],
+            bandwidth_hz: bandwidth_hz[i],
+            rc_hz,
+            noise: Coefficients {
+                white: white[i],
+                instability: instability[i],
+                walk: walk[i],
+            },
+            white_per_sample: white_per_sample[i],
+            low,
+            high,
+        }),
+        ratiometric: parts[0].ratiometric,
+        analog: parts[0].output == RawUnit::V,
+        code_low: 0.0,
+        code_span: 0.0,
+    }
+}
+
+/// A length of 1 already is left as it is, bit by bit.
+fn unit(v: Vector) -> Vector {
+    let length = norm(v);
+    if length == 0.0 || (length - 1.0).abs() < 1e-15 {
+        v
+    } else {
+        scale(1.0 / length, v)
+    }
+}
+
+fn draw_directions(parts: [&Sensor; 3], random: &mut Random) -> [Vector; 3] {
+    let mut turn = |s: &Sensor| {
+        let angles: Vector = from_fn(|_| (random.normal() * s.misalignment_deg).to_radians());
+        Rotation::about(angles, norm(angles))
+    };
+    let mut package = turn(parts[0]);
+    let mut directions = [[0.0; 3]; 3];
+    for i in 0..3 {
+        if i > 0 && parts[i].packages > 1 {
+            package = turn(parts[i]);
+        }
+        directions[i][i] = 1.0;
+        directions[i] = package.turn(directions[i]);
+    }
+    for i in 0..3 {
+        let across: Vector = from_fn(|j| {
+            if i == j {
+                0.0
+            } else {
+                random.within(parts[i].cross_axis)
+            }
+        });
+        directions[i] = unit(add(directions[i], across));
+    }
+    directions
+}

@@ -1,0 +1,297 @@
+//! A turntable: three axes with the flaws that real ones have, and a controller that knows none of them.
+//!
+//! From the ground: an outer axis, vertical; a middle axis across it, east at zero; an inner axis, up at
+//! zero, which is the body's z axis. All angles zero, the body axes are east, north, up. The nominal
+//! attitude (body into level axes) is `Rz(outer) Rx(middle) Rz(inner)`, so that up in body axes is (sin m
+//! sin i, sin m cos i, cos m).
+//!
+//! Left out: axes that do not meet in a point, play, and noise of the controller's own.
+
+use serde::{Deserialize, Serialize};
+
+use crate::axis::{Axis, Settling};
+use crate::chain::{Frame, Jet};
+use crate::controller::{Controller, Dwell, INNER, MIDDLE, OUTER};
+use crate::motion::{Carrier, Instant};
+use crate::place::Place;
+use crate::plan::{Limits, Plan};
+use crate::rotation::{Rotation, Vector, scale};
+
+/// What the table truly is. Three numbers are those of the outer, the middle and the inner axis, unless
+/// said otherwise.
+///
+/// The default is a good table of three axes: angles to a few arcseconds, rates to a few millionths.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct TableTruth {
+    /// 3, or 2: no outer axis, and rates about the inner one alone.
+    pub axes: u32,
+    /// Lowest angle of the middle axis, degrees.
+    pub middle_min_deg: f64,
+    /// Highest angle of the middle axis, degrees.
+    pub middle_max_deg: f64,
+    /// Highest rates.
+    pub max_rate_dps: Vector,
+    /// Accelerations, of every ramp.
+    pub max_acceleration_dps2: Vector,
+    /// Rates of the moves from pose to pose.
+    pub slew_dps: Vector,
+    /// Time from the end of a move to the dwell, s. Whether the load has come to rest by then is
+    /// [`Settling`]'s affair.
+    pub settle_s: f64,
+    /// Ring-down, of every axis.
+    pub settling: Settling,
+    /// Tilt of each axis to and fro, once a turn, in a plane fixed to the part that carries it. (A tilt
+    /// that goes round with the axis would be a mounting error, and one that stands still a level error.)
+    pub wobble_arcsec: Vector,
+    /// Outer to middle, and middle to inner axis: what the right angles have too much.
+    pub nonorthogonality_arcsec: [f64; 2],
+    /// Outer axis off the vertical: turns about east and north.
+    pub level_arcsec: [f64; 2],
+    /// Board in the frame of the inner axis: rotation vector.
+    pub mounting_arcsec: Vector,
+    /// True rate over stated rate, less one, in dwells with a rate.
+    pub rate_scale_ppm: Vector,
+    /// True angle less stated angle is this times the sine of the stated angle: an eccentric disc.
+    pub encoder_arcsec: Vector,
+    /// The board's origin from the point where the axes meet, x, y, z of the board, mm.
+    pub offset_mm: Vector,
+}
+
+impl Default for TableTruth {
+    fn default() -> Self {
+        Self {
+            axes: 3,
+            middle_min_deg: -180.0,
+            middle_max_deg: 180.0,
+            max_rate_dps: [400.0; 3],
+            max_acceleration_dps2: [200.0; 3],
+            slew_dps: [60.0; 3],
+            settle_s: 1.0,
+            settling: Settling::default(),
+            wobble_arcsec: [1.0, 2.0, 2.0],
+            nonorthogonality_arcsec: [3.0, -2.0],
+            level_arcsec: [2.0, -3.0],
+            mounting_arcsec: [20.0, -15.0, 30.0],
+            rate_scale_ppm: [5.0, 0.0, -5.0],
+            encoder_arcsec: [2.0, 3.0, -2.0],
+            offset_mm: [2.0, -3.0, 5.0],
+        }
+    }
+}
+
+impl TableTruth {
+    /// A table without any flaw, the board where its axes meet: it states what is true.
+    pub fn ideal() -> Self {
+        Self {
+            settling: Settling {
+                fraction: 0.0,
+                ..Settling::default()
+            },
+            wobble_arcsec: [0.0; 3],
+            nonorthogonality_arcsec: [0.0; 2],
+            level_arcsec: [0.0; 2],
+            mounting_arcsec: [0.0; 3],
+            rate_scale_ppm: [0.0; 3],
+            encoder_arcsec: [0.0; 3],
+            offset_mm: [0.0; 3],
+            ..Self::default()
+        }
+    }
+
+    /// What plans have to keep to.
+    pub fn limits(&self) -> Limits {
+        Limits {
+            outer: self.axes == 3,
+            middle: [
+                self.middle_min_deg.to_radians(),
+                self.middle_max_deg.to_radians(),
+            ],
+            rate: [
+                self.max_rate_dps[0].to_radians(),
+                self.max_rate_dps[2].to_radians(),
+            ],
+        }
+    }
+
+    /// Refuses what cannot be a table, and names the key.
+    pub fn check(&self) -> Result<(), String> {
+        let refuse =
+            |key: &str, remedy: &str| Err(format!("table: `{key}` makes no sense; {remedy}"));
+        if self.axes != 2 && self.axes != 3 {
+            return refuse("axes", "give 2 or 3");
+        }
+        if !(self.middle_min_deg <= 0.0 && self.middle_max_deg >= 0.0) {
+            return refuse(
+                "middle_min_deg, middle_max_deg",
+                "give a range with zero in it",
+            );
+        }
+        for (key, rates) in [
+            ("max_rate_dps", self.max_rate_dps),
+            ("max_acceleration_dps2", self.max_acceleration_dps2),
+            ("slew_dps", self.slew_dps),
+        ] {
+            if !rates.iter().all(|r| *r > 0.0 && r.is_finite()) {
+                return refuse(key, "give three numbers above zero");
+            }
+        }
+        if !(self.settle_s >= 0.0 && self.settle_s.is_finite()) {
+            return refuse("settle_s", "give seconds, zero or more");
+        }
+        let Settling {
+            frequency_hz,
+            damping,
+            fraction,
+        } = self.settling;
+        if !(frequency_hz > 0.0 && damping > 0.0 && damping < 1.0 && fraction.is_finite()) {
+            return refuse(
+                "settling",
+                "give a frequency above 0, a damping ratio above 0 and below 1, a finite fraction",
+            );
+        }
+        let flaws = [
+            self.wobble_arcsec,
+            self.mounting_arcsec,
+            self.rate_scale_ppm,
+            self.encoder_arcsec,
+            self.offset_mm,
+        ];
+        let finite = flaws
+            .iter()
+            .flatten()
+            .chain(&self.nonorthogonality_arcsec)
+            .chain(&self.level_arcsec);
+        if !finite.into_iter().all(|x| x.is_finite()) {
+            return Err("table: a flaw is not finite; give finite numbers".to_owned());
+        }
+        Ok(())
+    }
+}
+
+/// A table that carries out a plan.
+#[derive(Debug, Clone)]
+pub struct Table {
+    place: Place,
+    axes: [Axis; 3],
+    dwells: Vec<Dwell>,
+    cursor: usize,
+    duration_s: f64,
+    base: Frame,
+    mounting: Rotation,
+    wobble: Vector,
+    nonorthogonality: [f64; 2],
+    encoder: Vector,
+    /// Stated over true rate.
+    stated: Vector,
+    offset: Vector,
+    still: Option<([usize; 3], Instant)>,
+}
+
+impl Table {
+    /// The table `truth` about to carry out `plan`, which must be within its [`TableTruth::limits`].
+    pub fn new(plan: &Plan, truth: &TableTruth) -> Result<Self, String> {
+        truth.check()?;
+        plan.check(&truth.limits())?;
+        let Controller { axes, dwells, .. } = Controller::carry_out(plan, truth);
+        let arcsec = |x: f64| (x / 3600.0).to_radians();
+        let [east, north] = truth.level_arcsec.map(arcsec);
+        Ok(Self {
+            place: plan.place,
+            duration_s: dwells.last().map_or(0.0, |dwell| dwell.end_s),
+            axes,
+            dwells,
+            cursor: 0,
+            base: Frame::ground(&plan.place).fixed(Rotation::by([east, north, 0.0])),
+            mounting: Rotation::by(truth.mounting_arcsec.map(arcsec)),
+            wobble: truth.wobble_arcsec.map(arcsec),
+            nonorthogonality: truth.nonorthogonality_arcsec.map(arcsec),
+            encoder: truth.encoder_arcsec.map(arcsec),
+            stated: truth.rate_scale_ppm.map(|ppm| 1.0 / (1.0 + 1e-6 * ppm)),
+            offset: scale(1e-3, truth.offset_mm),
+            still: None,
+        })
+    }
+}
+
+impl Carrier for Table {
+    fn duration_s(&self) -> f64 {
+        self.duration_s
+    }
+
+    fn at(&mut self, t_s: f64) -> Instant {
+        while self
+            .dwells
+            .get(self.cursor)
+            .is_some_and(|dwell| dwell.end_s <= t_s)
+        {
+            self.cursor += 1;
+        }
+        let dwell = self
+            .dwells
+            .get(self.cursor)
+            .filter(|dwell| dwell.start_s <= t_s);
+        let step = dwell.map(|_| self.cursor as u32);
+        let mut resting = true;
+        for axis in &mut self.axes {
+            resting &= axis.advance(t_s);
+        }
+        let segments = [0, 1, 2].map(|i| self.axes[i].cursor());
+        if let Some((of, mut still)) = self.still
+            && resting
+            && of == segments
+        {
+            still.motion.t_s = t_s;
+            still.step = step;
+            return still;
+        }
+        let instant = self.moving(t_s, step);
+        self.still = resting.then_some((segments, instant));
+        instant
+    }
+}
+
+impl Table {
+    fn moving(&self, t_s: f64, step: Option<u32>) -> Instant {
+        let mut angle = [Jet::default(); 3];
+        let mut tilt = [Jet::default(); 3];
+        let mut rate = [0.0; 3];
+        let (mut sine, mut cosine) = ([0.0; 3], [0.0; 3]);
+        for i in 0..3 {
+            let (commanded, lag) = self.axes[i].at(t_s);
+            let (s, c) = commanded.value.sin_cos();
+            angle[i] = commanded + commanded.through([s, c, -s]).times(self.encoder[i]) + lag;
+            tilt[i] = commanded.through([c, -s, -c]).times(self.wobble[i]);
+            rate[i] = commanded.rate * self.stated[i];
+            (sine[i], cosine[i]) = (s, c);
+        }
+        // Each axis tilts about a direction of the part that carries it: the outer and the inner about x,
+        // the middle, which lies along x, about y. There it adds to its angle with the outer axis.
+        let body = self
+            .base
+            .about_own::<0>(tilt[OUTER])
+            .about_own::<2>(angle[OUTER])
+            .about_own::<1>(tilt[MIDDLE] + Jet::constant(self.nonorthogonality[0]))
+            .about_own::<0>(angle[MIDDLE])
+            .about_own::<1>(Jet::constant(self.nonorthogonality[1]))
+            .about_own::<0>(tilt[INNER])
+            .about_own::<2>(angle[INNER])
+            .fixed(self.mounting);
+        // Up, and the middle axis, in nominal body axes.
+        let up = [
+            sine[MIDDLE] * sine[INNER],
+            sine[MIDDLE] * cosine[INNER],
+            cosine[MIDDLE],
+        ];
+        Instant {
+            motion: body.motion(t_s, &self.place, self.offset, [0.0; 3], [0.0; 3]),
+            step,
+            stated_rate: Some([
+                rate[OUTER] * up[0] + rate[MIDDLE] * cosine[INNER],
+                rate[OUTER] * up[1] - rate[MIDDLE] * sine[INNER],
+                rate[OUTER] * up[2] + rate[INNER],
+            ]),
+            stated_force: Some(scale(self.place.gravity, up)),
+        }
+    }
+}

@@ -1,0 +1,207 @@
+//! The inertial unit: three gyros and an accelerometer on a board, from motion to the voltages at their pins.
+//!
+//! It stands on its own in front of any converter: one in a recording, or one of an emulated microcontroller.
+
+use serde::{Deserialize, Serialize};
+
+use crate::effects::{Active, Condition, Disturbance, EffectTruth};
+use crate::motion::Motion;
+use crate::random::Random;
+use crate::sensor::{Axis, TriadTruth};
+use crate::thermal::{Thermal, ThermalTruth};
+
+/// A voltage that others are measured by.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct VoltageTruth {
+    /// What it should be, V.
+    pub nominal_v: f64,
+    /// Constant relative error.
+    pub error: f64,
+    /// Relative drift from 25 °C with the board's temperature, 1/K.
+    pub per_c: f64,
+    /// White noise of each step, relative standard deviation.
+    pub noise: f64,
+}
+
+/// Where the unit measures the temperature that it reports.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum TemperatureSensor {
+    /// Mean of the gyros' own TEMP pins.
+    Dies,
+    /// A part of its own on the board.
+    Board,
+}
+
+/// The sensor of the reported temperature.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TemperatureTruth {
+    /// Where it is.
+    pub at: TemperatureSensor,
+    /// Constant error, K.
+    pub offset_c: f64,
+    /// White noise of each step, standard deviation, K.
+    pub noise_c: f64,
+}
+
+/// Everything about a unit that is true of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct UnitTruth {
+    /// Gyros; inputs in rad/s.
+    pub gyro: TriadTruth,
+    /// Accelerometer; inputs in m/s².
+    pub accel: TriadTruth,
+    /// Temperatures of board and dies.
+    pub thermal: ThermalTruth,
+    /// Reported temperature.
+    pub temperature: TemperatureTruth,
+    /// Supply of the accelerometer.
+    pub supply: VoltageTruth,
+    /// Reference of the converter.
+    pub converter_reference: VoltageTruth,
+    /// What the reference pins of the gyros should give, V.
+    pub gyro_reference_nominal_v: f64,
+    /// What they give, V.
+    pub gyro_reference_v: [f64; 3],
+    /// What the affine model lacks.
+    pub effects: Vec<EffectTruth>,
+}
+
+/// Voltages at the pins at one instant. Of a digital part: its counts before rounding.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pins {
+    /// RATEOUT of the gyros x, y, z, V.
+    pub gyro_v: [f64; 3],
+    /// 2.5 V reference pins of the gyros, V.
+    pub gyro_reference_v: [f64; 3],
+    /// TEMP pins of the gyros, V.
+    pub gyro_temp_v: [f64; 3],
+    /// Outputs of the accelerometer x, y, z, V.
+    pub accel_v: [f64; 3],
+    /// Supply of the accelerometer, V.
+    pub supply_v: f64,
+    /// Reference of the converter, V.
+    pub converter_reference_v: f64,
+    /// What the unit's temperature sensor says, °C.
+    pub temp_c: f64,
+}
+
+/// State of a voltage.
+#[derive(Debug, Clone)]
+struct Voltage {
+    truth: VoltageTruth,
+    stream: Random,
+}
+
+impl Voltage {
+    fn new(truth: VoltageTruth, name: &str, seed: u64) -> Self {
+        let stream = Random::new(seed, name);
+        Self { truth, stream }
+    }
+
+    /// Relative to nominal, at the board's temperature.
+    fn step(&mut self, board_c: f64) -> f64 {
+        let t = &self.truth;
+        let noise = if t.noise > 0.0 {
+            t.noise * self.stream.normal()
+        } else {
+            0.0
+        };
+        1.0 + t.error + t.per_c * (board_c - 25.0) + noise
+    }
+}
+
+/// A unit that is switched on.
+pub struct Unit {
+    gyro: [Axis; 3],
+    accel: [Axis; 3],
+    thermal: Thermal,
+    supply: Voltage,
+    converter_reference: Voltage,
+    temperature: TemperatureTruth,
+    temperature_stream: Random,
+    gyro_reference_v: [f64; 3],
+    on_before_s: f64,
+    effects: Vec<Active>,
+}
+
+impl Unit {
+    /// The unit at steps of `dt_s`. One seed gives the same voltages bit by bit; what an effect draws leaves
+    /// the noise as it was.
+    pub fn new(truth: &UnitTruth, seed: u64, dt_s: f64) -> Self {
+        let triad = |of: &TriadTruth, sensor: &str| {
+            std::array::from_fn(|i| {
+                let name = format!("{sensor} {}", ["x", "y", "z"][i]);
+                Axis::new(&of.axes[i], of.ratiometric, &name, dt_s, seed)
+            })
+        };
+        Self {
+            gyro: triad(&truth.gyro, "gyro"),
+            accel: triad(&truth.accel, "accel"),
+            thermal: Thermal::new(&truth.thermal, dt_s),
+            supply: Voltage::new(truth.supply, "supply", seed),
+            converter_reference: Voltage::new(
+                truth.converter_reference,
+                "converter reference",
+                seed,
+            ),
+            temperature: truth.temperature,
+            temperature_stream: Random::new(seed, "temperature reading"),
+            gyro_reference_v: truth.gyro_reference_v,
+            on_before_s: truth.thermal.on_before_s,
+            effects: truth
+                .effects
+                .iter()
+                .map(|e| e.activate(truth, seed, dt_s))
+                .collect(),
+        }
+    }
+
+    /// Voltages one step on, at the motion and the chamber's air there. The first call gives those at the
+    /// start.
+    pub fn step(&mut self, motion: &Motion, chamber_c: f64) -> Pins {
+        let temperatures = self.thermal.step(chamber_c);
+        let at = Condition {
+            motion,
+            gyro: self.gyro.each_ref().map(|a| a.sensed(motion.rate)),
+            accel: self.accel.each_ref().map(|a| a.sensed(motion.force)),
+            temperatures,
+            on_s: motion.t_s + self.on_before_s,
+        };
+        let mut add = Disturbance::default();
+        for effect in &mut self.effects {
+            effect.disturb(&at, &mut add);
+        }
+        let supply = self.supply.step(temperatures.board);
+        let reference = self.converter_reference.step(temperatures.board);
+        let die = temperatures.die;
+        let sensor_c = match self.temperature.at {
+            TemperatureSensor::Dies => (die[0] + die[1] + die[2]) / 3.0,
+            TemperatureSensor::Board => temperatures.board,
+        };
+        let mut noise_c = 0.0;
+        if self.temperature.noise_c > 0.0 {
+            noise_c = self.temperature.noise_c * self.temperature_stream.normal();
+        }
+        let mut pins = Pins {
+            gyro_v: std::array::from_fn(|i| self.gyro[i].step(at.gyro[i] + add.gyro[i], supply)),
+            gyro_reference_v: self.gyro_reference_v,
+            gyro_temp_v: std::array::from_fn(|i| temp_pin_v(die[i])),
+            accel_v: std::array::from_fn(|i| {
+                self.accel[i].step(at.accel[i] + add.accel[i], supply)
+            }),
+            supply_v: self.supply.truth.nominal_v * supply,
+            converter_reference_v: self.converter_reference.truth.nominal_v * reference,
+            temp_c: sensor_c + self.temperature.offset_c + noise_c,
+        };
+        for effect in &mut self.effects {
+            effect.read_out(&at, &mut pins);
+        }
+        pins
+    }
+}
+
+/// TEMP pin of an ADXRS300: 2.50 V at 298 K, 8.4 mV/K.
+fn temp_pin_v(die_c: f64) -> f64 {
+    2.5 + 8.4e-3 * (die_c + 273.15 - 298.0)
+}

@@ -1,0 +1,272 @@
+//! Rig files: what is drawn, what is written, what is refused.
+
+use mimu_rig::catalog::sensors;
+use mimu_rig::converter::Converter;
+use mimu_rig::ideal::{Angles, Fang, Ideal, XU_TABLE_1, XU_TABLE_2};
+use mimu_rig::located::Source;
+use mimu_rig::motion::Motion;
+use mimu_rig::rig_file::{RigFile, RigTruth};
+use mimu_rig::rotation::{Rotation, Vector};
+use mimu_rig::sensor::TriadTruth;
+use mimu_rig::unit::Unit;
+
+fn parse(text: &str) -> Result<RigFile, String> {
+    RigFile::parse(&Source::new(
+        "RIG.toml",
+        format!("format = \"mimu-rig/1\"\n{text}"),
+    ))
+}
+
+fn truth(text: &str, seed: u64) -> RigTruth {
+    RigTruth::resolve(&parse(text).unwrap(), seed).unwrap()
+}
+
+/// Turning a little, 1 g up.
+const MOTION: Motion = Motion {
+    t_s: 0.0,
+    attitude: Rotation::NONE,
+    rate: [0.1; 3],
+    angular_acceleration: [0.0; 3],
+    force: [0.0, 0.0, 9.8],
+};
+
+#[test]
+fn the_truth_is_a_rig_file_in_which_nothing_is_left_to_draw() {
+    let mpu = "[unit]\ngyro = \"MPU6050-gyro\"\naccel = \"MPU6050-accel\"\n";
+    let xu = "[unit]\ngyro = [\"MSG7100D-300\", \"MSG7100D-300\", \"MSG7100D-3600\"]\naccel = \"MSA6000D-50\"\n";
+    let affine =
+        "[unit.gyro_affine]\nmatrix = [[1, 0, 0.1], [0, 2, 0], [0, 0.3, 3]]\nbias = [0, 0, 0]\n";
+    for text in [
+        "",
+        "draw_effects = 7\n",
+        mpu,
+        xu,
+        affine,
+        "[[effect]]\nid = \"accel_size_effect\"\n",
+    ] {
+        let first = truth(text, 11);
+        let written = first.file.to_toml();
+        let again = RigFile::parse(&Source::new("truth.toml", written.clone())).unwrap();
+        assert_eq!(RigTruth::resolve(&again, 12).unwrap(), first, "{written}");
+    }
+}
+
+#[test]
+fn the_example_rigs_are_what_their_heads_say() {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("rigs");
+    let resolve =
+        |name: &str| RigTruth::resolve(&RigFile::read(&folder.join(name)).unwrap(), 1).unwrap();
+    let same = |name: &str, triad: &TriadTruth, model: Ideal, unit: Vector| {
+        let (matrix, bias) = triad.affine();
+        for i in 0..3 {
+            assert!(
+                (bias[i] - unit[i] * model.bias[i]).abs() < 1e-6,
+                "{name}: {bias:?}"
+            );
+            for j in 0..3 {
+                let expected = unit[i] * model.matrix[i][j];
+                assert!((matrix[i][j] - expected).abs() < 1e-6, "{name}: {matrix:?}");
+            }
+        }
+    };
+    let fang = resolve("fang.toml").unit;
+    let degrees = |v: Vector| v.map(f64::to_radians);
+    let gyro = Fang {
+        scale: [5.07e-3, 5.09e-3, 5.17e-3].map(f64::to_degrees),
+        bias: [2.51, 2.52, 2.48],
+        theta: degrees([-0.18, 0.05, 0.15]),
+        beta: degrees([1.32, 1.05, 1.15]),
+    };
+    let accel = Fang {
+        scale: [80.80e-3, 80.14e-3, 80.84e-3],
+        bias: [1.79, 1.66, 1.74],
+        theta: degrees([0.06, 0.20, 0.19]),
+        beta: degrees([0.01, -0.02, -0.01]),
+    };
+    same(
+        "fang",
+        &fang.gyro,
+        gyro.forward(Angles::Linear, [0.0; 3]),
+        [1.0; 3],
+    );
+    same(
+        "fang",
+        &fang.accel,
+        accel.forward(Angles::Linear, [0.0; 3]),
+        [1.0; 3],
+    );
+    let xu = resolve("xu.toml").unit;
+    let counts = [80.0, 80.0, 8.0].map(f64::to_degrees);
+    same(
+        "xu",
+        &xu.gyro,
+        XU_TABLE_1.forward([0.0; 3]).unwrap(),
+        counts,
+    );
+    same(
+        "xu",
+        &xu.accel,
+        XU_TABLE_2.forward([0.0; 3]).unwrap(),
+        [500.0 / 9.80665; 3],
+    );
+    assert_eq!(resolve("clean.toml").unit.effects, []);
+    assert_eq!(resolve("thermal.toml").unit.effects.len(), 5);
+    assert_eq!(resolve("flawed.toml").unit.effects.len(), 5);
+}
+
+#[test]
+fn one_seed_gives_the_same_bits_and_another_gives_others() {
+    let file = parse("draw_effects = 4").unwrap();
+    let run = |seed: u64| {
+        let truth = RigTruth::resolve(&file, seed).unwrap();
+        let mut unit = Unit::new(&truth.unit, seed, 1e-3);
+        let mut converter = Converter::new(&truth.converter, &truth.unit, seed);
+        (0..100)
+            .map(|_| converter.read(&unit.step(&MOTION, 25.0)))
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(run(1), run(1));
+    assert_ne!(run(1), run(2));
+}
+
+#[test]
+fn stating_one_quantity_leaves_the_others_as_drawn() {
+    let drawn = truth("", 21);
+    let stated = truth("[unit.gyro_axes]\nnull_raw = [2.4, 2.5, 2.6]\n", 21);
+    let mut expected = drawn.unit.clone();
+    for (axis, null) in expected.gyro.axes.iter_mut().zip([2.4, 2.5, 2.6]) {
+        axis.null = null;
+    }
+    assert_eq!(stated.unit, expected);
+}
+
+#[test]
+fn drawn_parameters_lie_within_the_data_sheet() {
+    for seed in 0..200 {
+        let unit = truth("", seed).unit;
+        for (gyro, accel) in unit.gyro.axes.iter().zip(&unit.accel.axes) {
+            let mv_per_dps = 1e3 * gyro.sensitivity.to_radians();
+            assert!((4.6..=5.4).contains(&mv_per_dps), "{mv_per_dps}");
+            assert!((2.3..=2.7).contains(&gyro.null));
+            let mv_per_g = 1e3 * accel.sensitivity * 9.80665;
+            assert!((740.0..=860.0).contains(&mv_per_g), "{mv_per_g}");
+            assert!((1.485..=1.815).contains(&accel.null));
+        }
+    }
+}
+
+#[test]
+fn every_catalog_file_is_read_and_has_a_name_of_its_own() {
+    let names: Vec<_> = sensors().iter().map(|s| &s.name).collect();
+    for name in [
+        "ADXRS300",
+        "MMA7260QT",
+        "MPU6050-gyro",
+        "MPU6050-accel",
+        "MSG7100D-300",
+        "MSG7100D-3600",
+        "MSA6000D-50",
+    ] {
+        assert_eq!(names.iter().filter(|n| **n == name).count(), 1, "{name}");
+    }
+}
+
+#[test]
+fn a_complaint_names_the_line_what_is_wrong_and_what_to_do() {
+    for (text, complaint) in [
+        (
+            "[unit]\ngyros = \"ADXRS300\"",
+            "3: unknown key `gyros`; did you mean `gyro`?",
+        ),
+        (
+            "[thermal]\non_before_min = 3",
+            "3: unknown key `on_before_min`; write `on_before_s`, in seconds",
+        ),
+        (
+            "[converter]\nreference_mv = 3300",
+            "3: unknown key `reference_mv`; write `reference_v`, in volts",
+        ),
+        (
+            "[unit]\ngyro = 3",
+            "3: not valid TOML: the name of a sensor, or a list of three; correct the line",
+        ),
+        (
+            "[unit]\n\ngyro = \"ADXRS301\"",
+            "4: no sensor is called \"ADXRS301\"; known here: ADXRS300, MPU6050-gyro, MSG7100D-300, MSG7100D-3600",
+        ),
+        (
+            "[unit]\ngyro = [\"ADXRS300\", \"ADXRS300\", \"MPU6050-gyro\"]",
+            "3: ADXRS300 and MPU6050-gyro do not make one triad; take parts with the same kind of output and package",
+        ),
+        (
+            "[unit.gyro_axes]\nwhite_si = [0, -1, 0]",
+            "3: `white_si` is -1; give 0 or a finite number above it",
+        ),
+        (
+            "[unit.accel_axes]\nnull_raw = [1, 1, 1]\nsensitivity_raw_per_si = [0.08, 0, 0.08]",
+            "4: `sensitivity_raw_per_si` is 0; give a finite number other than 0",
+        ),
+        (
+            "[unit.gyro_axes]\ndirections = [[1, 0, 0], [0, 1, 0], [1, 1, 0.001]]",
+            "3: the three sensitive axes lie in one plane; turn one of them out of it",
+        ),
+        (
+            "[unit.accel_affine]\nbias = [0, 0, 0]\nmatrix = [[1, 0, 0], [0, 0, 0], [0, 0, 1]]",
+            "4: axis y senses nothing; give its row a number other than 0",
+        ),
+        (
+            "[unit.gyro_axes]\nnull_raw = [0, 0, 0]\n[unit.gyro_affine]\nmatrix = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]\nbias = [0, 0, 0]",
+            "3: `null_raw` is stated twice: [unit.gyro_affine] has it too; remove one of them",
+        ),
+        (
+            "[thermal]\ndie_lag_s = [1, 1, 0, 1]",
+            "3: `die_lag_s` is 0; give a finite number above 0",
+        ),
+        ("[converter]\nbits = 0", "3: `bits` is 0; give 1 to 32"),
+        (
+            "[converter]\ngyro_divider = 1.5",
+            "3: `gyro_divider` is 1.5; give a number above 0 and up to 1",
+        ),
+        (
+            "[unit]\naccel = \"MPU6050-accel\"\n[converter]\nraw_unit = \"V\"",
+            "5: a digital part gives no volts; write \"count\"",
+        ),
+        (
+            "draw_effects = 1000",
+            "2: more effects than there are; give at most 35",
+        ),
+        (
+            "[[effect]]\nid = \"earth_rate\"\n\n[[effect]]\nid = \"accel_size_effect\"\narms_cm = [[0, 0, 0], [0, 0, 0], [0, 0, 0]]",
+            "3: the Earth's rate is no effect here but the truth; write `earth_rate = true` or false at the top",
+        ),
+        (
+            "[[effect]]\nid = \"accel_size_effect\"\narms_cm = [[0, 0, 0], [0, 0, 0], [0, 0, 0]]",
+            "4: `accel_size_effect` has no `arms_cm`; known here: arms_mm",
+        ),
+        (
+            "[[effect]]\nid = \"gyro_bias_drift\"\n[[effect]]\nid = \"accel_bias_drift\"\nmg_per_hour = 3",
+            "6: `mg_per_hour` is not a list of 3 numbers; give a list of 3 numbers, all finite",
+        ),
+        (
+            "[[effect]]\nid = \"gyro_warm_up\"\ntime_constant_s = 0",
+            "4: `time_constant_s` of `gyro_warm_up` is impossible; give a number above 0",
+        ),
+        (
+            "[[effect]]\nid = \"gyro_warm_up\"\n[[effect]]\nid = \"gyro_warm_up\"",
+            "5: effect `gyro_warm_up` stands twice; remove one, or put all of it into the other",
+        ),
+    ] {
+        assert_eq!(parse(text).unwrap_err(), format!("RIG.toml:{complaint}"));
+    }
+    let unknown = parse("[[effect]]\nid = \"gyro_g\"").unwrap_err();
+    assert!(
+        unknown
+            .starts_with("RIG.toml:3: no effect is called `gyro_g`; known: gyro_g_sensitivity, "),
+        "{unknown}"
+    );
+    let format = RigFile::parse(&Source::new("RIG.toml", "format = \"mimu-plan/1\"")).unwrap_err();
+    assert_eq!(
+        format,
+        "RIG.toml:1: format is \"mimu-plan/1\"; write \"mimu-rig/1\""
+    );
+}
