@@ -1,6 +1,6 @@
 //! Channels that do not follow their input: at a rail of the converter, stuck, or dead.
 
-use crate::blocks::{Condensed, Rails};
+use crate::blocks::{Condensed, Moments, Rails};
 use crate::dwell::quantile;
 use crate::error::{Error, Result};
 use crate::recording::{Manifest, RAW_COLUMNS};
@@ -23,8 +23,47 @@ pub(crate) fn longest_run_by_chance(condensed: &Condensed, c: usize) -> Option<f
     (share < 0.8).then(|| (1.0 + odds / -share.ln()).max(5.0))
 }
 
+/// Blocks in a row that have to be calm at an extreme.
+const CALM_BLOCKS: usize = 3;
+/// Standard deviation of a calm block, times that of the quietest tenth of the blocks elsewhere. Of ten samples of the
+/// same noise one block in four hundred is as calm, and three in a row one in sixty millions.
+const CALM: f64 = 0.4;
+/// Share of the range that counts as near an extreme.
+const NEAR: f64 = 0.1;
+
+/// Where a channel comes to a calm end: a sensor at its own rail, of whose noise only the converter's is left. `sign` is
+/// 1 for the high end and -1 for the low one; the answer is the innermost value there.
+///
+/// Repeated values, which tell a converter's rail, do not occur: behind a rail of the sensor the converter goes on making noise.
+fn calm_end(moments: impl Iterator<Item = Moments>, sign: f64, range: [f64; 2]) -> Option<f64> {
+    let [low, high] = range;
+    let near = NEAR * (high - low);
+    let end = if sign > 0.0 { high } else { low };
+    let deviation = |m: &Moments| (m.m2 / f64::from(m.n.max(2) - 1)).sqrt();
+    let blocks: Vec<Moments> = moments.filter(|m| m.n > 2).collect();
+    let elsewhere = blocks
+        .iter()
+        .filter(|m| m.mean > low + near && m.mean < high - near);
+    let mut deviations: Vec<f64> = elsewhere.map(deviation).collect();
+    let quiet = quantile(&mut deviations, 0.1)?;
+    let calm = |m: &Moments| deviation(m) < CALM * quiet && (m.mean - end).abs() < near;
+    // The outermost calm stretch: a pose near the end is calm at another value than the rail.
+    let stretches = blocks.chunk_by(|a, b| calm(a) && calm(b));
+    let calm_stretches = stretches.filter(|s| s.len() >= CALM_BLOCKS && calm(&s[0]));
+    let inner = |s: &[Moments]| {
+        let values = s.iter().map(|m| if sign > 0.0 { m.min } else { m.max });
+        values.fold(end, |a, b| if sign > 0.0 { a.min(b) } else { a.max(b) })
+    };
+    let widest = calm_stretches
+        .map(inner)
+        .max_by(|a, b| (sign * a).total_cmp(&(sign * b)))?;
+    let spread = (end - widest).abs();
+    // An extreme that was passed in motion lies beyond any rail: what is calm inside of it is no rail.
+    (spread < 20.0 * CALM * quiet).then_some(widest)
+}
+
 /// Rails of the six channels: as declared, or where the largest or smallest
-/// value of a whole recording is repeated more often in a row than chance allows.
+/// value of a whole recording is repeated more often in a row than chance allows, or is as calm as no noise of the sensor is.
 pub(crate) fn find(
     condensed: &Condensed,
     manifest: &Manifest,
@@ -82,6 +121,19 @@ pub(crate) fn find(
                     rail.high = Some(value)
                 } else {
                     rail.low = Some(value)
+                }
+                continue;
+            }
+            let sign = if value == high { 1.0 } else { -1.0 };
+            if let Some(inner) = calm_end(moments(), sign, [low, high]) {
+                warnings.push(format!(
+                    "{}: at its {name} values, from {inner} on, the noise is gone: taken for a rail of the sensor",
+                    RAW_COLUMNS[c]
+                ));
+                if value == high {
+                    rail.high = Some(inner)
+                } else {
+                    rail.low = Some(inner)
                 }
             }
         }

@@ -2,11 +2,14 @@
 //!
 //! | where                  | what                                                              |
 //! |------------------------|-------------------------------------------------------------------|
-//! | [`simulation`]         | inertial units with known truth, by physics that share nothing with `mimu` |
+//! | [`bench`]              | units with known truth on the virtual bench, read as a user's would be |
+//! | [`coverage`]           | how often intervals hold the truth, over the whole path of a recording |
+//! | [`recordings`]         | recordings by other people                                        |
 //! | `tests/agreement.rs`   | least squares against Kalman filter, forward against inverse model |
 //! | `tests/coverage.rs`    | do the 95 % intervals contain the truth in 95 % of the cases?     |
 //! | `tests/real_*.rs`      | real recordings by other people against their published results   |
 //! | `demo.sh`, `demo/`     | what `make demo` runs, and the small recording that it falls back on |
 
+pub mod bench;
+pub mod coverage;
 pub mod recordings;
-pub mod simulation;

@@ -88,6 +88,23 @@ impl Foreign<'_> {
     }
 }
 
+/// The session with an Xsens MTi that was published with IMU-TK, calibrated; `None` where the data are not.
+pub fn xsens() -> Option<Fit> {
+    let folder = data_set("imu_tk_xsens")?;
+    let foreign = Foreign {
+        files: vec![
+            (folder.join("xsens_acc.mat"), "t_s,accel_x,accel_y,accel_z"),
+            (folder.join("xsens_gyro.mat"), "t_s,gyro_x,gyro_y,gyro_z"),
+        ],
+        rate_hz: Some(100.0),
+        gravity_mps2: 9.81744,
+        raw_unit: RawUnit::Count,
+        scales: &[],
+        inputs: None,
+    };
+    Some(foreign.fit(Method::LeastSquares).expect("it can be fitted"))
+}
+
 /// `matrix = U Q` with U upper triangular, its diagonal positive, and Q orthogonal.
 ///
 /// Where gravity is the only reference the frame is a convention: mimu's has a lower triangular matrix, others' an

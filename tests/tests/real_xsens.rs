@@ -42,25 +42,9 @@ const IMU_TK_GYRO: [f64; 12] = [
     32511.8475,
 ];
 
-fn fitted() -> Option<Fit> {
-    let folder = data_set("imu_tk_xsens")?;
-    let foreign = Foreign {
-        files: vec![
-            (folder.join("xsens_acc.mat"), "t_s,accel_x,accel_y,accel_z"),
-            (folder.join("xsens_gyro.mat"), "t_s,gyro_x,gyro_y,gyro_z"),
-        ],
-        rate_hz: Some(100.0),
-        gravity_mps2: 9.81744,
-        raw_unit: RawUnit::Count,
-        scales: &[],
-        inputs: None,
-    };
-    Some(foreign.fit(Method::LeastSquares).expect("it can be fitted"))
-}
-
 #[test]
 fn the_dwells_of_a_recording_by_hand_are_found() {
-    let Some(fit) = fitted() else { return };
+    let Some(fit) = xsens() else { return };
     let [accel, gyro] = [Sensor::Accel, Sensor::Gyro].map(|s| fit.sensor(s).unwrap());
     println!(
         "{} dwells, {} turns",
@@ -73,7 +57,7 @@ fn the_dwells_of_a_recording_by_hand_are_found() {
 
 #[test]
 fn errors_in_sample_and_on_held_out_blocks_are_below_those_of_imu_tk() {
-    let Some(fit) = fitted() else { return };
+    let Some(fit) = xsens() else { return };
     let [accel, gyro] = [Sensor::Accel, Sensor::Gyro].map(|s| fit.sensor(s).unwrap());
     let size = [accel.rms(), accel.held_out_rms().unwrap()].map(|x| 1e3 * x);
     let angle = [gyro.rms(), gyro.held_out_rms().unwrap()].map(f64::to_degrees);
@@ -105,7 +89,7 @@ fn errors_in_sample_and_on_held_out_blocks_are_below_those_of_imu_tk() {
 
 #[test]
 fn parameters_agree_with_those_of_imu_tk_in_its_own_frame() {
-    let Some(fit) = fitted() else { return };
+    let Some(fit) = xsens() else { return };
     let models = Models::of(&fit);
     // x = T K (raw - b), T with a unit diagonal: a column of the inverse matrix over its diagonal element.
     let convention = |accel: &Affine<f64>, gyro: &Affine<f64>| {
@@ -137,7 +121,8 @@ fn parameters_agree_with_those_of_imu_tk_in_its_own_frame() {
     let theirs = IMU_TK_ACCEL.iter().chain(&IMU_TK_GYRO);
     println!("parameter       mimu      +-95 %       IMU-TK   in sigmas");
     let (mut far, mut squares, mut off) = (0, [0.0; 2], Vec::new());
-    for (k, (((sensor, name), &(value, sigma, interval)), theirs)) in names.zip(&ours).zip(theirs).enumerate()
+    for (k, (((sensor, name), &(value, sigma, interval)), theirs)) in
+        names.zip(&ours).zip(theirs).enumerate()
     {
         off.push((theirs - value) / sigma);
         squares[usize::from(k >= 9)] += off[k] * off[k];

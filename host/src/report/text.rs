@@ -159,7 +159,7 @@ fn sensor_text(out: &mut String, fit: &Fit, sensor: &SensorFit) {
         let _ = writeln!(out, "    {:<12}{:>16}", "in sample", shown(rms));
     }
     for (name, s) in &sensor.estimated.scatter {
-        if s.excess > 0.0 {
+        if s.is_significant() {
             let (factor, unit) = match (sensor.figure, name.as_str()) {
                 (Figure::Direction, "rest") => (1f64.to_degrees(), "deg/s".to_string()),
                 (Figure::Direction | Figure::GravitySize, _) => (factor, unit.to_string()),

@@ -1,0 +1,342 @@
+//! fang, section 5.1: its Table 3 and noise, with the six and nine positions and with our own.
+
+use mimu::design::Problem;
+use mimu::design::model::{Model, Setting, Terms};
+use mimu::design::reach::Carrier;
+use mimu::design::schemes::{FANG_FILTERS, Scheme};
+use mimu::dwell::Sensor;
+use mimu::estimate::known_input::{kalman, least_squares, six_positions};
+use mimu::estimate::{Estimated, Observation};
+use mimu::recording::Reference;
+use mimu::triad::{Angles, Forward, Physical};
+use mimu_core::kalman::Filter;
+use mimu_rig::ideal::{self, FANG_TABLE_3, Ideal};
+use mimu_rig::random::Random;
+use nalgebra::{Matrix3, Vector3};
+
+use crate::page::{Block, Table, three};
+
+/// Runs of the Monte Carlo.
+const RUNS: u64 = 1000;
+/// Standard deviation of a reading, fang (35).
+const SIGMA: f64 = 1e-3;
+
+/// How a calibration is made of readings.
+#[derive(Clone, Copy)]
+enum Estimator {
+    Scalar,
+    LeastSquares,
+    Kalman,
+    /// fang (26)-(28): each filter is given four of the nine positions.
+    KalmanOfFour,
+}
+
+/// A scheme, the readings that each of its positions gets in units of what others get, and an estimator.
+struct Contender {
+    name: &'static str,
+    positions: Vec<Vector3<f64>>,
+    /// Halves.
+    share: u32,
+    estimator: Estimator,
+}
+
+fn directions(settings: &[Setting]) -> Vec<Vector3<f64>> {
+    settings.iter().map(|s| s.up).collect()
+}
+
+fn contenders() -> Vec<Contender> {
+    let scheme = |s: Scheme| directions(&s.settings(Sensor::Accel).expect("a scheme of poses"));
+    let (six, nine) = (scheme(Scheme::SixFace), scheme(Scheme::FangNine));
+    let model = Model::accel(Reference::Table, &Terms::default());
+    let problem = Problem::accel(model, Carrier::ThreeAxis).expect("affine on the whole sphere");
+    let ours = directions(&problem.best(9, 1).expect("nine determine four"));
+    let new = |name, positions: &Vec<Vector3<f64>>, share, estimator| Contender {
+        name,
+        positions: positions.clone(),
+        share,
+        estimator,
+    };
+    vec![
+        new("six faces, scale and bias only", &six, 2, Estimator::Scalar),
+        new("six faces, least squares", &six, 2, Estimator::LeastSquares),
+        new(
+            "fang's nine, least squares",
+            &nine,
+            2,
+            Estimator::LeastSquares,
+        ),
+        new("fang's nine, Kalman", &nine, 2, Estimator::Kalman),
+        new(
+            "fang's nine, Kalman, four each",
+            &nine,
+            2,
+            Estimator::KalmanOfFour,
+        ),
+        new("our nine, least squares", &ours, 2, Estimator::LeastSquares),
+        new(
+            "six faces, as long as nine",
+            &six,
+            3,
+            Estimator::LeastSquares,
+        ),
+    ]
+}
+
+impl Contender {
+    fn dwells(&self, truth: &Ideal, readings: u32, random: &mut Random) -> Vec<Observation> {
+        let n = readings * self.share / 2;
+        let dwell = |(dwell, up): (usize, &Vector3<f64>)| Observation {
+            dwell,
+            raw: truth.read((*up).into(), n, random).into(),
+            variance: Vector3::repeat(SIGMA * SIGMA / f64::from(n)),
+            input: *up,
+        };
+        self.positions.iter().enumerate().map(dwell).collect()
+    }
+}
+
+/// Errors of one calibration, by kind: bias, scale factor, package misalignment, non-orthogonality.
+type Errors = [[f64; 3]; 4];
+
+fn physical(forward: &Forward, angles: Angles) -> [Vector3<f64>; 4] {
+    // The decomposition is all that is asked; it has no covariance.
+    let triad = mimu::triad::Triad::from_forward(*forward, Vec::new()).expect("regular");
+    let Physical {
+        scale,
+        misalignment,
+        non_orthogonality,
+        bias,
+        ..
+    } = triad.physical(angles);
+    [bias, scale, misalignment, non_orthogonality]
+        .map(|triple| Vector3::from(triple.map(|e| e.value)))
+}
+
+fn estimate(contender: &Contender, dwells: &[Observation]) -> Forward {
+    let forward = |e: Result<Estimated, _>| e.expect("determined").triad.forward;
+    match contender.estimator {
+        Estimator::Scalar => forward(six_positions(dwells)),
+        Estimator::LeastSquares => forward(least_squares(dwells)),
+        Estimator::Kalman => forward(kalman(dwells)),
+        Estimator::KalmanOfFour => {
+            let mut found = Forward {
+                matrix: Matrix3::zeros(),
+                bias: Vector3::zeros(),
+            };
+            for (axis, chosen) in FANG_FILTERS.iter().enumerate() {
+                let mut filter = Filter::<f64>::diffuse(dwells[0].variance[axis], 1.0);
+                for &k in chosen {
+                    let o = &dwells[k];
+                    filter
+                        .update(&o.input, o.raw[axis], o.variance[axis])
+                        .expect("finite");
+                }
+                let mean = filter.mean();
+                found.bias[axis] = mean[0];
+                for j in 0..3 {
+                    found.matrix[(axis, j)] = mean[j + 1];
+                }
+            }
+            found
+        }
+    }
+}
+
+/// Means and scatters of the errors over the runs, `readings` of `truth` at each position.
+fn monte_carlo(
+    contender: &Contender,
+    truth: &Ideal,
+    of_truth: &[Vector3<f64>; 4],
+    angles: Angles,
+    readings: u32,
+) -> [Errors; 2] {
+    let mut sums = [[[0.0; 3]; 4]; 2];
+    for run in 0..RUNS {
+        let mut random = Random::new(run, "fang");
+        let dwells = contender.dwells(truth, readings, &mut random);
+        let found = physical(&estimate(contender, &dwells), angles);
+        for kind in 0..4 {
+            for i in 0..3 {
+                let error = found[kind][i] - of_truth[kind][i];
+                sums[0][kind][i] += error / RUNS as f64;
+                sums[1][kind][i] += error * error / RUNS as f64;
+            }
+        }
+    }
+    sums
+}
+
+/// Root mean square over the three sensors.
+fn over_axes(squares: &[f64; 3]) -> f64 {
+    (squares.iter().sum::<f64>() / 3.0).sqrt()
+}
+
+/// One table: rms errors of all contenders, `readings` at each position.
+fn errors_of(truth: &Ideal, of_truth: &[Vector3<f64>; 4], angles: Angles, readings: u32) -> Table {
+    let mut table = Table::new(&[
+        "scheme and estimator",
+        "dwells",
+        "bias",
+        "scale factor",
+        "misalignment, rad",
+        "non-orthogonality, rad",
+    ]);
+    for contender in contenders() {
+        let [_, squares] = monte_carlo(&contender, truth, of_truth, angles, readings);
+        let cells = squares.iter().map(|s| three(over_axes(s)));
+        let start = [
+            contender.name.to_string(),
+            contender.positions.len().to_string(),
+        ];
+        table.row(start.into_iter().chain(cells));
+    }
+    table
+}
+
+/// The decomposition of noiseless truth: what small angles do to angles that are not small.
+fn decompositions() -> Table {
+    let mut table = Table::new(&[
+        "unit made with",
+        "taken apart with",
+        "bias",
+        "scale factor, relative",
+        "misalignment, rad",
+        "non-orthogonality, rad",
+    ]);
+    let made = |angles| forward(&FANG_TABLE_3.forward(angles, [0.0; 3]));
+    let cases = [
+        (
+            "(16)",
+            ideal::Angles::Linear,
+            "small angles",
+            Angles::Small,
+            table_3(),
+        ),
+        (
+            "(14), products kept",
+            ideal::Angles::Small,
+            "small angles",
+            Angles::Small,
+            table_3(),
+        ),
+        (
+            "rotations",
+            ideal::Angles::Exact,
+            "small angles",
+            Angles::Small,
+            table_3(),
+        ),
+        (
+            "rotations",
+            ideal::Angles::Exact,
+            "rotations",
+            Angles::Exact,
+            table_3_of_axes(),
+        ),
+    ];
+    for (how, angles, apart, decomposition, truth) in cases {
+        let found = physical(&made(angles), decomposition);
+        let errors = (0..4).map(|kind| {
+            let error = found[kind] - truth[kind];
+            let error = if kind == 1 {
+                error.component_div(&truth[kind])
+            } else {
+                error
+            };
+            match error.amax() {
+                rounding if rounding < 1e-12 => "0".to_string(),
+                largest => three(largest),
+            }
+        });
+        table.row(
+            [how.to_string(), apart.to_string()]
+                .into_iter()
+                .chain(errors),
+        );
+    }
+    table
+}
+
+fn forward(truth: &Ideal) -> Forward {
+    Forward {
+        matrix: Matrix3::from_fn(|i, j| truth.matrix[i][j]),
+        bias: truth.bias.into(),
+    }
+}
+
+/// Table 3 in the model that fang simulates, (16) and (18).
+fn linear() -> Ideal {
+    FANG_TABLE_3.forward(ideal::Angles::Linear, [SIGMA; 3])
+}
+
+/// Table 3 as bias, scale factors, misalignment, non-orthogonality.
+fn table_3() -> [Vector3<f64>; 4] {
+    let t = &FANG_TABLE_3;
+    [t.bias, t.scale, t.theta, t.beta].map(Vector3::from)
+}
+
+/// The same with scale factors and angles of the sensors' axes as directions: what (13) writes as 1 and β has the length
+/// √(1 + β²), which is part of the scale factor.
+fn table_3_of_axes() -> [Vector3<f64>; 4] {
+    let [bias, scale, theta, beta] = table_3();
+    let lengths = Vector3::new(
+        1.0,
+        (1.0 + beta.x * beta.x).sqrt(),
+        (1.0 + beta.y * beta.y + beta.z * beta.z).sqrt(),
+    );
+    let sines = Vector3::new(beta.x / lengths.y, beta.y / lengths.z, beta.z / lengths.z);
+    [
+        bias,
+        scale.component_mul(&lengths),
+        theta,
+        sines.map(f64::asin),
+    ]
+}
+
+/// Mean error over its standard error, the largest of all twelve parameters: whether an estimator is biased.
+fn biases() -> Table {
+    let mut table = Table::new(&[
+        "scheme and estimator",
+        "largest mean error of P and b, in standard errors of the mean",
+    ]);
+    let truth = linear();
+    for contender in contenders().iter().skip(1) {
+        let (mut sum, mut squares) = ([0.0; 12], [0.0; 12]);
+        for run in 0..RUNS {
+            let mut random = Random::new(run, "fang");
+            let dwells = contender.dwells(&truth, 2, &mut random);
+            let found = estimate(contender, &dwells);
+            for k in 0..12 {
+                let error = match k {
+                    0..9 => found.matrix[(k / 3, k % 3)] - truth.matrix[k / 3][k % 3],
+                    _ => found.bias[k - 9] - truth.bias[k - 9],
+                };
+                sum[k] += error;
+                squares[k] += error * error;
+            }
+        }
+        let n = RUNS as f64;
+        let in_errors = (0..12).map(|k| (sum[k] / n).abs() / (squares[k] / n / n).sqrt());
+        let largest = in_errors.fold(0.0, f64::max);
+        table.row([contender.name.to_string(), format!("{largest:.1}")]);
+    }
+    table
+}
+
+/// All of it.
+pub fn blocks() -> Vec<Block> {
+    let unit = linear();
+    let block = |name, table| Block::table(name, &table);
+    vec![
+        block(
+            "fang, two readings",
+            errors_of(&unit, &table_3(), Angles::Small, 2),
+        ),
+        block(
+            "fang, two thousand readings",
+            errors_of(&unit, &table_3(), Angles::Small, 2000),
+        ),
+        block("fang, mean errors", biases()),
+        block("fang, angles", decompositions()),
+    ]
+}

@@ -1,0 +1,53 @@
+//! `make papers`: computes every figure of docs/papers.md and puts it in its place.
+//!
+//! Prose in the document is written by people. Blocks between markers, and the plots, are made here: `papers` writes them,
+//! `papers --check` says whether they are as written.
+
+mod dwells;
+mod fang;
+mod page;
+mod plot;
+mod xu;
+
+use std::path::Path;
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    let check = std::env::args().any(|a| a == "--check");
+    match run(check) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(problem) => {
+            eprintln!("papers: {problem}");
+            ExitCode::from(1)
+        }
+    }
+}
+
+fn run(check: bool) -> Result<(), Box<dyn std::error::Error>> {
+    let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs");
+    let path = docs.join("papers.md");
+    let written = std::fs::read_to_string(&path)?;
+    let (dwells, charts) = dwells::blocks();
+    let blocks: Vec<page::Block> = fang::blocks()
+        .into_iter()
+        .chain(xu::blocks())
+        .chain(dwells)
+        .collect();
+    let computed = page::filled(&written, &blocks)?;
+    if check {
+        let differs = written.lines().zip(computed.lines()).find(|(w, c)| w != c);
+        return match differs {
+            Some((w, c)) => {
+                Err(format!("docs/papers.md says\n  {w}\nand it comes out as\n  {c}").into())
+            }
+            None => Ok(()),
+        };
+    }
+    let folder = docs.join("papers");
+    std::fs::create_dir_all(&folder)?;
+    for chart in &charts {
+        chart.draw(&folder)?;
+    }
+    std::fs::write(&path, computed)?;
+    Ok(())
+}

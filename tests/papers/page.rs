@@ -1,0 +1,116 @@
+//! The document: prose that people write, and between markers what this program computed.
+
+use std::fmt::Write as _;
+
+/// A computed part of the document.
+pub struct Block {
+    /// Name in its markers.
+    pub name: &'static str,
+    /// Markdown; `None` where the recording that it comes from is not at hand, and the document keeps what it has.
+    pub text: Option<String>,
+}
+
+impl Block {
+    /// Of a table.
+    pub fn table(name: &'static str, table: &Table) -> Self {
+        Self {
+            name,
+            text: Some(table.markdown()),
+        }
+    }
+}
+
+/// Markdown table with aligned columns.
+pub struct Table {
+    rows: Vec<Vec<String>>,
+}
+
+impl Table {
+    /// With the headings of its columns.
+    pub fn new(headings: &[&str]) -> Self {
+        Self {
+            rows: vec![headings.iter().map(ToString::to_string).collect()],
+        }
+    }
+
+    /// One more row.
+    pub fn row(&mut self, cells: impl IntoIterator<Item = String>) {
+        self.rows.push(cells.into_iter().collect());
+    }
+
+    /// As Markdown: the first column to the left, numbers to the right.
+    pub fn markdown(&self) -> String {
+        let columns = self.rows[0].len();
+        let width = |c: usize| {
+            let cells = self.rows.iter().filter_map(|r| r.get(c));
+            cells.map(|t| t.chars().count()).max().unwrap_or(0).max(3)
+        };
+        let widths: Vec<usize> = (0..columns).map(width).collect();
+        let mut out = String::new();
+        for (r, row) in self.rows.iter().enumerate() {
+            for (c, cell) in row.iter().enumerate() {
+                let w = widths[c];
+                let _ = match c {
+                    0 => write!(out, "| {cell:<w$} "),
+                    _ => write!(out, "| {cell:>w$} "),
+                };
+            }
+            out.push_str("|\n");
+            if r == 0 {
+                let rule = |(c, w): (usize, &usize)| {
+                    let dashes = "-".repeat(w + 1);
+                    if c == 0 {
+                        format!("|{dashes}-")
+                    } else {
+                        format!("|{dashes}:")
+                    }
+                };
+                out.extend(widths.iter().enumerate().map(rule));
+                out.push_str("|\n");
+            }
+        }
+        out
+    }
+}
+
+/// `x` with three digits.
+pub fn three(x: f64) -> String {
+    if x == 0.0 || !x.is_finite() {
+        return format!("{x}");
+    }
+    let digits = 2 - x.abs().log10().floor() as i32;
+    match digits {
+        ..=-3 | 7.. => format!("{x:.2e}"),
+        _ => format!("{x:.*}", digits.max(0) as usize),
+    }
+}
+
+/// `document` with every block in its place. Each block must have its place and each place its block.
+pub fn filled(document: &str, blocks: &[Block]) -> Result<String, String> {
+    let mut out = document.to_string();
+    for block in blocks {
+        let (open, close) = (
+            format!("<!-- {} -->\n", block.name),
+            format!("<!-- /{} -->", block.name),
+        );
+        let start = out
+            .find(&open)
+            .ok_or(format!("docs/papers.md has no place {open:?}"))?
+            + open.len();
+        let end = out
+            .find(&close)
+            .filter(|end| *end >= start)
+            .ok_or(format!("docs/papers.md has no {close:?}"))?;
+        if let Some(text) = &block.text {
+            out.replace_range(start..end, &format!("\n{}\n\n", text.trim_end()));
+        }
+    }
+    let places = out.matches("<!-- /").count();
+    if places != blocks.len() {
+        return Err(format!(
+            "docs/papers.md has {places} places for {} blocks",
+            blocks.len()
+        ));
+    }
+    Ok(out)
+}

@@ -1,0 +1,379 @@
+//! xu: its schedules, Tables 1 and 2 as truth, and the scatter of its five repeats as noise.
+
+use mimu::design::schemes::Scheme;
+use mimu::dwell::Sensor;
+use mimu::estimate::known_input::{inverse_form, kalman, least_squares, opposite_rates};
+use mimu::estimate::{Estimated, Failure, Observation};
+use mimu_core::compensation::Affine;
+use mimu_rig::ideal::Inverse;
+use mimu_rig::random::Random;
+use nalgebra::{DMatrix, Matrix3, Vector3};
+
+use crate::page::{Block, Table, three};
+
+/// Runs of the Monte Carlo.
+const RUNS: u64 = 1000;
+
+/// Table 1, five repeats: k_g11 to k_g33 by rows, then the offsets. The table says rad/s; deg/s is what agrees with
+/// its Table 3.
+const TABLE_1: [[f64; 5]; 12] = [
+    [0.99974, 0.99973, 0.99973, 0.99970, 0.99969],
+    [-0.01196, -0.01191, -0.01191, -0.01208, -0.01209],
+    [-0.00059, -0.00056, -0.00063, -0.00058, -0.00058],
+    [0.02402, 0.02390, 0.02394, 0.02391, 0.02393],
+    [1.00045, 1.00047, 1.00044, 1.00046, 1.00050],
+    [0.01051, 0.01053, 0.01052, 0.01055, 0.01055],
+    [0.01089, 0.01087, 0.01075, 0.01090, 0.01093],
+    [0.01486, 0.01487, 0.01487, 0.01495, 0.01496],
+    [1.00546, 1.00551, 1.00590, 1.00607, 1.00600],
+    [-0.03732, -0.04505, -0.04289, -0.04636, -0.04424],
+    [-0.14450, -0.14354, -0.13033, -0.11033, -0.09103],
+    [-0.29703, -0.41339, -0.30428, -0.36567, -0.37728],
+];
+
+/// Table 2: k_a11 to k_a33 by rows, then the offsets, said to be in mg.
+const TABLE_2: [[f64; 5]; 12] = [
+    [0.96698, 0.96695, 0.96676, 0.96642, 0.96625],
+    [0.01448, 0.01419, 0.01444, 0.01441, 0.01417],
+    [-0.00145, -0.00245, -0.00191, -0.00096, -0.00221],
+    [-0.01760, -0.01753, -0.01748, -0.01769, -0.01769],
+    [0.96947, 0.96966, 0.96998, 0.96948, 0.96964],
+    [-0.00835, -0.00860, -0.00852, -0.00859, -0.00851],
+    [0.01555, 0.014672, 0.01467, 0.014361, 0.01454],
+    [-0.01525, -0.01447, -0.01490, -0.01503, -0.01505],
+    [0.99333, 0.99286, 0.99299, 0.99357, 0.99357],
+    [-0.16403, -0.16128, -0.17054, -0.16464, -0.16037],
+    [0.11392, 0.10270, 0.11108, 0.10385, 0.10464],
+    [0.28710, 0.256601, 0.27716, 0.25291, 0.25164],
+];
+
+/// Table 3, deg/s, as printed: input about x, y, z; error of x, y, z; lowest and highest.
+const TABLE_3_BEFORE: [[[f64; 2]; 3]; 3] = [
+    [[0.004, 0.288], [-7.305, -7.185], [-3.474, 2.825]],
+    [[-3.445, 3.738], [-0.364, 0.4684], [-4.829, 4.105]],
+    [[-37.773, 37.959], [-1.174, 1.607], [-17.449, 16.48]],
+];
+/// The same after calibration by the proposed method.
+const TABLE_3_AFTER: [[[f64; 2]; 3]; 3] = [
+    [[-0.142, 0.144], [-0.005, 0.034], [-0.081, 0.039]],
+    [[-0.005, 0.014], [-0.15, 0.162], [0.007, 0.069]],
+    [[-0.149, 0.218], [-0.214, 0.358], [-2.954, 4.838]],
+];
+
+fn mean(repeats: &[f64; 5]) -> f64 {
+    repeats.iter().sum::<f64>() / 5.0
+}
+
+fn scatter(repeats: &[f64; 5]) -> f64 {
+    let m = mean(repeats);
+    (repeats.iter().map(|r| (r - m).powi(2)).sum::<f64>() / 4.0).sqrt()
+}
+
+/// Inverse model `x = C u + o` with the averages of a table.
+fn averages(table: &[[f64; 5]; 12]) -> Affine<f64> {
+    Affine {
+        matrix: Matrix3::from_fn(|i, j| mean(&table[3 * i + j])),
+        offset: Vector3::from_fn(|i, _| mean(&table[9 + i])),
+    }
+}
+
+/// One of the two experiments: inputs in the paper's units, and how the paper's estimator turns noise into scatter.
+struct Experiment {
+    inputs: Vec<Vector3<f64>>,
+    table: &'static [[f64; 5]; 12],
+    estimator: fn(&[Observation]) -> Result<Estimated, Failure>,
+}
+
+fn gyro() -> Experiment {
+    let settings = Scheme::XuRates.settings(Sensor::Gyro).expect("rates");
+    Experiment {
+        inputs: (settings.iter())
+            .map(|s| (s.rate * s.up).map(f64::to_degrees))
+            .collect(),
+        table: &TABLE_1,
+        estimator: opposite_rates,
+    }
+}
+
+fn accel() -> Experiment {
+    let settings = Scheme::Xu33.settings(Sensor::Accel).expect("poses");
+    Experiment {
+        inputs: settings.iter().map(|s| s.up).collect(),
+        table: &TABLE_2,
+        estimator: inverse_form,
+    }
+}
+
+impl Experiment {
+    /// Dwell means of a unit, with independent noise `sigma` in the readings.
+    fn dwells(&self, unit: &Affine<f64>, sigma: [f64; 3], random: &mut Random) -> Vec<Observation> {
+        let truth = Inverse {
+            matrix: std::array::from_fn(|i| std::array::from_fn(|j| unit.matrix[(i, j)])),
+            offset: unit.offset.into(),
+        };
+        let truth = truth.forward(sigma).expect("regular");
+        let read = |(dwell, input): (usize, &Vector3<f64>)| Observation {
+            dwell,
+            raw: truth.read((*input).into(), 1, random).into(),
+            variance: Vector3::from(sigma).map(|s| s * s),
+            input: *input,
+        };
+        self.inputs.iter().enumerate().map(read).collect()
+    }
+
+    /// Sigmas of the twelve parameters for noise of one in every dwell mean, by the estimator's own covariance.
+    fn gains(&self) -> [f64; 12] {
+        let mut random = Random::new(0, "xu gains");
+        let unit = averages(self.table);
+        let tiny = 1e-6;
+        let dwells = self.dwells(&unit, [tiny; 3], &mut random);
+        let found = (self.estimator)(&dwells).expect("determined").triad;
+        std::array::from_fn(|k| found.inverse_covariance[(k, k)].sqrt() / tiny)
+    }
+
+    /// Noise of a dwell mean of each axis that reproduces the five repeats best, and what scatters more.
+    ///
+    /// Repeats are five, so a scatter is known to 35 %; noise of the dwells is the most that no scatter of its row
+    /// contradicts: the smallest ratio of scatter to gain.
+    fn noise(&self) -> ([f64; 3], [f64; 12]) {
+        let gains = self.gains();
+        let row = |k: usize| if k < 9 { k / 3 } else { k - 9 };
+        let sigma = [0, 1, 2].map(|i| {
+            let of_row = (0..12).filter(|k| row(*k) == i);
+            of_row
+                .map(|k| scatter(&self.table[k]) / gains[k])
+                .fold(f64::INFINITY, f64::min)
+        });
+        let rest = std::array::from_fn(|k| {
+            let by_dwells = sigma[row(k)] * gains[k];
+            (scatter(&self.table[k]).powi(2) - by_dwells.powi(2))
+                .max(0.0)
+                .sqrt()
+        });
+        (sigma, rest)
+    }
+
+    /// The unit as it is on one day: the averages, and what differs from repeat to repeat.
+    fn of_the_day(&self, rest: &[f64; 12], random: &mut Random) -> Affine<f64> {
+        let mut unit = averages(self.table);
+        for k in 0..12 {
+            let off = rest[k] * random.normal();
+            match k {
+                0..9 => unit.matrix[(k / 3, k % 3)] += off,
+                _ => unit.offset[k - 9] += off,
+            }
+        }
+        unit
+    }
+}
+
+fn names(letter: &str, offset: &str) -> [String; 12] {
+    std::array::from_fn(|k| match k {
+        0..9 => format!("k_{letter}{}{}", k / 3 + 1, k % 3 + 1),
+        _ => format!("{offset}_{}0", ["x", "y", "z"][k - 9]),
+    })
+}
+
+/// Scatter of the repeats against what one noise of the dwells makes of each parameter.
+fn repeats(experiment: &Experiment, names: &[String; 12], unit: &str) -> Table {
+    let (sigma, _) = experiment.noise();
+    let gains = experiment.gains();
+    let ours = simulated(experiment);
+    let heading = format!("scatter of five ({unit} for offsets)");
+    let mut table = Table::new(&[
+        "parameter",
+        "average",
+        &heading,
+        "from noise of dwells",
+        "ours, 1000 runs",
+    ]);
+    for k in 0..12 {
+        let row = if k < 9 { k / 3 } else { k - 9 };
+        table.row([
+            names[k].clone(),
+            format!("{:.5}", mean(&experiment.table[k])),
+            three(scatter(&experiment.table[k])),
+            three(sigma[row] * gains[k]),
+            three(ours[k]),
+        ]);
+    }
+    table
+}
+
+/// Scatter of the twelve parameters about the averages, over the runs, by the paper's estimator.
+fn simulated(experiment: &Experiment) -> [f64; 12] {
+    let (sigma, rest) = experiment.noise();
+    let mut squares = [0.0; 12];
+    for run in 0..RUNS {
+        let mut random = Random::new(run, "xu repeats");
+        let unit = experiment.of_the_day(&rest, &mut random);
+        let dwells = experiment.dwells(&unit, sigma, &mut random);
+        let found = (experiment.estimator)(&dwells)
+            .expect("determined")
+            .triad
+            .inverse;
+        for (k, square) in squares.iter_mut().enumerate() {
+            let value = if k < 9 {
+                found.matrix[(k / 3, k % 3)]
+            } else {
+                found.offset[k - 9]
+            };
+            *square += (value - mean(&experiment.table[k])).powi(2) / RUNS as f64;
+        }
+    }
+    squares.map(f64::sqrt)
+}
+
+/// Errors of the estimators against the unit of the day: rms over all elements of C, and over o, and the share of intervals that
+/// hold the truth.
+fn estimators(experiment: &Experiment) -> Table {
+    let (sigma, rest) = experiment.noise();
+    type Estimator = fn(&[Observation]) -> Result<Estimated, Failure>;
+    let all: [(&str, Estimator); 3] = [
+        ("xu's inverse form", experiment.estimator),
+        ("least squares, forward form", least_squares),
+        ("Kalman bank", kalman),
+    ];
+    let mut table = Table::new(&[
+        "estimator",
+        "rms error of C",
+        "rms error of o",
+        "95 % intervals hold the truth, %",
+        "lowest to highest of twelve, %",
+    ]);
+    for (name, estimator) in all {
+        let (mut c, mut o, mut inside) = (0.0, 0.0, [0u32; 12]);
+        for run in 0..RUNS {
+            let mut random = Random::new(run, "xu estimators");
+            let unit = experiment.of_the_day(&rest, &mut random);
+            let dwells = experiment.dwells(&unit, sigma, &mut random);
+            let triad = estimator(&dwells).expect("determined").triad;
+            for (k, found) in triad.inverse_estimates().iter().enumerate() {
+                let truth = if k < 9 {
+                    unit.matrix[(k / 3, k % 3)]
+                } else {
+                    unit.offset[k - 9]
+                };
+                let error = found.value - truth;
+                *(if k < 9 { &mut c } else { &mut o }) += error * error;
+                inside[k] += u32::from(error.abs() <= found.interval);
+            }
+        }
+        let n = RUNS as f64;
+        let share = |k: &u32| 100.0 * f64::from(*k) / n;
+        let [low, high] =
+            [inside.iter().min(), inside.iter().max()].map(|k| share(k.expect("twelve")));
+        table.row([
+            name.to_string(),
+            three((c / n / 9.0).sqrt()),
+            three((o / n / 3.0).sqrt()),
+            format!("{:.1}", inside.iter().map(share).sum::<f64>() / 12.0),
+            format!("{low:.1} to {high:.1}"),
+        ]);
+    }
+    table
+}
+
+/// Lowest and highest of input less output over the rates about one axis.
+fn range(
+    inputs: &[Vector3<f64>],
+    about: usize,
+    of: usize,
+    output: impl Fn(&Vector3<f64>) -> Vector3<f64>,
+) -> [f64; 2] {
+    let along = |x: &&Vector3<f64>| x[about] != 0.0;
+    let errors = inputs.iter().filter(along).map(|x| x[of] - output(x)[of]);
+    errors.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], e| {
+        [low.min(e), high.max(e)]
+    })
+}
+
+/// Table 3 done again, before: with the averages of Table 1, and nothing else.
+fn before_and_after() -> Table {
+    let experiment = gyro();
+    let unit = averages(experiment.table);
+    let (sigma, rest) = experiment.noise();
+    let c = unit.matrix.try_inverse().expect("regular");
+    // After: the range over the rates of one verification, mean of the ends over the runs.
+    let mut after = [[[0.0; 2]; 3]; 3];
+    for run in 0..RUNS {
+        let mut random = Random::new(run, "xu after");
+        let unit = experiment.of_the_day(&rest, &mut random);
+        let found = (experiment.estimator)(&experiment.dwells(&unit, sigma, &mut random));
+        let model = found.expect("determined").triad.inverse;
+        let verification = experiment.dwells(&unit, sigma, &mut random);
+        for about in 0..3 {
+            for of in 0..3 {
+                let mut ends = [f64::INFINITY, f64::NEG_INFINITY];
+                for o in verification.iter().filter(|o| o.input[about] != 0.0) {
+                    let e = o.input[of] - model.apply(&o.raw)[of];
+                    ends = [ends[0].min(e), ends[1].max(e)];
+                }
+                for k in 0..2 {
+                    after[about][of][k] += ends[k] / RUNS as f64;
+                }
+            }
+        }
+    }
+    let mut table = Table::new(&[
+        "input, error of",
+        "before, printed",
+        "before, from Table 1",
+        "after, printed",
+        "after, from noise",
+    ]);
+    let ends = |e: [f64; 2]| format!("{:.3} to {:.3}", e[0], e[1]);
+    let axes = ["x", "y", "z"];
+    for about in 0..3 {
+        for of in 0..3 {
+            let before = range(&experiment.inputs, about, of, |x| c * (x - unit.offset));
+            table.row([
+                format!("{}, {}", axes[about], axes[of]),
+                ends(TABLE_3_BEFORE[about][of]),
+                ends(before),
+                ends(TABLE_3_AFTER[about][of]),
+                ends(after[about][of]),
+            ]);
+        }
+    }
+    table
+}
+
+/// How much regressing on the noisy side shrinks C: the largest singular direction of noise over signal.
+fn attenuation(experiment: &Experiment) -> f64 {
+    let (sigma, _) = experiment.noise();
+    let n = experiment.inputs.len();
+    let signal = DMatrix::from_fn(n, 3, |i, j| experiment.inputs[i][j]);
+    let normal = signal.transpose() * &signal / n as f64;
+    (0..3)
+        .map(|j| sigma[j] * sigma[j] / normal[(j, j)])
+        .fold(0.0, f64::max)
+}
+
+/// All of it.
+pub fn blocks() -> Vec<Block> {
+    let (g, a) = (gyro(), accel());
+    let block = |name, table| Block::table(name, &table);
+    let noise = |e: &Experiment| e.noise().0.map(three).join(", ");
+    let facts = format!(
+        "- Noise of a dwell mean, x, y, z: gyro {} deg/s; accelerometer {} g.\n- Regressing on the noisy side shrinks C by at most {:.1e} (gyro) and {:.1e} (accelerometer).",
+        noise(&g),
+        noise(&a),
+        attenuation(&g),
+        attenuation(&a)
+    );
+    vec![
+        block("xu, gyro repeats", repeats(&g, &names("g", "ω"), "deg/s")),
+        block(
+            "xu, accelerometer repeats",
+            repeats(&a, &names("a", "f"), "as printed"),
+        ),
+        Block {
+            name: "xu, noise",
+            text: Some(facts),
+        },
+        block("xu, gyro estimators", estimators(&g)),
+        block("xu, accelerometer estimators", estimators(&a)),
+        block("xu, table 3", before_and_after()),
+    ]
+}

@@ -1,0 +1,151 @@
+//! Units with known truth on the virtual bench, recorded and read the way a user's would be.
+
+use std::fmt::Write as _;
+
+use mimu::prepared::Prepared;
+use mimu::recording::Recording;
+use mimu::stillness::STILL_FACTOR;
+use mimu_rig::located::Source;
+use mimu_rig::plan::Plan;
+use mimu_rig::random::Random;
+use mimu_rig::record::{Output, samples, write};
+use mimu_rig::rig_file::{AffineFile, RigFile, RigTruth};
+use mimu_rig::table::TableTruth;
+use nalgebra::{Matrix3, SVector, Vector3};
+
+/// A forward model, SI to raw, of sensors like fang's (Table 4: 5 mV per deg/s about 2.5 V, 80 mV per m/s² about 1.65 V)
+/// with errors of some per cent and some degrees.
+pub fn gyro(random: &mut Random) -> AffineFile {
+    affine(5e-3f64.to_degrees(), 2.5, random)
+}
+
+/// The same of an accelerometer; lower triangular, so that its x axis and xy plane are the body's, which by hand nothing else
+/// defines.
+pub fn accel(random: &mut Random) -> AffineFile {
+    let mut model = affine(0.08, 1.65, random);
+    for i in 0..3 {
+        for j in i + 1..3 {
+            model.matrix[i][j] = 0.0;
+        }
+    }
+    model
+}
+
+fn affine(scale: f64, null: f64, random: &mut Random) -> AffineFile {
+    let mut matrix = [[0.0; 3]; 3];
+    for (i, row) in matrix.iter_mut().enumerate() {
+        for (j, element) in row.iter_mut().enumerate() {
+            let diagonal = if i == j { 1.0 } else { 0.0 };
+            *element = scale * (diagonal + random.within(0.03));
+        }
+    }
+    AffineFile {
+        matrix,
+        bias: std::array::from_fn(|_| null + random.within(0.05)),
+    }
+}
+
+/// P by rows, then b.
+pub fn parameters(model: &AffineFile) -> SVector<f64, 12> {
+    let matrix = Matrix3::from_fn(|i, j| model.matrix[i][j]);
+    mimu::triad::vector(&matrix, &Vector3::from(model.bias))
+}
+
+/// A unit of the usual parts with their noise, whose affine models are as given and whole, on a table without flaws on an
+/// Earth that does not turn: what is left for an interval to hold is noise.
+pub fn clean(gyro: AffineFile, accel: AffineFile) -> RigFile {
+    let mut file = RigFile {
+        earth_rate: Some(false),
+        table: TableTruth::ideal(),
+        ..RigFile::default()
+    };
+    file.unit.gyro_affine = Some(gyro);
+    file.unit.accel_affine = Some(accel);
+    file.unit.supply_error_ppm = Some(0.0);
+    file.converter.reference_error_ppm = Some(0.0);
+    file
+}
+
+/// Plan of six faces, four corners, and four rates about each axis, 3 s each at 100 Hz; in an order drawn by the
+/// seed, or as listed.
+///
+/// Sensors wander, and what neighbouring dwells share of it goes into the parameters that their difference determines.
+/// Drawn by lot, it is noise like any other.
+pub fn table_plan(order: Option<u64>) -> String {
+    let mut steps = Vec::new();
+    for axis in 0..3 {
+        let up: [f64; 3] = std::array::from_fn(|i| f64::from(u8::from(i == axis)));
+        steps.push((up, 0.0));
+        steps.extend([-200.0, -60.0, 60.0, 200.0].map(|rate| (up, rate)));
+        steps.push((up.map(|u| -u), 0.0));
+    }
+    let corners = [
+        [1.0, 1.0, 1.0],
+        [-1.0, 1.0, -1.0],
+        [1.0, -1.0, -1.0],
+        [-1.0, -1.0, 1.0],
+    ];
+    steps.extend(corners.map(|up| (up, 0.0)));
+    if let Some(seed) = order {
+        let mut random = Random::new(seed, "order of the steps");
+        for k in (1..steps.len()).rev() {
+            steps.swap(k, (random.uniform() * (k + 1) as f64) as usize);
+        }
+    }
+    let mut plan =
+        String::from("format = \"mimu-plan/1\"\nsample_rate_hz = 100.0\ncarrier = \"table\"\n");
+    for (up, rate_dps) in steps {
+        let _ = writeln!(
+            plan,
+            "[[step]]\nup = {up:?}\nrate_dps = {rate_dps:?}\ndwell_s = 3.0"
+        );
+    }
+    plan
+}
+
+/// Plan of so many poses by hand, 3 s each at 100 Hz.
+pub fn hand_plan(poses: usize) -> String {
+    format!(
+        "format = \"mimu-plan/1\"\nsample_rate_hz = 100.0\ncarrier = \"hands\"\n[[step]]\nposes = {poses}\ndwell_s = 3.0\n"
+    )
+}
+
+/// The recording of a plan.
+pub fn recorded(plan: &str, file: &RigFile, seed: u64) -> Prepared {
+    let plan = Plan::parse(Source::new("plan", plan)).expect("a plan");
+    let truth = RigTruth::resolve(file, seed).expect("a rig");
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("recording");
+    let output = Output::new(&path, &plan).expect("a name");
+    write(&plan, &truth, seed, &output).expect("written");
+    let recording = Recording::open(&path).expect("a recording");
+    Prepared::read(&recording, STILL_FACTOR, |_| ()).expect("readable")
+}
+
+/// What slow noise (bias instability, rate random walk) adds to the biases of gyro and accelerometer on the average of a
+/// recording: the same recording with and without, sample by sample, all else being the same bits.
+///
+/// The bias of one session is all that the recording of one session can tell. That of 1/f noise over all sessions has
+/// no value that any average would tend to.
+pub fn wander(plan: &str, file: &RigFile, seed: u64) -> [[f64; 3]; 2] {
+    let plan = Plan::parse(Source::new("plan", plan)).expect("a plan");
+    let mut still = file.clone();
+    for axes in [&mut still.unit.gyro_axes, &mut still.unit.accel_axes] {
+        axes.instability_si = Some([0.0; 3]);
+        axes.walk_si = Some([0.0; 3]);
+    }
+    let run = |file| {
+        let truth = RigTruth::resolve(file, seed).expect("a rig");
+        samples(&plan, &truth, seed).expect("a run")
+    };
+    let (with, without) = (run(file), run(&still));
+    let mut sums = [[0.0; 3]; 2];
+    let count = with.len() as f64;
+    for (a, b) in with.zip(without) {
+        for i in 0..3 {
+            sums[0][i] += (a.readings.gyro[i] - b.readings.gyro[i]) / count;
+            sums[1][i] += (a.readings.accel[i] - b.readings.accel[i]) / count;
+        }
+    }
+    sums
+}

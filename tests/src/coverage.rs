@@ -1,0 +1,193 @@
+//! Whether 95 % intervals hold the truth in 95 % of the cases, parameter by parameter, over the whole path of a recording.
+
+use mimu::dwell::Sensor;
+use mimu::fit::{Fit, Method, Options, fit};
+use mimu::stillness::STILL_FACTOR;
+use mimu::triad::Triad;
+use mimu_rig::random::Random;
+use mimu_rig::rig_file::RigFile;
+use nalgebra::SVector;
+use rayon::prelude::*;
+
+use crate::bench;
+
+/// How often the interval of each parameter held the truth, and the mean squared error in sigmas.
+#[derive(Debug, Clone)]
+pub struct Tally {
+    /// Estimator, sensor and experiment.
+    pub name: String,
+    /// Which of the twelve parameters of the forward model the estimator finds.
+    pub free: Vec<usize>,
+    inside: [u32; 12],
+    squared: [f64; 12],
+    /// Number of cases.
+    pub runs: u32,
+}
+
+impl Tally {
+    /// Nothing counted yet.
+    pub fn new(name: impl Into<String>, free: &[usize]) -> Self {
+        Self {
+            name: name.into(),
+            free: free.to_vec(),
+            inside: [0; 12],
+            squared: [0.0; 12],
+            runs: 0,
+        }
+    }
+
+    /// Compares the forward model with the truth.
+    pub fn add(&mut self, triad: &Triad, truth: &SVector<f64, 12>) {
+        self.runs += 1;
+        for (i, found) in triad.forward_estimates().iter().enumerate() {
+            let error = found.value - truth[i];
+            self.inside[i] += u32::from(error.abs() <= found.interval);
+            if found.sigma > 0.0 {
+                self.squared[i] += (error / found.sigma).powi(2);
+            }
+        }
+    }
+
+    /// Share of the cases in which each free parameter was inside.
+    pub fn shares(&self) -> Vec<f64> {
+        let share = |i: &usize| f64::from(self.inside[*i]) / f64::from(self.runs);
+        self.free.iter().map(share).collect()
+    }
+
+    /// Mean, lowest and highest of the shares.
+    pub fn summary(&self) -> [f64; 3] {
+        let shares = self.shares();
+        let mean = shares.iter().sum::<f64>() / shares.len() as f64;
+        let lowest = shares.iter().copied().fold(1.0, f64::min);
+        [mean, lowest, shares.iter().copied().fold(0.0, f64::max)]
+    }
+
+    /// Rms error in claimed sigmas.
+    pub fn rms(&self) -> f64 {
+        let sum: f64 = self.free.iter().map(|i| self.squared[*i]).sum();
+        (sum / f64::from(self.runs) / self.free.len() as f64).sqrt()
+    }
+
+    fn merge(&mut self, other: &Self) {
+        self.runs += other.runs;
+        for i in 0..12 {
+            self.inside[i] += other.inside[i];
+            self.squared[i] += other.squared[i];
+        }
+    }
+}
+
+fn options(method: Method) -> Options {
+    Options {
+        method,
+        holdout_blocks: 0,
+        only: None,
+        still_factor: STILL_FACTOR,
+    }
+}
+
+fn triad(fit: &Fit, sensor: Sensor) -> &Triad {
+    &fit.sensor(sensor).expect("recorded").estimated.triad
+}
+
+/// Forward models of gyro and accelerometer as they are on the average of the recording.
+fn of_the_session(plan: &str, file: &RigFile, seed: u64) -> [SVector<f64, 12>; 2] {
+    let wander = bench::wander(plan, file, seed);
+    let models = [&file.unit.gyro_affine, &file.unit.accel_affine];
+    std::array::from_fn(|k| {
+        let mut truth = bench::parameters(models[k].as_ref().expect("stated"));
+        for i in 0..3 {
+            truth[9 + i] += wander[k][i];
+        }
+        truth
+    })
+}
+
+/// Adds the cases of many seeds, side by side.
+fn over(runs: u64, empty: &[Tally], case: impl Fn(u64, &mut [Tally]) + Sync) -> Vec<Tally> {
+    let merged = |mut a: Vec<Tally>, b: Vec<Tally>| {
+        a.iter_mut().zip(&b).for_each(|(a, b)| a.merge(b));
+        a
+    };
+    (0..runs)
+        .into_par_iter()
+        .map(|seed| {
+            let mut tallies = empty.to_vec();
+            case(seed, &mut tallies);
+            tallies
+        })
+        .reduce(|| empty.to_vec(), merged)
+}
+
+/// Every estimator for known inputs, both sensors, on recordings from a table whose dwells come in an order drawn by lot, or as
+/// listed.
+pub fn with_a_table(runs: u64, by_lot: bool) -> Vec<Tally> {
+    let methods = [
+        ("least squares", Method::LeastSquares),
+        ("Kalman bank", Method::Kalman),
+        ("inverse form (xu)", Method::Xu),
+        ("six positions", Method::SixPositions),
+    ];
+    let all: Vec<usize> = (0..12).collect();
+    // Nothing but scale factors and biases is what six positions find.
+    let diagonal = [0, 4, 8, 9, 10, 11];
+    let mut empty = Vec::new();
+    for (name, method) in methods {
+        for sensor in Sensor::BOTH {
+            let free = match method {
+                Method::SixPositions => &diagonal[..],
+                _ => &all,
+            };
+            empty.push(Tally::new(format!("{name}, {sensor}"), free));
+        }
+    }
+    over(runs, &empty, |seed, tallies| {
+        let plan = bench::table_plan(by_lot.then_some(seed));
+        let mut random = Random::new(seed, "unit");
+        let (gyro, accel) = (bench::gyro(&mut random), bench::accel(&mut random));
+        let file = bench::clean(gyro, accel);
+        let truths = of_the_session(&plan, &file, seed);
+        let prepared = bench::recorded(&plan, &file, seed);
+        for (m, (name, method)) in methods.into_iter().enumerate() {
+            let fitted = fit(prepared.clone(), options(method))
+                .unwrap_or_else(|e| panic!("{name}, seed {seed}: {e}"));
+            for (k, sensor) in Sensor::BOTH.into_iter().enumerate() {
+                tallies[2 * m + k].add(triad(&fitted, sensor), &truths[k]);
+            }
+        }
+    })
+}
+
+/// Both sensors on recordings by hand, with nothing known but the size of gravity. A gyro that is `quiet` beside
+/// its accelerometer shows whether the errors that all turns share, those of the accelerometer's calibration, are in its
+/// intervals.
+pub fn by_hand(runs: u64, quiet: bool) -> Vec<Tally> {
+    let note = if quiet { ", quiet gyro" } else { "" };
+    let all: Vec<usize> = (0..12).collect();
+    // The accelerometer defines the frame.
+    let lower = [0, 3, 4, 6, 7, 8, 9, 10, 11];
+    let empty = [
+        Tally::new(format!("by hand, gyro{note}"), &all),
+        Tally::new(format!("by hand, accel{note}"), &lower),
+    ];
+    let plan = bench::hand_plan(30);
+    over(runs, &empty, |seed, tallies| {
+        let mut random = Random::new(seed, "unit");
+        let (gyro, accel) = (bench::gyro(&mut random), bench::accel(&mut random));
+        let mut file = bench::clean(gyro, accel);
+        if quiet {
+            file.unit.gyro_axes.white_si = Some([0.005f64.to_radians(); 3]);
+            file.unit.gyro_axes.instability_si = Some([0.0; 3]);
+            file.unit.gyro_axes.walk_si = Some([0.0; 3]);
+        }
+        let truths = of_the_session(&plan, &file, seed);
+        let fitted = fit(
+            bench::recorded(&plan, &file, seed),
+            options(Method::LeastSquares),
+        )
+        .unwrap_or_else(|e| panic!("by hand, seed {seed}: {e}"));
+        for (k, sensor) in Sensor::BOTH.into_iter().enumerate() {
+            tallies[k].add(triad(&fitted, sensor), &truths[k]);
+        }
+    })
+}
