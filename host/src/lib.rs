@@ -11,10 +11,12 @@
 //! | [`triad`]       | calibration of one triad: both directions, covariances, physical quantities   |
 //! | [`fit`], [`plausible`] | both triads, judged on what they have not seen; what cannot be right is refused |
 //! | [`calibration`], [`verify`] | the file, and judging it by another recording                     |
+//! | [`design`]      | experiments: which attitudes and rates, how many, for how long                |
 //! | [`report`]      | all results as JSON and as text                                               |
 
 pub mod blocks;
 pub mod calibration;
+pub mod design;
 pub mod dwell;
 pub mod error;
 pub mod estimate;

@@ -1,5 +1,7 @@
 //! The command `mimu`: argument parsing and output around the library of the same name.
 
+mod design_args;
+
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -38,6 +40,8 @@ enum Command {
     Fit(FitArgs),
     /// Judge a calibration by another recording
     Verify(VerifyArgs),
+    /// Design the experiment: which attitudes and rates, how many, for how long
+    Design(design_args::DesignArgs),
 }
 
 #[derive(Args)]
@@ -183,6 +187,7 @@ fn main() -> ExitCode {
         Command::Import(args) => run_import(args),
         Command::Fit(args) => run_fit(&args),
         Command::Verify(args) => run_verify(&args),
+        Command::Design(args) => design_args::run(&args),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

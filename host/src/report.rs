@@ -2,9 +2,11 @@
 //!
 //! Both hold the same numbers. JSON is SI throughout; the text uses degrees and mm/s² where a person reads.
 
+mod design;
 mod json;
 mod text;
 
+pub use design::{DesignReport, comparison_json, comparison_text, design_json, design_text};
 pub use json::{fit_json, import_json, verify_json};
 pub(crate) use text::three;
 pub use text::{dwell_table, fit_text, import_text, verify_text};

@@ -5,8 +5,10 @@
 
 mod dwells;
 mod fang;
+mod intervals;
 mod page;
 mod plot;
+mod schemes;
 mod xu;
 
 use std::path::Path;
@@ -31,7 +33,9 @@ fn run(check: bool) -> Result<(), Box<dyn std::error::Error>> {
     let blocks: Vec<page::Block> = fang::blocks()
         .into_iter()
         .chain(xu::blocks())
+        .chain(schemes::blocks())
         .chain(dwells)
+        .chain(intervals::blocks())
         .collect();
     let computed = page::filled(&written, &blocks)?;
     if check {

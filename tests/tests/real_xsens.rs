@@ -3,10 +3,8 @@
 //! Known answers: what IMU-TK itself computes from these files, in sample and with the same four blocks of dwells held out.
 
 use mimu::dwell::Sensor;
-use mimu::fit::{Fit, Method};
-use mimu::recording::RawUnit;
 use mimu_core::compensation::Affine;
-use mimu_tests::recordings::{Foreign, Models, data_set, upper_triangular_frame, verdict};
+use mimu_tests::recordings::{Models, upper_triangular_frame, verdict, xsens};
 use nalgebra::{Matrix3, Vector3};
 
 /// IMU-TK: error over dwell means in mm/s² and direction error in degrees, in sample and held out.

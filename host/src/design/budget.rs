@@ -1,0 +1,187 @@
+//! Most out of so many minutes: how many dwells, how long, and how often the whole again.
+
+use rayon::prelude::*;
+
+use super::Problem;
+use super::model::Setting;
+use super::tour::Motion;
+use crate::dwell::Sensor;
+use crate::error::{Error, Result};
+use crate::noise::AllanModel;
+
+/// Noise of a sensor as density and floor, from which the sigma of a dwell mean follows.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DwellNoise {
+    /// White noise N, SI unit times √s (the same as per √Hz).
+    pub n: f64,
+    /// Bias instability B, SI unit.
+    pub b: f64,
+    /// Rate random walk K, SI unit per √s.
+    pub k: f64,
+}
+
+/// Flicker floor of the Allan deviation over B: √(2 ln 2/π).
+const FLOOR: f64 = 0.664;
+
+/// Time up to which fang, section 3, finds noise white, s.
+pub const FANG_WHITE_S: f64 = 20.0;
+
+impl DwellNoise {
+    /// Of fang's sensors. N from the variances of Table 5 at 25 °C, taken to be those of samples at 1 kHz,
+    /// and the scale factors of Table 4, both averaged over the axes; B such that the floor is reached at 20
+    /// s (section 3: white noise within, drift beyond; no number for B is given); K = 0.
+    pub fn fang(sensor: Sensor) -> Self {
+        let (variances, scales, si) = match sensor {
+            Sensor::Gyro => ([1.27, 0.92, 1.92], [5.07, 5.09, 5.17], 1f64.to_radians()),
+            Sensor::Accel => ([3.57, 4.23, 2.47], [80.80, 80.14, 80.84], 1.0),
+        };
+        let volts = (variances.iter().sum::<f64>() / 3.0 * 1e-5).sqrt();
+        let volts_per_unit = scales.iter().sum::<f64>() / 3.0 * 1e-3;
+        let n = volts / volts_per_unit * si * 1e-3f64.sqrt();
+        Self {
+            n,
+            b: n / FANG_WHITE_S.sqrt() / FLOOR,
+            k: 0.0,
+        }
+    }
+
+    /// The three terms, as an Allan variance.
+    fn allan(&self) -> AllanModel {
+        AllanModel {
+            white: self.n.powi(2),
+            flicker: (FLOOR * self.b).powi(2),
+            walk: self.k.powi(2) / 3.0,
+        }
+    }
+
+    /// Sigma of the mean over `dwell_s`, SI unit: `√(N²/T + (0.664 B)² + K² T/3)`.
+    pub fn sigma(&self, dwell_s: f64) -> f64 {
+        self.allan().variance(dwell_s).sqrt()
+    }
+
+    /// Dwell beyond which the mean gets worse, s.
+    fn longest_s(&self) -> f64 {
+        (self.allan().white / self.allan().walk).sqrt()
+    }
+
+    /// Shares of white noise, floor and random walk in the variance of a dwell mean.
+    pub fn shares(&self, dwell_s: f64) -> [f64; 3] {
+        let a = self.allan();
+        [a.white / dwell_s, a.flicker, a.walk * dwell_s].map(|v| v / a.variance(dwell_s))
+    }
+}
+
+/// One way to spend the time.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Spending {
+    /// The settings of one pass, ordered.
+    pub settings: Vec<Setting>,
+    /// Passes.
+    pub passes: usize,
+    /// Length of each dwell, s.
+    pub dwell_s: f64,
+    /// Time of all moves, s.
+    pub moves_s: f64,
+    /// Sigma of one dwell mean, SI unit.
+    pub sigma: f64,
+    /// Normalised mean sigma of the parameters over all passes; see
+    /// [`super::judgement::Judgement::mean_sigma`].
+    pub mean_sigma: f64,
+}
+
+impl Spending {
+    /// Dwells of all passes.
+    pub fn dwells(&self) -> usize {
+        self.settings.len() * self.passes
+    }
+
+    /// Time of all dwells and moves, s.
+    pub fn time_s(&self) -> f64 {
+        self.dwells() as f64 * self.dwell_s + self.moves_s
+    }
+
+    /// The settings of all passes.
+    pub fn all(&self) -> Vec<Setting> {
+        self.settings.repeat(self.passes)
+    }
+}
+
+/// The ways looked at.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Budget {
+    /// The one with the smallest mean sigma.
+    pub best: Spending,
+    /// The best with each number of different settings, ascending.
+    pub by_settings: Vec<Spending>,
+}
+
+/// Most settings in a pass.
+const MOST: usize = 40;
+/// Most passes.
+const PASSES: usize = 50;
+/// Shortest dwell, s: a controller and a settling filter allow no shorter ones.
+const SHORTEST_S: f64 = 1.0;
+
+/// Finds the number of settings, the number of passes and the dwell that make the parameters' mean sigma
+/// smallest within `budget_s`.
+pub fn spend(
+    problem: &Problem,
+    noise: &DwellNoise,
+    motion: &Motion,
+    budget_s: f64,
+    seed: u64,
+) -> Result<Budget> {
+    let widths = super::refinement::Region::widths(&problem.reach);
+    let least = widths.iter().max().copied().unwrap_or(0);
+    let sizes: Vec<usize> = (least..=MOST.max(least)).collect();
+    let ways: Vec<Option<Spending>> = sizes
+        .into_par_iter()
+        .map(|n| {
+            let settings = motion.ordered(&problem.best(n, seed)?);
+            Ok(passes(problem, noise, motion, budget_s, settings))
+        })
+        .collect::<Result<_>>()?;
+    let by_settings: Vec<Spending> = ways.into_iter().flatten().collect();
+    let best = by_settings
+        .iter()
+        .min_by(|a, b| a.mean_sigma.total_cmp(&b.mean_sigma))
+        .cloned();
+    match best {
+        Some(best) => Ok(Budget { best, by_settings }),
+        None => Err(Error::new(
+            format!("--budget {} min", budget_s / 60.0),
+            format!("the moves between {least} dwells and {SHORTEST_S} s for each take longer"),
+            "allow more time, or a table that moves faster",
+        )),
+    }
+}
+
+/// The best number of passes over `settings`.
+fn passes(
+    problem: &Problem,
+    noise: &DwellNoise,
+    motion: &Motion,
+    budget_s: f64,
+    settings: Vec<Setting>,
+) -> Option<Spending> {
+    let unit = problem.judge(&settings, 1.0).mean_sigma;
+    let (first, last) = (settings.first()?, settings.last()?);
+    let once = motion.moves_s(&settings);
+    // Not backwards, which would save the way back: two dwells in a row at the same setting share the drift.
+    let between = motion.between(last, first);
+    let ways = (1..=PASSES).filter_map(|passes| {
+        let moves_s = once * passes as f64 + between * (passes - 1) as f64;
+        let dwells = (settings.len() * passes) as f64;
+        let dwell_s = ((budget_s - moves_s) / dwells).min(noise.longest_s());
+        let sigma = noise.sigma(dwell_s);
+        (dwell_s >= SHORTEST_S).then(|| Spending {
+            settings: settings.clone(),
+            passes,
+            dwell_s,
+            moves_s,
+            sigma,
+            mean_sigma: unit * sigma / (passes as f64).sqrt(),
+        })
+    });
+    ways.min_by(|a, b| a.mean_sigma.total_cmp(&b.mean_sigma))
+}

@@ -1,0 +1,226 @@
+//! Continuous (approximate) D-optimal designs: weights on points, without regard to whole numbers of dwells.
+//!
+//! By the equivalence theorem of Kiefer and Wolfowitz (1960) weights are optimal if and only if the variance
+//! function `Σ f' M⁻¹ f` is nowhere above the number of parameters p, and `ln det M* - ln det M <= p
+//! ln(max/p)`: how near one is to the optimum is known without knowing it. Weights are moved between pairs of
+//! points, each move the best of its pair (vertex exchange of Böhning, Metrika 33, 1986; pairs as in the
+//! randomized exchange of Harman, Filová and Richtárik, JASA 115, 2020).
+
+use super::exchange;
+use super::information::{Inverse, Rows, dot};
+use super::refinement::{Region, climb};
+
+/// A continuous D-optimal design.
+#[derive(Debug, Clone)]
+pub struct Optimum<P> {
+    /// Points that carry weight. Only their information is unique: over the sphere many supports have the same.
+    pub points: Vec<P>,
+    /// Their weights, of sum 1.
+    pub weights: Vec<f64>,
+    /// Logarithm of `det M`.
+    pub log_det: f64,
+    /// Largest variance function over the region, over p, less 1: zero at the optimum.
+    pub excess: f64,
+    /// Number of parameters p.
+    pub parameters: usize,
+}
+
+impl<P> Optimum<P> {
+    /// D-efficiency of a design of `n` points with `log_det` of `F'F`: `(det(F'F/n) / det M*)^(1/p)`. The
+    /// share of dwells that the optimum would need for the same determinant.
+    pub fn efficiency(&self, log_det: f64, n: usize) -> f64 {
+        let p = self.parameters as f64;
+        (((log_det - self.log_det) / p).exp()) / n as f64
+    }
+}
+
+/// Bound that has to hold over the region, relative to p.
+pub const TOLERANCE: f64 = 1e-6;
+/// Bound aimed at on the candidates. Tighter, so that an exact design that attains the optimum has an
+/// efficiency of 1 to eight digits.
+const ON_CANDIDATES: f64 = 1e-8;
+/// Rounds of exchanges on one list of candidates.
+const ROUNDS: usize = 2000;
+/// Times that maxima between the candidates are added to them.
+const ADDITIONS: usize = 20;
+/// Weight below which a point is dropped.
+const NOTHING: f64 = 1e-12;
+/// Most points looked at on each side of a round's pairs.
+const PAIRS: usize = 60;
+
+/// The optimum over a region, starting from `candidates` that cover it.
+///
+/// Where the variance function rises above the bound between candidates, its maxima join them. `None` if the
+/// candidates do not determine the parameters.
+pub fn optimum<R: Region>(region: &R, candidates: &[R::Point]) -> Option<Optimum<R::Point>> {
+    let mut points = candidates.to_vec();
+    let mut rows = region.rows(&points);
+    let p = rows.parameters();
+    let mut weights = first_weights(&rows)?;
+    let mut best: Option<Optimum<R::Point>> = None;
+    for _ in 0..ADDITIONS {
+        let inverse = exchange_weights(&rows, &mut weights)?;
+        // Maxima between the candidates, from every candidate near the bound.
+        let variances = variances(&rows, &inverse);
+        let mut excess = variances.iter().copied().fold(0.0, f64::max) / p as f64 - 1.0;
+        let mut tops: Vec<usize> = (0..rows.len())
+            .filter(|&i| variances[i] > 0.9 * p as f64)
+            .collect();
+        tops.sort_by(|a, b| variances[*b].total_cmp(&variances[*a]));
+        tops.truncate(10 * PAIRS);
+        let mut new = Vec::new();
+        for i in tops {
+            let (point, height) = climb(region, &points[i], 0.05, |row| inverse.variance(row));
+            excess = excess.max(height / p as f64 - 1.0);
+            if height > p as f64 * (1.0 + ON_CANDIDATES) && height > variances[i] * (1.0 + 1e-9) {
+                new.push((point, height));
+            }
+        }
+        let found = Optimum {
+            points: support(&points, &weights),
+            weights: weights.iter().copied().filter(|w| *w > 0.0).collect(),
+            log_det: inverse.log_det(),
+            excess,
+            parameters: p,
+        };
+        if best.as_ref().is_none_or(|b| found.excess < b.excess) {
+            best = Some(found);
+        }
+        if excess <= 10.0 * ON_CANDIDATES || new.is_empty() {
+            break;
+        }
+        // The highest suffice: those left out are found again if they still rise above the bound.
+        new.sort_by(|a, b| b.1.total_cmp(&a.1));
+        for (point, _) in new.into_iter().take(PAIRS) {
+            points.push(point);
+            weights.push(0.0);
+        }
+        rows = region.rows(&points);
+    }
+    best
+}
+
+fn support<P: Clone>(points: &[P], weights: &[f64]) -> Vec<P> {
+    let carrying = points.iter().zip(weights).filter(|(_, w)| **w > 0.0);
+    carrying.map(|(point, _)| point.clone()).collect()
+}
+
+/// Equal weights on a good exact design.
+fn first_weights(rows: &Rows) -> Option<Vec<f64>> {
+    let n = 3 * rows.parameters();
+    let found = exchange::search(rows, n, 1, 0).into_iter().next()?;
+    let mut weights = vec![0.0; rows.len()];
+    for i in found.points {
+        weights[i] += 1.0 / n as f64;
+    }
+    Some(weights)
+}
+
+fn of_weights(rows: &Rows, weights: &[f64]) -> Option<Inverse> {
+    let carrying = weights
+        .iter()
+        .copied()
+        .enumerate()
+        .filter(|(_, w)| *w > 0.0);
+    Inverse::of(rows, carrying)
+}
+
+/// Variance function of every row.
+fn variances(rows: &Rows, inverse: &Inverse) -> Vec<f64> {
+    let blocks = 0..rows.widths().len();
+    let each = (0..rows.len()).map(|i| {
+        let of = |b| inverse.product(b, rows.row(b, i), rows.row(b, i));
+        blocks.clone().map(of).sum()
+    });
+    each.collect()
+}
+
+/// Moves weight between candidates until the bound holds on them.
+fn exchange_weights(rows: &Rows, weights: &mut [f64]) -> Option<Inverse> {
+    let p = rows.parameters() as f64;
+    let mut inverse = of_weights(rows, weights)?;
+    for _ in 0..ROUNDS {
+        let variances = variances(rows, &inverse);
+        if variances.iter().all(|d| *d <= p * (1.0 + ON_CANDIDATES)) {
+            break;
+        }
+        let mut high: Vec<usize> = (0..rows.len()).collect();
+        high.sort_by(|a, b| variances[*b].total_cmp(&variances[*a]));
+        let mut low: Vec<usize> = high
+            .iter()
+            .copied()
+            .rev()
+            .filter(|i| weights[*i] > 0.0)
+            .collect();
+        low.truncate(PAIRS);
+        high.truncate(low.len());
+        for &from in &low {
+            for &to in &high {
+                if from != to && weights[from] > 0.0 {
+                    let moved = best_move(rows, &inverse, to, from, weights[from]);
+                    if moved == 0.0 {
+                        continue;
+                    }
+                    for b in 0..rows.widths().len() {
+                        inverse.update(b, rows.row(b, to), moved);
+                        inverse.update(b, rows.row(b, from), -moved);
+                    }
+                    weights[to] += moved;
+                    weights[from] -= moved;
+                    if weights[from] < NOTHING {
+                        weights[from] = 0.0;
+                    }
+                }
+            }
+        }
+        let sum: f64 = weights.iter().sum();
+        weights.iter_mut().for_each(|w| *w /= sum);
+        inverse = of_weights(rows, weights)?;
+    }
+    Some(inverse)
+}
+
+/// Weight between 0 and `most` whose move to row `to` from row `from` makes the determinant largest.
+///
+/// `ln det` along the move is `Σ ln(1 + a (d_to - d_from) - a² (d_to d_from - d_cross²))` over the blocks,
+/// concave in a; for one block the maximum is Böhning's closed form.
+fn best_move(rows: &Rows, inverse: &Inverse, to: usize, from: usize, most: f64) -> f64 {
+    let curve: Vec<(f64, f64)> = (0..rows.widths().len())
+        .map(|b| {
+            let (f, g) = (rows.row(b, from), rows.row(b, to));
+            let v = inverse.times(b, g);
+            let (d_to, cross) = (dot(&v, g), dot(&v, f));
+            let d_from = inverse.product(b, f, f);
+            (d_to - d_from, d_to * d_from - cross * cross)
+        })
+        .collect();
+    let slope = |a: f64| -> f64 {
+        let each = curve.iter();
+        each.map(|(linear, square)| {
+            (linear - 2.0 * a * square) / (1.0 + a * linear - a * a * square)
+        })
+        .sum()
+    };
+    if !(slope(0.0) > 0.0) {
+        return 0.0;
+    }
+    if let [(linear, square)] = curve[..] {
+        return match linear / (2.0 * square) {
+            best if square > 0.0 => best.min(most),
+            _ => most,
+        };
+    }
+    if slope(most) > 0.0 {
+        return most;
+    }
+    let (mut below, mut above) = (0.0, most);
+    for _ in 0..50 {
+        let middle = 0.5 * (below + above);
+        if slope(middle) > 0.0 {
+            below = middle;
+        } else {
+            above = middle;
+        }
+    }
+    below
+}

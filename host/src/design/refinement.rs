@@ -1,0 +1,119 @@
+//! From candidates to a continuous region: designs and maxima of the variance function between the grid's
+//! points.
+
+use super::information::{Inverse, Rows};
+
+/// Where one can measure, and the regressor row there.
+pub trait Region: Sync {
+    /// A point of it.
+    type Point: Clone + Send + Sync;
+
+    /// Number of parameters of each block of a row.
+    fn widths(&self) -> Vec<usize>;
+
+    /// Appends the row of `point`, its blocks one after the other.
+    fn regressors(&self, point: &Self::Point, row: &mut Vec<f64>);
+
+    /// Points of the region about `step` away from `point` (full extent 1, or 1 rad), along all directions
+    /// that the region has there. Empty where it consists of single points.
+    fn neighbours(&self, point: &Self::Point, step: f64) -> Vec<Self::Point>;
+
+    /// Rows of `points`.
+    fn rows(&self, points: &[Self::Point]) -> Rows {
+        let mut rows = Rows::new(&self.widths());
+        let mut row = Vec::new();
+        for point in points {
+            row.clear();
+            self.regressors(point, &mut row);
+            rows.push(&row);
+        }
+        rows
+    }
+}
+
+/// First and last step of a search. 1e-7 from a maximum costs 1e-14 of it.
+const STEPS: [f64; 2] = [0.1, 1e-7];
+/// Gain in a logarithm of a determinant below which it is rounding.
+const GAIN: f64 = 1e-13;
+/// Most sweeps over a design.
+const SWEEPS: usize = 400;
+
+/// Climbs from `point` to the next maximum of `value`: a pattern search, whose step halves where no neighbour
+/// is better.
+///
+/// Derivatives would be faster and need every term twice; at these sizes the search takes microseconds.
+pub(super) fn climb<R: Region>(
+    region: &R,
+    point: &R::Point,
+    first: f64,
+    value: impl Fn(&[f64]) -> f64,
+) -> (R::Point, f64) {
+    let mut row = Vec::new();
+    let mut at = |point: &R::Point| {
+        row.clear();
+        region.regressors(point, &mut row);
+        value(&row)
+    };
+    let (mut best, mut height) = (point.clone(), at(point));
+    let mut step = first;
+    while step > STEPS[1] {
+        let mut moved = false;
+        for next in region.neighbours(&best, step) {
+            let new = at(&next);
+            if new > height + GAIN {
+                (best, height, moved) = (next, new, true);
+                break;
+            }
+        }
+        if !moved {
+            step /= 2.0;
+        }
+    }
+    (best, height)
+}
+
+/// Moves the points of a design, one after the other, until none can be moved to a larger determinant.
+///
+/// Returns the points and the logarithm of `det F'F`; `None` if the design does not determine the parameters.
+pub fn refine<R: Region>(region: &R, mut points: Vec<R::Point>) -> Option<(Vec<R::Point>, f64)> {
+    let mut rows = region.rows(&points);
+    let all = |rows: &Rows| Inverse::of(rows, (0..rows.len()).map(|i| (i, 1.0)));
+    let mut inverse = all(&rows)?;
+    let mut first = STEPS[0];
+    for _ in 0..SWEEPS {
+        let before = inverse.log_det();
+        for k in 0..points.len() {
+            // log of the factor by which the determinant grows when row f is exchanged for row g; see
+            // `exchange`.
+            let own: Vec<(Vec<f64>, f64)> = (0..rows.widths().len())
+                .map(|b| {
+                    let f = rows.row(b, k);
+                    (inverse.times(b, f), 1.0 - inverse.product(b, f, f))
+                })
+                .collect();
+            let gain = |row: &[f64]| {
+                let mut from = 0;
+                let mut gain = 0.0;
+                for (b, (v, keep)) in own.iter().enumerate() {
+                    let g = &row[from..from + v.len()];
+                    from += v.len();
+                    let cross = super::information::dot(v, g);
+                    gain += ((1.0 + inverse.product(b, g, g)) * keep + cross * cross).ln();
+                }
+                gain
+            };
+            let (moved, gained) = climb(region, &points[k], first, gain);
+            if gained > GAIN {
+                points[k] = moved;
+                rows = region.rows(&points);
+                inverse = all(&rows)?;
+            }
+        }
+        if inverse.log_det() - before < 10.0 * GAIN {
+            break;
+        }
+        first = (first / 2.0).max(1e-3);
+    }
+    let log_det = inverse.log_det();
+    Some((points, log_det))
+}

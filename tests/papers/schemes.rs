@@ -1,0 +1,82 @@
+//! The published schemes against the continuous optimum.
+
+use mimu::design::Problem;
+use mimu::design::judgement::Judgement;
+use mimu::design::model::{Model, Setting, Terms};
+use mimu::design::reach::{Carrier, Rates};
+use mimu::design::schemes::Scheme;
+use mimu::dwell::Sensor;
+use mimu::recording::Reference;
+
+use crate::page::{Block, Table, three};
+
+/// Sigmas of the parameters that `belongs` picks, as one number or lowest to highest.
+fn sigmas(judged: &Judgement, belongs: impl Fn(&str) -> bool) -> String {
+    let all = judged.parameters.iter();
+    let picked = all.filter(|p| belongs(&p.parameter.name)).map(|p| p.sigma);
+    let [low, high] = picked.fold([f64::INFINITY, 0.0_f64], |[low, high], s| {
+        [low.min(s), high.max(s)]
+    });
+    match (low.is_finite(), high.is_finite()) {
+        (true, true) if high < 1.005 * low => three(low),
+        (true, true) => format!("{} to {}", three(low), three(high)),
+        (true, false) => format!("{} to undetermined", three(low)),
+        _ => "undetermined".to_string(),
+    }
+}
+
+fn table(problem: &Problem, sensor: Sensor, sizes: &[usize]) -> Table {
+    let mut table = Table::new(&[
+        "scheme",
+        "dwells",
+        "D-efficiency",
+        "sigma of biases",
+        "sigma of scale factors",
+        "of misalignments",
+        "dof left",
+    ]);
+    let mut line = |name: String, settings: &[Setting]| {
+        let judged = problem.judge(settings, 1.0);
+        let same = |n: &str| n.len() == 4 && n[2..3] == n[3..4];
+        table.row([
+            name,
+            settings.len().to_string(),
+            format!("{:.3}", judged.d_efficiency),
+            sigmas(&judged, |n| n.len() == 3),
+            sigmas(&judged, same),
+            sigmas(&judged, |n| n.len() == 4 && !same(n)),
+            judged.lack_of_fit_dof.to_string(),
+        ]);
+    };
+    for scheme in Scheme::ALL {
+        if let Ok(settings) = scheme.settings(sensor) {
+            line(scheme.name().to_string(), &settings);
+        }
+    }
+    for &n in sizes {
+        let best = problem.best(n, 1).expect("enough dwells");
+        line(format!("our {n}"), &best);
+    }
+    table
+}
+
+/// Tables for the accelerometer by both references and for the gyro.
+pub fn blocks() -> Vec<Block> {
+    let accel = |reference| {
+        let model = Model::accel(reference, &Terms::default());
+        Problem::accel(model, Carrier::ThreeAxis).expect("determined")
+    };
+    let gyro = Model::gyro(&Terms::default(), Scheme::XuRates.rate_span());
+    let gyro = Problem::gyro(gyro, Carrier::ThreeAxis, Rates::Any).expect("determined");
+    vec![
+        Block::table(
+            "schemes, poses known",
+            &table(&accel(Reference::Table), Sensor::Accel, &[6, 8, 9, 33]),
+        ),
+        Block::table(
+            "schemes, size of gravity",
+            &table(&accel(Reference::Gravity), Sensor::Accel, &[9, 12, 33]),
+        ),
+        Block::table("schemes, rates", &table(&gyro, Sensor::Gyro, &[6, 9, 61])),
+    ]
+}
