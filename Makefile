@@ -4,7 +4,7 @@ TOOLCHAIN := $(shell sed -n 's/^channel = "\(.*\)"/\1/p' rust-toolchain.toml)
 TARGET := thumbv7em-none-eabihf
 CARGO := cargo +$(TOOLCHAIN)
 
-.PHONY: help test demo bench fuzz audit toolchain
+.PHONY: help test demo papers bench fuzz audit toolchain
 
 help: ## this list
 	@sed -n 's/^\([a-z]*\):.*## /  make \1\t/p' Makefile
@@ -27,10 +27,14 @@ test: toolchain ## formatting, lints, documentation, firmware, all tests
 	./tests/no_panic/check.sh $(CARGO)
 	$(CARGO) test --locked
 	$(CARGO) test --locked -p mimu-firmware --lib
+	$(CARGO) run --locked -p mimu-tests --bin papers -- --check
 
 demo: toolchain ## import and fit a recording: the best real one at hand, or the small one in tests/
 	$(CARGO) build --locked --release -p mimu
 	./tests/demo.sh target/release/mimu
+
+papers: toolchain ## compute every figure and plot of docs/papers.md
+	$(CARGO) run --locked --release -p mimu-tests --bin papers
 
 bench: toolchain ## rates and peak memory on four hours at 1 kHz
 	$(CARGO) bench --locked -p mimu --bench four_hours

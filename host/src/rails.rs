@@ -25,8 +25,10 @@ pub(crate) fn longest_run_by_chance(condensed: &Condensed, c: usize) -> Option<f
 
 /// Blocks in a row that have to be calm at an extreme.
 const CALM_BLOCKS: usize = 3;
-/// Standard deviation of a calm block, times that of the quietest tenth of the blocks elsewhere. Of ten samples of the
-/// same noise one block in four hundred is as calm, and three in a row one in sixty millions.
+/// Standard deviation of a calm block, times that of quiet ones: the quietest tenth of the blocks of this channel elsewhere, and the
+/// quietest twentieth of those of each other channel of the sensor, which are alike. (By itself neither will do: a gyro
+/// that is turned one way only rests at an end of its range, and elsewhere there is but motion.) Of ten
+/// samples of the same noise one block in four hundred is as calm, and three in a row one in sixty millions.
 const CALM: f64 = 0.4;
 /// Share of the range that counts as near an extreme.
 const NEAR: f64 = 0.1;
@@ -35,17 +37,25 @@ const NEAR: f64 = 0.1;
 /// 1 for the high end and -1 for the low one; the answer is the innermost value there.
 ///
 /// Repeated values, which tell a converter's rail, do not occur: behind a rail of the sensor the converter goes on making noise.
-fn calm_end(moments: impl Iterator<Item = Moments>, sign: f64, range: [f64; 2]) -> Option<f64> {
+fn calm_end(condensed: &Condensed, c: usize, sign: f64, range: [f64; 2]) -> Option<f64> {
     let [low, high] = range;
     let near = NEAR * (high - low);
     let end = if sign > 0.0 { high } else { low };
     let deviation = |m: &Moments| (m.m2 / f64::from(m.n.max(2) - 1)).sqrt();
-    let blocks: Vec<Moments> = moments.filter(|m| m.n > 2).collect();
+    let blocks_of = |c: usize| {
+        let all = condensed.blocks.iter().map(move |b| b.raw[c]);
+        all.filter(|m| m.n > 2)
+    };
+    let blocks: Vec<Moments> = blocks_of(c).collect();
     let elsewhere = blocks
         .iter()
         .filter(|m| m.mean > low + near && m.mean < high - near);
-    let mut deviations: Vec<f64> = elsewhere.map(deviation).collect();
-    let quiet = quantile(&mut deviations, 0.1)?;
+    let mut quiet = quantile(&mut elsewhere.map(deviation).collect::<Vec<_>>(), 0.1)?;
+    let sensor = if c < 3 { 0..3 } else { 3..6 };
+    for other in sensor.filter(|o| *o != c && condensed.has_raw[*o]) {
+        let mut deviations: Vec<f64> = blocks_of(other).map(|m| deviation(&m)).collect();
+        quiet = quiet.min(quantile(&mut deviations, 0.05)?);
+    }
     let calm = |m: &Moments| deviation(m) < CALM * quiet && (m.mean - end).abs() < near;
     // The outermost calm stretch: a pose near the end is calm at another value than the rail.
     let stretches = blocks.chunk_by(|a, b| calm(a) && calm(b));
@@ -125,7 +135,7 @@ pub(crate) fn find(
                 continue;
             }
             let sign = if value == high { 1.0 } else { -1.0 };
-            if let Some(inner) = calm_end(moments(), sign, [low, high]) {
+            if let Some(inner) = calm_end(condensed, c, sign, [low, high]) {
                 warnings.push(format!(
                     "{}: at its {name} values, from {inner} on, the noise is gone: taken for a rail of the sensor",
                     RAW_COLUMNS[c]

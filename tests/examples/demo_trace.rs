@@ -13,7 +13,7 @@ use mimu_tests::bench;
 
 const PLAN: &str = r#"
 format = "mimu-plan/1"
-sample_rate_hz = 100.0
+sample_rate_hz = 50.0
 carrier = "hands"
 [[step]]
 poses = 20

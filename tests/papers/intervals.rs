@@ -28,12 +28,21 @@ fn table(tallies: &[Tally]) -> Table {
     table
 }
 
+const NAMES: [&str; 3] = [
+    "intervals, by lot",
+    "intervals, as listed",
+    "intervals, by hand",
+];
+
 /// With a table in an order drawn by lot and as listed, and by hand.
 pub fn blocks() -> Vec<Block> {
     let hand = [by_hand(RUNS, false), by_hand(RUNS, true)].concat();
-    vec![
-        Block::table("intervals, by lot", &table(&with_a_table(RUNS, true))),
-        Block::table("intervals, as listed", &table(&with_a_table(RUNS, false))),
-        Block::table("intervals, by hand", &table(&hand)),
-    ]
+    let all = [with_a_table(RUNS, true), with_a_table(RUNS, false), hand];
+    let block = |(name, tallies): (_, &Vec<Tally>)| Block::table(name, &table(tallies));
+    NAMES.into_iter().zip(&all).map(block).collect()
+}
+
+/// The same blocks as they are in the document.
+pub fn kept() -> Vec<Block> {
+    NAMES.map(|name| Block { name, text: None }).into()
 }

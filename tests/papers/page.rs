@@ -114,3 +114,17 @@ pub fn filled(document: &str, blocks: &[Block]) -> Result<String, String> {
     }
     Ok(out)
 }
+
+/// Whether two lines have the same words and, to 3 %, the same numbers: a machine whose sine rounds another way is no error.
+pub fn agree(a: &str, b: &str) -> bool {
+    let words = |line: &str| -> Vec<String> {
+        let cells = line.replace('|', " ");
+        cells.split_whitespace().map(ToString::to_string).collect()
+    };
+    let same = |a: &String, b: &String| match (a.parse::<f64>(), b.parse::<f64>()) {
+        (Ok(a), Ok(b)) => (a - b).abs() <= 0.03 * a.abs().max(b.abs()),
+        _ => a == b,
+    };
+    let (a, b) = (words(a), words(b));
+    a.len() == b.len() && a.iter().zip(&b).all(|(a, b)| same(a, b))
+}
