@@ -110,8 +110,9 @@ impl Converter {
             for (i, v) in gyro.iter_mut().enumerate() {
                 *v = self.gyro.worth * self.code(*v * self.gyro.gain * per_volt);
                 if self.take_out_reference {
+                    // A dead pin reads 0, and no firmware divides by that.
                     let pin = self.code(pins.gyro_reference_v[i] * self.gyro.gain * per_volt);
-                    *v *= self.gyro.expected / pin;
+                    *v *= self.gyro.expected / pin.max(1.0);
                 }
             }
         } else {
@@ -121,8 +122,8 @@ impl Converter {
         if self.accel.analog {
             let mut worth = self.accel.worth;
             if self.take_out_reference {
-                worth *=
-                    self.accel.expected / self.code(pins.supply_v * self.half_supply * per_volt);
+                let pin = self.code(pins.supply_v * self.half_supply * per_volt);
+                worth *= self.accel.expected / pin.max(1.0);
             }
             for v in &mut accel {
                 *v = worth * self.code(*v * self.accel.gain * per_volt);

@@ -17,12 +17,9 @@ pub struct LowPass {
 impl LowPass {
     /// With time constant `tau_s` (0: no filter) and step `dt_s`, settled at `start`.
     pub fn new(tau_s: f64, dt_s: f64, start: f64) -> Self {
-        let keep = if tau_s > 0.0 {
-            (-dt_s / tau_s).exp()
-        } else {
-            0.0
-        };
-        let late = (1.0 - keep) * tau_s / dt_s;
+        let keep = (-dt_s / tau_s).exp();
+        // As a difference, 1 - keep loses the digits that a lag of hours at 20 kHz needs.
+        let late = -(-dt_s / tau_s).exp_m1() * tau_s / dt_s;
         Self {
             keep,
             before: late - keep,

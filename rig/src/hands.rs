@@ -12,6 +12,7 @@ use crate::motion::{Carrier, Instant, Motion};
 use crate::place::Place;
 use crate::plan::{Plan, Pose};
 use crate::random::Random;
+use crate::refusal::{Refusal, within};
 use crate::rotation::{Vector, scale};
 
 use choice::{Jolt, Turn, between, chosen};
@@ -91,48 +92,43 @@ impl Default for HandsTruth {
 }
 
 impl HandsTruth {
-    /// Refuses what no person does, and names the key.
-    pub fn check(&self) -> Result<(), String> {
-        let refuse =
-            |key: &str, remedy: &str| Err(format!("hands: `{key}` makes no sense; {remedy}"));
-        for (key, [low, high], lowest) in [
-            ("turn_s", self.turn_s, 0.1),
-            ("pause_s", self.pause_s, 0.0),
-            ("tremor_hz", self.tremor_hz, 0.0),
-            ("sway_hz", self.sway_hz, 0.0),
+    /// Refuses what no person does.
+    pub fn check(&self) -> Result<(), Refusal> {
+        let (angle, size) = ([0.0, 90.0], [0.0, 1000.0]);
+        let ranges: [(&str, &[f64], [f64; 2]); 18] = [
+            ("aim_deg", &[self.aim_deg], angle),
+            ("turn_s", &self.turn_s, [0.1, 60.0]),
+            ("pause_s", &self.pause_s, [0.0, 600.0]),
+            ("dwell_stretch", &[self.dwell_stretch], [0.0, 10.0]),
+            ("wander_deg", &[self.wander_deg], angle),
+            ("carry_mm", &[self.carry_mm], size),
+            ("lift_mm", &[self.lift_mm], size),
+            ("lever_mm", &self.lever_mm, [-1000.0, 1000.0]),
+            ("tremor_hz", &self.tremor_hz, [0.0, 100.0]),
+            ("tremor_mm", &[self.tremor_mm], size),
+            ("tremor_mrad", &[self.tremor_mrad], size),
+            ("sway_hz", &self.sway_hz, [0.0, 100.0]),
+            ("sway_mm", &[self.sway_mm], size),
+            ("sway_mrad", &[self.sway_mrad], size),
+            ("jolt_probability", &[self.jolt_probability], [0.0, 1.0]),
+            ("jolt_s", &[self.jolt_s], [0.001, 10.0]),
+            ("jolt_mm", &[self.jolt_mm], size),
+            ("jolt_mrad", &[self.jolt_mrad], size),
+        ];
+        for (key, values, range) in ranges {
+            within(&format!("hands.{key}"), values, range)?;
+        }
+        for (key, [low, high]) in [
+            ("turn_s", self.turn_s),
+            ("pause_s", self.pause_s),
+            ("tremor_hz", self.tremor_hz),
+            ("sway_hz", self.sway_hz),
         ] {
-            if !(low >= lowest && high >= low && high.is_finite()) {
-                return refuse(
-                    key,
-                    &format!("give the lowest and the highest, {lowest} or more"),
-                );
+            if low > high {
+                let problem = format!("`{key}` is from {low} to {high}");
+                let path = format!("hands.{key}");
+                return Err(Refusal::new(path, problem, "give the lowest first"));
             }
-        }
-        for (key, size) in [
-            ("aim_deg", self.aim_deg),
-            ("dwell_stretch", self.dwell_stretch),
-            ("wander_deg", self.wander_deg),
-            ("carry_mm", self.carry_mm),
-            ("lift_mm", self.lift_mm),
-            ("tremor_mm", self.tremor_mm),
-            ("tremor_mrad", self.tremor_mrad),
-            ("sway_mm", self.sway_mm),
-            ("sway_mrad", self.sway_mrad),
-            ("jolt_mm", self.jolt_mm),
-            ("jolt_mrad", self.jolt_mrad),
-        ] {
-            if !(size >= 0.0 && size.is_finite()) {
-                return refuse(key, "give a size, zero or more");
-            }
-        }
-        if !(0.0..=1.0).contains(&self.jolt_probability) {
-            return refuse("jolt_probability", "give 0 to 1");
-        }
-        if !(self.jolt_s >= 0.001 && self.jolt_s.is_finite()) {
-            return refuse("jolt_s", "give seconds, 0.001 or more");
-        }
-        if !self.lever_mm.iter().all(|x| x.is_finite()) {
-            return refuse("lever_mm", "give three finite numbers");
         }
         Ok(())
     }

@@ -36,6 +36,7 @@ pub mod place;
 pub mod plan;
 pub mod random;
 pub mod record;
+pub mod refusal;
 pub mod rig_file;
 pub mod rotation;
 pub mod sensor;

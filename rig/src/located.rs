@@ -1,8 +1,8 @@
 //! TOML that a person wrote: every complaint is one line with the file, the line, and what to do.
 
 use std::fmt::Display;
-use std::fs;
-use std::io::ErrorKind;
+use std::fs::File;
+use std::io::{ErrorKind, Read};
 use std::ops::Range;
 use std::path::Path;
 
@@ -51,6 +51,9 @@ const UNITS: [(&str, &str); 39] = [
     ("uv", "microvolts"),
 ];
 
+/// Most bytes that a file may have: ten thousand times what a person writes. More is another file, or a device.
+const LARGEST: u64 = 16 << 20;
+
 /// A text file and its name, for complaints that point into it.
 #[derive(Debug, Clone)]
 pub struct Source {
@@ -70,7 +73,18 @@ impl Source {
     /// Reads a file. A missing one, a directory, or one that is no UTF-8 text is refused in one line.
     pub fn read(path: &Path) -> Result<Self, String> {
         let name = path.display().to_string();
-        let bytes = match fs::read(path) {
+        let read = File::open(path).and_then(|file| {
+            let mut bytes = Vec::new();
+            file.take(LARGEST + 1).read_to_end(&mut bytes)?;
+            Ok(bytes)
+        });
+        let bytes = match read {
+            Ok(bytes) if bytes.len() as u64 > LARGEST => {
+                return Err(format!(
+                    "{name}: is larger than {} MiB; is it the right file?",
+                    LARGEST >> 20
+                ));
+            }
             Ok(bytes) => bytes,
             Err(e) if e.kind() == ErrorKind::NotFound => {
                 return Err(format!("{name}: there is no such file; check the path"));
@@ -164,11 +178,24 @@ impl Source {
                 "a string" => "text in quotes",
                 "a boolean" => "true or false",
                 "a sequence" => "a list in square brackets",
+                other if other.starts_with("struct ") => {
+                    "a table of keys, in [brackets] above them"
+                }
                 other => other,
             };
+            let what = what
+                .replace(": map", ": table")
+                .replace(": sequence", ": list");
             return (
                 format!("{}{what}", self.key_before(span)),
                 format!("give {wanted}"),
+            );
+        }
+        // Good TOML: then it is what a type of its own says that it expects.
+        if self.text.parse::<toml::Table>().is_ok() {
+            return (
+                format!("{}invalid value", self.key_before(span)),
+                format!("give {message}"),
             );
         }
         let message = message.trim().replace('\n', ", ");
@@ -178,14 +205,25 @@ impl Source {
         )
     }
 
-    /// "`key`: " where the line has a key before the value at `span`.
+    /// "`key`: " where the line has a key before the value at `span`, or is a table's heading.
     fn key_before(&self, span: &Range<usize>) -> String {
         let before = self.text.get(..span.start).unwrap_or_default();
-        let line = &before[before.rfind('\n').map_or(0, |at| at + 1)..];
-        match line.split_once('=') {
+        let begin = before.rfind('\n').map_or(0, |at| at + 1);
+        let heading = self.text[begin..].lines().next().unwrap_or_default().trim();
+        match before[begin..].split_once('=') {
             Some((key, _)) => format!("`{}`: ", key.trim()),
+            None if heading.starts_with('[') => format!("`{heading}`: "),
             None => String::new(),
         }
+    }
+}
+
+/// A number without three hundred zeros.
+pub(crate) fn written(x: f64) -> String {
+    if x == 0.0 || x.is_infinite() || (1e-4..1e7).contains(&x.abs()) {
+        x.to_string()
+    } else {
+        format!("{x:e}")
     }
 }
 

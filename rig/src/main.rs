@@ -11,11 +11,14 @@ use mimu_rig::rig_file::{RigFile, RigTruth};
 
 /// The virtual bench: inertial units with known truth on a turntable, in a chamber, or in a hand.
 #[derive(Parser)]
-#[command(version, arg_required_else_help = true)]
+#[command(version, arg_required_else_help = true, after_help = KEYS)]
 struct Cli {
     #[command(subcommand)]
     command: Command,
 }
+
+/// Where to go on reading.
+const KEYS: &str = "docs/bench.md has all keys of both files; rig/plans and rig/rigs have examples to copy.";
 
 #[derive(Subcommand)]
 enum Command {
@@ -28,6 +31,7 @@ enum Command {
 /// it makes the same samples again. What the rig file leaves open is drawn from the seed, within the
 /// tolerances of the data sheets.
 #[derive(clap::Args)]
+#[command(after_help = KEYS)]
 struct Record {
     /// What to do: poses, rates, temperatures.
     #[arg(value_name = "PLAN.toml")]

@@ -74,6 +74,17 @@ pub struct Step {
     at: Places,
 }
 
+impl Step {
+    /// Dwells in it.
+    pub fn dwells(&self) -> u64 {
+        let poses = match self.pose {
+            Pose::Up(_) => 1,
+            Pose::Many(poses) => poses,
+        };
+        u64::from(poses) * u64::from(self.repeat)
+    }
+}
+
 /// Pose of a step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Pose {

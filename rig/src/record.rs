@@ -35,7 +35,8 @@ pub struct Run<'a> {
 
 /// Carries out a plan in memory. The same plan, truth and seed give the same samples, bit by bit.
 ///
-/// Errors: the plan asks for what the table cannot do, or the truth has a table or hands that cannot be.
+/// Errors: the plan asks for what the table cannot do, it takes too long, or the truth has a table or hands that
+/// cannot be.
 pub fn samples<'a>(plan: &'a Plan, truth: &RigTruth, seed: u64) -> Result<Run<'a>, String> {
     let mut at = plan.clone();
     if !truth.earth_rate {
@@ -45,6 +46,7 @@ pub fn samples<'a>(plan: &'a Plan, truth: &RigTruth, seed: u64) -> Result<Run<'a
         CarriedBy::Table => Box::new(Table::new(&at, &truth.table)?),
         CarriedBy::Hands => Box::new(Hands::new(&at, &truth.hands, seed)?),
     };
+    plan.check_length(carrier.duration_s())?;
     Ok(Run {
         plan,
         // All before the end. The ends of dwells are sums: a rounding error beyond a sample is none.
@@ -108,7 +110,8 @@ impl Output {
         let mut truth = name.to_owned();
         truth.push(".truth.toml");
         Ok(Self {
-            folder: folder.to_owned(),
+            // Without a slash or a dot behind the name, which cannot be renamed to.
+            folder: folder.with_file_name(name),
             truth: folder.with_file_name(truth),
             samples: plan.samples,
             replace: false,

@@ -15,6 +15,7 @@ use crate::controller::{Controller, Dwell, INNER, MIDDLE, OUTER};
 use crate::motion::{Carrier, Instant};
 use crate::place::Place;
 use crate::plan::{Limits, Plan};
+use crate::refusal::{Refusal, within};
 use crate::rotation::{Rotation, Vector, scale};
 
 /// What the table truly is. Three numbers are those of the outer, the middle and the inner axis, unless
@@ -114,58 +115,48 @@ impl TableTruth {
         }
     }
 
-    /// Refuses what cannot be a table, and names the key.
-    pub fn check(&self) -> Result<(), String> {
-        let refuse =
-            |key: &str, remedy: &str| Err(format!("table: `{key}` makes no sense; {remedy}"));
+    /// Refuses what cannot be a table.
+    pub fn check(&self) -> Result<(), Refusal> {
         if self.axes != 2 && self.axes != 3 {
-            return refuse("axes", "give 2 or 3");
-        }
-        if !(self.middle_min_deg <= 0.0 && self.middle_max_deg >= 0.0) {
-            return refuse(
-                "middle_min_deg, middle_max_deg",
-                "give a range with zero in it",
-            );
-        }
-        for (key, rates) in [
-            ("max_rate_dps", self.max_rate_dps),
-            ("max_acceleration_dps2", self.max_acceleration_dps2),
-            ("slew_dps", self.slew_dps),
-        ] {
-            if !rates.iter().all(|r| *r > 0.0 && r.is_finite()) {
-                return refuse(key, "give three numbers above zero");
-            }
-        }
-        if !(self.settle_s >= 0.0 && self.settle_s.is_finite()) {
-            return refuse("settle_s", "give seconds, zero or more");
+            let problem = format!("`axes` is {}", self.axes);
+            return Err(Refusal::new("table.axes", problem, "give 2 or 3"));
         }
         let Settling {
             frequency_hz,
             damping,
             fraction,
         } = self.settling;
-        if !(frequency_hz > 0.0 && damping > 0.0 && damping < 1.0 && fraction.is_finite()) {
-            return refuse(
-                "settling",
-                "give a frequency above 0, a damping ratio above 0 and below 1, a finite fraction",
-            );
-        }
-        let flaws = [
-            self.wobble_arcsec,
-            self.mounting_arcsec,
-            self.rate_scale_ppm,
-            self.encoder_arcsec,
-            self.offset_mm,
+        // Ten degrees is no flaw of a table any more, but a board may be mounted any way.
+        let (flaw, any) = ([-36e3, 36e3], [-648e3, 648e3]);
+        let ranges: [(&str, &[f64], [f64; 2]); 15] = [
+            ("middle_min_deg", &[self.middle_min_deg], [-360.0, 0.0]),
+            ("middle_max_deg", &[self.middle_max_deg], [0.0, 360.0]),
+            ("max_rate_dps", &self.max_rate_dps, [0.01, 36e3]),
+            (
+                "max_acceleration_dps2",
+                &self.max_acceleration_dps2,
+                [0.01, 1e6],
+            ),
+            ("slew_dps", &self.slew_dps, [0.01, 36e3]),
+            ("settle_s", &[self.settle_s], [0.0, 3600.0]),
+            ("settling.frequency_hz", &[frequency_hz], [0.1, 1000.0]),
+            ("settling.damping", &[damping], [0.001, 0.999]),
+            ("settling.fraction", &[fraction], [0.0, 1.0]),
+            ("wobble_arcsec", &self.wobble_arcsec, flaw),
+            (
+                "nonorthogonality_arcsec",
+                &self.nonorthogonality_arcsec,
+                flaw,
+            ),
+            ("level_arcsec", &self.level_arcsec, flaw),
+            ("mounting_arcsec", &self.mounting_arcsec, any),
+            ("encoder_arcsec", &self.encoder_arcsec, flaw),
+            ("rate_scale_ppm", &self.rate_scale_ppm, [-1e5, 1e5]),
         ];
-        let finite = flaws
-            .iter()
-            .flatten()
-            .chain(&self.nonorthogonality_arcsec)
-            .chain(&self.level_arcsec);
-        if !finite.into_iter().all(|x| x.is_finite()) {
-            return Err("table: a flaw is not finite; give finite numbers".to_owned());
+        for (key, values, range) in ranges {
+            within(&format!("table.{key}"), values, range)?;
         }
-        Ok(())
+        within("table.offset_mm", &self.offset_mm, [-1e4, 1e4])
     }
 }
 

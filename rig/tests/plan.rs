@@ -6,6 +6,8 @@ use std::path::{Path, PathBuf};
 use mimu_rig::hands::{Hands, HandsTruth};
 use mimu_rig::located::Source;
 use mimu_rig::plan::{CarriedBy, Plan, Pose, Samples};
+use mimu_rig::record;
+use mimu_rig::rig_file::{RigFile, RigTruth};
 use mimu_rig::table::{Table, TableTruth};
 
 const HEAD: &str = "format = \"mimu-plan/1\"\nsample_rate_hz = 1000.0\ncarrier = \"table\"\n";
@@ -71,7 +73,7 @@ type Complaint = (&'static str, &'static str);
 
 #[test]
 fn mistakes_in_the_head_are_named_with_their_line() {
-    let cases: [(&str, Complaint); 21] = [
+    let cases: [(&str, Complaint); 23] = [
         ("", ("PLAN.toml:1: `format` is missing", "format")),
         (
             "\u{1}\u{2}garbage",
@@ -164,6 +166,14 @@ fn mistakes_in_the_head_are_named_with_their_line() {
             ("PLAN.toml:4: `lead_in_s` is -1", "give 0"),
         ),
         (
+            "HEADchamber_c = [[-1e308, 20], [1e308, 30]]",
+            ("PLAN.toml:4: `chamber_c`: time -1e308 s", "48 h"),
+        ),
+        (
+            "HEADdevice = \"a\\nb\"",
+            ("PLAN.toml:4: `device` is no name", "in one line"),
+        ),
+        (
             "HEADdevice = \" \"",
             ("PLAN.toml:4: `device`", "name the unit"),
         ),
@@ -197,7 +207,7 @@ fn mistakes_in_the_head_are_named_with_their_line() {
 
 #[test]
 fn mistakes_in_a_step_are_named_with_their_line() {
-    let cases: [(&str, Complaint); 24] = [
+    let cases: [(&str, Complaint); 25] = [
         ("dwell_s = 1", ("PLAN.toml:4: `up` is missing", "`poses")),
         (
             "up = [0, 0, 1]",
@@ -286,11 +296,11 @@ fn mistakes_in_a_step_are_named_with_their_line() {
         ),
         (
             "up = [0, 0, 1]\nrate_dps = inf\ndwell_s = 1",
-            ("PLAN.toml:6: `rate_dps` is inf", "finite"),
+            ("PLAN.toml:6: `rate_dps` is inf", "-36000 to 36000"),
         ),
         (
             "up = [0, 0, 1]\nheading_deg = nan\ndwell_s = 1",
-            ("PLAN.toml:6: `heading_deg` is NaN", "finite"),
+            ("PLAN.toml:6: `heading_deg` is NaN", "-360 to 360 degrees"),
         ),
         (
             "up = [0, 0, 1]\ndwell_s = 1\nrepeat = 0",
@@ -307,13 +317,23 @@ fn mistakes_in_a_step_are_named_with_their_line() {
         (
             "poses = 4000000000\ndwell_s = 0.001",
             (
-                "PLAN.toml:5: with this step there are 4000000000 dwells",
+                "PLAN.toml:5: up to this step the plan has 4000000000 dwells",
                 "100000 dwells",
             ),
         ),
         (
+            "[[step.up]]\nx = 1",
+            (
+                "PLAN.toml:5: `[[step.up]]`: invalid type: table",
+                "give a number",
+            ),
+        ),
+        (
             "up = [0, 0, 1]\nrepeat = 3\ndwell_s = 90000",
-            ("PLAN.toml:5: with this step", "48 h"),
+            (
+                "PLAN.toml:5: up to this step the plan has 3 dwells, 75.0 h",
+                "48 h",
+            ),
         ),
     ];
     for (step, complaint) in cases {
@@ -409,6 +429,34 @@ fn what_the_table_cannot_do_is_refused_with_its_limit_and_the_line_of_the_plan()
 }
 
 #[test]
+fn a_plan_that_takes_too_long_with_its_moves_or_samples_is_refused_before_it_begins() {
+    let truth = |text: &str| {
+        let source = Source::new("RIG.toml", format!("format = \"mimu-rig/1\"\n{text}"));
+        RigTruth::resolve(&RigFile::parse(&source).unwrap(), 1).unwrap()
+    };
+    let plan = parse(&format!("{HEAD}[[step]]\nposes = 90000\ndwell_s = 1\n")).unwrap();
+    let error = record::samples(&plan, &truth("[table]\nsettle_s = 60"), 1)
+        .err()
+        .unwrap();
+    assert!(
+        error.starts_with(
+            "PLAN.toml:5: with the moves from pose to pose the plan has 90000 dwells, "
+        ),
+        "{error}"
+    );
+    assert_complaint(
+        &format!(
+            "{}[[step]]\nposes = 1\ndwell_s = 172800\n",
+            HEAD.replace("1000.0", "20000")
+        ),
+        (
+            "PLAN.toml:5: up to this step the plan has 1 dwells, 48.0 h, 3.456e9 samples",
+            "2e8 samples",
+        ),
+    );
+}
+
+#[test]
 fn files_that_are_no_plans_are_refused_by_name() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
@@ -417,10 +465,14 @@ fn files_that_are_no_plans_are_refused_by_name() {
         b"format = \"mimu-plan/1\"\ndevice = \"\xe4\"\n",
     )
     .unwrap();
+    // A hole: it takes no room, and no time to write.
+    let large = fs::File::create(at("large.toml")).unwrap();
+    large.set_len(1 << 40).unwrap();
     for (path, beginning) in [
         (at("missing.toml"), "there is no such file"),
         (folder.path().to_path_buf(), "is a directory"),
         (at("latin.toml"), "is not UTF-8 text"),
+        (at("large.toml"), "is larger than 16 MiB"),
     ] {
         let error = Plan::read(&path).unwrap_err();
         assert!(error.contains(&*path.to_string_lossy()), "{error}");

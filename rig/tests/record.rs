@@ -276,6 +276,14 @@ fn nothing_is_overwritten_unasked_and_nothing_but_a_recording_ever() {
         "{complaint}"
     );
     assert_eq!(bench.read("table.toml"), TABLE);
+    // A rig file that somebody wrote has the format of a truth, and is none.
+    let complaint =
+        bench.refused("table.toml --rig rig.toml --seed 2 -o new --truth rig.toml --replace");
+    assert!(
+        complaint.contains("rig.toml: is there and is no truth"),
+        "{complaint}"
+    );
+    assert_eq!(bench.read("rig.toml"), RIG);
 }
 
 #[test]
@@ -312,9 +320,13 @@ fn a_run_that_fails_leaves_nothing_behind() {
     assert_eq!(bench.names(), there);
     assert_eq!(bench.run("table.toml -o rec").status.code(), Some(2));
     bench.record("table.toml --seed 1 -o rec");
-    let complaint = bench.refused("table.toml --seed 1 -o rec --truth rec/truth.toml --replace");
-    assert!(
-        complaint.contains("would stand in the recording"),
-        "{complaint}"
-    );
+    for truth in ["rec/truth.toml", "./rec/truth.toml", "rec", "./rec"] {
+        let complaint = bench.refused(&format!(
+            "table.toml --seed 1 -o rec --truth {truth} --replace"
+        ));
+        assert!(
+            complaint.contains("would stand in the recording"),
+            "{complaint}"
+        );
+    }
 }

@@ -188,7 +188,7 @@ fn a_complaint_names_the_line_what_is_wrong_and_what_to_do() {
         ),
         (
             "[unit]\ngyro = 3",
-            "3: not valid TOML: the name of a sensor, or a list of three; correct the line",
+            "3: `gyro`: invalid value; give the name of a sensor, or a list of three",
         ),
         (
             "[unit]\n\ngyro = \"ADXRS301\"",
@@ -200,11 +200,11 @@ fn a_complaint_names_the_line_what_is_wrong_and_what_to_do() {
         ),
         (
             "[unit.gyro_axes]\nwhite_si = [0, -1, 0]",
-            "3: `white_si` is -1; give 0 or a finite number above it",
+            "3: `white_si` is -1; give 0 to 1000",
         ),
         (
             "[unit.accel_axes]\nnull_raw = [1, 1, 1]\nsensitivity_raw_per_si = [0.08, 0, 0.08]",
-            "4: `sensitivity_raw_per_si` is 0; give a finite number other than 0",
+            "4: `sensitivity_raw_per_si` is 0; give 1e-9 or more, of either sign",
         ),
         (
             "[unit.gyro_axes]\ndirections = [[1, 0, 0], [0, 1, 0], [1, 1, 0.001]]",
@@ -212,7 +212,7 @@ fn a_complaint_names_the_line_what_is_wrong_and_what_to_do() {
         ),
         (
             "[unit.accel_affine]\nbias = [0, 0, 0]\nmatrix = [[1, 0, 0], [0, 0, 0], [0, 0, 1]]",
-            "4: axis y senses nothing; give its row a number other than 0",
+            "4: axis y senses nothing; give its row a number that is not 0 or next to it",
         ),
         (
             "[unit.gyro_axes]\nnull_raw = [0, 0, 0]\n[unit.gyro_affine]\nmatrix = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]\nbias = [0, 0, 0]",
@@ -220,12 +220,12 @@ fn a_complaint_names_the_line_what_is_wrong_and_what_to_do() {
         ),
         (
             "[thermal]\ndie_lag_s = [1, 1, 0, 1]",
-            "3: `die_lag_s` is 0; give a finite number above 0",
+            "3: `die_lag_s` is 0; give 0.01 to 1000000",
         ),
         ("[converter]\nbits = 0", "3: `bits` is 0; give 1 to 32"),
         (
             "[converter]\ngyro_divider = 1.5",
-            "3: `gyro_divider` is 1.5; give a number above 0 and up to 1",
+            "3: `gyro_divider` is 1.5; give 0.01 to 1",
         ),
         (
             "[unit]\naccel = \"MPU6050-accel\"\n[converter]\nraw_unit = \"V\"",
@@ -248,8 +248,41 @@ fn a_complaint_names_the_line_what_is_wrong_and_what_to_do() {
             "6: `mg_per_hour` is not a list of 3 numbers; give a list of 3 numbers, all finite",
         ),
         (
+            "[unit.accel_axes]\nhigh_raw = 0.2",
+            "3: the lowest output, 0.25, is not below the highest, 0.2; give `low_raw` and `high_raw`, the lower first",
+        ),
+        (
+            "[unit]\ngyro = \"MPU6050-gyro\"\ngyro_reference_v = [2.5, 2.5, 2.5]",
+            "4: MPU6050-gyro has no reference pin; remove it",
+        ),
+        ("[table]\naxes = 4", "3: `axes` is 4; give 2 or 3"),
+        (
+            "[table]\naxes = 3\nsettle_s = 1e308",
+            "4: `settle_s` is 1e308; give 0 to 3600",
+        ),
+        (
+            "[table.settling]\ndamping = 1",
+            "3: `damping` is 1; give 0.001 to 0.999",
+        ),
+        (
+            "table = 3",
+            "2: `table`: invalid type: integer `3`; give a table of keys, in [brackets] above them",
+        ),
+        (
+            "[hands]\nheld = true\naim_deg = nan",
+            "4: `aim_deg` is NaN; give 0 to 90",
+        ),
+        (
+            "[hands]\nturn_s = [3, 1]",
+            "3: `turn_s` is from 3 to 1; give the lowest first",
+        ),
+        (
+            "[[effect]]\nid = \"accel_thermal_misalignment\"\nmatrix_urad_per_c = [[1, 0, 0], [0, 0, 0], [0, 0, 0]]",
+            "4: `matrix_urad_per_c` has a diagonal, which is a scale factor's part; give zeros there",
+        ),
+        (
             "[[effect]]\nid = \"gyro_warm_up\"\ntime_constant_s = 0",
-            "4: `time_constant_s` of `gyro_warm_up` is impossible; give a number above 0",
+            "4: `time_constant_s` is 0; give 0.06 to 600000",
         ),
         (
             "[[effect]]\nid = \"gyro_warm_up\"\n[[effect]]\nid = \"gyro_warm_up\"",

@@ -7,7 +7,7 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::{CarriedBy, Places, Plan, Pose, Samples, Step};
-use crate::located::Source;
+use crate::located::{Source, written};
 use crate::place::Place;
 use crate::rotation::{Vector, norm, scale};
 
@@ -15,6 +15,10 @@ use crate::rotation::{Vector, norm, scale};
 const LONGEST_S: f64 = 48.0 * 3600.0;
 /// Most dwells in one plan, for the same reason.
 const MOST_DWELLS: u64 = 100_000;
+/// Most samples, for the same reason: 48 h at 1 kHz are 173 million, and each is some hundred bytes on disk.
+const MOST_SAMPLES: f64 = 200e6;
+/// Beyond any centrifuge that takes a board, degrees per second.
+const FASTEST_DPS: f64 = 36_000.0;
 /// What people write for a key.
 const SYNONYMS: [(&str, &str); 16] = [
     ("chamber_temp", "chamber_c"),
@@ -82,11 +86,12 @@ impl Plan {
                 "give a plan, with format = \"mimu-plan/1\"",
             ));
         }
-        if raw.device.get_ref().trim().is_empty() {
+        let device = raw.device.get_ref();
+        if device.trim().is_empty() || device.contains(char::is_control) {
             return Err(source.error(
                 &raw.device.span(),
-                "`device` has no name",
-                "name the unit, or leave the key out",
+                "`device` is no name",
+                "name the unit in one line, or leave the key out",
             ));
         }
         let sample_rate_hz =
@@ -116,9 +121,9 @@ impl Plan {
             .iter()
             .map(|step| reader.step(step, raw.carrier, sample_rate_hz))
             .collect::<Result<Vec<_>, _>>()?;
-        reader.length(lead_in_s, &steps)?;
+        reader.length(lead_in_s, sample_rate_hz, &steps)?;
         Ok(Self {
-            device: raw.device.get_ref().clone(),
+            device: device.clone(),
             sample_rate_hz,
             samples: raw.samples.unwrap_or(Samples::Parquet),
             carrier: raw.carrier,
@@ -130,6 +135,45 @@ impl Plan {
             source,
         })
     }
+}
+
+impl Plan {
+    /// Refuses a plan that takes too long with the moves from pose to pose, at its last step.
+    pub(crate) fn check_length(&self, duration_s: f64) -> Result<(), String> {
+        let last = self.steps.last().map_or(0..0, |step| step.at.pose.clone());
+        let dwells = self.steps.iter().map(Step::dwells).sum();
+        let what = "with the moves from pose to pose the plan has";
+        too_long(
+            &self.source,
+            &last,
+            what,
+            dwells,
+            duration_s,
+            self.sample_rate_hz,
+        )
+    }
+}
+
+fn too_long(
+    source: &Source,
+    at: &Range<usize>,
+    what: &str,
+    dwells: u64,
+    seconds: f64,
+    rate_hz: f64,
+) -> Result<(), String> {
+    let samples = seconds * rate_hz;
+    if seconds <= LONGEST_S && samples <= MOST_SAMPLES && dwells <= MOST_DWELLS {
+        return Ok(());
+    }
+    let (hours, most_hours) = (seconds / 3600.0, LONGEST_S / 3600.0);
+    Err(source.error(
+        at,
+        format_args!("{what} {dwells} dwells, {hours:.1} h, {samples:.3e} samples"),
+        format_args!(
+            "stay within {MOST_DWELLS} dwells, {most_hours} h (`dwell_s` is in seconds), {MOST_SAMPLES:e} samples"
+        ),
+    ))
 }
 
 /// What is checked after parsing.
@@ -149,24 +193,23 @@ impl Reader<'_> {
         if x >= low && x <= high {
             return Ok(x);
         }
-        let problem = format!("`{key}` is {x}");
-        Err(self.source.error(
-            &value.span(),
-            problem,
-            format_args!("give {low} to {high} {unit}"),
-        ))
+        let problem = format!("`{key}` is {}", written(x));
+        let remedy = format_args!("give {low} to {high} {unit}");
+        Err(self.source.error(&value.span(), problem, remedy))
     }
 
-    fn finite(&self, key: &str, value: &Option<Spanned<f64>>) -> Result<f64, String> {
-        match value {
-            Some(value) if value.get_ref().is_finite() => Ok(*value.get_ref()),
-            Some(value) => Err(self.source.error(
-                &value.span(),
-                format_args!("`{key}` is {}", value.get_ref()),
-                "give a finite number",
-            )),
-            None => Ok(0.0),
-        }
+    /// As [`Reader::within`], 0 for what is left out, and in radians.
+    fn angle(
+        &self,
+        key: &str,
+        value: &Option<Spanned<f64>>,
+        most: f64,
+        unit: &str,
+    ) -> Result<f64, String> {
+        let degrees = value
+            .as_ref()
+            .map(|v| self.within(key, v, [-most, most], unit));
+        Ok(degrees.transpose()?.unwrap_or(0.0).to_radians())
     }
 
     fn step(
@@ -215,7 +258,7 @@ impl Reader<'_> {
         };
         let dwell_s = *raw.dwell_s.get_ref();
         if !(dwell_s.is_finite() && dwell_s * sample_rate_hz >= 1.0) {
-            let problem = format!("`dwell_s` is {dwell_s}");
+            let problem = format!("`dwell_s` is {}", written(dwell_s));
             return refuse(
                 &raw.dwell_s.span(),
                 &problem,
@@ -245,11 +288,11 @@ impl Reader<'_> {
         Ok(Step {
             pose,
             heading: match &raw.heading_deg {
-                Some(_) => Some(self.finite("heading_deg", &raw.heading_deg)?.to_radians()),
+                Some(_) => Some(self.angle("heading_deg", &raw.heading_deg, 360.0, "degrees")?),
                 None => None,
             },
-            rate: self.finite("rate_dps", &raw.rate_dps)?.to_radians(),
-            spin: self.finite("spin_dps", &raw.spin_dps)?.to_radians(),
+            rate: self.angle("rate_dps", &raw.rate_dps, FASTEST_DPS, "degrees per second")?,
+            spin: self.angle("spin_dps", &raw.spin_dps, FASTEST_DPS, "degrees per second")?,
             dwell_s,
             repeat,
             at: Places {
@@ -266,30 +309,15 @@ impl Reader<'_> {
         })
     }
 
-    /// Refuses more than the longest recording, at the step where it becomes too long. Transit is not
-    /// counted.
-    fn length(&self, lead_in_s: f64, steps: &[Step]) -> Result<(), String> {
+    /// Refuses more than the longest recording, at the step where it becomes too long. Moves come on top, see
+    /// [`Plan::check_length`].
+    fn length(&self, lead_in_s: f64, rate_hz: f64, steps: &[Step]) -> Result<(), String> {
         let (mut seconds, mut dwells) = (lead_in_s, 0_u64);
         for step in steps {
-            let count = match step.pose {
-                Pose::Up(_) => u64::from(step.repeat),
-                Pose::Many(poses) => u64::from(poses) * u64::from(step.repeat),
-            };
-            seconds += count as f64 * step.dwell_s;
-            dwells += count;
-            if seconds > LONGEST_S || dwells > MOST_DWELLS {
-                return Err(self.source.error(
-                    &step.at.pose,
-                    format_args!(
-                        "with this step there are {dwells} dwells, {:.1} h of them",
-                        seconds / 3600.0
-                    ),
-                    format_args!(
-                        "stay within {MOST_DWELLS} dwells and {} h (`dwell_s` is in seconds)",
-                        LONGEST_S / 3600.0
-                    ),
-                ));
-            }
+            seconds += step.dwells() as f64 * step.dwell_s;
+            dwells += step.dwells();
+            let what = "up to this step the plan has";
+            too_long(self.source, &step.at.pose, what, dwells, seconds, rate_hz)?;
         }
         Ok(())
     }
@@ -298,7 +326,12 @@ impl Reader<'_> {
         let mut last = f64::NEG_INFINITY;
         for point in raw {
             let [t, c] = *point.get_ref();
-            if !(t.is_finite() && t > last) {
+            if !(t.abs() <= LONGEST_S) {
+                let problem = format!("`chamber_c`: time {} s", written(t));
+                let remedy = "give times within 48 h of the beginning, in seconds";
+                return Err(self.source.error(&point.span(), problem, remedy));
+            }
+            if t <= last {
                 let problem = format!("`chamber_c`: time {t} s does not come after the one before");
                 return Err(self.source.error(
                     &point.span(),
@@ -308,7 +341,7 @@ impl Reader<'_> {
             }
             // Beyond what chambers and silicon stand; 298 is a temperature in kelvins.
             if !(-100.0..=200.0).contains(&c) {
-                let problem = format!("`chamber_c`: {c} °C at {t} s");
+                let problem = format!("`chamber_c`: {} °C at {t} s", written(c));
                 return Err(self.source.error(
                     &point.span(),
                     problem,

@@ -3,10 +3,9 @@
 use std::fmt::Display;
 use std::fs;
 use std::io;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
-use tempfile::TempDir;
 
 use super::{Output, Run, storage};
 use crate::converter::RawUnit;
@@ -17,6 +16,9 @@ use crate::rig_file::{self, RigTruth};
 const FORMAT: &str = "mimu-recording/1";
 /// All that a recording may have in it.
 const FILES: [&str; 3] = ["recording.toml", "samples.csv", "samples.parquet"];
+
+/// How the file of a truth begins, and a rig file that somebody wrote does not.
+const TRUTH: &str = "# The truth of the recording ";
 
 /// `recording.toml`.
 #[derive(Serialize)]
@@ -47,16 +49,17 @@ fn parent(path: &Path) -> &Path {
 /// Refuses places where nothing can or must be written, before any time is spent.
 pub(super) fn check(output: &Output) -> Result<(), String> {
     let Output { folder, truth, .. } = output;
-    for path in [folder, truth] {
-        if !parent(path).is_dir() {
-            return Err(said(
-                path,
-                "the folder that it is to stand in is not there",
-                "make it first",
-            ));
+    // Two ways to one place must not look like two places.
+    let place = |path: &Path| {
+        match (parent(path).canonicalize(), path.file_name()) {
+            (Ok(parent), Some(name)) if parent.is_dir() => Ok(parent.join(name)),
+            _ => {
+                let problem = "the folder that it is to stand in is not there";
+                Err(said(path, problem, "make it first"))
+            }
         }
-    }
-    if truth.starts_with(folder) {
+    };
+    if place(truth)?.starts_with(place(folder)?) {
         let remedy = "write it elsewhere: who reads the recording must not see it";
         return Err(said(
             truth,
@@ -81,7 +84,8 @@ pub(super) fn check(output: &Output) -> Result<(), String> {
         }
     }
     if truth.symlink_metadata().is_ok() {
-        if !has_format(truth, rig_file::FORMAT) {
+        let begins = fs::read_to_string(truth).is_ok_and(|text| text.starts_with(TRUTH));
+        if !begins || !has_format(truth, rig_file::FORMAT) {
             return Err(said(
                 truth,
                 "is there and is no truth",
@@ -177,26 +181,61 @@ pub(super) fn write(
     stored.map_err(failed(folder))?;
     let name = folder.file_name().unwrap_or_default().to_string_lossy();
     let text = format!(
-        "# The truth of the recording {name}, made with seed {seed}. As a rig file, with the same plan and seed, it\n\
+        "{TRUTH}{name}, made with seed {seed}. As a rig file, with the same plan and seed, it\n\
          # makes the same samples again. It judges estimates; whatever makes them must not read it.\n\n{}",
         truth.file.to_toml()
     );
     fs::write(&new_truth, text).map_err(failed(truth_path))?;
-    put(&beside, &new, folder).map_err(failed(folder))?;
-    fs::rename(&new_truth, truth_path).map_err(failed(truth_path))
+    let (old, old_truth) = (beside.path().join("old"), truth_beside.path().join("old"));
+    let away = [(folder, folder, &old), (truth_path, truth_path, &old_truth)];
+    let here = [(truth_path, &new_truth, truth_path), (folder, &new, folder)];
+    // What was not there when the run began has come since then: it is left alone.
+    let away = away
+        .into_iter()
+        .filter(|(path, ..)| output.replace && path.symlink_metadata().is_ok());
+    put(&away.chain(here).collect::<Vec<_>>()).map_err(|(path, e)| failed(path)(e))
 }
 
-/// Moves a finished folder to its place; what stood there goes away with the temporary folder.
-fn put(beside: &TempDir, new: &Path, folder: &Path) -> io::Result<()> {
-    let old = beside.path().join("old");
-    let there = folder.exists();
-    if there {
-        fs::rename(folder, &old)?;
-    }
-    fs::rename(new, folder).inspect_err(|_| {
-        // Nothing has come of it: what was there goes back.
-        if there {
-            let _ = fs::rename(&old, folder);
+/// Carries out moves (of what, from, to) in their order, all or none. Errors: what could not be moved.
+///
+/// An old recording goes first and the new one comes last: cut short anywhere, no recording stands without its
+/// truth or beside another's.
+fn put<'a>(moves: &[(&'a PathBuf, &PathBuf, &PathBuf)]) -> Result<(), (&'a Path, io::Error)> {
+    for (i, (what, from, to)) in moves.iter().enumerate() {
+        if let Err(e) = fs::rename(from, to) {
+            // Nothing has come of it: everything goes back, the last first.
+            for (_, from, to) in moves[..i].iter().rev() {
+                let _ = fs::rename(to, from);
+            }
+            return Err((what, e));
         }
-    })
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_move_that_fails_takes_back_those_before_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let [rec, old, truth, new_truth, new] =
+            ["rec", "old", "truth", "new_truth", "new"].map(|name| folder.path().join(name));
+        fs::write(&rec, "old recording").unwrap();
+        fs::write(&new_truth, "new truth").unwrap();
+        // There is no new recording to move.
+        let moves = [
+            (&rec, &rec, &old),
+            (&truth, &new_truth, &truth),
+            (&rec, &new, &rec),
+        ];
+        let (what, error) = put(&moves).unwrap_err();
+        assert_eq!(
+            (what, error.kind()),
+            (rec.as_path(), io::ErrorKind::NotFound)
+        );
+        assert_eq!(fs::read_to_string(&rec).unwrap(), "old recording");
+        assert!(!truth.exists() && new_truth.exists() && !old.exists());
+    }
 }

@@ -4,68 +4,37 @@ use super::{AxesFile, FORMAT, Parts, RigFile};
 use crate::catalog::{Kind, Sensor, sensor, sensors};
 use crate::converter::RawUnit;
 use crate::effects::specs;
+use crate::located::written;
+use crate::refusal::{Refusal, within};
 use crate::rotation::{Vector, cross, dot, norm, scale};
 
 /// Smallest volume that three unit directions may span: 1 is orthogonal, 0 in one plane. fang's table 3,
 /// far beyond any unit, has 0.65.
 const LEAST_VOLUME: f64 = 0.05;
+/// Raw per SI, and the length of a direction, below which an axis senses nothing.
+const LEAST_GAIN: f64 = 1e-9;
 
-/// One thing that is wrong, and where.
-pub(super) struct Bad {
-    pub path: String,
-    pub problem: String,
-    pub remedy: String,
-}
+// Ranges of numbers, see `within`.
+const GAIN: [f64; 2] = [-1e9, 1e9];
+/// Twice the codes of 32 bits.
+const RAW: [f64; 2] = [-1e10, 1e10];
+const BANDWIDTH: [f64; 2] = [0.001, f64::INFINITY];
+const LAG: [f64; 2] = [0.01, 1e6];
+const HEATING: [f64; 2] = [0.0, 100.0];
 
-fn bad(
+fn refuse(
     path: impl Into<String>,
     problem: impl Into<String>,
     remedy: impl Into<String>,
-) -> Result<(), Bad> {
-    Err(Bad {
-        path: path.into(),
-        problem: problem.into(),
-        remedy: remedy.into(),
-    })
-}
-
-/// What a number must be. Infinity is no filter, or warmed up for ever.
-#[derive(Clone, Copy)]
-enum Must {
-    BeFinite,
-    BePositive,
-    BePositiveOrInf,
-    NotBeNegative,
-    NotBeNegativeOrInf,
-    BeAFraction,
-}
-
-fn number(path: &str, values: &[f64], must: Must) -> Result<(), Bad> {
-    let key = path.rsplit('.').next().unwrap_or(path);
-    for &v in values {
-        let (good, remedy) = match must {
-            Must::BeFinite => (v.is_finite(), "give a finite number"),
-            Must::BePositive => (v > 0.0 && v.is_finite(), "give a finite number above 0"),
-            Must::BePositiveOrInf => (v > 0.0, "give a number above 0, or inf"),
-            Must::NotBeNegative => (
-                v >= 0.0 && v.is_finite(),
-                "give 0 or a finite number above it",
-            ),
-            Must::NotBeNegativeOrInf => (v >= 0.0, "give 0 or more, or inf"),
-            Must::BeAFraction => (v > 0.0 && v <= 1.0, "give a number above 0 and up to 1"),
-        };
-        if !good {
-            return bad(path, format!("`{key}` is {v}"), remedy);
-        }
-    }
-    Ok(())
+) -> Result<(), Refusal> {
+    Err(Refusal::new(path, problem, remedy))
 }
 
 impl RigFile {
     /// Complains of the first thing that is wrong.
-    pub(super) fn check(&self) -> Result<(), Bad> {
+    pub(super) fn check(&self) -> Result<(), Refusal> {
         if self.format != FORMAT {
-            return bad(
+            return refuse(
                 "format",
                 format!("format is \"{}\"", self.format),
                 format!("write \"{FORMAT}\""),
@@ -74,20 +43,16 @@ impl RigFile {
         let gyro = self.sensors(Kind::Gyro)?;
         let accel = self.sensors(Kind::Accel)?;
         let unit = &self.unit;
-        axes("unit.gyro_axes", &unit.gyro_axes)?;
-        axes("unit.accel_axes", &unit.accel_axes)?;
+        axes("unit.gyro_axes", &unit.gyro_axes, &gyro)?;
+        axes("unit.accel_axes", &unit.accel_axes, &accel)?;
         for (name, affine, axes) in [
             ("gyro", &unit.gyro_affine, &unit.gyro_axes),
             ("accel", &unit.accel_affine, &unit.accel_axes),
         ] {
             let Some(affine) = affine else { continue };
             let path = format!("unit.{name}_affine.matrix");
-            number(&path, affine.matrix.as_flattened(), Must::BeFinite)?;
-            number(
-                &format!("unit.{name}_affine.bias"),
-                &affine.bias,
-                Must::BeFinite,
-            )?;
+            within(&path, affine.matrix.as_flattened(), GAIN)?;
+            within(&format!("unit.{name}_affine.bias"), &affine.bias, RAW)?;
             span(&path, &affine.matrix)?;
             for (key, stated) in [
                 ("directions", axes.directions.is_some()),
@@ -98,7 +63,7 @@ impl RigFile {
                 ("null_raw", axes.null_raw.is_some()),
             ] {
                 if stated {
-                    return bad(
+                    return refuse(
                         format!("unit.{name}_axes.{key}"),
                         format!("`{key}` is stated twice: [unit.{name}_affine] has it too"),
                         "remove one of them",
@@ -107,27 +72,29 @@ impl RigFile {
             }
         }
         self.check_numbers()?;
+        self.table.check()?;
+        self.hands.check()?;
         let analog = [&gyro, &accel].map(|parts| parts[0].output == RawUnit::V);
         if self.converter.raw_unit == Some(RawUnit::V) && !(analog[0] && analog[1]) {
-            return bad(
+            return refuse(
                 "converter.raw_unit",
                 "a digital part gives no volts",
                 "write \"count\"",
             );
         }
-        if self.converter.take_out_reference == Some(true)
-            && analog[0]
-            && gyro[0].reference_v.is_none()
-        {
-            return bad(
-                "converter.take_out_reference",
-                format!("{} has no reference pin to convert", gyro[0].name),
-                "write false, or take another gyro",
-            );
+        if gyro[0].reference_v.is_none() {
+            let problem = format!("{} has no reference pin", gyro[0].name);
+            if unit.gyro_reference_v.is_some() {
+                return refuse("unit.gyro_reference_v", problem, "remove it");
+            }
+            if self.converter.take_out_reference == Some(true) && analog[0] {
+                let remedy = "write false, or take another gyro";
+                return refuse("converter.take_out_reference", problem, remedy);
+            }
         }
         let kinds = specs().count();
         if self.draw_effects.is_some_and(|n| n > kinds) {
-            return bad(
+            return refuse(
                 "draw_effects",
                 "more effects than there are",
                 format!("give at most {kinds}"),
@@ -136,7 +103,7 @@ impl RigFile {
         for (i, effect) in self.effect.iter().enumerate() {
             if self.effect[..i].iter().any(|other| other.id == effect.id) {
                 let remedy = "remove one, or put all of it into the other";
-                return bad(
+                return refuse(
                     format!("effect.{i}.id"),
                     format!("effect `{}` stands twice", effect.id),
                     remedy,
@@ -147,116 +114,79 @@ impl RigFile {
         Ok(())
     }
 
-    fn check_numbers(&self) -> Result<(), Bad> {
-        use Must::{BeAFraction, BeFinite, BePositive, NotBeNegative, NotBeNegativeOrInf};
+    fn check_numbers(&self) -> Result<(), Refusal> {
         let (unit, thermal, converter) = (&self.unit, &self.thermal, &self.converter);
-        let one = |v: &Option<f64>| v.iter().copied().collect::<Vec<_>>();
-        let all = |v: &Option<[f64; 4]>| v.iter().flatten().copied().collect::<Vec<_>>();
-        for (path, values, must) in [
+        // Error, drift and noise of a voltage: at the worst of all three it still has its sign.
+        let (error, drift, noise) = ([-2e5, 2e5], [-2e3, 2e3], [0.0, 2e4]);
+        for (path, value, range) in [
             (
                 "unit.temperature_offset_c",
-                one(&unit.temperature_offset_c),
-                BeFinite,
+                unit.temperature_offset_c,
+                [-100.0, 100.0],
             ),
             (
                 "unit.temperature_noise_c",
-                one(&unit.temperature_noise_c),
-                NotBeNegative,
+                unit.temperature_noise_c,
+                [0.0, 100.0],
             ),
-            (
-                "unit.gyro_reference_v",
-                unit.gyro_reference_v.iter().flatten().copied().collect(),
-                BePositive,
-            ),
-            (
-                "unit.supply_error_ppm",
-                one(&unit.supply_error_ppm),
-                BeFinite,
-            ),
-            (
-                "unit.supply_ppm_per_c",
-                one(&unit.supply_ppm_per_c),
-                BeFinite,
-            ),
-            (
-                "unit.supply_noise_ppm",
-                one(&unit.supply_noise_ppm),
-                NotBeNegative,
-            ),
-            ("thermal.board_lag_s", one(&thermal.board_lag_s), BePositive),
-            ("thermal.die_lag_s", all(&thermal.die_lag_s), BePositive),
-            (
-                "thermal.board_heating_c",
-                one(&thermal.board_heating_c),
-                BeFinite,
-            ),
-            (
-                "thermal.die_heating_c",
-                all(&thermal.die_heating_c),
-                BeFinite,
-            ),
+            ("unit.supply_error_ppm", unit.supply_error_ppm, error),
+            ("unit.supply_ppm_per_c", unit.supply_ppm_per_c, drift),
+            ("unit.supply_noise_ppm", unit.supply_noise_ppm, noise),
+            ("thermal.board_lag_s", thermal.board_lag_s, LAG),
+            ("thermal.board_heating_c", thermal.board_heating_c, HEATING),
             (
                 "thermal.on_before_s",
-                one(&thermal.on_before_s),
-                NotBeNegativeOrInf,
+                thermal.on_before_s,
+                [0.0, f64::INFINITY],
             ),
-            (
-                "converter.reference_v",
-                one(&converter.reference_v),
-                BePositive,
-            ),
+            ("converter.reference_v", converter.reference_v, [0.5, 10.0]),
             (
                 "converter.reference_error_ppm",
-                one(&converter.reference_error_ppm),
-                BeFinite,
+                converter.reference_error_ppm,
+                error,
             ),
             (
                 "converter.reference_ppm_per_c",
-                one(&converter.reference_ppm_per_c),
-                BeFinite,
+                converter.reference_ppm_per_c,
+                drift,
             ),
             (
                 "converter.reference_noise_ppm",
-                one(&converter.reference_noise_ppm),
-                NotBeNegative,
+                converter.reference_noise_ppm,
+                noise,
             ),
             (
                 "converter.gyro_divider",
-                one(&converter.gyro_divider),
-                BeAFraction,
+                converter.gyro_divider,
+                [0.01, 1.0],
             ),
             (
                 "converter.accel_divider",
-                one(&converter.accel_divider),
-                BeAFraction,
+                converter.accel_divider,
+                [0.01, 1.0],
             ),
+            ("converter.noise_codes", converter.noise_codes, [0.0, 1e6]),
+            ("converter.bits", converter.bits.map(f64::from), [1.0, 32.0]),
             (
-                "converter.noise_codes",
-                one(&converter.noise_codes),
-                NotBeNegative,
+                "converter.conversions",
+                converter.conversions.map(f64::from),
+                [1.0, 1000.0],
             ),
         ] {
-            number(path, &values, must)?;
+            within(path, value.as_slice(), range)?;
         }
-        if let Some(bits) = converter.bits.filter(|b| !(1..=32).contains(b)) {
-            return bad(
-                "converter.bits",
-                format!("`bits` is {bits}"),
-                "give 1 to 32",
-            );
+        for (path, values, range) in [
+            ("thermal.die_lag_s", &thermal.die_lag_s, LAG),
+            ("thermal.die_heating_c", &thermal.die_heating_c, HEATING),
+        ] {
+            within(path, values.as_slice().as_flattened(), range)?;
         }
-        if converter.conversions == Some(0) {
-            return bad(
-                "converter.conversions",
-                "`conversions` is 0",
-                "give 1 or more",
-            );
-        }
-        Ok(())
+        let pins = unit.gyro_reference_v.as_slice().as_flattened();
+        within("unit.gyro_reference_v", pins, [0.1, 10.0])
     }
 
     /// Catalog entries of the three axes, which must agree in what concerns all three.
-    pub(super) fn sensors(&self, kind: Kind) -> Result<[&'static Sensor; 3], Bad> {
+    pub(super) fn sensors(&self, kind: Kind) -> Result<[&'static Sensor; 3], Refusal> {
         let (path, parts, usual) = match kind {
             Kind::Gyro => ("unit.gyro", &self.unit.gyro, "ADXRS300"),
             Kind::Accel => ("unit.accel", &self.unit.accel, "MMA7260QT"),
@@ -273,7 +203,7 @@ impl RigFile {
                 if alike(x) != alike(other) {
                     let problem = format!("{} and {} do not make one triad", x.name, other.name);
                     let remedy = "take parts with the same kind of output and package";
-                    bad(path, problem, remedy)?;
+                    refuse(path, problem, remedy)?;
                 }
             }
             return Ok([x, y, z]);
@@ -284,7 +214,7 @@ impl RigFile {
             .filter(|s| s.kind == kind)
             .map(|s| s.name.as_str())
             .collect();
-        Err(Bad {
+        Err(Refusal {
             path: path.to_owned(),
             problem: format!("no sensor is called \"{unknown}\""),
             remedy: format!("known here: {}", known.join(", ")),
@@ -292,71 +222,71 @@ impl RigFile {
     }
 }
 
-fn axes(path: &str, axes: &AxesFile) -> Result<(), Bad> {
-    use Must::{BeFinite, BePositiveOrInf, NotBeNegative};
+fn axes(path: &str, axes: &AxesFile, parts: &[&Sensor; 3]) -> Result<(), Refusal> {
     let at = |key: &str| format!("{path}.{key}");
-    let three = |v: &Option<[f64; 3]>| v.iter().flatten().copied().collect::<Vec<_>>();
     if let Some(directions) = &axes.directions {
-        number(&at("directions"), directions.as_flattened(), BeFinite)?;
+        within(&at("directions"), directions.as_flattened(), [-1e6, 1e6])?;
         span(&at("directions"), directions)?;
     }
-    if let Some(v) = axes
-        .sensitivity_raw_per_si
-        .iter()
-        .flatten()
-        .find(|v| !v.is_normal())
-    {
-        let problem = format!("`sensitivity_raw_per_si` is {v}");
-        return bad(
-            at("sensitivity_raw_per_si"),
-            problem,
-            "give a finite number other than 0",
-        );
-    }
-    for (key, values, must) in [
-        ("null_raw", three(&axes.null_raw), BeFinite),
-        ("bandwidth_hz", three(&axes.bandwidth_hz), BePositiveOrInf),
-        (
-            "rc_hz",
-            axes.rc_hz.iter().copied().collect(),
-            BePositiveOrInf,
-        ),
-        ("white_si", three(&axes.white_si), NotBeNegative),
-        ("instability_si", three(&axes.instability_si), NotBeNegative),
-        ("walk_si", three(&axes.walk_si), NotBeNegative),
-        (
-            "white_per_sample",
-            three(&axes.white_per_sample),
-            NotBeNegative,
-        ),
+    let noise = [0.0, 1000.0];
+    for (key, values, range) in [
+        ("sensitivity_raw_per_si", &axes.sensitivity_raw_per_si, GAIN),
+        ("null_raw", &axes.null_raw, RAW),
+        ("bandwidth_hz", &axes.bandwidth_hz, BANDWIDTH),
+        ("white_si", &axes.white_si, noise),
+        ("instability_si", &axes.instability_si, noise),
+        ("walk_si", &axes.walk_si, noise),
+        ("white_per_sample", &axes.white_per_sample, [0.0, RAW[1]]),
     ] {
-        number(&at(key), &values, must)?;
+        within(&at(key), values.as_slice().as_flattened(), range)?;
     }
-    if let (Some(low), Some(high)) = (axes.low_raw, axes.high_raw)
-        && !(low < high)
-    {
-        return bad(
-            at("low_raw"),
-            format!("lowest output {low} is not below the highest, {high}"),
-            "swap them",
+    let stated = axes.sensitivity_raw_per_si.iter().flatten();
+    if let Some(v) = stated.copied().find(|v| v.abs() < LEAST_GAIN) {
+        let problem = format!("`sensitivity_raw_per_si` is {}", written(v));
+        let remedy = format!("give {LEAST_GAIN:e} or more, of either sign");
+        return refuse(at("sensitivity_raw_per_si"), problem, remedy);
+    }
+    for (key, value, range) in [
+        ("rc_hz", axes.rc_hz, BANDWIDTH),
+        ("low_raw", axes.low_raw, RAW),
+        ("high_raw", axes.high_raw, RAW),
+    ] {
+        within(&at(key), value.as_slice(), range)?;
+    }
+    // One of the two may be the data sheet's.
+    let (low, high) = (
+        axes.low_raw.unwrap_or(parts[0].low),
+        axes.high_raw.unwrap_or(parts[0].high),
+    );
+    if low >= high {
+        let key = if axes.low_raw.is_some() {
+            "low_raw"
+        } else {
+            "high_raw"
+        };
+        let problem = format!("the lowest output, {low}, is not below the highest, {high}");
+        return refuse(
+            at(key),
+            problem,
+            "give `low_raw` and `high_raw`, the lower first",
         );
     }
     Ok(())
 }
 
 /// Three rows must span space.
-fn span(path: &str, rows: &[Vector; 3]) -> Result<(), Bad> {
-    if let Some(i) = rows.iter().position(|r| norm(*r) == 0.0) {
+fn span(path: &str, rows: &[Vector; 3]) -> Result<(), Refusal> {
+    if let Some(i) = rows.iter().position(|r| norm(*r) < LEAST_GAIN) {
         let axis = ["x", "y", "z"][i];
-        return bad(
+        return refuse(
             path,
             format!("axis {axis} senses nothing"),
-            "give its row a number other than 0",
+            "give its row a number that is not 0 or next to it",
         );
     }
     let [x, y, z] = rows.map(|r| scale(1.0 / norm(r), r));
     if dot(x, cross(y, z)).abs() < LEAST_VOLUME {
-        return bad(
+        return refuse(
             path,
             "the three sensitive axes lie in one plane",
             "turn one of them out of it",

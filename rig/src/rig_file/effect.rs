@@ -3,13 +3,13 @@
 use std::collections::BTreeMap;
 
 use super::EffectFile;
-use super::check::Bad;
-use crate::effects::{EffectTruth, Parameter, Shape, Spec, spec, specs};
+use crate::effects::{Draw, EffectTruth, Parameter, Shape, spec, specs};
+use crate::refusal::{Refusal, within};
 
 impl EffectFile {
     /// Stated numbers by key, as the kind of effect wants them; `i` counts effects from 0.
-    pub(super) fn numbers(&self, i: usize) -> Result<BTreeMap<&'static str, Vec<f64>>, Bad> {
-        let wrong = |key: &str, problem: String, remedy: String| Bad {
+    pub(super) fn numbers(&self, i: usize) -> Result<BTreeMap<&'static str, Vec<f64>>, Refusal> {
+        let wrong = |key: &str, problem: String, remedy: String| Refusal {
             path: format!("effect.{i}.{key}"),
             problem,
             remedy,
@@ -42,29 +42,23 @@ impl EffectFile {
                     format!("give {form}, all finite"),
                 )
             })?;
-            if let Some(why) = refusal(spec, parameter, &values) {
-                return Err(wrong(
-                    key,
-                    format!("`{key}` of `{}` is impossible", spec.id),
-                    why.to_owned(),
-                ));
+            if parameter.shape == Shape::Cross && values.iter().step_by(4).any(|v| *v != 0.0) {
+                let problem = format!("`{key}` has a diagonal, which is a scale factor's part");
+                return Err(wrong(key, problem, "give zeros there".to_owned()));
             }
+            within(&format!("effect.{i}.{key}"), &values, range(parameter))?;
             numbers.insert(parameter.key, values);
         }
         Ok(numbers)
     }
 }
 
-/// Why these numbers cannot be, if they cannot: what to give instead.
-fn refusal(spec: &Spec, parameter: &Parameter, values: &[f64]) -> Option<&'static str> {
-    if parameter.shape == Shape::Cross && values.iter().step_by(4).any(|v| *v != 0.0) {
-        return Some("give zeros on the diagonal");
+/// A size may have any sign; times, frequencies and limits are positive. Both a long way from the usual.
+fn range(parameter: &Parameter) -> [f64; 2] {
+    match parameter.draw {
+        Draw::Size(size) => [-1e6 * size, 1e6 * size],
+        Draw::Between(low, high) => [1e-3 * low, 1e3 * high],
     }
-    // The form of an effect is times, frequencies and limits; the size may have any sign.
-    if parameter != &spec.parameters[0] && values.iter().any(|v| !(*v > 0.0)) {
-        return Some("give a number above 0");
-    }
-    None
 }
 
 /// The numbers of a value, row by row, if it has the shape.

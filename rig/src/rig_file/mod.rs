@@ -213,7 +213,7 @@ pub struct ConverterFile {
     /// Noise of the true reference, standard deviation of one sample. Default 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reference_noise_ppm: Option<f64>,
-    /// Default: as much as fits the gyros' highest output under the reference, in twentieths.
+    /// Default: as much as fits the gyro's highest output by its data sheet under the reference, in twentieths.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gyro_divider: Option<f64>,
     /// Default: the same for the accelerometer.

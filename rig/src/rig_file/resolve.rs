@@ -9,6 +9,7 @@ use crate::effects::{EffectTruth, draw_ids};
 use crate::hands::HandsTruth;
 use crate::noise::Coefficients;
 use crate::random::Random;
+use crate::refusal::Refusal;
 use crate::rotation::{Rotation, Vector, add, norm, scale};
 use crate::sensor::{AxisTruth, TriadTruth};
 use crate::table::TableTruth;
@@ -38,16 +39,13 @@ impl RigTruth {
     ///
     /// Errors: a file put together in memory that [`RigFile::parse`] would refuse.
     pub fn resolve(file: &RigFile, seed: u64) -> Result<Self, String> {
-        let said = |bad: super::check::Bad| {
-            format!("rig file, `{}`: {}; {}", bad.path, bad.problem, bad.remedy)
-        };
-        file.check().map_err(said)?;
+        file.check()?;
         let mut file = file.clone();
         let random = |cause: &str| Random::new(seed, cause);
-        let gyro = file.sensors(Kind::Gyro).map_err(said)?;
-        let accel = file.sensors(Kind::Accel).map_err(said)?;
+        let gyro = file.sensors(Kind::Gyro)?;
+        let accel = file.sensors(Kind::Accel)?;
 
-        let effects = effects(&mut file, seed).map_err(said)?;
+        let effects = effects(&mut file, seed)?;
         let earth_rate = *file.earth_rate.get_or_insert(true);
         let unit = &mut file.unit;
         let affine = unit.gyro_affine.as_ref().map(|a| (a.matrix, a.bias));
@@ -104,19 +102,16 @@ impl RigTruth {
             per_c: 1e-6 * *c.reference_ppm_per_c.get_or_insert(0.0),
             noise: 1e-6 * *c.reference_noise_ppm.get_or_insert(0.0),
         };
-        let divider = |triad: &TriadTruth| {
-            let highest = triad.axes.iter().map(|a| a.high).fold(nominal_v, f64::max);
-            if triad.analog {
-                (20.0 * nominal_v / highest).floor() / 20.0
-            } else {
-                1.0
-            }
+        // Of the part, whatever output is stated: boards are made by data sheets.
+        let divider = |part: &Sensor| match part.output {
+            RawUnit::V => (20.0 * (nominal_v / part.high).min(1.0)).floor() / 20.0,
+            RawUnit::Count => 1.0,
         };
         let analog = gyro_truth.analog && accel_truth.analog;
         let converter = ConverterTruth {
             bits: *c.bits.get_or_insert(16),
-            gyro_divider: *c.gyro_divider.get_or_insert(divider(&gyro_truth)),
-            accel_divider: *c.accel_divider.get_or_insert(divider(&accel_truth)),
+            gyro_divider: *c.gyro_divider.get_or_insert(divider(gyro[0])),
+            accel_divider: *c.accel_divider.get_or_insert(divider(accel[0])),
             conversions: *c.conversions.get_or_insert(4),
             noise_codes: *c.noise_codes.get_or_insert(1.5),
             take_out_reference: *c.take_out_reference.get_or_insert(false),
@@ -159,7 +154,7 @@ impl RigTruth {
 }
 
 /// Draws the effects, and writes them into the file.
-fn effects(file: &mut RigFile, seed: u64) -> Result<Vec<EffectTruth>, super::check::Bad> {
+fn effects(file: &mut RigFile, seed: u64) -> Result<Vec<EffectTruth>, Refusal> {
     let count = file.draw_effects.take().unwrap_or(0);
     let stated = file.effect.len();
     let drawn = draw_ids(count + stated, seed).into_iter();
