@@ -1,6 +1,7 @@
 //! The virtual bench: inertial units with known truth, and what moves and heats them.
 //!
-//! Physics from datasheets and kinematics, so that estimators can be judged by it. It shares no model code with them.
+//! Physics from datasheets and kinematics, so that estimators can be judged by it. It shares no model code with
+//! them. `docs/bench.md` has the command and all keys of its files.
 //!
 //! | the experiment                 |                                                                   |
 //! |--------------------------------|-------------------------------------------------------------------|
@@ -17,7 +18,7 @@
 //! | [`noise`], [`thermal`]         | what disturbs every sensor                                        |
 //! | [`effects`]                    | what the affine model lacks, switched on one by one               |
 //! | [`converter`]                  | from the pins to the readings of a recording                      |
-//! | [`catalog`], [`rig_file`]      | sensors by their data sheets; RIG.toml, and the truth drawn by it |
+//! | [`catalog`], [`rig_file`], [`refusal`] | sensors by their data sheets; RIG.toml, and the truth drawn by it |
 //! | [`ideal`]                      | forward models of papers, for Monte Carlo studies                 |
 
 pub mod axis;

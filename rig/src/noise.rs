@@ -5,13 +5,10 @@
 //! `B` is the coefficient; the floor that a plot shows is 0.664 of it. A datasheet's noise density is
 //! one-sided, the root mean square per root hertz of positive frequency: `N` is that over √2.
 
-use serde::{Deserialize, Serialize};
-
 use crate::random::Random;
 
 /// Coefficients of one axis, in the unit of its input (rad/s or m/s²).
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Coefficients {
     /// White noise N (angle or velocity random walk), unit/√Hz.
     pub white: f64,

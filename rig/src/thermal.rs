@@ -1,15 +1,12 @@
 //! Temperatures of the board and of the dies on it: chamber air → board → die, one heat capacity each.
 
-use serde::{Deserialize, Serialize};
-
 use crate::filter::LowPass;
 
 /// The thermal network. Temperatures in °C, times in s.
 ///
 /// `lag T' + T = temperature of what it sits on + heating`: the heating is the rise in still air of a part
 /// that is switched on.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct ThermalTruth {
     /// Lag of the board behind the chamber's air, s.
     pub board_lag_s: f64,

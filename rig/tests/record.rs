@@ -287,6 +287,16 @@ fn nothing_is_overwritten_unasked_and_nothing_but_a_recording_ever() {
 }
 
 #[test]
+fn a_name_with_a_slash_or_a_dot_behind_it_is_the_same_name() {
+    let bench = Bench::new();
+    for (output, name) in [("a/", "a"), ("./b/.", "b")] {
+        bench.record(&format!("table.toml --seed 1 -o {output}"));
+        assert!(bench.names().contains(&name.to_owned()));
+        assert!(bench.names().contains(&format!("{name}.truth.toml")));
+    }
+}
+
+#[test]
 fn a_run_that_fails_leaves_nothing_behind() {
     let bench = Bench::new();
     let impossible = TABLE.replace("rate_dps = 100.0", "rate_dps = 1000.0");

@@ -1,12 +1,11 @@
-//! Noise, heat, sensors and converter against closed forms.
+//! Heat, sensors and converter against closed forms.
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::TAU;
 
 use mimu_rig::converter::Converter;
 use mimu_rig::filter::LowPass;
 use mimu_rig::located::Source;
 use mimu_rig::motion::Motion;
-use mimu_rig::noise::{Coefficients, Noise};
 use mimu_rig::rig_file::{RigFile, RigTruth};
 use mimu_rig::rotation::{Rotation, dot};
 use mimu_rig::thermal::{Thermal, ThermalTruth};
@@ -49,110 +48,6 @@ fn still(rate: [f64; 3], force: [f64; 3]) -> Motion {
         angular_acceleration: [0.0; 3],
         force,
     }
-}
-
-/// Overlapping Allan variance at `m` samples, and its degrees of freedom for white noise, flicker noise and
-/// random walk (Riley, NIST SP 1065, table 5).
-fn allan(samples: &[f64], m: usize) -> (f64, [f64; 3]) {
-    let mut sums = vec![0.0];
-    for x in samples {
-        sums.push(sums[sums.len() - 1] + x);
-    }
-    let terms = sums.len() - 2 * m;
-    let square: f64 = (0..terms)
-        .map(|i| (sums[i + 2 * m] - 2.0 * sums[i + m] + sums[i]).powi(2))
-        .sum();
-    let (n, k) = (sums.len() as f64, m as f64);
-    let dof = [
-        (3.0 * (n - 1.0) / (2.0 * k) - 2.0 * (n - 2.0) / n) * 4.0 * k * k / (4.0 * k * k + 5.0),
-        5.0 * n * n / (4.0 * k * (n + 3.0 * k)),
-        (n - 2.0) / k * ((n - 1.0).powi(2) - 3.0 * k * (n - 1.0) + 4.0 * k * k) / (n - 3.0).powi(2),
-    ];
-    (square / (2.0 * k * k * terms as f64), dof)
-}
-
-#[test]
-fn the_allan_deviation_shows_each_coefficient_as_stated() {
-    let (dt, count) = (0.01, 2_000_000);
-    let only = |white, instability, walk| Coefficients {
-        white,
-        instability,
-        walk,
-    };
-    type Expected = fn(f64) -> f64;
-    // What the variance may miss beside chance: nothing; twice the 0.5 % of the floor; 1/(2 m²), by which the sums
-    // of a random walk at whole steps exceed its integral.
-    let cases: [(Coefficients, Expected, f64); 3] = [
-        (only(3.0, 0.0, 0.0), |tau| 9.0 / tau, 0.0),
-        (only(0.0, 3.0, 0.0), |_| 9.0 * 2.0 * 2_f64.ln() / PI, 0.01),
-        (only(0.0, 0.0, 3.0), |tau| 9.0 * tau / 3.0, 5e-4),
-    ];
-    let seeds = 8;
-    for (kind, (coefficients, expected, slack)) in cases.into_iter().enumerate() {
-        let lengths = [32, 320, 3_200, 32_000];
-        let (mut ratio, mut sigma) = ([0.0; 4], [0.0; 4]);
-        for seed in 0..seeds {
-            let mut noise = Noise::new(&coefficients, "a", dt, seed);
-            let samples: Vec<f64> = (0..count).map(|_| noise.step()).collect();
-            for (i, m) in lengths.into_iter().enumerate() {
-                let (variance, dof) = allan(&samples, m);
-                ratio[i] += variance / expected(m as f64 * dt) / seeds as f64;
-                sigma[i] = (2.0 / dof[kind] / seeds as f64).sqrt();
-            }
-        }
-        println!("variance over stated, kind {kind}: {ratio:.4?} +- {sigma:.4?}");
-        for i in 0..4 {
-            let miss = (ratio[i] - 1.0).abs();
-            assert!(
-                miss < 4.0 * sigma[i] + slack,
-                "kind {kind}, m {}: {}",
-                lengths[i],
-                ratio[i]
-            );
-        }
-    }
-}
-
-#[test]
-fn one_coefficient_leaves_the_random_numbers_of_the_others() {
-    let both = Coefficients {
-        white: 1.0,
-        instability: 2.0,
-        walk: 3.0,
-    };
-    let (mut all, mut sum) = (Noise::new(&both, "a", 0.1, 5), Vec::new());
-    for i in 0..3 {
-        let one = Coefficients {
-            white: if i == 0 { 1.0 } else { 0.0 },
-            instability: if i == 1 { 2.0 } else { 0.0 },
-            walk: if i == 2 { 3.0 } else { 0.0 },
-        };
-        sum.push(Noise::new(&one, "a", 0.1, 5));
-    }
-    for _ in 0..1000 {
-        let parts: f64 = sum.iter_mut().map(Noise::step).sum();
-        assert!((all.step() - parts).abs() < 1e-12);
-    }
-}
-
-#[test]
-fn white_noise_keeps_its_density_through_the_output_filter() {
-    let dt = 1e-3;
-    let only = Coefficients {
-        white: 1.0,
-        instability: 0.0,
-        walk: 0.0,
-    };
-    let mut noise = Noise::new(&only, "a", dt, 9);
-    let mut filter = LowPass::of_bandwidth(40.0, dt);
-    let samples: Vec<f64> = (0..2_000_000).map(|_| filter.step(noise.step())).collect();
-    let (variance, dof) = allan(&samples, 2000);
-    // A lag of 4 ms takes 4/2000 · 3/2 of the variance at 2 s.
-    let sigma = (2.0 / dof[0]).sqrt();
-    assert!(
-        (variance * 2.0 - 1.0).abs() < 4.0 * sigma + 0.003,
-        "{variance}"
-    );
 }
 
 #[test]

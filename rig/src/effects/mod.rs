@@ -217,9 +217,7 @@ impl Shape {
             Self::Matrix | Self::Cross => 9,
         }
     }
-}
 
-impl Shape {
     /// In words.
     pub(crate) fn form(self) -> String {
         match self {

@@ -50,13 +50,11 @@ fn parent(path: &Path) -> &Path {
 pub(super) fn check(output: &Output) -> Result<(), String> {
     let Output { folder, truth, .. } = output;
     // Two ways to one place must not look like two places.
-    let place = |path: &Path| {
-        match (parent(path).canonicalize(), path.file_name()) {
-            (Ok(parent), Some(name)) if parent.is_dir() => Ok(parent.join(name)),
-            _ => {
-                let problem = "the folder that it is to stand in is not there";
-                Err(said(path, problem, "make it first"))
-            }
+    let place = |path: &Path| match (parent(path).canonicalize(), path.file_name()) {
+        (Ok(parent), Some(name)) if parent.is_dir() => Ok(parent.join(name)),
+        _ => {
+            let problem = "the folder that it is to stand in is not there";
+            Err(said(path, problem, "make it first"))
         }
     };
     if place(truth)?.starts_with(place(folder)?) {

@@ -92,12 +92,12 @@ impl RigFile {
                 return refuse("converter.take_out_reference", problem, remedy);
             }
         }
-        let kinds = specs().count();
-        if self.draw_effects.is_some_and(|n| n > kinds) {
+        let left = specs().count().saturating_sub(self.effect.len());
+        if self.draw_effects.is_some_and(|n| n > left) {
             return refuse(
                 "draw_effects",
-                "more effects than there are",
-                format!("give at most {kinds}"),
+                "more effects than there are besides the stated ones",
+                format!("give at most {left}"),
             );
         }
         for (i, effect) in self.effect.iter().enumerate() {

@@ -1,0 +1,134 @@
+//! `docs/bench.md` against the code: every key, no other, and the defaults.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::Path;
+
+use mimu_rig::effects::{Draw, Shape, specs};
+use mimu_rig::hands::HandsTruth;
+use mimu_rig::located::Source;
+use mimu_rig::plan::Plan;
+use mimu_rig::rig_file::RigFile;
+use mimu_rig::table::TableTruth;
+
+fn page() -> String {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/bench.md");
+    fs::read_to_string(path).unwrap()
+}
+
+/// Rows of the table behind the first line that begins with `heading`: keys in backticks in the first cell, and
+/// the other cells.
+fn rows(page: &str, heading: &str) -> Vec<(Vec<String>, Vec<String>)> {
+    let mut lines = page.lines().skip_while(|line| !line.starts_with(heading));
+    assert!(lines.next().is_some(), "no {heading}");
+    lines
+        .skip_while(|line| !line.starts_with('|'))
+        .take_while(|line| line.starts_with('|'))
+        .skip(2)
+        .map(|line| {
+            // A bar that is text has a backslash before it.
+            let line = line.trim_matches('|').replace("\\|", "¦");
+            let mut cells = line.split('|').map(|c| c.trim().to_owned());
+            let keys = cells.next().unwrap();
+            let keys = keys.split('`').skip(1).step_by(2).map(str::to_owned);
+            (keys.collect(), cells.collect::<Vec<_>>())
+        })
+        .collect()
+}
+
+/// The keys that the reader knows, by its own complaint of one that it does not.
+fn known(complaint: &str) -> BTreeSet<String> {
+    let (_, list) = complaint
+        .split_once("known here: ")
+        .unwrap_or_else(|| panic!("{complaint}"));
+    list.split(", ").map(str::to_owned).collect()
+}
+
+#[test]
+fn the_page_has_every_key_of_both_files_and_no_other() {
+    let page = page();
+    let unknown = "a_key_that_nobody_would_ever_give = 1\n";
+    let plan = |text: &str| Plan::parse(Source::new("PLAN.toml", text)).unwrap_err();
+    let rig = |text: &str| RigFile::parse(&Source::new("RIG.toml", text)).unwrap_err();
+    for (heading, complaint) in [
+        ("Examples: `rig/plans`", plan(unknown)),
+        ("`[[step]]`", plan(&format!("[[step]]\n{unknown}"))),
+        ("Examples: `rig/rigs`", rig(unknown)),
+        ("`[unit]`", rig(&format!("[unit]\n{unknown}"))),
+        (
+            "`[unit.gyro_axes]`",
+            rig(&format!("[unit.gyro_axes]\n{unknown}")),
+        ),
+        (
+            "`[unit.gyro_affine]`",
+            rig(&format!("[unit.gyro_affine]\n{unknown}")),
+        ),
+        ("`[thermal]`", rig(&format!("[thermal]\n{unknown}"))),
+        ("`[converter]`", rig(&format!("[converter]\n{unknown}"))),
+        ("`[table]`", rig(&format!("[table]\n{unknown}"))),
+        (
+            "`[table.settling]`",
+            rig(&format!("[table.settling]\n{unknown}")),
+        ),
+        ("`[hands]`", rig(&format!("[hands]\n{unknown}"))),
+    ] {
+        let documented: BTreeSet<_> = rows(&page, heading).into_iter().flat_map(|r| r.0).collect();
+        assert_eq!(documented, known(&complaint), "{heading}");
+    }
+}
+
+#[test]
+fn the_defaults_of_table_and_hands_are_those_of_the_code() {
+    let page = page();
+    let settling = toml::Table::try_from(TableTruth::default().settling).unwrap();
+    for (heading, defaults) in [
+        (
+            "`[table]`",
+            toml::Table::try_from(TableTruth::default()).unwrap(),
+        ),
+        ("`[table.settling]`", settling),
+        (
+            "`[hands]`",
+            toml::Table::try_from(HandsTruth::default()).unwrap(),
+        ),
+    ] {
+        for (keys, cells) in rows(&page, heading) {
+            let key = &keys[0];
+            if !defaults[key].is_table() {
+                assert_eq!(cells[1], format!("`{}`", defaults[key]), "{heading} {key}");
+            }
+        }
+    }
+}
+
+#[test]
+fn the_page_has_every_effect_with_its_parameters() {
+    let documented: BTreeMap<_, _> = ["Known to estimators", "On no list"]
+        .into_iter()
+        .flat_map(|heading| rows(&page(), heading))
+        .map(|(keys, cells)| (keys[0].clone(), cells))
+        .collect();
+    let expected: BTreeMap<_, _> = specs()
+        .map(|spec| {
+            let parameters: Vec<_> = spec
+                .parameters
+                .iter()
+                .map(|p| {
+                    let shape = match p.shape {
+                        Shape::Scalar => String::new(),
+                        Shape::List(n) => format!(" × {n}"),
+                        Shape::Matrix | Shape::Cross => " × 3×3".to_owned(),
+                    };
+                    let drawn = match p.draw {
+                        Draw::Size(size) => format!("±{size}"),
+                        Draw::Between(low, high) => format!("{low} to {high}"),
+                    };
+                    format!("`{}`{shape}: {drawn}", p.key)
+                })
+                .collect();
+            let about = spec.about.replace('|', "¦");
+            (spec.id.to_owned(), vec![about, parameters.join("; ")])
+        })
+        .collect();
+    assert_eq!(documented, expected);
+}
