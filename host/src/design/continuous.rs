@@ -6,6 +6,8 @@
 //! points, each move the best of its pair (vertex exchange of Böhning, Metrika 33, 1986; pairs as in the
 //! randomized exchange of Harman, Filová and Richtárik, JASA 115, 2020).
 
+use nalgebra::{DMatrix, DVector};
+
 use super::exchange;
 use super::information::{Inverse, Rows, dot};
 use super::refinement::{Region, climb};
@@ -40,7 +42,9 @@ pub const TOLERANCE: f64 = 1e-6;
 /// efficiency of 1 to eight digits.
 const ON_CANDIDATES: f64 = 1e-8;
 /// Rounds of exchanges on one list of candidates.
-const ROUNDS: usize = 2000;
+const ROUNDS: usize = 200;
+/// Newton's steps after each round of pairs.
+const NEWTON: usize = 5;
 /// Times that maxima between the candidates are added to them.
 const ADDITIONS: usize = 20;
 /// Weight below which a point is dropped.
@@ -146,38 +150,84 @@ fn exchange_weights(rows: &Rows, weights: &mut [f64]) -> Option<Inverse> {
         }
         let mut high: Vec<usize> = (0..rows.len()).collect();
         high.sort_by(|a, b| variances[*b].total_cmp(&variances[*a]));
-        let mut low: Vec<usize> = high
-            .iter()
-            .copied()
-            .rev()
-            .filter(|i| weights[*i] > 0.0)
-            .collect();
+        let carry = |i: &usize| weights[*i] > 0.0;
+        let mut low: Vec<usize> = high.iter().copied().rev().filter(carry).collect();
         low.truncate(PAIRS);
         high.truncate(low.len());
         for &from in &low {
             for &to in &high {
-                if from != to && weights[from] > 0.0 {
-                    let moved = best_move(rows, &inverse, to, from, weights[from]);
-                    if moved == 0.0 {
-                        continue;
-                    }
-                    for b in 0..rows.widths().len() {
-                        inverse.update(b, rows.row(b, to), moved);
-                        inverse.update(b, rows.row(b, from), -moved);
-                    }
-                    weights[to] += moved;
-                    weights[from] -= moved;
-                    if weights[from] < NOTHING {
-                        weights[from] = 0.0;
-                    }
+                if from == to || weights[from] == 0.0 {
+                    continue;
+                }
+                let moved = best_move(rows, &inverse, to, from, weights[from]);
+                if moved == 0.0 {
+                    continue;
+                }
+                for b in 0..rows.widths().len() {
+                    inverse.update(b, rows.row(b, to), moved);
+                    inverse.update(b, rows.row(b, from), -moved);
+                }
+                weights[to] += moved;
+                weights[from] -= moved;
+                if weights[from] < NOTHING {
+                    weights[from] = 0.0;
                 }
             }
         }
-        let sum: f64 = weights.iter().sum();
-        weights.iter_mut().for_each(|w| *w /= sum);
         inverse = of_weights(rows, weights)?;
+        for _ in 0..NEWTON {
+            newton_step(rows, &inverse, weights)?;
+            inverse = of_weights(rows, weights)?;
+        }
     }
     Some(inverse)
+}
+
+/// Newton's step for all weights at once on the points that carry any.
+///
+/// With `g` the variance function and `H` the squares of `f_i' M⁻¹ f_j`, summed over the blocks, it is `δ = H⁻¹
+/// (g - ν)`, ν such that the sum stays 1. Pairs find the points in tens of rounds and then crawl where these
+/// are close together; this ends it in a few. `ln det` is self-concordant, so that a step of `δ/(1 + λ)`, `λ² =
+/// δ'Hδ`, never leads down; it ends at the first weight that it brings to nothing.
+fn newton_step(rows: &Rows, inverse: &Inverse, weights: &mut [f64]) -> Option<()> {
+    let carrying: Vec<usize> = (0..rows.len()).filter(|i| weights[*i] > 0.0).collect();
+    let k = carrying.len();
+    let mut gradient = DVector::zeros(k);
+    let mut curvature = DMatrix::zeros(k, k);
+    for b in 0..rows.widths().len() {
+        for (i, &point) in carrying.iter().enumerate() {
+            let v = inverse.times(b, rows.row(b, point));
+            for (j, &other) in carrying.iter().enumerate() {
+                let cross = dot(&v, rows.row(b, other));
+                curvature[(i, j)] += cross * cross;
+                if i == j {
+                    gradient[i] += cross;
+                }
+            }
+        }
+    }
+    // More points than moments: H is singular, and g has nothing along what it does not see.
+    let damping = 1e-10 * curvature.trace();
+    let damped = &curvature + DMatrix::from_diagonal_element(k, k, damping);
+    let solver = damped.cholesky()?;
+    let (own, ones) = (solver.solve(&gradient), solver.solve(&DVector::repeat(k, 1.0)));
+    let step = &own - &ones * (own.sum() / ones.sum());
+    let lambda = step.dot(&(&curvature * &step)).sqrt();
+    let ends = carrying.iter().zip(step.iter());
+    let longest = ends.fold(f64::INFINITY, |least, (&i, s)| match *s < 0.0 {
+        true => least.min(-weights[i] / s),
+        false => least,
+    });
+    let length = longest.min(1.0 / (1.0 + lambda));
+    for (&i, s) in carrying.iter().zip(step.iter()) {
+        weights[i] += length * s;
+        if weights[i] < NOTHING {
+            weights[i] = 0.0;
+        }
+    }
+    let sum: f64 = weights.iter().sum();
+    weights.iter_mut().for_each(|w| *w /= sum);
+    Some(())
 }
 
 /// Weight between 0 and `most` whose move to row `to` from row `from` makes the determinant largest.
@@ -197,7 +247,12 @@ fn best_move(rows: &Rows, inverse: &Inverse, to: usize, from: usize, most: f64) 
     let slope = |a: f64| -> f64 {
         let each = curve.iter();
         each.map(|(linear, square)| {
-            (linear - 2.0 * a * square) / (1.0 + a * linear - a * a * square)
+            let factor = 1.0 + a * linear - a * a * square;
+            // Singular there; rounding must not turn the sign.
+            match factor > 1e-12 {
+                true => (linear - 2.0 * a * square) / factor,
+                false => f64::NEG_INFINITY,
+            }
         })
         .sum()
     };

@@ -150,6 +150,9 @@ impl Reach {
                 Sensor::Gyro => DIRECTIONS_WITH_RATES,
             };
             all.extend(self.settings((0..n).map(|i| fibonacci(i, n))));
+            if self.carrier == Carrier::TwoAxis {
+                all.extend(self.settings(lowest_ring().into_iter()));
+            }
         }
         all
     }
@@ -192,6 +195,16 @@ impl Reach {
 fn upper(up: &Vector3<f64>) -> bool {
     let first = [up.z, up.y, up.x].into_iter().find(|c| c.abs() > 1e-12);
     first.is_some_and(|c| c > 0.0)
+}
+
+/// Directions 5 degrees apart at the lowest tilt of the two-axis table, which weigh most, and which no grid over the
+/// sphere has.
+fn lowest_ring() -> [Vector3<f64>; 72] {
+    let r = (1.0 - lowest() * lowest()).sqrt();
+    std::array::from_fn(|i| {
+        let (sine, cosine) = (i as f64 / 72.0 * 2.0 * PI).sin_cos();
+        Vector3::new(r * cosine, r * sine, lowest())
+    })
 }
 
 /// Point `i` of `n` of the spiral that covers the sphere evenly.
