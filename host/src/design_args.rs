@@ -5,11 +5,11 @@ use std::path::PathBuf;
 use clap::{ArgGroup, Args, ValueEnum};
 use mimu::calibration::stage;
 use mimu::design::Problem;
-use mimu::design::budget::{DwellNoise, spend};
+use mimu::design::budget::{DwellNoise, Session};
 use mimu::design::model::{Model, Setting, Terms};
 use mimu::design::reach::{Carrier, RateList, Rates};
 use mimu::design::schemes::Scheme;
-use mimu::design::tour::Motion;
+use mimu::design::tour::{Motion, Order, by_lot};
 use mimu::dwell::Sensor;
 use mimu::error::{Error, Result};
 use mimu::recording::Reference;
@@ -34,7 +34,7 @@ pub struct DesignArgs {
     #[arg(short, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=200))]
     n: Option<u16>,
     /// Find how many dwells and how long are best within so many minutes, moves included
-    #[arg(long, value_name = "MINUTES", value_parser = positive)]
+    #[arg(long, value_name = "MINUTES", value_parser = |t: &str| number(t, 0.1, 2880.0))]
     budget: Option<f64>,
     /// Judge a published scheme
     #[arg(long, value_enum, value_name = "NAME")]
@@ -46,31 +46,39 @@ pub struct DesignArgs {
     #[arg(long, value_enum)]
     table: Option<TableArg>,
     /// Length of a dwell, s
-    #[arg(long, value_name = "S", default_value_t = 20.0, value_parser = positive, conflicts_with = "budget")]
+    #[arg(long, value_name = "S", default_value_t = 20.0, conflicts_with = "budget",
+          value_parser = |t: &str| number(t, 0.1, 86400.0))]
     dwell: f64,
-    /// Rates of the table, deg/s: `10,100,300`, or `..300` for any up to 300
-    #[arg(long, value_name = "LIST", default_value = "..300", conflicts_with_all = ["scheme", "compare"])]
-    rates: RateList,
+    /// Order of the dwells: lot without it, and published schemes as published
+    ///
+    /// Sensors wander, and what neighbouring dwells share of that goes into the parameters that their difference
+    /// determines: with like beside like, 95 % intervals hold the truth less often than they say (docs/design.md). A
+    /// lot costs a fraction of a minute of moves, which is printed.
+    #[arg(long, value_enum)]
+    order: Option<OrderArg>,
+    /// Rates of the table for a gyro, deg/s: `10,100,300`, or `..300` for any up to 300, which it is without it
+    #[arg(long, value_name = "LIST", conflicts_with_all = ["scheme", "compare"])]
+    rates: Option<RateList>,
     /// Rate at which the attitude is changed, deg/s; without it 10 on a table, 45 by hand
-    #[arg(long, value_name = "DPS", value_parser = positive)]
+    #[arg(long, value_name = "DPS", value_parser = |t: &str| number(t, 0.01, 10000.0))]
     slew: Option<f64>,
     /// Time from the end of a move to the dwell, s
-    #[arg(long, value_name = "S", default_value_t = 1.0, value_parser = not_negative)]
+    #[arg(long, value_name = "S", default_value_t = 1.0, value_parser = |t: &str| number(t, 0.0, 3600.0))]
     settle: f64,
     /// Sigma of a dwell mean, m/s² or rad/s; without it, from --noise and --instability
-    #[arg(long, value_name = "SI", value_parser = positive,
+    #[arg(long, value_name = "SI", value_parser = |t: &str| number(t, 1e-12, 1e3),
           conflicts_with_all = ["budget", "noise", "instability", "walk"])]
     sigma: Option<f64>,
     /// White noise N, m/s² or rad/s per √Hz; without it that of fang's sensors
-    #[arg(long, value_name = "SI", value_parser = positive)]
+    #[arg(long, value_name = "SI", value_parser = |t: &str| number(t, 1e-12, 1e3))]
     noise: Option<f64>,
     /// Bias instability B, m/s² or rad/s; without it, what --noise averages to in 20 s
-    #[arg(long, value_name = "SI", value_parser = not_negative)]
+    #[arg(long, value_name = "SI", value_parser = |t: &str| number(t, 0.0, 1e3))]
     instability: Option<f64>,
     /// Random walk K, m/s² or rad/s per √s
-    #[arg(long, value_name = "SI", default_value_t = 0.0, value_parser = not_negative)]
+    #[arg(long, value_name = "SI", default_value_t = 0.0, value_parser = |t: &str| number(t, 0.0, 1e3))]
     walk: f64,
-    /// Seed of the search
+    /// Seed of the search and of the lots
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Plan to write, for a table or a person to carry out
@@ -93,6 +101,14 @@ enum TableArg {
 }
 
 #[derive(Clone, Copy, ValueEnum)]
+enum OrderArg {
+    /// Shortest moves found
+    Shortest,
+    /// Drawn by lot from the seed
+    Lot,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
 enum SchemeArg {
     /// Each axis up and down
     SixFace,
@@ -108,17 +124,10 @@ enum SchemeArg {
     Niu8,
 }
 
-fn not_negative(text: &str) -> std::result::Result<f64, String> {
+fn number(text: &str, lowest: f64, highest: f64) -> std::result::Result<f64, String> {
     match text.parse() {
-        Ok(v) if (0.0..=1e9).contains(&v) => Ok(v),
-        _ => Err("write a number of at least 0".into()),
-    }
-}
-
-fn positive(text: &str) -> std::result::Result<f64, String> {
-    match not_negative(text) {
-        Ok(v) if v >= 1e-12 => Ok(v),
-        _ => Err("write a number above 0".into()),
+        Ok(v) if (lowest..=highest).contains(&v) => Ok(v),
+        _ => Err(format!("write a number from {lowest:?} to {highest:?}")),
     }
 }
 
@@ -158,6 +167,14 @@ impl DesignArgs {
         }
     }
 
+    /// Order of a design, and of a published scheme if it is not to be as published.
+    fn order(&self) -> Option<Order> {
+        self.order.map(|order| match order {
+            OrderArg::Shortest => Order::Shortest,
+            OrderArg::Lot => Order::Lot,
+        })
+    }
+
     /// The problem, with full rates `span` for a gyro.
     fn problem(&self, span: Vector3<f64>, rates: Rates) -> Result<Problem> {
         match (self.sensor(), self.reference) {
@@ -175,37 +192,110 @@ impl DesignArgs {
         }
     }
 
-    fn report(&self, problem: &Problem, title: String, settings: &[Setting]) -> DesignReport {
+    /// The problem of designs at the rates that the table is to turn at.
+    fn own_problem(&self) -> Result<Problem> {
+        match (&self.rates, self.sensor()) {
+            (Some(_), Sensor::Accel) => Err(Error::new(
+                "--rates",
+                "an accelerometer is designed at rest",
+                "leave it out, or use --sensor gyro",
+            )),
+            (Some(list), Sensor::Gyro) => {
+                let span = Vector3::repeat(list.largest_dps.to_radians());
+                self.problem(span, list.rates.clone())
+            }
+            (None, _) => self.problem(Vector3::repeat(RATE_DPS.to_radians()), Rates::Any),
+        }
+    }
+
+    /// Report of a design of one pass over `settings`, in the order asked for; without one, in the order given.
+    fn report(
+        &self,
+        problem: &Problem,
+        title: String,
+        settings: &[Setting],
+        order: Option<Order>,
+    ) -> DesignReport {
         let noise = self.sigma.is_none().then(|| self.noise());
         let sigma = self.sigma.unwrap_or_else(|| self.noise().sigma(self.dwell));
+        let motion = self.motion();
+        let shortest = motion.shortest(settings);
+        let shortest_moves_s = motion.moves_s(&shortest).min(motion.moves_s(settings));
+        let settings = match order {
+            None => settings.to_vec(),
+            Some(Order::Shortest) => shortest,
+            Some(Order::Lot) => by_lot(settings, self.seed),
+        };
         DesignReport {
             title,
-            judgement: problem.judge(settings, sigma),
+            judgement: problem.judge(&settings, sigma),
             problem: problem.clone(),
             dwell_s: self.dwell,
             noise,
-            motion: self.motion(),
+            motion,
+            order,
+            shortest_moves_s,
             scheme: None,
+            turned_over: false,
             budget: None,
         }
     }
 
-    fn best(&self, problem: &Problem, n: usize) -> Result<Vec<Setting>> {
-        Ok(self.motion().ordered(&problem.best(n, self.seed)?))
+    fn best(&self, problem: &Problem, n: usize, title: String) -> Result<DesignReport> {
+        let settings = problem.best(n, self.seed)?;
+        let order = self.order().unwrap_or(Order::Lot);
+        Ok(self.report(problem, title, &settings, Some(order)))
     }
 
     fn scheme(&self, problem: &Problem, scheme: Scheme) -> Result<DesignReport> {
-        let title = format!("scheme {}", scheme.name());
         let settings = scheme.settings(self.sensor())?;
+        let Some((settings, turned_over)) = self.carrier().holding(&settings) else {
+            return Err(Error::new(
+                format!("--scheme {}", scheme.name()),
+                format!(
+                    "not all of its poses are within reach of --table {}",
+                    self.carrier().name()
+                ),
+                "use --table three-axis",
+            ));
+        };
+        let title = format!("scheme {}", scheme.name());
         Ok(DesignReport {
             scheme: Some(scheme),
-            ..self.report(problem, title, &settings)
+            turned_over,
+            ..self.report(problem, title, &settings, self.order())
         })
     }
 
-    /// Every scheme for the sensor, each followed by the best design of as many dwells.
-    fn compare(&self) -> Result<Vec<DesignReport>> {
-        let mut reports = Vec::new();
+    fn within(&self, problem: &Problem, minutes: f64) -> Result<DesignReport> {
+        let order = self.order().unwrap_or(Order::Lot);
+        let session = Session {
+            time_s: 60.0 * minutes,
+            noise: self.noise(),
+            motion: self.motion(),
+            order,
+        };
+        let budget = session.spend(problem, self.seed)?;
+        let best = &budget.best;
+        Ok(DesignReport {
+            title: format!("best within {minutes} min (seed {})", self.seed),
+            judgement: problem.judge(&best.settings, best.sigma),
+            problem: problem.clone(),
+            dwell_s: best.dwell_s,
+            noise: Some(session.noise),
+            motion: session.motion,
+            order: Some(order),
+            shortest_moves_s: best.shortest_moves_s,
+            scheme: None,
+            turned_over: false,
+            budget: Some((session.time_s, budget)),
+        })
+    }
+
+    /// Every scheme for the sensor, each followed by the best design of as many dwells; and the schemes that are not
+    /// within the table's reach.
+    fn compare(&self) -> Result<(Vec<DesignReport>, Vec<Scheme>)> {
+        let (mut reports, mut out_of_reach) = (Vec::new(), Vec::new());
         let mut done: Vec<(usize, Vector3<f64>)> = Vec::new();
         for scheme in Scheme::ALL {
             let Ok(settings) = scheme.settings(self.sensor()) else {
@@ -213,30 +303,33 @@ impl DesignArgs {
             };
             let (n, span) = (settings.len(), scheme.rate_span());
             let problem = self.problem(span, Rates::Any)?;
+            if self.carrier().holding(&settings).is_none() {
+                out_of_reach.push(scheme);
+                continue;
+            }
             reports.push(self.scheme(&problem, scheme)?);
             let enough =
                 problem.optimum.parameters <= n * problem.reach.model.distinct_regressions();
             if enough && !done.contains(&(n, span)) {
                 done.push((n, span));
-                let title = format!("best of {n}");
-                reports.push(self.report(&problem, title, &self.best(&problem, n)?));
+                reports.push(self.best(&problem, n, format!("best of {n}"))?);
             }
         }
-        Ok(reports)
+        Ok((reports, out_of_reach))
     }
 }
+
+/// Largest rate without `--rates`, deg/s: the range of fang's gyros.
+const RATE_DPS: f64 = 300.0;
 
 pub fn run(args: &DesignArgs) -> Result<()> {
     check_outputs(&[args.output.as_deref(), args.json.file()], &[])?;
     if args.compare {
-        let reports = args.compare()?;
-        let (text, json) = (
-            report::comparison_text(&reports),
-            report::comparison_json(&reports),
-        );
+        let (reports, out_of_reach) = args.compare()?;
+        let text = report::comparison_text(&reports, &out_of_reach);
+        let json = report::comparison_json(&reports, &out_of_reach);
         return print(&args.json, &text, &json, None);
     }
-    let span = Vector3::repeat(args.rates.largest_dps.to_radians());
     let designed = match (args.scheme, args.budget, args.n) {
         (Some(scheme), ..) => {
             let scheme = match scheme {
@@ -248,24 +341,11 @@ pub fn run(args: &DesignArgs) -> Result<()> {
             };
             args.scheme(&args.problem(scheme.rate_span(), Rates::Any)?, scheme)?
         }
-        (_, Some(minutes), _) => {
-            let problem = args.problem(span, args.rates.rates.clone())?;
-            let budget_s = 60.0 * minutes;
-            let budget = spend(&problem, &args.noise(), &args.motion(), budget_s, args.seed)?;
-            let best = &budget.best;
-            let title = format!("best within {minutes} min (seed {})", args.seed);
-            DesignReport {
-                judgement: problem.judge(&best.all(), best.sigma),
-                dwell_s: best.dwell_s,
-                budget: Some((budget_s, budget)),
-                ..args.report(&problem, title, &[])
-            }
-        }
+        (_, Some(minutes), _) => args.within(&args.own_problem()?, minutes)?,
         (_, _, n) => {
             let n = usize::from(n.unwrap_or_default());
-            let problem = args.problem(span, args.rates.rates.clone())?;
             let title = format!("best of {n} dwells found (seed {})", args.seed);
-            args.report(&problem, title, &args.best(&problem, n)?)
+            args.best(&args.own_problem()?, n, title)?
         }
     };
     let mut text = report::design_text(&designed);

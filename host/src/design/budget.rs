@@ -4,7 +4,8 @@ use rayon::prelude::*;
 
 use super::Problem;
 use super::model::Setting;
-use super::tour::Motion;
+use super::refinement::Region as _;
+use super::tour::{Motion, Order, by_lot};
 use crate::dwell::Sensor;
 use crate::error::{Error, Result};
 use crate::noise::AllanModel;
@@ -24,7 +25,7 @@ pub struct DwellNoise {
 const FLOOR: f64 = 0.664;
 
 /// Time up to which fang, section 3, finds noise white, s.
-pub const FANG_WHITE_S: f64 = 20.0;
+const FANG_WHITE_S: f64 = 20.0;
 
 impl DwellNoise {
     /// Of fang's sensors. N from the variances of Table 5 at 25 °C, taken to be those of samples at 1 kHz,
@@ -74,14 +75,16 @@ impl DwellNoise {
 /// One way to spend the time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Spending {
-    /// The settings of one pass, ordered.
+    /// The settings of all dwells, in order.
     pub settings: Vec<Setting>,
-    /// Passes.
+    /// Passes over the design.
     pub passes: usize,
     /// Length of each dwell, s.
     pub dwell_s: f64,
     /// Time of all moves, s.
     pub moves_s: f64,
+    /// The same if each pass took the shortest way found, s.
+    pub shortest_moves_s: f64,
     /// Sigma of one dwell mean, SI unit.
     pub sigma: f64,
     /// Normalised mean sigma of the parameters over all passes; see
@@ -90,19 +93,14 @@ pub struct Spending {
 }
 
 impl Spending {
-    /// Dwells of all passes.
-    pub fn dwells(&self) -> usize {
-        self.settings.len() * self.passes
+    /// Dwells of one pass.
+    pub fn each_pass(&self) -> usize {
+        self.settings.len() / self.passes
     }
 
     /// Time of all dwells and moves, s.
     pub fn time_s(&self) -> f64 {
-        self.dwells() as f64 * self.dwell_s + self.moves_s
-    }
-
-    /// The settings of all passes.
-    pub fn all(&self) -> Vec<Setting> {
-        self.settings.repeat(self.passes)
+        self.settings.len() as f64 * self.dwell_s + self.moves_s
     }
 }
 
@@ -111,77 +109,90 @@ impl Spending {
 pub struct Budget {
     /// The one with the smallest mean sigma.
     pub best: Spending,
-    /// The best with each number of different settings, ascending.
-    pub by_settings: Vec<Spending>,
+    /// The best with each number of dwells in a pass, ascending.
+    pub by_size: Vec<Spending>,
 }
 
-/// Most settings in a pass.
+/// Most dwells in a pass.
 const MOST: usize = 40;
 /// Most passes.
 const PASSES: usize = 50;
 /// Shortest dwell, s: a controller and a settling filter allow no shorter ones.
 const SHORTEST_S: f64 = 1.0;
 
-/// Finds the number of settings, the number of passes and the dwell that make the parameters' mean sigma
-/// smallest within `budget_s`.
-pub fn spend(
-    problem: &Problem,
-    noise: &DwellNoise,
-    motion: &Motion,
-    budget_s: f64,
-    seed: u64,
-) -> Result<Budget> {
-    let widths = super::refinement::Region::widths(&problem.reach);
-    let least = widths.iter().max().copied().unwrap_or(0);
-    let sizes: Vec<usize> = (least..=MOST.max(least)).collect();
-    let ways: Vec<Option<Spending>> = sizes
-        .into_par_iter()
-        .map(|n| {
-            let settings = motion.ordered(&problem.best(n, seed)?);
-            Ok(passes(problem, noise, motion, budget_s, settings))
-        })
-        .collect::<Result<_>>()?;
-    let by_settings: Vec<Spending> = ways.into_iter().flatten().collect();
-    let best = by_settings
-        .iter()
-        .min_by(|a, b| a.mean_sigma.total_cmp(&b.mean_sigma))
-        .cloned();
-    match best {
-        Some(best) => Ok(Budget { best, by_settings }),
-        None => Err(Error::new(
-            format!("--budget {} min", budget_s / 60.0),
-            format!("the moves between {least} dwells and {SHORTEST_S} s for each take longer"),
-            "allow more time, or a table that moves faster",
-        )),
-    }
+/// What a session may take, and what it is made with.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Session {
+    /// Time for all dwells and moves, s.
+    pub time_s: f64,
+    /// Noise of the sensor.
+    pub noise: DwellNoise,
+    /// Moves between the dwells.
+    pub motion: Motion,
+    /// Order of the dwells within a pass.
+    pub order: Order,
 }
 
-/// The best number of passes over `settings`.
-fn passes(
-    problem: &Problem,
-    noise: &DwellNoise,
-    motion: &Motion,
-    budget_s: f64,
-    settings: Vec<Setting>,
-) -> Option<Spending> {
-    let unit = problem.judge(&settings, 1.0).mean_sigma;
-    let (first, last) = (settings.first()?, settings.last()?);
-    let once = motion.moves_s(&settings);
-    // Not backwards, which would save the way back: two dwells in a row at the same setting share the drift.
-    let between = motion.between(last, first);
-    let ways = (1..=PASSES).filter_map(|passes| {
-        let moves_s = once * passes as f64 + between * (passes - 1) as f64;
-        let dwells = (settings.len() * passes) as f64;
-        let dwell_s = ((budget_s - moves_s) / dwells).min(noise.longest_s());
-        let sigma = noise.sigma(dwell_s);
-        (dwell_s >= SHORTEST_S).then(|| Spending {
-            settings: settings.clone(),
+impl Session {
+    /// The number of dwells in a pass, the number of passes and the length of a dwell that make the parameters' mean
+    /// sigma smallest. `seed` is that of the searches and of the lots, which each pass draws anew.
+    pub fn spend(&self, problem: &Problem, seed: u64) -> Result<Budget> {
+        let widths = problem.reach.widths();
+        let least = widths.iter().max().copied().unwrap_or(0);
+        let sizes: Vec<usize> = (least..=MOST.max(least)).collect();
+        let ways: Vec<Option<Spending>> = sizes
+            .into_par_iter()
+            .map(|n| {
+                let settings = problem.best(n, seed)?;
+                let unit = problem.judge(&settings, 1.0).mean_sigma;
+                let shortest = self.motion.shortest(&settings);
+                let ways = (1..=PASSES).filter_map(|k| self.passes(&shortest, k, unit, seed));
+                Ok(ways.min_by(|a, b| a.mean_sigma.total_cmp(&b.mean_sigma)))
+            })
+            .collect::<Result<_>>()?;
+        let by_size: Vec<Spending> = ways.into_iter().flatten().collect();
+        let best = by_size
+            .iter()
+            .min_by(|a, b| a.mean_sigma.total_cmp(&b.mean_sigma));
+        match best.cloned() {
+            Some(best) => Ok(Budget { best, by_size }),
+            None => Err(Error::new(
+                format!("--budget {} min", self.time_s / 60.0),
+                format!("{least} dwells of {SHORTEST_S} s and the moves between them take longer"),
+                "allow more time, or a table that moves faster",
+            )),
+        }
+    }
+
+    /// So many passes over settings whose mean sigma is `unit` for a sigma of 1; `None` if there is no time for them.
+    fn passes(
+        &self,
+        shortest: &[Setting],
+        passes: usize,
+        unit: f64,
+        seed: u64,
+    ) -> Option<Spending> {
+        // Not there and back: two dwells in a row at the same setting share the drift.
+        let there = shortest.repeat(passes);
+        let shortest_moves_s = self.motion.moves_s(&there);
+        let settings = match self.order {
+            Order::Shortest => there,
+            Order::Lot => (0..passes as u64)
+                .flat_map(|pass| by_lot(shortest, seed.wrapping_add(pass)))
+                .collect(),
+        };
+        let moves_s = self.motion.moves_s(&settings);
+        let most_s = (self.time_s - moves_s) / settings.len() as f64;
+        let dwell_s = most_s.min(self.noise.longest_s().max(SHORTEST_S));
+        let sigma = self.noise.sigma(dwell_s);
+        (dwell_s >= SHORTEST_S).then_some(Spending {
+            settings,
             passes,
             dwell_s,
             moves_s,
+            shortest_moves_s,
             sigma,
             mean_sigma: unit * sigma / (passes as f64).sqrt(),
         })
-    });
-    ways.min_by(|a, b| a.mean_sigma.total_cmp(&b.mean_sigma))
+    }
 }

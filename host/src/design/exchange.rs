@@ -2,9 +2,8 @@
 //! (Technometrics 22, 1980) from many random starts.
 //!
 //! Exchanging row f of a design for row g multiplies `det F'F` by `(1 + g'Ag)(1 - f'Af) + (f'Ag)²`, A =
-//! (F'F)⁻¹ (Fedorov,
-//! *Theory of Optimal Experiments*, 1972). Each point in turn is exchanged for the best candidate; Fedorov's
-//! own rule, the best of all pairs, looks at n times as many pairs for each exchange.
+//! (F'F)⁻¹ (Fedorov, *Theory of Optimal Experiments*, 1972). Each point in turn is exchanged for the best
+//! candidate; Fedorov's own rule, the best of all pairs, looks at n times as many pairs for each exchange.
 
 use rayon::prelude::*;
 
@@ -21,8 +20,7 @@ pub struct Found {
 
 /// Gain in the determinant below which an exchange is rounding.
 const GAIN: f64 = 1e-9;
-/// Passes over the design after which a start is taken as it stands; of 5609 starts with 5 to 40 dwells the
-/// slowest took 18.
+/// Passes over the design after which a start is taken as it stands.
 const PASSES: usize = 100;
 /// Candidates looked at for each point of a random start. More make the starts good and alike.
 const DRAWS: usize = 8;
@@ -121,12 +119,12 @@ fn improve(rows: &Rows, mut points: Vec<usize>) -> Option<Found> {
     Some(Found { points, log_det })
 }
 
-/// Random numbers for the starts: SplitMix64 (Steele, Lea and Flood, OOPSLA 2014), the same on every machine.
-struct SplitMix(u64);
+/// Random numbers for starts and lots: SplitMix64 (Steele, Lea and Flood, OOPSLA 2014), the same on every machine.
+pub(super) struct SplitMix(pub(super) u64);
 
 impl SplitMix {
     /// A number below `end`. The remainder's bias, `end` in 2⁶⁴, is of no consequence here.
-    fn below(&mut self, end: usize) -> usize {
+    pub(super) fn below(&mut self, end: usize) -> usize {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);

@@ -43,6 +43,7 @@ pub mod tour;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
+use crate::blocks::counted;
 use crate::dwell::Sensor;
 use crate::error::{Error, Result};
 use crate::estimate::least_squares::Observability;
@@ -179,7 +180,10 @@ impl Problem {
             let p = self.rows.widths().iter().max().copied().unwrap_or(0);
             Error::new(
                 format!("{}, {}", self.reach.model.sensor, self.reach.model),
-                format!("{n} dwells cannot determine {p} parameters"),
+                format!(
+                    "{} cannot determine {p} parameters",
+                    counted(n as u64, "dwell")
+                ),
                 format!("design at least {p}"),
             )
         })

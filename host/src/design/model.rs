@@ -150,13 +150,6 @@ impl Model {
         }
     }
 
-    /// The same model with `term` as well.
-    pub fn with(&self, term: Term) -> Self {
-        let mut model = self.clone();
-        model.terms.push(term);
-        model
-    }
-
     /// Whether a gyro's reading depends on which way is up, and not on the rate alone.
     pub fn feels_force(&self) -> bool {
         self.terms.contains(&Term::GSensitivity)

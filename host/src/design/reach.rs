@@ -46,13 +46,41 @@ impl Carrier {
         }
     }
 
-    /// The direction nearest to `up` that it reaches, among neighbours of one that it does.
-    fn nearest(self, up: Vector3<f64>) -> Vector3<f64> {
-        if self.reaches(&up) {
-            return up;
+    /// The settings as this carrier holds them: as they are, or on a two-axis table the unit turned over by a half turn
+    /// about x where only that brings all of them within reach. The flag says whether it was. `None` if neither does.
+    pub fn holding(self, settings: &[Setting]) -> Option<(Vec<Setting>, bool)> {
+        let reached = |settings: &[Setting]| settings.iter().all(|s| self.reaches(&s.up));
+        if reached(settings) {
+            return Some((settings.to_vec(), false));
         }
-        let flat = Vector3::new(up.x, up.y, 0.0).normalize();
-        flat * (1.0 - lowest() * lowest()).sqrt() + Vector3::z() * lowest()
+        let over = |s: &Setting| Setting {
+            up: Vector3::new(s.up.x, -s.up.y, -s.up.z),
+            ..*s
+        };
+        let turned: Vec<Setting> = settings.iter().map(over).collect();
+        (self == Self::TwoAxis && reached(&turned)).then_some((turned, true))
+    }
+
+    /// Directions `step` (rad) away from `up`, or less at the end of its reach, along two axes.
+    fn around(self, up: &Vector3<f64>, step: f64) -> [Vector3<f64>; 4] {
+        if self == Self::TwoAxis {
+            // By its own axes: what is best on such a table are whole rings about z, and across them a search only
+            // creeps along.
+            let (tilt, turn) = (up.z.clamp(-1.0, 1.0).acos(), up.y.atan2(up.x));
+            let at = |tilt: f64, turn: f64| {
+                let tilt = tilt.min(TILT_DEG.to_radians());
+                Vector3::new(tilt.sin() * turn.cos(), tilt.sin() * turn.sin(), tilt.cos())
+            };
+            return [
+                at(tilt, turn + step),
+                at(tilt, turn - step),
+                at(tilt + step, turn),
+                at(tilt - step, turn),
+            ];
+        }
+        let side = up.cross(&Vector3::ith(up.iamin(), 1.0)).normalize();
+        let other = up.cross(&side);
+        [side, -side, other, -other].map(|direction| (up + direction * step).normalize())
     }
 }
 
@@ -84,9 +112,9 @@ impl FromStr for RateList {
 
     fn from_str(text: &str) -> Result<Self, String> {
         let rate = |t: &str| match t.trim().parse::<f64>() {
-            Ok(r) if r > 0.0 && r.is_finite() => Ok(r),
+            Ok(r) if (1e-3..=1e5).contains(&r) => Ok(r),
             _ => Err(format!(
-                "{t:?} is no rate above 0 deg/s: write 10,100,300 or ..300"
+                "{t:?} is no rate from 0.001 to 100000 deg/s: write 10,100,300 or ..300"
             )),
         };
         if let Some(largest) = text.strip_prefix("..") {
@@ -125,8 +153,6 @@ const DIRECTIONS_WITH_RATES: usize = 500;
 
 impl Reach {
     /// Faces, edges and corners of the cube: directions that a person finds and a fixture holds.
-    ///
-    /// Designs made of them are preferred to equally good ones in odd directions.
     pub fn plain(&self) -> Vec<Setting> {
         let steps = [0.0, 1.0, -1.0];
         let mut ups: Vec<Vector3<f64>> = Vec::new();
@@ -235,15 +261,7 @@ impl Region for Reach {
         let share = point.rate / self.largest_rate(&point.up);
         // At rest a gyro's attitude matters only if it feels force.
         if self.carrier != Carrier::Faces && (!gyro || share != 0.0 || self.model.feels_force()) {
-            let side = point
-                .up
-                .cross(&Vector3::ith(point.up.iamin(), 1.0))
-                .normalize();
-            let other = point.up.cross(&side);
-            for direction in [side, -side, other, -other] {
-                let up = self
-                    .carrier
-                    .nearest((point.up + direction * step).normalize());
+            for up in self.carrier.around(&point.up, step) {
                 list.push(Setting {
                     up,
                     rate: share * self.largest_rate(&up),

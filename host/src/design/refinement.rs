@@ -35,6 +35,11 @@ pub trait Region: Sync {
 const STEPS: [f64; 2] = [0.1, 1e-7];
 /// Gain in a logarithm of a determinant below which it is rounding.
 const GAIN: f64 = 1e-13;
+/// Gain that a move of a climb must bring, over the square of its length. Any gain at all let it creep along a ridge
+/// for ever: where a table has an axis of symmetry, maxima are whole rings.
+const SUFFICIENT: f64 = 1e-2;
+/// Most moves and halvings of a climb. Where it ends by that, what is left to climb is a ridge all but level.
+const MOVES: usize = 300;
 /// Most sweeps over a design.
 const SWEEPS: usize = 400;
 
@@ -56,18 +61,23 @@ pub(super) fn climb<R: Region>(
     };
     let (mut best, mut height) = (point.clone(), at(point));
     let mut step = first;
-    while step > STEPS[1] {
+    for _ in 0..MOVES {
+        if step < STEPS[1] {
+            break;
+        }
         let mut moved = false;
         for next in region.neighbours(&best, step) {
             let new = at(&next);
-            if new > height + GAIN {
+            if new > height + GAIN.max(SUFFICIENT * step * step) {
                 (best, height, moved) = (next, new, true);
                 break;
             }
         }
-        if !moved {
-            step /= 2.0;
-        }
+        step = if moved {
+            (2.0 * step).min(first)
+        } else {
+            step / 2.0
+        };
     }
     (best, height)
 }

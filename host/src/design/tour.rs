@@ -1,7 +1,40 @@
-//! Time of a sequence of dwells, and an order that shortens it.
+//! Time of a sequence of dwells, and in which order they come.
 
+use super::exchange::SplitMix;
 use super::model::Setting;
 use super::reach::Carrier;
+
+/// Order of the dwells of a design.
+///
+/// Sensors wander. What neighbouring dwells share of that goes into the parameters that the difference of their
+/// inputs determines, and no residual tells. In an order drawn by lot it is scatter like any other.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Order {
+    /// The one with the shortest moves found: like beside like.
+    Shortest,
+    /// Drawn by lot.
+    Lot,
+}
+
+impl Order {
+    /// Name as on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Shortest => "shortest",
+            Self::Lot => "lot",
+        }
+    }
+}
+
+/// The settings in an order drawn by lot (Fisher and Yates), determinate for a `seed`.
+pub fn by_lot(settings: &[Setting], seed: u64) -> Vec<Setting> {
+    let mut drawn = settings.to_vec();
+    let mut random = SplitMix(seed);
+    for k in (1..drawn.len()).rev() {
+        drawn.swap(k, random.below(k + 1));
+    }
+    drawn
+}
 
 /// How fast one gets from a dwell to the next.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -52,7 +85,7 @@ impl Motion {
 
     /// The settings in an order with short moves: nearest neighbours from every start, then 2-opt (Croes,
     /// 1958).
-    pub fn ordered(&self, settings: &[Setting]) -> Vec<Setting> {
+    pub fn shortest(&self, settings: &[Setting]) -> Vec<Setting> {
         let each =
             (0..settings.len()).map(|start| self.two_opt(self.nearest_neighbours(settings, start)));
         let shorter = |a: Vec<Setting>, b: Vec<Setting>| {

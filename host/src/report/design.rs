@@ -12,7 +12,7 @@ use crate::design::judgement::Judgement;
 use crate::design::lack_of_fit::Notice;
 use crate::design::model::Term;
 use crate::design::schemes::{FANG_FILTERS, Scheme};
-use crate::design::tour::Motion;
+use crate::design::tour::{Motion, Order};
 use crate::design::{Problem, plan};
 use crate::dwell::Sensor;
 use crate::recording::Reference;
@@ -32,8 +32,15 @@ pub struct DesignReport {
     pub noise: Option<DwellNoise>,
     /// Moves between the dwells.
     pub motion: Motion,
+    /// Order of the dwells; `None` as published.
+    pub order: Option<Order>,
+    /// Time of the moves in the shortest order found, s.
+    pub shortest_moves_s: f64,
     /// The published scheme that it is.
     pub scheme: Option<Scheme>,
+    /// Whether the unit had to be turned over for the table to reach the scheme's poses: see
+    /// [`crate::design::reach::Carrier::holding`].
+    pub turned_over: bool,
     /// What was looked at to spend a budget, s.
     pub budget: Option<(f64, Budget)>,
 }
@@ -73,6 +80,10 @@ impl DesignReport {
         })
     }
 
+    fn order_name(&self) -> &'static str {
+        self.order.map_or("published", Order::name)
+    }
+
     /// Sensor, model, reference and table in one line.
     fn subject(&self) -> String {
         let reach = &self.problem.reach;
@@ -90,9 +101,15 @@ impl DesignReport {
     /// Plan of the design, as a file.
     pub fn plan(&self) -> String {
         let about = format!(
-            "{}: {}\nD-efficiency {:.4}, {} with moves at {} deg/s",
+            "{}: {}\norder {}{}\nD-efficiency {:.4}, {} with moves at {} deg/s",
             self.subject(),
             self.title,
+            self.order_name(),
+            if self.turned_over {
+                ", unit turned over about x"
+            } else {
+                ""
+            },
             self.judgement.d_efficiency,
             text::minutes(self.time_s()),
             three(self.motion.slew.to_degrees()),

@@ -46,6 +46,34 @@ fn a_parameter_that_is_not_determined_has_no_sigma() {
 }
 
 #[test]
+fn people_read_the_same_numbers_in_their_units() {
+    // Six faces: bias ± 1.96 σ/√6, scale factor ± 1.96 σ/(√2 g), P_xy the same in µrad. x² outside the model is √(4/3):
+    // noticed from 3.242 σ/√(4/3) over full scale.
+    let text = |arguments: &str| String::from_utf8(mimu(Path::new("."), arguments).stdout).unwrap();
+    let accel = text("--scheme six-face --sigma 0.01");
+    for says in [
+        "b_x ± 0.816 mg",
+        "P_xx ± 1413 ppm",
+        "P_xy ± 1413 µrad",
+        "quadratic from 2863 ppm FS",
+        "1.02 mg, given",
+    ] {
+        assert!(accel.contains(says), "{says}: {accel}");
+    }
+    // At 300 deg/s, in deg/s and its share.
+    let gyro = text("--scheme six-face --sensor gyro --sigma 0.001");
+    for says in [
+        "b_z ± 0.0458 deg/s",
+        "P_zz ± 265 ppm",
+        "P_zy ± 265 µrad",
+        "quadratic from 536 ppm FS",
+        "0.0573 deg/s, given",
+    ] {
+        assert!(gyro.contains(says), "{says}: {gyro}");
+    }
+}
+
+#[test]
 fn the_plan_is_the_design() {
     let folder = tempfile::tempdir().unwrap();
     let arguments =
@@ -88,6 +116,9 @@ fn text_fits_a_hundred_columns() {
         "--compare",
         "--compare --sensor gyro",
         "--compare --reference gravity",
+        "--compare --table two-axis",
+        "-n 20 --table two-axis --reference gravity --model affine,quadratic,cubic",
+        "-n 200 --seed 18446744073709551615",
         "--budget 10",
         "--scheme fang-nine",
         "--scheme niu-8 --table two-axis",
@@ -109,6 +140,52 @@ fn text_fits_a_hundred_columns() {
 }
 
 #[test]
+fn a_lot_is_drawn_unless_the_order_is_given_and_says_its_price() {
+    let positions = |arguments: &str| json(arguments)["positions"].as_array().unwrap().clone();
+    let by_lot = json("-n 9");
+    let shortest = json("-n 9 --order shortest");
+    assert_eq!(
+        (&by_lot["order"], &shortest["order"]),
+        (&"lot".into(), &"shortest".into())
+    );
+    let longer = by_lot["moves_s"].as_f64().unwrap() - shortest["moves_s"].as_f64().unwrap();
+    assert!(longer > 1.0 && shortest["moves_s"] == by_lot["shortest_moves_s"]);
+    let text = String::from_utf8(mimu(Path::new("."), "-n 9").stdout).unwrap();
+    assert!(text.contains(&format!("{longer:.1} s longer")), "{text}");
+    // The same dwells, in another order for another seed, and in the same for the same.
+    let sorted = |mut list: Vec<serde_json::Value>| {
+        list.sort_by_key(ToString::to_string);
+        list
+    };
+    let scheme = "--scheme xu-33 --order lot --seed";
+    let [one, two, again] = [1, 2, 1].map(|seed| positions(&format!("{scheme} {seed}")));
+    let published = json("--scheme xu-33");
+    assert_eq!(published["order"], "published");
+    assert!(one == again && one != two && sorted(one.clone()) == sorted(two));
+    assert!(one != *published["positions"].as_array().unwrap());
+    assert_eq!(
+        sorted(one),
+        sorted(published["positions"].as_array().unwrap().clone())
+    );
+}
+
+#[test]
+fn a_comparison_leaves_out_and_names_the_schemes_out_of_reach() {
+    let compared = json("--compare --table two-axis");
+    assert_eq!(compared["format"], "mimu-design-comparison/1");
+    assert_eq!(
+        compared["out_of_reach"],
+        serde_json::json!(["six-face", "fang-nine", "xu-33"])
+    );
+    let designs = compared["designs"].as_array().unwrap();
+    assert_eq!(designs.len(), 2);
+    // Within reach none beats the continuous optimum.
+    for design in designs {
+        assert!(design["d_efficiency"].as_f64().unwrap() < 1.0 + 1e-6);
+    }
+}
+
+#[test]
 fn refusals_are_one_line_with_status_1_and_wrong_usage_has_status_2() {
     let cases = [
         ("-n 3", 1, "at least 4"),
@@ -123,16 +200,66 @@ fn refusals_are_one_line_with_status_1_and_wrong_usage_has_status_2() {
         ("-n 8 --model affine,g-sensitivity", 1, "--sensor gyro"),
         ("--scheme xu-rates", 1, "--sensor gyro"),
         ("--scheme niu-8 --sensor gyro", 1, "--sensor accel"),
+        ("-n 1", 1, "1 dwell cannot"),
+        (
+            "-n 17 --model affine,quadratic --table faces --reference gravity",
+            1,
+            "quadratic",
+        ),
         ("--budget 0.1", 1, "allow more time"),
+        ("--budget 10 --slew 0.01", 1, "a table that moves faster"),
+        ("--scheme six-face --table two-axis", 1, "three-axis"),
+        ("--scheme fang-nine --table faces", 1, "three-axis"),
+        ("--compare --sensor gyro --table hand", 1, "turns"),
+        ("-n 8 --rates 10", 1, "--sensor gyro"),
         ("-n 8 -o missing/plan.toml", 1, "folder"),
+        ("-n 8 -o folder", 1, "directory"),
+        ("-n 8 --json folder", 1, "directory"),
+        ("-n 8 --json missing/design.json", 1, "folder"),
+        ("-n 8 -o one --json one", 1, "another name"),
+        ("-n 3 -o there", 1, "at least 4"),
         ("--dwell 10", 2, "--compare"),
         ("-n 8 --scheme six-face", 2, "cannot be used with"),
         ("-n 8 --model affine,quartic", 2, "quartic"),
-        ("-n 8 --dwell=-1", 2, "above 0"),
-        ("-n 8 --dwell NaN", 2, "above 0"),
-        ("-n 8 --sensor gyro --rates 10,,30", 2, "deg/s"),
+        ("-n 8 --model g-sensitivity,", 2, "no term"),
+        ("-n 0", 2, "1..=200"),
+        ("-n 1000000000", 2, "1..=200"),
+        ("-n=-4", 2, "invalid"),
+        ("-n 4.5", 2, "invalid"),
+        ("-n 8 --dwell=-1", 2, "from 0.1 to"),
+        ("-n 8 --dwell 0.00001", 2, "from 0.1 to"),
+        ("-n 8 --dwell NaN", 2, "from 0.1 to"),
+        ("-n 8 --dwell inf", 2, "from 0.1 to"),
+        ("--budget 0", 2, "to 2880"),
+        ("--budget NaN", 2, "to 2880"),
+        ("--budget=-5", 2, "to 2880"),
+        ("--budget 1e9", 2, "to 2880"),
+        ("--budget 5 --dwell 3", 2, "cannot be used with"),
+        ("--budget 5 --sigma 1", 2, "cannot be used with"),
+        ("-n 8 --budget 5", 2, "cannot be used with"),
+        ("--compare -o plan.toml", 2, "cannot be used with"),
+        ("-n 8 --sigma 0", 2, "write a number"),
+        ("-n 8 --sigma inf", 2, "write a number"),
+        ("-n 8 --sigma 1 --noise 1", 2, "cannot be used with"),
+        ("-n 8 --walk=-1", 2, "write a number"),
+        ("-n 8 --settle 1e9", 2, "write a number"),
+        ("-n 8 --slew 0", 2, "write a number"),
+        ("-n 8 --sensor gyro --rates abc", 2, "no rate"),
+        ("-n 8 --sensor gyro --rates 10,,30", 2, "no rate"),
+        ("-n 8 --sensor gyro --rates ..0", 2, "no rate"),
+        ("-n 8 --sensor gyro --rates ..", 2, "no rate"),
+        ("-n 8 --sensor gyro --rates=-10", 2, "no rate"),
+        ("-n 8 --sensor gyro --rates 1e300", 2, "no rate"),
+        ("--scheme six-face --rates 10", 2, "cannot be used with"),
+        ("--scheme seven-face", 2, "six-face"),
+        ("-n 8 --table four-axis", 2, "two-axis"),
+        ("-n 8 --order random", 2, "lot"),
+        ("-n 8 --seed x", 2, "invalid digit"),
+        ("-n 8 --seed 18446744073709551616", 2, "too large"),
     ];
     let folder = tempfile::tempdir().unwrap();
+    std::fs::create_dir(folder.path().join("folder")).unwrap();
+    std::fs::write(folder.path().join("there"), "kept").unwrap();
     for (arguments, status, says) in cases {
         let out = mimu(folder.path(), arguments);
         let error = String::from_utf8(out.stderr).unwrap();
@@ -142,7 +269,11 @@ fn refusals_are_one_line_with_status_1_and_wrong_usage_has_status_2() {
             status == 2 || error.lines().count() == 1,
             "{arguments}: {error}"
         );
-        assert!(out.stdout.is_empty());
+        assert!(out.stdout.is_empty(), "{arguments}");
     }
-    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+    // Nothing was written or left behind.
+    let there = std::fs::read_to_string(folder.path().join("there")).unwrap();
+    let count = |path: &Path| std::fs::read_dir(path).unwrap().count();
+    assert_eq!((there.as_str(), count(folder.path())), ("kept", 2));
+    assert_eq!(count(&folder.path().join("folder")), 0);
 }

@@ -175,6 +175,93 @@ fn on_a_two_axis_table_every_setting_is_within_its_tilt() {
 }
 
 #[test]
+fn the_size_of_gravity_on_a_two_axis_table_is_best_measured_on_rings() {
+    // Rotated about z the optimum stays one. Twelve points are a ring to polynomials of degree four.
+    let h = 95_f64.to_radians().cos();
+    let of_rings = |x: &[f64]| {
+        let mut m = DMatrix::<f64>::zeros(9, 9);
+        let all: f64 = x.chunks(2).map(|ring| ring[1] * ring[1]).sum();
+        for ring in x.chunks(2) {
+            let z = h + (1.0 - h) * (ring[0] + 1.0) / 2.0;
+            for k in 0..12 {
+                let (s, c) = (f64::from(k) * PI / 6.0).sin_cos();
+                let r = (1.0 - z * z).max(0.0).sqrt();
+                let (x, y) = (r * c, r * s);
+                let f = nalgebra::dvector![x * x, x * y, y * y, x * z, y * z, z * z, x, y, z];
+                m += &f * f.transpose() * (ring[1] * ring[1] / all / 12.0);
+            }
+        }
+        m.determinant()
+    };
+    let known = brute_force::best(6, 1.0, of_rings);
+    let model = Model::accel(Reference::Gravity, &terms("affine"));
+    let problem = Problem::accel(model, Carrier::TwoAxis).unwrap();
+    let found = problem.optimum.log_det.exp();
+    assert!(close(found, known, 1e-5), "{found} {known}");
+}
+
+#[test]
+fn own_squares_are_best_measured_on_six_faces() {
+    // With shares of 1/6, M of a sensor has det 1/27 (1/3 - 1/9) = 2/243, and the variance function of all three is 10.5
+    // + 4.5 (x⁴ + y⁴ + z⁴), nowhere on the sphere above the number of parameters, 15.
+    for problem in [
+        accel(Reference::Table, "affine,quadratic"),
+        gyro("affine,quadratic", "..300"),
+    ] {
+        assert!(close(
+            problem.optimum.log_det.exp(),
+            (2.0_f64 / 243.0).powi(3),
+            1e-6
+        ));
+        let judged = problem.judge(&problem.best(6, 1).unwrap(), 1.0);
+        assert!(
+            (judged.d_efficiency - 1.0).abs() < 1e-7,
+            "{}",
+            judged.d_efficiency
+        );
+    }
+}
+
+#[test]
+fn every_problem_has_an_optimum_that_designs_approach_or_names_what_it_cannot_tell_apart() {
+    let lists = [
+        "affine",
+        "affine,quadratic",
+        "affine,cubic",
+        "affine,cross",
+        "affine,quadratic,cubic",
+        "affine,quadratic,cubic,cross",
+    ];
+    let carriers = [Carrier::ThreeAxis, Carrier::TwoAxis, Carrier::Faces];
+    for list in lists {
+        for (carrier, reference) in carriers
+            .into_iter()
+            .flat_map(|c| [(c, Reference::Table), (c, Reference::Gravity)])
+        {
+            let what = format!("{list}, {}, {reference:?}", carrier.name());
+            match Problem::accel(Model::accel(reference, &terms(list)), carrier) {
+                Ok(problem) => {
+                    assert!(problem.optimum.excess <= 1e-6, "{what}");
+                    let judged = problem.judge(&problem.best(24, 1).unwrap(), 1.0);
+                    let range = 0.94..1.0 + 1e-6;
+                    assert!(
+                        range.contains(&judged.d_efficiency),
+                        "{what}: {}",
+                        judged.d_efficiency
+                    );
+                }
+                Err(refused) => {
+                    assert!(refused.problem.contains("tell apart"), "{what}: {refused}");
+                    let known = carrier == Carrier::Faces
+                        || (reference == Reference::Gravity && list.contains("cross"));
+                    assert!(known, "{what}: {refused}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
 fn a_gyro_that_feels_force_is_designed_with_both_ways_up() {
     let problem = gyro("affine,quadratic,g-sensitivity", "..300");
     let best = problem.best(14, 1).unwrap();

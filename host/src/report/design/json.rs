@@ -5,6 +5,7 @@ use serde_json::{Value, json};
 use super::DesignReport;
 use crate::design::budget::Spending;
 use crate::design::judgement::HALF_95;
+use crate::design::schemes::Scheme;
 use crate::recording::Reference;
 
 /// Result of `mimu design` as JSON.
@@ -66,7 +67,10 @@ pub fn design_json(report: &DesignReport) -> Value {
         "notices": notices,
         "dwell_s": report.dwell_s,
         "dwell_sigma": { "value": j.sigma, "unit": reach.model.bias_unit().0 },
+        "order": report.order_name(),
+        "turned_over": report.turned_over,
         "moves_s": report.moves_s(),
+        "shortest_moves_s": report.shortest_moves_s,
         "time_s": report.time_s(),
     });
     if report.gyro() {
@@ -83,14 +87,14 @@ pub fn design_json(report: &DesignReport) -> Value {
     if let Some((budget_s, budget)) = &report.budget {
         let spending = |s: &Spending| {
             json!({
-                "settings": s.settings.len(),
+                "dwells_a_pass": s.each_pass(),
                 "passes": s.passes,
                 "dwell_s": s.dwell_s,
                 "moves_s": s.moves_s,
                 "mean_sigma": s.mean_sigma,
             })
         };
-        let ways: Vec<Value> = budget.by_settings.iter().map(spending).collect();
+        let ways: Vec<Value> = budget.by_size.iter().map(spending).collect();
         value["budget"] =
             json!({ "time_s": budget_s, "best": spending(&budget.best), "ways": ways });
     }
@@ -98,7 +102,8 @@ pub fn design_json(report: &DesignReport) -> Value {
 }
 
 /// Result of `mimu design --compare` as JSON.
-pub fn comparison_json(reports: &[DesignReport]) -> Value {
+pub fn comparison_json(reports: &[DesignReport], out_of_reach: &[Scheme]) -> Value {
     let designs: Vec<Value> = reports.iter().map(design_json).collect();
-    json!({ "format": "mimu-design-comparison/1", "designs": designs })
+    let names: Vec<&str> = out_of_reach.iter().map(|s| s.name()).collect();
+    json!({ "format": "mimu-design-comparison/1", "designs": designs, "out_of_reach": names })
 }

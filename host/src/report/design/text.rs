@@ -10,7 +10,10 @@ use crate::design::judgement::{HALF_95, Judgement};
 use crate::design::lack_of_fit::Notice;
 use crate::design::plan::round;
 use crate::design::schemes::Scheme;
+use crate::design::tour::Order;
 
+/// Dwells listed: as many as the longest design.
+const LISTED: usize = 200;
 /// Width that tables of parameters keep to.
 const COLUMNS: usize = 98;
 
@@ -62,6 +65,7 @@ pub fn design_text(report: &DesignReport) -> String {
             minutes(report.moves_s())
         ),
     );
+    line("order", order(report));
     line("sigma of a dwell mean", sigma(report));
     line(
         "left over",
@@ -92,6 +96,11 @@ pub fn design_text(report: &DesignReport) -> String {
     }
     if let Some(assumed) = report.scheme.and_then(Scheme::assumed) {
         wrapped(&mut out, "assumed", assumed);
+    }
+    if report.turned_over {
+        let text = "the unit stands the other way up than published, turned by a half turn about x: y and z \
+                    change sign, and the table reaches all poses";
+        wrapped(&mut out, "mounted", text);
     }
     if let Some((budget_s, budget)) = &report.budget {
         spent(&mut out, report, *budget_s, budget);
@@ -142,6 +151,22 @@ fn sigma(report: &DesignReport) -> String {
     }
 }
 
+/// Order of the dwells, and what it costs.
+fn order(report: &DesignReport) -> String {
+    let name = match report.order {
+        None => "as published",
+        Some(Order::Shortest) => {
+            return "shortest found; neighbours share drift (see --order)".into();
+        }
+        Some(Order::Lot) => "drawn by lot",
+    };
+    let longer = report.moves_s() - report.shortest_moves_s;
+    match longer >= 0.05 {
+        true => format!("{name}, {} longer than the shortest found", minutes(longer)),
+        false => format!("{name}, as short as the shortest found"),
+    }
+}
+
 /// What is noticed and what is not, as lines.
 fn noticed(report: &DesignReport) -> Vec<(&'static str, String)> {
     let mut lines = Vec::new();
@@ -183,13 +208,21 @@ fn settings(out: &mut String, report: &DesignReport) {
         "\n  {:<7}{:>9}{:>9}{:>9}{rate}",
         "dwell", "up: x", "y", "z"
     );
-    for (k, s) in report.judgement.settings.iter().enumerate() {
+    let all = &report.judgement.settings;
+    for (k, s) in all.iter().enumerate().take(LISTED) {
         let [x, y, z] = <[f64; 3]>::from(s.up).map(|c| round(c, 1e4));
         let _ = write!(out, "  {:<7}{x:>9.4}{y:>9.4}{z:>9.4}", k + 1);
         if report.gyro() {
             let _ = write!(out, "{:>13.2}", round(s.rate.to_degrees(), 1e2));
         }
         let _ = writeln!(out);
+    }
+    if all.len() > LISTED {
+        let _ = writeln!(
+            out,
+            "  ... and {} more: -o and --json have them",
+            all.len() - LISTED
+        );
     }
 }
 
@@ -231,7 +264,7 @@ fn parameters(out: &mut String, j: &Judgement) {
     for (name, inflation) in j.weak() {
         let _ = writeln!(
             out,
-            "warning: {name} is all but unobservable: its sigma is {} times what it were beside known others",
+            "warning: {name} is all but unobservable: sigma {} times what it were with the others known",
             three(inflation)
         );
     }
@@ -262,16 +295,16 @@ fn spent(out: &mut String, report: &DesignReport, budget_s: f64, budget: &Budget
     let _ = writeln!(
         out,
         "\n  {:<10}{:>8}{:>10}{:>9}{:>16}",
-        "settings", "passes", "dwell, s", "moves", "sigmas, best 1"
+        "a pass", "passes", "dwell, s", "moves", "sigma over best"
     );
     let shown = [4, 5, 6, 8, 9, 10, 12, 14, 16, 20, 25, 30, 35, 40];
-    let is_best = |s: &Spending| s.settings.len() == best.settings.len();
-    for s in &budget.by_settings {
-        if is_best(s) || shown.contains(&s.settings.len()) {
+    let is_best = |s: &Spending| s.each_pass() == best.each_pass();
+    for s in &budget.by_size {
+        if is_best(s) || shown.contains(&s.each_pass()) {
             let _ = writeln!(
                 out,
                 "  {:<10}{:>8}{:>10}{:>7.0} %{:>16.3}{}",
-                s.settings.len(),
+                s.each_pass(),
                 s.passes,
                 three(s.dwell_s),
                 100.0 * s.moves_s / budget_s,
@@ -283,7 +316,7 @@ fn spent(out: &mut String, report: &DesignReport, budget_s: f64, budget: &Budget
 }
 
 /// Result of `mimu design --compare`: one design a line.
-pub fn comparison_text(reports: &[DesignReport]) -> String {
+pub fn comparison_text(reports: &[DesignReport], out_of_reach: &[Scheme]) -> String {
     let mut out = String::new();
     if let Some(first) = reports.first() {
         let _ = writeln!(
@@ -335,6 +368,10 @@ pub fn comparison_text(reports: &[DesignReport]) -> String {
         "\n  mean sigma: geometric mean over the parameters, of full scale; dof: left to notice a wrong model;\n  \
          can notice: terms beyond the model that show in the residuals in every direction"
     );
+    if !out_of_reach.is_empty() {
+        let names: Vec<&str> = out_of_reach.iter().map(|s| s.name()).collect();
+        let _ = writeln!(out, "  out of this table's reach: {}", names.join(", "));
+    }
     for scheme in reports.iter().filter_map(|r| r.scheme) {
         if let Some(assumed) = scheme.assumed() {
             wrapped(&mut out, scheme.name(), assumed);
