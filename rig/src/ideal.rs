@@ -57,6 +57,28 @@ pub struct Inverse {
     pub offset: Vector,
 }
 
+/// xu, table 1, averages of the gyros: raw in rad/s, to rad/s.
+pub const XU_TABLE_1: Inverse = Inverse {
+    matrix: [
+        [0.99972, -0.01199, -0.00059],
+        [0.02394, 1.00046, 0.01053],
+        [0.01087, 0.01490, 1.00579],
+    ],
+    offset: [-0.04317, -0.12395, -0.35153],
+};
+
+const MG: f64 = 1e-3 * 9.80665;
+
+/// xu, table 2, averages of the accelerometers: raw in m/s², to m/s². The offsets are printed in mg.
+pub const XU_TABLE_2: Inverse = Inverse {
+    matrix: [
+        [0.96667, 0.01434, -0.00180],
+        [-0.01760, 0.96965, -0.00851],
+        [0.01476, -0.01494, 0.99326],
+    ],
+    offset: [-0.16417 * MG, 0.10724 * MG, 0.26508 * MG],
+};
+
 impl Ideal {
     /// Mean of `samples` readings of the input x.
     pub fn read(&self, x: Vector, samples: u32, random: &mut Random) -> Vector {
@@ -182,16 +204,10 @@ mod tests {
 
     #[test]
     fn the_forward_model_of_an_inverse_one_reads_what_it_brings_back() {
-        // xu, table 1, averages.
-        let inverse = Inverse {
-            matrix: [
-                [0.99972, -0.01199, -0.00059],
-                [0.02394, 1.00046, 0.01053],
-                [0.01087, 0.01490, 1.00579],
-            ],
-            offset: [-0.04317, -0.12395, -0.35153],
-        };
-        for x in [[1.0, -2.0, 60.0], [9.8, -3.0, 0.5]] {
+        for (inverse, x) in [
+            (XU_TABLE_1, [1.0, -2.0, 60.0]),
+            (XU_TABLE_2, [9.8, -3.0, 0.5]),
+        ] {
             let u = inverse
                 .forward([0.0; 3])
                 .unwrap()

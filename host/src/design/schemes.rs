@@ -83,9 +83,10 @@ impl Scheme {
     pub fn assumed(self) -> Option<&'static str> {
         match self {
             Self::Niu8 => Some(
-                "the figure with the sequence is not in the text: of quarter turns, only cycles with \
-                 z down four times and x and y up and down once each reach the five poses and \
-                 turn both ways about each axis",
+                "the figure with the sequence is not in the text: of eight quarter turns, only cycles \
+                 with z down four times and x and y up and down once each reach the five poses and \
+                 turn both ways about each axis; in those x and y point the same way in all their \
+                 turns, as the appendix has it, and z does not",
             ),
             Self::XuRates => {
                 Some("rates are taken as shares of each gyro's range: 300, 300 and 3600 deg/s")
@@ -111,7 +112,8 @@ impl Scheme {
                 let z = plane(|c, s| Vector3::new(0.0, -s, -c));
                 [x, y, z].concat()
             }
-            // Quarter turns about: y, z, x, z, y, z, x, z.
+            // Quarter turns about: y, z, x, z, y, z, x, z. Of the 24 cycles that fit the words (a test goes through
+            // all there are) one of the eight with two turns each about x and y; the poses are those of all.
             (Self::Niu8, Sensor::Accel) => {
                 let (x, y, z) = (Vector3::x(), Vector3::y(), Vector3::z());
                 vec![-z, x, y, -z, -z, -x, -y, -z]

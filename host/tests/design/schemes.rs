@@ -195,11 +195,13 @@ fn niu_and_xu_positions_are_as_published() {
     assert_eq!(rates.iter().filter(|s| s.rate == 0.0).count(), 3);
 }
 
+/// Poses, and turns as (body axis, sense, how that axis points).
+type Cycle = Vec<([i32; 3], (usize, i32, i32))>;
+
 /// Every cycle of eight quarter turns on a table that tilts by -90, 0 or 90 degrees about a horizontal axis and turns about
 /// the unit's z without end, begun at tilt 0: for each the poses it holds, and its turns as (body axis, sense,
 /// how that axis points).
-fn cycles() -> Vec<Vec<([i32; 3], (usize, i32, i32))>> {
-    type Cycle = Vec<([i32; 3], (usize, i32, i32))>;
+fn cycles() -> Vec<Cycle> {
     fn go(tilt: i32, turn: i32, cycle: &mut Cycle, all: &mut Vec<Cycle>) {
         if cycle.len() == 8 {
             if (tilt, turn) == (0, 0) {
