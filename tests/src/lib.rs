@@ -2,7 +2,7 @@
 //!
 //! | where                  | what                                                              |
 //! |------------------------|-------------------------------------------------------------------|
-//! | [`bench`]              | units with known truth on the virtual bench, read as a user's would be |
+//! | [`mod@bench`]          | units with known truth on the virtual bench, read as a user's would be |
 //! | [`coverage`]           | how often intervals hold the truth, over the whole path of a recording |
 //! | [`recordings`]         | recordings by other people                                        |
 //! | `tests/agreement.rs`   | least squares against Kalman filter, forward against inverse model |
