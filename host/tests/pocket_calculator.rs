@@ -32,8 +32,6 @@ fn fitted(folder: &Path) -> serde_json::Value {
             columns[0],
             "--columns",
             columns[1],
-            "--rate-hz",
-            "100",
             "--raw-unit",
             "count",
             "--reference",
