@@ -199,6 +199,36 @@ fn seven_and_eight_runs_on_the_square_are_as_good_as_brute_force_finds() {
 }
 
 #[test]
+fn no_exchange_of_one_run_betters_what_a_single_start_ends_with() {
+    let square = Cube {
+        factors: 2,
+        degree: 2,
+    };
+    let grid = square.grid(6);
+    let rows = square.rows(&grid);
+    let determinant = |points: &[usize]| {
+        let each = points.iter().map(|&i| [grid[i][0], grid[i][1]]);
+        of_square(&each.collect::<Vec<_>>())
+    };
+    for seed in 0..20 {
+        let found = &exchange::search(&rows, 7, 1, seed)[0];
+        let known = determinant(&found.points);
+        assert!(close(found.log_det.exp(), known, 1e-9));
+        for k in 0..7 {
+            for other in 0..grid.len() {
+                let mut points = found.points.clone();
+                points[k] = other;
+                let exchanged = determinant(&points);
+                assert!(
+                    exchanged <= known * (1.0 + 1e-7),
+                    "{seed}: {known} {exchanged}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
 fn rows_that_determine_nothing_have_no_design() {
     let mut rows = Rows::new(&[2]);
     rows.push(&[1.0, 1.0]);
