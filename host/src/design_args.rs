@@ -1,6 +1,7 @@
 //! `mimu design`: arguments and what follows from them.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
 
 use clap::{ArgGroup, Args, ValueEnum};
 use mimu::calibration::stage;
@@ -12,6 +13,7 @@ use mimu::design::schemes::Scheme;
 use mimu::design::tour::{Motion, Order, by_lot};
 use mimu::dwell::Sensor;
 use mimu::error::{Error, Result};
+use mimu::noise_file::NoiseFile;
 use mimu::recording::Reference;
 use mimu::report::{self, DesignReport};
 use nalgebra::Vector3;
@@ -46,9 +48,11 @@ pub struct DesignArgs {
     #[arg(long, value_enum)]
     table: Option<TableArg>,
     /// Length of a dwell, s
-    #[arg(long, value_name = "S", default_value_t = 20.0, conflicts_with = "budget",
+    ///
+    /// Without it 20 s; with a noise file, from which on a longer one has a sigma at most 5 % smaller.
+    #[arg(long, value_name = "S", conflicts_with = "budget",
           value_parser = |t: &str| number(t, 0.1, 86400.0))]
-    dwell: f64,
+    dwell: Option<f64>,
     /// Order of the dwells: lot without it, and published schemes as published
     ///
     /// Sensors wander, and what neighbouring dwells share of that goes into the parameters that the difference of their
@@ -70,15 +74,15 @@ pub struct DesignArgs {
     #[arg(long, value_name = "SI", value_parser = |t: &str| number(t, 1e-12, 1e3),
           conflicts_with_all = ["budget", "noise", "instability", "walk"])]
     sigma: Option<f64>,
-    /// White noise N, m/s² or rad/s per √Hz; without it that of fang's sensors
-    #[arg(long, value_name = "SI", value_parser = |t: &str| number(t, 1e-12, 1e3))]
-    noise: Option<f64>,
+    /// White noise N, m/s² or rad/s per √Hz, or the noise file of the unit; without it that of fang's sensors
+    #[arg(long, value_name = "SI|FILE")]
+    noise: Option<NoiseArg>,
     /// Bias instability B, m/s² or rad/s; without it, what --noise averages to in 20 s
     #[arg(long, value_name = "SI", value_parser = |t: &str| number(t, 0.0, 1e3))]
     instability: Option<f64>,
-    /// Random walk K, m/s² or rad/s per √s
-    #[arg(long, value_name = "SI", default_value_t = 0.0, value_parser = |t: &str| number(t, 0.0, 1e3))]
-    walk: f64,
+    /// Random walk K, m/s² or rad/s per √s; without it none
+    #[arg(long, value_name = "SI", value_parser = |t: &str| number(t, 0.0, 1e3))]
+    walk: Option<f64>,
     /// Seed of the search and of the lots
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -125,12 +129,33 @@ enum SchemeArg {
     Niu8,
 }
 
-fn number(text: &str, lowest: f64, highest: f64) -> std::result::Result<f64, String> {
+pub fn number(text: &str, lowest: f64, highest: f64) -> std::result::Result<f64, String> {
     match text.parse() {
         Ok(v) if (lowest..=highest).contains(&v) => Ok(v),
         _ => Err(format!("write a number from {lowest:?} to {highest:?}")),
     }
 }
+
+/// White noise, or where the noise is stated.
+#[derive(Clone)]
+enum NoiseArg {
+    Density(f64),
+    File(PathBuf),
+}
+
+impl FromStr for NoiseArg {
+    type Err = String;
+
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        match text.parse::<f64>() {
+            Ok(_) => number(text, 1e-12, 1e3).map(Self::Density),
+            Err(_) => Ok(Self::File(text.into())),
+        }
+    }
+}
+
+/// Length of a dwell where nothing is known of the unit: fang's, s.
+const DWELL_S: f64 = 20.0;
 
 impl DesignArgs {
     fn sensor(&self) -> Sensor {
@@ -158,14 +183,39 @@ impl DesignArgs {
         }
     }
 
-    fn noise(&self) -> DwellNoise {
-        let fang = DwellNoise::fang(self.sensor());
-        let n = self.noise.unwrap_or(fang.n);
-        DwellNoise {
-            n,
-            b: self.instability.unwrap_or(fang.b * n / fang.n),
-            k: self.walk,
-        }
+    /// Noise of the sensor; what is given by hand goes before the file.
+    fn noise(&self) -> Result<DwellNoise> {
+        let stated = match &self.noise {
+            Some(NoiseArg::File(path)) => {
+                DwellNoise::stated(&NoiseFile::read(path)?, self.sensor())?
+            }
+            other => {
+                let fang = DwellNoise::fang(self.sensor());
+                let n = match other {
+                    Some(NoiseArg::Density(n)) => *n,
+                    _ => fang.n,
+                };
+                let b = fang.b * n / fang.n;
+                DwellNoise { n, b, k: 0.0 }
+            }
+        };
+        Ok(DwellNoise {
+            n: stated.n,
+            b: self.instability.unwrap_or(stated.b),
+            k: self.walk.unwrap_or(stated.k),
+        })
+    }
+
+    /// Length of a dwell, s.
+    fn dwell_s(&self, noise: &DwellNoise) -> f64 {
+        let useful = match &self.noise {
+            Some(NoiseArg::File(_)) => noise.useful_s(),
+            _ => None,
+        };
+        // Times are set on tables in tenths of a second.
+        self.dwell
+            .or(useful.map(|s| ((10.0 * s).ceil() / 10.0).max(1.0)))
+            .unwrap_or(DWELL_S)
     }
 
     /// Order of a design, and of a published scheme if it is not to be as published.
@@ -216,9 +266,10 @@ impl DesignArgs {
         title: String,
         settings: &[Setting],
         order: Option<Order>,
-    ) -> DesignReport {
-        let noise = self.sigma.is_none().then(|| self.noise());
-        let sigma = self.sigma.unwrap_or_else(|| self.noise().sigma(self.dwell));
+    ) -> Result<DesignReport> {
+        let noise = self.noise()?;
+        let dwell_s = self.dwell_s(&noise);
+        let sigma = self.sigma.unwrap_or_else(|| noise.sigma(dwell_s));
         let motion = self.motion();
         let shortest = motion.shortest(settings);
         let shortest_moves_s = motion.moves_s(&shortest).min(motion.moves_s(settings));
@@ -227,25 +278,25 @@ impl DesignArgs {
             Some(Order::Shortest) => shortest,
             Some(Order::Lot) => by_lot(settings, self.seed),
         };
-        DesignReport {
+        Ok(DesignReport {
             title,
             judgement: problem.judge(&settings, sigma),
             problem: problem.clone(),
-            dwell_s: self.dwell,
-            noise,
+            dwell_s,
+            noise: self.sigma.is_none().then_some(noise),
             motion,
             order,
             shortest_moves_s,
             scheme: None,
             turned_over: false,
             budget: None,
-        }
+        })
     }
 
     fn best(&self, problem: &Problem, n: usize, title: String) -> Result<DesignReport> {
         let settings = problem.best(n, self.seed)?;
         let order = self.order().unwrap_or(Order::Lot);
-        Ok(self.report(problem, title, &settings, Some(order)))
+        self.report(problem, title, &settings, Some(order))
     }
 
     fn scheme(&self, problem: &Problem, scheme: Scheme) -> Result<DesignReport> {
@@ -264,7 +315,7 @@ impl DesignArgs {
         Ok(DesignReport {
             scheme: Some(scheme),
             turned_over,
-            ..self.report(problem, title, &settings, self.order())
+            ..self.report(problem, title, &settings, self.order())?
         })
     }
 
@@ -272,7 +323,7 @@ impl DesignArgs {
         let order = self.order().unwrap_or(Order::Lot);
         let session = Session {
             time_s: 60.0 * minutes,
-            noise: self.noise(),
+            noise: self.noise()?,
             motion: self.motion(),
             order,
         };
@@ -324,7 +375,11 @@ impl DesignArgs {
 const RATE_DPS: f64 = 300.0;
 
 pub fn run(args: &DesignArgs) -> Result<()> {
-    check_outputs(&[args.output.as_deref(), args.json.file()], &[])?;
+    let stated: Vec<&Path> = match &args.noise {
+        Some(NoiseArg::File(path)) => vec![path],
+        _ => Vec::new(),
+    };
+    check_outputs(&[args.output.as_deref(), args.json.file()], &stated)?;
     if args.compare {
         let (reports, out_of_reach) = args.compare()?;
         let text = report::comparison_text(&reports, &out_of_reach);

@@ -260,9 +260,11 @@ fn fit_known(
             continue;
         }
         refuse_wrong_gravity(prepared, sensor, &observations)?;
+        let wander = prepared.noise.wander(sensor, &prepared.dwells.list);
+        let wander = wander.as_ref();
         let estimate = |o: &[Observation]| match (options.method, sensor) {
-            (Method::LeastSquares, _) => known_input::least_squares(o),
-            (Method::Kalman, _) => known_input::kalman(o),
+            (Method::LeastSquares, _) => known_input::least_squares(o, wander),
+            (Method::Kalman, _) => known_input::kalman(o, wander),
             (Method::Xu, Sensor::Gyro) => known_input::opposite_rates(o),
             (Method::Xu, Sensor::Accel) => known_input::inverse_form(o),
             (Method::SixPositions, _) => known_input::six_positions(o),

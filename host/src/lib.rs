@@ -12,17 +12,22 @@
 //! | [`fit`], [`plausible`] | both triads, judged on what they have not seen; what cannot be right is refused |
 //! | [`calibration`], [`verify`] | the file, and judging it by another recording                     |
 //! | [`design`]      | experiments: which attitudes and rates, how many, for how long                |
+//! | [`allan`]       | noise from a recording at rest: Allan deviation and noise model                |
+//! | [`noise_file`], [`export`] | its result for the other commands, and for other programs          |
 //! | [`report`]      | all results as JSON and as text                                               |
 
+pub mod allan;
 pub mod blocks;
 pub mod calibration;
 pub mod design;
 pub mod dwell;
 pub mod error;
 pub mod estimate;
+pub mod export;
 pub mod fit;
 pub mod increment;
 pub mod noise;
+pub mod noise_file;
 pub mod plausible;
 pub mod prepared;
 pub mod rails;

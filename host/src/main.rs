@@ -1,6 +1,8 @@
 //! The command `mimu`: argument parsing and output around the library of the same name.
 
+mod allan_args;
 mod design_args;
+mod export_args;
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -12,6 +14,7 @@ use mimu::calibration::{Calibration, Staged, stage, to_toml};
 use mimu::dwell::Sensor;
 use mimu::error::{Error, Result};
 use mimu::fit::{Method, Options, fit};
+use mimu::noise_file::NoiseFile;
 use mimu::prepared::Prepared;
 use mimu::recording::{
     ColumnList, ImportOptions, MANIFEST_FILE, RawUnit, Recording, Reference, SampleFormat, Scale,
@@ -42,6 +45,10 @@ enum Command {
     Verify(VerifyArgs),
     /// Design the experiment: which attitudes and rates, how many, for how long
     Design(design_args::DesignArgs),
+    /// Noise of a unit at rest: Allan deviation, N, B, K, Q and R
+    Allan(allan_args::AllanArgs),
+    /// Write noise coefficients in the format of another program
+    Export(export_args::ExportArgs),
 }
 
 #[derive(Args)]
@@ -111,6 +118,8 @@ struct FitArgs {
     only: Option<SensorArg>,
     #[command(flatten)]
     still: StillArgs,
+    #[command(flatten)]
+    noise: NoiseArgs,
     /// List the dwells
     #[arg(long)]
     dwells: bool,
@@ -131,6 +140,8 @@ struct VerifyArgs {
     #[command(flatten)]
     still: StillArgs,
     #[command(flatten)]
+    noise: NoiseArgs,
+    #[command(flatten)]
     json: JsonArgs,
 }
 
@@ -139,6 +150,15 @@ struct StillArgs {
     /// Without a step column: largest variance of a still window, times that of the quietest
     #[arg(long = "still", value_name = "FACTOR", default_value_t = STILL_FACTOR, value_parser = still)]
     factor: f64,
+}
+
+#[derive(Args)]
+struct NoiseArgs {
+    /// Noise of the unit at rest, by `mimu allan -o`; without it, the noise within the dwells
+    ///
+    /// It also says how the bias wanders from dwell to dwell, which no dwell can tell.
+    #[arg(long = "noise", value_name = "FILE")]
+    file: Option<PathBuf>,
 }
 
 #[derive(Args)]
@@ -188,6 +208,8 @@ fn main() -> ExitCode {
         Command::Fit(args) => run_fit(&args),
         Command::Verify(args) => run_verify(&args),
         Command::Design(args) => design_args::run(&args),
+        Command::Allan(args) => allan_args::run(&args),
+        Command::Export(args) => export_args::run(&args),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,
@@ -271,7 +293,9 @@ fn run_fit(args: &FitArgs) -> Result<()> {
         }),
     };
     let outputs = [args.output.as_deref(), args.json.file()];
-    let prepared = read(&args.recording, options.still_factor, &outputs, None)?;
+    let inputs = [args.noise.file.as_deref()];
+    let prepared = read(&args.recording, options.still_factor, &outputs, &inputs)?;
+    let prepared = args.noise.state(prepared)?;
     if args.method.is_some() && prepared.manifest.reference == Reference::Gravity {
         return Err(Error::new(
             args.recording.display(),
@@ -306,8 +330,9 @@ fn run_verify(args: &VerifyArgs) -> Result<()> {
         &args.recording,
         args.still.factor,
         &outputs,
-        Some(&args.calibration),
+        &[Some(&args.calibration), args.noise.file.as_deref()],
     )?;
+    let prepared = args.noise.state(prepared)?;
     let verified = verify(&prepared, &calibration)?;
     print(
         &args.json,
@@ -322,12 +347,12 @@ fn read(
     directory: &Path,
     still_factor: f64,
     outputs: &[Option<&Path>],
-    calibration: Option<&Path>,
+    others: &[Option<&Path>],
 ) -> Result<Prepared> {
     let recording = Recording::open(directory)?;
     let manifest = directory.join(MANIFEST_FILE);
     let mut inputs: Vec<&Path> = vec![&manifest, &recording.samples];
-    inputs.extend(calibration);
+    inputs.extend(others.iter().flatten());
     check_outputs(outputs, &inputs)?;
     let bar = progress("reading");
     let prepared = Prepared::read(&recording, still_factor, |share| {
@@ -368,6 +393,16 @@ fn progress(what: &'static str) -> ProgressBar {
     bar
 }
 
+impl NoiseArgs {
+    /// `prepared` with the noise of the file, if there is one.
+    fn state(&self, prepared: Prepared) -> Result<Prepared> {
+        match &self.file {
+            Some(path) => prepared.with_noise(&NoiseFile::read(path)?),
+            None => Ok(prepared),
+        }
+    }
+}
+
 impl JsonArgs {
     /// The file to write, if it is one.
     fn file(&self) -> Option<&Path> {
@@ -381,11 +416,11 @@ fn print(
     json: &JsonArgs,
     text: &str,
     value: &serde_json::Value,
-    calibration: Option<Staged>,
+    files: impl IntoIterator<Item = Staged>,
 ) -> Result<()> {
     let pretty = format!("{value:#}\n");
     let file = json.file().map(|path| stage(path, pretty.clone()));
-    for staged in calibration.into_iter().chain(file.transpose()?) {
+    for staged in files.into_iter().chain(file.transpose()?) {
         staged.publish()?;
     }
     let shown = match (&json.path, json.file()) {

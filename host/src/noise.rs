@@ -1,14 +1,22 @@
 //! Noise of a dwell mean, from the Allan deviation within the dwells.
 //!
 //! A mean of n samples is not sigma/√n when the noise is correlated: the Allan variance at the length
-//! of the dwell is what two successive means differ by (fang (8), section 3).
+//! of the dwell is what two successive means differ by (fang (8), section 3). What wanders more slowly than a dwell lasts only a
+//! longer record at rest can tell: its noise file, and [`wander`].
 
-use nalgebra::Vector3;
+pub mod wander;
+
+use nalgebra::{DMatrix, Vector3};
 
 use mimu_core::compensation::Affine;
 
+use self::wander::{Slow, Span};
+use crate::allan::model::FLOOR;
 use crate::blocks::{Block, Condensed};
 use crate::dwell::{Dwell, Sensor};
+use crate::error::{Error, Result};
+use crate::noise_file::NoiseFile;
+use crate::recording::{Manifest, RAW_COLUMNS, RawUnit};
 
 /// Allan variance of one raw channel as `N²/τ + B² + K² τ`: white noise, bias instability and rate
 /// random walk, each at least zero.
@@ -26,6 +34,40 @@ impl AllanModel {
     /// Variance of the mean over `tau_s`, raw units squared.
     pub fn variance(&self, tau_s: f64) -> f64 {
         self.white / tau_s + self.flicker + self.walk * tau_s
+    }
+
+    /// Its slow part.
+    fn slow(&self) -> Slow {
+        Slow {
+            instability: (self.flicker / FLOOR).sqrt(),
+            walk: (3.0 * self.walk).sqrt(),
+        }
+    }
+}
+
+/// Noise of one raw channel by a record at rest, at one temperature or several (fang, Table 5).
+#[derive(Debug, Clone, PartialEq)]
+pub struct Stated {
+    /// Temperature, °C, ascending, and the model there; of a single one the temperature does not count.
+    nodes: Vec<(f64, AllanModel)>,
+}
+
+impl Stated {
+    /// The model at `temp_c`: between the temperatures of the records interpolated linearly in the variances, beyond them that of the
+    /// nearest. Where it is not known, that of the lowest.
+    fn at(&self, temp_c: f64) -> AllanModel {
+        let k = self.nodes.partition_point(|n| n.0 <= temp_c);
+        if k == 0 || k == self.nodes.len() {
+            return self.nodes[k.saturating_sub(1)].1;
+        }
+        let [(t0, a), (t1, b)] = [self.nodes[k - 1], self.nodes[k]];
+        let share = (temp_c - t0) / (t1 - t0);
+        let mix = |a: f64, b: f64| a + share * (b - a);
+        AllanModel {
+            white: mix(a.white, b.white),
+            flicker: mix(a.flicker, b.flicker),
+            walk: mix(a.walk, b.walk),
+        }
     }
 }
 
@@ -61,9 +103,16 @@ impl ChannelNoise {
 /// Noise of the six raw channels of a unit at rest.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Noise {
-    /// Gyro x, y, z, accelerometer x, y, z.
+    /// Gyro x, y, z, accelerometer x, y, z: within the dwells.
     pub channels: [ChannelNoise; 6],
+    /// What a record at rest said of them, where it is used.
+    stated: [Option<Stated>; 6],
+    /// From the first dwell to the end of the last, s.
+    session: Span,
 }
+
+/// A noise file whose variance of a mean over 1 s is off by this factor, up or down, is not that of this recording.
+const ANOTHER_NOISE: f64 = 2.0;
 
 impl Noise {
     /// Pools the overlapping Allan variance within all usable dwells at rest or at a constant rate, and fits the
@@ -82,7 +131,86 @@ impl Noise {
                 }
             }
         }
-        Self { channels }
+        let end = |d: &Dwell| d.start_s + d.duration_s;
+        Self {
+            channels,
+            stated: Default::default(),
+            session: [
+                dwells.first().map_or(0.0, |d| d.start_s),
+                dwells.last().map_or(0.0, end),
+            ],
+        }
+    }
+
+    /// Takes the noise of `file` in place of that within the dwells; a channel whose dwells are not as noisy as the file says
+    /// keeps its own, and is told of.
+    ///
+    /// Errors: the file is in another unit than the readings, or lacks a channel.
+    pub fn state(
+        &mut self,
+        file: &NoiseFile,
+        manifest: &Manifest,
+        dwells: &[Dwell],
+        warnings: &mut Vec<String>,
+    ) -> Result<()> {
+        if file.device != manifest.device {
+            warnings.push(format!(
+                "the noise file is of {:?}, the recording of {:?}",
+                file.device, manifest.device
+            ));
+        }
+        let present = |c: &usize| dwells.iter().any(|d| d.raw[*c].n > 0);
+        for c in (0..6).filter(present) {
+            let name = RAW_COLUMNS[c];
+            let unit = match manifest.raw_unit {
+                RawUnit::Si => Sensor::BOTH[c / 3].unit(),
+                other => &other.to_string(),
+            };
+            let mut nodes = Vec::new();
+            for channel in file.channel.iter().filter(|k| k.name == name) {
+                if channel.unit != unit {
+                    return Err(Error::new(
+                        format!("{}, channel {name}", file.place),
+                        format!("it is in {}, and the readings are in {unit}", channel.unit),
+                        match manifest.raw_unit {
+                            RawUnit::Si => "run mimu allan with --calibration",
+                            _ => {
+                                "run mimu allan on a recording in the same unit, without --calibration"
+                            }
+                        },
+                    ));
+                }
+                nodes.push((channel.temp_c.unwrap_or(f64::NAN), channel.model()));
+            }
+            if nodes.is_empty() {
+                return Err(Error::new(
+                    &file.place,
+                    format!("there is no channel {name}"),
+                    "run mimu allan on a recording that has it",
+                ));
+            }
+            if nodes.len() > 1 && nodes.iter().any(|n| n.0.is_nan()) {
+                return Err(Error::new(
+                    format!("{}, channel {name}", file.place),
+                    "it is there more than once, and not always with a temperature",
+                    "run mimu allan on recordings with temp_c, or on one",
+                ));
+            }
+            nodes.sort_by(|a, b| a.0.total_cmp(&b.0));
+            let stated = Stated { nodes };
+            let mean_c = dwells.iter().map(|d| d.temp_c).sum::<f64>() / dwells.len() as f64;
+            let ratio = self.channels[c].variance(1.0) / stated.at(mean_c).variance(1.0);
+            if (1.0 / ANOTHER_NOISE..=ANOTHER_NOISE).contains(&ratio) {
+                self.stated[c] = Some(stated);
+            } else {
+                warnings.push(format!(
+                    "{name}: the mean over a second is {} times as noisy within the dwells as {} says, so the noise within the dwells is used",
+                    crate::report::three(ratio.sqrt()),
+                    file.place
+                ));
+            }
+        }
+        Ok(())
     }
 
     /// Noise of the size of specific force, m/s², as `accel` gives it: what a fit to the size of gravity sees. A unit that
@@ -97,11 +225,69 @@ impl Noise {
         })
     }
 
-    /// Variances of the mean reading of `sensor` over `dwell`, raw units squared.
+    /// Whether a record at rest says the noise of all channels of `sensor`.
+    pub fn is_stated(&self, sensor: Sensor) -> bool {
+        self.stated[sensor.channels()].iter().all(Option::is_some)
+    }
+
+    /// Variance of the difference of two successive means over `tau_s` of channel `c`, halved, raw units squared.
+    pub fn variance(&self, c: usize, tau_s: f64, temp_c: f64) -> f64 {
+        match &self.stated[c] {
+            Some(stated) => stated.at(temp_c).variance(tau_s),
+            None => self.channels[c].variance(tau_s),
+        }
+    }
+
+    /// Variances of the mean reading of `sensor` over `dwell`, raw units squared; where a record at rest says how it wanders,
+    /// of the mean less that of the session.
     pub fn of_mean(&self, sensor: Sensor, dwell: &Dwell) -> Vector3<f64> {
         let from = sensor.channels().start;
-        Vector3::from_fn(|i, _| self.channels[from + i].variance(dwell.averaged_s(sensor)))
+        let averaged_s = dwell.averaged_s(sensor);
+        Vector3::from_fn(|i, _| match &self.stated[from + i] {
+            None => self.channels[from + i].variance(averaged_s),
+            Some(stated) => {
+                let model = stated.at(dwell.temp_c);
+                let wander = model.slow().covariance(&[span(dwell)], self.session);
+                model.white / averaged_s + wander[(0, 0)]
+            }
+        })
     }
+
+    /// What the mean readings of `sensor` over `dwells` share of its wander, raw units squared, axis by axis: part of the
+    /// variances of [`Noise::of_mean`]. `None` where no record at rest says anything of it.
+    pub fn wander(&self, sensor: Sensor, dwells: &[Dwell]) -> Option<[DMatrix<f64>; 3]> {
+        let from = sensor.channels().start;
+        let stated = || self.stated[from..from + 3].iter().flatten();
+        let wanders = |s: &Stated| s.nodes.iter().any(|n| n.1.flicker + n.1.walk > 0.0);
+        if !stated().any(wanders) {
+            return None;
+        }
+        let spans: Vec<Span> = dwells.iter().map(span).collect();
+        Some(std::array::from_fn(|i| match &self.stated[from + i] {
+            None => DMatrix::zeros(dwells.len(), dwells.len()),
+            Some(stated) => {
+                // A noise whose size follows the temperature: each mean has the amplitude of its own.
+                let of = |part: fn(&mut AllanModel) -> &mut f64| {
+                    let amplitude: Vec<f64> = dwells
+                        .iter()
+                        .map(|d| part(&mut stated.at(d.temp_c)).sqrt())
+                        .collect();
+                    let mut one = AllanModel::default();
+                    *part(&mut one) = 1.0;
+                    let c = one.slow().covariance(&spans, self.session);
+                    DMatrix::from_fn(spans.len(), spans.len(), |i, j| {
+                        c[(i, j)] * amplitude[i] * amplitude[j]
+                    })
+                };
+                of(|m| &mut m.flicker) + of(|m| &mut m.walk)
+            }
+        }))
+    }
+}
+
+/// Time that a dwell takes.
+fn span(dwell: &Dwell) -> Span {
+    [dwell.start_s, dwell.start_s + dwell.duration_s]
 }
 
 /// Noise of `value` of the blocks within `dwells`.

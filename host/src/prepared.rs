@@ -9,6 +9,7 @@ use crate::error::{Error, Result};
 use crate::estimate::rotation::{Motion, Turn};
 use crate::estimate::{Failure, Observation};
 use crate::noise::Noise;
+use crate::noise_file::NoiseFile;
 use crate::rails::refuse_dead_channels;
 use crate::recording::{Manifest, Recording, Reference};
 
@@ -49,6 +50,13 @@ impl Prepared {
         })
     }
 
+    /// With the noise that a record at rest has shown in place of that within the dwells. Errors: see [`Noise::state`].
+    pub fn with_noise(mut self, file: &NoiseFile) -> Result<Self> {
+        let Dwells { list, warnings, .. } = &mut self.dwells;
+        self.noise.state(file, &self.manifest, list, warnings)?;
+        Ok(self)
+    }
+
     /// Whether the recording has the channels of `sensor`.
     pub fn has(&self, sensor: Sensor) -> bool {
         sensor.channels().all(|c| self.condensed.has_raw[c])
@@ -79,6 +87,13 @@ impl Prepared {
 
     /// Variances of the size of specific force over each of `poses` by noise, (m/s²)².
     pub fn size_variances(&self, accel: &Affine<f64>, poses: &[Observation]) -> Vec<f64> {
+        if self.noise.is_stated(Sensor::Accel) {
+            let size = |o: &Observation| {
+                let by = accel.matrix.tr_mul(&accel.apply(&o.raw).normalize());
+                by.component_mul(&by).dot(&o.variance)
+            };
+            return poses.iter().map(size).collect();
+        }
         let noise = Noise::of_size(&self.dwells.list, &self.condensed, accel);
         poses
             .iter()
@@ -137,7 +152,7 @@ impl Prepared {
             // The integral is the mean times the duration.
             let gyro = Sensor::Gyro.channels();
             let rate_variance = gyro
-                .map(|c| self.noise.channels[c].variance(duration_s))
+                .map(|c| self.noise.variance(c, duration_s, a.temp_c))
                 .sum::<f64>()
                 / 3.0;
             turns.push(Turn {

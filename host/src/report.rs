@@ -2,10 +2,12 @@
 //!
 //! Both hold the same numbers. JSON is SI throughout; the text uses degrees and mm/s² where a person reads.
 
+mod allan;
 mod design;
 mod json;
 mod text;
 
+pub use allan::{allan_json, allan_text, allan_toml};
 pub use design::{DesignReport, comparison_json, comparison_text, design_json, design_text};
 pub use json::{fit_json, import_json, verify_json};
 pub(crate) use text::three;

@@ -116,8 +116,8 @@ fn estimate(contender: &Contender, dwells: &[Observation]) -> Forward {
     let forward = |e: Result<Estimated, _>| e.expect("determined").triad.forward;
     match contender.estimator {
         Estimator::Scalar => forward(six_positions(dwells)),
-        Estimator::LeastSquares => forward(least_squares(dwells)),
-        Estimator::Kalman => forward(kalman(dwells)),
+        Estimator::LeastSquares => forward(least_squares(dwells, None)),
+        Estimator::Kalman => forward(kalman(dwells, None)),
         Estimator::KalmanOfFour => {
             let mut found = Forward {
                 matrix: Matrix3::zeros(),

@@ -1,6 +1,6 @@
 //! Whether the 95 % intervals hold the truth, over recordings from the virtual bench.
 
-use mimu_tests::coverage::{Tally, by_hand, with_a_table};
+use mimu_tests::coverage::{Dwells, Tally, by_hand, with_a_table};
 
 use crate::page::{Block, Table};
 
@@ -28,16 +28,23 @@ fn table(tallies: &[Tally]) -> Table {
     table
 }
 
-const NAMES: [&str; 3] = [
+const NAMES: [&str; 4] = [
     "intervals, by lot",
     "intervals, as listed",
+    "intervals, as listed, noise known",
     "intervals, by hand",
 ];
 
-/// With a table in an order drawn by lot and as listed, and by hand.
+/// With a table in an order drawn by lot, as listed, as listed with the noise of the unit at rest; and by hand.
 pub fn blocks() -> Vec<Block> {
     let hand = [by_hand(RUNS, false), by_hand(RUNS, true)].concat();
-    let all = [with_a_table(RUNS, true), with_a_table(RUNS, false), hand];
+    let [by_lot, listed, known] = [
+        Dwells::ByLot,
+        Dwells::AsListed,
+        Dwells::AsListedWithNoise,
+    ]
+    .map(|dwells| with_a_table(RUNS, dwells));
+    let all = [by_lot, listed, known, hand];
     let block = |(name, tallies): (_, &Vec<Tally>)| Block::table(name, &table(tallies));
     NAMES.into_iter().zip(&all).map(block).collect()
 }

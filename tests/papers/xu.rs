@@ -231,8 +231,8 @@ fn estimators(experiment: &Experiment) -> Table {
     type Estimator = fn(&[Observation]) -> Result<Estimated, Failure>;
     let all: [(&str, Estimator); 3] = [
         ("xu's inverse form", experiment.estimator),
-        ("least squares, forward form", least_squares),
-        ("Kalman bank", kalman),
+        ("least squares, forward form", |o| least_squares(o, None)),
+        ("Kalman bank", |o| kalman(o, None)),
     ];
     let mut table = Table::new(&[
         "estimator",

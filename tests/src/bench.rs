@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use mimu::noise_file::NoiseFile;
 use mimu::prepared::Prepared;
 use mimu::recording::Recording;
 use mimu::stillness::STILL_FACTOR;
@@ -148,4 +149,44 @@ pub fn wander(plan: &str, file: &RigFile, seed: u64) -> [[f64; 3]; 2] {
         }
     }
     sums
+}
+
+/// Noise file with the true coefficients of a unit whose affine models are stated, in volts.
+pub fn noise_file(file: &RigFile, seed: u64, period_s: f64) -> NoiseFile {
+    let truth = RigTruth::resolve(file, seed).expect("a rig");
+    let mut text = String::from(
+        "format = \"mimu-noise/1\"\ndevice = \"unit-007\"\nsample_rate_hz = 100.0\nduration_s = 10800.0\nconfidence = 0.95\n",
+    );
+    let (unit, converter) = (&truth.unit, &truth.converter);
+    let code_v = unit.converter_reference.nominal_v / f64::from(converter.bits).exp2();
+    let models = [&file.unit.gyro_affine, &file.unit.accel_affine];
+    for (k, sensor) in [&unit.gyro, &unit.accel].into_iter().enumerate() {
+        let divider = [converter.gyro_divider, converter.accel_divider][k];
+        // A sample is the mean of so many conversions, each with the noise of the converter.
+        let conversion =
+            converter.noise_codes * code_v / divider / f64::from(converter.conversions).sqrt();
+        for (i, axis) in sensor.axes.iter().enumerate() {
+            let row = models[k].as_ref().expect("stated").matrix[i];
+            let volts = row.iter().map(|p| p * p).sum::<f64>().sqrt();
+            let noise = &axis.noise;
+            let n = (volts * noise.white).hypot(conversion * period_s.sqrt());
+            let _ = writeln!(
+                text,
+                "[[channel]]\nname = \"{}_{}\"\nunit = \"V\"\nsamples = 1080000",
+                ["gyro", "accel"][k],
+                ["x", "y", "z"][i]
+            );
+            for (key, value, unit) in [
+                ("n", n, "V/sqrt(Hz)"),
+                ("b", volts * noise.instability, "V"),
+                ("k", volts * noise.walk, "V/sqrt(s)"),
+            ] {
+                let _ = writeln!(
+                    text,
+                    "{key} = {{ value = {value:e}, sigma = 0.0, lower = {value:e}, upper = {value:e}, unit = \"{unit}\" }}"
+                );
+            }
+        }
+    }
+    NoiseFile::parse(&text, "noise").expect("a noise file")
 }

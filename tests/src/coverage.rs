@@ -119,20 +119,35 @@ fn over(runs: u64, empty: &[Tally], case: impl Fn(u64, &mut [Tally]) + Sync) -> 
         .reduce(|| empty.to_vec(), merged)
 }
 
-/// Every estimator for known inputs, both sensors, on recordings from a table whose dwells come in an order drawn by lot, or as
-/// listed.
-pub fn with_a_table(runs: u64, by_lot: bool) -> Vec<Tally> {
+/// How the recordings from a table are made and fitted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Dwells {
+    /// In an order drawn by lot.
+    ByLot,
+    /// As listed, axis by axis: neighbours share what the bias wanders, and differ along one axis only.
+    AsListed,
+    /// As listed, fitted with the noise of the unit at rest.
+    AsListedWithNoise,
+}
+
+/// Every estimator for known inputs, both sensors, on recordings from a table. With the noise of the unit at rest the two
+/// that can use it.
+pub fn with_a_table(runs: u64, dwells: Dwells) -> Vec<Tally> {
     let methods = [
         ("least squares", Method::LeastSquares),
         ("Kalman bank", Method::Kalman),
         ("inverse form (xu)", Method::Xu),
         ("six positions", Method::SixPositions),
     ];
+    let methods = match dwells {
+        Dwells::AsListedWithNoise => &methods[..2],
+        _ => &methods[..],
+    };
     let all: Vec<usize> = (0..12).collect();
     // Nothing but scale factors and biases is what six positions find.
     let diagonal = [0, 4, 8, 9, 10, 11];
     let mut empty = Vec::new();
-    for (name, method) in methods {
+    for &(name, method) in methods {
         for sensor in Sensor::BOTH {
             let free = match method {
                 Method::SixPositions => &diagonal[..],
@@ -142,14 +157,18 @@ pub fn with_a_table(runs: u64, by_lot: bool) -> Vec<Tally> {
         }
     }
     over(runs, &empty, |seed, tallies| {
-        let plan = bench::table_plan(by_lot.then_some(seed));
+        let plan = bench::table_plan((dwells == Dwells::ByLot).then_some(seed));
         let mut random = Random::new(seed, "unit");
         let (gyro, accel) = (bench::gyro(&mut random), bench::accel(&mut random));
         let file = bench::clean(gyro, accel);
         let truths = of_the_session(&plan, &file, seed);
-        let prepared = bench::recorded(&plan, &file, seed);
-        for (m, (name, method)) in methods.into_iter().enumerate() {
-            let fitted = fit(prepared.clone(), options(method))
+        let mut prepared = bench::recorded(&plan, &file, seed);
+        if dwells == Dwells::AsListedWithNoise {
+            let noise = bench::noise_file(&file, seed, prepared.condensed.period_s);
+            prepared = prepared.with_noise(&noise).expect("a noise file");
+        }
+        for (m, (name, method)) in methods.iter().enumerate() {
+            let fitted = fit(prepared.clone(), options(*method))
                 .unwrap_or_else(|e| panic!("{name}, seed {seed}: {e}"));
             for (k, sensor) in Sensor::BOTH.into_iter().enumerate() {
                 tallies[2 * m + k].add(triad(&fitted, sensor), &truths[k]);

@@ -2,6 +2,7 @@
 
 use mimu::estimate::Observation;
 use mimu::estimate::known_input::{inverse_form, kalman, least_squares, opposite_rates};
+use mimu::noise::wander::Slow;
 use mimu::triad::{Angles, Triad};
 use mimu_rig::ideal::Ideal;
 use mimu_rig::random::Random;
@@ -72,11 +73,31 @@ fn kalman_filter_with_a_diffuse_prior_agrees_with_least_squares_to_rounding() {
         let mut random = Random::new(seed, "unit");
         let unit = unit(&mut random);
         let observations = on_a_table(&unit, 1000, &mut random);
-        let batch = least_squares(&observations).unwrap();
-        let recursive = kalman(&observations).unwrap();
-        worst[0] = worst[0].max(apart(&batch.triad, &recursive.triad, &observations));
-        let [a, b] = [&batch, &recursive].map(|e| e.triad.forward_covariance);
-        worst[1] = worst[1].max((a - b).norm() / a.norm());
+        // With independent errors, and with a wander of the size of the noise that all dwells share.
+        let sigma = observations[0].variance.x.sqrt();
+        let slow = Slow {
+            instability: sigma,
+            walk: 0.1 * sigma,
+        };
+        let spans: Vec<_> = (0..observations.len())
+            .map(|i| [i as f64, i as f64 + 1.0])
+            .collect();
+        let wander = slow.covariance(&spans, [0.0, spans.len() as f64]);
+        let wandering: Vec<_> = observations
+            .iter()
+            .map(|o| Observation {
+                variance: o.variance.add_scalar(wander[(o.dwell, o.dwell)]),
+                ..*o
+            })
+            .collect();
+        let wander = std::array::from_fn(|_| wander.clone());
+        for (observations, wander) in [(&observations, None), (&wandering, Some(&wander))] {
+            let batch = least_squares(observations, wander).unwrap();
+            let recursive = kalman(observations, wander).unwrap();
+            worst[0] = worst[0].max(apart(&batch.triad, &recursive.triad, observations));
+            let [a, b] = [&batch, &recursive].map(|e| e.triad.forward_covariance);
+            worst[1] = worst[1].max((a - b).norm() / a.norm());
+        }
     }
     println!(
         "largest difference over 200 units: output {:.1e}, covariance {:.1e} relative",
@@ -95,7 +116,7 @@ fn forward_and_inverse_model_agree_on_the_compensated_output() {
         let mut random = Random::new(seed, "unit");
         let unit = unit(&mut random);
         let observations = on_a_table(&noiseless(unit), 1, &mut random);
-        let forward = least_squares(&observations).unwrap();
+        let forward = least_squares(&observations, None).unwrap();
         // Without noise, regressing either way must give the same calibration.
         for inverse in [inverse_form(&observations), opposite_rates(&observations)] {
             worst = worst.max(apart(
@@ -121,7 +142,7 @@ fn physical_quantities_make_the_forward_model_again() {
     for seed in 0..200 {
         let mut random = Random::new(seed, "unit");
         let unit = unit(&mut random);
-        let triad = least_squares(&on_a_table(&noiseless(unit), 1, &mut random))
+        let triad = least_squares(&on_a_table(&noiseless(unit), 1, &mut random), None)
             .unwrap()
             .triad;
         for angles in [Angles::Small, Angles::Exact] {
@@ -138,7 +159,7 @@ fn exact_quantities_make_the_forward_model_again_in_any_mounting() {
     for seed in 0..500 {
         let mut random = Random::new(seed, "unit");
         let unit = unit(&mut random);
-        let mut triad = least_squares(&on_a_table(&noiseless(unit), 1, &mut random))
+        let mut triad = least_squares(&on_a_table(&noiseless(unit), 1, &mut random), None)
             .unwrap()
             .triad;
         let axis = nalgebra::Unit::new_normalize(Vector3::from_fn(|_, _| random.normal()));
@@ -159,8 +180,8 @@ fn a_channel_without_noise_is_fitted_by_filter_and_least_squares_alike() {
     for o in &mut observations {
         o.variance.y = 0.0;
     }
-    let batch = least_squares(&observations).unwrap();
-    let recursive = kalman(&observations).unwrap();
+    let batch = least_squares(&observations, None).unwrap();
+    let recursive = kalman(&observations, None).unwrap();
     assert!(apart(&batch.triad, &recursive.triad, &observations) < 1e-12);
 }
 
@@ -170,7 +191,7 @@ fn small_angles_are_exact_ones_to_first_order() {
     for seed in 0..50 {
         let mut random = Random::new(seed, "unit");
         let unit = unit(&mut random);
-        let triad = least_squares(&on_a_table(&noiseless(unit), 1, &mut random))
+        let triad = least_squares(&on_a_table(&noiseless(unit), 1, &mut random), None)
             .unwrap()
             .triad;
         let [small, exact] = [Angles::Small, Angles::Exact].map(|a| triad.physical(a));
@@ -195,7 +216,7 @@ fn a_positive_misalignment_about_z_shows_x_on_the_sensor_y_positive() {
     let mut random = Random::new(1, "unit");
     let mut unit = unit(&mut random);
     unit.matrix = [[1.0, -angle, 0.0], [angle, 1.0, 0.0], [0.0, 0.0, 1.0]];
-    let physical = least_squares(&on_a_table(&noiseless(unit), 1, &mut random))
+    let physical = least_squares(&on_a_table(&noiseless(unit), 1, &mut random), None)
         .unwrap()
         .triad
         .physical(Angles::Exact);

@@ -6,9 +6,11 @@ use super::Problem;
 use super::model::Setting;
 use super::refinement::Region as _;
 use super::tour::{Motion, Order, by_lot};
+use crate::allan::model::FLOOR;
 use crate::dwell::Sensor;
 use crate::error::{Error, Result};
 use crate::noise::AllanModel;
+use crate::noise_file::NoiseFile;
 
 /// Noise of a sensor as density and floor, from which the sigma of a dwell mean follows.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -20,9 +22,6 @@ pub struct DwellNoise {
     /// Rate random walk K, SI unit per √s.
     pub k: f64,
 }
-
-/// Flicker floor of the Allan deviation over B: √(2 ln 2/π).
-const FLOOR: f64 = 0.664;
 
 /// Time up to which fang, section 3, finds noise white, s.
 const FANG_WHITE_S: f64 = 20.0;
@@ -41,16 +40,67 @@ impl DwellNoise {
         let n = volts / volts_per_unit * si * 1e-3f64.sqrt();
         Self {
             n,
-            b: n / FANG_WHITE_S.sqrt() / FLOOR,
+            b: n / (FANG_WHITE_S * FLOOR).sqrt(),
             k: 0.0,
         }
+    }
+
+    /// Of the worst axis of `sensor` in a noise file: of each coefficient the largest, over all temperatures.
+    ///
+    /// Errors: the file lacks the sensor, or is not in SI.
+    pub fn stated(file: &NoiseFile, sensor: Sensor) -> Result<Self> {
+        let mut worst = Self {
+            n: 0.0,
+            b: 0.0,
+            k: 0.0,
+        };
+        let channels = file.of(sensor);
+        if channels.is_empty() {
+            return Err(Error::new(
+                &file.place,
+                format!("there is no channel of the {sensor}"),
+                "run mimu allan on a recording that has it",
+            ));
+        }
+        for channel in channels {
+            if channel.unit != sensor.unit() {
+                return Err(Error::new(
+                    format!("{}, channel {}", file.place, channel.name),
+                    format!("it is in {} and not in {}", channel.unit, sensor.unit()),
+                    "run mimu allan with --calibration",
+                ));
+            }
+            let AllanModel {
+                white,
+                flicker,
+                walk,
+            } = channel.model();
+            worst.n = worst.n.max(white.sqrt());
+            worst.b = worst.b.max((flicker / FLOOR).sqrt());
+            worst.k = worst.k.max((3.0 * walk).sqrt());
+        }
+        Ok(worst)
+    }
+
+    /// Dwell from which on a longer one is not worth it, s: its sigma is within 5 % of the least that any has. That is fang's
+    /// argument (section 3) for 20 s. `None` where white noise is all.
+    pub fn useful_s(&self) -> Option<f64> {
+        let AllanModel {
+            white,
+            flicker,
+            walk,
+        } = self.allan();
+        // Least at √(white/walk), 2 √(white walk) above the floor. Solves white/t + walk t + flicker = (1.05)² least.
+        let over = 1.05 * 1.05 * (flicker + 2.0 * (white * walk).sqrt()) - flicker;
+        (over > 0.0 && white > 0.0)
+            .then(|| 2.0 * white / (over + (over * over - 4.0 * white * walk).max(0.0).sqrt()))
     }
 
     /// The three terms, as an Allan variance.
     fn allan(&self) -> AllanModel {
         AllanModel {
             white: self.n.powi(2),
-            flicker: (FLOOR * self.b).powi(2),
+            flicker: FLOOR * self.b.powi(2),
             walk: self.k.powi(2) / 3.0,
         }
     }

@@ -1,10 +1,12 @@
 //! Estimators for dwells whose input is known: a rate table, or a levelled cube.
 
 use mimu_core::compensation::Affine;
-use mimu_core::kalman::Bank;
+use mimu_core::kalman::Filter;
 use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, Vector3};
 
-use super::least_squares::{Observability, Scatter, excess_variance, solve_with_excess};
+use super::least_squares::{
+    Errors, Observability, Scatter, excess_of, excess_variance, solve_with_excess,
+};
 use super::{AXES, Estimated, Failure, Observation};
 use crate::triad::{Covariance, Forward, Part, Triad};
 
@@ -71,82 +73,141 @@ pub fn observability(observations: &[Observation]) -> Result<Observability, Fail
     })
 }
 
+/// What is known of the errors of the readings of sensor `axis`. `wander` is what the means of all dwells share, axis by axis
+/// ([`crate::noise::Noise::wander`]), and part of their variances.
+fn errors(observations: &[Observation], axis: usize, wander: Option<&[DMatrix<f64>; 3]>) -> Errors {
+    let n = observations.len();
+    let variances = positive(DVector::from_fn(n, |i, _| observations[i].variance[axis]));
+    let Some(wander) = wander else {
+        return Errors::Independent(variances);
+    };
+    Errors::Correlated(DMatrix::from_fn(n, n, |i, j| match i == j {
+        true => variances[i],
+        false => wander[axis][(observations[i].dwell, observations[j].dwell)],
+    }))
+}
+
 /// Least squares in the forward form, fang (15), (17): `u = P x + b`, sensor by sensor.
 ///
-/// The noisy reading is regressed on the known input, so that nothing is attenuated.
-pub fn least_squares(observations: &[Observation]) -> Result<Estimated, Failure> {
+/// The noisy reading is regressed on the known input, so that nothing is attenuated. With the `wander` that the means share,
+/// it is generalized least squares: of neighbouring dwells the difference counts, which is free of it.
+pub fn least_squares(
+    observations: &[Observation],
+    wander: Option<&[DMatrix<f64>; 3]>,
+) -> Result<Estimated, Failure> {
     let observability = observability(observations)?;
     let span = span(observations);
     let design = design(observations, span);
     let mut axes = Vec::new();
     for axis in 0..3 {
         let raw = DVector::from_fn(observations.len(), |i, _| observations[i].raw[axis]);
-        let variance = DVector::from_fn(observations.len(), |i, _| observations[i].variance[axis]);
-        let (solution, scatter) = solve_with_excess(&design, &raw, &positive(variance))
+        let errors = errors(observations, axis, wander);
+        let (solution, scatter) = solve_with_excess(&design, &raw, &errors)
             .ok_or_else(|| Failure::NoSolution("the design is singular".into()))?;
         axes.push((solution.parameters, solution.covariance, scatter));
     }
     forward(&axes, span, observability.condition)
 }
 
+/// One scalar measurement of a filter: `raw = b + P x + noise`.
+struct Measurement {
+    input: Vector3<f64>,
+    raw: f64,
+    variance: f64,
+}
+
+/// The readings of sensor `axis` as measurements with independent noise: each less its prediction from the errors of those before,
+/// and divided by what is left of the bias. Of independent readings it is themselves.
+fn innovations(
+    observations: &[Observation],
+    span: f64,
+    axis: usize,
+    errors: &Errors,
+    excess: f64,
+) -> Option<Vec<Measurement>> {
+    let covariance = match errors {
+        Errors::Independent(variances) => {
+            let own = observations.iter().zip(variances.iter());
+            return Some(
+                own.map(|(o, v)| Measurement {
+                    input: o.input / span,
+                    raw: o.raw[axis],
+                    variance: v + excess,
+                })
+                .collect(),
+            );
+        }
+        Errors::Correlated(covariance) => covariance,
+    };
+    let n = observations.len();
+    let root = (covariance + DMatrix::identity(n, n) * excess).cholesky()?;
+    let rows = DMatrix::from_fn(n, 5, |i, j| match j {
+        0 => 1.0,
+        4 => observations[i].raw[axis],
+        _ => observations[i].input[j - 1] / span,
+    });
+    let white = root.l_dirty().solve_lower_triangular(&rows)?;
+    let measurement = |i: usize| {
+        let bias = white[(i, 0)];
+        Measurement {
+            input: Vector3::new(white[(i, 1)], white[(i, 2)], white[(i, 3)]) / bias,
+            raw: white[(i, 4)] / bias,
+            variance: 1.0 / (bias * bias),
+        }
+    };
+    Some((0..n).map(measurement).collect())
+}
+
 /// The Kalman bank of fang (23)-(28), fed the dwell means one scalar at a time with a diffuse prior.
 ///
 /// Its noise is that of the dwell means; where the innovations' residual shows more, the bank is run again with
-/// the excess added, as in [`least_squares`], with which it agrees to rounding.
-pub fn kalman(observations: &[Observation]) -> Result<Estimated, Failure> {
+/// the excess added, as in [`least_squares`], with which it agrees to rounding. A `wander` that the means share is no noise of
+/// one measurement: each is then fed less what those before predict of its error.
+pub fn kalman(
+    observations: &[Observation],
+    wander: Option<&[DMatrix<f64>; 3]>,
+) -> Result<Estimated, Failure> {
     let observability = observability(observations)?;
     let span = span(observations);
     let dof = observations.len() as f64 - 4.0;
-    let n = observations.len();
-    let known: [DVector<f64>; 3] = std::array::from_fn(|axis| {
-        positive(DVector::from_fn(n, |i, _| observations[i].variance[axis]))
-    });
-    let floor = Vector3::from_fn(|axis, _| known[axis].max());
-    let run = |excess: &Vector3<f64>| {
-        let mut bank = Bank::<f64>::diffuse(&(floor + excess), 1.0);
-        for (i, o) in observations.iter().enumerate() {
-            let noise = Vector3::from_fn(|axis, _| known[axis][i]) + excess;
-            bank.update(&(o.input / span), &o.raw, &noise)
-                .map_err(|e| Failure::NoSolution(format!("dwell {}: {e}", o.dwell)))?;
-        }
-        Ok::<_, Failure>(bank)
-    };
-    let mut scatter = [Scatter {
-        excess: 0.0,
-        chi2: 0.0,
-        dof,
-    }; 3];
-    let mut bank = run(&Vector3::zeros())?;
-    for round in 0..30 {
-        let before = Vector3::from_fn(|i, _| scatter[i].excess);
-        for axis in 0..3 {
-            let mean = bank.axes[axis].mean();
-            let residuals: Vec<f64> = observations
-                .iter()
-                .map(|o| o.raw[axis] - mean[0] - mean.fixed_rows::<3>(1).dot(&(o.input / span)))
-                .collect();
-            let found = excess_variance(&residuals, known[axis].as_slice(), dof);
-            let chi2 = if round == 0 {
-                found.chi2
-            } else {
-                scatter[axis].chi2
-            };
-            scatter[axis] = Scatter { chi2, ..found };
-        }
-        let now = Vector3::from_fn(|i, _| scatter[i].excess);
-        if (now - before).amax() <= 1e-6 * before.amax() {
-            break;
-        }
-        bank = run(&now)?;
-    }
-    let axes: Vec<_> = (0..3)
-        .map(|axis| {
-            let filter = &bank.axes[axis];
+    let axis = |axis: usize| {
+        let errors = errors(observations, axis, wander);
+        let known = DVector::from_fn(observations.len(), |i, _| observations[i].variance[axis]);
+        let floor = positive(known).max();
+        let mut scatter = Scatter {
+            excess: 0.0,
+            chi2: 0.0,
+            dof,
+        };
+        let mut round = 0;
+        loop {
+            let mut filter = Filter::<f64>::diffuse(floor + scatter.excess, 1.0);
+            let measurements = innovations(observations, span, axis, &errors, scatter.excess)
+                .ok_or_else(|| Failure::NoSolution("the noise of the dwells is none".into()))?;
+            for (m, o) in measurements.iter().zip(observations) {
+                filter
+                    .update(&m.input, m.raw, m.variance)
+                    .map_err(|e| Failure::NoSolution(format!("dwell {}: {e}", o.dwell)))?;
+            }
             let mean = DVector::from_column_slice(filter.mean().as_slice());
-            let covariance = DMatrix::from_column_slice(4, 4, filter.covariance().as_slice());
-            (mean, covariance, scatter[axis])
-        })
-        .collect();
+            let residuals = DVector::from_fn(observations.len(), |i, _| {
+                let o = &observations[i];
+                o.raw[axis] - mean[0] - mean.fixed_rows::<3>(1).dot(&(o.input / span))
+            });
+            let found = excess_of(&residuals, &errors, dof);
+            let settled = (found.excess - scatter.excess).abs() <= 1e-6 * scatter.excess;
+            scatter = Scatter {
+                chi2: if round == 0 { found.chi2 } else { scatter.chi2 },
+                ..found
+            };
+            round += 1;
+            if settled || round == 30 {
+                let covariance = DMatrix::from_column_slice(4, 4, filter.covariance().as_slice());
+                return Ok((mean, covariance, scatter));
+            }
+        }
+    };
+    let axes = (0..3).map(axis).collect::<Result<Vec<_>, _>>()?;
     forward(&axes, span, observability.condition)
 }
 

@@ -87,21 +87,72 @@ pub struct Solution {
     pub residuals: DVector<f64>,
 }
 
-/// Solves `observations = design * parameters + noise` for independent noise with `variances`.
+/// Known errors of observations.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Errors {
+    /// Independent, with these variances.
+    Independent(DVector<f64>),
+    /// With this covariance.
+    Correlated(DMatrix<f64>),
+}
+
+impl Errors {
+    /// `rows` (one for each observation) decorrelated and in units of sigma, where every observation has an independent
+    /// `excess` variance besides. `None` if the covariance is not positive definite.
+    fn whitened(&self, excess: f64, rows: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+        match self {
+            Self::Independent(variances) => {
+                let mut rows = rows.clone();
+                for (mut row, v) in rows.row_iter_mut().zip(variances.iter()) {
+                    row /= (v + excess).sqrt();
+                }
+                Some(rows)
+            }
+            Self::Correlated(covariance) => {
+                let mut covariance = covariance.clone();
+                for i in 0..covariance.nrows() {
+                    covariance[(i, i)] += excess;
+                }
+                covariance
+                    .cholesky()?
+                    .l_dirty()
+                    .solve_lower_triangular(rows)
+            }
+        }
+    }
+
+    /// Sum of the squares of decorrelated `residuals`, where each has `excess` besides.
+    fn chi2(&self, excess: f64, residuals: &DVector<f64>) -> f64 {
+        match self {
+            Self::Independent(variances) => {
+                let terms = residuals.iter().zip(variances.iter());
+                terms.map(|(r, v)| r * r / (v + excess)).sum()
+            }
+            Self::Correlated(_) => {
+                let rows = DMatrix::from_column_slice(residuals.len(), 1, residuals.as_slice());
+                let white = self.whitened(excess, &rows);
+                white.map_or(f64::NAN, |r| r.norm_squared())
+            }
+        }
+    }
+}
+
+/// Solves `observations = design * parameters + noise` for noise with the known `errors` and an independent `excess` variance
+/// besides.
 ///
 /// By QR of the whitened design: normal equations would square the condition. The design must have full rank
 /// ([`Observability::is_complete`]).
 pub fn solve(
     design: &DMatrix<f64>,
     observations: &DVector<f64>,
-    variances: &DVector<f64>,
+    errors: &Errors,
+    excess: f64,
 ) -> Option<Solution> {
-    let weights = variances.map(|v| v.sqrt().recip());
-    let mut a = design.clone();
-    for (mut row, w) in a.row_iter_mut().zip(weights.iter()) {
-        row *= *w;
-    }
-    let y = observations.component_mul(&weights);
+    let columns = design.ncols();
+    let mut both = design.clone().insert_column(columns, 0.0);
+    both.set_column(columns, observations);
+    let both = errors.whitened(excess, &both)?;
+    let (mut a, y) = (both.columns(0, columns).into_owned(), both.column(columns));
     // Columns of very different units: scaled for QR, scaled back after.
     let scale = DVector::from_iterator(
         a.ncols(),
@@ -165,13 +216,13 @@ fn exceeds(chi2: f64, dof: f64, share: f64) -> bool {
 ///
 /// Added and not multiplied: what a model lacks is the same for a long dwell and a short one.
 pub fn excess_variance(residuals: &[f64], variances: &[f64], dof: f64) -> Scatter {
-    let chi2_at = |s: f64| {
-        residuals
-            .iter()
-            .zip(variances)
-            .map(|(r, v)| r * r / (v + s))
-            .sum::<f64>()
-    };
+    let errors = Errors::Independent(DVector::from_column_slice(variances));
+    excess_of(&DVector::from_column_slice(residuals), &errors, dof)
+}
+
+/// [`excess_variance`] beside errors that may be correlated.
+pub fn excess_of(residuals: &DVector<f64>, errors: &Errors, dof: f64) -> Scatter {
+    let chi2_at = |s: f64| errors.chi2(s, residuals);
     let chi2 = chi2_at(0.0);
     let none = Scatter {
         excess: 0.0,
@@ -181,7 +232,7 @@ pub fn excess_variance(residuals: &[f64], variances: &[f64], dof: f64) -> Scatte
     if !(dof >= 1.0) || chi2.is_nan() || !exceeds(chi2, dof, EXCESS_IN_DOUBT) {
         return none;
     }
-    let (mut low, mut high) = (0.0, residuals.iter().map(|r| r * r).sum::<f64>() / dof);
+    let (mut low, mut high) = (0.0, residuals.norm_squared() / dof);
     for _ in 0..100 {
         let middle = 0.5 * (low + high);
         if chi2_at(middle) > dof {
@@ -200,19 +251,19 @@ pub fn excess_variance(residuals: &[f64], variances: &[f64], dof: f64) -> Scatte
 pub fn solve_with_excess(
     design: &DMatrix<f64>,
     observations: &DVector<f64>,
-    variances: &DVector<f64>,
+    errors: &Errors,
 ) -> Option<(Solution, Scatter)> {
     let dof = design.nrows() as f64 - design.ncols() as f64;
-    let mut solution = solve(design, observations, variances)?;
-    let mut scatter = excess_variance(solution.residuals.as_slice(), variances.as_slice(), dof);
+    let mut solution = solve(design, observations, errors, 0.0)?;
+    let mut scatter = excess_of(&solution.residuals, errors, dof);
     let first = scatter;
     for _ in 0..30 {
         if scatter.excess == 0.0 {
             break;
         }
         let before = scatter.excess;
-        solution = solve(design, observations, &variances.add_scalar(before))?;
-        scatter = excess_variance(solution.residuals.as_slice(), variances.as_slice(), dof);
+        solution = solve(design, observations, errors, before)?;
+        scatter = excess_of(&solution.residuals, errors, dof);
         if (scatter.excess - before).abs() <= 1e-6 * before {
             break;
         }

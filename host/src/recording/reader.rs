@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::batch::Batch;
-use super::columns::{Columns, Layout};
+use super::columns::{Column, Columns, Layout};
 use super::csv_file::{CHUNK, CsvFile};
 use super::digest;
 use super::manifest::{MANIFEST_FILE, Manifest};
@@ -135,6 +135,33 @@ impl Recording {
         consume: impl FnMut(&Batch) -> Result<()>,
     ) -> Result<ReadSummary> {
         self.in_pieces(CHUNK, SLICE, progress, consume)
+    }
+
+    /// Whether one column can be read without the others: Parquet.
+    pub fn is_columnar(&self) -> bool {
+        matches!(self.source, Samples::Parquet(..))
+    }
+
+    /// Some columns that the recording has, whole, steps as numbers. Of a CSV file every column is parsed.
+    pub fn read_columns(
+        &self,
+        columns: &[Column],
+        progress: impl Fn(f64),
+    ) -> Result<Vec<Vec<f64>>> {
+        if let Samples::Parquet(file, _) = &self.source {
+            return columns.iter().map(|column| file.column(*column)).collect();
+        }
+        let mut all: Vec<Vec<f64>> = vec![Vec::new(); columns.len()];
+        self.for_each_batch(progress, |batch| {
+            for (values, column) in all.iter_mut().zip(columns) {
+                match batch.values(*column) {
+                    Some(more) => values.extend_from_slice(more),
+                    None => values.extend(batch.step.iter().copied().map(f64::from)),
+                }
+            }
+            Ok(())
+        })?;
+        Ok(all)
     }
 
     /// [`Recording::for_each_batch`] with pieces of a chosen size: bytes of CSV, rows of Parquet.

@@ -1,0 +1,114 @@
+//! Sums of the squares of all differences at many averaging times.
+
+use std::ops::Range;
+
+use rayon::prelude::*;
+
+use super::super::Kind;
+use super::differences::{difference, sums};
+use super::series::{Samples, Series};
+use super::window_sums::WindowSums;
+
+/// Positions that all clusters are done at before the next: with what clusters of [`NEAR`] reach beyond, 350 KB of
+/// doubles, for a second-level cache.
+const TILE: usize = 1 << 15;
+/// Shorter clusters than this are done in tiles. Differences of longer ones are so far apart
+/// (`STARTS_PER_CLUSTER`) that a line of cache would be read for each from a tile too.
+const NEAR: usize = 4096;
+
+/// What is computed at one averaging time.
+#[derive(Clone, Copy)]
+pub struct Plan {
+    /// Cluster length.
+    pub m: usize,
+    /// Every so-many-th difference is used.
+    pub stride: usize,
+    /// Differences that there are.
+    pub all: usize,
+}
+
+impl Plan {
+    /// From the first used difference in the tile at `from` to the last.
+    fn within(&self, from: usize) -> Range<usize> {
+        let end = (from + TILE).min(self.all).max(from);
+        from.next_multiple_of(self.stride).min(end)..end
+    }
+}
+
+/// Differences of one kind of a series.
+pub struct Squares<'a, X: Samples + ?Sized> {
+    x: &'a X,
+    kind: Kind,
+    windows: Option<WindowSums<'a, X>>,
+}
+
+impl<'a, X: Samples + ?Sized> Squares<'a, X> {
+    /// One pass over the series for [`Kind::Modified`].
+    pub fn new(x: &'a X, kind: Kind) -> Self {
+        let windows = (kind == Kind::Modified).then(|| WindowSums::new(x));
+        Self { x, kind, windows }
+    }
+
+    /// Sum of the squares of every `stride`-th of those differences that begin in `positions`, from the first.
+    pub fn sum(&self, m: usize, stride: usize, positions: Range<usize>) -> f64 {
+        if let Some(windows) = &self.windows {
+            return windows.sum_of_squares(m, stride, positions);
+        }
+        let [sum] = if self.kind == Kind::Hadamard {
+            sums(self.x, [0, m, 2 * m, 3 * m], stride, positions, |taps| {
+                [difference(&taps).powi(2)]
+            })
+        } else {
+            sums(self.x, [0, m, 2 * m], stride, positions, |taps| {
+                [difference(&taps).powi(2)]
+            })
+        };
+        sum
+    }
+}
+
+/// For each of `plans`, which have ascending clusters. The order of additions does not depend on the number of threads.
+pub fn sums_of_squares(x: &Series, kind: Kind, plans: &[Plan]) -> Vec<f64> {
+    if let Some(x) = x.slice() {
+        let squares = Squares::new(x, kind);
+        return tiled(plans, |from, _| {
+            let sum = |plan: &Plan| squares.sum(plan.m, plan.stride, plan.within(from));
+            plans.iter().map(sum).collect()
+        });
+    }
+    let (near, far) = plans.split_at(plans.partition_point(|plan| plan.m < NEAR));
+    let reach = TILE + near.last().map_or(0, |longest| 3 * longest.m);
+    let mut sums = tiled(near, |from, window| {
+        x.read(from..(from + reach).min(x.len()), window);
+        let squares = Squares::new(&window[..], kind);
+        let sum = |plan: &Plan| {
+            let Range { start, end } = plan.within(from);
+            squares.sum(plan.m, plan.stride, start - from..end - from)
+        };
+        near.iter().map(sum).collect()
+    });
+    if !far.is_empty() {
+        let squares = Squares::new(x, kind);
+        let sum = |plan: &Plan| squares.sum(plan.m, plan.stride, 0..plan.all);
+        sums.par_extend(far.par_iter().map(sum));
+    }
+    sums
+}
+
+/// Sums for all plans, a tile after the other: the series comes from memory once for all clusters, and not once for
+/// each. `part` is handed the start of the tile and a thread's own buffer.
+fn tiled(plans: &[Plan], part: impl Fn(usize, &mut Vec<f64>) -> Vec<f64> + Sync) -> Vec<f64> {
+    let end = plans.iter().map(|plan| plan.all).max().unwrap_or(0);
+    let tiles: Vec<Vec<f64>> = (0..end)
+        .into_par_iter()
+        .step_by(TILE)
+        .map_init(Vec::new, |buffer, from| part(from, buffer))
+        .collect();
+    let mut sums = vec![0.0; plans.len()];
+    for tile in tiles {
+        for (sum, part) in sums.iter_mut().zip(tile) {
+            *sum += part;
+        }
+    }
+    sums
+}

@@ -1,0 +1,184 @@
+//! From the curves of a record to its noise model.
+
+use std::sync::OnceLock;
+
+use statrs::distribution::{ContinuousCDF, Normal};
+
+use super::covariance::Covariances;
+use super::differences::{Differences, Order};
+use super::estimate::Curve;
+use super::selection::{FEWEST, Selection};
+use super::unseen::SEEN;
+use super::{Coefficient, NoiseModel, Term, Unseen};
+use crate::allan::Point;
+
+/// Third differences over second ones that are no more than rounding errors.
+const ROUNDING: f64 = 1e-6;
+
+/// Fits models to the curves of one record: several channels have the same times, and so the same covariances.
+pub struct Estimator {
+    pub(super) samples: usize,
+    pub(super) dt_s: f64,
+    /// Normal deviate of the upper end of an interval.
+    pub(super) z: f64,
+    pub(super) covariances: Covariances,
+    /// For records two, four and eight times as long.
+    pub(super) longer: OnceLock<Vec<Covariances>>,
+}
+
+/// Averaging factors of the Allan curve that a model is fitted to: octaves up to a quarter of the record, and half of it.
+///
+/// What lies between the octaves repeats them: every sample is in every one of the difference series. It would only make the
+/// covariance of the points nearly singular. The half is a single difference, but the only one that goes once through the whole
+/// record: a random walk there and back again is a ramp to squares of shorter ones.
+pub fn allan_factors(samples: usize) -> Vec<usize> {
+    octaves(samples)
+        .chain((samples >= 4).then_some(samples / 2))
+        .collect()
+}
+
+/// Averaging factors of the Hadamard curve that a model is fitted to besides: the three longest octaves that the record holds
+/// six times.
+///
+/// Of the terms only the ramp is no part of them. The Allan curve alone takes one random walk in eight for a ramp whose rise its few
+/// longest differences happen to share.
+pub fn hadamard_factors(samples: usize) -> Vec<usize> {
+    let mut all: Vec<usize> = octaves(samples).filter(|m| 6 * m <= samples).collect();
+    all.split_off(all.len().saturating_sub(3))
+}
+
+fn octaves(samples: usize) -> impl Iterator<Item = usize> {
+    (0..usize::BITS - 3)
+        .map(|k| 1 << k)
+        .take_while(move |m| 4 * m <= samples)
+}
+
+/// Points that a model is fitted to, the longest of each curve first.
+pub(super) fn points(samples: usize) -> Vec<Differences> {
+    let over = |order| move |m| Differences { order, m };
+    let third = hadamard_factors(samples).into_iter().rev();
+    let second = allan_factors(samples).into_iter().rev();
+    third
+        .map(over(Order::Third))
+        .chain(second.map(over(Order::Second)))
+        .collect()
+}
+
+impl Estimator {
+    /// For records of `samples` at steps of `dt_s`, with intervals of probability `confidence`.
+    pub fn new(samples: usize, dt_s: f64, confidence: f64) -> Self {
+        Self {
+            covariances: Covariances::new(points(samples), samples),
+            z: Normal::standard().inverse_cdf(0.5 + 0.5 * confidence),
+            samples,
+            dt_s,
+            longer: OnceLock::new(),
+        }
+    }
+
+    /// Fits a model to an overlapping Allan curve that has the points of [`allan_factors`] and a Hadamard curve that has those of
+    /// [`hadamard_factors`]. `unit` writes a coefficient with its unit, for the sentences about those that are not seen.
+    ///
+    /// `None` if the Allan curve has fewer than six such points above zero.
+    pub fn fit(
+        &self,
+        allan: &[Point],
+        hadamard: &[Point],
+        unit: impl Fn(Term, f64) -> String,
+    ) -> Option<NoiseModel> {
+        let at = |curve: &[Point], m| {
+            let found = curve.binary_search_by_key(&m, |p| p.m).ok();
+            found.map(|i| curve[i].deviation)
+        };
+        let mut whole = Curve {
+            y: Vec::new(),
+            range: 0..0,
+            covariances: &self.covariances,
+        };
+        for (index, point) in self.covariances.points().iter().enumerate() {
+            let second = at(allan, point.m)?;
+            let deviation = match point.order {
+                Order::Second => second,
+                Order::Third => at(hadamard, point.m)?,
+            };
+            match point.order {
+                // Of a ramp without noise the third differences are rounding errors.
+                Order::Third if !(deviation > ROUNDING * second) => {
+                    whole.y.clear();
+                    whole.range.start = index + 1;
+                }
+                _ if !(deviation > 0.0) => break,
+                _ => whole.y.push(deviation.powi(2)),
+            }
+            whole.range.end = index + 1;
+        }
+        if whole.allan_points() < FEWEST {
+            return None;
+        }
+        let shortest = (whole.shortest(), *whole.y.last()?);
+        let selection = Selection::of(whole)?;
+        let filtered = selection.filtered(shortest);
+        let (curve, best) = (&selection.curve, selection.best());
+        let coefficients = Term::ALL.map(|term| {
+            if term == Term::Q && (filtered || selection.shortened) {
+                let why = match filtered {
+                    true => {
+                        "at short times the curve is below white noise, as behind a low-pass filter"
+                    }
+                    false => "at short times the curve is none of the terms', which would hide it",
+                };
+                return Err(Unseen {
+                    at_most: None,
+                    why: why.into(),
+                });
+            }
+            let instead = selection.instead_of(term);
+            // What is in a model that does not fit may be there to mend it.
+            let k = term as usize;
+            let misfit = selection.excess.sqrt() * best.sigma(k);
+            let shown = selection.excess == 1.0 || best.a[k] > SEEN * misfit;
+            if best.a[k] > 0.0 && instead.is_empty() && shown {
+                return Ok(self.coefficient(&selection, term));
+            }
+            let (at_most, bound) = self.bound(&selection, term, &unit);
+            let why = match instead.is_empty() {
+                true => format!("not seen: {bound}"),
+                false => format!(
+                    "or {}, the record does not tell which: {bound}",
+                    instead.join(" or ")
+                ),
+            };
+            Err(Unseen { at_most, why })
+        });
+        Some(NoiseModel {
+            coefficients,
+            filtered,
+            range_s: [curve.shortest(), curve.longest()].map(|m| m * self.dt_s),
+            excess: (selection.excess > 1.0).then_some(selection.excess),
+            amplitudes: best.a,
+            dt_s: self.dt_s,
+        })
+    }
+
+    fn coefficient(&self, selection: &Selection, term: Term) -> Coefficient {
+        let (k, curve, excess) = (term as usize, &selection.curve, selection.excess);
+        let best = selection.best();
+        let of = |a: f64| term.coefficient(a, self.dt_s);
+        let value = of(best.a[k]);
+        let sigma = excess.sqrt() * best.sigma(k);
+        let (mut lower, mut upper) = (best.a[k], best.a[k]);
+        for model in selection.plausible() {
+            if model.a[k] > 0.0 {
+                lower = lower.min(curve.end(model, k, self.z, excess).unwrap_or(0.0));
+                let end = curve.end(model, k, -self.z, excess);
+                upper = upper.max(end.unwrap_or(f64::INFINITY));
+            }
+        }
+        Coefficient {
+            value,
+            sigma: 0.5 * value * sigma / best.a[k],
+            lower: of(lower),
+            upper: of(upper),
+        }
+    }
+}

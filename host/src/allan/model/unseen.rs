@@ -1,0 +1,87 @@
+//! What a record says of a term that it does not show.
+
+use super::covariance::Covariances;
+use super::differences::Differences;
+use super::estimate::{Curve, Fitted};
+use super::estimator::points;
+use super::selection::Selection;
+use super::{Estimator, Term, duration};
+
+/// Sigmas at which a coefficient is told to be seen.
+pub(super) const SEEN: f64 = 3.0;
+
+impl Estimator {
+    /// Upper end of the interval of a `term` that is not shown, and what it says.
+    pub(super) fn bound(
+        &self,
+        selection: &Selection,
+        term: Term,
+        unit: &impl Fn(Term, f64) -> String,
+    ) -> (Option<f64>, String) {
+        let (k, curve, excess) = (term as usize, &selection.curve, selection.excess);
+        let upper = |model: &Fitted| match model.terms.contains(&k) {
+            true => curve.end(model, k, -self.z, excess),
+            false => curve.end(&curve.beside(model, k)?, k, -self.z, excess),
+        };
+        let ends = selection.plausible().into_iter().filter_map(upper);
+        let Some(most) = ends.reduce(f64::max) else {
+            return (None, "the other terms leave nothing to tell it by".into());
+        };
+        let at_most = term.coefficient(most, self.dt_s);
+        let bound = format!("at most {}", unit(term, at_most));
+        // A longer record has more of the long times only.
+        let longer_s = match (term, selection.without(term)) {
+            (Term::Q | Term::N, _) | (_, None) => None,
+            // A quarter of the variance, which is half the coefficient.
+            (_, Some(without)) => self.longer_s(curve, without, k, 0.25 * most, excess),
+        };
+        let bound = match longer_s.map(duration) {
+            Some(longer) => {
+                format!("{bound}; to see one of half that, record at least {longer} longer")
+            }
+            None => bound,
+        };
+        (Some(at_most), bound)
+    }
+
+    /// How much longer a record than that of `curve` has to be for a term of amplitude `a` beside those of `without` to be [`SEEN`] times its
+    /// own sigma, s.
+    fn longer_s(
+        &self,
+        curve: &Curve,
+        without: &Fitted,
+        term: usize,
+        a: f64,
+        excess: f64,
+    ) -> Option<f64> {
+        let longer = self.longer.get_or_init(|| {
+            let table = |factor| {
+                let samples = factor * self.samples;
+                Covariances::new(points(samples), samples)
+            };
+            [2, 4, 8].map(table).into()
+        });
+        let sigmas = |covariances: &Covariances| {
+            // What is too short for the model stays so.
+            let used = |d: &&Differences| d.m as f64 >= curve.shortest();
+            let curve = Curve {
+                y: Vec::new(),
+                range: 0..covariances.points().iter().take_while(used).count(),
+                covariances,
+            };
+            Some(a / (excess.sqrt() * curve.error_of(without, term, a)?))
+        };
+        let mut before = (1.0, sigmas(&self.covariances)?);
+        let mut slope: f64 = 0.5;
+        for (i, covariances) in longer.iter().enumerate() {
+            let now = sigmas(covariances)?;
+            slope = (now / before.1).log2().max(0.1);
+            if now >= SEEN {
+                break;
+            }
+            before = (f64::from(2u32 << i), now);
+        }
+        let factor = before.0 * (SEEN / before.1).powf(1.0 / slope);
+        Some((factor - 1.0) * self.samples as f64 * self.dt_s).filter(|s| *s > 0.0)
+    }
+}

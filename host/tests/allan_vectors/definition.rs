@@ -1,0 +1,218 @@
+//! The definitions, term by term, and what follows from them.
+
+use mimu::allan::deviation::{ALL_TERMS, curve, curve_of_phase};
+use mimu::allan::{Kind, Point, Spacing};
+
+use super::Random;
+
+fn at(rates: &[f64], kind: Kind, m: usize) -> Point {
+    curve(rates, 1.0, kind, &Spacing::Samples(vec![m]), 0.95).expect("finite")[0]
+}
+
+fn mean(rates: &[f64], from: usize, m: usize) -> f64 {
+    rates[from..from + m].iter().sum::<f64>() / m as f64
+}
+
+/// Mean square of a list, over a divisor, to the root.
+fn root(terms: Vec<f64>, divisor: f64) -> (f64, usize) {
+    let n = terms.len();
+    let mean = terms.iter().map(|t| t * t).sum::<f64>() / n as f64;
+    ((mean / divisor).sqrt(), n)
+}
+
+/// SP 1065 in rates: (8) of fang with its inner sum, the mean of m neighbouring such differences, the second
+/// difference.
+fn by_definition(rates: &[f64], kind: Kind, m: usize) -> (f64, usize) {
+    let n = rates.len();
+    let step = |j: usize| mean(rates, j + m, m) - mean(rates, j, m);
+    match kind {
+        Kind::Allan => root((0..n + 1 - 2 * m).map(step).collect(), 2.0),
+        Kind::Modified => root(
+            (0..n + 2 - 3 * m)
+                .map(|j| (j..j + m).map(step).sum::<f64>() / m as f64)
+                .collect(),
+            2.0,
+        ),
+        Kind::Hadamard => root(
+            (0..n + 1 - 3 * m).map(|j| step(j + m) - step(j)).collect(),
+            6.0,
+        ),
+    }
+}
+
+#[test]
+fn every_cluster_length_of_a_short_series_is_the_definition_term_by_term() {
+    let rates = Random(1).white(200);
+    for (kind, longest) in [
+        (Kind::Allan, 100),
+        (Kind::Modified, 67),
+        (Kind::Hadamard, 66),
+    ] {
+        let all = Spacing::Samples((0..300).collect());
+        let points = curve(&rates, 0.01, kind, &all, 0.95).expect("finite");
+        assert_eq!(points.len(), longest, "{kind:?}");
+        for (point, m) in points.iter().zip(1..) {
+            let (deviation, terms) = by_definition(&rates, kind, m);
+            assert_eq!((point.m, point.terms), (m, terms), "{kind:?}");
+            assert!((point.tau_s - 0.01 * m as f64).abs() < 1e-12);
+            let error = point.deviation / deviation - 1.0;
+            assert!(error.abs() < 1e-12, "{kind:?} at {m}: {error:.1e}");
+        }
+    }
+}
+
+#[test]
+fn long_runs_of_the_modified_variance_are_the_definition_too() {
+    let rates = Random(2).white(20_000);
+    for m in [1, 63, 64, 65, 200] {
+        let (deviation, _) = by_definition(&rates, Kind::Modified, m);
+        let error = at(&rates, Kind::Modified, m).deviation / deviation - 1.0;
+        assert!(error.abs() < 1e-11, "{m}: {error:.1e}");
+    }
+}
+
+#[test]
+fn the_phase_of_a_series_has_its_deviations() {
+    let rates = Random(3).white(5000);
+    let mut angle = 0.7;
+    let mut phase = vec![angle];
+    phase.extend(rates.iter().map(|rate| {
+        angle += 0.01 * rate;
+        angle
+    }));
+    for kind in [Kind::Allan, Kind::Modified, Kind::Hadamard] {
+        let of_rates = curve(&rates, 0.01, kind, &Spacing::Octave, 0.95).expect("finite");
+        let of_phase = curve_of_phase(&phase, 0.01, kind, &Spacing::Octave, 0.95).expect("finite");
+        assert!(of_rates.len() > 10);
+        for (a, b) in of_rates.iter().zip(&of_phase) {
+            assert!(
+                (a.deviation / b.deviation - 1.0).abs() < 1e-9,
+                "{a:?} {b:?}"
+            );
+            assert_eq!((a.terms, a.alpha), (b.terms, b.alpha));
+        }
+    }
+}
+
+#[test]
+fn a_ramp_has_the_deviation_of_its_coefficient_and_no_hadamard_deviation() {
+    let rates: Vec<f64> = (0..10_000).map(|i| f64::from(i) / 256.0).collect();
+    for m in [1, 7, 300, 3000] {
+        // sigma = R tau / sqrt 2.
+        let expected = m as f64 / 256.0 / 2_f64.sqrt();
+        for kind in [Kind::Allan, Kind::Modified] {
+            let deviation = at(&rates, kind, m).deviation;
+            assert!((deviation / expected - 1.0).abs() < 1e-9, "{kind:?} {m}");
+        }
+        assert!(at(&rates, Kind::Hadamard, m).deviation < 1e-8 * expected);
+    }
+}
+
+#[test]
+fn a_series_that_does_not_vary_has_no_deviation_and_bounds_that_are_numbers() {
+    for kind in [Kind::Allan, Kind::Modified, Kind::Hadamard] {
+        for point in curve(&[2.5; 1000], 1.0, kind, &Spacing::Octave, 0.95).expect("finite") {
+            assert_eq!((point.deviation, point.lower, point.upper), (0.0, 0.0, 0.0));
+            assert!(point.edf >= 1.0 && point.fang_7 == 0.0);
+        }
+    }
+}
+
+/// Against the same differences, all of them: the error must be small next to that of the estimate.
+#[test]
+fn differences_that_are_left_out_of_a_long_series_are_not_missed() {
+    let mut random = Random(5);
+    let mut walk = 0.0;
+    let rates: Vec<f64> = (0..10 * ALL_TERMS)
+        .map(|_| {
+            walk += 1e-3 * random.normal();
+            random.normal() + walk
+        })
+        .collect();
+    let mut x = vec![0.0];
+    x.extend(rates.iter().scan(0.0, |sum, rate| {
+        *sum += rate;
+        Some(*sum)
+    }));
+    let window = {
+        let mut sum = vec![0.0];
+        sum.extend(x.iter().scan(0.0, |total, x| {
+            *total += x;
+            Some(*total)
+        }));
+        sum
+    };
+    for m in [200, 5000, 100_000] {
+        for kind in [Kind::Allan, Kind::Hadamard, Kind::Modified] {
+            let all: Vec<f64> = match kind {
+                Kind::Allan => (0..x.len() - 2 * m)
+                    .map(|j| x[j + 2 * m] - 2.0 * x[j + m] + x[j])
+                    .collect(),
+                Kind::Hadamard => (0..x.len() - 3 * m)
+                    .map(|j| x[j + 3 * m] - 3.0 * (x[j + 2 * m] - x[j + m]) - x[j])
+                    .collect(),
+                Kind::Modified => (0..x.len() + 1 - 3 * m)
+                    .map(|j| {
+                        (window[j + 3 * m] - 3.0 * (window[j + 2 * m] - window[j + m]) - window[j])
+                            / m as f64
+                    })
+                    .collect(),
+            };
+            let divisor = if kind == Kind::Hadamard { 6.0 } else { 2.0 } * (m as f64).powi(2);
+            let (expected, terms) = root(all, divisor);
+            let point = at(&rates, kind, m);
+            assert!(point.terms <= terms);
+            if m > 5000 {
+                assert!(point.terms < terms / 2, "{kind:?} {m}: {}", point.terms);
+            }
+            let sigma = 1.0 / (2.0 * point.edf).sqrt();
+            let error = point.deviation / expected - 1.0;
+            assert!(
+                error.abs() < 0.05 * sigma,
+                "{kind:?} at {m}: {error:.1e} of {sigma:.1e}, {} of {terms}",
+                point.terms
+            );
+        }
+    }
+}
+
+#[test]
+fn times_are_ascending_each_once_and_none_is_too_long() {
+    let rates = Random(6).white(1000);
+    let clusters = |spacing| -> Vec<usize> {
+        let points = curve(&rates, 1.0, Kind::Allan, &spacing, 0.95).expect("finite");
+        points.iter().map(|p| p.m).collect()
+    };
+    assert_eq!(
+        clusters(Spacing::Octave),
+        [1, 2, 4, 8, 16, 32, 64, 128, 256]
+    );
+    assert_eq!(
+        clusters(Spacing::PerDecade(4)),
+        [1, 2, 3, 6, 10, 18, 32, 56, 100, 178, 316]
+    );
+    assert_eq!(
+        clusters(Spacing::Samples(vec![9, 0, 3, 9, 500, 501])),
+        [3, 9, 500]
+    );
+}
+
+#[test]
+fn series_too_short_for_a_difference_have_no_points() {
+    for n in 0..6 {
+        let rates = vec![1.0; n];
+        for (kind, least) in [(Kind::Allan, 2), (Kind::Modified, 2), (Kind::Hadamard, 3)] {
+            let points = curve(&rates, 1.0, kind, &Spacing::Octave, 0.95).expect("finite");
+            assert_eq!(points.is_empty(), n < least, "{n} {kind:?}");
+        }
+    }
+}
+
+#[test]
+fn a_gap_is_refused_with_the_sample_where_it_begins() {
+    let mut rates = vec![1.0; 10_000];
+    rates[7000] = f64::NAN;
+    rates[9000] = f64::INFINITY;
+    let error = curve(&rates, 1.0, Kind::Allan, &Spacing::Octave, 0.95).expect_err("a gap");
+    assert!(error.to_string().starts_with("sample 7000: NaN"), "{error}");
+}
