@@ -180,6 +180,29 @@ fn cases() -> Vec<(&'static str, Truth)> {
 /// Of so many the shares scatter by 0.5 %.
 const RUNS: u64 = 2000;
 
+/// Of 2000 runs each, by `cargo test --release -p mimu --test allan_model table_of_coverages -- --ignored --nocapture`: how many told the
+/// term, and in how many per cent of these the 95 % interval held the truth. What is told only where it happens to look large is held
+/// less often ("weak"); interval or bound together are right as stated.
+///
+/// | noise | told | held, % | interval or bound, % |
+/// |---|---|---|---|
+/// | N | N 2000 | N 94.9 | N 94.9 |
+/// | B | B 1999 | B 95.0 | B 95.0 |
+/// | K | K 2000 | K 95.2 | K 95.2 |
+/// | Q | Q 1998 | Q 94.8 | Q 94.8 |
+/// | N R | N 2000, R 1853 | N 94.8, R 94.2 | N 94.8, R 94.5 |
+/// | N B | N 1999, B 2000 | N 94.9, B 95.0 | N 94.9, B 95.0 |
+/// | N K | N 1998, K 1980 | N 94.8, K 95.5 | N 94.8, K 95.0 |
+/// | Q N | Q 1999, N 2000 | Q 95.3, N 95.2 | Q 95.3, N 95.2 |
+/// | N, weak B | N 2000, B 1215 | N 95.2, B 95.5 | N 95.2, B 94.2 |
+/// | N, weak K | N 1999, K 868 | N 95.5, K 95.0 | N 95.5, K 96.3 |
+/// | N, weak R | N 2000, R 891 | N 94.8, R 94.5 | N 94.8, R 95.5 |
+/// | N B K | N 1998, B 1998, K 2000 | N 94.3, B 94.9, K 94.2 | N 94.3, B 94.9, K 94.2 |
+/// | N B, weak K | N 1997, B 1999, K 50 | N 94.5, B 95.2, K 50.0 | N 94.5, B 95.2, K 98.8 |
+/// | Q N B | Q 1989, N 1994, B 1999 | Q 94.9, N 94.7, B 94.9 | Q 94.9, N 94.7, B 94.9 |
+/// | Q N B K R | Q 1994, N 1999, B 1995, K 2000, R 2000 | Q 94.0, N 94.0, B 94.8, K 93.7, R 94.2 | Q 94.0, N 94.0, B 94.8, K 93.7, R 94.2 |
+///
+/// A term that was not there was told in 50 at most (B in "N, weak K"), and in 25 without a weak one.
 #[test]
 #[ignore = "2000 runs of each case take minutes"]
 fn table_of_coverages() {

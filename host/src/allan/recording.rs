@@ -74,7 +74,7 @@ pub struct Survey {
     pub warnings: Vec<String>,
 }
 
-/// Fewer samples have no five octaves up to a quarter of them, which a model needs.
+/// Fewer have no five octaves up to a quarter of them, which a model needs beside their half.
 const FEWEST: usize = 64;
 
 /// Share of the Allan variance at the longest time from which on a ramp is what the curve shows there.
