@@ -11,6 +11,7 @@
 //! | [`triad`]       | calibration of one triad: both directions, covariances, physical quantities   |
 //! | [`fit`], [`plausible`] | both triads, judged on what they have not seen; what cannot be right is refused |
 //! | [`calibration`], [`verify`] | the file, and judging it by another recording                     |
+//! | [`diagnose`]    | the effect behind a residual: found, added, proved on other data              |
 //! | [`design`]      | experiments: which attitudes and rates, how many, for how long                |
 //! | [`allan`]       | noise from a recording at rest: Allan deviation and noise model                |
 //! | [`noise_file`], [`export`] | its result for the other commands, and for other programs          |
@@ -20,6 +21,7 @@ pub mod allan;
 pub mod blocks;
 pub mod calibration;
 pub mod design;
+pub mod diagnose;
 pub mod dwell;
 pub mod error;
 pub mod estimate;

@@ -2,6 +2,7 @@
 
 mod allan_args;
 mod design_args;
+mod diagnose_args;
 mod export_args;
 
 use std::io::Write as _;
@@ -43,6 +44,8 @@ enum Command {
     Fit(FitArgs),
     /// Judge a calibration by another recording
     Verify(VerifyArgs),
+    /// Find the effect behind the residual of a calibrated unit
+    Diagnose(diagnose_args::DiagnoseArgs),
     /// Design the experiment: which attitudes and rates, how many, for how long
     Design(design_args::DesignArgs),
     /// Noise of a unit at rest: Allan deviation, N, B, K, Q and R
@@ -207,6 +210,7 @@ fn main() -> ExitCode {
         Command::Import(args) => run_import(args),
         Command::Fit(args) => run_fit(&args),
         Command::Verify(args) => run_verify(&args),
+        Command::Diagnose(args) => diagnose_args::run(&args),
         Command::Design(args) => design_args::run(&args),
         Command::Allan(args) => allan_args::run(&args),
         Command::Export(args) => export_args::run(&args),

@@ -4,11 +4,13 @@
 
 mod allan;
 mod design;
+mod diagnosis;
 mod json;
 mod text;
 
 pub use allan::{allan_json, allan_text, allan_toml};
 pub use design::{DesignReport, comparison_json, comparison_text, design_json, design_text};
+pub use diagnosis::{DiagnosisReport, diagnosis_json, diagnosis_text};
 pub use json::{fit_json, import_json, verify_json};
 pub(crate) use text::three;
 pub use text::{dwell_table, fit_text, import_text, verify_text};

@@ -68,9 +68,22 @@ pub fn verify(prepared: &Prepared, calibration: &Calibration) -> Result<Verifica
     if calibration.recording.sha256 == prepared.condensed.sha256 {
         warnings.push("this is the recording that the calibration was made from: the figures say nothing about new data".into());
     }
+    let models = Sensor::BOTH.map(|s| calibration.inverse(s));
+    let judged = judge(prepared, models.each_ref().map(Option::as_ref))?;
+    warnings.extend(judged.warnings);
+    Ok(Verification {
+        sensors: judged.sensors,
+        warnings,
+    })
+}
+
+/// Judges inverse models of gyro and accelerometer by a recording.
+pub fn judge(prepared: &Prepared, models: [Option<&Affine<f64>>; 2]) -> Result<Verification> {
+    let manifest = &prepared.manifest;
+    let mut warnings = Vec::new();
     let mut sensors = Vec::new();
-    for sensor in Sensor::BOTH {
-        let Some(inverse) = calibration.inverse(sensor) else {
+    for (sensor, inverse) in Sensor::BOTH.into_iter().zip(models) {
+        let Some(inverse) = inverse else {
             continue;
         };
         if !prepared.has(sensor) {
@@ -81,10 +94,10 @@ pub fn verify(prepared: &Prepared, calibration: &Calibration) -> Result<Verifica
             refuse_wrong_gravity(prepared, sensor, &observations)?;
         }
         let judged = match (manifest.reference, sensor) {
-            (Reference::Table, _) => known(prepared, sensor, &inverse),
-            (Reference::Gravity, Sensor::Accel) => size(prepared, &inverse),
-            (Reference::Gravity, Sensor::Gyro) => match calibration.inverse(Sensor::Accel) {
-                Some(accel) => turns(prepared, &inverse, &accel, &mut warnings),
+            (Reference::Table, _) => known(prepared, sensor, inverse),
+            (Reference::Gravity, Sensor::Accel) => size(prepared, inverse),
+            (Reference::Gravity, Sensor::Gyro) => match models[1] {
+                Some(accel) => turns(prepared, inverse, accel, &mut warnings),
                 None => None,
             },
         };

@@ -11,5 +11,6 @@
 //! | `demo.sh`, `demo/`     | what `make demo` runs, and the small recording that it falls back on |
 
 pub mod bench;
+pub mod blind;
 pub mod coverage;
 pub mod recordings;

@@ -122,6 +122,16 @@ impl Centred {
     }
 }
 
+impl Centred {
+    /// Rotation vector under `ω = C (u - rest) + o`, rad; `half` is half the cofactor matrix of C.
+    fn rotation(&self, c: &Matrix3<f64>, o: &Vector3<f64>, half: &Matrix3<f64>) -> Vector3<f64> {
+        c * self.integral
+            + o * self.duration
+            + half * self.coning
+            + (c * self.moment).cross(o) * 0.5
+    }
+}
+
 /// Cofactor matrix: `(C a) × (C b) = cof(C) (a × b)`.
 fn cofactor(c: &Matrix3<f64>) -> Matrix3<f64> {
     let [x, y, z] = [0, 1, 2].map(|i| c.row(i).transpose());
@@ -171,10 +181,7 @@ fn integrate(
     let mut by = [Matrix3::zeros(); 4];
     // Backwards, so that what is left of the turn carries each piece into the frame at its end.
     for piece in pieces.iter().rev() {
-        let phi = c * piece.integral
-            + o * piece.duration
-            + cofactor * piece.coning
-            + (c * piece.moment).cross(o) * 0.5;
+        let phi = piece.rotation(c, o, &cofactor);
         let (turn, right) = exponential(&phi);
         if sensitivity {
             let into = after * right;
@@ -199,6 +206,38 @@ pub fn direction_error(turn: &Turn, gyro: &Affine<f64>) -> Vector3<f64> {
         .collect();
     let (after, _) = integrate(&pieces, &gyro.matrix, &gyro.offset, false);
     between(&(after * turn.before.normalize()), &turn.after.normalize())
+}
+
+/// The direction error of a turn and what it owes to each piece of it.
+#[derive(Debug, Clone)]
+pub struct Sensitivity {
+    /// Its two components across the measured direction, rad.
+    pub error: [f64; 2],
+    /// Derivatives of the two by the rotation vector of each increment, rad/rad, body frame.
+    pub by: Vec<[Vector3<f64>; 2]>,
+}
+
+/// [`direction_error`] in components, where of the rotation of each increment `less` (rad, body frame) is taken off before.
+pub fn sensitivity(turn: &Turn, gyro: &Affine<f64>, less: &[Vector3<f64>]) -> Sensitivity {
+    let (c, o) = (&gyro.matrix, &gyro.offset);
+    let half = cofactor(c) * 0.5;
+    let measured = turn.after.normalize();
+    let sides = across(&measured);
+    let mut after = Matrix3::identity();
+    let mut by = vec![[Vector3::zeros(); 2]; turn.increments.len()];
+    for (k, increment) in turn.increments.iter().enumerate().rev() {
+        let piece = Centred::new(increment, &Vector3::zeros());
+        let phi = piece.rotation(c, o, &half) - less.get(k).copied().unwrap_or_default();
+        let (back, right) = exponential(&phi);
+        let into: Matrix3<f64> = after * right;
+        by[k] = sides.map(|e| into.tr_mul(&e));
+        after *= back.transpose();
+    }
+    let error = between(&(after * turn.before.normalize()), &measured);
+    Sensitivity {
+        error: sides.map(|e| e.dot(&error)),
+        by,
+    }
 }
 
 /// Rotation vector that turns the unit vector `a` into `b` the shortest way.

@@ -39,7 +39,7 @@ fn plus_minus(value: f64, half: f64) -> String {
 }
 
 /// Factor and unit in which a person reads a figure.
-fn readable(figure: Figure, sensor: Sensor) -> (f64, &'static str) {
+pub(super) fn readable(figure: Figure, sensor: Sensor) -> (f64, &'static str) {
     match (figure, sensor) {
         (Figure::Direction, _) => (1f64.to_degrees(), "deg"),
         (_, Sensor::Gyro) => (1f64.to_degrees(), "deg/s"),
@@ -47,7 +47,7 @@ fn readable(figure: Figure, sensor: Sensor) -> (f64, &'static str) {
     }
 }
 
-fn warn(out: &mut String, warnings: impl Iterator<Item = impl AsRef<str>>) {
+pub(super) fn warn(out: &mut String, warnings: impl Iterator<Item = impl AsRef<str>>) {
     for warning in warnings {
         let _ = writeln!(out, "warning: {}", warning.as_ref());
     }

@@ -1,0 +1,296 @@
+//! What is tried: named effects, terms found from the data, and jumps.
+
+use nalgebra::DMatrix;
+
+use super::effect::{Effect, Form, Moment};
+use super::rows::Rows;
+use crate::dwell::Sensor;
+use crate::estimate::AXES;
+
+/// A quantity that terms are products of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Variable {
+    /// Rate about a body axis.
+    Rate(usize),
+    /// Specific force along a body axis.
+    Force(usize),
+    /// Temperature.
+    Temperature,
+    /// Its rate of change, behind a lag of [`RATE_LAG_S`]: unfiltered it would be noise.
+    TemperatureRate,
+    /// Time since the recording began.
+    Time,
+}
+
+/// Lag of the filter that the rate of change of the temperature is taken by, s.
+pub const RATE_LAG_S: f64 = 30.0;
+
+impl Variable {
+    /// All of them.
+    pub const ALL: [Self; 9] = [
+        Self::Rate(0),
+        Self::Rate(1),
+        Self::Rate(2),
+        Self::Force(0),
+        Self::Force(1),
+        Self::Force(2),
+        Self::Temperature,
+        Self::TemperatureRate,
+        Self::Time,
+    ];
+
+    /// Name.
+    pub fn name(self) -> String {
+        match self {
+            Self::Rate(i) => format!("rate_{}", AXES[i]),
+            Self::Force(i) => format!("force_{}", AXES[i]),
+            Self::Temperature => "temp".into(),
+            Self::TemperatureRate => "temp_rate".into(),
+            Self::Time => "time".into(),
+        }
+    }
+
+    /// SI unit.
+    pub fn unit(self) -> &'static str {
+        match self {
+            Self::Rate(_) => "(rad/s)",
+            Self::Force(_) => "(m/s^2)",
+            Self::Temperature => "K",
+            Self::TemperatureRate => "(K/s)",
+            Self::Time => "s",
+        }
+    }
+
+    /// Its value, SI; of the temperature rate that of moments behind a lag of [`RATE_LAG_S`].
+    fn of(self, at: &Moment) -> f64 {
+        match self {
+            Self::Rate(i) => at.rate[i],
+            Self::Force(i) => at.force[i],
+            Self::Temperature => at.warm_c,
+            Self::TemperatureRate => (at.warm_c - at.late_c) / RATE_LAG_S,
+            Self::Time => at.t_s,
+        }
+    }
+}
+
+/// A product of one to three variables.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Monomial(pub Vec<Variable>);
+
+impl Monomial {
+    /// All up to third order, each once.
+    pub fn all() -> Vec<Self> {
+        let v = Variable::ALL;
+        let mut all = Vec::new();
+        for i in 0..v.len() {
+            all.push(Self(vec![v[i]]));
+            for j in i..v.len() {
+                all.push(Self(vec![v[i], v[j]]));
+                for k in j..v.len() {
+                    all.push(Self(vec![v[i], v[j], v[k]]));
+                }
+            }
+        }
+        all
+    }
+
+    /// Name: `rate_x*force_y`, `force_z^2`.
+    pub fn name(&self) -> String {
+        let mut parts: Vec<(Variable, usize)> = Vec::new();
+        for v in &self.0 {
+            match parts.last_mut() {
+                Some((last, n)) if last == v => *n += 1,
+                _ => parts.push((*v, 1)),
+            }
+        }
+        let written = parts.iter().map(|(v, n)| match n {
+            1 => v.name(),
+            n => format!("{}^{n}", v.name()),
+        });
+        written.collect::<Vec<_>>().join("*")
+    }
+
+    /// Its value, SI.
+    pub fn value(&self, at: &Moment) -> f64 {
+        self.0.iter().map(|v| v.of(at)).product()
+    }
+
+    /// Unit of its coefficient in an error of `sensor`.
+    pub fn unit(&self, sensor: Sensor) -> String {
+        let units: Vec<&str> = self.0.iter().map(|v| v.unit()).collect();
+        format!("{}/({})", sensor.unit(), units.join("*"))
+    }
+
+    fn lags(&self) -> bool {
+        self.0.contains(&Variable::TemperatureRate)
+    }
+}
+
+/// What a candidate is.
+#[derive(Debug, Clone)]
+pub enum Kind {
+    /// A named effect.
+    Effect(&'static Effect),
+    /// A term found from the data, of one axis.
+    Term(usize, Monomial),
+    /// The bias of one axis is another from some dwell on.
+    Jump(usize, f64),
+}
+
+/// What is tried.
+#[derive(Debug, Clone)]
+pub struct Candidate {
+    /// Sensor.
+    pub sensor: Sensor,
+    /// What it is.
+    pub kind: Kind,
+    /// Which of its coefficients the experiment can tell.
+    pub active: Vec<usize>,
+}
+
+/// Most coefficients of an effect.
+const MOST_COEFFICIENTS: usize = 9;
+/// Values of a nonlinear constant that are screened.
+const FORMS: usize = 9;
+
+impl Candidate {
+    /// Stable name; of a jump what a person reads.
+    pub fn id(&self) -> String {
+        match &self.kind {
+            Kind::Effect(e) => e.id.into(),
+            Kind::Term(axis, m) => format!("term:{}_{}~{}", self.sensor, AXES[*axis], m.name()),
+            Kind::Jump(axis, t_s) => {
+                format!("jump of {}_{} at {t_s:.0} s", self.sensor, AXES[*axis])
+            }
+        }
+    }
+
+    /// Whether it is an effect of the library.
+    pub fn is_listed(&self) -> bool {
+        matches!(self.kind, Kind::Effect(_))
+    }
+
+    /// Its physics in a line.
+    pub fn about(&self) -> &'static str {
+        match self.kind {
+            Kind::Effect(e) => e.about,
+            Kind::Term(..) => "a product of what was recorded; no effect of this name is known",
+            Kind::Jump(..) => "the bias is another from here on",
+        }
+    }
+
+    /// Its nonlinear constant.
+    pub fn form(&self) -> Option<Form> {
+        match self.kind {
+            Kind::Effect(e) => e.form,
+            _ => None,
+        }
+    }
+
+    /// Range of its nonlinear constant.
+    pub fn form_range(&self) -> Option<(f64, f64)> {
+        match self.kind {
+            Kind::Effect(Effect { form: Some(f), .. }) => Some((f.from, f.to)),
+            _ => None,
+        }
+    }
+
+    /// Values of its nonlinear constant to be screened; a single 0 if it has none.
+    pub fn forms(&self) -> Vec<f64> {
+        let Some((from, to)) = self.form_range() else {
+            return vec![0.0];
+        };
+        let step = (to / from).powf(1.0 / (FORMS - 1) as f64);
+        (0..FORMS).map(|k| from * step.powi(k as i32)).collect()
+    }
+
+    /// A candidate with all of its coefficients.
+    pub fn new(sensor: Sensor, kind: Kind) -> Self {
+        let count = match &kind {
+            Kind::Effect(e) => e.coefficients.len(),
+            _ => 1,
+        };
+        Self {
+            sensor,
+            kind,
+            active: (0..count).collect(),
+        }
+    }
+
+    /// Axis of each of its active coefficients.
+    pub fn axes(&self) -> Vec<usize> {
+        match &self.kind {
+            Kind::Effect(e) => self
+                .active
+                .iter()
+                .map(|k| e.coefficients[*k].axis)
+                .collect(),
+            Kind::Term(axis, _) | Kind::Jump(axis, _) => vec![*axis],
+        }
+    }
+
+    /// Name and unit of each of its active coefficients.
+    pub fn names(&self) -> Vec<(String, String)> {
+        match &self.kind {
+            Kind::Effect(e) => {
+                let of = |k: &usize| {
+                    (
+                        e.coefficients[*k].name.into(),
+                        e.coefficients[*k].unit.into(),
+                    )
+                };
+                self.active.iter().map(of).collect()
+            }
+            Kind::Term(axis, m) => vec![(AXES[*axis].into(), m.unit(self.sensor))],
+            Kind::Jump(axis, _) => vec![(AXES[*axis].into(), self.sensor.unit().into())],
+        }
+    }
+
+    /// Writes the regressors of its active coefficients at a moment.
+    pub fn regressors(&self, at: &Moment, form: f64, out: &mut [f64]) {
+        match &self.kind {
+            Kind::Effect(e) => {
+                let mut all = [0.0; MOST_COEFFICIENTS];
+                (e.regressors)(at, form, &mut all[..e.coefficients.len()]);
+                for (out, k) in out.iter_mut().zip(&self.active) {
+                    *out = all[*k];
+                }
+            }
+            Kind::Term(_, m) => out[0] = m.value(at),
+            Kind::Jump(_, t_s) => out[0] = f64::from(u8::from(at.t_s >= *t_s)),
+        }
+    }
+
+    /// Lag of [`Moment::late_c`] that its regressors want, s.
+    pub fn lag_s(&self, form: f64) -> Option<f64> {
+        match &self.kind {
+            Kind::Effect(Effect { form: Some(f), .. }) if f.lags => Some(form),
+            Kind::Term(_, m) if m.lags() => Some(RATE_LAG_S),
+            _ => None,
+        }
+    }
+
+    /// Its columns in `rows`.
+    pub fn columns(&self, rows: &Rows, form: f64) -> DMatrix<f64> {
+        let moments = rows.moments(self.lag_s(form));
+        rows.columns(&moments, &self.axes(), |at, out| {
+            self.regressors(at, form, out)
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_monomial_up_to_third_order_is_there_once() {
+        // Nine variables: 9 + 45 + 165.
+        let all = Monomial::all();
+        let mut names: Vec<String> = all.iter().map(Monomial::name).collect();
+        names.sort();
+        names.dedup();
+        assert_eq!((all.len(), names.len()), (219, 219));
+        assert!(names.contains(&"rate_x*force_y^2".into()));
+    }
+}

@@ -1,0 +1,349 @@
+//! How the rows scatter: known noise, scatter beside it, and a bias that walks, each estimated where it is not known.
+//!
+//! A drift of the bias and a walk of it are told apart by nothing else than that one is a straight line. So the walk is
+//! in the null hypothesis: without it, 1 clean unit in 3 would be found to drift.
+
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+
+use super::rows::Rows;
+
+/// Variances of each stratum beside the known ones.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Components {
+    /// Of each row by itself, unit of the rows squared.
+    pub excess: Vec<f64>,
+    /// K² of a walk, unit²/s.
+    pub walk: Vec<f64>,
+}
+
+/// A linear model of the rows at some components.
+#[derive(Debug, Clone)]
+pub struct Fitted {
+    /// Components.
+    pub components: Components,
+    /// -2 ln of the likelihood but for a constant: what models are compared by.
+    pub deviance: f64,
+    /// The same of the restricted likelihood: what the components of one model are best estimated by.
+    pub restricted: f64,
+    /// Coefficients of the columns.
+    pub coefficients: DVector<f64>,
+    /// Their covariance for the components.
+    pub covariance: DMatrix<f64>,
+    /// Sum of the squares of the decorrelated residuals.
+    pub chi2: f64,
+}
+
+/// Which likelihood.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum By {
+    /// The likelihood itself, for tests: of two models the drop is then a function of F where the noise has one size.
+    Likelihood,
+    /// The restricted one, for the noise of one model: it knows what the coefficients have taken up.
+    Restricted,
+}
+
+/// What a stratum adds to the normal equations.
+struct Share {
+    /// Of columns and residual.
+    normal: DMatrix<f64>,
+    log_determinant: f64,
+}
+
+/// Root of the covariance of a stratum.
+enum Root {
+    Diagonal(DVector<f64>),
+    Full(Cholesky<f64, Dyn>),
+}
+
+impl Root {
+    fn whiten(&self, part: &mut DMatrix<f64>) {
+        match self {
+            Self::Diagonal(sigmas) => {
+                for (mut row, sigma) in part.row_iter_mut().zip(sigmas.iter()) {
+                    row /= *sigma;
+                }
+            }
+            Self::Full(root) => {
+                root.l_dirty().solve_lower_triangular_mut(part);
+            }
+        }
+    }
+
+    fn log_determinant(&self) -> f64 {
+        match self {
+            Self::Diagonal(sigmas) => sigmas.iter().map(|s| 2.0 * s.ln()).sum(),
+            Self::Full(root) => root.l_dirty().diagonal().iter().map(|s| 2.0 * s.ln()).sum(),
+        }
+    }
+}
+
+/// Decorrelates rows.
+pub struct Whitener<'a> {
+    rows: &'a Rows,
+    roots: Vec<Root>,
+}
+
+impl Whitener<'_> {
+    /// `matrix`, a row for each of the rows, decorrelated and in sigmas.
+    pub fn whiten(&self, matrix: &DMatrix<f64>) -> DMatrix<f64> {
+        let mut out = matrix.clone();
+        for (stratum, root) in self.rows.strata.iter().zip(&self.roots) {
+            let (from, count) = (stratum.rows.start, stratum.rows.len());
+            let mut part = matrix.rows(from, count).into_owned();
+            root.whiten(&mut part);
+            out.rows_mut(from, count).copy_from(&part);
+        }
+        out
+    }
+}
+
+/// Decorrelates a choice of rows.
+pub struct Kept {
+    parts: Vec<(usize, Cholesky<f64, Dyn>)>,
+}
+
+impl Kept {
+    /// `matrix`, a row for each of the chosen rows, decorrelated and in sigmas.
+    pub fn whiten(&self, matrix: &DMatrix<f64>) -> DMatrix<f64> {
+        let mut out = matrix.clone();
+        for (from, root) in &self.parts {
+            let count = root.l_dirty().nrows();
+            let mut part = matrix.rows(*from, count).into_owned();
+            root.l_dirty().solve_lower_triangular_mut(&mut part);
+            out.rows_mut(*from, count).copy_from(&part);
+        }
+        out
+    }
+}
+
+/// Rows, with what takes long to find out about them.
+pub struct Spread<'a> {
+    rows: &'a Rows,
+    /// Whether the known covariance of each stratum is diagonal.
+    diagonal: Vec<bool>,
+    /// Typical variance of a row, and of a unit walk, by stratum.
+    typical: Vec<(f64, f64)>,
+    /// Whether a walk is sought where the wander is known as well.
+    all_walk: bool,
+}
+
+impl<'a> Spread<'a> {
+    /// Of `rows`. Where the wander is known, a walk beside it is only sought if `all_walk`: it would take up every slow effect.
+    pub fn new(rows: &'a Rows, all_walk: bool) -> Self {
+        let mean = |m: &DMatrix<f64>| m.diagonal().mean().max(1e-30);
+        Self {
+            rows,
+            all_walk,
+            diagonal: rows
+                .strata
+                .iter()
+                .map(|s| {
+                    let off = &s.known - DMatrix::from_diagonal(&s.known.diagonal());
+                    off.amax() == 0.0
+                })
+                .collect(),
+            typical: rows
+                .strata
+                .iter()
+                .map(|s| (mean(&s.known), s.walk.as_ref().map_or(0.0, mean)))
+                .collect(),
+        }
+    }
+
+    /// Nothing beside the known noise.
+    pub fn none(&self) -> Components {
+        let zeros = vec![0.0; self.rows.strata.len()];
+        Components {
+            excess: zeros.clone(),
+            walk: zeros,
+        }
+    }
+
+    /// Root of the covariance of stratum `s`.
+    fn root(&self, s: usize, excess: f64, walk: f64) -> Option<Root> {
+        let stratum = &self.rows.strata[s];
+        let floor = 1e-12 * self.typical[s].0;
+        if self.diagonal[s] && (walk == 0.0 || stratum.walk.is_none()) {
+            let sigmas = stratum
+                .known
+                .diagonal()
+                .map(|v| (v.max(floor) + excess).sqrt());
+            return Some(Root::Diagonal(sigmas));
+        }
+        let mut v = stratum.known.clone();
+        if let Some(unit) = &stratum.walk {
+            v += unit * walk;
+        }
+        for i in 0..v.nrows() {
+            v[(i, i)] += excess + floor;
+        }
+        Cholesky::new(v).map(Root::Full)
+    }
+
+    /// What decorrelates all rows.
+    pub fn whitener(&self, at: &Components) -> Option<Whitener<'a>> {
+        let roots = (0..self.rows.strata.len()).map(|s| self.root(s, at.excess[s], at.walk[s]));
+        Some(Whitener {
+            rows: self.rows,
+            roots: roots.collect::<Option<_>>()?,
+        })
+    }
+
+    /// What decorrelates some of the rows, given in ascending order, by themselves.
+    pub fn kept(&self, at: &Components, kept: &[usize]) -> Option<Kept> {
+        let mut parts = Vec::new();
+        for (s, stratum) in self.rows.strata.iter().enumerate() {
+            let from = kept.partition_point(|r| *r < stratum.rows.start);
+            let to = kept.partition_point(|r| *r < stratum.rows.end);
+            let rows: Vec<usize> = kept[from..to]
+                .iter()
+                .map(|r| r - stratum.rows.start)
+                .collect();
+            let mut v = stratum.known.select_rows(&rows).select_columns(&rows);
+            if let Some(unit) = &stratum.walk {
+                v += unit.select_rows(&rows).select_columns(&rows) * at.walk[s];
+            }
+            for i in 0..v.nrows() {
+                v[(i, i)] += at.excess[s] + 1e-12 * self.typical[s].0;
+            }
+            if !rows.is_empty() {
+                parts.push((from, Cholesky::new(v)?));
+            }
+        }
+        Some(Kept { parts })
+    }
+
+    fn share(&self, s: usize, excess: f64, walk: f64, both: &DMatrix<f64>) -> Option<Share> {
+        let range = &self.rows.strata[s].rows;
+        let mut part = both.rows(range.start, range.len()).into_owned();
+        let root = self.root(s, excess, walk)?;
+        root.whiten(&mut part);
+        Some(Share {
+            normal: part.tr_mul(&part),
+            log_determinant: root.log_determinant(),
+        })
+    }
+
+    fn solve(&self, shares: &[Share], at: &Components) -> Option<Fitted> {
+        let p = shares.first()?.normal.ncols() - 1;
+        let mut normal = DMatrix::zeros(p + 1, p + 1);
+        let mut logs = 0.0;
+        for share in shares {
+            normal += &share.normal;
+            logs += share.log_determinant;
+        }
+        let y2 = normal[(p, p)];
+        if p == 0 {
+            return Some(Fitted {
+                components: at.clone(),
+                deviance: logs + y2,
+                restricted: logs + y2,
+                coefficients: DVector::zeros(0),
+                covariance: DMatrix::zeros(0, 0),
+                chi2: y2,
+            });
+        }
+        // Columns of very different units.
+        let scale = DVector::from_fn(p, |i, _| normal[(i, i)].sqrt().max(f64::MIN_POSITIVE));
+        let scaled = DMatrix::from_fn(p, p, |i, j| normal[(i, j)] / (scale[i] * scale[j]));
+        let right = DVector::from_fn(p, |i, _| normal[(i, p)] / scale[i]);
+        let root = Cholesky::new(scaled)?;
+        let solution = root.solve(&right);
+        let chi2 = (y2 - solution.dot(&right)).max(0.0);
+        let l = root.l_dirty();
+        let log: f64 = (0..p).map(|i| 2.0 * (l[(i, i)] * scale[i]).ln()).sum();
+        let mut covariance = root.inverse();
+        for i in 0..p {
+            for j in 0..p {
+                covariance[(i, j)] /= scale[i] * scale[j];
+            }
+        }
+        Some(Fitted {
+            components: at.clone(),
+            deviance: logs + chi2,
+            restricted: logs + log + chi2,
+            coefficients: solution.component_div(&scale),
+            covariance,
+            chi2,
+        })
+    }
+
+    fn both(&self, columns: &DMatrix<f64>) -> DMatrix<f64> {
+        let p = columns.ncols();
+        let mut both = columns.clone().insert_column(p, 0.0);
+        both.set_column(p, &self.rows.y);
+        both
+    }
+
+    /// The model with `columns` at given components.
+    pub fn fit_at(&self, columns: &DMatrix<f64>, at: &Components) -> Option<Fitted> {
+        let both = self.both(columns);
+        let shares: Option<Vec<Share>> = (0..self.rows.strata.len())
+            .map(|s| self.share(s, at.excess[s], at.walk[s], &both))
+            .collect();
+        self.solve(&shares?, at)
+    }
+
+    /// The model with `columns`, with the components that make its likelihood largest, from `start` on; `by` says which.
+    pub fn fit(&self, columns: &DMatrix<f64>, start: &Components, by: By) -> Option<Fitted> {
+        let cost = |f: &Fitted| match by {
+            By::Likelihood => f.deviance,
+            By::Restricted => f.restricted,
+        };
+        let both = self.both(columns);
+        let mut at = start.clone();
+        let mut shares: Vec<Share> = (0..self.rows.strata.len())
+            .map(|s| self.share(s, at.excess[s], at.walk[s], &both))
+            .collect::<Option<_>>()?;
+        let mut best = self.solve(&shares, &at)?;
+        for _ in 0..SWEEPS {
+            let before = cost(&best);
+            for s in 0..shares.len() {
+                let (row, unit_walk) = self.typical[s];
+                let stratum = &self.rows.strata[s];
+                let walks = stratum.walk.is_some() && (self.all_walk || !stratum.wander_known);
+                for part in 0..if walks { 2 } else { 1 } {
+                    let (now, unit) = match part {
+                        0 => (at.excess[s], row),
+                        _ => (at.walk[s], row / unit_walk),
+                    };
+                    let mut steps: Vec<f64> = vec![0.0];
+                    match now > 0.0 {
+                        true => steps.extend([0.25, 0.5, 0.8, 1.25, 2.0, 4.0].map(|f| f * now)),
+                        false => {
+                            steps.extend([0.1, 0.5, 2.0, 8.0, 64.0, 1e3, 1e5].map(|f| f * unit))
+                        }
+                    }
+                    for value in steps {
+                        let (excess, walk) = match part {
+                            0 => (value, at.walk[s]),
+                            _ => (at.excess[s], value),
+                        };
+                        let Some(new) = self.share(s, excess, walk, &both) else {
+                            continue;
+                        };
+                        let old = std::mem::replace(&mut shares[s], new);
+                        let mut there = at.clone();
+                        (there.excess[s], there.walk[s]) = (excess, walk);
+                        match self.solve(&shares, &there) {
+                            Some(found) if cost(&found) < cost(&best) - 1e-9 => {
+                                best = found;
+                                at = there;
+                            }
+                            _ => shares[s] = old,
+                        }
+                    }
+                }
+            }
+            if before - cost(&best) < SETTLED {
+                break;
+            }
+        }
+        Some(best)
+    }
+}
+
+/// Rounds over the components.
+const SWEEPS: usize = 12;
+/// Deviance below which another round is not worth it.
+const SETTLED: f64 = 0.02;

@@ -1,0 +1,162 @@
+//! The diagnosis for people.
+
+use std::fmt::Write as _;
+
+use super::DiagnosisReport;
+use crate::diagnose::decision::{Accepted, Decision, Split};
+use crate::diagnose::{SensorDiagnosis, Verdict};
+use crate::dwell::Sensor;
+use crate::fit::Figure;
+use crate::report::text::{readable, three, warn};
+
+/// Result of `mimu diagnose`.
+pub fn diagnosis_text(report: &DiagnosisReport) -> String {
+    let mut out = String::new();
+    let d = &report.diagnosis;
+    let said = match d.verdict {
+        Verdict::Clean => "clean: noise explains what the affine calibration leaves",
+        Verdict::Explained => "explained: with the effects below, noise explains what is left",
+        Verdict::Unexplained => "unexplained: something is left that nothing here explains",
+    };
+    let _ = writeln!(out, "{}: {said}", d.before.prepared.manifest.device);
+    for s in &d.sensors {
+        let figure = d
+            .before
+            .sensor(s.sensor)
+            .map_or(Figure::Input, |f| f.figure);
+        let _ = writeln!(out);
+        sensor(&mut out, s, figure);
+    }
+    if let Some((name, [before, after])) = &report.second {
+        let _ = writeln!(out, "\non {name}, which nothing was fitted to");
+        let _ = writeln!(
+            out,
+            "  {:<8}{:>16}{:>16}{:>16}",
+            "", "before", "after", "noise floor"
+        );
+        for (b, a) in before.sensors.iter().zip(&after.sensors) {
+            let (factor, unit) = readable(b.figure, b.sensor);
+            let [x, y, z] =
+                [b.rms, a.rms, a.noise_floor].map(|v| format!("{} {unit}", three(v * factor)));
+            let _ = writeln!(out, "  {:<8}{x:>16}{y:>16}{z:>16}", b.sensor.name());
+        }
+    }
+    let warnings: Vec<&String> = d
+        .after
+        .warnings
+        .iter()
+        .chain(d.after.sensors.iter().flat_map(|s| &s.warnings))
+        .collect();
+    if !warnings.is_empty() {
+        let _ = writeln!(out);
+        warn(&mut out, warnings.into_iter());
+    }
+    out
+}
+
+fn sensor(out: &mut String, s: &SensorDiagnosis, figure: Figure) {
+    let d = &s.decision;
+    let (factor, unit) = readable(figure, s.sensor);
+    let shown = |v: f64| match v.is_finite() {
+        true => format!("{} {unit}", three(v * factor)),
+        false => "-".into(),
+    };
+    let _ = writeln!(
+        out,
+        "{} ({}, rms)\n  {:<12}{:>14}{:>14}{:>14}",
+        s.sensor,
+        crate::calibration::figure(figure),
+        "",
+        "before",
+        "after",
+        "noise floor"
+    );
+    let floor = shown(d.noise_floor);
+    for (name, [before, after]) in [("in sample", d.rms), ("held out", d.held_out_rms)] {
+        let _ = writeln!(
+            out,
+            "  {name:<12}{:>14}{:>14}{floor:>14}",
+            shown(before),
+            shown(after)
+        );
+    }
+    if d.split == Split::Interleaved {
+        let _ = writeln!(
+            out,
+            "  held out every fourth dwell, as one block alone shows the effect"
+        );
+    }
+    for a in &d.accepted {
+        effect(out, s.sensor, a, &shown);
+    }
+    for l in &d.leftover {
+        let (factor, unit) = match l.stratum == "turns" {
+            true => (1f64.to_degrees(), "deg"),
+            false => readable(Figure::Input, s.sensor),
+        };
+        let _ = writeln!(
+            out,
+            "  left over, {}: {} {unit} rms beyond the noise; goes with {}",
+            l.stratum,
+            three(l.strength * factor),
+            l.against
+        );
+    }
+    tried(out, d);
+}
+
+fn effect(out: &mut String, sensor: Sensor, a: &Accepted, shown: &impl Fn(f64) -> String) {
+    let candidate = &a.chosen.candidate;
+    let about = candidate.about();
+    let _ = writeln!(out, "  + {}: {about}", candidate.id());
+    let _ = writeln!(
+        out,
+        "    held out {} without it, {} with it; by chance once in {}",
+        shown(a.held_out[0]),
+        shown(a.held_out[1]),
+        odds(a.chosen.p)
+    );
+    let _ = sensor;
+    for (i, (name, unit)) in candidate.names().iter().enumerate() {
+        // Twice the standard deviation: with dwells by the dozen Student's factor is within a tenth of it.
+        let half = 2.0 * a.covariance[(i, i)].sqrt();
+        let _ = writeln!(
+            out,
+            "    {name:<12}{:>12.3e} ± {half:.1e} {unit}",
+            a.values[i]
+        );
+    }
+    if let Some(form) = candidate.form() {
+        let _ = writeln!(out, "    {:<12}{:>12}", form.name, three(a.chosen.form));
+    }
+    for (id, worse) in &a.chosen.alternatives {
+        let _ = writeln!(out, "    or {id}, worse by {} in deviance", three(*worse));
+    }
+}
+
+fn odds(p: f64) -> String {
+    match 1.0 / p.max(1e-300) {
+        n if n < 1e6 => format!("{n:.0}"),
+        n => format!("{n:.0e}"),
+    }
+}
+
+fn tried(out: &mut String, d: &Decision) {
+    for (id, reason) in &d.rejected {
+        let _ = writeln!(out, "  - {id}: {reason}");
+    }
+    let mut by_experiment: Vec<(&str, Vec<&str>)> = Vec::new();
+    for (id, experiment) in &d.not_excited {
+        match by_experiment.iter_mut().find(|(e, _)| e == experiment) {
+            Some((_, ids)) => ids.push(id),
+            None => by_experiment.push((experiment, vec![id])),
+        }
+    }
+    for (experiment, ids) in by_experiment {
+        let _ = writeln!(
+            out,
+            "  not excited: {}\n    needs {experiment}",
+            ids.join(", ")
+        );
+    }
+}

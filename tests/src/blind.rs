@@ -1,0 +1,189 @@
+//! Units with an effect that nobody told the diagnosis of.
+//!
+//! The truth is made by the bench, whose physics shares no code with the diagnosis; how large an effect is, is the
+//! difference of two recordings of the same unit, with and without it, all else being the same bits.
+
+use std::fmt::Write as _;
+
+use mimu::diagnose::{Diagnosis, diagnose};
+use mimu::dwell::Sensor;
+use mimu::fit::{Method, Options};
+use mimu::prepared::Prepared;
+use mimu::stillness::STILL_FACTOR;
+use mimu_rig::effects::Shape;
+use mimu_rig::random::Random;
+use mimu_rig::rig_file::{EffectFile, RigFile, RigTruth};
+use nalgebra::{DMatrix, DVector};
+
+use crate::bench;
+
+/// Plan of half an hour on a table in a chamber: faces, edges, corners and eight rates about each axis, all twice, in an order drawn
+/// by the seed, while the chamber warms by 15 °C and cools again.
+pub fn plan(seed: u64) -> String {
+    let mut steps: Vec<([f64; 3], f64)> = Vec::new();
+    for x in [-1.0, 0.0, 1.0] {
+        for y in [-1.0, 0.0, 1.0] {
+            for z in [-1.0, 0.0, 1.0] {
+                if (x, y, z) != (0.0, 0.0, 0.0) {
+                    steps.push(([x, y, z], 0.0));
+                }
+            }
+        }
+    }
+    for axis in 0..3 {
+        let up: [f64; 3] = std::array::from_fn(|i| f64::from(u8::from(i == axis)));
+        steps.extend([-280.0, -200.0, -100.0, -30.0, 30.0, 100.0, 200.0, 280.0].map(|r| (up, r)));
+    }
+    let mut random = Random::new(seed, "order of the steps");
+    let mut plan = String::from(
+        "format = \"mimu-plan/1\"\nsample_rate_hz = 100.0\ncarrier = \"table\"\nlead_in_s = 5.0\n\
+         chamber_c = [[0.0, 20.0], [200.0, 20.0], [800.0, 35.0], [1000.0, 35.0], [1600.0, 20.0]]\n",
+    );
+    for _ in 0..2 {
+        for k in (1..steps.len()).rev() {
+            steps.swap(k, (random.uniform() * (k + 1) as f64) as usize);
+        }
+        for (up, rate_dps) in &steps {
+            let heading = random.within(180.0);
+            let _ = writeln!(
+                plan,
+                "[[step]]\nup = {up:?}\nheading_deg = {heading:?}\nrate_dps = {rate_dps:?}\ndwell_s = 10.0"
+            );
+        }
+    }
+    plan
+}
+
+/// A unit with `ids`, the size of each drawn evenly in the logarithm over a decade around that of data sheets.
+pub fn unit(ids: &[&str], seed: u64) -> RigFile {
+    let mut random = Random::new(seed, "unit");
+    let (gyro, accel) = (bench::gyro(&mut random), bench::accel(&mut random));
+    let mut file = bench::clean(gyro, accel);
+    file.effect = ids
+        .iter()
+        .map(|id| EffectFile {
+            id: (*id).into(),
+            parameters: toml::Table::new(),
+        })
+        .collect();
+    // The sizes that the seed draws, and then another size.
+    let mut drawn = RigTruth::resolve(&file, seed).expect("a rig").file;
+    let mut size = Random::new(seed, "size of the effect");
+    for effect in &mut drawn.effect {
+        let spec = mimu_rig::effects::specs()
+            .find(|s| s.id == effect.id)
+            .expect("an effect");
+        let factor = 10f64.powf(size.within(0.5));
+        let first = &spec.parameters[0];
+        if let Some(value) = effect.parameters.get_mut(first.key) {
+            scale(value, factor, first.shape);
+        }
+    }
+    drawn
+}
+
+fn scale(value: &mut toml::Value, factor: f64, shape: Shape) {
+    match value {
+        toml::Value::Float(v) => *v *= factor,
+        toml::Value::Integer(v) => *value = toml::Value::Float(*v as f64 * factor),
+        toml::Value::Array(all) => all.iter_mut().for_each(|v| scale(v, factor, shape)),
+        _ => {}
+    }
+}
+
+/// One unit of the suite.
+#[derive(Debug, Clone)]
+pub struct Case {
+    /// Effects that it has.
+    pub truth: Vec<String>,
+    /// Root mean square over the noise floor that each effect leaves in the dwell means after an affine fit.
+    pub strength: Vec<f64>,
+    /// Effects that were accepted.
+    pub found: Vec<String>,
+    /// Verdict.
+    pub verdict: &'static str,
+    /// Error after over noise floor, held out, of the sensor of the first effect.
+    pub after: f64,
+    /// What was found and not accepted, and why.
+    pub rejected: Vec<String>,
+    /// What was left, in words.
+    pub left: Vec<String>,
+}
+
+fn options() -> Options {
+    Options {
+        method: Method::LeastSquares,
+        holdout_blocks: 0,
+        only: None,
+        still_factor: STILL_FACTOR,
+    }
+}
+
+/// What remains of the difference between two recordings after an affine model, over the noise floor, of the sensor that has more.
+fn strength(with: &Prepared, without: &Prepared) -> (Sensor, f64) {
+    let of = |sensor: Sensor| {
+        let (a, b) = (with.observations(sensor), without.observations(sensor));
+        let n = a.len();
+        let design = DMatrix::from_fn(n, 4, |i, j| if j == 0 { 1.0 } else { a[i].input[j - 1] });
+        let q = design.qr().q();
+        let mut sum = 0.0;
+        let mut noise = 0.0;
+        for axis in 0..3 {
+            let y = DVector::from_fn(n, |i, _| a[i].raw[axis] - b[i].raw[axis]);
+            sum += (&y - &q * q.tr_mul(&y)).norm_squared();
+            noise += b.iter().map(|o| o.variance[axis]).sum::<f64>();
+        }
+        (sensor, (sum / noise).sqrt())
+    };
+    let [g, a] = Sensor::BOTH.map(of);
+    if g.1 > a.1 { g } else { a }
+}
+
+/// Records and diagnoses a unit with `ids`.
+pub fn case(ids: &[&str], seed: u64) -> Case {
+    let plan = plan(seed);
+    let file = unit(ids, seed);
+    let with = bench::recorded(&plan, &file, seed);
+    let mut strengths = Vec::new();
+    let mut sensors = Vec::new();
+    for k in 0..ids.len() {
+        let mut less = file.clone();
+        less.effect.remove(k);
+        let (sensor, s) = strength(&with, &bench::recorded(&plan, &less, seed));
+        strengths.push(s);
+        sensors.push(sensor);
+    }
+    let noise = bench::noise_file(&file, seed, with.condensed.period_s);
+    let with = with.with_noise(&noise).expect("its noise");
+    let found: Diagnosis =
+        diagnose(with, options()).unwrap_or_else(|e| panic!("{ids:?}, seed {seed}: {e}"));
+    let judged = sensors.first().copied().unwrap_or(Sensor::Gyro);
+    let after = found.sensors.iter().find(|s| s.sensor == judged);
+    Case {
+        truth: ids.iter().map(|s| (*s).into()).collect(),
+        strength: strengths,
+        found: found.effects.iter().map(|e| e.candidate.id()).collect(),
+        verdict: found.verdict.name(),
+        after: after.map_or(f64::NAN, |s| {
+            s.decision.held_out_rms[1] / s.decision.noise_floor
+        }),
+        rejected: found
+            .sensors
+            .iter()
+            .flat_map(|s| s.decision.rejected.clone())
+            .map(|r| format!("{}: {}", r.0, r.1))
+            .collect(),
+        left: found
+            .sensors
+            .iter()
+            .flat_map(|s| {
+                s.decision.leftover.iter().map(move |l| {
+                    format!(
+                        "{}_{}: {} {:.2e}",
+                        s.sensor, l.stratum, l.against, l.strength
+                    )
+                })
+            })
+            .collect(),
+    }
+}
