@@ -4,7 +4,7 @@ TOOLCHAIN := $(shell sed -n 's/^channel = "\(.*\)"/\1/p' rust-toolchain.toml)
 TARGET := thumbv7em-none-eabihf
 CARGO := cargo +$(TOOLCHAIN)
 
-.PHONY: help test demo papers bench fuzz audit toolchain
+.PHONY: help test demo papers blind bench fuzz audit toolchain
 
 help: ## this list
 	@sed -n 's/^\([a-z]*\):.*## /  make \1\t/p' Makefile
@@ -35,6 +35,9 @@ demo: toolchain ## import and fit a recording: the best real one at hand, or the
 
 papers: toolchain ## compute every figure and plot of docs/papers.md
 	$(CARGO) run --locked --release -p mimu-tests --bin papers
+
+blind: toolchain ## undeclared effects on hundreds of units, and what the diagnosis says of them
+	$(CARGO) run --locked --release -p mimu-tests --bin blind
 
 bench: toolchain ## rates and peak memory on four hours at 1 kHz
 	$(CARGO) bench --locked -p mimu --bench four_hours

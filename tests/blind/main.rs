@@ -1,35 +1,162 @@
-//! `make blind`: units with undeclared effects, and what the diagnosis says of them.
+//! `make blind`: units with effects that nobody declares, and what the diagnosis says of them, as tables.
+//!
+//! `blind SEEDS CLEAN [NAME...]`: so many seeds of each effect and pair, so many clean units; names choose among the effects. Every
+//! case is a recording of its own; with names, each is printed.
+
+use std::collections::BTreeMap;
 
 use mimu_rig::effects::specs;
-use mimu_tests::blind::case;
+use mimu_tests::blind::{Case, case};
 use rayon::prelude::*;
+
+/// Pairs of effects, of one sensor and of both.
+const PAIRS: [[&str; 2]; 10] = [
+    ["gyro_g_sensitivity", "gyro_scale_cubic"],
+    ["gyro_g_sensitivity", "gyro_thermal_bias"],
+    ["gyro_scale_quadratic", "gyro_bias_drift"],
+    ["gyro_scale_asymmetry", "gyro_warm_up"],
+    ["gyro_thermal_scale", "gyro_g_sensitivity"],
+    ["accel_scale_quadratic", "accel_size_effect"],
+    ["accel_scale_cubic", "accel_thermal_scale"],
+    ["accel_cross_axis_product", "accel_bias_drift"],
+    ["accel_scale_quadratic", "gyro_g_sensitivity"],
+    ["accel_warm_up", "gyro_scale_cubic"],
+];
+
+/// Strengths, effect over noise of a dwell mean, that the tables tell apart.
+const CLASSES: [(f64, &str); 5] = [
+    (0.5, "below 0.5"),
+    (1.0, "0.5 to 1"),
+    (2.0, "1 to 2"),
+    (5.0, "2 to 5"),
+    (f64::INFINITY, "above 5"),
+];
+
+/// What became of some cases.
+#[derive(Debug, Clone, Copy, Default)]
+struct Tally {
+    cases: u32,
+    detected: u32,
+    right: u32,
+    /// Right, and something else besides.
+    more: u32,
+    wrong: u32,
+    missed: u32,
+    /// Right ones whose error after is at most 1.2 times the floor.
+    at_floor: u32,
+}
+
+impl Tally {
+    fn add(&mut self, case: &Case) {
+        self.cases += 1;
+        let all = case.truth.iter().all(|t| case.found.contains(t));
+        self.detected += u32::from(case.verdict != "clean");
+        match (all, case.found.len() == case.truth.len(), case.verdict) {
+            (true, true, _) => {
+                self.right += 1;
+                self.at_floor += u32::from(case.after <= 1.2);
+            }
+            (true, false, _) => self.more += 1,
+            (false, _, "clean") => self.missed += 1,
+            // Nothing named, but the verdict says that something is there.
+            (false, _, _) if case.found.is_empty() => {}
+            (false, ..) => self.wrong += 1,
+        }
+    }
+
+    fn row(&self, name: &str) -> String {
+        let Self {
+            cases,
+            detected,
+            right,
+            more,
+            wrong,
+            missed,
+            at_floor,
+        } = self;
+        format!(
+            "| {name} | {cases} | {detected} | {right} | {more} | {wrong} | {missed} | {at_floor} |"
+        )
+    }
+}
+
+const HEAD: &str = "| | cases | detected | named right | right and more | named wrong | missed | right, error after at most 1.2 floors |\n|---|---:|---:|---:|---:|---:|---:|---:|";
 
 fn main() {
     let args: Vec<String> = std::env::args().skip(1).collect();
-    let seeds: u64 = args.first().and_then(|s| s.parse().ok()).unwrap_or(20);
-    let only: Vec<&str> = args.iter().skip(1).map(String::as_str).collect();
-    let mut all: Vec<Vec<&str>> = specs().map(|s| vec![s.id]).collect();
-    all.insert(0, vec![]);
-    for ids in all {
-        let name = if ids.is_empty() {
-            "clean".into()
+    let number = |k: usize, default| args.get(k).and_then(|s| s.parse().ok()).unwrap_or(default);
+    let (seeds, clean): (u64, u64) = (number(0, 20), number(1, 200));
+    let chosen: Vec<&str> = args.iter().skip(2).map(String::as_str).collect();
+    let mut kinds: Vec<Vec<&str>> = specs().map(|s| vec![s.id]).collect();
+    kinds.extend(PAIRS.iter().map(|p| p.to_vec()));
+    kinds.retain(|ids| chosen.is_empty() || chosen.iter().any(|c| ids.join("+").contains(c)));
+    let mut jobs: Vec<(Vec<&str>, u64)> = (0..clean).map(|seed| (Vec::new(), seed)).collect();
+    for ids in &kinds {
+        jobs.extend((0..seeds).map(|seed| (ids.clone(), seed)));
+    }
+    let cases: Vec<(String, Case)> = jobs
+        .into_par_iter()
+        .map(|(ids, seed)| (ids.join(" + "), case(&ids, seed)))
+        .collect();
+    if !chosen.is_empty() {
+        for (name, c) in &cases {
+            println!("{name}: {c:?}");
+        }
+    }
+    tables(&cases);
+}
+
+fn tables(cases: &[(String, Case)]) {
+    let mut by_kind: BTreeMap<&str, Tally> = BTreeMap::new();
+    let mut by_class = [[Tally::default(); 2]; CLASSES.len()];
+    let mut unlisted: BTreeMap<&str, [u32; 4]> = BTreeMap::new();
+    let mut false_alarms = Vec::new();
+    let mut clean = 0;
+    for (name, case) in cases {
+        if case.truth.is_empty() {
+            clean += 1;
+            if case.verdict != "clean" {
+                false_alarms.push(case);
+            }
+        } else if name.starts_with("x_") {
+            let listed = case.found.iter().any(|f| !f.starts_with("term:"));
+            let count = unlisted.entry(name).or_default();
+            count[0] += 1;
+            count[1] += u32::from(case.verdict == "unexplained");
+            count[2] += u32::from(case.verdict == "clean");
+            count[3] += u32::from(listed && case.verdict == "explained");
         } else {
-            ids.join("+")
-        };
-        if !only.is_empty() && !only.iter().any(|o| name.contains(o)) {
-            continue;
+            by_kind.entry(name).or_default().add(case);
+            // A pair is as strong as its weaker part.
+            let strength = case.strength.iter().copied().fold(f64::INFINITY, f64::min);
+            let class = CLASSES
+                .iter()
+                .position(|c| strength < c.0)
+                .unwrap_or(CLASSES.len() - 1);
+            by_class[class][usize::from(case.truth.len() > 1)].add(case);
         }
-        let start = std::time::Instant::now();
-        let cases: Vec<_> = (0..seeds)
-            .into_par_iter()
-            .map(|seed| case(&ids, seed))
-            .collect();
-        println!("{name} ({:.1} s)", start.elapsed().as_secs_f64());
-        for c in &cases {
-            println!(
-                "   {:7.2?} {:12} after {:.2}  {:?} {:?} - {:?}",
-                c.strength, c.verdict, c.after, c.found, c.left, c.rejected
-            );
+    }
+    println!(
+        "clean units: {} false alarms of {clean}",
+        false_alarms.len()
+    );
+    for case in false_alarms {
+        println!("  {case:?}");
+    }
+    for (k, title) in ["one effect", "two effects"].iter().enumerate() {
+        println!("\n{title}, by strength\n\n{HEAD}");
+        for (class, (_, name)) in by_class.iter().zip(CLASSES) {
+            println!("{}", class[k].row(name));
         }
+    }
+    println!("\nby effect\n\n{HEAD}");
+    for (name, tally) in &by_kind {
+        println!("{}", tally.row(&format!("`{name}`")));
+    }
+    println!(
+        "\neffects on no list\n\n| | cases | unexplained | clean | explained by a listed effect |\n|---|---:|---:|---:|---:|"
+    );
+    for (name, [cases, unexplained, missed, passed]) in &unlisted {
+        println!("| `{name}` | {cases} | {unexplained} | {missed} | {passed} |");
     }
 }

@@ -105,6 +105,20 @@ pub fn xsens() -> Option<Fit> {
     Some(foreign.fit(Method::LeastSquares).expect("it can be fitted"))
 }
 
+/// One of the five MPU-9150 of A. Mikov et al. (ICINS 2020), calibrated; `None` where the data are not.
+pub fn mikoff(unit: usize) -> Option<Fit> {
+    let file = data_set("mikoff_mpu9150x5")?.join(format!("imu{unit}.log"));
+    let foreign = Foreign {
+        files: vec![(file, "accel_x,accel_y,accel_z,gyro_x,gyro_y,gyro_z")],
+        rate_hz: Some(100.0),
+        gravity_mps2: 9.81,
+        raw_unit: RawUnit::Si,
+        scales: &[],
+        inputs: None,
+    };
+    Some(foreign.fit(Method::LeastSquares).expect("it can be fitted"))
+}
+
 /// `matrix = U Q` with U upper triangular, its diagonal positive, and Q orthogonal.
 ///
 /// Where gravity is the only reference the frame is a convention: mimu's has a lower triangular matrix, others' an

@@ -3,12 +3,11 @@
 //! Their model goes from SI to raw: accelerometer `M f + b` with M upper triangular, gyro `(I + [eps x]) (M w + b)`.
 
 use mimu::dwell::Sensor;
-use mimu::fit::{Fit, Method};
-use mimu::recording::RawUnit;
+use mimu::fit::Fit;
 use mimu::triad::invert;
 use mimu_core::compensation::Affine;
 use mimu_tests::recordings::{
-    Foreign, Models, Samples, data_set, dwell_rows, numbers, rms, upper_triangular_frame, verdict,
+    Models, Samples, data_set, dwell_rows, mikoff, numbers, rms, upper_triangular_frame, verdict,
 };
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
@@ -104,15 +103,7 @@ fn column(table: &[[f64; 5]; 21], unit: usize) -> Parameters {
 /// Fit and samples of one unit.
 fn fitted(unit: usize) -> Option<(Fit, Samples)> {
     let file = data_set("mikoff_mpu9150x5")?.join(format!("imu{unit}.log"));
-    let foreign = Foreign {
-        files: vec![(file.clone(), "accel_x,accel_y,accel_z,gyro_x,gyro_y,gyro_z")],
-        rate_hz: Some(100.0),
-        gravity_mps2: 9.81,
-        raw_unit: RawUnit::Si,
-        scales: &[],
-        inputs: None,
-    };
-    let fit = foreign.fit(Method::LeastSquares).expect("it can be fitted");
+    let fit = mikoff(unit)?;
     let rows = numbers(&file);
     let triple = |r: &[f64], from: usize| Vector3::new(r[from], r[from + 1], r[from + 2]);
     let samples = Samples {

@@ -1,0 +1,84 @@
+//! Diagnosis of units whose truth is known, and of recordings by other people. All of the first is `make blind`.
+
+use mimu::diagnose::{Diagnosis, Verdict, diagnose};
+use mimu::dwell::Sensor;
+use mimu_tests::blind::{Case, case};
+use mimu_tests::recordings::{mikoff, xsens};
+use rayon::prelude::*;
+
+fn cases(ids: &[&str], seeds: u64) -> Vec<Case> {
+    (0..seeds)
+        .into_par_iter()
+        .map(|seed| case(ids, seed))
+        .collect()
+}
+
+#[test]
+fn clean_units_are_told_to_be_clean() {
+    // Of all the 200 of `make blind` at most two may not be.
+    for case in cases(&[], 8) {
+        assert_eq!(case.verdict, "clean", "{case:?}");
+    }
+}
+
+#[test]
+fn single_effects_and_a_pair_are_named_and_brought_down_to_the_noise() {
+    for ids in [
+        &["gyro_g_sensitivity"][..],
+        &["gyro_thermal_bias"],
+        &["accel_scale_quadratic"],
+        &["accel_cross_axis_product"],
+        &["accel_warm_up"],
+        &["gyro_scale_asymmetry", "accel_scale_cubic"],
+    ] {
+        for case in cases(ids, 2) {
+            let mut found = case.found.clone();
+            found.sort();
+            assert_eq!(found, case.truth, "{case:?}");
+            assert!(case.after < 1.5, "{case:?}");
+        }
+    }
+}
+
+#[test]
+fn what_is_on_no_list_is_told_to_be_unexplained() {
+    for id in ["x_accel_stress_hysteresis", "x_usb_beat"] {
+        for case in cases(&[id], 2) {
+            assert_eq!(case.verdict, "unexplained", "{case:?}");
+        }
+    }
+}
+
+fn diagnosed(fit: mimu::fit::Fit) -> Diagnosis {
+    diagnose(fit.prepared, fit.options).unwrap()
+}
+
+#[test]
+fn the_published_xsens_session_has_a_gyro_that_feels_force() {
+    let Some(fit) = xsens() else { return };
+    let found = diagnosed(fit);
+    assert_eq!(found.verdict, Verdict::Explained);
+    let ids: Vec<String> = found.effects.iter().map(|e| e.candidate.id()).collect();
+    // Nothing for the accelerometer: its higher-order terms do not hold out.
+    assert_eq!(ids, ["gyro_g_sensitivity"]);
+    let gyro = found
+        .sensors
+        .iter()
+        .find(|s| s.sensor == Sensor::Gyro)
+        .unwrap();
+    let [before, after] = gyro.decision.held_out_rms.map(f64::to_degrees);
+    println!(
+        "direction of gravity after a turn, held out: {before:.3} deg before, {after:.3} deg after"
+    );
+    assert!(before > 0.45 && after < 0.18);
+}
+
+#[test]
+fn nothing_is_added_to_five_units_that_do_not_ask_for_it() {
+    for unit in 0..5 {
+        let Some(fit) = mikoff(unit) else { return };
+        let found = diagnosed(fit);
+        println!("unit {unit}: {}", found.verdict.name());
+        assert!(found.effects.is_empty(), "{:?}", found.effects);
+    }
+}
