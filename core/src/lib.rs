@@ -1,9 +1,10 @@
-//! What the device computes, on the device and on the PC alike: compensation of raw readings and
-//! the recursive estimation of a calibration.
+//! What the device computes, on the device and on the PC alike: compensation of raw readings, removal
+//! of what an affine model lacks, and the recursive estimation of a calibration.
 //!
 //! | module           | what it is                                                        |
 //! |------------------|-------------------------------------------------------------------|
 //! | [`compensation`] | inverse model, raw to SI: `x = C u + o` for gyro and accelerometer |
+//! | [`effects`]      | what the affine model lacks, removed sample by sample              |
 //! | [`kalman`]       | bank of three four-state Kalman filters fed one scalar at a time  |
 //!
 //! Everything is generic over `f32` (the target's floating-point unit) and `f64` (the PC), without
@@ -12,6 +13,7 @@
 #![no_std]
 
 pub mod compensation;
+pub mod effects;
 pub mod kalman;
 
 pub use nalgebra::RealField;

@@ -1,19 +1,27 @@
 //! The calibration file: TOML that a program reads and a person can apply with a pocket calculator.
 
-use std::fmt::Write as _;
-use std::io::Write as _;
-use std::path::{Path, PathBuf};
+mod effect;
+mod staging;
+mod writing;
 
+pub use effect::{CoefficientTable, EffectTable, FormTable};
+pub(crate) use effect::{Condition, depends};
+pub use staging::{Staged, stage};
+pub use writing::{figure, to_toml};
+
+use std::path::Path;
+
+use mimu_core::RealField;
 use mimu_core::compensation::Affine;
+use mimu_core::effects::Effects;
 use nalgebra::{Matrix3, Vector3};
 use serde::Deserialize;
-use tempfile::NamedTempFile;
 
+use crate::diagnose::removal::Removed;
 use crate::dwell::Sensor;
 use crate::error::{Error, Result};
-use crate::fit::{Figure, Fit, SensorFit};
 use crate::recording::{RawUnit, Reference, read_text};
-use crate::triad::{Angles, Forward};
+use crate::triad::Forward;
 
 /// Version of the layout.
 const FORMAT: &str = "mimu-calibration/1";
@@ -38,6 +46,12 @@ pub struct Calibration {
     /// Accelerometer triad.
     #[serde(default)]
     pub accel: Option<TriadTable>,
+    /// What the affine models lack.
+    #[serde(default, rename = "effect")]
+    pub effect_tables: Vec<EffectTable>,
+    /// The same as it is taken out.
+    #[serde(skip)]
+    effects: Vec<Removed>,
 }
 
 /// The recording that a calibration was made from.
@@ -167,7 +181,7 @@ impl Calibration {
 
     /// Parses and checks the text of a calibration file; `place` is its path.
     pub fn parse(text: &str, place: &str) -> Result<Self> {
-        let calibration: Self = toml::from_str(text).map_err(|e| {
+        let mut calibration: Self = toml::from_str(text).map_err(|e| {
             let message = e.message().trim();
             // A missing key has the table that lacks it for its place.
             let line = e.span().map_or(1, |s| {
@@ -245,7 +259,19 @@ impl Calibration {
                 "fit the recording again",
             ));
         }
+        calibration.effects = effect::read(&calibration, place)?;
         Ok(calibration)
+    }
+
+    /// What the affine models lack.
+    pub fn effects(&self) -> &[Removed] {
+        &self.effects
+    }
+
+    /// The same as the device removes it, up to N effects of each triad that run with every sample and N that do not.
+    /// Refused, by its id, is one that this build of `core` cannot remove.
+    pub fn core_effects<T: RealField + Copy, const N: usize>(&self) -> Result<Effects<T, N>> {
+        effect::core_effects(self)
     }
 
     /// The table of `sensor`.
@@ -282,293 +308,4 @@ fn check_both_ways(table: &TriadTable, forward: &Forward, place: &str) -> Result
         "C and o are not the inverse of forward.P and forward.b: the file was edited",
         "fit the recording again",
     ))
-}
-
-/// Text of the calibration file for `fit`, made at `created` (RFC 3339).
-pub fn to_toml(fit: &Fit, created: &str) -> String {
-    let mut out = String::new();
-    // Writing to a string does not fail.
-    let _ = write_file(&mut out, fit, created);
-    out
-}
-
-fn write_file(out: &mut String, fit: &Fit, created: &str) -> std::fmt::Result {
-    let manifest = &fit.prepared.manifest;
-    writeln!(
-        out,
-        "# Calibration of an inertial unit. To apply it by hand to a raw reading u = (x, y, z):"
-    )?;
-    writeln!(
-        out,
-        "#   first axis  = C[0][0]*u_x + C[0][1]*u_y + C[0][2]*u_z + o[0],  and so on by rows."
-    )?;
-    writeln!(out, "format = \"{FORMAT}\"")?;
-    writeln!(out, "device = {}", quoted(&manifest.device))?;
-    writeln!(out, "created = \"{created}\"")?;
-    writeln!(out, "tool = \"mimu {}\"", env!("CARGO_PKG_VERSION"))?;
-    writeln!(
-        out,
-        "\n[recording]\nsha256 = \"{}\"  # of its samples file",
-        fit.prepared.condensed.sha256
-    )?;
-    writeln!(
-        out,
-        "reference = \"{}\"\nraw_unit = \"{}\"\ngravity_mps2 = {:?}",
-        manifest.reference, manifest.raw_unit, manifest.gravity_mps2
-    )?;
-    let temperatures: Vec<f64> = fit
-        .prepared
-        .dwells
-        .list
-        .iter()
-        .map(|d| d.temp_c)
-        .filter(|t| t.is_finite())
-        .collect();
-    if !temperatures.is_empty() {
-        let mean = temperatures.iter().sum::<f64>() / temperatures.len() as f64;
-        writeln!(
-            out,
-            "temp_c = {mean:?}  # mean of the dwells; nothing here depends on it"
-        )?;
-    }
-    for sensor in &fit.sensors {
-        write_sensor(out, fit, sensor)?;
-    }
-    Ok(())
-}
-
-fn write_sensor(out: &mut String, fit: &Fit, sensor: &SensorFit) -> std::fmt::Result {
-    let name = sensor.sensor.name();
-    let raw_unit = fit.prepared.manifest.raw_unit;
-    let triad = &sensor.estimated.triad;
-    let frame = match (fit.prepared.manifest.reference, sensor.sensor) {
-        (Reference::Table, _) => "body: the axes of the ref_ columns",
-        (Reference::Gravity, Sensor::Accel) => {
-            "body: x along the accelerometer's x, xy plane through its y"
-        }
-        (Reference::Gravity, Sensor::Gyro) => {
-            "body: the accelerometer's (x along its x, xy plane through its y)"
-        }
-    };
-    writeln!(
-        out,
-        "\n[{name}]\nformula = \"x = C u + o\"\ndirection = \"raw to SI\""
-    )?;
-    writeln!(
-        out,
-        "raw_unit = \"{raw_unit}\"\nunit = \"{}\"\nframe = \"{frame}\"",
-        sensor.sensor.unit()
-    )?;
-    let covariance = &triad.inverse_covariance;
-    let estimates = triad.inverse_estimates();
-    let sigma = |i: usize| estimates[i].sigma;
-    let interval = |i: usize| estimates[i].interval;
-    writeln!(
-        out,
-        "C = {}",
-        matrix(|i, j| number(triad.inverse.matrix[(i, j)]))
-    )?;
-    writeln!(out, "o = {}", row(3, |i| number(triad.inverse.offset[i])))?;
-    writeln!(
-        out,
-        "sigma_C = {}",
-        matrix(|i, j| format!("{:.3e}", sigma(3 * i + j)))
-    )?;
-    writeln!(
-        out,
-        "sigma_o = {}",
-        row(3, |i| format!("{:.3e}", sigma(9 + i)))
-    )?;
-    writeln!(out, "# halves of the 95 % intervals")?;
-    writeln!(
-        out,
-        "interval_C = {}",
-        matrix(|i, j| format!("{:.3e}", interval(3 * i + j)))
-    )?;
-    writeln!(
-        out,
-        "interval_o = {}",
-        row(3, |i| format!("{:.3e}", interval(9 + i)))
-    )?;
-    let names = crate::report::inverse_names();
-    writeln!(
-        out,
-        "parameters = {}",
-        row(12, |i| format!("\"{}\"", names[i]))
-    )?;
-    writeln!(out, "covariance = [")?;
-    for i in 0..12 {
-        writeln!(out, "  {},", row(12, |j| number(covariance[(i, j)])))?;
-    }
-    writeln!(out, "]")?;
-    writeln!(
-        out,
-        "\n[{name}.judged]\nestimator = \"{}\"\nfigure = \"{}\"",
-        fit.estimator(sensor.sensor),
-        figure(sensor.figure)
-    )?;
-    writeln!(
-        out,
-        "unit = \"{}\"\nrms = {:.6e}",
-        sensor.figure.unit(sensor.sensor),
-        sensor.rms()
-    )?;
-    if let Some(rms) = sensor.held_out_rms() {
-        writeln!(
-            out,
-            "held_out_rms = {rms:.6e}  # {} contiguous blocks",
-            fit.options.holdout_blocks
-        )?;
-    }
-    writeln!(
-        out,
-        "noise_floor = {:.6e}\ndwells = {}\ncondition = {:.4}",
-        sensor.noise_floor(),
-        sensor.dwells,
-        sensor.estimated.condition
-    )?;
-    writeln!(
-        out,
-        "\n[{name}.forward]\nformula = \"u = P x + b\"\ndirection = \"SI to raw\""
-    )?;
-    writeln!(
-        out,
-        "P = {}",
-        matrix(|i, j| number(triad.forward.matrix[(i, j)]))
-    )?;
-    writeln!(out, "b = {}", row(3, |i| number(triad.forward.bias[i])))?;
-    let physical = triad.physical(Angles::Exact);
-    writeln!(
-        out,
-        "\n[{name}.physical]\nformula = \"P = K Mo Mp, Mp = Rz Ry Rx by the misalignments, rows of Mo of unit length\""
-    )?;
-    let triples = [
-        ("scale_factor", &physical.scale, 1.0),
-        ("bias", &physical.bias, 1.0),
-        (
-            "misalignment_deg",
-            &physical.misalignment,
-            1f64.to_degrees(),
-        ),
-        (
-            "non_orthogonality_deg",
-            &physical.non_orthogonality,
-            1f64.to_degrees(),
-        ),
-    ];
-    for (key, triple, unit) in triples {
-        let order = match key {
-            "misalignment_deg" => "  # x, y, z",
-            "non_orthogonality_deg" => "  # yz, zy, zx",
-            _ => "",
-        };
-        writeln!(
-            out,
-            "{key} = {}{order}",
-            row(3, |i| number(triple[i].value * unit))
-        )?;
-        writeln!(
-            out,
-            "sigma_{key} = {}",
-            row(3, |i| format!("{:.3e}", triple[i].sigma * unit))
-        )?;
-    }
-    Ok(())
-}
-
-/// What a figure is about, as a sentence fragment.
-pub fn figure(figure: Figure) -> &'static str {
-    match figure {
-        Figure::Input => "compensated dwell mean less known input, over dwells and axes",
-        Figure::GravitySize => "size of the compensated dwell mean less gravity",
-        Figure::Direction => "angle between predicted and measured gravity after each turn",
-    }
-}
-
-/// All digits, so that it is read back exactly; minus zero, which only puzzles, is zero.
-fn number(value: f64) -> String {
-    format!("{:?}", value + 0.0)
-}
-
-fn row(n: usize, cell: impl Fn(usize) -> String) -> String {
-    format!("[{}]", (0..n).map(cell).collect::<Vec<_>>().join(", "))
-}
-
-fn matrix(cell: impl Fn(usize, usize) -> String) -> String {
-    let rows: Vec<String> = (0..3)
-        .map(|i| format!("  {},\n", row(3, |j| cell(i, j))))
-        .collect();
-    format!("[\n{}]", rows.concat())
-}
-
-fn quoted(text: &str) -> String {
-    toml::Value::String(text.into()).to_string()
-}
-
-/// A result that is written, and has yet to appear under its name.
-#[derive(Debug)]
-pub struct Staged {
-    path: PathBuf,
-    file: Option<NamedTempFile>,
-    text: String,
-}
-
-/// Writes `text` beside `path`, so that whatever can fail fails before any file has appeared.
-pub fn stage(path: &Path, text: String) -> Result<Staged> {
-    let failed = |e: std::io::Error| Error::io(path, &e);
-    let path = path.to_owned();
-    match std::fs::metadata(&path) {
-        Ok(there) if there.is_dir() => {
-            let problem = "this is a directory, and a file is to be written";
-            return Err(Error::new(path.display(), problem, "name a file in it"));
-        }
-        // A device or a pipe is written to, never replaced: `/dev/null` has to stay what it is.
-        Ok(there) if !there.is_file() => {
-            let file = None;
-            return Ok(Staged { path, file, text });
-        }
-        _ => {}
-    }
-    let folder = folder(&path);
-    if !folder.is_dir() {
-        return Err(Error::new(
-            path.display(),
-            "its folder does not exist",
-            "create it, or check the path",
-        ));
-    }
-    let mut file = NamedTempFile::new_in(folder).map_err(failed)?;
-    file.write_all(text.as_bytes()).map_err(failed)?;
-    file.as_file().sync_all().map_err(failed)?;
-    // Temporary files are private; a result is for everybody who may read the folder's other files.
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt as _;
-        let mode = std::fs::Permissions::from_mode(0o644);
-        file.as_file().set_permissions(mode).map_err(failed)?;
-    }
-    let file = Some(file);
-    Ok(Staged { path, file, text })
-}
-
-impl Staged {
-    /// Folder that the file will be in, with its links resolved.
-    pub fn folder(&self) -> PathBuf {
-        let folder = folder(&self.path);
-        folder.canonicalize().unwrap_or_else(|_| folder.to_owned())
-    }
-
-    /// Gives the file its name.
-    pub fn publish(self) -> Result<()> {
-        match self.file {
-            Some(file) => file.persist(&self.path).map(drop).map_err(|e| e.error),
-            None => std::fs::write(&self.path, self.text),
-        }
-        .map_err(|e| Error::io(&self.path, &e))
-    }
-}
-
-fn folder(path: &Path) -> &Path {
-    let parent = path.parent().filter(|p| !p.as_os_str().is_empty());
-    parent.unwrap_or(Path::new("."))
 }

@@ -321,7 +321,7 @@ fn run_fit(args: &FitArgs) -> Result<()> {
         let now = jiff::Timestamp::now()
             .round(jiff::Unit::Second)
             .unwrap_or_default();
-        calibration = Some(stage(path, to_toml(&fitted, &now.to_string()))?);
+        calibration = Some(stage(path, to_toml(&fitted, &[], &now.to_string()))?);
         text.push_str(&format!("\ncalibration: {}\n", path.display()));
     }
     print(&args.json, &text, &report::fit_json(&fitted), calibration)

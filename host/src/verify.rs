@@ -3,7 +3,8 @@
 use mimu_core::compensation::Affine;
 use nalgebra::{Matrix3, Vector3};
 
-use crate::calibration::Calibration;
+use crate::calibration::{Calibration, Condition, depends};
+use crate::diagnose::removal::remove;
 use crate::dwell::Sensor;
 use crate::error::{Error, Result};
 use crate::estimate::rotation::{Turn, direction_error};
@@ -22,6 +23,8 @@ pub struct SensorVerification {
     /// With one scale factor and one bias for all axes and no misalignment, what a
     /// datasheet would give: the means of the calibration's own.
     pub rms_raw: f64,
+    /// With the calibration, but with its effects left in; `None` if it has none.
+    pub rms_affine: Option<f64>,
     /// With the calibration.
     pub rms: f64,
     /// The largest error with the calibration.
@@ -68,45 +71,38 @@ pub fn verify(prepared: &Prepared, calibration: &Calibration) -> Result<Verifica
     if calibration.recording.sha256 == prepared.condensed.sha256 {
         warnings.push("this is the recording that the calibration was made from: the figures say nothing about new data".into());
     }
-    let models = Sensor::BOTH.map(|s| calibration.inverse(s));
-    let judged = judge(prepared, models.each_ref().map(Option::as_ref))?;
-    warnings.extend(judged.warnings);
-    Ok(Verification {
-        sensors: judged.sensors,
-        warnings,
-    })
-}
-
-/// Judges inverse models of gyro and accelerometer by a recording.
-pub fn judge(prepared: &Prepared, models: [Option<&Affine<f64>>; 2]) -> Result<Verification> {
-    let manifest = &prepared.manifest;
-    let mut warnings = Vec::new();
+    let cleaned = without_effects(prepared, calibration)?;
     let mut sensors = Vec::new();
-    for (sensor, inverse) in Sensor::BOTH.into_iter().zip(models) {
-        let Some(inverse) = inverse else {
-            continue;
-        };
-        if !prepared.has(sensor) {
+    for sensor in Sensor::BOTH {
+        if calibration.inverse(sensor).is_none() || !prepared.has(sensor) {
             continue;
         }
         let observations = prepared.observations(sensor);
         if !observations.is_empty() {
             refuse_wrong_gravity(prepared, sensor, &observations)?;
         }
-        let judged = match (manifest.reference, sensor) {
-            (Reference::Table, _) => known(prepared, sensor, inverse),
-            (Reference::Gravity, Sensor::Accel) => size(prepared, inverse),
-            (Reference::Gravity, Sensor::Gyro) => match models[1] {
-                Some(accel) => turns(prepared, inverse, accel, &mut warnings),
-                None => None,
-            },
+        let affine = judge(prepared, calibration, sensor);
+        let with_effects = cleaned.as_ref().and_then(|c| judge(c, calibration, sensor));
+        let (judged, refused) = match (affine, with_effects) {
+            // What the readings are judged by without a calibration is what the unit gave.
+            (Some((affine, _)), Some((clean, refused))) => {
+                let judged = SensorVerification {
+                    rms_raw: affine.rms_raw,
+                    rms_affine: Some(affine.rms),
+                    ..clean
+                };
+                (judged, refused)
+            }
+            (Some(affine), None) if cleaned.is_none() => affine,
+            _ => {
+                warnings.push(format!(
+                    "{sensor}: the recording has nothing to judge it by"
+                ));
+                continue;
+            }
         };
-        match judged {
-            Some(judged) => sensors.push(judged),
-            None => warnings.push(format!(
-                "{sensor}: the recording has nothing to judge it by"
-            )),
-        }
+        warnings.extend(refused);
+        sensors.push(judged);
     }
     if sensors.is_empty() {
         return Err(Error::new(
@@ -122,6 +118,72 @@ pub fn judge(prepared: &Prepared, models: [Option<&Affine<f64>>; 2]) -> Result<V
         ));
     }
     Ok(Verification { sensors, warnings })
+}
+
+/// The recording without the effects of the calibration, if it has any.
+fn without_effects(prepared: &Prepared, calibration: &Calibration) -> Result<Option<Prepared>> {
+    let effects = calibration.effects();
+    if effects.is_empty() {
+        return Ok(None);
+    }
+    let dwells = &prepared.dwells.list;
+    let mut blocks = dwells.iter().enumerate().flat_map(|(i, dwell)| {
+        let from = match (prepared.manifest.reference, i.checked_sub(1)) {
+            // By hand the turns are judged too, and they lie between the dwells.
+            (Reference::Gravity, Some(before)) => dwells[before].blocks.end,
+            _ => dwell.blocks.start,
+        };
+        &prepared.condensed.blocks[from..dwell.blocks.end]
+    });
+    let cold = blocks.find(|b| !b.temp_c.mean.is_finite());
+    for effect in effects {
+        let sensor = effect.candidate.sensor;
+        let lacks = |problem: String| {
+            let problem = format!("{} cannot be removed: {problem}", effect.candidate.id());
+            let remedy = "record it, or use a calibration without this effect";
+            Err(Error::new(&prepared.place, problem, remedy))
+        };
+        if !prepared.has(sensor) {
+            continue;
+        }
+        for (other, condition) in [
+            (Sensor::Gyro, Condition::Rate),
+            (Sensor::Accel, Condition::Force),
+        ] {
+            if !prepared.has(other) && depends(effect, condition) {
+                return lacks(format!("the recording has no {other} columns"));
+            }
+        }
+        if let (Some(block), true) = (cold, depends(effect, Condition::Temperature)) {
+            return lacks(format!("temp_c is missing at {} s", block.start_s));
+        }
+    }
+    let [gyro, accel] = Sensor::BOTH.map(|s| calibration.inverse(s));
+    let cleaned = remove(prepared, gyro.as_ref(), accel.as_ref(), effects);
+    let singular = || {
+        let place = format!("calibration of {:?}", calibration.device);
+        Error::new(place, "C is singular", "fit the recording again")
+    };
+    cleaned.map(Some).ok_or_else(singular)
+}
+
+/// The figures of one sensor and what could not be used; `None` if the recording has nothing to judge it by.
+fn judge(
+    prepared: &Prepared,
+    calibration: &Calibration,
+    sensor: Sensor,
+) -> Option<(SensorVerification, Vec<String>)> {
+    let inverse = calibration.inverse(sensor)?;
+    let mut warnings = Vec::new();
+    let judged = match (prepared.manifest.reference, sensor) {
+        (Reference::Table, _) => known(prepared, sensor, &inverse),
+        (Reference::Gravity, Sensor::Accel) => size(prepared, &inverse),
+        (Reference::Gravity, Sensor::Gyro) => {
+            let accel = calibration.inverse(Sensor::Accel)?;
+            turns(prepared, &inverse, &accel, &mut warnings)
+        }
+    };
+    judged.map(|j| (j, warnings))
 }
 
 /// The calibration of a unit whose sensors are all alike and perfectly mounted: every sensor with the mean scale factor
@@ -167,6 +229,7 @@ fn judged(
         sensor,
         figure,
         rms_raw: rms(raw),
+        rms_affine: None,
         rms: rms(after),
         max: largest(after),
         noise_floor: rms(floor),

@@ -525,7 +525,7 @@ impl Seeds {
                 text.as_bytes(),
             );
             let fitted = fit_recording(&folder.join("seed"), options).expect("the seeds are valid");
-            calibration = to_toml(&fitted, "2026-01-01T00:00:00Z");
+            calibration = to_toml(&fitted, &[], "2026-01-01T00:00:00Z");
             let files = vec![folder.join("seed/samples.csv")];
             let known = if *reference == "table" {
                 Reference::Table
@@ -584,7 +584,7 @@ fn numbers(fit: &Fit) -> std::result::Result<(), String> {
     }
     report::fit_text(fit);
     report::dwell_table(&fit.prepared.dwells.list, &fit.prepared.manifest);
-    Calibration::parse(&to_toml(fit, "2026-01-01T00:00:00Z"), "written")
+    Calibration::parse(&to_toml(fit, &[], "2026-01-01T00:00:00Z"), "written")
         .map(drop)
         .map_err(|error| format!("what was written cannot be read: {error}"))
 }

@@ -214,6 +214,9 @@ pub fn verify_json(verification: &Verification) -> Value {
             "figure": crate::calibration::figure(s.figure),
             "count": s.count,
         });
+        if let Some(rms) = s.rms_affine {
+            value["rms_affine"] = json!(rms);
+        }
         if let Some(rms) = s.static_rms {
             value["static_rms"] = json!(rms);
         }

@@ -295,6 +295,15 @@ pub fn verify_text(verification: &Verification) -> String {
             s.sensor.name(),
             format!("{} {noun}", s.count).as_str()
         );
+        if let Some(affine) = s.rms_affine {
+            let _ = writeln!(
+                out,
+                "{:<7}{:>14}{:>14}",
+                "",
+                "effects left",
+                format!("{} {unit}", three(affine * factor))
+            );
+        }
         if let Some(rest) = s.static_rms {
             let _ = writeln!(
                 out,

@@ -6,6 +6,7 @@
 #![no_std]
 
 use mimu_core::compensation::{Affine, Compensation, Sample};
+use mimu_core::effects::{Effect, Effects, Refused, Sensor, State, Variable};
 use mimu_core::kalman::{Bank, Filter, Innovation, Rejected};
 use nalgebra::{Matrix4, Vector3, Vector4};
 
@@ -19,6 +20,55 @@ pub fn affine(model: &Affine<f32>, raw: &Vector3<f32>) -> Vector3<f32> {
 #[inline(never)]
 pub fn compensation(model: &Compensation<f32>, raw: &Sample<f32>) -> Sample<f32> {
     model.apply(raw)
+}
+
+/// [`Effect::named`]: with it all that the table of effects refers to.
+#[inline(never)]
+pub fn effect_named(
+    id: &str,
+    coefficients: &[f32],
+    time_constant: Option<f32>,
+) -> Result<Effect<f32>, Refused> {
+    Effect::named(id, coefficients, time_constant)
+}
+
+/// [`Effect::term`].
+#[inline(never)]
+pub fn effect_term(
+    sensor: Sensor,
+    axis: usize,
+    coefficient: f32,
+    variables: &[Variable],
+) -> Result<Effect<f32>, Refused> {
+    Effect::term(sensor, axis, coefficient, variables)
+}
+
+/// [`Effects::push`].
+#[inline(never)]
+pub fn effects_push(effects: &mut Effects<f32, 8>, effect: Effect<f32>) -> Result<(), Refused> {
+    effects.push(effect)
+}
+
+/// [`State::new`].
+#[inline(never)]
+pub fn effects_state(sample_rate_hz: f32) -> State<f32, 8> {
+    State::new(sample_rate_hz)
+}
+
+/// [`Effects::slow`].
+#[inline(never)]
+pub fn effects_slow(effects: &Effects<f32, 8>, state: &mut State<f32, 8>, dt_s: f32, temp_c: f32) {
+    effects.slow(state, dt_s, temp_c);
+}
+
+/// [`Effects::remove`].
+#[inline(never)]
+pub fn effects_remove(
+    effects: &Effects<f32, 8>,
+    state: &mut State<f32, 8>,
+    compensated: &Sample<f32>,
+) -> Sample<f32> {
+    effects.remove(state, compensated)
 }
 
 /// [`Filter::with_prior`].

@@ -1,0 +1,324 @@
+//! Removal of what the affine model lacks: effects, sample by sample.
+//!
+//! The error e_i of sensor i is a sum of coefficients times functions of rate, force, temperature and time, in SI along the
+//! sensitive direction of the sensor, and is added to what the sensor should read. In raw units it is `|P_i| e_i`, with
+//! P_i the row of the forward matrix, so that with `x = C u + o`
+//!
+//! `x_clean = x - R e(x)`, `R = C diag(|P_x|, |P_y|, |P_z|)`.
+//!
+//! What moves with temperature and time only is folded into `x_clean = M x - b - R e(x)` by [`Effects::slow`] and costs
+//! nothing with a sample but M, however many there are.
+
+mod law;
+mod triad;
+
+use nalgebra::{RealField, Vector3, convert};
+
+use crate::compensation::{Affine, Sample};
+use law::{Ambience, COEFFICIENTS, Conditions, Evaluation, Form, Law, Slow, Values};
+use triad::{Folded, Triad, lagged};
+
+/// Temperature that warmth counts from, °C.
+pub const REFERENCE_C: f64 = 25.0;
+/// Lag of the filter by which the rate of change of the temperature is taken, s: unfiltered it would be noise.
+pub const RATE_LAG_S: f64 = 30.0;
+
+/// Triad whose readings err.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Sensor {
+    /// Gyro; errors in rad/s.
+    Gyro,
+    /// Accelerometer; errors in m/s².
+    Accel,
+}
+
+/// A quantity that a [term](Effect::term) is a product of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Variable {
+    /// Rate about body x, rad/s.
+    RateX = 1,
+    /// Rate about body y, rad/s.
+    RateY,
+    /// Rate about body z, rad/s.
+    RateZ,
+    /// Specific force along body x, m/s².
+    ForceX,
+    /// Specific force along body y, m/s².
+    ForceY,
+    /// Specific force along body z, m/s².
+    ForceZ,
+    /// Temperature above [`REFERENCE_C`], °C.
+    Temperature,
+    /// Its rate of change behind a lag of [`RATE_LAG_S`], °C/s.
+    TemperatureRate,
+    /// Time since power-on, s.
+    Time,
+}
+
+/// Why an effect is refused.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Refused {
+    /// No effect of this name can be removed here.
+    Unknown,
+    /// It takes another number of coefficients, or a term another number of variables.
+    Count {
+        /// How many (a term: at most).
+        needed: usize,
+    },
+    /// A coefficient is not a finite number, a time constant is missing, not wanted or not positive, or there is no such axis.
+    Value,
+    /// There is no room for one more.
+    Full,
+}
+
+/// An effect with its numbers.
+#[derive(Debug, Clone, Copy)]
+pub struct Effect<T: RealField> {
+    sensor: Sensor,
+    kind: Kind<T>,
+}
+
+#[derive(Debug, Clone, Copy)]
+enum Kind<T: RealField> {
+    Fast {
+        coefficients: [T; COEFFICIENTS],
+        error: fn(&[T; COEFFICIENTS], &Conditions<T>, &mut Vector3<T>),
+    },
+    Slow {
+        coefficients: [T; COEFFICIENTS],
+        form: T,
+        lags: bool,
+        error: fn(&[T; COEFFICIENTS], T, &Ambience<T>, &mut Slow<T>),
+    },
+    Term {
+        /// A unit vector times the coefficient: an axis without an index.
+        coefficient: Vector3<T>,
+        factors: [u8; 3],
+    },
+}
+
+impl<T: RealField + Copy> Effect<T> {
+    /// The effect of a public id like `gyro_scale_cubic`, with all of its coefficients (SI, those of a matrix by rows) and the
+    /// time constant, s, of one that has any.
+    pub fn named(id: &str, coefficients: &[T], time_constant: Option<T>) -> Result<Self, Refused> {
+        let (sensor, name) = match (id.strip_prefix("gyro_"), id.strip_prefix("accel_")) {
+            (Some(name), _) => (Sensor::Gyro, name),
+            (_, Some(name)) => (Sensor::Accel, name),
+            _ => return Err(Refused::Unknown),
+        };
+        let law = Law::<T>::named(name).ok_or(Refused::Unknown)?;
+        if coefficients.len() != law.coefficients {
+            let needed = law.coefficients;
+            return Err(Refused::Count { needed });
+        }
+        let form = match (law.form, time_constant) {
+            (Form::None, None) => T::one(),
+            (Form::TimeConstant | Form::Lag, Some(s)) if s > T::zero() && s.is_finite() => s,
+            _ => return Err(Refused::Value),
+        };
+        let mut all = [T::zero(); COEFFICIENTS];
+        for (all, coefficient) in all.iter_mut().zip(coefficients) {
+            if !coefficient.is_finite() {
+                return Err(Refused::Value);
+            }
+            *all = *coefficient;
+        }
+        let kind = match law.evaluation {
+            Evaluation::Fast(error) => Kind::Fast {
+                coefficients: all,
+                error,
+            },
+            Evaluation::Slow(error) => Kind::Slow {
+                coefficients: all,
+                form,
+                lags: law.form == Form::Lag,
+                error,
+            },
+        };
+        Ok(Self { sensor, kind })
+    }
+
+    /// `coefficient` times the product of one to three variables, in the error of one axis (0 to 2); SI.
+    pub fn term(
+        sensor: Sensor,
+        axis: usize,
+        coefficient: T,
+        variables: &[Variable],
+    ) -> Result<Self, Refused> {
+        let needed = 3;
+        if variables.is_empty() || variables.len() > needed {
+            return Err(Refused::Count { needed });
+        }
+        let mut along = Vector3::zeros();
+        match along.get_mut(axis) {
+            Some(along) if coefficient.is_finite() => *along = coefficient,
+            _ => return Err(Refused::Value),
+        }
+        let mut factors = [0; 3];
+        for (factor, variable) in factors.iter_mut().zip(variables) {
+            *factor = *variable as u8;
+        }
+        let kind = Kind::Term {
+            coefficient: along,
+            factors,
+        };
+        Ok(Self { sensor, kind })
+    }
+
+    /// Whether it moves with temperature and time only, so that no sample pays for it.
+    pub fn is_slow(&self) -> bool {
+        match self.kind {
+            Kind::Fast { .. } => false,
+            Kind::Slow { .. } => true,
+            Kind::Term { factors, .. } => factors
+                .iter()
+                .all(|f| *f == 0 || *f >= Variable::Temperature as u8),
+        }
+    }
+}
+
+/// Effects of a unit: immutable, for any number of streams. Up to N of each triad that run with every sample, and N that do
+/// not.
+///
+/// ```
+/// # use mimu_core::compensation::{Affine, Sample};
+/// # use mimu_core::effects::{Effect, Effects, State};
+/// # use nalgebra::{Matrix3, Vector3};
+/// // A gyro of which 1 g along z is read as 0.2 deg/s about x, at rest. Its readings are in SI already.
+/// let si = Affine { matrix: Matrix3::identity(), offset: Vector3::zeros() };
+/// let g = 9.80665;
+/// let sag = 0.2_f64.to_radians();
+/// let mut effects = Effects::<f64, 8>::new(&si, &si).unwrap();
+/// let matrix = [0.0, 0.0, sag / g, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+/// effects.push(Effect::named("gyro_g_sensitivity", &matrix, None).unwrap()).unwrap();
+/// let mut state = State::new(1000.0);
+/// let read = Sample { gyro: Vector3::new(sag, 0.0, 0.0), accel: Vector3::new(0.0, 0.0, g) };
+/// let clean = effects.remove(&mut state, &read);
+/// assert!(clean.gyro.norm() < 1e-15);
+/// assert_eq!(clean.accel, read.accel);
+/// ```
+#[derive(Debug, Clone, Copy)]
+pub struct Effects<T: RealField, const N: usize> {
+    gyro: Triad<T, N>,
+    accel: Triad<T, N>,
+}
+
+/// What the effects remember of one stream of samples.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct State<T: RealField, const N: usize> {
+    sample_rate_hz: T,
+    /// Rate in the sample before, rad/s.
+    previous: Option<Vector3<T>>,
+    /// The variables as they were last; of the slow ones, since the last call of [`Effects::slow`].
+    values: Values<T>,
+    /// Time since power-on, s, and what rounding has added to it.
+    time: T,
+    lost: T,
+    /// The last temperature above the reference that was a number, °C.
+    warm: Option<T>,
+    /// The temperature behind [`RATE_LAG_S`], less itself, °C.
+    rate_lag: T,
+    gyro: Folded<T, N>,
+    accel: Folded<T, N>,
+}
+
+impl<T: RealField + Copy, const N: usize> State<T, N> {
+    /// That of a stream which begins at power-on, of so many samples a second.
+    ///
+    /// [`Effects::slow`] before the first sample, or the slow effects stay in until its first call.
+    pub fn new(sample_rate_hz: T) -> Self {
+        let folded = Folded::none();
+        let (none, one) = (T::zero(), T::one());
+        Self {
+            sample_rate_hz,
+            previous: None,
+            values: [one, none, none, none, none, none, none, none, none, none],
+            time: T::zero(),
+            lost: T::zero(),
+            warm: None,
+            rate_lag: T::zero(),
+            gyro: folded,
+            accel: folded,
+        }
+    }
+}
+
+impl<T: RealField + Copy, const N: usize> Effects<T, N> {
+    /// No effects yet, of a unit with these inverse models, raw to SI. `None` if one of them is singular.
+    ///
+    /// The forward matrices are computed here, in double precision whatever T is, so this is for the PC; the device takes what
+    /// it has computed.
+    pub fn new(gyro: &Affine<f64>, accel: &Affine<f64>) -> Option<Self> {
+        let (gyro, accel) = (Triad::new(gyro)?, Triad::new(accel)?);
+        Some(Self { gyro, accel })
+    }
+
+    /// Adds one.
+    pub fn push(&mut self, effect: Effect<T>) -> Result<(), Refused> {
+        let triad = match effect.sensor {
+            Sensor::Gyro => &mut self.gyro,
+            Sensor::Accel => &mut self.accel,
+        };
+        triad.push(effect)
+    }
+
+    /// Follows temperature, °C, and time, s since the call before or since power-on: some times a second is enough.
+    ///
+    /// A temperature that is not a number is that of before; as long as there was none, the reference. A step of time that is not
+    /// positive is none.
+    pub fn slow(&self, state: &mut State<T, N>, dt_s: T, temp_c: T) {
+        let dt = match dt_s > T::zero() && dt_s.is_finite() {
+            true => dt_s,
+            false => T::zero(),
+        };
+        // Compensated (Kahan): of steps of 0.1 s each single precision loses seconds within hours.
+        let step = dt - state.lost;
+        let time = state.time + step;
+        state.lost = (time - state.time) - step;
+        state.time = time;
+
+        let before = state.warm;
+        let warm = match temp_c.is_finite() {
+            true => temp_c - convert(REFERENCE_C),
+            false => before.unwrap_or(T::zero()),
+        };
+        if temp_c.is_finite() {
+            state.warm = Some(warm);
+        }
+        let risen = warm - before.unwrap_or(warm);
+        let rate_lag: T = convert(RATE_LAG_S);
+        state.rate_lag = lagged(state.rate_lag, dt, risen, rate_lag);
+        let [.., temperature, rate, since] = &mut state.values;
+        *temperature = warm;
+        *rate = -state.rate_lag / rate_lag;
+        *since = time;
+
+        self.gyro.slow(&mut state.gyro, dt, risen, &state.values);
+        self.accel.slow(&mut state.accel, dt, risen, &state.values);
+    }
+
+    /// A compensated sample, SI in the body frame, without the effects. To be called with every sample in turn: the angular
+    /// acceleration is the difference to the one before.
+    #[inline]
+    pub fn remove(&self, state: &mut State<T, N>, compensated: &Sample<T>) -> Sample<T> {
+        let (rate, force) = (compensated.gyro, compensated.accel);
+        let [_, rx, ry, rz, fx, fy, fz, ..] = &mut state.values;
+        (*rx, *ry, *rz) = (rate.x, rate.y, rate.z);
+        (*fx, *fy, *fz) = (force.x, force.y, force.z);
+        let change = rate - state.previous.unwrap_or(rate);
+        state.previous = Some(rate);
+        let mut at = Conditions {
+            rate,
+            force,
+            angular_acceleration: change * state.sample_rate_hz,
+            sensed: rate,
+        };
+        Sample {
+            gyro: self.gyro.remove(&state.gyro, &rate, &mut at, &state.values),
+            accel: self
+                .accel
+                .remove(&state.accel, &force, &mut at, &state.values),
+        }
+    }
+}

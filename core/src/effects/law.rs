@@ -1,0 +1,227 @@
+//! The effects that the device removes by name, each in one row of one table.
+
+use nalgebra::{Matrix3, RealField, Vector3};
+
+/// Most coefficients of an effect.
+pub(super) const COEFFICIENTS: usize = 9;
+
+/// Values of the variables by their numbers; the first is 1, for products of fewer than three.
+pub(super) type Values<T> = [T; 10];
+
+/// What the error of a sample is computed from, SI, body frame.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Conditions<T: RealField> {
+    /// Rate, rad/s.
+    pub rate: Vector3<T>,
+    /// Specific force, m/s².
+    pub force: Vector3<T>,
+    /// Angular acceleration, rad/s².
+    pub angular_acceleration: Vector3<T>,
+    /// The triad's own input along its three sensitive directions, rad/s or m/s².
+    pub sensed: Vector3<T>,
+}
+
+/// What the errors are computed from that move with temperature and time.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Ambience<T> {
+    /// Time since power-on, s.
+    pub time: T,
+    /// Temperature above the reference, °C.
+    pub warm: T,
+    /// The same behind the lag of the effect, less itself, °C.
+    pub lag: T,
+}
+
+/// An error that moves with temperature and time: of sensor i, `bias_i + along_i s_i + (across x)_i`, with s the input along
+/// the sensitive directions and x in the body frame.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Slow<T: RealField> {
+    pub bias: Vector3<T>,
+    pub along: Vector3<T>,
+    pub across: Matrix3<T>,
+}
+
+/// How an effect is evaluated: what it adds to the error of the three sensors, SI.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Evaluation<T: RealField> {
+    /// With every sample, by coefficients and conditions.
+    Fast(fn(&[T; COEFFICIENTS], &Conditions<T>, &mut Vector3<T>)),
+    /// Now and then, by coefficients, nonlinear constant and ambience.
+    Slow(fn(&[T; COEFFICIENTS], T, &Ambience<T>, &mut Slow<T>)),
+}
+
+/// Nonlinear constant of an effect.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Form {
+    /// It has none.
+    None,
+    /// A time constant, s.
+    TimeConstant,
+    /// The time constant of [`Ambience::lag`], s.
+    Lag,
+}
+
+/// A row of the table.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Law<T: RealField> {
+    /// Id of the effect without the `gyro_` or `accel_` before it.
+    pub name: &'static str,
+    /// How many coefficients it takes. A matrix is by rows; rows are sensors.
+    pub coefficients: usize,
+    pub form: Form,
+    pub evaluation: Evaluation<T>,
+}
+
+impl<T: RealField + Copy> Law<T> {
+    /// The row of this name.
+    pub fn named(name: &str) -> Option<&'static Self> {
+        Self::TABLE.iter().find(|law| law.name == name)
+    }
+
+    /// Everything that the device can remove. The laws hold for either triad; that some are of no use to one of them costs
+    /// nothing. An effect is added here and nowhere else.
+    const TABLE: &'static [Self] = &[
+        Self::fast("g_sensitivity", 9, g_sensitivity),
+        Self::fast("scale_quadratic", 3, scale_quadratic),
+        Self::fast("scale_cubic", 3, scale_cubic),
+        Self::fast("scale_asymmetry", 3, scale_asymmetry),
+        Self::fast("cross_axis_product", 9, cross_axis_product),
+        Self::fast("size_effect", 9, size_effect),
+        Self::slow("bias_drift", 3, Form::None, |c, _, at, e| {
+            e.bias += each(c) * at.time;
+        }),
+        Self::slow(
+            "warm_up",
+            3,
+            Form::TimeConstant,
+            |c, time_constant, at, e| {
+                e.bias += each(c) * (-at.time / time_constant).exp();
+            },
+        ),
+        Self::slow("thermal_bias", 6, Form::None, |c, _, at, e| {
+            let bend = Vector3::new(c[3], c[4], c[5]);
+            e.bias += (each(c) + bend * at.warm) * at.warm;
+        }),
+        Self::slow("thermal_scale", 3, Form::None, |c, _, at, e| {
+            e.along += each(c) * at.warm;
+        }),
+        Self::slow("thermal_misalignment", 6, Form::None, |c, _, at, e| {
+            let none = T::zero();
+            let tilt = Matrix3::new(none, c[0], c[1], c[2], none, c[3], c[4], c[5], none);
+            e.across += tilt * at.warm;
+        }),
+        Self::slow("thermal_lag", 3, Form::Lag, |c, _, at, e| {
+            e.bias += each(c) * at.lag;
+        }),
+    ];
+
+    const fn fast(
+        name: &'static str,
+        coefficients: usize,
+        error: fn(&[T; COEFFICIENTS], &Conditions<T>, &mut Vector3<T>),
+    ) -> Self {
+        Self {
+            name,
+            coefficients,
+            form: Form::None,
+            evaluation: Evaluation::Fast(error),
+        }
+    }
+
+    const fn slow(
+        name: &'static str,
+        coefficients: usize,
+        form: Form,
+        error: fn(&[T; COEFFICIENTS], T, &Ambience<T>, &mut Slow<T>),
+    ) -> Self {
+        Self {
+            name,
+            coefficients,
+            form,
+            evaluation: Evaluation::Slow(error),
+        }
+    }
+}
+
+fn each<T: RealField + Copy>(c: &[T; COEFFICIENTS]) -> Vector3<T> {
+    Vector3::new(c[0], c[1], c[2])
+}
+
+fn matrix<T: RealField + Copy>(c: &[T; COEFFICIENTS]) -> Matrix3<T> {
+    Matrix3::new(c[0], c[1], c[2], c[3], c[4], c[5], c[6], c[7], c[8])
+}
+
+// The laws that run with every sample have names, so that their instructions can be counted by them.
+
+/// `e = G f`.
+fn g_sensitivity<T: RealField + Copy>(
+    c: &[T; COEFFICIENTS],
+    at: &Conditions<T>,
+    e: &mut Vector3<T>,
+) {
+    *e += matrix(c) * at.force;
+}
+
+/// `e_i = c_i s_i²`.
+fn scale_quadratic<T: RealField + Copy>(
+    c: &[T; COEFFICIENTS],
+    at: &Conditions<T>,
+    e: &mut Vector3<T>,
+) {
+    *e += each(c).component_mul(&at.sensed.map(|s| s * s));
+}
+
+/// `e_i = c_i s_i³`.
+fn scale_cubic<T: RealField + Copy>(c: &[T; COEFFICIENTS], at: &Conditions<T>, e: &mut Vector3<T>) {
+    *e += each(c).component_mul(&at.sensed.map(|s| s * s * s));
+}
+
+/// `e_i = c_i |s_i|`.
+fn scale_asymmetry<T: RealField + Copy>(
+    c: &[T; COEFFICIENTS],
+    at: &Conditions<T>,
+    e: &mut Vector3<T>,
+) {
+    *e += each(c).component_mul(&at.sensed.map(|s| s.abs()));
+}
+
+/// `e = Q (s_x s_y, s_y s_z, s_z s_x)`.
+fn cross_axis_product<T: RealField + Copy>(
+    c: &[T; COEFFICIENTS],
+    at: &Conditions<T>,
+    e: &mut Vector3<T>,
+) {
+    let s = at.sensed;
+    *e += matrix(c) * Vector3::new(s.x * s.y, s.y * s.z, s.z * s.x);
+}
+
+/// `e_i = (α × r_i + ω × (ω × r_i))_i`, with r_i the place, m, where sensor i senses.
+///
+/// As rows of `[α]× + [ω]×²` times the places: the matrix is shared by the three sensors.
+fn size_effect<T: RealField + Copy>(c: &[T; COEFFICIENTS], at: &Conditions<T>, e: &mut Vector3<T>) {
+    let (w, a) = (at.rate, at.angular_acceleration);
+    let (xx, yy, zz) = (w.x * w.x, w.y * w.y, w.z * w.z);
+    let (xy, yz, zx) = (w.x * w.y, w.y * w.z, w.z * w.x);
+    // Into the sum one by one: three instructions fewer than by the sum of each row.
+    e.x = e.x + (zx + a.y) * c[2] + (xy - a.z) * c[1] - (yy + zz) * c[0];
+    e.y = e.y + (yz - a.x) * c[5] + (xy + a.z) * c[3] - (zz + xx) * c[4];
+    e.z = e.z + (yz + a.x) * c[7] + (zx - a.y) * c[6] - (xx + yy) * c[8];
+}
+
+/// `e_i = c_i v_1 v_2 v_3`, where one c_i is not zero: an axis without an index, and without a branch.
+#[inline(never)]
+pub(super) fn term<T: RealField + Copy>(
+    c: &Vector3<T>,
+    factors: &[u8; 3],
+    values: &Values<T>,
+    e: &mut Vector3<T>,
+) {
+    let value = |factor: u8| {
+        values
+            .get(usize::from(factor))
+            .copied()
+            .unwrap_or(T::zero())
+    };
+    let [first, second, third] = *factors;
+    *e += c * (value(first) * value(second) * value(third));
+}

@@ -1,0 +1,399 @@
+//! Effects in a calibration file, and as the device takes them.
+
+use std::fmt::Write as _;
+
+use mimu_core::RealField;
+use mimu_core::effects::Variable as DeviceVariable;
+use mimu_core::effects::{Effect as DeviceEffect, Effects, Refused, Sensor as DeviceSensor};
+use nalgebra::{Vector3, convert};
+use serde::Deserialize;
+
+use super::Calibration;
+use super::writing::{number, quoted};
+use crate::diagnose::candidate::{Candidate, Kind, Monomial, Variable};
+use crate::diagnose::decision::Accepted;
+use crate::diagnose::effect::{Effect, Moment};
+use crate::diagnose::library;
+use crate::diagnose::removal::{Removed, errors};
+use crate::dwell::Sensor;
+use crate::error::{Error, Result};
+use crate::estimate::AXES;
+
+/// How the coefficients of an effect are applied: e is the error of the three sensors, S the norms of the rows of P.
+const FORMULA: &str = "x = C (u - S e) + o, e_i = sum of coefficient * regressor";
+const DIRECTION: &str = "raw to SI";
+
+/// An effect in a calibration file.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct EffectTable {
+    /// Public id.
+    pub id: String,
+    /// Sensor whose readings err.
+    pub sensor: String,
+    /// Physics in a line.
+    pub about: String,
+    /// How it is applied.
+    pub formula: String,
+    /// `raw to SI`.
+    pub direction: String,
+    /// Its nonlinear constant, if it has one.
+    #[serde(default)]
+    pub form: Option<FormTable>,
+    /// Those that the experiment determined; the others are zero.
+    pub coefficients: Vec<CoefficientTable>,
+}
+
+/// Nonlinear constant of an effect.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FormTable {
+    /// Name, with the unit.
+    pub name: String,
+    /// Value.
+    pub value: f64,
+}
+
+/// Coefficient of an effect.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CoefficientTable {
+    /// Name within the effect.
+    pub name: String,
+    /// Value.
+    pub value: f64,
+    /// Standard deviation.
+    pub sigma: f64,
+    /// Unit of both.
+    pub unit: String,
+}
+
+impl From<&Accepted> for EffectTable {
+    fn from(accepted: &Accepted) -> Self {
+        let removed = Removed {
+            candidate: accepted.chosen.candidate.clone(),
+            form: accepted.chosen.form,
+            values: accepted.values.iter().copied().collect(),
+        };
+        let sigmas: Vec<f64> = accepted
+            .covariance
+            .diagonal()
+            .map(f64::sqrt)
+            .iter()
+            .copied()
+            .collect();
+        Self::new(&removed, &sigmas)
+    }
+}
+
+impl EffectTable {
+    /// The table of an effect whose coefficients have these standard deviations.
+    pub fn new(removed: &Removed, sigmas: &[f64]) -> Self {
+        let candidate = &removed.candidate;
+        let (about, form) = match &candidate.kind {
+            Kind::Effect(e) => (e.about, e.form),
+            Kind::Term(..) => ("found from the data: the product in its id", None),
+            Kind::Jump(..) => ("the bias is another from then on", None),
+        };
+        let numbers = removed.values.iter().zip(sigmas);
+        let coefficients = candidate.names().into_iter().zip(numbers);
+        Self {
+            id: candidate.id(),
+            sensor: candidate.sensor.name().into(),
+            about: about.into(),
+            formula: FORMULA.into(),
+            direction: DIRECTION.into(),
+            form: form.map(|f| FormTable {
+                name: f.name.into(),
+                value: removed.form,
+            }),
+            coefficients: coefficients
+                .map(|((name, unit), (value, sigma))| CoefficientTable {
+                    name,
+                    value: *value,
+                    sigma: *sigma,
+                    unit,
+                })
+                .collect(),
+        }
+    }
+
+    /// The effect that the table states, or what is wrong and what to do.
+    fn removed(&self) -> std::result::Result<Removed, (String, &'static str)> {
+        const OTHER_VERSION: &str = "use the version of mimu that wrote it";
+        const EDITED: &str = "diagnose the recording again";
+        let mut candidate = candidate(&self.id).ok_or_else(|| {
+            let problem = "this program knows no effect of this id".to_string();
+            (problem, OTHER_VERSION)
+        })?;
+        if self.formula != FORMULA || self.direction != DIRECTION {
+            let problem = format!(
+                "formula {:?}, direction {:?}: only {FORMULA:?}, {DIRECTION}, can be applied",
+                self.formula, self.direction
+            );
+            return Err((problem, OTHER_VERSION));
+        }
+        if self.sensor != candidate.sensor.name() {
+            let problem = format!(
+                "sensor is {:?}, and this is an effect of the {}",
+                self.sensor, candidate.sensor
+            );
+            return Err((problem, EDITED));
+        }
+        let wanted = match candidate.kind {
+            Kind::Effect(Effect { form, .. }) => form.map(|f| f.name),
+            _ => None,
+        };
+        let form = match (wanted, &self.form) {
+            (None, None) => 0.0,
+            (Some(name), Some(f)) if f.name == name && f.value > 0.0 && f.value.is_finite() => {
+                f.value
+            }
+            (Some(name), _) => {
+                let problem = format!("form has to be {name}, a positive number");
+                return Err((problem, EDITED));
+            }
+            (None, Some(f)) => {
+                let problem = format!("form {:?} is there, and this effect has none", f.name);
+                return Err((problem, EDITED));
+            }
+        };
+        let known = candidate.names();
+        let mut values = vec![None; known.len()];
+        for c in &self.coefficients {
+            let Some(at) = known.iter().position(|(name, _)| *name == c.name) else {
+                let names: Vec<&str> = known.iter().map(|(name, _)| name.as_str()).collect();
+                let problem = format!(
+                    "coefficient {:?} is none of its: {}",
+                    c.name,
+                    names.join(", ")
+                );
+                return Err((problem, EDITED));
+            };
+            let unit = &known[at].1;
+            if c.unit != *unit {
+                let problem = format!("unit of {:?} is {:?}, not {unit:?}", c.name, c.unit);
+                return Err((problem, EDITED));
+            }
+            if !c.value.is_finite() || !(c.sigma >= 0.0) || !c.sigma.is_finite() {
+                let problem = format!("value or sigma of {:?} is not a number", c.name);
+                return Err((problem, EDITED));
+            }
+            if values[at].replace(c.value).is_some() {
+                return Err((format!("coefficient {:?} is there twice", c.name), EDITED));
+            }
+        }
+        candidate.active.retain(|k| values[*k].is_some());
+        if candidate.active.is_empty() {
+            return Err(("it has no coefficients".into(), EDITED));
+        }
+        Ok(Removed {
+            candidate,
+            form,
+            values: values.into_iter().flatten().collect(),
+        })
+    }
+
+    /// Writes it as TOML.
+    pub(super) fn write(&self, out: &mut String) -> std::fmt::Result {
+        writeln!(
+            out,
+            "\n[[effect]]\nid = {}\nsensor = {}\nabout = {}\nformula = {}\ndirection = {}",
+            quoted(&self.id),
+            quoted(&self.sensor),
+            quoted(&self.about),
+            quoted(&self.formula),
+            quoted(&self.direction)
+        )?;
+        if let Some(form) = &self.form {
+            writeln!(
+                out,
+                "form = {{ name = {}, value = {} }}",
+                quoted(&form.name),
+                number(form.value)
+            )?;
+        }
+        writeln!(out, "coefficients = [")?;
+        for c in &self.coefficients {
+            writeln!(
+                out,
+                "  {{ name = {}, value = {}, sigma = {:.3e}, unit = {} }},",
+                quoted(&c.name),
+                number(c.value),
+                c.sigma,
+                quoted(&c.unit)
+            )?;
+        }
+        writeln!(out, "]")
+    }
+}
+
+/// The candidate of an id, with all of its coefficients.
+fn candidate(id: &str) -> Option<Candidate> {
+    let Some(term) = id.strip_prefix("term:") else {
+        let effect = library::by_id(id)?;
+        return Some(Candidate::new(effect.sensor, Kind::Effect(effect)));
+    };
+    let (of, product) = term.split_once('~')?;
+    let (sensor, axis) = of.split_once('_')?;
+    let sensor = Sensor::BOTH.into_iter().find(|s| s.name() == sensor)?;
+    let axis = AXES.iter().position(|a| *a == axis)?;
+    let mut variables = Vec::new();
+    for factor in product.split('*') {
+        let (name, power) = factor.split_once('^').unwrap_or((factor, "1"));
+        let power: usize = power.parse().ok().filter(|p| *p <= 3)?;
+        let variable = Variable::ALL.into_iter().find(|v| v.name() == name)?;
+        variables.extend(std::iter::repeat_n(variable, power));
+    }
+    let monomial = Monomial(variables);
+    // One spelling for each.
+    let plain =
+        (1..=3).contains(&monomial.0.len()) && monomial.0.is_sorted() && monomial.name() == product;
+    plain.then(|| Candidate::new(sensor, Kind::Term(axis, monomial)))
+}
+
+/// A condition that an effect may need, or not.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Condition {
+    Rate,
+    Force,
+    Temperature,
+}
+
+/// Whether the error by an effect depends on a condition: tried, so that no effect has to say it.
+pub(crate) fn depends(effect: &Removed, on: Condition) -> bool {
+    let one = Vector3::repeat(1.0);
+    let mut at = Moment {
+        t_s: 1.0,
+        duration_s: 1.0,
+        rate: one,
+        force: one,
+        angular_acceleration: one,
+        sensed: one,
+        warm_c: 1.0,
+        late_c: 1.0,
+    };
+    let none = Vector3::repeat(f64::NAN);
+    let own = |sensor| effect.candidate.sensor == sensor;
+    match on {
+        Condition::Rate => {
+            at.rate = none;
+            if own(Sensor::Gyro) {
+                at.sensed = none;
+            }
+        }
+        Condition::Force => {
+            at.force = none;
+            if own(Sensor::Accel) {
+                at.sensed = none;
+            }
+        }
+        Condition::Temperature => (at.warm_c, at.late_c) = (f64::NAN, f64::NAN),
+    }
+    let error = errors(std::slice::from_ref(effect), &[at]);
+    error.iter().any(|e| e.iter().any(|v| v.is_nan()))
+}
+
+/// Checks the effect tables of a calibration and gives what they state; `place` is its path.
+pub(super) fn read(calibration: &Calibration, place: &str) -> Result<Vec<Removed>> {
+    let mut all: Vec<Removed> = Vec::new();
+    for table in &calibration.effect_tables {
+        let refuse = |problem: String, remedy: &str| {
+            Error::new(format!("{place}, [[effect]] {}", table.id), problem, remedy)
+        };
+        let removed = table
+            .removed()
+            .map_err(|(problem, remedy)| refuse(problem, remedy))?;
+        if all.iter().any(|r| r.candidate.id() == table.id) {
+            return Err(refuse(
+                "it is there twice".into(),
+                "diagnose the recording again",
+            ));
+        }
+        for (sensor, condition) in [
+            (Sensor::Gyro, Condition::Rate),
+            (Sensor::Accel, Condition::Force),
+        ] {
+            let needed = removed.candidate.sensor == sensor || depends(&removed, condition);
+            if needed && calibration.table(sensor).is_none() {
+                let problem =
+                    format!("it cannot be removed without [{sensor}], which is not there");
+                return Err(refuse(problem, "diagnose a recording of both sensors"));
+            }
+        }
+        all.push(removed);
+    }
+    Ok(all)
+}
+
+/// An effect as `core` removes it.
+fn on_device<T: RealField + Copy>(
+    removed: &Removed,
+) -> std::result::Result<DeviceEffect<T>, Refused> {
+    let candidate = &removed.candidate;
+    match &candidate.kind {
+        Kind::Effect(effect) => {
+            let mut all = vec![T::zero(); effect.coefficients.len()];
+            for (k, value) in candidate.active.iter().zip(&removed.values) {
+                all[*k] = convert(*value);
+            }
+            let form = effect.form.map(|_| convert(removed.form));
+            DeviceEffect::named(effect.id, &all, form)
+        }
+        Kind::Term(axis, monomial) => {
+            let sensor = match candidate.sensor {
+                Sensor::Gyro => DeviceSensor::Gyro,
+                Sensor::Accel => DeviceSensor::Accel,
+            };
+            let variables: Vec<DeviceVariable> = monomial.0.iter().map(|v| variable(*v)).collect();
+            let value = removed.values.first().copied().unwrap_or_default();
+            DeviceEffect::term(sensor, *axis, convert(value), &variables)
+        }
+        // A bias that has jumped once says nothing of the next recording.
+        Kind::Jump(..) => Err(Refused::Unknown),
+    }
+}
+
+fn variable(of: Variable) -> DeviceVariable {
+    use DeviceVariable as Device;
+    let axes = |all: [Device; 3], axis: usize| all[axis];
+    match of {
+        Variable::Rate(i) => axes([Device::RateX, Device::RateY, Device::RateZ], i),
+        Variable::Force(i) => axes([Device::ForceX, Device::ForceY, Device::ForceZ], i),
+        Variable::Temperature => Device::Temperature,
+        Variable::TemperatureRate => Device::TemperatureRate,
+        Variable::Time => Device::Time,
+    }
+}
+
+/// The effects of a calibration as the device removes them; one that `core` lacks is refused by its id.
+pub(super) fn core_effects<T: RealField + Copy, const N: usize>(
+    calibration: &Calibration,
+) -> Result<Effects<T, N>> {
+    let place = format!("calibration of {:?}", calibration.device);
+    let model = |sensor: Sensor| {
+        calibration.inverse(sensor).ok_or_else(|| {
+            let problem = format!("there is no [{sensor}], and the device needs both");
+            Error::new(&place, problem, "calibrate both sensors")
+        })
+    };
+    let [gyro, accel] = [model(Sensor::Gyro)?, model(Sensor::Accel)?];
+    let singular = || Error::new(&place, "C is singular", "fit the recording again");
+    let mut all = Effects::new(&gyro, &accel).ok_or_else(singular)?;
+    for removed in calibration.effects() {
+        let pushed = on_device(removed).and_then(|effect| all.push(effect));
+        pushed.map_err(|refused| {
+            let problem = match refused {
+                Refused::Full => format!("the device has no room for it: at most {N} of a kind"),
+                _ => "the device cannot remove it".to_string(),
+            };
+            let remedy = "update the device, or use the calibration without effects";
+            let id = removed.candidate.id();
+            Error::new(format!("{place}, [[effect]] {id}"), problem, remedy)
+        })?;
+    }
+    Ok(all)
+}
+
+#[cfg(test)]
+mod tests;
