@@ -3,13 +3,12 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use mimu::calibration::{Calibration, EffectTable, stage, to_toml};
 use mimu::diagnose::diagnose;
-use mimu::diagnose::removal::remove;
-use mimu::dwell::Sensor;
-use mimu::error::{Error, Result};
+use mimu::error::Result;
 use mimu::fit::{Method, Options};
 use mimu::report::{self, DiagnosisReport};
-use mimu::verify::judge;
+use mimu::verify::verify;
 
 use crate::{JsonArgs, NoiseArgs, StillArgs, print, read};
 
@@ -20,6 +19,9 @@ pub struct DiagnoseArgs {
     /// Another recording of the unit, to judge what was found by
     #[arg(long, value_name = "REC")]
     verify: Option<PathBuf>,
+    /// Calibration file to write, with the effects
+    #[arg(short, value_name = "FILE")]
+    output: Option<PathBuf>,
     #[command(flatten)]
     still: StillArgs,
     #[command(flatten)]
@@ -35,35 +37,42 @@ pub fn run(args: &DiagnoseArgs) -> Result<()> {
         still_factor: args.still.factor,
         only: None,
     };
-    let outputs = [args.json.file()];
+    let outputs = [args.output.as_deref(), args.json.file()];
     let inputs = [args.noise.file.as_deref()];
     let prepared = read(&args.recording, args.still.factor, &outputs, &inputs)?;
     let diagnosis = diagnose(args.noise.state(prepared)?, options)?;
+    let now = jiff::Timestamp::now()
+        .round(jiff::Unit::Second)
+        .unwrap_or_default()
+        .to_string();
+    let effects: Vec<EffectTable> = diagnosis
+        .sensors
+        .iter()
+        .flat_map(|s| s.decision.accepted.iter().map(EffectTable::from))
+        .collect();
+    let after = to_toml(&diagnosis.after, &effects, &now);
     let mut second = None;
     if let Some(path) = &args.verify {
         let other = args
             .noise
             .state(read(path, args.still.factor, &outputs, &inputs)?)?;
-        let model = |fit: &mimu::fit::Fit, s| fit.sensor(s).map(|f| f.estimated.triad.inverse);
-        let [g0, a0] = Sensor::BOTH.map(|s| model(&diagnosis.before, s));
-        let [g1, a1] = Sensor::BOTH.map(|s| model(&diagnosis.after, s));
-        let cleaned =
-            remove(&other, g1.as_ref(), a1.as_ref(), &diagnosis.effects).ok_or_else(|| {
-                Error::new(
-                    path.display(),
-                    "the calibration is singular",
-                    "look at the recordings",
-                )
-            })?;
-        let before = judge(&other, [g0.as_ref(), a0.as_ref()])?;
-        let after = judge(&cleaned, [g1.as_ref(), a1.as_ref()])?;
-        second = Some((path.display().to_string(), [before, after]));
+        // By the files that they would be: what is judged is what is given away.
+        let before = to_toml(&diagnosis.before, &[], &now);
+        let judged = |text: &str| verify(&other, &Calibration::parse(text, "calibration")?);
+        second = Some((
+            path.display().to_string(),
+            [judged(&before)?, judged(&after)?],
+        ));
+    }
+    let mut calibration = None;
+    if let Some(path) = &args.output {
+        calibration = Some(stage(path, after)?);
     }
     let found = DiagnosisReport { diagnosis, second };
     print(
         &args.json,
         &report::diagnosis_text(&found),
         &report::diagnosis_json(&found),
-        None,
+        calibration,
     )
 }
