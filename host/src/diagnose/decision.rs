@@ -15,6 +15,9 @@ const BLOCKS: usize = 4;
 const EXCITED: f64 = 3.0;
 /// One dwell that has more than this share in what an effect rests on decides it alone.
 const LEVERAGE: f64 = 0.7;
+/// A bias that wanders by this many times the noise of a dwell mean is told of even where nobody has recorded how far it may: sensors
+/// of the usual kind wander by up to three in half an hour.
+const WANDERS: f64 = 4.0;
 /// Probability that the rows of a clean sensor scatter so much that structure is told of.
 pub const FALSE_LEFTOVER: f64 = 1e-3;
 
@@ -232,20 +235,24 @@ pub fn decide(rows: &Rows, dwell_ends: &[f64]) -> Option<Decision> {
     let held_rms = |chosen: &[Chosen], fit: &Fitted, split: Split| {
         held_out(&search, &search.model(chosen), fit, split).map(|r| rms(rows, &r))
     };
-    let split_of = |chosen: &[Chosen], one: &Chosen| {
-        let [dwell, block] = leverage(rows, &search.model(chosen), &one.columns);
-        let split = match block > LEVERAGE {
-            true => Split::Interleaved,
-            false => Split::Blocks,
-        };
-        (dwell, split)
+    // All rates in one block of time, and without it there is no calibration.
+    let usual = match held_rms(&[], &null, Split::Blocks) {
+        Some(_) => Split::Blocks,
+        None => Split::Interleaved,
+    };
+    let split_of = |rest: &[Chosen], one: &Chosen, with: &Fitted| {
+        let [dwell, block] = leverage(rows, &search.model(rest), &one.columns);
+        let mut all = rest.to_vec();
+        all.push(one.clone());
+        let alone = block > LEVERAGE || held_rms(&all, with, usual).is_none();
+        (dwell, if alone { Split::Interleaved } else { usual })
     };
     loop {
         let mut worst: Option<(usize, String)> = None;
         for i in (0..kept.len()).rev() {
             let mut rest = kept.clone();
             let one = rest.remove(i);
-            let (share, split) = split_of(&rest, &one);
+            let (share, split) = split_of(&rest, &one, &with);
             let without = search.fit(&rest)?;
             let [a, b] = [
                 held_rms(&rest, &without, split),
@@ -279,7 +286,7 @@ pub fn decide(rows: &Rows, dwell_ends: &[f64]) -> Option<Decision> {
         let mut rest = kept.clone();
         rest.remove(i);
         let without = search.fit(&rest)?;
-        let (_, split) = split_of(&rest, one);
+        let (_, split) = split_of(&rest, one, &with);
         let held = [
             held_rms(&rest, &without, split),
             held_rms(&kept, &with, split),
@@ -304,7 +311,7 @@ pub fn decide(rows: &Rows, dwell_ends: &[f64]) -> Option<Decision> {
     // One way for all of them, so that the figures compare.
     let split = match accepted.iter().any(|a| a.split == Split::Interleaved) {
         true => Split::Interleaved,
-        false => Split::Blocks,
+        false => usual,
     };
     let held = |chosen: &[Chosen], fit: &Fitted| held_rms(chosen, fit, split).unwrap_or(f64::NAN);
     let floor: f64 = rows.strata.iter().map(|s| known_in(s, rows.judged.0)).sum();
@@ -362,7 +369,9 @@ fn leftover(
         let worse = bare.deviance - last.deviance;
         // Two components at the edge of what they can be: chi-square of two degrees of freedom is on the safe side.
         let p = (-0.5 * worse).exp() * rows.strata.len() as f64;
-        if p > FALSE_LEFTOVER && jump.is_none() {
+        let floor = stratum.known.diagonal().mean().sqrt();
+        let wanders_far = !stratum.wander_known && strength > WANDERS * floor;
+        if p > FALSE_LEFTOVER && jump.is_none() && !wanders_far {
             continue;
         }
         let against = match jump {

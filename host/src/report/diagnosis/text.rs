@@ -83,7 +83,7 @@ fn sensor(out: &mut String, s: &SensorDiagnosis, figure: Figure) {
     if d.split == Split::Interleaved {
         let _ = writeln!(
             out,
-            "  held out every fourth dwell, as one block alone shows the effect"
+            "  held out every fourth dwell: one block of time alone shows what is needed"
         );
     }
     for a in &d.accepted {
