@@ -303,6 +303,38 @@ pub fn decide(rows: &Rows, dwell_ends: &[f64]) -> Option<Decision> {
         });
         from += count;
     }
+    for one in search.others(&kept, &with) {
+        let id = one.candidate.id();
+        if rejected.iter().any(|r: &(String, String)| r.0 == id) {
+            continue;
+        }
+        let mut more = kept.clone();
+        more.push(one.clone());
+        let held = search
+            .fit(&more)
+            .and_then(|f| Some((f.clone(), held_rms(&more, &f, usual)?)))
+            .map(|(f, held)| {
+                (
+                    rms(rows, &(&rows.y - search.model(&more) * &f.coefficients)),
+                    held,
+                )
+            });
+        let now = (
+            rms(rows, &(&rows.y - search.model(&kept) * &with.coefficients)),
+            held_rms(&kept, &with, usual),
+        );
+        let chance = match one.p {
+            p if p >= 1.0 => "no better than chance".to_string(),
+            p => format!("by chance once in {:.0}", 1.0 / p),
+        };
+        let figures = match (held, now) {
+            (Some((sample, held)), (before, Some(out))) => format!(
+                "; in sample {before:.3e} to {sample:.3e}, held out {out:.3e} to {held:.3e}"
+            ),
+            _ => String::new(),
+        };
+        rejected.push((id, chance + &figures));
+    }
     let residuals = |fit: &Fitted, model: &DMatrix<f64>| &rows.y - model * &fit.coefficients;
     let base = search
         .spread

@@ -276,6 +276,17 @@ impl<'a> Search<'a> {
         judged
     }
 
+    /// The named effects that are not among the chosen, each beside them with noise of its own.
+    pub fn others(&self, chosen: &[Chosen], now: &Fitted) -> Vec<Chosen> {
+        let screened = self.screen(chosen, now);
+        let listed = screened
+            .into_par_iter()
+            .filter(|s| self.candidates[s.0].is_listed());
+        listed
+            .filter_map(|(i, form, _)| self.judge(chosen, now, i, form))
+            .collect()
+    }
+
     /// The effects that the rows ask for.
     ///
     /// A named effect goes before a term found from the data unless the term is better by [`PREFERENCE`]: with two thousand terms

@@ -1,7 +1,7 @@
 //! How the rows scatter: known noise, scatter beside it, and a bias that walks, each estimated where it is not known.
 //!
-//! A drift of the bias and a walk of it are told apart by nothing else than that one is a straight line. So the walk is
-//! in the null hypothesis: without it, 1 clean unit in 3 would be found to drift.
+//! A drift of the bias and a walk of it are told apart by nothing else than that one is a straight line. So where the walk is not
+//! known, it is in the null hypothesis.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
