@@ -10,7 +10,6 @@ use mimu::dwell::Sensor;
 use mimu::fit::{Method, Options};
 use mimu::prepared::Prepared;
 use mimu::stillness::STILL_FACTOR;
-use mimu_rig::effects::Shape;
 use mimu_rig::random::Random;
 use mimu_rig::rig_file::{EffectFile, RigFile, RigTruth};
 use nalgebra::{DMatrix, DVector};
@@ -76,17 +75,17 @@ pub fn unit(ids: &[&str], seed: u64) -> RigFile {
         let factor = 10f64.powf(size.within(0.5));
         let first = &spec.parameters[0];
         if let Some(value) = effect.parameters.get_mut(first.key) {
-            scale(value, factor, first.shape);
+            scale(value, factor);
         }
     }
     drawn
 }
 
-fn scale(value: &mut toml::Value, factor: f64, shape: Shape) {
+fn scale(value: &mut toml::Value, factor: f64) {
     match value {
         toml::Value::Float(v) => *v *= factor,
         toml::Value::Integer(v) => *value = toml::Value::Float(*v as f64 * factor),
-        toml::Value::Array(all) => all.iter_mut().for_each(|v| scale(v, factor, shape)),
+        toml::Value::Array(all) => all.iter_mut().for_each(|v| scale(v, factor)),
         _ => {}
     }
 }

@@ -324,7 +324,7 @@ pub fn decide(rows: &Rows, dwell_ends: &[f64]) -> Option<Decision> {
             held_rms(&kept, &with, usual),
         );
         let chance = match one.p {
-            p if p >= 1.0 => "no better than chance".to_string(),
+            p if p > 0.5 => "no better than chance".to_string(),
             p => format!("by chance once in {:.0}", 1.0 / p),
         };
         let figures = match (held, now) {

@@ -289,7 +289,7 @@ impl<'a> Search<'a> {
 
     /// The effects that the rows ask for.
     ///
-    /// A named effect goes before a term found from the data unless the term is better by [`PREFERENCE`]: with two thousand terms
+    /// A named effect goes before a term found from the data unless the term is better by 12 in deviance: with two thousand terms
     /// some product is always near an effect.
     pub fn run(&self) -> Option<(Vec<Chosen>, Fitted)> {
         let mut chosen: Vec<Chosen> = Vec::new();
