@@ -356,9 +356,15 @@ impl<'a> Search<'a> {
 }
 
 /// How good a candidate is among others with more or fewer coefficients: the drop of the deviance less what each coefficient
-/// costs (Akaike's two, doubled, as for each there are several candidates).
+/// costs (Akaike's two, doubled, as for each there are several candidates). Of products that are the same in this recording the
+/// shortest is told.
 fn score(c: &Chosen) -> f64 {
-    c.worth - 4.0 * (c.columns.ncols() as f64 + if c.form > 0.0 { 1.0 } else { 0.0 })
+    let coefficients = c.columns.ncols() as f64 + if c.form > 0.0 { 1.0 } else { 0.0 };
+    let order = match &c.candidate.kind {
+        Kind::Term(_, monomial) => monomial.0.len() as f64,
+        _ => 0.0,
+    };
+    c.worth - 4.0 * coefficients - order
 }
 
 /// Deviance by which a term found from the data has to be better than an effect with a name.

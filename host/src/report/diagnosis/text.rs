@@ -129,10 +129,17 @@ fn effect(out: &mut String, sensor: Sensor, a: &Accepted, shown: &impl Fn(f64) -
     if let Some(form) = candidate.form() {
         let _ = writeln!(out, "    {:<12}{:>12}", form.name, three(a.chosen.form));
     }
-    for (id, worse) in &a.chosen.alternatives {
-        let _ = writeln!(out, "    or {id}, worse by {} in deviance", three(*worse));
+    let alternatives = &a.chosen.alternatives;
+    for (id, worse) in alternatives.iter().take(SHOWN) {
+        let _ = writeln!(out, "    or {id}, worse by {worse:.1} in deviance");
+    }
+    if alternatives.len() > SHOWN {
+        let _ = writeln!(out, "    or one of {} more", alternatives.len() - SHOWN);
     }
 }
+
+/// Alternatives that are listed.
+const SHOWN: usize = 3;
 
 fn odds(p: f64) -> String {
     match 1.0 / p.max(1e-300) {
