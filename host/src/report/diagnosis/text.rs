@@ -41,11 +41,16 @@ pub fn diagnosis_text(report: &DiagnosisReport) -> String {
             let _ = writeln!(out, "  {:<8}{x:>16}{y:>16}{z:>16}", b.sensor.name());
         }
     }
+    let second = report
+        .second
+        .iter()
+        .flat_map(|(_, [_, after])| &after.warnings);
     let warnings: Vec<&String> = d
         .after
         .warnings
         .iter()
         .chain(d.after.sensors.iter().flat_map(|s| &s.warnings))
+        .chain(second)
         .collect();
     if !warnings.is_empty() {
         let _ = writeln!(out);
@@ -63,7 +68,7 @@ fn sensor(out: &mut String, s: &SensorDiagnosis, figure: Figure) {
     };
     let _ = writeln!(
         out,
-        "{} ({}, rms)\n  {:<12}{:>14}{:>14}{:>14}",
+        "{} ({}, rms)\n  {:<12}{:>16}{:>16}{:>16}",
         s.sensor,
         crate::calibration::figure(figure),
         "",
@@ -75,7 +80,7 @@ fn sensor(out: &mut String, s: &SensorDiagnosis, figure: Figure) {
     for (name, [before, after]) in [("in sample", d.rms), ("held out", d.held_out_rms)] {
         let _ = writeln!(
             out,
-            "  {name:<12}{:>14}{:>14}{floor:>14}",
+            "  {name:<12}{:>16}{:>16}{floor:>16}",
             shown(before),
             shown(after)
         );
