@@ -105,9 +105,8 @@ pub fn diagnose(prepared: Prepared, options: Options) -> Result<Diagnosis> {
         };
         let model = |s: Sensor| now.sensor(s).map(|f| f.estimated.triad.inverse);
         let (inverse, accel) = (fitted.estimated.triad.inverse, model(Sensor::Accel));
-        let none = |m: &[effect::Moment], _: Sensor| vec![nalgebra::Vector3::zeros(); m.len()];
-        let rows = Rows::new(&now.prepared, sensor, &inverse, accel.as_ref(), &none)
-            .ok_or_else(singular)?;
+        let rows =
+            Rows::new(&now.prepared, sensor, &inverse, accel.as_ref()).ok_or_else(singular)?;
         let decision = decide(&rows, &dwell_ends(&now.prepared)).ok_or_else(singular)?;
         let found: Vec<Removed> = decision
             .accepted

@@ -102,9 +102,6 @@ pub(super) fn directions(inverse: &Affine<f64>) -> Option<(Matrix3<f64>, Vector3
     Some((unit, scale, forward))
 }
 
-/// Errors of the axes of the sensor, SI, at each of some moments.
-pub type ErrorsAt<'a> = dyn Fn(&[Moment], Sensor) -> Vec<Vector3<f64>> + 'a;
-
 struct Builder<'a> {
     prepared: &'a Prepared,
     sensor: Sensor,
@@ -188,7 +185,7 @@ impl Builder<'_> {
 }
 
 impl Rows {
-    /// The rows of `sensor`, after its calibration `inverse` and `errors` of accepted effects; `accel` is the calibrated
+    /// The rows of `sensor`, after its calibration `inverse`; `accel` is the calibrated
     /// accelerometer, for what forces act on a gyro.
     ///
     /// `None` if there are none, or the calibration is singular.
@@ -197,7 +194,6 @@ impl Rows {
         sensor: Sensor,
         inverse: &Affine<f64>,
         accel: Option<&Affine<f64>>,
-        errors: &ErrorsAt,
     ) -> Option<Self> {
         let (direction, scale, forward) = directions(inverse)?;
         let blocks = &prepared.condensed.blocks;
@@ -217,9 +213,9 @@ impl Rows {
             direction,
         };
         match (prepared.manifest.reference, sensor) {
-            (Reference::Table, _) => builder.known(&scale, &forward, accel, errors),
-            (Reference::Gravity, Sensor::Accel) => builder.sizes(inverse, errors),
-            (Reference::Gravity, Sensor::Gyro) => builder.turns(inverse, accel?, errors),
+            (Reference::Table, _) => builder.known(&scale, &forward, accel),
+            (Reference::Gravity, Sensor::Accel) => builder.sizes(inverse),
+            (Reference::Gravity, Sensor::Gyro) => builder.turns(inverse, accel?),
         }
     }
 }
@@ -284,7 +280,6 @@ impl Builder<'_> {
         scale: &Vector3<f64>,
         forward: &Forward,
         accel: Option<&Affine<f64>>,
-        errors: &ErrorsAt,
     ) -> Option<Rows> {
         let prepared = self.prepared;
         let observations = prepared.observations(self.sensor);
@@ -295,7 +290,6 @@ impl Builder<'_> {
             .iter()
             .map(|d| self.dwell(*d, self.force(*d, accel)))
             .collect();
-        let all = errors(&self.moments, self.sensor);
         let walk = self.walk(&dwells);
         let mut y = Vec::new();
         let mut nuisance = DMatrix::zeros(3 * n, 12);
@@ -305,7 +299,7 @@ impl Builder<'_> {
                 let row = y.len();
                 let predicted = forward.apply(&o.input)[axis];
                 self.mean_row(o.dwell, &moments[i], Vector3::ith(axis, 1.0));
-                y.push((o.raw[axis] - predicted) / scale[axis] - self.of(&all, row));
+                y.push((o.raw[axis] - predicted) / scale[axis]);
                 nuisance[(row, 4 * axis)] = 1.0;
                 for k in 0..3 {
                     nuisance[(row, 4 * axis + 1 + k)] = o.input[k];
@@ -330,19 +324,12 @@ impl Builder<'_> {
         self.finish(y, nuisance, strata, judged)
     }
 
-    /// Error of the accepted effects in row `row`.
-    fn of(&self, all: &[Vector3<f64>], row: usize) -> f64 {
-        let row = &self.rows[row];
-        let pairs = all[row.moments.clone()].iter().zip(&row.weights);
-        pairs.map(|(e, w)| e.dot(w)).sum()
-    }
-
     /// Errors along the sensors as errors in the body frame: inverse of the sensitive directions.
     fn to_body(&self) -> Option<Matrix3<f64>> {
         self.direction.try_inverse()
     }
 
-    fn sizes(mut self, inverse: &Affine<f64>, errors: &ErrorsAt) -> Option<Rows> {
+    fn sizes(mut self, inverse: &Affine<f64>) -> Option<Rows> {
         let prepared = self.prepared;
         let g = prepared.manifest.gravity_mps2;
         let observations = prepared.observations(Sensor::Accel);
@@ -353,15 +340,12 @@ impl Builder<'_> {
             .iter()
             .map(|o| self.dwell(o.dwell, inverse.apply(&o.raw)))
             .collect();
-        let all = errors(&self.moments, Sensor::Accel);
         let mut y = Vec::new();
         let mut nuisance = DMatrix::zeros(n, 9);
         let lower = [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2)];
         let centre = observations.iter().map(|o| o.raw).sum::<Vector3<f64>>() / n.max(1) as f64;
         for (i, o) in observations.iter().enumerate() {
-            let mean =
-                all[moments[i].clone()].iter().sum::<Vector3<f64>>() / moments[i].len() as f64;
-            let force = inverse.apply(&o.raw) - body * mean;
+            let force = inverse.apply(&o.raw);
             let up = force.normalize();
             self.mean_row(o.dwell, &moments[i], body.tr_mul(&up));
             y.push(force.norm() - g);
@@ -384,12 +368,7 @@ impl Builder<'_> {
         self.finish(y, nuisance, strata, (n, 1))
     }
 
-    fn turns(
-        mut self,
-        inverse: &Affine<f64>,
-        accel: &Affine<f64>,
-        errors: &ErrorsAt,
-    ) -> Option<Rows> {
+    fn turns(mut self, inverse: &Affine<f64>, accel: &Affine<f64>) -> Option<Rows> {
         let prepared = self.prepared;
         let body = self.to_body()?;
         let (turns, _) = prepared.turns(accel);
@@ -417,12 +396,7 @@ impl Builder<'_> {
                 self.block.push(at);
             }
             let moments = first..self.moments.len();
-            let less: Vec<Vector3<f64>> = errors(&self.moments[moments.clone()], Sensor::Gyro)
-                .iter()
-                .zip(turn.increments)
-                .map(|(e, piece)| body * e * piece.duration_s)
-                .collect();
-            let found = sensitivity(turn, inverse, &less);
+            let found = sensitivity(turn, inverse);
             for side in 0..2 {
                 let mut columns = [0.0; 12];
                 let mut weights = Vec::with_capacity(moments.len());
@@ -450,9 +424,6 @@ impl Builder<'_> {
             .iter()
             .map(|d| self.dwell(*d, self.force(*d, Some(accel))))
             .collect();
-        let from = moments.first().map_or(self.moments.len(), |r| r.start);
-        let mut all = vec![Vector3::zeros(); from];
-        all.extend(errors(&self.moments[from..], Sensor::Gyro));
         let mut nuisance = DMatrix::zeros(m + 3 * n, 12);
         for (row, columns) in turn_rows.iter().enumerate() {
             for (k, v) in columns.iter().enumerate() {
@@ -480,7 +451,7 @@ impl Builder<'_> {
             for (i, o) in rest.iter().enumerate() {
                 let row = y.len();
                 self.mean_row(o.dwell, &moments[i], body.row(axis).transpose());
-                y.push(inverse.apply(&o.raw)[axis] - self.of(&all, row));
+                y.push(inverse.apply(&o.raw)[axis]);
                 for k in 0..3 {
                     nuisance[(row, 3 * axis + k)] = at_rest[k];
                 }

@@ -217,8 +217,8 @@ pub struct Sensitivity {
     pub by: Vec<[Vector3<f64>; 2]>,
 }
 
-/// [`direction_error`] in components, where of the rotation of each increment `less` (rad, body frame) is taken off before.
-pub fn sensitivity(turn: &Turn, gyro: &Affine<f64>, less: &[Vector3<f64>]) -> Sensitivity {
+/// [`direction_error`] in components, with its derivatives.
+pub fn sensitivity(turn: &Turn, gyro: &Affine<f64>) -> Sensitivity {
     let (c, o) = (&gyro.matrix, &gyro.offset);
     let half = cofactor(c) * 0.5;
     let measured = turn.after.normalize();
@@ -227,7 +227,7 @@ pub fn sensitivity(turn: &Turn, gyro: &Affine<f64>, less: &[Vector3<f64>]) -> Se
     let mut by = vec![[Vector3::zeros(); 2]; turn.increments.len()];
     for (k, increment) in turn.increments.iter().enumerate().rev() {
         let piece = Centred::new(increment, &Vector3::zeros());
-        let phi = piece.rotation(c, o, &half) - less.get(k).copied().unwrap_or_default();
+        let phi = piece.rotation(c, o, &half);
         let (back, right) = exponential(&phi);
         let into: Matrix3<f64> = after * right;
         by[k] = sides.map(|e| into.tr_mul(&e));
