@@ -6,6 +6,9 @@
 //! | [`compensation`] | inverse model, raw to SI: `x = C u + o` for gyro and accelerometer |
 //! | [`effects`]      | what the affine model lacks, removed sample by sample              |
 //! | [`kalman`]       | bank of three four-state Kalman filters fed one scalar at a time  |
+//! | [`table`]        | inverse models at several temperatures, and between them          |
+//! | [`stored`]       | all of this as bytes, for the device to keep                       |
+//! | [`wire`]         | messages between device and host, and their frames                 |
 //!
 //! Everything is generic over `f32` (the target's floating-point unit) and `f64` (the PC), without
 //! allocation, without `unsafe` and without a path to a panic. Parameters and state are different
@@ -15,5 +18,8 @@
 pub mod compensation;
 pub mod effects;
 pub mod kalman;
+pub mod stored;
+pub mod table;
+pub mod wire;
 
 pub use nalgebra::RealField;

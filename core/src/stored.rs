@@ -1,0 +1,353 @@
+//! A calibration as bytes: what is sent to the device, kept in its flash, and used.
+//!
+//! Little end first, `f32` as IEEE 754, matrices by rows:
+//!
+//! | bytes | what                                                                                              |
+//! |-------|---------------------------------------------------------------------------------------------------|
+//! | 4     | `mimc`                                                                                            |
+//! | 2     | version of this layout, [`VERSION`]                                                               |
+//! | 2     | length of everything                                                                              |
+//! | 1, 1  | number of nodes (1 to [`NODES`]), of effects                                                      |
+//! | 2     | zero                                                                                              |
+//! | 72    | C of the gyro, rad/s per V, and of the accelerometer, m/s² per V, that the effects were found with |
+//! | 100   | each node: temperature, °C; C and o (rad/s) of the gyro; C and o (m/s²) of the accelerometer      |
+//! | ...   | each effect, see below                                                                            |
+//! | 4     | CRC-32/ISO-HDLC of everything before                                                              |
+//!
+//! A named effect: 0; length of the id, the id; number of coefficients, these, `f32`; time constant, s, or 0 if it has none.
+//! A term: 1; triad (0 gyro, 1 accelerometer); axis; number of variables, these, a byte each as in [`Variable`]; coefficient.
+//!
+//! Raw is volts at the sensor, as in [`RawBatch`](crate::wire::RawBatch). The noise of biases and the sigmas of the parameters are not
+//! here: the device has no use for them.
+
+mod bytes;
+
+use crc::{CRC_32_ISO_HDLC, CRC_64_XZ, Crc, NoTable};
+use nalgebra::{Matrix3, Vector3};
+use serde::{Deserialize, Serialize};
+
+use crate::compensation::{Affine, Compensation};
+use crate::effects::{self, Effect, Effects, Sensor, Variable};
+use crate::table::{self, Node, Table};
+use bytes::{Reader, Writer};
+
+/// Version of the layout.
+pub const VERSION: u16 = 1;
+/// Most temperature nodes.
+pub const NODES: usize = 16;
+/// Most effects of a triad that run with every sample, and as many that do not.
+pub const ROOM: usize = 8;
+/// Most bytes of a calibration: all nodes and effects at their longest come to 3.9 kB.
+pub const MAX_LENGTH: usize = 4096;
+
+const MAGIC: [u8; 4] = *b"mimc";
+const HEADER: usize = 12;
+const CHECK: usize = 4;
+/// Where the length stands.
+const LENGTH_AT: usize = 6;
+const NAMED: u8 = 0;
+const TERM: u8 = 1;
+/// Most coefficients of an effect.
+const COEFFICIENTS: usize = 9;
+/// Most variables of a term.
+const FACTORS: usize = 3;
+
+// Bit by bit: it is computed once in a while over some kB, and has the flash for other things.
+const CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
+const HASH: Crc<u64, NoTable> = Crc::<u64, NoTable>::new(&CRC_64_XZ);
+
+/// What a calibration is told apart by: CRC-64/XZ over all of its bytes. Not the CRC-32 once more, which over anything that ends in its
+/// own CRC-32 is always the same.
+pub fn hash(bytes: &[u8]) -> u64 {
+    HASH.checksum(bytes)
+}
+
+/// A calibration in use.
+#[derive(Debug, Clone, Copy)]
+pub struct Stored {
+    /// Compensation over temperature.
+    pub table: Table<f32, NODES>,
+    /// What the affine model lacks; `None` if there are none, so that no sample pays for it.
+    pub effects: Option<Effects<f32, ROOM>>,
+    /// How many effects.
+    pub effect_count: u8,
+}
+
+/// An effect as it is stored.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Record<'a> {
+    /// As in [`Effect::named`].
+    Named {
+        /// Public id.
+        id: &'a str,
+        /// All of its coefficients, SI.
+        coefficients: &'a [f32],
+        /// Time constant, s, of an effect that has any.
+        time_constant: Option<f32>,
+    },
+    /// As in [`Effect::term`].
+    Term {
+        /// Triad.
+        sensor: Sensor,
+        /// 0 to 2.
+        axis: u8,
+        /// SI.
+        coefficient: f32,
+        /// One to three.
+        variables: &'a [Variable],
+    },
+}
+
+/// Why bytes are not a calibration that this build can use.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Refused {
+    /// They do not begin as a calibration does.
+    NotACalibration,
+    /// They end too early, or go on after the end.
+    Length,
+    /// Another version of the layout.
+    Version {
+        /// Theirs.
+        found: u16,
+    },
+    /// The CRC does not hold.
+    Check,
+    /// A node is not finite or not warmer than the one before, or there are none or too many.
+    Node {
+        /// Which, from 0.
+        at: u8,
+    },
+    /// C of the gyro or of the accelerometer is singular.
+    Singular,
+    /// An effect that this build does not know.
+    EffectUnknown {
+        /// Which, from 0, in the order that they were given in.
+        at: u8,
+    },
+    /// An effect with numbers that make no sense.
+    EffectValue {
+        /// Which, from 0.
+        at: u8,
+    },
+    /// More effects than there is room for.
+    EffectsFull {
+        /// The first that has none.
+        at: u8,
+    },
+}
+
+/// The calibration would be longer than there is room for, or an effect is longer than any is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct TooLong;
+
+/// Writes a calibration to the beginning of `out`; returns its length. `found_with`: C of the gyro and of the accelerometer that the
+/// effects were found with. What is written is not judged; [`decode`] does that.
+pub fn encode(
+    found_with: [&Matrix3<f32>; 2],
+    nodes: &[Node<f32>],
+    effects: &[Record<'_>],
+    out: &mut [u8],
+) -> Result<usize, TooLong> {
+    let count = |n: usize| u8::try_from(n).map_err(|_| TooLong);
+    let mut to = Writer::new(out);
+    to.bytes(&MAGIC)?;
+    to.u16(VERSION)?;
+    to.u16(0)?;
+    to.bytes(&[count(nodes.len())?, count(effects.len())?, 0, 0])?;
+    for matrix in found_with {
+        to.matrix(matrix)?;
+    }
+    for node in nodes {
+        to.f32(node.temp_c)?;
+        for triad in [&node.model.gyro, &node.model.accel] {
+            to.matrix(&triad.matrix)?;
+            triad.offset.iter().try_for_each(|v| to.f32(*v))?;
+        }
+    }
+    for effect in effects {
+        match effect {
+            Record::Named {
+                id,
+                coefficients,
+                time_constant,
+            } => {
+                to.bytes(&[NAMED, count(id.len())?])?;
+                to.bytes(id.as_bytes())?;
+                to.bytes(&[count(coefficients.len())?])?;
+                coefficients.iter().try_for_each(|c| to.f32(*c))?;
+                to.f32(time_constant.unwrap_or(0.0))?;
+            }
+            Record::Term {
+                sensor,
+                axis,
+                coefficient,
+                variables,
+            } => {
+                let triad = match sensor {
+                    Sensor::Gyro => 0,
+                    Sensor::Accel => 1,
+                };
+                to.bytes(&[TERM, triad, *axis, count(variables.len())?])?;
+                variables.iter().try_for_each(|v| to.bytes(&[*v as u8]))?;
+                to.f32(*coefficient)?;
+            }
+        }
+    }
+    let length = to.length() + CHECK;
+    let length_bytes = u16::try_from(length).map_err(|_| TooLong)?.to_le_bytes();
+    if length > MAX_LENGTH {
+        return Err(TooLong);
+    }
+    to.put_at(LENGTH_AT, &length_bytes)?;
+    let check = CRC.checksum(to.written());
+    to.bytes(&check.to_le_bytes())?;
+    Ok(length)
+}
+
+/// The calibration in `bytes`, all of them.
+pub fn decode(bytes: &[u8]) -> Result<Stored, Refused> {
+    let mut from = Reader(bytes);
+    if from.bytes::<4>() != Some(MAGIC) {
+        return Err(Refused::NotACalibration);
+    }
+    let version = from.u16().ok_or(Refused::Length)?;
+    if version != VERSION {
+        return Err(Refused::Version { found: version });
+    }
+    let length = from.u16().ok_or(Refused::Length)?;
+    if usize::from(length) != bytes.len() || bytes.len() < HEADER + CHECK {
+        return Err(Refused::Length);
+    }
+    let (body, check) = bytes.split_last_chunk::<CHECK>().ok_or(Refused::Length)?;
+    if CRC.checksum(body) != u32::from_le_bytes(*check) {
+        return Err(Refused::Check);
+    }
+    let mut from = Reader(body.get(LENGTH_AT + 2..).ok_or(Refused::Length)?);
+    let [nodes, effects, ..] = from.bytes::<4>().ok_or(Refused::Length)?;
+    contents(&mut from, nodes, effects)
+}
+
+fn contents(from: &mut Reader<'_>, nodes: u8, effects: u8) -> Result<Stored, Refused> {
+    let gyro = from.matrix().ok_or(Refused::Length)?;
+    let accel = from.matrix().ok_or(Refused::Length)?;
+    let mut short = false;
+    let read = (0..nodes).map_while(|_| {
+        let node = node(from);
+        short |= node.is_none();
+        node
+    });
+    let table = Table::new(read);
+    if short {
+        return Err(Refused::Length);
+    }
+    let table = table.map_err(|refused| Refused::Node {
+        at: match refused {
+            table::Refused::Count => nodes,
+            table::Refused::Order(at) | table::Refused::NotFinite(at) => at as u8,
+        },
+    })?;
+
+    let linear = |matrix: &Matrix3<f32>| Affine {
+        matrix: matrix.map(f64::from),
+        offset: Vector3::zeros(),
+    };
+    let mut all = Effects::new(&linear(&gyro), &linear(&accel)).ok_or(Refused::Singular)?;
+    for at in 0..effects {
+        let effect = effect(from).ok_or(Refused::Length)?;
+        effect
+            .and_then(|effect| all.push(effect))
+            .map_err(|refused| match refused {
+                effects::Refused::Unknown => Refused::EffectUnknown { at },
+                effects::Refused::Full => Refused::EffectsFull { at },
+                effects::Refused::Count { .. } | effects::Refused::Value => {
+                    Refused::EffectValue { at }
+                }
+            })?;
+    }
+    match from.0.is_empty() {
+        true => Ok(Stored {
+            table,
+            effects: (effects > 0).then_some(all),
+            effect_count: effects,
+        }),
+        false => Err(Refused::Length),
+    }
+}
+
+fn node(from: &mut Reader<'_>) -> Option<Node<f32>> {
+    let affine = |from: &mut Reader<'_>| {
+        Some(Affine {
+            matrix: from.matrix()?,
+            offset: Vector3::new(from.f32()?, from.f32()?, from.f32()?),
+        })
+    };
+    Some(Node {
+        temp_c: from.f32()?,
+        model: Compensation {
+            gyro: affine(from)?,
+            accel: affine(from)?,
+        },
+    })
+}
+
+/// `None` if the bytes end in it.
+fn effect(from: &mut Reader<'_>) -> Option<Result<Effect<f32>, effects::Refused>> {
+    match from.u8()? {
+        NAMED => {
+            let length = from.u8()?;
+            let id = from.slice(usize::from(length))?;
+            let count = usize::from(from.u8()?);
+            let mut coefficients = [0.0; COEFFICIENTS];
+            let room = coefficients.get_mut(..count);
+            let Some(coefficients) = room else {
+                return Some(Err(effects::Refused::Unknown));
+            };
+            for coefficient in coefficients.iter_mut() {
+                *coefficient = from.f32()?;
+            }
+            let constant = from.f32()?;
+            let constant = (constant != 0.0).then_some(constant);
+            let id = core::str::from_utf8(id).unwrap_or_default();
+            Some(Effect::named(id, coefficients, constant))
+        }
+        TERM => {
+            let [triad, axis, count] = from.bytes()?;
+            let mut variables = [Variable::Time; FACTORS];
+            let Some(variables) = variables.get_mut(..usize::from(count)) else {
+                return Some(Err(effects::Refused::Count { needed: FACTORS }));
+            };
+            let mut known = true;
+            for variable in variables.iter_mut() {
+                let number = from.u8()?;
+                match VARIABLES.iter().find(|v| **v as u8 == number) {
+                    Some(found) => *variable = *found,
+                    None => known = false,
+                }
+            }
+            let coefficient = from.f32()?;
+            let sensor = match triad {
+                0 => Sensor::Gyro,
+                1 => Sensor::Accel,
+                _ => return Some(Err(effects::Refused::Unknown)),
+            };
+            Some(match known {
+                true => Effect::term(sensor, usize::from(axis), coefficient, variables),
+                false => Err(effects::Refused::Unknown),
+            })
+        }
+        // Of a kind that a later version has.
+        _ => Some(Err(effects::Refused::Unknown)),
+    }
+}
+
+const VARIABLES: [Variable; 9] = [
+    Variable::RateX,
+    Variable::RateY,
+    Variable::RateZ,
+    Variable::ForceX,
+    Variable::ForceY,
+    Variable::ForceZ,
+    Variable::Temperature,
+    Variable::TemperatureRate,
+    Variable::Time,
+];

@@ -1,0 +1,38 @@
+//! The line between device and host: messages, frames, batches of samples.
+//!
+//! ```text
+//! 0x00  COBS( postcard(message) CRC-32 )  0x00        at most MAX_FRAME bytes
+//! ```
+//!
+//! * A message is a [`Call`] from the host or a [`Message`] from the device, in
+//!   [postcard](https://postcard.jamesmunns.com/wire-format): a variant is its number, integers are varints of 7 bits a byte, `f32`
+//!   and fixed arrays of bytes are as they are in memory, little end first, text and byte strings begin with their length.
+//! * CRC-32 is that of Ethernet and zip (CRC-32/ISO-HDLC), over the message, little end first.
+//! * COBS takes every zero out, so that a zero is the end of a frame and nothing else: whatever was lost or garbled, reading
+//!   resumes at the next zero. The zero in front costs a byte and saves the first frame after noise. Empty frames mean nothing.
+//!
+//! The order of variants and fields is the protocol. A minor version appends variants; a major one may do anything but change
+//! [`Message::Greeting`] and [`Request::Hello`], by which both sides find out whom they talk to.
+//!
+//! | rate                              | bytes a frame | frames a second | kB/s |
+//! |-----------------------------------|---------------|-----------------|------|
+//! | raw stream, 20 samples a frame    | 393           | 50              | 19.7 |
+//! | compensated, 20 samples a frame   | 512           | 50              | 25.6 |
+
+mod batch;
+mod frame;
+mod greeting;
+mod message;
+
+pub use batch::{
+    BATCH, BatchHead, COMPENSATED_BYTES, CompensatedBatch, RAW_BYTES, RawBatch, flags, volts,
+};
+pub use frame::{Decoder, EncodeError, Frame, MAX_FRAME, MAX_PAYLOAD, encode};
+pub use greeting::{
+    Capabilities, Compatibility, EFFECTS, Greeting, MAGIC, PROTOCOL, Slot, Start, StoredInfo,
+    Version, compatibility, effects_of_this_build,
+};
+pub use message::{
+    CHUNK, Call, Counters, Event, KalmanAxis, KalmanState, Message, Prior, Refusal, Reply, Request,
+    SelfTest, Triad,
+};

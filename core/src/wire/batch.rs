@@ -1,0 +1,166 @@
+//! Samples in batches.
+
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+
+use crate::compensation::Sample;
+
+/// Most samples of a batch. Fewer come where a sample is missing, since those of a batch are consecutive.
+///
+/// Twenty: 20 ms of delay, and 33 bytes of everything else are 8 % of a raw frame.
+pub const BATCH: usize = 20;
+
+/// Bytes of a raw sample: six sums of three bytes.
+pub const RAW_BYTES: usize = 18;
+
+/// Bytes of a compensated sample: six `f32`.
+pub const COMPENSATED_BYTES: usize = 24;
+
+/// Bits of [`BatchHead::flags`].
+pub mod flags {
+    /// The temperature is outside the nodes of the calibration: that of the nearest node is used.
+    pub const OUTSIDE_NODES: u8 = 1;
+    /// The self-test deflects the sensors.
+    pub const SELF_TEST: u8 = 1 << 1;
+    /// A calibration is being written.
+    pub const STORING: u8 = 1 << 2;
+    /// A sample of the batch stands at the end of the converter's range.
+    pub const SATURATED: u8 = 1 << 3;
+    /// The gyros' reference is not where it can be: its pin is open, and its nominal voltage is used.
+    pub const NO_REFERENCE: u8 = 1 << 4;
+}
+
+/// What holds for all samples of a batch.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct BatchHead {
+    /// Number of the first sample: milliseconds since sampling began. The others follow one by one; a gap between batches is a gap
+    /// in time.
+    pub first: u32,
+    /// Samples that the device lost so far, of all causes: sampling began anew, or processing was behind.
+    pub samples_lost: u32,
+    /// Batches that were lost so far because the line was behind.
+    pub batches_dropped: u32,
+    /// Temperature of the gyros, filtered, °C: the mean of the three, and what compensation goes by.
+    pub temp_c: f32,
+    /// [`flags`].
+    pub flags: u8,
+}
+
+/// Raw readings.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct RawBatch<'a> {
+    /// What holds for all of them.
+    pub head: BatchHead,
+    /// Volts at a gyro for one step of its sum. It moves with the filtered reading of the gyros' own reference, so that drift of the
+    /// converter's is taken out. Reading in V = sum * this, in `f32`, which is what the device compensates.
+    pub gyro_volts: f32,
+    /// Volts at the accelerometer for one step of its sum.
+    pub accel_volts: f32,
+    /// Sums of the converter's codes over the scans of a sample, so that averaging loses nothing: gyro x, y, z, accel x, y, z, each
+    /// three bytes, little end first; sample after sample.
+    pub samples: &'a [u8],
+}
+
+/// Compensated samples.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct CompensatedBatch<'a> {
+    /// What holds for all of them.
+    pub head: BatchHead,
+    /// Gyro x, y, z, rad/s, accel x, y, z, m/s², each an `f32`, little end first; sample after sample.
+    pub samples: &'a [u8],
+}
+
+impl<'a> RawBatch<'a> {
+    /// The bytes of a sample, from its sums; those above 2²⁴ are cut off.
+    pub fn pack(sums: &[u32; 6]) -> [u8; RAW_BYTES] {
+        let mut bytes = [0; RAW_BYTES];
+        for (bytes, sum) in bytes.chunks_exact_mut(3).zip(sums) {
+            for (byte, of) in bytes.iter_mut().zip(sum.to_le_bytes()) {
+                *byte = of;
+            }
+        }
+        bytes
+    }
+
+    /// Whether the length of [`Self::samples`] is one that a device sends.
+    pub fn is_whole(&self) -> bool {
+        self.samples.len().is_multiple_of(RAW_BYTES)
+            && (1..=BATCH).contains(&(self.samples.len() / RAW_BYTES))
+    }
+
+    /// Numbers and sums of the samples, in order.
+    pub fn sums(&self) -> impl Iterator<Item = (u32, [u32; 6])> + 'a {
+        let numbers = numbers(self.head.first);
+        numbers.zip(self.samples.chunks_exact(RAW_BYTES).map(|bytes| {
+            let mut sums = [0; 6];
+            for (sum, bytes) in sums.iter_mut().zip(bytes.chunks_exact(3)) {
+                for byte in bytes.iter().rev() {
+                    *sum = *sum << 8 | u32::from(*byte);
+                }
+            }
+            sums
+        }))
+    }
+
+    /// Numbers and readings of the samples, V, in order: to the last bit what the device compensates.
+    pub fn volts(&self) -> impl Iterator<Item = (u32, Sample<f32>)> + 'a {
+        let (gyro, accel) = (self.gyro_volts, self.accel_volts);
+        self.sums()
+            .map(move |(number, sums)| (number, volts(&sums, gyro, accel)))
+    }
+}
+
+/// Reading of a sample, V, from its sums and the volts for a step of them; see [`RawBatch`].
+#[inline]
+pub fn volts(sums: &[u32; 6], gyro_volts: f32, accel_volts: f32) -> Sample<f32> {
+    let [gx, gy, gz, ax, ay, az] = sums.map(|sum| sum as f32);
+    Sample {
+        gyro: Vector3::new(gx, gy, gz) * gyro_volts,
+        accel: Vector3::new(ax, ay, az) * accel_volts,
+    }
+}
+
+impl<'a> CompensatedBatch<'a> {
+    /// The bytes of a sample, SI.
+    pub fn pack(sample: &Sample<f32>) -> [u8; COMPENSATED_BYTES] {
+        let mut bytes = [0; COMPENSATED_BYTES];
+        let values = sample.gyro.iter().chain(sample.accel.iter());
+        for (bytes, value) in bytes.chunks_exact_mut(4).zip(values) {
+            for (byte, of) in bytes.iter_mut().zip(value.to_le_bytes()) {
+                *byte = of;
+            }
+        }
+        bytes
+    }
+
+    /// Whether the length of [`Self::samples`] is one that a device sends.
+    pub fn is_whole(&self) -> bool {
+        self.samples.len().is_multiple_of(COMPENSATED_BYTES)
+            && (1..=BATCH).contains(&(self.samples.len() / COMPENSATED_BYTES))
+    }
+
+    /// Numbers and values of the samples, rad/s and m/s² in the body frame, in order.
+    pub fn values(&self) -> impl Iterator<Item = (u32, Sample<f32>)> + 'a {
+        let numbers = numbers(self.head.first);
+        numbers.zip(self.samples.chunks_exact(COMPENSATED_BYTES).map(|bytes| {
+            let mut values = [0.0; 6];
+            for (value, bytes) in values.iter_mut().zip(bytes.chunks_exact(4)) {
+                let mut of = [0; 4];
+                for (of, byte) in of.iter_mut().zip(bytes) {
+                    *of = *byte;
+                }
+                *value = f32::from_le_bytes(of);
+            }
+            let [gx, gy, gz, ax, ay, az] = values;
+            Sample {
+                gyro: Vector3::new(gx, gy, gz),
+                accel: Vector3::new(ax, ay, az),
+            }
+        }))
+    }
+}
+
+/// Sample numbers from the first on; after 49 days they begin again at 0.
+fn numbers(first: u32) -> impl Iterator<Item = u32> {
+    (0..).map(move |k| first.wrapping_add(k))
+}

@@ -1,0 +1,165 @@
+//! Frames: where a message begins and ends, and whether it arrived whole.
+
+use cobs::{DecodeResult, DecoderState};
+use crc::{CRC_32_ISO_HDLC, Crc};
+use serde::{Deserialize, Serialize};
+
+/// Most bytes of a message. The longest is a compensated batch, 506.
+pub const MAX_PAYLOAD: usize = 512;
+
+const CHECK: usize = 4;
+
+/// Most bytes of a frame: message and CRC, one byte of COBS for every 254 begun, and the zeros.
+pub const MAX_FRAME: usize = cobs::max_encoding_length(MAX_PAYLOAD + CHECK) + 2;
+
+/// With the table of 1 KiB: bit by bit it would be some fifty instructions a byte, at 45 kB/s.
+const CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
+
+/// The message is longer than [`MAX_PAYLOAD`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct EncodeError;
+
+impl core::fmt::Display for EncodeError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str("the message is longer than a frame")
+    }
+}
+
+impl core::error::Error for EncodeError {}
+
+/// Writes the frame of a [`Call`](super::Call) or [`Message`](super::Message) to the beginning of `out`; returns its length.
+pub fn encode<T: Serialize>(message: &T, out: &mut [u8; MAX_FRAME]) -> Result<usize, EncodeError> {
+    let mut payload = [0; MAX_PAYLOAD + CHECK];
+    let room = payload.get_mut(..MAX_PAYLOAD).ok_or(EncodeError)?;
+    let length = postcard::to_slice(message, room)
+        .map_err(|_| EncodeError)?
+        .len();
+    let check = CRC.checksum(payload.get(..length).ok_or(EncodeError)?);
+    let room = payload.get_mut(length..).ok_or(EncodeError)?;
+    for (byte, of) in room.iter_mut().zip(check.to_le_bytes()) {
+        *byte = of;
+    }
+    let whole = payload.get(..length + CHECK).ok_or(EncodeError)?;
+
+    let (zero, out) = out.split_first_mut().ok_or(EncodeError)?;
+    *zero = 0;
+    let length = cobs::try_encode(whole, out).map_err(|_| EncodeError)?;
+    *out.get_mut(length).ok_or(EncodeError)? = 0;
+    Ok(length + 2)
+}
+
+/// Payload of a frame that arrived whole.
+#[derive(Debug, PartialEq, Eq)]
+pub struct Frame<'a>(pub &'a [u8]);
+
+impl<'a> Frame<'a> {
+    /// The message in it: all of it, or `None`. A [greeting](super::Message::Greeting) may be followed by what later versions have
+    /// appended to it.
+    pub fn message(&self) -> Option<super::Message<'a>> {
+        let (message, rest) = postcard::take_from_bytes(self.0).ok()?;
+        let greeting = matches!(message, super::Message::Greeting { .. });
+        (rest.is_empty() || greeting).then_some(message)
+    }
+
+    /// The call in it: all of it, or `None`.
+    pub fn call(&self) -> Option<super::Call<'a>> {
+        self.all()
+    }
+
+    /// The number of the call, which can be read even if the rest cannot.
+    pub fn id(&self) -> Option<u16> {
+        let (id, _) = postcard::take_from_bytes(self.0).ok()?;
+        Some(id)
+    }
+
+    fn all<T: Deserialize<'a>>(&self) -> Option<T> {
+        let (message, rest) = postcard::take_from_bytes(self.0).ok()?;
+        rest.is_empty().then_some(message)
+    }
+}
+
+/// Finds frames in a stream of bytes.
+#[derive(Debug)]
+pub struct Decoder {
+    cobs: DecoderState,
+    buffer: [u8; MAX_PAYLOAD + CHECK],
+    length: usize,
+    /// The rest until the next zero is not looked at.
+    discarding: bool,
+    garbled: u32,
+}
+
+impl Default for Decoder {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Decoder {
+    /// At the beginning of a frame.
+    pub const fn new() -> Self {
+        Self {
+            cobs: DecoderState::Idle,
+            buffer: [0; MAX_PAYLOAD + CHECK],
+            length: 0,
+            discarding: false,
+            garbled: 0,
+        }
+    }
+
+    /// Takes the next byte; returns the frame that it ends, if that arrived whole.
+    pub fn push(&mut self, byte: u8) -> Option<Frame<'_>> {
+        if byte == 0 {
+            return self.end();
+        }
+        if self.discarding {
+            return None;
+        }
+        match self.cobs.feed(byte) {
+            Ok(DecodeResult::NoData) => {}
+            Ok(DecodeResult::DataContinue(decoded)) => match self.buffer.get_mut(self.length) {
+                Some(place) => {
+                    *place = decoded;
+                    self.length += 1;
+                }
+                None => self.discarding = true,
+            },
+            // Both need a zero.
+            Ok(DecodeResult::DataComplete) | Err(_) => self.discarding = true,
+        }
+        None
+    }
+
+    /// Frames so far that did not arrive whole: too short, too long, not COBS, wrong CRC.
+    pub const fn garbled(&self) -> u32 {
+        self.garbled
+    }
+
+    /// Begins counting anew.
+    pub const fn reset_garbled(&mut self) {
+        self.garbled = 0;
+    }
+
+    fn end(&mut self) -> Option<Frame<'_>> {
+        let discarded = core::mem::replace(&mut self.discarding, false);
+        let length = core::mem::replace(&mut self.length, 0);
+        let state = core::mem::replace(&mut self.cobs, DecoderState::Idle);
+        if matches!(state, DecoderState::Idle) {
+            return None;
+        }
+        let complete = matches!(state, DecoderState::Grab(0) | DecoderState::GrabChain(0));
+        let length = length.saturating_sub(CHECK);
+        let whole = self
+            .buffer
+            .split_at_checked(length)
+            .is_some_and(|(p, c)| c.first_chunk() == Some(&CRC.checksum(p).to_le_bytes()));
+        // A frame shorter than its CRC has length 0 here, and the CRC of nothing is 0: what is left in the buffer does not count.
+        match whole && complete && !discarded && length > 0 {
+            true => self.buffer.get(..length).map(Frame),
+            false => {
+                self.garbled = self.garbled.saturating_add(1);
+                None
+            }
+        }
+    }
+}

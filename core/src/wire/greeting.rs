@@ -1,0 +1,210 @@
+//! Who the device is. The layout of this is that of version 1 for ever; later versions append fields.
+
+use serde::{Deserialize, Serialize};
+
+use crate::effects::{Effect, Refused};
+use crate::stored;
+
+/// First bytes of every greeting.
+pub const MAGIC: [u8; 4] = *b"mimu";
+
+/// The protocol of this build.
+pub const PROTOCOL: Version = Version { major: 1, minor: 0 };
+
+/// Version of a protocol.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub struct Version {
+    /// Another one cannot be talked to.
+    pub major: u8,
+    /// A higher one knows more messages.
+    pub minor: u8,
+}
+
+/// Who the device is, what it can do, and what it holds.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Greeting<'a> {
+    /// [`MAGIC`].
+    pub magic: [u8; 4],
+    /// What it speaks.
+    pub protocol: Version,
+    /// Version of the firmware.
+    pub firmware: &'a str,
+    /// Name of the board.
+    pub board: &'a str,
+    /// The microcontroller's own 96-bit number, as it is in memory.
+    pub unit_id: [u8; 12],
+    /// What it can do.
+    pub capabilities: Capabilities,
+    /// The effects that it can remove: bit k stands for [`EFFECTS`]`[k]`.
+    pub effects: u32,
+    /// Most effects of each triad that run with every sample, and as many that do not.
+    pub effects_room: u8,
+    /// Most temperature nodes.
+    pub nodes_room: u8,
+    /// Most bytes of a stored calibration.
+    pub stored_room: u32,
+    /// Samples per second.
+    pub sample_rate_hz: u32,
+    /// Channels of a sample in their order, separated by commas.
+    pub channels: &'a str,
+    /// Unit of a raw reading.
+    pub raw_unit: &'a str,
+    /// Why it started.
+    #[serde(borrow)]
+    pub start: Start<'a>,
+    /// Starts without a power failure in between, this one counted.
+    pub starts: u32,
+    /// The calibration in use.
+    pub stored: Option<StoredInfo>,
+    /// What is in the two places for a calibration.
+    pub slots: [Slot; 2],
+}
+
+/// Bits of [`Greeting::capabilities`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Capabilities(pub u32);
+
+impl Capabilities {
+    /// Compensates with temperature nodes.
+    pub const TEMPERATURE_NODES: Self = Self(1);
+    /// Removes products that were found from the data (`term:`).
+    pub const TERMS: Self = Self(1 << 1);
+    /// Runs Kalman banks.
+    pub const KALMAN: Self = Self(1 << 2);
+    /// Has a self-test.
+    pub const SELF_TEST: Self = Self(1 << 3);
+    /// Is connected by its own USB and not by a serial line.
+    pub const USB: Self = Self(1 << 4);
+
+    /// Whether all of `those` are among them.
+    pub const fn contains(self, those: Self) -> bool {
+        self.0 & those.0 == those.0
+    }
+
+    /// Those of both.
+    pub const fn and(self, those: Self) -> Self {
+        Self(self.0 | those.0)
+    }
+}
+
+/// Ids of effects by the bits of [`Greeting::effects`]. Append only.
+pub const EFFECTS: [&str; 20] = [
+    "gyro_g_sensitivity",
+    "gyro_scale_quadratic",
+    "gyro_scale_cubic",
+    "gyro_scale_asymmetry",
+    "accel_scale_quadratic",
+    "accel_scale_cubic",
+    "accel_cross_axis_product",
+    "accel_size_effect",
+    "gyro_bias_drift",
+    "accel_bias_drift",
+    "gyro_warm_up",
+    "accel_warm_up",
+    "gyro_thermal_bias",
+    "accel_thermal_bias",
+    "gyro_thermal_scale",
+    "accel_thermal_scale",
+    "gyro_thermal_misalignment",
+    "accel_thermal_misalignment",
+    "gyro_thermal_lag",
+    "accel_thermal_lag",
+];
+
+/// The bits of the effects that this build removes: found by asking for each, so that they cannot be out of date.
+pub fn effects_of_this_build() -> u32 {
+    // None takes no numbers at all, so that a known one is refused for their count.
+    let known = |id| !matches!(Effect::<f32>::named(id, &[], None), Err(Refused::Unknown));
+    let bits = EFFECTS.iter().enumerate();
+    bits.fold(0, |bits, (bit, id)| bits | u32::from(known(id)) << bit)
+}
+
+/// Why the device started.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Start<'a> {
+    /// Power came, or was too low in between.
+    PowerOn,
+    /// The reset pin: the button, or the debugger.
+    ResetPin,
+    /// The watchdog: the program did not come round for too long.
+    Watchdog,
+    /// The program asked for it.
+    Software,
+    /// The program stopped at a panic.
+    Panic {
+        /// End of the path of the source file.
+        file: &'a str,
+        /// Line in it.
+        line: u32,
+    },
+    /// The processor stopped at a fault.
+    Fault {
+        /// Address of the instruction.
+        pc: u32,
+        /// Configurable fault status register.
+        cfsr: u32,
+    },
+    /// None of these.
+    Other,
+}
+
+/// A stored calibration.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct StoredInfo {
+    /// Bytes.
+    pub length: u32,
+    /// [`stored::hash`] over them.
+    pub hash: u64,
+    /// Temperature nodes.
+    pub nodes: u8,
+    /// Effects.
+    pub effects: u8,
+}
+
+/// What is in one of the two places for a calibration.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Slot {
+    /// Nothing.
+    Empty,
+    /// A whole calibration.
+    Whole {
+        /// Counts the calibrations; the higher one is in use.
+        generation: u32,
+    },
+    /// A calibration whose writing did not end, or the remains of one being erased.
+    Unfinished,
+    /// A calibration that was whole once and is not any more.
+    Damaged,
+    /// A whole calibration that this version of the firmware cannot use.
+    NotUsable(stored::Refused),
+}
+
+/// How a device compares with this build.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Compatibility {
+    /// It speaks the same.
+    Same,
+    /// It speaks less: update the device.
+    DeviceOlder {
+        /// Whether what both know is the same; otherwise only the greeting can be relied on.
+        usable: bool,
+    },
+    /// It speaks more: update the host.
+    DeviceNewer {
+        /// As above.
+        usable: bool,
+    },
+    /// Something else answers.
+    NotMimu,
+}
+
+/// How the device of a greeting compares with this build.
+pub fn compatibility(greeting: &Greeting<'_>) -> Compatibility {
+    let usable = greeting.protocol.major == PROTOCOL.major;
+    match greeting.protocol.cmp(&PROTOCOL) {
+        _ if greeting.magic != MAGIC => Compatibility::NotMimu,
+        core::cmp::Ordering::Equal => Compatibility::Same,
+        core::cmp::Ordering::Less => Compatibility::DeviceOlder { usable },
+        core::cmp::Ordering::Greater => Compatibility::DeviceNewer { usable },
+    }
+}

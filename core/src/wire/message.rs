@@ -1,0 +1,293 @@
+//! The table of messages. Variants and fields are numbered by their order: append, never insert.
+
+use serde::{Deserialize, Serialize};
+
+use super::batch::{CompensatedBatch, RawBatch};
+use super::greeting::Greeting;
+
+/// Most bytes of a stored calibration in one message, either way.
+pub const CHUNK: usize = 256;
+
+/// What the host sends: a request and a number of its choice, which the answer repeats.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Call<'a> {
+    /// Repeated in the answer. 0 is for messages that nobody asked for.
+    pub id: u16,
+    /// What is wanted.
+    #[serde(borrow)]
+    pub request: Request<'a>,
+}
+
+/// What the host can ask. Each is answered by one [`Message`] with its id: the reply that is named here, or [`Message::Refused`].
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub enum Request<'a> {
+    /// Who are you? → [`Message::Greeting`]. Number and answer stay as they are in all versions.
+    Hello,
+    /// Send samples from the next batch on, as [`Event::Raw`], [`Event::Compensated`] or both; neither is [`Request::Stop`].
+    /// Both start with the same sample. → [`Reply::Done`]
+    Stream {
+        /// Raw readings.
+        raw: bool,
+        /// SI, compensated on the device: refused without a stored calibration.
+        compensated: bool,
+    },
+    /// Send no more samples. → [`Reply::Done`]
+    Stop,
+    /// → [`Reply::Counters`]
+    Counters,
+    /// Set the counters to zero, but for what describes the present. → [`Reply::Done`]
+    ResetCounters,
+    /// Deflect the sensors electrically and measure it; the unit has to stand still for a second. Samples meanwhile carry
+    /// [`flags::SELF_TEST`](super::flags::SELF_TEST). → [`Reply::SelfTest`], after about a second.
+    SelfTest,
+    /// Begin sending a calibration. One that was begun before and not committed is forgotten. → [`Reply::Done`]
+    UploadBegin {
+        /// Bytes, at most [`stored::MAX_LENGTH`](crate::stored::MAX_LENGTH).
+        length: u32,
+        /// [`stored::hash`](crate::stored::hash) over all of them.
+        hash: u64,
+    },
+    /// Part of it, in order of the offset and without gaps; a part that was received already may be repeated. → [`Reply::Done`]
+    UploadChunk {
+        /// Of the first byte.
+        offset: u32,
+        /// 1 to [`CHUNK`] bytes.
+        bytes: &'a [u8],
+    },
+    /// Check the hash and the contents, then store and use it. → [`Reply::Done`], once it is in flash and has been read back; the old
+    /// one holds until then. Takes some seconds.
+    UploadCommit,
+    /// Part of the calibration in use. → [`Reply::Stored`]
+    Download {
+        /// Of the first byte.
+        offset: u32,
+        /// At most [`CHUNK`]; fewer come at the end.
+        length: u16,
+    },
+    /// Start the Kalman bank of a triad anew; it takes in no sample before its input is known. → [`Reply::Done`]
+    KalmanStart {
+        /// Of the sensors.
+        triad: Triad,
+        /// Variances of single readings of the sensors x, y, z, V².
+        noise: [f32; 3],
+        /// What is known before.
+        prior: Prior,
+    },
+    /// From the next sample on this is what the triad senses, until the next such request. → [`Reply::Done`]
+    KalmanInput {
+        /// Of the sensors.
+        triad: Triad,
+        /// True input in the body frame: rate, rad/s, or specific force (at rest it points up), m/s². `None`: unknown, as while the
+        /// table moves; no sample is taken in.
+        input: Option<[f32; 3]>,
+    },
+    /// Stop the bank. → [`Reply::Kalman`], the last state.
+    KalmanEnd {
+        /// Of the sensors.
+        triad: Triad,
+    },
+}
+
+/// What the device sends.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub enum Message<'a> {
+    /// Who it is: answer to [`Request::Hello`], and sent once after every start with the id 0.
+    Greeting {
+        /// That of the call.
+        id: u16,
+        /// Who.
+        #[serde(borrow)]
+        greeting: Greeting<'a>,
+    },
+    /// The call was done.
+    Reply {
+        /// That of the call.
+        id: u16,
+        /// What it asked for.
+        #[serde(borrow)]
+        reply: Reply<'a>,
+    },
+    /// The call was not done, and nothing has changed.
+    Refused {
+        /// That of the call; 0 if the frame was whole but its contents could not be read.
+        id: u16,
+        /// Why.
+        refusal: Refusal,
+    },
+    /// What is sent without being asked each time.
+    Event(#[serde(borrow)] Event<'a>),
+}
+
+/// Answers to calls.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub enum Reply<'a> {
+    /// Done, and there is nothing to tell.
+    Done,
+    /// What has been counted.
+    Counters(Counters),
+    /// How the sensors answered.
+    SelfTest(SelfTest),
+    /// Part of the stored calibration.
+    Stored {
+        /// Of the first byte.
+        offset: u32,
+        /// Length of the whole, bytes.
+        length: u32,
+        /// The part; shorter than asked for at the end.
+        bytes: &'a [u8],
+    },
+    /// A bank as it ended.
+    Kalman(KalmanState),
+}
+
+/// What comes without being asked each time.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub enum Event<'a> {
+    /// Raw readings.
+    Raw(#[serde(borrow)] RawBatch<'a>),
+    /// Compensated samples.
+    Compensated(#[serde(borrow)] CompensatedBatch<'a>),
+    /// A running bank, five times a second.
+    Kalman(KalmanState),
+}
+
+/// Why a call was not done.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Refusal {
+    /// This version knows no such request, or its contents make no sense.
+    Unknown,
+    /// Compensation and download need a stored calibration, and there is none.
+    NoCalibration,
+    /// No upload was begun.
+    NoUpload,
+    /// The calibration is longer than there is room for.
+    TooLong {
+        /// Room, bytes.
+        room: u32,
+    },
+    /// The part does not continue what was received.
+    WrongOffset {
+        /// Where to continue.
+        expected: u32,
+    },
+    /// Not all parts were received.
+    Incomplete {
+        /// Bytes received.
+        received: u32,
+    },
+    /// What was received does not have the hash that was announced.
+    WrongHash {
+        /// What it has.
+        found: u64,
+    },
+    /// What was received is not a calibration that this device can use.
+    NotUsable(crate::stored::Refused),
+    /// The flash did not take it; the calibration before is still there.
+    FlashFailed,
+    /// No bank of this triad runs.
+    NoBank,
+    /// A number is not finite, or a variance is not positive.
+    BadNumber,
+    /// The device does something that does not go together with it; try again later.
+    Busy,
+}
+
+/// Three sensors.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Triad {
+    /// Gyros; inputs in rad/s.
+    Gyro,
+    /// Accelerometers; inputs in m/s².
+    Accel,
+}
+
+/// What a Kalman bank knows before the first sample.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub enum Prior {
+    /// Nothing.
+    Diffuse {
+        /// Size of the inputs to come, rad/s or m/s².
+        span: f32,
+    },
+    /// Independent parameters.
+    Known {
+        /// `[b, P1, P2, P3]` of the sensors x, y, z: V, and V per rad/s or per m/s².
+        mean: [[f32; 4]; 3],
+        /// Their variances, the units squared.
+        variance: [[f32; 4]; 3],
+    },
+}
+
+/// A Kalman bank.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct KalmanState {
+    /// Of the sensors.
+    pub triad: Triad,
+    /// Number of the last sample that was offered to it, by [`BatchHead::first`](super::BatchHead::first).
+    pub last: u32,
+    /// Samples taken in.
+    pub updates: u32,
+    /// Samples that at least one of its filters rejected.
+    pub rejected: u32,
+    /// Samples that the device lost, or that an unknown input let pass.
+    pub skipped: u32,
+    /// Sensors x, y, z.
+    pub axes: [KalmanAxis; 3],
+}
+
+/// Estimate of one sensor: forward model, SI to raw.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct KalmanAxis {
+    /// `[b, P1, P2, P3]`: V, and V per rad/s or per m/s².
+    pub mean: [f32; 4],
+    /// Upper triangle of their covariance, by rows: 00 01 02 03 11 12 13 22 23 33.
+    pub covariance: [f32; 10],
+}
+
+/// How the sensors answered to their self-test inputs.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct SelfTest {
+    /// Change of the gyros' outputs by ST1, V at the gyro.
+    pub gyro_st1_v: [f32; 3],
+    /// The same by ST2.
+    pub gyro_st2_v: [f32; 3],
+    /// Outputs of the accelerometer at its finest range, V.
+    pub accel_fine_v: [f32; 3],
+    /// The same at its coarsest.
+    pub accel_coarse_v: [f32; 3],
+    /// Bits 0 to 2: gyro x, y, z answered as their datasheet states; bit 3: the accelerometer.
+    pub passed: u8,
+}
+
+/// What the device has counted since its start, or since [`Request::ResetCounters`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct Counters {
+    /// Since the start, ms. Not reset.
+    pub uptime_ms: u32,
+    /// Samples taken.
+    pub samples: u32,
+    /// Number of the last one. Not reset.
+    pub last: u32,
+    /// Times that sampling began anew because a sample was read too late.
+    pub late: u32,
+    /// The same because the converter's buffer overran.
+    pub converter_overruns: u32,
+    /// The same because the converter stood still.
+    pub stalls: u32,
+    /// Samples that were taken, and lost because processing was behind.
+    pub queue_overruns: u32,
+    /// Batches that were lost because the line was behind.
+    pub batches_dropped: u32,
+    /// Frames from the host that were garbled.
+    pub frames_garbled: u32,
+    /// Bytes from the host that were lost before they were looked at, in times that this happened.
+    pub receiver_overruns: u32,
+    /// Calls refused.
+    pub refused: u32,
+    /// Words of the calibration flash whose error was corrected when they were read.
+    pub flash_corrected: u32,
+    /// The same, of those that could not be.
+    pub flash_uncorrectable: u32,
+    /// Longest time between a sample and the end of its processing, µs.
+    pub longest_us: u32,
+}

@@ -1,0 +1,388 @@
+//! The bytes of every message, written out by hand from the specification of postcard: a variant is its number, integers above
+//! 127 are varints, `f32` are little end first (1.0 is `0000803f`, -2.0 is `000000c0`, 0.5 is `0000003f`), text has its length in front.
+
+use mimu_core::stored;
+use mimu_core::wire::{
+    BatchHead, Call, Capabilities, CompensatedBatch, Counters, Event, Greeting, KalmanAxis,
+    KalmanState, MAGIC, Message, Prior, RawBatch, Refusal, Reply, Request, SelfTest, Slot, Start,
+    StoredInfo, Triad, Version,
+};
+use serde::{Deserialize, Serialize};
+
+fn hex(text: &str) -> Vec<u8> {
+    let digits: Vec<u8> = text
+        .chars()
+        .filter(|c| !c.is_whitespace())
+        .map(|c| c.to_digit(16).unwrap() as u8)
+        .collect();
+    assert!(digits.len().is_multiple_of(2), "{text}");
+    digits.chunks(2).map(|d| d[0] << 4 | d[1]).collect()
+}
+
+/// Checks both directions.
+#[track_caller]
+fn frozen<'a, T>(message: T, bytes: &'a [u8])
+where
+    T: Serialize + Deserialize<'a> + PartialEq + std::fmt::Debug,
+{
+    let mut room = [0; 512];
+    let written = postcard::to_slice(&message, &mut room).unwrap();
+    assert_eq!(written, bytes, "{message:?}");
+    let (read, rest) = postcard::take_from_bytes::<T>(bytes).unwrap();
+    assert_eq!(read, message);
+    assert!(rest.is_empty());
+}
+
+#[track_caller]
+fn request(request: Request<'_>, text: &str) {
+    // 300 is 2 * 128 + 44: ac 02.
+    let bytes = hex(&format!("ac02 {text}"));
+    let mut room = [0; 512];
+    let call = Call { id: 300, request };
+    assert_eq!(postcard::to_slice(&call, &mut room).unwrap(), bytes);
+    assert_eq!(postcard::from_bytes::<Call<'_>>(&bytes).unwrap(), call);
+}
+
+#[test]
+fn requests() {
+    request(Request::Hello, "00");
+    let (raw, compensated) = (true, false);
+    request(Request::Stream { raw, compensated }, "01 01 00");
+    request(Request::Stop, "02");
+    request(Request::Counters, "03");
+    request(Request::ResetCounters, "04");
+    request(Request::SelfTest, "05");
+    let (length, hash) = (1000, 128);
+    request(Request::UploadBegin { length, hash }, "06 e807 8001");
+    let (offset, bytes) = (256, &[7, 0, 255][..]);
+    request(Request::UploadChunk { offset, bytes }, "07 8002 03 0700ff");
+    request(Request::UploadCommit, "08");
+    let (offset, length) = (0, 256);
+    request(Request::Download { offset, length }, "09 00 8002");
+    let noise = [1.0, -2.0, 0.5];
+    request(
+        Request::KalmanStart {
+            triad: Triad::Gyro,
+            noise,
+            prior: Prior::Diffuse { span: 1.0 },
+        },
+        "0a 00 0000803f 000000c0 0000003f 00 0000803f",
+    );
+    let row = "0000803f 000000c0 0000003f 00000000";
+    request(
+        Request::KalmanStart {
+            triad: Triad::Accel,
+            noise,
+            prior: Prior::Known {
+                mean: [[1.0, -2.0, 0.5, 0.0]; 3],
+                variance: [[0.5; 4]; 3],
+            },
+        },
+        &format!(
+            "0a 01 0000803f 000000c0 0000003f 01 {} {}",
+            row.repeat(3),
+            "0000003f".repeat(12)
+        ),
+    );
+    request(
+        Request::KalmanInput {
+            triad: Triad::Accel,
+            input: Some([1.0, -2.0, 0.5]),
+        },
+        "0b 01 01 0000803f 000000c0 0000003f",
+    );
+    request(
+        Request::KalmanInput {
+            triad: Triad::Gyro,
+            input: None,
+        },
+        "0b 00 00",
+    );
+    let triad = Triad::Gyro;
+    request(Request::KalmanEnd { triad }, "0c 00");
+}
+
+fn greeting<'a>(start: Start<'a>, stored: Option<StoredInfo>, slots: [Slot; 2]) -> Message<'a> {
+    Message::Greeting {
+        id: 1,
+        greeting: Greeting {
+            magic: MAGIC,
+            protocol: Version { major: 1, minor: 2 },
+            firmware: "0.1.0",
+            board: "B",
+            unit_id: [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12],
+            capabilities: Capabilities(31),
+            effects: 0xf_ffff,
+            effects_room: 8,
+            nodes_room: 16,
+            stored_room: 4096,
+            sample_rate_hz: 1000,
+            channels: "x,y",
+            raw_unit: "V",
+            start,
+            starts: 3,
+            stored,
+            slots,
+        },
+    }
+}
+
+/// A greeting as far as `start`. 0xfffff in sevens is 7f 7f 3f; 4096 is 32 * 128.
+const BEFORE: &str = "00 01 6d696d75 01 02 05 302e312e30 01 42 0102030405060708090a0b0c \
+                      1f ffff3f 08 10 8020 e807 03 782c79 01 56";
+
+#[test]
+fn greetings() {
+    let none = [Slot::Empty; 2];
+    for (start, bytes) in [
+        (Start::PowerOn, "00"),
+        (Start::ResetPin, "01"),
+        (Start::Watchdog, "02"),
+        (Start::Software, "03"),
+        (
+            Start::Panic {
+                file: "a.rs",
+                line: 300,
+            },
+            "04 04 612e7273 ac02",
+        ),
+        (Start::Fault { pc: 128, cfsr: 1 }, "05 8001 01"),
+        (Start::Other, "06"),
+    ] {
+        let bytes = hex(&format!("{BEFORE} {bytes} 03 00 00 00"));
+        frozen(greeting(start, None, none), &bytes);
+    }
+    let stored = StoredInfo {
+        length: 300,
+        hash: u64::MAX,
+        nodes: 5,
+        effects: 2,
+    };
+    for (slot, bytes) in [
+        (Slot::Empty, "00"),
+        (Slot::Whole { generation: 128 }, "01 8001"),
+        (Slot::Unfinished, "02"),
+        (Slot::Damaged, "03"),
+        (Slot::NotUsable(stored::Refused::Check), "04 03"),
+    ] {
+        let bytes = hex(&format!(
+            "{BEFORE} 00 03 01 ac02 ffffffffffffffffff01 05 02 {bytes} 00"
+        ));
+        frozen(
+            greeting(Start::PowerOn, Some(stored), [slot, Slot::Empty]),
+            &bytes,
+        );
+    }
+}
+
+#[test]
+fn a_greeting_that_a_later_version_has_added_to_is_read() {
+    let bytes = hex(&format!("{BEFORE} 00 03 00 00 00 aabbcc"));
+    let message = mimu_core::wire::Frame(&bytes).message();
+    assert_eq!(
+        message,
+        Some(greeting(Start::PowerOn, None, [Slot::Empty; 2]))
+    );
+}
+
+#[test]
+fn replies() {
+    let reply = |reply| Message::Reply { id: 2, reply };
+    frozen(reply(Reply::Done), &hex("01 02 00"));
+    let counters = Counters {
+        uptime_ms: 1,
+        samples: 2,
+        last: 3,
+        late: 4,
+        converter_overruns: 5,
+        stalls: 6,
+        queue_overruns: 7,
+        batches_dropped: 8,
+        frames_garbled: 9,
+        receiver_overruns: 10,
+        refused: 11,
+        flash_corrected: 12,
+        flash_uncorrectable: 13,
+        longest_us: 300,
+    };
+    frozen(
+        reply(Reply::Counters(counters)),
+        &hex("01 02 01 01 02 03 04 05 06 07 08 09 0a 0b 0c 0d ac02"),
+    );
+    let self_test = SelfTest {
+        gyro_st1_v: [1.0; 3],
+        gyro_st2_v: [-2.0; 3],
+        accel_fine_v: [0.5; 3],
+        accel_coarse_v: [0.0; 3],
+        passed: 15,
+    };
+    let [one, minus, half] = ["0000803f", "000000c0", "0000003f"].map(|f| f.repeat(3));
+    frozen(
+        reply(Reply::SelfTest(self_test)),
+        &hex(&format!(
+            "01 02 02 {one} {minus} {half} {} 0f",
+            "00".repeat(12)
+        )),
+    );
+    frozen(
+        reply(Reply::Stored {
+            offset: 256,
+            length: 300,
+            bytes: &[1, 0],
+        }),
+        &hex("01 02 03 8002 ac02 02 0100"),
+    );
+    frozen(
+        reply(Reply::Kalman(kalman())),
+        &hex(&format!("01 02 04 {KALMAN} {}", axis().repeat(3))),
+    );
+}
+
+/// A state as far as the axes.
+const KALMAN: &str = "01 ac02 8001 02 03";
+
+fn kalman() -> KalmanState {
+    let axis = KalmanAxis {
+        mean: [1.0, -2.0, 0.5, 0.0],
+        covariance: [0.5; 10],
+    };
+    KalmanState {
+        triad: Triad::Accel,
+        last: 300,
+        updates: 128,
+        rejected: 2,
+        skipped: 3,
+        axes: [axis; 3],
+    }
+}
+
+fn axis() -> String {
+    format!(
+        "0000803f 000000c0 0000003f 00000000 {}",
+        "0000003f".repeat(10)
+    )
+}
+
+#[test]
+fn refusals() {
+    for (refusal, bytes) in [
+        (Refusal::Unknown, "00"),
+        (Refusal::NoCalibration, "01"),
+        (Refusal::NoUpload, "02"),
+        (Refusal::TooLong { room: 4096 }, "03 8020"),
+        (Refusal::WrongOffset { expected: 300 }, "04 ac02"),
+        (Refusal::Incomplete { received: 5 }, "05 05"),
+        (Refusal::WrongHash { found: 128 }, "06 8001"),
+        (
+            Refusal::NotUsable(stored::Refused::NotACalibration),
+            "07 00",
+        ),
+        (Refusal::NotUsable(stored::Refused::Length), "07 01"),
+        (
+            Refusal::NotUsable(stored::Refused::Version { found: 300 }),
+            "07 02 ac02",
+        ),
+        (Refusal::NotUsable(stored::Refused::Check), "07 03"),
+        (
+            Refusal::NotUsable(stored::Refused::Node { at: 200 }),
+            "07 04 c8",
+        ),
+        (Refusal::NotUsable(stored::Refused::Singular), "07 05"),
+        (
+            Refusal::NotUsable(stored::Refused::EffectUnknown { at: 1 }),
+            "07 06 01",
+        ),
+        (
+            Refusal::NotUsable(stored::Refused::EffectValue { at: 2 }),
+            "07 07 02",
+        ),
+        (
+            Refusal::NotUsable(stored::Refused::EffectsFull { at: 3 }),
+            "07 08 03",
+        ),
+        (Refusal::FlashFailed, "08"),
+        (Refusal::NoBank, "09"),
+        (Refusal::BadNumber, "0a"),
+        (Refusal::Busy, "0b"),
+    ] {
+        let bytes = hex(&format!("02 03 {bytes}"));
+        frozen(Message::Refused { id: 3, refusal }, &bytes);
+    }
+}
+
+#[test]
+fn events() {
+    let head = BatchHead {
+        first: 300,
+        samples_lost: 1,
+        batches_dropped: 128,
+        temp_c: 0.5,
+        flags: 3,
+    };
+    let samples = &[1, 2, 3][..];
+    frozen(
+        Message::Event(Event::Raw(RawBatch {
+            head,
+            gyro_volts: 1.0,
+            accel_volts: -2.0,
+            samples,
+        })),
+        &hex("03 00 ac02 01 8001 0000003f 03 0000803f 000000c0 03 010203"),
+    );
+    frozen(
+        Message::Event(Event::Compensated(CompensatedBatch { head, samples })),
+        &hex("03 01 ac02 01 8001 0000003f 03 03 010203"),
+    );
+    frozen(
+        Message::Event(Event::Kalman(kalman())),
+        &hex(&format!("03 02 {KALMAN} {}", axis().repeat(3))),
+    );
+}
+
+#[test]
+fn samples_of_a_batch() {
+    // 131070 = 2 * 65535 is 01fffe, 200000 is 030d40.
+    let sums = [131_070, 0, 1, 256, 65_536, 200_000];
+    let bytes = RawBatch::pack(&sums);
+    assert_eq!(
+        bytes.to_vec(),
+        hex("feff01 000000 010000 000100 000001 400d03")
+    );
+    let two = [bytes, RawBatch::pack(&[7; 6])].concat();
+    let batch = RawBatch {
+        head: BatchHead {
+            first: u32::MAX,
+            samples_lost: 0,
+            batches_dropped: 0,
+            temp_c: 25.0,
+            flags: 0,
+        },
+        gyro_volts: 0.25,
+        accel_volts: 0.5,
+        samples: &two,
+    };
+    assert!(batch.is_whole());
+    let read: Vec<_> = batch.sums().collect();
+    assert_eq!(read, [(u32::MAX, sums), (0, [7; 6])]);
+    let (number, volts) = batch.volts().nth(1).unwrap();
+    assert_eq!((number, volts.gyro.y, volts.accel.z), (0, 1.75, 3.5));
+
+    let bytes = CompensatedBatch::pack(&mimu_core::compensation::Sample {
+        gyro: [1.0, -2.0, 0.5].into(),
+        accel: [0.0, 0.0, 1.0].into(),
+    });
+    assert_eq!(
+        bytes.to_vec(),
+        hex("0000803f 000000c0 0000003f 00000000 00000000 0000803f")
+    );
+    let head = batch.head;
+    let batch = CompensatedBatch {
+        head,
+        samples: &bytes,
+    };
+    assert!(batch.is_whole());
+    let read: Vec<_> = batch.values().collect();
+    assert_eq!(read.len(), 1);
+    assert_eq!(read[0].1.gyro.y, -2.0);
+    assert_eq!(read[0].1.accel.z, 1.0);
+}
