@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use mimu::calibration::{Calibration, EffectTable, stage, to_toml};
-use mimu::diagnose::diagnose;
+use mimu::diagnose::{Recordings, diagnose};
 use mimu::error::Result;
 use mimu::fit::{Method, Options};
 use mimu::report::{self, DiagnosisReport};
@@ -14,11 +14,18 @@ use crate::{JsonArgs, NoiseArgs, StillArgs, print, read};
 
 #[derive(Args)]
 pub struct DiagnoseArgs {
-    /// Directory of the recording
-    recording: PathBuf,
-    /// Another recording of the unit, to judge what was found by
+    /// Directory of the recording, and of more of the same unit: effects are found in all of them, each with its own biases;
+    /// the calibration is that of the first
+    #[arg(required = true, value_name = "REC")]
+    recordings: Vec<PathBuf>,
+    /// Another recording of the unit, which nothing is found in: an effect that it contradicts is not accepted
     #[arg(long, value_name = "REC")]
     verify: Option<PathBuf>,
+    /// Keep the matrices of this calibration, and find the biases only: for a unit that is never turned, like in a chamber
+    ///
+    /// Its effects are taken out first, and go into the new file.
+    #[arg(long, value_name = "FILE")]
+    calibration: Option<PathBuf>,
     /// Calibration file to write, with the effects
     #[arg(short, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -38,37 +45,59 @@ pub fn run(args: &DiagnoseArgs) -> Result<()> {
         only: None,
     };
     let outputs = [args.output.as_deref(), args.json.file()];
-    let inputs = [args.noise.file.as_deref()];
-    let prepared = read(&args.recording, args.still.factor, &outputs, &inputs)?;
-    let diagnosis = diagnose(args.noise.state(prepared)?, options)?;
+    let inputs = [args.noise.file.as_deref(), args.calibration.as_deref()];
+    let open = |path: &PathBuf| {
+        let prepared = read(path, args.still.factor, &outputs, &inputs)?;
+        args.noise.state(prepared)
+    };
+    let given = match &args.calibration {
+        Some(path) => Some(Calibration::read(path)?),
+        None => None,
+    };
+    let mut all = Vec::new();
+    for path in &args.recordings {
+        all.push(open(path)?);
+    }
+    let second = match &args.verify {
+        Some(path) => Some(open(path)?),
+        None => None,
+    };
+    let first = all.remove(0);
+    let diagnosis = diagnose(
+        Recordings {
+            first,
+            more: all,
+            second: second.clone(),
+            given: given.as_ref(),
+        },
+        options,
+    )?;
     let now = jiff::Timestamp::now()
         .round(jiff::Unit::Second)
         .unwrap_or_default()
         .to_string();
-    let effects: Vec<EffectTable> = diagnosis
+    let known = given.map_or(Vec::new(), |g| g.effect_tables);
+    let found = diagnosis
         .sensors
         .iter()
-        .flat_map(|s| s.decision.accepted.iter().map(EffectTable::from))
-        .collect();
+        .flat_map(|s| s.decision.accepted.iter().map(EffectTable::from));
+    let effects: Vec<EffectTable> = known.iter().cloned().chain(found).collect();
     let after = to_toml(&diagnosis.after, &effects, &now);
-    let mut second = None;
-    if let Some(path) = &args.verify {
-        let other = args
-            .noise
-            .state(read(path, args.still.factor, &outputs, &inputs)?)?;
+    let mut judged = None;
+    if let (Some(other), Some(path)) = (second, &args.verify) {
         // By the files that they would be: what is judged is what is given away.
-        let before = to_toml(&diagnosis.before, &[], &now);
-        let judged = |text: &str| verify(&other, &Calibration::parse(text, "calibration")?);
-        second = Some((
-            path.display().to_string(),
-            [judged(&before)?, judged(&after)?],
-        ));
+        let before = to_toml(&diagnosis.before, &known, &now);
+        let by = |text: &str| verify(&other, &Calibration::parse(text, "calibration")?);
+        judged = Some((path.display().to_string(), [by(&before)?, by(&after)?]));
     }
     let mut calibration = None;
     if let Some(path) = &args.output {
         calibration = Some(stage(path, after)?);
     }
-    let found = DiagnosisReport { diagnosis, second };
+    let found = DiagnosisReport {
+        diagnosis,
+        second: judged,
+    };
     print(
         &args.json,
         &report::diagnosis_text(&found),

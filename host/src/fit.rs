@@ -1,5 +1,7 @@
 //! From a recording to a calibration of both triads, judged on what it was not fitted to.
 
+mod biases;
+
 use mimu_core::compensation::Affine;
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -13,6 +15,8 @@ use crate::plausible;
 use crate::prepared::{Prepared, si_covariance};
 use crate::recording::{RawUnit, Reference};
 use crate::triad::Triad;
+
+pub use biases::fit_biases;
 
 /// How a triad with known input is estimated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

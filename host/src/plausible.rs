@@ -24,7 +24,7 @@ const TURNED_DEG: f64 = 20.0;
 
 /// Refuses or adds warnings to the fit of one sensor.
 pub fn check(prepared: &Prepared, fit: &mut SensorFit) -> Result<()> {
-    refuse_no_numbers(fit)?;
+    check_numbers(fit)?;
     refuse_unrelated(prepared, fit)?;
     let found = [
         outliers(prepared, fit),
@@ -35,7 +35,8 @@ pub fn check(prepared: &Prepared, fit: &mut SensorFit) -> Result<()> {
     Ok(())
 }
 
-fn refuse_no_numbers(fit: &SensorFit) -> Result<()> {
+/// Refuses a fit that ends in something that is not a number.
+pub fn check_numbers(fit: &SensorFit) -> Result<()> {
     let triad = &fit.estimated.triad;
     let models = triad.inverse.matrix.iter().chain(&triad.inverse.offset);
     let numbers = models

@@ -155,7 +155,7 @@ pub fn case(ids: &[&str], seed: u64) -> Case {
     let noise = bench::noise_file(&file, seed, with.condensed.period_s);
     let with = with.with_noise(&noise).expect("its noise");
     let found: Diagnosis =
-        diagnose(with, options()).unwrap_or_else(|e| panic!("{ids:?}, seed {seed}: {e}"));
+        diagnose(with.into(), options()).unwrap_or_else(|e| panic!("{ids:?}, seed {seed}: {e}"));
     let judged = sensors.first().copied().unwrap_or(Sensor::Gyro);
     let after = found.sensors.iter().find(|s| s.sensor == judged);
     Case {

@@ -53,7 +53,7 @@ fn what_is_on_no_list_is_told_to_be_unexplained() {
 }
 
 fn diagnosed(fit: mimu::fit::Fit) -> Diagnosis {
-    diagnose(fit.prepared, fit.options).unwrap()
+    diagnose(fit.prepared.into(), fit.options).unwrap()
 }
 
 #[test]

@@ -93,7 +93,7 @@ impl EffectTable {
         let (about, form) = match &candidate.kind {
             Kind::Effect(e) => (e.about, e.form),
             Kind::Term(..) => ("found from the data: the product in its id", None),
-            Kind::Jump(..) => ("the bias is another from then on", None),
+            Kind::Jump { .. } => ("the bias is another from then on", None),
         };
         let numbers = removed.values.iter().zip(sigmas);
         let coefficients = candidate.names().into_iter().zip(numbers);
@@ -264,6 +264,7 @@ pub(crate) enum Condition {
 pub(crate) fn depends(effect: &Removed, on: Condition) -> bool {
     let one = Vector3::repeat(1.0);
     let mut at = Moment {
+        session: 0,
         t_s: 1.0,
         duration_s: 1.0,
         rate: one,
@@ -350,7 +351,7 @@ fn on_device<T: RealField + Copy>(
             DeviceEffect::term(sensor, *axis, convert(value), &variables)
         }
         // A bias that has jumped once says nothing of the next recording.
-        Kind::Jump(..) => Err(Refused::Unknown),
+        Kind::Jump { .. } => Err(Refused::Unknown),
     }
 }
 

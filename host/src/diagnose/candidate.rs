@@ -133,8 +133,15 @@ pub enum Kind {
     Effect(&'static Effect),
     /// A term found from the data, of one axis.
     Term(usize, Monomial),
-    /// The bias of one axis is another from some dwell on.
-    Jump(usize, f64),
+    /// The bias of one axis is another from some time on, s, within one recording.
+    Jump {
+        /// Axis.
+        axis: usize,
+        /// Index of the recording.
+        session: usize,
+        /// Time, s since it began.
+        t_s: f64,
+    },
 }
 
 /// What is tried.
@@ -159,8 +166,15 @@ impl Candidate {
         match &self.kind {
             Kind::Effect(e) => e.id.into(),
             Kind::Term(axis, m) => format!("term:{}_{}~{}", self.sensor, AXES[*axis], m.name()),
-            Kind::Jump(axis, t_s) => {
-                format!("jump of {}_{} at {t_s:.0} s", self.sensor, AXES[*axis])
+            Kind::Jump { axis, session, t_s } => {
+                let place = match session {
+                    0 => String::new(),
+                    later => format!(" of recording {}", later + 1),
+                };
+                format!(
+                    "jump of {}_{} at {t_s:.0} s{place}",
+                    self.sensor, AXES[*axis]
+                )
             }
         }
     }
@@ -175,7 +189,7 @@ impl Candidate {
         match self.kind {
             Kind::Effect(e) => e.about,
             Kind::Term(..) => "a product of what was recorded; no effect of this name is known",
-            Kind::Jump(..) => "the bias is another from here on",
+            Kind::Jump { .. } => "the bias is another from here on",
         }
     }
 
@@ -225,7 +239,7 @@ impl Candidate {
                 .iter()
                 .map(|k| e.coefficients[*k].axis)
                 .collect(),
-            Kind::Term(axis, _) | Kind::Jump(axis, _) => vec![*axis],
+            Kind::Term(axis, _) | Kind::Jump { axis, .. } => vec![*axis],
         }
     }
 
@@ -242,7 +256,7 @@ impl Candidate {
                 self.active.iter().map(of).collect()
             }
             Kind::Term(axis, m) => vec![(AXES[*axis].into(), m.unit(self.sensor))],
-            Kind::Jump(axis, _) => vec![(AXES[*axis].into(), self.sensor.unit().into())],
+            Kind::Jump { axis, .. } => vec![(AXES[*axis].into(), self.sensor.unit().into())],
         }
     }
 
@@ -257,7 +271,10 @@ impl Candidate {
                 }
             }
             Kind::Term(_, m) => out[0] = m.value(at),
-            Kind::Jump(_, t_s) => out[0] = f64::from(u8::from(at.t_s >= *t_s)),
+            Kind::Jump { session, t_s, .. } => {
+                let since = at.session == *session && at.t_s >= *t_s;
+                out[0] = f64::from(u8::from(since));
+            }
         }
     }
 

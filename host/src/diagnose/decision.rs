@@ -1,26 +1,28 @@
 //! From the rows of one sensor to a verdict: what is tried, what is accepted, what is left.
 
+mod hold_out;
+mod leftover;
+mod second;
+mod tried;
+
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use super::candidate::{Candidate, Kind, Monomial};
-use super::library;
+use super::candidate::Kind;
 use super::rows::Rows;
 use super::search::{Chosen, Search};
-use super::spread::{By, Fitted, Spread};
+use super::spread::{By, Fitted};
+use hold_out::{held_out, leverage, rms};
+use leftover::leftover;
+use second::{Given, second};
+use tried::candidates;
 
-/// Contiguous blocks that are left out in turn.
-const BLOCKS: usize = 4;
-/// An effect whose coefficient of the size of a data sheet would not be this many sigmas is not excited.
-const EXCITED: f64 = 3.0;
+pub use hold_out::Split;
+pub use leftover::{FALSE_LEFTOVER, Leftover};
+pub use second::Second;
+
 /// One dwell that has more than this share in what an effect rests on decides it alone.
 const LEVERAGE: f64 = 0.7;
-/// A bias that wanders by this many times the noise of a dwell mean is told of even where nobody has recorded how far it may: sensors
-/// of the usual kind wander by up to three in half an hour.
-const WANDERS: f64 = 4.0;
-/// Probability that the rows of a clean sensor scatter so much that structure is told of.
-pub const FALSE_LEFTOVER: f64 = 1e-3;
-
 /// An accepted effect with its coefficients.
 #[derive(Debug, Clone)]
 pub struct Accepted {
@@ -34,19 +36,8 @@ pub struct Accepted {
     pub held_out: [f64; 2],
     /// How it was held out.
     pub split: Split,
-}
-
-/// Structure that is left.
-#[derive(Debug, Clone)]
-pub struct Leftover {
-    /// Stratum: an axis, `turns`.
-    pub stratum: String,
-    /// Axis, if it is of one.
-    pub axis: Option<usize>,
-    /// What it goes with, if with anything.
-    pub against: String,
-    /// Root mean square beyond the noise, unit of the rows.
-    pub strength: f64,
+    /// What it does to the second recording, if there is one that can be judged by.
+    pub second: Option<Second>,
 }
 
 /// What was decided on one sensor.
@@ -68,158 +59,20 @@ pub struct Decision {
     pub split: Split,
     /// What noise alone would leave.
     pub noise_floor: f64,
+    /// Rows, and affine parameters that they had to determine first: what is left between them is all that can be judged by.
+    pub rows: [usize; 2],
     /// Probability of chance that the rows before scatter as they do, by the known noise alone.
     pub omnibus_p: f64,
 }
 
-/// Root mean square of the judged rows; of `judged.1` rows a dwell or turn.
-fn rms(rows: &Rows, residuals: &DVector<f64>) -> f64 {
-    let (count, together) = rows.judged;
-    (residuals.rows(0, count).norm_squared() / (count / together) as f64).sqrt()
-}
-
-/// How dwells are held out.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Split {
-    /// Contiguous blocks of time.
-    Blocks,
-    /// Every so manieth dwell: for what is seen in one block only, like a warm-up, which nothing else determines.
-    Interleaved,
-}
-
-impl Split {
-    /// Part that dwell `d` of so many is in.
-    fn part(self, d: usize, dwells: usize) -> usize {
-        match self {
-            Self::Blocks => d * BLOCKS / dwells.max(1),
-            Self::Interleaved => d % BLOCKS,
-        }
-    }
-}
-
-fn dwells(rows: &Rows) -> usize {
-    let all = (0..rows.y.len()).flat_map(|r| rows.dwells(r));
-    1 + all.max().unwrap_or(0)
-}
-
-/// Held-out residuals of the judged rows: each by a model that has not seen its block. `None` where what is left of the
-/// experiment does not determine the model.
-fn held_out(
-    search: &Search,
-    model: &DMatrix<f64>,
-    at: &Fitted,
-    split: Split,
-) -> Option<DVector<f64>> {
-    let rows = search.rows;
-    let dwells = dwells(rows);
-    let parts_of = |r: usize| rows.dwells(r).map(|d| split.part(d, dwells));
-    let mut out = DVector::zeros(rows.y.len());
-    for block in 0..BLOCKS {
-        let kept: Vec<usize> = (0..rows.y.len())
-            .filter(|r| !parts_of(*r).contains(&block))
-            .collect();
-        let parts = search.spread.kept(&at.components, &kept)?;
-        let white = parts.whiten(&model.select_rows(&kept));
-        let y = parts.whiten(&DMatrix::from_fn(kept.len(), 1, |i, _| rows.y[kept[i]]));
-        let svd = white.svd(true, true);
-        let most = svd.singular_values.max();
-        if svd.singular_values.min() < 1e-7 * most {
-            return None;
-        }
-        let solution = svd.solve(&y, 0.0).ok()?;
-        // A turn into the block is of it; one out of it is of the next, and is judged there.
-        for r in (0..rows.y.len()).filter(|r| parts_of(*r)[1] == block) {
-            out[r] = rows.y[r] - (model.row(r) * &solution)[(0, 0)];
-        }
-    }
-    Some(out)
-}
-
-/// Largest shares of one dwell, and of one block of time, in what the columns of an effect rest on.
-fn leverage(rows: &Rows, others: &DMatrix<f64>, columns: &DMatrix<f64>) -> [f64; 2] {
-    let q = others.clone().qr().q();
-    let z = columns - &q * q.tr_mul(columns);
-    let count = dwells(rows);
-    let mut worst = [0.0_f64; 2];
-    for column in z.column_iter() {
-        let mut by = [vec![0.0; count], vec![0.0; BLOCKS]];
-        for (r, v) in column.iter().enumerate() {
-            let dwell = rows.dwells(r)[1];
-            by[0][dwell] += v * v;
-            by[1][Split::Blocks.part(dwell, count)] += v * v;
-        }
-        for (worst, by) in worst.iter_mut().zip(by) {
-            let total: f64 = by.iter().sum();
-            *worst = worst.max(by.into_iter().fold(0.0, f64::max) / total);
-        }
-    }
-    worst
-}
-
-/// Everything that is tried on a sensor, and the effects that its experiment does not show.
-fn candidates(rows: &Rows, dwell_ends: &[f64]) -> (Vec<Candidate>, Vec<(String, String)>) {
-    let sensor = rows.sensor;
-    let mut all = Vec::new();
-    let mut not_excited = Vec::new();
-    // Excitation is judged by the known noise.
-    let plain = Search::new(rows, Vec::new());
-    let Some(whitener) = plain.spread.whitener(&plain.spread.none()) else {
-        return (all, not_excited);
-    };
-    let q = whitener.whiten(&plain.basis).qr().q();
-    let across = |columns: &DMatrix<f64>| {
-        let white = whitener.whiten(columns);
-        let z = &white - &q * q.tr_mul(&white);
-        // Of what the affine parameters span rounding leaves a little.
-        DVector::from_fn(z.ncols(), |k, _| {
-            let (left, all) = (z.column(k).norm(), white.column(k).norm());
-            if left > 1e-6 * all { left } else { 0.0 }
-        })
-    };
-    for effect in library::all().filter(|e| e.sensor == sensor) {
-        let mut candidate = Candidate::new(sensor, Kind::Effect(effect));
-        let mut best = vec![0.0_f64; effect.coefficients.len()];
-        for form in candidate.forms() {
-            let seen = across(&candidate.columns(rows, form));
-            for (best, (seen, typical)) in best.iter_mut().zip(seen.iter().zip(effect.typical)) {
-                if seen.is_finite() {
-                    *best = best.max(seen * typical);
-                }
-            }
-        }
-        candidate.active.retain(|k| best[*k] > EXCITED);
-        if candidate.active.is_empty() {
-            not_excited.push((effect.id.into(), effect.needs.into()));
-        } else {
-            all.push(candidate);
-        }
-    }
-    for monomial in Monomial::all() {
-        let first = Candidate::new(sensor, Kind::Term(0, monomial.clone()));
-        for axis in 0..3 {
-            let candidate = Candidate {
-                kind: Kind::Term(axis, monomial.clone()),
-                ..first.clone()
-            };
-            let columns = candidate.columns(rows, 0.0);
-            if columns.iter().all(|v| v.is_finite()) && across(&columns)[0] > 0.0 {
-                all.push(candidate);
-            }
-        }
-    }
-    for &t_s in dwell_ends {
-        all.extend((0..3).map(|axis| Candidate::new(sensor, Kind::Jump(axis, t_s))));
-    }
-    (all, not_excited)
-}
-
-/// Decides on the rows of one sensor; `dwell_ends` are the times between dwells, where a bias may have jumped, s.
-pub fn decide(rows: &Rows, dwell_ends: &[f64]) -> Option<Decision> {
+/// Decides on the rows of one sensor; `dwell_ends` are the times between dwells, where a bias may have jumped: index of the
+/// recording and s. `unseen` are the rows of a second recording, which nothing is found in: what it contradicts is not accepted.
+pub fn decide(rows: &Rows, dwell_ends: &[(usize, f64)], unseen: Option<&Rows>) -> Option<Decision> {
     let (all, not_excited) = candidates(rows, dwell_ends);
     let search = Search::new(rows, all);
     let null = search.fit(&[])?;
     let known = search.spread.fit_at(&search.basis, &search.spread.none())?;
-    let dof = (rows.y.len() - search.basis.ncols()) as f64;
+    let dof = rows.y.len() as f64 - search.basis.ncols() as f64;
     let omnibus_p = ChiSquared::new(dof).map_or(1.0, |d| d.sf(known.chi2));
     let (chosen, mut with) = search.run()?;
     let mut rejected = Vec::new();
@@ -227,7 +80,7 @@ pub fn decide(rows: &Rows, dwell_ends: &[f64]) -> Option<Decision> {
     let mut jumps = Vec::new();
     for one in chosen {
         match one.candidate.kind {
-            Kind::Jump(..) => jumps.push(one),
+            Kind::Jump { .. } => jumps.push(one),
             _ => kept.push(one),
         }
     }
@@ -247,7 +100,23 @@ pub fn decide(rows: &Rows, dwell_ends: &[f64]) -> Option<Decision> {
         let alone = block > LEVERAGE || held_rms(&all, with, usual).is_none();
         (dwell, if alone { Split::Interleaved } else { usual })
     };
+    let elsewhere = |kept: &[Chosen], values: &[DVector<f64>]| -> Vec<Option<Second>> {
+        let given: Vec<Given> = kept
+            .iter()
+            .zip(values)
+            .map(|(c, values)| Given {
+                candidate: &c.candidate,
+                form: c.form,
+                values,
+            })
+            .collect();
+        match unseen.and_then(|u| second(u, &given)) {
+            Some(all) => all.into_iter().map(Some).collect(),
+            None => vec![None; kept.len()],
+        }
+    };
     loop {
+        let seconds = elsewhere(&kept, &shares(&search, &kept, &with));
         let mut worst: Option<(usize, String)> = None;
         for i in (0..kept.len()).rev() {
             let mut rest = kept.clone();
@@ -265,6 +134,12 @@ pub fn decide(rows: &Rows, dwell_ends: &[f64]) -> Option<Decision> {
                 (Some(a), Some(b)) if !(b < a) => {
                     format!("the held-out error does not go down: {a:.3e} without, {b:.3e} with")
                 }
+                _ if seconds[i].is_some_and(|s| s.contradicts()) => {
+                    let [a, b] = seconds[i].map_or([f64::NAN; 2], |s| s.rms);
+                    format!(
+                        "the error of the second recording does not go down: {a:.3e} without, {b:.3e} with"
+                    )
+                }
                 (_, None) => "what is left when a block is held out does not determine it".into(),
                 _ => continue,
             };
@@ -280,6 +155,8 @@ pub fn decide(rows: &Rows, dwell_ends: &[f64]) -> Option<Decision> {
         .spread
         .fit(&model, &with.components, By::Restricted)?;
     let mut accepted = Vec::new();
+    let values = shares(&search, &kept, &last);
+    let seconds = elsewhere(&kept, &values);
     let mut from = search.basis.ncols();
     for (i, one) in kept.iter().enumerate() {
         let count = one.columns.ncols();
@@ -294,7 +171,8 @@ pub fn decide(rows: &Rows, dwell_ends: &[f64]) -> Option<Decision> {
         accepted.push(Accepted {
             chosen: one.clone(),
             split,
-            values: last.coefficients.rows(from, count).into_owned(),
+            values: values[i].clone(),
+            second: seconds[i],
             covariance: last
                 .covariance
                 .view((from, from), (count, count))
@@ -359,6 +237,7 @@ pub fn decide(rows: &Rows, dwell_ends: &[f64]) -> Option<Decision> {
         rejected,
         not_excited,
         leftover: left,
+        rows: [rows.y.len(), search.basis.ncols()],
         omnibus_p,
     })
 }
@@ -368,55 +247,14 @@ fn known_in(stratum: &super::rows::Stratum, judged: usize) -> f64 {
     stratum.known.diagonal().rows(0, rows).sum()
 }
 
-/// Scatter beyond the known noise, stratum by stratum, and what it goes with.
-fn leftover(
-    search: &Search,
-    model: &DMatrix<f64>,
-    last: &Fitted,
-    jumps: &[Chosen],
-) -> Vec<Leftover> {
-    let rows = search.rows;
-    let mut left = Vec::new();
-    let spread = Spread::new(rows, true);
-    let Some(last) = spread.fit(model, &last.components, By::Likelihood) else {
-        return left;
-    };
-    for (s, stratum) in rows.strata.iter().enumerate() {
-        let (excess, walk) = (last.components.excess[s], last.components.walk[s]);
-        let unit = stratum.walk.as_ref().map_or(0.0, |w| w.diagonal().mean());
-        let strength = (excess + walk * unit).sqrt();
-        let jump = jumps
-            .iter()
-            .find(|j| j.candidate.axes().first().copied() == stratum.axis);
-        // Without the components of this stratum: does the known noise do? A bias wanders, and while nobody has recorded
-        // by how much, that it does is no news.
-        let mut bare = last.components.clone();
-        bare.excess[s] = 0.0;
-        if stratum.wander_known {
-            bare.walk[s] = 0.0;
-        }
-        let Some(bare) = spread.fit_at(model, &bare) else {
-            continue;
-        };
-        let worse = bare.deviance - last.deviance;
-        // Two components at the edge of what they can be: chi-square of two degrees of freedom is on the safe side.
-        let p = (-0.5 * worse).exp() * rows.strata.len() as f64;
-        let floor = stratum.known.diagonal().mean().sqrt();
-        let wanders_far = !stratum.wander_known && strength > WANDERS * floor;
-        if p > FALSE_LEFTOVER && jump.is_none() && !wanders_far {
-            continue;
-        }
-        let against = match jump {
-            Some(jump) => jump.candidate.id(),
-            None if walk * unit > excess => "time: the bias wanders".into(),
-            None => "no quantity recorded: the dwells do not repeat".into(),
-        };
-        left.push(Leftover {
-            stratum: stratum.name.clone(),
-            axis: stratum.axis,
-            against,
-            strength,
-        });
+/// Coefficients of each of the chosen.
+fn shares(search: &Search, chosen: &[Chosen], fit: &Fitted) -> Vec<DVector<f64>> {
+    let mut from = search.basis.ncols();
+    let mut all = Vec::new();
+    for one in chosen {
+        let count = one.columns.ncols();
+        all.push(fit.coefficients.rows(from, count).into_owned());
+        from += count;
     }
-    left
+    all
 }

@@ -10,6 +10,8 @@ pub const REFERENCE_C: f64 = 25.0;
 /// What a unit undergoes over a short stretch of time, in the body frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Moment {
+    /// Index of its recording.
+    pub session: usize,
     /// Middle of the stretch, s since the recording began.
     pub t_s: f64,
     /// Its length, s.

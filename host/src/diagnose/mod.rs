@@ -21,13 +21,18 @@ pub mod search;
 pub mod spread;
 
 use decision::{Decision, decide};
+use mimu_core::compensation::Affine;
+use nalgebra::{Matrix3, Vector3};
 use removal::{Removed, remove};
-use rows::Rows;
+use rows::{Free, Rows, Session};
 
+use crate::calibration::Calibration;
 use crate::dwell::Sensor;
 use crate::error::{Error, Result};
-use crate::fit::{Fit, Options, fit};
+use crate::estimate::session_bias;
+use crate::fit::{Fit, Options, fit, fit_biases};
 use crate::prepared::Prepared;
+use crate::recording::{RawUnit, Reference};
 
 /// What a diagnosis says.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -75,19 +80,118 @@ pub struct Diagnosis {
     pub verdict: Verdict,
 }
 
-/// Times between the dwells, s since the recording began.
-fn dwell_ends(prepared: &Prepared) -> Vec<f64> {
-    let t0_s = prepared.condensed.blocks.first().map_or(0.0, |b| b.start_s);
-    let ends = prepared.dwells.list.windows(2);
-    ends.map(|d| 0.5 * (d[0].last_s + d[1].start_s) - t0_s)
-        .collect()
+/// What a diagnosis is made from.
+#[derive(Debug, Clone)]
+pub struct Recordings<'a> {
+    /// The recording that the calibration is made from.
+    pub first: Prepared,
+    /// More of the same unit: effects are found in all of them together; each has biases of its own.
+    pub more: Vec<Prepared>,
+    /// One that nothing is found in, and that effects are judged by.
+    pub second: Option<Prepared>,
+    /// The calibration of the unit, where the first recording cannot make one: its matrices are kept, and its effects taken out.
+    pub given: Option<&'a Calibration>,
 }
 
-/// Diagnoses a recording.
+impl From<Prepared> for Recordings<'_> {
+    fn from(first: Prepared) -> Self {
+        Self {
+            first,
+            more: Vec::new(),
+            second: None,
+            given: None,
+        }
+    }
+}
+
+impl Recordings<'_> {
+    fn later(&self) -> impl Iterator<Item = &Prepared> {
+        self.more.iter().chain(&self.second)
+    }
+
+    /// Refuses recordings that cannot be of one unit.
+    fn check(&self) -> Result<()> {
+        let (unit, raw_unit) = (&self.first.manifest.device, self.first.manifest.raw_unit);
+        for other in self.later() {
+            if other.manifest.raw_unit != raw_unit {
+                return Err(Error::new(
+                    &other.place,
+                    format!(
+                        "raw_unit is {}, and that of the first recording {raw_unit}",
+                        other.manifest.raw_unit
+                    ),
+                    "give recordings that the same converter wrote",
+                ));
+            }
+        }
+        let given = self.given.map(|c| (c.device.as_str(), "the calibration"));
+        let recordings = self
+            .later()
+            .map(|r| (r.manifest.device.as_str(), r.place.as_str()));
+        if let Some((device, place)) = recordings.chain(given).find(|(d, _)| d != unit) {
+            return Err(Error::new(
+                place,
+                format!("device is {device:?}, and that of the first recording {unit:?}"),
+                "effects are a unit's own: give recordings of one unit, or mend the name in recording.toml",
+            ));
+        }
+        Ok(())
+    }
+}
+
+/// Whether nothing but the biases can be found: matrices for the gyro and the accelerometer, raw to SI.
+///
+/// They are those of the given calibration. Without one, readings in SI of a unit that was never turned are what they say.
+fn matrices(recordings: &Recordings) -> Option<[Option<Affine<f64>>; 2]> {
+    if let Some(given) = recordings.given {
+        return Some(Sensor::BOTH.map(|s| given.inverse(s)));
+    }
+    let first = &recordings.first;
+    let unit = Affine {
+        matrix: Matrix3::identity(),
+        offset: Vector3::zeros(),
+    };
+    let never_turned = match first.manifest.reference {
+        Reference::Gravity => !first.has(Sensor::Accel),
+        Reference::Table => Sensor::BOTH.iter().all(|s| {
+            let inputs: Vec<_> = first.observations(*s).iter().map(|o| o.input).collect();
+            inputs.windows(2).all(|w| w[0] == w[1])
+        }),
+    };
+    (first.manifest.raw_unit == RawUnit::Si && never_turned).then_some([Some(unit); 2])
+}
+
+/// Times between the dwells, s since the recording began, and which recording.
+fn dwell_ends(recordings: &[&Prepared]) -> Vec<(usize, f64)> {
+    let mut all = Vec::new();
+    for (session, prepared) in recordings.iter().enumerate() {
+        let t0_s = prepared.condensed.blocks.first().map_or(0.0, |b| b.start_s);
+        let ends = prepared.dwells.list.windows(2);
+        all.extend(ends.map(|d| (session, 0.5 * (d[0].last_s + d[1].start_s) - t0_s)));
+    }
+    all
+}
+
+/// A later recording beside the calibration of the first: its matrices, and biases of its own.
+fn session<'a>(prepared: &'a Prepared, models: &[Option<Affine<f64>>; 2]) -> Session<'a> {
+    let [gyro, accel] = [0, 1].map(|i| {
+        let known = models[i]?;
+        let own = session_bias::estimate(prepared, Sensor::BOTH[i], &known);
+        Some(own.map_or(known, |e| e.triad.inverse))
+    });
+    Session {
+        prepared,
+        gyro,
+        accel,
+    }
+}
+
+/// Diagnoses a unit.
 ///
 /// The accelerometer comes first: without a table it is what the gyro is judged by.
-pub fn diagnose(prepared: Prepared, options: Options) -> Result<Diagnosis> {
-    let place = prepared.place.clone();
+pub fn diagnose(recordings: Recordings, options: Options) -> Result<Diagnosis> {
+    recordings.check()?;
+    let place = recordings.first.place.clone();
     let singular = || {
         Error::new(
             &place,
@@ -95,19 +199,47 @@ pub fn diagnose(prepared: Prepared, options: Options) -> Result<Diagnosis> {
             "look at the columns of the recording",
         )
     };
-    let before = fit(prepared, options)?;
+    let held = matrices(&recordings);
+    let free = match held {
+        Some(_) => Free::Bias,
+        None => Free::Affine,
+    };
+    let calibrate = |prepared: Prepared| match held {
+        Some(matrices) => fit_biases(prepared, options, matrices),
+        None => fit(prepared, options),
+    };
+    let without = |prepared: &Prepared| match (recordings.given, held) {
+        (Some(given), Some([gyro, accel])) => {
+            remove(prepared, gyro.as_ref(), accel.as_ref(), given.effects())
+        }
+        _ => Some(prepared.clone()),
+    };
+    let before = calibrate(without(&recordings.first).ok_or_else(singular)?)?;
+    let mut later: Vec<Prepared> = Vec::new();
+    for prepared in recordings.later() {
+        later.push(without(prepared).ok_or_else(singular)?);
+    }
+    let found_in = 1 + recordings.more.len();
     let mut now = before.clone();
     let mut effects: Vec<Removed> = Vec::new();
     let mut sensors = Vec::new();
     for sensor in [Sensor::Accel, Sensor::Gyro] {
-        let Some(fitted) = now.sensor(sensor) else {
+        if now.sensor(sensor).is_none() {
             continue;
+        }
+        let models = Sensor::BOTH.map(|s| now.sensor(s).map(|f| f.estimated.triad.inverse));
+        let head = Session {
+            prepared: &now.prepared,
+            gyro: models[0],
+            accel: models[1],
         };
-        let model = |s: Sensor| now.sensor(s).map(|f| f.estimated.triad.inverse);
-        let (inverse, accel) = (fitted.estimated.triad.inverse, model(Sensor::Accel));
-        let rows =
-            Rows::new(&now.prepared, sensor, &inverse, accel.as_ref()).ok_or_else(singular)?;
-        let decision = decide(&rows, &dwell_ends(&now.prepared)).ok_or_else(singular)?;
+        let others = later.iter().map(|p| session(p, &models));
+        let sessions: Vec<Session> = std::iter::once(head).chain(others).collect();
+        let (ours, unseen) = sessions.split_at(found_in);
+        let rows = Rows::of(ours, sensor, free).ok_or_else(singular)?;
+        let unseen = Rows::of(unseen, sensor, free);
+        let all: Vec<&Prepared> = ours.iter().map(|s| s.prepared).collect();
+        let decision = decide(&rows, &dwell_ends(&all), unseen.as_ref()).ok_or_else(singular)?;
         let found: Vec<Removed> = decision
             .accepted
             .iter()
@@ -118,15 +250,14 @@ pub fn diagnose(prepared: Prepared, options: Options) -> Result<Diagnosis> {
             })
             .collect();
         if !found.is_empty() {
-            let cleaned = remove(
-                &now.prepared,
-                model(Sensor::Gyro).as_ref(),
-                accel.as_ref(),
-                &found,
-            )
-            .ok_or_else(singular)?;
+            let clean = |s: &Session| {
+                remove(s.prepared, s.gyro.as_ref(), s.accel.as_ref(), &found).ok_or_else(singular)
+            };
+            let mut cleaned: Vec<Prepared> = sessions.iter().map(clean).collect::<Result<_>>()?;
+            let first = cleaned.remove(0);
             effects.extend(found);
-            now = fit(cleaned, options)?;
+            later = cleaned;
+            now = calibrate(first)?;
         }
         sensors.push(SensorDiagnosis { sensor, decision });
     }

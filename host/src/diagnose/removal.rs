@@ -85,6 +85,7 @@ pub fn remove(
         let moment =
             |at: usize, t_s: f64, duration_s: f64, rate: Vector3<f64>, force: Vector3<f64>| {
                 Moment {
+                    session: 0,
                     t_s: t_s - t0_s,
                     duration_s,
                     rate,

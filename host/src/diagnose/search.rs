@@ -55,7 +55,7 @@ pub struct Search<'a> {
 }
 
 /// Columns that span what `columns` do.
-fn basis(columns: &DMatrix<f64>) -> DMatrix<f64> {
+pub fn basis(columns: &DMatrix<f64>) -> DMatrix<f64> {
     let svd = columns.clone().svd(true, false);
     let largest = svd.singular_values.max();
     let kept: Vec<usize> = (0..svd.singular_values.len())
@@ -373,7 +373,7 @@ const PREFERENCE: f64 = 12.0;
 const CONFUSED: f64 = 12.0;
 
 /// Columns of size 1.
-fn unit_columns(columns: &DMatrix<f64>) -> DMatrix<f64> {
+pub fn unit_columns(columns: &DMatrix<f64>) -> DMatrix<f64> {
     let mut columns = columns.clone();
     for mut column in columns.column_iter_mut() {
         let norm = column.norm();

@@ -87,6 +87,15 @@ fn accepted(sensor: Sensor, a: &Accepted) -> Value {
             .map(|(id, worse)| json!({ "id": id, "deviance_worse_by": worse }))
             .collect::<Vec<_>>(),
     });
+    if let Some(second) = a.second {
+        value["second"] = json!({
+            "rms_before": number(second.rms[0]),
+            "rms_after": number(second.rms[1]),
+            "chi2_before": number(second.chi2[0]),
+            "chi2_after": number(second.chi2[1]),
+            "expected_sigmas": number(second.expected),
+        });
+    }
     if let Some(form) = a.chosen.candidate.form() {
         value["form"] = json!({ "name": form.name, "value": a.chosen.form });
     }
@@ -104,6 +113,8 @@ fn sensor(d: &Diagnosis, s: &SensorDiagnosis) -> Value {
         "held_out_rms_after": number(decision.held_out_rms[1]),
         "held_out": split(decision.split),
         "noise_floor": decision.noise_floor,
+        "rows": decision.rows[0],
+        "affine_parameters": decision.rows[1],
         "omnibus_chance": decision.omnibus_p,
     })
 }

@@ -5,7 +5,6 @@ use std::fmt::Write as _;
 use super::DiagnosisReport;
 use crate::diagnose::decision::{Accepted, Decision, Split};
 use crate::diagnose::{SensorDiagnosis, Verdict};
-use crate::dwell::Sensor;
 use crate::fit::Figure;
 use crate::report::text::{readable, three, warn};
 
@@ -91,11 +90,18 @@ fn sensor(out: &mut String, s: &SensorDiagnosis, figure: Figure) {
             "  held out every fourth dwell: one block of time alone shows what is needed"
         );
     }
+    let [rows, parameters] = d.rows;
+    if rows < parameters + FEW {
+        let _ = writeln!(
+            out,
+            "  {rows} residuals for {parameters} affine parameters: nothing can be found in them, and nothing refuted"
+        );
+    }
     for a in &d.accepted {
-        effect(out, s.sensor, a, &shown);
+        effect(out, a, &shown);
     }
     for l in &d.leftover {
-        let (factor, unit) = match l.stratum == "turns" {
+        let (factor, unit) = match l.stratum.starts_with("turns") {
             true => (1f64.to_degrees(), "deg"),
             false => readable(Figure::Input, s.sensor),
         };
@@ -110,7 +116,7 @@ fn sensor(out: &mut String, s: &SensorDiagnosis, figure: Figure) {
     tried(out, d);
 }
 
-fn effect(out: &mut String, sensor: Sensor, a: &Accepted, shown: &impl Fn(f64) -> String) {
+fn effect(out: &mut String, a: &Accepted, shown: &impl Fn(f64) -> String) {
     let candidate = &a.chosen.candidate;
     let about = candidate.about();
     let _ = writeln!(out, "  + {}: {about}", candidate.id());
@@ -121,7 +127,22 @@ fn effect(out: &mut String, sensor: Sensor, a: &Accepted, shown: &impl Fn(f64) -
         shown(a.held_out[1]),
         odds(a.chosen.p)
     );
-    let _ = sensor;
+    match &a.second {
+        Some(second) if second.shows() => {
+            let [x, y] = second.rms.map(shown);
+            let _ = writeln!(
+                out,
+                "    second recording {x} without it, {y} with it, its affine parameters its own"
+            );
+        }
+        Some(_) => {
+            let _ = writeln!(
+                out,
+                "    the second recording does not excite it, and can say nothing of it"
+            );
+        }
+        None => {}
+    }
     for (i, (name, unit)) in candidate.names().iter().enumerate() {
         // Twice the standard deviation: with dwells by the dozen Student's factor is within a tenth of it.
         let half = 2.0 * a.covariance[(i, i)].sqrt();
@@ -143,6 +164,8 @@ fn effect(out: &mut String, sensor: Sensor, a: &Accepted, shown: &impl Fn(f64) -
     }
 }
 
+/// Fewer residuals beyond the affine parameters than this say nothing.
+const FEW: usize = 3;
 /// Alternatives that are listed.
 const SHOWN: usize = 3;
 

@@ -1,0 +1,78 @@
+//! Structure that nothing explains.
+
+use nalgebra::DMatrix;
+
+use crate::diagnose::search::{Chosen, Search};
+use crate::diagnose::spread::{By, Fitted, Spread};
+
+/// A bias that wanders by this many times the noise of a dwell mean is told of even where nobody has recorded how far it may: sensors
+/// of the usual kind wander by up to three in half an hour.
+const WANDERS: f64 = 4.0;
+/// Probability that the rows of a clean sensor scatter so much that structure is told of.
+pub const FALSE_LEFTOVER: f64 = 1e-3;
+
+/// Structure that is left.
+#[derive(Debug, Clone)]
+pub struct Leftover {
+    /// Stratum: an axis, `turns`.
+    pub stratum: String,
+    /// Axis, if it is of one.
+    pub axis: Option<usize>,
+    /// What it goes with, if with anything.
+    pub against: String,
+    /// Root mean square beyond the noise, unit of the rows.
+    pub strength: f64,
+}
+
+/// Scatter beyond the known noise, stratum by stratum, and what it goes with.
+pub(super) fn leftover(
+    search: &Search,
+    model: &DMatrix<f64>,
+    last: &Fitted,
+    jumps: &[Chosen],
+) -> Vec<Leftover> {
+    let rows = search.rows;
+    let mut left = Vec::new();
+    let spread = Spread::new(rows, true);
+    let Some(last) = spread.fit(model, &last.components, By::Likelihood) else {
+        return left;
+    };
+    for (s, stratum) in rows.strata.iter().enumerate() {
+        let (excess, walk) = (last.components.excess[s], last.components.walk[s]);
+        let unit = stratum.walk.as_ref().map_or(0.0, |w| w.diagonal().mean());
+        let strength = (excess + walk * unit).sqrt();
+        let jump = jumps
+            .iter()
+            .find(|j| j.candidate.axes().first().copied() == stratum.axis);
+        // Without the components of this stratum: does the known noise do? A bias wanders, and while nobody has recorded
+        // by how much, that it does is no news.
+        let mut bare = last.components.clone();
+        bare.excess[s] = 0.0;
+        if stratum.wander_known {
+            bare.walk[s] = 0.0;
+        }
+        let Some(bare) = spread.fit_at(model, &bare) else {
+            continue;
+        };
+        let worse = bare.deviance - last.deviance;
+        // Two components at the edge of what they can be: chi-square of two degrees of freedom is on the safe side.
+        let p = (-0.5 * worse).exp() * rows.strata.len() as f64;
+        let floor = stratum.known.diagonal().mean().sqrt();
+        let wanders_far = !stratum.wander_known && strength > WANDERS * floor;
+        if p > FALSE_LEFTOVER && jump.is_none() && !wanders_far {
+            continue;
+        }
+        let against = match jump {
+            Some(jump) => jump.candidate.id(),
+            None if walk * unit > excess => "time: the bias wanders".into(),
+            None => "no quantity recorded: the dwells do not repeat".into(),
+        };
+        left.push(Leftover {
+            stratum: stratum.name.clone(),
+            axis: stratum.axis,
+            against,
+            strength,
+        });
+    }
+    left
+}

@@ -1,0 +1,72 @@
+//! What is tried on a sensor.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::diagnose::candidate::{Candidate, Kind, Monomial};
+use crate::diagnose::library;
+use crate::diagnose::rows::Rows;
+use crate::diagnose::search::Search;
+
+/// An effect whose coefficient of the size of a data sheet would not be this many sigmas is not excited.
+const EXCITED: f64 = 3.0;
+
+/// Everything that is tried on a sensor, and the effects that its experiment does not show.
+pub(super) fn candidates(
+    rows: &Rows,
+    dwell_ends: &[(usize, f64)],
+) -> (Vec<Candidate>, Vec<(String, String)>) {
+    let sensor = rows.sensor;
+    let mut all = Vec::new();
+    let mut not_excited = Vec::new();
+    // Excitation is judged by the known noise.
+    let plain = Search::new(rows, Vec::new());
+    let Some(whitener) = plain.spread.whitener(&plain.spread.none()) else {
+        return (all, not_excited);
+    };
+    let q = whitener.whiten(&plain.basis).qr().q();
+    let across = |columns: &DMatrix<f64>| {
+        let white = whitener.whiten(columns);
+        let z = &white - &q * q.tr_mul(&white);
+        // Of what the affine parameters span rounding leaves a little.
+        DVector::from_fn(z.ncols(), |k, _| {
+            let (left, all) = (z.column(k).norm(), white.column(k).norm());
+            if left > 1e-6 * all { left } else { 0.0 }
+        })
+    };
+    for effect in library::all().filter(|e| e.sensor == sensor) {
+        let mut candidate = Candidate::new(sensor, Kind::Effect(effect));
+        let mut best = vec![0.0_f64; effect.coefficients.len()];
+        for form in candidate.forms() {
+            let seen = across(&candidate.columns(rows, form));
+            for (best, (seen, typical)) in best.iter_mut().zip(seen.iter().zip(effect.typical)) {
+                if seen.is_finite() {
+                    *best = best.max(seen * typical);
+                }
+            }
+        }
+        candidate.active.retain(|k| best[*k] > EXCITED);
+        if candidate.active.is_empty() {
+            not_excited.push((effect.id.into(), effect.needs.into()));
+        } else {
+            all.push(candidate);
+        }
+    }
+    for monomial in Monomial::all() {
+        let first = Candidate::new(sensor, Kind::Term(0, monomial.clone()));
+        for axis in 0..3 {
+            let candidate = Candidate {
+                kind: Kind::Term(axis, monomial.clone()),
+                ..first.clone()
+            };
+            let columns = candidate.columns(rows, 0.0);
+            if columns.iter().all(|v| v.is_finite()) && across(&columns)[0] > 0.0 {
+                all.push(candidate);
+            }
+        }
+    }
+    for &(session, t_s) in dwell_ends {
+        let jump = |axis| Kind::Jump { axis, session, t_s };
+        all.extend((0..3).map(|axis| Candidate::new(sensor, jump(axis))));
+    }
+    (all, not_excited)
+}
