@@ -1,6 +1,6 @@
 //! What is tried: named effects, terms found from the data, and jumps.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, Vector3};
 
 use super::effect::{Effect, Form, Moment};
 use super::rows::Rows;
@@ -276,6 +276,33 @@ impl Candidate {
                 out[0] = f64::from(u8::from(since));
             }
         }
+    }
+
+    /// Whether its regressors move with temperature or time; found by moving them, so that no effect has to say it.
+    pub fn is_slow(&self) -> bool {
+        let early = Moment {
+            session: 0,
+            t_s: 100.0,
+            duration_s: 1.0,
+            rate: Vector3::new(0.3, 0.5, 0.7),
+            force: Vector3::new(3.0, 5.0, 7.0),
+            angular_acceleration: Vector3::new(0.2, 0.3, 0.4),
+            sensed: Vector3::new(1.0, 2.0, 3.0),
+            warm_c: 5.0,
+            late_c: 4.0,
+        };
+        let late = Moment {
+            t_s: 200.0,
+            warm_c: 9.0,
+            late_c: 6.0,
+            ..early
+        };
+        let form = self.forms()[0];
+        let mut values = [[0.0; MOST_COEFFICIENTS]; 2];
+        for (at, out) in [early, late].iter().zip(&mut values) {
+            self.regressors(at, form, &mut out[..self.active.len()]);
+        }
+        values[0] != values[1]
     }
 
     /// Lag of [`Moment::late_c`] that its regressors want, s.

@@ -59,6 +59,8 @@ pub struct Decision {
     pub split: Split,
     /// What noise alone would leave.
     pub noise_floor: f64,
+    /// What a person should know of the accepted effects.
+    pub notes: Vec<String>,
     /// Rows, and affine parameters that they had to determine first: what is left between them is all that can be judged by.
     pub rows: [usize; 2],
     /// Probability of chance that the rows before scatter as they do, by the known noise alone.
@@ -237,6 +239,7 @@ pub fn decide(rows: &Rows, dwell_ends: &[(usize, f64)], unseen: Option<&Rows>) -
         rejected,
         not_excited,
         leftover: left,
+        notes: notes(rows, &kept),
         rows: [rows.y.len(), search.basis.ncols()],
         omnibus_p,
     })
@@ -257,4 +260,19 @@ fn shares(search: &Search, chosen: &[Chosen], fit: &Fitted) -> Vec<DVector<f64>>
         from += count;
     }
     all
+}
+
+/// What the experiment cannot tell of the chosen.
+fn notes(rows: &Rows, chosen: &[Chosen]) -> Vec<String> {
+    let slow = chosen.iter().filter(|c| c.candidate.is_slow());
+    let ids: Vec<String> = slow.map(|c| c.candidate.id()).collect();
+    let Some(order) = rows.one_way().filter(|_| !ids.is_empty()) else {
+        return Vec::new();
+    };
+    vec![format!(
+        "{}: the temperature only {} while time goes on (rank correlation {order:.2}), so that what follows temperature and what \
+         follows time look alike, and a lag of the die looks like a bias; let it come back within one recording",
+        ids.join(", "),
+        if order > 0.0 { "rises" } else { "falls" },
+    )]
 }

@@ -128,6 +128,9 @@ pub struct Rows {
     first: Vec<usize>,
 }
 
+/// Rank correlation from which on temperature and time are one. A ramp up and half of the way back has 0.5.
+const ONE_WAY: f64 = 0.95;
+
 /// Sensitive directions of the sensors, by rows, unit vectors; and the scale factors, raw/SI.
 pub(super) fn directions(inverse: &Affine<f64>) -> Option<(Matrix3<f64>, Vector3<f64>, Forward)> {
     let forward = Forward::of(inverse)?;
@@ -177,6 +180,17 @@ impl Rows {
             moment.late_c = late[*session][*at];
         }
         Cow::Owned(moments)
+    }
+
+    /// Rank correlation of temperature and time where they go together in all recordings, so that what follows one follows the
+    /// other; `None` where the temperature comes back.
+    pub fn one_way(&self) -> Option<f64> {
+        let correlations: Vec<f64> = self.warm.iter().filter_map(|w| lag::order(w)).collect();
+        let least = correlations.iter().copied().fold(f64::INFINITY, |a, b| {
+            if b.abs() < a.abs() { b } else { a }
+        });
+        let alike = correlations.iter().all(|c| c.signum() == least.signum());
+        (least.is_finite() && alike && least.abs() > ONE_WAY).then_some(least)
     }
 
     /// Columns of some regressors, each the error of one axis: `values` writes those of a moment.

@@ -1,4 +1,4 @@
-//! A first-order lag.
+//! What temperature does over time: behind a lag, and whether it ever comes back.
 
 /// Behind a first-order lag: `(time in s, value)` in, the lagged value out.
 pub fn late(signal: &[(f64, f64)], lag_s: f64) -> Vec<f64> {
@@ -22,6 +22,39 @@ pub fn late(signal: &[(f64, f64)], lag_s: f64) -> Vec<f64> {
     }
     out
 }
+/// Spearman's rank correlation of the values of a signal with time; `None` where fewer than three values are known or all are one.
+pub fn order(signal: &[(f64, f64)]) -> Option<f64> {
+    let mut known: Vec<(usize, f64)> = signal
+        .iter()
+        .map(|s| s.1)
+        .filter(|v| v.is_finite())
+        .enumerate()
+        .collect();
+    let n = known.len();
+    known.sort_by(|a, b| a.1.total_cmp(&b.1));
+    let (first, last) = (known.first()?.1, known.last()?.1);
+    if n < 3 || first == last {
+        return None;
+    }
+    // Equal values share the mean of their ranks.
+    let mut ranks = vec![0.0; n];
+    for same in known.chunk_by(|a, b| a.1 == b.1) {
+        let at = known.partition_point(|k| k.1 < same[0].1);
+        for (index, _) in same {
+            ranks[*index] = at as f64 + 0.5 * (same.len() - 1) as f64;
+        }
+    }
+    let middle = 0.5 * (n - 1) as f64;
+    let (mut both, mut time, mut value) = (0.0, 0.0, 0.0);
+    for (i, rank) in ranks.iter().enumerate() {
+        let (t, v) = (i as f64 - middle, rank - middle);
+        both += t * v;
+        time += t * t;
+        value += v * v;
+    }
+    Some(both / (time * value).sqrt())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -39,5 +72,20 @@ mod tests {
         // The step is a ramp of a second: exp(-99/20) (exp(1/20) - 1) 20 is left of it.
         let left = 20.0 * (-99.0_f64 / 20.0).exp() * (0.05_f64.exp() - 1.0);
         assert!((1.0 - late(&step, 20.0)[99] - left).abs() < 1e-12);
+    }
+
+    #[test]
+    fn order_is_one_for_a_bent_ramp_and_none_for_there_and_back() {
+        let signal = |value: &dyn Fn(f64) -> f64| -> Vec<(f64, f64)> {
+            (0..101).map(|i| (f64::from(i), value(f64::from(i)))).collect()
+        };
+        let falls = signal(&|t| (-t / 20.0).exp());
+        assert!((order(&falls).unwrap() + 1.0).abs() < 1e-12);
+        let returns = signal(&|t| -(t - 50.0).abs());
+        assert!(order(&returns).unwrap().abs() < 1e-12);
+        // Ties: ranks 0.5, 0.5, 2.5, 2.5 against 0, 1, 2, 3 correlate by 4/sqrt(5 * 4).
+        let steps = [(0.0, 1.0), (1.0, 1.0), (2.0, 5.0), (3.0, 5.0)];
+        assert!((order(&steps).unwrap() - 4.0 / 20f64.sqrt()).abs() < 1e-12);
+        assert_eq!(order(&signal(&|_| 3.0)), None);
     }
 }

@@ -113,6 +113,7 @@ fn sensor(d: &Diagnosis, s: &SensorDiagnosis) -> Value {
         "held_out_rms_after": number(decision.held_out_rms[1]),
         "held_out": split(decision.split),
         "noise_floor": decision.noise_floor,
+        "notes": decision.notes,
         "rows": decision.rows[0],
         "affine_parameters": decision.rows[1],
         "omnibus_chance": decision.omnibus_p,

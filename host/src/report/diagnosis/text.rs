@@ -100,6 +100,9 @@ fn sensor(out: &mut String, s: &SensorDiagnosis, figure: Figure) {
     for a in &d.accepted {
         effect(out, a, &shown);
     }
+    for note in &d.notes {
+        let _ = writeln!(out, "  note: {note}");
+    }
     for l in &d.leftover {
         let (factor, unit) = match l.stratum.starts_with("turns") {
             true => (1f64.to_degrees(), "deg"),
