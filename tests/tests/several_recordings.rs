@@ -31,7 +31,11 @@ fn session(file: &RigFile, seed: u64) -> Prepared {
     .enumerate()
     {
         let bias = &mut model.as_mut().expect("stated").bias;
-        let sign = if (seed + k as u64).is_multiple_of(2) { 1.0 } else { -1.0 };
+        let sign = if (seed + k as u64).is_multiple_of(2) {
+            1.0
+        } else {
+            -1.0
+        };
         bias.iter_mut().for_each(|b| *b += sign * by);
     }
     let prepared = bench::recorded(&plan(seed), &file, seed);
@@ -79,7 +83,9 @@ fn two_recordings_know_an_effect_better_than_one_by_the_root_of_two() {
     assert_eq!(ids(&both), ["accel_scale_quadratic"]);
     let sigmas = |d: &Diagnosis| {
         let accel = d.sensors.iter().find(|s| s.sensor == Sensor::Accel);
-        accel.expect("there").decision.accepted[0].covariance.clone()
+        accel.expect("there").decision.accepted[0]
+            .covariance
+            .clone()
     };
     let ratio = (sigmas(&alone).trace() / sigmas(&both).trace()).sqrt();
     // The wander that each session has is of its own: exactly the root of two but for how often each pose was taken.
@@ -147,7 +153,6 @@ fn cooling() -> Option<Prepared> {
 #[test]
 fn a_chamber_that_only_cools_cannot_tell_temperature_from_time() {
     let Some(prepared) = cooling() else { return };
-    assert_eq!(prepared.dwells.list.len(), 25);
     let found = diagnose(prepared.into(), OPTIONS).expect("a diagnosis");
     let gyro = &found.sensors[0].decision;
     println!(
@@ -159,11 +164,19 @@ fn a_chamber_that_only_cools_cannot_tell_temperature_from_time() {
     for a in &gyro.accepted {
         println!("{}: {:?}", a.chosen.candidate.id(), a.chosen.alternatives);
     }
-    let of_slow = |id: &str| id.contains("thermal") || id.contains("drift") || id.contains("temp") || id.contains("time") || id.contains("warm");
+    let of_slow = |id: &str| {
+        id.contains("thermal")
+            || id.contains("drift")
+            || id.contains("temp")
+            || id.contains("time")
+            || id.contains("warm")
+    };
     assert!(!gyro.accepted.is_empty());
     for a in &gyro.accepted {
         assert!(of_slow(&a.chosen.candidate.id()));
     }
+    assert!(gyro.held_out_rms[1] < 0.2 * gyro.held_out_rms[0]);
+    assert!(gyro.notes[0].contains("only falls"), "{:?}", gyro.notes);
 }
 
 #[test]
@@ -190,5 +203,10 @@ fn ten_poses_by_hand_leave_nothing_to_find_in_an_accelerometer() {
     let accel = &found.sensors[1].decision;
     // One of the ten is too short; nine poses, nine parameters.
     assert_eq!(accel.rows, [9, 9]);
-    assert!(accel.not_excited.iter().any(|e| e.0 == "accel_scale_quadratic"));
+    assert!(
+        accel
+            .not_excited
+            .iter()
+            .any(|e| e.0 == "accel_scale_quadratic")
+    );
 }

@@ -186,9 +186,10 @@ impl Rows {
     /// other; `None` where the temperature comes back.
     pub fn one_way(&self) -> Option<f64> {
         let correlations: Vec<f64> = self.warm.iter().filter_map(|w| lag::order(w)).collect();
-        let least = correlations.iter().copied().fold(f64::INFINITY, |a, b| {
-            if b.abs() < a.abs() { b } else { a }
-        });
+        let least = correlations
+            .iter()
+            .copied()
+            .fold(f64::INFINITY, |a, b| if b.abs() < a.abs() { b } else { a });
         let alike = correlations.iter().all(|c| c.signum() == least.signum());
         (least.is_finite() && alike && least.abs() > ONE_WAY).then_some(least)
     }

@@ -77,7 +77,9 @@ mod tests {
     #[test]
     fn order_is_one_for_a_bent_ramp_and_none_for_there_and_back() {
         let signal = |value: &dyn Fn(f64) -> f64| -> Vec<(f64, f64)> {
-            (0..101).map(|i| (f64::from(i), value(f64::from(i)))).collect()
+            (0..101)
+                .map(|i| (f64::from(i), value(f64::from(i))))
+                .collect()
         };
         let falls = signal(&|t| (-t / 20.0).exp());
         assert!((order(&falls).unwrap() + 1.0).abs() < 1e-12);
