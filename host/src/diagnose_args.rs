@@ -7,7 +7,7 @@ use mimu::calibration::{Calibration, EffectTable, stage, to_toml};
 use mimu::diagnose::{Recordings, diagnose};
 use mimu::error::Result;
 use mimu::fit::{Method, Options};
-use mimu::report::{self, DiagnosisReport};
+use mimu::report::{self, DiagnosisReport, Made};
 use mimu::verify::verify;
 
 use crate::{JsonArgs, NoiseArgs, StillArgs, print, read};
@@ -29,6 +29,9 @@ pub struct DiagnoseArgs {
     /// Calibration file to write, with the effects
     #[arg(short, value_name = "FILE")]
     output: Option<PathBuf>,
+    /// Page to write: residuals, effects and figures as one HTML file
+    #[arg(long, value_name = "FILE")]
+    page: Option<PathBuf>,
     #[command(flatten)]
     still: StillArgs,
     #[command(flatten)]
@@ -44,7 +47,11 @@ pub fn run(args: &DiagnoseArgs) -> Result<()> {
         still_factor: args.still.factor,
         only: None,
     };
-    let outputs = [args.output.as_deref(), args.json.file()];
+    let outputs = [
+        args.output.as_deref(),
+        args.page.as_deref(),
+        args.json.file(),
+    ];
     let inputs = [args.noise.file.as_deref(), args.calibration.as_deref()];
     let open = |path: &PathBuf| {
         let prepared = read(path, args.still.factor, &outputs, &inputs)?;
@@ -90,18 +97,44 @@ pub fn run(args: &DiagnoseArgs) -> Result<()> {
         let by = |text: &str| verify(&other, &Calibration::parse(text, "calibration")?);
         judged = Some((path.display().to_string(), [by(&before)?, by(&after)?]));
     }
-    let mut calibration = None;
+    let mut files = Vec::new();
     if let Some(path) = &args.output {
-        calibration = Some(stage(path, after)?);
+        files.push(stage(path, after)?);
     }
     let found = DiagnosisReport {
         diagnosis,
         second: judged,
     };
+    let named: Vec<String> = args
+        .recordings
+        .iter()
+        .map(|r| r.display().to_string())
+        .collect();
+    if let Some(path) = &args.page {
+        let made = Made {
+            recording: named.join(", "),
+            command: command_line(),
+            created: now,
+        };
+        files.push(stage(path, report::diagnosis_page(&found, &made)?)?);
+    }
     print(
         &args.json,
         &report::diagnosis_text(&found),
         &report::diagnosis_json(&found),
-        calibration,
+        files,
     )
+}
+
+/// The command as it was typed, without the path of the program.
+fn command_line() -> String {
+    let arguments = std::env::args_os().skip(1);
+    let shown = arguments.map(|a| match a.to_string_lossy() {
+        a if a.contains([' ', '\'', '"']) => format!("{a:?}"),
+        a => a.into_owned(),
+    });
+    std::iter::once("mimu".to_string())
+        .chain(shown)
+        .collect::<Vec<_>>()
+        .join(" ")
 }

@@ -10,7 +10,7 @@ mod text;
 
 pub use allan::{allan_json, allan_text, allan_toml};
 pub use design::{DesignReport, comparison_json, comparison_text, design_json, design_text};
-pub use diagnosis::{DiagnosisReport, diagnosis_json, diagnosis_text};
+pub use diagnosis::{DiagnosisReport, Made, diagnosis_json, diagnosis_page, diagnosis_text};
 pub use json::{fit_json, import_json, verify_json};
 pub(crate) use text::three;
 pub use text::{dwell_table, fit_text, import_text, verify_text};

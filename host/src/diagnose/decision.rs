@@ -12,17 +12,18 @@ use super::candidate::Kind;
 use super::rows::Rows;
 use super::search::{Chosen, Search};
 use super::spread::{By, Fitted};
-use hold_out::{held_out, leverage, rms};
+use hold_out::leverage;
 use leftover::leftover;
 use second::{Given, second};
 use tried::candidates;
 
 pub use hold_out::Split;
+pub(super) use hold_out::{held_out, rms};
 pub use leftover::{FALSE_LEFTOVER, Leftover};
 pub use second::Second;
 
 /// One dwell that has more than this share in what an effect rests on decides it alone.
-const LEVERAGE: f64 = 0.7;
+pub const LEVERAGE: f64 = 0.7;
 /// An accepted effect with its coefficients.
 #[derive(Debug, Clone)]
 pub struct Accepted {
@@ -85,6 +86,10 @@ pub fn decide(rows: &Rows, dwell_ends: &[(usize, f64)], unseen: Option<&Rows>) -
             Kind::Jump { .. } => jumps.push(one),
             _ => kept.push(one),
         }
+    }
+    // Jumps are told of and not fitted.
+    if !jumps.is_empty() {
+        with = search.fit(&kept)?;
     }
     // What does not hold out goes, the least worth first.
     let held_rms = |chosen: &[Chosen], fit: &Fitted, split: Split| {
@@ -183,7 +188,13 @@ pub fn decide(rows: &Rows, dwell_ends: &[(usize, f64)], unseen: Option<&Rows>) -
         });
         from += count;
     }
-    for one in search.others(&kept, &with) {
+    // Beside the jumps that were found: every slow effect would seem to explain a little of them.
+    let beside: Vec<Chosen> = kept.iter().chain(&jumps).cloned().collect();
+    let all = match jumps.is_empty() {
+        true => with.clone(),
+        false => search.fit(&beside)?,
+    };
+    for one in search.others(&beside, &all) {
         let id = one.candidate.id();
         if rejected.iter().any(|r: &(String, String)| r.0 == id) {
             continue;

@@ -10,11 +10,13 @@
 //! | [`search`]    | which effects the rows ask for                                                   |
 //! | [`decision`]  | which of them are accepted, and what is left                                     |
 //! | [`removal`]   | taking them out of readings                                                      |
+//! | [`picture`]   | what of it can be drawn                                                          |
 
 pub mod candidate;
 pub mod decision;
 pub mod effect;
 pub mod library;
+pub mod picture;
 pub mod removal;
 pub mod rows;
 pub mod search;
@@ -61,6 +63,8 @@ impl Verdict {
 pub struct SensorDiagnosis {
     /// Which.
     pub sensor: Sensor,
+    /// What the affine model leaves of it, the effects of the other sensor taken out.
+    pub rows: Rows,
     /// What its rows led to.
     pub decision: Decision,
 }
@@ -259,7 +263,11 @@ pub fn diagnose(recordings: Recordings, options: Options) -> Result<Diagnosis> {
             later = cleaned;
             now = calibrate(first)?;
         }
-        sensors.push(SensorDiagnosis { sensor, decision });
+        sensors.push(SensorDiagnosis {
+            sensor,
+            rows,
+            decision,
+        });
     }
     sensors.reverse();
     let left = sensors.iter().any(|s| !s.decision.leftover.is_empty());

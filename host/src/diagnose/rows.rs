@@ -169,6 +169,13 @@ impl Rows {
         (dwell - from, to - from)
     }
 
+    /// Mean of a quantity over the moments of row `row`, by their lengths; `moments` are all, as [`Self::moments`] gives them.
+    pub fn mean(&self, row: usize, moments: &[Moment], value: impl Fn(&Moment) -> f64) -> f64 {
+        let of_row = &moments[self.rows[row].moments.clone()];
+        let total: f64 = of_row.iter().map(|m| m.duration_s).sum();
+        of_row.iter().map(|m| value(m) * m.duration_s / total).sum()
+    }
+
     /// The moments, with the temperature behind a lag of `lag_s` if there is one.
     pub fn moments(&self, lag_s: Option<f64>) -> Cow<'_, [Moment]> {
         let Some(lag_s) = lag_s else {

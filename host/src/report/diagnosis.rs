@@ -1,9 +1,11 @@
 //! What `mimu diagnose` says.
 
 mod json;
+mod page;
 mod text;
 
 pub use json::diagnosis_json;
+pub use page::{Made, diagnosis_page};
 pub use text::diagnosis_text;
 
 use crate::diagnose::Diagnosis;
@@ -16,4 +18,17 @@ pub struct DiagnosisReport {
     pub diagnosis: Diagnosis,
     /// Name of the other recording, and its figures without and with the effects.
     pub second: Option<(String, [Verification; 2])>,
+}
+
+impl DiagnosisReport {
+    /// What a person should know.
+    pub fn warnings(&self) -> impl Iterator<Item = &String> {
+        let d = &self.diagnosis;
+        let second = self.second.iter();
+        d.after
+            .warnings
+            .iter()
+            .chain(d.after.sensors.iter().flat_map(|s| &s.warnings))
+            .chain(second.flat_map(|(_, [_, after])| &after.warnings))
+    }
 }

@@ -95,7 +95,14 @@ fn an_effect_that_the_device_lacks_is_refused() {
         regressors: |_, _, _| (),
         needs: "slow ramps",
     };
-    for kind in [Kind::Effect(&CODE), Kind::Jump(0, 9.0)] {
+    for kind in [
+        Kind::Effect(&CODE),
+        Kind::Jump {
+            axis: 0,
+            session: 0,
+            t_s: 9.0,
+        },
+    ] {
         let candidate = Candidate::new(Sensor::Gyro, kind);
         let removed = Removed {
             candidate,

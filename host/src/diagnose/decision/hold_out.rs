@@ -10,7 +10,7 @@ use crate::diagnose::spread::Fitted;
 const BLOCKS: usize = 4;
 
 /// Root mean square of the judged rows; of `judged.1` rows a dwell or turn.
-pub(super) fn rms(rows: &Rows, residuals: &DVector<f64>) -> f64 {
+pub(in crate::diagnose) fn rms(rows: &Rows, residuals: &DVector<f64>) -> f64 {
     let (count, together) = rows.judged;
     (residuals.rows(0, count).norm_squared() / (count / together) as f64).sqrt()
 }
@@ -26,7 +26,7 @@ pub enum Split {
 
 impl Split {
     /// Part that a dwell is in; of several recordings each block is a stretch of every one.
-    pub(super) fn part(self, rows: &Rows, dwell: usize) -> usize {
+    pub(in crate::diagnose) fn part(self, rows: &Rows, dwell: usize) -> usize {
         let (place, of) = rows.place(dwell);
         match self {
             Self::Blocks => place * BLOCKS / of.max(1),
@@ -37,7 +37,7 @@ impl Split {
 
 /// Held-out residuals of the judged rows: each by a model that has not seen its block. `None` where what is left of the
 /// experiment does not determine the model.
-pub(super) fn held_out(
+pub(in crate::diagnose) fn held_out(
     search: &Search,
     model: &DMatrix<f64>,
     at: &Fitted,

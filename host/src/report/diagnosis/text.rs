@@ -40,17 +40,7 @@ pub fn diagnosis_text(report: &DiagnosisReport) -> String {
             let _ = writeln!(out, "  {:<8}{x:>16}{y:>16}{z:>16}", b.sensor.name());
         }
     }
-    let second = report
-        .second
-        .iter()
-        .flat_map(|(_, [_, after])| &after.warnings);
-    let warnings: Vec<&String> = d
-        .after
-        .warnings
-        .iter()
-        .chain(d.after.sensors.iter().flat_map(|s| &s.warnings))
-        .chain(second)
-        .collect();
+    let warnings: Vec<&String> = report.warnings().collect();
     if !warnings.is_empty() {
         let _ = writeln!(out);
         warn(&mut out, warnings.into_iter());
@@ -172,7 +162,8 @@ const FEW: usize = 3;
 /// Alternatives that are listed.
 const SHOWN: usize = 3;
 
-fn odds(p: f64) -> String {
+/// 1/p in few digits.
+pub(super) fn odds(p: f64) -> String {
     match 1.0 / p.max(1e-300) {
         n if n < 1e6 => format!("{n:.0}"),
         n => format!("{n:.0e}"),

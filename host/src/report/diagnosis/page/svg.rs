@@ -1,0 +1,274 @@
+//! Drawings as inline SVG, straight: plotters writes its colours into every element, and a page that is read in the dark and
+//! printed in the light needs them from a style sheet.
+
+use std::fmt::Write as _;
+use std::ops::Range;
+
+use maud::{Markup, html};
+
+/// Where points of a drawing go on the page.
+#[derive(Debug, Clone)]
+pub struct Frame {
+    /// Left and right end, pixels.
+    pub across: Range<f64>,
+    /// Top and bottom, pixels.
+    pub down: Range<f64>,
+    /// Values at the left and the right.
+    pub x: Range<f64>,
+    /// Values at the bottom and the top.
+    pub y: Range<f64>,
+}
+
+impl Frame {
+    /// Pixel of an abscissa.
+    pub fn at_x(&self, x: f64) -> f64 {
+        let share = (x - self.x.start) / (self.x.end - self.x.start);
+        self.across.start + share * (self.across.end - self.across.start)
+    }
+
+    /// Pixel of an ordinate.
+    pub fn at_y(&self, y: f64) -> f64 {
+        let share = (y - self.y.start) / (self.y.end - self.y.start);
+        self.down.end - share * (self.down.end - self.down.start)
+    }
+
+    /// Grid, numbers and a heading; numbers on the left only `with_y`.
+    pub fn axes(&self, heading: &str, with_y: bool) -> Markup {
+        let (left, right) = (self.across.start, self.across.end);
+        let (top, bottom) = (self.down.start, self.down.end);
+        let x_ticks = Ticks::over(&self.x, 5);
+        let y_ticks = Ticks::over(&self.y, 5);
+        html! {
+            path class="grid" d=(y_ticks.at.iter().fold(String::new(), |mut d, y| {
+                let _ = write!(d, "M{left:.1} {:.1}H{right:.1}", self.at_y(*y));
+                d
+            })) {}
+            path class="grid" d=(x_ticks.at.iter().fold(String::new(), |mut d, x| {
+                let _ = write!(d, "M{:.1} {top:.1}V{bottom:.1}", self.at_x(*x));
+                d
+            })) {}
+            @if self.y.contains(&0.0) {
+                path class="zero" d={ "M" (px(left)) " " (px(self.at_y(0.0))) "H" (px(right)) } {}
+            }
+            @for x in &x_ticks.at {
+                text class="tick" x=(px(self.at_x(*x))) y=(px(bottom + 14.0)) text-anchor="middle" {
+                    (x_ticks.label(*x))
+                }
+            }
+            @if with_y {
+                @for y in &y_ticks.at {
+                    text class="tick" x=(px(left - 6.0)) y=(px(self.at_y(*y) + 3.5)) text-anchor="end" {
+                        (y_ticks.label(*y))
+                    }
+                }
+            }
+            text class="heading" x=(px(left)) y=(px(top - 8.0)) { (heading) }
+        }
+    }
+
+    /// Name of the abscissa, in the middle of this frame and `last`, which may be the same.
+    pub fn x_name(&self, name: &str, last: &Self) -> Markup {
+        let (x, y) = (
+            0.5 * (self.across.start + last.across.end),
+            self.down.end + 31.0,
+        );
+        html! { text class="name" x=(px(x)) y=(px(y)) text-anchor="middle" { (name) } }
+    }
+
+    /// Name of the ordinate, upright beside the numbers.
+    pub fn y_name(&self, name: &str) -> Markup {
+        let (x, y) = (12.0, 0.5 * (self.down.start + self.down.end));
+        html! {
+            text class="name" x=(px(x)) y=(px(y)) text-anchor="middle"
+                transform={ "rotate(-90 " (px(x)) " " (px(y)) ")" } { (name) }
+        }
+    }
+
+    /// Round marks.
+    pub fn dots(&self, class: &str, points: impl Iterator<Item = (f64, f64)>) -> Markup {
+        // A line of no length with round ends: a tenth of the size of circles.
+        let d = self.path(points, |d, x, y| write!(d, "M{x:.1} {y:.1}h0"));
+        html! { path class=(class) d=(d) {} }
+    }
+
+    /// Open diamonds.
+    pub fn diamonds(&self, class: &str, points: impl Iterator<Item = (f64, f64)>) -> Markup {
+        let d = self.path(points, |d, x, y| {
+            write!(d, "M{x:.1} {:.1}l3.4 3.4l-3.4 3.4l-3.4 -3.4z", y - 3.4)
+        });
+        html! { path class=(class) d=(d) {} }
+    }
+
+    /// Upright bars: abscissa, middle, half the length.
+    pub fn bars(&self, class: &str, bars: impl Iterator<Item = (f64, f64, f64)>) -> Markup {
+        let mut d = String::new();
+        for (x, y, half) in bars.filter(|b| b.0.is_finite() && b.1.is_finite()) {
+            let [low, high] =
+                [y - half, y + half].map(|v| self.at_y(v.clamp(self.y.start, self.y.end)));
+            let _ = write!(d, "M{:.1} {low:.1}V{high:.1}", self.at_x(x));
+        }
+        html! { path class=(class) d=(d) {} }
+    }
+
+    /// A line through points.
+    pub fn line(&self, class: &str, points: impl Iterator<Item = (f64, f64)>) -> Markup {
+        let mut begun = false;
+        let d = self.path(points, |d, x, y| {
+            let letter = if std::mem::replace(&mut begun, true) {
+                'L'
+            } else {
+                'M'
+            };
+            write!(d, "{letter}{x:.1} {y:.1}")
+        });
+        html! { path class=(class) d=(d) {} }
+    }
+
+    /// The area between two lines: abscissa, lowest, highest.
+    pub fn band(&self, class: &str, points: &[(f64, f64, f64)]) -> Markup {
+        let inside = |y: f64| y.clamp(self.y.start, self.y.end);
+        let up = points.iter().map(|p| (p.0, inside(p.2)));
+        let back = points.iter().rev().map(|p| (p.0, inside(p.1)));
+        self.line(class, up.chain(back))
+    }
+
+    /// Every other stretch between `ends`, shaded.
+    pub fn stretches(&self, class: &str, ends: &[f64]) -> Markup {
+        let (top, height) = (self.down.start, self.down.end - self.down.start);
+        let after = ends.get(1..).unwrap_or_default();
+        let right = after.iter().copied().chain([self.x.end]);
+        html! {
+            @for (from, to) in ends.iter().zip(right).step_by(2) {
+                @let (from, to) = (self.at_x(*from), self.at_x(to));
+                rect class=(class) x=(px(from)) y=(px(top)) width=(px(to - from)) height=(px(height)) {}
+            }
+        }
+    }
+
+    fn path(
+        &self,
+        points: impl Iterator<Item = (f64, f64)>,
+        mut mark: impl FnMut(&mut String, f64, f64) -> std::fmt::Result,
+    ) -> String {
+        let mut d = String::new();
+        for (x, y) in points.filter(|p| p.0.is_finite() && p.1.is_finite()) {
+            let _ = mark(&mut d, self.at_x(x), self.at_y(y));
+        }
+        d
+    }
+}
+
+/// Pixels to a tenth.
+pub fn px(v: f64) -> String {
+    format!("{v:.1}")
+}
+
+/// The range of `values` with a little room, and never empty.
+pub fn range(values: impl Iterator<Item = f64>) -> Range<f64> {
+    let (low, high) = values
+        .filter(|v| v.is_finite())
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| {
+            (l.min(v), h.max(v))
+        });
+    if !(low <= high) {
+        return -1.0..1.0;
+    }
+    let room = match high - low {
+        width if width > 0.0 => 0.06 * width,
+        _ => high.abs().max(1e-12),
+    };
+    low - room..high + room
+}
+
+/// Power of ten, of which an axis with these ends is best written in multiples: 0, or so that numbers have few digits.
+pub fn power_of_ten(ends: &Range<f64>) -> i32 {
+    let most = ends.start.abs().max(ends.end.abs());
+    if (0.02..2e4).contains(&most) || most == 0.0 {
+        return 0;
+    }
+    3 * (most.log10() / 3.0).floor() as i32
+}
+
+/// `10⁻³ ` before the unit of an axis that is written in multiples of a power of ten.
+pub fn times_ten(power: i32) -> String {
+    if power == 0 {
+        return String::new();
+    }
+    format!("10{} ", raised(&power.to_string()))
+}
+
+/// Digits as exponents.
+pub fn raised(text: &str) -> String {
+    let one = |c: char| match c {
+        '-' => '⁻',
+        '1' => '¹',
+        '2' => '²',
+        '3' => '³',
+        c => c
+            .to_digit(10)
+            .and_then(|d| char::from_u32('⁰' as u32 + d))
+            .unwrap_or(c),
+    };
+    text.chars().map(one).collect()
+}
+
+/// Round numbers on an axis.
+struct Ticks {
+    at: Vec<f64>,
+    decimals: usize,
+}
+
+impl Ticks {
+    /// About so many in the range.
+    fn over(range: &Range<f64>, about: usize) -> Self {
+        let width = range.end - range.start;
+        let rough = width / about as f64;
+        let decade = 10f64.powf(rough.log10().floor());
+        let step = [1.0, 2.0, 5.0, 10.0]
+            .map(|m| m * decade)
+            .into_iter()
+            .find(|s| *s >= 0.999 * rough)
+            .unwrap_or(10.0 * decade);
+        let from = (range.start / step).ceil() as i64;
+        let to = (range.end / step).floor() as i64;
+        Self {
+            at: (from..=to).map(|k| k as f64 * step).collect(),
+            decimals: (-step.log10()).ceil().clamp(0.0, 9.0) as usize,
+        }
+    }
+
+    fn label(&self, value: f64) -> String {
+        let text = format!("{value:.*}", self.decimals);
+        // Of zero a sum of steps may leave the sign.
+        match text.trim_start_matches('-').trim_matches(['0', '.']) {
+            "" => text.trim_start_matches('-').into(),
+            _ => text.replace('-', "−"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ticks_are_round_and_inside() {
+        let ticks = Ticks::over(&(-0.031..0.047), 5);
+        let labels: Vec<String> = ticks.at.iter().map(|t| ticks.label(*t)).collect();
+        assert_eq!(labels, ["−0.02", "0.00", "0.02", "0.04"]);
+        assert_eq!(power_of_ten(&(-3.1e-5..2e-5)), -6);
+        assert_eq!(times_ten(-6), "10⁻⁶ ");
+    }
+
+    #[test]
+    fn the_ends_of_the_ranges_are_the_edges_of_the_frame() {
+        let frame = Frame {
+            across: 50.0..250.0,
+            down: 10.0..110.0,
+            x: -1.0..1.0,
+            y: 0.0..4.0,
+        };
+        assert_eq!((frame.at_x(-1.0), frame.at_x(1.0)), (50.0, 250.0));
+        assert_eq!((frame.at_y(4.0), frame.at_y(0.0)), (10.0, 110.0));
+    }
+}
