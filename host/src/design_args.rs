@@ -1,5 +1,7 @@
 //! `mimu design`: arguments and what follows from them.
 
+mod effects;
+
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
@@ -21,7 +23,7 @@ use nalgebra::Vector3;
 use crate::{JsonArgs, SensorArg, check_outputs, print};
 
 #[derive(Args)]
-#[command(group(ArgGroup::new("design").required(true).args(["n", "budget", "scheme", "compare"])))]
+#[command(group(ArgGroup::new("design").required(true).args(["n", "budget", "scheme", "compare", "effects"])))]
 pub struct DesignArgs {
     /// Sensor to calibrate
     #[arg(long, value_enum, default_value = "accel")]
@@ -44,6 +46,16 @@ pub struct DesignArgs {
     /// Judge all published schemes beside the best designs of as many dwells
     #[arg(long)]
     compare: bool,
+    /// Find the fewest dwells that show these effects (see `mimu diagnose`) and tell them apart
+    #[arg(long, value_name = "ID[,ID..]", value_delimiter = ',',
+          conflicts_with_all = ["model", "sigma", "instability", "walk", "order"])]
+    effects: Option<Vec<String>>,
+    /// With --effects: a recording that the new one adds to; both are then diagnosed together
+    #[arg(long, value_name = "REC", requires = "effects")]
+    after: Option<PathBuf>,
+    /// With --effects: temperatures of the chamber, °C: where it begins and ends, and two others
+    #[arg(long, value_name = "C,C,C", requires = "effects", allow_hyphen_values = true, value_parser = effects::chamber)]
+    chamber: Option<[f64; 3]>,
     /// What carries the unit; without it three-axis, or hand with --reference gravity
     #[arg(long, value_enum)]
     table: Option<TableArg>,
@@ -375,6 +387,9 @@ impl DesignArgs {
 const RATE_DPS: f64 = 300.0;
 
 pub fn run(args: &DesignArgs) -> Result<()> {
+    if let Some(ids) = &args.effects {
+        return effects::run(args, ids);
+    }
     let stated: Vec<&Path> = match &args.noise {
         Some(NoiseArg::File(path)) => vec![path],
         _ => Vec::new(),

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use mimu::calibration::{Calibration, EffectTable, stage, to_toml};
-use mimu::diagnose::{Recordings, diagnose};
+use mimu::diagnose::{Recordings, diagnose, next};
 use mimu::error::Result;
 use mimu::fit::{Method, Options};
 use mimu::report::{self, DiagnosisReport, Made};
@@ -32,6 +32,9 @@ pub struct DiagnoseArgs {
     /// Page to write: residuals, effects and figures as one HTML file
     #[arg(long, value_name = "FILE")]
     page: Option<PathBuf>,
+    /// Plan of the next experiment to write: what this recording could not show, and what it could not tell apart
+    #[arg(long, value_name = "FILE")]
+    plan: Option<PathBuf>,
     #[command(flatten)]
     still: StillArgs,
     #[command(flatten)]
@@ -50,6 +53,7 @@ pub fn run(args: &DiagnoseArgs) -> Result<()> {
     let outputs = [
         args.output.as_deref(),
         args.page.as_deref(),
+        args.plan.as_deref(),
         args.json.file(),
     ];
     let inputs = [args.noise.file.as_deref(), args.calibration.as_deref()];
@@ -101,8 +105,22 @@ pub fn run(args: &DiagnoseArgs) -> Result<()> {
     if let Some(path) = &args.output {
         files.push(stage(path, after)?);
     }
+    let next = next::next(&diagnosis);
+    let mut said = String::new();
+    if let Some(path) = &args.plan {
+        said = match next::together(&diagnosis, &next) {
+            Some(answer) => {
+                let manifest = &diagnosis.before.prepared.manifest;
+                let text = answer.plan(Some(&manifest.device), manifest.sample_rate_hz);
+                files.push(stage(path, text)?);
+                format!("\nplan of the next experiment: {}\n", path.display())
+            }
+            None => "\nplan of the next experiment: none written, as there is nothing that one of this kind would settle\n".into(),
+        };
+    }
     let found = DiagnosisReport {
         diagnosis,
+        next,
         second: judged,
     };
     let named: Vec<String> = args
@@ -120,7 +138,7 @@ pub fn run(args: &DiagnoseArgs) -> Result<()> {
     }
     print(
         &args.json,
-        &report::diagnosis_text(&found),
+        &(report::diagnosis_text(&found) + &said),
         &report::diagnosis_json(&found),
         files,
     )

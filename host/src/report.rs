@@ -9,7 +9,10 @@ mod json;
 mod text;
 
 pub use allan::{allan_json, allan_text, allan_toml};
-pub use design::{DesignReport, comparison_json, comparison_text, design_json, design_text};
+pub use design::{
+    DesignReport, NextReport, comparison_json, comparison_text, design_json, design_text,
+    next_json, next_text,
+};
 pub use diagnosis::{DiagnosisReport, Made, diagnosis_json, diagnosis_page, diagnosis_text};
 pub use json::{fit_json, import_json, verify_json};
 pub(crate) use text::three;

@@ -38,6 +38,7 @@ pub mod plan;
 pub mod reach;
 pub mod refinement;
 pub mod schemes;
+pub mod settle;
 pub mod tour;
 
 use nalgebra::Vector3;

@@ -28,7 +28,7 @@ use crate::dwell::Sensor;
 use crate::prepared::Prepared;
 use crate::triad::Forward;
 
-pub(super) use lag::late;
+pub(crate) use lag::late;
 
 /// Rows that share their noise.
 #[derive(Debug, Clone)]

@@ -1,9 +1,11 @@
 //! What is reported of a design: the judgement, with what it was judged under.
 
 mod json;
+mod next;
 mod text;
 
 pub use json::{comparison_json, design_json};
+pub use next::{NextReport, next_json, next_text};
 pub use text::{comparison_text, design_text};
 
 use super::three;

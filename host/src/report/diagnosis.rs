@@ -9,6 +9,7 @@ pub use page::{Made, diagnosis_page};
 pub use text::diagnosis_text;
 
 use crate::diagnose::Diagnosis;
+use crate::diagnose::next::Next;
 use crate::verify::Verification;
 
 /// A diagnosis, and the calibration before and after on a recording that it was not made from.
@@ -16,6 +17,8 @@ use crate::verify::Verification;
 pub struct DiagnosisReport {
     /// What was found.
     pub diagnosis: Diagnosis,
+    /// What to record next.
+    pub next: Next,
     /// Name of the other recording, and its figures without and with the effects.
     pub second: Option<(String, [Verification; 2])>,
 }

@@ -4,6 +4,7 @@ mod brute_force;
 mod command;
 mod polynomials;
 mod schemes;
+mod settle;
 mod sphere;
 mod time;
 

@@ -111,7 +111,7 @@ pub fn design_text(report: &DesignReport) -> String {
 }
 
 /// Text in lines beside a name.
-fn wrapped(out: &mut String, name: &str, text: &str) {
+pub(super) fn wrapped(out: &mut String, name: &str, text: &str) {
     let mut shown = name;
     let mut line = String::new();
     for word in text.split(' ').chain([""]) {

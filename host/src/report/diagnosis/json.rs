@@ -26,7 +26,10 @@ pub fn diagnosis_json(report: &DiagnosisReport) -> Value {
         "verdict": d.verdict.name(),
         "effects": all(&|s| s.decision.accepted.iter().map(|a| accepted(s.sensor, a)).collect()),
         "rejected": all(&|s| pairs(&s.decision.rejected, "reason")),
-        "not_excited": all(&|s| pairs(&s.decision.not_excited, "experiment")),
+        "not_excited": pairs(&report.next.not_excited, "experiment"),
+        "confused": report.next.confused.iter()
+            .map(|c| json!({ "ids": c.ids, "difference": c.difference, "experiment": c.experiment }))
+            .collect::<Vec<_>>(),
         "sensors": sensors,
         "leftover": all(&|s| leftover(s.sensor, &s.decision)),
         "warnings": d.after.warnings,

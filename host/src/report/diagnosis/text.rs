@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use super::DiagnosisReport;
 use crate::diagnose::decision::{Accepted, Decision, Split};
+use crate::diagnose::next::Next;
 use crate::diagnose::{SensorDiagnosis, Verdict};
 use crate::fit::Figure;
 use crate::report::text::{readable, three, warn};
@@ -25,7 +26,9 @@ pub fn diagnosis_text(report: &DiagnosisReport) -> String {
             .map_or(Figure::Input, |f| f.figure);
         let _ = writeln!(out);
         sensor(&mut out, s, figure);
+        not_excited(&mut out, s, &report.next);
     }
+    confused(&mut out, &report.next);
     if let Some((name, [before, after])) = &report.second {
         let _ = writeln!(out, "\non {name}, which nothing was fitted to");
         let _ = writeln!(
@@ -174,8 +177,15 @@ fn tried(out: &mut String, d: &Decision) {
     for (id, reason) in &d.rejected {
         let _ = writeln!(out, "  - {id}: {reason}");
     }
+}
+
+/// What the recording could not show, and what would.
+fn not_excited(out: &mut String, s: &SensorDiagnosis, next: &Next) {
     let mut by_experiment: Vec<(&str, Vec<&str>)> = Vec::new();
-    for (id, experiment) in &d.not_excited {
+    for (id, _) in &s.decision.not_excited {
+        let Some((_, experiment)) = next.not_excited.iter().find(|n| n.0 == *id) else {
+            continue;
+        };
         match by_experiment.iter_mut().find(|(e, _)| e == experiment) {
             Some((_, ids)) => ids.push(id),
             None => by_experiment.push((experiment, vec![id])),
@@ -186,6 +196,19 @@ fn tried(out: &mut String, d: &Decision) {
             out,
             "  not excited: {}\n    needs {experiment}",
             ids.join(", ")
+        );
+    }
+}
+
+fn confused(out: &mut String, next: &Next) {
+    if !next.confused.is_empty() {
+        let _ = writeln!(out);
+    }
+    for c in &next.confused {
+        let _ = writeln!(
+            out,
+            "{} or {} (worse by {:.1} in deviance)\n  told apart by {}",
+            c.ids[0], c.ids[1], c.difference, c.experiment
         );
     }
 }
