@@ -6,8 +6,11 @@
 //!
 //! `x_clean = x - R e(x)`, `R = C diag(|P_x|, |P_y|, |P_z|)`.
 //!
-//! What moves with temperature and time only is folded into `x_clean = M x - b - R e(x)` by [`Effects::slow`] and costs
-//! nothing with a sample but M, however many there are.
+//! The conditions of e that the triad reads itself have the error in them. So e is evaluated again where the first has been taken
+//! out, `x_clean = x - R e(x - R e(x))`: of an error with slope k, the share k would stay, and k² does.
+//!
+//! What moves with temperature and time only is folded into a matrix and a bias by [`Effects::slow`] and costs nothing with a
+//! sample but these, however many there are.
 
 mod law;
 mod triad;
@@ -66,7 +69,7 @@ pub enum Refused {
         /// How many (a term: at most).
         needed: usize,
     },
-    /// A coefficient is not a finite number, a time constant is missing, not wanted or not positive, or there is no such axis.
+    /// A coefficient is not a finite number, a nonlinear constant is missing, not wanted or not positive, or there is no such axis.
     Value,
     /// There is no room for one more.
     Full,
@@ -91,6 +94,12 @@ enum Kind<T: RealField> {
         lags: bool,
         error: fn(&[T; COEFFICIENTS], T, &Ambience<T>, &mut Slow<T>),
     },
+    Code {
+        /// Of nine bits, in units of the weight of bit 0.
+        errors: [T; COEFFICIENTS],
+        /// Of bit 0, raw.
+        weight: T,
+    },
     Term {
         /// A unit vector times the coefficient: an axis without an index.
         coefficient: Vector3<T>,
@@ -100,8 +109,8 @@ enum Kind<T: RealField> {
 
 impl<T: RealField + Copy> Effect<T> {
     /// The effect of a public id like `gyro_scale_cubic`, with all of its coefficients (SI, those of a matrix by rows) and the
-    /// time constant, s, of one that has any.
-    pub fn named(id: &str, coefficients: &[T], time_constant: Option<T>) -> Result<Self, Refused> {
+    /// nonlinear constant of one that has any: a time constant, s, or the weight of the first bit, raw.
+    pub fn named(id: &str, coefficients: &[T], form: Option<T>) -> Result<Self, Refused> {
         let (sensor, name) = match (id.strip_prefix("gyro_"), id.strip_prefix("accel_")) {
             (Some(name), _) => (Sensor::Gyro, name),
             (_, Some(name)) => (Sensor::Accel, name),
@@ -112,9 +121,13 @@ impl<T: RealField + Copy> Effect<T> {
             let needed = law.coefficients;
             return Err(Refused::Count { needed });
         }
-        let form = match (law.form, time_constant) {
+        let form = match (law.form, form) {
             (Form::None, None) => T::one(),
-            (Form::TimeConstant | Form::Lag, Some(s)) if s > T::zero() && s.is_finite() => s,
+            (Form::TimeConstant | Form::Lag | Form::Weight, Some(value))
+                if value > T::zero() && value.is_finite() =>
+            {
+                value
+            }
             _ => return Err(Refused::Value),
         };
         let mut all = [T::zero(); COEFFICIENTS];
@@ -134,6 +147,10 @@ impl<T: RealField + Copy> Effect<T> {
                 form,
                 lags: law.form == Form::Lag,
                 error,
+            },
+            Evaluation::Code => Kind::Code {
+                errors: all,
+                weight: form,
             },
         };
         Ok(Self { sensor, kind })
@@ -169,7 +186,7 @@ impl<T: RealField + Copy> Effect<T> {
     /// Whether it moves with temperature and time only, so that no sample pays for it.
     pub fn is_slow(&self) -> bool {
         match self.kind {
-            Kind::Fast { .. } => false,
+            Kind::Fast { .. } | Kind::Code { .. } => false,
             Kind::Slow { .. } => true,
             Kind::Term { factors, .. } => factors
                 .iter()
@@ -308,17 +325,19 @@ impl<T: RealField + Copy, const N: usize> Effects<T, N> {
         (*fx, *fy, *fz) = (force.x, force.y, force.z);
         let change = rate - state.previous.unwrap_or(rate);
         state.previous = Some(rate);
-        let mut at = Conditions {
+        let at = Conditions {
             rate,
             force,
             angular_acceleration: change * state.sample_rate_hz,
             sensed: rate,
         };
         Sample {
-            gyro: self.gyro.remove(&state.gyro, &rate, &mut at, &state.values),
+            gyro: self
+                .gyro
+                .remove(&state.gyro, Sensor::Gyro, &at, &state.values),
             accel: self
                 .accel
-                .remove(&state.accel, &force, &mut at, &state.values),
+                .remove(&state.accel, Sensor::Accel, &at, &state.values),
         }
     }
 }

@@ -7,6 +7,7 @@
 
 use crate::error::{Error, Result};
 use crate::increment::{Increment, Integrator};
+use crate::reading_step::StepFinder;
 use crate::recording::{Batch, RAW_COLUMNS, Recording};
 
 /// Length of a block, s. A tenth of the shortest dwell that is worth having; ten samples at 100 Hz.
@@ -221,6 +222,8 @@ pub struct Condensed {
     pub increments: Vec<Increment>,
     /// Number of rows.
     pub rows: u64,
+    /// Step that the readings of each raw channel are multiples of, raw; `None` where they are not in steps.
+    pub reading_step: [Option<f64>; 6],
     /// Which of the six raw channels the recording has.
     pub has_raw: [bool; 6],
     /// Which of the six reference channels the recording has.
@@ -267,6 +270,7 @@ struct Condenser {
     last: Option<(f64, i32)>,
     integrator: Option<Integrator>,
     steps: Steps,
+    reading_steps: [StepFinder; 6],
     out: Condensed,
 }
 
@@ -294,10 +298,12 @@ impl Condenser {
             last: None,
             integrator: integrate.then(|| Integrator::new(period_s)),
             steps: Steps::default(),
+            reading_steps: Default::default(),
             out: Condensed {
                 blocks: Vec::new(),
                 increments: Vec::new(),
                 rows: 0,
+                reading_step: [None; 6],
                 has_raw: [false; 6],
                 has_reference: [false; 6],
                 has_steps: false,
@@ -453,6 +459,7 @@ impl Condenser {
         for (c, column) in open.raw.iter().enumerate() {
             if !column.is_empty() {
                 raw[c] = Moments::of(column);
+                self.reading_steps[c].push(column);
                 self.out.missing[c] += column.len() as u64 - u64::from(raw[c].n);
             }
         }
@@ -567,6 +574,7 @@ impl Condenser {
         if let Some(integrator) = &mut self.integrator {
             out.increments.extend(integrator.take());
         }
+        out.reading_step = self.reading_steps.map(StepFinder::find);
         Ok(self.out)
     }
 }

@@ -5,6 +5,7 @@
 //! | [`recording`]   | files: reading in a stream, writing whole or not at all, importing            |
 //! | [`blocks`], [`increment`] | one pass over the samples condenses them to 0.1 s blocks and 10 ms integrals |
 //! | [`rails`], [`stillness`], [`dwell`] | which samples and which stretches can be averaged           |
+//! | [`reading_step`] | the step that readings are multiples of                                       |
 //! | [`noise`]       | how well a dwell mean is known                                                |
 //! | [`prepared`]    | all of these for one recording                                                |
 //! | [`estimate`]    | the estimators                                                                |
@@ -33,6 +34,7 @@ pub mod noise_file;
 pub mod plausible;
 pub mod prepared;
 pub mod rails;
+pub mod reading_step;
 pub mod recording;
 pub mod report;
 pub mod stillness;

@@ -1,6 +1,6 @@
 //! The effects that the device removes by name, each in one row of one table.
 
-use nalgebra::{Matrix3, RealField, Vector3};
+use nalgebra::{Matrix3, RealField, Vector3, convert};
 
 /// Most coefficients of an effect.
 pub(super) const COEFFICIENTS: usize = 9;
@@ -48,6 +48,8 @@ pub(super) enum Evaluation<T: RealField> {
     Fast(fn(&[T; COEFFICIENTS], &Conditions<T>, &mut Vector3<T>)),
     /// Now and then, by coefficients, nonlinear constant and ambience.
     Slow(fn(&[T; COEFFICIENTS], T, &Ambience<T>, &mut Slow<T>)),
+    /// With every sample, by the [`Code`] of the reading.
+    Code,
 }
 
 /// Nonlinear constant of an effect.
@@ -59,6 +61,8 @@ pub(super) enum Form {
     TimeConstant,
     /// The time constant of [`Ambience::lag`], s.
     Lag,
+    /// The weight of bit 0, raw.
+    Weight,
 }
 
 /// A row of the table.
@@ -87,6 +91,12 @@ impl<T: RealField + Copy> Law<T> {
         Self::fast("scale_asymmetry", 3, scale_asymmetry),
         Self::fast("cross_axis_product", 9, cross_axis_product),
         Self::fast("size_effect", 9, size_effect),
+        Self {
+            name: "readout_code",
+            coefficients: COEFFICIENTS,
+            form: Form::Weight,
+            evaluation: Evaluation::Code,
+        },
         Self::slow("bias_drift", 3, Form::None, |c, _, at, e| {
             e.bias += each(c) * at.time;
         }),
@@ -206,6 +216,79 @@ fn size_effect<T: RealField + Copy>(c: &[T; COEFFICIENTS], at: &Conditions<T>, e
     e.x = e.x + (zx + a.y) * c[2] + (xy - a.z) * c[1] - (yy + zz) * c[0];
     e.y = e.y + (yz - a.x) * c[5] + (xy + a.z) * c[3] - (zz + xx) * c[4];
     e.z = e.z + (yz + a.x) * c[7] + (zx - a.y) * c[6] - (xx + yy) * c[8];
+}
+
+/// Errors of the converter by the bits of its code, nine of them: in two tables, as a table of all would be ten times as large,
+/// and with three tables of eight it takes 71 instructions.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Code<T> {
+    /// From the input along the directions, SI, to the weight of the last bit, from [`ABOVE_ZERO`].
+    gain: [T; 3],
+    null: [T; 3],
+    /// From fractions of the weight of bit 0 to SI.
+    back: [T; 3],
+    /// By bits 0 to -3, and by bits -4 to -8; the least bit of an index is the last bit.
+    first: [T; 16],
+    last: [T; 32],
+}
+
+/// A multiple of what nine bits can count: keeps codes with a sign above zero, and their bits the same. And half a code, where the
+/// last bit is worth 128: codes that are that of a turn would be on either side by rounding.
+const ABOVE_ZERO: f64 = 1024.0 + 1.0 / 256.0;
+
+impl<T: RealField + Copy> Code<T> {
+    /// Of errors in units of the weight of bit 0, `weight`, raw; readings are `scale s + bias`.
+    pub fn new(
+        errors: &[T; COEFFICIENTS],
+        weight: T,
+        scale: &Vector3<T>,
+        bias: &Vector3<T>,
+    ) -> Self {
+        let last: T = weight / convert(256.0);
+        let above: T = convert(ABOVE_ZERO);
+        let (four, five) = errors.split_at(4);
+        Self {
+            gain: [scale.x / last, scale.y / last, scale.z / last],
+            null: [
+                bias.x / last + above,
+                bias.y / last + above,
+                bias.z / last + above,
+            ],
+            back: [weight / scale.x, weight / scale.y, weight / scale.z],
+            first: core::array::from_fn(|bits| set(four, bits)),
+            last: core::array::from_fn(|bits| set(five, bits)),
+        }
+    }
+}
+
+/// Sum of the errors of the bits that are set; the least bit is the last error.
+fn set<T: RealField + Copy>(errors: &[T], bits: usize) -> T {
+    let mut sum = T::zero();
+    let mut left = bits;
+    for error in errors.iter().rev() {
+        if left & 1 == 1 {
+            sum += *error;
+        }
+        left >>= 1;
+    }
+    sum
+}
+
+/// `e_i = weight / |P_i|` times the sum of the errors of the bits that are set in the reading.
+#[inline(never)]
+pub(super) fn readout_code<T: RealField + Copy>(
+    code: &Code<T>,
+    sensed: &Vector3<T>,
+    e: &mut Vector3<T>,
+) {
+    let axes = code.gain.iter().zip(&code.null).zip(&code.back);
+    for ((e, s), ((gain, null), back)) in e.iter_mut().zip(sensed.iter()).zip(axes) {
+        let weights: f32 = (*gain * *s + *null).to_subset_unchecked();
+        // Saturates: of no number it is 0.
+        let bits = weights as u32;
+        let first = code.first[((bits >> 5) & 15) as usize];
+        *e += *back * (first + code.last[(bits & 31) as usize]);
+    }
 }
 
 /// `e_i = c_i v_1 v_2 v_3`, where one c_i is not zero: an axis without an index, and without a branch.

@@ -12,7 +12,7 @@ use super::Calibration;
 use super::writing::{number, quoted};
 use crate::diagnose::candidate::{Candidate, Kind, Monomial, Variable};
 use crate::diagnose::decision::Accepted;
-use crate::diagnose::effect::{Effect, Moment};
+use crate::diagnose::effect::{Effect, Moment, Reading};
 use crate::diagnose::library;
 use crate::diagnose::removal::{Removed, errors};
 use crate::dwell::Sensor;
@@ -273,6 +273,11 @@ pub(crate) fn depends(effect: &Removed, on: Condition) -> bool {
         sensed: one,
         warm_c: 1.0,
         late_c: 1.0,
+        reading: Reading {
+            mean: one,
+            sd: one,
+            scale: one,
+        },
     };
     let none = Vector3::repeat(f64::NAN);
     let own = |sensor| effect.candidate.sensor == sensor;

@@ -53,7 +53,14 @@ fn suspects(ids: &[String]) -> Result<Vec<Suspect>> {
         if all.iter().any(|s| s.candidate.id() == effect.id) {
             continue;
         }
-        all.push(Suspect::listed(effect));
+        let suspect = Suspect::listed(effect).ok_or_else(|| {
+            Error::new(
+                format!("--effects {id}"),
+                "an error of the code is met by chance, and no dwell can be planned for it",
+                format!("needs {}", effect.needs),
+            )
+        })?;
+        all.push(suspect);
     }
     Ok(all)
 }

@@ -2,7 +2,8 @@
 
 use nalgebra::{DMatrix, Vector3};
 
-use super::effect::{Effect, Form, Moment};
+use super::effect::{Effect, Form, FormKind, Moment, Reading};
+use super::library::readout;
 use super::rows::Rows;
 use crate::dwell::Sensor;
 use crate::estimate::AXES;
@@ -153,10 +154,16 @@ pub struct Candidate {
     pub kind: Kind,
     /// Which of its coefficients the experiment can tell.
     pub active: Vec<usize>,
+    /// Its nonlinear constant, where the readings say it.
+    pub known_form: Option<f64>,
+    /// How many choices of coefficients it is the best of.
+    pub choices: f64,
+    /// Coefficients to choose from, where the choice is part of the search.
+    pub offered: Vec<usize>,
 }
 
-/// Most coefficients of an effect.
-const MOST_COEFFICIENTS: usize = 9;
+/// Most regressors of an effect: nine coefficients, three axes.
+const MOST_REGRESSORS: usize = 27;
 /// Values of a nonlinear constant that are screened.
 const FORMS: usize = 9;
 
@@ -201,18 +208,20 @@ impl Candidate {
         }
     }
 
-    /// Range of its nonlinear constant.
+    /// Range in which its nonlinear constant is searched.
     pub fn form_range(&self) -> Option<(f64, f64)> {
         match self.kind {
-            Kind::Effect(Effect { form: Some(f), .. }) => Some((f.from, f.to)),
+            Kind::Effect(Effect { form: Some(f), .. }) if f.kind != FormKind::Steps => {
+                Some((f.from, f.to))
+            }
             _ => None,
         }
     }
 
-    /// Values of its nonlinear constant to be screened; a single 0 if it has none.
+    /// Values of its nonlinear constant to be screened; where there is nothing to search the one that it has, 0 if it has none.
     pub fn forms(&self) -> Vec<f64> {
         let Some((from, to)) = self.form_range() else {
-            return vec![0.0];
+            return vec![self.known_form.unwrap_or(0.0)];
         };
         let step = (to / from).powf(1.0 / (FORMS - 1) as f64);
         (0..FORMS).map(|k| from * step.powi(k as i32)).collect()
@@ -228,18 +237,72 @@ impl Candidate {
             sensor,
             kind,
             active: (0..count).collect(),
+            known_form: None,
+            choices: 1.0,
+            offered: Vec::new(),
         }
     }
 
-    /// Axis of each of its active coefficients.
-    pub fn axes(&self) -> Vec<usize> {
+    /// An effect in `rows`; `None` where it takes readings in steps, and they have none.
+    pub fn effect_in(effect: &'static Effect, rows: &Rows) -> Option<Self> {
+        let mut candidate = Self::new(rows.sensor, Kind::Effect(effect));
+        if candidate.reads_code() {
+            let (lowest, highest) = rows.reading_range();
+            candidate.known_form = Some(readout::first_weight(rows.step?, lowest, highest));
+        }
+        Some(candidate)
+    }
+
+    /// Whether its errors are a function of the reading in whose steps they are.
+    pub fn reads_code(&self) -> bool {
+        self.form().is_some_and(|f| f.kind == FormKind::Steps)
+    }
+
+    /// The candidates that it is tried as: of the bits of a code, which are wrong has to be found as well, so each by itself
+    /// and all from the first down to each. The search goes on from the best of these.
+    pub fn variants(mut self) -> Vec<Self> {
+        if !self.reads_code() {
+            return vec![self];
+        }
+        let offered = self.active.clone();
+        self.offered.clone_from(&offered);
+        self.choices = (offered.len() as f64).exp2();
+        let with = |active: &[usize]| Self {
+            active: active.to_vec(),
+            ..self.clone()
+        };
+        let alone = offered.chunks(1).map(with);
+        let down = (2..=offered.len()).map(|k| with(&offered[..k]));
+        alone.chain(down).collect()
+    }
+
+    /// Active coefficient and axis of each of its regressors.
+    fn slots(&self) -> Vec<(usize, usize)> {
         match &self.kind {
-            Kind::Effect(e) => self
-                .active
-                .iter()
-                .map(|k| e.coefficients[*k].axis)
-                .collect(),
-            Kind::Term(axis, _) | Kind::Jump { axis, .. } => vec![*axis],
+            Kind::Effect(e) => {
+                let axes = self.active.iter().map(|k| e.coefficients[*k].axis);
+                let slots = axes.enumerate().flat_map(|(at, axis)| match axis {
+                    Some(axis) => vec![(at, axis)],
+                    None => (0..3).map(|axis| (at, axis)).collect(),
+                });
+                slots.collect()
+            }
+            Kind::Term(axis, _) | Kind::Jump { axis, .. } => vec![(0, *axis)],
+        }
+    }
+
+    /// Axis of each of its regressors.
+    pub fn axes(&self) -> Vec<usize> {
+        self.slots().into_iter().map(|s| s.1).collect()
+    }
+
+    /// Adds the errors of the three axes at a moment by `values`, coefficients in the order of the active ones; SI.
+    pub fn add_error(&self, at: &Moment, form: f64, values: &[f64], error: &mut Vector3<f64>) {
+        let slots = self.slots();
+        let mut regressors = [0.0; MOST_REGRESSORS];
+        self.regressors(at, form, &mut regressors[..slots.len()]);
+        for ((coefficient, axis), regressor) in slots.iter().zip(regressors) {
+            error[*axis] += values[*coefficient] * regressor;
         }
     }
 
@@ -264,10 +327,18 @@ impl Candidate {
     pub fn regressors(&self, at: &Moment, form: f64, out: &mut [f64]) {
         match &self.kind {
             Kind::Effect(e) => {
-                let mut all = [0.0; MOST_COEFFICIENTS];
-                (e.regressors)(at, form, &mut all[..e.coefficients.len()]);
-                for (out, k) in out.iter_mut().zip(&self.active) {
-                    *out = all[*k];
+                let width = |k: usize| e.coefficients[k].axis.map_or(3, |_| 1);
+                let mut all = [0.0; MOST_REGRESSORS];
+                let count = (0..e.coefficients.len()).map(width).sum();
+                (e.regressors)(at, form, &mut all[..count]);
+                // Both lists ascend.
+                let (mut from, mut to, mut active) = (0, 0, self.active.iter().peekable());
+                for k in 0..e.coefficients.len() {
+                    if active.next_if_eq(&&k).is_some() {
+                        out[to..to + width(k)].copy_from_slice(&all[from..from + width(k)]);
+                        to += width(k);
+                    }
+                    from += width(k);
                 }
             }
             Kind::Term(_, m) => out[0] = m.value(at),
@@ -290,6 +361,11 @@ impl Candidate {
             sensed: Vector3::new(1.0, 2.0, 3.0),
             warm_c: 5.0,
             late_c: 4.0,
+            reading: Reading {
+                mean: Vector3::repeat(1.0),
+                sd: Vector3::repeat(0.1),
+                scale: Vector3::repeat(1.0),
+            },
         };
         let late = Moment {
             t_s: 200.0,
@@ -298,9 +374,10 @@ impl Candidate {
             ..early
         };
         let form = self.forms()[0];
-        let mut values = [[0.0; MOST_COEFFICIENTS]; 2];
+        let count = self.axes().len();
+        let mut values = [[0.0; MOST_REGRESSORS]; 2];
         for (at, out) in [early, late].iter().zip(&mut values) {
-            self.regressors(at, form, &mut out[..self.active.len()]);
+            self.regressors(at, form, &mut out[..count]);
         }
         values[0] != values[1]
     }
@@ -308,7 +385,7 @@ impl Candidate {
     /// Lag of [`Moment::late_c`] that its regressors want, s.
     pub fn lag_s(&self, form: f64) -> Option<f64> {
         match &self.kind {
-            Kind::Effect(Effect { form: Some(f), .. }) if f.lags => Some(form),
+            Kind::Effect(Effect { form: Some(f), .. }) if f.kind == FormKind::Lag => Some(form),
             Kind::Term(_, m) if m.lags() => Some(RATE_LAG_S),
             _ => None,
         }
@@ -316,10 +393,24 @@ impl Candidate {
 
     /// Its columns in `rows`.
     pub fn columns(&self, rows: &Rows, form: f64) -> DMatrix<f64> {
-        let moments = rows.moments(self.lag_s(form));
-        rows.columns(&moments, &self.axes(), |at, out| {
+        self.columns_at(rows, &rows.moments(self.lag_s(form)), form)
+    }
+
+    /// Its columns in `rows` at other moments than theirs.
+    pub fn columns_at(&self, rows: &Rows, moments: &[Moment], form: f64) -> DMatrix<f64> {
+        let slots = self.slots();
+        let all = rows.columns(moments, &self.axes(), |at, out| {
             self.regressors(at, form, out)
-        })
+        });
+        if slots.len() == self.active.len() {
+            return all;
+        }
+        let mut columns = DMatrix::zeros(all.nrows(), self.active.len());
+        for (slot, (coefficient, _)) in slots.iter().enumerate() {
+            let mut sum = columns.column_mut(*coefficient);
+            sum += all.column(slot);
+        }
+        columns
     }
 }
 

@@ -2,6 +2,7 @@
 
 use nalgebra::Vector3;
 
+use crate::blocks::{Block, Moments};
 use crate::dwell::Sensor;
 
 /// Temperature that warmth counts from, °C.
@@ -28,9 +29,94 @@ pub struct Moment {
     pub warm_c: f64,
     /// The same behind a first-order lag with the time constant of the effect, if it has one of this kind.
     pub late_c: f64,
+    /// What the sensor reads.
+    pub reading: Reading,
 }
 
-/// A nonlinear constant of an effect, searched between two values.
+impl Moment {
+    /// One moment of several at the same input: the first, with the readings of all.
+    pub(super) fn pooled(all: &[Self]) -> Self {
+        let total: f64 = all.iter().map(|m| m.duration_s).sum();
+        let mean = |of: &dyn Fn(&Self) -> Vector3<f64>| -> Vector3<f64> {
+            all.iter().map(|m| of(m) * (m.duration_s / total)).sum()
+        };
+        let level = mean(&|m| m.reading.mean);
+        let square = |v: Vector3<f64>| v.component_mul(&v);
+        let variance = mean(&|m| square(m.reading.sd) + square(m.reading.mean - level));
+        let mut pooled = all[0];
+        pooled.duration_s = total;
+        pooled.reading.mean = level;
+        pooled.reading.sd = variance.map(f64::sqrt);
+        pooled
+    }
+
+    /// The moment as the sensor would read it without `error` of its axes, SI.
+    pub fn read_without(&self, error: &Vector3<f64>) -> Self {
+        let mut clean = *self;
+        clean.reading.mean -= self.reading.scale.component_mul(error);
+        clean
+    }
+}
+
+/// Middle of each block, s, and its temperature above [`REFERENCE_C`], °C: where there is none that of the block before, as
+/// the device does it, and not a number before the first.
+pub fn warmth(blocks: &[Block]) -> Vec<(f64, f64)> {
+    let mut held = f64::NAN;
+    let each = blocks.iter().map(|b| {
+        if b.temp_c.mean.is_finite() {
+            held = b.temp_c.mean - REFERENCE_C;
+        }
+        (0.5 * (b.start_s + b.last_s), held)
+    });
+    each.collect()
+}
+
+/// Raw readings of the three axes of a sensor over a stretch of time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Reading {
+    /// Their mean, raw.
+    pub mean: Vector3<f64>,
+    /// Standard deviation of a sample, raw.
+    pub sd: Vector3<f64>,
+    /// Scale factors, raw/SI, positive.
+    pub scale: Vector3<f64>,
+}
+
+impl Reading {
+    /// Of a moment that nobody has recorded, without noise, in SI.
+    pub const NONE: Self = Self {
+        mean: Vector3::new(0.0, 0.0, 0.0),
+        sd: Vector3::new(0.0, 0.0, 0.0),
+        scale: Vector3::new(1.0, 1.0, 1.0),
+    };
+
+    /// Of `moments` of the three axes.
+    pub fn of(moments: &[Moments], scale: &Vector3<f64>) -> Self {
+        let mean = |i: usize| moments[i].mean;
+        let sd = |i: usize| match moments[i].n {
+            0 | 1 => 0.0,
+            n => (moments[i].m2 / f64::from(n - 1)).sqrt(),
+        };
+        Self {
+            mean: Vector3::from_fn(|i, _| mean(i)),
+            sd: Vector3::from_fn(|i, _| sd(i)),
+            scale: *scale,
+        }
+    }
+}
+
+/// Where the value of a nonlinear constant comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FormKind {
+    /// It is searched.
+    Free,
+    /// It is searched, and is the lag of [`Moment::late_c`].
+    Lag,
+    /// It is not searched: the steps of the raw readings say it.
+    Steps,
+}
+
+/// A nonlinear constant of an effect, between two values.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Form {
     /// Name, with the unit.
@@ -39,8 +125,8 @@ pub struct Form {
     pub from: f64,
     /// Largest.
     pub to: f64,
-    /// Whether it is the lag of [`Moment::late_c`].
-    pub lags: bool,
+    /// Where it comes from.
+    pub kind: FormKind,
 }
 
 /// One coefficient.
@@ -48,8 +134,8 @@ pub struct Form {
 pub struct Coefficient {
     /// Name.
     pub name: &'static str,
-    /// Axis of the sensor whose reading it is added to.
-    pub axis: usize,
+    /// Axis of the sensor whose reading it is added to; `None`: to all three, each with a regressor of its own.
+    pub axis: Option<usize>,
     /// Unit.
     pub unit: &'static str,
 }
@@ -70,7 +156,8 @@ pub struct Effect {
     pub typical: &'static [f64],
     /// Its nonlinear constant.
     pub form: Option<Form>,
-    /// The regressors at a moment, one for each coefficient; the number is that of the form.
+    /// The regressors at a moment, one for each coefficient, or three in a row (x, y, z) for one of all axes; the number is that
+    /// of the form.
     pub regressors: fn(&Moment, f64, &mut [f64]),
     /// What an experiment has to have for it to be seen.
     pub needs: &'static str,

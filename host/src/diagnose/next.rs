@@ -142,7 +142,7 @@ pub fn known(fit: &Fit) -> Known {
 /// The candidate of this name; `None` of a jump, which is of one recording only.
 fn by_id(id: &str) -> Option<Candidate> {
     if let Some(effect) = library::by_id(id) {
-        return Some(Candidate::new(effect.sensor, Kind::Effect(effect)));
+        return Suspect::listed(effect).map(|s| s.candidate);
     }
     let (channel, product) = id.strip_prefix("term:")?.split_once('~')?;
     let (sensor, axis) = channel.split_once('_')?;
@@ -168,7 +168,7 @@ pub fn next(diagnosis: &Diagnosis) -> Next {
         .flat_map(|s| &s.decision.not_excited);
     let open: Vec<Suspect> = open
         .filter_map(|(id, _)| library::by_id(id))
-        .map(Suspect::listed)
+        .filter_map(Suspect::listed)
         .collect();
     let mut kinds: Vec<_> = open.iter().map(kind).collect();
     kinds.sort_unstable();
@@ -182,10 +182,14 @@ pub fn next(diagnosis: &Diagnosis) -> Next {
         .map(|suspects| shown(&base, diagnosis, suspects))
         .collect();
     let told: Vec<(String, String)> = told.into_iter().flatten().collect();
-    // In the order of the diagnosis.
-    let not_excited = open.iter().filter_map(|s| {
-        let id = s.candidate.id();
-        told.iter().find(|t| t.0 == id).cloned()
+    // In the order of the diagnosis; of what no dwell is planned for, what it needs.
+    let all = diagnosis
+        .sensors
+        .iter()
+        .flat_map(|s| &s.decision.not_excited);
+    let not_excited = all.map(|(id, needs)| {
+        let planned = told.iter().find(|t| t.0 == *id).cloned();
+        planned.unwrap_or_else(|| (id.clone(), needs.clone()))
     });
     let pairs = pairs(diagnosis);
     let confused: Vec<Confused> = pairs.par_iter().map(|p| p.settled(&base)).collect();

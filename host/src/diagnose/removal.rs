@@ -1,11 +1,12 @@
 //! Taking effects out of readings, by what the device itself measures.
 
 use mimu_core::compensation::Affine;
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 use super::candidate::Candidate;
-use super::effect::{Moment, REFERENCE_C};
+use super::effect::{Moment, Reading, warmth};
 use super::rows::{directions, late};
+use crate::blocks::Block;
 use crate::dwell::Sensor;
 use crate::prepared::Prepared;
 
@@ -23,13 +24,7 @@ pub struct Removed {
 impl Removed {
     /// Adds its error of the three axes at a moment, SI.
     fn add(&self, at: &Moment, error: &mut Vector3<f64>) {
-        let mut regressors = [0.0; 9];
-        let axes = self.candidate.axes();
-        self.candidate
-            .regressors(at, self.form, &mut regressors[..axes.len()]);
-        for ((axis, value), regressor) in axes.iter().zip(&self.values).zip(regressors) {
-            error[*axis] += value * regressor;
-        }
+        self.candidate.add_error(at, self.form, &self.values, error);
     }
 }
 
@@ -47,7 +42,9 @@ pub fn errors(effects: &[Removed], moments: &[Moment]) -> Vec<Vector3<f64>> {
 /// A recording with `effects` taken out of the readings: of each triad, given with its inverse model, in the raw domain. `None` if a
 /// calibration is singular.
 ///
-/// The conditions are what the device has: its own compensated readings and its temperature, not the table's.
+/// The conditions are what the device has: its own compensated readings and its temperature, not the table's. An error that is
+/// a function of what its own sensor reads is evaluated twice, the second time without the error by the first: of an error
+/// with slope k its share k would stay, and k² does.
 pub fn remove(
     prepared: &Prepared,
     gyro: Option<&Affine<f64>>,
@@ -55,116 +52,144 @@ pub fn remove(
     effects: &[Removed],
 ) -> Option<Prepared> {
     let mut out = prepared.clone();
-    if effects.is_empty() {
-        return Some(out);
-    }
-    let blocks = &prepared.condensed.blocks;
-    let t0_s = blocks.first()?.start_s;
-    let raw = |b: &crate::blocks::Block, from: usize| Vector3::from_fn(|i, _| b.raw[from + i].mean);
-    let apply = |model: Option<&Affine<f64>>, u: Vector3<f64>| {
-        model.map_or(Vector3::repeat(f64::NAN), |m| m.apply(&u))
-    };
-    let warm: Vec<(f64, f64)> = blocks
-        .iter()
-        .map(|b| (0.5 * (b.start_s + b.last_s), b.temp_c.mean - REFERENCE_C))
-        .collect();
     for sensor in Sensor::BOTH {
         let ours: Vec<&Removed> = effects
             .iter()
             .filter(|e| e.candidate.sensor == sensor)
             .collect();
-        let model = match sensor {
-            Sensor::Gyro => gyro,
-            Sensor::Accel => accel,
+        let models = [gyro, accel];
+        if models[sensor as usize].is_some() && !ours.is_empty() {
+            of_sensor(prepared, sensor, models, &ours, &mut out)?;
+        }
+    }
+    Some(out)
+}
+
+/// The moments that readings of a sensor are corrected at.
+struct Stretches<'a> {
+    sensor: Sensor,
+    /// Sensitive directions by rows, and how errors along them become errors in the body frame.
+    direction: Matrix3<f64>,
+    to_body: Matrix3<f64>,
+    effects: &'a [&'a Removed],
+    /// Of each effect: the temperature behind its lag, by block.
+    late: Vec<Option<Vec<f64>>>,
+}
+
+impl Stretches<'_> {
+    /// The moment as it is where the sensor errs by `error`.
+    fn without(&self, at: &Moment, error: &Vector3<f64>) -> Moment {
+        let mut clean = at.read_without(error);
+        let input = match self.sensor {
+            Sensor::Gyro => &mut clean.rate,
+            Sensor::Accel => &mut clean.force,
         };
-        let (Some(model), false) = (model, ours.is_empty()) else {
-            continue;
+        *input -= self.to_body * error;
+        clean.sensed = self.direction * *input;
+        clean
+    }
+
+    /// Errors of the axes at a moment within block `at`, SI.
+    fn error(&self, moment: &Moment, at: usize) -> Vector3<f64> {
+        let sum = |moment: &Moment| {
+            let mut error = Vector3::zeros();
+            for (effect, late) in self.effects.iter().zip(&self.late) {
+                let late_c = late.as_ref().map_or(moment.warm_c, |l| l[at]);
+                effect.add(&Moment { late_c, ..*moment }, &mut error);
+            }
+            error
         };
-        let (direction, scale, _) = directions(model)?;
-        let from = sensor.channels().start;
-        let moment =
-            |at: usize, t_s: f64, duration_s: f64, rate: Vector3<f64>, force: Vector3<f64>| {
-                Moment {
-                    session: 0,
-                    t_s: t_s - t0_s,
-                    duration_s,
-                    rate,
-                    force,
-                    angular_acceleration: Vector3::zeros(),
-                    sensed: direction
-                        * match sensor {
-                            Sensor::Gyro => rate,
-                            Sensor::Accel => force,
-                        },
-                    warm_c: warm[at].1,
-                    late_c: warm[at].1,
-                }
-            };
-        let mut of_blocks: Vec<Moment> = blocks
+        let first = sum(moment);
+        let second = sum(&self.without(moment, &first));
+        // As the device: where the error is steeper than the input, this would lead away.
+        match (second - first).norm_squared() < first.norm_squared() {
+            true => second,
+            false => first,
+        }
+    }
+}
+
+fn of_sensor(
+    prepared: &Prepared,
+    sensor: Sensor,
+    models: [Option<&Affine<f64>>; 2],
+    effects: &[&Removed],
+    out: &mut Prepared,
+) -> Option<()> {
+    let model = models[sensor as usize]?;
+    let (direction, scale, _) = directions(model)?;
+    let blocks = &prepared.condensed.blocks;
+    let t0_s = blocks.first()?.start_s;
+    // As the device: before the first temperature it is the reference.
+    let warm: Vec<(f64, f64)> = warmth(blocks)
+        .into_iter()
+        .map(|(t, w)| (t, if w.is_nan() { 0.0 } else { w }))
+        .collect();
+    let all = Stretches {
+        sensor,
+        direction,
+        to_body: direction.try_inverse()?,
+        effects,
+        late: effects
             .iter()
-            .enumerate()
-            .map(|(at, b)| {
-                let duration_s = f64::from(b.rows) * prepared.condensed.period_s;
-                moment(
-                    at,
-                    warm[at].0,
-                    duration_s,
-                    apply(gyro, raw(b, 0)),
-                    apply(accel, raw(b, 3)),
-                )
-            })
-            .collect();
-        let mut of_increments: Vec<Moment> = Vec::new();
-        let mut block_of = Vec::new();
-        if sensor == Sensor::Gyro {
-            for piece in &prepared.condensed.increments {
-                let t_s = piece.end_s - 0.5 * piece.duration_s;
-                let at = blocks
-                    .partition_point(|b| b.last_s < t_s)
-                    .min(blocks.len() - 1);
-                let rate = apply(gyro, Vector3::from(piece.integral) / piece.duration_s);
-                of_increments.push(moment(at, t_s, piece.duration_s, rate, of_blocks[at].force));
-                block_of.push(at);
-            }
-        }
-        let mut of_block = vec![Vector3::zeros(); blocks.len()];
-        let mut of_increment = vec![Vector3::zeros(); of_increments.len()];
-        for effect in ours {
-            if let Some(lag_s) = effect.candidate.lag_s(effect.form) {
-                let late = late(&warm, lag_s);
-                for (moment, late) in of_blocks.iter_mut().zip(&late) {
-                    moment.late_c = *late;
-                }
-                for (moment, at) in of_increments.iter_mut().zip(&block_of) {
-                    moment.late_c = late[*at];
-                }
-            }
-            for (error, moment) in of_block.iter_mut().zip(&of_blocks) {
-                effect.add(moment, error);
-            }
-            for (error, moment) in of_increment.iter_mut().zip(&of_increments) {
-                effect.add(moment, error);
-            }
-        }
-        for (block, error) in out.condensed.blocks.iter_mut().zip(&of_block) {
-            for i in 0..3 {
-                block.raw[from + i].mean -= scale[i] * error[i];
-            }
-        }
-        for (piece, error) in out.condensed.increments.iter_mut().zip(&of_increment) {
+            .map(|e| Some(late(&warm, e.candidate.lag_s(e.form)?)))
+            .collect(),
+    };
+    let from = sensor.channels().start;
+    let raw = |b: &Block, from: usize| Vector3::from_fn(|i, _| b.raw[from + i].mean);
+    let apply = |model: Option<&Affine<f64>>, u: Vector3<f64>| {
+        model.map_or(Vector3::repeat(f64::NAN), |m| m.apply(&u))
+    };
+    let moment = |at: usize, t_s: f64, rate: Vector3<f64>, force: Vector3<f64>| Moment {
+        session: 0,
+        t_s: t_s - t0_s,
+        duration_s: f64::from(blocks[at].rows) * prepared.condensed.period_s,
+        rate,
+        force,
+        angular_acceleration: Vector3::zeros(),
+        sensed: direction * if sensor == Sensor::Gyro { rate } else { force },
+        warm_c: warm[at].1,
+        late_c: warm[at].1,
+        reading: Reading::of(&blocks[at].raw[from..from + 3], &scale),
+    };
+    let mut of_block = Vec::with_capacity(blocks.len());
+    for (at, block) in blocks.iter().enumerate() {
+        let [rate, force] = [0, 1].map(|s| apply(models[s], raw(block, 3 * s)));
+        of_block.push(all.error(&moment(at, warm[at].0, rate, force), at));
+    }
+    if sensor == Sensor::Gyro {
+        for piece in &mut out.condensed.increments {
+            let t_s = piece.end_s - 0.5 * piece.duration_s;
+            let at = blocks
+                .partition_point(|b| b.last_s < t_s)
+                .min(blocks.len() - 1);
+            let mean = Vector3::from(piece.integral) / piece.duration_s;
+            let force = apply(models[1], raw(&blocks[at], 3));
+            let mut moment = moment(at, t_s, model.apply(&mean), force);
+            moment.reading.mean = mean;
+            moment.duration_s = piece.duration_s;
+            let error = all.error(&moment, at);
             for i in 0..3 {
                 piece.integral[i] -= scale[i] * error[i] * piece.duration_s;
             }
         }
-        for dwell in &mut out.dwells.list {
-            let range = dwell.blocks.clone();
-            let total: f64 = of_blocks[range.clone()].iter().map(|m| m.duration_s).sum();
-            let pairs = of_blocks[range.clone()].iter().zip(&of_block[range]);
-            let mean: Vector3<f64> = pairs.map(|(m, e)| e * (m.duration_s / total)).sum();
-            for i in 0..3 {
-                dwell.raw[from + i].mean -= scale[i] * mean[i];
-            }
+    }
+    for (block, error) in out.condensed.blocks.iter_mut().zip(&of_block) {
+        for i in 0..3 {
+            block.raw[from + i].mean -= scale[i] * error[i];
         }
     }
-    Some(out)
+    for dwell in &mut out.dwells.list {
+        let range = dwell.blocks.clone();
+        let total: f64 = blocks[range.clone()]
+            .iter()
+            .map(|b| f64::from(b.rows))
+            .sum();
+        let pairs = blocks[range.clone()].iter().zip(&of_block[range]);
+        let mean: Vector3<f64> = pairs.map(|(b, e)| e * (f64::from(b.rows) / total)).sum();
+        for i in 0..3 {
+            dwell.raw[from + i].mean -= scale[i] * mean[i];
+        }
+    }
+    Some(())
 }

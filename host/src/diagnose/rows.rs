@@ -118,6 +118,8 @@ pub struct Rows {
     pub figure: Figure,
     /// How many of the rows, from the first on, the error figures are about, and how many of these make one dwell or turn.
     pub judged: (usize, usize),
+    /// Step that the readings of the three axes alike are multiples of, raw, in all recordings; `None` where they are not.
+    pub step: Option<f64>,
     rows: Vec<Row>,
     moments: Vec<Moment>,
     /// Recording and block of each moment.
@@ -174,6 +176,56 @@ impl Rows {
         let of_row = &moments[self.rows[row].moments.clone()];
         let total: f64 = of_row.iter().map(|m| m.duration_s).sum();
         of_row.iter().map(|m| value(m) * m.duration_s / total).sum()
+    }
+
+    /// The same rows with one moment for each dwell, whose reading scatters as its samples do: for what depends on the reading alone.
+    pub fn by_dwell(&self) -> Self {
+        let mut out = self.clone();
+        out.moments.clear();
+        out.block.clear();
+        let mut merged: Vec<(Range<usize>, usize)> = Vec::new();
+        for row in &mut out.rows {
+            let range = row.moments.clone();
+            let at = out.moments.len();
+            if row.dwells[0] != row.dwells[1] {
+                out.moments.extend_from_slice(&self.moments[range.clone()]);
+                out.block.extend_from_slice(&self.block[range]);
+                row.moments = at..out.moments.len();
+                continue;
+            }
+            let known = merged.iter().rev().find(|m| m.0 == range).map(|m| m.1);
+            let at = known.unwrap_or_else(|| {
+                out.moments
+                    .push(Moment::pooled(&self.moments[range.clone()]));
+                out.block.push(self.block[range.start]);
+                merged.push((range, at));
+                at
+            });
+            row.moments = at..at + 1;
+            row.weights = vec![row.weights.iter().sum()];
+        }
+        out
+    }
+
+    /// The moments of rows [by dwell](Self::by_dwell), each reading without what `residuals` say of it: the dwell's noise, which
+    /// is in the row as well and would make any function of the reading seem to explain it, and the error that is sought.
+    pub fn moments_without(&self, residuals: &DVector<f64>) -> Vec<Moment> {
+        let mut moments = self.moments.clone();
+        for (row, residual) in self.rows.iter().zip(residuals.iter()) {
+            if let ([moment], [weight]) = (&mut moments[row.moments.clone()], &row.weights[..]) {
+                let error = weight * (residual / weight.norm_squared());
+                *moment = moment.read_without(&error);
+            }
+        }
+        moments
+    }
+
+    /// Lowest and highest reading of its axes, raw, averaged over a moment.
+    pub fn reading_range(&self) -> (f64, f64) {
+        let all = self.moments.iter().flat_map(|m| m.reading.mean.iter());
+        all.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| {
+            (a.min(*v), b.max(*v))
+        })
     }
 
     /// The moments, with the temperature behind a lag of `lag_s` if there is one.

@@ -4,6 +4,9 @@
 //! fitted with noise of their own, and judged by the likelihood ratio, as a probability after the whole search. The noise of
 //! a model that lacks an effect is too large, and a test that keeps it would miss what makes it so.
 
+mod refine;
+mod screen;
+
 use std::borrow::Cow;
 
 use nalgebra::DMatrix;
@@ -11,8 +14,11 @@ use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::candidate::{Candidate, Kind};
+use super::effect::Moment;
 use super::rows::Rows;
-use super::spread::{By, Components, Fitted, Spread};
+use super::spread::{By, Fitted, Spread};
+use refine::Beside;
+use screen::Screened;
 
 /// Probability that a clean sensor is found to have an effect of the library.
 pub const FALSE_LISTED: f64 = 1.5e-3;
@@ -44,12 +50,14 @@ pub struct Chosen {
 pub struct Search<'a> {
     /// Rows.
     pub rows: &'a Rows,
+    /// The same by dwells, for functions of the reading.
+    by_dwell: Rows,
     /// Their scatter.
     pub spread: Spread<'a>,
     /// Basis of what the affine parameters can do.
     pub basis: DMatrix<f64>,
     candidates: Vec<Candidate>,
-    /// Columns of those without a nonlinear constant.
+    /// Columns of those that are the same whatever else there is.
     fixed: Vec<Option<DMatrix<f64>>>,
     tests: [f64; 2],
 }
@@ -73,11 +81,6 @@ pub fn beside(matrix: &DMatrix<f64>, more: &DMatrix<f64>) -> DMatrix<f64> {
     all
 }
 
-/// What the rows would still show of `columns` beside `others`, decorrelated.
-fn across(others: &DMatrix<f64>, columns: &DMatrix<f64>) -> DMatrix<f64> {
-    columns - others * others.tr_mul(columns)
-}
-
 /// Probability that chance makes F with these degrees of freedom as large.
 fn exceeds(f: f64, p: f64, dof: f64) -> f64 {
     match FisherSnedecor::new(p, dof) {
@@ -90,8 +93,11 @@ impl<'a> Search<'a> {
     /// Over `rows` for `candidates`.
     pub fn new(rows: &'a Rows, candidates: Vec<Candidate>) -> Self {
         let count = |listed: bool| -> f64 {
-            let ours = candidates.iter().filter(|c| c.is_listed() == listed);
-            ours.map(|c| c.tests()).sum::<f64>().max(1.0)
+            let ours = candidates.iter().enumerate().filter(|(i, c)| {
+                // Variants of one follow each other.
+                c.is_listed() == listed && !(*i > 0 && candidates[i - 1].is_variant_of(c))
+            });
+            ours.map(|(_, c)| c.tests()).sum::<f64>().max(1.0)
         };
         Self {
             rows,
@@ -100,8 +106,12 @@ impl<'a> Search<'a> {
             tests: [count(true), count(false)],
             fixed: candidates
                 .par_iter()
-                .map(|c| c.form_range().is_none().then(|| c.columns(rows, 0.0)))
+                .map(|c| {
+                    let fixed = c.form_range().is_none() && !c.reads_code();
+                    fixed.then(|| c.columns(rows, 0.0))
+                })
                 .collect(),
+            by_dwell: rows.by_dwell(),
             candidates,
         }
     }
@@ -111,6 +121,32 @@ impl<'a> Search<'a> {
             Some(columns) => Cow::Borrowed(columns),
             None => Cow::Owned(self.candidates[index].columns(self.rows, form)),
         }
+    }
+
+    /// Moments by dwell, without what `fitted` of `model` does not explain of their readings.
+    fn freed(&self, model: &DMatrix<f64>, fitted: &Fitted) -> Vec<Moment> {
+        let left = &self.rows.y - model * &fitted.coefficients;
+        self.by_dwell.moments_without(&left)
+    }
+
+    /// Finds the bits of the codes again beside what has been added since: errors of other kinds move the readings too.
+    fn read_again(&self, chosen: &mut [Chosen], now: &mut Fitted) -> Option<()> {
+        let mut first = self.basis.ncols();
+        for k in 0..chosen.len() {
+            let count = chosen[k].columns.ncols();
+            if chosen[k].candidate.reads_code() && chosen.len() > 1 {
+                let own = &chosen[k].columns * now.coefficients.rows(first, count);
+                let left = &self.rows.y - self.model(chosen) * &now.coefficients + own;
+                let moments = self.by_dwell.moments_without(&left);
+                let Chosen {
+                    candidate, form, ..
+                } = &chosen[k];
+                chosen[k].columns = candidate.columns_at(&self.by_dwell, &moments, *form);
+                *now = self.fit(chosen)?;
+            }
+            first += count;
+        }
+        Some(())
     }
 
     /// Columns of the affine parameters and of the chosen.
@@ -131,125 +167,48 @@ impl<'a> Search<'a> {
         self.rows.y.len() as f64 - columns as f64
     }
 
-    /// Probability of chance, after the search, of a drop of the deviance by `drop` for `p` more columns.
+    /// Probability of chance, after the search, of a drop of the deviance by `drop` for `p` more columns of `candidate`.
     ///
     /// By F: where the size of the noise is found from the rows, `n ln(1 + p F/dof)` is the drop, exactly; where it is known
     /// and F's `dof` is large, it is chi-square.
-    fn chance(&self, drop: f64, p: usize, columns: usize, listed: bool) -> f64 {
+    fn chance(&self, drop: f64, p: usize, columns: usize, candidate: &Candidate) -> f64 {
         let n = self.rows.y.len() as f64;
         let dof = self.dof(columns + p);
         if !(drop > 0.0) || dof < 2.0 {
             return 1.0;
         }
         let f = ((drop / n).exp_m1()) * dof / p as f64;
-        let tests = self.tests[usize::from(!listed)];
+        let tests = self.tests[usize::from(!candidate.is_listed())] * candidate.choices;
         (exceeds(f, p as f64, dof) * tests).min(1.0)
     }
 
-    /// Screens all candidates beside the chosen ones; the most promising first: candidate, form, chance.
-    fn screen(&self, chosen: &[Chosen], null: &Fitted) -> Vec<(usize, f64, f64)> {
-        let Some(whitener) = self.spread.whitener(&null.components) else {
-            return Vec::new();
+    /// A candidate beside the chosen, its form refined, with noise of its own: the drop of the deviance and its chance.
+    fn judge(&self, chosen: &[Chosen], null: &Fitted, screened: &Screened) -> Option<Chosen> {
+        let candidate = &self.candidates[screened.index];
+        let beside_these = Beside {
+            search: self,
+            model: self.model(chosen),
+            null,
         };
-        let y = DMatrix::from_column_slice(self.rows.y.len(), 1, self.rows.y.as_slice());
-        let (white, y) = (whitener.whiten(&self.model(chosen)), whitener.whiten(&y));
-        let others = white.qr().q();
-        let left = across(&others, &y);
-        let total = left.norm_squared();
-        let taken = |c: &Candidate| chosen.iter().any(|k| k.candidate.id() == c.id());
-        let mut found: Vec<(usize, f64, f64)> = (0..self.candidates.len())
-            .into_par_iter()
-            .filter(|i| !taken(&self.candidates[*i]))
-            .flat_map_iter(|i| {
-                let candidate = &self.candidates[i];
-                let mut best: Option<(usize, f64, f64)> = None;
-                for form in candidate.forms() {
-                    let white = whitener.whiten(&self.columns(i, form));
-                    let Some(p) = self.explained(&others, &left, total, &white) else {
-                        continue;
-                    };
-                    if best.is_none_or(|b| p < b.2) {
-                        best = Some((i, form, p));
-                    }
-                }
-                best
-            })
-            .collect();
-        found.sort_by(|a, b| a.2.total_cmp(&b.2));
-        found
-    }
-
-    fn explained(
-        &self,
-        others: &DMatrix<f64>,
-        left: &DMatrix<f64>,
-        total: f64,
-        white: &DMatrix<f64>,
-    ) -> Option<f64> {
-        let raw: Vec<f64> = white.column_iter().map(|c| c.norm()).collect();
-        let mut z = across(others, white);
-        for (mut column, raw) in z.column_iter_mut().zip(&raw) {
-            let norm = column.norm();
-            // What rounding leaves of a column that the others span.
-            if !(norm > 1e-7 * raw) || !norm.is_finite() {
-                return None;
+        let (candidate, form, fitted) = match candidate.reads_code() {
+            true => {
+                let (candidate, fitted) = beside_these.bits(candidate, screened.form)?;
+                (candidate, screened.form, fitted)
             }
-            column /= norm;
-        }
-        let svd = z.svd(true, false);
-        let rank = svd.singular_values.iter().filter(|s| **s > 1e-4).count();
-        let u = svd.u?;
-        let explained: f64 = (0..rank)
-            .map(|k| u.column(k).dot(&left.column(0)).powi(2))
-            .sum();
-        let dof = self.dof(others.ncols() + rank);
-        if rank == 0 || dof < 2.0 {
-            return None;
-        }
-        let f = explained / rank as f64 / ((total - explained) / dof);
-        Some(exceeds(f, rank as f64, dof))
-    }
-
-    /// `candidate` beside the chosen, its form refined, with noise of its own: the drop of the deviance and its chance.
-    fn judge(&self, chosen: &[Chosen], null: &Fitted, index: usize, form: f64) -> Option<Chosen> {
-        let candidate = &self.candidates[index];
-        let model = self.model(chosen);
-        let fit = |form: f64, start: &Components| {
-            let columns = self.columns(index, form).into_owned();
-            let both = beside(&model, &unit_columns(&columns));
-            let with = self.spread.fit(&both, start, By::Likelihood)?;
-            Some((
-                (null.deviance - with.deviance).max(0.0),
-                with.components,
-                columns,
-            ))
+            false => {
+                let (form, fitted) = beside_these.form(candidate, screened)?;
+                (candidate.clone(), form, fitted)
+            }
         };
-        let mut best = (form, fit(form, &null.components)?);
-        if let Some((from, to)) = candidate.form_range() {
-            let mut step: f64 = 1.35;
-            while step > 1.03 {
-                let mut moved = false;
-                for f in [best.0 * step, best.0 / step] {
-                    if f < from || f > to {
-                        continue;
-                    }
-                    if let Some(there) = fit(f, &best.1.1)
-                        && there.0 > best.1.0
-                    {
-                        best = (f, there);
-                        moved = true;
-                        break;
-                    }
-                }
-                if !moved {
-                    step = step.sqrt();
-                }
-            }
-        }
-        let (form, (drop, _, columns)) = best;
-        let p = self.chance(drop, columns.ncols(), model.ncols(), candidate.is_listed());
+        let (drop, columns) = (fitted.drop, fitted.columns);
+        let p = self.chance(
+            drop,
+            columns.ncols(),
+            beside_these.model.ncols(),
+            &candidate,
+        );
         Some(Chosen {
-            candidate: candidate.clone(),
+            candidate,
             form,
             columns,
             p,
@@ -264,13 +223,13 @@ impl<'a> Search<'a> {
         let of = |listed: bool| {
             screened
                 .iter()
-                .filter(move |s| self.candidates[s.0].is_listed() == listed)
+                .filter(move |s| self.candidates[s.index].is_listed() == listed)
                 .take(FINALISTS)
         };
         let picked: Vec<_> = of(true).chain(of(false)).collect();
         let mut judged: Vec<Chosen> = picked
             .into_par_iter()
-            .filter_map(|&(i, form, _)| self.judge(chosen, null, i, form))
+            .filter_map(|s| self.judge(chosen, null, s))
             .collect();
         judged.sort_by(|a, b| a.p.total_cmp(&b.p).then(b.worth.total_cmp(&a.worth)));
         judged
@@ -281,10 +240,8 @@ impl<'a> Search<'a> {
         let screened = self.screen(chosen, now);
         let listed = screened
             .into_par_iter()
-            .filter(|s| self.candidates[s.0].is_listed());
-        listed
-            .filter_map(|(i, form, _)| self.judge(chosen, now, i, form))
-            .collect()
+            .filter(|s| self.candidates[s.index].is_listed());
+        listed.filter_map(|s| self.judge(chosen, now, &s)).collect()
     }
 
     /// The effects that the rows ask for.
@@ -325,6 +282,7 @@ impl<'a> Search<'a> {
                 .collect();
             chosen.push(best);
             now = self.fit(&chosen)?;
+            self.read_again(&mut chosen, &mut now)?;
             self.again(&mut chosen, &mut now)?;
         }
         Some((chosen, now))
@@ -340,7 +298,7 @@ impl<'a> Search<'a> {
             let model = self.model(&rest);
             let drop = (without.deviance - now.deviance).max(0.0);
             let listed = one.candidate.is_listed();
-            let p = self.chance(drop, one.columns.ncols(), model.ncols(), listed);
+            let p = self.chance(drop, one.columns.ncols(), model.ncols(), &one.candidate);
             if p > if listed { FALSE_LISTED } else { FALSE_FOUND } {
                 *chosen = rest;
                 *now = without;
@@ -364,8 +322,11 @@ fn score(c: &Chosen) -> f64 {
         Kind::Term(_, monomial) => monomial.0.len() as f64,
         _ => 0.0,
     };
-    c.worth - 4.0 * coefficients - order
+    c.worth - COEFFICIENT * coefficients - order
 }
+
+/// What a coefficient costs.
+const COEFFICIENT: f64 = 4.0;
 
 /// Deviance by which a term found from the data has to be better than an effect with a name.
 const PREFERENCE: f64 = 12.0;
@@ -385,10 +346,31 @@ pub fn unit_columns(columns: &DMatrix<f64>) -> DMatrix<f64> {
 }
 
 impl Candidate {
-    /// How many independent tests it counts for.
+    /// Whether both are the same but for the choice of coefficients.
+    fn is_variant_of(&self, other: &Self) -> bool {
+        match (&self.kind, &other.kind) {
+            (Kind::Effect(a), Kind::Effect(b)) => a.id == b.id,
+            (Kind::Term(i, a), Kind::Term(j, b)) => i == j && a == b,
+            (
+                Kind::Jump {
+                    axis: i,
+                    session: r,
+                    t_s: a,
+                },
+                Kind::Jump {
+                    axis: j,
+                    session: s,
+                    t_s: b,
+                },
+            ) => i == j && r == s && a == b,
+            _ => false,
+        }
+    }
+
+    /// How many independent tests it counts for, beside the choices that it is the best of.
     fn tests(&self) -> f64 {
         match self.kind {
-            Kind::Effect(e) if e.form.is_some() => 4.0,
+            Kind::Effect(_) if self.form_range().is_some() => 4.0,
             _ => 1.0,
         }
     }

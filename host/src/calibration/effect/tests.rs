@@ -20,7 +20,7 @@ fn every_term_is_found_again_by_its_id() {
 fn what_is_no_id_names_nothing() {
     for id in [
         "earth_rate",
-        "gyro_readout_code",
+        "gyro_magnetic",
         "gyro_scale_cubic ",
         "term:gyro_x~",
         "term:gyro_w~rate_x",
@@ -85,18 +85,18 @@ fn every_effect_that_is_found_can_be_removed_by_the_device() {
 
 #[test]
 fn an_effect_that_the_device_lacks_is_refused() {
-    static CODE: Effect = Effect {
-        id: "gyro_readout_code",
+    static MAGNETIC: Effect = Effect {
+        id: "gyro_magnetic",
         sensor: Sensor::Gyro,
-        about: "an error that is a function of the code",
+        about: "an error by the magnetic field",
         coefficients: &[],
         typical: &[],
         form: None,
         regressors: |_, _, _| (),
-        needs: "slow ramps",
+        needs: "a compass",
     };
     for kind in [
-        Kind::Effect(&CODE),
+        Kind::Effect(&MAGNETIC),
         Kind::Jump {
             axis: 0,
             session: 0,

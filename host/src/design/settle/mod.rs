@@ -82,13 +82,16 @@ pub enum Sought {
 
 impl Suspect {
     /// An effect by name, each of its coefficients at the size of data sheets.
-    pub fn listed(effect: &'static Effect) -> Self {
-        Self {
-            candidate: Candidate::new(effect.sensor, Kind::Effect(effect)),
+    ///
+    /// `None` of an error of the code: which codes a dwell meets is decided by the noise and the bias of the unit, and by no plan.
+    pub fn listed(effect: &'static Effect) -> Option<Self> {
+        let candidate = Candidate::new(effect.sensor, Kind::Effect(effect));
+        (!candidate.reads_code()).then(|| Self {
+            candidate,
             sizes: effect.typical.to_vec(),
             sought: Sought::Each,
             group: 0,
-        }
+        })
     }
 }
 
@@ -201,7 +204,9 @@ impl<'a> Question<'a> {
             .collect();
         let before = all.hopeless();
         for effect in library::all() {
-            let rival = Suspect::listed(effect);
+            let Some(rival) = Suspect::listed(effect) else {
+                continue;
+            };
             let slow = stop::slow(&rival.candidate).any();
             let mut groups: Vec<usize> = of
                 .iter()

@@ -6,7 +6,7 @@ use super::super::model::{GRAVITY, Setting};
 use super::super::reach::{Carrier, Rates};
 use super::Question;
 use crate::diagnose::candidate::Candidate;
-use crate::diagnose::effect::Moment;
+use crate::diagnose::effect::{Moment, Reading};
 use crate::dwell::Sensor;
 use crate::recording::Reference;
 
@@ -33,6 +33,7 @@ impl Stop {
         let late = self.late_c.iter().find(|l| Some(l.0) == lag_s);
         Moment {
             session: 0,
+            reading: Reading::NONE,
             t_s: self.t_s,
             duration_s: self.dwell_s,
             rate,
@@ -70,6 +71,7 @@ pub fn slow(candidate: &Candidate) -> Slow {
     let form = middle(candidate);
     let at = Moment {
         session: 0,
+        reading: Reading::NONE,
         t_s: 137.0,
         duration_s: 1.0,
         rate: Vector3::new(1.3, -0.7, 2.1),
@@ -80,7 +82,7 @@ pub fn slow(candidate: &Candidate) -> Slow {
         late_c: 5.1,
     };
     let values = |at: &Moment| {
-        let mut out = vec![0.0; candidate.active.len()];
+        let mut out = vec![0.0; candidate.axes().len()];
         candidate.regressors(at, form, &mut out);
         out
     };

@@ -34,7 +34,10 @@ pub(super) fn candidates(
         })
     };
     for effect in library::all().filter(|e| e.sensor == sensor) {
-        let mut candidate = Candidate::new(sensor, Kind::Effect(effect));
+        let Some(mut candidate) = Candidate::effect_in(effect, rows) else {
+            not_excited.push((effect.id.into(), effect.needs.into()));
+            continue;
+        };
         let mut best = vec![0.0_f64; effect.coefficients.len()];
         for form in candidate.forms() {
             let seen = across(&candidate.columns(rows, form));
@@ -48,7 +51,7 @@ pub(super) fn candidates(
         if candidate.active.is_empty() {
             not_excited.push((effect.id.into(), effect.needs.into()));
         } else {
-            all.push(candidate);
+            all.extend(candidate.variants());
         }
     }
     for monomial in Monomial::all() {

@@ -1,7 +1,7 @@
 //! Biases that move with time.
 
 use super::{each, per_axis};
-use crate::diagnose::effect::{Coefficient, Effect, Form, Moment};
+use crate::diagnose::effect::{Coefficient, Effect, Form, FormKind, Moment};
 use crate::dwell::Sensor;
 
 const DPS: f64 = std::f64::consts::PI / 180.0;
@@ -18,7 +18,7 @@ const SETTLING: Option<Form> = Some(Form {
     name: "time_constant_s",
     from: 20.0,
     to: 1200.0,
-    lags: false,
+    kind: FormKind::Free,
 });
 
 fn linear(at: &Moment, _: f64, out: &mut [f64]) {

@@ -5,6 +5,7 @@
 mod accel;
 mod drift;
 mod gyro;
+pub mod readout;
 mod thermal;
 
 use super::effect::{Coefficient, Effect};
@@ -16,6 +17,7 @@ pub fn all() -> impl Iterator<Item = &'static Effect> {
         &accel::EFFECTS[..],
         &drift::EFFECTS[..],
         &thermal::EFFECTS[..],
+        &readout::EFFECTS[..],
     ]
     .into_iter()
     .flatten()
@@ -28,7 +30,20 @@ pub fn by_id(id: &str) -> Option<&'static Effect> {
 
 /// A coefficient of sensor axis `axis`.
 const fn of(axis: usize, name: &'static str, unit: &'static str) -> Coefficient {
-    Coefficient { name, axis, unit }
+    Coefficient {
+        name,
+        axis: Some(axis),
+        unit,
+    }
+}
+
+/// A coefficient of all axes.
+const fn all_axes(name: &'static str, unit: &'static str) -> Coefficient {
+    Coefficient {
+        name,
+        axis: None,
+        unit,
+    }
 }
 
 /// One coefficient for each axis.

@@ -1,7 +1,7 @@
 //! Errors by temperature.
 
 use super::{each, of, per_axis};
-use crate::diagnose::effect::{Coefficient, Effect, Form, Moment};
+use crate::diagnose::effect::{Coefficient, Effect, Form, FormKind, Moment};
 use crate::dwell::Sensor;
 
 const DPS: f64 = std::f64::consts::PI / 180.0;
@@ -39,7 +39,7 @@ const LAG: Option<Form> = Some(Form {
     name: "lag_s",
     from: 5.0,
     to: 600.0,
-    lags: true,
+    kind: FormKind::Lag,
 });
 
 fn line_and_bend(at: &Moment, _: f64, out: &mut [f64]) {

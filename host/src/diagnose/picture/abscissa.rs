@@ -243,6 +243,7 @@ mod tests {
     fn moment() -> Moment {
         Moment {
             session: 0,
+            reading: crate::diagnose::effect::Reading::NONE,
             t_s: 0.0,
             duration_s: 1.0,
             rate: Vector3::zeros(),

@@ -83,7 +83,7 @@ struct Group {
 fn groups(rows: &Rows, one: &Accepted) -> Vec<Group> {
     let (candidate, form) = (&one.chosen.candidate, one.chosen.form);
     let moments = rows.moments(None);
-    let Some(like) = moments.first() else {
+    let Some(like) = moments.first().filter(|_| !candidate.reads_code()) else {
         return Vec::new();
     };
     let mut groups: Vec<Group> = Vec::new();
@@ -124,6 +124,8 @@ pub(super) fn panels(
     tracks: &[Track],
 ) -> Option<Vec<Panel>> {
     let mut panels = Vec::new();
+    // What the code says is a function of the bits, and no function of one quantity that a person reads.
+    let coded = one.chosen.candidate.reads_code();
     for group in groups(rows, one) {
         let of_axis = tracks
             .iter()
@@ -141,7 +143,7 @@ pub(super) fn panels(
         .solve(&white.whiten(columns), 1e-12)
         .ok()?;
     let across = columns - basis * share;
-    for track in tracks.iter().filter(|t| t.axis.is_none()) {
+    for track in tracks.iter().filter(|t| t.axis.is_none() || coded) {
         panels.push(whole(one, &across, track));
     }
     Some(panels)

@@ -6,7 +6,7 @@ use mimu_core::compensation::Affine;
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
 use super::{Figure, Free, Row, Session, Stratum, directions};
-use crate::diagnose::effect::{Moment, REFERENCE_C};
+use crate::diagnose::effect::{Moment, Reading, warmth};
 use crate::dwell::Sensor;
 use crate::noise::wander::{Slow, Span};
 use crate::prepared::Prepared;
@@ -28,6 +28,8 @@ pub(super) struct Part {
     pub figure: Figure,
     /// As in [`super::Rows`].
     pub judged: (usize, usize),
+    /// As in [`super::Rows`], of this recording.
+    pub step: Option<f64>,
     pub rows: Vec<Row>,
     pub moments: Vec<Moment>,
     pub block: Vec<usize>,
@@ -43,6 +45,7 @@ pub(super) struct Builder<'a> {
     pub moments: Vec<Moment>,
     pub block: Vec<usize>,
     pub direction: Matrix3<f64>,
+    pub scale: Vector3<f64>,
 }
 
 /// The rows of `sensor` in a recording. `None` if there are none, or the calibration is singular.
@@ -55,10 +58,7 @@ pub(super) fn part(session: &Session, sensor: Sensor, free: Free) -> Option<Part
     }
     let (direction, scale, forward) = directions(&inverse)?;
     let blocks = &prepared.condensed.blocks;
-    let warm: Vec<(f64, f64)> = blocks
-        .iter()
-        .map(|b| (0.5 * (b.start_s + b.last_s), b.temp_c.mean - REFERENCE_C))
-        .collect();
+    let warm = warmth(blocks);
     let builder = Builder {
         prepared,
         sensor,
@@ -68,6 +68,7 @@ pub(super) fn part(session: &Session, sensor: Sensor, free: Free) -> Option<Part
         moments: Vec::new(),
         block: Vec::new(),
         direction,
+        scale,
     };
     let mut part = match (prepared.manifest.reference, sensor) {
         (Reference::Table, _) => builder.known(&scale, &forward, accel.as_ref()),
@@ -79,6 +80,14 @@ pub(super) fn part(session: &Session, sensor: Sensor, free: Free) -> Option<Part
         part.biases = (0..part.biases.len()).collect();
     }
     Some(part)
+}
+
+/// The step of several channels, if they have one in common: their mean, to within what rounding in a text file leaves.
+pub(super) fn common_step(steps: &[Option<f64>]) -> Option<f64> {
+    let steps: Vec<f64> = steps.iter().copied().collect::<Option<_>>()?;
+    let mean = steps.iter().sum::<f64>() / steps.len() as f64;
+    let alike = steps.iter().all(|s| (s / mean - 1.0).abs() < 1e-3);
+    alike.then_some(mean)
 }
 
 impl Builder<'_> {
@@ -104,6 +113,10 @@ impl Builder<'_> {
             sensed: self.direction * input,
             warm_c: self.warm[at].1,
             late_c: self.warm[at].1,
+            reading: Reading::of(
+                &self.prepared.condensed.blocks[at].raw[self.sensor.channels()],
+                &self.scale,
+            ),
         }
     }
 
@@ -166,6 +179,7 @@ impl Builder<'_> {
             strata,
             figure: figure.0,
             judged: (figure.1, figure.2),
+            step: common_step(&self.prepared.condensed.reading_step[self.sensor.channels()]),
             rows: self.rows,
             moments: self.moments,
             block: self.block,

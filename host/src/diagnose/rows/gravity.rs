@@ -85,6 +85,7 @@ impl Builder<'_> {
                 let reading = Vector3::from_fn(|i, _| blocks[at].raw[3 + i].mean);
                 let force = accel.map_or(Vector3::repeat(f64::NAN), |a| a.apply(&reading));
                 let mut moment = self.moment(at, t_s, piece.duration_s, rate, force);
+                moment.reading.mean = raw;
                 if k > 0 {
                     let before: &Moment = &self.moments[first + k - 1];
                     moment.angular_acceleration = (rate - before.rate) / (moment.t_s - before.t_s);

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::build::Part;
+use super::build::{Part, common_step};
 use super::{Row, Rows};
 use crate::dwell::Sensor;
 use crate::recording::Reference;
@@ -72,6 +72,8 @@ pub(super) fn join(sensor: Sensor, parts: Vec<(usize, Part)>, sessions: usize) -
     let total: usize = parts.iter().map(|p| p.1.y.len()).sum();
     let judged = parts.iter().map(|p| judged_rows(&p.1)).sum();
 
+    let steps: Vec<Option<f64>> = parts.iter().map(|p| p.1.step).collect();
+    let step = common_step(&steps);
     let mut first = vec![0];
     let mut moments = Vec::new();
     let mut block = Vec::new();
@@ -131,6 +133,7 @@ pub(super) fn join(sensor: Sensor, parts: Vec<(usize, Part)>, sessions: usize) -
         strata,
         figure,
         judged: (judged, together),
+        step,
         rows,
         moments,
         block,

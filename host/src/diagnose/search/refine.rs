@@ -1,0 +1,107 @@
+//! A candidate beside a model, with what is not linear in it: a nonlinear constant, or the choice of bits.
+
+use nalgebra::DMatrix;
+
+use super::screen::Screened;
+use super::{COEFFICIENT, Search, beside, unit_columns};
+use crate::diagnose::candidate::Candidate;
+use crate::diagnose::spread::{By, Components, Fitted};
+
+/// A model with noise of its own that a candidate is put beside.
+pub(super) struct Beside<'a> {
+    pub search: &'a Search<'a>,
+    pub model: DMatrix<f64>,
+    pub null: &'a Fitted,
+}
+
+/// A candidate beside it.
+#[derive(Clone)]
+pub(super) struct With {
+    /// By how much the deviance is less.
+    pub drop: f64,
+    pub columns: DMatrix<f64>,
+    components: Components,
+}
+
+impl With {
+    fn score(&self) -> f64 {
+        self.drop - COEFFICIENT * self.columns.ncols() as f64
+    }
+}
+
+impl Beside<'_> {
+    fn fit(&self, columns: DMatrix<f64>, start: &Components) -> Option<With> {
+        let both = beside(&self.model, &unit_columns(&columns));
+        let fitted = self.search.spread.fit(&both, start, By::Likelihood)?;
+        Some(With {
+            drop: (self.null.deviance - fitted.deviance).max(0.0),
+            components: fitted.components,
+            columns,
+        })
+    }
+
+    /// With the best value of its nonlinear constant, if it has one: a walk uphill with ever smaller steps.
+    pub fn form(&self, candidate: &Candidate, screened: &Screened) -> Option<(f64, With)> {
+        let fit = |form: f64, start: &Components| {
+            let columns = self.search.columns(screened.index, form).into_owned();
+            self.fit(columns, start)
+        };
+        let mut best = (screened.form, fit(screened.form, &self.null.components)?);
+        let Some((from, to)) = candidate.form_range() else {
+            return Some(best);
+        };
+        let mut step: f64 = 1.35;
+        while step > 1.03 {
+            let mut moved = false;
+            for f in [best.0 * step, best.0 / step] {
+                if f < from || f > to {
+                    continue;
+                }
+                if let Some(there) = fit(f, &best.1.components)
+                    && there.drop > best.1.drop
+                {
+                    best = (f, there);
+                    moved = true;
+                    break;
+                }
+            }
+            if !moved {
+                step = step.sqrt();
+            }
+        }
+        Some(best)
+    }
+
+    /// With the best choice of bits: one is added or dropped as long as that makes the score better.
+    pub fn bits(&self, from: &Candidate, form: f64) -> Option<(Candidate, With)> {
+        let moments = self.search.freed(&self.model, self.null);
+        let columns = |c: &Candidate| c.columns_at(&self.search.by_dwell, &moments, form);
+        let mut best = (
+            from.clone(),
+            self.fit(columns(from), &self.null.components)?,
+        );
+        loop {
+            let toggled = from.offered.iter().filter_map(|&bit| {
+                let mut other = best.0.clone();
+                match other.active.binary_search(&bit) {
+                    Ok(at) => drop(other.active.remove(at)),
+                    Err(at) => other.active.insert(at, bit),
+                }
+                if other.active.is_empty() {
+                    return None;
+                }
+                // By the noise so far: by its own it could only be better.
+                let both = beside(&self.model, &unit_columns(&columns(&other)));
+                let fitted = self.search.spread.fit_at(&both, &best.1.components)?;
+                let score = -fitted.deviance - COEFFICIENT * other.active.len() as f64;
+                Some((other, score))
+            });
+            let (other, _) = toggled.max_by(|a, b| a.1.total_cmp(&b.1))?;
+            let with = self.fit(columns(&other), &best.1.components)?;
+            if with.score() <= best.1.score() {
+                return Some(best);
+            }
+            best = (other, with);
+        }
+    }
+}

@@ -1,0 +1,116 @@
+//! All candidates at first sight: by how much of the scatter each explains, with the noise of the model so far.
+
+use std::borrow::Cow;
+
+use nalgebra::DMatrix;
+use rayon::prelude::*;
+
+use super::{COEFFICIENT, Chosen, Search, exceeds};
+use crate::diagnose::candidate::Candidate;
+use crate::diagnose::spread::Fitted;
+
+/// A candidate as it looked at first sight.
+pub(super) struct Screened {
+    pub index: usize,
+    pub form: f64,
+    /// Probability of chance.
+    pub p: f64,
+    /// Drop of the deviance less what its coefficients cost.
+    pub gain: f64,
+}
+
+/// What the rows would still show of `columns` beside `others`, decorrelated.
+fn across(others: &DMatrix<f64>, columns: &DMatrix<f64>) -> DMatrix<f64> {
+    columns - others * others.tr_mul(columns)
+}
+
+impl Search<'_> {
+    /// Screens all candidates beside the chosen ones; the most promising first. Of the variants of one the best.
+    pub(super) fn screen(&self, chosen: &[Chosen], null: &Fitted) -> Vec<Screened> {
+        let Some(whitener) = self.spread.whitener(&null.components) else {
+            return Vec::new();
+        };
+        let y = DMatrix::from_column_slice(self.rows.y.len(), 1, self.rows.y.as_slice());
+        let (white, y) = (whitener.whiten(&self.model(chosen)), whitener.whiten(&y));
+        let others = white.qr().q();
+        let left = across(&others, &y);
+        let total = left.norm_squared();
+        let freed = self.freed(&self.model(chosen), null);
+        let taken = |c: &Candidate| chosen.iter().any(|k| k.candidate.is_variant_of(c));
+        let mut found: Vec<Screened> = (0..self.candidates.len())
+            .into_par_iter()
+            .filter(|i| !taken(&self.candidates[*i]))
+            .flat_map_iter(|index| {
+                let candidate = &self.candidates[index];
+                let mut best: Option<Screened> = None;
+                for form in candidate.forms() {
+                    let columns = match candidate.reads_code() {
+                        true => Cow::Owned(candidate.columns_at(&self.by_dwell, &freed, form)),
+                        false => self.columns(index, form),
+                    };
+                    let white = whitener.whiten(&columns);
+                    let Some((p, gain)) = self.explained(&others, &left, total, &white) else {
+                        continue;
+                    };
+                    if best.as_ref().is_none_or(|b| gain > b.gain) {
+                        best = Some(Screened {
+                            index,
+                            form,
+                            p,
+                            gain,
+                        });
+                    }
+                }
+                best
+            })
+            .collect();
+        found.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+        let mut seen: Vec<usize> = Vec::new();
+        found.retain(|s| {
+            let candidate = &self.candidates[s.index];
+            let again = candidate.choices > 1.0
+                && seen
+                    .iter()
+                    .any(|i| self.candidates[*i].is_variant_of(candidate));
+            seen.push(s.index);
+            !again
+        });
+        found.sort_by(|a, b| a.p.total_cmp(&b.p).then(b.gain.total_cmp(&a.gain)));
+        found
+    }
+
+    fn explained(
+        &self,
+        others: &DMatrix<f64>,
+        left: &DMatrix<f64>,
+        total: f64,
+        white: &DMatrix<f64>,
+    ) -> Option<(f64, f64)> {
+        let raw: Vec<f64> = white.column_iter().map(|c| c.norm()).collect();
+        let mut z = across(others, white);
+        for (mut column, raw) in z.column_iter_mut().zip(&raw) {
+            let norm = column.norm();
+            // What rounding leaves of a column that the others span.
+            if !(norm > 1e-7 * raw) || !norm.is_finite() {
+                return None;
+            }
+            column /= norm;
+        }
+        let svd = z.svd(true, false);
+        let rank = svd.singular_values.iter().filter(|s| **s > 1e-4).count();
+        let u = svd.u?;
+        let explained: f64 = (0..rank)
+            .map(|k| u.column(k).dot(&left.column(0)).powi(2))
+            .sum();
+        let dof = self.dof(others.ncols() + rank);
+        if rank == 0 || dof < 2.0 {
+            return None;
+        }
+        let f = explained / rank as f64 / ((total - explained) / dof);
+        let drop = -(left.len() as f64) * (-explained / total).ln_1p();
+        Some((
+            exceeds(f, rank as f64, dof),
+            drop - COEFFICIENT * rank as f64,
+        ))
+    }
+}
