@@ -74,7 +74,8 @@ fn an_effect_that_low_rates_cannot_show_is_found_by_the_next_experiment() {
     let (_, experiment) = told.expect("20 deg/s show no cubic of 300");
     println!("{experiment}");
     assert!(experiment.contains("300 deg/s"), "{experiment}");
-    let cubic = Suspect::listed(library::by_id("gyro_scale_cubic").unwrap()).expect("a plan can show it");
+    let cubic =
+        Suspect::listed(library::by_id("gyro_scale_cubic").unwrap()).expect("a plan can show it");
     let second = diagnosed(&plan(&first, vec![cubic]), &unit, 2);
     assert_eq!(found(&second), ["gyro_scale_cubic"]);
 }

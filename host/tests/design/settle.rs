@@ -89,7 +89,7 @@ fn question(ids: &[&str]) -> Question<'static> {
     Question {
         suspects: ids
             .iter()
-            .map(|id| Suspect::listed(library::by_id(id).unwrap()))
+            .map(|id| Suspect::listed(library::by_id(id).unwrap()).expect("a plan can show it"))
             .collect(),
         reference: Reference::Table,
         carrier: Carrier::ThreeAxis,
