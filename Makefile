@@ -4,7 +4,7 @@ TOOLCHAIN := $(shell sed -n 's/^channel = "\(.*\)"/\1/p' rust-toolchain.toml)
 TARGET := thumbv7em-none-eabihf
 CARGO := cargo +$(TOOLCHAIN)
 
-.PHONY: help test demo papers blind bench fuzz audit toolchain
+.PHONY: help test demo papers blind bench budget device fuzz audit toolchain
 
 help: ## this list
 	@sed -n 's/^\([a-z]*\):.*## /  make \1\t/p' Makefile
@@ -21,13 +21,15 @@ test: toolchain ## formatting, lints, documentation, firmware, all tests
 	$(CARGO) fmt --all --check
 	$(CARGO) clippy --locked --all-targets -- -D warnings
 	$(CARGO) clippy --locked -p mimu-no-panic --release --target $(TARGET) -- -D warnings
-	$(CARGO) clippy --locked -p mimu-firmware --release --target $(TARGET) -- -D warnings
+	$(CARGO) clippy --locked -p mimu-firmware -p mimu-counted --release --target $(TARGET) -- -D warnings
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --locked --no-deps
 	$(CARGO) build --locked -p mimu-firmware --release --target $(TARGET)
+	$(CARGO) build --locked -p mimu-counted --release --target $(TARGET)
 	./tests/no_panic/check.sh $(CARGO)
 	$(CARGO) test --locked
 	$(CARGO) test --locked -p mimu-firmware --lib
 	$(CARGO) run --locked -p mimu-tests --bin papers -- --check
+	$(CARGO) run --locked -p mimu-tests --bin budget -- --check
 
 demo: toolchain ## import and fit a recording: the best real one at hand, or the small one in tests/
 	$(CARGO) build --locked --release -p mimu
@@ -41,6 +43,16 @@ blind: toolchain ## undeclared effects on hundreds of units, and what the diagno
 
 bench: toolchain ## rates and peak memory on four hours at 1 kHz
 	$(CARGO) bench --locked -p mimu --bench four_hours
+
+budget: toolchain ## instructions, load and memory of the firmware, counted on the emulated board
+	$(CARGO) build --locked -p mimu-firmware --release --target $(TARGET)
+	$(CARGO) build --locked -p mimu-counted --release --target $(TARGET)
+	$(CARGO) run --locked -p mimu-tests --bin budget
+
+device: toolchain ## ten minutes of the device's samples, and 300 power cuts while a calibration is stored
+	$(CARGO) build --locked -p mimu-firmware --release --target $(TARGET)
+	MIMU_DEVICE_SECONDS=600 MIMU_CUTS=300 $(CARGO) test --locked --release -p mimu-tests \
+	  --test device_serial --test device_power -- --nocapture
 
 fuzz: toolchain ## mutated recordings, manifests and calibrations for ten minutes, or MIMU_FUZZ_SECONDS
 	MIMU_FUZZ_SECONDS=$${MIMU_FUZZ_SECONDS:-600} $(CARGO) test --locked --release -p mimu --test fuzz -- --nocapture

@@ -20,8 +20,10 @@
 //! | [`converter`]                  | from the pins to the readings of a recording                      |
 //! | [`catalog`], [`rig_file`], [`refusal`] | sensors by their data sheets; RIG.toml, and the truth drawn by it |
 //! | [`ideal`]                      | forward models of papers, for Monte Carlo studies                 |
+//! | [`board`]                      | the firmware on an emulated microcontroller behind these pins     |
 
 pub mod axis;
+pub mod board;
 pub mod catalog;
 pub mod chain;
 pub(crate) mod controller;

@@ -27,6 +27,11 @@ impl Random {
         self.0.random()
     }
 
+    /// Any 64 bits.
+    pub fn word(&mut self) -> u64 {
+        self.0.random()
+    }
+
     /// Normal, zero mean, unit variance.
     pub fn normal(&mut self) -> f64 {
         self.0.sample(StandardNormal)

@@ -1,0 +1,32 @@
+//! The emulated board: the release image of the firmware, unmodified, on an emulated NUCLEO-H743ZI2 with the
+//! bench's physics in front of its pins.
+//!
+//! The emulator is the crate `rigless`; what is the bench's own:
+//!
+//! | module        |                                                                               |
+//! |---------------|-------------------------------------------------------------------------------|
+//! | [`schematic`] | what is wired to which pin                                                    |
+//! | [`front`]     | voltages at the converter's pins at any instant                               |
+//! | [`sampler`]   | the converter, shown the voltages of each conversion's own instant            |
+//! | [`flash`]     | what is being written, and what a cut supply leaves of it                     |
+//! | `watchdog`    | a model that the emulator lacks                                               |
+//! | `line`        | the serial line                                                               |
+//! | [`image`]     | the ELF file                                                                  |
+//! | [`findings`]  | what the emulator found out about the firmware                                |
+//! | [`running`]   | a board that runs: time, bytes, supply, reset, counters                       |
+//! | [`serve`], [`terminal`] | the same behind a pseudo-terminal                                  |
+
+mod driver;
+pub mod findings;
+pub mod flash;
+pub mod front;
+pub mod image;
+mod line;
+mod memory;
+mod part;
+pub mod running;
+pub mod sampler;
+pub mod schematic;
+pub mod serve;
+pub mod terminal;
+mod watchdog;

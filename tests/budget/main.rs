@@ -1,0 +1,120 @@
+//! What the firmware costs, counted on the emulated board: `cargo run -p mimu-tests --bin budget [-- --check]`.
+//!
+//! With `--check` a figure above `tests/budget.toml` is an error. Both images are built before; `make budget` does.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::process::ExitCode;
+
+use mimu_core::wire::Request;
+use mimu_rig::board::front::Front;
+use mimu_rig::board::image::Image;
+use mimu_rig::board::running::Board;
+use mimu_rig::board::schematic::Volts;
+use mimu_tests::device::conversation::{Answer, Conversation};
+use mimu_tests::device::{MS, STARTED, built, image, still};
+
+/// Cycles of the core in a millisecond.
+const CYCLES_PER_MS: f64 = 400e3;
+
+/// What `tests/counted` runs between its marks, in its order, behind the empty pair.
+const COUNTED: [&str; 2] = ["compensation_instructions", "kalman_update_instructions"];
+
+fn main() -> ExitCode {
+    let check = std::env::args()
+        .skip(1)
+        .any(|argument| argument == "--check");
+    match figures().and_then(|figures| report(&figures, check)) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(problem) => {
+            eprintln!("budget: {problem}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn figures() -> Result<BTreeMap<String, f64>, String> {
+    let mut figures = BTreeMap::new();
+    let marked = counted()?;
+    for (name, instructions) in COUNTED.into_iter().zip(marked) {
+        figures.insert(name.to_owned(), instructions as f64);
+    }
+    let mut device = Conversation::new(still(Volts::GROUND));
+    device.greeting();
+    device.run_for(STARTED);
+    let stream = device.ask(Request::Stream {
+        raw: true,
+        compensated: false,
+    });
+    if stream != Answer::Done {
+        return Err(format!("the stream of raw readings: {stream:?}"));
+    }
+    let began = device.board.standing();
+    let ms = 1000;
+    let ended = device.board.run_for(ms * MS)?;
+    let each = (ended.instructions - began.instructions) as f64 / ms as f64;
+    figures.insert("sample_instructions".into(), each);
+    figures.insert("load_percent".into(), 100.0 * each / CYCLES_PER_MS);
+    let sizes = image().sizes();
+    figures.insert("flash_bytes".into(), sizes.flash as f64);
+    figures.insert("ram_bytes".into(), sizes.ram as f64);
+    Ok(figures)
+}
+
+/// Instructions between each pair of marks, less those of the empty pair.
+fn counted() -> Result<Vec<u64>, String> {
+    let image = Image::read(&built("mimu-counted"))?;
+    let (from, to) = (image.find("counted_from")?, image.find("counted_to")?);
+    let mut board = Board::new(&image, Front::Still(Volts::GROUND))?;
+    board.watch(from)?;
+    board.watch(to)?;
+    board.run_for(10 * MS)?;
+    let arrivals = board.arrivals()?;
+    let expected = [from, to].repeat(1 + COUNTED.len());
+    let came: Vec<u64> = arrivals.iter().map(|a| a.address).collect();
+    if came != expected {
+        return Err(format!(
+            "{} marks passed, not {}: tests/counted and COUNTED differ",
+            came.len(),
+            expected.len()
+        ));
+    }
+    let spans: Vec<u64> = arrivals
+        .chunks(2)
+        .map(|pair| pair[1].instructions - pair[0].instructions)
+        .collect();
+    Ok(spans[1..].iter().map(|span| span - spans[0]).collect())
+}
+
+fn report(figures: &BTreeMap<String, f64>, check: bool) -> Result<(), String> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("budget.toml");
+    let text = std::fs::read_to_string(&path).map_err(|e| format!("{}: {e}", path.display()))?;
+    let most: BTreeMap<String, toml::Value> =
+        toml::from_str(&text).map_err(|e| format!("{}: {e}", path.display()))?;
+    let number = |value: &toml::Value| {
+        value
+            .as_float()
+            .or(value.as_integer().map(|whole| whole as f64))
+    };
+    let mut over = Vec::new();
+    println!("{:<28} {:>10} {:>10}", "", "measured", "at most");
+    for (name, &measured) in figures {
+        let limit = most.get(name).and_then(number);
+        let limit = limit.ok_or_else(|| format!("{}: no number `{name}`", path.display()))?;
+        println!("{name:<28} {measured:>10.1} {limit:>10.1}");
+        // Not a number is over it too.
+        if !(measured <= limit) {
+            over.push(name.as_str());
+        }
+    }
+    if let Some(unmeasured) = most.keys().find(|name| !figures.contains_key(*name)) {
+        return Err(format!(
+            "{}: `{unmeasured}` is not measured",
+            path.display()
+        ));
+    }
+    if check && !over.is_empty() {
+        return Err(format!("over the budget: {}", over.join(", ")));
+    }
+    Ok(())
+}

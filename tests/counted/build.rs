@@ -1,0 +1,14 @@
+//! Hands the linker the memory layout, as the firmware's build does, and an empty `defmt.x`: the target's flags ask for
+//! one, and nothing here logs.
+
+use std::{env, fs, path::PathBuf};
+
+fn main() {
+    let from = PathBuf::from(env::var("CARGO_MANIFEST_DIR").unwrap()).join("../../memory.x");
+    let directory = PathBuf::from(env::var("OUT_DIR").unwrap());
+    fs::copy(&from, directory.join("memory.x")).expect("memory.x stands at the workspace root");
+    fs::write(directory.join("defmt.x"), "").expect("a file can be written there");
+    println!("cargo:rustc-link-search={}", directory.display());
+    println!("cargo:rerun-if-changed={}", from.display());
+    println!("cargo:rerun-if-changed=build.rs");
+}
