@@ -22,6 +22,7 @@ test: toolchain ## formatting, lints, documentation, firmware, all tests
 	$(CARGO) clippy --locked --all-targets -- -D warnings
 	$(CARGO) clippy --locked -p mimu-no-panic --release --target $(TARGET) -- -D warnings
 	$(CARGO) clippy --locked -p mimu-firmware -p mimu-counted --release --target $(TARGET) -- -D warnings
+	$(CARGO) clippy --locked -p mimu-firmware --release --features usb --target $(TARGET) -- -D warnings
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --locked --no-deps
 	$(CARGO) build --locked -p mimu-firmware --release --target $(TARGET)
 	$(CARGO) build --locked -p mimu-counted --release --target $(TARGET)

@@ -7,6 +7,7 @@
 //! | [`effects`]      | what the affine model lacks, removed sample by sample              |
 //! | [`kalman`]       | bank of three four-state Kalman filters fed one scalar at a time  |
 //! | [`table`]        | inverse models at several temperatures, and between them          |
+//! | [`single`]       | what runs with every sample, in single precision                   |
 //! | [`stored`]       | all of this as bytes, for the device to keep                       |
 //! | [`wire`]         | messages between device and host, and their frames                 |
 //!
@@ -18,6 +19,7 @@
 pub mod compensation;
 pub mod effects;
 pub mod kalman;
+pub mod single;
 pub mod stored;
 pub mod table;
 pub mod wire;

@@ -31,7 +31,7 @@ use embassy_stm32::pac::adc::vals::{Adstp, Boost, Dmngt, Ovrmod, Pcsel, Res, Sam
 use embassy_stm32::peripherals::{ADC1, DMA1_CH0};
 use embassy_time::{Duration, Instant, with_deadline};
 
-use crate::convert::{Code, CodeSum};
+use crate::convert::Sums;
 use crate::design_parameters::{
     ADC_HZ, BLOCK, CHANNELS, LAST_REVISION_WITHOUT_DIVIDER, SAMPLE_HZ, SAMPLING_HALF_CYCLES, SCAN,
     SCANS,
@@ -81,8 +81,8 @@ pub struct Sample {
     /// within a stream. Across a fault it advances by the time that passed, rounded up: a gap in
     /// the numbers is the gap in time, to within one sample.
     pub number: u32,
-    /// The conversions of each channel, in the order of [`SCAN`].
-    pub channels: [CodeSum; CHANNELS],
+    /// Sums of the conversions of each channel, in the order of [`SCAN`].
+    pub sums: Sums,
 }
 
 /// Why a stream ended. Samples were lost.
@@ -217,11 +217,11 @@ impl Stream<'_> {
             return Err(fault);
         }
         match self.read().await {
-            Ok(channels) => {
+            Ok(sums) => {
                 let number = *self.next_number;
                 *self.next_number = number.wrapping_add(1);
                 self.samples += 1;
-                Ok(Sample { number, channels })
+                Ok(Sample { number, sums })
             }
             Err(fault) => {
                 self.fault = Some(fault);
@@ -230,7 +230,7 @@ impl Stream<'_> {
         }
     }
 
-    async fn read(&mut self) -> Result<[CodeSum; CHANNELS], Fault> {
+    async fn read(&mut self) -> Result<Sums, Fault> {
         // Sample k is complete at k + 1 periods, and at k + 2 the controller is back at its first
         // word.
         let overwritten =
@@ -249,13 +249,13 @@ impl Stream<'_> {
             Err(_) => return Err(Fault::Stalled),
         }
 
-        let mut channels = [CodeSum::EMPTY; CHANNELS];
+        let mut sums = [0; CHANNELS];
         for scan in scans {
-            for (channel, code) in channels.iter_mut().zip(scan) {
-                channel.push(Code(code));
+            for (sum, code) in sums.iter_mut().zip(scan) {
+                *sum += u32::from(code);
             }
         }
-        Ok(channels)
+        Ok(sums)
     }
 }
 

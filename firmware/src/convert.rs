@@ -1,128 +1,170 @@
-//! Converter codes, their sums, and what they stand for.
+//! Sums of converter codes, and what they stand for.
 //!
-//! Averages are integer sums until the moment they become volts: no order of adding changes them.
+//! A sample is the sum of [`SCANS`] conversions of every channel: integers until the moment they become volts, so that no order of
+//! adding changes them and nothing is lost by averaging.
+//!
+//! # What is taken out
+//!
+//! The gyros' outputs are absolute and the converter measures in units of its own reference, the 3.3 V supply of the board, whose
+//! drift of 1 % would look like 5 deg/s. The 2.5 V reference of gyro x is converted along with the rest through an equal divider:
+//! a ratio to it is free of the supply and of the dividers. The accelerometer follows that supply itself, as its codes do.
 
 use crate::design_parameters::{
-    DIVIDER_RATIO, GYRO_TEMPERATURE_NULL_C, GYRO_TEMPERATURE_NULL_V, GYRO_TEMPERATURE_V_PER_C,
-    REFERENCE_V,
+    CHANNELS, DIVIDER_RATIO, GYRO_REFERENCE_V, GYRO_TEMPERATURE_NULL_C, GYRO_TEMPERATURE_NULL_V,
+    GYRO_TEMPERATURE_V_PER_C, REFERENCE_TOLERANCE, REFERENCE_V, SAMPLE_HZ, SCANS, SLOW_S,
 };
 
-/// Result of one conversion: 0 at 0 V to 65 535 at the reference, straight binary.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
-#[repr(transparent)]
-pub struct Code(pub u16);
+/// Sums of the conversions of one sample, in the order of [`SCAN`](crate::design_parameters::SCAN).
+pub type Sums = [u32; CHANNELS];
 
-impl Code {
-    /// The code at the reference voltage. A full scale of 2^16 - 1 and not 2^16 (RM0433 25.4.35).
-    pub const FULL_SCALE: u16 = u16::MAX;
+/// The code at the converter's reference voltage. A full scale of 2^16 - 1 and not 2^16 (RM0433 25.4.35).
+pub const FULL_SCALE: u32 = u16::MAX as u32;
 
-    /// Volts per step at the pin, 50.355 µV.
-    pub const VOLTS_PER_STEP: f32 = REFERENCE_V / Self::FULL_SCALE as f32;
+/// A sum at the end of the range.
+pub const SUM_FULL_SCALE: u32 = SCANS as u32 * FULL_SCALE;
+
+/// Volts at the accelerometer for a step of its sum, 25.2 µV. By the nominal reference: it is ratiometric.
+pub const ACCEL_VOLTS: f32 = REFERENCE_V / SUM_FULL_SCALE as f32;
+
+/// The sum that the reference of the gyros has at nominal voltages: 2.5 V behind the divider.
+pub const NOMINAL_REFERENCE: f32 =
+    GYRO_REFERENCE_V * DIVIDER_RATIO / REFERENCE_V * SUM_FULL_SCALE as f32;
+
+/// What moves slowly and is filtered: the gyros' reference and their temperature.
+///
+/// A mean over the first [`SLOW_S`], and from then on a first-order lag of that length: with the lag alone the first reading would
+/// weigh on the first seconds with all of its noise.
+///
+/// Both are kept as differences, to the nominal reference and to equal voltages, where a step of the filter is not lost in the
+/// last digit of a large number.
+#[derive(Clone, Copy, Debug)]
+pub struct Slow {
+    /// Sum of the reference less [`NOMINAL_REFERENCE`].
+    reference: f32,
+    /// Mean of the three temperature sums less the sum of the reference.
+    temperature: f32,
+    /// Samples so far, as far as the mean goes.
+    samples: f32,
 }
 
-/// Sum of conversions of one channel.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct CodeSum {
-    sum: u64,
-    count: u32,
-}
+impl Slow {
+    /// Before the first sample.
+    pub const NEW: Self = Self {
+        reference: 0.0,
+        temperature: 0.0,
+        samples: 0.0,
+    };
 
-impl CodeSum {
-    /// The sum of no conversions.
-    pub const EMPTY: Self = Self { sum: 0, count: 0 };
-
-    /// Adds one conversion.
-    pub const fn push(&mut self, code: Code) {
-        self.sum += code.0 as u64;
-        self.count += 1;
-    }
-
-    /// Adds the conversions of another sum.
-    pub const fn add(&mut self, other: Self) {
-        self.sum += other.sum;
-        self.count += other.count;
-    }
-
-    /// Number of conversions.
-    pub const fn count(self) -> u32 {
-        self.count
-    }
-
-    /// Mean voltage at the pin, V; zero for no conversions.
-    pub fn mean_v(self) -> f32 {
-        if self.count == 0 {
-            return 0.0;
+    /// Takes in `count` samples: totals of the reference's sums, and of those of the three temperatures together.
+    pub fn update(&mut self, reference: u32, temperatures: u32, count: u32) {
+        if count == 0 {
+            return;
         }
-        // Whole and part apart, each exact in an f32: the sum of a second's conversions has 27
-        // bits.
-        let count = u64::from(self.count);
-        let whole = (self.sum / count) as f32;
-        let part = (self.sum % count) as f32 / self.count as f32;
-        (whole + part) * Code::VOLTS_PER_STEP
+        let count = count as f32;
+        let reference = reference as f32 / count;
+        let temperature = temperatures as f32 / (3.0 * count);
+        self.samples = (self.samples + count).min(SLOW_S * SAMPLE_HZ as f32);
+        let weight = count / self.samples;
+        self.reference += weight * (reference - NOMINAL_REFERENCE - self.reference);
+        self.temperature += weight * (temperature - reference - self.temperature);
     }
-}
 
-/// Voltage at a gyro's own pin, V, from that behind its divider.
-pub fn gyro_v(pin_v: f32) -> f32 {
-    pin_v / DIVIDER_RATIO
-}
+    /// Whether the reference is where it can be; otherwise its pin is open, and the nominal one counts.
+    pub fn has_reference(&self) -> bool {
+        self.reference.abs() <= REFERENCE_TOLERANCE * NOMINAL_REFERENCE
+    }
 
-/// Temperature of a gyro's die, °C, from its TEMP output behind the divider, V.
-pub fn gyro_temperature_c(pin_v: f32) -> f32 {
-    GYRO_TEMPERATURE_NULL_C + (gyro_v(pin_v) - GYRO_TEMPERATURE_NULL_V) / GYRO_TEMPERATURE_V_PER_C
+    /// Whether any sample was taken in.
+    pub fn begun(&self) -> bool {
+        self.samples > 0.0
+    }
+
+    fn reference(&self) -> f32 {
+        match self.has_reference() {
+            true => NOMINAL_REFERENCE + self.reference,
+            false => NOMINAL_REFERENCE,
+        }
+    }
+
+    /// Volts at a gyro for a step of its sum, about 42 µV.
+    pub fn gyro_volts(&self) -> f32 {
+        GYRO_REFERENCE_V / self.reference()
+    }
+
+    /// Mean temperature of the gyros, °C. TEMP is made from the gyro's reference as well: that, too, is a ratio.
+    pub fn temp_c(&self) -> f32 {
+        let above_null = match self.has_reference() {
+            true => self.temperature,
+            false => self.temperature + self.reference,
+        } * self.gyro_volts();
+        let null = GYRO_REFERENCE_V - GYRO_TEMPERATURE_NULL_V;
+        GYRO_TEMPERATURE_NULL_C + (above_null + null) / GYRO_TEMPERATURE_V_PER_C
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn repeated(codes: &[u16], times: u32) -> CodeSum {
-        let mut sum = CodeSum::EMPTY;
-        for _ in 0..times {
-            for &code in codes {
-                sum.push(Code(code));
+    /// Sum of a pin at `pin_v` while the converter's reference is `vref_v`, rounded as the converter does.
+    fn sum(pin_v: f64, vref_v: f64) -> u32 {
+        2 * (pin_v / vref_v * 65_535.0).round() as u32
+    }
+
+    /// After `seconds` at these voltages of the sensors.
+    fn settled(reference_v: f64, temp_v: f64, vref_v: f64, seconds: u32) -> Slow {
+        let mut slow = Slow::NEW;
+        for _ in 0..seconds * 50 {
+            let reference = 20 * sum(reference_v * 0.6, vref_v);
+            slow.update(reference, 3 * 20 * sum(temp_v * 0.6, vref_v), 20);
+        }
+        slow
+    }
+
+    #[test]
+    fn drift_of_the_supply_moves_neither_a_rate_nor_a_temperature() {
+        for vref_v in [3.3, 3.267, 3.333] {
+            let slow = settled(2.5, 2.5 + 0.0084 * 30.0, vref_v, 5);
+            // A gyro at its null and 100 deg/s above, through the divider.
+            for gyro_v in [2.5, 3.0] {
+                let read = sum(gyro_v * 0.6, vref_v) as f32 * slow.gyro_volts();
+                // Half a step of a code is 42 µV; so is that of the reference.
+                assert!((f64::from(read) - gyro_v).abs() < 1.0e-4, "{read}");
             }
+            assert!((slow.temp_c() - 55.0).abs() < 0.02, "{}", slow.temp_c());
         }
-        sum
     }
 
     #[test]
-    fn full_scale_is_the_reference_voltage_and_zero_is_ground() {
-        assert_eq!(repeated(&[Code::FULL_SCALE], 1).mean_v(), REFERENCE_V);
-        assert_eq!(repeated(&[0], 1).mean_v(), 0.0);
+    fn without_the_reference_the_nominal_one_counts() {
+        let slow = settled(0.0, 2.5 + 0.0084 * 10.0, 3.3, 5);
+        assert!(!slow.has_reference());
+        let read = sum(1.5, 3.3) as f32 * slow.gyro_volts();
+        assert!((read - 2.5).abs() < 1e-4);
+        assert!((slow.temp_c() - 35.0).abs() < 0.02, "{}", slow.temp_c());
     }
 
     #[test]
-    fn a_mean_does_not_depend_on_how_its_conversions_were_grouped() {
-        let mut by_parts = CodeSum::EMPTY;
-        for _ in 0..500 {
-            by_parts.add(repeated(&[40_000, 40_003], 2));
+    fn the_first_second_is_a_mean_and_then_it_forgets() {
+        let mut slow = Slow::NEW;
+        let nominal = NOMINAL_REFERENCE.round() as u32;
+        for k in 0..500 {
+            let sign = [-20, 20][k % 2];
+            slow.update(nominal.saturating_add_signed(sign), 3 * nominal, 1);
         }
-        assert_eq!(by_parts, repeated(&[40_000, 40_003], 1000));
-    }
-
-    #[test]
-    fn an_hour_at_full_scale_neither_overflows_nor_moves() {
-        let second = repeated(&[Code::FULL_SCALE], 2000);
-        let mut hour = CodeSum::EMPTY;
-        for _ in 0..3600 {
-            hour.add(second);
+        assert!((slow.reference + NOMINAL_REFERENCE - nominal as f32).abs() < 0.1);
+        // A step of the reference: when the second is full the mean is halfway, and after three time constants more e⁻³ of that
+        // half is left.
+        for _ in 0..500 + 3000 {
+            slow.update(nominal + 200, 3 * nominal, 1);
         }
-        assert_eq!(hour.count(), 7_200_000);
-        assert_eq!(hour.mean_v(), REFERENCE_V);
+        let left = f64::from(nominal as f32 + 200.0 - (slow.reference + NOMINAL_REFERENCE));
+        assert!((left - 100.0 * (-3.0_f64).exp()).abs() < 0.1, "{left}");
     }
 
     #[test]
-    fn a_quarter_of_a_step_survives_the_mean_of_a_second() {
-        let below = repeated(&[30_000], 2000).mean_v();
-        let above = repeated(&[30_000, 30_000, 30_000, 30_001], 500).mean_v();
-        let quarter_v = Code::VOLTS_PER_STEP / 4.0;
-        assert!(((above - below) - quarter_v).abs() < 0.02 * quarter_v);
-    }
-
-    #[test]
-    fn the_temperature_output_reads_298_kelvin_at_its_null_and_its_absolute_zero_near_zero_volts() {
-        assert!((gyro_temperature_c(2.5 * DIVIDER_RATIO) - 25.0).abs() < 1e-3);
-        assert!((gyro_temperature_c(0.0) - -273.15).abs() < 1.0);
+    fn the_accelerometer_reads_half_its_supply_at_half_scale() {
+        let read = SUM_FULL_SCALE as f32 * 0.5 * ACCEL_VOLTS;
+        assert!((read - 1.65).abs() < 1e-6);
     }
 }

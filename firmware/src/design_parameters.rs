@@ -8,6 +8,13 @@
 /// so a change of the converter's reference looks like a rate: hence [`REFERENCE`] in the scan.
 pub const GYRO_NULL_V: f32 = 2.5;
 
+/// Voltage of an ADXRS300's reference pin, V: what its null and its TEMP output are made from.
+pub const GYRO_REFERENCE_V: f32 = 2.5;
+
+/// How far the converted reference may be from its nominal value before its pin is taken for open. Reference and supply are
+/// within 2 % each; an open or shorted pin reads 0 or 3.3 V.
+pub const REFERENCE_TOLERANCE: f32 = 0.1;
+
 /// Sensitivity of an ADXRS300 at its own pin, V per (deg/s): 1.0 to 4.0 V for its 300 deg/s.
 pub const GYRO_SENSITIVITY_V_PER_DPS: f32 = 0.005;
 
@@ -123,6 +130,80 @@ pub const REFERENCE: usize = 9;
 /// Reference of the converter, V: VREF+ is tied to the board's 3.3 V.
 pub const REFERENCE_V: f32 = 3.3;
 
+// ---- Self-test ---------------------------------------------------------------------------------
+
+// Four outputs of the Zio header that no input of ADC1 and no other part of the board is on:
+//   PE13 (D3)  ST1 of the three gyros
+//   PE11 (D5)  ST2 of the three gyros
+//   PE9  (D6)  g-Select1 of the accelerometer
+//   PD15 (D9)  g-Select2
+// A self-test input of the ADXRS300 takes 3.3 V and more for high, which a pin of a 3.3 V part just does not reach: both go through a
+// 74AHCT buffer at 5 V. The accelerometer is a 3.3 V part. Low, as after reset, is no test and the finest range.
+
+/// Change of an ADXRS300's output by ST1, V, typically: it deflects the sensor by some -50 deg/s.
+pub const SELF_TEST_ST1_V: f32 = -0.27;
+
+/// The same by ST2.
+pub const SELF_TEST_ST2_V: f32 = 0.27;
+
+/// Largest departure from that: the datasheet states 0.15 to 0.45 V.
+pub const SELF_TEST_TOLERANCE_V: f32 = 0.18;
+
+/// The accelerometer has no input that moves its mass; but its 6 g range (both g-Selects high) is four times coarser, so that
+/// gravity's share of the output must shrink from 0.8 to 0.2 V. This is the change of its length, V.
+pub const SELF_TEST_ACCEL_V: f32 = 0.6;
+
+/// Largest departure from that. Its nulls differ from 1.65 V by up to 0.165 V, and not by the same in both ranges.
+pub const SELF_TEST_ACCEL_TOLERANCE_V: f32 = 0.35;
+
+/// Time that every state of the self-test lasts before it is measured, ms. The slowest part of the chain is the gyro's 40 Hz filter,
+/// 4 ms: 25 time constants.
+pub const SELF_TEST_SETTLE_MS: u64 = 100;
+
+/// Samples that are averaged in every state: 2.4 mV of a gyro's noise become 0.2 mV.
+pub const SELF_TEST_SAMPLES: u32 = 128;
+
+// ---- The line ----------------------------------------------------------------------------------
+
+/// Baud rate: 100 kB/s, twice what raw and compensated streams take together. Not 921 600, of which a kernel clock of 100 MHz
+/// makes 0.45 % more; this divides it evenly, and the debugger's bridge takes any rate.
+pub const BAUD: u32 = 1_000_000;
+
+/// Vendor and product of the port on the part's own USB: the numbers that pid.codes has set apart for testing. A product needs its own.
+pub const USB_VENDOR: u16 = 0x1209;
+/// See [`USB_VENDOR`].
+pub const USB_PRODUCT: u16 = 0x0001;
+/// Bytes of a packet, the most at full speed.
+pub const USB_PACKET: u16 = 64;
+
+/// Frames that wait for the line. A frame of a full batch takes 5 ms of the 20 that it stands for.
+pub const FRAMES: usize = 6;
+
+/// Bytes from the host that wait to be looked at: 10 ms of the line.
+pub const RECEIVED: usize = 1024;
+
+/// Samples that wait to be processed, so ms. Storing a calibration computes its hash twice, 4 ms; the rest is for what nobody
+/// thought of.
+pub const QUEUE: usize = 64;
+
+/// Time in which the program has to come round, or the watchdog restarts it, µs. It comes round every [`WATCHDOG_FEED_MS`]; the
+/// watchdog's own clock is 32 kHz within 10 %.
+pub const WATCHDOG_US: u32 = 2_000_000;
+
+/// How often the watchdog is fed, ms.
+pub const WATCHDOG_FEED_MS: u64 = 250;
+
+// ---- Flash -------------------------------------------------------------------------------------
+
+/// Size of a word of the flash memory, bytes: programmed once between erases, and whole (RM0433 4.3.9).
+pub const FLASH_WORD: usize = 32;
+
+/// Size of a sector, bytes: what is erased.
+pub const FLASH_SECTOR: usize = 128 * 1024;
+
+/// The two sectors of `memory.x` as sectors of bank 2.
+pub const FLASH_SECTORS: [u8; 2] = [6, 7];
+
 // ---- Clocks ------------------------------------------------------------------------------------
 
 /// The debugger's clock output, Hz, which drives the oscillator input: a clock, not a crystal,
@@ -185,6 +266,10 @@ pub const CHANNEL_CYCLES: u32 = (SAMPLING_HALF_CYCLES + CONVERSION_HALF_CYCLES) 
 /// averaging more of it would show nowhere. It would show in the emulator that the image is tested
 /// on, which spends about 12 µs on a conversion and falls behind real time near 80 000 a second.
 pub const SCANS: usize = 2;
+
+/// Time constant of the filter of temperature and reference, s. The noise of one sample of the reference, some 50 ppm of it, would
+/// be 0.02 deg/s of every gyro at once; over a second it is 1.5 ppm. Both move with the temperature of a board, over minutes.
+pub const SLOW_S: f32 = 1.0;
 
 /// Conversions in one sample.
 pub const BLOCK: usize = SCANS * CHANNELS;

@@ -1,16 +1,41 @@
-//! Sampling of an analog inertial unit by a NUCLEO-H743ZI2, at exactly 1 kHz.
+//! An analog inertial unit on a NUCLEO-H743ZI2: sampled at exactly 1 kHz, compensated, streamed, calibrated.
 //!
-//! | module                | what it is                                                     |
-//! |-----------------------|----------------------------------------------------------------|
-//! | [`design_parameters`] | every electrical and timing constant, and why it is what it is |
-//! | [`convert`]           | converter codes, their sums, and what they stand for           |
-//! | `adc`                 | the converter's driver, the only place with its registers      |
+//! | module                | what it is                                                       |
+//! |-----------------------|------------------------------------------------------------------|
+//! | [`design_parameters`] | every electrical and timing constant, and why it is what it is   |
+//! | [`convert`]           | sums of converter codes, and what they stand for                 |
+//! | [`pipeline`]          | what happens to a sample: compensation, batches, Kalman banks    |
+//! | [`bank`]              | a Kalman bank that is told its input and fed from the stream     |
+//! | [`upload`]            | a calibration on its way to the device                           |
+//! | [`slots`]             | where calibrations are kept, safe against a failing supply       |
+//! | `adc`                 | the converter's driver, the only place with its registers        |
+//! | `flash`               | the same of the flash memory                                     |
+//! | `clocks`              | the clock tree                                                   |
+//! | `link`                | the line to the host: serial, or USB                             |
+//! | `commands`            | what the host asks, and what it is answered                      |
+//! | `self_test`           | deflects the sensors by their inputs                             |
+//! | `restart`             | why the device started, and the record that a panic leaves       |
 //!
-//! The first two compile for the PC as well and are tested there; the driver is for the target
-//! only.
+//! Those with links compile for the PC as well and are tested there.
 #![no_std]
 
 #[cfg(target_os = "none")]
 pub mod adc;
+pub mod bank;
+#[cfg(target_os = "none")]
+pub mod clocks;
+#[cfg(target_os = "none")]
+pub mod commands;
 pub mod convert;
 pub mod design_parameters;
+#[cfg(target_os = "none")]
+pub mod flash;
+#[cfg(target_os = "none")]
+pub mod link;
+pub mod pipeline;
+#[cfg(target_os = "none")]
+pub mod restart;
+#[cfg(target_os = "none")]
+pub mod self_test;
+pub mod slots;
+pub mod upload;

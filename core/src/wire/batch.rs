@@ -74,7 +74,7 @@ impl<'a> RawBatch<'a> {
     /// The bytes of a sample, from its sums; those above 2²⁴ are cut off.
     pub fn pack(sums: &[u32; 6]) -> [u8; RAW_BYTES] {
         let mut bytes = [0; RAW_BYTES];
-        for (bytes, sum) in bytes.chunks_exact_mut(3).zip(sums) {
+        for (bytes, sum) in bytes.as_chunks_mut::<3>().0.iter_mut().zip(sums) {
             for (byte, of) in bytes.iter_mut().zip(sum.to_le_bytes()) {
                 *byte = of;
             }
@@ -91,9 +91,9 @@ impl<'a> RawBatch<'a> {
     /// Numbers and sums of the samples, in order.
     pub fn sums(&self) -> impl Iterator<Item = (u32, [u32; 6])> + 'a {
         let numbers = numbers(self.head.first);
-        numbers.zip(self.samples.chunks_exact(RAW_BYTES).map(|bytes| {
+        numbers.zip(self.samples.as_chunks::<RAW_BYTES>().0.iter().map(|bytes| {
             let mut sums = [0; 6];
-            for (sum, bytes) in sums.iter_mut().zip(bytes.chunks_exact(3)) {
+            for (sum, bytes) in sums.iter_mut().zip(bytes.as_chunks::<3>().0) {
                 for byte in bytes.iter().rev() {
                     *sum = *sum << 8 | u32::from(*byte);
                 }
@@ -125,7 +125,7 @@ impl<'a> CompensatedBatch<'a> {
     pub fn pack(sample: &Sample<f32>) -> [u8; COMPENSATED_BYTES] {
         let mut bytes = [0; COMPENSATED_BYTES];
         let values = sample.gyro.iter().chain(sample.accel.iter());
-        for (bytes, value) in bytes.chunks_exact_mut(4).zip(values) {
+        for (bytes, value) in bytes.as_chunks_mut::<4>().0.iter_mut().zip(values) {
             for (byte, of) in bytes.iter_mut().zip(value.to_le_bytes()) {
                 *byte = of;
             }
@@ -142,21 +142,23 @@ impl<'a> CompensatedBatch<'a> {
     /// Numbers and values of the samples, rad/s and m/s² in the body frame, in order.
     pub fn values(&self) -> impl Iterator<Item = (u32, Sample<f32>)> + 'a {
         let numbers = numbers(self.head.first);
-        numbers.zip(self.samples.chunks_exact(COMPENSATED_BYTES).map(|bytes| {
-            let mut values = [0.0; 6];
-            for (value, bytes) in values.iter_mut().zip(bytes.chunks_exact(4)) {
-                let mut of = [0; 4];
-                for (of, byte) in of.iter_mut().zip(bytes) {
-                    *of = *byte;
-                }
-                *value = f32::from_le_bytes(of);
-            }
-            let [gx, gy, gz, ax, ay, az] = values;
-            Sample {
-                gyro: Vector3::new(gx, gy, gz),
-                accel: Vector3::new(ax, ay, az),
-            }
-        }))
+        numbers.zip(
+            self.samples
+                .as_chunks::<COMPENSATED_BYTES>()
+                .0
+                .iter()
+                .map(|bytes| {
+                    let mut values = [0.0; 6];
+                    for (value, bytes) in values.iter_mut().zip(bytes.as_chunks::<4>().0) {
+                        *value = f32::from_le_bytes(*bytes);
+                    }
+                    let [gx, gy, gz, ax, ay, az] = values;
+                    Sample {
+                        gyro: Vector3::new(gx, gy, gz),
+                        accel: Vector3::new(ax, ay, az),
+                    }
+                }),
+        )
     }
 }
 

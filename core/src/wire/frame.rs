@@ -4,7 +4,7 @@ use cobs::{DecodeResult, DecoderState};
 use crc::{CRC_32_ISO_HDLC, Crc};
 use serde::{Deserialize, Serialize};
 
-/// Most bytes of a message. The longest is a compensated batch, 506.
+/// Most bytes of a message. The longest is a compensated batch, some ten less.
 pub const MAX_PAYLOAD: usize = 512;
 
 const CHECK: usize = 4;
@@ -13,7 +13,8 @@ const CHECK: usize = 4;
 pub const MAX_FRAME: usize = cobs::max_encoding_length(MAX_PAYLOAD + CHECK) + 2;
 
 /// With the table of 1 KiB: bit by bit it would be some fifty instructions a byte, at 45 kB/s.
-const CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
+// A static: the table of a constant is in the image once for each use.
+static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
 /// The message is longer than [`MAX_PAYLOAD`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -185,8 +185,8 @@ proptest! {
         let (payloads, garbled) = decode(&line);
         let all = decode(&one).0.remove(0);
         prop_assert!(payloads.iter().all(|p| *p == all));
-        // The zeros between frames are two: losing one of them loses nothing.
-        prop_assert!(payloads.len() >= 1 && payloads.len() + 2 >= 3);
+        // At worst it was the end of one and the beginning of the next.
+        prop_assert!(!payloads.is_empty());
         prop_assert!(payloads.len() == 3 || garbled >= 1);
     }
 

@@ -1,14 +1,21 @@
 //! Everything of `mimu-core` in the precision of the device, as functions that a compiler has to generate.
 //!
-//! `check.sh` compiles this for the target and looks through the assembly: no call into
-//! `core::panicking` may be in it. Generic code is only compiled where it is used, so a function
-//! that is missing here is not looked at.
+//! `check.sh` compiles this and everything that it uses for the target, and follows every call and every address in the assembly from
+//! these functions on: none may lead out of it, but to a few functions that are known not to panic. A function that is missing here
+//! is not looked at.
 #![no_std]
 
 use mimu_core::compensation::{Affine, Compensation, Sample};
 use mimu_core::effects::{Effect, Effects, Refused, Sensor, State, Variable};
 use mimu_core::kalman::{Bank, Filter, Innovation, Rejected};
-use nalgebra::{Matrix4, Vector3, Vector4};
+use mimu_core::single;
+use mimu_core::stored::{self, Record, Stored, TooLong};
+use mimu_core::table::{self, Node, Table};
+use mimu_core::wire::{
+    Call, CompensatedBatch, Decoder, EncodeError, MAX_FRAME, Message, RawBatch,
+    effects_of_this_build, encode, volts,
+};
+use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
 
 /// [`Affine::apply`].
 #[inline(never)]
@@ -109,4 +116,114 @@ pub fn bank_update(
     noise: &Vector3<f32>,
 ) -> Result<(), Rejected> {
     bank.update(input, raw, noise)
+}
+
+/// [`Effects::new`], which the device calls when it is given a calibration.
+#[inline(never)]
+pub fn effects_new(gyro: &Affine<f64>, accel: &Affine<f64>) -> Option<Effects<f32, 8>> {
+    Effects::new(gyro, accel)
+}
+
+/// [`Table::new`].
+#[inline(never)]
+pub fn table_new(nodes: &[Node<f32>]) -> Result<Table<f32, 16>, table::Refused> {
+    Table::new(nodes.iter().copied())
+}
+
+/// [`Table::state`] and [`Table::follow`].
+#[inline(never)]
+pub fn table_follow(table: &Table<f32, 16>, temp_c: f32) -> table::State<f32> {
+    let mut state = table.state();
+    table.follow(&mut state, temp_c);
+    state
+}
+
+/// [`stored::encode`].
+#[inline(never)]
+pub fn stored_encode(
+    found_with: [&Matrix3<f32>; 2],
+    nodes: &[Node<f32>],
+    effects: &[Record<'_>],
+    out: &mut [u8],
+) -> Result<usize, TooLong> {
+    stored::encode(found_with, nodes, effects, out)
+}
+
+/// [`stored::decode`] and [`stored::hash`].
+#[inline(never)]
+pub fn stored_decode(bytes: &[u8]) -> (u64, Result<Stored, stored::Refused>) {
+    (stored::hash(bytes), stored::decode(bytes))
+}
+
+/// [`encode`] of what a device sends.
+#[inline(never)]
+pub fn wire_send(message: &Message<'_>, out: &mut [u8; MAX_FRAME]) -> Result<usize, EncodeError> {
+    encode(message, out)
+}
+
+/// [`encode`] of what a host sends.
+#[inline(never)]
+pub fn wire_ask(call: &Call<'_>, out: &mut [u8; MAX_FRAME]) -> Result<usize, EncodeError> {
+    encode(call, out)
+}
+
+/// [`Decoder`], as a device uses it.
+#[inline(never)]
+pub fn wire_asked(decoder: &mut Decoder, byte: u8) -> Option<(Option<Call<'_>>, Option<u16>)> {
+    let frame = decoder.push(byte)?;
+    Some((frame.call(), frame.id()))
+}
+
+/// [`Decoder`], as a host uses it.
+#[inline(never)]
+pub fn wire_received(decoder: &mut Decoder, byte: u8) -> Option<Message<'_>> {
+    decoder.push(byte)?.message()
+}
+
+/// [`RawBatch`] as a host reads it.
+#[inline(never)]
+pub fn wire_raw(batch: &RawBatch<'_>, take: &mut dyn FnMut(u32, [u32; 6], Sample<f32>)) {
+    if batch.is_whole() {
+        for ((number, sums), (_, sample)) in batch.sums().zip(batch.volts()) {
+            take(number, sums, sample);
+        }
+    }
+}
+
+/// [`CompensatedBatch`] as a host reads it.
+#[inline(never)]
+pub fn wire_compensated(batch: &CompensatedBatch<'_>, take: &mut dyn FnMut(u32, Sample<f32>)) {
+    if batch.is_whole() {
+        for (number, sample) in batch.values() {
+            take(number, sample);
+        }
+    }
+}
+
+/// [`effects_of_this_build`].
+#[inline(never)]
+pub fn wire_effects() -> u32 {
+    effects_of_this_build()
+}
+
+/// What a device does with every sample: sums to volts, compensation at the temperature of the batch, effects, bytes of both
+/// streams.
+#[inline(never)]
+pub fn sample_path(
+    sums: &[u32; 6],
+    scale: [f32; 2],
+    at: &table::State<f32>,
+    effects: &Effects<f32, 8>,
+    state: &mut State<f32, 8>,
+) -> ([u8; 18], [u8; 24]) {
+    let [gyro, accel] = scale;
+    let raw = volts(sums, gyro, accel);
+    let sample = single::remove(effects, state, &single::compensate(&at.model, &raw));
+    (RawBatch::pack(sums), CompensatedBatch::pack(&sample))
+}
+
+/// The same without effects: compensation proper, whose instructions are counted.
+#[inline(never)]
+pub fn sample_compensation(at: &table::State<f32>, raw: &Sample<f32>) -> Sample<f32> {
+    single::compensate(&at.model, raw)
 }

@@ -1,0 +1,339 @@
+//! What the host asks, and what it is answered.
+
+use core::cell::RefCell;
+use core::sync::atomic::{AtomicU32, Ordering};
+
+use embassy_stm32::uid::uid;
+use embassy_sync::blocking_mutex::Mutex;
+use embassy_sync::blocking_mutex::raw::NoopRawMutex;
+use embassy_time::Instant;
+use mimu_core::stored::{self, MAX_LENGTH, NODES, ROOM, Stored};
+use mimu_core::wire::{
+    CHUNK, Call, Capabilities, Counters, Decoder, Greeting, MAGIC, Message, PROTOCOL, Prior,
+    Refusal, Reply, Request, StoredInfo, Triad, effects_of_this_build, flags,
+};
+
+use crate::bank::Bank;
+use crate::design_parameters::SAMPLE_HZ;
+use crate::flash::{self, Flash};
+use crate::link::{FrameSender, Input, send};
+use crate::pipeline::{Pipeline, Streams};
+use crate::restart::Before;
+use crate::self_test::SelfTest;
+use crate::slots::Slots;
+use crate::upload::Upload;
+
+/// The path of the samples, between tasks of one executor: none of them holds it while it waits.
+pub type Shared = Mutex<NoopRawMutex, RefCell<Pipeline>>;
+
+/// What sampling and processing count.
+#[derive(Debug, Default)]
+pub struct Tally {
+    /// Samples taken.
+    pub samples: AtomicU32,
+    /// Number of the last.
+    pub last: AtomicU32,
+    /// See [`Fault`](crate::adc::Fault).
+    pub late: AtomicU32,
+    /// See [`Fault`](crate::adc::Fault).
+    pub converter_overruns: AtomicU32,
+    /// See [`Fault`](crate::adc::Fault).
+    pub stalls: AtomicU32,
+    /// Samples that found no room in the queue.
+    pub queue_overruns: AtomicU32,
+    /// Longest time between a sample and the end of its processing, µs.
+    pub longest_us: AtomicU32,
+}
+
+impl Tally {
+    /// All zero.
+    pub const fn new() -> Self {
+        Self {
+            samples: AtomicU32::new(0),
+            last: AtomicU32::new(0),
+            late: AtomicU32::new(0),
+            converter_overruns: AtomicU32::new(0),
+            stalls: AtomicU32::new(0),
+            queue_overruns: AtomicU32::new(0),
+            longest_us: AtomicU32::new(0),
+        }
+    }
+
+    /// Samples and faults, so that it moves as long as sampling does not stand still.
+    pub fn progress(&self) -> u32 {
+        let of = |counter: &AtomicU32| counter.load(Ordering::Relaxed);
+        of(&self.samples)
+            .wrapping_add(of(&self.late))
+            .wrapping_add(of(&self.converter_overruns))
+            .wrapping_add(of(&self.stalls))
+    }
+}
+
+/// Everything that a call can concern.
+pub struct Commands<'a> {
+    /// The path of the samples.
+    pub pipeline: &'a Shared,
+    /// What sampling counts.
+    pub tally: &'a Tally,
+    /// Where calibrations are kept.
+    pub slots: Slots<Flash>,
+    /// One on its way.
+    pub upload: Upload<'a>,
+    /// Of the calibration in use.
+    pub stored: Option<StoredInfo>,
+    /// Inputs of the sensors.
+    pub self_test: SelfTest<'a>,
+    /// Why the device started.
+    pub before: &'a Before,
+    /// Where answers go.
+    pub replies: FrameSender,
+}
+
+/// What the greeting says of a calibration.
+pub fn info(length: u32, hash: u64, stored: &Stored) -> StoredInfo {
+    StoredInfo {
+        length,
+        hash,
+        nodes: stored.table.len() as u8,
+        effects: stored.effect_count,
+    }
+}
+
+/// Calls that were refused, and times that bytes were lost on the way to the decoder.
+#[derive(Default)]
+struct Heard {
+    refused: u32,
+    overruns: u32,
+    garbled: u32,
+}
+
+impl Commands<'_> {
+    /// Greets, and then answers for ever.
+    pub async fn serve(mut self, mut input: Input) -> ! {
+        self.greet(0).await;
+        let mut decoder = Decoder::new();
+        let mut heard = Heard::default();
+        let mut bytes = [0; 64];
+        loop {
+            let Some(count) = input.receive(&mut bytes).await else {
+                heard.overruns = heard.overruns.wrapping_add(1);
+                continue;
+            };
+            for byte in &bytes[..count] {
+                heard.garbled = decoder.garbled();
+                let Some(frame) = decoder.push(*byte) else {
+                    continue;
+                };
+                let reset = match frame.call() {
+                    Some(call) => {
+                        self.answer(&call, &mut heard).await;
+                        call.request == Request::ResetCounters
+                    }
+                    None => {
+                        let id = frame.id().unwrap_or_default();
+                        heard.refused = heard.refused.wrapping_add(1);
+                        self.refuse(id, Refusal::Unknown).await;
+                        false
+                    }
+                };
+                if reset {
+                    decoder.reset_garbled();
+                }
+            }
+        }
+    }
+
+    async fn refuse(&mut self, id: u16, refusal: Refusal) {
+        send(&mut self.replies, &Message::Refused { id, refusal }).await;
+    }
+
+    async fn answer(&mut self, call: &Call<'_>, heard: &mut Heard) {
+        let id = call.id;
+        let mut part = [0; CHUNK];
+        let outcome = match call.request {
+            Request::Hello => return self.greet(id).await,
+            Request::Download { offset, length } => self.download(offset, length, &mut part).await,
+            Request::UploadCommit => self.commit().await.map(|()| Reply::Done),
+            Request::SelfTest => Ok(Reply::SelfTest(self.self_test.run(self.pipeline).await)),
+            Request::Counters => Ok(Reply::Counters(self.counters(heard))),
+            Request::ResetCounters => {
+                self.reset_counters(heard);
+                Ok(Reply::Done)
+            }
+            request => self.at_once(request),
+        };
+        match outcome {
+            Ok(reply) => send(&mut self.replies, &Message::Reply { id, reply }).await,
+            Err(refusal) => {
+                heard.refused = heard.refused.wrapping_add(1);
+                self.refuse(id, refusal).await;
+            }
+        }
+    }
+
+    /// What takes no time.
+    fn at_once(&mut self, request: Request<'_>) -> Result<Reply<'static>, Refusal> {
+        let pipeline = self.pipeline;
+        match request {
+            Request::Stream { raw, compensated } => pipeline.lock(|p| {
+                let mut p = p.borrow_mut();
+                if compensated && !p.is_calibrated() {
+                    return Err(Refusal::NoCalibration);
+                }
+                p.stream(Streams { raw, compensated });
+                Ok(())
+            })?,
+            Request::Stop => pipeline.lock(|p| p.borrow_mut().stream(Streams::default())),
+            Request::UploadBegin { length, hash } => self.upload.begin(length, hash)?,
+            Request::UploadChunk { offset, bytes } => self.upload.chunk(offset, bytes)?,
+            Request::KalmanStart {
+                triad,
+                noise,
+                prior,
+            } => self.start_bank(triad, noise, prior)?,
+            Request::KalmanInput { triad, input } => {
+                let set = pipeline.lock(|p| {
+                    let mut p = p.borrow_mut();
+                    let bank = p.banks[triad as usize].as_mut();
+                    bank.map(|bank| bank.set_input(input))
+                });
+                match set {
+                    Some(true) => {}
+                    Some(false) => return Err(Refusal::BadNumber),
+                    None => return Err(Refusal::NoBank),
+                }
+            }
+            Request::KalmanEnd { triad } => {
+                let bank = pipeline.lock(|p| p.borrow_mut().banks[triad as usize].take());
+                let bank = bank.ok_or(Refusal::NoBank)?;
+                return Ok(Reply::Kalman(bank.state()));
+            }
+            // The others are the caller's.
+            _ => return Err(Refusal::Unknown),
+        }
+        Ok(Reply::Done)
+    }
+
+    fn start_bank(&mut self, triad: Triad, noise: [f32; 3], prior: Prior) -> Result<(), Refusal> {
+        let bank = Bank::new(triad, noise, prior).ok_or(Refusal::BadNumber)?;
+        self.pipeline
+            .lock(|p| p.borrow_mut().banks[triad as usize] = Some(bank));
+        Ok(())
+    }
+
+    async fn commit(&mut self) -> Result<(), Refusal> {
+        self.upload.check()?;
+        let bytes = self.upload.bytes();
+        let storing = |on| {
+            let set = |p: &RefCell<Pipeline>| p.borrow_mut().flag(flags::STORING, on);
+            self.pipeline.lock(set);
+        };
+        storing(true);
+        let kept = self.slots.store(bytes).await;
+        storing(false);
+        kept.map_err(|_| Refusal::FlashFailed)?;
+        self.use_stored()?;
+        self.upload.end();
+        Ok(())
+    }
+
+    /// Not in `commit`, whose future would keep room for what is decoded.
+    #[inline(never)]
+    fn use_stored(&mut self) -> Result<(), Refusal> {
+        let bytes = self.upload.bytes();
+        let stored = stored::decode(bytes).map_err(Refusal::NotUsable)?;
+        self.stored = Some(info(bytes.len() as u32, stored::hash(bytes), &stored));
+        self.pipeline.lock(|p| p.borrow_mut().calibrate(stored));
+        Ok(())
+    }
+
+    async fn download<'b>(
+        &mut self,
+        offset: u32,
+        wanted: u16,
+        part: &'b mut [u8; CHUNK],
+    ) -> Result<Reply<'b>, Refusal> {
+        let (length, _) = self.slots.in_use().ok_or(Refusal::NoCalibration)?;
+        if offset > length {
+            return Err(Refusal::WrongOffset { expected: length });
+        }
+        let count = (length - offset).min(u32::from(wanted)).min(CHUNK as u32);
+        let part = &mut part[..count as usize];
+        let read = self.slots.part(offset as usize, part).await;
+        read.ok_or(Refusal::FlashFailed)?;
+        Ok(Reply::Stored {
+            offset,
+            length,
+            bytes: part,
+        })
+    }
+
+    async fn greet(&mut self, id: u16) {
+        let usb = match cfg!(feature = "usb") {
+            true => Capabilities::USB,
+            false => Capabilities(0),
+        };
+        let greeting = Greeting {
+            magic: MAGIC,
+            protocol: PROTOCOL,
+            firmware: env!("CARGO_PKG_VERSION"),
+            board: "NUCLEO-H743ZI2",
+            unit_id: uid(),
+            capabilities: Capabilities::TEMPERATURE_NODES
+                .and(Capabilities::TERMS)
+                .and(Capabilities::KALMAN)
+                .and(Capabilities::SELF_TEST)
+                .and(usb),
+            effects: effects_of_this_build(),
+            effects_room: ROOM as u8,
+            nodes_room: NODES as u8,
+            stored_room: MAX_LENGTH as u32,
+            sample_rate_hz: SAMPLE_HZ,
+            channels: "gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z",
+            raw_unit: "V",
+            start: self.before.start(),
+            starts: self.before.starts(),
+            stored: self.stored,
+            slots: self.slots.state(),
+        };
+        send(&mut self.replies, &Message::Greeting { id, greeting }).await;
+    }
+
+    fn counters(&self, heard: &Heard) -> Counters {
+        let of = |counter: &AtomicU32| counter.load(Ordering::Relaxed);
+        let losses = self.pipeline.lock(|p| p.borrow().losses());
+        Counters {
+            uptime_ms: Instant::now().as_millis() as u32,
+            samples: of(&self.tally.samples),
+            last: of(&self.tally.last),
+            late: of(&self.tally.late),
+            converter_overruns: of(&self.tally.converter_overruns),
+            stalls: of(&self.tally.stalls),
+            queue_overruns: of(&self.tally.queue_overruns),
+            batches_dropped: losses.batches,
+            frames_garbled: heard.garbled,
+            receiver_overruns: heard.overruns,
+            refused: heard.refused,
+            flash_corrected: of(&flash::CORRECTED),
+            flash_uncorrectable: of(&flash::UNCORRECTABLE),
+            longest_us: of(&self.tally.longest_us),
+        }
+    }
+
+    fn reset_counters(&mut self, heard: &mut Heard) {
+        for counter in [
+            &self.tally.samples,
+            &self.tally.late,
+            &self.tally.converter_overruns,
+            &self.tally.stalls,
+            &self.tally.queue_overruns,
+            &self.tally.longest_us,
+            &flash::CORRECTED,
+            &flash::UNCORRECTABLE,
+        ] {
+            counter.store(0, Ordering::Relaxed);
+        }
+        self.pipeline.lock(|p| p.borrow_mut().reset_losses());
+        *heard = Heard::default();
+    }
+}

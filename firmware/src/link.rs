@@ -1,0 +1,81 @@
+//! The line to the host: frames out, bytes in. The debugger's serial bridge, or the part's own USB with the feature `usb`.
+
+use embassy_futures::select::{Either, select};
+use embassy_sync::blocking_mutex::raw::NoopRawMutex;
+use embassy_sync::zerocopy_channel::{Receiver, Sender};
+use mimu_core::wire::{MAX_FRAME, Message, encode};
+
+#[cfg(not(feature = "usb"))]
+mod serial;
+#[cfg(feature = "usb")]
+mod usb;
+
+#[cfg(not(feature = "usb"))]
+pub use serial::{Input, Output, config, split};
+#[cfg(feature = "usb")]
+pub use usb::{Input, Memory, Output, Usb, split};
+
+/// A frame on its way out.
+#[derive(Clone, Copy)]
+pub struct Outgoing {
+    length: usize,
+    bytes: [u8; MAX_FRAME],
+}
+
+impl Outgoing {
+    /// Nothing.
+    pub const EMPTY: Self = Self {
+        length: 0,
+        bytes: [0; MAX_FRAME],
+    };
+
+    fn fill(&mut self, message: &Message<'_>) {
+        // Too long is none; the types leave no such message.
+        self.length = encode(message, &mut self.bytes).unwrap_or_default();
+    }
+
+    fn bytes(&self) -> &[u8] {
+        self.bytes.get(..self.length).unwrap_or(&[])
+    }
+}
+
+/// Where frames go in.
+pub type FrameSender = Sender<'static, NoopRawMutex, Outgoing>;
+/// Where they come out.
+pub type FrameReceiver = Receiver<'static, NoopRawMutex, Outgoing>;
+
+/// Sends a message when there is room.
+pub async fn send(frames: &mut FrameSender, message: &Message<'_>) {
+    frames.send().await.fill(message);
+    frames.send_done();
+}
+
+/// Sends a message if there is room; says whether.
+pub fn try_send(frames: &mut FrameSender, message: &Message<'_>) -> bool {
+    let Some(frame) = frames.try_send() else {
+        return false;
+    };
+    frame.fill(message);
+    frames.send_done();
+    true
+}
+
+/// Transmits what comes, answers before events: the host waits for those.
+pub async fn transmit(mut output: Output, mut replies: FrameReceiver, mut events: FrameReceiver) {
+    loop {
+        let from_replies = match select(replies.receive(), events.receive()).await {
+            Either::First(frame) => {
+                output.send(frame.bytes()).await;
+                true
+            }
+            Either::Second(frame) => {
+                output.send(frame.bytes()).await;
+                false
+            }
+        };
+        match from_replies {
+            true => replies.receive_done(),
+            false => events.receive_done(),
+        }
+    }
+}

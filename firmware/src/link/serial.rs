@@ -1,0 +1,40 @@
+//! USART3, which the debugger's bridge is on, by DMA both ways.
+
+use embassy_stm32::mode::Async;
+use embassy_stm32::usart::{Config, RingBufferedUartRx, Uart, UartTx};
+
+use crate::design_parameters::{BAUD, RECEIVED};
+
+/// Towards the host.
+pub struct Output(UartTx<'static, Async>);
+
+impl Output {
+    /// Sends all of it.
+    pub async fn send(&mut self, bytes: &[u8]) {
+        // The transmitter knows no error but that of an empty buffer.
+        let _ = self.0.write(bytes).await;
+    }
+}
+
+/// From the host: a ring that the controller fills by itself, so that nothing is lost while a call is being answered.
+pub struct Input(RingBufferedUartRx<'static>);
+
+impl Input {
+    /// The next bytes; `None` if some were lost.
+    pub async fn receive(&mut self, bytes: &mut [u8]) -> Option<usize> {
+        self.0.read(bytes).await.ok()
+    }
+}
+
+/// Settings of the line: [`BAUD`], 8 data bits, no parity, 1 stop bit.
+pub fn config() -> Config {
+    let mut config = Config::default();
+    config.baudrate = BAUD;
+    config
+}
+
+/// Both directions.
+pub fn split(uart: Uart<'static, Async>, ring: &'static mut [u8; RECEIVED]) -> (Output, Input) {
+    let (output, input) = uart.split();
+    (Output(output), Input(input.into_ring_buffered(ring)))
+}

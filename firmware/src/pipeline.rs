@@ -1,0 +1,362 @@
+//! What happens to a sample: from sums of codes to batches of the streams and to the Kalman banks.
+//!
+//! Once for every sample: volts, compensation, effects, banks. Once for every batch: reference and temperature, the model at that
+//! temperature, and what else moves slowly. All samples of a batch are therefore compensated by the same numbers, which the batch states.
+
+use mimu_core::compensation::Sample;
+use mimu_core::effects;
+use mimu_core::single;
+use mimu_core::stored::{ROOM, Stored};
+use mimu_core::table::{self, Place};
+use mimu_core::wire::{
+    BATCH, BatchHead, COMPENSATED_BYTES, CompensatedBatch, Event, Message, RAW_BYTES, RawBatch,
+    Triad, flags, volts,
+};
+use nalgebra::Vector3;
+
+use crate::bank::Bank;
+use crate::convert::{ACCEL_VOLTS, SUM_FULL_SCALE, Slow, Sums};
+use crate::design_parameters::{ACCEL, GYRO, REFERENCE, SAMPLE_HZ, TEMPERATURE};
+
+/// A calibration with what it remembers of the stream.
+struct Calibrated {
+    stored: Stored,
+    model: table::State<f32>,
+    effects: effects::State<f32, ROOM>,
+    /// Number of the sample at which the slow effects were followed last; time since power-on is counted by it.
+    followed: u32,
+}
+
+/// Which streams are sent.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Streams {
+    /// Raw readings.
+    pub raw: bool,
+    /// Compensated samples.
+    pub compensated: bool,
+}
+
+/// What has been lost on the way.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Losses {
+    /// Samples that are missing in the numbers.
+    pub samples: u32,
+    /// Batches that the line had no room for.
+    pub batches: u32,
+}
+
+/// Mean of some samples for the self-test.
+#[derive(Clone, Copy, Debug)]
+struct Measurement {
+    wanted: u32,
+    count: u32,
+    /// Gyro and accelerometer, V, summed.
+    total: Sample<f32>,
+}
+
+/// The batch that is being filled.
+struct Batch {
+    streams: Streams,
+    head: BatchHead,
+    gyro_volts: f32,
+    count: usize,
+    raw: [u8; BATCH * RAW_BYTES],
+    compensated: [u8; BATCH * COMPENSATED_BYTES],
+    /// Totals for [`Slow::update`].
+    reference: u32,
+    temperatures: u32,
+}
+
+/// The path of the samples.
+pub struct Pipeline {
+    calibrated: Option<Calibrated>,
+    slow: Slow,
+    batch: Batch,
+    /// Number of the next sample, if none is lost.
+    expected: Option<u32>,
+    /// Streams from the next batch on.
+    streams: Streams,
+    /// Flags that others set, see [`flags`].
+    held_flags: u8,
+    losses: Losses,
+    measurement: Option<Measurement>,
+    /// Banks of the gyros and of the accelerometers.
+    pub banks: [Option<Bank>; 2],
+}
+
+impl Default for Pipeline {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Pipeline {
+    /// Without a calibration, and sending nothing.
+    pub const fn new() -> Self {
+        Self {
+            calibrated: None,
+            slow: Slow::NEW,
+            batch: Batch {
+                streams: Streams {
+                    raw: false,
+                    compensated: false,
+                },
+                head: BatchHead {
+                    first: 0,
+                    samples_lost: 0,
+                    batches_dropped: 0,
+                    temp_c: 0.0,
+                    flags: 0,
+                },
+                gyro_volts: 0.0,
+                count: 0,
+                raw: [0; BATCH * RAW_BYTES],
+                compensated: [0; BATCH * COMPENSATED_BYTES],
+                reference: 0,
+                temperatures: 0,
+            },
+            expected: None,
+            streams: Streams {
+                raw: false,
+                compensated: false,
+            },
+            held_flags: 0,
+            losses: Losses {
+                samples: 0,
+                batches: 0,
+            },
+            measurement: None,
+            banks: [None; 2],
+        }
+    }
+
+    /// Compensates by this from the next batch on.
+    pub fn calibrate(&mut self, stored: Stored) {
+        self.calibrated = Some(Calibrated {
+            model: stored.table.state(),
+            effects: effects::State::new(SAMPLE_HZ as f32),
+            // So that time since power-on goes on.
+            followed: 0,
+            stored,
+        });
+    }
+
+    /// Whether there is a calibration.
+    pub fn is_calibrated(&self) -> bool {
+        self.calibrated.is_some()
+    }
+
+    /// Sends these streams from the next batch on.
+    pub fn stream(&mut self, streams: Streams) {
+        self.streams = streams;
+    }
+
+    /// Sets or clears some of [`flags`] for the samples to come.
+    pub fn flag(&mut self, flag: u8, on: bool) {
+        match on {
+            true => self.held_flags |= flag,
+            false => self.held_flags &= !flag,
+        }
+    }
+
+    /// What has been lost.
+    pub fn losses(&self) -> Losses {
+        self.losses
+    }
+
+    /// Begins counting losses anew.
+    pub fn reset_losses(&mut self) {
+        self.losses = Losses::default();
+    }
+
+    /// Begins to average the next samples.
+    pub fn measure(&mut self, samples: u32) {
+        let zero = Vector3::zeros();
+        self.measurement = Some(Measurement {
+            wanted: samples,
+            count: 0,
+            total: Sample {
+                gyro: zero,
+                accel: zero,
+            },
+        });
+    }
+
+    /// The mean, V at the sensors, once all of the samples are in it.
+    pub fn measured(&self) -> Option<Sample<f32>> {
+        let done = self.measurement.filter(|m| m.count == m.wanted)?;
+        let count = done.count as f32;
+        Some(Sample {
+            gyro: done.total.gyro / count,
+            accel: done.total.accel / count,
+        })
+    }
+
+    /// Takes the next sample. `send` is given what is to be sent and says whether there was room for it.
+    pub fn take(&mut self, number: u32, sums: &Sums, send: &mut impl FnMut(&Message<'_>) -> bool) {
+        let lost = number.wrapping_sub(self.expected.unwrap_or(number));
+        self.expected = Some(number.wrapping_add(1));
+        if lost > 0 {
+            self.end_batch(send);
+            self.losses.samples = self.losses.samples.wrapping_add(lost);
+            for bank in self.banks.iter_mut().flatten() {
+                bank.skip(lost);
+            }
+        }
+        if self.batch.count == 0 {
+            self.begin_batch(number, sums);
+        }
+
+        let six = [
+            sums[GYRO],
+            sums[GYRO + 1],
+            sums[GYRO + 2],
+            sums[ACCEL],
+            sums[ACCEL + 1],
+            sums[ACCEL + 2],
+        ];
+        let batch = &mut self.batch;
+        batch.reference += sums[REFERENCE];
+        batch.temperatures += sums[TEMPERATURE..TEMPERATURE + 3].iter().sum::<u32>();
+        if six.iter().any(|sum| *sum == 0 || *sum == SUM_FULL_SCALE) {
+            batch.head.flags |= flags::SATURATED;
+        }
+        batch.head.flags |= self.held_flags;
+        let raw = volts(&six, batch.gyro_volts, ACCEL_VOLTS);
+        if let Some(place) = batch.raw.as_chunks_mut().0.get_mut(batch.count) {
+            *place = RawBatch::pack(&six);
+        }
+        // Also while nobody listens: the effects have to see every sample, and the load is then the same at all times.
+        if let Some(calibrated) = &mut self.calibrated {
+            let sample = calibrated.apply(&raw);
+            if let Some(place) = batch.compensated.as_chunks_mut().0.get_mut(batch.count) {
+                *place = CompensatedBatch::pack(&sample);
+            }
+        }
+        batch.count += 1;
+
+        self.offer(number, &raw, send);
+        if self.batch.count == BATCH {
+            self.end_batch(send);
+        }
+    }
+
+    /// To the banks and the self-test.
+    fn offer(
+        &mut self,
+        number: u32,
+        raw: &Sample<f32>,
+        send: &mut impl FnMut(&Message<'_>) -> bool,
+    ) {
+        if let Some(m) = &mut self.measurement
+            && m.count < m.wanted
+        {
+            m.total.gyro += raw.gyro;
+            m.total.accel += raw.accel;
+            m.count += 1;
+        }
+        for (bank, triad) in self.banks.iter_mut().zip([Triad::Gyro, Triad::Accel]) {
+            let Some(bank) = bank else { continue };
+            let reading = match triad {
+                Triad::Gyro => &raw.gyro,
+                Triad::Accel => &raw.accel,
+            };
+            if bank.offer(number, reading) {
+                // One that finds no room is followed by the next, which says more.
+                send(&Message::Event(Event::Kalman(bank.state())));
+            }
+        }
+    }
+
+    fn begin_batch(&mut self, number: u32, sums: &Sums) {
+        if !self.slow.begun() {
+            let temperatures = sums[TEMPERATURE..TEMPERATURE + 3].iter().sum();
+            self.slow.update(sums[REFERENCE], temperatures, 1);
+        }
+        let temp_c = self.slow.temp_c();
+        let batch = &mut self.batch;
+        batch.streams = self.streams;
+        batch.gyro_volts = self.slow.gyro_volts();
+        batch.reference = 0;
+        batch.temperatures = 0;
+        batch.head = BatchHead {
+            first: number,
+            samples_lost: self.losses.samples,
+            batches_dropped: self.losses.batches,
+            temp_c,
+            flags: 0,
+        };
+        if !self.slow.has_reference() {
+            batch.head.flags |= flags::NO_REFERENCE;
+        }
+        if let Some(calibrated) = &mut self.calibrated {
+            if calibrated.follow(number, temp_c) != Place::Inside {
+                batch.head.flags |= flags::OUTSIDE_NODES;
+            }
+        } else {
+            batch.streams.compensated = false;
+        }
+    }
+
+    fn end_batch(&mut self, send: &mut impl FnMut(&Message<'_>) -> bool) {
+        let batch = &mut self.batch;
+        let count = core::mem::replace(&mut batch.count, 0);
+        if count == 0 {
+            return;
+        }
+        let samples = count as u32;
+        self.slow
+            .update(batch.reference, batch.temperatures, samples);
+        let Batch {
+            streams,
+            head,
+            gyro_volts,
+            ..
+        } = *batch;
+        let mut dropped = 0;
+        if streams.raw {
+            let batch = RawBatch {
+                head,
+                gyro_volts,
+                accel_volts: ACCEL_VOLTS,
+                samples: batch.raw.get(..count * RAW_BYTES).unwrap_or(&[]),
+            };
+            dropped += u32::from(!send(&Message::Event(Event::Raw(batch))));
+        }
+        if streams.compensated {
+            let samples = batch.compensated.get(..count * COMPENSATED_BYTES);
+            let batch = CompensatedBatch {
+                head,
+                samples: samples.unwrap_or(&[]),
+            };
+            dropped += u32::from(!send(&Message::Event(Event::Compensated(batch))));
+        }
+        self.losses.batches = self.losses.batches.wrapping_add(dropped);
+    }
+}
+
+impl Calibrated {
+    /// Follows temperature and time to the beginning of a batch.
+    fn follow(&mut self, number: u32, temp_c: f32) -> Place {
+        self.stored.table.follow(&mut self.model, temp_c);
+        if let Some(all) = &self.stored.effects {
+            let passed = number.wrapping_sub(self.followed);
+            let dt_s = passed as f32 / SAMPLE_HZ as f32;
+            all.slow(&mut self.effects, dt_s, temp_c);
+            self.followed = number;
+        }
+        self.model.place
+    }
+
+    #[inline]
+    fn apply(&mut self, raw: &Sample<f32>) -> Sample<f32> {
+        let sample = single::compensate(&self.model.model, raw);
+        match &self.stored.effects {
+            Some(all) => single::remove(all, &mut self.effects, &sample),
+            None => sample,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,201 @@
+//! Where calibrations are kept: two sectors of flash memory, so that a write either happened or did not.
+//!
+//! # Why it cannot be half done
+//!
+//! Each sector is a slot: a word that says what follows, and the calibration. A new one goes to the slot that is not in use:
+//! it is erased, the calibration is written and read back, and last the word in front is written, in a single programming operation, with
+//! the next generation and a CRC of itself. Before that word is whole the slot does not count; from then on it is the younger one.
+//! The slot in use is not touched until the next calibration.
+//!
+//! # Why not a key-value store
+//!
+//! `sequential-storage` appends within a sector behind whatever is there, and finds the end by what reads as erased. A word of this
+//! memory whose programming was cut off may read as erased and yet not be: to program it again leaves an error code that does not
+//! match (RM0433 4.3.9), and the item is lost after it was reported as stored. Here nothing is ever written to a sector that was not
+//! erased to the end in the same operation. It also costs erasing when a calibration is stored, about a second, and a life of 10 000
+//! of them, neither of which matters.
+
+use embedded_storage_async::nor_flash::NorFlash;
+use mimu_core::stored::{self, MAX_LENGTH, hash};
+use mimu_core::wire::Slot;
+
+use crate::design_parameters::{FLASH_SECTOR as SECTOR, FLASH_WORD as WORD};
+
+const MAGIC: [u8; 4] = *b"slot";
+
+/// What the word in front of a calibration says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Front {
+    generation: u32,
+    length: u32,
+    hash: u64,
+}
+
+impl Front {
+    fn to_word(self) -> [u8; WORD] {
+        let mut word = [0; WORD];
+        let [g0, g1, g2, g3] = self.generation.to_le_bytes();
+        let [l0, l1, l2, l3] = self.length.to_le_bytes();
+        word[..4].copy_from_slice(&MAGIC);
+        word[4..12].copy_from_slice(&[g0, g1, g2, g3, l0, l1, l2, l3]);
+        word[12..20].copy_from_slice(&self.hash.to_le_bytes());
+        let check = hash(&word[..24]);
+        word[24..].copy_from_slice(&check.to_le_bytes());
+        word
+    }
+
+    fn from_word(word: &[u8; WORD]) -> Option<Self> {
+        let (said, check) = word.split_last_chunk::<8>()?;
+        let u32_at = |at: usize| Some(u32::from_le_bytes(*said.get(at..)?.first_chunk()?));
+        let front = Self {
+            generation: u32_at(4)?,
+            length: u32_at(8)?,
+            hash: u64::from_le_bytes(*said.get(12..)?.first_chunk()?),
+        };
+        let whole = said.starts_with(&MAGIC) && hash(said).to_le_bytes() == *check;
+        (whole && (front.length as usize) <= MAX_LENGTH).then_some(front)
+    }
+}
+
+/// The flash memory refused, or did not keep what was written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Failed;
+
+/// The calibration in use.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct InUse {
+    slot: usize,
+    front: Front,
+}
+
+/// Two slots in a flash memory of two sectors.
+pub struct Slots<F> {
+    flash: F,
+    state: [Slot; 2],
+    in_use: Option<InUse>,
+    /// The highest that was found.
+    generation: u32,
+}
+
+impl<F: NorFlash> Slots<F> {
+    /// Looks for calibrations. `buffer` holds the one in use afterwards, as long as [`Self::in_use`] says.
+    pub async fn open(flash: F, buffer: &mut [u8; MAX_LENGTH]) -> Self {
+        let mut slots = Self {
+            flash,
+            state: [Slot::Empty; 2],
+            in_use: None,
+            generation: 0,
+        };
+        for slot in 0..2 {
+            let (state, front) = slots.look(slot, buffer).await;
+            slots.state[slot] = state;
+            let Some(front) = front else { continue };
+            slots.generation = slots.generation.max(front.generation);
+            let younger = slots
+                .in_use
+                .is_none_or(|other| front.generation > other.front.generation);
+            if younger && matches!(state, Slot::Whole { .. }) {
+                slots.in_use = Some(InUse { slot, front });
+            }
+        }
+        if let Some(InUse { slot, front }) = slots.in_use {
+            slots
+                .read(slot, WORD, &mut buffer[..front.length as usize])
+                .await;
+        }
+        slots
+    }
+
+    /// What is in the slots.
+    pub fn state(&self) -> [Slot; 2] {
+        self.state
+    }
+
+    /// Length, bytes, and hash of the calibration in use.
+    pub fn in_use(&self) -> Option<(u32, u64)> {
+        self.in_use.map(|it| (it.front.length, it.front.hash))
+    }
+
+    /// The flash memory.
+    pub fn flash(&self) -> &F {
+        &self.flash
+    }
+
+    /// Reads a part of the calibration in use; `None` if there is none, or the part is not within it, or cannot be read.
+    pub async fn part(&mut self, offset: usize, bytes: &mut [u8]) -> Option<()> {
+        let InUse { slot, front } = self.in_use?;
+        let end = offset.checked_add(bytes.len())?;
+        let within = end <= front.length as usize;
+        (within && self.read(slot, WORD + offset, bytes).await).then_some(())
+    }
+
+    /// Stores a calibration. When this returns, or the supply fails on the way, either it is the one in use, whole, or the one before
+    /// is.
+    pub async fn store(&mut self, bytes: &[u8]) -> Result<(), Failed> {
+        let slot = match self.in_use {
+            Some(InUse { slot: 0, .. }) => 1,
+            _ => 0,
+        };
+        let front = Front {
+            generation: self.generation.checked_add(1).ok_or(Failed)?,
+            length: u32::try_from(bytes.len()).map_err(|_| Failed)?,
+            hash: hash(bytes),
+        };
+        if bytes.len() > MAX_LENGTH {
+            return Err(Failed);
+        }
+        self.state[slot] = Slot::Unfinished;
+        let from = slot * SECTOR;
+        let erased = self.flash.erase(from as u32, (from + SECTOR) as u32);
+        erased.await.map_err(|_| Failed)?;
+        for (k, part) in bytes.chunks(WORD).enumerate() {
+            let mut word = [0xff; WORD];
+            word[..part.len()].copy_from_slice(part);
+            self.write(slot, WORD * (k + 1), &word).await?;
+        }
+        self.write(slot, 0, &front.to_word()).await?;
+        let generation = front.generation;
+        self.generation = generation;
+        self.state[slot] = Slot::Whole { generation };
+        self.in_use = Some(InUse { slot, front });
+        Ok(())
+    }
+
+    /// Writes a word and reads it back.
+    async fn write(&mut self, slot: usize, at: usize, word: &[u8; WORD]) -> Result<(), Failed> {
+        let written = self.flash.write((slot * SECTOR + at) as u32, word);
+        written.await.map_err(|_| Failed)?;
+        let mut back = [0; WORD];
+        let kept = self.read(slot, at, &mut back).await && back == *word;
+        kept.then_some(()).ok_or(Failed)
+    }
+
+    async fn read(&mut self, slot: usize, at: usize, bytes: &mut [u8]) -> bool {
+        let offset = (slot * SECTOR + at) as u32;
+        self.flash.read(offset, bytes).await.is_ok()
+    }
+
+    async fn look(&mut self, slot: usize, buffer: &mut [u8; MAX_LENGTH]) -> (Slot, Option<Front>) {
+        let mut words = [[0; WORD]; 2];
+        let [first, second] = &mut words;
+        let readable = self.read(slot, 0, first).await & self.read(slot, WORD, second).await;
+        let Some(front) = Front::from_word(&words[0]) else {
+            let empty = readable && words.as_flattened().iter().all(|byte| *byte == 0xff);
+            let state = if empty { Slot::Empty } else { Slot::Unfinished };
+            return (state, None);
+        };
+        let bytes = &mut buffer[..front.length as usize];
+        let whole = self.read(slot, WORD, bytes).await && hash(bytes) == front.hash;
+        let state = match whole.then(|| stored::decode(bytes)) {
+            None => Slot::Damaged,
+            Some(Err(refused)) => Slot::NotUsable(refused),
+            Some(Ok(_)) => Slot::Whole {
+                generation: front.generation,
+            },
+        };
+        (state, Some(front))
+    }
+}
+
+#[cfg(test)]
+mod tests;

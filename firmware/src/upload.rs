@@ -1,0 +1,132 @@
+//! A calibration on its way to the device.
+
+use mimu_core::stored::{self, MAX_LENGTH, hash};
+use mimu_core::wire::{CHUNK, Refusal};
+
+/// What has been announced, and what has come of it.
+#[derive(Clone, Copy, Debug)]
+struct Announced {
+    length: usize,
+    hash: u64,
+    received: usize,
+}
+
+/// Room for a calibration, and how far it is filled.
+pub struct Upload<'a> {
+    buffer: &'a mut [u8; MAX_LENGTH],
+    announced: Option<Announced>,
+}
+
+impl<'a> Upload<'a> {
+    /// Nothing has been announced.
+    pub fn new(buffer: &'a mut [u8; MAX_LENGTH]) -> Self {
+        Self {
+            buffer,
+            announced: None,
+        }
+    }
+
+    /// Announces one; another before it is forgotten.
+    pub fn begin(&mut self, length: u32, hash: u64) -> Result<(), Refusal> {
+        let room = MAX_LENGTH as u32;
+        if length > room {
+            return Err(Refusal::TooLong { room });
+        }
+        self.announced = Some(Announced {
+            length: length as usize,
+            hash,
+            received: 0,
+        });
+        Ok(())
+    }
+
+    /// Takes a part.
+    pub fn chunk(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Refusal> {
+        let announced = self.announced.as_mut().ok_or(Refusal::NoUpload)?;
+        if bytes.is_empty() || bytes.len() > CHUNK {
+            return Err(Refusal::Unknown);
+        }
+        let offset = offset as usize;
+        if offset > announced.received {
+            return Err(Refusal::WrongOffset {
+                expected: announced.received as u32,
+            });
+        }
+        let end = offset + bytes.len();
+        let places = self.buffer.get_mut(offset..end);
+        match places.filter(|_| end <= announced.length) {
+            Some(places) => places.copy_from_slice(bytes),
+            None => {
+                return Err(Refusal::TooLong {
+                    room: announced.length as u32,
+                });
+            }
+        }
+        announced.received = announced.received.max(end);
+        Ok(())
+    }
+
+    /// Whether all of it is there, has the hash that was announced, and can be used.
+    #[inline(never)]
+    pub fn check(&self) -> Result<(), Refusal> {
+        let announced = self.announced.as_ref().ok_or(Refusal::NoUpload)?;
+        if announced.received < announced.length {
+            return Err(Refusal::Incomplete {
+                received: announced.received as u32,
+            });
+        }
+        let bytes = self.bytes();
+        let found = hash(bytes);
+        if found != announced.hash {
+            return Err(Refusal::WrongHash { found });
+        }
+        stored::decode(bytes)
+            .map(|_| ())
+            .map_err(Refusal::NotUsable)
+    }
+
+    /// What has been received.
+    pub fn bytes(&self) -> &[u8] {
+        let received = self.announced.map_or(0, |announced| announced.received);
+        self.buffer.get(..received).unwrap_or(&[])
+    }
+
+    /// Forgets it.
+    pub fn end(&mut self) {
+        self.announced = None;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parts_have_to_come_in_order_and_may_be_repeated() {
+        let mut buffer = [0; MAX_LENGTH];
+        let mut upload = Upload::new(&mut buffer);
+        assert_eq!(upload.chunk(0, &[1]), Err(Refusal::NoUpload));
+        let room = MAX_LENGTH as u32;
+        assert_eq!(upload.begin(4097, 0), Err(Refusal::TooLong { room }));
+        // CRC-64/XZ of "123456789", by the catalogue of CRC algorithms.
+        upload.begin(9, 0x995d_c9bb_df19_39fa).unwrap();
+        upload.chunk(0, b"12345").unwrap();
+        let gap = upload.chunk(6, b"7");
+        assert_eq!(gap, Err(Refusal::WrongOffset { expected: 5 }));
+        assert_eq!(
+            upload.check().err(),
+            Some(Refusal::Incomplete { received: 5 })
+        );
+        upload.chunk(3, b"45678").unwrap();
+        let over = upload.chunk(8, b"9!");
+        assert_eq!(over, Err(Refusal::TooLong { room: 9 }));
+        upload.chunk(8, b"9").unwrap();
+        // The hash holds; it is no calibration.
+        let foreign = Refusal::NotUsable(stored::Refused::NotACalibration);
+        assert_eq!(upload.check().err(), Some(foreign));
+        upload.chunk(0, b"0").unwrap();
+        assert!(matches!(upload.check(), Err(Refusal::WrongHash { .. })));
+        upload.end();
+        assert_eq!(upload.check().err(), Some(Refusal::NoUpload));
+    }
+}
