@@ -5,7 +5,7 @@ mod staging;
 mod writing;
 
 pub use effect::{CoefficientTable, EffectTable, FormTable};
-pub(crate) use effect::{Condition, depends};
+pub(crate) use effect::{Condition, depends, variable as device_variable};
 pub use staging::{Staged, stage};
 pub use writing::{figure, to_toml};
 

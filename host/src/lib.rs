@@ -15,6 +15,7 @@
 //! | [`diagnose`]    | the effect behind a residual: found, added, proved on other data              |
 //! | [`design`]      | experiments: which attitudes and rates, how many, for how long                |
 //! | [`allan`]       | noise from a recording at rest: Allan deviation and noise model                |
+//! | [`device`], [`record`] | the device at a serial port, and recordings of it                         |
 //! | [`noise_file`], [`export`] | its result for the other commands, and for other programs          |
 //! | [`report`]      | all results as JSON and as text                                               |
 
@@ -22,6 +23,7 @@ pub mod allan;
 pub mod blocks;
 pub mod calibration;
 pub mod design;
+pub mod device;
 pub mod diagnose;
 pub mod dwell;
 pub mod error;
@@ -35,6 +37,7 @@ pub mod plausible;
 pub mod prepared;
 pub mod rails;
 pub mod reading_step;
+pub mod record;
 pub mod recording;
 pub mod report;
 pub mod stillness;

@@ -2,8 +2,10 @@
 
 mod allan_args;
 mod design_args;
+mod device_args;
 mod diagnose_args;
 mod export_args;
+mod record_args;
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -52,6 +54,10 @@ enum Command {
     Allan(allan_args::AllanArgs),
     /// Write noise coefficients in the format of another program
     Export(export_args::ExportArgs),
+    /// Record the raw stream of a device
+    Record(record_args::RecordArgs),
+    /// Talk with a device: info, stream, upload, download, self-test, counters, check, kalman
+    Device(device_args::DeviceArgs),
 }
 
 #[derive(Args)]
@@ -214,6 +220,8 @@ fn main() -> ExitCode {
         Command::Design(args) => design_args::run(&args),
         Command::Allan(args) => allan_args::run(&args),
         Command::Export(args) => export_args::run(&args),
+        Command::Record(args) => record_args::run(&args),
+        Command::Device(args) => device_args::run(&args),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,
@@ -411,6 +419,11 @@ impl JsonArgs {
     /// The file to write, if it is one.
     fn file(&self) -> Option<&Path> {
         self.path.as_deref().filter(|path| *path != Path::new("-"))
+    }
+
+    /// Whether it takes the place of the text.
+    fn is_standard_output(&self) -> bool {
+        self.path.is_some() && self.file().is_none()
     }
 }
 

@@ -360,7 +360,8 @@ fn on_device<T: RealField + Copy>(
     }
 }
 
-fn variable(of: Variable) -> DeviceVariable {
+/// A variable of a term in the words of `core`.
+pub(crate) fn variable(of: Variable) -> DeviceVariable {
     use DeviceVariable as Device;
     let axes = |all: [Device; 3], axis: usize| all[axis];
     match of {

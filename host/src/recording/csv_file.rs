@@ -93,6 +93,21 @@ impl CsvFile {
         })
     }
 
+    /// Leaves out what stands behind the last line break: of a file that nobody has ended it may be half a row, and half a number reads
+    /// like a whole one. Returns how many bytes that is.
+    pub fn leave_out_cut_row(&mut self) -> Result<u64> {
+        let io = |error: std::io::Error| Error::io(&self.path, &error);
+        let mut file = File::open(&self.path).map_err(io)?;
+        let from = self.start.max(self.length.saturating_sub(LONGEST_LINE));
+        file.seek(SeekFrom::Start(from)).map_err(io)?;
+        let mut tail = Vec::new();
+        read_up_to(&mut file, self.length - from, &mut tail).map_err(io)?;
+        let whole = memrchr(b'\n', &tail).map_or(0, |newline| newline + 1);
+        let cut = (tail.len() - whole) as u64;
+        self.length -= cut;
+        Ok(cut)
+    }
+
     /// Hands the rows to `consume` in order and returns their number; `chunk` is the bytes that a
     /// worker parses at a time.
     pub fn for_each_batch(

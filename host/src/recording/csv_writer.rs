@@ -61,7 +61,14 @@ impl CsvWriter {
             .map_err(|error| Error::io(&self.path, &error))
     }
 
-    fn flush(&mut self) -> Result<()> {
+    /// The file, for another thread to wait for the disk.
+    pub fn file(&self) -> Result<File> {
+        let file = self.file.try_clone();
+        file.map_err(|error| Error::io(&self.path, &error))
+    }
+
+    /// Hands everything over to the system, which keeps it whatever becomes of this program.
+    pub fn flush(&mut self) -> Result<()> {
         self.file
             .write_all(&self.text)
             .map_err(|error| Error::io(&self.path, &error))?;

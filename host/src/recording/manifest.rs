@@ -5,6 +5,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
+use super::recorded::Recorded;
 use crate::error::{Error, Result};
 
 /// Name of the manifest in a recording's directory.
@@ -143,6 +144,9 @@ pub struct Manifest {
     pub latitude_deg: Option<f64>,
     /// What is known of the true input.
     pub reference: Reference,
+    /// It was not ended: what records it was killed, or is still at it. Its last row may be cut, and is left out then.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub unfinished: bool,
     /// Text label of step i, where the source named its steps.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub step_labels: Vec<String>,
@@ -152,6 +156,9 @@ pub struct Manifest {
     /// Arguments of the import that made the recording, with file names instead of paths.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub imported_with: Vec<String>,
+    /// The device that it was recorded from.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub recorded: Option<Recorded>,
     /// Where readings saturate.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rails: Option<Rails>,
@@ -177,9 +184,11 @@ impl Manifest {
             raw_unit,
             latitude_deg: None,
             reference,
+            unfinished: false,
             step_labels: Vec::new(),
             turn_steps: Vec::new(),
             imported_with: Vec::new(),
+            recorded: None,
             rails: None,
             sources: Vec::new(),
         }
@@ -334,6 +343,16 @@ reference = "table"
         manifest.rails = Some(Rails {
             gyro: Some([0.05, 3.25]),
             accel: None,
+        });
+        manifest.unfinished = true;
+        manifest.recorded = Some(Recorded {
+            tool: "mimu 0".into(),
+            missing: 3,
+            restarts: vec![super::super::recorded::Restart {
+                t_s: 12.5,
+                start: "watchdog".into(),
+            }],
+            ..Recorded::default()
         });
         manifest.step_labels = vec!["x_a".into(), "x_rot".into()];
         manifest.imported_with = vec!["a.csv".into(), "--rate-hz".into()];

@@ -10,12 +10,14 @@ mod columns;
 mod csv_file;
 mod csv_writer;
 mod digest;
+mod growing;
 mod import;
 mod in_order;
 mod manifest;
 mod parquet_file;
 mod parquet_writer;
 mod reader;
+mod recorded;
 #[cfg(test)]
 mod round_trip_tests;
 mod staging;
@@ -24,10 +26,12 @@ mod writer;
 
 pub use batch::Batch;
 pub use columns::{Column, Columns, RAW_COLUMNS, REFERENCE_COLUMNS};
+pub use growing::Growing;
 pub use import::{
     ColumnList, ImportOptions, ImportSummary, Role, Scale, Separator, SkippedLines, import,
 };
 pub(crate) use manifest::read_text;
 pub use manifest::{Format, MANIFEST_FILE, Manifest, Rails, RawUnit, Reference, Source};
 pub use reader::{ReadSummary, Recording};
+pub use recorded::{Recorded, Restart};
 pub use writer::{SampleFormat, Writer};

@@ -67,6 +67,7 @@ impl Recording {
         let manifest = Manifest::read(&manifest)?;
         let csv = directory.join("samples.csv");
         let parquet = directory.join("samples.parquet");
+        let mut warnings = Vec::new();
         let (samples, source) = match (csv.exists(), parquet.exists()) {
             (true, true) => {
                 return Err(Error::new(
@@ -83,7 +84,17 @@ impl Recording {
                 ));
             }
             (true, false) => {
-                let file = CsvFile::open(&csv)?;
+                let mut file = CsvFile::open(&csv)?;
+                if manifest.unfinished {
+                    let cut = match file.leave_out_cut_row()? {
+                        0 => "",
+                        _ => " but for its last row, which is cut",
+                    };
+                    warnings.push(format!(
+                        "{}: the recording was not ended (its program was killed, or still records); what is there is used{cut}",
+                        directory.display()
+                    ));
+                }
                 (csv, Samples::Csv(file))
             }
             (false, true) => {
@@ -111,7 +122,7 @@ impl Recording {
             directory: directory.to_owned(),
             samples,
             columns: layout.columns,
-            warnings: layout.warnings.clone(),
+            warnings: [warnings, layout.warnings.clone()].concat(),
             source,
         })
     }

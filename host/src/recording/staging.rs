@@ -92,7 +92,7 @@ impl Drop for Staging {
     }
 }
 
-fn check_target(target: &Path, replace: bool) -> Result<()> {
+pub(super) fn check_target(target: &Path, replace: bool) -> Result<()> {
     let refuse = |problem: &str, remedy: &str| Err(Error::new(target.display(), problem, remedy));
     let metadata = match fs::symlink_metadata(target) {
         Err(error) if error.kind() == ErrorKind::NotFound => {
@@ -138,7 +138,7 @@ fn check_target(target: &Path, replace: bool) -> Result<()> {
     }
 }
 
-fn parent(target: &Path) -> PathBuf {
+pub(super) fn parent(target: &Path) -> PathBuf {
     match target.parent() {
         Some(parent) if parent.as_os_str().is_empty() => PathBuf::from("."),
         Some(parent) => parent.to_owned(),
@@ -175,7 +175,7 @@ fn sibling(target: &Path, purpose: &str) -> Result<PathBuf> {
 }
 
 /// Makes a rename durable, where the system can: Windows cannot open a directory, and needs not.
-fn sync_directory(path: &Path) {
+pub(super) fn sync_directory(path: &Path) {
     if let Ok(directory) = File::open(path) {
         let _ = directory.sync_all();
     }

@@ -47,7 +47,7 @@ pub(super) fn readable(figure: Figure, sensor: Sensor) -> (f64, &'static str) {
     }
 }
 
-pub(super) fn warn(out: &mut String, warnings: impl Iterator<Item = impl AsRef<str>>) {
+pub(crate) fn warn(out: &mut String, warnings: impl Iterator<Item = impl AsRef<str>>) {
     for warning in warnings {
         let _ = writeln!(out, "warning: {}", warning.as_ref());
     }

@@ -1,0 +1,189 @@
+//! A recording that grows while it is received, and can be read whatever becomes of the program.
+//!
+//! Rows are appended to `samples.csv` as they come and handed to the system at once, so that a killed program loses none; another
+//! thread waits for the disk every second, so that a power failure loses no more than that. Not Parquet, whose files cannot be read
+//! before they are ended, and no journal of another kind, which would need a program of its own to be read.
+
+use std::fs::{self, File};
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use super::batch::Batch;
+use super::columns::Columns;
+use super::csv_writer::CsvWriter;
+use super::manifest::{MANIFEST_FILE, Manifest};
+use super::reader::Recording;
+use super::staging::{check_target, parent, sync_directory};
+use super::writer::{SampleFormat, Writer};
+use crate::error::{Error, Result};
+
+/// Time between two waits for the disk.
+const SYNC: Duration = Duration::from_secs(1);
+
+/// A recording that is being received.
+#[derive(Debug)]
+pub struct Growing {
+    directory: PathBuf,
+    csv: Option<CsvWriter>,
+    columns: Columns,
+    rows: u64,
+    disk: Option<Disk>,
+}
+
+/// The thread that waits for the disk: a disk may take longer than the port's buffer of some tenths of a second holds.
+#[derive(Debug)]
+struct Disk {
+    stop: Sender<()>,
+    thread: JoinHandle<std::io::Result<()>>,
+}
+
+impl Growing {
+    /// Begins a recording in a new directory. Its manifest is written now, and says that it is unfinished.
+    pub fn create(directory: &Path, columns: Columns, manifest: &Manifest) -> Result<Self> {
+        let place = directory.join(MANIFEST_FILE).display().to_string();
+        manifest.check(&place)?;
+        check_target(directory, false)?;
+        fs::create_dir_all(directory).map_err(|error| Error::io(directory, &error))?;
+        let mut csv = CsvWriter::create(&directory.join(SampleFormat::Csv.file_name()), columns)?;
+        csv.flush()?;
+        let disk = Disk::new(csv.file()?).map_err(|error| Error::io(directory, &error))?;
+        let growing = Self {
+            directory: directory.to_owned(),
+            csv: Some(csv),
+            columns,
+            rows: 0,
+            disk: Some(disk),
+        };
+        growing.state(&Manifest {
+            unfinished: true,
+            ..manifest.clone()
+        })?;
+        sync_directory(&parent(directory));
+        Ok(growing)
+    }
+
+    /// Appends rows, which have the announced columns and nothing that a reader would refuse.
+    pub fn write(&mut self, batch: &Batch) -> Result<()> {
+        if let Some(column) = batch.ragged(&self.columns) {
+            return Err(Error::new(
+                format!("{}, column {}", self.directory.display(), column.name()),
+                "the rows to write do not have the columns that were announced",
+                "report this: it is a mistake in the program",
+            ));
+        }
+        if self
+            .disk
+            .as_ref()
+            .is_some_and(|disk| disk.thread.is_finished())
+        {
+            self.settle()?;
+        }
+        if let Some(csv) = &mut self.csv {
+            csv.write(batch)?;
+            csv.flush()?;
+        }
+        self.rows += batch.len() as u64;
+        Ok(())
+    }
+
+    /// Rows so far.
+    pub fn rows(&self) -> u64 {
+        self.rows
+    }
+
+    /// Ends it: `manifest` takes the place of the one of the beginning, the samples become Parquet if that is wanted. Without a row
+    /// nothing is left.
+    pub fn finish(
+        mut self,
+        manifest: &Manifest,
+        format: SampleFormat,
+        progress: impl Fn(f64),
+    ) -> Result<()> {
+        self.settle()?;
+        if self.rows == 0 {
+            drop(self.csv.take());
+            return fs::remove_dir_all(&self.directory)
+                .map_err(|error| Error::io(&self.directory, &error));
+        }
+        if let Some(csv) = self.csv.take() {
+            csv.finish()?;
+        }
+        let manifest = Manifest {
+            unfinished: false,
+            ..manifest.clone()
+        };
+        match format {
+            SampleFormat::Csv => self.state(&manifest),
+            SampleFormat::Parquet => {
+                let recording = Recording::open(&self.directory)?;
+                let mut writer = Writer::create(&self.directory, self.columns, format, true)?;
+                recording.for_each_batch(progress, |batch| writer.write(batch))?;
+                writer.finish(&manifest).map(drop)
+            }
+        }
+    }
+
+    /// Puts a manifest in the place of the one that is there.
+    fn state(&self, manifest: &Manifest) -> Result<()> {
+        let io = |error: std::io::Error| Error::io(&self.directory, &error);
+        let text = manifest.to_toml()?;
+        let mut file = tempfile::Builder::new()
+            .prefix(".recording")
+            .tempfile_in(&self.directory)
+            .map_err(io)?;
+        file.write_all(text.as_bytes()).map_err(io)?;
+        file.as_file().sync_all().map_err(io)?;
+        // Temporary files are private; a recording is for everybody who may read the folder.
+        #[cfg(unix)]
+        {
+            use std::os::unix::fs::PermissionsExt as _;
+            let mode = fs::Permissions::from_mode(0o644);
+            file.as_file().set_permissions(mode).map_err(io)?;
+        }
+        file.persist(self.directory.join(MANIFEST_FILE))
+            .map_err(|error| io(error.error))?;
+        sync_directory(&self.directory);
+        Ok(())
+    }
+
+    /// Ends the thread, and says what it says.
+    fn settle(&mut self) -> Result<()> {
+        let Some(Disk { stop, thread }) = self.disk.take() else {
+            return Ok(());
+        };
+        drop(stop);
+        match thread.join() {
+            Ok(done) => done.map_err(|error| Error::io(&self.directory, &error)),
+            Err(_) => Err(Error::new(
+                self.directory.display(),
+                "the thread that waits for the disk broke down",
+                "report this",
+            )),
+        }
+    }
+}
+
+impl Disk {
+    fn new(file: File) -> std::io::Result<Self> {
+        let (stop, stopped) = channel();
+        let wait = move || {
+            while stopped.recv_timeout(SYNC) == Err(RecvTimeoutError::Timeout) {
+                file.sync_data()?;
+            }
+            Ok(())
+        };
+        let name = std::thread::Builder::new().name("disk".into());
+        let thread = name.spawn(wait)?;
+        Ok(Self { stop, thread })
+    }
+}
+
+impl Drop for Growing {
+    fn drop(&mut self) {
+        // What it says does not matter any more: the recording was given up, and stays unfinished.
+        let _ = self.settle();
+    }
+}

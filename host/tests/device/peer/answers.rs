@@ -1,0 +1,212 @@
+//! Calls, and what is answered.
+
+use std::time::Instant;
+
+use mimu_core::kalman::Bank;
+use mimu_core::stored::{self, ROOM};
+use mimu_core::wire::{
+    Call, Capabilities, Counters, Greeting, KalmanAxis, KalmanState, Message, Prior, Refusal,
+    Reply, Request, SelfTest, Slot, Start, StoredInfo,
+};
+use nalgebra::Vector3;
+
+use super::samples::Running;
+use super::{Device, UNIT_ID};
+
+impl Device {
+    pub(super) fn greeting(&mut self, id: u16) {
+        let held = self.seen.lock().unwrap().stored.clone();
+        let stored = held.as_ref().map(|bytes| {
+            let decoded = stored::decode(bytes).unwrap();
+            StoredInfo {
+                length: bytes.len() as u32,
+                hash: stored::hash(bytes),
+                nodes: decoded.table.len() as u8,
+                effects: decoded.effect_count,
+            }
+        });
+        let first = match stored {
+            Some(_) => Slot::Whole { generation: 1 },
+            None => Slot::Empty,
+        };
+        let greeting = Greeting {
+            magic: self.script.magic,
+            protocol: self.script.protocol,
+            firmware: "9.8.7",
+            board: "a script",
+            unit_id: UNIT_ID,
+            capabilities: Capabilities::TEMPERATURE_NODES
+                .and(Capabilities::TERMS)
+                .and(Capabilities::KALMAN)
+                .and(Capabilities::SELF_TEST),
+            effects: self.script.effects,
+            effects_room: ROOM as u8,
+            nodes_room: 16,
+            stored_room: 4096,
+            sample_rate_hz: 1000,
+            channels: "gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z",
+            raw_unit: "V",
+            start: Start::Panic {
+                file: "src/x.rs",
+                line: 7,
+            },
+            starts: 3,
+            stored,
+            slots: [first, Slot::Empty],
+        };
+        let message = Message::Greeting { id, greeting };
+        match id {
+            0 => self.frame(&message, false),
+            _ => self.send(&message),
+        }
+    }
+
+    pub(super) fn restart(&mut self) {
+        (self.began, self.next) = (Instant::now(), 0);
+        (self.streams, self.upload) = ((false, false), None);
+        (self.calibrated, self.banks) = (None, [None, None]);
+        self.greeting(0);
+    }
+
+    pub(super) fn answer(&mut self, call: &Call<'_>) {
+        let name = format!("{:?}", call.request);
+        let end = name.find([' ', '{']).unwrap_or(name.len());
+        self.seen
+            .lock()
+            .unwrap()
+            .requests
+            .push(name[..end].to_string());
+        let id = call.id;
+        if call.request == Request::Hello {
+            return self.greeting(id);
+        }
+        if let Request::UploadChunk { offset, .. } = call.request
+            && self.script.restart_at_chunk == Some(offset)
+        {
+            self.script.restart_at_chunk = None;
+            return self.restart();
+        }
+        let held = self.seen.lock().unwrap().stored.clone();
+        let reply = match call.request {
+            Request::Download { offset, length } => match &held {
+                None => Err(Refusal::NoCalibration),
+                Some(bytes) => {
+                    let from = (offset as usize).min(bytes.len());
+                    let to = (from + usize::from(length)).min(bytes.len());
+                    Ok(Reply::Stored {
+                        offset,
+                        length: bytes.len() as u32,
+                        bytes: &bytes[from..to],
+                    })
+                }
+            },
+            request => self.does(request, held.as_deref()),
+        };
+        match reply {
+            Ok(reply) => self.send(&Message::Reply { id, reply }),
+            Err(refusal) => self.send(&Message::Refused { id, refusal }),
+        }
+    }
+
+    pub(super) fn does(
+        &mut self,
+        request: Request<'_>,
+        held: Option<&[u8]>,
+    ) -> Result<Reply<'static>, Refusal> {
+        match request {
+            Request::Stream { raw, compensated } => {
+                if compensated && held.is_none() {
+                    return Err(Refusal::NoCalibration);
+                }
+                self.streams = (raw, compensated);
+                self.streamed_from.get_or_insert(self.next);
+            }
+            Request::Stop => self.streams = (false, false),
+            Request::Counters => {
+                return Ok(Reply::Counters(Counters {
+                    samples: self.next,
+                    late: 17,
+                    ..Counters::default()
+                }));
+            }
+            Request::SelfTest => {
+                return Ok(Reply::SelfTest(SelfTest {
+                    gyro_st1_v: [-0.27; 3],
+                    gyro_st2_v: [0.27; 3],
+                    accel_fine_v: [1.65, 1.65, 2.45],
+                    accel_coarse_v: [1.65, 1.65, 1.85],
+                    passed: self.script.self_test_passed,
+                }));
+            }
+            Request::UploadBegin { length, hash } => {
+                self.upload = Some((length as usize, hash, Vec::new()));
+            }
+            Request::UploadChunk { offset, bytes } => {
+                let Some((_, _, received)) = &mut self.upload else {
+                    return Err(Refusal::NoUpload);
+                };
+                if offset as usize > received.len() {
+                    let expected = received.len() as u32;
+                    return Err(Refusal::WrongOffset { expected });
+                }
+                received.truncate(offset as usize);
+                received.extend_from_slice(bytes);
+            }
+            Request::UploadCommit => {
+                let Some((length, hash, received)) = self.upload.clone() else {
+                    return Err(Refusal::NoUpload);
+                };
+                if let Some(refusal) = self.script.refuse_commit {
+                    return Err(refusal);
+                }
+                if received.len() < length {
+                    let received = received.len() as u32;
+                    return Err(Refusal::Incomplete { received });
+                }
+                let found = stored::hash(&received);
+                if found != hash {
+                    return Err(Refusal::WrongHash { found });
+                }
+                stored::decode(&received).map_err(Refusal::NotUsable)?;
+                self.upload = None;
+                self.calibrated = None;
+                self.seen.lock().unwrap().stored = Some(received);
+            }
+            Request::KalmanStart {
+                triad,
+                noise,
+                prior: Prior::Diffuse { span },
+            } => {
+                let noise = Vector3::from(noise);
+                self.banks[triad as usize] = Some(Running {
+                    filters: Bank::diffuse(&noise, span),
+                    noise,
+                    input: None,
+                    offered: 0,
+                    state: KalmanState {
+                        triad,
+                        last: 0,
+                        updates: 0,
+                        rejected: 0,
+                        skipped: 0,
+                        axes: [KalmanAxis {
+                            mean: [0.0; 4],
+                            covariance: [0.0; 10],
+                        }; 3],
+                    },
+                });
+            }
+            Request::KalmanInput { triad, input } => {
+                let bank = self.banks[triad as usize].as_mut().ok_or(Refusal::NoBank)?;
+                bank.input = input.map(Vector3::from);
+            }
+            Request::KalmanEnd { triad } => {
+                let bank = self.banks[triad as usize].take().ok_or(Refusal::NoBank)?;
+                return Ok(Reply::Kalman(bank.state()));
+            }
+            Request::ResetCounters => {}
+            _ => return Err(Refusal::Unknown),
+        }
+        Ok(Reply::Done)
+    }
+}
