@@ -51,10 +51,10 @@ impl StepFinder {
             .extend(moved.filter(|d| *d > 0.0 && d.is_finite()).take(OF_A_BLOCK));
         if self.differences.len() > KEPT {
             // Every other block, in future and of the past.
-            let mut index = 0;
+            let mut index = 0_usize;
             self.differences.retain(|_| {
                 index += 1;
-                (index / OF_A_BLOCK) % 2 == 0
+                (index / OF_A_BLOCK).is_multiple_of(2)
             });
             self.every *= 2;
         }

@@ -140,7 +140,8 @@ fn the_effect_that_is_drawn_is_the_one_that_the_unit_has() {
             .iter()
             .map(|p| p.after.abs())
             .fold(0.0, f64::max);
-        assert!(most > 5.0 * left, "{}: {most} {left}", panel.title);
+        // The largest of 56 residuals is three sigmas by itself, and the cubic less its best line some eight.
+        assert!(most > 2.0 * left, "{}: {most} {left}", panel.title);
     }
     // The residuals drawn are those that the figures are of.
     for k in 0..2 {
@@ -153,6 +154,11 @@ fn the_effect_that_is_drawn_is_the_one_that_the_unit_has() {
     }
     let last = picture.steps.last().unwrap();
     assert!((last.held_out_rms / gyro.decision.held_out_rms[1] - 1.0).abs() < 1e-9);
+}
+
+/// Reading JSON may cost the last bit.
+fn same(a: f64, b: f64) -> bool {
+    (a - b).abs() <= 4.0 * f64::EPSILON * b.abs()
 }
 
 /// Text of an element and all within.
@@ -201,8 +207,12 @@ fn numbers_of_the_page_are_those_of_the_json_and_are_read_in_its_units() {
         };
         let found = shown
             .iter()
-            .any(|(v, text)| *v == value && text.ends_with(unit) && fits(text));
-        assert!(found, "{value} {unit}");
+            .any(|(v, text)| same(*v, value) && text.ends_with(unit) && fits(text));
+        let near: Vec<_> = shown
+            .iter()
+            .filter(|(v, _)| (v / value - 1.0).abs() < 0.01)
+            .collect();
+        assert!(found, "{value} {unit}, near it {near:?}");
         checked += 1;
     };
     let deg = 180.0 / std::f64::consts::PI;
@@ -219,8 +229,10 @@ fn numbers_of_the_page_are_those_of_the_json_and_are_read_in_its_units() {
             );
         }
     }
-    assert_eq!(json["effects"].as_array().unwrap().len(), 1);
-    let effect = &json["effects"][0];
+    // The board sits off the table's axis, which an accelerometer feels.
+    let effects = json["effects"].as_array().unwrap();
+    let of_cubic = |e: &&Value| e["id"] == "gyro_scale_cubic";
+    let effect = effects.iter().find(of_cubic).unwrap();
     for key in ["rms_after", "held_out_rms_after"] {
         seen(&json["sensors"]["gyro"][key], deg, "deg/s");
     }
@@ -243,7 +255,7 @@ fn numbers_of_the_page_are_those_of_the_json_and_are_read_in_its_units() {
             s.as_object()
                 .unwrap()
                 .values()
-                .any(|v| v.as_f64() == Some(value))
+                .any(|v| v.as_f64().is_some_and(|v| same(v, value)))
         });
         assert!(known, "{text}");
     }

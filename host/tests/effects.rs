@@ -277,7 +277,7 @@ fn bits_are_removed_block_by_block_as_sample_by_sample() {
         .map(|line| line.split(',').map(|v| v.parse().unwrap()).collect())
         .collect();
     let mut state = State::new(RATE_HZ);
-    let (mut alike, mut moved) = (0, 0.0_f64);
+    let (mut off, mut moved) = (Vector3::zeros(), 0.0);
     for (block, clean) in fit
         .prepared
         .condensed
@@ -301,15 +301,16 @@ fn bits_are_removed_block_by_block_as_sample_by_sample() {
         let mean = |block: &mimu::blocks::Block| {
             accel.apply(&Vector3::from_fn(|i, _| block.raw[3 + i].mean))
         };
-        let left = (by_device - mean(clean)).norm();
-        moved = moved.max((mean(clean) - mean(block)).norm());
-        alike += u32::from(left < 1e-9);
-        // Where a bit turns within the noise, five samples tell the share of the time only so well.
-        assert!(left < 0.1, "{left}");
+        // Where a bit turns within the noise, five samples tell the share of the time only so well: to a fifth, by chance.
+        off += by_device - mean(clean);
+        moved += (mean(clean) - mean(block)).norm();
     }
-    let blocks = fit.prepared.condensed.blocks.len() as u32;
+    let blocks = fit.prepared.condensed.blocks.len() as f64;
+    let (off, moved) = (off.norm() / blocks, moved / blocks);
+    println!("errors of {moved:.4} m/s², removed by blocks and by samples to within {off:.5}");
     assert!(moved > 0.02, "{moved}");
-    assert!(alike > blocks / 2, "{alike} of {blocks}");
+    // 1440 blocks: a fifth of an error over their root is 0.005 of it; half of that again for bits that share blocks.
+    assert!(off < 0.01 * moved, "{off} of {moved}");
 }
 
 fn mimu(arguments: &[&str]) -> (bool, String) {

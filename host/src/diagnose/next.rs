@@ -147,7 +147,7 @@ fn by_id(id: &str) -> Option<Candidate> {
     let (channel, product) = id.strip_prefix("term:")?.split_once('~')?;
     let (sensor, axis) = channel.split_once('_')?;
     let sensor = Sensor::BOTH.into_iter().find(|s| s.name() == sensor)?;
-    let axis = AXES.iter().position(|a| a.to_string() == axis)?;
+    let axis = AXES.iter().position(|a| *a == axis)?;
     let monomial = Monomial::all().into_iter().find(|m| m.name() == product)?;
     Some(Candidate::new(sensor, Kind::Term(axis, monomial)))
 }

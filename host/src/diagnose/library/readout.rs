@@ -66,7 +66,7 @@ pub(super) const EFFECTS: [Effect; 2] = [
 fn bits(at: &Moment, weight: f64, out: &mut [f64]) {
     let reading = &at.reading;
     let mut of_bit = weight;
-    for all in out.chunks_exact_mut(3) {
+    for all in out.as_chunks_mut::<3>().0 {
         for (i, out) in all.iter_mut().enumerate() {
             *out = weight * share_set(reading.mean[i], reading.sd[i], of_bit) / reading.scale[i];
         }
