@@ -309,7 +309,8 @@ fn bits_are_removed_block_by_block_as_sample_by_sample() {
     let (off, moved) = (off.norm() / blocks, moved / blocks);
     println!("errors of {moved:.4} m/s², removed by blocks and by samples to within {off:.5}");
     assert!(moved > 0.02, "{moved}");
-    // 1440 blocks: a fifth of an error over their root is 0.005 of it; half of that again for bits that share blocks.
+    // Five samples tell a share of one half to 0.22 (the root of a fifth of a quarter), and 1440 blocks their mean to 0.006 of an
+    // error; three axes together to 0.010.
     assert!(off < 0.01 * moved, "{off} of {moved}");
 }
 

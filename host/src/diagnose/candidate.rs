@@ -396,6 +396,24 @@ impl Candidate {
         self.columns_at(rows, &rows.moments(self.lag_s(form)), form)
     }
 
+    /// The same with all of the coefficients that its search chooses from.
+    pub fn with_all_offered(&self) -> Self {
+        Self {
+            active: self.offered.clone(),
+            ..self.clone()
+        }
+    }
+
+    /// Its columns out of those [with all that are offered](Self::with_all_offered): the share of the time that a bit is set takes an
+    /// error function for each moment, and a search over choices of bits asks for the same ones again and again.
+    pub fn columns_of(&self, all_offered: &DMatrix<f64>) -> DMatrix<f64> {
+        let places = self.active.iter();
+        let places: Vec<usize> = places
+            .filter_map(|k| self.offered.binary_search(k).ok())
+            .collect();
+        all_offered.select_columns(&places)
+    }
+
     /// Its columns in `rows` at other moments than theirs.
     pub fn columns_at(&self, rows: &Rows, moments: &[Moment], form: f64) -> DMatrix<f64> {
         let slots = self.slots();

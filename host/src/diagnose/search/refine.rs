@@ -75,7 +75,10 @@ impl Beside<'_> {
     /// With the best choice of bits: one is added or dropped as long as that makes the score better.
     pub fn bits(&self, from: &Candidate, form: f64) -> Option<(Candidate, With)> {
         let moments = self.search.freed(&self.model, self.null);
-        let columns = |c: &Candidate| c.columns_at(&self.search.by_dwell, &moments, form);
+        let all = from
+            .with_all_offered()
+            .columns_at(&self.search.by_dwell, &moments, form);
+        let columns = |c: &Candidate| c.columns_of(&all);
         let mut best = (
             from.clone(),
             self.fit(columns(from), &self.null.components)?,

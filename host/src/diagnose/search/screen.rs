@@ -37,6 +37,15 @@ impl Search<'_> {
         let total = left.norm_squared();
         let freed = self.freed(&self.model(chosen), null);
         let taken = |c: &Candidate| chosen.iter().any(|k| k.candidate.is_variant_of(c));
+        // Of each code once for all of its variants, which follow each other.
+        let mut codes: Vec<(&Candidate, DMatrix<f64>)> = Vec::new();
+        for c in self.candidates.iter().filter(|c| c.reads_code()) {
+            if !codes.last().is_some_and(|last| last.0.is_variant_of(c)) {
+                let form = c.forms()[0];
+                let all = c.with_all_offered();
+                codes.push((c, all.columns_at(&self.by_dwell, &freed, form)));
+            }
+        }
         let mut found: Vec<Screened> = (0..self.candidates.len())
             .into_par_iter()
             .filter(|i| !taken(&self.candidates[*i]))
@@ -44,9 +53,9 @@ impl Search<'_> {
                 let candidate = &self.candidates[index];
                 let mut best: Option<Screened> = None;
                 for form in candidate.forms() {
-                    let columns = match candidate.reads_code() {
-                        true => Cow::Owned(candidate.columns_at(&self.by_dwell, &freed, form)),
-                        false => self.columns(index, form),
+                    let columns = match codes.iter().find(|c| c.0.is_variant_of(candidate)) {
+                        Some((_, all)) => Cow::Owned(candidate.columns_of(all)),
+                        None => self.columns(index, form),
                     };
                     let white = whitener.whiten(&columns);
                     let Some((p, gain)) = self.explained(&others, &left, total, &white) else {

@@ -54,7 +54,9 @@ pub fn diagnosis_text(report: &DiagnosisReport) -> String {
 fn sensor(out: &mut String, s: &SensorDiagnosis, figure: Figure) {
     let d = &s.decision;
     let (factor, unit) = readable(figure, s.sensor);
-    let shown = |v: f64| match v.is_finite() {
+    // As many parameters as residuals leave rounding.
+    let [rows, parameters] = d.rows;
+    let shown = |v: f64| match v.is_finite() && rows > parameters {
         true => format!("{} {unit}", three(v * factor)),
         false => "-".into(),
     };
@@ -68,7 +70,7 @@ fn sensor(out: &mut String, s: &SensorDiagnosis, figure: Figure) {
         "after",
         "noise floor"
     );
-    let floor = shown(d.noise_floor);
+    let floor = format!("{} {unit}", three(d.noise_floor * factor));
     for (name, [before, after]) in [("in sample", d.rms), ("held out", d.held_out_rms)] {
         let _ = writeln!(
             out,
@@ -83,7 +85,6 @@ fn sensor(out: &mut String, s: &SensorDiagnosis, figure: Figure) {
             "  held out every fourth dwell: one block of time alone shows what is needed"
         );
     }
-    let [rows, parameters] = d.rows;
     if rows < parameters + FEW {
         let _ = writeln!(
             out,
