@@ -3,7 +3,9 @@
 //! The truth is made by the bench, whose physics shares no code with the diagnosis; how large an effect is, is the
 //! difference of two recordings of the same unit, with and without it, all else being the same bits.
 
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
+use std::sync::{Arc, Mutex};
 
 use mimu::diagnose::{Diagnosis, diagnose};
 use mimu::dwell::Sensor;
@@ -138,6 +140,17 @@ fn strength(with: &Prepared, without: &Prepared) -> (Sensor, f64) {
     if g.1 > a.1 { g } else { a }
 }
 
+/// Recording of the unit of a seed without any effect, which every effect of that seed is measured against.
+fn clean(plan: &str, file: &RigFile, seed: u64) -> Arc<Prepared> {
+    static RECORDED: Mutex<BTreeMap<u64, Arc<Prepared>>> = Mutex::new(BTreeMap::new());
+    let known = || RECORDED.lock().expect("nobody panics with it");
+    if let Some(recorded) = known().get(&seed) {
+        return recorded.clone();
+    }
+    let recorded = Arc::new(bench::recorded(plan, file, seed));
+    known().entry(seed).or_insert(recorded).clone()
+}
+
 /// Records and diagnoses a unit with `ids`.
 pub fn case(ids: &[&str], seed: u64) -> Case {
     let plan = plan(seed);
@@ -148,7 +161,11 @@ pub fn case(ids: &[&str], seed: u64) -> Case {
     for k in 0..ids.len() {
         let mut less = file.clone();
         less.effect.remove(k);
-        let (sensor, s) = strength(&with, &bench::recorded(&plan, &less, seed));
+        let less = match less.effect.is_empty() {
+            true => clean(&plan, &less, seed),
+            false => Arc::new(bench::recorded(&plan, &less, seed)),
+        };
+        let (sensor, s) = strength(&with, &less);
         strengths.push(s);
         sensors.push(sensor);
     }

@@ -396,7 +396,16 @@ impl Candidate {
         self.columns_at(rows, &rows.moments(self.lag_s(form)), form)
     }
 
-    /// The same with all of the coefficients that its search chooses from.
+    /// Columns of the one regressor of a term or a jump as an error of each of `axes`: it takes longer to find than to weigh.
+    pub fn columns_by_axis(&self, rows: &Rows, axes: &[usize]) -> DMatrix<f64> {
+        let moments = rows.moments(self.lag_s(0.0));
+        rows.columns(&moments, axes, |at, out| {
+            self.regressors(at, 0.0, &mut out[..1]);
+            out.fill(out[0]);
+        })
+    }
+
+    /// It with all of the coefficients that its search chooses from.
     pub fn with_all_offered(&self) -> Self {
         Self {
             active: self.offered.clone(),

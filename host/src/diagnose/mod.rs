@@ -44,7 +44,7 @@ pub enum Verdict {
     Clean,
     /// The effects found explain it.
     Explained,
-    /// Something is left that nothing explains.
+    /// Something is left that nothing explains, or a law that is on no list explains it as well as the effect found.
     Unexplained,
 }
 
@@ -271,7 +271,8 @@ pub fn diagnose(recordings: Recordings, options: Options) -> Result<Diagnosis> {
         });
     }
     sensors.reverse();
-    let left = sensors.iter().any(|s| !s.decision.leftover.is_empty());
+    let open = |d: &Decision| !d.leftover.is_empty() || !d.undecided.is_empty();
+    let left = sensors.iter().any(|s| open(&s.decision));
     let verdict = match (left, effects.is_empty()) {
         (true, _) => Verdict::Unexplained,
         (false, true) => Verdict::Clean,

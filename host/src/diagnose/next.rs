@@ -6,6 +6,7 @@ use rayon::prelude::*;
 
 use super::Diagnosis;
 use super::candidate::{Candidate, Kind, Monomial};
+use super::decision::EXCITED;
 use super::library;
 use super::rows::{Free, Rows, Session};
 use crate::design::budget::DwellNoise;
@@ -210,9 +211,10 @@ fn shown(base: &Question, diagnosis: &Diagnosis, suspects: Vec<Suspect>) -> Vec<
         suspects: suspects.clone(),
         ..base.clone()
     });
+    // What would not even be tested after it is no experiment for it.
     let possible = |answer: &Answer, id: &str| {
         let settled = answer.settled.iter().find(|s| s.id == id);
-        settled.is_some_and(|s| s.possible())
+        settled.is_some_and(|s| s.sigmas > EXCITED)
     };
     let (can, cannot): (Vec<Suspect>, Vec<Suspect>) = suspects
         .into_iter()

@@ -7,14 +7,12 @@
 mod refine;
 mod screen;
 
-use std::borrow::Cow;
-
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::candidate::{Candidate, Kind};
-use super::effect::Moment;
+use super::effect::{Effect, Moment};
 use super::rows::Rows;
 use super::spread::{By, Fitted, Spread};
 use refine::Beside;
@@ -57,8 +55,8 @@ pub struct Search<'a> {
     /// Basis of what the affine parameters can do.
     pub basis: DMatrix<f64>,
     candidates: Vec<Candidate>,
-    /// Columns of those that are the same whatever else there is.
-    fixed: Vec<Option<DMatrix<f64>>>,
+    /// Columns of each, turned, for each form that is screened; none of those that are another beside other effects.
+    turned: Vec<Vec<(f64, DMatrix<f64>)>>,
     tests: [f64; 2],
 }
 
@@ -99,27 +97,33 @@ impl<'a> Search<'a> {
             });
             ours.map(|(_, c)| c.tests()).sum::<f64>().max(1.0)
         };
+        let spread = Spread::new(rows, false);
+        let alike = |a: &Candidate, b: &Candidate| a.is_same_of_another_axis(b);
+        let alike: Vec<&[Candidate]> = candidates.chunk_by(alike).collect();
+        let turned = alike
+            .into_par_iter()
+            .flat_map_iter(|group| match group {
+                [one] if one.reads_code() => vec![Vec::new()],
+                [one] => {
+                    let at = |form| (form, spread.turn(&one.columns(rows, form)));
+                    vec![one.forms().into_iter().map(at).collect()]
+                }
+                of_axes => {
+                    let axes: Vec<usize> = of_axes.iter().flat_map(|c| c.axes()).collect();
+                    let columns = spread.turn(&of_axes[0].columns_by_axis(rows, &axes));
+                    let of_axis = |k| vec![(0.0, columns.columns(k, 1).into_owned())];
+                    (0..axes.len()).map(of_axis).collect()
+                }
+            })
+            .collect();
         Self {
             rows,
-            spread: Spread::new(rows, false),
+            turned,
             basis: basis(&rows.nuisance),
             tests: [count(true), count(false)],
-            fixed: candidates
-                .par_iter()
-                .map(|c| {
-                    let fixed = c.form_range().is_none() && !c.reads_code();
-                    fixed.then(|| c.columns(rows, 0.0))
-                })
-                .collect(),
             by_dwell: rows.by_dwell(),
+            spread,
             candidates,
-        }
-    }
-
-    fn columns(&self, index: usize, form: f64) -> Cow<'_, DMatrix<f64>> {
-        match &self.fixed[index] {
-            Some(columns) => Cow::Borrowed(columns),
-            None => Cow::Owned(self.candidates[index].columns(self.rows, form)),
         }
     }
 
@@ -196,7 +200,7 @@ impl<'a> Search<'a> {
                 (candidate, screened.form, fitted)
             }
             false => {
-                let (form, fitted) = beside_these.form(candidate, screened)?;
+                let (form, fitted) = beside_these.form(candidate, screened.form)?;
                 (candidate.clone(), form, fitted)
             }
         };
@@ -242,6 +246,28 @@ impl<'a> Search<'a> {
             .into_par_iter()
             .filter(|s| self.candidates[s.index].is_listed());
         listed.filter_map(|s| self.judge(chosen, now, &s)).collect()
+    }
+
+    /// By how much the score is less with `law` in the place of `one` beside `rest`; negative where it is better.
+    pub fn worse_with(&self, law: &'static Effect, one: &Chosen, rest: &[Chosen]) -> Option<f64> {
+        let null = self.fit(rest)?;
+        let beside_these = Beside {
+            search: self,
+            model: self.model(rest),
+            null: &null,
+        };
+        let law = Candidate::new(self.rows.sensor, Kind::Effect(law));
+        let best_of = |form| beside_these.form(&law, form);
+        let found = law.forms().into_par_iter().filter_map(best_of);
+        let (form, with) = found.max_by(|a, b| a.1.drop.total_cmp(&b.1.drop))?;
+        let shadow = Chosen {
+            worth: with.drop,
+            columns: with.columns,
+            candidate: law,
+            form,
+            ..one.clone()
+        };
+        Some(score(one) - score(&shadow))
     }
 
     /// The effects that the rows ask for.
@@ -363,6 +389,22 @@ impl Candidate {
                     t_s: b,
                 },
             ) => i == j && r == s && a == b,
+            _ => false,
+        }
+    }
+
+    /// Whether both are a term or a jump, and the same but for the axis.
+    fn is_same_of_another_axis(&self, other: &Self) -> bool {
+        match (&self.kind, &other.kind) {
+            (Kind::Term(_, a), Kind::Term(_, b)) => a == b,
+            (
+                Kind::Jump {
+                    session: r, t_s: a, ..
+                },
+                Kind::Jump {
+                    session: s, t_s: b, ..
+                },
+            ) => r == s && a == b,
             _ => false,
         }
     }

@@ -3,9 +3,15 @@
 //! A drift of the bias and a walk of it are told apart by nothing else than that one is a straight line. So where the walk is not
 //! known, it is in the null hypothesis.
 
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+mod root;
+
+use nalgebra::{Cholesky, DMatrix, DVector};
+use rayon::prelude::*;
 
 use super::rows::Rows;
+use root::{Axes, Root};
+
+pub use root::{Kept, Whitener};
 
 /// Variances of each stratum beside the known ones.
 #[derive(Debug, Clone, PartialEq)]
@@ -49,78 +55,12 @@ struct Share {
     log_determinant: f64,
 }
 
-/// Root of the covariance of a stratum.
-enum Root {
-    Diagonal(DVector<f64>),
-    Full(Cholesky<f64, Dyn>),
-}
-
-impl Root {
-    fn whiten(&self, part: &mut DMatrix<f64>) {
-        match self {
-            Self::Diagonal(sigmas) => {
-                for (mut row, sigma) in part.row_iter_mut().zip(sigmas.iter()) {
-                    row /= *sigma;
-                }
-            }
-            Self::Full(root) => {
-                root.l_dirty().solve_lower_triangular_mut(part);
-            }
-        }
-    }
-
-    fn log_determinant(&self) -> f64 {
-        match self {
-            Self::Diagonal(sigmas) => sigmas.iter().map(|s| 2.0 * s.ln()).sum(),
-            Self::Full(root) => root.l_dirty().diagonal().iter().map(|s| 2.0 * s.ln()).sum(),
-        }
-    }
-}
-
-/// Decorrelates rows.
-pub struct Whitener<'a> {
-    rows: &'a Rows,
-    roots: Vec<Root>,
-}
-
-impl Whitener<'_> {
-    /// `matrix`, a row for each of the rows, decorrelated and in sigmas.
-    pub fn whiten(&self, matrix: &DMatrix<f64>) -> DMatrix<f64> {
-        let mut out = matrix.clone();
-        for (stratum, root) in self.rows.strata.iter().zip(&self.roots) {
-            let (from, count) = (stratum.rows.start, stratum.rows.len());
-            let mut part = matrix.rows(from, count).into_owned();
-            root.whiten(&mut part);
-            out.rows_mut(from, count).copy_from(&part);
-        }
-        out
-    }
-}
-
-/// Decorrelates a choice of rows.
-pub struct Kept {
-    parts: Vec<(usize, Cholesky<f64, Dyn>)>,
-}
-
-impl Kept {
-    /// `matrix`, a row for each of the chosen rows, decorrelated and in sigmas.
-    pub fn whiten(&self, matrix: &DMatrix<f64>) -> DMatrix<f64> {
-        let mut out = matrix.clone();
-        for (from, root) in &self.parts {
-            let count = root.l_dirty().nrows();
-            let mut part = matrix.rows(*from, count).into_owned();
-            root.l_dirty().solve_lower_triangular_mut(&mut part);
-            out.rows_mut(*from, count).copy_from(&part);
-        }
-        out
-    }
-}
-
 /// Rows, with what takes long to find out about them.
 pub struct Spread<'a> {
     rows: &'a Rows,
-    /// Whether the known covariance of each stratum is diagonal.
-    diagonal: Vec<bool>,
+    /// Axes in which the rows of a stratum are independent whatever its excess, as long as there is no walk: its own where one is
+    /// sought.
+    axes: Vec<Option<Axes>>,
     /// Typical variance of a row, and of a unit walk, by stratum.
     typical: Vec<(f64, f64)>,
     /// Whether a walk is sought where the wander is known as well.
@@ -131,23 +71,42 @@ impl<'a> Spread<'a> {
     /// Of `rows`. Where the wander is known, a walk beside it is only sought if `all_walk`: it would take up every slow effect.
     pub fn new(rows: &'a Rows, all_walk: bool) -> Self {
         let mean = |m: &DMatrix<f64>| m.diagonal().mean().max(1e-30);
-        Self {
+        let mut spread = Self {
             rows,
             all_walk,
-            diagonal: rows
-                .strata
-                .iter()
-                .map(|s| {
-                    let off = &s.known - DMatrix::from_diagonal(&s.known.diagonal());
-                    off.amax() == 0.0
-                })
-                .collect(),
+            axes: Vec::new(),
             typical: rows
                 .strata
                 .iter()
                 .map(|s| (mean(&s.known), s.walk.as_ref().map_or(0.0, mean)))
                 .collect(),
+        };
+        spread.axes = (0..rows.strata.len())
+            .into_par_iter()
+            .map(|s| match spread.walks(s) {
+                true => Axes::as_they_stand(&rows.strata[s].known),
+                false => Some(Axes::of(&rows.strata[s].known)),
+            })
+            .collect();
+        spread
+    }
+
+    /// Whether a walk of stratum `s` is sought.
+    fn walks(&self, s: usize) -> bool {
+        let stratum = &self.rows.strata[s];
+        stratum.walk.is_some() && (self.all_walk || !stratum.wander_known)
+    }
+
+    /// `matrix`, a row for each of the rows, in the axes in which rows are independent, where there are such.
+    pub fn turn(&self, matrix: &DMatrix<f64>) -> DMatrix<f64> {
+        let mut out = matrix.clone();
+        for (stratum, axes) in self.rows.strata.iter().zip(&self.axes) {
+            if let Some(axes) = axes {
+                let (from, count) = (stratum.rows.start, stratum.rows.len());
+                axes.turn(&mut out.rows_mut(from, count));
+            }
         }
+        out
     }
 
     /// Nothing beside the known noise.
@@ -159,16 +118,14 @@ impl<'a> Spread<'a> {
         }
     }
 
-    /// Root of the covariance of stratum `s`.
+    /// Root of the covariance of stratum `s`, for rows that have been turned.
     fn root(&self, s: usize, excess: f64, walk: f64) -> Option<Root> {
         let stratum = &self.rows.strata[s];
         let floor = 1e-12 * self.typical[s].0;
-        if self.diagonal[s] && (walk == 0.0 || stratum.walk.is_none()) {
-            let sigmas = stratum
-                .known
-                .diagonal()
-                .map(|v| (v.max(floor) + excess).sqrt());
-            return Some(Root::Diagonal(sigmas));
+        if let Some(axes) = &self.axes[s]
+            && walk == 0.0
+        {
+            return Some(axes.root(excess, floor));
         }
         let mut v = stratum.known.clone();
         if let Some(unit) = &stratum.walk {
@@ -181,10 +138,10 @@ impl<'a> Spread<'a> {
     }
 
     /// What decorrelates all rows.
-    pub fn whitener(&self, at: &Components) -> Option<Whitener<'a>> {
+    pub fn whitener(&self, at: &Components) -> Option<Whitener<'_>> {
         let roots = (0..self.rows.strata.len()).map(|s| self.root(s, at.excess[s], at.walk[s]));
         Some(Whitener {
-            rows: self.rows,
+            spread: self,
             roots: roots.collect::<Option<_>>()?,
         })
     }
@@ -268,11 +225,12 @@ impl<'a> Spread<'a> {
         })
     }
 
+    /// Columns and residual, turned.
     fn both(&self, columns: &DMatrix<f64>) -> DMatrix<f64> {
         let p = columns.ncols();
         let mut both = columns.clone().insert_column(p, 0.0);
         both.set_column(p, &self.rows.y);
-        both
+        self.turn(&both)
     }
 
     /// The model with `columns` at given components.
@@ -300,9 +258,7 @@ impl<'a> Spread<'a> {
             let before = cost(&best);
             for s in 0..shares.len() {
                 let (row, unit_walk) = self.typical[s];
-                let stratum = &self.rows.strata[s];
-                let walks = stratum.walk.is_some() && (self.all_walk || !stratum.wander_known);
-                for part in 0..if walks { 2 } else { 1 } {
+                for part in 0..if self.walks(s) { 2 } else { 1 } {
                     let (now, unit) = match part {
                         0 => (at.excess[s], row),
                         _ => (at.walk[s], row / unit_walk),
@@ -314,12 +270,20 @@ impl<'a> Spread<'a> {
                             steps.extend([0.1, 0.5, 2.0, 8.0, 64.0, 1e3, 1e5].map(|f| f * unit))
                         }
                     }
-                    for value in steps {
-                        let (excess, walk) = match part {
-                            0 => (value, at.walk[s]),
-                            _ => (at.excess[s], value),
-                        };
-                        let Some(new) = self.share(s, excess, walk, &both) else {
+                    let with = |value: f64| match part {
+                        0 => (value, at.walk[s]),
+                        _ => (at.excess[s], value),
+                    };
+                    // Decorrelating a stratum takes nearly all of the time, and one value asks nothing of another.
+                    let tried: Vec<((f64, f64), Option<Share>)> = steps
+                        .into_par_iter()
+                        .map(|value| {
+                            let (excess, walk) = with(value);
+                            ((excess, walk), self.share(s, excess, walk, &both))
+                        })
+                        .collect();
+                    for ((excess, walk), share) in tried {
+                        let Some(new) = share else {
                             continue;
                         };
                         let old = std::mem::replace(&mut shares[s], new);

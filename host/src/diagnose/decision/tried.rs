@@ -1,6 +1,7 @@
 //! What is tried on a sensor.
 
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 
 use crate::diagnose::candidate::{Candidate, Kind, Monomial};
 use crate::diagnose::library;
@@ -8,7 +9,7 @@ use crate::diagnose::rows::Rows;
 use crate::diagnose::search::Search;
 
 /// An effect whose coefficient of the size of a data sheet would not be this many sigmas is not excited.
-const EXCITED: f64 = 3.0;
+pub(in crate::diagnose) const EXCITED: f64 = 3.0;
 
 /// Everything that is tried on a sensor, and the effects that its experiment does not show.
 pub(super) fn candidates(
@@ -54,19 +55,19 @@ pub(super) fn candidates(
             all.extend(candidate.variants());
         }
     }
-    for monomial in Monomial::all() {
-        let first = Candidate::new(sensor, Kind::Term(0, monomial.clone()));
-        for axis in 0..3 {
-            let candidate = Candidate {
-                kind: Kind::Term(axis, monomial.clone()),
-                ..first.clone()
+    let terms: Vec<Vec<Candidate>> = Monomial::all()
+        .into_par_iter()
+        .map(|monomial| {
+            let term = |axis| Candidate::new(sensor, Kind::Term(axis, monomial.clone()));
+            let columns = term(0).columns_by_axis(rows, &[0, 1, 2]);
+            let seen = across(&columns);
+            let seen = |axis: &usize| {
+                columns.column(*axis).iter().all(|v| v.is_finite()) && seen[*axis] > 0.0
             };
-            let columns = candidate.columns(rows, 0.0);
-            if columns.iter().all(|v| v.is_finite()) && across(&columns)[0] > 0.0 {
-                all.push(candidate);
-            }
-        }
-    }
+            (0..3).filter(seen).map(term).collect()
+        })
+        .collect();
+    all.extend(terms.into_iter().flatten());
     for &(session, t_s) in dwell_ends {
         let jump = |axis| Kind::Jump { axis, session, t_s };
         all.extend((0..3).map(|axis| Candidate::new(sensor, jump(axis))));

@@ -6,6 +6,7 @@ mod accel;
 mod drift;
 mod gyro;
 pub mod readout;
+pub mod rivals;
 mod thermal;
 
 use super::effect::{Coefficient, Effect};

@@ -2,7 +2,6 @@
 
 use nalgebra::DMatrix;
 
-use super::screen::Screened;
 use super::{COEFFICIENT, Search, beside, unit_columns};
 use crate::diagnose::candidate::Candidate;
 use crate::diagnose::spread::{By, Components, Fitted};
@@ -40,13 +39,12 @@ impl Beside<'_> {
         })
     }
 
-    /// With the best value of its nonlinear constant, if it has one: a walk uphill with ever smaller steps.
-    pub fn form(&self, candidate: &Candidate, screened: &Screened) -> Option<(f64, With)> {
+    /// With the best value of its nonlinear constant, if it has one: a walk uphill from `first` with ever smaller steps.
+    pub fn form(&self, candidate: &Candidate, first: f64) -> Option<(f64, With)> {
         let fit = |form: f64, start: &Components| {
-            let columns = self.search.columns(screened.index, form).into_owned();
-            self.fit(columns, start)
+            self.fit(candidate.columns(self.search.rows, form), start)
         };
-        let mut best = (screened.form, fit(screened.form, &self.null.components)?);
+        let mut best = (first, fit(first, &self.null.components)?);
         let Some((from, to)) = candidate.form_range() else {
             return Some(best);
         };

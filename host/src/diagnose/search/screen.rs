@@ -1,7 +1,5 @@
 //! All candidates at first sight: by how much of the scatter each explains, with the noise of the model so far.
 
-use std::borrow::Cow;
-
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
@@ -38,12 +36,12 @@ impl Search<'_> {
         let freed = self.freed(&self.model(chosen), null);
         let taken = |c: &Candidate| chosen.iter().any(|k| k.candidate.is_variant_of(c));
         // Of each code once for all of its variants, which follow each other.
-        let mut codes: Vec<(&Candidate, DMatrix<f64>)> = Vec::new();
+        let mut codes: Vec<(&Candidate, f64, DMatrix<f64>)> = Vec::new();
         for c in self.candidates.iter().filter(|c| c.reads_code()) {
             if !codes.last().is_some_and(|last| last.0.is_variant_of(c)) {
                 let form = c.forms()[0];
                 let all = c.with_all_offered();
-                codes.push((c, all.columns_at(&self.by_dwell, &freed, form)));
+                codes.push((c, form, all.columns_at(&self.by_dwell, &freed, form)));
             }
         }
         let mut found: Vec<Screened> = (0..self.candidates.len())
@@ -52,12 +50,11 @@ impl Search<'_> {
             .flat_map_iter(|index| {
                 let candidate = &self.candidates[index];
                 let mut best: Option<Screened> = None;
-                for form in candidate.forms() {
-                    let columns = match codes.iter().find(|c| c.0.is_variant_of(candidate)) {
-                        Some((_, all)) => Cow::Owned(candidate.columns_of(all)),
-                        None => self.columns(index, form),
-                    };
-                    let white = whitener.whiten(&columns);
+                let code = codes.iter().find(|c| c.0.is_variant_of(candidate));
+                let code = code
+                    .map(|(_, form, all)| (*form, self.spread.turn(&candidate.columns_of(all))));
+                for (form, turned) in self.turned[index].iter().chain(&code) {
+                    let (form, white) = (*form, whitener.whiten_turned(turned.clone()));
                     let Some((p, gain)) = self.explained(&others, &left, total, &white) else {
                         continue;
                     };

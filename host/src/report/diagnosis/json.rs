@@ -31,6 +31,7 @@ pub fn diagnosis_json(report: &DiagnosisReport) -> Value {
             .map(|c| json!({ "ids": c.ids, "difference": c.difference, "experiment": c.experiment }))
             .collect::<Vec<_>>(),
         "sensors": sensors,
+        "undecided": all(&|s| undecided(&s.decision)),
         "leftover": all(&|s| leftover(s.sensor, &s.decision)),
         "warnings": d.after.warnings,
     });
@@ -121,6 +122,11 @@ fn sensor(d: &Diagnosis, s: &SensorDiagnosis) -> Value {
         "affine_parameters": decision.rows[1],
         "omnibus_chance": decision.omnibus_p,
     })
+}
+
+fn undecided(decision: &Decision) -> Vec<Value> {
+    let one = |u: &crate::diagnose::decision::Undecided| json!({ "id": u.id, "law": u.law, "difference": u.worse, "experiment": u.settled_by });
+    decision.undecided.iter().map(one).collect()
 }
 
 fn leftover(sensor: Sensor, decision: &Decision) -> Vec<Value> {

@@ -10,6 +10,7 @@ use maud::{Markup, PreEscaped, html};
 
 use super::DiagnosisReport;
 use crate::diagnose::decision::{Accepted, FALSE_LEFTOVER, LEVERAGE};
+use crate::diagnose::next::Next;
 use crate::diagnose::picture::{Against, Picture};
 use crate::diagnose::search::{FALSE_FOUND, FALSE_LISTED};
 use crate::diagnose::{Diagnosis, SensorDiagnosis, Verdict};
@@ -64,7 +65,7 @@ pub fn diagnosis_page(report: &DiagnosisReport, made: &Made) -> Result<String> {
                     p { "Of " code { (name) } " nothing was used to find or to fit the effects." }
                     (tables::second(both))
                 }
-                @if d.verdict == Verdict::Unexplained {
+                @if d.sensors.iter().any(|s| !s.decision.leftover.is_empty()) {
                     h2 { "What is left" }
                     p { "Scatter beyond the known noise that no candidate explains:" }
                     (tables::leftover(d))
@@ -74,6 +75,7 @@ pub fn diagnosis_page(report: &DiagnosisReport, made: &Made) -> Result<String> {
                 (tables::rejected(&d.sensors))
                 h2 { "Not tested: the experiment does not excite it" }
                 (tables::not_excited(&d.sensors))
+                (confused(&report.next))
                 (recorded(report))
                 (method())
                 p class="dim" { "mimu " (env!("CARGO_PKG_VERSION")) ", " (made.created) ": " code { (made.command) } }
@@ -127,17 +129,20 @@ fn head(d: &Diagnosis, made: &Made) -> Markup {
 fn verdict(d: &Diagnosis) -> Markup {
     let shown = |s: &SensorDiagnosis, value: f64| {
         let (factor, unit) = readable(figure(d, s.sensor), s.sensor);
-        number(value, factor, unit)
+        tables::figure_of(&s.decision, value, factor, unit)
     };
     let held = |s: &SensorDiagnosis, k: usize| shown(s, s.decision.held_out_rms[k]);
     let in_sample = |s: &SensorDiagnosis| shown(s, s.decision.rms[0]);
     let floor = |s: &SensorDiagnosis| shown(s, s.decision.noise_floor);
+    let left = || d.sensors.iter().filter(|s| !s.decision.leftover.is_empty());
     let said = match d.verdict {
         Verdict::Clean => "noise explains what the affine calibration leaves.",
         Verdict::Explained => "with the effects found, noise explains what is left.",
-        Verdict::Unexplained => "something is left that nothing tried explains:",
+        Verdict::Unexplained if left().next().is_some() => {
+            "something is left that nothing tried explains:"
+        }
+        Verdict::Unexplained => "what was found is explained as well by a law that is on no list.",
     };
-    let left = || d.sensors.iter().filter(|s| !s.decision.leftover.is_empty());
     html! {
         strong { (d.verdict.name()) } ": " (said)
         @for (n, s) in left().enumerate() { @if n > 0 { ";" } " " (tables::leftover_words(s)) }
@@ -179,6 +184,7 @@ fn sensor(d: &Diagnosis, s: &SensorDiagnosis, picture: &Picture) -> Markup {
         @for (one, panels) in s.decision.accepted.iter().zip(&picture.effects) {
             (effect(d, s, one, panels))
         }
+        @for note in &s.decision.notes { p { strong { "Note. " } (sentence(note)) "." } }
         @if !after {
             p { "No effect is accepted; residuals are those of the affine calibration." }
         }
@@ -253,7 +259,20 @@ fn effect(
                 }
             }
         }
-        (tables::alternatives(one))
+        (tables::alternatives(s, one))
+    }
+}
+
+/// What the next recording has to tell apart.
+fn confused(next: &Next) -> Markup {
+    html! {
+        @if !next.confused.is_empty() {
+            h2 { "What tells the confused ones apart" }
+            dl { @for c in &next.confused {
+                dt { code { (c.ids[0]) } " or " code { (c.ids[1]) } }
+                dd { "worse by " (number(c.difference, 1.0, "")) " in deviance; " (c.experiment) }
+            } }
+        }
     }
 }
 

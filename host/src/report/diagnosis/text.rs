@@ -94,6 +94,16 @@ fn sensor(out: &mut String, s: &SensorDiagnosis, figure: Figure) {
     for a in &d.accepted {
         effect(out, a, &shown);
     }
+    for u in &d.undecided {
+        let _ = writeln!(
+            out,
+            "  undecided, {}: {} explains it {}\n    told apart by {}",
+            u.id,
+            u.law,
+            by_score(u.worse),
+            u.settled_by
+        );
+    }
     for note in &d.notes {
         let _ = writeln!(out, "  note: {note}");
     }
@@ -158,6 +168,14 @@ fn effect(out: &mut String, a: &Accepted, shown: &impl Fn(f64) -> String) {
     }
     if alternatives.len() > SHOWN {
         let _ = writeln!(out, "    or one of {} more", alternatives.len() - SHOWN);
+    }
+}
+
+/// How a law on no list does in the place of an effect; `worse` in deviance.
+pub(super) fn by_score(worse: f64) -> String {
+    match worse > 0.0 {
+        true => format!("nearly as well, worse by {worse:.1} in deviance"),
+        false => format!("as well, better by {:.1} in deviance", -worse),
     }
 }
 

@@ -3,8 +3,8 @@
 use maud::{Markup, PreEscaped, html};
 
 use super::figures::unit;
-use super::spoken;
 use super::svg::raised;
+use super::{sentence, spoken};
 use crate::calibration::figure as figure_name;
 use crate::diagnose::candidate::{Candidate, Kind};
 use crate::diagnose::decision::{Accepted, Decision, Leftover, Split};
@@ -12,7 +12,7 @@ use crate::diagnose::picture::{Kind as Rows, Picture};
 use crate::diagnose::{Diagnosis, SensorDiagnosis};
 use crate::dwell::Sensor;
 use crate::fit::Figure;
-use crate::report::diagnosis::text::odds;
+use crate::report::diagnosis::text::{by_score, odds};
 use crate::report::text::{readable, three};
 use crate::verify::Verification;
 
@@ -25,6 +25,15 @@ pub fn number(si: f64, factor: f64, unit: &str) -> Markup {
         @if si.is_finite() {
             data value=(si) { (written(&three(si * factor))) @if !unit.is_empty() { " " (unit) } }
         } @else { "–" }
+    }
+}
+
+/// An error figure: none where there are as many parameters as residuals, and only rounding is left.
+pub fn figure_of(decision: &Decision, si: f64, factor: f64, unit: &str) -> Markup {
+    let [rows, parameters] = decision.rows;
+    match rows > parameters {
+        true => number(si, factor, unit),
+        false => html! { "–" },
     }
 }
 
@@ -71,8 +80,8 @@ pub fn errors(d: &Diagnosis, pictures: &[Picture]) -> Markup {
                                 Some((_, k)) => (s.decision.rms[k], s.decision.held_out_rms[k]),
                                 None => (step.rms, step.held_out_rms),
                             };
-                            td class="n" { (number(rms, factor, unit)) }
-                            td class="n" { (number(held, factor, unit)) }
+                            td class="n" { (figure_of(&s.decision, rms, factor, unit)) }
+                            td class="n" { (figure_of(&s.decision, held, factor, unit)) }
                             td class="n" { (number(s.decision.noise_floor, factor, unit)) }
                         }
                     }
@@ -157,11 +166,18 @@ pub fn coefficients(one: &Accepted) -> Markup {
     }
 }
 
-/// Candidates that would do nearly as well in the place of an effect.
-pub fn alternatives(one: &Accepted) -> Markup {
+/// Candidates, and laws on no list, that would do nearly as well in the place of an effect.
+pub fn alternatives(s: &SensorDiagnosis, one: &Accepted) -> Markup {
+    let id = one.chosen.candidate.id();
+    let undecided = || s.decision.undecided.iter().filter(|u| u.id == id);
     html! {
+        @for u in undecided() {
+            p { strong { "Undecided. " } (sentence(u.law)) " explains it " (by_score(u.worse)) ". Told apart by: " (u.settled_by) "." }
+        }
         @if one.chosen.alternatives.is_empty() {
-            p { "Nothing else that was tried would do nearly as well." }
+            @if undecided().next().is_none() && s.decision.notes.is_empty() {
+                p { "Nothing else that was tried would do nearly as well." }
+            }
         } @else {
             p { "In this recording it can be confused with:" }
             div class="scroll" { table {
