@@ -96,20 +96,22 @@ fn main() {
     }
     let cases: Vec<(String, Case)> = jobs
         .into_par_iter()
-        .map(|(ids, seed)| (ids.join(" + "), case(&ids, seed)))
+        .map(|(ids, seed)| {
+            let name = ids.join(" + ");
+            let case = case(&ids, seed);
+            if !chosen.is_empty() {
+                println!("{name}, seed {seed}: {case:?}");
+            }
+            (name, case)
+        })
         .collect();
-    if !chosen.is_empty() {
-        for (name, c) in &cases {
-            println!("{name}: {c:?}");
-        }
-    }
     tables(&cases);
 }
 
 fn tables(cases: &[(String, Case)]) {
     let mut by_kind: BTreeMap<&str, Tally> = BTreeMap::new();
     let mut by_class = [[Tally::default(); 2]; CLASSES.len()];
-    let mut unlisted: BTreeMap<&str, [u32; 4]> = BTreeMap::new();
+    let mut unlisted: BTreeMap<&str, [u32; 5]> = BTreeMap::new();
     let mut false_alarms = Vec::new();
     let mut clean = 0;
     for (name, case) in cases {
@@ -125,6 +127,7 @@ fn tables(cases: &[(String, Case)]) {
             count[1] += u32::from(case.verdict == "unexplained");
             count[2] += u32::from(case.verdict == "clean");
             count[3] += u32::from(listed && case.verdict == "explained");
+            count[4] += u32::from(case.verdict == "refused");
         } else {
             by_kind.entry(name).or_default().add(case);
             // A pair is as strong as its weaker part.
@@ -154,9 +157,9 @@ fn tables(cases: &[(String, Case)]) {
         println!("{}", tally.row(&format!("`{name}`")));
     }
     println!(
-        "\neffects on no list\n\n| | cases | unexplained | clean | explained by a listed effect |\n|---|---:|---:|---:|---:|"
+        "\neffects on no list\n\n| | cases | unexplained | clean | explained by a listed effect | refused |\n|---|---:|---:|---:|---:|---:|"
     );
-    for (name, [cases, unexplained, missed, passed]) in &unlisted {
-        println!("| `{name}` | {cases} | {unexplained} | {missed} | {passed} |");
+    for (name, [cases, unexplained, missed, passed, refused]) in &unlisted {
+        println!("| `{name}` | {cases} | {unexplained} | {missed} | {passed} | {refused} |");
     }
 }

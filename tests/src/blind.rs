@@ -101,7 +101,7 @@ pub struct Case {
     pub strength: Vec<f64>,
     /// Effects that were accepted.
     pub found: Vec<String>,
-    /// Verdict.
+    /// Verdict, or `refused`.
     pub verdict: &'static str,
     /// Error after over noise floor, held out, of the sensor of the first effect.
     pub after: f64,
@@ -171,12 +171,26 @@ pub fn case(ids: &[&str], seed: u64) -> Case {
     }
     let noise = bench::noise_file(&file, seed, with.condensed.period_s);
     let with = with.with_noise(&noise).expect("its noise");
-    let found: Diagnosis =
-        diagnose(with.into(), options()).unwrap_or_else(|e| panic!("{ids:?}, seed {seed}: {e}"));
+    let truth: Vec<String> = ids.iter().map(|s| (*s).into()).collect();
+    let found: Diagnosis = match diagnose(with.into(), options()) {
+        Ok(found) => found,
+        // An error so large that the readings no longer follow their inputs is refused before anything is diagnosed.
+        Err(refusal) => {
+            return Case {
+                truth,
+                strength: strengths,
+                found: Vec::new(),
+                verdict: "refused",
+                after: f64::NAN,
+                rejected: Vec::new(),
+                left: vec![refusal.to_string()],
+            };
+        }
+    };
     let judged = sensors.first().copied().unwrap_or(Sensor::Gyro);
     let after = found.sensors.iter().find(|s| s.sensor == judged);
     Case {
-        truth: ids.iter().map(|s| (*s).into()).collect(),
+        truth,
         strength: strengths,
         found: found.effects.iter().map(|e| e.candidate.id()).collect(),
         verdict: found.verdict.name(),
