@@ -45,7 +45,12 @@ fn single_effects_and_a_pair_are_named_and_brought_down_to_the_noise() {
 
 #[test]
 fn what_is_on_no_list_is_told_to_be_unexplained() {
-    for id in ["x_accel_stress_hysteresis", "x_usb_beat"] {
+    for id in [
+        "x_accel_stress_hysteresis",
+        "x_usb_beat",
+        "x_accel_creep",
+        "x_gyro_magnetic",
+    ] {
         for case in cases(&[id], 2) {
             assert_eq!(case.verdict, "unexplained", "{case:?}");
         }

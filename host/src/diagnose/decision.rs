@@ -4,12 +4,12 @@ mod hold_out;
 mod leftover;
 mod second;
 mod tried;
+mod undecided;
 
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::candidate::Kind;
-use super::library::rivals::rivals;
 use super::rows::Rows;
 use super::search::{Chosen, Search};
 use super::spread::{By, Fitted};
@@ -17,12 +17,14 @@ use hold_out::leverage;
 use leftover::leftover;
 use second::{Given, second};
 use tried::candidates;
+use undecided::undecided;
 
 pub use hold_out::Split;
 pub(super) use hold_out::{held_out, rms};
 pub use leftover::{FALSE_LEFTOVER, Leftover};
 pub use second::Second;
 pub(super) use tried::EXCITED;
+pub use undecided::Undecided;
 
 /// One dwell that has more than this share in what an effect rests on decides it alone.
 pub const LEVERAGE: f64 = 0.7;
@@ -41,19 +43,6 @@ pub struct Accepted {
     pub split: Split,
     /// What it does to the second recording, if there is one that can be judged by.
     pub second: Option<Second>,
-}
-
-/// An accepted effect that a law on no list explains the rows as well as.
-#[derive(Debug, Clone)]
-pub struct Undecided {
-    /// Id of the effect.
-    pub id: String,
-    /// The law.
-    pub law: &'static str,
-    /// By how much the law is worse, in deviance with what its coefficients cost; negative where it is better.
-    pub worse: f64,
-    /// What would tell them apart.
-    pub settled_by: &'static str,
 }
 
 /// What was decided on one sensor.
@@ -291,31 +280,6 @@ pub fn decide(rows: &Rows, dwell_ends: &[(usize, f64)], unseen: Option<&Rows>) -
         rows: [rows.y.len(), search.basis.ncols()],
         omnibus_p,
     })
-}
-
-/// Score by which an effect has to be better than a law that is on no list, for the verdict to name it: odds of one to twenty.
-const DECIDED: f64 = 6.0;
-
-/// Which of the kept effects a law that is on no list does as well as.
-fn undecided(search: &Search, kept: &[Chosen]) -> Vec<Undecided> {
-    let mut all = Vec::new();
-    for (i, one) in kept.iter().enumerate() {
-        let mut rest = kept.to_vec();
-        rest.remove(i);
-        let id = one.candidate.id();
-        for rival in rivals(&id) {
-            let worse = search.worse_with(&rival.law, one, &rest);
-            if let Some(worse) = worse.filter(|w| *w < DECIDED) {
-                all.push(Undecided {
-                    id: id.clone(),
-                    law: rival.law.about,
-                    worse,
-                    settled_by: rival.settled_by,
-                });
-            }
-        }
-    }
-    all
 }
 
 fn known_in(stratum: &super::rows::Stratum, judged: usize) -> f64 {

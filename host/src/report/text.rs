@@ -23,6 +23,34 @@ pub(crate) fn three(value: f64) -> String {
     }
 }
 
+/// Width that text keeps to, characters.
+pub(crate) const COLUMNS: usize = 98;
+
+/// `head` and `text` in lines, the later ones below the beginning of the text, or a little in where the head is long.
+pub(super) fn wrap(out: &mut String, head: &str, text: &str) {
+    let first = head.chars().count();
+    let spaces = head.chars().take_while(|c| *c == ' ').count();
+    let indent = if first > COLUMNS / 3 {
+        spaces + 2
+    } else {
+        first
+    };
+    let (mut line, mut begun) = (head.to_string(), false);
+    for word in text.split(' ') {
+        let longer = line.chars().count() + usize::from(begun) + word.chars().count();
+        if begun && longer > COLUMNS {
+            let _ = writeln!(out, "{line}");
+            (line, begun) = (" ".repeat(indent), false);
+        }
+        if begun {
+            line.push(' ');
+        }
+        line.push_str(word);
+        begun = true;
+    }
+    let _ = writeln!(out, "{line}");
+}
+
 /// `value ± half`, both to the second digit of `half`.
 fn plus_minus(value: f64, half: f64) -> String {
     if !(half > 0.0) || !half.is_finite() {

@@ -11,11 +11,10 @@ use crate::design::lack_of_fit::Notice;
 use crate::design::plan::round;
 use crate::design::schemes::Scheme;
 use crate::design::tour::Order;
+use crate::report::text::{COLUMNS, wrap};
 
 /// Dwells listed: as many as the longest design.
 const LISTED: usize = 200;
-/// Width that tables of parameters keep to.
-const COLUMNS: usize = 98;
 
 /// Result of `mimu design`.
 pub fn design_text(report: &DesignReport) -> String {
@@ -112,16 +111,7 @@ pub fn design_text(report: &DesignReport) -> String {
 
 /// Text in lines beside a name.
 pub(super) fn wrapped(out: &mut String, name: &str, text: &str) {
-    let mut shown = name;
-    let mut line = String::new();
-    for word in text.split(' ').chain([""]) {
-        if word.is_empty() || line.chars().count() + word.chars().count() > COLUMNS - 26 {
-            let _ = writeln!(out, "  {shown:<22}{}", line.trim_end());
-            (shown, line) = ("", String::new());
-        }
-        line.push_str(word);
-        line.push(' ');
-    }
+    wrap(out, &format!("  {name:<22}"), text);
 }
 
 pub(super) fn minutes(seconds: f64) -> String {

@@ -7,7 +7,7 @@ use crate::diagnose::decision::{Accepted, Decision, Split};
 use crate::diagnose::next::Next;
 use crate::diagnose::{SensorDiagnosis, Verdict};
 use crate::fit::Figure;
-use crate::report::text::{readable, three, warn};
+use crate::report::text::{readable, three, warn, wrap};
 
 /// Result of `mimu diagnose`.
 pub fn diagnosis_text(report: &DiagnosisReport) -> String {
@@ -16,7 +16,12 @@ pub fn diagnosis_text(report: &DiagnosisReport) -> String {
     let said = match d.verdict {
         Verdict::Clean => "clean: noise explains what the affine calibration leaves",
         Verdict::Explained => "explained: with the effects below, noise explains what is left",
-        Verdict::Unexplained => "unexplained: something is left that nothing here explains",
+        Verdict::Unexplained if d.sensors.iter().any(|s| !s.decision.leftover.is_empty()) => {
+            "unexplained: something is left that nothing here explains"
+        }
+        Verdict::Unexplained => {
+            "unexplained: a law that is on no list does as well as what was found"
+        }
     };
     let _ = writeln!(out, "{}: {said}", d.before.prepared.manifest.device);
     for s in &d.sensors {
@@ -95,17 +100,12 @@ fn sensor(out: &mut String, s: &SensorDiagnosis, figure: Figure) {
         effect(out, a, &shown);
     }
     for u in &d.undecided {
-        let _ = writeln!(
-            out,
-            "  undecided, {}: {} explains it {}\n    told apart by {}",
-            u.id,
-            u.law,
-            by_score(u.worse),
-            u.settled_by
-        );
+        let law = format!("{} explains it {}", u.law, by_score(u.worse));
+        wrap(out, &format!("  undecided, {}: ", u.id), &law);
+        wrap(out, "    told apart by ", u.settled_by);
     }
     for note in &d.notes {
-        let _ = writeln!(out, "  note: {note}");
+        wrap(out, "  note: ", note);
     }
     for l in &d.leftover {
         let (factor, unit) = match l.stratum.starts_with("turns") {
@@ -194,7 +194,7 @@ pub(super) fn odds(p: f64) -> String {
 
 fn tried(out: &mut String, d: &Decision) {
     for (id, reason) in &d.rejected {
-        let _ = writeln!(out, "  - {id}: {reason}");
+        wrap(out, &format!("  - {id}: "), reason);
     }
 }
 
@@ -211,11 +211,8 @@ fn not_excited(out: &mut String, s: &SensorDiagnosis, next: &Next) {
         }
     }
     for (experiment, ids) in by_experiment {
-        let _ = writeln!(
-            out,
-            "  not excited: {}\n    needs {experiment}",
-            ids.join(", ")
-        );
+        wrap(out, "  not excited: ", &ids.join(", "));
+        wrap(out, "    needs ", experiment);
     }
 }
 
@@ -226,8 +223,9 @@ fn confused(out: &mut String, next: &Next) {
     for c in &next.confused {
         let _ = writeln!(
             out,
-            "{} or {} (worse by {:.1} in deviance)\n  told apart by {}",
-            c.ids[0], c.ids[1], c.difference, c.experiment
+            "{} or {} (worse by {:.1} in deviance)",
+            c.ids[0], c.ids[1], c.difference
         );
+        wrap(out, "  told apart by ", &c.experiment);
     }
 }

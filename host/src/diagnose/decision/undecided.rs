@@ -1,0 +1,42 @@
+//! Effects whose physics the rows do not decide.
+
+use crate::diagnose::library::rivals::rivals;
+use crate::diagnose::search::{Chosen, Search};
+
+/// An accepted effect that a law on no list explains the rows as well as.
+#[derive(Debug, Clone)]
+pub struct Undecided {
+    /// Id of the effect.
+    pub id: String,
+    /// The law.
+    pub law: &'static str,
+    /// By how much the law is worse, in deviance with what its coefficients cost; negative where it is better.
+    pub worse: f64,
+    /// What would tell them apart.
+    pub settled_by: &'static str,
+}
+
+/// Score by which an effect has to be better than a law that is on no list, for the verdict to name it: odds of one to twenty.
+const DECIDED: f64 = 6.0;
+
+/// Which of the kept effects a law that is on no list does as well as.
+pub(super) fn undecided(search: &Search, kept: &[Chosen]) -> Vec<Undecided> {
+    let mut all = Vec::new();
+    for (i, one) in kept.iter().enumerate() {
+        let mut rest = kept.to_vec();
+        rest.remove(i);
+        let id = one.candidate.id();
+        for rival in rivals(&id) {
+            let worse = search.worse_with(&rival.law, one, &rest);
+            if let Some(worse) = worse.filter(|w| *w < DECIDED) {
+                all.push(Undecided {
+                    id: id.clone(),
+                    law: rival.law.about,
+                    worse,
+                    settled_by: rival.settled_by,
+                });
+            }
+        }
+    }
+    all
+}
