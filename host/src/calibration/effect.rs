@@ -88,7 +88,11 @@ impl From<&Accepted> for EffectTable {
 
 impl EffectTable {
     /// The table of an effect whose coefficients have these standard deviations.
+    ///
+    /// What is of the recording alone stays out.
     pub fn new(removed: &Removed, sigmas: &[f64]) -> Self {
+        let (_, sigmas) = removed.candidate.of_unit(sigmas);
+        let removed = &removed.of_unit();
         let candidate = &removed.candidate;
         let (about, form) = match &candidate.kind {
             Kind::Effect(e) => (e.about, e.form),
@@ -111,7 +115,7 @@ impl EffectTable {
                 .map(|((name, unit), (value, sigma))| CoefficientTable {
                     name,
                     value: *value,
-                    sigma: *sigma,
+                    sigma: sigma,
                     unit,
                 })
                 .collect(),
@@ -339,9 +343,13 @@ fn on_device<T: RealField + Copy>(
     let candidate = &removed.candidate;
     match &candidate.kind {
         Kind::Effect(effect) => {
-            let mut all = vec![T::zero(); effect.coefficients.len()];
+            // Those of a recording stand last, and no file has them.
+            let of_unit = effect.coefficients.iter().filter(|c| !c.of_recording);
+            let mut all = vec![T::zero(); of_unit.count()];
             for (k, value) in candidate.active.iter().zip(&removed.values) {
-                all[*k] = convert(*value);
+                if let Some(slot) = all.get_mut(*k) {
+                    *slot = convert(*value);
+                }
             }
             let form = effect.form.map(|_| convert(removed.form));
             DeviceEffect::named(effect.id, &all, form)

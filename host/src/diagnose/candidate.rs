@@ -112,16 +112,19 @@ impl Candidate {
         (0..FORMS).map(|k| from * step.powi(k as i32)).collect()
     }
 
-    /// A candidate with all of its coefficients.
+    /// A candidate with all of the coefficients that are the unit's.
     pub fn new(sensor: Sensor, kind: Kind) -> Self {
-        let count = match &kind {
-            Kind::Effect(e) => e.coefficients.len(),
-            _ => 1,
+        let active = match &kind {
+            Kind::Effect(e) => {
+                let of_unit = |k: &usize| !e.coefficients[*k].of_recording;
+                (0..e.coefficients.len()).filter(of_unit).collect()
+            }
+            _ => vec![0],
         };
         Self {
             sensor,
             kind,
-            active: (0..count).collect(),
+            active,
             known_form: None,
             choices: 1.0,
             offered: Vec::new(),
@@ -145,7 +148,16 @@ impl Candidate {
 
     /// The candidates that it is tried as: of the bits of a code, which are wrong has to be found as well, so each by itself
     /// and all from the first down to each. The search goes on from the best of these.
+    ///
+    /// What is of the recording alone is tried as well, and costs its coefficients.
     pub fn variants(mut self) -> Vec<Self> {
+        let of_recording = self.of_recording();
+        if !of_recording.is_empty() {
+            self.choices = 2.0;
+            let mut whole = self.clone();
+            whole.active.extend(of_recording);
+            return vec![self, whole];
+        }
         if !self.reads_code() {
             return vec![self];
         }
@@ -159,6 +171,33 @@ impl Candidate {
         let alone = offered.chunks(1).map(with);
         let down = (2..=offered.len()).map(|k| with(&offered[..k]));
         alone.chain(down).collect()
+    }
+
+    /// Coefficients of the recording alone, of the axes that are active.
+    fn of_recording(&self) -> Vec<usize> {
+        let Kind::Effect(e) = &self.kind else {
+            return Vec::new();
+        };
+        let is_active = |axis| self.active.iter().any(|k| e.coefficients[*k].axis == axis);
+        let all = e.coefficients.iter().enumerate();
+        all.filter(|(_, c)| c.of_recording && is_active(c.axis))
+            .map(|(k, _)| k)
+            .collect()
+    }
+
+    /// It and the values of its active coefficients without those that are of a recording alone.
+    pub fn of_unit(&self, values: &[f64]) -> (Self, Vec<f64>) {
+        let Kind::Effect(e) = &self.kind else {
+            return (self.clone(), values.to_vec());
+        };
+        let of_unit = |(k, _): &(usize, f64)| !e.coefficients[*k].of_recording;
+        let all = self.active.iter().copied().zip(values.iter().copied());
+        let (active, values) = all.filter(of_unit).unzip();
+        let unit = Self {
+            active,
+            ..self.clone()
+        };
+        (unit, values)
     }
 
     /// Active coefficient and axis of each of its regressors.

@@ -10,12 +10,13 @@ use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::candidate::Kind;
+use super::removal::Removed;
 use super::rows::Rows;
 use super::search::{Chosen, Search};
 use super::spread::{By, Fitted};
 use hold_out::leverage;
 use leftover::leftover;
-use second::{Given, second};
+use second::second;
 use tried::candidates;
 use undecided::undecided;
 
@@ -114,13 +115,15 @@ pub fn decide(rows: &Rows, dwell_ends: &[(usize, f64)], unseen: Option<&Rows>) -
         (dwell, if alone { Split::Interleaved } else { usual })
     };
     let elsewhere = |kept: &[Chosen], values: &[DVector<f64>]| -> Vec<Option<Second>> {
-        let given: Vec<Given> = kept
-            .iter()
-            .zip(values)
-            .map(|(c, values)| Given {
-                candidate: &c.candidate,
-                form: c.form,
-                values,
+        let each = kept.iter().zip(values);
+        let given: Vec<Removed> = each
+            .map(|(c, values)| {
+                let (candidate, values) = c.candidate.of_unit(values.as_slice());
+                Removed {
+                    candidate,
+                    form: c.form,
+                    values,
+                }
             })
             .collect();
         match unseen.and_then(|u| second(u, &given)) {

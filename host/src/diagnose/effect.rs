@@ -138,6 +138,8 @@ pub struct Coefficient {
     pub axis: Option<usize>,
     /// Unit.
     pub unit: &'static str,
+    /// Whether it belongs to the first recording and not to the unit: it is fitted and told, and neither written nor removed elsewhere.
+    pub of_recording: bool,
 }
 
 /// One kind of effect. The error of sensor axis i is the sum over the coefficients of i of coefficient times regressor, in the

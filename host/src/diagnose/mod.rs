@@ -255,10 +255,13 @@ pub fn diagnose(recordings: Recordings, options: Options) -> Result<Diagnosis> {
             })
             .collect();
         if !found.is_empty() {
-            let clean = |s: &Session| {
-                remove(s.prepared, s.gyro.as_ref(), s.accel.as_ref(), &found).ok_or_else(singular)
+            let elsewhere: Vec<Removed> = found.iter().map(Removed::of_unit).collect();
+            let clean = |(k, s): (usize, &Session)| {
+                let effects = if k == 0 { &found } else { &elsewhere };
+                remove(s.prepared, s.gyro.as_ref(), s.accel.as_ref(), effects).ok_or_else(singular)
             };
-            let mut cleaned: Vec<Prepared> = sessions.iter().map(clean).collect::<Result<_>>()?;
+            let cleaned = sessions.iter().enumerate().map(clean);
+            let mut cleaned: Vec<Prepared> = cleaned.collect::<Result<_>>()?;
             let first = cleaned.remove(0);
             effects.extend(found);
             later = cleaned;

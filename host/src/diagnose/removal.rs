@@ -22,6 +22,16 @@ pub struct Removed {
 }
 
 impl Removed {
+    /// It without what is of the recording that it was found in alone.
+    pub fn of_unit(&self) -> Self {
+        let (candidate, values) = self.candidate.of_unit(&self.values);
+        Self {
+            candidate,
+            values,
+            form: self.form,
+        }
+    }
+
     /// Adds its error of the three axes at a moment, SI.
     fn add(&self, at: &Moment, error: &mut Vector3<f64>) {
         self.candidate.add_error(at, self.form, &self.values, error);

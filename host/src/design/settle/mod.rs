@@ -87,8 +87,12 @@ impl Suspect {
     pub fn listed(effect: &'static Effect) -> Option<Self> {
         let candidate = Candidate::new(effect.sensor, Kind::Effect(effect));
         (!candidate.reads_code()).then(|| Self {
+            sizes: candidate
+                .active
+                .iter()
+                .map(|k| effect.typical[*k])
+                .collect(),
             candidate,
-            sizes: effect.typical.to_vec(),
             sought: Sought::Each,
             group: 0,
         })

@@ -3,21 +3,13 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::hold_out::rms;
-use crate::diagnose::candidate::Candidate;
+use crate::diagnose::removal::Removed;
 use crate::diagnose::rows::Rows;
 use crate::diagnose::search::{Search, basis, beside};
 use crate::diagnose::spread::By;
 
 /// An effect that should change the residuals of a recording by fewer sigmas than this is neither borne out nor contradicted by it.
 const SHOWS: f64 = 3.0;
-
-/// An effect with coefficients from elsewhere.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Given<'a> {
-    pub candidate: &'a Candidate,
-    pub form: f64,
-    pub values: &'a DVector<f64>,
-}
 
 /// One effect in another recording, with coefficients that this had no part in; the other effects are taken out.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -43,7 +35,7 @@ impl Second {
 }
 
 /// Each of `effects` in `rows`. The affine parameters are the recording's own: what is judged is the effect alone.
-pub(super) fn second(rows: &Rows, effects: &[Given]) -> Option<Vec<Second>> {
+pub(super) fn second(rows: &Rows, effects: &[Removed]) -> Option<Vec<Second>> {
     let search = Search::new(rows, Vec::new());
     let columns: Vec<DMatrix<f64>> = effects
         .iter()
@@ -61,7 +53,7 @@ pub(super) fn second(rows: &Rows, effects: &[Given]) -> Option<Vec<Second>> {
     let errors: Vec<DVector<f64>> = columns
         .iter()
         .zip(effects)
-        .map(|(c, e)| c * e.values)
+        .map(|(c, e)| c * DVector::from_column_slice(&e.values))
         .collect();
     // What the affine parameters leave of some residuals, as they are and decorrelated.
     let left = |y: &DVector<f64>| {

@@ -35,6 +35,15 @@ const fn of(axis: usize, name: &'static str, unit: &'static str) -> Coefficient 
         name,
         axis: Some(axis),
         unit,
+        of_recording: false,
+    }
+}
+
+/// A coefficient of sensor axis `axis` that is of the recording alone.
+const fn at_start(axis: usize, name: &'static str, unit: &'static str) -> Coefficient {
+    Coefficient {
+        of_recording: true,
+        ..of(axis, name, unit)
     }
 }
 
@@ -44,6 +53,7 @@ const fn all_axes(name: &'static str, unit: &'static str) -> Coefficient {
         name,
         axis: None,
         unit,
+        of_recording: false,
     }
 }
 

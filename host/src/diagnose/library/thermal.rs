@@ -1,6 +1,6 @@
 //! Errors by temperature.
 
-use super::{each, of, per_axis};
+use super::{at_start, each, of, per_axis};
 use crate::diagnose::effect::{Coefficient, Effect, Form, FormKind, Moment};
 use crate::dwell::Sensor;
 
@@ -32,8 +32,21 @@ const TILT: [Coefficient; 6] = [
 ];
 /// Axis of the input that each coefficient of [`TILT`] is about.
 const TILTED: [usize; 6] = [1, 2, 0, 2, 0, 1];
-const GYRO_LAG: [Coefficient; 3] = each("rad/s/K");
-const ACCEL_LAG: [Coefficient; 3] = each("m/s^2/K");
+/// Lag of each axis, and what it was still behind by when the recording began.
+const fn behind(unit: &'static str, error: &'static str) -> [Coefficient; 6] {
+    let [x, y, z] = each(unit);
+    [
+        x,
+        y,
+        z,
+        at_start(0, "x at start", error),
+        at_start(1, "y at start", error),
+        at_start(2, "z at start", error),
+    ]
+}
+
+const GYRO_LAG: [Coefficient; 6] = behind("rad/s/K", "rad/s");
+const ACCEL_LAG: [Coefficient; 6] = behind("m/s^2/K", "m/s^2");
 
 const LAG: Option<Form> = Some(Form {
     name: "lag_s",
@@ -56,8 +69,14 @@ fn scale(at: &Moment, _: f64, out: &mut [f64]) {
     per_axis(out, |i| at.warm_c * at.sensed[i]);
 }
 
-fn lag(at: &Moment, _: f64, out: &mut [f64]) {
-    per_axis(out, |_| at.late_c - at.warm_c);
+/// Where the die was when the recording began is not known: it sits elsewhere than the thermometer, and after power-on each warms up
+/// by itself. What that differs from the thermometer dies away with the lag.
+fn lag(at: &Moment, lag_s: f64, out: &mut [f64]) {
+    let left = match at.session {
+        0 => (-at.t_s / lag_s).exp(),
+        _ => 0.0,
+    };
+    per_axis(out, |k| if k < 3 { at.late_c - at.warm_c } else { left });
 }
 
 const SWEEP: &str = "temp_c, and the dwells at temperatures 20 °C apart";
@@ -145,7 +164,15 @@ pub(super) const EFFECTS: [Effect; 8] = [
         sensor: Sensor::Gyro,
         about: "die and package lag behind the temperature sensor: a loop on ramps",
         coefficients: &GYRO_LAG,
-        typical: &[0.1 * DPS; 3],
+        // Beside the slope: some kelvins of self-heating.
+        typical: &[
+            0.1 * DPS,
+            0.1 * DPS,
+            0.1 * DPS,
+            0.3 * DPS,
+            0.3 * DPS,
+            0.3 * DPS,
+        ],
         form: LAG,
         regressors: lag,
         needs: RAMP,
@@ -155,7 +182,7 @@ pub(super) const EFFECTS: [Effect; 8] = [
         sensor: Sensor::Accel,
         about: "die and package lag behind the temperature sensor: a loop on ramps",
         coefficients: &ACCEL_LAG,
-        typical: &[2.0 * MG; 3],
+        typical: &[2.0 * MG, 2.0 * MG, 2.0 * MG, 6.0 * MG, 6.0 * MG, 6.0 * MG],
         form: LAG,
         regressors: lag,
         needs: RAMP,
