@@ -71,7 +71,7 @@ impl<T: RealField + Copy> Sum<T> {
         }
     }
 
-    #[inline]
+    #[inline(always)]
     fn add(&mut self, increment: T) {
         let increment = increment + self.lost;
         let sum = self.value + increment;
@@ -166,13 +166,18 @@ impl<T: RealField + Copy> Filter<T> {
             u13 + b12 * l[3],
             u23 + v[2] * l[3],
         ];
-        for (w, growth) in self.information.iter_mut().zip(growth) {
-            w.add(growth);
-        }
+        // Not in loops, which stay loops where an image is compiled for size: 380 instructions instead of 167.
+        let [w0, w1, w2, w3] = &mut self.information;
+        w0.add(growth[0]);
+        w1.add(growth[1]);
+        w2.add(growth[2]);
+        w3.add(growth[3]);
         let step = innovation / a3;
-        for (mean, gain) in self.mean.iter_mut().zip([b03, b13, b23, v[3]]) {
-            mean.add(gain * step);
-        }
+        let [m0, m1, m2, m3] = &mut self.mean;
+        m0.add(b03 * step);
+        m1.add(b13 * step);
+        m2.add(b23 * step);
+        m3.add(v[3] * step);
         Ok(Innovation {
             value: innovation,
             variance: a3,

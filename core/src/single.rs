@@ -32,6 +32,12 @@ fn affine(model: &Affine<f32>, u: &Vector3<f32>) -> Vector3<f32> {
     )
 }
 
+/// [`Effects::without_code_errors`].
+#[inline(never)]
+pub fn without_code_errors(effects: &Effects<f32, ROOM>, raw: &Sample<f32>) -> Sample<f32> {
+    effects.without_code_errors(raw)
+}
+
 /// [`Effects::remove`].
 #[inline(never)]
 pub fn remove(

@@ -9,12 +9,13 @@
 //! | 2     | length of everything                                                                              |
 //! | 1, 1  | number of nodes (1 to [`NODES`]), of effects                                                      |
 //! | 2     | zero                                                                                              |
-//! | 72    | C of the gyro, rad/s per V, and of the accelerometer, m/s² per V, that the effects were found with |
+//! | 144   | [`Directions`] of the gyro, D and R, then of the accelerometer: those of C that the effects were found with |
 //! | 100   | each node: temperature, °C; C and o (rad/s) of the gyro; C and o (m/s²) of the accelerometer      |
 //! | ...   | each effect, see below                                                                            |
 //! | 4     | CRC-32/ISO-HDLC of everything before                                                              |
 //!
-//! A named effect: 0; length of the id, the id; number of coefficients, these, `f32`; time constant, s, or 0 if it has none.
+//! A named effect: 0; length of the id, the id; number of coefficients, these, `f32`; its nonlinear constant (time constant, s, or weight
+//! of the converter's first bit, V), or 0 if it has none.
 //! A term: 1; triad (0 gyro, 1 accelerometer); axis; number of variables, these, a byte each as in [`Variable`]; coefficient.
 //!
 //! Raw is volts at the sensor, as in [`RawBatch`](crate::wire::RawBatch). The noise of biases and the sigmas of the parameters are not
@@ -27,17 +28,17 @@ use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
 use crate::compensation::{Affine, Compensation};
-use crate::effects::{self, Effect, Effects, Sensor, Variable};
+use crate::effects::{self, Directions, Effect, Effects, Sensor, Variable};
 use crate::table::{self, Node, Table};
 use bytes::{Reader, Writer};
 
 /// Version of the layout.
-pub const VERSION: u16 = 1;
+pub const VERSION: u16 = 2;
 /// Most temperature nodes.
 pub const NODES: usize = 16;
 /// Most effects of a triad that run with every sample, and as many that do not.
 pub const ROOM: usize = 8;
-/// Most bytes of a calibration: all nodes and effects at their longest come to 3.9 kB.
+/// Most bytes of a calibration: all nodes and effects at their longest come to 4.0 kB.
 pub const MAX_LENGTH: usize = 4096;
 
 const MAGIC: [u8; 4] = *b"mimc";
@@ -82,8 +83,8 @@ pub enum Record<'a> {
         id: &'a str,
         /// All of its coefficients, SI.
         coefficients: &'a [f32],
-        /// Time constant, s, of an effect that has any.
-        time_constant: Option<f32>,
+        /// Nonlinear constant of an effect that has any: time constant, s, or weight of the first bit, V.
+        form: Option<f32>,
     },
     /// As in [`Effect::term`].
     Term {
@@ -155,7 +156,15 @@ pub fn encode(
     to.u16(0)?;
     to.bytes(&[count(nodes.len())?, count(effects.len())?, 0, 0])?;
     for matrix in found_with {
-        to.matrix(matrix)?;
+        // The device inverts nothing, so what is singular is told by what is no number.
+        let nothing = Matrix3::repeat(f32::NAN);
+        let none = Directions {
+            sensed: nothing,
+            to_body: nothing,
+        };
+        let found = Directions::of(&matrix.map(f64::from)).unwrap_or(none);
+        to.matrix(&found.sensed)?;
+        to.matrix(&found.to_body)?;
     }
     for node in nodes {
         to.f32(node.temp_c)?;
@@ -169,13 +178,13 @@ pub fn encode(
             Record::Named {
                 id,
                 coefficients,
-                time_constant,
+                form,
             } => {
                 to.bytes(&[NAMED, count(id.len())?])?;
                 to.bytes(id.as_bytes())?;
                 to.bytes(&[count(coefficients.len())?])?;
                 coefficients.iter().try_for_each(|c| to.f32(*c))?;
-                to.f32(time_constant.unwrap_or(0.0))?;
+                to.f32(form.unwrap_or(0.0))?;
             }
             Record::Term {
                 sensor,
@@ -228,8 +237,8 @@ pub fn decode(bytes: &[u8]) -> Result<Stored, Refused> {
 }
 
 fn contents(from: &mut Reader<'_>, nodes: u8, effects: u8) -> Result<Stored, Refused> {
-    let gyro = from.matrix().ok_or(Refused::Length)?;
-    let accel = from.matrix().ok_or(Refused::Length)?;
+    let gyro = directions(from).ok_or(Refused::Length)?;
+    let accel = directions(from).ok_or(Refused::Length)?;
     let mut short = false;
     let read = (0..nodes).map_while(|_| {
         let node = node(from);
@@ -247,11 +256,11 @@ fn contents(from: &mut Reader<'_>, nodes: u8, effects: u8) -> Result<Stored, Ref
         },
     })?;
 
-    let linear = |matrix: &Matrix3<f32>| Affine {
-        matrix: matrix.map(f64::from),
-        offset: Vector3::zeros(),
-    };
-    let mut all = Effects::new(&linear(&gyro), &linear(&accel)).ok_or(Refused::Singular)?;
+    let sum = |of: &Directions<f32>| of.sensed.iter().chain(&of.to_body).sum::<f32>();
+    if !(sum(&gyro) + sum(&accel)).is_finite() {
+        return Err(Refused::Singular);
+    }
+    let mut all = Effects::of(gyro, accel);
     for at in 0..effects {
         let effect = effect(from).ok_or(Refused::Length)?;
         effect
@@ -272,6 +281,13 @@ fn contents(from: &mut Reader<'_>, nodes: u8, effects: u8) -> Result<Stored, Ref
         }),
         false => Err(Refused::Length),
     }
+}
+
+fn directions(from: &mut Reader<'_>) -> Option<Directions<f32>> {
+    Some(Directions {
+        sensed: from.matrix()?,
+        to_body: from.matrix()?,
+    })
 }
 
 fn node(from: &mut Reader<'_>) -> Option<Node<f32>> {

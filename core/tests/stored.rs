@@ -74,7 +74,7 @@ fn the_layout_is_that_of_the_table_in_the_documentation() {
         Record::Named {
             id: "gyro_warm_up",
             coefficients: &[1.0, 2.0, 3.0],
-            time_constant: Some(60.0),
+            form: Some(60.0),
         },
         Record::Term {
             sensor: Sensor::Accel,
@@ -82,13 +82,32 @@ fn the_layout_is_that_of_the_table_in_the_documentation() {
             coefficient: -2.0,
             variables: &[Variable::RateX, Variable::ForceY],
         },
+        Record::Named {
+            id: "gyro_readout_code",
+            coefficients: &[0.001, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -0.0005],
+            form: Some(1.65),
+        },
     ];
-    let all = bytes(&[node(25.0, &regular())], &effects);
-    let mut expected = b"mimc\x01\x00".to_vec();
+    // Sensors that look along -y, x and z, 2, 4 and 0.5 V per unit; and C of a gyro that looks along y, -x and z.
+    let accel = Matrix3::new(0.0, 0.25, 0.0, -0.5, 0.0, 0.0, 0.0, 0.0, 2.0);
+    let gyro = Matrix3::new(0.0, -2.0, 0.0, 4.0, 0.0, 0.0, 0.0, 0.0, 0.5);
+    let mut all = [0; 4096];
+    let one = [node(25.0, &regular())];
+    let length = encode([&gyro, &accel], &one, &effects, &mut all).unwrap();
+    let all = &all[..length];
+    let mut expected = b"mimc\x02\x00".to_vec();
     expected.extend((all.len() as u16).to_le_bytes());
-    expected.extend([1, 2, 0, 0]);
-    for k in 0..18 {
-        expected.extend((if k % 9 % 4 == 0 { 3.5_f32 } else { 0.0 }).to_le_bytes());
+    expected.extend([1, 3, 0, 0]);
+    // D by rows, and R: of right angles the one is the other transposed.
+    for rows in [
+        [[0, 1, 0], [-1, 0, 0], [0, 0, 1]],
+        [[0, -1, 0], [1, 0, 0], [0, 0, 1]],
+        [[0, -1, 0], [1, 0, 0], [0, 0, 1]],
+        [[0, 1, 0], [-1, 0, 0], [0, 0, 1]],
+    ] {
+        for value in rows.as_flattened() {
+            expected.extend((*value as f32).to_le_bytes());
+        }
     }
     expected.extend(25.0_f32.to_le_bytes());
     for value in regular() {
@@ -100,11 +119,24 @@ fn the_layout_is_that_of_the_table_in_the_documentation() {
     }
     expected.extend([1, 1, 1, 2, 1, 5]);
     expected.extend((-2.0_f32).to_le_bytes());
+    // An id of 17 letters, nine bits, and half of the converter's 3.3 V.
+    expected.extend(b"\x00\x11gyro_readout_code\x09");
+    for value in [0.001_f32, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -0.0005, 1.65] {
+        expected.extend(value.to_le_bytes());
+    }
     expected.extend(crc32(&expected).to_le_bytes());
-    assert_eq!(all, expected);
-    let stored = decode(&all).unwrap();
-    assert_eq!((stored.table.len(), stored.effect_count), (1, 2));
-    assert!(stored.effects.is_some());
+    assert_eq!(all, &expected[..]);
+    let stored = decode(all).unwrap();
+    assert_eq!((stored.table.len(), stored.effect_count), (1, 3));
+    // 384 of 256 codes to 1.65 V are bits 0 and -1, and 255 are bits -1 to -8; half a code more, so that no error turns any.
+    let right = Vector3::new(384.5, 0.5, 255.5) * (1.65 / 256.0);
+    let read = Sample {
+        gyro: right + Vector3::new(0.001, 0.0, -0.0005) * 1.65,
+        accel: Vector3::new(2.475, 0.0, 1.0),
+    };
+    let clean = single::without_code_errors(&stored.effects.unwrap(), &read);
+    assert_eq!(clean.accel, read.accel);
+    assert!((clean.gyro - right).amax() < 1e-6, "{}", clean.gyro);
 }
 
 #[test]
@@ -128,7 +160,7 @@ fn every_refusal_has_its_name() {
     assert_eq!(refused(&good), None);
     assert_eq!(refused(b""), Some(Refused::NotACalibration));
     assert_eq!(refused(&with(0, b'x')), Some(Refused::NotACalibration));
-    assert_eq!(refused(&with(4, 2)), Some(Refused::Version { found: 2 }));
+    assert_eq!(refused(&with(4, 1)), Some(Refused::Version { found: 1 }));
     assert_eq!(refused(&with(8, 0)), Some(Refused::Node { at: 0 }));
     assert_eq!(refused(&with(8, 1)), Some(Refused::Length));
     assert_eq!(refused(&with(8, 3)), Some(Refused::Length));
@@ -155,7 +187,7 @@ fn every_refusal_has_its_name() {
     let named = |id, coefficients| Record::Named {
         id,
         coefficients,
-        time_constant: None,
+        form: None,
     };
     let one = [node(0.0, &regular())];
     let effects = |all: &[Record<'_>]| refused(&bytes(&one, all));
@@ -263,7 +295,7 @@ proptest! {
     /// Whatever the bytes are, they are refused or make a calibration; the check is made to hold, or nothing would get past it.
     #[test]
     fn no_bytes_are_too_bad_to_be_refused(noise in prop::collection::vec(any::<u8>(), 0..600), at in 12..200_usize) {
-        let effects = [Record::Named { id: "gyro_scale_cubic", coefficients: &[0.0; 3], time_constant: None }];
+        let effects = [Record::Named { id: "gyro_scale_cubic", coefficients: &[0.0; 3], form: None }];
         let mut all = bytes(&[node(0.0, &regular())], &effects);
         for (place, byte) in all.iter_mut().skip(at).zip(&noise) {
             *place = *byte;

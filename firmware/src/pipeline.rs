@@ -202,6 +202,9 @@ impl Pipeline {
             for bank in self.banks.iter_mut().flatten() {
                 bank.skip(lost);
             }
+            if let Some(calibrated) = &mut self.calibrated {
+                calibrated.effects.gap();
+            }
         }
         if self.batch.count == 0 {
             self.begin_batch(number, sums);
@@ -350,10 +353,13 @@ impl Calibrated {
 
     #[inline]
     fn apply(&mut self, raw: &Sample<f32>) -> Sample<f32> {
-        let sample = single::compensate(&self.model.model, raw);
+        let model = &self.model.model;
         match &self.stored.effects {
-            Some(all) => single::remove(all, &mut self.effects, &sample),
-            None => sample,
+            Some(all) => {
+                let raw = single::without_code_errors(all, raw);
+                single::remove(all, &mut self.effects, &single::compensate(model, &raw))
+            }
+            None => single::compensate(model, raw),
         }
     }
 }

@@ -234,8 +234,8 @@ fn every_effect_comes_back_from_the_file_and_the_device_removes_what_the_pc_does
                 accel: accel.apply(&raw(3)),
             }
         };
-        // Twice the same: the rate of a dwell does not change.
-        device.remove(&mut state, &si(block));
+        // No block follows the one before sample by sample: evaluated twice, as on the PC, and without an angular acceleration.
+        state.gap();
         let by_device = device.remove(&mut state, &si(block));
         let (by_host, raw) = (si(clean), si(block));
         // The same formula in another order: rounding.
@@ -292,9 +292,13 @@ fn bits_are_removed_block_by_block_as_sample_by_sample() {
         };
         let raw = |row: &[f64], from: usize| Vector3::from_fn(|i, _| row[2 + from + i]);
         let by_device = sum(&mut |row| {
+            let read = device.without_code_errors(&Sample {
+                gyro: raw(row, 0),
+                accel: raw(row, 3),
+            });
             let sample = Sample {
-                gyro: gyro.apply(&raw(row, 0)),
-                accel: accel.apply(&raw(row, 3)),
+                gyro: gyro.apply(&read.gyro),
+                accel: accel.apply(&read.accel),
             };
             device.remove(&mut state, &sample).accel
         });

@@ -9,17 +9,27 @@ pub(super) const COEFFICIENTS: usize = 9;
 pub(super) type Values<T> = [T; 10];
 
 /// What the error of a sample is computed from, SI, body frame.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Conditions<T: RealField> {
-    /// Rate, rad/s.
-    pub rate: Vector3<T>,
-    /// Specific force, m/s².
-    pub force: Vector3<T>,
+    /// Rate, rad/s, force, m/s², and the slow ones.
+    pub values: Values<T>,
     /// Angular acceleration, rad/s².
     pub angular_acceleration: Vector3<T>,
     /// The triad's own input along its three sensitive directions, rad/s or m/s².
     pub sensed: Vector3<T>,
 }
+
+/// An effect that runs with every sample, with its numbers.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Fast<T: RealField> {
+    pub law: FastLaw<T>,
+    pub coefficients: [T; COEFFICIENTS],
+    /// Of a term: the numbers of its variables.
+    pub factors: [u8; 3],
+}
+
+/// Adds an effect to the error of the three sensors, SI.
+pub(super) type FastLaw<T> = fn(&Fast<T>, &Conditions<T>, &mut Vector3<T>);
 
 /// What the errors are computed from that move with temperature and time.
 #[derive(Debug, Clone, Copy)]
@@ -41,13 +51,16 @@ pub(super) struct Slow<T: RealField> {
     pub across: Matrix3<T>,
 }
 
+/// Adds an effect by coefficients, nonlinear constant and ambience.
+pub(super) type SlowLaw<T> = fn(&[T; COEFFICIENTS], T, &Ambience<T>, &mut Slow<T>);
+
 /// How an effect is evaluated: what it adds to the error of the three sensors, SI.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Evaluation<T: RealField> {
-    /// With every sample, by coefficients and conditions.
-    Fast(fn(&[T; COEFFICIENTS], &Conditions<T>, &mut Vector3<T>)),
-    /// Now and then, by coefficients, nonlinear constant and ambience.
-    Slow(fn(&[T; COEFFICIENTS], T, &Ambience<T>, &mut Slow<T>)),
+    /// With every sample.
+    Fast(FastLaw<T>),
+    /// Now and then.
+    Slow(SlowLaw<T>),
     /// With every sample, by the [`Code`] of the reading.
     Code,
 }
@@ -105,7 +118,9 @@ impl<T: RealField + Copy> Law<T> {
             3,
             Form::TimeConstant,
             |c, time_constant, at, e| {
-                e.bias += each(c) * (-at.time / time_constant).exp();
+                // Not `exp`, which nothing else here uses and which would be in the image for this.
+                let left = (-at.time / time_constant).exp_m1() + T::one();
+                e.bias += each(c) * left;
             },
         ),
         Self::slow("thermal_bias", 6, Form::None, |c, _, at, e| {
@@ -125,30 +140,21 @@ impl<T: RealField + Copy> Law<T> {
         }),
     ];
 
-    const fn fast(
-        name: &'static str,
-        coefficients: usize,
-        error: fn(&[T; COEFFICIENTS], &Conditions<T>, &mut Vector3<T>),
-    ) -> Self {
+    const fn fast(name: &'static str, coefficients: usize, law: FastLaw<T>) -> Self {
         Self {
             name,
             coefficients,
             form: Form::None,
-            evaluation: Evaluation::Fast(error),
+            evaluation: Evaluation::Fast(law),
         }
     }
 
-    const fn slow(
-        name: &'static str,
-        coefficients: usize,
-        form: Form,
-        error: fn(&[T; COEFFICIENTS], T, &Ambience<T>, &mut Slow<T>),
-    ) -> Self {
+    const fn slow(name: &'static str, coefficients: usize, form: Form, law: SlowLaw<T>) -> Self {
         Self {
             name,
             coefficients,
             form,
-            evaluation: Evaluation::Slow(error),
+            evaluation: Evaluation::Slow(law),
         }
     }
 }
@@ -157,77 +163,102 @@ fn each<T: RealField + Copy>(c: &[T; COEFFICIENTS]) -> Vector3<T> {
     Vector3::new(c[0], c[1], c[2])
 }
 
-fn matrix<T: RealField + Copy>(c: &[T; COEFFICIENTS]) -> Matrix3<T> {
-    Matrix3::new(c[0], c[1], c[2], c[3], c[4], c[5], c[6], c[7], c[8])
+/// `M x + a`. Written out, since the product of matrices is a loop, which is left rolled where an image is compiled for size.
+#[inline(always)]
+pub(super) fn affine<T: RealField + Copy>(
+    m: &Matrix3<T>,
+    x: &Vector3<T>,
+    a: &Vector3<T>,
+) -> Vector3<T> {
+    Vector3::new(
+        a.x + m.m11 * x.x + m.m12 * x.y + m.m13 * x.z,
+        a.y + m.m21 * x.x + m.m22 * x.y + m.m23 * x.z,
+        a.z + m.m31 * x.x + m.m32 * x.y + m.m33 * x.z,
+    )
 }
 
-// The laws that run with every sample have names, so that their instructions can be counted by them.
+// The laws that run with every sample, in the order in which the compiler makes the fewest instructions of them: each adds to the
+// error term by term, which is an instruction less than to add a sum.
+
+/// `e = M x`, M by rows.
+#[inline(always)]
+fn product<T: RealField + Copy>(c: &[T; COEFFICIENTS], x: T, y: T, z: T, e: &mut Vector3<T>) {
+    e.x = e.x + c[0] * x + c[1] * y + c[2] * z;
+    e.y = e.y + c[3] * x + c[4] * y + c[5] * z;
+    e.z = e.z + c[6] * x + c[7] * y + c[8] * z;
+}
 
 /// `e = G f`.
-fn g_sensitivity<T: RealField + Copy>(
-    c: &[T; COEFFICIENTS],
-    at: &Conditions<T>,
-    e: &mut Vector3<T>,
-) {
-    *e += matrix(c) * at.force;
+fn g_sensitivity<T: RealField + Copy>(law: &Fast<T>, at: &Conditions<T>, e: &mut Vector3<T>) {
+    let [_, _, _, _, x, y, z, ..] = at.values;
+    product(&law.coefficients, x, y, z, e);
 }
 
 /// `e_i = c_i s_i²`.
-fn scale_quadratic<T: RealField + Copy>(
-    c: &[T; COEFFICIENTS],
-    at: &Conditions<T>,
-    e: &mut Vector3<T>,
-) {
-    *e += each(c).component_mul(&at.sensed.map(|s| s * s));
+fn scale_quadratic<T: RealField + Copy>(law: &Fast<T>, at: &Conditions<T>, e: &mut Vector3<T>) {
+    let (c, s) = (&law.coefficients, &at.sensed);
+    e.x += c[0] * (s.x * s.x);
+    e.y += c[1] * (s.y * s.y);
+    e.z += c[2] * (s.z * s.z);
 }
 
 /// `e_i = c_i s_i³`.
-fn scale_cubic<T: RealField + Copy>(c: &[T; COEFFICIENTS], at: &Conditions<T>, e: &mut Vector3<T>) {
-    *e += each(c).component_mul(&at.sensed.map(|s| s * s * s));
+fn scale_cubic<T: RealField + Copy>(law: &Fast<T>, at: &Conditions<T>, e: &mut Vector3<T>) {
+    let (c, s) = (&law.coefficients, &at.sensed);
+    e.x += c[0] * (s.x * s.x * s.x);
+    e.y += c[1] * (s.y * s.y * s.y);
+    e.z += c[2] * (s.z * s.z * s.z);
 }
 
 /// `e_i = c_i |s_i|`.
-fn scale_asymmetry<T: RealField + Copy>(
-    c: &[T; COEFFICIENTS],
-    at: &Conditions<T>,
-    e: &mut Vector3<T>,
-) {
-    *e += each(c).component_mul(&at.sensed.map(|s| s.abs()));
+fn scale_asymmetry<T: RealField + Copy>(law: &Fast<T>, at: &Conditions<T>, e: &mut Vector3<T>) {
+    let (c, s) = (&law.coefficients, &at.sensed);
+    // Not `abs`, which is a call.
+    let size = |s: T| if s < T::zero() { -s } else { s };
+    e.x += c[0] * size(s.x);
+    e.y += c[1] * size(s.y);
+    e.z += c[2] * size(s.z);
 }
 
 /// `e = Q (s_x s_y, s_y s_z, s_z s_x)`.
-fn cross_axis_product<T: RealField + Copy>(
-    c: &[T; COEFFICIENTS],
-    at: &Conditions<T>,
-    e: &mut Vector3<T>,
-) {
-    let s = at.sensed;
-    *e += matrix(c) * Vector3::new(s.x * s.y, s.y * s.z, s.z * s.x);
+fn cross_axis_product<T: RealField + Copy>(law: &Fast<T>, at: &Conditions<T>, e: &mut Vector3<T>) {
+    let s = &at.sensed;
+    product(&law.coefficients, s.x * s.y, s.y * s.z, s.z * s.x, e);
 }
 
 /// `e_i = (α × r_i + ω × (ω × r_i))_i`, with r_i the place, m, where sensor i senses.
 ///
 /// As rows of `[α]× + [ω]×²` times the places: the matrix is shared by the three sensors.
-fn size_effect<T: RealField + Copy>(c: &[T; COEFFICIENTS], at: &Conditions<T>, e: &mut Vector3<T>) {
-    let (w, a) = (at.rate, at.angular_acceleration);
-    let (xx, yy, zz) = (w.x * w.x, w.y * w.y, w.z * w.z);
-    let (xy, yz, zx) = (w.x * w.y, w.y * w.z, w.z * w.x);
-    // Into the sum one by one: three instructions fewer than by the sum of each row.
+fn size_effect<T: RealField + Copy>(law: &Fast<T>, at: &Conditions<T>, e: &mut Vector3<T>) {
+    let (c, a) = (&law.coefficients, &at.angular_acceleration);
+    let [_, x, y, z, ..] = at.values;
+    let (xx, yy, zz) = (x * x, y * y, z * z);
+    let (xy, yz, zx) = (x * y, y * z, z * x);
     e.x = e.x + (zx + a.y) * c[2] + (xy - a.z) * c[1] - (yy + zz) * c[0];
     e.y = e.y + (yz - a.x) * c[5] + (xy + a.z) * c[3] - (zz + xx) * c[4];
     e.z = e.z + (yz + a.x) * c[7] + (zx - a.y) * c[6] - (xx + yy) * c[8];
 }
 
-/// Errors of the converter by the bits of its code, nine of them: in two tables, as a table of all would be ten times as large,
-/// and with three tables of eight it takes 71 instructions.
+/// `e_i = c_i v_1 v_2 v_3`, where one c_i is not zero: an axis without an index, and without a branch.
+pub(super) fn term<T: RealField + Copy>(law: &Fast<T>, at: &Conditions<T>, e: &mut Vector3<T>) {
+    let value = |factor: u8| {
+        let value = at.values.get(usize::from(factor));
+        value.copied().unwrap_or(T::zero())
+    };
+    let [first, second, third] = law.factors.map(value);
+    let product = first * second * third;
+    let c = &law.coefficients;
+    e.x += c[0] * product;
+    e.y += c[1] * product;
+    e.z += c[2] * product;
+}
+
+/// Errors of the converter by the bits of its code, nine of them: in two tables, as a table of all would be ten times as large.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Code<T> {
-    /// From the input along the directions, SI, to the weight of the last bit, from [`ABOVE_ZERO`].
-    gain: [T; 3],
-    null: [T; 3],
-    /// From fractions of the weight of bit 0 to SI.
-    back: [T; 3],
-    /// By bits 0 to -3, and by bits -4 to -8; the least bit of an index is the last bit.
+    /// Codes of the last bit, 1/raw.
+    codes: T,
+    /// Errors, raw, by bits 0 to -3, and by bits -4 to -8; the least bit of an index is the last bit.
     first: [T; 16],
     last: [T; 32],
 }
@@ -237,27 +268,31 @@ pub(super) struct Code<T> {
 const ABOVE_ZERO: f64 = 1024.0 + 1.0 / 256.0;
 
 impl<T: RealField + Copy> Code<T> {
-    /// Of errors in units of the weight of bit 0, `weight`, raw; readings are `scale s + bias`.
-    pub fn new(
-        errors: &[T; COEFFICIENTS],
-        weight: T,
-        scale: &Vector3<T>,
-        bias: &Vector3<T>,
-    ) -> Self {
-        let last: T = weight / convert(256.0);
-        let above: T = convert(ABOVE_ZERO);
-        let (four, five) = errors.split_at(4);
+    /// Of errors in units of the weight of bit 0, `weight`, raw.
+    pub fn new(errors: &[T; COEFFICIENTS], weight: T) -> Self {
+        let raw = errors.map(|error| error * weight);
+        let (four, five) = raw.split_at(4);
+        let codes: T = convert(256.0);
         Self {
-            gain: [scale.x / last, scale.y / last, scale.z / last],
-            null: [
-                bias.x / last + above,
-                bias.y / last + above,
-                bias.z / last + above,
-            ],
-            back: [weight / scale.x, weight / scale.y, weight / scale.z],
+            codes: codes / weight,
             first: core::array::from_fn(|bits| set(four, bits)),
             last: core::array::from_fn(|bits| set(five, bits)),
         }
+    }
+
+    /// Readings without their errors, raw. The error is one of the code that the reading should have had, so the code is looked at
+    /// again without it.
+    #[inline(always)]
+    pub fn clean(&self, raw: &Vector3<T>) -> Vector3<T> {
+        raw.map(|u| u - self.error(u - self.error(u)))
+    }
+
+    #[inline(always)]
+    fn error(&self, u: T) -> T {
+        let codes: f32 = (u * self.codes + convert(ABOVE_ZERO)).to_subset_unchecked();
+        // Saturates: of no number it is 0.
+        let bits = codes as u32;
+        self.first[((bits >> 5) & 15) as usize] + self.last[(bits & 31) as usize]
     }
 }
 
@@ -272,39 +307,4 @@ fn set<T: RealField + Copy>(errors: &[T], bits: usize) -> T {
         left >>= 1;
     }
     sum
-}
-
-/// `e_i = weight / |P_i|` times the sum of the errors of the bits that are set in the reading.
-#[inline(never)]
-pub(super) fn readout_code<T: RealField + Copy>(
-    code: &Code<T>,
-    sensed: &Vector3<T>,
-    e: &mut Vector3<T>,
-) {
-    let axes = code.gain.iter().zip(&code.null).zip(&code.back);
-    for ((e, s), ((gain, null), back)) in e.iter_mut().zip(sensed.iter()).zip(axes) {
-        let weights: f32 = (*gain * *s + *null).to_subset_unchecked();
-        // Saturates: of no number it is 0.
-        let bits = weights as u32;
-        let first = code.first[((bits >> 5) & 15) as usize];
-        *e += *back * (first + code.last[(bits & 31) as usize]);
-    }
-}
-
-/// `e_i = c_i v_1 v_2 v_3`, where one c_i is not zero: an axis without an index, and without a branch.
-#[inline(never)]
-pub(super) fn term<T: RealField + Copy>(
-    c: &Vector3<T>,
-    factors: &[u8; 3],
-    values: &Values<T>,
-    e: &mut Vector3<T>,
-) {
-    let value = |factor: u8| {
-        values
-            .get(usize::from(factor))
-            .copied()
-            .unwrap_or(T::zero())
-    };
-    let [first, second, third] = *factors;
-    *e += c * (value(first) * value(second) * value(third));
 }

@@ -1,51 +1,64 @@
 //! The effects of one triad: those that run with every sample, and the others folded into a matrix and a bias.
 
-use nalgebra::{Matrix3, RealField, Vector3, convert};
+use nalgebra::{Matrix3, RealField, Vector3};
 
-use super::law::{Ambience, Code, Conditions, Slow, Values, readout_code, term};
-use super::{Effect, Kind, Refused, Sensor};
-use crate::compensation::Affine;
+use super::law::{Ambience, COEFFICIENTS, Code, Conditions, Fast, Slow, SlowLaw, Values, affine};
+use super::{Directions, Kind, Refused, Sensor};
+
+/// Evaluations of a sample that none goes before.
+const COLD: usize = 2;
+
+/// An effect that moves with temperature and time only.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Slowly<T: RealField> {
+    Law {
+        law: SlowLaw<T>,
+        coefficients: [T; COEFFICIENTS],
+        form: T,
+        lags: bool,
+    },
+    /// A term of slow variables, which is a bias.
+    Term(Fast<T>),
+}
 
 /// Effects of one triad, and how their errors become errors in the body frame.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Triad<T: RealField, const N: usize> {
-    /// Sensitive directions in the body frame: rows of the forward matrix, of unit length.
-    directions: Matrix3<T>,
-    /// Their lengths, raw/SI, and the readings without input, raw.
-    scale: Vector3<T>,
-    bias: Vector3<T>,
-    /// R: errors along the sensors into errors of the compensated triad.
-    to_body: Matrix3<T>,
+    directions: Directions<T>,
     /// Without gaps.
-    fast: [Option<Effect<T>>; N],
+    fast: [Option<Fast<T>>; N],
     /// Without gaps.
-    slow: [Option<Effect<T>>; N],
+    slow: [Option<Slowly<T>>; N],
     code: Option<Code<T>>,
 }
 
-/// The slow effects of one triad: errors of the compensated triad `G x + b`, and with them once taken out of x as well, `M x + a`.
+/// What the effects of one triad remember.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Folded<T: RealField, const N: usize> {
-    gain: Matrix3<T>,
+pub(super) struct Memory<T: RealField, const N: usize> {
+    /// The slow effects: errors of the sensors `A x + b`.
+    slope: Matrix3<T>,
     bias: Vector3<T>,
-    clean: Affine<T>,
+    /// Error of the sample before, body frame; `None` if there was none.
+    before: Option<Vector3<T>>,
     /// Of each slow effect: the temperature behind its lag, less itself, °C. Kept as the difference: the lagged temperature itself
     /// would stand still in single precision once its step is below the last digit of some 10 °C.
     lags: [T; N],
 }
 
-impl<T: RealField + Copy, const N: usize> Folded<T, N> {
-    /// Of no effects.
+impl<T: RealField + Copy, const N: usize> Memory<T, N> {
+    /// Of nothing.
     pub fn none() -> Self {
         Self {
-            gain: Matrix3::zeros(),
+            slope: Matrix3::zeros(),
             bias: Vector3::zeros(),
-            clean: Affine {
-                matrix: Matrix3::identity(),
-                offset: Vector3::zeros(),
-            },
+            before: None,
             lags: [T::zero(); N],
         }
+    }
+
+    /// The next sample does not follow the one before.
+    pub fn gap(&mut self) {
+        self.before = None;
     }
 }
 
@@ -61,149 +74,125 @@ pub(super) fn lagged<T: RealField + Copy>(difference: T, dt: T, step: T, lag: T)
 }
 
 impl<T: RealField + Copy, const N: usize> Triad<T, N> {
-    /// No effects of a triad with this inverse model; `None` if it is singular.
-    pub fn new(inverse: &Affine<f64>) -> Option<Self> {
-        let forward = inverse.matrix.try_inverse()?;
-        let scale = Vector3::from_fn(|i, _| forward.row(i).norm());
-        let positive = |s: &f64| *s > 0.0 && s.is_finite();
-        let bias = -(forward * inverse.offset);
-        scale.iter().all(positive).then(|| Self {
-            scale: scale.map(convert),
-            bias: bias.map(convert),
-            code: None,
-            directions: Matrix3::from_fn(|i, j| convert(forward[(i, j)] / scale[i])),
-            to_body: (inverse.matrix * Matrix3::from_diagonal(&scale)).map(convert),
+    /// No effects.
+    pub fn new(directions: Directions<T>) -> Self {
+        Self {
+            directions,
             fast: [None; N],
             slow: [None; N],
-        })
+            code: None,
+        }
     }
 
-    pub fn push(&mut self, effect: Effect<T>) -> Result<(), Refused> {
-        if let Kind::Code { errors, weight } = &effect.kind {
-            if self.code.is_some() {
-                return Err(Refused::Full);
+    pub fn push(&mut self, effect: &Kind<T>) -> Result<(), Refused> {
+        match effect {
+            Kind::Code { errors, weight } => {
+                if self.code.is_some() {
+                    return Err(Refused::Full);
+                }
+                self.code = Some(Code::new(errors, *weight));
             }
-            self.code = Some(Code::new(errors, *weight, &self.scale, &self.bias));
-            return Ok(());
+            Kind::Fast(fast) => {
+                let free = self.fast.iter_mut().find(|e| e.is_none());
+                *free.ok_or(Refused::Full)? = Some(*fast);
+            }
+            Kind::Slow(slow) => {
+                let free = self.slow.iter_mut().find(|e| e.is_none());
+                *free.ok_or(Refused::Full)? = Some(*slow);
+            }
         }
-        let list = match effect.is_slow() {
-            true => &mut self.slow,
-            false => &mut self.fast,
-        };
-        let free = list.iter_mut().find(|e| e.is_none());
-        *free.ok_or(Refused::Full)? = Some(effect);
         Ok(())
     }
 
-    /// Folds the slow effects; the variables of the slow ones are set.
-    pub fn slow(&self, folded: &mut Folded<T, N>, dt: T, risen: T, values: &Values<T>) {
-        let [.., warm, _, time] = *values;
+    /// Folds the slow effects; the slow variables of the conditions are set.
+    pub fn slow(&self, memory: &mut Memory<T, N>, dt: T, risen: T, at: &Conditions<T>) {
+        let [.., warm, _, time] = at.values;
         let mut total = Slow {
             bias: Vector3::zeros(),
             along: Vector3::zeros(),
             across: Matrix3::zeros(),
         };
-        for (effect, lag) in self.slow.iter().flatten().zip(&mut folded.lags) {
-            match &effect.kind {
-                Kind::Slow {
+        for (effect, lag) in self.slow.iter().flatten().zip(&mut memory.lags) {
+            match effect {
+                Slowly::Law {
+                    law,
                     coefficients,
                     form,
                     lags,
-                    error,
                 } => {
                     if *lags {
                         *lag = lagged(*lag, dt, risen, *form);
                     }
                     let lag = *lag;
-                    error(
+                    law(
                         coefficients,
                         *form,
                         &Ambience { time, warm, lag },
                         &mut total,
                     );
                 }
-                Kind::Term {
-                    coefficient,
-                    factors,
-                } => term(coefficient, factors, values, &mut total.bias),
-                Kind::Fast { .. } | Kind::Code { .. } => {}
+                Slowly::Term(term) => (term.law)(term, at, &mut total.bias),
             }
         }
-        let along = Matrix3::from_diagonal(&total.along) * self.directions + total.across;
-        let (gain, bias) = (self.to_body * along, self.to_body * total.bias);
-        folded.clean = Affine {
-            matrix: Matrix3::identity() - gain + gain * gain,
-            offset: gain * bias - bias,
-        };
-        (folded.gain, folded.bias) = (gain, bias);
+        memory.slope = Matrix3::from_diagonal(&total.along) * self.directions.sensed + total.across;
+        memory.bias = total.bias;
     }
 
-    /// The input of the triad without its errors; `own` says which of the conditions that is.
-    #[inline]
+    /// Raw readings without the errors of the converter.
+    #[inline(always)]
+    pub fn without_code_errors(&self, raw: &Vector3<T>) -> Vector3<T> {
+        match &self.code {
+            Some(code) => code.clean(raw),
+            None => *raw,
+        }
+    }
+
+    /// The input of the triad without its errors; `own` says which of the conditions that is. They are left as they were.
+    #[inline(never)]
     pub fn remove(
         &self,
-        folded: &Folded<T, N>,
+        memory: &mut Memory<T, N>,
         own: Sensor,
-        at: &Conditions<T>,
-        values: &Values<T>,
-    ) -> Vector3<T> {
-        let input = match own {
-            Sensor::Gyro => at.rate,
-            Sensor::Accel => at.force,
-        };
-        let none = !matches!(self.fast.first(), Some(Some(_)));
-        if none && self.code.is_none() {
-            return folded.clean.apply(&input);
-        }
-        let first = self.error(folded, &input, at, values);
-        let once = input - first;
-        let (mut at, mut values) = (*at, *values);
-        let [_, rx, ry, rz, fx, fy, fz, ..] = &mut values;
-        match own {
-            Sensor::Gyro => {
-                at.rate = once;
-                (*rx, *ry, *rz) = (once.x, once.y, once.z);
-            }
-            Sensor::Accel => {
-                at.force = once;
-                (*fx, *fy, *fz) = (once.x, once.y, once.z);
-            }
-        }
-        let second = self.error(folded, &once, &at, &values);
-        // Where the error is steeper than the input, far beyond any sensor, this would lead away, and out of all numbers.
-        match (second - first).norm_squared() < first.norm_squared() {
-            true => input - second,
-            false => input - first,
-        }
-    }
-
-    /// Error of the compensated triad by its input.
-    fn error(
-        &self,
-        folded: &Folded<T, N>,
         input: &Vector3<T>,
-        at: &Conditions<T>,
-        values: &Values<T>,
+        at: &mut Conditions<T>,
     ) -> Vector3<T> {
-        let sensed = self.directions * input;
-        let at = Conditions { sensed, ..*at };
-        let mut e = Vector3::zeros();
-        for effect in self.fast.iter().map_while(Option::as_ref) {
-            match &effect.kind {
-                Kind::Fast {
-                    coefficients,
-                    error,
-                } => error(coefficients, &at, &mut e),
-                Kind::Term {
-                    coefficient,
-                    factors,
-                } => term(coefficient, factors, values, &mut e),
-                Kind::Slow { .. } | Kind::Code { .. } => {}
+        let none = !matches!(self.fast.first(), Some(Some(_)))
+            && !matches!(self.slow.first(), Some(Some(_)));
+        if none {
+            return *input;
+        }
+        let rounds = match memory.before {
+            Some(_) => 1,
+            None => COLD,
+        };
+        for _ in 0..rounds {
+            let before = memory.before.unwrap_or(Vector3::zeros());
+            // Where the error is steeper than the input, far beyond any sensor, this would lead away, and out of all numbers. The
+            // one is 1 rad/s or 1 m/s²: by much less may a resting sensor be off.
+            let size = |v: &Vector3<T>| v.x * v.x + v.y * v.y + v.z * v.z;
+            let clean = match size(&before) < size(input) + T::one() {
+                true => Vector3::new(input.x - before.x, input.y - before.y, input.z - before.z),
+                false => *input,
+            };
+            put(&mut at.values, own, &clean);
+            at.sensed = affine(&self.directions.sensed, &clean, &Vector3::zeros());
+            let mut e = affine(&memory.slope, &clean, &memory.bias);
+            for effect in self.fast.iter().map_while(Option::as_ref) {
+                (effect.law)(effect, at, &mut e);
             }
+            memory.before = Some(affine(&self.directions.to_body, &e, &Vector3::zeros()));
         }
-        if let Some(code) = &self.code {
-            readout_code(code, &sensed, &mut e);
-        }
-        folded.gain * input + folded.bias + self.to_body * e
+        put(&mut at.values, own, input);
+        input - memory.before.unwrap_or(Vector3::zeros())
     }
+}
+
+/// Sets the input of a triad among the variables.
+pub(super) fn put<T: RealField + Copy>(values: &mut Values<T>, own: Sensor, input: &Vector3<T>) {
+    let [_, rx, ry, rz, fx, fy, fz, ..] = values;
+    let [x, y, z] = match own {
+        Sensor::Gyro => [rx, ry, rz],
+        Sensor::Accel => [fx, fy, fz],
+    };
+    (*x, *y, *z) = (input.x, input.y, input.z);
 }

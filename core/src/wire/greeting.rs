@@ -88,7 +88,7 @@ impl Capabilities {
 }
 
 /// Ids of effects by the bits of [`Greeting::effects`]. Append only.
-pub const EFFECTS: [&str; 20] = [
+pub const EFFECTS: [&str; 22] = [
     "gyro_g_sensitivity",
     "gyro_scale_quadratic",
     "gyro_scale_cubic",
@@ -109,6 +109,8 @@ pub const EFFECTS: [&str; 20] = [
     "accel_thermal_misalignment",
     "gyro_thermal_lag",
     "accel_thermal_lag",
+    "gyro_readout_code",
+    "accel_readout_code",
 ];
 
 /// The bits of the effects that this build removes: found by asking for each, so that they cannot be out of date.

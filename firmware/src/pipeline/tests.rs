@@ -4,7 +4,7 @@ extern crate std;
 use std::vec::Vec;
 
 use mimu_core::compensation::{Affine, Compensation};
-use mimu_core::stored;
+use mimu_core::stored::{self, Record};
 use mimu_core::table::Node;
 use mimu_core::wire::Prior;
 use nalgebra::Matrix3;
@@ -66,7 +66,7 @@ fn both() -> Streams {
 }
 
 /// Compensation that doubles from -10 °C to 60 °C, where 25 °C is in the middle.
-fn calibration() -> Stored {
+fn calibration(effects: &[Record<'_>]) -> Stored {
     let node = |temp_c, gain: f32| {
         let affine = Affine {
             matrix: Matrix3::from_diagonal_element(gain),
@@ -83,7 +83,7 @@ fn calibration() -> Stored {
     let mut bytes = [0; stored::MAX_LENGTH];
     let one = Matrix3::identity();
     let nodes = [node(-10.0, 2.0), node(60.0, 4.0)];
-    let length = stored::encode([&one, &one], &nodes, &[], &mut bytes).unwrap();
+    let length = stored::encode([&one, &one], &nodes, effects, &mut bytes).unwrap();
     stored::decode(&bytes[..length]).unwrap()
 }
 
@@ -131,7 +131,7 @@ fn a_gap_ends_the_batch_and_is_counted() {
 #[test]
 fn batches_without_room_are_counted_and_the_next_says_so() {
     let mut pipeline = Pipeline::new();
-    pipeline.calibrate(calibration());
+    pipeline.calibrate(calibration(&[]));
     pipeline.stream(both());
     for number in 0..40 {
         pipeline.take(number, &sums(number), &mut |_| false);
@@ -148,7 +148,7 @@ fn batches_without_room_are_counted_and_the_next_says_so() {
 #[test]
 fn compensated_samples_are_those_of_the_raw_ones_at_the_stated_temperature() {
     let mut pipeline = Pipeline::new();
-    pipeline.calibrate(calibration());
+    pipeline.calibrate(calibration(&[]));
     pipeline.stream(both());
     let sent = run(&mut pipeline, 0..20);
     let [
@@ -170,6 +170,60 @@ fn compensated_samples_are_those_of_the_raw_ones_at_the_stated_temperature() {
             assert!((f64::from(value.accel[axis]) - gain * (accel - 1.0)).abs() < 1e-5);
         }
     }
+}
+
+#[test]
+fn errors_of_the_code_are_taken_out_of_the_reading_before_its_temperature_matters() {
+    // Bits of half of 3.3 V and of an eighth are worth more than they say, at any temperature and on all axes of the triad alike.
+    let weight = 1.65;
+    let (half, eighth) = (2e-4, -1e-4);
+    let mut errors = [0.0; 9];
+    (errors[0], errors[2]) = (half as f32, eighth as f32);
+    let code = Record::Named {
+        id: "accel_readout_code",
+        coefficients: &errors,
+        form: Some(weight as f32),
+    };
+    let mut pipeline = Pipeline::new();
+    pipeline.calibrate(calibration(&[code]));
+    pipeline.stream(both());
+    let (mut seen, mut number) = ([false; 4], 0);
+    while number < 400 {
+        let mut sums = sums(number);
+        for axis in 0..3 {
+            // Over the whole range, in steps of none of the bits.
+            sums[ACCEL + axis] = 1000 + (number * 317 + axis as u32 * 41_003) % 129_000;
+        }
+        pipeline.take(number, &sums, &mut |message| {
+            let Sent::Compensated(head, samples) = keep(message) else {
+                return true;
+            };
+            let gain = 2.0 + 2.0 * (f64::from(head.temp_c) + 10.0) / 70.0;
+            for (of, value) in samples {
+                for axis in 0..3 {
+                    let sum = 1000 + (of * 317 + axis as u32 * 41_003) % 129_000;
+                    let read = f64::from(sum) * 3.3 / 131_070.0;
+                    let set = |bit: f64| (read / bit).floor() as u32 % 2 == 1;
+                    let bits = (set(weight), set(weight / 4.0));
+                    // Within the error of a turn a reading may stand for either side of it.
+                    let turn = (read / (weight / 4.0)).round() * weight / 4.0;
+                    if (read - turn).abs() < 5e-4 {
+                        continue;
+                    }
+                    seen[usize::from(bits.0) + 2 * usize::from(bits.1)] = true;
+                    let off =
+                        f64::from(u8::from(bits.0)) * half + f64::from(u8::from(bits.1)) * eighth;
+                    let expected = gain * (read - weight * off - 1.0);
+                    // The step of a bit is 5e-4 at the least.
+                    let left = f64::from(value.accel[axis]) - expected;
+                    assert!(left.abs() < 2e-5, "{of} {axis}: {left:e}");
+                }
+            }
+            true
+        });
+        number += 1;
+    }
+    assert_eq!(seen, [true; 4]);
 }
 
 #[test]

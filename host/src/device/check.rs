@@ -4,6 +4,7 @@ use std::time::{Duration, Instant};
 
 use mimu_core::compensation::Sample;
 use mimu_core::effects;
+use mimu_core::single;
 use mimu_core::stored::{ROOM, Stored};
 use mimu_core::table;
 use mimu_core::wire::{BatchHead, Request};
@@ -181,6 +182,10 @@ impl Twin {
         let head = &raw.head;
         self.follow(head);
         let first = self.next != Some(head.first);
+        if first {
+            self.single.gap();
+            self.double.gap();
+        }
         for (k, (raw, device)) in raw.values.iter().zip(&device.values).enumerate() {
             let single = self.single(raw);
             let (double, bounds) = self.double(raw);
@@ -220,16 +225,23 @@ impl Twin {
 
     /// As the device computes.
     fn single(&mut self, raw: &Sample<f32>) -> Sample<f32> {
-        let sample = self.model.model.apply(raw);
+        let model = &self.model.model;
         match &self.stored.effects {
-            Some(all) => all.remove(&mut self.single, &sample),
-            None => sample,
+            Some(all) => {
+                let raw = single::without_code_errors(all, raw);
+                all.remove(&mut self.single, &model.apply(&raw))
+            }
+            None => model.apply(raw),
         }
     }
 
     /// In double precision, with what rounding can make of it.
     fn double(&mut self, raw: &Sample<f32>) -> (Sample<f64>, [Vector3<f64>; 2]) {
-        let raw = [raw.gyro.map(f64::from), raw.accel.map(f64::from)];
+        let raw = self.effects.without_code_errors(&Sample {
+            gyro: raw.gyro.map(f64::from),
+            accel: raw.accel.map(f64::from),
+        });
+        let raw = [raw.gyro, raw.accel];
         let [gyro, accel] = [0, 1].map(|i| self.affine[i].apply(&raw[i]));
         let bounds = [0, 1].map(|i| rounding(&self.affine[i], &raw[i]));
         let sample = Sample { gyro, accel };

@@ -6,8 +6,9 @@ use mimu_core::stored::{self, Refused};
 /// A stored calibration, number by number.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Contents {
-    /// C of gyro and accelerometer (rad/s and m/s² per V, by rows) that the effects were found with.
-    pub found_with: [[[f32; 3]; 3]; 2],
+    /// Sensitive directions of gyro and accelerometer in the body frame, by rows, and their inverse: of the calibration that the
+    /// effects were found with.
+    pub directions: [[[[f32; 3]; 3]; 2]; 2],
     /// Temperature nodes, the coldest first.
     pub nodes: Vec<NodeContents>,
     /// What the affine model lacks.
@@ -34,6 +35,8 @@ pub struct EffectContents {
     pub coefficients: Vec<f32>,
     /// Time constant, s, of an effect that has one.
     pub time_constant_s: Option<f32>,
+    /// Weight of the converter's first bit, V, of errors by its code.
+    pub weight_of_bit_0_v: Option<f32>,
 }
 
 /// Bytes of the layout that are read with the others before them.
@@ -76,11 +79,14 @@ impl Rest<'_> {
             self.0 = rest;
             let [count] = self.take()?;
             let coefficients = (0..count).map(|_| self.f32()).collect::<Option<_>>()?;
-            let time_constant = self.f32()?;
+            let form = Some(self.f32()?).filter(|form| *form != 0.0);
+            let id = String::from_utf8_lossy(id).into_owned();
+            let reads_code = id.ends_with("_readout_code");
             return Some(EffectContents {
-                id: String::from_utf8_lossy(id).into_owned(),
+                id,
                 coefficients,
-                time_constant_s: (time_constant != 0.0).then_some(time_constant),
+                time_constant_s: form.filter(|_| !reads_code),
+                weight_of_bit_0_v: form.filter(|_| reads_code),
             });
         }
         let [triad, axis, count] = self.take()?;
@@ -95,6 +101,7 @@ impl Rest<'_> {
             id: format!("term:{sensor}_{axis}~{}", names.join("*")),
             coefficients: vec![self.f32()?],
             time_constant_s: None,
+            weight_of_bit_0_v: None,
         })
     }
 }
@@ -124,7 +131,10 @@ fn read(bytes: &[u8]) -> Option<Contents> {
     let [_version, _length] = [rest.take::<2>()?, rest.take::<2>()?];
     let [nodes, effects, ..] = rest.take::<4>()?;
     Some(Contents {
-        found_with: [rest.matrix()?, rest.matrix()?],
+        directions: [
+            [rest.matrix()?, rest.matrix()?],
+            [rest.matrix()?, rest.matrix()?],
+        ],
         nodes: (0..nodes).map(|_| rest.node()).collect::<Option<_>>()?,
         effects: (0..effects).map(|_| rest.effect()).collect::<Option<_>>()?,
     })

@@ -217,10 +217,10 @@ fn on_device(removed: &Removed, place: &str) -> Result<OnDevice> {
 impl OnDevice {
     fn record(&self) -> Record<'_> {
         match &self.what {
-            What::Named(time_constant) => Record::Named {
+            What::Named(form) => Record::Named {
                 id: &self.id,
                 coefficients: &self.numbers,
-                time_constant: *time_constant,
+                form: *form,
             },
             What::Term(axis, variables) => Record::Term {
                 sensor: self.sensor,
@@ -233,7 +233,7 @@ impl OnDevice {
 
     fn effect(&self) -> std::result::Result<Effect<f32>, mimu_core::effects::Refused> {
         match &self.what {
-            What::Named(time_constant) => Effect::named(&self.id, &self.numbers, *time_constant),
+            What::Named(form) => Effect::named(&self.id, &self.numbers, *form),
             What::Term(axis, variables) => {
                 Effect::term(self.sensor, usize::from(*axis), self.numbers[0], variables)
             }

@@ -1,14 +1,17 @@
 //! What the device computes with a sample, each between two marks, for the emulator to count instructions.
 //!
-//! The functions are those of `mimu_no_panic`: compiled on their own, called through pointers, nothing inlined from
-//! here. `cargo run -p mimu-tests --bin budget` runs it, and knows the order.
+//! The functions are those that the firmware calls, of `mimu_core::single`, compiled there; nothing is inlined from here.
+//! `cargo run -p mimu-tests --bin budget` runs it, and knows the order.
 #![no_std]
 #![no_main]
 
 use core::hint::black_box;
 
 use mimu_core::compensation::{Affine, Compensation, Sample};
-use mimu_core::kalman::Filter;
+use mimu_core::effects::{Directions, Effect, Effects, Refused, Sensor, State, Variable};
+use mimu_core::kalman::Bank;
+use mimu_core::single;
+use mimu_core::stored::ROOM;
 use nalgebra::{Matrix3, Vector3};
 use panic_halt as _;
 
@@ -45,13 +48,71 @@ fn main() -> ! {
         gyro: Vector3::new(2.4, 2.5, 2.6),
         accel: Vector3::new(1.6, 1.7, 2.4),
     });
-    let mut filter = Filter::with_prior([0.0, 0.0, 1.0, 0.0], [1.0, 1.0, 1.0, 1.0]);
+    let si = Sample {
+        gyro: Vector3::new(0.3, -0.2, 0.1),
+        accel: Vector3::new(1.0, -2.0, 9.0),
+    };
+    let noise = Vector3::repeat(1e-3);
+    let mut bank = Bank::diffuse(&noise, 10.0);
 
     // What the marks cost by themselves.
     between(|| ());
-    between(|| mimu_no_panic::compensation(&model, &raw));
-    between(|| mimu_no_panic::filter_update(&mut filter, &raw.gyro, 2.5, 1e-3));
+    between(|| single::compensate(&model, &raw));
+    between(|| single::update(&mut bank, &si.accel, &raw.accel, &noise));
+
+    let directions = Directions {
+        sensed: Matrix3::identity(),
+        to_body: Matrix3::identity(),
+    };
+    let none = || black_box(Effects::of(directions, directions));
+    let remove = |all: &Effects<f32, ROOM>| {
+        let mut state = State::new(1000.0);
+        // The first sample is evaluated twice.
+        single::remove(all, &mut state, &si);
+        between(|| single::remove(all, &mut state, &si));
+    };
+    remove(&none());
+    let term = Effect::term(Sensor::Gyro, 1, 1e-3, &TERM);
+    for effect in EFFECTS.map(named).into_iter().chain([term]) {
+        let mut all = none();
+        let Ok(effect) = effect else { continue };
+        // Alone, it pays for what all of a triad share; the second shows what each costs.
+        for _ in 0..2 {
+            if all.push(effect).is_ok() {
+                remove(&all);
+            }
+        }
+    }
+    let mut all = none();
+    for id in ["gyro_readout_code", "accel_readout_code"] {
+        if let Ok(code) = Effect::named(id, &[1e-4; 9], Some(1.65)) {
+            let _ = all.push(code);
+        }
+    }
+    between(|| single::without_code_errors(&all, &raw));
     loop {
         cortex_m::asm::wfi();
+    }
+}
+
+/// Effects that run with every sample.
+const EFFECTS: [&str; 8] = [
+    "gyro_g_sensitivity",
+    "gyro_scale_quadratic",
+    "gyro_scale_cubic",
+    "gyro_scale_asymmetry",
+    "accel_scale_quadratic",
+    "accel_scale_cubic",
+    "accel_cross_axis_product",
+    "accel_size_effect",
+];
+
+/// Variables of a term, as many as there can be.
+const TERM: [Variable; 3] = [Variable::RateX, Variable::ForceY, Variable::ForceZ];
+
+fn named(id: &str) -> Result<Effect<f32>, Refused> {
+    match Effect::named(id, &[1e-4; 9], None) {
+        Err(Refused::Count { .. }) => Effect::named(id, &[1e-4; 3], None),
+        other => other,
     }
 }

@@ -6,7 +6,7 @@
 #![no_std]
 
 use mimu_core::compensation::{Affine, Compensation, Sample};
-use mimu_core::effects::{Effect, Effects, Refused, Sensor, State, Variable};
+use mimu_core::effects::{Directions, Effect, Effects, Refused, Sensor, State, Variable};
 use mimu_core::kalman::{Bank, Filter, Innovation, Rejected};
 use mimu_core::single;
 use mimu_core::stored::{self, Record, Stored, TooLong};
@@ -34,9 +34,9 @@ pub fn compensation(model: &Compensation<f32>, raw: &Sample<f32>) -> Sample<f32>
 pub fn effect_named(
     id: &str,
     coefficients: &[f32],
-    time_constant: Option<f32>,
+    form: Option<f32>,
 ) -> Result<Effect<f32>, Refused> {
-    Effect::named(id, coefficients, time_constant)
+    Effect::named(id, coefficients, form)
 }
 
 /// [`Effect::term`].
@@ -76,6 +76,12 @@ pub fn effects_remove(
     compensated: &Sample<f32>,
 ) -> Sample<f32> {
     effects.remove(state, compensated)
+}
+
+/// [`Effects::without_code_errors`].
+#[inline(never)]
+pub fn effects_codes(effects: &Effects<f32, 8>, raw: &Sample<f32>) -> Sample<f32> {
+    effects.without_code_errors(raw)
 }
 
 /// [`Filter::with_prior`].
@@ -118,10 +124,18 @@ pub fn bank_update(
     bank.update(input, raw, noise)
 }
 
-/// [`Effects::new`], which the device calls when it is given a calibration.
+/// [`Effects::new`].
 #[inline(never)]
 pub fn effects_new(gyro: &Affine<f64>, accel: &Affine<f64>) -> Option<Effects<f32, 8>> {
     Effects::new(gyro, accel)
+}
+
+/// [`Effects::of`], which the device calls when it is given a calibration, and [`State::gap`].
+#[inline(never)]
+pub fn effects_of(of: [Directions<f32>; 2], state: &mut State<f32, 8>) -> Effects<f32, 8> {
+    let [gyro, accel] = of;
+    state.gap();
+    Effects::of(gyro, accel)
 }
 
 /// [`Table::new`].
@@ -217,7 +231,7 @@ pub fn sample_path(
     state: &mut State<f32, 8>,
 ) -> ([u8; 18], [u8; 24]) {
     let [gyro, accel] = scale;
-    let raw = volts(sums, gyro, accel);
+    let raw = single::without_code_errors(effects, &volts(sums, gyro, accel));
     let sample = single::remove(effects, state, &single::compensate(&at.model, &raw));
     (RawBatch::pack(sums), CompensatedBatch::pack(&sample))
 }
