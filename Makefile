@@ -24,6 +24,8 @@ test: toolchain ## formatting, lints, documentation, firmware, all tests
 	$(CARGO) clippy --locked -p mimu-firmware -p mimu-counted --release --target $(TARGET) -- -D warnings
 	$(CARGO) clippy --locked -p mimu-firmware --release --features usb --target $(TARGET) -- -D warnings
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --locked --no-deps
+# Before the image without it, which has the same name and is what the tests run.
+	$(CARGO) build --locked -p mimu-firmware --release --features usb --target $(TARGET)
 	$(CARGO) build --locked -p mimu-firmware --release --target $(TARGET)
 	$(CARGO) build --locked -p mimu-counted --release --target $(TARGET)
 	./tests/no_panic/check.sh $(CARGO)
@@ -50,7 +52,7 @@ budget: toolchain ## instructions, load and memory of the firmware, counted on t
 	$(CARGO) build --locked -p mimu-counted --release --target $(TARGET)
 	$(CARGO) run --locked -p mimu-tests --bin budget
 
-device: toolchain ## ten minutes of the device's samples, and 300 power cuts while a calibration is stored
+device: toolchain ## ten minutes of the device's samples, and 300 power cuts while a calibration is stored, drawn into docs/device
 	$(CARGO) build --locked -p mimu-firmware --release --target $(TARGET)
 	MIMU_DEVICE_SECONDS=600 MIMU_CUTS=300 $(CARGO) test --locked --release -p mimu-tests \
 	  --test device_serial --test device_power -- --nocapture
