@@ -69,6 +69,7 @@ impl Front {
             filters,
             before: first,
             after: first,
+            began_ns: 0,
             steps: 0,
             drives: Drives::default(),
             deflection: LowPass::of_bandwidth(GYRO_BANDWIDTH_HZ, dt_s),
@@ -78,6 +79,14 @@ impl Front {
                 / f64::from(truth.converter.bits).exp2(),
             stream: Random::new(seed, "converter noise"),
         })))
+    }
+
+    /// The same, with the plan's beginning at an instant, ns, that is not yet past.
+    pub fn begun_at(mut self, ns: u64) -> Self {
+        if let Self::Bench(bench) = &mut self {
+            bench.began_ns = ns;
+        }
+        self
     }
 
     /// What the microcontroller drives from now on.
@@ -114,6 +123,8 @@ pub struct Bench {
     /// At the steps `steps - 1` and `steps`.
     before: Volts,
     after: Volts,
+    /// The virtual clock at step 0.
+    began_ns: u64,
     steps: u64,
     drives: Drives,
     /// Self-test of the gyros behind their filter, V.
@@ -144,6 +155,7 @@ impl Bench {
     }
 
     fn at(&mut self, ns: u64) -> Volts {
+        let ns = ns.saturating_sub(self.began_ns);
         while self.steps * STEP_NS <= ns {
             self.steps += 1;
             let t_s = self.steps as f64 / STEPS_PER_S as f64;

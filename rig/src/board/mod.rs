@@ -12,11 +12,13 @@
 //! | `watchdog`    | a model that the emulator lacks                                               |
 //! | `line`        | the serial line                                                               |
 //! | [`image`]     | the ELF file                                                                  |
+//! | [`fault`]     | an instruction that is not what the image says                                |
 //! | [`findings`]  | what the emulator found out about the firmware                                |
 //! | [`running`]   | a board that runs: time, bytes, supply, reset, counters                       |
 //! | [`serve`], [`terminal`] | the same behind a pseudo-terminal                                  |
 
 mod driver;
+pub mod fault;
 pub mod findings;
 pub mod flash;
 pub mod front;

@@ -138,7 +138,7 @@ impl Board {
     }
 
     /// Does an errand on the stopped board.
-    fn with<T: Send + 'static>(
+    pub(super) fn with<T: Send + 'static>(
         &mut self,
         errand: impl FnOnce(&mut Stopped<'_>) -> T + Send + 'static,
     ) -> Result<T, String> {
