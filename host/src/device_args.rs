@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use clap::{Args, Subcommand, ValueEnum};
-use mimu::device::{Answer, Session, Stream, stream};
+use mimu::device::{Answer, Session, Stream, self_test, stream};
 use mimu::error::{Error, Result};
 use mimu::recording::RAW_COLUMNS;
 use mimu::report;
@@ -17,9 +17,6 @@ use mimu_core::wire::Request;
 use signal_hook::consts::TERM_SIGNALS;
 
 use crate::{JsonArgs, check_outputs, print};
-
-/// The self-test takes a second; a device that is slow to start it gets as much again, and then some.
-const SELF_TEST: Duration = Duration::from_secs(5);
 
 #[derive(Args)]
 pub struct DeviceArgs {
@@ -138,7 +135,7 @@ pub fn run(args: &DeviceArgs) -> Result<()> {
         DeviceCommand::Stream(args) => run_stream(args),
         DeviceCommand::Upload(args) => transfer::run_upload(args),
         DeviceCommand::Download(args) => transfer::run_download(args),
-        DeviceCommand::SelfTest(args) => self_test(args),
+        DeviceCommand::SelfTest(args) => run_self_test(args),
         DeviceCommand::Counters(args) => counters(args),
         DeviceCommand::Check(args) => comparison::run_check(args),
         DeviceCommand::Kalman(args) => comparison::run_kalman(args),
@@ -213,20 +210,16 @@ fn run_stream(args: &StreamArgs) -> Result<()> {
     print(&args.json, "", &value, None)
 }
 
-fn self_test(args: &PlainArgs) -> Result<()> {
+fn run_self_test(args: &PlainArgs) -> Result<()> {
     check_outputs(&[args.json.file()], &[])?;
     let mut session = open(&args.port)?;
-    let purpose = "to test its sensors";
-    let test = match session.call(Request::SelfTest, purpose, SELF_TEST)? {
-        Answer::SelfTest(test) => test,
-        _ => return Err(session.unexpected(purpose)),
-    };
-    let port = session.port();
-    let text = report::self_test_text(port, &test);
+    let found = self_test(&mut session)?;
+    let (port, test) = (session.port(), &found.test);
+    let text = report::self_test_text(port, &found);
     print(
         &args.json,
         &text,
-        &report::self_test_json(port, &test),
+        &report::self_test_json(port, &found),
         None,
     )?;
     let failed: Vec<&str> = ["gyro x", "gyro y", "gyro z", "accel"]
@@ -235,12 +228,18 @@ fn self_test(args: &PlainArgs) -> Result<()> {
         .filter(|(bit, _)| test.passed >> bit & 1 == 0)
         .map(|(_, name)| name)
         .collect();
-    match failed.is_empty() {
-        true => Ok(()),
-        false => Err(Error::new(
+    let failed = failed.join(", ");
+    match &found.moved {
+        _ if failed.is_empty() => Ok(()),
+        Some(moved) => Err(Error::new(
             port,
-            format!("the self-test failed: {}", failed.join(", ")),
-            "keep the unit still and test again, then check the wiring of the self-test pins",
+            format!("the self-test failed ({failed}), and the unit moved during it: {moved}"),
+            "keep the unit still and test again",
+        )),
+        None => Err(Error::new(
+            port,
+            format!("the self-test failed: {failed}"),
+            "check the wiring of the self-test pins and of these sensors",
         )),
     }
 }

@@ -151,6 +151,24 @@ impl Record {
     }
 }
 
+/// Longest virtual time that a firmware may take until it says something, ms.
+const START_MS: u32 = 2000;
+
+/// Runs a board until its firmware has said something, as one does that was plugged in before its port is opened. Executing
+/// this takes seconds on a busy machine, which whoever opens the port would otherwise spend waiting for an answer.
+fn start(board: &mut Board) -> Result<(), String> {
+    let mut spoken = false;
+    for _ in 0..START_MS {
+        board.run_for(1_000_000)?;
+        let quiet = board.receive().is_empty();
+        if spoken && quiet {
+            break;
+        }
+        spoken |= !quiet;
+    }
+    Ok(())
+}
+
 /// The unit at rest with z up, in a room.
 const AT_REST: &str = include_str!("../plans/rest.toml");
 
@@ -166,7 +184,8 @@ impl Serve {
         };
         let truth = RigTruth::resolve(&rig, self.seed)?;
         let image = Image::read(&self.image.unwrap_or_else(release_image))?;
-        let board = Board::new(&image, Front::bench(&plan, &truth, self.seed)?)?;
+        let mut board = Board::new(&image, Front::bench(&plan, &truth, self.seed)?)?;
+        start(&mut board)?;
         let pace = match self.pace {
             Pace::Wall => serve::Pace::Wall,
             Pace::Fast => serve::Pace::Fast,

@@ -9,6 +9,7 @@
 //! | `image`      | a calibration file as the bytes that the device stores                                 |
 //! | `upload`     | sending them and fetching them back                                                    |
 //! | `contents`   | what stands in them                                                                    |
+//! | `self_test`  | the self-test, and whether the unit stood still for it                                 |
 //! | `stream`     | samples as they come                                                                   |
 //! | `check`      | the device's compensation against the PC's, sample by sample                           |
 //! | `kalman`     | the device's Kalman bank against the PC's, on the same samples                         |
@@ -20,6 +21,7 @@ mod image;
 mod kalman;
 mod line;
 mod port;
+mod self_test;
 mod session;
 mod stream;
 mod upload;
@@ -31,6 +33,7 @@ pub use heard::{Answer, Ear, Event, Heard, LineCount, Samples};
 pub use image::{Image, remembers};
 pub use kalman::{AxisEstimate, KalmanPlan, KalmanRun, SHORTEST, kalman};
 pub use port::{BAUD, Port, ports};
+pub use self_test::{SelfTested, self_test};
 pub use session::{Session, refused};
 pub use stream::{Stream, Streamed, stream};
 pub use upload::{Uploaded, download, upload};

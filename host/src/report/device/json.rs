@@ -2,13 +2,13 @@
 
 use std::path::Path;
 
-use mimu_core::wire::{Counters, SelfTest};
+use mimu_core::wire::Counters;
 use serde_json::{Value, json};
 
 use super::{counters, passed, triad_name, triad_units};
 use crate::device::{
-    AxisEstimate, Checked, Contents, Image, KalmanRun, LineCount, Started, Stream, Streamed,
-    Uploaded, Who, slot,
+    AxisEstimate, Checked, Contents, Image, KalmanRun, LineCount, SelfTested, Started, Stream,
+    Streamed, Uploaded, Who, slot,
 };
 use crate::error::Error;
 use crate::record::RecordSummary;
@@ -130,6 +130,7 @@ pub fn download_json(port: &str, path: &Path, bytes: &[u8], contents: &Contents)
                 "id": effect.id,
                 "coefficients": effect.coefficients,
                 "time_constant_s": effect.time_constant_s,
+                "weight_of_bit_0_v": effect.weight_of_bit_0_v,
             })
         })
         .collect();
@@ -151,7 +152,8 @@ pub fn download_json(port: &str, path: &Path, bytes: &[u8], contents: &Contents)
 }
 
 /// Result of `mimu device self-test`.
-pub fn self_test_json(port: &str, test: &SelfTest) -> Value {
+pub fn self_test_json(port: &str, found: &SelfTested) -> Value {
+    let test = &found.test;
     let [x, y, z, accel] = passed(test);
     with(
         "self-test",
@@ -162,6 +164,7 @@ pub fn self_test_json(port: &str, test: &SelfTest) -> Value {
             "gyro_st2_v": test.gyro_st2_v,
             "accel_fine_v": test.accel_fine_v,
             "accel_coarse_v": test.accel_coarse_v,
+            "moved": found.moved,
         }),
     )
 }

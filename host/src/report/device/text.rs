@@ -3,11 +3,12 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use mimu_core::wire::{Counters, SelfTest};
+use mimu_core::wire::Counters;
 
 use super::{counters, passed, triad_name, triad_units};
 use crate::device::{
-    Checked, Contents, Image, KalmanRun, LineCount, Stream, Streamed, Uploaded, Who, slot,
+    Checked, Contents, Image, KalmanRun, LineCount, SelfTested, Stream, Streamed, Uploaded, Who,
+    slot,
 };
 use crate::record::RecordSummary;
 use crate::report::text::{three, warn};
@@ -155,13 +156,17 @@ pub fn download_text(port: &str, path: &Path, bytes: &[u8], contents: &Contents)
         if let Some(time) = effect.time_constant_s {
             line!(out, "  time constant {time} s");
         }
+        if let Some(weight) = effect.weight_of_bit_0_v {
+            line!(out, "  weight of bit 0 {weight} V");
+        }
     }
     line!(out, "\nimage: {}", path.display());
     out
 }
 
 /// Result of `mimu device self-test`.
-pub fn self_test_text(port: &str, test: &SelfTest) -> String {
+pub fn self_test_text(port: &str, found: &SelfTested) -> String {
+    let test = &found.test;
     let mut out = String::new();
     line!(out, "{port}: self-test");
     let passed = passed(test);
@@ -184,6 +189,9 @@ pub fn self_test_text(port: &str, test: &SelfTest) -> String {
         volts(&test.accel_fine_v),
         volts(&test.accel_coarse_v)
     );
+    if let Some(moved) = &found.moved {
+        line!(out, "the unit did not stand still: {moved}");
+    }
     out
 }
 
