@@ -1,6 +1,7 @@
 //! The firmware's release image on the bench's emulated board, for tests that look at it as a whole.
 
 pub mod conversation;
+pub mod traces;
 
 use std::path::PathBuf;
 

@@ -10,6 +10,7 @@
 //! | `tests/coverage.rs`    | do the 95 % intervals contain the truth in 95 % of the cases?     |
 //! | `tests/real_*.rs`      | real recordings by other people against their published results   |
 //! | `tests/device_*.rs`   | the firmware's release image on the emulated board                |
+//! | `traces/`              | what the device sent of every kind of step, which `core` computes again |
 //! | `budget/`, `counted/`  | what the firmware costs                                           |
 //! | `demo.sh`, `demo/`     | what `make demo` runs, and the small recording that it falls back on |
 

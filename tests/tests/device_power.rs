@@ -14,9 +14,9 @@ use mimu_tests::device::{MS, still};
 use nalgebra::{Matrix3, Vector3};
 use plotters::prelude::*;
 
-/// Cuts: some, or as many as `MIMU_CUTS` says; `make device` takes 300. Starting the device after each takes seconds, since
-/// it polls while its converter calibrates. Half of them fall where words are being programmed, which takes a hundredth of
-/// the time.
+/// Cuts: some, or as many as `MIMU_CUTS` says; `make device` takes 300 and keeps the plot in `docs/device`. Starting the
+/// device after each takes seconds, since it polls while its converter calibrates. Half of them fall where words are being
+/// programmed, which takes a hundredth of the time.
 fn cuts() -> usize {
     std::env::var("MIMU_CUTS").map_or(30, |n| n.parse().unwrap())
 }
@@ -58,6 +58,8 @@ struct Course {
     done: u64,
     /// Slices of time in which a word was programmed.
     words: Vec<u64>,
+    /// Slices of time in which a sector was erased.
+    erasing: Vec<u64>,
 }
 
 /// Carries out the whole of it once.
@@ -67,7 +69,7 @@ fn course(old: &[u8], new: &[u8]) -> Course {
     device.upload(new);
     let committed = device.board.standing().ns;
     let id = device.send(Request::UploadCommit);
-    let mut words = Vec::new();
+    let (mut words, mut erasing) = (Vec::new(), Vec::new());
     while device.answer(id).is_none() {
         // Half the time that a word takes, so that none is missed.
         device.run_for(MS / 20);
@@ -79,6 +81,9 @@ fn course(old: &[u8], new: &[u8]) -> Course {
         {
             words.push(at);
         }
+        if operations.iter().any(|o| o.change == Change::Erase) {
+            erasing.push(at);
+        }
         assert!(at < committed + 20_000 * MS, "no answer to the commit");
     }
     Course {
@@ -86,6 +91,7 @@ fn course(old: &[u8], new: &[u8]) -> Course {
         committed,
         done: device.board.standing().ns,
         words,
+        erasing,
     }
 }
 
@@ -200,35 +206,67 @@ fn judge(course: &Course, [old, new]: [&[u8]; 2], stores: &[(u64, Vec<u8>)]) -> 
 
 /// Draws which calibration was there after the cut at each instant.
 fn plot(course: &Course, outcomes: &[(u64, bool)]) {
-    let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join("supply-cuts.svg");
+    let temporary = Path::new(env!("CARGO_TARGET_TMPDIR"));
+    let path = match std::env::var_os("MIMU_CUTS") {
+        // A plot of few cuts is no figure for a page.
+        None => temporary.join("supply-cuts.svg"),
+        Some(_) => Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/device/supply-cuts.svg"),
+    };
     let seconds = |at: u64| (at as f64 - course.began as f64) / 1e9;
+    let span = |slices: &[u64]| Some([*slices.first()?, *slices.last()?].map(seconds));
+    let words = span(&course.words).unwrap();
+    let phases = [
+        Some((
+            "upload",
+            [0.0, seconds(course.committed)],
+            RGBColor(120, 160, 210),
+        )),
+        span(&course.erasing).map(|s| ("a sector is erased", s, RGBColor(225, 165, 60))),
+        Some(("words are programmed", words, RGBColor(90, 170, 110))),
+    ];
     let end = seconds(outcomes.last().unwrap().0);
-    let first_word = seconds(course.words[0]);
-    let last_word = seconds(*course.words.last().unwrap());
-    let root = SVGBackend::new(&path, (900, 360)).into_drawing_area();
+    let root = SVGBackend::new(&path, (900, 330)).into_drawing_area();
     root.fill(&WHITE).unwrap();
     let panels = root.split_evenly((1, 2));
     let ranges = [
-        ("whole upload and commit", 0.0, end),
+        ("upload and commit", 0.0, end),
         (
-            "while words are programmed",
-            first_word - 0.002,
-            last_word + 0.004,
+            "enlarged: where words are programmed",
+            words[0] - 0.002,
+            words[1] + 0.004,
         ),
     ];
-    for (panel, (title, from, to)) in panels.iter().zip(ranges) {
+    for (k, (panel, (title, from, to))) in panels.iter().zip(ranges).enumerate() {
         let mut chart = ChartBuilder::on(panel)
-            .caption(title, ("sans-serif", 16))
+            .caption(title, ("sans-serif", 17))
             .margin(10)
-            .x_label_area_size(35)
-            .y_label_area_size(45)
-            .build_cartesian_2d(from..to, -0.5..1.5)
+            .margin_right(20)
+            .x_label_area_size(40)
+            .y_label_area_size(50)
+            .build_cartesian_2d(from..to, -0.5..2.0)
             .unwrap();
+        for (name, [begin, end], color) in phases.into_iter().flatten() {
+            let corners = [(begin.max(from), -0.5), (end.min(to), 2.0)];
+            if corners[0].0 >= corners[1].0 {
+                continue;
+            }
+            let drawn = chart
+                .draw_series([Rectangle::new(corners, color.mix(0.35).filled())])
+                .unwrap();
+            // The first panel has them all.
+            if k == 0 {
+                drawn.label(name).legend(move |(x, y)| {
+                    Rectangle::new([(x, y - 5), (x + 14, y + 5)], color.mix(0.6).filled())
+                });
+            }
+        }
         chart
             .configure_mesh()
-            .disable_y_mesh()
-            .x_desc("supply cut, seconds after the upload began")
+            .disable_mesh()
+            .x_desc("instant of the cut, s after the upload began")
+            .x_labels(6)
             .y_labels(3)
+            .label_style(("sans-serif", 14))
             .y_label_formatter(&|y| match *y {
                 0.0 => "old".into(),
                 1.0 => "new".into(),
@@ -241,12 +279,29 @@ fn plot(course: &Course, outcomes: &[(u64, bool)]) {
             .filter(|o| (from..=to).contains(&seconds(o.0)))
             .map(|&(at, is_new)| {
                 let (y, color) = if is_new { (1.0, BLUE) } else { (0.0, RED) };
-                Circle::new((seconds(at), y), 3, color.mix(0.5).filled())
+                Circle::new((seconds(at), y), 3, color.mix(0.6).filled())
             });
         chart.draw_series(points).unwrap();
+        if k == 0 {
+            chart
+                .configure_series_labels()
+                .position(SeriesLabelPosition::UpperLeft)
+                .background_style(WHITE.mix(0.7))
+                .label_font(("sans-serif", 13))
+                .draw()
+                .unwrap();
+        }
     }
     root.present().unwrap();
-    println!("{}", path.display());
+    let new = outcomes.iter().filter(|o| o.1).count();
+    println!(
+        "{} cuts: {} left the old calibration, {new} the new one, none anything else; upload {:.2} s, commit {:.2} s; {}",
+        outcomes.len(),
+        outcomes.len() - new,
+        seconds(course.committed),
+        (course.done - course.committed) as f64 / 1e9,
+        path.display()
+    );
 }
 
 #[test]

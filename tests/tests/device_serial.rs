@@ -63,6 +63,12 @@ fn no_sample_is_lost_or_out_of_order_and_all_are_1_ms_apart() {
     assert!(taken + 40 >= 1000 * long_run_s() + 100, "{taken} samples");
     assert_eq!(device.lost, (0, 0));
     assert_eq!(device.garbled(), 0);
+    println!(
+        "{taken} samples in {} s: {} lost, {} frames garbled, none out of order, all 20 conversions of 50 µs apart",
+        long_run_s(),
+        device.lost.0,
+        device.garbled()
+    );
     assert_eq!(device.board.findings().unwrap().broken, [""; 0]);
     assert_eq!(device.board.restarts().unwrap(), []);
 }

@@ -4,8 +4,11 @@ use std::fmt::Write as _;
 
 use nalgebra::{Matrix3, Vector3};
 
-/// Forward matrices (V per rad/s, V per m/s²) and biases (V).
-pub fn forward() -> [(Matrix3<f64>, Vector3<f64>); 2] {
+/// Forward matrices (V per rad/s, V per m/s²) and biases (V) of gyro and accelerometer.
+pub type Forward = [(Matrix3<f64>, Vector3<f64>); 2];
+
+/// Some unit.
+pub fn forward() -> Forward {
     let gyro = Matrix3::new(
         0.28, 0.002, -0.001, 0.003, 0.29, 0.001, -0.002, 0.001, 0.285,
     );
@@ -29,6 +32,11 @@ fn three(v: &Vector3<f64>) -> String {
 
 /// Text of a calibration of both sensors, with the effects.
 pub fn text(raw_unit: &str, effects: &str) -> String {
+    text_of(&forward(), raw_unit, effects)
+}
+
+/// The same of a certain unit.
+pub fn text_of(forward: &Forward, raw_unit: &str, effects: &str) -> String {
     let mut out = format!(
         "format = \"mimu-calibration/1\"\ndevice = \"unit-7\"\ncreated = \"2026-01-01T00:00:00Z\"\ntool = \"by hand\"\n\
          [recording]\nsha256 = \"00\"\nreference = \"table\"\nraw_unit = \"{raw_unit}\"\ngravity_mps2 = 9.81\ntemp_c = 26.5\n"
@@ -36,10 +44,7 @@ pub fn text(raw_unit: &str, effects: &str) -> String {
     let zeros = |n: usize| format!("[{}]", vec!["0.0"; n].join(", "));
     let zero_matrix = format!("[{0}, {0}, {0}]", zeros(3));
     let covariance = format!("[{}]", vec![zeros(12); 12].join(", "));
-    for ((name, unit), (p, b)) in [("gyro", "rad/s"), ("accel", "m/s^2")]
-        .iter()
-        .zip(forward())
-    {
+    for ((name, unit), (p, b)) in [("gyro", "rad/s"), ("accel", "m/s^2")].iter().zip(forward) {
         let c = p.try_inverse().unwrap();
         let o = -(c * b);
         let (z3, zm) = (zeros(3), &zero_matrix);
@@ -54,8 +59,8 @@ pub fn text(raw_unit: &str, effects: &str) -> String {
              misalignment_deg = {z3}\nsigma_misalignment_deg = {z3}\nnon_orthogonality_deg = {z3}\nsigma_non_orthogonality_deg = {z3}\n",
             rows(&c),
             three(&o),
-            rows(&p),
-            three(&b),
+            rows(p),
+            three(b),
         );
     }
     out + effects

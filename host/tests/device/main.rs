@@ -1,7 +1,8 @@
-//! `mimu device` and `mimu record` against a device by script at a pseudo-terminal: the command as it is run, from its arguments to
-//! its exit status.
+//! `mimu device` and `mimu record`, from their arguments to their exit status: against the firmware's release image on the emulated
+//! board ([`board`]), and against a device by script, which misbehaves as told. Both are behind pseudo-terminals.
 #![cfg(unix)]
 
+mod board;
 mod calibration;
 mod conversation;
 mod fuzz;

@@ -10,7 +10,7 @@ use crate::peer::{ACCEL_VOLTS, Act, GYRO_VOLTS, Peer, Script, TEMP_C, sums};
 use crate::{Place, command, mimu, start};
 
 /// All rows of a recording.
-fn rows(place: &Place, name: &str) -> (Recording, Batch) {
+pub fn rows(place: &Place, name: &str) -> (Recording, Batch) {
     let recording = Recording::open(&place.path(name)).unwrap();
     let mut all = Batch::default();
     let read = recording.for_each_batch(

@@ -50,6 +50,8 @@ pub struct Conversation {
     pub samples: Vec<Sample>,
     /// Samples and batches that the device says it has lost, by the last batch.
     pub lost: (u32, u32),
+    /// Every byte that comes, where one has put a list here to keep them.
+    pub kept: Option<Vec<u8>>,
 }
 
 impl Conversation {
@@ -62,6 +64,7 @@ impl Conversation {
             answers: Vec::new(),
             samples: Vec::new(),
             lost: (0, 0),
+            kept: None,
         }
     }
 
@@ -79,6 +82,9 @@ impl Conversation {
     /// Takes in what has come.
     pub fn listen(&mut self) {
         for (_, byte) in self.board.receive() {
+            if let Some(kept) = &mut self.kept {
+                kept.push(byte);
+            }
             let Some(frame) = self.decoder.push(byte) else {
                 continue;
             };

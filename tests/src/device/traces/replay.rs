@@ -1,0 +1,196 @@
+//! A trace computed again.
+
+use std::collections::BTreeMap;
+
+use mimu_core::compensation::Sample;
+use mimu_core::effects;
+use mimu_core::kalman::Bank;
+use mimu_core::stored::{self, ROOM};
+use mimu_core::wire::{
+    BATCH, BatchHead, Decoder, Event, KalmanState, MAX_FRAME, Message, Triad, encode,
+};
+use mimu_core::{single, table};
+use nalgebra::Vector3;
+
+use super::{INPUTS, NOISE, SPANS, Trace};
+
+/// What a replay has compared.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Replayed {
+    /// Samples of the raw stream.
+    pub raw: usize,
+    /// Compensated samples that are the device's, bit by bit.
+    pub compensated: usize,
+    /// Reports of banks that are the device's, bit by bit.
+    pub reports: usize,
+}
+
+/// Has `core` compute a trace again.
+///
+/// Errors: the first frame, sample or report that is another.
+pub fn replay(trace: &Trace) -> Result<Replayed, String> {
+    let stored = stored::decode(&trace.calibration).map_err(|e| format!("calibration: {e:?}"))?;
+    let mut twin = Twin {
+        model: stored.table.state(),
+        effects: effects::State::new(1000.0),
+        slow_at: None,
+        next: None,
+        stored,
+    };
+    let (mut found, mut decoder) = (Replayed::default(), Decoder::new());
+    let mut raw: Option<(BatchHead, Vec<Sample<f32>>)> = None;
+    let (mut all, mut reports) = (BTreeMap::new(), Vec::new());
+    let mut begin = 0;
+    for (i, byte) in trace.wire.iter().enumerate() {
+        let frame = decoder.push(*byte);
+        let bytes = begin..=i;
+        if *byte == 0 {
+            begin = i + 1;
+        }
+        let Some(frame) = frame else { continue };
+        let message = frame
+            .message()
+            .ok_or_else(|| format!("byte {i}: a frame that is not understood"))?;
+        same_bytes(&message, &trace.wire[bytes]).map_err(|e| format!("byte {i}: {e}"))?;
+        match message {
+            Message::Event(Event::Raw(batch)) => {
+                let samples: Vec<_> = batch.volts().collect();
+                found.raw += samples.len();
+                all.extend(samples.iter().copied());
+                raw = Some((batch.head, samples.into_iter().map(|(_, s)| s).collect()));
+            }
+            Message::Event(Event::Compensated(batch)) => {
+                let (head, samples) = raw.take().ok_or("a compensated batch without a raw one")?;
+                let device: Vec<_> = batch.values().map(|(_, s)| s).collect();
+                if head != batch.head || samples.len() != device.len() {
+                    return Err(format!("sample {}: the two batches differ", head.first));
+                }
+                found.compensated += twin.compare(&head, &samples, &device)?;
+            }
+            Message::Event(Event::Kalman(state)) => {
+                // The samples that it took in last come with the batch behind it.
+                reports.push(state);
+            }
+            _ => {}
+        }
+    }
+    for report in &reports {
+        found.reports += usize::from(same_report(report, &all)?);
+    }
+    match decoder.garbled() {
+        0 => Ok(found),
+        n => Err(format!("{n} frames are garbled")),
+    }
+}
+
+/// A message is encoded as the device has.
+fn same_bytes(message: &Message<'_>, bytes: &[u8]) -> Result<(), String> {
+    let mut out = [0; MAX_FRAME];
+    let length = encode(message, &mut out).map_err(|e| format!("{e:?}"))?;
+    // The zero in front of a frame is an empty frame to the decoder.
+    match out[1..length] == *bytes {
+        true => Ok(()),
+        false => Err("the message is encoded otherwise".into()),
+    }
+}
+
+/// The device's side, in single precision.
+struct Twin {
+    stored: stored::Stored,
+    model: table::State<f32>,
+    effects: effects::State<f32, ROOM>,
+    /// Number of the sample at which the slow effects were followed last.
+    slow_at: Option<u32>,
+    next: Option<u32>,
+}
+
+/// Samples from which on a trace is compared where effects are removed. The angular acceleration is a difference to the sample before,
+/// which is not known of the first; and each sample is freed from the error that the one before had, of which a thousandth or
+/// less is left in the next.
+const SETTLED: usize = 8;
+
+impl Twin {
+    fn compare(
+        &mut self,
+        head: &BatchHead,
+        raw: &[Sample<f32>],
+        device: &[Sample<f32>],
+    ) -> Result<usize, String> {
+        self.stored.table.follow(&mut self.model, head.temp_c);
+        self.follow(head);
+        let mut compared = 0;
+        for (k, (raw, device)) in raw.iter().zip(device).enumerate() {
+            let mut sample = single::compensate(&self.model.model, raw);
+            if let Some(all) = &self.stored.effects {
+                sample = single::remove(all, &mut self.effects, &sample);
+                if k < SETTLED && self.next != Some(head.first) {
+                    continue;
+                }
+            }
+            let bits = |s: &Sample<f32>| [s.gyro, s.accel].map(|v| v.map(f32::to_bits));
+            if bits(&sample) != bits(device) {
+                let number = head.first + k as u32;
+                return Err(format!(
+                    "sample {number}: {sample:?}, and the device {device:?}"
+                ));
+            }
+            compared += 1;
+        }
+        self.next = Some(head.first + raw.len() as u32);
+        Ok(compared)
+    }
+
+    /// As the firmware does, from the start on: batch after batch, since the time is a sum.
+    fn follow(&mut self, head: &BatchHead) {
+        let Some(all) = &self.stored.effects else {
+            return;
+        };
+        let mut at = self.slow_at.map_or(0, |last| last + BATCH as u32);
+        loop {
+            let passed = at - self.slow_at.unwrap_or(0);
+            all.slow(&mut self.effects, passed as f32 / 1000.0, head.temp_c);
+            self.slow_at = Some(at);
+            if at >= head.first {
+                break;
+            }
+            at += BATCH as u32;
+        }
+    }
+}
+
+/// Runs a bank up to a report. `false` for one from before the first input, and for one behind the last batch.
+fn same_report(device: &KalmanState, samples: &BTreeMap<u32, Sample<f32>>) -> Result<bool, String> {
+    if device.updates == 0 {
+        return Ok(false);
+    }
+    let (i, what) = match device.triad {
+        Triad::Gyro => (0, "gyro"),
+        Triad::Accel => (1, "accel"),
+    };
+    let (noise, input) = (Vector3::from(NOISE), Vector3::from(INPUTS[i]));
+    let mut bank = Bank::<f32>::diffuse(&noise, SPANS[i]);
+    for number in device.last + 1 - device.updates..=device.last {
+        let Some(sample) = samples.get(&number) else {
+            return Ok(false);
+        };
+        let reading = [&sample.gyro, &sample.accel][i];
+        single::update(&mut bank, &input, reading, &noise)
+            .map_err(|e| format!("{what}, sample {number}: {e:?}"))?;
+    }
+    for (axis, (filter, told)) in bank.axes.iter().zip(&device.axes).enumerate() {
+        let p = filter.covariance();
+        let covariance = [
+            p.m11, p.m12, p.m13, p.m14, p.m22, p.m23, p.m24, p.m33, p.m34, p.m44,
+        ];
+        let mean: [f32; 4] = filter.mean().into();
+        let same = mean.map(f32::to_bits) == told.mean.map(f32::to_bits)
+            && covariance.map(f32::to_bits) == told.covariance.map(f32::to_bits);
+        if !same {
+            return Err(format!(
+                "{what} {axis} after sample {}: {mean:?}, and the device {:?}",
+                device.last, told.mean
+            ));
+        }
+    }
+    Ok(true)
+}
