@@ -184,7 +184,7 @@ fn sensor(d: &Diagnosis, s: &SensorDiagnosis, picture: &Picture) -> Markup {
         @for (one, panels) in s.decision.accepted.iter().zip(&picture.effects) {
             (effect(d, s, one, panels))
         }
-        @for note in &s.decision.notes { p { strong { "Note. " } (sentence(note)) "." } }
+        @for note in &s.decision.notes { p { strong { "Note. " } (note) "." } }
         @if !after {
             p { "No effect is accepted; residuals are those of the affine calibration." }
         }
