@@ -281,10 +281,15 @@ impl<T: RealField + Copy> Code<T> {
     }
 
     /// Readings without their errors, raw. The error is one of the code that the reading should have had, so the code is looked at
-    /// again without it.
+    /// again without it; where that changes the error by more than it is, beside the turn of a bit that is far off, it would lead away.
     #[inline(always)]
     pub fn clean(&self, raw: &Vector3<T>) -> Vector3<T> {
-        raw.map(|u| u - self.error(u - self.error(u)))
+        let first = raw.map(|u| self.error(u));
+        let second = (raw - first).map(|u| self.error(u));
+        match (second - first).norm_squared() < first.norm_squared() {
+            true => raw - second,
+            false => raw - first,
+        }
     }
 
     #[inline(always)]

@@ -102,12 +102,11 @@ pub fn check(
             .cloned()
             .collect(),
     };
-    session.forget_events();
     let both = Request::Stream {
         raw: true,
         compensated: true,
     };
-    session.done(both, "to stream")?;
+    session.begin_stream(both)?;
     let mut raw: Option<Samples> = None;
     let mut heard = Instant::now();
     while found.samples < wanted {

@@ -116,9 +116,8 @@ pub fn kalman(
     let mut ends: Vec<u32> = Vec::new();
     for (at, input) in plan.inputs.iter().enumerate() {
         apply(input)?;
-        session.forget_events();
         log.heard = Instant::now();
-        session.done(raw, "to stream")?;
+        session.begin_stream(raw)?;
         // A stream begins with a batch, an input with a sample: those in between would be missing here.
         let before = log.samples.len();
         while log.samples.len() == before {

@@ -22,6 +22,8 @@ pub(super) struct Line {
     pub ear: Ear,
     pub waiting: VecDeque<Event>,
     pub overflowed: u64,
+    /// How many of those that wait came before the last answer.
+    pub before_answer: usize,
     /// Calls that had to be made again.
     pub repeated: u32,
     last_id: u16,
@@ -34,6 +36,7 @@ impl Line {
             ear: Ear::default(),
             waiting: VecDeque::new(),
             overflowed: 0,
+            before_answer: 0,
             repeated: 0,
             // Not always 1, so that answers to a program before this one are nobody's.
             last_id: std::process::id() as u16,
@@ -71,11 +74,15 @@ impl Line {
         let mut answer = None;
         let mut stranger = None;
         let (waiting, overflowed) = (&mut self.waiting, &mut self.overflowed);
+        let before_answer = &mut self.before_answer;
         self.ear.take(&bytes[..count], |heard| match heard {
             Heard::Event(event) if waiting.len() < WAITING => waiting.push_back(event),
             Heard::Event(_) => *overflowed += 1,
             // Answers to calls that were given up are late, and nobody's.
-            Heard::Answer(id, of) if Some(id) == wanted => answer = Some(of),
+            Heard::Answer(id, of) if Some(id) == wanted => {
+                *before_answer = waiting.len();
+                answer = Some(of);
+            }
             Heard::Answer(..) => {}
             Heard::Stranger(_, magic, version) => stranger = Some((magic, version)),
         });

@@ -165,6 +165,16 @@ impl Session {
         Ok(event)
     }
 
+    /// Has the device stream, and forgets what came before it said so: batches of an older stream may still have been on the way,
+    /// and would be followed by a gap.
+    pub fn begin_stream(&mut self, request: Request<'_>) -> Result<()> {
+        self.done(request, "to stream")?;
+        let old = self.line.before_answer.min(self.line.waiting.len());
+        self.line.waiting.drain(..old);
+        self.line.overflowed = 0;
+        Ok(())
+    }
+
     /// Forgets the events that wait.
     pub fn forget_events(&mut self) {
         self.line.waiting.clear();

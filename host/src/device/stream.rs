@@ -54,13 +54,12 @@ pub fn stream(
     let mut squares = [0.0; 6];
     let mut expected: Option<u32> = None;
     let mut heard = Instant::now();
-    session.forget_events();
     let before = session.count();
     let request = Request::Stream {
         raw: which == Stream::Raw,
         compensated: which == Stream::Compensated,
     };
-    session.done(request, "to stream")?;
+    session.begin_stream(request)?;
     'all: while !stop() {
         let batch = match (session.event()?, which) {
             (Some(Event::Raw(batch)), Stream::Raw)

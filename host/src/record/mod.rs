@@ -148,7 +148,6 @@ pub fn record(
         // A program that was killed may have left half a frame.
         before: session.count(),
     };
-    session.forget_events();
     let ended = run.receive(session, options, &mut look);
     let mut standing = run.standing;
     standing.line = session.count().since(&run.before);
@@ -213,7 +212,7 @@ impl Run {
             raw: true,
             compensated: false,
         };
-        session.done(raw, "to stream")?;
+        session.begin_stream(raw)?;
         let rate_hz = f64::from(session.who().sample_rate_hz);
         let wanted = options
             .duration
