@@ -87,6 +87,6 @@ fn after_the_reset_pin_and_after_a_power_cut_it_samples_again_in_step() {
 #[test]
 fn the_image_leaves_most_of_its_memory_free() {
     let sizes = image().sizes();
-    assert!(sizes.flash <= 64_000, "{} bytes of flash", sizes.flash);
+    assert!(sizes.flash <= 65_536, "{} bytes of flash", sizes.flash);
     assert!(sizes.ram < 32 << 10, "{} bytes of RAM", sizes.ram);
 }

@@ -284,11 +284,13 @@ impl<T: RealField + Copy> Code<T> {
     /// again without it; where that changes the error by more than it is, beside the turn of a bit that is far off, it would lead away.
     #[inline(always)]
     pub fn clean(&self, raw: &Vector3<T>) -> Vector3<T> {
-        let first = raw.map(|u| self.error(u));
-        let second = (raw - first).map(|u| self.error(u));
-        match (second - first).norm_squared() < first.norm_squared() {
-            true => raw - second,
-            false => raw - first,
+        let (a, b, c) = (raw.x, raw.y, raw.z);
+        let (a1, b1, c1) = (self.error(a), self.error(b), self.error(c));
+        let (a2, b2, c2) = (self.error(a - a1), self.error(b - b1), self.error(c - c1));
+        let (da, db, dc) = (a2 - a1, b2 - b1, c2 - c1);
+        match da * da + db * db + dc * dc < a1 * a1 + b1 * b1 + c1 * c1 {
+            true => Vector3::new(a - a2, b - b2, c - c2),
+            false => Vector3::new(a - a1, b - b1, c - c1),
         }
     }
 

@@ -115,7 +115,7 @@ impl EffectTable {
                 .map(|((name, unit), (value, sigma))| CoefficientTable {
                     name,
                     value: *value,
-                    sigma: sigma,
+                    sigma,
                     unit,
                 })
                 .collect(),

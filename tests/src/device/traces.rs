@@ -160,7 +160,7 @@ fn nodes() -> Vec<u8> {
 }
 
 /// One of every kind of law. Without lags, whose state when the stream begins is not on the line, and without the warm-up, whose
-/// exponential is the PC's library's here and differs from the device's in the last bit now and then.
+/// exponential is the PC's library's here, and may differ from the device's in the last bit.
 fn with_effects() -> Vec<u8> {
     let named = |id, coefficients, form| Record::Named {
         id,
