@@ -9,7 +9,7 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::rows::Rows;
-use root::{Axes, Root};
+use root::{Axes, Root, Separable};
 
 pub use root::{Kept, Whitener};
 
@@ -61,6 +61,8 @@ pub struct Spread<'a> {
     /// Axes in which the rows of a stratum are independent whatever its excess, as long as there is no walk: its own where one is
     /// sought.
     axes: Vec<Option<Axes>>,
+    /// The walk that is sought of each, where it has a root of few terms.
+    separable: Vec<Option<Separable>>,
     /// Typical variance of a row, and of a unit walk, by stratum.
     typical: Vec<(f64, f64)>,
     /// Whether a walk is sought where the wander is known as well.
@@ -75,6 +77,7 @@ impl<'a> Spread<'a> {
             rows,
             all_walk,
             axes: Vec::new(),
+            separable: Vec::new(),
             typical: rows
                 .strata
                 .iter()
@@ -87,6 +90,9 @@ impl<'a> Spread<'a> {
                 true => Axes::as_they_stand(&rows.strata[s].known),
                 false => Some(Axes::of(&rows.strata[s].known)),
             })
+            .collect();
+        spread.separable = (0..rows.strata.len())
+            .map(|s| Separable::of(rows.strata[s].walk.as_ref().filter(|_| spread.walks(s))?))
             .collect();
         spread
     }
@@ -126,6 +132,11 @@ impl<'a> Spread<'a> {
             && walk == 0.0
         {
             return Some(axes.root(excess, floor));
+        }
+        if let (Some(axes), Some(separable)) = (&self.axes[s], &self.separable[s])
+            && let Some(known) = axes.standing()
+        {
+            return separable.root(walk, &known.map(|v| v.max(floor) + excess));
         }
         let mut v = stratum.known.clone();
         if let Some(unit) = &stratum.walk {
