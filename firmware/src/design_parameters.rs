@@ -100,8 +100,9 @@ pub const CHANNELS: usize = 10;
 /// parts from the PHY; it has the reference, the one signal whose loss does not cost an axis. The
 /// debugger's serial line (PD8, PD9), USB and the other LEDs have no input of ADC1.
 ///
-/// Pin and input numbers are those of the part's tables, and were seen to match on an emulated board; the header positions and
-/// the jumper are from the board's manual as remembered, to be checked against the board before anything is wired.
+/// Pin and input numbers are those of the part's tables, and were seen to match on an emulated board. A0 to A3 and D3 to D13 are
+/// those of Zephyr's description of this board, CN12 that of published drawings of the Nucleo-144 family; D24, D32 and the
+/// jumper are to be checked against the board's manual (UM2407) before anything is wired.
 ///
 /// The three axes of a triad stand together: neighbours are 50 µs apart, which at the gyro's 40 Hz
 /// is 0.7 degrees of phase.
