@@ -91,7 +91,9 @@ pub fn run(args: &DiagnoseArgs) -> Result<()> {
     let found = diagnosis
         .sensors
         .iter()
-        .flat_map(|s| s.decision.accepted.iter().map(EffectTable::from));
+        .flat_map(|s| &s.decision.accepted)
+        .filter(|a| a.chosen.candidate.is_error())
+        .map(EffectTable::from);
     let effects: Vec<EffectTable> = known.iter().cloned().chain(found).collect();
     let after = to_toml(&diagnosis.after, &effects, &now);
     let mut judged = None;

@@ -2,7 +2,12 @@
 
 use mimu::diagnose::{Diagnosis, Verdict, diagnose};
 use mimu::dwell::Sensor;
-use mimu_tests::blind::{Case, case};
+use mimu::fit::{Method, Options};
+use mimu::stillness::STILL_FACTOR;
+use mimu_rig::located::Source;
+use mimu_rig::plan::Plan;
+use mimu_tests::bench;
+use mimu_tests::blind::{Case, case, plan, unit};
 use mimu_tests::recordings::{mikoff, xsens};
 use rayon::prelude::*;
 
@@ -55,6 +60,41 @@ fn what_is_on_no_list_is_told_to_be_unexplained() {
             assert_eq!(case.verdict, "unexplained", "{case:?}");
         }
     }
+}
+
+#[test]
+fn a_quiet_gyro_reads_the_earth_and_nothing_takes_that_from_it() {
+    // A tenth of the noise of the usual parts, at the latitude of the bench.
+    let mut file = unit(&[], 3);
+    file.earth_rate = Some(true);
+    file.unit.gyro_axes.white_si = Some([1.7e-4; 3]);
+    file.unit.gyro_axes.instability_si = Some([1e-7; 3]);
+    file.unit.gyro_axes.walk_si = Some([1e-10; 3]);
+    let plan = plan(3);
+    let place = Plan::parse(Source::new("plan", &plan)).unwrap().place;
+    let expected = place.earth_rate()[2];
+    let recorded = bench::recorded(&plan, &file, 3);
+    let noise = bench::noise_file(&file, 3, recorded.condensed.period_s);
+    let options = Options {
+        method: Method::LeastSquares,
+        holdout_blocks: 0,
+        only: None,
+        still_factor: STILL_FACTOR,
+    };
+    let found = diagnose(recorded.with_noise(&noise).unwrap().into(), options).unwrap();
+    let accepted: Vec<_> = found
+        .sensors
+        .iter()
+        .flat_map(|s| &s.decision.accepted)
+        .collect();
+    let [earth] = accepted[..] else {
+        panic!("{accepted:?}")
+    };
+    assert_eq!(earth.chosen.candidate.id(), "earth_rate");
+    let (value, sigma) = (earth.values[0], earth.covariance[(0, 0)].sqrt());
+    println!("{value:.3e} +- {sigma:.1e} rad/s about the vertical; true {expected:.3e}");
+    assert!((value - expected).abs() < 3.0 * sigma && value > 5.0 * sigma);
+    assert!(!earth.chosen.candidate.is_error());
 }
 
 fn diagnosed(fit: mimu::fit::Fit) -> Diagnosis {

@@ -12,7 +12,7 @@ use super::Calibration;
 use super::writing::{number, quoted};
 use crate::diagnose::candidate::{Candidate, Kind, Monomial, Variable};
 use crate::diagnose::decision::Accepted;
-use crate::diagnose::effect::{Effect, Moment, Reading};
+use crate::diagnose::effect::{Effect, Moment, Reading, Scope};
 use crate::diagnose::library;
 use crate::diagnose::removal::{Removed, errors};
 use crate::dwell::Sensor;
@@ -91,8 +91,8 @@ impl EffectTable {
     ///
     /// What is of the recording alone stays out.
     pub fn new(removed: &Removed, sigmas: &[f64]) -> Self {
-        let (_, sigmas) = removed.candidate.of_unit(sigmas);
-        let removed = &removed.of_unit();
+        let (_, sigmas) = removed.candidate.lasting(sigmas);
+        let removed = &removed.lasting();
         let candidate = &removed.candidate;
         let (about, form) = match &candidate.kind {
             Kind::Effect(e) => (e.about, e.form),
@@ -235,7 +235,7 @@ impl EffectTable {
 /// The candidate of an id, with all of its coefficients.
 fn candidate(id: &str) -> Option<Candidate> {
     let Some(term) = id.strip_prefix("term:") else {
-        let effect = library::by_id(id)?;
+        let effect = library::by_id(id).filter(|e| e.is_error())?;
         return Some(Candidate::new(effect.sensor, Kind::Effect(effect)));
     };
     let (of, product) = term.split_once('~')?;
@@ -344,7 +344,10 @@ fn on_device<T: RealField + Copy>(
     match &candidate.kind {
         Kind::Effect(effect) => {
             // Those of a recording stand last, and no file has them.
-            let of_unit = effect.coefficients.iter().filter(|c| !c.of_recording);
+            let of_unit = effect
+                .coefficients
+                .iter()
+                .filter(|c| c.scope == Scope::Unit);
             let mut all = vec![T::zero(); of_unit.count()];
             for (k, value) in candidate.active.iter().zip(&removed.values) {
                 if let Some(slot) = all.get_mut(*k) {

@@ -4,7 +4,7 @@ mod monomial;
 
 use nalgebra::{DMatrix, Vector3};
 
-use super::effect::{Effect, Form, FormKind, Moment, Reading};
+use super::effect::{Behind, Effect, Form, FormKind, Moment, Reading, Scope};
 use super::library::readout;
 use super::rows::Rows;
 use crate::dwell::Sensor;
@@ -41,7 +41,9 @@ pub struct Candidate {
     pub active: Vec<usize>,
     /// Its nonlinear constant, where the readings say it.
     pub known_form: Option<f64>,
-    /// How many choices of coefficients it is the best of.
+    /// As in [`Behind`].
+    pub elsewhere: bool,
+    /// How many choices it is the best of.
     pub choices: f64,
     /// Coefficients to choose from, where the choice is part of the search.
     pub offered: Vec<usize>,
@@ -112,12 +114,12 @@ impl Candidate {
         (0..FORMS).map(|k| from * step.powi(k as i32)).collect()
     }
 
-    /// A candidate with all of the coefficients that are the unit's.
+    /// A candidate with all of its coefficients but those of the recording alone.
     pub fn new(sensor: Sensor, kind: Kind) -> Self {
         let active = match &kind {
             Kind::Effect(e) => {
-                let of_unit = |k: &usize| !e.coefficients[*k].of_recording;
-                (0..e.coefficients.len()).filter(of_unit).collect()
+                let lasting = |k: &usize| e.coefficients[*k].scope != Scope::Recording;
+                (0..e.coefficients.len()).filter(lasting).collect()
             }
             _ => vec![0],
         };
@@ -126,6 +128,7 @@ impl Candidate {
             kind,
             active,
             known_form: None,
+            elsewhere: false,
             choices: 1.0,
             offered: Vec::new(),
         }
@@ -149,14 +152,22 @@ impl Candidate {
     /// The candidates that it is tried as: of the bits of a code, which are wrong has to be found as well, so each by itself
     /// and all from the first down to each. The search goes on from the best of these.
     ///
-    /// What is of the recording alone is tried as well, and costs its coefficients.
-    pub fn variants(mut self) -> Vec<Self> {
+    /// What is of the recording alone is tried as well, and costs its coefficients; of what goes by a lag, whether the thermometer is
+    /// on the same die.
+    pub fn variants(mut self, rows: &Rows) -> Vec<Self> {
         let of_recording = self.of_recording();
         if !of_recording.is_empty() {
-            self.choices = 2.0;
             let mut whole = self.clone();
             whole.active.extend(of_recording);
-            return vec![self, whole];
+            let mut all = vec![self, whole];
+            if all[0].lag_s(1.0).is_some() && rows.thermometer_warms_up() {
+                let mut elsewhere = all.clone();
+                elsewhere.iter_mut().for_each(|c| c.elsewhere = true);
+                all.extend(elsewhere);
+            }
+            let choices = all.len() as f64;
+            all.iter_mut().for_each(|c| c.choices = choices);
+            return all;
         }
         if !self.reads_code() {
             return vec![self];
@@ -180,24 +191,33 @@ impl Candidate {
         };
         let is_active = |axis| self.active.iter().any(|k| e.coefficients[*k].axis == axis);
         let all = e.coefficients.iter().enumerate();
-        all.filter(|(_, c)| c.of_recording && is_active(c.axis))
+        all.filter(|(_, c)| c.scope == Scope::Recording && is_active(c.axis))
             .map(|(k, _)| k)
             .collect()
     }
 
+    /// Whether the readings err by it.
+    pub fn is_error(&self) -> bool {
+        match &self.kind {
+            Kind::Effect(e) => e.is_error(),
+            Kind::Term(..) | Kind::Jump { .. } => true,
+        }
+    }
+
     /// It and the values of its active coefficients without those that are of a recording alone.
-    pub fn of_unit(&self, values: &[f64]) -> (Self, Vec<f64>) {
+    pub fn lasting(&self, values: &[f64]) -> (Self, Vec<f64>) {
         let Kind::Effect(e) = &self.kind else {
             return (self.clone(), values.to_vec());
         };
-        let of_unit = |(k, _): &(usize, f64)| !e.coefficients[*k].of_recording;
+        let lasting = |(k, _): &(usize, f64)| e.coefficients[*k].scope != Scope::Recording;
         let all = self.active.iter().copied().zip(values.iter().copied());
-        let (active, values) = all.filter(of_unit).unzip();
-        let unit = Self {
+        let (active, values) = all.filter(lasting).unzip();
+        let lasting = Self {
             active,
+            elsewhere: false,
             ..self.clone()
         };
-        (unit, values)
+        (lasting, values)
     }
 
     /// Active coefficient and axis of each of its regressors.
@@ -315,14 +335,20 @@ impl Candidate {
         }
     }
 
+    /// The temperature that its regressors want behind a lag.
+    pub fn behind(&self, form: f64) -> Option<Behind> {
+        let elsewhere = self.elsewhere;
+        self.lag_s(form).map(|lag_s| Behind { lag_s, elsewhere })
+    }
+
     /// Its columns in `rows`.
     pub fn columns(&self, rows: &Rows, form: f64) -> DMatrix<f64> {
-        self.columns_at(rows, &rows.moments(self.lag_s(form)), form)
+        self.columns_at(rows, &rows.moments(self.behind(form)), form)
     }
 
     /// Columns of the one regressor of a term or a jump as an error of each of `axes`: it takes longer to find than to weigh.
     pub fn columns_by_axis(&self, rows: &Rows, axes: &[usize]) -> DMatrix<f64> {
-        let moments = rows.moments(self.lag_s(0.0));
+        let moments = rows.moments(self.behind(0.0));
         rows.columns(&moments, axes, |at, out| {
             self.regressors(at, 0.0, &mut out[..1]);
             out.fill(out[0]);

@@ -118,7 +118,7 @@ pub fn decide(rows: &Rows, dwell_ends: &[(usize, f64)], unseen: Option<&Rows>) -
         let each = kept.iter().zip(values);
         let given: Vec<Removed> = each
             .map(|(c, values)| {
-                let (candidate, values) = c.candidate.of_unit(values.as_slice());
+                let (candidate, values) = c.candidate.lasting(values.as_slice());
                 Removed {
                     candidate,
                     form: c.form,
@@ -302,17 +302,26 @@ fn shares(search: &Search, chosen: &[Chosen], fit: &Fitted) -> Vec<DVector<f64>>
     all
 }
 
-/// What the experiment cannot tell of the chosen.
+/// What a person should know of the chosen.
 fn notes(rows: &Rows, chosen: &[Chosen]) -> Vec<String> {
+    let mut notes = Vec::new();
+    let inputs = chosen.iter().filter(|c| !c.candidate.is_error());
+    notes.extend(inputs.map(|c| {
+        format!(
+            "{}: the unit is right to read it; the calibration is found without it, and nothing takes it out of readings",
+            c.candidate.id()
+        )
+    }));
     let slow = chosen.iter().filter(|c| c.candidate.is_slow());
     let ids: Vec<String> = slow.map(|c| c.candidate.id()).collect();
     let Some(order) = rows.one_way().filter(|_| !ids.is_empty()) else {
-        return Vec::new();
+        return notes;
     };
-    vec![format!(
+    notes.push(format!(
         "{}: the temperature only {} while time goes on (rank correlation {order:.2}), so that what follows temperature and what \
          follows time look alike, and a lag of the die looks like a bias; let it come back within one recording",
         ids.join(", "),
         if order > 0.0 { "rises" } else { "falls" },
-    )]
+    ));
+    notes
 }

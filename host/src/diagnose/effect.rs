@@ -58,6 +58,15 @@ impl Moment {
     }
 }
 
+/// The temperature that [`Moment::late_c`] is made of.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Behind {
+    /// Lag, s.
+    pub lag_s: f64,
+    /// Whether the thermometer is on another die, and what it warms up by itself after power-on not the sensor's.
+    pub elsewhere: bool,
+}
+
 /// Middle of each block, s, and its temperature above [`REFERENCE_C`], °C: where there is none that of the block before, as
 /// the device does it, and not a number before the first.
 pub fn warmth(blocks: &[Block]) -> Vec<(f64, f64)> {
@@ -138,8 +147,19 @@ pub struct Coefficient {
     pub axis: Option<usize>,
     /// Unit.
     pub unit: &'static str,
-    /// Whether it belongs to the first recording and not to the unit: it is fitted and told, and neither written nor removed elsewhere.
-    pub of_recording: bool,
+    /// What it belongs to.
+    pub scope: Scope,
+}
+
+/// What a coefficient belongs to. All are fitted and told.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Scope {
+    /// The unit: it is an error, written and removed.
+    Unit,
+    /// The first recording: neither written nor removed elsewhere.
+    Recording,
+    /// The place: what the sensor reads is there. The calibration is found without it, and nothing takes it out of readings.
+    Place,
 }
 
 /// One kind of effect. The error of sensor axis i is the sum over the coefficients of i of coefficient times regressor, in the
@@ -163,4 +183,11 @@ pub struct Effect {
     pub regressors: fn(&Moment, f64, &mut [f64]),
     /// What an experiment has to have for it to be seen.
     pub needs: &'static str,
+}
+
+impl Effect {
+    /// Whether the readings err by it; else it is something that they should show.
+    pub fn is_error(&self) -> bool {
+        self.coefficients.iter().all(|c| c.scope != Scope::Place)
+    }
 }

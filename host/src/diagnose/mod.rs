@@ -255,7 +255,7 @@ pub fn diagnose(recordings: Recordings, options: Options) -> Result<Diagnosis> {
             })
             .collect();
         if !found.is_empty() {
-            let elsewhere: Vec<Removed> = found.iter().map(Removed::of_unit).collect();
+            let elsewhere: Vec<Removed> = found.iter().map(Removed::lasting).collect();
             let clean = |(k, s): (usize, &Session)| {
                 let effects = if k == 0 { &found } else { &elsewhere };
                 remove(s.prepared, s.gyro.as_ref(), s.accel.as_ref(), effects).ok_or_else(singular)

@@ -4,8 +4,8 @@ use mimu_core::compensation::Affine;
 use nalgebra::{Matrix3, Vector3};
 
 use super::candidate::Candidate;
-use super::effect::{Moment, Reading, warmth};
-use super::rows::{directions, late};
+use super::effect::{Behind, Moment, Reading, warmth};
+use super::rows::{directions, elsewhere, late};
 use crate::blocks::Block;
 use crate::dwell::Sensor;
 use crate::prepared::Prepared;
@@ -23,8 +23,8 @@ pub struct Removed {
 
 impl Removed {
     /// It without what is of the recording that it was found in alone.
-    pub fn of_unit(&self) -> Self {
-        let (candidate, values) = self.candidate.of_unit(&self.values);
+    pub fn lasting(&self) -> Self {
+        let (candidate, values) = self.candidate.lasting(&self.values);
         Self {
             candidate,
             values,
@@ -82,8 +82,8 @@ struct Stretches<'a> {
     direction: Matrix3<f64>,
     to_body: Matrix3<f64>,
     effects: &'a [&'a Removed],
-    /// Of each effect: the temperature behind its lag, by block.
-    late: Vec<Option<Vec<f64>>>,
+    /// Of each effect with a lag: the temperature that it goes by and that behind the lag, by block.
+    late: Vec<Option<Vec<(f64, f64)>>>,
 }
 
 impl Stretches<'_> {
@@ -104,8 +104,14 @@ impl Stretches<'_> {
         let sum = |moment: &Moment| {
             let mut error = Vector3::zeros();
             for (effect, late) in self.effects.iter().zip(&self.late) {
-                let late_c = late.as_ref().map_or(moment.warm_c, |l| l[at]);
-                effect.add(&Moment { late_c, ..*moment }, &mut error);
+                let now = (moment.warm_c, moment.warm_c);
+                let (warm_c, late_c) = late.as_ref().map_or(now, |l| l[at]);
+                let moment = Moment {
+                    warm_c,
+                    late_c,
+                    ..*moment
+                };
+                effect.add(&moment, &mut error);
             }
             error
         };
@@ -142,7 +148,16 @@ fn of_sensor(
         effects,
         late: effects
             .iter()
-            .map(|e| Some(late(&warm, e.candidate.lag_s(e.form)?)))
+            .map(|e| {
+                let Behind {
+                    lag_s,
+                    elsewhere: other,
+                } = e.candidate.behind(e.form)?;
+                let other = if other { elsewhere(&warm) } else { None };
+                let warm = other.as_ref().unwrap_or(&warm);
+                let now = warm.iter().map(|w| w.1);
+                Some(now.zip(late(warm, lag_s)).collect())
+            })
             .collect(),
     };
     let from = sensor.channels().start;

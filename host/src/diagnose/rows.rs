@@ -23,12 +23,12 @@ use std::ops::Range;
 use mimu_core::compensation::Affine;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
-use super::effect::Moment;
+use super::effect::{Behind, Moment};
 use crate::dwell::Sensor;
 use crate::prepared::Prepared;
 use crate::triad::Forward;
 
-pub(crate) use lag::late;
+pub(crate) use lag::{elsewhere, late};
 
 /// Rows that share their noise.
 #[derive(Debug, Clone)]
@@ -126,6 +126,8 @@ pub struct Rows {
     block: Vec<(usize, usize)>,
     /// Of each recording: time of each block, s, and its temperature, °C above the reference.
     warm: Vec<Vec<(f64, f64)>>,
+    /// The same without what the thermometer warms up by itself, where it does.
+    elsewhere: Vec<Option<Vec<(f64, f64)>>>,
     /// Number of the first dwell of each recording, and that of all dwells.
     first: Vec<usize>,
 }
@@ -228,17 +230,27 @@ impl Rows {
         })
     }
 
-    /// The moments, with the temperature behind a lag of `lag_s` if there is one.
-    pub fn moments(&self, lag_s: Option<f64>) -> Cow<'_, [Moment]> {
-        let Some(lag_s) = lag_s else {
+    /// The moments, with the temperature behind a lag if there is one.
+    pub fn moments(&self, behind: Option<Behind>) -> Cow<'_, [Moment]> {
+        let Some(Behind { lag_s, elsewhere }) = behind else {
             return Cow::Borrowed(&self.moments);
         };
-        let late: Vec<Vec<f64>> = self.warm.iter().map(|w| late(w, lag_s)).collect();
+        let each = self.warm.iter().zip(&self.elsewhere);
+        let warm: Vec<&[(f64, f64)]> = each
+            .map(|(warm, other)| other.as_deref().filter(|_| elsewhere).unwrap_or(warm))
+            .collect();
+        let late: Vec<Vec<f64>> = warm.iter().map(|w| late(w, lag_s)).collect();
         let mut moments = self.moments.clone();
         for (moment, (session, at)) in moments.iter_mut().zip(&self.block) {
+            moment.warm_c = warm[*session][*at].1;
             moment.late_c = late[*session][*at];
         }
         Cow::Owned(moments)
+    }
+
+    /// Whether the thermometer of a recording warms up by itself.
+    pub fn thermometer_warms_up(&self) -> bool {
+        self.elsewhere.iter().any(Option::is_some)
     }
 
     /// Rank correlation of temperature and time where they go together in all recordings, so that what follows one follows the

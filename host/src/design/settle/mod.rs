@@ -83,10 +83,11 @@ pub enum Sought {
 impl Suspect {
     /// An effect by name, each of its coefficients at the size of data sheets.
     ///
-    /// `None` of an error of the code: which codes a dwell meets is decided by the noise and the bias of the unit, and by no plan.
+    /// `None` of an error of the code: which codes a dwell meets is decided by the noise and the bias of the unit, and by no plan;
+    /// and of what is no error, which no session need be longer for.
     pub fn listed(effect: &'static Effect) -> Option<Self> {
         let candidate = Candidate::new(effect.sensor, Kind::Effect(effect));
-        (!candidate.reads_code()).then(|| Self {
+        (effect.is_error() && !candidate.reads_code()).then(|| Self {
             sizes: candidate
                 .active
                 .iter()

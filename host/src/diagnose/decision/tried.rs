@@ -52,7 +52,7 @@ pub(super) fn candidates(
         if candidate.active.is_empty() {
             not_excited.push((effect.id.into(), effect.needs.into()));
         } else {
-            all.extend(candidate.variants());
+            all.extend(candidate.variants(rows));
         }
     }
     let terms: Vec<Vec<Candidate>> = Monomial::all()

@@ -1,7 +1,7 @@
 //! Gyro errors that depend on the motion.
 
-use super::{each, matrix, per_axis};
-use crate::diagnose::effect::{Coefficient, Effect};
+use super::{all_axes, each, matrix, per_axis};
+use crate::diagnose::effect::{Coefficient, Effect, Scope};
 use crate::dwell::Sensor;
 
 /// 1 deg/s, rad/s.
@@ -15,7 +15,27 @@ const QUADRATIC: [Coefficient; 3] = each("1/(rad/s)");
 const CUBIC: [Coefficient; 3] = each("1/(rad/s)^2");
 const ASYMMETRY: [Coefficient; 3] = each("1");
 
-pub(super) const EFFECTS: [Effect; 4] = [
+const EARTH: [Coefficient; 1] = [Coefficient {
+    scope: Scope::Place,
+    ..all_axes("vertical", "rad/s")
+}];
+
+pub(super) const EFFECTS: [Effect; 5] = [
+    // The vertical part alone: about the level one nothing is known where nothing says which way is north.
+    Effect {
+        id: "earth_rate",
+        sensor: Sensor::Gyro,
+        about: "the Earth turns, and a gyro at rest reads it: its rate times the sine of the latitude, about the vertical",
+        coefficients: &EARTH,
+        // 7.292e-5 rad/s at 45 degrees.
+        typical: &[5.2e-5],
+        form: None,
+        regressors: |at, _, out| {
+            let size = at.force.norm();
+            per_axis(out, |i| at.force[i] / size);
+        },
+        needs: "rest with each axis up and down, long enough to see 0.003 deg/s",
+    },
     Effect {
         id: "gyro_g_sensitivity",
         sensor: Sensor::Gyro,

@@ -202,7 +202,7 @@ fn variable(
     track: &Track,
 ) -> Option<Panel> {
     let (candidate, form) = (&one.chosen.candidate, one.chosen.form);
-    let moments = rows.moments(candidate.lag_s(form));
+    let moments = rows.moments(candidate.behind(form));
     let column = |k: usize, r: usize| one.chosen.columns[(r, k)];
     let x: Vec<f64> = track
         .rows

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::build::{Part, common_step};
-use super::{Row, Rows};
+use super::{Row, Rows, elsewhere};
 use crate::dwell::Sensor;
 use crate::recording::Reference;
 
@@ -137,6 +137,7 @@ pub(super) fn join(sensor: Sensor, parts: Vec<(usize, Part)>, sessions: usize) -
         rows,
         moments,
         block,
+        elsewhere: warm.iter().map(|w| elsewhere(w)).collect(),
         warm,
         first,
     })

@@ -1,4 +1,6 @@
-//! What temperature does over time: behind a lag, and whether it ever comes back.
+//! What temperature does over time: behind a lag, without what the thermometer warms up by itself, and whether it ever comes back.
+
+use nalgebra::{DMatrix, DVector};
 
 /// Behind a first-order lag: `(time in s, value)` in, the lagged value out.
 pub fn late(signal: &[(f64, f64)], lag_s: f64) -> Vec<f64> {
@@ -22,6 +24,54 @@ pub fn late(signal: &[(f64, f64)], lag_s: f64) -> Vec<f64> {
     }
     out
 }
+/// Time after the beginning in which a thermometer warms up by itself, s: dies of such parts take 3 to 10 s.
+const START_S: f64 = 60.0;
+/// Time constants of it that are tried, s.
+const OWN_S: [f64; 9] = [2.0, 2.7, 3.6, 4.8, 6.4, 8.5, 11.0, 15.0, 20.0];
+/// Least of it that counts, K.
+const OWN_C: f64 = 0.2;
+/// Least F: the thermometer alone has to show it beyond doubt.
+const OWN_F: f64 = 50.0;
+
+/// A temperature without what its thermometer warmed up by itself after power-on, which a sensor on another die did not undergo:
+/// an exponential beside a parabola, the slower course of the board, over the first minute. `None` where it shows none.
+pub fn elsewhere(signal: &[(f64, f64)]) -> Option<Vec<(f64, f64)>> {
+    let first = signal.first()?.0;
+    let start: Vec<(f64, f64)> = signal
+        .iter()
+        .map(|s| (s.0 - first, s.1))
+        .take_while(|s| s.0 < START_S)
+        .filter(|s| s.1.is_finite())
+        .collect();
+    let n = start.len();
+    if n < 20 || start.last()?.0 < 0.5 * START_S {
+        return None;
+    }
+    let y = DVector::from_fn(n, |i, _| start[i].1);
+    let fit = |own_s: Option<f64>| {
+        let columns = 3 + usize::from(own_s.is_some());
+        let design = DMatrix::from_fn(n, columns, |i, k| match (k, own_s) {
+            (3, Some(own_s)) => (-start[i].0 / own_s).exp(),
+            (k, _) => (start[i].0 / START_S).powi(k as i32),
+        });
+        let x = design.clone().svd(true, true).solve(&y, 1e-12).ok()?;
+        Some(((&y - design * &x).norm_squared(), x))
+    };
+    let (without, _) = fit(None)?;
+    let tried = OWN_S
+        .iter()
+        .filter_map(|own_s| Some((*own_s, fit(Some(*own_s))?)));
+    let (own_s, (with, x)) = tried.min_by(|a, b| a.1.0.total_cmp(&b.1.0))?;
+    let f = (without - with) / 2.0 / (with / (n as f64 - 5.0)).max(f64::MIN_POSITIVE);
+    if f < OWN_F || x[3] > -OWN_C {
+        return None;
+    }
+    let without = signal
+        .iter()
+        .map(|(t, v)| (*t, v - x[3] * (-(t - first) / own_s).exp()));
+    Some(without.collect())
+}
+
 /// Spearman's rank correlation of the values of a signal with time; `None` where fewer than three values are known or all are one.
 pub fn order(signal: &[(f64, f64)]) -> Option<f64> {
     let mut known: Vec<(usize, f64)> = signal
@@ -72,6 +122,24 @@ mod tests {
         // The step is a ramp of a second: exp(-99/20) (exp(1/20) - 1) 20 is left of it.
         let left = 20.0 * (-99.0_f64 / 20.0).exp() * (0.05_f64.exp() - 1.0);
         assert!((1.0 - late(&step, 20.0)[99] - left).abs() < 1e-12);
+    }
+
+    #[test]
+    fn what_a_thermometer_warms_up_by_itself_is_taken_out_and_a_board_that_warms_is_left() {
+        let noise = |i: i32| 0.02 * f64::from((i * 7919) % 101 - 50) / 50.0;
+        let board = |t: f64| 20.0 - 4.0 * (-t / 300.0).exp();
+        let signal = |own_c: f64| -> Vec<(f64, f64)> {
+            let at = |i: i32| {
+                let t = f64::from(i);
+                (100.0 + t, board(t) - own_c * (-t / 5.0).exp() + noise(i))
+            };
+            (0..300).map(at).collect()
+        };
+        let without = elsewhere(&signal(6.0)).unwrap();
+        for (t, v) in &without {
+            assert!((v - board(t - 100.0)).abs() < 0.1, "{t} {v}");
+        }
+        assert!(elsewhere(&signal(0.0)).is_none());
     }
 
     #[test]
