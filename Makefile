@@ -44,8 +44,9 @@ papers: toolchain ## compute every figure and plot of docs/papers.md
 blind: toolchain ## undeclared effects on hundreds of units, and what the diagnosis says of them
 	$(CARGO) run --locked --release -p mimu-tests --bin blind
 
-bench: toolchain ## rates and peak memory on four hours at 1 kHz
+bench: toolchain ## rates and peak memory on four hours at 1 kHz, and of a diagnosis
 	$(CARGO) bench --locked -p mimu --bench four_hours
+	$(CARGO) bench --locked -p mimu-tests --bench diagnosis
 
 budget: toolchain ## instructions, load and memory of the firmware, counted on the emulated board
 	$(CARGO) build --locked -p mimu-firmware --release --target $(TARGET)

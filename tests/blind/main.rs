@@ -44,10 +44,12 @@ struct Tally {
     missed: u32,
     /// Right ones whose error after is at most 1.2 times the floor.
     at_floor: u32,
+    /// Right ones whose error after is at most 1.2 times that of the same unit, with the same noise, without the effect.
+    at_clean: u32,
 }
 
 impl Tally {
-    fn add(&mut self, case: &Case) {
+    fn add(&mut self, case: &Case, clean: Option<&Case>) {
         self.cases += 1;
         let all = case.truth.iter().all(|t| case.found.contains(t));
         self.detected += u32::from(case.verdict != "clean");
@@ -55,6 +57,8 @@ impl Tally {
             (true, true, _) => {
                 self.right += 1;
                 self.at_floor += u32::from(case.after <= 1.2);
+                let of = |c: &Case| c.held_out[case.judged as usize];
+                self.at_clean += u32::from(clean.is_some_and(|c| of(case) <= 1.2 * of(c)));
             }
             (true, false, _) => self.more += 1,
             (false, _, "clean") => self.missed += 1,
@@ -73,14 +77,15 @@ impl Tally {
             wrong,
             missed,
             at_floor,
+            at_clean,
         } = self;
         format!(
-            "| {name} | {cases} | {detected} | {right} | {more} | {wrong} | {missed} | {at_floor} |"
+            "| {name} | {cases} | {detected} | {right} | {more} | {wrong} | {missed} | {at_floor} | {at_clean} |"
         )
     }
 }
 
-const HEAD: &str = "| | cases | detected | named right | right and more | named wrong | missed | right, error after at most 1.2 floors |\n|---|---:|---:|---:|---:|---:|---:|---:|";
+const HEAD: &str = "| | cases | detected | named right | right and more | named wrong | missed | right, error after at most 1.2 floors | at most 1.2 times that without the effect |\n|---|---:|---:|---:|---:|---:|---:|---:|---:|";
 
 fn main() {
     let args: Vec<String> = std::env::args().skip(1).collect();
@@ -94,7 +99,7 @@ fn main() {
     for ids in &kinds {
         jobs.extend((0..seeds).map(|seed| (ids.clone(), seed)));
     }
-    let cases: Vec<(String, Case)> = jobs
+    let cases: Vec<(String, u64, Case)> = jobs
         .into_par_iter()
         .map(|(ids, seed)| {
             let name = ids.join(" + ");
@@ -102,19 +107,21 @@ fn main() {
             if !chosen.is_empty() {
                 println!("{name}, seed {seed}: {case:?}");
             }
-            (name, case)
+            (name, seed, case)
         })
         .collect();
     tables(&cases);
 }
 
-fn tables(cases: &[(String, Case)]) {
+fn tables(cases: &[(String, u64, Case)]) {
     let mut by_kind: BTreeMap<&str, Tally> = BTreeMap::new();
     let mut by_class = [[Tally::default(); 2]; CLASSES.len()];
     let mut unlisted: BTreeMap<&str, [u32; 5]> = BTreeMap::new();
     let mut false_alarms = Vec::new();
     let mut clean = 0;
-    for (name, case) in cases {
+    let without = |seed: u64| cases.iter().find(|c| c.1 == seed && c.2.truth.is_empty());
+    for (name, seed, case) in cases {
+        let without = without(*seed).map(|c| &c.2);
         if case.truth.is_empty() {
             clean += 1;
             if case.verdict != "clean" {
@@ -129,14 +136,14 @@ fn tables(cases: &[(String, Case)]) {
             count[3] += u32::from(listed && case.verdict == "explained");
             count[4] += u32::from(case.verdict == "refused");
         } else {
-            by_kind.entry(name).or_default().add(case);
+            by_kind.entry(name).or_default().add(case, without);
             // A pair is as strong as its weaker part.
             let strength = case.strength.iter().copied().fold(f64::INFINITY, f64::min);
             let class = CLASSES
                 .iter()
                 .position(|c| strength < c.0)
                 .unwrap_or(CLASSES.len() - 1);
-            by_class[class][usize::from(case.truth.len() > 1)].add(case);
+            by_class[class][usize::from(case.truth.len() > 1)].add(case, without);
         }
     }
     println!(

@@ -103,8 +103,12 @@ pub struct Case {
     pub found: Vec<String>,
     /// Verdict, or `refused`.
     pub verdict: &'static str,
-    /// Error after over noise floor, held out, of the sensor of the first effect.
+    /// Sensor of the first effect.
+    pub judged: Sensor,
+    /// Its error after over noise floor, held out.
     pub after: f64,
+    /// Error after, held out, of gyro and accelerometer, SI.
+    pub held_out: [f64; 2],
     /// What was found and not accepted, and why.
     pub rejected: Vec<String>,
     /// What was left, in words.
@@ -181,22 +185,27 @@ pub fn case(ids: &[&str], seed: u64) -> Case {
                 strength: strengths,
                 found: Vec::new(),
                 verdict: "refused",
+                judged: sensors.first().copied().unwrap_or(Sensor::Gyro),
                 after: f64::NAN,
+                held_out: [f64::NAN; 2],
                 rejected: Vec::new(),
                 left: vec![refusal.to_string()],
             };
         }
     };
     let judged = sensors.first().copied().unwrap_or(Sensor::Gyro);
-    let after = found.sensors.iter().find(|s| s.sensor == judged);
+    let of = |sensor: Sensor| found.sensors.iter().find(|s| s.sensor == sensor);
+    let held_out = |s| of(s).map_or(f64::NAN, |s| s.decision.held_out_rms[1]);
     Case {
         truth,
         strength: strengths,
         found: found.effects.iter().map(|e| e.candidate.id()).collect(),
         verdict: found.verdict.name(),
-        after: after.map_or(f64::NAN, |s| {
+        judged,
+        after: of(judged).map_or(f64::NAN, |s| {
             s.decision.held_out_rms[1] / s.decision.noise_floor
         }),
+        held_out: Sensor::BOTH.map(held_out),
         rejected: found
             .sensors
             .iter()

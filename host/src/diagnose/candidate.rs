@@ -152,25 +152,28 @@ impl Candidate {
     /// The candidates that it is tried as: of the bits of a code, which are wrong has to be found as well, so each by itself
     /// and all from the first down to each. The search goes on from the best of these.
     ///
-    /// What is of the recording alone is tried as well, and costs its coefficients; of what goes by a lag, whether the thermometer is
-    /// on the same die.
+    /// What is of the recording alone is tried as well, and costs its coefficients; of what goes by the temperature, whether the
+    /// thermometer is on the same die.
     pub fn variants(mut self, rows: &Rows) -> Vec<Self> {
-        let of_recording = self.of_recording();
-        if !of_recording.is_empty() {
+        if !self.reads_code() {
             let mut whole = self.clone();
-            whole.active.extend(of_recording);
-            let mut all = vec![self, whole];
-            if all[0].lag_s(1.0).is_some() && rows.thermometer_warms_up() {
-                let mut elsewhere = all.clone();
-                elsewhere.iter_mut().for_each(|c| c.elsewhere = true);
-                all.extend(elsewhere);
+            whole.active.extend(self.of_recording());
+            let mut all = vec![self];
+            if whole.active.len() > all[0].active.len() {
+                all.push(whole);
+            }
+            if rows.thermometer_warms_up()
+                && all[0].moves_with(|at| (at.warm_c, at.late_c) = (9.0, 6.0))
+            {
+                let elsewhere = all.clone().into_iter().map(|c| Self {
+                    elsewhere: true,
+                    ..c
+                });
+                all.extend(elsewhere.collect::<Vec<_>>());
             }
             let choices = all.len() as f64;
             all.iter_mut().for_each(|c| c.choices = choices);
             return all;
-        }
-        if !self.reads_code() {
-            return vec![self];
         }
         let offered = self.active.clone();
         self.offered.clone_from(&offered);
@@ -295,6 +298,11 @@ impl Candidate {
 
     /// Whether its regressors move with temperature or time; found by moving them, so that no effect has to say it.
     pub fn is_slow(&self) -> bool {
+        self.moves_with(|at| (at.t_s, at.warm_c, at.late_c) = (200.0, 9.0, 6.0))
+    }
+
+    /// Whether its regressors change where `change` does that to a moment at 100 s, 5 °C above the reference, 4 °C behind the lag.
+    fn moves_with(&self, change: impl Fn(&mut Moment)) -> bool {
         let early = Moment {
             session: 0,
             t_s: 100.0,
@@ -311,12 +319,8 @@ impl Candidate {
                 scale: Vector3::repeat(1.0),
             },
         };
-        let late = Moment {
-            t_s: 200.0,
-            warm_c: 9.0,
-            late_c: 6.0,
-            ..early
-        };
+        let mut late = early;
+        change(&mut late);
         let form = self.forms()[0];
         let count = self.axes().len();
         let mut values = [[0.0; MOST_REGRESSORS]; 2];
@@ -335,10 +339,10 @@ impl Candidate {
         }
     }
 
-    /// The temperature that its regressors want behind a lag.
+    /// The temperature that its regressors want, where that is not what the thermometer shows.
     pub fn behind(&self, form: f64) -> Option<Behind> {
-        let elsewhere = self.elsewhere;
-        self.lag_s(form).map(|lag_s| Behind { lag_s, elsewhere })
+        let (lag_s, elsewhere) = (self.lag_s(form), self.elsewhere);
+        (elsewhere || lag_s.is_some()).then_some(Behind { lag_s, elsewhere })
     }
 
     /// Its columns in `rows`.

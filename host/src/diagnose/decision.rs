@@ -312,6 +312,14 @@ fn notes(rows: &Rows, chosen: &[Chosen]) -> Vec<String> {
             c.candidate.id()
         )
     }));
+    let elsewhere = chosen.iter().filter(|c| c.candidate.elsewhere);
+    notes.extend(elsewhere.map(|c| {
+        format!(
+            "{}: the thermometer warms up by itself in the first minute, and the sensor is on another die; the device has no other \
+             thermometer, and errs by that for so long after power-on",
+            c.candidate.id()
+        )
+    }));
     let slow = chosen.iter().filter(|c| c.candidate.is_slow());
     let ids: Vec<String> = slow.map(|c| c.candidate.id()).collect();
     let Some(order) = rows.one_way().filter(|_| !ids.is_empty()) else {

@@ -58,11 +58,11 @@ impl Moment {
     }
 }
 
-/// The temperature that [`Moment::late_c`] is made of.
+/// The temperature that an effect goes by.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Behind {
-    /// Lag, s.
-    pub lag_s: f64,
+    /// Lag of [`Moment::late_c`], s, if it has one.
+    pub lag_s: Option<f64>,
     /// Whether the thermometer is on another die, and what it warms up by itself after power-on not the sensor's.
     pub elsewhere: bool,
 }

@@ -82,7 +82,7 @@ struct Stretches<'a> {
     direction: Matrix3<f64>,
     to_body: Matrix3<f64>,
     effects: &'a [&'a Removed],
-    /// Of each effect with a lag: the temperature that it goes by and that behind the lag, by block.
+    /// Of each effect that does not go by what the thermometer shows: the temperature and that behind the lag, by block.
     late: Vec<Option<Vec<(f64, f64)>>>,
 }
 
@@ -156,7 +156,10 @@ fn of_sensor(
                 let other = if other { elsewhere(&warm) } else { None };
                 let warm = other.as_ref().unwrap_or(&warm);
                 let now = warm.iter().map(|w| w.1);
-                Some(now.zip(late(warm, lag_s)).collect())
+                Some(match lag_s {
+                    Some(lag_s) => now.zip(late(warm, lag_s)).collect(),
+                    None => now.map(|w| (w, w)).collect(),
+                })
             })
             .collect(),
     };

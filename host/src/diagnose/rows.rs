@@ -230,7 +230,7 @@ impl Rows {
         })
     }
 
-    /// The moments, with the temperature behind a lag if there is one.
+    /// The moments, with the temperature that an effect goes by.
     pub fn moments(&self, behind: Option<Behind>) -> Cow<'_, [Moment]> {
         let Some(Behind { lag_s, elsewhere }) = behind else {
             return Cow::Borrowed(&self.moments);
@@ -239,7 +239,13 @@ impl Rows {
         let warm: Vec<&[(f64, f64)]> = each
             .map(|(warm, other)| other.as_deref().filter(|_| elsewhere).unwrap_or(warm))
             .collect();
-        let late: Vec<Vec<f64>> = warm.iter().map(|w| late(w, lag_s)).collect();
+        let late: Vec<Vec<f64>> = warm
+            .iter()
+            .map(|w| match lag_s {
+                Some(lag_s) => late(w, lag_s),
+                None => w.iter().map(|w| w.1).collect(),
+            })
+            .collect();
         let mut moments = self.moments.clone();
         for (moment, (session, at)) in moments.iter_mut().zip(&self.block) {
             moment.warm_c = warm[*session][*at].1;

@@ -112,6 +112,15 @@ impl Monomial {
         self.0.iter().map(|v| v.of(at)).product()
     }
 
+    /// Largest value that it could have in `moments`: all of its variables at their largest together.
+    pub fn largest(&self, moments: &[Moment]) -> f64 {
+        let most = |v: &Variable| {
+            let sizes = moments.iter().map(|at| v.of(at).abs());
+            sizes.filter(|s| s.is_finite()).fold(0.0, f64::max)
+        };
+        self.0.iter().map(most).product()
+    }
+
     /// Unit of its coefficient in an error of `sensor`.
     pub fn unit(&self, sensor: Sensor) -> String {
         let units: Vec<&str> = self.0.iter().map(|v| v.unit()).collect();

@@ -11,6 +11,9 @@ use crate::diagnose::search::Search;
 /// An effect whose coefficient of the size of a data sheet would not be this many sigmas is not excited.
 pub(in crate::diagnose) const EXCITED: f64 = 3.0;
 
+/// Share of what a product could be at most below which it is made of rounding.
+const ROUNDING: f64 = 1e-9;
+
 /// Everything that is tried on a sensor, and the effects that its experiment does not show.
 pub(super) fn candidates(
     rows: &Rows,
@@ -61,8 +64,13 @@ pub(super) fn candidates(
             let term = |axis| Candidate::new(sensor, Kind::Term(axis, monomial.clone()));
             let columns = term(0).columns_by_axis(rows, &[0, 1, 2]);
             let seen = across(&columns);
+            // A table that turns about one axis at a time has rates about the others of rounding's size: with a coefficient of
+            // 5e12 their product passed for an effect.
+            let rounding = ROUNDING * monomial.largest(&rows.moments(term(0).behind(0.0)));
             let seen = |axis: &usize| {
-                columns.column(*axis).iter().all(|v| v.is_finite()) && seen[*axis] > 0.0
+                let column = columns.column(*axis);
+                let finite = column.iter().all(|v| v.is_finite());
+                finite && seen[*axis] > 0.0 && column.amax() > rounding
             };
             (0..3).filter(seen).map(term).collect()
         })

@@ -48,12 +48,12 @@ const LONGER: &str =
 static RIVALS: [Rival; 3] = [
     Rival {
         law: creep(Sensor::Gyro, &GYRO_CREEP),
-        of: &["gyro_warm_up"],
+        of: &["gyro_warm_up", "gyro_thermal_lag"],
         settled_by: LONGER,
     },
     Rival {
         law: creep(Sensor::Accel, &ACCEL_CREEP),
-        of: &["accel_warm_up"],
+        of: &["accel_warm_up", "accel_thermal_lag"],
         settled_by: LONGER,
     },
     // Whatever field goes with the vertical, the Earth's magnetic one first of all, is felt along the axis alone; a proof mass
