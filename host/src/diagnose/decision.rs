@@ -75,6 +75,13 @@ pub struct Decision {
     pub omnibus_p: f64,
 }
 
+impl Decision {
+    /// What is left that no usual sensor does.
+    pub fn unexplained(&self) -> impl Iterator<Item = &Leftover> {
+        self.leftover.iter().filter(|l| !l.usual)
+    }
+}
+
 /// Decides on the rows of one sensor; `dwell_ends` are the times between dwells, where a bias may have jumped: index of the
 /// recording and s. `unseen` are the rows of a second recording, which nothing is found in: what it contradicts is not accepted.
 pub fn decide(rows: &Rows, dwell_ends: &[(usize, f64)], unseen: Option<&Rows>) -> Option<Decision> {
@@ -263,7 +270,7 @@ pub fn decide(rows: &Rows, dwell_ends: &[(usize, f64)], unseen: Option<&Rows>) -
     let base = search
         .spread
         .fit(&search.basis, &null.components, By::Restricted)?;
-    let left = leftover(&search, &model, &last, &jumps);
+    let left = leftover(&search, &model, &last, !kept.is_empty(), &jumps);
     let held = |chosen: &[Chosen], fit: &Fitted| held_rms(chosen, fit, split).unwrap_or(f64::NAN);
     let floor: f64 = rows.strata.iter().map(|s| known_in(s, rows.judged.0)).sum();
     Some(Decision {

@@ -274,7 +274,7 @@ pub fn diagnose(recordings: Recordings, options: Options) -> Result<Diagnosis> {
         });
     }
     sensors.reverse();
-    let open = |d: &Decision| !d.leftover.is_empty() || !d.undecided.is_empty();
+    let open = |d: &Decision| d.unexplained().next().is_some() || !d.undecided.is_empty();
     let left = sensors.iter().any(|s| open(&s.decision));
     let verdict = match (left, effects.is_empty()) {
         (true, _) => Verdict::Unexplained,

@@ -277,8 +277,11 @@ impl<'a> Search<'a> {
     pub fn run(&self) -> Option<(Vec<Chosen>, Fitted)> {
         let mut chosen: Vec<Chosen> = Vec::new();
         let mut now = self.fit(&chosen)?;
+        // What others have made superfluous does not come back: two that make each other superfluous would take turns for ever.
+        let mut gone: Vec<String> = Vec::new();
         while chosen.len() < MOST {
-            let finalists = self.finalists(&chosen, &now);
+            let mut finalists = self.finalists(&chosen, &now);
+            finalists.retain(|c| !gone.contains(&c.candidate.id()));
             let significant = |c: &&Chosen| {
                 c.p < if c.candidate.is_listed() {
                     FALSE_LISTED
@@ -307,9 +310,12 @@ impl<'a> Search<'a> {
                 .map(|c| (c.candidate.id(), score(&best) - score(c)))
                 .collect();
             chosen.push(best);
+            let before: Vec<String> = chosen.iter().map(|c| c.candidate.id()).collect();
             now = self.fit(&chosen)?;
             self.read_again(&mut chosen, &mut now)?;
             self.again(&mut chosen, &mut now)?;
+            let stays = |id: &String| chosen.iter().any(|c| c.candidate.id() == *id);
+            gone.extend(before.into_iter().filter(|id| !stays(id)));
         }
         Some((chosen, now))
     }

@@ -136,6 +136,7 @@ fn leftover(sensor: Sensor, decision: &Decision) -> Vec<Value> {
             "axis": l.axis.map(|a| crate::estimate::AXES[a]),
             "rows": l.stratum,
             "against": l.against,
+            "usual": l.usual,
             "strength": l.strength,
         })
     };

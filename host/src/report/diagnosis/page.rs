@@ -9,6 +9,7 @@ mod tables;
 use maud::{Markup, PreEscaped, html};
 
 use super::DiagnosisReport;
+use super::text::USUAL;
 use crate::diagnose::decision::{Accepted, FALSE_LEFTOVER, LEVERAGE};
 use crate::diagnose::next::Next;
 use crate::diagnose::picture::{Against, Picture};
@@ -69,6 +70,9 @@ pub fn diagnosis_page(report: &DiagnosisReport, made: &Made) -> Result<String> {
                     h2 { "What is left" }
                     p { "Scatter beyond the known noise that no candidate explains:" }
                     (tables::leftover(d))
+                    @if d.sensors.iter().any(|s| s.decision.leftover.iter().any(|l| l.usual)) {
+                        p { "*  " (USUAL) "." }
+                    }
                 }
                 @for (s, picture) in d.sensors.iter().zip(&pictures) { (sensor(d, s, picture)) }
                 h2 { "Tried and not accepted" }
@@ -134,7 +138,11 @@ fn verdict(d: &Diagnosis) -> Markup {
     let held = |s: &SensorDiagnosis, k: usize| shown(s, s.decision.held_out_rms[k]);
     let in_sample = |s: &SensorDiagnosis| shown(s, s.decision.rms[0]);
     let floor = |s: &SensorDiagnosis| shown(s, s.decision.noise_floor);
-    let left = || d.sensors.iter().filter(|s| !s.decision.leftover.is_empty());
+    let left = || {
+        d.sensors
+            .iter()
+            .filter(|s| s.decision.unexplained().next().is_some())
+    };
     let said = match d.verdict {
         Verdict::Clean => "noise explains what the affine calibration leaves.",
         Verdict::Explained => "with the effects found, noise explains what is left.",

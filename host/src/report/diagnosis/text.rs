@@ -16,7 +16,11 @@ pub fn diagnosis_text(report: &DiagnosisReport) -> String {
     let said = match d.verdict {
         Verdict::Clean => "clean: noise explains what the affine calibration leaves",
         Verdict::Explained => "explained: with the effects below, noise explains what is left",
-        Verdict::Unexplained if d.sensors.iter().any(|s| !s.decision.leftover.is_empty()) => {
+        Verdict::Unexplained
+            if d.sensors
+                .iter()
+                .any(|s| s.decision.unexplained().next().is_some()) =>
+        {
             "unexplained: something is left that nothing here explains"
         }
         Verdict::Unexplained => {
@@ -120,8 +124,15 @@ fn sensor(out: &mut String, s: &SensorDiagnosis, figure: Figure) {
             l.against
         );
     }
+    if d.leftover.iter().any(|l| l.usual) {
+        wrap(out, "    ", USUAL);
+    }
     tried(out, d);
 }
+
+/// What is said of what is left that usual sensors do.
+pub(super) const USUAL: &str = "by up to four times the noise of a dwell mean the biases of usual sensors wander; `mimu allan` of the \
+                                unit at rest, given as --noise, tells whether this one does";
 
 fn effect(out: &mut String, a: &Accepted, shown: &impl Fn(f64) -> String) {
     let candidate = &a.chosen.candidate;

@@ -216,7 +216,7 @@ pub fn leftover(d: &Diagnosis) -> Markup {
                 tr {
                     td { (spoken(s.sensor)) " " (left.stratum) }
                     td class="n" { (number(left.strength, factor, unit)) }
-                    td { (left.against) }
+                    td { (left.against) @if left.usual { " *" } }
                 }
             } } }
         } }
@@ -225,10 +225,11 @@ pub fn leftover(d: &Diagnosis) -> Markup {
 
 /// What is left of a sensor, in words: where, and the largest; what it goes with stands in the table.
 pub fn leftover_words(s: &SensorDiagnosis) -> Markup {
-    let all = &s.decision.leftover;
+    let all: Vec<&Leftover> = s.decision.unexplained().collect();
     // Turns are in another unit than the rest.
     let of_unit = |turns: bool| -> Vec<&Leftover> {
         all.iter()
+            .copied()
             .filter(|l| (l.stratum == "turns") == turns)
             .collect()
     };
