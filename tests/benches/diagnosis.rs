@@ -30,7 +30,10 @@ fn forget_peak() {
 
 fn main() {
     let seed = 1;
-    let text = plan(seed).replace("sample_rate_hz = 100.0", "sample_rate_hz = 1000.0");
+    // Half an hour, of which the plan as it is takes 23 minutes.
+    let text = plan(seed)
+        .replace("sample_rate_hz = 100.0", "sample_rate_hz = 1000.0")
+        .replace("dwell_s = 10.0", "dwell_s = 14.2");
     let plan = Plan::parse(Source::new("plan", &text)).expect("a plan");
     let file = unit(&["gyro_g_sensitivity", "accel_scale_quadratic"], seed);
     let truth = RigTruth::resolve(&file, seed).expect("a rig");
