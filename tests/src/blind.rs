@@ -9,6 +9,7 @@ use std::sync::{Arc, Mutex};
 
 use mimu::diagnose::{Diagnosis, diagnose};
 use mimu::dwell::Sensor;
+use mimu::estimate::Observation;
 use mimu::fit::{Method, Options};
 use mimu::prepared::Prepared;
 use mimu::stillness::STILL_FACTOR;
@@ -127,7 +128,14 @@ fn options() -> Options {
 /// What remains of the difference between two recordings after an affine model, over the noise floor, of the sensor that has more.
 fn strength(with: &Prepared, without: &Prepared) -> (Sensor, f64) {
     let of = |sensor: Sensor| {
-        let (a, b) = (with.observations(sensor), without.observations(sensor));
+        let (a, all) = (with.observations(sensor), without.observations(sensor));
+        // A dwell that the effect makes unusable is in one of them only.
+        let step = |p: &Prepared, o: &Observation| p.dwells.list[o.dwell].step;
+        let pairs = a.into_iter().filter_map(|a| {
+            let same = |b: &&Observation| step(without, b) == step(with, &a);
+            Some((a, *all.iter().find(same)?))
+        });
+        let (a, b): (Vec<Observation>, Vec<Observation>) = pairs.unzip();
         let n = a.len();
         let design = DMatrix::from_fn(n, 4, |i, j| if j == 0 { 1.0 } else { a[i].input[j - 1] });
         let q = design.qr().q();
