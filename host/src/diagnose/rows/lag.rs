@@ -26,8 +26,8 @@ pub fn late(signal: &[(f64, f64)], lag_s: f64) -> Vec<f64> {
 }
 /// Time after the beginning in which a thermometer warms up by itself, s: dies of such parts take 3 to 10 s.
 const START_S: f64 = 60.0;
-/// Time constants of it that are tried, s.
-const OWN_S: [f64; 9] = [2.0, 2.7, 3.6, 4.8, 6.4, 8.5, 11.0, 15.0, 20.0];
+/// Time constants of it that are tried first: the least, s, the ratio of each to that before, and how many.
+const OWN_S: (f64, f64, i32) = (2.0, 1.33, 9);
 /// Least of it that counts, K.
 const OWN_C: f64 = 0.2;
 /// Least F: the thermometer alone has to show it beyond doubt.
@@ -58,10 +58,21 @@ pub fn elsewhere(signal: &[(f64, f64)]) -> Option<Vec<(f64, f64)>> {
         Some(((&y - design * &x).norm_squared(), x))
     };
     let (without, _) = fit(None)?;
-    let tried = OWN_S
-        .iter()
-        .filter_map(|own_s| Some((*own_s, fit(Some(*own_s))?)));
-    let (own_s, (with, x)) = tried.min_by(|a, b| a.1.0.total_cmp(&b.1.0))?;
+    let (least, mut ratio, count) = OWN_S;
+    let at = |own_s: f64| Some((own_s, fit(Some(own_s))?));
+    let tried = (0..count).filter_map(|k| at(least * ratio.powi(k)));
+    let mut best = tried.min_by(|a, b| a.1.0.total_cmp(&b.1.0))?;
+    while ratio > 1.005 {
+        ratio = ratio.sqrt();
+        let beside = [best.0 * ratio, best.0 / ratio];
+        let better = beside.into_iter().filter_map(at);
+        if let Some(other) = better.min_by(|a, b| a.1.0.total_cmp(&b.1.0))
+            && other.1.0 < best.1.0
+        {
+            best = other;
+        }
+    }
+    let (own_s, (with, x)) = best;
     let f = (without - with) / 2.0 / (with / (n as f64 - 5.0)).max(f64::MIN_POSITIVE);
     if f < OWN_F || x[3] > -OWN_C {
         return None;
