@@ -158,6 +158,7 @@ const BIT_0_V: f64 = 1.6384;
 /// All that is known by name, some of it with some of its coefficients only, and three terms; ten times what data sheets say.
 fn every_effect() -> Vec<Removed> {
     let mut all: Vec<Removed> = library::all()
+        .filter(|effect| effect.is_error())
         .enumerate()
         .map(|(n, effect)| {
             let mut candidate = Candidate::new(effect.sensor, Kind::Effect(effect));
