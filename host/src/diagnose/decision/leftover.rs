@@ -6,8 +6,8 @@ use crate::diagnose::search::{Chosen, Search};
 use crate::diagnose::spread::{By, Fitted, Spread};
 
 /// A bias that wanders by this many times the noise of a dwell mean is no usual one, and the verdict says so even where nobody has
-/// recorded how far it may: sensors of the usual kind wander by up to three in half an hour. A walk is not all of it: by flicker alone
-/// 22 of 40 clean units of the blind suite scatter more than their samples do.
+/// recorded how far it may: sensors of the usual kind wander by up to three in half an hour. A walk is not all of it: they flicker as
+/// well, so that clean units scatter more than their samples do.
 const WANDERS: f64 = 4.0;
 /// Probability that the rows of a clean sensor scatter so much that structure is told of.
 pub const FALSE_LEFTOVER: f64 = 1e-3;
