@@ -17,7 +17,8 @@
 //! many there are.
 //!
 //! Errors of the converter are another matter: they are functions of the raw reading, whatever that stands for, and are taken out of it
-//! before it is compensated, by [`Effects::without_code_errors`].
+//! before it is compensated, by [`Effects::without_code_errors`]. They are those of an axis, which may have a converter to itself, and are
+//! made by [`Effect::code`].
 
 mod law;
 mod triad;
@@ -76,9 +77,10 @@ pub enum Refused {
         /// How many (a term: at most).
         needed: usize,
     },
-    /// A coefficient is not a finite number, a nonlinear constant is missing, not wanted or not positive, or there is no such axis.
+    /// A coefficient is not a finite number, a nonlinear constant or a weight is missing, not wanted or not positive, or there is no such
+    /// axis.
     Value,
-    /// There is no room for one more.
+    /// There is no room for one more, or an axis has a code already.
     Full,
 }
 
@@ -94,16 +96,20 @@ enum Kind<T: RealField> {
     Fast(Fast<T>),
     Slow(Slowly<T>),
     Code {
+        /// Whose readings err.
+        axes: [bool; 3],
         /// Of nine bits, in units of the weight of bit 0.
         errors: [T; COEFFICIENTS],
         /// Of bit 0, raw.
         weight: T,
+        /// Reading of code 0, raw.
+        zero: T,
     },
 }
 
 impl<T: RealField + Copy> Effect<T> {
     /// The effect of a public id like `gyro_scale_cubic`, with all of its coefficients (SI, those of a matrix by rows) and the
-    /// nonlinear constant of one that has any: a time constant, s, or the weight of the first bit, raw.
+    /// nonlinear constant of one that has any: a time constant, s.
     pub fn named(id: &str, coefficients: &[T], form: Option<T>) -> Result<Self, Refused> {
         let (sensor, name) = match (id.strip_prefix("gyro_"), id.strip_prefix("accel_")) {
             (Some(name), _) => (Sensor::Gyro, name),
@@ -117,7 +123,7 @@ impl<T: RealField + Copy> Effect<T> {
         }
         let form = match (law.form, form) {
             (Form::None, None) => T::one(),
-            (Form::TimeConstant | Form::Lag | Form::Weight, Some(value))
+            (Form::TimeConstant | Form::Lag, Some(value))
                 if value > T::zero() && value.is_finite() =>
             {
                 value
@@ -143,10 +149,6 @@ impl<T: RealField + Copy> Effect<T> {
                 form,
                 lags: law.form == Form::Lag,
             }),
-            Evaluation::Code => Kind::Code {
-                errors: all,
-                weight: form,
-            },
         };
         Ok(Self { sensor, kind })
     }
@@ -181,6 +183,52 @@ impl<T: RealField + Copy> Effect<T> {
         let kind = match variables.iter().all(slow) {
             true => Kind::Slow(Slowly::Term(term)),
             false => Kind::Fast(term),
+        };
+        Ok(Self { sensor, kind })
+    }
+
+    /// Errors of a converter by the bits of its code, of one axis (0 to 2), or of all three alike.
+    ///
+    /// `weight`: of bit 0, the highest, raw; each of the nine bits has half the weight of the one before. `errors`: what a reading has too
+    /// much where the bit is set, in units of `weight`. `zero`: the reading of code 0, raw; not 0 where something was subtracted from the
+    /// readings. A reading of less than 1/65536 of `weight` below the turn of a bit counts as one of the turn, whichever way it was
+    /// rounded. The code of all nine bits set, and one more, is again 0: what lies beyond is not told apart.
+    ///
+    /// ```
+    /// # use mimu_core::compensation::Sample;
+    /// # use mimu_core::effects::{Directions, Effect, Effects, Sensor};
+    /// # use nalgebra::{Matrix3, Vector3};
+    /// // Bit 0 of a converter of ±2.5 V is worth 2.5 V, and 1 mV more than that.
+    /// let code = Effect::code(Sensor::Gyro, Some(2), &[4e-4, 0., 0., 0., 0., 0., 0., 0., 0.], 2.5, -2.5).unwrap();
+    /// let directions = Directions { sensed: Matrix3::identity(), to_body: Matrix3::identity() };
+    /// let mut effects = Effects::<f64, 8>::of(directions, directions);
+    /// effects.push(code).unwrap();
+    /// let read = Sample { gyro: Vector3::new(0.5, 0.5, 0.5), accel: Vector3::repeat(1.7) };
+    /// let clean = effects.without_code_errors(&read);
+    /// assert_eq!(clean.gyro, Vector3::new(0.5, 0.5, 0.499));
+    /// assert_eq!(clean.accel, read.accel);
+    /// ```
+    pub fn code(
+        sensor: Sensor,
+        axis: Option<usize>,
+        errors: &[T; COEFFICIENTS],
+        weight: T,
+        zero: T,
+    ) -> Result<Self, Refused> {
+        let axes = match axis {
+            None => [true; 3],
+            Some(axis) => [0, 1, 2].map(|i| i == axis),
+        };
+        let finite = weight.is_finite() && zero.is_finite() && errors.iter().all(T::is_finite);
+        if !(finite && weight > T::zero() && axes.contains(&true)) {
+            return Err(Refused::Value);
+        }
+        let errors = *errors;
+        let kind = Kind::Code {
+            axes,
+            errors,
+            weight,
+            zero,
         };
         Ok(Self { sensor, kind })
     }
@@ -355,7 +403,7 @@ impl<T: RealField + Copy, const N: usize> Effects<T, N> {
         self.accel.slow(&mut state.accel, dt, risen, &state.at);
     }
 
-    /// Raw readings without the errors of the converter's codes: to be compensated in place of those that were read.
+    /// Raw readings without the errors of the converters' codes: to be compensated in place of those that were read.
     #[inline]
     pub fn without_code_errors(&self, raw: &Sample<T>) -> Sample<T> {
         Sample {

@@ -14,9 +14,11 @@
 //! | ...   | each effect, see below                                                                            |
 //! | 4     | CRC-32/ISO-HDLC of everything before                                                              |
 //!
-//! A named effect: 0; length of the id, the id; number of coefficients, these, `f32`; its nonlinear constant (time constant, s, or weight
-//! of the converter's first bit, V), or 0 if it has none.
+//! A named effect: 0; length of the id, the id; number of coefficients, these, `f32`; its nonlinear constant (time constant, s), or 0 if
+//! it has none.
 //! A term: 1; triad (0 gyro, 1 accelerometer); axis; number of variables, these, a byte each as in [`Variable`]; coefficient.
+//! A code: 2; triad; axis (0 to 2, or 3 for all); weight of the converter's first bit, V; reading of code 0, V; errors of nine bits in
+//! units of the weight; `f32` each.
 //!
 //! Raw is volts at the sensor, as in [`RawBatch`](crate::wire::RawBatch). The noise of biases and the sigmas of the parameters are not
 //! here: the device has no use for them.
@@ -33,7 +35,7 @@ use crate::table::{self, Node, Table};
 use bytes::{Reader, Writer};
 
 /// Version of the layout.
-pub const VERSION: u16 = 2;
+pub const VERSION: u16 = 3;
 /// Most temperature nodes.
 pub const NODES: usize = 16;
 /// Most effects of a triad that run with every sample, and as many that do not.
@@ -48,6 +50,9 @@ const CHECK: usize = 4;
 const LENGTH_AT: usize = 6;
 const NAMED: u8 = 0;
 const TERM: u8 = 1;
+const CODE: u8 = 2;
+/// The axis of a code that is that of all three.
+const ALL: u8 = 3;
 /// Most coefficients of an effect.
 const COEFFICIENTS: usize = 9;
 /// Most variables of a term.
@@ -83,7 +88,7 @@ pub enum Record<'a> {
         id: &'a str,
         /// All of its coefficients, SI.
         coefficients: &'a [f32],
-        /// Nonlinear constant of an effect that has any: time constant, s, or weight of the first bit, V.
+        /// Nonlinear constant of an effect that has any: time constant, s.
         form: Option<f32>,
     },
     /// As in [`Effect::term`].
@@ -96,6 +101,19 @@ pub enum Record<'a> {
         coefficient: f32,
         /// One to three.
         variables: &'a [Variable],
+    },
+    /// As in [`Effect::code`].
+    Code {
+        /// Triad.
+        sensor: Sensor,
+        /// 0 to 2; `None`: all three alike.
+        axis: Option<u8>,
+        /// Of the first bit, V.
+        weight: f32,
+        /// Reading of code 0, V.
+        zero: f32,
+        /// Of nine bits, in units of the weight.
+        errors: &'a [f32; COEFFICIENTS],
     },
 }
 
@@ -192,13 +210,26 @@ pub fn encode(
                 coefficient,
                 variables,
             } => {
-                let triad = match sensor {
-                    Sensor::Gyro => 0,
-                    Sensor::Accel => 1,
-                };
-                to.bytes(&[TERM, triad, *axis, count(variables.len())?])?;
+                to.bytes(&[TERM, triad(*sensor), *axis, count(variables.len())?])?;
                 variables.iter().try_for_each(|v| to.bytes(&[*v as u8]))?;
                 to.f32(*coefficient)?;
+            }
+            Record::Code {
+                sensor,
+                axis,
+                weight,
+                zero,
+                errors,
+            } => {
+                let axis = match axis {
+                    None => ALL,
+                    // No axis, which must not be read as all of them.
+                    Some(ALL) => u8::MAX,
+                    Some(axis) => *axis,
+                };
+                to.bytes(&[CODE, triad(*sensor), axis])?;
+                let mut numbers = [weight, zero].into_iter().chain(*errors);
+                numbers.try_for_each(|v| to.f32(*v))?;
             }
         }
     }
@@ -211,6 +242,21 @@ pub fn encode(
     let check = CRC.checksum(to.written());
     to.bytes(&check.to_le_bytes())?;
     Ok(length)
+}
+
+fn triad(sensor: Sensor) -> u8 {
+    match sensor {
+        Sensor::Gyro => 0,
+        Sensor::Accel => 1,
+    }
+}
+
+fn sensor(triad: u8) -> Result<Sensor, effects::Refused> {
+    match triad {
+        0 => Ok(Sensor::Gyro),
+        1 => Ok(Sensor::Accel),
+        _ => Err(effects::Refused::Unknown),
+    }
 }
 
 /// The calibration in `bytes`, all of them.
@@ -341,15 +387,20 @@ fn effect(from: &mut Reader<'_>) -> Option<Result<Effect<f32>, effects::Refused>
                 }
             }
             let coefficient = from.f32()?;
-            let sensor = match triad {
-                0 => Sensor::Gyro,
-                1 => Sensor::Accel,
-                _ => return Some(Err(effects::Refused::Unknown)),
-            };
-            Some(match known {
+            Some(sensor(triad).and_then(|sensor| match known {
                 true => Effect::term(sensor, usize::from(axis), coefficient, variables),
                 false => Err(effects::Refused::Unknown),
-            })
+            }))
+        }
+        CODE => {
+            let [triad, axis] = from.bytes()?;
+            let (weight, zero) = (from.f32()?, from.f32()?);
+            let mut errors = [0.0; COEFFICIENTS];
+            for error in &mut errors {
+                *error = from.f32()?;
+            }
+            let axis = (axis != ALL).then_some(usize::from(axis));
+            Some(sensor(triad).and_then(|sensor| Effect::code(sensor, axis, &errors, weight, zero)))
         }
         // Of a kind that a later version has.
         _ => Some(Err(effects::Refused::Unknown)),

@@ -3,7 +3,7 @@
 use mimu_core::compensation::{Affine, Compensation, Sample};
 use mimu_core::effects::{Sensor, Variable};
 use mimu_core::single;
-use mimu_core::stored::{NODES, Record, Refused, decode, encode, hash};
+use mimu_core::stored::{NODES, ROOM, Record, Refused, decode, encode, hash};
 use mimu_core::table::{self, Node, Place, Table};
 use nalgebra::{Matrix3, Vector3};
 use proptest::prelude::*;
@@ -82,10 +82,19 @@ fn the_layout_is_that_of_the_table_in_the_documentation() {
             coefficient: -2.0,
             variables: &[Variable::RateX, Variable::ForceY],
         },
-        Record::Named {
-            id: "gyro_readout_code",
-            coefficients: &[0.001, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -0.0005],
-            form: Some(1.65),
+        Record::Code {
+            sensor: Sensor::Gyro,
+            axis: None,
+            weight: 1.65,
+            zero: 0.0,
+            errors: &[0.001, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -0.0005],
+        },
+        Record::Code {
+            sensor: Sensor::Accel,
+            axis: Some(2),
+            weight: 2.0,
+            zero: -1.25,
+            errors: &[0.0, -0.002, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
         },
     ];
     // Sensors that look along -y, x and z, 2, 4 and 0.5 V per unit; and C of a gyro that looks along y, -x and z.
@@ -95,9 +104,9 @@ fn the_layout_is_that_of_the_table_in_the_documentation() {
     let one = [node(25.0, &regular())];
     let length = encode([&gyro, &accel], &one, &effects, &mut all).unwrap();
     let all = &all[..length];
-    let mut expected = b"mimc\x02\x00".to_vec();
+    let mut expected = b"mimc\x03\x00".to_vec();
     expected.extend((all.len() as u16).to_le_bytes());
-    expected.extend([1, 3, 0, 0]);
+    expected.extend([1, 4, 0, 0]);
     // D by rows, and R: of right angles the one is the other transposed.
     for rows in [
         [[0, 1, 0], [-1, 0, 0], [0, 0, 1]],
@@ -119,24 +128,92 @@ fn the_layout_is_that_of_the_table_in_the_documentation() {
     }
     expected.extend([1, 1, 1, 2, 1, 5]);
     expected.extend((-2.0_f32).to_le_bytes());
-    // An id of 17 letters, nine bits, and half of the converter's 3.3 V.
-    expected.extend(b"\x00\x11gyro_readout_code\x09");
-    for value in [0.001_f32, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -0.0005, 1.65] {
+    // Half of the converter's 3.3 V, and nine bits.
+    expected.extend([2, 0, 3]);
+    let all_axes = [
+        1.65_f32, 0.0, 0.001, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -0.0005,
+    ];
+    for value in all_axes {
+        expected.extend(value.to_le_bytes());
+    }
+    expected.extend([2, 1, 2]);
+    let one_axis = [
+        2.0_f32, -1.25, 0.0, -0.002, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
+    ];
+    for value in one_axis {
         expected.extend(value.to_le_bytes());
     }
     expected.extend(crc32(&expected).to_le_bytes());
     assert_eq!(all, &expected[..]);
     let stored = decode(all).unwrap();
-    assert_eq!((stored.table.len(), stored.effect_count), (1, 3));
+    assert_eq!((stored.table.len(), stored.effect_count), (1, 4));
     // 384 of 256 codes to 1.65 V are bits 0 and -1, and 255 are bits -1 to -8; half a code more, so that no error turns any.
     let right = Vector3::new(384.5, 0.5, 255.5) * (1.65 / 256.0);
     let read = Sample {
         gyro: right + Vector3::new(0.001, 0.0, -0.0005) * 1.65,
+        // 2.25 V at the converter of the third axis, whose second bit is of 1 V and not set; and 1.25 V, where it is.
         accel: Vector3::new(2.475, 0.0, 1.0),
     };
     let clean = single::without_code_errors(&stored.effects.unwrap(), &read);
     assert_eq!(clean.accel, read.accel);
     assert!((clean.gyro - right).amax() < 1e-6, "{}", clean.gyro);
+    let set = Sample {
+        accel: Vector3::new(2.475, 0.0, 0.0),
+        ..read
+    };
+    let clean = single::without_code_errors(&stored.effects.unwrap(), &set);
+    assert_eq!(clean.accel, Vector3::new(2.475, 0.0, 0.004));
+}
+
+#[test]
+fn a_code_of_no_axis_is_not_one_of_all() {
+    let code = |axis| Record::Code {
+        sensor: Sensor::Accel,
+        axis,
+        weight: 1.0,
+        zero: 0.0,
+        errors: &[0.0; 9],
+    };
+    let refused = |all: &[Record<'_>]| decode(&bytes(&[node(0.0, &regular())], all)).err();
+    assert_eq!(refused(&[code(None)]), None);
+    let three = [0, 1, 2].map(|axis| code(Some(axis)));
+    assert_eq!(refused(&three), None);
+    for axis in 3..=u8::MAX {
+        let at = Some(Refused::EffectValue { at: 0 });
+        assert_eq!(refused(&[code(Some(axis))]), at, "{axis}");
+    }
+    let full = Some(Refused::EffectsFull { at: 1 });
+    assert_eq!(refused(&[code(None), code(Some(1))]), full);
+    assert_eq!(refused(&[code(Some(1)), code(None)]), full);
+}
+
+#[test]
+fn everything_at_its_longest_has_room() {
+    let nodes: Vec<_> = (0..NODES).map(|k| node(k as f32, &regular())).collect();
+    let named = |id, coefficients| Record::Named {
+        id,
+        coefficients,
+        form: None,
+    };
+    let mut all = Vec::new();
+    for (fast, slow) in [
+        ("gyro_cross_axis_product", "gyro_thermal_misalignment"),
+        ("accel_cross_axis_product", "accel_thermal_misalignment"),
+    ] {
+        all.extend([named(fast, &[0.0; 9]); ROOM]);
+        all.extend([named(slow, &[0.0; 6]); ROOM]);
+    }
+    for sensor in [Sensor::Gyro, Sensor::Accel] {
+        all.extend([0, 1, 2].map(|axis| Record::Code {
+            sensor,
+            axis: Some(axis),
+            weight: 1.0,
+            zero: 0.0,
+            errors: &[0.0; 9],
+        }));
+    }
+    let stored = decode(&bytes(&nodes, &all)).unwrap();
+    assert_eq!(stored.effect_count, 2 * (2 * ROOM as u8 + 3));
 }
 
 #[test]
@@ -294,9 +371,10 @@ proptest! {
 
     /// Whatever the bytes are, they are refused or make a calibration; the check is made to hold, or nothing would get past it.
     #[test]
-    fn no_bytes_are_too_bad_to_be_refused(noise in prop::collection::vec(any::<u8>(), 0..600), at in 12..200_usize) {
-        let effects = [Record::Named { id: "gyro_scale_cubic", coefficients: &[0.0; 3], form: None }];
-        let mut all = bytes(&[node(0.0, &regular())], &effects);
+    fn no_bytes_are_too_bad_to_be_refused(noise in prop::collection::vec(any::<u8>(), 0..600), at in 12..360_usize) {
+        let named = Record::Named { id: "gyro_scale_cubic", coefficients: &[0.0; 3], form: None };
+        let code = Record::Code { sensor: Sensor::Gyro, axis: Some(1), weight: 1.0, zero: 0.0, errors: &[0.0; 9] };
+        let mut all = bytes(&[node(0.0, &regular())], &[named, code]);
         for (place, byte) in all.iter_mut().skip(at).zip(&noise) {
             *place = *byte;
         }

@@ -61,8 +61,6 @@ pub(super) enum Evaluation<T: RealField> {
     Fast(FastLaw<T>),
     /// Now and then.
     Slow(SlowLaw<T>),
-    /// With every sample, by the [`Code`] of the reading.
-    Code,
 }
 
 /// Nonlinear constant of an effect.
@@ -74,8 +72,6 @@ pub(super) enum Form {
     TimeConstant,
     /// The time constant of [`Ambience::lag`], s.
     Lag,
-    /// The weight of bit 0, raw.
-    Weight,
 }
 
 /// A row of the table.
@@ -95,7 +91,7 @@ impl<T: RealField + Copy> Law<T> {
         Self::TABLE.iter().find(|law| law.name == name)
     }
 
-    /// Everything that the device can remove. The laws hold for either triad; that some are of no use to one of them costs
+    /// Everything that the device can remove by name. The laws hold for either triad; that some are of no use to one of them costs
     /// nothing. An effect is added here and nowhere else.
     const TABLE: &'static [Self] = &[
         Self::fast("g_sensitivity", 9, g_sensitivity),
@@ -104,12 +100,6 @@ impl<T: RealField + Copy> Law<T> {
         Self::fast("scale_asymmetry", 3, scale_asymmetry),
         Self::fast("cross_axis_product", 9, cross_axis_product),
         Self::fast("size_effect", 9, size_effect),
-        Self {
-            name: "readout_code",
-            coefficients: COEFFICIENTS,
-            form: Form::Weight,
-            evaluation: Evaluation::Code,
-        },
         Self::slow("bias_drift", 3, Form::None, |c, _, at, e| {
             e.bias += each(c) * at.time;
         }),
@@ -253,11 +243,15 @@ pub(super) fn term<T: RealField + Copy>(law: &Fast<T>, at: &Conditions<T>, e: &m
     e.z += c[2] * product;
 }
 
-/// Errors of the converter by the bits of its code, nine of them: in two tables, as a table of all would be ten times as large.
+/// Errors of the converter of one axis by the bits of its code, nine of them: in two tables, as a table of all would be ten times as
+/// large.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Code<T> {
     /// Codes of the last bit, 1/raw.
     codes: T,
+    /// Codes of the last bit at reading 0, and [`ABOVE_ZERO`]: in one constant, so that a reading is at its code by one product and one
+    /// sum wherever the code is 0.
+    at_zero: T,
     /// Errors, raw, by bits 0 to -3, and by bits -4 to -8; the least bit of an index is the last bit.
     first: [T; 16],
     last: [T; 32],
@@ -268,35 +262,37 @@ pub(super) struct Code<T> {
 const ABOVE_ZERO: f64 = 1024.0 + 1.0 / 256.0;
 
 impl<T: RealField + Copy> Code<T> {
-    /// Of errors in units of the weight of bit 0, `weight`, raw.
-    pub fn new(errors: &[T; COEFFICIENTS], weight: T) -> Self {
+    /// Of errors in units of the weight of bit 0, `weight`, raw, where the reading `zero`, raw, has code 0.
+    pub fn new(errors: &[T; COEFFICIENTS], weight: T, zero: T) -> Self {
         let raw = errors.map(|error| error * weight);
         let (four, five) = raw.split_at(4);
-        let codes: T = convert(256.0);
+        let codes = convert::<_, T>(256.0) / weight;
         Self {
-            codes: codes / weight,
+            codes,
+            at_zero: convert::<_, T>(ABOVE_ZERO) - zero * codes,
             first: core::array::from_fn(|bits| set(four, bits)),
             last: core::array::from_fn(|bits| set(five, bits)),
         }
     }
 
-    /// Readings without their errors, raw. The error is one of the code that the reading should have had, so the code is looked at
+    /// A reading without its error, raw. The error is one of the code that the reading should have had, so the code is looked at
     /// again without it; where that changes the error by more than it is, beside the turn of a bit that is far off, it would lead away.
-    #[inline(always)]
-    pub fn clean(&self, raw: &Vector3<T>) -> Vector3<T> {
-        let (a, b, c) = (raw.x, raw.y, raw.z);
-        let (a1, b1, c1) = (self.error(a), self.error(b), self.error(c));
-        let (a2, b2, c2) = (self.error(a - a1), self.error(b - b1), self.error(c - c1));
-        let (da, db, dc) = (a2 - a1, b2 - b1, c2 - c1);
-        match da * da + db * db + dc * dc < a1 * a1 + b1 * b1 + c1 * c1 {
-            true => Vector3::new(a - a2, b - b2, c - c2),
-            false => Vector3::new(a - a1, b - b1, c - c1),
+    ///
+    /// Called, not written out for each of six axes: a few instructions more, for a seventh of the flash.
+    #[inline(never)]
+    pub fn clean(&self, u: T) -> T {
+        let first = self.error(u);
+        let second = self.error(u - first);
+        let moved = second - first;
+        match moved * moved < first * first {
+            true => u - second,
+            false => u - first,
         }
     }
 
     #[inline(always)]
     fn error(&self, u: T) -> T {
-        let codes: f32 = (u * self.codes + convert(ABOVE_ZERO)).to_subset_unchecked();
+        let codes: f32 = (u * self.codes + self.at_zero).to_subset_unchecked();
         // Saturates: of no number it is 0.
         let bits = codes as u32;
         self.first[((bits >> 5) & 15) as usize] + self.last[(bits & 31) as usize]

@@ -21,15 +21,18 @@ pub(super) enum Slowly<T: RealField> {
     Term(Fast<T>),
 }
 
-/// Effects of one triad, and how their errors become errors in the body frame.
+/// Effects of one triad, and how their errors become errors in the body frame. In this order: what lies further from the beginning
+/// than an instruction can say takes one more.
 #[derive(Debug, Clone, Copy)]
+#[repr(C)]
 pub(super) struct Triad<T: RealField, const N: usize> {
     directions: Directions<T>,
     /// Without gaps.
     fast: [Option<Fast<T>>; N],
     /// Without gaps.
     slow: [Option<Slowly<T>>; N],
-    code: Option<Code<T>>,
+    /// By axis, which may each have a converter of its own.
+    code: [Option<Code<T>>; 3],
 }
 
 /// What the effects of one triad remember.
@@ -80,17 +83,29 @@ impl<T: RealField + Copy, const N: usize> Triad<T, N> {
             directions,
             fast: [None; N],
             slow: [None; N],
-            code: None,
+            code: [None; 3],
         }
     }
 
     pub fn push(&mut self, effect: &Kind<T>) -> Result<(), Refused> {
         match effect {
-            Kind::Code { errors, weight } => {
-                if self.code.is_some() {
+            Kind::Code {
+                axes,
+                errors,
+                weight,
+                zero,
+            } => {
+                // All are looked at before any is set: what is refused changes nothing.
+                let mut both = self.code.iter().zip(axes);
+                if both.any(|(code, meant)| *meant && code.is_some()) {
                     return Err(Refused::Full);
                 }
-                self.code = Some(Code::new(errors, *weight));
+                let new = Code::new(errors, *weight, *zero);
+                for (code, meant) in self.code.iter_mut().zip(axes) {
+                    if *meant {
+                        *code = Some(new);
+                    }
+                }
             }
             Kind::Fast(fast) => {
                 let free = self.fast.iter_mut().find(|e| e.is_none());
@@ -138,13 +153,21 @@ impl<T: RealField + Copy, const N: usize> Triad<T, N> {
         memory.bias = total.bias;
     }
 
-    /// Raw readings without the errors of the converter.
+    /// Raw readings without the errors of the converters.
     #[inline(always)]
     pub fn without_code_errors(&self, raw: &Vector3<T>) -> Vector3<T> {
-        match &self.code {
-            Some(code) => code.clean(raw),
-            None => *raw,
+        let mut clean = *raw;
+        let [x, y, z] = &self.code;
+        if let Some(code) = x {
+            clean.x = code.clean(raw.x);
         }
+        if let Some(code) = y {
+            clean.y = code.clean(raw.y);
+        }
+        if let Some(code) = z {
+            clean.z = code.clean(raw.z);
+        }
+        clean
     }
 
     /// The input of the triad without its errors; `own` says which of the conditions that is. They are left as they were.

@@ -113,12 +113,15 @@ pub const EFFECTS: [&str; 22] = [
     "accel_readout_code",
 ];
 
-/// The bits of the effects that this build removes: found by asking for each, so that they cannot be out of date.
+/// Bits of those that are no effects by name, but [`Effect::code`].
+const CODES: u32 = 0b11 << 20;
+
+/// The bits of the effects that this build removes: found by asking for each that has a name, so that they cannot be out of date.
 pub fn effects_of_this_build() -> u32 {
     // None takes no numbers at all, so that a known one is refused for their count.
     let known = |id| !matches!(Effect::<f32>::named(id, &[], None), Err(Refused::Unknown));
     let bits = EFFECTS.iter().enumerate();
-    bits.fold(0, |bits, (bit, id)| bits | u32::from(known(id)) << bit)
+    bits.fold(CODES, |bits, (bit, id)| bits | u32::from(known(id)) << bit)
 }
 
 /// Why the device started.

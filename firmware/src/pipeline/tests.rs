@@ -4,6 +4,7 @@ extern crate std;
 use std::vec::Vec;
 
 use mimu_core::compensation::{Affine, Compensation};
+use mimu_core::effects::Sensor;
 use mimu_core::stored::{self, Record};
 use mimu_core::table::Node;
 use mimu_core::wire::Prior;
@@ -179,10 +180,12 @@ fn errors_of_the_code_are_taken_out_of_the_reading_before_its_temperature_matter
     let (half, eighth) = (2e-4, -1e-4);
     let mut errors = [0.0; 9];
     (errors[0], errors[2]) = (half as f32, eighth as f32);
-    let code = Record::Named {
-        id: "accel_readout_code",
-        coefficients: &errors,
-        form: Some(weight as f32),
+    let code = Record::Code {
+        sensor: Sensor::Accel,
+        axis: None,
+        weight: weight as f32,
+        zero: 0.0,
+        errors: &errors,
     };
     let mut pipeline = Pipeline::new();
     pipeline.calibrate(calibration(&[code]));

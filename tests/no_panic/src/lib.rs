@@ -50,6 +50,18 @@ pub fn effect_term(
     Effect::term(sensor, axis, coefficient, variables)
 }
 
+/// [`Effect::code`].
+#[inline(never)]
+pub fn effect_code(
+    sensor: Sensor,
+    axis: Option<usize>,
+    errors: &[f32; 9],
+    weight: f32,
+    zero: f32,
+) -> Result<Effect<f32>, Refused> {
+    Effect::code(sensor, axis, errors, weight, zero)
+}
+
 /// [`Effects::push`].
 #[inline(never)]
 pub fn effects_push(effects: &mut Effects<f32, 8>, effect: Effect<f32>) -> Result<(), Refused> {
