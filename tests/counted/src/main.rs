@@ -83,13 +83,24 @@ fn main() -> ! {
             }
         }
     }
+    // Without any, with one axis of a triad, with all of it, and with both.
     let mut all = none();
-    for id in ["gyro_readout_code", "accel_readout_code"] {
-        if let Ok(code) = Effect::named(id, &[1e-4; 9], Some(1.65)) {
-            let _ = all.push(code);
+    let clean = |all: &Effects<f32, ROOM>| between(|| single::without_code_errors(all, &raw));
+    clean(&all);
+    for (sensor, axes) in [
+        (Sensor::Gyro, 0..1),
+        (Sensor::Gyro, 1..3),
+        (Sensor::Accel, 0..3),
+    ] {
+        for axis in axes {
+            // Of each axis its own.
+            let weight = 1.65 + 0.1 * axis as f32;
+            if let Ok(code) = Effect::code(sensor, Some(axis), &[1e-4; 9], weight, 0.01 * weight) {
+                let _ = all.push(code);
+            }
         }
+        clean(&all);
     }
-    between(|| single::without_code_errors(&all, &raw));
     loop {
         cortex_m::asm::wfi();
     }
