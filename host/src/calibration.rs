@@ -4,7 +4,7 @@ mod effect;
 mod staging;
 mod writing;
 
-pub use effect::{CoefficientTable, EffectTable, FormTable};
+pub use effect::{CoefficientTable, ConverterTable, EffectTable, FormTable};
 pub(crate) use effect::{Condition, depends, variable as device_variable};
 pub use staging::{Staged, stage};
 pub use writing::{figure, to_toml};

@@ -107,6 +107,8 @@ pub struct Noise {
     pub channels: [ChannelNoise; 6],
     /// What a record at rest said of them, where it is used.
     stated: [Option<Stated>; 6],
+    /// Variances of a mean over a second, raw units squared, within the dwells and as a record at rest said, where it did not hold.
+    other: [Option<[f64; 2]>; 6],
     /// From the first dwell to the end of the last, s.
     session: Span,
 }
@@ -135,6 +137,7 @@ impl Noise {
         Self {
             channels,
             stated: Default::default(),
+            other: Default::default(),
             session: [
                 dwells.first().map_or(0.0, |d| d.start_s),
                 dwells.last().map_or(0.0, end),
@@ -199,10 +202,15 @@ impl Noise {
             nodes.sort_by(|a, b| a.0.total_cmp(&b.0));
             let stated = Stated { nodes };
             let mean_c = dwells.iter().map(|d| d.temp_c).sum::<f64>() / dwells.len() as f64;
-            let ratio = self.channels[c].variance(1.0) / stated.at(mean_c).variance(1.0);
+            let second = [
+                self.channels[c].variance(1.0),
+                stated.at(mean_c).variance(1.0),
+            ];
+            let ratio = second[0] / second[1];
             if (1.0 / ANOTHER_NOISE..=ANOTHER_NOISE).contains(&ratio) {
                 self.stated[c] = Some(stated);
             } else {
+                self.other[c] = Some(second);
                 warnings.push(format!(
                     "{name}: the mean over a second is {} times as noisy within the dwells as {} says, so the noise within the dwells is used",
                     crate::report::three(ratio.sqrt()),
@@ -228,6 +236,14 @@ impl Noise {
     /// Whether a record at rest says the noise of all channels of `sensor`.
     pub fn is_stated(&self, sensor: Sensor) -> bool {
         self.stated[sensor.channels()].iter().all(Option::is_some)
+    }
+
+    /// Channel `c`, where the dwells are noisier than a record at rest said: by how much, as the standard deviation of a mean over a
+    /// second, raw; and how many times as noisy as it said.
+    pub fn beyond_stated(&self, c: usize) -> Option<(f64, f64)> {
+        let [within, stated] = self.other[c]?;
+        let more = within > stated;
+        more.then(|| ((within - stated).sqrt(), (within / stated).sqrt()))
     }
 
     /// Variance of the difference of two successive means over `tau_s` of channel `c`, halved, raw units squared.

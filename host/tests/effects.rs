@@ -6,8 +6,8 @@ use std::process::Command;
 
 use mimu::calibration::{Calibration, EffectTable, to_toml};
 use mimu::diagnose::candidate::{Candidate, Kind, Monomial, Variable};
-use mimu::diagnose::effect::FormKind;
 use mimu::diagnose::library;
+use mimu::diagnose::library::readout::{Converter, TYPICAL, first_of};
 use mimu::diagnose::removal::{Removed, remove};
 use mimu::dwell::Sensor;
 use mimu::fit::{Fit, Method, Options, fit};
@@ -53,8 +53,39 @@ const CUBIC: f64 = 3e-5;
 /// Thermal bias of gyro z, rad/s/K.
 const THERMAL: f64 = 5e-4;
 
+/// Weight of bit 0 of the converters, V.
+const BIT_0_V: f64 = 1.6384;
+/// Bits of each converter of the accelerometer that are worth more than they say, V, three times what data sheets say and less.
+const WORTH_V: [[(i32, f64); 3]; 3] = {
+    let one = TYPICAL * BIT_0_V;
+    [
+        [(0, 3.0 * one), (3, -2.0 * one), (6, one)],
+        [(1, -3.0 * one), (2, 2.0 * one), (5, -one)],
+        [(0, -2.0 * one), (4, 3.0 * one), (7, -one)],
+    ]
+};
+/// Readings of code 0, V: what has been subtracted is no multiple of anything.
+const ZERO_V: [f64; 3] = [-0.0713, -1.1234, -0.5061];
+
+/// What the converters of the accelerometer add to a reading of `u` of an axis, V.
+fn worth(axis: usize, u: f64) -> f64 {
+    let each = WORTH_V[axis].iter().map(|(bit, worth)| {
+        let code = ((u - ZERO_V[axis]) / (BIT_0_V * 0.5_f64.powi(*bit))).floor();
+        if code.rem_euclid(2.0) == 1.0 {
+            *worth
+        } else {
+            0.0
+        }
+    });
+    each.sum()
+}
+
 /// Records the unit on a table, with its flaws or without; `temp` says whether temp_c is recorded.
 fn record(folder: &Path, flawed: bool, temp: bool) {
+    write_recording(folder, flawed, false, temp);
+}
+
+fn write_recording(folder: &Path, flawed: bool, converted: bool, temp: bool) {
     std::fs::create_dir(folder).unwrap();
     let manifest = format!(
         "format = \"mimu-recording/1\"\ndevice = \"bench\"\nsample_rate_hz = {RATE_HZ:?}\n\
@@ -102,8 +133,14 @@ fn record(folder: &Path, flawed: bool, temp: bool) {
                 }),
             };
             let read = p * *input + b + scale.component_mul(&error);
-            for u in read.iter() {
-                write!(out, ",{:.9}", u + NOISE[sensor] * normal()).unwrap();
+            for (axis, u) in read.iter().enumerate() {
+                let u = u + NOISE[sensor] * normal();
+                let more = if converted && sensor == 1 {
+                    worth(axis, u)
+                } else {
+                    0.0
+                };
+                write!(out, ",{:.9}", u + more).unwrap();
             }
         }
         for v in rate_dps.iter().chain(force.iter()) {
@@ -152,9 +189,6 @@ fn table(effect: &Removed) -> EffectTable {
     EffectTable::new(effect, &sigmas)
 }
 
-/// Weight of bit 0 of a converter, V.
-const BIT_0_V: f64 = 1.6384;
-
 /// All that is known by name, some of it with some of its coefficients only, and three terms; ten times what data sheets say.
 fn every_effect() -> Vec<Removed> {
     let mut all: Vec<Removed> = library::all()
@@ -162,6 +196,11 @@ fn every_effect() -> Vec<Removed> {
         .enumerate()
         .map(|(n, effect)| {
             let mut candidate = Candidate::new(effect.sensor, Kind::Effect(effect));
+            if candidate.reads_code() {
+                let zero = 0.123;
+                let weight = BIT_0_V;
+                candidate = candidate.behind_one(Converter { weight, zero });
+            }
             if n % 2 == 1 {
                 candidate.active.remove(1);
             }
@@ -171,10 +210,7 @@ fn every_effect() -> Vec<Removed> {
                 .iter()
                 .map(|k| sign(*k) * effect.typical[*k] * (10.0 + *k as f64))
                 .collect();
-            let form = effect.form.map_or(0.0, |f| match f.kind {
-                FormKind::Steps => BIT_0_V,
-                _ => 2.0 * f.from,
-            });
+            let form = effect.form.map_or(0.0, |f| 2.0 * f.from);
             removed(candidate, form, &values)
         })
         .collect();
@@ -207,6 +243,7 @@ fn every_effect_comes_back_from_the_file_and_the_device_removes_what_the_pc_does
         assert_eq!(read.candidate.id(), written.candidate.id());
         assert_eq!(read.candidate.active, written.candidate.active);
         assert_eq!((read.form, &read.values), (written.form, &written.values));
+        assert_eq!(read.candidate.codes, written.candidate.codes);
     }
 
     // Of a block the PC knows mean and scatter, from which bits follow another way.
@@ -248,75 +285,88 @@ fn every_effect_comes_back_from_the_file_and_the_device_removes_what_the_pc_does
     assert!(moved[0] > 0.01 && moved[1] > 0.1, "{moved:?}");
 }
 
+/// Converters of the accelerometer, as the recording is made.
+fn converters() -> Removed {
+    let effect = library::by_id("accel_readout_code").unwrap();
+    let mut candidate = Candidate::new(Sensor::Accel, Kind::Effect(effect));
+    candidate.active.clear();
+    let mut values = Vec::new();
+    for axis in 0..3 {
+        let (weight, zero) = (BIT_0_V, ZERO_V[axis]);
+        candidate.codes[axis] = Some(Converter { weight, zero });
+        for (bit, worth) in WORTH_V[axis] {
+            candidate.active.push(first_of(axis) + bit as usize);
+            values.push(worth / BIT_0_V);
+        }
+    }
+    removed(candidate, 0.0, &values)
+}
+
 #[test]
-fn bits_are_removed_block_by_block_as_sample_by_sample() {
+fn errors_by_the_code_are_taken_out_block_by_block_and_sample_by_sample() {
     let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("recording");
-    record(&path, false, false);
-    let fit = fitted(&path);
-    let effects: Vec<Removed> = every_effect()
-        .into_iter()
-        .filter(|e| e.candidate.reads_code())
-        .collect();
-    assert_eq!(effects.len(), 2);
-    let tables: Vec<EffectTable> = effects.iter().map(table).collect();
-    let text = to_toml(&fit, &tables, "2026-01-01T00:00:00Z");
+    let [clean, coded] = ["clean", "coded"].map(|name| folder.path().join(name));
+    // The same noise to the last bit.
+    record(&clean, false, false);
+    write_recording(&coded, false, true, false);
+    let fit = fitted(&clean);
+    let text = to_toml(&fit, &[table(&converters())], "2026-01-01T00:00:00Z");
     let calibration = Calibration::parse(&text, "cal.toml").unwrap();
     let [gyro, accel] = Sensor::BOTH.map(|s| calibration.inverse(s).unwrap());
+    let coded_blocks = prepared(&coded);
     let after = remove(
-        &fit.prepared,
+        &coded_blocks,
         Some(&gyro),
         Some(&accel),
         calibration.effects(),
     )
     .unwrap();
     let device: Effects<f64, 8> = calibration.core_effects().unwrap();
-    let text = std::fs::read_to_string(path.join("samples.csv")).unwrap();
+    let text = std::fs::read_to_string(coded.join("samples.csv")).unwrap();
     let samples: Vec<Vec<f64>> = text
         .lines()
         .skip(1)
         .map(|line| line.split(',').map(|v| v.parse().unwrap()).collect())
         .collect();
-    let mut state = State::new(RATE_HZ);
-    let (mut off, mut moved) = (Vector3::zeros(), 0.0);
-    for (block, clean) in fit
-        .prepared
-        .condensed
-        .blocks
-        .iter()
-        .zip(&after.condensed.blocks)
-    {
-        let from = block.first_row as usize;
-        let rows = &samples[from..from + block.rows as usize];
-        let sum = |f: &mut dyn FnMut(&[f64]) -> Vector3<f64>| -> Vector3<f64> {
-            rows.iter().map(|row| f(row)).sum::<Vector3<f64>>() / rows.len() as f64
-        };
-        let raw = |row: &[f64], from: usize| Vector3::from_fn(|i, _| row[2 + from + i]);
-        let by_device = sum(&mut |row| {
-            let read = device.without_code_errors(&Sample {
-                gyro: raw(row, 0),
-                accel: raw(row, 3),
-            });
-            let sample = Sample {
-                gyro: gyro.apply(&read.gyro),
-                accel: accel.apply(&read.accel),
-            };
-            device.remove(&mut state, &sample).accel
+    let mean = |block: &mimu::blocks::Block| Vector3::from_fn(|i, _| block.raw[3 + i].mean);
+    let blocks = |of: &Prepared| of.condensed.blocks.clone();
+    // Of the truth, V: what was put in, and what is left of it by block and by sample.
+    let [mut put, mut by_block, mut by_sample] = [(); 3].map(|()| Vec::new());
+    let all = blocks(&fit.prepared).into_iter().zip(blocks(&coded_blocks));
+    for ((truth, read), cleaned) in all.zip(blocks(&after)) {
+        assert_eq!((truth.first_row, truth.rows), (read.first_row, read.rows));
+        let from = read.first_row as usize;
+        let rows = &samples[from..from + read.rows as usize];
+        let of_device = rows.iter().map(|row| {
+            let raw = |from: usize| Vector3::from_fn(|i, _| row[2 + from + i]);
+            let (gyro, accel) = (raw(0), raw(3));
+            device.without_code_errors(&Sample { gyro, accel }).accel
         });
-        let mean = |block: &mimu::blocks::Block| {
-            accel.apply(&Vector3::from_fn(|i, _| block.raw[3 + i].mean))
-        };
-        // Where a bit turns within the noise, five samples tell the share of the time only so well: to a fifth, by chance.
-        off += by_device - mean(clean);
-        moved += (mean(clean) - mean(block)).norm();
+        let of_device = of_device.sum::<Vector3<f64>>() / rows.len() as f64;
+        put.push(mean(&read) - mean(&truth));
+        by_block.push(mean(&cleaned) - mean(&truth));
+        by_sample.push(of_device - mean(&truth));
     }
-    let blocks = fit.prepared.condensed.blocks.len() as f64;
-    let (off, moved) = (off.norm() / blocks, moved / blocks);
-    println!("errors of {moved:.4} m/s², removed by blocks and by samples to within {off:.5}");
-    assert!(moved > 0.02, "{moved}");
-    // Five samples tell a share of one half to 0.22 (the root of a fifth of a quarter), and 1440 blocks their mean to 0.006 of an
-    // error; three axes together to 0.010.
-    assert!(off < 0.01 * moved, "{off} of {moved}");
+    let rms = |all: &[Vector3<f64>]| {
+        let squares: f64 = all.iter().map(|e| e.norm_squared()).sum();
+        (squares / (3 * all.len()) as f64).sqrt()
+    };
+    let mean = |all: &[Vector3<f64>]| all.iter().sum::<Vector3<f64>>().norm() / all.len() as f64;
+    println!(
+        "errors of {:.3e} V rms: by block {:.3e} left, {:.1e} on average; by sample {:.3e}, {:.1e}",
+        rms(&put),
+        rms(&by_block),
+        mean(&by_block),
+        rms(&by_sample),
+        mean(&by_sample)
+    );
+    assert!(rms(&put) > 5e-4);
+    // Where a bit that is worth too little turns, the readings of some codes before and after are the same, and of five samples
+    // the share of the time is known to a fifth. One turn in the wrong place, or of the wrong sign, leaves more than all of this.
+    for left in [&by_block, &by_sample] {
+        assert!(rms(left) < 0.12 * rms(&put), "{}", rms(left));
+        assert!(mean(left) < 0.04 * rms(&put), "{}", mean(left));
+    }
 }
 
 fn mimu(arguments: &[&str]) -> (bool, String) {

@@ -10,10 +10,11 @@ use serde::Deserialize;
 
 use super::Calibration;
 use super::writing::{number, quoted};
-use crate::diagnose::candidate::{Candidate, Kind, Monomial, Variable};
+use crate::diagnose::candidate::{Candidate, Codes, Kind, Monomial, OfConverter, Variable};
 use crate::diagnose::decision::Accepted;
 use crate::diagnose::effect::{Effect, Moment, Reading, Scope};
 use crate::diagnose::library;
+use crate::diagnose::library::readout::Converter;
 use crate::diagnose::removal::{Removed, errors};
 use crate::dwell::Sensor;
 use crate::error::{Error, Result};
@@ -40,6 +41,9 @@ pub struct EffectTable {
     /// Its nonlinear constant, if it has one.
     #[serde(default)]
     pub form: Option<FormTable>,
+    /// Of errors by the code: the converters, of all axes or one each.
+    #[serde(default)]
+    pub converters: Vec<ConverterTable>,
     /// Those that the experiment determined; the others are zero.
     pub coefficients: Vec<CoefficientTable>,
 }
@@ -52,6 +56,64 @@ pub struct FormTable {
     pub name: String,
     /// Value.
     pub value: f64,
+}
+
+/// How the codes of a converter stand behind readings.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ConverterTable {
+    /// Axes whose readings it gives: x, y or z, or xyz.
+    pub axes: String,
+    /// Of its first bit, raw.
+    pub weight_of_bit_0_raw: f64,
+    /// Reading of its code 0, raw.
+    pub reading_of_code_0_raw: f64,
+}
+
+impl ConverterTable {
+    /// Those of some axes, in a table of its own for each unless all are the same.
+    pub fn of(codes: &Codes) -> Vec<Self> {
+        let table = |axes: &str, converter: &Converter| Self {
+            axes: axes.into(),
+            weight_of_bit_0_raw: converter.weight,
+            reading_of_code_0_raw: converter.zero,
+        };
+        match codes {
+            [Some(x), Some(y), Some(z)] if x == y && y == z => vec![table("xyz", x)],
+            _ => {
+                let each = AXES.iter().zip(codes);
+                each.filter_map(|(axis, c)| Some(table(axis, c.as_ref()?)))
+                    .collect()
+            }
+        }
+    }
+
+    /// Those of the axes, or what is wrong.
+    fn codes(all: &[Self]) -> std::result::Result<Codes, String> {
+        let mut codes: Codes = [None; 3];
+        for table in all {
+            let (weight, zero) = (table.weight_of_bit_0_raw, table.reading_of_code_0_raw);
+            if !(weight > 0.0 && weight.is_finite() && zero.is_finite()) {
+                return Err(format!(
+                    "converter of {}: weight_of_bit_0_raw has to be a positive number, reading_of_code_0_raw a number",
+                    table.axes
+                ));
+            }
+            let ours: Vec<usize> = match table.axes.as_str() {
+                "xyz" => (0..3).collect(),
+                one => AXES.iter().position(|a| *a == one).into_iter().collect(),
+            };
+            if ours.is_empty() {
+                return Err(format!("converter of {:?}: x, y, z or xyz", table.axes));
+            }
+            for axis in ours {
+                if codes[axis].replace(Converter { weight, zero }).is_some() {
+                    return Err(format!("there are two converters of {}", AXES[axis]));
+                }
+            }
+        }
+        Ok(codes)
+    }
 }
 
 /// Coefficient of an effect.
@@ -111,6 +173,7 @@ impl EffectTable {
                 name: f.name.into(),
                 value: removed.form,
             }),
+            converters: ConverterTable::of(&candidate.codes),
             coefficients: coefficients
                 .map(|((name, unit), (value, sigma))| CoefficientTable {
                     name,
@@ -191,6 +254,25 @@ impl EffectTable {
         if candidate.active.is_empty() {
             return Err(("it has no coefficients".into(), EDITED));
         }
+        candidate.codes = ConverterTable::codes(&self.converters).map_err(|e| (e, EDITED))?;
+        if candidate.reads_code() != !self.converters.is_empty() {
+            let problem = match candidate.reads_code() {
+                true => "it has no converters",
+                false => "it has converters, and is no effect of their codes",
+            };
+            return Err((problem.into(), EDITED));
+        }
+        let alone = |axis: &usize| candidate.codes[*axis].is_none();
+        if let Some(axis) = candidate
+            .reads_code()
+            .then(|| candidate.axes())
+            .and_then(|all| all.into_iter().find(alone))
+        {
+            return Err((
+                format!("{} has coefficients and no converter", AXES[axis]),
+                EDITED,
+            ));
+        }
         Ok(Removed {
             candidate,
             form,
@@ -216,6 +298,19 @@ impl EffectTable {
                 quoted(&form.name),
                 number(form.value)
             )?;
+        }
+        if !self.converters.is_empty() {
+            writeln!(out, "converters = [")?;
+            for c in &self.converters {
+                writeln!(
+                    out,
+                    "  {{ axes = {}, weight_of_bit_0_raw = {}, reading_of_code_0_raw = {} }},",
+                    quoted(&c.axes),
+                    number(c.weight_of_bit_0_raw),
+                    number(c.reading_of_code_0_raw)
+                )?;
+            }
+            writeln!(out, "]")?;
         }
         writeln!(out, "coefficients = [")?;
         for c in &self.coefficients {
@@ -336,12 +431,25 @@ pub(super) fn read(calibration: &Calibration, place: &str) -> Result<Vec<Removed
     Ok(all)
 }
 
-/// An effect as `core` removes it.
+/// An effect as `core` removes it: of converters of the axes one for each.
 fn on_device<T: RealField + Copy>(
     removed: &Removed,
-) -> std::result::Result<DeviceEffect<T>, Refused> {
+) -> std::result::Result<Vec<DeviceEffect<T>>, Refused> {
     let candidate = &removed.candidate;
+    let sensor = match candidate.sensor {
+        Sensor::Gyro => DeviceSensor::Gyro,
+        Sensor::Accel => DeviceSensor::Accel,
+    };
     match &candidate.kind {
+        Kind::Effect(_) if candidate.reads_code() => {
+            let of = |c: OfConverter| {
+                let Converter { weight, zero } = c.converter;
+                let errors = c.errors.map(convert);
+                DeviceEffect::code(sensor, c.axis, &errors, convert(weight), convert(zero))
+            };
+            let all = candidate.by_converter(&removed.values);
+            all.into_iter().map(of).collect()
+        }
         Kind::Effect(effect) => {
             // Those of a recording stand last, and no file has them.
             let of_unit = effect
@@ -355,16 +463,13 @@ fn on_device<T: RealField + Copy>(
                 }
             }
             let form = effect.form.map(|_| convert(removed.form));
-            DeviceEffect::named(effect.id, &all, form)
+            Ok(vec![DeviceEffect::named(effect.id, &all, form)?])
         }
         Kind::Term(axis, monomial) => {
-            let sensor = match candidate.sensor {
-                Sensor::Gyro => DeviceSensor::Gyro,
-                Sensor::Accel => DeviceSensor::Accel,
-            };
             let variables: Vec<DeviceVariable> = monomial.0.iter().map(|v| variable(*v)).collect();
             let value = removed.values.first().copied().unwrap_or_default();
-            DeviceEffect::term(sensor, *axis, convert(value), &variables)
+            let term = DeviceEffect::term(sensor, *axis, convert(value), &variables)?;
+            Ok(vec![term])
         }
         // A bias that has jumped once says nothing of the next recording.
         Kind::Jump { .. } => Err(Refused::Unknown),
@@ -399,7 +504,8 @@ pub(super) fn core_effects<T: RealField + Copy, const N: usize>(
     let singular = || Error::new(&place, "C is singular", "fit the recording again");
     let mut all = Effects::new(&gyro, &accel).ok_or_else(singular)?;
     for removed in calibration.effects() {
-        let pushed = on_device(removed).and_then(|effect| all.push(effect));
+        let parts = on_device(removed);
+        let pushed = parts.and_then(|all_of| all_of.into_iter().try_for_each(|e| all.push(e)));
         pushed.map_err(|refused| {
             let problem = match refused {
                 Refused::Full => format!("the device has no room for it: at most {N} of a kind"),

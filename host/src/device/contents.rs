@@ -3,6 +3,8 @@
 
 use mimu_core::stored::{self, Refused};
 
+use crate::diagnose::library::readout::BITS;
+
 /// A stored calibration, number by number.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Contents {
@@ -35,8 +37,19 @@ pub struct EffectContents {
     pub coefficients: Vec<f32>,
     /// Time constant, s, of an effect that has one.
     pub time_constant_s: Option<f32>,
-    /// Weight of the converter's first bit, V, of errors by its code.
-    pub weight_of_bit_0_v: Option<f32>,
+    /// Of errors by the code.
+    pub converter: Option<ConverterContents>,
+}
+
+/// A converter.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ConverterContents {
+    /// Axes that it reads: x, y, z or xyz.
+    pub axes: &'static str,
+    /// Weight of its first bit, V.
+    pub weight_of_bit_0_v: f32,
+    /// Reading of its code 0, V.
+    pub reading_of_code_0_v: f32,
 }
 
 /// Bytes of the layout that are read with the others before them.
@@ -73,38 +86,60 @@ impl Rest<'_> {
     }
 
     fn effect(&mut self) -> Option<EffectContents> {
-        if self.take()? == [0] {
-            let [length] = self.take()?;
-            let (id, rest) = self.0.split_at_checked(usize::from(length))?;
-            self.0 = rest;
-            let [count] = self.take()?;
-            let coefficients = (0..count).map(|_| self.f32()).collect::<Option<_>>()?;
-            let form = Some(self.f32()?).filter(|form| *form != 0.0);
-            let id = String::from_utf8_lossy(id).into_owned();
-            let reads_code = id.ends_with("_readout_code");
-            return Some(EffectContents {
-                id,
-                coefficients,
-                time_constant_s: form.filter(|_| !reads_code),
-                weight_of_bit_0_v: form.filter(|_| reads_code),
-            });
+        match self.take()? {
+            [0] => self.named(),
+            [1] => self.term(),
+            _ => self.code(),
         }
+    }
+
+    fn named(&mut self) -> Option<EffectContents> {
+        let [length] = self.take()?;
+        let (id, rest) = self.0.split_at_checked(usize::from(length))?;
+        self.0 = rest;
+        let [count] = self.take()?;
+        Some(EffectContents {
+            coefficients: (0..count).map(|_| self.f32()).collect::<Option<_>>()?,
+            time_constant_s: Some(self.f32()?).filter(|form| *form != 0.0),
+            id: String::from_utf8_lossy(id).into_owned(),
+            converter: None,
+        })
+    }
+
+    fn code(&mut self) -> Option<EffectContents> {
+        let [triad, axis] = self.take()?;
+        let converter = ConverterContents {
+            axes: ["x", "y", "z", "xyz"].get(usize::from(axis))?,
+            weight_of_bit_0_v: self.f32()?,
+            reading_of_code_0_v: self.f32()?,
+        };
+        Some(EffectContents {
+            id: format!("{}_readout_code", SENSORS.get(usize::from(triad))?),
+            coefficients: (0..BITS).map(|_| self.f32()).collect::<Option<_>>()?,
+            time_constant_s: None,
+            converter: Some(converter),
+        })
+    }
+
+    fn term(&mut self) -> Option<EffectContents> {
         let [triad, axis, count] = self.take()?;
         let mut names: Vec<&str> = Vec::new();
         for _ in 0..count {
             let [variable] = self.take()?;
             names.push(VARIABLES.get(usize::from(variable).checked_sub(1)?)?);
         }
-        let sensor = ["gyro", "accel"].get(usize::from(triad))?;
+        let sensor = SENSORS.get(usize::from(triad))?;
         let axis = ["x", "y", "z"].get(usize::from(axis))?;
         Some(EffectContents {
             id: format!("term:{sensor}_{axis}~{}", names.join("*")),
             coefficients: vec![self.f32()?],
             time_constant_s: None,
-            weight_of_bit_0_v: None,
+            converter: None,
         })
     }
 }
+
+const SENSORS: [&str; 2] = ["gyro", "accel"];
 
 /// By the numbers of [`mimu_core::effects::Variable`], which begin at 1.
 const VARIABLES: [&str; 9] = [

@@ -9,7 +9,8 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::who::{Who, unusable};
 use crate::calibration::{Calibration, device_variable};
-use crate::diagnose::candidate::Kind;
+use crate::diagnose::candidate::{Kind, OfConverter};
+use crate::diagnose::library::readout::BITS;
 use crate::diagnose::removal::Removed;
 use crate::dwell::Sensor;
 use crate::error::{Error, Result};
@@ -30,18 +31,33 @@ pub struct Image {
     pub warnings: Vec<String>,
 }
 
-/// An effect in the words of the device.
+/// An effect, or a converter of one, in the words of the device.
+#[derive(Debug, Clone)]
 struct OnDevice {
     id: String,
     sensor: DeviceSensor,
-    /// All coefficients of a named effect, or the one of a term.
+    /// All coefficients of a named effect, or the one of a term; none of a converter.
     numbers: Vec<f32>,
     what: What,
 }
 
+#[derive(Debug, Clone)]
 enum What {
     Named(Option<f32>),
+    Code(Code),
     Term(u8, Vec<mimu_core::effects::Variable>),
+}
+
+/// Errors of a converter.
+#[derive(Debug, Clone)]
+struct Code {
+    axis: Option<u8>,
+    /// Weight of its first bit, V.
+    weight: f32,
+    /// Reading of its code 0, V.
+    zero: f32,
+    /// Of its bits, in units of the weight.
+    errors: [f32; BITS],
 }
 
 impl Image {
@@ -65,7 +81,8 @@ impl Image {
             .effects()
             .iter()
             .map(|removed| on_device(removed, place))
-            .collect::<Result<_>>()?;
+            .collect::<Result<Vec<_>>>()?
+            .concat();
         let records: Vec<Record<'_>> = effects.iter().map(OnDevice::record).collect();
         let node = Node {
             temp_c: temp_c as f32,
@@ -119,7 +136,8 @@ impl Image {
             .effects()
             .iter()
             .map(|removed| on_device(removed, place))
-            .collect::<Result<_>>()?;
+            .collect::<Result<Vec<_>>>()?
+            .concat();
         check_room(&effects, usize::from(who.effects_room), place)?;
         let (nodes, room) = (
             self.node_temp_c.len(),
@@ -171,7 +189,7 @@ fn model(calibration: &Calibration, sensor: Sensor, place: &str) -> Result<Affin
     })
 }
 
-fn on_device(removed: &Removed, place: &str) -> Result<OnDevice> {
+fn on_device(removed: &Removed, place: &str) -> Result<Vec<OnDevice>> {
     let candidate = &removed.candidate;
     let id = candidate.id();
     let none = |problem: &str| {
@@ -190,6 +208,21 @@ fn on_device(removed: &Removed, place: &str) -> Result<OnDevice> {
             if !EFFECTS.contains(&effect.id) {
                 return none("no device removes this effect");
             }
+            if candidate.reads_code() {
+                let of = |c: OfConverter| OnDevice {
+                    id: id.clone(),
+                    sensor,
+                    numbers: Vec::new(),
+                    what: What::Code(Code {
+                        axis: c.axis.map(|axis| axis as u8),
+                        weight: c.converter.weight as f32,
+                        zero: c.converter.zero as f32,
+                        errors: c.errors.map(|e| e as f32),
+                    }),
+                };
+                let all = candidate.by_converter(&removed.values);
+                return Ok(all.into_iter().map(of).collect());
+            }
             let mut all = vec![0.0; effect.coefficients.len()];
             for (k, value) in candidate.active.iter().zip(&removed.values) {
                 all[*k] = *value as f32;
@@ -206,12 +239,12 @@ fn on_device(removed: &Removed, place: &str) -> Result<OnDevice> {
             return none("a bias that has jumped once says nothing of the time after it");
         }
     };
-    Ok(OnDevice {
+    Ok(vec![OnDevice {
         id,
         sensor,
         numbers,
         what,
-    })
+    }])
 }
 
 impl OnDevice {
@@ -221,6 +254,13 @@ impl OnDevice {
                 id: &self.id,
                 coefficients: &self.numbers,
                 form: *form,
+            },
+            What::Code(code) => Record::Code {
+                sensor: self.sensor,
+                axis: code.axis,
+                weight: code.weight,
+                zero: code.zero,
+                errors: &code.errors,
             },
             What::Term(axis, variables) => Record::Term {
                 sensor: self.sensor,
@@ -234,6 +274,13 @@ impl OnDevice {
     fn effect(&self) -> std::result::Result<Effect<f32>, mimu_core::effects::Refused> {
         match &self.what {
             What::Named(form) => Effect::named(&self.id, &self.numbers, *form),
+            What::Code(code) => Effect::code(
+                self.sensor,
+                code.axis.map(usize::from),
+                &code.errors,
+                code.weight,
+                code.zero,
+            ),
             What::Term(axis, variables) => {
                 Effect::term(self.sensor, usize::from(*axis), self.numbers[0], variables)
             }
@@ -250,6 +297,10 @@ fn check_room(effects: &[OnDevice], room: usize, place: &str) -> Result<()> {
             let problem = "its numbers make no sense to the device";
             return Err(Error::new(at, problem, "diagnose the recording again"));
         };
+        // Of these each axis has room for one, and the search finds no more.
+        if matches!(effect.what, What::Code(..)) {
+            continue;
+        }
         let triad = usize::from(effect.sensor == DeviceSensor::Accel);
         let count = &mut taken[triad][usize::from(compiled.is_slow())];
         *count += 1;

@@ -5,7 +5,7 @@ mod monomial;
 use nalgebra::{DMatrix, Vector3};
 
 use super::effect::{Behind, Effect, Form, FormKind, Moment, Reading, Scope};
-use super::library::readout;
+use super::library::readout::{self, Converter};
 use super::rows::Rows;
 use crate::dwell::Sensor;
 use crate::estimate::AXES;
@@ -39,18 +39,34 @@ pub struct Candidate {
     pub kind: Kind,
     /// Which of its coefficients the experiment can tell.
     pub active: Vec<usize>,
-    /// Its nonlinear constant, where the readings say it.
-    pub known_form: Option<f64>,
+    /// Of errors by the code: the converter of each axis that has one. Two axes may share one.
+    pub codes: Codes,
     /// As in [`Behind`].
     pub elsewhere: bool,
     /// How many choices it is the best of.
     pub choices: f64,
+    /// How many of them were converters, rather than bits of one.
+    pub converters: f64,
     /// Coefficients to choose from, where the choice is part of the search.
     pub offered: Vec<usize>,
 }
 
-/// Most regressors of an effect: nine coefficients, three axes.
-const MOST_REGRESSORS: usize = 27;
+/// Converters of the axes.
+pub type Codes = [Option<Converter>; 3];
+
+/// Errors of a converter.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OfConverter {
+    /// Axis that it reads; `None`: all of them.
+    pub axis: Option<usize>,
+    /// Its codes.
+    pub converter: Converter,
+    /// Of its bits from the first down, in units of the weight of the first.
+    pub errors: [f64; readout::BITS],
+}
+
+/// Most regressors of an effect: nine bits of a converter of three axes, or of three.
+const MOST_REGRESSORS: usize = 54;
 /// Values of a nonlinear constant that are screened.
 const FORMS: usize = 9;
 
@@ -98,17 +114,15 @@ impl Candidate {
     /// Range in which its nonlinear constant is searched.
     pub fn form_range(&self) -> Option<(f64, f64)> {
         match self.kind {
-            Kind::Effect(Effect { form: Some(f), .. }) if f.kind != FormKind::Steps => {
-                Some((f.from, f.to))
-            }
+            Kind::Effect(Effect { form: Some(f), .. }) => Some((f.from, f.to)),
             _ => None,
         }
     }
 
-    /// Values of its nonlinear constant to be screened; where there is nothing to search the one that it has, 0 if it has none.
+    /// Values of its nonlinear constant to be screened; 0 if it has none.
     pub fn forms(&self) -> Vec<f64> {
         let Some((from, to)) = self.form_range() else {
-            return vec![self.known_form.unwrap_or(0.0)];
+            return vec![0.0];
         };
         let step = (to / from).powf(1.0 / (FORMS - 1) as f64);
         (0..FORMS).map(|k| from * step.powi(k as i32)).collect()
@@ -121,32 +135,44 @@ impl Candidate {
                 let lasting = |k: &usize| e.coefficients[*k].scope != Scope::Recording;
                 (0..e.coefficients.len()).filter(lasting).collect()
             }
-            _ => vec![0],
+            Kind::Term(..) | Kind::Jump { .. } => vec![0],
         };
         Self {
             sensor,
             kind,
             active,
-            known_form: None,
+            codes: [None; 3],
             elsewhere: false,
             choices: 1.0,
+            converters: 1.0,
             offered: Vec::new(),
         }
     }
 
-    /// An effect in `rows`; `None` where it takes readings in steps, and they have none.
+    /// An effect in `rows`; `None` where it goes by codes that the steps of the readings would have to say, and they have none.
     pub fn effect_in(effect: &'static Effect, rows: &Rows) -> Option<Self> {
-        let mut candidate = Self::new(rows.sensor, Kind::Effect(effect));
-        if candidate.reads_code() {
-            let (lowest, highest) = rows.reading_range();
-            candidate.known_form = Some(readout::first_weight(rows.step?, lowest, highest));
+        let candidate = Self::new(rows.sensor, Kind::Effect(effect));
+        if !candidate.reads_code() {
+            return Some(candidate);
         }
-        Some(candidate)
+        let (lowest, highest) = rows.reading_range();
+        let usual = Converter {
+            weight: readout::first_weight(rows.step?, lowest, highest),
+            zero: 0.0,
+        };
+        Some(candidate.behind_one(usual))
     }
 
-    /// Whether its errors are a function of the reading in whose steps they are.
+    /// It with one converter for all axes.
+    pub fn behind_one(mut self, converter: Converter) -> Self {
+        self.active = (0..readout::BITS).collect();
+        self.codes = [Some(converter); 3];
+        self
+    }
+
+    /// Whether its errors are a function of the converter's code.
     pub fn reads_code(&self) -> bool {
-        self.form().is_some_and(|f| f.kind == FormKind::Steps)
+        matches!(self.kind, Kind::Effect(e) if readout::is(e))
     }
 
     /// The candidates that it is tried as: of the bits of a code, which are wrong has to be found as well, so each by itself
@@ -253,6 +279,38 @@ impl Candidate {
         }
     }
 
+    /// Of errors by the code, with the values of its active coefficients: what each converter is off by; one of all axes where that is
+    /// all there is to say.
+    pub fn by_converter(&self, values: &[f64]) -> Vec<OfConverter> {
+        let all: Vec<OfConverter> = (0..3)
+            .filter_map(|axis| {
+                let mut errors = [0.0; readout::BITS];
+                for (k, value) in self.active.iter().zip(values) {
+                    let own = k.checked_sub(readout::first_of(axis));
+                    let bit = if *k < errors.len() { Some(*k) } else { own };
+                    if let Some(error) = bit.and_then(|bit| errors.get_mut(bit)) {
+                        *error += value;
+                    }
+                }
+                Some(OfConverter {
+                    axis: Some(axis),
+                    converter: self.codes[axis]?,
+                    errors,
+                })
+            })
+            .collect();
+        let first = all.first().copied();
+        let alike = |one: &OfConverter| {
+            first.is_some_and(|f| (f.converter, f.errors) == (one.converter, one.errors))
+        };
+        match first {
+            Some(one) if all.len() == 3 && all.iter().all(alike) => {
+                vec![OfConverter { axis: None, ..one }]
+            }
+            _ => all,
+        }
+    }
+
     /// Name and unit of each of its active coefficients.
     pub fn names(&self) -> Vec<(String, String)> {
         match &self.kind {
@@ -274,6 +332,10 @@ impl Candidate {
     pub fn regressors(&self, at: &Moment, form: f64, out: &mut [f64]) {
         match &self.kind {
             Kind::Effect(e) => {
+                let at = match self.reads_code() {
+                    true => &at.in_bits(&self.codes),
+                    false => at,
+                };
                 let width = |k: usize| e.coefficients[k].axis.map_or(3, |_| 1);
                 let mut all = [0.0; MOST_REGRESSORS];
                 let count = (0..e.coefficients.len()).map(width).sum();

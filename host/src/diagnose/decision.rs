@@ -16,6 +16,7 @@ use super::search::{Chosen, Search};
 use super::spread::{By, Fitted};
 use hold_out::leverage;
 use leftover::leftover;
+pub(super) use leftover::noisier;
 use second::second;
 use tried::candidates;
 use undecided::undecided;

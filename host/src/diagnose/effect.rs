@@ -2,6 +2,7 @@
 
 use nalgebra::Vector3;
 
+use super::library::readout::Converter;
 use crate::blocks::{Block, Moments};
 use crate::dwell::Sensor;
 
@@ -55,6 +56,19 @@ impl Moment {
         let mut clean = *self;
         clean.reading.mean -= self.reading.scale.component_mul(error);
         clean
+    }
+
+    /// The moment with readings in units of the first bit of the converters, from their codes 0; not a number on an axis without.
+    pub(super) fn in_bits(&self, codes: &[Option<Converter>; 3]) -> Self {
+        let mut out = *self;
+        let Reading { mean, sd, scale } = &mut out.reading;
+        for (i, converter) in codes.iter().enumerate() {
+            let (weight, zero) = converter.map_or((f64::NAN, 0.0), |c| (c.weight, c.zero));
+            mean[i] = (mean[i] - zero) / weight;
+            sd[i] /= weight;
+            scale[i] /= weight;
+        }
+        out
     }
 }
 
@@ -121,8 +135,6 @@ pub enum FormKind {
     Free,
     /// It is searched, and is the lag of [`Moment::late_c`].
     Lag,
-    /// It is not searched: the steps of the raw readings say it.
-    Steps,
 }
 
 /// A nonlinear constant of an effect, between two values.

@@ -23,7 +23,7 @@ pub mod rows;
 pub mod search;
 pub mod spread;
 
-use decision::{Decision, decide};
+use decision::{Decision, decide, noisier};
 use mimu_core::compensation::Affine;
 use nalgebra::{Matrix3, Vector3};
 use removal::{Removed, remove};
@@ -244,7 +244,10 @@ pub fn diagnose(recordings: Recordings, options: Options) -> Result<Diagnosis> {
         let rows = Rows::of(ours, sensor, free).ok_or_else(singular)?;
         let unseen = Rows::of(unseen, sensor, free);
         let all: Vec<&Prepared> = ours.iter().map(|s| s.prepared).collect();
-        let decision = decide(&rows, &dwell_ends(&all), unseen.as_ref()).ok_or_else(singular)?;
+        let decided = decide(&rows, &dwell_ends(&all), unseen.as_ref());
+        let mut decision = decided.ok_or_else(singular)?;
+        let noisier = ours.iter().flat_map(|s| noisier(s, sensor));
+        decision.leftover.extend(noisier);
         let found: Vec<Removed> = decision
             .accepted
             .iter()

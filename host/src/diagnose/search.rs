@@ -4,6 +4,7 @@
 //! fitted with noise of their own, and judged by the likelihood ratio, as a probability after the whole search. The noise of
 //! a model that lacks an effect is too large, and a test that keeps it would miss what makes it so.
 
+mod converter;
 mod refine;
 mod screen;
 
@@ -235,6 +236,7 @@ impl<'a> Search<'a> {
             .into_par_iter()
             .filter_map(|s| self.judge(chosen, null, s))
             .collect();
+        judged.extend(self.converters(chosen, null));
         judged.sort_by(|a, b| a.p.total_cmp(&b.p).then(b.worth.total_cmp(&a.worth)));
         judged
     }
@@ -245,7 +247,9 @@ impl<'a> Search<'a> {
         let listed = screened
             .into_par_iter()
             .filter(|s| self.candidates[s.index].is_listed());
-        listed.filter_map(|s| self.judge(chosen, now, &s)).collect()
+        let mut judged: Vec<Chosen> = listed.filter_map(|s| self.judge(chosen, now, &s)).collect();
+        judged.extend(self.converters(chosen, now));
+        judged
     }
 
     /// By how much the score is less with `law` in the place of `one` beside `rest`; negative where it is better.
@@ -346,7 +350,7 @@ impl<'a> Search<'a> {
 }
 
 /// How good a candidate is among others with more or fewer coefficients: the drop of the deviance less what each coefficient
-/// costs (Akaike's two, doubled, as for each there are several candidates). Of products that are the same in this recording the
+/// costs (Akaike's two, doubled, as for each there are several candidates), and each of the converters that it is the best of. Of products that are the same in this recording the
 /// shortest is told.
 fn score(c: &Chosen) -> f64 {
     let coefficients = c.columns.ncols() as f64 + if c.form > 0.0 { 1.0 } else { 0.0 };
@@ -354,7 +358,7 @@ fn score(c: &Chosen) -> f64 {
         Kind::Term(_, monomial) => monomial.0.len() as f64,
         _ => 0.0,
     };
-    c.worth - COEFFICIENT * coefficients - order
+    c.worth - COEFFICIENT * coefficients - order - 2.0 * c.candidate.converters.ln()
 }
 
 /// What a coefficient costs.

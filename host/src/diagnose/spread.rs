@@ -124,6 +124,21 @@ impl<'a> Spread<'a> {
         }
     }
 
+    /// Variance of each row.
+    pub fn variances(&self, at: &Components) -> DVector<f64> {
+        let mut out = DVector::zeros(self.rows.y.len());
+        for (s, stratum) in self.rows.strata.iter().enumerate() {
+            for (i, row) in stratum.rows.clone().enumerate() {
+                let walk = stratum.walk.as_ref().map_or(0.0, |unit| unit[(i, i)]);
+                out[row] = stratum.known[(i, i)]
+                    + at.excess[s]
+                    + at.walk[s] * walk
+                    + 1e-12 * self.typical[s].0;
+            }
+        }
+        out
+    }
+
     /// Root of the covariance of stratum `s`, for rows that have been turned.
     fn root(&self, s: usize, excess: f64, walk: f64) -> Option<Root> {
         let stratum = &self.rows.strata[s];

@@ -3,7 +3,7 @@
 
 use std::f64::consts::TAU;
 
-use super::{Active, Build, Parameter, Shape, Spec, axes, form, read_out, scalar, sized};
+use super::{Active, Build, Draw, Parameter, Shape, Spec, axes, form, read_out, scalar, sized};
 use crate::sensor::TriadTruth;
 use crate::unit::Pins;
 
@@ -11,7 +11,20 @@ use crate::unit::Pins;
 /// the integral nonlinearity that makers state for 16-bit converters in microcontrollers.
 const MISMATCH: [Parameter; 1] = [sized("bit_errors_lsb", Shape::List(6), 6.0)];
 
-pub(super) const SPECS: [Spec; 5] = [
+/// Codes that never come, and where. Assumed: some times a usual integral nonlinearity, off the ends.
+const MISSING: [Parameter; 2] = [scalar("codes", 20.0), form("at", 0.4, 0.6)];
+
+/// Six errors of each of three converters, and what is added to their codes.
+const CONVERTERS: [Parameter; 2] = [
+    sized("bit_errors_lsb", Shape::List(18), 6.0),
+    Parameter {
+        key: "added_codes",
+        shape: Shape::List(3),
+        draw: Draw::Between(300.0, 30000.0),
+    },
+];
+
+pub(super) const SPECS: [Spec; 9] = [
     Spec {
         id: "gyro_readout_code",
         about: "each of the six top bits of the code, when set, is worth so much more",
@@ -23,6 +36,32 @@ pub(super) const SPECS: [Spec; 5] = [
         about: "each of the six top bits of the code, when set, is worth so much more",
         parameters: &MISMATCH,
         build: |b| mismatch(b, &b.unit.accel, |pins| &mut pins.accel_v),
+    },
+    // The charge that a capacitor array has lost by the middle of its range: codes that never come.
+    Spec {
+        id: "gyro_missing_codes",
+        about: "from a code on, this fraction of the converter's range up, all codes are so many too high (digital: of 16 bits)",
+        parameters: &MISSING,
+        build: |b| missing(b, &b.unit.gyro, |pins| &mut pins.gyro_v),
+    },
+    Spec {
+        id: "accel_missing_codes",
+        about: "from a code on, this fraction of the converter's range up, all codes are so many too high (digital: of 16 bits)",
+        parameters: &MISSING,
+        build: |b| missing(b, &b.unit.accel, |pins| &mut pins.accel_v),
+    },
+    // Three converters, as of a part for each axis, with a bias register that is added before the bits are found.
+    Spec {
+        id: "gyro_converters",
+        about: "each axis has a converter of its own, whose codes begin elsewhere: its six top bits, when set, are worth so much more",
+        parameters: &CONVERTERS,
+        build: |b| converters(b, &b.unit.gyro, |pins| &mut pins.gyro_v),
+    },
+    Spec {
+        id: "accel_converters",
+        about: "each axis has a converter of its own, whose codes begin elsewhere: its six top bits, when set, are worth so much more",
+        parameters: &CONVERTERS,
+        build: |b| converters(b, &b.unit.accel, |pins| &mut pins.accel_v),
     },
     // A short on the converter's data bus. Size: a bit low enough to pass for noise.
     Spec {
@@ -80,14 +119,52 @@ impl Span {
 
     /// Moves each output by the error, in codes, that its code has.
     fn shift(&self, outputs: &mut [f64; 3], reference_v: f64, error: impl Fn(i64) -> f64) {
+        self.shift_each(outputs, reference_v, |_, code| error(code));
+    }
+
+    /// The same with errors of each axis.
+    fn shift_each(
+        &self,
+        outputs: &mut [f64; 3],
+        reference_v: f64,
+        error: impl Fn(usize, i64) -> f64,
+    ) {
         let true_span = self.span * self.nominal_v.map_or(1.0, |v| reference_v / v);
-        for v in outputs {
+        for (axis, v) in outputs.iter_mut().enumerate() {
             let code = ((*v - self.low) / true_span * 65536.0)
                 .round()
                 .clamp(0.0, 65535.0) as i64;
-            *v += true_span / 65536.0 * error(code);
+            *v += true_span / 65536.0 * error(axis, code);
         }
     }
+}
+
+fn missing(b: &Build, triad: &TriadTruth, outputs: Outputs) -> Active {
+    let (codes, at) = (b.number("codes"), b.number("at"));
+    let first = (65536.0 * at) as i64;
+    let span = Span::new(b, triad);
+    read_out(move |_, pins| {
+        let reference = pins.converter_reference_v;
+        let worth = |code| if code >= first { codes } else { 0.0 };
+        span.shift(outputs(pins), reference, worth);
+    })
+}
+
+fn converters(b: &Build, triad: &TriadTruth, outputs: Outputs) -> Active {
+    let errors = b.list::<18>("bit_errors_lsb");
+    let added = b.list::<3>("added_codes").map(|a| a.round() as i64);
+    let span = Span::new(b, triad);
+    read_out(move |_, pins| {
+        let reference = pins.converter_reference_v;
+        span.shift_each(outputs(pins), reference, |axis, code| {
+            let code = code + added[axis];
+            let set = |i: usize| code & (0x8000 >> i) != 0;
+            (0..6)
+                .filter(|i| set(*i))
+                .map(|i| errors[6 * axis + i])
+                .sum()
+        });
+    })
 }
 
 fn mismatch(b: &Build, triad: &TriadTruth, outputs: Outputs) -> Active {

@@ -2,8 +2,12 @@
 
 use nalgebra::DMatrix;
 
+use crate::diagnose::rows::{Session, directions};
 use crate::diagnose::search::{Chosen, Search};
 use crate::diagnose::spread::{By, Fitted, Spread};
+use crate::dwell::Sensor;
+use crate::estimate::AXES;
+use crate::report::three;
 
 /// A bias that wanders by this many times the noise of a dwell mean is no usual one, and the verdict says so even where nobody has
 /// recorded how far it may: sensors of the usual kind wander by up to three in half an hour. A walk is not all of it: they flicker as
@@ -81,4 +85,27 @@ pub(super) fn leftover(
         });
     }
     left
+}
+
+/// Noise beyond what a record at rest said of a channel: what has made it is in no model, and hides whatever is smaller.
+pub(in crate::diagnose) fn noisier(session: &Session, sensor: Sensor) -> Vec<Leftover> {
+    let scale = session.model(sensor).and_then(|m| directions(&m));
+    let Some((_, scale, _)) = scale else {
+        return Vec::new();
+    };
+    let of = |axis: usize| {
+        let channel = sensor.channels().start + axis;
+        let (beyond, times) = session.prepared.noise.beyond_stated(channel)?;
+        Some(Leftover {
+            stratum: format!("means of {} over a second", AXES[axis]),
+            axis: Some(axis),
+            against: format!(
+                "no quantity recorded: within the dwells it is {} times as noisy as the noise file says",
+                three(times)
+            ),
+            strength: beyond / scale[axis],
+            usual: false,
+        })
+    };
+    (0..3).filter_map(of).collect()
 }

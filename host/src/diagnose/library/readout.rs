@@ -1,52 +1,69 @@
 //! Errors that are a function of the converter's code.
 //!
 //! A converter adds up the weights of the bits that it finds, and a capacitor that is off makes one of them worth more or less
-//! than the others say. The error is then a step wherever the bit turns, as high as the weight is wrong, and in the readings
-//! of all channels alike: they share the converter. Neither its width nor its scale has to be told. Readings are multiples of a
-//! step (of a code, or of a fraction of one where several are averaged), powers of two times that are the weights, and the
-//! largest within the range of the readings is the first that can be seen.
+//! than the others say. The error is then a step wherever the bit turns, as high as the weight is wrong. Codes that never come, one or
+//! a range of them, are a step as well: that of a bit so heavy that it turns once. Where the axes share the converter, as they do
+//! behind a multiplexer, they share the errors; where each has its own, or a firmware has subtracted a bias from each, the bits
+//! turn elsewhere on each.
+//!
+//! Neither the width of the code nor its scale nor its offset has to be told. Readings of one converter are multiples of a step (of
+//! a code, or of a fraction of one where several are averaged): powers of two times that from a reading of zero are tried
+//! first, as the usual case. Then any weight and any zero, by what the residuals do against the readings.
 //!
 //! Noise carries a reading across a turn and back, so over a dwell a bit is set for a share of the time: that is what a mean
 //! depends on, and it bends where the code jumps.
 
 use statrs::function::erf::erfc;
 
-use super::all_axes;
-use crate::diagnose::effect::{Coefficient, Effect, Form, FormKind, Moment};
+use super::{all_axes, of};
+use crate::diagnose::effect::{Coefficient, Effect, Moment};
 use crate::dwell::Sensor;
 
-const BITS: [Coefficient; 9] = [
-    all_axes("bit 0", "1"),
-    all_axes("bit -1", "1"),
-    all_axes("bit -2", "1"),
-    all_axes("bit -3", "1"),
-    all_axes("bit -4", "1"),
-    all_axes("bit -5", "1"),
-    all_axes("bit -6", "1"),
-    all_axes("bit -7", "1"),
-    all_axes("bit -8", "1"),
+/// Bits that are told apart, from the first down.
+pub const BITS: usize = 9;
+
+/// Of a converter of all axes, and then of each axis.
+const COEFFICIENTS: [Coefficient; 4 * BITS] = {
+    let mut all = [all_axes("", "1"); 4 * BITS];
+    let mut bit = 0;
+    while bit < BITS {
+        all[bit] = all_axes(NAMES[0][bit], "1");
+        let mut axis = 0;
+        while axis < 3 {
+            all[first_of(axis) + bit] = of(axis, NAMES[1 + axis][bit], "1");
+            axis += 1;
+        }
+        bit += 1;
+    }
+    all
+};
+
+/// Coefficient of the first bit of a converter of one axis.
+pub const fn first_of(axis: usize) -> usize {
+    (1 + axis) * BITS
+}
+
+#[rustfmt::skip]
+const NAMES: [[&str; BITS]; 4] = [
+    ["bit 0", "bit -1", "bit -2", "bit -3", "bit -4", "bit -5", "bit -6", "bit -7", "bit -8"],
+    ["x bit 0", "x bit -1", "x bit -2", "x bit -3", "x bit -4", "x bit -5", "x bit -6", "x bit -7", "x bit -8"],
+    ["y bit 0", "y bit -1", "y bit -2", "y bit -3", "y bit -4", "y bit -5", "y bit -6", "y bit -7", "y bit -8"],
+    ["z bit 0", "z bit -1", "z bit -2", "z bit -3", "z bit -4", "z bit -5", "z bit -6", "z bit -7", "z bit -8"],
 ];
 
-const WEIGHT: Option<Form> = Some(Form {
-    name: "weight_of_bit_0_raw",
-    from: 0.0,
-    to: f64::INFINITY,
-    kind: FormKind::Steps,
-});
-
 /// STM32H743: integral nonlinearity of 4 to 12 in 65536, which is 6 in the 32768 of the first bit.
-const TYPICAL: f64 = 2e-4;
+pub const TYPICAL: f64 = 2e-4;
 const NEEDS: &str = "raw readings as the converter gave them, at many levels over its range";
-const ABOUT: &str = "bits of the converter are worth more or less than they say: error by the code, alike on all axes";
+const ABOUT: &str = "bits of the converter are worth more or less than they say, or codes never come: error by the code";
 
-pub(super) const EFFECTS: [Effect; 2] = [
+pub(super) static EFFECTS: [Effect; 2] = [
     Effect {
         id: "gyro_readout_code",
         sensor: Sensor::Gyro,
         about: ABOUT,
-        coefficients: &BITS,
-        typical: &[TYPICAL; 9],
-        form: WEIGHT,
+        coefficients: &COEFFICIENTS,
+        typical: &[TYPICAL; 4 * BITS],
+        form: None,
         regressors: bits,
         needs: NEEDS,
     },
@@ -54,21 +71,51 @@ pub(super) const EFFECTS: [Effect; 2] = [
         id: "accel_readout_code",
         sensor: Sensor::Accel,
         about: ABOUT,
-        coefficients: &BITS,
-        typical: &[TYPICAL; 9],
-        form: WEIGHT,
+        coefficients: &COEFFICIENTS,
+        typical: &[TYPICAL; 4 * BITS],
+        form: None,
         regressors: bits,
         needs: NEEDS,
     },
 ];
 
-/// Of each bit, from `weight` on downwards, and of each axis: what 1 of `weight` too much in that of the bit adds, SI.
-fn bits(at: &Moment, weight: f64, out: &mut [f64]) {
+/// How the codes of a converter stand behind readings.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Converter {
+    /// Of bit 0, raw.
+    pub weight: f64,
+    /// Reading of code 0, raw.
+    pub zero: f64,
+}
+
+impl Converter {
+    /// Share of the time that bit `-bit` is set while readings scatter about `mean` with `sd`, raw.
+    pub fn share(&self, bit: usize, mean: f64, sd: f64) -> f64 {
+        share_set(mean - self.zero, sd, self.weight * 0.5_f64.powi(bit as i32))
+    }
+}
+
+/// That of a sensor.
+pub fn of_sensor(sensor: Sensor) -> Option<&'static Effect> {
+    EFFECTS.iter().find(|e| e.sensor == sensor)
+}
+
+/// Whether an effect is one of these.
+pub fn is(effect: &Effect) -> bool {
+    EFFECTS.iter().any(|e| e.id == effect.id)
+}
+
+/// Of each bit of a converter of all axes, and then of each axis: what 1 of the weight of bit 0 too much in that of the bit adds, SI.
+///
+/// Readings are in units of bit 0, from code 0, which are those of [`Converter`] of each axis.
+fn bits(at: &Moment, _: f64, out: &mut [f64]) {
     let reading = &at.reading;
-    let mut of_bit = weight;
-    for all in out.as_chunks_mut::<3>().0 {
-        for (i, out) in all.iter_mut().enumerate() {
-            *out = weight * share_set(reading.mean[i], reading.sd[i], of_bit) / reading.scale[i];
+    let (of_all, of_axes) = out.split_at_mut(3 * BITS);
+    let mut of_bit = 1.0;
+    for (bit, all) in of_all.as_chunks_mut::<3>().0.iter_mut().enumerate() {
+        for (axis, out) in all.iter_mut().enumerate() {
+            *out = share_set(reading.mean[axis], reading.sd[axis], of_bit) / reading.scale[axis];
+            of_axes[axis * BITS + bit] = *out;
         }
         of_bit *= 0.5;
     }

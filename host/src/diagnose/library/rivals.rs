@@ -3,12 +3,12 @@
 //! An effect that explains the rows no better than such a law is accepted, as the error goes down all the same; but which physics it is,
 //! this recording does not say, and the verdict says so.
 
-use super::{each, per_axis};
+use super::{each, of, per_axis};
 use crate::diagnose::effect::{Coefficient, Effect, Form, FormKind};
 use crate::dwell::Sensor;
 
-const GYRO_CREEP: [Coefficient; 3] = each("rad/s");
-const ACCEL_CREEP: [Coefficient; 3] = each("m/s^2");
+const GYRO_BIASES: [Coefficient; 3] = each("rad/s");
+const ACCEL_BIASES: [Coefficient; 3] = each("m/s^2");
 const VERTICAL_FIELD: [Coefficient; 3] = each("rad/s/(m/s^2)");
 
 /// Mouldings and glue relax from seconds after power-on to minutes.
@@ -42,17 +42,108 @@ const fn creep(sensor: Sensor, coefficients: &'static [Coefficient]) -> Effect {
     }
 }
 
+/// Limits of usual gyros, and of what a table turns at.
+const RATE_LIMIT: Option<Form> = Some(Form {
+    name: "limit_rad_s",
+    from: 0.1,
+    to: 20.0,
+    kind: FormKind::Free,
+});
+
+const FORCE_LIMIT: Option<Form> = Some(Form {
+    name: "limit_m_s2",
+    from: 1.0,
+    to: 200.0,
+    kind: FormKind::Free,
+});
+
+/// A stage of the amplifier that no longer follows, or a reading that is put right beyond a limit: on either side of zero input alike,
+/// where codes have no reason to be.
+const fn beyond(
+    sensor: Sensor,
+    coefficients: &'static [Coefficient],
+    limit: Option<Form>,
+) -> Effect {
+    Effect {
+        id: "beyond_a_limit",
+        sensor,
+        about: "a bias while the input of the axis is beyond a limit, one way or the other",
+        coefficients,
+        typical: &[1.0; 3],
+        form: limit,
+        regressors: |at, limit, out| {
+            per_axis(out, |i| f64::from(u8::from(at.sensed[i].abs() > limit)))
+        },
+        needs: "",
+    }
+}
+
+const GYRO_POWERS: [Coefficient; 12] =
+    powers(["1/(rad/s)", "1/(rad/s)^2", "1/(rad/s)^3", "1/(rad/s)^4"]);
+const ACCEL_POWERS: [Coefficient; 12] =
+    powers(["1/(m/s^2)", "1/(m/s^2)^2", "1/(m/s^2)^3", "1/(m/s^2)^4"]);
+
+const fn powers(units: [&'static str; 4]) -> [Coefficient; 12] {
+    let mut all = [of(0, "", ""); 12];
+    let mut k = 0;
+    while k < 12 {
+        all[k] = of(k / 4, "", units[k % 4]);
+        k += 1;
+    }
+    all
+}
+
+const fn smooth(sensor: Sensor, coefficients: &'static [Coefficient]) -> Effect {
+    Effect {
+        id: "smooth",
+        sensor,
+        about: "a smooth nonlinearity of up to fifth order",
+        coefficients,
+        typical: &[1.0; 12],
+        form: None,
+        regressors: |at, _, out| {
+            for (k, out) in out.iter_mut().enumerate() {
+                *out = at.sensed[k / 4].powi(2 + k as i32 % 4);
+            }
+        },
+        needs: "",
+    }
+}
+
+const CLOSER: &str =
+    "inputs a few noises apart, where the error was found to change: codes change it at once";
+
 const LONGER: &str =
     "a cold start recorded for several hours: an exponential ends, a logarithm does not";
 
-static RIVALS: [Rival; 3] = [
+static RIVALS: [Rival; 7] = [
     Rival {
-        law: creep(Sensor::Gyro, &GYRO_CREEP),
+        law: beyond(Sensor::Gyro, &GYRO_BIASES, RATE_LIMIT),
+        of: &["gyro_readout_code"],
+        settled_by: CLOSER,
+    },
+    Rival {
+        law: beyond(Sensor::Accel, &ACCEL_BIASES, FORCE_LIMIT),
+        of: &["accel_readout_code"],
+        settled_by: CLOSER,
+    },
+    Rival {
+        law: smooth(Sensor::Gyro, &GYRO_POWERS),
+        of: &["gyro_readout_code"],
+        settled_by: CLOSER,
+    },
+    Rival {
+        law: smooth(Sensor::Accel, &ACCEL_POWERS),
+        of: &["accel_readout_code"],
+        settled_by: CLOSER,
+    },
+    Rival {
+        law: creep(Sensor::Gyro, &GYRO_BIASES),
         of: &["gyro_warm_up", "gyro_thermal_lag"],
         settled_by: LONGER,
     },
     Rival {
-        law: creep(Sensor::Accel, &ACCEL_CREEP),
+        law: creep(Sensor::Accel, &ACCEL_BIASES),
         of: &["accel_warm_up", "accel_thermal_lag"],
         settled_by: LONGER,
     },

@@ -130,7 +130,11 @@ pub fn download_json(port: &str, path: &Path, bytes: &[u8], contents: &Contents)
                 "id": effect.id,
                 "coefficients": effect.coefficients,
                 "time_constant_s": effect.time_constant_s,
-                "weight_of_bit_0_v": effect.weight_of_bit_0_v,
+                "converter": effect.converter.as_ref().map(|c| json!({
+                    "axes": c.axes,
+                    "weight_of_bit_0_v": c.weight_of_bit_0_v,
+                    "reading_of_code_0_v": c.reading_of_code_0_v,
+                })),
             })
         })
         .collect();

@@ -156,8 +156,14 @@ pub fn download_text(port: &str, path: &Path, bytes: &[u8], contents: &Contents)
         if let Some(time) = effect.time_constant_s {
             line!(out, "  time constant {time} s");
         }
-        if let Some(weight) = effect.weight_of_bit_0_v {
-            line!(out, "  weight of bit 0 {weight} V");
+        if let Some(converter) = &effect.converter {
+            line!(
+                out,
+                "  converter of {}: bit 0 is worth {} V, code 0 reads {} V",
+                converter.axes,
+                converter.weight_of_bit_0_v,
+                converter.reading_of_code_0_v
+            );
         }
     }
     line!(out, "\nimage: {}", path.display());

@@ -3,6 +3,7 @@
 use serde_json::{Map, Value, json};
 
 use super::DiagnosisReport;
+use crate::calibration::ConverterTable;
 use crate::diagnose::decision::{Accepted, Decision, Split};
 use crate::diagnose::{Diagnosis, SensorDiagnosis};
 use crate::dwell::Sensor;
@@ -102,6 +103,17 @@ fn accepted(sensor: Sensor, a: &Accepted) -> Value {
     }
     if let Some(form) = a.chosen.candidate.form() {
         value["form"] = json!({ "name": form.name, "value": a.chosen.form });
+    }
+    let converters = ConverterTable::of(&a.chosen.candidate.codes);
+    if !converters.is_empty() {
+        let table = |c: &ConverterTable| {
+            json!({
+                "axes": c.axes,
+                "weight_of_bit_0_raw": c.weight_of_bit_0_raw,
+                "reading_of_code_0_raw": c.reading_of_code_0_raw,
+            })
+        };
+        value["converters"] = converters.iter().map(table).collect();
     }
     value
 }

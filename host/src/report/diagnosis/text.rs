@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use super::DiagnosisReport;
+use crate::calibration::ConverterTable;
 use crate::diagnose::decision::{Accepted, Decision, Split};
 use crate::diagnose::next::Next;
 use crate::diagnose::{SensorDiagnosis, Verdict};
@@ -173,6 +174,9 @@ fn effect(out: &mut String, a: &Accepted, shown: &impl Fn(f64) -> String) {
     if let Some(form) = candidate.form() {
         let _ = writeln!(out, "    {:<12}{:>12}", form.name, three(a.chosen.form));
     }
+    for c in ConverterTable::of(&candidate.codes) {
+        let _ = writeln!(out, "    {}", converter(&c));
+    }
     let alternatives = &a.chosen.alternatives;
     for (id, worse) in alternatives.iter().take(SHOWN) {
         let _ = writeln!(out, "    or {id}, worse by {worse:.1} in deviance");
@@ -180,6 +184,16 @@ fn effect(out: &mut String, a: &Accepted, shown: &impl Fn(f64) -> String) {
     if alternatives.len() > SHOWN {
         let _ = writeln!(out, "    or one of {} more", alternatives.len() - SHOWN);
     }
+}
+
+/// A converter in a line.
+pub(super) fn converter(c: &ConverterTable) -> String {
+    let [weight, zero] =
+        [c.weight_of_bit_0_raw, c.reading_of_code_0_raw].map(|v| format!("{v:.6}"));
+    format!(
+        "converter of {}: bit 0 is worth {weight} raw, code 0 reads {zero}; errors are in units of bit 0",
+        c.axes
+    )
 }
 
 /// How a law on no list does in the place of an effect; `worse` in deviance.

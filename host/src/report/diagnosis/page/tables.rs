@@ -5,14 +5,14 @@ use maud::{Markup, PreEscaped, html};
 use super::figures::unit;
 use super::svg::raised;
 use super::{sentence, spoken};
-use crate::calibration::figure as figure_name;
+use crate::calibration::{ConverterTable, figure as figure_name};
 use crate::diagnose::candidate::{Candidate, Kind};
 use crate::diagnose::decision::{Accepted, Decision, Leftover, Split};
 use crate::diagnose::picture::{Kind as Rows, Picture};
 use crate::diagnose::{Diagnosis, SensorDiagnosis};
 use crate::dwell::Sensor;
 use crate::fit::Figure;
-use crate::report::diagnosis::text::{by_score, odds};
+use crate::report::diagnosis::text::{by_score, converter, odds};
 use crate::report::text::{readable, three};
 use crate::verify::Verification;
 
@@ -160,6 +160,9 @@ pub fn coefficients(one: &Accepted) -> Markup {
                         td class="n" { (number(form.from, 1.0, "")) " to " (number(form.to, 1.0, "")) " sought" }
                         td { } td { }
                     }
+                }
+                @for c in ConverterTable::of(&candidate.codes) {
+                    tr { td colspan="7" { (converter(&c)) } }
                 }
             }
         } }

@@ -1,0 +1,464 @@
+//! Converters that the residuals speak of: errors by the code, of any weight and any zero.
+//!
+//! A bit that is worth too much is a square wave against the reading: of an unknown period, twice its weight, and an unknown phase,
+//! the zero. So the residuals are looked through as a periodogram is (Lomb 1976, Scargle 1982), with the reading in place of the time,
+//! and for single steps, which codes that never come leave. From the best of these the other bits of the same converter follow:
+//! their weights are halves and doubles, and their turns fall together with its own. Weight and zero are then refined with all bits.
+//!
+//! Thousands of places are looked at, so at first the rows are taken for independent: each by what it is off from what all others
+//! predict of it, with the variance of that. The readings of successive dwells have no order, and what a slow wander makes
+//! neighbours share averages out. What is found is judged with the whole noise, as every candidate is.
+
+use std::f64::consts::PI;
+
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+use super::{COEFFICIENT, Chosen, Search, basis, beside, exceeds, unit_columns};
+use crate::diagnose::candidate::{Candidate, Kind};
+use crate::diagnose::decision::EXCITED;
+use crate::diagnose::library::readout::{self, BITS, Converter, TYPICAL, first_of};
+use crate::diagnose::rows::RowReading;
+use crate::diagnose::spread::{By, Fitted};
+
+/// Periods are looked at so many to a cycle over the range of the readings.
+const OVERSAMPLED: f64 = 2.5;
+/// Most periods.
+const PERIODS: usize = 4000;
+/// Cycles in a standard deviation of the readings: more, and noise has levelled nine tenths of the wave.
+const FINEST: f64 = 0.3;
+/// Most places of a step.
+const STEPS: usize = 256;
+/// Waves, and steps, that are followed up.
+const WAVES: usize = 4;
+const FOLLOWED_STEPS: usize = 2;
+/// Phases and directions that a period stands for, as tests.
+const PHASES: f64 = 4.0;
+/// A first sight that chance has more often than this, after all places, is not followed up.
+const PROMISING: f64 = 0.05;
+/// Part of a column that the others do not span, below which it is none of its own.
+const INDEPENDENT: f64 = 1e-2;
+/// Rows up to which the noise is taken apart by all of its covariances.
+const DENSE: usize = 1500;
+
+/// The residuals beside a model, as if rows were independent.
+struct Sight {
+    readings: Vec<RowReading>,
+    /// Root of the weight of each row.
+    root: DVector<f64>,
+    /// Basis of the model, weighted, by rows: orthonormal columns.
+    model: DMatrix<f64>,
+    /// Residuals over their standard deviations.
+    left: DVector<f64>,
+    /// Sum of their squares, as the noise has it.
+    total: f64,
+    lowest: f64,
+    highest: f64,
+}
+
+/// Normal equations of some columns beside the model.
+struct Normal {
+    matrix: DMatrix<f64>,
+    with_left: DVector<f64>,
+}
+
+impl Normal {
+    /// What the columns in `set` explain; `None` where they are not independent.
+    fn explains(&self, set: &[usize]) -> Option<f64> {
+        let size = |k: usize| self.matrix[(k, k)].max(0.0).sqrt();
+        let p = set.len();
+        let scaled = DMatrix::from_fn(p, p, |i, j| {
+            let (a, b) = (set[i], set[j]);
+            self.matrix[(a, b)] / (size(a) * size(b))
+        });
+        let with_left = DVector::from_fn(p, |i, _| self.with_left[set[i]] / size(set[i]));
+        let root = scaled.cholesky()?;
+        let least = root.l_dirty().diagonal().min();
+        (least > INDEPENDENT).then(|| root.solve(&with_left).dot(&with_left))
+    }
+}
+
+/// Some bits of a converter, and how well they explain the residuals.
+#[derive(Debug, Clone)]
+struct Hypothesis {
+    converter: Converter,
+    /// From 0, the first, up.
+    bits: Vec<usize>,
+    /// Drop of the deviance.
+    drop: f64,
+}
+
+impl Hypothesis {
+    fn score(&self) -> f64 {
+        self.drop - COEFFICIENT * self.bits.len() as f64
+    }
+}
+
+/// What was found of the readings of one axis, or of all.
+struct Outcome {
+    best: Hypothesis,
+    /// Places that were looked at.
+    places: f64,
+    /// Bits to choose from.
+    offered: usize,
+    /// Probability of chance, roughly.
+    p: f64,
+}
+
+impl Sight {
+    fn new(search: &Search, model: &DMatrix<f64>, null: &Fitted) -> Option<Self> {
+        let rows = search.rows;
+        let n = rows.y.len();
+        let whitener = search.spread.whitener(&null.components)?;
+        let whitened = whitener.whiten(model);
+        let y = whitener.whiten(&DMatrix::from_column_slice(n, 1, rows.y.as_slice()));
+        let q = whitened.qr().q();
+        let left = &y - &q * q.tr_mul(&y);
+        let total = left.norm_squared();
+        let (pull, weights) = if n <= DENSE {
+            let whitener = whitener.whiten(&DMatrix::identity(n, n));
+            let weights = DVector::from_fn(n, |i, _| whitener.column(i).norm_squared());
+            (whitener.tr_mul(&left), weights)
+        } else {
+            let left = &rows.y - model * &null.coefficients;
+            let weights = search.spread.variances(&null.components).map(|v| 1.0 / v);
+            let pull = left.component_mul(&weights);
+            (DMatrix::from_column_slice(n, 1, pull.as_slice()), weights)
+        };
+        let root = weights.map(f64::sqrt);
+        let mut weighted = unit_columns(model);
+        for (mut row, w) in weighted.row_iter_mut().zip(root.iter()) {
+            row *= *w;
+        }
+        let mut readings = search.by_dwell.readings(&search.freed(model, null));
+        readings.retain(|r| r.mean.is_finite() && r.sd.is_finite());
+        let range = |(a, b): (f64, f64), r: &RowReading| (a.min(r.mean), b.max(r.mean));
+        let (lowest, highest) = readings
+            .iter()
+            .fold((f64::INFINITY, f64::NEG_INFINITY), range);
+        Some(Self {
+            left: DVector::from_fn(n, |i, _| pull[(i, 0)] / root[i]),
+            model: basis(&weighted).transpose(),
+            root,
+            total,
+            readings,
+            lowest,
+            highest,
+        })
+    }
+
+    fn range(&self) -> f64 {
+        self.highest - self.lowest
+    }
+
+    /// Of one axis alone.
+    fn of(&self, axis: Option<usize>) -> Vec<RowReading> {
+        let ours = self.readings.iter().copied();
+        ours.filter(|r| axis.is_none_or(|a| a == r.axis)).collect()
+    }
+
+    /// Normal equations of N functions of the reading, which `values` gives.
+    fn normal(
+        &self,
+        readings: &[RowReading],
+        count: usize,
+        values: impl Fn(&RowReading, &mut [f64]),
+    ) -> Normal {
+        let mut columns = DMatrix::<f64>::zeros(count, self.root.len());
+        let mut of_one = vec![0.0; count];
+        for r in readings {
+            values(r, &mut of_one);
+            let weight = r.weight * self.root[r.row];
+            for (sum, value) in columns.column_mut(r.row).iter_mut().zip(&of_one) {
+                *sum += weight * value;
+            }
+        }
+        let in_model: DMatrix<f64> = &columns * self.model.transpose();
+        Normal {
+            matrix: &columns * columns.transpose() - &in_model * in_model.transpose(),
+            with_left: &columns * &self.left,
+        }
+    }
+
+    /// Drop of the deviance where so much is explained.
+    fn drop(&self, explained: f64) -> f64 {
+        let share = (explained / self.total).clamp(0.0, 0.999_999);
+        -(self.root.len() as f64) * (-share).ln_1p()
+    }
+
+    /// All bits of a converter.
+    fn bits(&self, readings: &[RowReading], converter: &Converter) -> Normal {
+        self.normal(readings, BITS, |r, out| {
+            for (bit, out) in out.iter_mut().enumerate() {
+                *out = converter.weight * converter.share(bit, r.mean, r.sd);
+            }
+        })
+    }
+
+    /// The best choice of bits, and how many there were to choose from.
+    fn choose(&self, readings: &[RowReading], converter: Converter) -> Option<(Hypothesis, usize)> {
+        let normal = self.bits(readings, &converter);
+        let excited = |k: &usize| normal.matrix[(*k, *k)].max(0.0).sqrt() * TYPICAL > EXCITED;
+        let offered: Vec<usize> = (0..BITS).filter(excited).collect();
+        let sets = (1..1usize << offered.len()).filter_map(|set| {
+            let bits: Vec<usize> = (0..offered.len())
+                .filter(|k| set & (1 << k) != 0)
+                .map(|k| offered[k])
+                .collect();
+            let drop = self.drop(normal.explains(&bits)?);
+            Some(Hypothesis {
+                converter,
+                bits,
+                drop,
+            })
+        });
+        let best = sets.max_by(|a, b| a.score().total_cmp(&b.score()))?;
+        Some((best, offered.len()))
+    }
+
+    /// The converter that a bit of weight `weight` belongs to, whose turns are at `zero` and every weight from there: each bit above
+    /// may turn where this one turns on or where it turns off.
+    fn above(&self, readings: &[RowReading], weight: f64, zero: f64) -> Converter {
+        let mut converter = Converter { weight, zero };
+        for level in 1..BITS {
+            if converter.weight >= self.range() {
+                break;
+            }
+            let either = [0.0, converter.weight].map(|by| Converter {
+                weight: 2.0 * converter.weight,
+                zero: converter.zero + by,
+            });
+            let bits: Vec<usize> = (0..=level).collect();
+            let explains = |c: &Converter| {
+                let normal = self.bits(readings, c);
+                // Bits that do not turn in the range are no columns.
+                let seen = |k: &usize| normal.matrix[(*k, *k)] > 1e-12;
+                let bits: Vec<usize> = bits.iter().copied().filter(seen).collect();
+                normal.explains(&bits).unwrap_or(0.0)
+            };
+            let [a, b] = either.each_ref().map(explains);
+            converter = if b > a { either[1] } else { either[0] };
+        }
+        // Code 0 below all readings.
+        let period = 2.0 * converter.weight;
+        converter.zero -= period * ((converter.zero - self.lowest) / period).ceil();
+        converter
+    }
+
+    /// With weight and zero walked uphill by ever smaller steps.
+    fn refine(&self, readings: &[RowReading], from: Hypothesis) -> Hypothesis {
+        let mut best = from;
+        let finest = best.bits.last().copied().unwrap_or(0);
+        let middle = 0.5 * (self.lowest + self.highest);
+        let mut step = 0.25;
+        while step > 0.01 {
+            let Converter { weight, zero } = best.converter;
+            let by = step * weight * 0.5_f64.powi(finest as i32);
+            let shifted = |by: f64| Converter {
+                weight,
+                zero: zero + by,
+            };
+            // About the middle of the readings: else a weight would have to be refined together with the zero.
+            let scaled = |by: f64| {
+                let factor = 1.0 + 2.0 * by / self.range().max(weight);
+                Converter {
+                    weight: weight * factor,
+                    zero: middle - (middle - zero) * factor,
+                }
+            };
+            let tried = [shifted(by), shifted(-by), scaled(by), scaled(-by)];
+            let found = tried.into_iter().find_map(|converter| {
+                let explained = self.bits(readings, &converter).explains(&best.bits)?;
+                let drop = self.drop(explained);
+                (drop > best.drop + 1e-6).then(|| Hypothesis {
+                    converter,
+                    drop,
+                    ..best.clone()
+                })
+            });
+            match found {
+                Some(better) => best = better,
+                None => step *= 0.5,
+            }
+        }
+        best
+    }
+
+    /// Waves and steps against the reading, as the converter that each would be the heaviest bit of, the best first, and how many places
+    /// were looked at.
+    fn first_sight(&self, readings: &[RowReading]) -> (Vec<(f64, Converter)>, f64) {
+        let mut sds: Vec<f64> = readings.iter().map(|r| r.sd).collect();
+        sds.sort_by(f64::total_cmp);
+        let sd = sds.get(sds.len() / 2).copied().unwrap_or(0.0);
+        let cycle = 1.0 / (OVERSAMPLED * self.range());
+        let finest = (FINEST / sd / cycle).min(PERIODS as f64);
+        let first = (0.5 / self.range() / cycle) as usize;
+        let waves: Vec<(f64, Converter)> = (first.max(1)..finest as usize)
+            .into_par_iter()
+            .filter_map(|k| self.wave(readings, k as f64 * cycle))
+            .collect();
+        let mut levels: Vec<f64> = readings.iter().map(|r| r.mean).collect();
+        levels.sort_by(f64::total_cmp);
+        let every = levels.len().div_ceil(STEPS).max(1);
+        let between = levels.windows(2).step_by(every);
+        let places: Vec<f64> = between.map(|w| 0.5 * (w[0] + w[1])).collect();
+        let steps: Vec<(f64, Converter)> = places
+            .par_iter()
+            .filter_map(|at| self.step(readings, *at))
+            .collect();
+        let count = PHASES * waves.len() as f64 + 2.0 * steps.len() as f64;
+        let mut followed = peaks(waves, WAVES);
+        followed.extend(peaks(steps, FOLLOWED_STEPS));
+        followed.sort_by(|a, b| b.0.total_cmp(&a.0));
+        (followed, count)
+    }
+
+    fn wave(&self, readings: &[RowReading], frequency: f64) -> Option<(f64, Converter)> {
+        let normal = self.normal(readings, 2, |r, out| {
+            let (sin, cos) = (2.0 * PI * frequency * r.mean).sin_cos();
+            let left = (-2.0 * (PI * frequency * r.sd).powi(2)).exp();
+            (out[0], out[1]) = (left * cos, left * sin);
+        });
+        let explained = normal.explains(&[0, 1])?;
+        let of = normal.matrix.cholesky()?.solve(&normal.with_left);
+        // Of a bit the share is 1/2 - 2/π sin(2π f (u - zero)) and so on; of which sign its error is does not matter here.
+        let zero = f64::atan2(-of[0], of[1]) / (2.0 * PI * frequency);
+        let weight = 0.5 / frequency;
+        Some((self.drop(explained), Converter { weight, zero }))
+    }
+
+    fn step(&self, readings: &[RowReading], at: f64) -> Option<(f64, Converter)> {
+        // So heavy that it turns nowhere else.
+        let weight = 2.0 * self.range();
+        let zero = at - weight;
+        let converter = Converter { weight, zero };
+        let normal = self.normal(readings, 1, |r, out| {
+            out[0] = converter.share(0, r.mean, r.sd);
+        });
+        let own = normal.matrix[(0, 0)];
+        (own > 1e-12).then(|| (self.drop(normal.with_left[0].powi(2) / own), converter))
+    }
+
+    /// Errors by the code of an axis, or of all alike. `None` where there are no readings to speak of.
+    fn look(&self, axis: Option<usize>) -> Option<Outcome> {
+        let readings = self.of(axis);
+        if !(self.range() > 0.0) {
+            return None;
+        }
+        let (followed, places) = self.first_sight(&readings);
+        let (drop, converter) = followed.first().copied()?;
+        let chance = |drop: f64, columns: f64, choices: f64| {
+            let n = self.root.len() as f64;
+            let dof = n - self.model.nrows() as f64 - columns;
+            let f = (drop / n).exp_m1() * dof / columns;
+            (exceeds(f, columns, dof) * choices).min(1.0)
+        };
+        let p = chance(drop, 2.0, places);
+        let first = Outcome {
+            best: Hypothesis {
+                converter,
+                bits: vec![0],
+                drop,
+            },
+            places,
+            offered: 1,
+            p,
+        };
+        if p > PROMISING {
+            return Some(first);
+        }
+        let all = followed.into_par_iter().filter_map(|(_, seen)| {
+            let whole = self.above(&readings, seen.weight, seen.zero);
+            let (chosen, _) = self.choose(&readings, whole)?;
+            let refined = self.refine(&readings, chosen);
+            // With weight and zero in their places other bits may be seen.
+            let (chosen, offered) = self.choose(&readings, refined.converter)?;
+            Some((self.refine(&readings, chosen), offered))
+        });
+        let found = all.max_by(|a, b| a.0.score().total_cmp(&b.0.score()));
+        let Some((best, offered)) = found else {
+            return Some(first);
+        };
+        let choices = places * (offered as f64).exp2();
+        let p = chance(best.drop, best.bits.len() as f64, choices);
+        Some(Outcome {
+            best,
+            places,
+            offered,
+            p,
+        })
+    }
+}
+
+/// The highest of some places in a row, none beside a higher one.
+fn peaks(all: Vec<(f64, Converter)>, most: usize) -> Vec<(f64, Converter)> {
+    let before = |k: usize| k.checked_sub(1).map_or(f64::NEG_INFINITY, |k| all[k].0);
+    let after = |k: usize| all.get(k + 1).map_or(f64::NEG_INFINITY, |a| a.0);
+    let mut peaks: Vec<_> = (0..all.len())
+        .filter(|k| all[*k].0 >= before(*k) && all[*k].0 > after(*k))
+        .map(|k| all[k])
+        .collect();
+    peaks.sort_by(|a, b| b.0.total_cmp(&a.0));
+    peaks.truncate(most);
+    peaks
+}
+
+impl Search<'_> {
+    /// Errors by the code beside the chosen, of converters of any weight and zero: of one that all axes share, and of one each.
+    /// None if errors by the code are among the chosen.
+    pub(super) fn converters(&self, chosen: &[Chosen], null: &Fitted) -> Vec<Chosen> {
+        if chosen.iter().any(|c| c.candidate.reads_code()) {
+            return Vec::new();
+        }
+        let Some(effect) = readout::of_sensor(self.rows.sensor) else {
+            return Vec::new();
+        };
+        let model = self.model(chosen);
+        let Some(sight) = Sight::new(self, &model, null) else {
+            return Vec::new();
+        };
+        let plain = Candidate::new(self.rows.sensor, Kind::Effect(effect));
+        let mut found = Vec::new();
+        if let Some(one) = sight.look(None) {
+            let mut candidate = plain.clone().behind_one(one.best.converter);
+            candidate.active.clone_from(&one.best.bits);
+            candidate.converters = one.places;
+            candidate.choices = one.places * (one.offered as f64).exp2();
+            found.push(candidate);
+        }
+        let mut each = plain;
+        each.active.clear();
+        for (axis, one) in (0..3).filter_map(|axis| Some((axis, sight.look(Some(axis))?))) {
+            if one.p > PROMISING {
+                continue;
+            }
+            each.converters *= one.places;
+            each.choices *= one.places * (one.offered as f64).exp2();
+            each.codes[axis] = Some(one.best.converter);
+            each.active
+                .extend(one.best.bits.iter().map(|bit| first_of(axis) + bit));
+        }
+        if !each.active.is_empty() {
+            found.push(each);
+        }
+        let moments = self.freed(&model, null);
+        found
+            .into_iter()
+            .filter_map(|candidate| {
+                let columns = candidate.columns_at(&self.by_dwell, &moments, 0.0);
+                let both = beside(&model, &unit_columns(&columns));
+                let fitted = self.spread.fit(&both, &null.components, By::Likelihood)?;
+                let drop = (null.deviance - fitted.deviance).max(0.0);
+                let p = self.chance(drop, columns.ncols(), model.ncols(), &candidate);
+                Some(Chosen {
+                    candidate,
+                    form: 0.0,
+                    columns,
+                    p,
+                    worth: drop,
+                    alternatives: Vec::new(),
+                })
+            })
+            .collect()
+    }
+}
