@@ -199,7 +199,7 @@ fn every_effect() -> Vec<Removed> {
             if candidate.reads_code() {
                 let zero = 0.123;
                 let weight = BIT_0_V;
-                candidate = candidate.behind_one(Converter { weight, zero });
+                candidate = candidate.behind_one(Converter::of(weight, zero));
             }
             if n % 2 == 1 {
                 candidate.active.remove(1);
@@ -293,7 +293,7 @@ fn converters() -> Removed {
     let mut values = Vec::new();
     for axis in 0..3 {
         let (weight, zero) = (BIT_0_V, ZERO_V[axis]);
-        candidate.codes[axis] = Some(Converter { weight, zero });
+        candidate.codes[axis] = Some(Converter::of(weight, zero));
         for (bit, worth) in WORTH_V[axis] {
             candidate.active.push(first_of(axis) + bit as usize);
             values.push(worth / BIT_0_V);

@@ -233,7 +233,7 @@ fn a_complaint_names_the_line_what_is_wrong_and_what_to_do() {
         ),
         (
             "draw_effects = 1000",
-            "2: more effects than there are besides the stated ones; give at most 35",
+            "2: more effects than there are besides the stated ones; give at most 39",
         ),
         (
             "draw_effects = 35\n[[effect]]\nid = \"gyro_warm_up\"",

@@ -68,6 +68,8 @@ pub struct ConverterTable {
     pub weight_of_bit_0_raw: f64,
     /// Reading of its code 0, raw.
     pub reading_of_code_0_raw: f64,
+    /// It is known to within so much, raw, with 95 %.
+    pub within_raw: f64,
 }
 
 impl ConverterTable {
@@ -77,6 +79,7 @@ impl ConverterTable {
             axes: axes.into(),
             weight_of_bit_0_raw: converter.weight,
             reading_of_code_0_raw: converter.zero,
+            within_raw: converter.zero_within,
         };
         match codes {
             [Some(x), Some(y), Some(z)] if x == y && y == z => vec![table("xyz", x)],
@@ -93,9 +96,11 @@ impl ConverterTable {
         let mut codes: Codes = [None; 3];
         for table in all {
             let (weight, zero) = (table.weight_of_bit_0_raw, table.reading_of_code_0_raw);
-            if !(weight > 0.0 && weight.is_finite() && zero.is_finite()) {
+            let within = table.within_raw;
+            let numbers = [weight, zero, within].iter().all(|v| v.is_finite());
+            if !(numbers && weight > 0.0 && within >= 0.0) {
                 return Err(format!(
-                    "converter of {}: weight_of_bit_0_raw has to be a positive number, reading_of_code_0_raw a number",
+                    "converter of {}: weight_of_bit_0_raw has to be a positive number, reading_of_code_0_raw a number, within_raw not negative",
                     table.axes
                 ));
             }
@@ -107,7 +112,12 @@ impl ConverterTable {
                 return Err(format!("converter of {:?}: x, y, z or xyz", table.axes));
             }
             for axis in ours {
-                if codes[axis].replace(Converter { weight, zero }).is_some() {
+                let converter = Converter {
+                    weight,
+                    zero,
+                    zero_within: within,
+                };
+                if codes[axis].replace(converter).is_some() {
                     return Err(format!("there are two converters of {}", AXES[axis]));
                 }
             }
@@ -304,10 +314,11 @@ impl EffectTable {
             for c in &self.converters {
                 writeln!(
                     out,
-                    "  {{ axes = {}, weight_of_bit_0_raw = {}, reading_of_code_0_raw = {} }},",
+                    "  {{ axes = {}, weight_of_bit_0_raw = {}, reading_of_code_0_raw = {}, within_raw = {} }},",
                     quoted(&c.axes),
                     number(c.weight_of_bit_0_raw),
-                    number(c.reading_of_code_0_raw)
+                    number(c.reading_of_code_0_raw),
+                    number(c.within_raw)
                 )?;
             }
             writeln!(out, "]")?;
@@ -443,7 +454,7 @@ fn on_device<T: RealField + Copy>(
     match &candidate.kind {
         Kind::Effect(_) if candidate.reads_code() => {
             let of = |c: OfConverter| {
-                let Converter { weight, zero } = c.converter;
+                let Converter { weight, zero, .. } = c.converter;
                 let errors = c.errors.map(convert);
                 DeviceEffect::code(sensor, c.axis, &errors, convert(weight), convert(zero))
             };

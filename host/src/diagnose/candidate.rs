@@ -156,11 +156,8 @@ impl Candidate {
             return Some(candidate);
         }
         let (lowest, highest) = rows.reading_range();
-        let usual = Converter {
-            weight: readout::first_weight(rows.step?, lowest, highest),
-            zero: 0.0,
-        };
-        Some(candidate.behind_one(usual))
+        let weight = readout::first_weight(rows.step?, lowest, highest);
+        Some(candidate.behind_one(Converter::of(weight, 0.0)))
     }
 
     /// It with one converter for all axes.

@@ -8,6 +8,8 @@ mod converter;
 mod refine;
 mod screen;
 
+use std::sync::{Mutex, PoisonError};
+
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
@@ -59,6 +61,8 @@ pub struct Search<'a> {
     /// Columns of each, turned, for each form that is screened; none of those that are another beside other effects.
     turned: Vec<Vec<(f64, DMatrix<f64>)>>,
     tests: [f64; 2],
+    /// The converters that were found last, and beside which deviance: the last round and [`Self::others`] ask for the same.
+    converters: Mutex<Option<(f64, Vec<Chosen>)>>,
 }
 
 /// Columns that span what `columns` do.
@@ -125,6 +129,7 @@ impl<'a> Search<'a> {
             by_dwell: rows.by_dwell(),
             spread,
             candidates,
+            converters: Mutex::new(None),
         }
     }
 
@@ -220,6 +225,23 @@ impl<'a> Search<'a> {
             worth: drop,
             alternatives: Vec::new(),
         })
+    }
+
+    /// As [`Self::converters_beside`], once.
+    fn converters(&self, chosen: &[Chosen], null: &Fitted) -> Vec<Chosen> {
+        // Nobody leaves it half written, and nobody waits for it while a search goes on.
+        let last = || {
+            self.converters
+                .lock()
+                .unwrap_or_else(PoisonError::into_inner)
+        };
+        let known = last().clone();
+        if let Some((_, found)) = known.filter(|k| k.0 == null.deviance) {
+            return found;
+        }
+        let found = self.converters_beside(chosen, null);
+        *last() = Some((null.deviance, found.clone()));
+        found
     }
 
     /// The best candidates beside the chosen, each with noise of its own, the least by chance first.

@@ -236,3 +236,46 @@ fn a_mismatched_bit_adds_its_error_wherever_it_is_set() {
         assert!((found - expected).abs() < 1e-6, "{code}: {found}");
     }
 }
+
+/// Difference that an effect makes to the outputs of the three gyros where the first reads a code, in codes.
+fn by_code(effect: &str, code: f64) -> [f64; 3] {
+    let rig = "format = \"mimu-rig/1\"\n[unit.gyro_axes]\nwhite_si = [0, 0, 0]\ninstability_si = [0, 0, 0]\n\
+               walk_si = [0, 0, 0]\nbandwidth_hz = [inf, inf, inf]\n[converter]\nreference_error_ppm = 0\n";
+    let mut pair = Pair::of(rig, effect, 1e-3);
+    std::array::from_fn(|i| {
+        let axis = pair.truth.unit.gyro.axes[i].clone();
+        let rate = ((code + 0.2) * GYRO_LSB - axis.null) / axis.sensitivity;
+        let along = motion(0.0, axis.direction.map(|d| d * rate), [0.0; 3]);
+        let (with, without) = pair.pins(&along, 25.0);
+        (with.gyro_v[i] - without.gyro_v[i]) / GYRO_LSB
+    })
+}
+
+#[test]
+fn where_codes_are_missing_all_above_are_too_high() {
+    let effect = "id = \"gyro_missing_codes\"\ncodes = 20\nat = 0.5";
+    for (code, expected) in [(32_767.0, 0.0), (32_768.0, 20.0), (50_000.0, 20.0)] {
+        for found in by_code(effect, code) {
+            assert!((found - expected).abs() < 1e-6, "{code}: {found}");
+        }
+    }
+}
+
+#[test]
+fn each_converter_has_errors_and_codes_of_its_own() {
+    let errors = "[8, 0, 0, 0, 0, 0, 0, 4, 0, 0, 0, 0, 0, 0, 2, 0, 0, 0]";
+    let effect = format!(
+        "id = \"gyro_converters\"\nbit_errors_lsb = {errors}\nadded_codes = [1000, 2000, 65536]"
+    );
+    // 32767 + 1000 has the top bit, 32767 + 2000 not the second, and 32767 the second and third.
+    for (code, expected) in [
+        (32_767.0, [8.0, 0.0, 2.0]),
+        (31_000.0, [0.0, 0.0, 2.0]),
+        (30_000.0, [0.0, 4.0, 2.0]),
+    ] {
+        let found = by_code(&effect, code);
+        for (found, expected) in found.iter().zip(expected) {
+            assert!((found - expected).abs() < 1e-6, "{code}: {found}");
+        }
+    }
+}

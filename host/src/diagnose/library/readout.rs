@@ -86,9 +86,20 @@ pub struct Converter {
     pub weight: f64,
     /// Reading of code 0, raw.
     pub zero: f64,
+    /// It is known to within so much, raw, with 95 %.
+    pub zero_within: f64,
 }
 
 impl Converter {
+    /// One of a given zero.
+    pub fn of(weight: f64, zero: f64) -> Self {
+        Self {
+            weight,
+            zero,
+            zero_within: 0.0,
+        }
+    }
+
     /// Share of the time that bit `-bit` is set while readings scatter about `mean` with `sd`, raw.
     pub fn share(&self, bit: usize, mean: f64, sd: f64) -> f64 {
         share_set(mean - self.zero, sd, self.weight * 0.5_f64.powi(bit as i32))

@@ -32,6 +32,10 @@ const STEPS: usize = 256;
 /// Waves, and steps, that are followed up.
 const WAVES: usize = 4;
 const FOLLOWED_STEPS: usize = 2;
+/// Of these, the ones whose weights and zeros are refined.
+const REFINED: usize = 2;
+/// Deviance within which a zero does as well: 95 %.
+const WITHIN: f64 = 4.0;
 /// Phases and directions that a period stands for, as tests.
 const PHASES: f64 = 4.0;
 /// A first sight that chance has more often than this, after all places, is not followed up.
@@ -157,27 +161,35 @@ impl Sight {
         ours.filter(|r| axis.is_none_or(|a| a == r.axis)).collect()
     }
 
-    /// Normal equations of N functions of the reading, which `values` gives.
+    /// Normal equations of so many functions of the reading, which `values` writes.
     fn normal(
         &self,
         readings: &[RowReading],
         count: usize,
         values: impl Fn(&RowReading, &mut [f64]),
     ) -> Normal {
-        let mut columns = DMatrix::<f64>::zeros(count, self.root.len());
         let mut of_one = vec![0.0; count];
-        for r in readings {
-            values(r, &mut of_one);
-            let weight = r.weight * self.root[r.row];
-            for (sum, value) in columns.column_mut(r.row).iter_mut().zip(&of_one) {
-                *sum += weight * value;
+        let mut of_row = DVector::zeros(count);
+        let mut matrix = DMatrix::zeros(count, count);
+        let mut with_left = DVector::zeros(count);
+        let mut in_model = DMatrix::zeros(self.model.nrows(), count);
+        // The readings of a row follow each other; rows of other axes are none of these.
+        for of_this in readings.chunk_by(|a, b| a.row == b.row) {
+            of_row.fill(0.0);
+            let row = of_this[0].row;
+            for r in of_this {
+                values(r, &mut of_one);
+                let weight = r.weight * self.root[row];
+                for (sum, value) in of_row.iter_mut().zip(&of_one) {
+                    *sum += weight * value;
+                }
             }
+            matrix.ger(1.0, &of_row, &of_row, 1.0);
+            with_left.axpy(self.left[row], &of_row, 1.0);
+            in_model.ger(1.0, &self.model.column(row), &of_row, 1.0);
         }
-        let in_model: DMatrix<f64> = &columns * self.model.transpose();
-        Normal {
-            matrix: &columns * columns.transpose() - &in_model * in_model.transpose(),
-            with_left: &columns * &self.left,
-        }
+        matrix.gemm_tr(-1.0, &in_model, &in_model, 1.0);
+        Normal { matrix, with_left }
     }
 
     /// Drop of the deviance where so much is explained.
@@ -186,18 +198,19 @@ impl Sight {
         -(self.root.len() as f64) * (-share).ln_1p()
     }
 
-    /// All bits of a converter.
-    fn bits(&self, readings: &[RowReading], converter: &Converter) -> Normal {
-        self.normal(readings, BITS, |r, out| {
-            for (bit, out) in out.iter_mut().enumerate() {
-                *out = converter.weight * converter.share(bit, r.mean, r.sd);
+    /// Some bits of a converter.
+    fn bits(&self, readings: &[RowReading], converter: &Converter, bits: &[usize]) -> Normal {
+        self.normal(readings, bits.len(), |r, out| {
+            for (bit, out) in bits.iter().zip(out) {
+                *out = converter.weight * converter.share(*bit, r.mean, r.sd);
             }
         })
     }
 
     /// The best choice of bits, and how many there were to choose from.
     fn choose(&self, readings: &[RowReading], converter: Converter) -> Option<(Hypothesis, usize)> {
-        let normal = self.bits(readings, &converter);
+        let all: [usize; BITS] = std::array::from_fn(|bit| bit);
+        let normal = self.bits(readings, &converter, &all);
         let excited = |k: &usize| normal.matrix[(*k, *k)].max(0.0).sqrt() * TYPICAL > EXCITED;
         let offered: Vec<usize> = (0..BITS).filter(excited).collect();
         let sets = (1..1usize << offered.len()).filter_map(|set| {
@@ -219,22 +232,20 @@ impl Sight {
     /// The converter that a bit of weight `weight` belongs to, whose turns are at `zero` and every weight from there: each bit above
     /// may turn where this one turns on or where it turns off.
     fn above(&self, readings: &[RowReading], weight: f64, zero: f64) -> Converter {
-        let mut converter = Converter { weight, zero };
+        let mut converter = Converter::of(weight, zero);
         for level in 1..BITS {
             if converter.weight >= self.range() {
                 break;
             }
-            let either = [0.0, converter.weight].map(|by| Converter {
-                weight: 2.0 * converter.weight,
-                zero: converter.zero + by,
-            });
+            let either = [0.0, converter.weight]
+                .map(|by| Converter::of(2.0 * converter.weight, converter.zero + by));
             let bits: Vec<usize> = (0..=level).collect();
             let explains = |c: &Converter| {
-                let normal = self.bits(readings, c);
+                let normal = self.bits(readings, c, &bits);
                 // Bits that do not turn in the range are no columns.
                 let seen = |k: &usize| normal.matrix[(*k, *k)] > 1e-12;
-                let bits: Vec<usize> = bits.iter().copied().filter(seen).collect();
-                normal.explains(&bits).unwrap_or(0.0)
+                let seen: Vec<usize> = bits.iter().copied().filter(seen).collect();
+                normal.explains(&seen).unwrap_or(0.0)
             };
             let [a, b] = either.each_ref().map(explains);
             converter = if b > a { either[1] } else { either[0] };
@@ -245,6 +256,13 @@ impl Sight {
         converter
     }
 
+    /// Drop of the deviance with the bits of a hypothesis and another converter.
+    fn with(&self, readings: &[RowReading], of: &Hypothesis, converter: &Converter) -> Option<f64> {
+        let set: Vec<usize> = (0..of.bits.len()).collect();
+        let normal = self.bits(readings, converter, &of.bits);
+        Some(self.drop(normal.explains(&set)?))
+    }
+
     /// With weight and zero walked uphill by ever smaller steps.
     fn refine(&self, readings: &[RowReading], from: Hypothesis) -> Hypothesis {
         let mut best = from;
@@ -252,11 +270,11 @@ impl Sight {
         let middle = 0.5 * (self.lowest + self.highest);
         let mut step = 0.25;
         while step > 0.01 {
-            let Converter { weight, zero } = best.converter;
+            let Converter { weight, zero, .. } = best.converter;
             let by = step * weight * 0.5_f64.powi(finest as i32);
             let shifted = |by: f64| Converter {
-                weight,
                 zero: zero + by,
+                ..best.converter
             };
             // About the middle of the readings: else a weight would have to be refined together with the zero.
             let scaled = |by: f64| {
@@ -264,12 +282,12 @@ impl Sight {
                 Converter {
                     weight: weight * factor,
                     zero: middle - (middle - zero) * factor,
+                    ..best.converter
                 }
             };
             let tried = [shifted(by), shifted(-by), scaled(by), scaled(-by)];
             let found = tried.into_iter().find_map(|converter| {
-                let explained = self.bits(readings, &converter).explains(&best.bits)?;
-                let drop = self.drop(explained);
+                let drop = self.with(readings, &best, &converter)?;
                 (drop > best.drop + 1e-6).then(|| Hypothesis {
                     converter,
                     drop,
@@ -282,6 +300,50 @@ impl Sight {
             }
         }
         best
+    }
+
+    /// With the zero in the middle of those that do as well to within 95 %: a step between two readings may be anywhere between them.
+    fn centred(&self, readings: &[RowReading], from: Hypothesis) -> Hypothesis {
+        let Converter { weight, zero, .. } = from.converter;
+        let finest = from.bits.last().copied().unwrap_or(0);
+        let most = 0.5 * weight * 0.5_f64.powi(finest as i32);
+        let as_well = |by: f64| {
+            let converter = Converter {
+                zero: zero + by,
+                ..from.converter
+            };
+            let drop = self.with(readings, &from, &converter);
+            drop.is_some_and(|drop| drop > from.drop - WITHIN)
+        };
+        let reach = |side: f64| {
+            let (mut inside, mut outside) = (0.0, most);
+            while outside - inside > 0.01 * outside {
+                let middle = 0.5 * (inside + outside);
+                if as_well(side * middle) {
+                    inside = middle;
+                } else {
+                    outside = middle;
+                }
+                if outside < 1e-6 * most {
+                    break;
+                }
+            }
+            inside
+        };
+        let (down, up) = (reach(-1.0), reach(1.0));
+        let converter = Converter {
+            zero: zero + 0.5 * (up - down),
+            zero_within: 0.5 * (up + down),
+            ..from.converter
+        };
+        match self.with(readings, &from, &converter) {
+            Some(drop) => Hypothesis {
+                converter,
+                drop,
+                ..from
+            },
+            None => from,
+        }
     }
 
     /// Waves and steps against the reading, as the converter that each would be the heaviest bit of, the best first, and how many places
@@ -324,14 +386,14 @@ impl Sight {
         // Of a bit the share is 1/2 - 2/π sin(2π f (u - zero)) and so on; of which sign its error is does not matter here.
         let zero = f64::atan2(-of[0], of[1]) / (2.0 * PI * frequency);
         let weight = 0.5 / frequency;
-        Some((self.drop(explained), Converter { weight, zero }))
+        Some((self.drop(explained), Converter::of(weight, zero)))
     }
 
     fn step(&self, readings: &[RowReading], at: f64) -> Option<(f64, Converter)> {
         // So heavy that it turns nowhere else.
         let weight = 2.0 * self.range();
         let zero = at - weight;
-        let converter = Converter { weight, zero };
+        let converter = Converter::of(weight, zero);
         let normal = self.normal(readings, 1, |r, out| {
             out[0] = converter.share(0, r.mean, r.sd);
         });
@@ -367,13 +429,19 @@ impl Sight {
         if p > PROMISING {
             return Some(first);
         }
-        let all = followed.into_par_iter().filter_map(|(_, seen)| {
+        let whole = followed.into_par_iter().filter_map(|(_, seen)| {
             let whole = self.above(&readings, seen.weight, seen.zero);
-            let (chosen, _) = self.choose(&readings, whole)?;
+            Some(self.choose(&readings, whole)?.0)
+        });
+        let mut whole: Vec<Hypothesis> = whole.collect();
+        whole.sort_by(|a, b| b.score().total_cmp(&a.score()));
+        whole.truncate(REFINED);
+        let all = whole.into_par_iter().filter_map(|chosen| {
             let refined = self.refine(&readings, chosen);
             // With weight and zero in their places other bits may be seen.
             let (chosen, offered) = self.choose(&readings, refined.converter)?;
-            Some((self.refine(&readings, chosen), offered))
+            let refined = self.refine(&readings, chosen);
+            Some((self.centred(&readings, refined), offered))
         });
         let found = all.max_by(|a, b| a.0.score().total_cmp(&b.0.score()));
         let Some((best, offered)) = found else {
@@ -406,7 +474,7 @@ fn peaks(all: Vec<(f64, Converter)>, most: usize) -> Vec<(f64, Converter)> {
 impl Search<'_> {
     /// Errors by the code beside the chosen, of converters of any weight and zero: of one that all axes share, and of one each.
     /// None if errors by the code are among the chosen.
-    pub(super) fn converters(&self, chosen: &[Chosen], null: &Fitted) -> Vec<Chosen> {
+    pub(super) fn converters_beside(&self, chosen: &[Chosen], null: &Fitted) -> Vec<Chosen> {
         if chosen.iter().any(|c| c.candidate.reads_code()) {
             return Vec::new();
         }

@@ -111,6 +111,7 @@ fn accepted(sensor: Sensor, a: &Accepted) -> Value {
                 "axes": c.axes,
                 "weight_of_bit_0_raw": c.weight_of_bit_0_raw,
                 "reading_of_code_0_raw": c.reading_of_code_0_raw,
+                "within_raw": c.within_raw,
             })
         };
         value["converters"] = converters.iter().map(table).collect();

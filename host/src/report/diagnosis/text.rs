@@ -186,14 +186,21 @@ fn effect(out: &mut String, a: &Accepted, shown: &impl Fn(f64) -> String) {
     }
 }
 
-/// A converter in a line.
+/// A converter in words.
 pub(super) fn converter(c: &ConverterTable) -> String {
-    let [weight, zero] =
-        [c.weight_of_bit_0_raw, c.reading_of_code_0_raw].map(|v| format!("{v:.6}"));
     format!(
-        "converter of {}: bit 0 is worth {weight} raw, code 0 reads {zero}; errors are in units of bit 0",
-        c.axes
+        "converter of {}: bit 0 turns every {} raw from {} ± {} on; errors are in units of the first",
+        c.axes,
+        plain(c.weight_of_bit_0_raw),
+        plain(c.reading_of_code_0_raw),
+        three(c.within_raw)
     )
+}
+
+/// Six significant digits.
+fn plain(value: f64) -> String {
+    let digits = 5 - value.abs().max(1e-9).log10().floor() as i32;
+    format!("{value:.*}", digits.clamp(0, 12) as usize)
 }
 
 /// How a law on no list does in the place of an effect; `worse` in deviance.
