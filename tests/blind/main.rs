@@ -44,6 +44,8 @@ struct Tally {
     missed: u32,
     /// Right ones whose error after is at most 1.2 times the floor.
     at_floor: u32,
+    /// The same where every fourth dwell is held out instead of blocks of time.
+    between: u32,
     /// Right ones whose error after is at most 1.2 times that of the same unit, with the same noise, without the effect.
     at_clean: u32,
 }
@@ -57,6 +59,7 @@ impl Tally {
             (true, true, _) => {
                 self.right += 1;
                 self.at_floor += u32::from(case.after <= 1.2);
+                self.between += u32::from(case.interleaved <= 1.2);
                 let of = |c: &Case| c.held_out[case.judged as usize];
                 self.at_clean += u32::from(clean.is_some_and(|c| of(case) <= 1.2 * of(c)));
             }
@@ -77,15 +80,16 @@ impl Tally {
             wrong,
             missed,
             at_floor,
+            between,
             at_clean,
         } = self;
         format!(
-            "| {name} | {cases} | {detected} | {right} | {more} | {wrong} | {missed} | {at_floor} | {at_clean} |"
+            "| {name} | {cases} | {detected} | {right} | {more} | {wrong} | {missed} | {at_floor} | {between} | {at_clean} |"
         )
     }
 }
 
-const HEAD: &str = "| | cases | detected | named right | right and more | named wrong | missed | right, error after at most 1.2 floors | at most 1.2 times that without the effect |\n|---|---:|---:|---:|---:|---:|---:|---:|---:|";
+const HEAD: &str = "| | cases | detected | named right | right and more | named wrong | missed | right, error after at most 1.2 floors | the same, every fourth dwell held out | at most 1.2 times that without the effect |\n|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|";
 
 fn main() {
     let args: Vec<String> = std::env::args().skip(1).collect();

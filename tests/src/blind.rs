@@ -124,6 +124,8 @@ pub struct Case {
     pub judged: Sensor,
     /// Its error after over noise floor, held out.
     pub after: f64,
+    /// The same with every fourth dwell held out, instead of blocks of time.
+    pub interleaved: f64,
     /// Error after, held out, of gyro and accelerometer, SI.
     pub held_out: [f64; 2],
     /// What was found and not accepted, and why.
@@ -211,6 +213,7 @@ pub fn case(ids: &[&str], seed: u64) -> Case {
                 verdict: "refused",
                 judged: sensors.first().copied().unwrap_or(Sensor::Gyro),
                 after: f64::NAN,
+                interleaved: f64::NAN,
                 held_out: [f64::NAN; 2],
                 rejected: Vec::new(),
                 left: vec![refusal.to_string()],
@@ -228,6 +231,9 @@ pub fn case(ids: &[&str], seed: u64) -> Case {
         judged,
         after: of(judged).map_or(f64::NAN, |s| {
             s.decision.held_out_rms[1] / s.decision.noise_floor
+        }),
+        interleaved: of(judged).map_or(f64::NAN, |s| {
+            s.decision.interleaved_rms / s.decision.noise_floor
         }),
         held_out: Sensor::BOTH.map(held_out),
         rejected: found

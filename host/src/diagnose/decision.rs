@@ -64,6 +64,9 @@ pub struct Decision {
     pub held_out_rms: [f64; 2],
     /// How they were held out.
     pub split: Split,
+    /// The last, with every fourth dwell held out instead: a block of time may hold a range of temperature to itself, and is then
+    /// extrapolated to; between dwells that were seen nothing is.
+    pub interleaved_rms: f64,
     /// What noise alone would leave.
     pub noise_floor: f64,
     /// Accepted effects whose physics the rows do not decide.
@@ -272,7 +275,9 @@ pub fn decide(rows: &Rows, dwell_ends: &[(usize, f64)], unseen: Option<&Rows>) -
         .spread
         .fit(&search.basis, &null.components, By::Restricted)?;
     let left = leftover(&search, &model, &last, !kept.is_empty(), &jumps);
-    let held = |chosen: &[Chosen], fit: &Fitted| held_rms(chosen, fit, split).unwrap_or(f64::NAN);
+    let by =
+        |chosen: &[Chosen], fit: &Fitted, split| held_rms(chosen, fit, split).unwrap_or(f64::NAN);
+    let held = |chosen: &[Chosen], fit: &Fitted| by(chosen, fit, split);
     let floor: f64 = rows.strata.iter().map(|s| known_in(s, rows.judged.0)).sum();
     Some(Decision {
         rms: [
@@ -280,6 +285,7 @@ pub fn decide(rows: &Rows, dwell_ends: &[(usize, f64)], unseen: Option<&Rows>) -
             rms(rows, &residuals(&last, &model)),
         ],
         held_out_rms: [held(&[], &null), held(&kept, &last)],
+        interleaved_rms: by(&kept, &last, Split::Interleaved),
         split,
         noise_floor: (floor / (rows.judged.0 / rows.judged.1) as f64).sqrt(),
         accepted,

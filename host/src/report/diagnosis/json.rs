@@ -129,6 +129,7 @@ fn sensor(d: &Diagnosis, s: &SensorDiagnosis) -> Value {
         "held_out_rms_before": number(decision.held_out_rms[0]),
         "held_out_rms_after": number(decision.held_out_rms[1]),
         "held_out": split(decision.split),
+        "interleaved_rms_after": number(decision.interleaved_rms),
         "noise_floor": decision.noise_floor,
         "notes": decision.notes,
         "rows": decision.rows[0],
