@@ -5,6 +5,7 @@ use std::path::Path;
 use std::process::Command;
 
 use mimu::calibration::{Calibration, EffectTable, to_toml};
+use mimu::device::Image;
 use mimu::diagnose::candidate::{Candidate, Kind, Monomial, Variable};
 use mimu::diagnose::library;
 use mimu::diagnose::library::readout::{Converter, TYPICAL, first_of};
@@ -322,6 +323,10 @@ fn errors_by_the_code_are_taken_out_block_by_block_and_sample_by_sample() {
     )
     .unwrap();
     let device: Effects<f64, 8> = calibration.core_effects().unwrap();
+    // One to each axis, and the device has room for them.
+    let image = Image::new(&calibration, "cal.toml").unwrap();
+    assert_eq!(image.stored().unwrap().effect_count, 3);
+    assert_eq!(image.effects, ["accel_readout_code"]);
     let text = std::fs::read_to_string(coded.join("samples.csv")).unwrap();
     let samples: Vec<Vec<f64>> = text
         .lines()
@@ -380,6 +385,69 @@ fn mimu(arguments: &[&str]) -> (bool, String) {
         run.stderr
     };
     (run.status.success(), String::from_utf8(text).unwrap())
+}
+
+#[test]
+fn converters_that_make_no_sense_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("recording");
+    record(&path, false, false);
+    let fit = fitted(&path);
+    let text = to_toml(&fit, &[table(&converters())], "2026-01-01T00:00:00Z");
+    let of_y = "{ axes = \"y\", ";
+    for (from, to, says) in [
+        (
+            "converters = [",
+            "converters = []\nothers = [",
+            "unknown field",
+        ),
+        ("{ axes = \"x\", ", "{ axes = \"w\", ", "x, y, z or xyz"),
+        (of_y, "{ axes = \"x\", ", "two converters of x"),
+        (of_y, "{ axes = \"xyz\", ", "two converters of x"),
+        (
+            "weight_of_bit_0_raw = 1.6384",
+            "weight_of_bit_0_raw = 0.0",
+            "converter of x: weight_of_bit_0_raw",
+        ),
+        (
+            "reading_of_code_0_raw = -0.0713",
+            "reading_of_code_0_raw = nan",
+            "reading_of_code_0_raw a number",
+        ),
+        ("within_raw = 0.0", "within_raw = -1.0", "not negative"),
+        (
+            "formula = \"x",
+            "form = { name = \"time_constant_s\", value = 3.0 }\nformula = \"x",
+            "this effect has none",
+        ),
+    ] {
+        assert!(text.contains(from), "{from} is not in {text}");
+        let edited = text.replacen(from, to, 1);
+        let refusal = Calibration::parse(&edited, "cal.toml")
+            .unwrap_err()
+            .to_string();
+        assert!(refusal.contains(says), "{refusal}");
+    }
+    let line = text.lines().find(|l| l.contains(of_y)).unwrap();
+    for (edited, says) in [
+        (
+            text.replacen(line, "", 1),
+            "y has coefficients and no converter",
+        ),
+        (
+            text.lines()
+                .filter(|l| !l.contains("weight_of_bit_0_raw"))
+                .collect::<Vec<_>>()
+                .join("\n"),
+            "it has no converters",
+        ),
+    ] {
+        let refusal = Calibration::parse(&edited, "cal.toml")
+            .unwrap_err()
+            .to_string();
+        assert!(refusal.contains(says), "{refusal}");
+        assert!(!refusal.contains('\n'), "{refusal}");
+    }
 }
 
 #[test]

@@ -105,7 +105,11 @@ impl Image {
             hash: stored::hash(&bytes),
             bytes,
             node_temp_c: vec![node.temp_c],
-            effects: effects.into_iter().map(|e| e.id).collect(),
+            effects: calibration
+                .effects()
+                .iter()
+                .map(|e| e.candidate.id())
+                .collect(),
             warnings,
         })
     }

@@ -28,7 +28,7 @@ mod upload;
 mod who;
 
 pub use check::{Checked, Difference, check, rounding, ulps};
-pub use contents::{Contents, EffectContents, NodeContents, contents};
+pub use contents::{Contents, ConverterContents, EffectContents, NodeContents, contents};
 pub use heard::{Answer, Ear, Event, Heard, LineCount, Samples};
 pub use image::{Image, remembers};
 pub use kalman::{AxisEstimate, KalmanPlan, KalmanRun, SHORTEST, kalman};

@@ -188,6 +188,20 @@ fn with_effects() -> Vec<u8> {
             coefficient: 1e-3,
             variables: &[Variable::RateX, Variable::ForceY],
         },
+        Record::Code {
+            sensor: Sensor::Gyro,
+            axis: None,
+            weight: 1.65,
+            zero: 0.0,
+            errors: &[2e-4, -1e-4, 2e-4, 1e-4, -2e-4, 1e-4, -1e-4, 2e-4, 1e-4],
+        },
+        Record::Code {
+            sensor: Sensor::Accel,
+            axis: Some(2),
+            weight: 1.1,
+            zero: -0.31,
+            errors: &[3e-4, 0.0, -2e-4, 0.0, 1e-4, 0.0, 0.0, 0.0, 2e-4],
+        },
     ];
     stored(&[20.0, 30.0, 40.0], &records)
 }
