@@ -83,6 +83,33 @@ pub struct Diagnosis {
     pub effects: Vec<Removed>,
     /// What it amounts to.
     pub verdict: Verdict,
+    /// The recordings that effects were found in, the first first.
+    pub sources: Vec<Source>,
+}
+
+/// A recording, told apart from others.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Source {
+    /// Its file of samples.
+    pub place: String,
+    /// Samples.
+    pub rows: u64,
+    /// Between samples, s.
+    pub period_s: f64,
+    /// Of the samples.
+    pub sha256: String,
+}
+
+impl From<&Prepared> for Source {
+    fn from(prepared: &Prepared) -> Self {
+        let condensed = &prepared.condensed;
+        Self {
+            place: prepared.place.clone(),
+            rows: condensed.rows,
+            period_s: condensed.period_s,
+            sha256: condensed.sha256.clone(),
+        }
+    }
 }
 
 /// What a diagnosis is made from.
@@ -225,6 +252,8 @@ pub fn diagnose(recordings: Recordings, options: Options) -> Result<Diagnosis> {
         later.push(without(prepared).ok_or_else(singular)?);
     }
     let found_in = 1 + recordings.more.len();
+    let sources = std::iter::once(&recordings.first).chain(&recordings.more);
+    let sources = sources.map(Source::from).collect();
     let mut now = before.clone();
     let mut effects: Vec<Removed> = Vec::new();
     let mut sensors = Vec::new();
@@ -290,5 +319,6 @@ pub fn diagnose(recordings: Recordings, options: Options) -> Result<Diagnosis> {
         sensors,
         effects,
         verdict,
+        sources,
     })
 }

@@ -24,6 +24,9 @@ pub fn diagnosis_json(report: &DiagnosisReport) -> Value {
         "format": "mimu-diagnosis/1",
         "tool": concat!("mimu ", env!("CARGO_PKG_VERSION")),
         "device": d.before.prepared.manifest.device,
+        "recordings": d.sources.iter()
+            .map(|s| json!({ "samples": s.place, "rows": s.rows, "period_s": s.period_s, "sha256": s.sha256 }))
+            .collect::<Vec<_>>(),
         "verdict": d.verdict.name(),
         "effects": all(&|s| s.decision.accepted.iter().map(|a| accepted(s.sensor, a)).collect()),
         "rejected": all(&|s| pairs(&s.decision.rejected, "reason")),

@@ -13,6 +13,7 @@ use super::text::USUAL;
 use crate::diagnose::decision::{Accepted, FALSE_LEFTOVER, LEVERAGE};
 use crate::diagnose::next::Next;
 use crate::diagnose::picture::{Against, Picture};
+use crate::diagnose::rows::Figure;
 use crate::diagnose::search::{FALSE_FOUND, FALSE_LISTED};
 use crate::diagnose::{Diagnosis, SensorDiagnosis, Verdict};
 use crate::dwell::Sensor;
@@ -99,19 +100,22 @@ fn spoken(sensor: Sensor) -> &'static str {
 
 fn head(d: &Diagnosis, made: &Made) -> Markup {
     let prepared = &d.before.prepared;
-    let (manifest, condensed) = (&prepared.manifest, &prepared.condensed);
+    let manifest = &prepared.manifest;
     let known = match manifest.reference {
         Reference::Table => "known from the table",
         Reference::Gravity => "only gravity is known",
     };
     let counts: Vec<String> = d
-        .before
         .sensors
         .iter()
-        .map(|f| {
-            let turns = f.figure == crate::fit::Figure::Direction;
-            let what = if turns { "turns" } else { "dwells" };
-            format!("{} {what} for the {}", f.residuals.len(), spoken(f.sensor))
+        .map(|s| {
+            let (count, together) = s.rows.judged;
+            let (what, of_one) = match s.rows.figure {
+                Figure::Direction => ("turns", together),
+                Figure::Size => ("dwells", together),
+                Figure::Input | Figure::Rest => ("dwells", 3 * together),
+            };
+            format!("{} {what} for the {}", count / of_one, spoken(s.sensor))
         })
         .collect();
     html! {
@@ -119,9 +123,12 @@ fn head(d: &Diagnosis, made: &Made) -> Markup {
         p class={ "verdict " (d.verdict.name()) } { (verdict(d)) }
         dl {
             dt { "Recording" } dd { code { (made.recording) } }
-            dt { "Samples" } dd {
-                (condensed.rows) " in " (number(condensed.rows as f64 * condensed.period_s, 1.0 / 60.0, "min"))
-                " at " (number(1.0 / condensed.period_s, 1.0, "Hz")) ", SHA-256 " code { (condensed.sha256) }
+            @for source in &d.sources {
+                dt { "Samples" } dd {
+                    @if d.sources.len() > 1 { code { (source.place) } ": " }
+                    (source.rows) " in " (number(source.rows as f64 * source.period_s, 1.0 / 60.0, "min"))
+                    " at " (number(1.0 / source.period_s, 1.0, "Hz")) ", SHA-256 " code { (source.sha256) }
+                }
             }
             dt { "Input" } dd { (known) "; gravity " data value=(manifest.gravity_mps2) { (format!("{:.5}", manifest.gravity_mps2)) " m/s²" } }
             dt { "Judged by" } dd { (counts.join(", ")) }
