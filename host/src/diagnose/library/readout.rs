@@ -86,7 +86,7 @@ pub struct Converter {
     pub weight: f64,
     /// Reading of code 0, raw.
     pub zero: f64,
-    /// It is known to within so much, raw, with 95 %.
+    /// It is known to within so much, raw, with 95 %; 0 where it was given.
     pub zero_within: f64,
 }
 

@@ -25,6 +25,10 @@ use crate::diagnose::spread::{By, Fitted};
 const OVERSAMPLED: f64 = 2.5;
 /// Most periods.
 const PERIODS: usize = 4000;
+/// Most waves at readings: of a recording by hand every 10 ms of a turn is one, and all periods of all would take a minute.
+const EVALUATIONS: usize = 4_000_000;
+/// Periods that are looked at all the same.
+const FEWEST_PERIODS: usize = 100;
 /// Cycles in a standard deviation of the readings: more, and noise has levelled nine tenths of the wave.
 const FINEST: f64 = 0.3;
 /// Most places of a step.
@@ -353,7 +357,8 @@ impl Sight {
         sds.sort_by(f64::total_cmp);
         let sd = sds.get(sds.len() / 2).copied().unwrap_or(0.0);
         let cycle = 1.0 / (OVERSAMPLED * self.range());
-        let finest = (FINEST / sd / cycle).min(PERIODS as f64);
+        let most = (EVALUATIONS / readings.len().max(1)).clamp(FEWEST_PERIODS, PERIODS);
+        let finest = (FINEST / sd / cycle).min(most as f64);
         let first = (0.5 / self.range() / cycle) as usize;
         let waves: Vec<(f64, Converter)> = (first.max(1)..finest as usize)
             .into_par_iter()
