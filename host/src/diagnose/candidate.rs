@@ -246,8 +246,8 @@ impl Candidate {
         (lasting, values)
     }
 
-    /// Active coefficient and axis of each of its regressors.
-    fn slots(&self) -> Vec<(usize, usize)> {
+    /// Place among the active coefficients, and axis, of each of its regressors.
+    pub fn slots(&self) -> Vec<(usize, usize)> {
         match &self.kind {
             Kind::Effect(e) => {
                 let axes = self.active.iter().map(|k| e.coefficients[*k].axis);

@@ -18,6 +18,8 @@ use crate::estimate::AXES;
 
 /// Points of a curve.
 const POINTS: usize = 81;
+/// Of one with steps.
+const POINTS_OF_STEPS: usize = 801;
 
 /// What a panel has on its abscissa.
 #[derive(Debug, Clone, PartialEq)]
@@ -124,8 +126,10 @@ pub(super) fn panels(
     tracks: &[Track],
 ) -> Option<Vec<Panel>> {
     let mut panels = Vec::new();
-    // What the code says is a function of the bits, and no function of one quantity that a person reads.
-    let coded = one.chosen.candidate.reads_code();
+    if one.chosen.candidate.reads_code() {
+        let input = tracks.iter().filter(|t| t.kind == Kind::Input);
+        panels.extend(input.filter_map(|t| coded(rows, one, t)));
+    }
     for group in groups(rows, one) {
         let of_axis = tracks
             .iter()
@@ -143,7 +147,7 @@ pub(super) fn panels(
         .solve(&white.whiten(columns), 1e-12)
         .ok()?;
     let across = columns - basis * share;
-    for track in tracks.iter().filter(|t| t.axis.is_none() || coded) {
+    for track in tracks.iter().filter(|t| t.axis.is_none()) {
         panels.push(whole(one, &across, track));
     }
     Some(panels)
@@ -212,82 +216,151 @@ fn variable(
             _ => column(group.members[0], *r),
         })
         .collect();
-    let (low, high) = x
-        .iter()
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| {
-            (l.min(*v), h.max(*v))
-        });
+    let (low, high) = ends(&x);
     if !(high - low > 1e-9 * high.abs().max(low.abs())) {
         return None;
     }
-    let sloped = affine_in(search, &x, track);
-    let lines: Vec<(f64, f64)> = group
-        .members
-        .iter()
-        .map(|k| {
-            let y: Vec<f64> = track.rows.iter().map(|r| column(*k, *r)).collect();
-            line(&x, &y, sloped)
-        })
-        .collect();
-    let less = |m: usize, x: f64, value: f64| value - lines[m].0 - lines[m].1 * x;
-    let value = |k: usize| one.values[k];
-    let covariance = DMatrix::from_fn(group.members.len(), group.members.len(), |i, j| {
-        one.covariance[(group.members[i], group.members[j])]
-    });
-    let regressors = |at: &Moment| {
-        let mut out = vec![0.0; candidate.axes().len()];
-        candidate.regressors(at, form, &mut out);
-        out
-    };
     let like = *moments.first()?;
-    let curve = (0..POINTS).map(|i| {
-        let x = low + (high - low) * i as f64 / (POINTS - 1) as f64;
-        let at: DVector<f64> = match &group.on {
-            Dependence::Alone(field) => {
-                let all = regressors(&field.with(like, x));
-                DVector::from_iterator(
-                    group.members.len(),
-                    group
-                        .members
-                        .iter()
-                        .enumerate()
-                        .map(|(m, k)| less(m, x, all[*k])),
-                )
-            }
-            _ => DVector::from_element(1, less(0, x, x)),
-        };
-        Curve {
-            x,
-            value: group
-                .members
-                .iter()
-                .zip(&at)
-                .map(|(k, v)| value(*k) * v)
-                .sum(),
-            half: 2.0 * at.dot(&(&covariance * &at)).max(0.0).sqrt(),
+    let values = |x: f64| match &group.on {
+        Dependence::Alone(field) => {
+            let mut all = vec![0.0; candidate.axes().len()];
+            candidate.regressors(&field.with(like, x), form, &mut all);
+            group.members.iter().map(|k| all[*k]).collect()
         }
-    });
-    let curve = curve.collect();
-    let effect = |i: usize| {
-        let members = group.members.iter().enumerate();
-        members
-            .map(|(m, k)| value(*k) * less(m, x[i], column(*k, track.rows[i])))
-            .sum()
+        _ => vec![x],
     };
     let names: Vec<String> = candidate.names().into_iter().map(|n| n.0).collect();
     let members: Vec<&str> = group.members.iter().map(|k| names[*k].as_str()).collect();
     let axis = AXES[group.axis];
+    let drawn = Drawn {
+        one,
+        track,
+        members: &group.members,
+        sloped: affine_in(search, &x, track),
+        x,
+        points: POINTS,
+    };
     let title = match members[..] {
         [name] if name != axis => format!("{} {axis}, {name}", candidate.sensor),
         _ => format!("{} {axis}", candidate.sensor),
     };
-    Some(Panel {
+    Some(drawn.panel(
         title,
-        kind: track.kind,
-        against: Against::Variable(abscissa(&group.on, candidate, group.members[0])),
-        points: points(track, |i| (x[i], effect(i))),
-        curve,
-    })
+        abscissa(&group.on, candidate, group.members[0]),
+        values,
+    ))
+}
+
+/// Errors by the code of the axis of `track`, against what it reads. `None` where it has none.
+fn coded(rows: &Rows, one: &Accepted, track: &Track) -> Option<Panel> {
+    let axis = track.axis?;
+    let candidate = &one.chosen.candidate;
+    let slots = candidate.slots();
+    let ours = || slots.iter().enumerate().filter(|(_, s)| s.1 == axis);
+    let members: Vec<usize> = ours().map(|(_, s)| s.0).collect();
+    let moments = rows.moments(None);
+    let mut like = *moments.first().filter(|_| !members.is_empty())?;
+    let of_rows = |value: &dyn Fn(&Moment) -> f64| -> Vec<f64> {
+        let rows_of = track.rows.iter();
+        rows_of.map(|r| rows.mean(*r, &moments, value)).collect()
+    };
+    let sds = of_rows(&|at| at.reading.sd[axis]);
+    like.reading.sd[axis] = sds.iter().sum::<f64>() / sds.len() as f64;
+    let values = |x: f64| {
+        let mut at = like;
+        at.reading.mean[axis] = x;
+        let mut all = vec![0.0; slots.len()];
+        candidate.regressors(&at, 0.0, &mut all);
+        ours().map(|(slot, _)| all[slot]).collect()
+    };
+    let drawn = Drawn {
+        one,
+        track,
+        members: &members,
+        x: of_rows(&|at| at.reading.mean[axis]),
+        // What it reads is linear in the input.
+        sloped: true,
+        points: POINTS_OF_STEPS,
+    };
+    let reading = Abscissa {
+        name: format!("what {} {} reads", candidate.sensor, AXES[axis]),
+        unit: "raw".into(),
+        factor: 1.0,
+        offset: 0.0,
+    };
+    let title = format!("{} {}", candidate.sensor, AXES[axis]);
+    Some(drawn.panel(title, reading, values))
+}
+
+/// Coefficients of an effect that are functions of one abscissa, on one track.
+struct Drawn<'a> {
+    one: &'a Accepted,
+    track: &'a Track,
+    /// Indices of the coefficients.
+    members: &'a [usize],
+    /// Of each row of the track.
+    x: Vec<f64>,
+    /// Whether the affine calibration can do a straight line in x.
+    sloped: bool,
+    /// Points of the curve.
+    points: usize,
+}
+
+impl Drawn<'_> {
+    /// `values` gives the regressors of the members at an abscissa.
+    fn panel(&self, title: String, abscissa: Abscissa, values: impl Fn(f64) -> Vec<f64>) -> Panel {
+        let column = |k: usize, r: usize| self.one.chosen.columns[(r, k)];
+        let lines: Vec<(f64, f64)> = self
+            .members
+            .iter()
+            .map(|k| {
+                let y: Vec<f64> = self.track.rows.iter().map(|r| column(*k, *r)).collect();
+                line(&self.x, &y, self.sloped)
+            })
+            .collect();
+        let less = |m: usize, x: f64, value: f64| value - lines[m].0 - lines[m].1 * x;
+        let value = |k: &usize| self.one.values[*k];
+        let count = self.members.len();
+        let covariance = DMatrix::from_fn(count, count, |i, j| {
+            self.one.covariance[(self.members[i], self.members[j])]
+        });
+        let (low, high) = ends(&self.x);
+        let curve = (0..self.points).map(|i| {
+            let x = low + (high - low) * i as f64 / (self.points - 1) as f64;
+            let values = values(x);
+            let at = DVector::from_fn(count, |m, _| less(m, x, values[m]));
+            Curve {
+                x,
+                value: self
+                    .members
+                    .iter()
+                    .zip(&at)
+                    .map(|(k, v)| value(k) * v)
+                    .sum(),
+                half: 2.0 * at.dot(&(&covariance * &at)).max(0.0).sqrt(),
+            }
+        });
+        let effect = |i: usize| {
+            let members = self.members.iter().enumerate();
+            members
+                .map(|(m, k)| value(k) * less(m, self.x[i], column(*k, self.track.rows[i])))
+                .sum()
+        };
+        Panel {
+            title,
+            kind: self.track.kind,
+            against: Against::Variable(abscissa),
+            curve: curve.collect(),
+            points: points(self.track, |i| (self.x[i], effect(i))),
+        }
+    }
+}
+
+fn ends(x: &[f64]) -> (f64, f64) {
+    x.iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| {
+            (l.min(*v), h.max(*v))
+        })
 }
 
 /// Whether the affine calibration can do a straight line in `x`, the values of the rows of `track`.
