@@ -139,24 +139,56 @@ impl<'a> Search<'a> {
         self.by_dwell.moments_without(&left)
     }
 
-    /// Finds the bits of the codes again beside what has been added since: errors of other kinds move the readings too.
+    /// Finds the bits of the codes again beside what has been added since: errors of other kinds move the readings too. And, where
+    /// neither weight nor zero were given, these.
     fn read_again(&self, chosen: &mut [Chosen], now: &mut Fitted) -> Option<()> {
-        let mut first = self.basis.ncols();
         for k in 0..chosen.len() {
-            let count = chosen[k].columns.ncols();
-            if chosen[k].candidate.reads_code() && chosen.len() > 1 {
-                let own = &chosen[k].columns * now.coefficients.rows(first, count);
-                let left = &self.rows.y - self.model(chosen) * &now.coefficients + own;
-                let moments = self.by_dwell.moments_without(&left);
-                let Chosen {
-                    candidate, form, ..
-                } = &chosen[k];
-                chosen[k].columns = candidate.columns_at(&self.by_dwell, &moments, *form);
-                *now = self.fit(chosen)?;
+            let sought = chosen[k].candidate.converters > 1.0;
+            if !chosen[k].candidate.reads_code() || !(sought || chosen.len() > 1) {
+                continue;
             }
-            first += count;
+            let moments = self.moments_beside(chosen, k, now);
+            let candidate = chosen[k].candidate.clone();
+            chosen[k].columns = candidate.columns_at(&self.by_dwell, &moments, chosen[k].form);
+            *now = self.fit(chosen)?;
+            if !sought {
+                continue;
+            }
+            let cost =
+                |c: &Candidate, fit: &Fitted| fit.deviance + COEFFICIENT * c.active.len() as f64;
+            for _ in 0..SETTLED {
+                let moments = self.moments_beside(chosen, k, now);
+                let mut rest = chosen.to_vec();
+                let mut one = rest.remove(k);
+                let noise = &now.components;
+                let settled = self.settle_converters(&one.candidate, &rest, &moments, noise);
+                let Some(candidate) = settled else {
+                    break;
+                };
+                one.columns = candidate.columns_at(&self.by_dwell, &moments, one.form);
+                one.candidate = candidate;
+                rest.insert(k, one);
+                let Some(fit) = self.fit(&rest) else {
+                    break;
+                };
+                if cost(&rest[k].candidate, &fit) > cost(&chosen[k].candidate, now) - 0.1 {
+                    break;
+                }
+                chosen[k] = rest.swap_remove(k);
+                *now = fit;
+            }
         }
         Some(())
+    }
+
+    /// Moments by dwell whose readings err by nothing but chosen effect `k`.
+    fn moments_beside(&self, chosen: &[Chosen], k: usize, now: &Fitted) -> Vec<Moment> {
+        let before = chosen[..k].iter().map(|c| c.columns.ncols()).sum::<usize>();
+        let first = self.basis.ncols() + before;
+        let columns = &chosen[k].columns;
+        let own = columns * now.coefficients.rows(first, columns.ncols());
+        let left = &self.rows.y - self.model(chosen) * &now.coefficients + own;
+        self.by_dwell.moments_without(&left)
     }
 
     /// Columns of the affine parameters and of the chosen.
@@ -382,6 +414,9 @@ fn score(c: &Chosen) -> f64 {
     };
     c.worth - COEFFICIENT * coefficients - order - 2.0 * c.candidate.converters.ln()
 }
+
+/// Rounds in which converters and readings are found in turn.
+const SETTLED: usize = 4;
 
 /// What a coefficient costs.
 const COEFFICIENT: f64 = 4.0;

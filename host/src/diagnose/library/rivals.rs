@@ -57,6 +57,20 @@ const FORCE_LIMIT: Option<Form> = Some(Form {
     kind: FormKind::Free,
 });
 
+const SMALL_RATE: Option<Form> = Some(Form {
+    name: "limit_rad_s",
+    from: 1e-3,
+    to: 1.0,
+    kind: FormKind::Free,
+});
+
+const SMALL_FORCE: Option<Form> = Some(Form {
+    name: "limit_m_s2",
+    from: 0.01,
+    to: 5.0,
+    kind: FormKind::Free,
+});
+
 /// A stage of the amplifier that no longer follows, or a reading that is put right beyond a limit: on either side of zero input alike,
 /// where codes have no reason to be.
 const fn beyond(
@@ -77,6 +91,31 @@ const fn beyond(
         needs: "",
     }
 }
+
+/// What rubs, or a stage that rests: the scale factor is another about zero input.
+const fn within(
+    sensor: Sensor,
+    coefficients: &'static [Coefficient],
+    limit: Option<Form>,
+) -> Effect {
+    Effect {
+        id: "within_a_limit",
+        sensor,
+        about: "another scale factor while the input of the axis is small",
+        coefficients,
+        typical: &[1.0; 3],
+        form: limit,
+        regressors: |at, limit, out| {
+            per_axis(out, |i| match at.sensed[i] {
+                small if small.abs() < limit => small,
+                _ => 0.0,
+            })
+        },
+        needs: "",
+    }
+}
+
+const SCALES: [Coefficient; 3] = each("1");
 
 const GYRO_POWERS: [Coefficient; 12] =
     powers(["1/(rad/s)", "1/(rad/s)^2", "1/(rad/s)^3", "1/(rad/s)^4"]);
@@ -116,7 +155,7 @@ const CLOSER: &str =
 const LONGER: &str =
     "a cold start recorded for several hours: an exponential ends, a logarithm does not";
 
-static RIVALS: [Rival; 7] = [
+static RIVALS: [Rival; 9] = [
     Rival {
         law: beyond(Sensor::Gyro, &GYRO_BIASES, RATE_LIMIT),
         of: &["gyro_readout_code"],
@@ -124,6 +163,16 @@ static RIVALS: [Rival; 7] = [
     },
     Rival {
         law: beyond(Sensor::Accel, &ACCEL_BIASES, FORCE_LIMIT),
+        of: &["accel_readout_code"],
+        settled_by: CLOSER,
+    },
+    Rival {
+        law: within(Sensor::Gyro, &SCALES, SMALL_RATE),
+        of: &["gyro_readout_code"],
+        settled_by: CLOSER,
+    },
+    Rival {
+        law: within(Sensor::Accel, &SCALES, SMALL_FORCE),
         of: &["accel_readout_code"],
         settled_by: CLOSER,
     },

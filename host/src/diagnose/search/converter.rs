@@ -17,9 +17,10 @@ use rayon::prelude::*;
 use super::{COEFFICIENT, Chosen, Search, basis, beside, exceeds, unit_columns};
 use crate::diagnose::candidate::{Candidate, Kind};
 use crate::diagnose::decision::EXCITED;
+use crate::diagnose::effect::Moment;
 use crate::diagnose::library::readout::{self, BITS, Converter, TYPICAL, first_of};
 use crate::diagnose::rows::RowReading;
-use crate::diagnose::spread::{By, Fitted};
+use crate::diagnose::spread::{By, Components, Fitted};
 
 /// Periods are looked at so many to a cycle over the range of the readings.
 const OVERSAMPLED: f64 = 2.5;
@@ -33,11 +34,17 @@ const FEWEST_PERIODS: usize = 100;
 const FINEST: f64 = 0.3;
 /// Most places of a step.
 const STEPS: usize = 256;
-/// Waves, and steps, that are followed up.
-const WAVES: usize = 4;
+/// Waves, and steps, that are followed up. The highest wave may be a third harmonic.
+const WAVES: usize = 6;
 const FOLLOWED_STEPS: usize = 2;
+/// Zeros of a converter of the usual weight, a power of two times the step of the readings, that are looked at.
+const ZEROS: usize = 1024;
+/// And followed up.
+const FOLLOWED_ZEROS: usize = 4;
+/// What keeps bits that turn together, or not at all, from being told apart by rounding.
+const RIDGE: f64 = 1e-3;
 /// Of these, the ones whose weights and zeros are refined.
-const REFINED: usize = 2;
+const REFINED: usize = 3;
 /// Deviance within which a zero does as well: 95 %.
 const WITHIN: f64 = 4.0;
 /// Phases and directions that a period stands for, as tests.
@@ -62,6 +69,10 @@ struct Sight {
     total: f64,
     lowest: f64,
     highest: f64,
+    /// That readings are multiples of, raw, where they are.
+    step: Option<f64>,
+    /// Whether the noise is that beside all errors: else it is taken for what is left, errors included.
+    noise_known: bool,
 }
 
 /// Normal equations of some columns beside the model.
@@ -83,6 +94,22 @@ impl Normal {
         let root = scaled.cholesky()?;
         let least = root.l_dirty().diagonal().min();
         (least > INDEPENDENT).then(|| root.solve(&with_left).dot(&with_left))
+    }
+}
+
+impl Normal {
+    /// What all columns together explain, those that there are.
+    fn explains_with_ridge(&self) -> Option<f64> {
+        let p = self.with_left.len();
+        let size: Vec<f64> = (0..p)
+            .map(|k| self.matrix[(k, k)].max(f64::MIN_POSITIVE).sqrt())
+            .collect();
+        let ridge = |i, j| if i == j { RIDGE } else { 0.0 };
+        let scaled = DMatrix::from_fn(p, p, |i, j| {
+            self.matrix[(i, j)] / (size[i] * size[j]) + ridge(i, j)
+        });
+        let with_left = DVector::from_fn(p, |i, _| self.with_left[i] / size[i]);
+        Some(scaled.cholesky()?.solve(&with_left).dot(&with_left))
     }
 }
 
@@ -114,7 +141,13 @@ struct Outcome {
 }
 
 impl Sight {
-    fn new(search: &Search, model: &DMatrix<f64>, null: &Fitted) -> Option<Self> {
+    /// Beside `model`, at readings without noise, which `moments` are.
+    fn new(
+        search: &Search,
+        model: &DMatrix<f64>,
+        null: &Fitted,
+        moments: &[Moment],
+    ) -> Option<Self> {
         let rows = search.rows;
         let n = rows.y.len();
         let whitener = search.spread.whitener(&null.components)?;
@@ -138,7 +171,7 @@ impl Sight {
         for (mut row, w) in weighted.row_iter_mut().zip(root.iter()) {
             row *= *w;
         }
-        let mut readings = search.by_dwell.readings(&search.freed(model, null));
+        let mut readings = search.by_dwell.readings(moments);
         readings.retain(|r| r.mean.is_finite() && r.sd.is_finite());
         let range = |(a, b): (f64, f64), r: &RowReading| (a.min(r.mean), b.max(r.mean));
         let (lowest, highest) = readings
@@ -152,6 +185,8 @@ impl Sight {
             readings,
             lowest,
             highest,
+            step: rows.step,
+            noise_known: false,
         })
     }
 
@@ -198,6 +233,9 @@ impl Sight {
 
     /// Drop of the deviance where so much is explained.
     fn drop(&self, explained: f64) -> f64 {
+        if self.noise_known {
+            return explained;
+        }
         let share = (explained / self.total).clamp(0.0, 0.999_999);
         -(self.root.len() as f64) * (-share).ln_1p()
     }
@@ -306,6 +344,15 @@ impl Sight {
         best
     }
 
+    /// With weight, zero and bits as they fit best together, and how many bits there were to choose from.
+    fn settled(&self, readings: &[RowReading], from: Hypothesis) -> Option<(Hypothesis, usize)> {
+        let refined = self.refine(readings, from);
+        // With weight and zero in their places other bits may be seen.
+        let (chosen, offered) = self.choose(readings, refined.converter)?;
+        let refined = self.refine(readings, chosen);
+        Some((self.centred(readings, refined), offered))
+    }
+
     /// With the zero in the middle of those that do as well to within 95 %: a step between two readings may be anywhere between them.
     fn centred(&self, readings: &[RowReading], from: Hypothesis) -> Hypothesis {
         let Converter { weight, zero, .. } = from.converter;
@@ -375,9 +422,26 @@ impl Sight {
             .collect();
         let count = PHASES * waves.len() as f64 + 2.0 * steps.len() as f64;
         let mut followed = peaks(waves, WAVES);
-        followed.extend(peaks(steps, FOLLOWED_STEPS));
         followed.sort_by(|a, b| b.0.total_cmp(&a.0));
         (followed, count)
+    }
+
+    /// Converters of the usual weight that fit best: of their zeros nothing is known, and with all bits at work no single wave says it.
+    fn usual(&self, readings: &[RowReading]) -> Vec<(f64, Converter)> {
+        let Some(step) = self.step else {
+            return Vec::new();
+        };
+        let weight = step * (self.range() / step).log2().ceil().exp2();
+        let all: [usize; BITS] = std::array::from_fn(|bit| bit);
+        let at = |k: usize| {
+            // Bits of a zero one weight further are the same, but for the sign of the first.
+            let zero = self.lowest - weight * (k + 1) as f64 / ZEROS as f64;
+            let converter = Converter::of(weight, zero);
+            let normal = self.bits(readings, &converter, &all);
+            Some((self.drop(normal.explains_with_ridge()?), converter))
+        };
+        let zeros: Vec<_> = (0..ZEROS).into_par_iter().filter_map(at).collect();
+        peaks(zeros, FOLLOWED_ZEROS)
     }
 
     fn wave(&self, readings: &[RowReading], frequency: f64) -> Option<(f64, Converter)> {
@@ -417,7 +481,10 @@ impl Sight {
         let chance = |drop: f64, columns: f64, choices: f64| {
             let n = self.root.len() as f64;
             let dof = n - self.model.nrows() as f64 - columns;
-            let f = (drop / n).exp_m1() * dof / columns;
+            let f = match self.noise_known {
+                true => drop / columns,
+                false => (drop / n).exp_m1() * dof / columns,
+            };
             (exceeds(f, columns, dof) * choices).min(1.0)
         };
         let p = chance(drop, 2.0, places);
@@ -434,20 +501,22 @@ impl Sight {
         if p > PROMISING {
             return Some(first);
         }
-        let whole = followed.into_par_iter().filter_map(|(_, seen)| {
-            let whole = self.above(&readings, seen.weight, seen.zero);
-            Some(self.choose(&readings, whole)?.0)
-        });
+        let usual = self.usual(&readings);
+        let places = places + ZEROS as f64;
+        let mut whole: Vec<Converter> = followed
+            .into_par_iter()
+            .map(|(_, seen)| self.above(&readings, seen.weight, seen.zero))
+            .collect();
+        whole.extend(usual.iter().map(|u| u.1));
+        let whole = whole
+            .into_par_iter()
+            .filter_map(|converter| Some(self.choose(&readings, converter)?.0));
         let mut whole: Vec<Hypothesis> = whole.collect();
         whole.sort_by(|a, b| b.score().total_cmp(&a.score()));
         whole.truncate(REFINED);
-        let all = whole.into_par_iter().filter_map(|chosen| {
-            let refined = self.refine(&readings, chosen);
-            // With weight and zero in their places other bits may be seen.
-            let (chosen, offered) = self.choose(&readings, refined.converter)?;
-            let refined = self.refine(&readings, chosen);
-            Some((self.centred(&readings, refined), offered))
-        });
+        let all = whole
+            .into_par_iter()
+            .filter_map(|chosen| self.settled(&readings, chosen));
         let found = all.max_by(|a, b| a.0.score().total_cmp(&b.0.score()));
         let Some((best, offered)) = found else {
             return Some(first);
@@ -487,7 +556,8 @@ impl Search<'_> {
             return Vec::new();
         };
         let model = self.model(chosen);
-        let Some(sight) = Sight::new(self, &model, null) else {
+        let moments = self.freed(&model, null);
+        let Some(sight) = Sight::new(self, &model, null, &moments) else {
             return Vec::new();
         };
         let plain = Candidate::new(self.rows.sensor, Kind::Effect(effect));
@@ -514,7 +584,6 @@ impl Search<'_> {
         if !each.active.is_empty() {
             found.push(each);
         }
-        let moments = self.freed(&model, null);
         found
             .into_iter()
             .filter_map(|candidate| {
@@ -533,5 +602,50 @@ impl Search<'_> {
                 })
             })
             .collect()
+    }
+
+    /// The converters of `one` again, beside `rest`, at readings and by a noise that are known better: as long as its errors were not
+    /// known, they were in the affine parameters, in the readings that bits were taken from, and in the noise, which hid all but the largest.
+    pub(super) fn settle_converters(
+        &self,
+        one: &Candidate,
+        rest: &[Chosen],
+        moments: &[Moment],
+        noise: &Components,
+    ) -> Option<Candidate> {
+        let model = self.model(rest);
+        let null = self.spread.fit_at(&model, noise)?;
+        let mut sight = Sight::new(self, &model, &null, moments)?;
+        sight.noise_known = true;
+        let shared = one.active.iter().any(|k| *k < BITS);
+        let mut again = one.clone();
+        again.active.clear();
+        (again.converters, again.choices) = (1.0, 1.0);
+        for axis in 0..3 {
+            let axes = if shared { None } else { Some(axis) };
+            let found = sight.look(axes)?;
+            let as_it_was = one.codes[axis].and_then(|converter| {
+                let readings = sight.of(axes);
+                let (chosen, _) = sight.choose(&readings, converter)?;
+                Some(sight.settled(&readings, chosen)?.0)
+            });
+            let promising = (found.p < PROMISING).then(|| found.best.clone());
+            let best = as_it_was.into_iter().chain(promising);
+            let Some(best) = best.max_by(|a, b| a.score().total_cmp(&b.score())) else {
+                again.codes[axis] = None;
+                continue;
+            };
+            again.converters *= found.places;
+            again.choices *= found.places * (found.offered as f64).exp2();
+            if shared {
+                again.codes = [Some(best.converter); 3];
+                again.active = best.bits;
+                return Some(again);
+            }
+            again.codes[axis] = Some(best.converter);
+            let bits = best.bits.iter().map(|bit| first_of(axis) + bit);
+            again.active.extend(bits);
+        }
+        Some(again)
     }
 }

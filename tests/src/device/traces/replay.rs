@@ -120,8 +120,10 @@ impl Twin {
         self.follow(head);
         let mut compared = 0;
         for (k, (raw, device)) in raw.iter().zip(device).enumerate() {
-            let mut sample = single::compensate(&self.model.model, raw);
-            if let Some(all) = &self.stored.effects {
+            let effects = self.stored.effects.as_ref();
+            let read = effects.map_or(*raw, |all| single::without_code_errors(all, raw));
+            let mut sample = single::compensate(&self.model.model, &read);
+            if let Some(all) = effects {
                 sample = single::remove(all, &mut self.effects, &sample);
                 if k < SETTLED && self.next != Some(head.first) {
                     continue;
