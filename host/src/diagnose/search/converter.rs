@@ -422,6 +422,7 @@ impl Sight {
             .collect();
         let count = PHASES * waves.len() as f64 + 2.0 * steps.len() as f64;
         let mut followed = peaks(waves, WAVES);
+        followed.extend(peaks(steps, FOLLOWED_STEPS));
         followed.sort_by(|a, b| b.0.total_cmp(&a.0));
         (followed, count)
     }
