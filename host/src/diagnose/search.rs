@@ -416,7 +416,7 @@ fn score(c: &Chosen) -> f64 {
 }
 
 /// Rounds in which converters and readings are found in turn.
-const SETTLED: usize = 4;
+const SETTLED: usize = 3;
 
 /// What a coefficient costs.
 const COEFFICIENT: f64 = 4.0;

@@ -43,7 +43,7 @@ const ZEROS: usize = 1024;
 const FOLLOWED_ZEROS: usize = 4;
 /// What keeps bits that turn together, or not at all, from being told apart by rounding.
 const RIDGE: f64 = 1e-3;
-/// Of these, the ones whose weights and zeros are refined.
+/// Of these, the ones whose weights and zeros are refined where the noise is known; else one.
 const REFINED: usize = 3;
 /// Deviance within which a zero does as well: 95 %.
 const WITHIN: f64 = 4.0;
@@ -82,8 +82,9 @@ struct Normal {
 }
 
 impl Normal {
-    /// What the columns in `set` explain; `None` where they are not independent.
-    fn explains(&self, set: &[usize]) -> Option<f64> {
+    /// What the columns in `set` explain; `None` where they are not independent, or the coefficient of one of them beside the others is not
+    /// known to within `sigma`: all bits together are nearly what is read, which the affine parameters take up.
+    fn explains(&self, set: &[usize], sigma: f64) -> Option<f64> {
         let size = |k: usize| self.matrix[(k, k)].max(0.0).sqrt();
         let p = set.len();
         let scaled = DMatrix::from_fn(p, p, |i, j| {
@@ -93,7 +94,9 @@ impl Normal {
         let with_left = DVector::from_fn(p, |i, _| self.with_left[set[i]] / size(set[i]));
         let root = scaled.cholesky()?;
         let least = root.l_dirty().diagonal().min();
-        (least > INDEPENDENT).then(|| root.solve(&with_left).dot(&with_left))
+        let variance = root.inverse().diagonal();
+        let known = |k: usize| variance[k].sqrt() <= sigma * size(set[k]);
+        (least > INDEPENDENT && (0..p).all(known)).then(|| root.solve(&with_left).dot(&with_left))
     }
 }
 
@@ -260,7 +263,7 @@ impl Sight {
                 .filter(|k| set & (1 << k) != 0)
                 .map(|k| offered[k])
                 .collect();
-            let drop = self.drop(normal.explains(&bits)?);
+            let drop = self.drop(normal.explains(&bits, TYPICAL / EXCITED)?);
             Some(Hypothesis {
                 converter,
                 bits,
@@ -287,7 +290,7 @@ impl Sight {
                 // Bits that do not turn in the range are no columns.
                 let seen = |k: &usize| normal.matrix[(*k, *k)] > 1e-12;
                 let seen: Vec<usize> = bits.iter().copied().filter(seen).collect();
-                normal.explains(&seen).unwrap_or(0.0)
+                normal.explains(&seen, f64::INFINITY).unwrap_or(0.0)
             };
             let [a, b] = either.each_ref().map(explains);
             converter = if b > a { either[1] } else { either[0] };
@@ -302,7 +305,7 @@ impl Sight {
     fn with(&self, readings: &[RowReading], of: &Hypothesis, converter: &Converter) -> Option<f64> {
         let set: Vec<usize> = (0..of.bits.len()).collect();
         let normal = self.bits(readings, converter, &of.bits);
-        Some(self.drop(normal.explains(&set)?))
+        Some(self.drop(normal.explains(&set, f64::INFINITY)?))
     }
 
     /// With weight and zero walked uphill by ever smaller steps.
@@ -451,7 +454,7 @@ impl Sight {
             let left = (-2.0 * (PI * frequency * r.sd).powi(2)).exp();
             (out[0], out[1]) = (left * cos, left * sin);
         });
-        let explained = normal.explains(&[0, 1])?;
+        let explained = normal.explains(&[0, 1], f64::INFINITY)?;
         let of = normal.matrix.cholesky()?.solve(&normal.with_left);
         // Of a bit the share is 1/2 - 2/π sin(2π f (u - zero)) and so on; of which sign its error is does not matter here.
         let zero = f64::atan2(-of[0], of[1]) / (2.0 * PI * frequency);
@@ -502,8 +505,11 @@ impl Sight {
         if p > PROMISING {
             return Some(first);
         }
-        let usual = self.usual(&readings);
-        let places = places + ZEROS as f64;
+        // At first sight it is enough to know whether codes do better than what else there is; they are looked for again.
+        let (usual, places, refined) = match self.noise_known {
+            true => (self.usual(&readings), places + ZEROS as f64, REFINED),
+            false => (Vec::new(), places, 1),
+        };
         let mut whole: Vec<Converter> = followed
             .into_par_iter()
             .map(|(_, seen)| self.above(&readings, seen.weight, seen.zero))
@@ -514,7 +520,7 @@ impl Sight {
             .filter_map(|converter| Some(self.choose(&readings, converter)?.0));
         let mut whole: Vec<Hypothesis> = whole.collect();
         whole.sort_by(|a, b| b.score().total_cmp(&a.score()));
-        whole.truncate(REFINED);
+        whole.truncate(refined);
         let all = whole
             .into_par_iter()
             .filter_map(|chosen| self.settled(&readings, chosen));
