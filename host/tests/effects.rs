@@ -416,8 +416,8 @@ fn converters_that_make_no_sense_are_refused() {
         ),
         ("within_raw = 0.0", "within_raw = -1.0", "not negative"),
         (
-            "formula = \"x",
-            "form = { name = \"time_constant_s\", value = 3.0 }\nformula = \"x",
+            "formula = \"x = C (u - S e)",
+            "form = { name = \"time_constant_s\", value = 3.0 }\nformula = \"x = C (u - S e)",
             "this effect has none",
         ),
     ] {
