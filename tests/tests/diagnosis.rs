@@ -6,7 +6,6 @@ use mimu::fit::{Method, Options};
 use mimu::stillness::STILL_FACTOR;
 use mimu_rig::located::Source;
 use mimu_rig::plan::Plan;
-use mimu_rig::rig_file::RigTruth;
 use mimu_tests::bench;
 use mimu_tests::blind::{Case, case, plan, unit};
 use mimu_tests::recordings::{mikoff, xsens};
@@ -99,64 +98,6 @@ fn a_quiet_gyro_reads_the_earth_and_nothing_takes_that_from_it() {
     println!("{value:.3e} +- {sigma:.1e} rad/s about the vertical; true {expected:.3e}");
     assert!((value - expected).abs() < 3.0 * sigma && value > 5.0 * sigma);
     assert!(!earth.chosen.candidate.is_error());
-}
-
-#[test]
-fn where_codes_are_skipped_the_place_and_how_many_are_found() {
-    let plan = plan(5);
-    let mut file = unit(&["gyro_missing_codes"], 5);
-    let (codes, at) = (40.0, 0.55);
-    let parameters = &mut file.effect[0].parameters;
-    parameters.insert("codes".into(), codes.into());
-    parameters.insert("at".into(), at.into());
-    let recorded = bench::recorded(&plan, &file, 5);
-    let noise = bench::noise_file(&file, 5, recorded.condensed.period_s);
-    let options = Options {
-        method: Method::LeastSquares,
-        holdout_blocks: 0,
-        only: None,
-        still_factor: STILL_FACTOR,
-    };
-    let found = diagnose(recorded.with_noise(&noise).unwrap().into(), options).unwrap();
-    let accepted: Vec<_> = found
-        .sensors
-        .iter()
-        .flat_map(|s| &s.decision.accepted)
-        .collect();
-    let [step] = accepted[..] else {
-        panic!("{accepted:?}")
-    };
-    let candidate = &step.chosen.candidate;
-    assert_eq!(candidate.id(), "gyro_readout_code");
-    let range_v = {
-        let truth = RigTruth::resolve(&file, 5).unwrap();
-        truth.unit.converter_reference.nominal_v / truth.converter.gyro_divider
-    };
-    let all = candidate.by_converter(step.values.as_slice());
-    let [one] = &all[..] else {
-        panic!("one converter of all axes: {all:?}")
-    };
-    // Errors of readings without noise, V.
-    let error = |u: f64| -> f64 {
-        let bits = one.errors.iter().enumerate();
-        bits.map(|(bit, e)| e * one.converter.weight * one.converter.share(bit, u, 0.0))
-            .sum()
-    };
-    let expected = codes * range_v / 65536.0;
-    // Bit 0 turns once within the readings, which no two are near the place of: 30 and 100 deg/s.
-    let within = one.converter.zero_within;
-    let (below, above) = ((at - 0.1) * range_v, (at + 0.1) * range_v);
-    let risen = error(above) - error(below);
-    let place = (0..=2000)
-        .map(|k| below + (above - below) * f64::from(k) / 2000.0)
-        .find(|u| (error(*u) - error(below)).abs() > 0.5 * risen.abs())
-        .unwrap();
-    println!(
-        "{risen:.3e} V more from {place:.4} +- {within:.4} V on; true {expected:.3e} from {:.4}",
-        at * range_v
-    );
-    assert!((risen - expected).abs() < 0.1 * expected);
-    assert!((place - at * range_v).abs() < within && within < 0.05 * range_v);
 }
 
 fn diagnosed(fit: mimu::fit::Fit) -> Diagnosis {
