@@ -6,6 +6,7 @@ use mimu::fit::{Method, Options};
 use mimu::stillness::STILL_FACTOR;
 use mimu_rig::located::Source;
 use mimu_rig::plan::Plan;
+use mimu_rig::rig_file::RigTruth;
 use mimu_tests::bench;
 use mimu_tests::blind::{Case, case, plan, unit};
 use mimu_tests::recordings::{mikoff, xsens};
@@ -98,6 +99,73 @@ fn a_quiet_gyro_reads_the_earth_and_nothing_takes_that_from_it() {
     println!("{value:.3e} +- {sigma:.1e} rad/s about the vertical; true {expected:.3e}");
     assert!((value - expected).abs() < 3.0 * sigma && value > 5.0 * sigma);
     assert!(!earth.chosen.candidate.is_error());
+}
+
+/// Units from whose converter codes are missing: how many are told over how many there are, and by how many half widths of the
+/// interval the place is off. It is off by chance alone, as the place is between rates of the plan, 30 and 100 deg/s.
+fn missing(seed: u64, codes: f64, at: f64) -> [f64; 2] {
+    let plan = plan(seed);
+    let mut file = unit(&["gyro_missing_codes"], seed);
+    let parameters = &mut file.effect[0].parameters;
+    parameters.insert("codes".into(), codes.into());
+    parameters.insert("at".into(), at.into());
+    let recorded = bench::recorded(&plan, &file, seed);
+    let noise = bench::noise_file(&file, seed, recorded.condensed.period_s);
+    let options = Options {
+        method: Method::LeastSquares,
+        holdout_blocks: 0,
+        only: None,
+        still_factor: STILL_FACTOR,
+    };
+    let found = diagnose(recorded.with_noise(&noise).unwrap().into(), options).unwrap();
+    let accepted: Vec<_> = found
+        .sensors
+        .iter()
+        .flat_map(|s| &s.decision.accepted)
+        .collect();
+    let [step] = accepted[..] else {
+        panic!("{accepted:?}")
+    };
+    let candidate = &step.chosen.candidate;
+    assert_eq!(candidate.id(), "gyro_readout_code");
+    let range_v = {
+        let truth = RigTruth::resolve(&file, seed).unwrap();
+        truth.unit.converter_reference.nominal_v / truth.converter.gyro_divider
+    };
+    let one = candidate.by_converter(step.values.as_slice())[0];
+    // Errors of readings without noise, V.
+    let error = |u: f64| -> f64 {
+        let bits = one.errors.iter().enumerate();
+        bits.map(|(bit, e)| e * one.converter.weight * one.converter.share(bit, u, 0.0))
+            .sum()
+    };
+    let expected = codes * range_v / 65536.0;
+    let (below, above) = ((at - 0.1) * range_v, (at + 0.1) * range_v);
+    let risen = error(above) - error(below);
+    let place = (0..=2000)
+        .map(|k| below + (above - below) * f64::from(k) / 2000.0)
+        .find(|u| (error(*u) - error(below)).abs() > 0.5 * risen.abs())
+        .unwrap();
+    let within = one.converter.zero_within;
+    println!(
+        "{risen:.3e} V more from {place:.4} +- {within:.4} V on; true {expected:.3e} from {:.4}",
+        at * range_v
+    );
+    assert!(within < 0.05 * range_v);
+    [risen / expected, (place - at * range_v).abs() / within]
+}
+
+#[test]
+fn where_codes_are_skipped_the_place_and_how_many_are_found() {
+    let units: Vec<[f64; 2]> = (0..20)
+        .into_par_iter()
+        .map(|seed| missing(seed, 20.0, if seed % 2 == 0 { 0.42 } else { 0.55 }))
+        .collect();
+    let held = units.iter().filter(|u| u[1] < 1.0).count();
+    println!("the place is in the interval of {held} of {}", units.len());
+    // Fewer than 17 of 20 have a probability of 1.6 % where the intervals are of 95 %.
+    assert!(held >= 17, "{units:?}");
+    assert!(units.iter().all(|u| (u[0] - 1.0).abs() < 0.15), "{units:?}");
 }
 
 fn diagnosed(fit: mimu::fit::Fit) -> Diagnosis {

@@ -154,15 +154,13 @@ impl<'a> Search<'a> {
             if !sought {
                 continue;
             }
-            let cost =
-                |c: &Candidate, fit: &Fitted| fit.deviance + COEFFICIENT * c.active.len() as f64;
             for _ in 0..SETTLED {
                 let moments = self.moments_beside(chosen, k, now);
                 let mut rest = chosen.to_vec();
                 let mut one = rest.remove(k);
                 let noise = &now.components;
                 let settled = self.settle_converters(&one.candidate, &rest, &moments, noise);
-                let Some(candidate) = settled else {
+                let Some((candidate, dearer)) = settled else {
                     break;
                 };
                 one.columns = candidate.columns_at(&self.by_dwell, &moments, one.form);
@@ -171,7 +169,7 @@ impl<'a> Search<'a> {
                 let Some(fit) = self.fit(&rest) else {
                     break;
                 };
-                if cost(&rest[k].candidate, &fit) > cost(&chosen[k].candidate, now) - 0.1 {
+                if fit.deviance + dearer > now.deviance - 0.1 {
                     break;
                 }
                 chosen[k] = rest.swap_remove(k);
@@ -315,7 +313,7 @@ impl<'a> Search<'a> {
             null: &null,
         };
         let law = Candidate::new(self.rows.sensor, Kind::Effect(law));
-        let best_of = |form| beside_these.form(&law, form);
+        let best_of = |form| beside_these.law(&law, form);
         let found = law.forms().into_par_iter().filter_map(best_of);
         let (form, with) = found.max_by(|a, b| a.1.drop.total_cmp(&b.1.drop))?;
         let shadow = Chosen {

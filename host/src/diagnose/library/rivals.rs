@@ -149,13 +149,64 @@ const fn smooth(sensor: Sensor, coefficients: &'static [Coefficient]) -> Effect 
     }
 }
 
+const GYRO_TURNING: [Coefficient; 9] = turning(["rad/s/(rad/s)", "rad/s/(rad/s)^2", "1/(rad/s)"]);
+const ACCEL_TURNING: [Coefficient; 9] = turning(["m/s^2/(rad/s)", "m/s^2/(rad/s)^2", "1/(rad/s)"]);
+
+const fn turning(units: [&'static str; 3]) -> [Coefficient; 9] {
+    let mut all = [of(0, "", ""); 9];
+    let mut k = 0;
+    while k < 9 {
+        all[k] = of(k / 3, "", units[k % 3]);
+        k += 1;
+    }
+    all
+}
+
+/// A supply that sags with the motor's current, or a bearing that shakes: known by no reading of the unit. But an axis reads the turns
+/// about the others as well, by a few per cent, so that fine bits of its codes can tell them from rest.
+const fn by_turning(sensor: Sensor, coefficients: &'static [Coefficient]) -> Effect {
+    Effect {
+        id: "by_turning",
+        sensor,
+        about: "a bias and a scale factor that follow how fast the unit turns, whichever way",
+        coefficients,
+        typical: &[1.0; 9],
+        form: None,
+        regressors: |at, _, out| {
+            let rate = at.rate.norm();
+            let axes = out.as_chunks_mut::<3>().0;
+            for (out, x) in axes.iter_mut().zip(at.sensed.iter()) {
+                *out = [rate, rate * rate, x * rate];
+            }
+        },
+        needs: "",
+    }
+}
+
 const CLOSER: &str =
     "inputs a few noises apart, where the error was found to change: codes change it at once";
+
+const BY_HAND: &str =
+    "the same rates from another supply, and turned by hand: codes do not mind what turns the unit";
 
 const LONGER: &str =
     "a cold start recorded for several hours: an exponential ends, a logarithm does not";
 
-static RIVALS: [Rival; 9] = [
+static RIVALS: [Rival; 11] = [
+    Rival {
+        law: by_turning(Sensor::Gyro, &GYRO_TURNING),
+        of: &[
+            "gyro_readout_code",
+            "gyro_scale_asymmetry",
+            "gyro_scale_quadratic",
+        ],
+        settled_by: BY_HAND,
+    },
+    Rival {
+        law: by_turning(Sensor::Accel, &ACCEL_TURNING),
+        of: &["accel_readout_code", "accel_size_effect"],
+        settled_by: BY_HAND,
+    },
     Rival {
         law: beyond(Sensor::Gyro, &GYRO_BIASES, RATE_LIMIT),
         of: &["gyro_readout_code"],

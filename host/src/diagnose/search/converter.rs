@@ -13,6 +13,7 @@ use std::f64::consts::PI;
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
+use statrs::function::factorial::ln_binomial;
 
 use super::{COEFFICIENT, Chosen, Search, basis, beside, exceeds, unit_columns};
 use crate::diagnose::candidate::{Candidate, Kind};
@@ -45,8 +46,12 @@ const FOLLOWED_ZEROS: usize = 4;
 const RIDGE: f64 = 1e-3;
 /// Of these, the ones whose weights and zeros are refined where the noise is known; else one.
 const REFINED: usize = 3;
-/// Deviance within which a zero does as well: 95 %.
-const WITHIN: f64 = 4.0;
+/// Most places of a zero, on either side, that the mass of its likelihood is summed from.
+const PLACES: f64 = 1000.0;
+/// Deviance from which a place has no part in it.
+const NEGLIGIBLE: f64 = 20.0;
+/// Part of it that is outside the interval, on either side.
+const OUTSIDE: f64 = 0.025;
 /// Phases and directions that a period stands for, as tests.
 const PHASES: f64 = 4.0;
 /// A first sight that chance has more often than this, after all places, is not followed up.
@@ -124,11 +129,13 @@ struct Hypothesis {
     bits: Vec<usize>,
     /// Drop of the deviance.
     drop: f64,
+    /// What that costs, [`Sight::price`].
+    price: f64,
 }
 
 impl Hypothesis {
     fn score(&self) -> f64 {
-        self.drop - COEFFICIENT * self.bits.len() as f64
+        self.drop - self.price
     }
 }
 
@@ -203,6 +210,41 @@ impl Sight {
         ours.filter(|r| axis.is_none_or(|a| a == r.axis)).collect()
     }
 
+    /// Whether bits of this weight are what a converter with the step of the readings has.
+    fn is_usual(&self, weight: f64) -> bool {
+        let power = self.step.map(|step| (weight / step).log2());
+        power.is_some_and(|p| (p - p.round()).abs() < 1e-9)
+    }
+
+    /// What some bits of a converter cost: each its coefficient, all that they are chosen, and weight and zero what it takes to name them,
+    /// which is the more the more often the finest bit turns. A single step pays for neither, and a usual weight for itself. Without this a
+    /// step of ten noises took on two fine bits, for a deviance of 20 that the best of 1024 zeros has by chance, and they drew it from its place.
+    /// At first sight errors are most of the noise, all bits but the largest are hidden, and none is asked for more than its coefficient.
+    fn price(&self, bits: &[usize], weight: f64) -> f64 {
+        let coefficients = COEFFICIENT * bits.len() as f64;
+        if !self.noise_known {
+            return coefficients;
+        }
+        let finest = bits.iter().max().map_or(0, |bit| *bit as i32);
+        let turns = self.range() / (weight * 0.5_f64.powi(finest));
+        let named = if self.is_usual(weight) { 2.0 } else { 4.0 };
+        let choice = 2.0 * ln_binomial(BITS as u64, bits.len() as u64);
+        coefficients + choice + named * turns.max(1.0).ln()
+    }
+
+    /// The same of the converters of a candidate.
+    fn price_of(&self, candidate: &Candidate) -> f64 {
+        let of = |first: usize, axis: usize| {
+            let own = candidate.active.iter().filter_map(|k| k.checked_sub(first));
+            let bits: Vec<usize> = own.filter(|bit| *bit < BITS).collect();
+            match candidate.codes[axis] {
+                Some(converter) if !bits.is_empty() => self.price(&bits, converter.weight),
+                _ => 0.0,
+            }
+        };
+        of(0, 0) + (0..3).map(|axis| of(first_of(axis), axis)).sum::<f64>()
+    }
+
     /// Normal equations of so many functions of the reading, which `values` writes.
     fn normal(
         &self,
@@ -264,10 +306,12 @@ impl Sight {
                 .map(|k| offered[k])
                 .collect();
             let drop = self.drop(normal.explains(&bits, TYPICAL / EXCITED)?);
+            let price = self.price(&bits, converter.weight);
             Some(Hypothesis {
                 converter,
                 bits,
                 drop,
+                price,
             })
         });
         let best = sets.max_by(|a, b| a.score().total_cmp(&b.score()))?;
@@ -308,11 +352,12 @@ impl Sight {
         Some(self.drop(normal.explains(&set, f64::INFINITY)?))
     }
 
-    /// With weight and zero walked uphill by ever smaller steps.
+    /// With weight, if it is no usual one, and zero walked uphill by ever smaller steps.
     fn refine(&self, readings: &[RowReading], from: Hypothesis) -> Hypothesis {
         let mut best = from;
         let finest = best.bits.last().copied().unwrap_or(0);
         let middle = 0.5 * (self.lowest + self.highest);
+        let usual = self.is_usual(best.converter.weight);
         let mut step = 0.25;
         while step > 0.01 {
             let Converter { weight, zero, .. } = best.converter;
@@ -331,7 +376,8 @@ impl Sight {
                 }
             };
             let tried = [shifted(by), shifted(-by), scaled(by), scaled(-by)];
-            let found = tried.into_iter().find_map(|converter| {
+            let moves = if usual { 2 } else { 4 };
+            let found = tried.into_iter().take(moves).find_map(|converter| {
                 let drop = self.with(readings, &best, &converter)?;
                 (drop > best.drop + 1e-6).then(|| Hypothesis {
                     converter,
@@ -356,38 +402,52 @@ impl Sight {
         Some((self.centred(readings, refined), offered))
     }
 
-    /// With the zero in the middle of those that do as well to within 95 %: a step between two readings may be anywhere between them.
+    /// With the zero in the middle of where it is with 95 %, every place being as likely before.
+    ///
+    /// By the mass of the likelihood and not by its height: a step between two readings may be anywhere between them, and one that cuts
+    /// into a dwell takes that dwell's own noise for its edge, which is higher, but narrow.
     fn centred(&self, readings: &[RowReading], from: Hypothesis) -> Hypothesis {
         let Converter { weight, zero, .. } = from.converter;
-        let finest = from.bits.last().copied().unwrap_or(0);
-        let most = 0.5 * weight * 0.5_f64.powi(finest as i32);
-        let as_well = |by: f64| {
+        let finest = from.bits.iter().max().map_or(0, |bit| *bit as i32);
+        let most = 0.5 * weight * 0.5_f64.powi(finest);
+        let step = (0.5 * median_sd(readings)).max(most / PLACES);
+        let at = |by: f64| {
             let converter = Converter {
                 zero: zero + by,
                 ..from.converter
             };
-            let drop = self.with(readings, &from, &converter);
-            drop.is_some_and(|drop| drop > from.drop - WITHIN)
+            self.with(readings, &from, &converter)
         };
-        let reach = |side: f64| {
-            let (mut inside, mut outside) = (0.0, most);
-            while outside - inside > 0.01 * outside {
-                let middle = 0.5 * (inside + outside);
-                if as_well(side * middle) {
-                    inside = middle;
-                } else {
-                    outside = middle;
-                }
-                if outside < 1e-6 * most {
-                    break;
-                }
-            }
-            inside
+        let walked = |side: f64| {
+            (1..)
+                .map(|k| f64::from(k) * step)
+                .take_while(|by| *by < most)
+                .map_while(|by| Some((side * by, at(side * by)?)))
+                .take_while(|(_, drop)| *drop > from.drop - NEGLIGIBLE)
+                .collect::<Vec<_>>()
         };
-        let (down, up) = (reach(-1.0), reach(1.0));
+        let mut places = walked(-1.0);
+        places.reverse();
+        places.push((0.0, from.drop));
+        places.extend(walked(1.0));
+        let highest = places.iter().map(|p| p.1).fold(from.drop, f64::max);
+        let mass = |p: &(f64, f64)| (0.5 * (p.1 - highest)).exp();
+        let all: f64 = places.iter().map(mass).sum();
+        let reaches = |share: f64| {
+            let so_far = places.iter().scan(0.0, |sum, p| {
+                *sum += mass(p);
+                Some((p.0, *sum))
+            });
+            let mut beyond = so_far.filter(|(_, sum)| *sum > share * all);
+            beyond.next().map_or(0.0, |(by, _)| by)
+        };
+        let (down, up) = (
+            reaches(OUTSIDE) - 0.5 * step,
+            reaches(1.0 - OUTSIDE) + 0.5 * step,
+        );
         let converter = Converter {
-            zero: zero + 0.5 * (up - down),
-            zero_within: 0.5 * (up + down),
+            zero: zero + 0.5 * (up + down),
+            zero_within: 0.5 * (up - down),
             ..from.converter
         };
         match self.with(readings, &from, &converter) {
@@ -403,9 +463,7 @@ impl Sight {
     /// Waves and steps against the reading, as the converter that each would be the heaviest bit of, the best first, and how many places
     /// were looked at.
     fn first_sight(&self, readings: &[RowReading]) -> (Vec<(f64, Converter)>, f64) {
-        let mut sds: Vec<f64> = readings.iter().map(|r| r.sd).collect();
-        sds.sort_by(f64::total_cmp);
-        let sd = sds.get(sds.len() / 2).copied().unwrap_or(0.0);
+        let sd = median_sd(readings);
         let cycle = 1.0 / (OVERSAMPLED * self.range());
         let most = (EVALUATIONS / readings.len().max(1)).clamp(FEWEST_PERIODS, PERIODS);
         let finest = (FINEST / sd / cycle).min(most as f64);
@@ -497,6 +555,7 @@ impl Sight {
                 converter,
                 bits: vec![0],
                 drop,
+                price: self.price(&[0], converter.weight),
             },
             places,
             offered: 1,
@@ -537,6 +596,13 @@ impl Sight {
             p,
         })
     }
+}
+
+/// How far samples scatter in a dwell, raw.
+fn median_sd(readings: &[RowReading]) -> f64 {
+    let mut sds: Vec<f64> = readings.iter().map(|r| r.sd).collect();
+    sds.sort_by(f64::total_cmp);
+    sds.get(sds.len() / 2).copied().unwrap_or(0.0)
 }
 
 /// The highest of some places in a row, none beside a higher one.
@@ -613,13 +679,14 @@ impl Search<'_> {
 
     /// The converters of `one` again, beside `rest`, at readings and by a noise that are known better: as long as its errors were not
     /// known, they were in the affine parameters, in the readings that bits were taken from, and in the noise, which hid all but the largest.
+    /// And by how much these cost more.
     pub(super) fn settle_converters(
         &self,
         one: &Candidate,
         rest: &[Chosen],
         moments: &[Moment],
         noise: &Components,
-    ) -> Option<Candidate> {
+    ) -> Option<(Candidate, f64)> {
         let model = self.model(rest);
         let null = self.spread.fit_at(&model, noise)?;
         let mut sight = Sight::new(self, &model, &null, moments)?;
@@ -647,12 +714,13 @@ impl Search<'_> {
             if shared {
                 again.codes = [Some(best.converter); 3];
                 again.active = best.bits;
-                return Some(again);
+                break;
             }
             again.codes[axis] = Some(best.converter);
             let bits = best.bits.iter().map(|bit| first_of(axis) + bit);
             again.active.extend(bits);
         }
-        Some(again)
+        let dearer = sight.price_of(&again) - sight.price_of(one);
+        Some((again, dearer))
     }
 }
