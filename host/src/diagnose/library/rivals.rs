@@ -118,15 +118,18 @@ const fn within(
 const SCALES: [Coefficient; 3] = each("1");
 
 const GYRO_POWERS: [Coefficient; 12] =
-    powers(["1/(rad/s)", "1/(rad/s)^2", "1/(rad/s)^3", "1/(rad/s)^4"]);
+    by_axis(["1/(rad/s)", "1/(rad/s)^2", "1/(rad/s)^3", "1/(rad/s)^4"]);
 const ACCEL_POWERS: [Coefficient; 12] =
-    powers(["1/(m/s^2)", "1/(m/s^2)^2", "1/(m/s^2)^3", "1/(m/s^2)^4"]);
+    by_axis(["1/(m/s^2)", "1/(m/s^2)^2", "1/(m/s^2)^3", "1/(m/s^2)^4"]);
 
-const fn powers(units: [&'static str; 4]) -> [Coefficient; 12] {
-    let mut all = [of(0, "", ""); 12];
+/// Coefficients of these units, for one axis after the other.
+const fn by_axis<const N: usize, const UNITS: usize>(
+    units: [&'static str; UNITS],
+) -> [Coefficient; N] {
+    let mut all = [of(0, "", ""); N];
     let mut k = 0;
-    while k < 12 {
-        all[k] = of(k / 4, "", units[k % 4]);
+    while k < N {
+        all[k] = of(k / UNITS, "", units[k % UNITS]);
         k += 1;
     }
     all
@@ -149,18 +152,8 @@ const fn smooth(sensor: Sensor, coefficients: &'static [Coefficient]) -> Effect 
     }
 }
 
-const GYRO_TURNING: [Coefficient; 9] = turning(["rad/s/(rad/s)", "rad/s/(rad/s)^2", "1/(rad/s)"]);
-const ACCEL_TURNING: [Coefficient; 9] = turning(["m/s^2/(rad/s)", "m/s^2/(rad/s)^2", "1/(rad/s)"]);
-
-const fn turning(units: [&'static str; 3]) -> [Coefficient; 9] {
-    let mut all = [of(0, "", ""); 9];
-    let mut k = 0;
-    while k < 9 {
-        all[k] = of(k / 3, "", units[k % 3]);
-        k += 1;
-    }
-    all
-}
+const GYRO_TURNING: [Coefficient; 9] = by_axis(["1", "1/(rad/s)", "1/(rad/s)"]);
+const ACCEL_TURNING: [Coefficient; 9] = by_axis(["m/s^2/(rad/s)", "m/s^2/(rad/s)^2", "1/(rad/s)"]);
 
 /// A supply that sags with the motor's current, or a bearing that shakes: known by no reading of the unit. But an axis reads the turns
 /// about the others as well, by a few per cent, so that fine bits of its codes can tell them from rest.
