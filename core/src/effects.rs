@@ -31,6 +31,9 @@ use triad::{Memory, Slowly, Triad, lagged, put};
 
 /// Temperature that warmth counts from, °C.
 pub const REFERENCE_C: f64 = 25.0;
+/// Weights of bit 0 that the reading of code 0 may be away from a reading of 0: farther, rounding in single precision is more than a
+/// converter's codes are kept away from their turns.
+pub const FARTHEST_ZERO: f64 = 64.0;
 /// Lag of the filter by which the rate of change of the temperature is taken, s: unfiltered it would be noise.
 pub const RATE_LAG_S: f64 = 30.0;
 
@@ -192,7 +195,8 @@ impl<T: RealField + Copy> Effect<T> {
     /// `weight`: of bit 0, the highest, raw; each of the nine bits has half the weight of the one before. `errors`: what a reading has too
     /// much where the bit is set, in units of `weight`. `zero`: the reading of code 0, raw; not 0 where something was subtracted from the
     /// readings. A reading of less than 1/65536 of `weight` below the turn of a bit counts as one of the turn, whichever way it was
-    /// rounded. The code of all nine bits set, and one more, is again 0: what lies beyond is not told apart.
+    /// rounded. The code of all nine bits set, and one more, is again 0: what lies beyond is not told apart. Refused where a number is not
+    /// finite, the weight not positive, or `zero` farther from a reading of 0 than [`FARTHEST_ZERO`] weights.
     ///
     /// ```
     /// # use mimu_core::compensation::Sample;
@@ -219,8 +223,12 @@ impl<T: RealField + Copy> Effect<T> {
             None => [true; 3],
             Some(axis) => [0, 1, 2].map(|i| i == axis),
         };
-        let finite = weight.is_finite() && zero.is_finite() && errors.iter().all(T::is_finite);
-        if !(finite && weight > T::zero() && axes.contains(&true)) {
+        // What is not finite in single precision is not in this one, or becomes it in the tables.
+        let codes = convert::<_, T>(256.0) / weight;
+        let most = errors.iter().fold(T::zero(), |sum, e| sum + e.abs()) * weight;
+        let finite = [weight, codes, most].iter().all(T::is_finite);
+        let near = zero.abs() <= convert::<_, T>(FARTHEST_ZERO) * weight;
+        if !(finite && near && weight > T::zero() && axes.contains(&true)) {
             return Err(Refused::Value);
         }
         let errors = *errors;

@@ -75,7 +75,7 @@ pub struct Stored {
     pub table: Table<f32, NODES>,
     /// What the affine model lacks; `None` if there are none, so that no sample pays for it.
     pub effects: Option<Effects<f32, ROOM>>,
-    /// How many effects.
+    /// How many records of effects: errors by the code have one for each converter.
     pub effect_count: u8,
 }
 

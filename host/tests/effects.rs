@@ -407,14 +407,23 @@ fn converters_that_make_no_sense_are_refused() {
         (
             "weight_of_bit_0_raw = 1.6384",
             "weight_of_bit_0_raw = 0.0",
-            "converter of x: weight_of_bit_0_raw",
+            "converter of x: weight_of_bit_0_raw is 0.0",
         ),
         (
             "reading_of_code_0_raw = -0.0713",
             "reading_of_code_0_raw = nan",
-            "reading_of_code_0_raw a number",
+            "reading_of_code_0_raw is NaN",
         ),
-        ("within_raw = 0.0", "within_raw = -1.0", "not negative"),
+        (
+            "reading_of_code_0_raw = -0.0713",
+            "reading_of_code_0_raw = 1e17",
+            "reading_of_code_0_raw is 1e17",
+        ),
+        (
+            "within_raw = 0.0",
+            "within_raw = -1.0",
+            "within_raw is -1.0",
+        ),
         (
             "formula = \"x = C (u - S e)",
             "form = { name = \"time_constant_s\", value = 3.0 }\nformula = \"x = C (u - S e)",

@@ -257,9 +257,10 @@ pub(super) struct Code<T> {
     last: [T; 32],
 }
 
-/// A multiple of what nine bits can count: keeps codes with a sign above zero, and their bits the same. And half a code, where the
-/// last bit is worth 128: codes that are that of a turn would be on either side by rounding.
-const ABOVE_ZERO: f64 = 1024.0 + 1.0 / 256.0;
+/// A multiple of what nine bits can count: keeps codes down to 32 weights below the zero positive, and their bits the same. More would
+/// cost what single precision tells codes apart by, 1/1024 here. And half a code, where the last bit is worth 128: codes that are that of
+/// a turn would be on either side by rounding.
+const ABOVE_ZERO: f64 = 8192.0 + 1.0 / 256.0;
 
 impl<T: RealField + Copy> Code<T> {
     /// Of errors in units of the weight of bit 0, `weight`, raw, where the reading `zero`, raw, has code 0.

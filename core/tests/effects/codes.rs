@@ -1,7 +1,7 @@
 //! Errors by the code of a converter.
 
 use mimu_core::compensation::Sample;
-use mimu_core::effects::{Effect, Effects, Refused, Sensor};
+use mimu_core::effects::{Effect, Effects, FARTHEST_ZERO, Refused, Sensor};
 use nalgebra::Vector3;
 
 use super::{Eight, Mounted, si, with};
@@ -244,7 +244,11 @@ fn a_code_that_cannot_be_removed_is_refused() {
     };
     let (none, last) = (f64::NAN, f64::INFINITY);
     for axis in [None, Some(0), Some(2)] {
-        assert!(code(axis, &errors, 1.0, -1e6).is_ok());
+        for zero in [-FARTHEST_ZERO, FARTHEST_ZERO] {
+            assert!(code(axis, &errors, 1.0, zero).is_ok());
+            let beyond = code(axis, &errors, 1.0, 1.01 * zero);
+            assert_eq!(beyond.err(), Some(Refused::Value));
+        }
         for weight in [0.0, -1.0, none, last] {
             assert_eq!(code(axis, &errors, weight, 0.0).err(), Some(Refused::Value));
         }
@@ -256,6 +260,11 @@ fn a_code_that_cannot_be_removed_is_refused() {
             errors[bit] = error;
             assert_eq!(code(axis, &errors, 1.0, 0.0).err(), Some(Refused::Value));
         }
+    }
+    // Finite, and not what becomes of them in single precision.
+    let single = |error, weight| Effect::code(Sensor::Gyro, None, &[error; 9], weight, 0.0_f32);
+    for (error, weight) in [(1e-3, 1e-37), (1e20, 1e20), (1e38, 1.0)] {
+        assert_eq!(single(error, weight).err(), Some(Refused::Value));
     }
     for axis in [3, 255, usize::MAX] {
         assert_eq!(
@@ -291,4 +300,24 @@ fn a_code_that_cannot_be_removed_is_refused() {
     let other = Effect::code(Sensor::Accel, None, &errors, 1.0, 0.0).unwrap();
     assert_eq!(effects.push(other), Ok(()));
     assert_eq!(effects.push(other), Err(Refused::Full));
+}
+
+#[test]
+fn codes_repeat_below_the_zero_as_they_do_above() {
+    let errors = [0.25, 0.0, 0.03, 0.0, 0.0, 0.0, 0.0, 0.0, 0.002];
+    let effects = with(
+        &[Effect::code(Sensor::Accel, None, &errors, 1.0, 5.0).unwrap()],
+        &si(),
+    );
+    let removed = |u: f64| {
+        let read = of(Sensor::Accel, Vector3::repeat(u), Vector3::zeros());
+        u - effects.without_code_errors(&read).accel.x
+    };
+    for k in 0..200 {
+        let u = 5.0 + 0.01 * f64::from(k) + 0.003;
+        for periods in 1..=12 {
+            let below = removed(u - 2.0 * f64::from(periods));
+            assert!((below - removed(u)).abs() < 1e-12, "{u} {periods}: {below}");
+        }
+    }
 }

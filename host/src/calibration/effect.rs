@@ -4,7 +4,9 @@ use std::fmt::Write as _;
 
 use mimu_core::RealField;
 use mimu_core::effects::Variable as DeviceVariable;
-use mimu_core::effects::{Effect as DeviceEffect, Effects, Refused, Sensor as DeviceSensor};
+use mimu_core::effects::{
+    Effect as DeviceEffect, Effects, FARTHEST_ZERO, Refused, Sensor as DeviceSensor,
+};
 use nalgebra::{Vector3, convert};
 use serde::Deserialize;
 
@@ -95,21 +97,45 @@ impl ConverterTable {
     fn codes(all: &[Self]) -> std::result::Result<Codes, String> {
         let mut codes: Codes = [None; 3];
         for table in all {
-            let (weight, zero) = (table.weight_of_bit_0_raw, table.reading_of_code_0_raw);
-            let within = table.within_raw;
-            let numbers = [weight, zero, within].iter().all(|v| v.is_finite());
-            if !(numbers && weight > 0.0 && within >= 0.0) {
-                return Err(format!(
-                    "converter of {}: weight_of_bit_0_raw has to be a positive number, reading_of_code_0_raw a number, within_raw not negative",
-                    table.axes
-                ));
-            }
             let ours: Vec<usize> = match table.axes.as_str() {
                 "xyz" => (0..3).collect(),
                 one => AXES.iter().position(|a| *a == one).into_iter().collect(),
             };
             if ours.is_empty() {
-                return Err(format!("converter of {:?}: x, y, z or xyz", table.axes));
+                return Err(format!(
+                    "a converter: axes is {:?}, and has to be x, y, z or xyz",
+                    table.axes
+                ));
+            }
+            let (weight, zero) = (table.weight_of_bit_0_raw, table.reading_of_code_0_raw);
+            let within = table.within_raw;
+            let farthest = FARTHEST_ZERO * weight;
+            let wrong = if !(weight > 0.0 && weight.is_finite()) {
+                Some((
+                    "weight_of_bit_0_raw",
+                    weight,
+                    "has to be a positive number".into(),
+                ))
+            } else if !(zero.abs() <= farthest) {
+                let why = format!(
+                    "has to be from {:e} to {farthest:e}: farther, readings of single precision do not tell codes apart",
+                    -farthest
+                );
+                Some(("reading_of_code_0_raw", zero, why))
+            } else if !(within >= 0.0 && within.is_finite()) {
+                Some((
+                    "within_raw",
+                    within,
+                    "has to be a number that is not negative".into(),
+                ))
+            } else {
+                None
+            };
+            if let Some((key, value, why)) = wrong {
+                return Err(format!(
+                    "converter of {}: {key} is {value:?}, and {why}",
+                    table.axes
+                ));
             }
             for axis in ours {
                 let converter = Converter {

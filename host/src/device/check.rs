@@ -20,6 +20,10 @@ use crate::error::{Error, Result};
 /// Longest silence of a stream.
 const SILENCE: Duration = Duration::from_secs(3);
 
+/// Part of a reading that single precision may be off by at the turn of a bit: a reading, its product, and the sum with the code at
+/// reading 0, which is up to 64 weights where the reading is of one.
+const TURN: f64 = 64.0 * f32::EPSILON as f64;
+
 /// Largest differences of one triad.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Difference {
@@ -234,13 +238,34 @@ impl Twin {
         }
     }
 
+    /// Readings without errors by the code, in double precision. Within rounding of a turn either side is right, and a bit's error apart: the
+    /// one that single precision takes.
+    fn without_code_errors(&self, raw: &Sample<f32>) -> [Vector3<f64>; 2] {
+        let exact = [raw.gyro, raw.accel].map(|u| u.map(f64::from));
+        let Some(stored) = &self.stored.effects else {
+            return exact;
+        };
+        let single = single::without_code_errors(stored, raw);
+        let single = [single.gyro, single.accel].map(|u| u.map(f64::from));
+        let beside = |by: f64| {
+            let [gyro, accel] = exact.map(|u| u * (1.0 + by));
+            let clean = self.effects.without_code_errors(&Sample { gyro, accel });
+            [exact[0] - gyro + clean.gyro, exact[1] - accel + clean.accel]
+        };
+        let sides = [0.0, TURN, -TURN].map(beside);
+        [0, 1].map(|triad| {
+            Vector3::from_fn(|axis, _| {
+                let off =
+                    |side: &[Vector3<f64>; 2]| (side[triad][axis] - single[triad][axis]).abs();
+                let nearest = sides.iter().min_by(|a, b| off(a).total_cmp(&off(b)));
+                nearest.map_or(f64::NAN, |side| side[triad][axis])
+            })
+        })
+    }
+
     /// In double precision, with what rounding can make of it.
     fn double(&mut self, raw: &Sample<f32>) -> (Sample<f64>, [Vector3<f64>; 2]) {
-        let raw = self.effects.without_code_errors(&Sample {
-            gyro: raw.gyro.map(f64::from),
-            accel: raw.accel.map(f64::from),
-        });
-        let raw = [raw.gyro, raw.accel];
+        let raw = self.without_code_errors(raw);
         let [gyro, accel] = [0, 1].map(|i| self.affine[i].apply(&raw[i]));
         let bounds = [0, 1].map(|i| rounding(&self.affine[i], &raw[i]));
         let sample = Sample { gyro, accel };

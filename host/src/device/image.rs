@@ -301,7 +301,7 @@ fn check_room(effects: &[OnDevice], room: usize, place: &str) -> Result<()> {
             let problem = "its numbers make no sense to the device";
             return Err(Error::new(at, problem, "diagnose the recording again"));
         };
-        // Of these each axis has room for one, and the search finds no more.
+        // Of these each axis has room for one, and a file that has two for an axis was refused.
         if matches!(effect.what, What::Code(..)) {
             continue;
         }

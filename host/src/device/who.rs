@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use mimu_core::stored::Refused;
+use mimu_core::stored::{Refused, VERSION};
 use mimu_core::wire::{
     Capabilities, Compatibility, EFFECTS, Greeting, MAGIC, PROTOCOL, Slot, Start, StoredInfo,
     Version, compatibility,
@@ -257,7 +257,9 @@ pub fn unusable(refused: &Refused) -> String {
     match refused {
         Refused::NotACalibration => "they do not begin as a calibration does".into(),
         Refused::Length => "their length is not the one that they state".into(),
-        Refused::Version { found } => format!("their layout is of version {found}"),
+        Refused::Version { found } => {
+            format!("their layout is of version {found}, and this program's of version {VERSION}")
+        }
         Refused::Check => "their CRC does not hold".into(),
         Refused::Node { at } => format!(
             "temperature node {at} is not finite, or not warmer than the one before, or one too many"

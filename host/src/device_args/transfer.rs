@@ -8,6 +8,7 @@ use mimu::calibration::Calibration;
 use mimu::device::{Image, contents, download, unusable, upload};
 use mimu::error::{Error, Result};
 use mimu::report;
+use mimu_core::stored::{Refused, VERSION};
 
 use super::{PortArgs, open};
 use crate::{JsonArgs, check_outputs, print, progress};
@@ -65,7 +66,14 @@ pub fn run_download(args: &DownloadArgs) -> Result<()> {
             "this program cannot read what it stores: {}",
             unusable(&refused)
         );
-        Error::new(port, problem, "update mimu on this computer")
+        let remedy = match refused {
+            Refused::Version { found } if found < VERSION => {
+                "upload the calibration file again: the device keeps the numbers in an older layout"
+            }
+            Refused::Version { .. } => "update mimu on this computer",
+            _ => "upload the calibration file again",
+        };
+        Error::new(port, problem, remedy)
     })?;
     write_whole(&args.output, &bytes)?;
     let text = report::download_text(port, &args.output, &bytes, &contents);

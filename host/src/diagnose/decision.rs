@@ -195,6 +195,7 @@ pub fn decide(rows: &Rows, dwell_ends: &[(usize, f64)], unseen: Option<&Rows>) -
         // More dwells may prove it: it is asked for in the next experiment.
         if let Kind::Effect(effect) = &candidate.kind
             && too_few_dwells
+            && !not_excited.iter().any(|n| n.0 == effect.id)
         {
             not_excited.push((effect.id.into(), effect.needs.into()));
         }
@@ -240,7 +241,8 @@ pub fn decide(rows: &Rows, dwell_ends: &[(usize, f64)], unseen: Option<&Rows>) -
     };
     for one in search.others(&beside, &all) {
         let id = one.candidate.id();
-        if rejected.iter().any(|r: &(String, String)| r.0 == id) {
+        let told = |all: &[(String, String)]| all.iter().any(|r| r.0 == id);
+        if told(&rejected) || told(&not_excited) {
             continue;
         }
         let mut more = kept.clone();
@@ -270,6 +272,8 @@ pub fn decide(rows: &Rows, dwell_ends: &[(usize, f64)], unseen: Option<&Rows>) -
         };
         rejected.push((id, chance + &figures));
     }
+    // Errors by the code are looked for even where those of the usual converter would not be seen.
+    not_excited.retain(|(id, _)| !accepted.iter().any(|a| a.chosen.candidate.id() == *id));
     let residuals = |fit: &Fitted, model: &DMatrix<f64>| &rows.y - model * &fit.coefficients;
     let base = search
         .spread

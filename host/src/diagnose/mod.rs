@@ -275,7 +275,13 @@ pub fn diagnose(recordings: Recordings, options: Options) -> Result<Diagnosis> {
         let all: Vec<&Prepared> = ours.iter().map(|s| s.prepared).collect();
         let decided = decide(&rows, &dwell_ends(&all), unseen.as_ref());
         let mut decision = decided.ok_or_else(singular)?;
-        let noisier = ours.iter().flat_map(|s| noisier(s, sensor));
+        let noisier = ours.iter().enumerate().flat_map(|(k, s)| {
+            let mut all = noisier(s, sensor);
+            for one in all.iter_mut().filter(|_| ours.len() > 1) {
+                one.stratum = format!("{} of recording {}", one.stratum, k + 1);
+            }
+            all
+        });
         decision.leftover.extend(noisier);
         let found: Vec<Removed> = decision
             .accepted

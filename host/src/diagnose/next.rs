@@ -299,7 +299,10 @@ impl Pair {
 
     fn settled(&self, base: &Question) -> Confused {
         let experiment = match self.suspects(0) {
-            None => "the same recording again: a jump does not come back where it was".into(),
+            None => match library::by_id(&self.id) {
+                Some(effect) => effect.needs.into(),
+                None => "the same recording again: a jump does not come back where it was".into(),
+            },
             Some(suspects) => settle(&Question {
                 suspects: suspects.to_vec(),
                 ..base.clone()

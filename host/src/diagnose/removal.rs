@@ -101,9 +101,12 @@ impl Stretches<'_> {
 
     /// Errors of the axes at a moment within block `at`, SI.
     fn error(&self, moment: &Moment, at: usize) -> Vector3<f64> {
-        let sum = |moment: &Moment| {
+        let sum = |moment: &Moment, codes: bool| {
             let mut error = Vector3::zeros();
             for (effect, late) in self.effects.iter().zip(&self.late) {
+                if effect.candidate.reads_code() != codes {
+                    continue;
+                }
                 let now = (moment.warm_c, moment.warm_c);
                 let (warm_c, late_c) = late.as_ref().map_or(now, |l| l[at]);
                 let moment = Moment {
@@ -115,12 +118,22 @@ impl Stretches<'_> {
             }
             error
         };
-        let first = sum(moment);
-        let second = sum(&self.without(moment, &first));
-        // As the device: where the error is steeper than the input, this would lead away.
+        // As the device: where the error is steeper than the input, a second look would lead away. Each axis has a code of its own, and
+        // its errors go first, as all else is a function of what would have been read without them.
+        let first = sum(moment, true);
+        let second = sum(&self.without(moment, &first), true);
+        let codes = first.zip_map(&second, |first, second| {
+            match (second - first).powi(2) < first.powi(2) {
+                true => second,
+                false => first,
+            }
+        });
+        let moment = &self.without(moment, &codes);
+        let first = sum(moment, false);
+        let second = sum(&self.without(moment, &first), false);
         match (second - first).norm_squared() < first.norm_squared() {
-            true => second,
-            false => first,
+            true => codes + second,
+            false => codes + first,
         }
     }
 }

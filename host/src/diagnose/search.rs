@@ -8,6 +8,7 @@ mod converter;
 mod refine;
 mod screen;
 
+use std::collections::{HashMap, HashSet};
 use std::sync::{Mutex, PoisonError};
 
 use nalgebra::DMatrix;
@@ -175,11 +176,13 @@ impl<'a> Search<'a> {
                 chosen[k] = rest.swap_remove(k);
                 *now = fit;
             }
+            let (worth, p, _) = self.worth(chosen, k, now)?;
+            (chosen[k].worth, chosen[k].p) = (worth, p);
         }
         Some(())
     }
 
-    /// Moments by dwell whose readings err by nothing but chosen effect `k`.
+    /// Moments by dwell whose readings are free from noise and from the error of chosen effect `k`.
     fn moments_beside(&self, chosen: &[Chosen], k: usize, now: &Fitted) -> Vec<Moment> {
         let before = chosen[..k].iter().map(|c| c.columns.ncols()).sum::<usize>();
         let first = self.basis.ncols() + before;
@@ -301,6 +304,10 @@ impl<'a> Search<'a> {
             .filter(|s| self.candidates[s.index].is_listed());
         let mut judged: Vec<Chosen> = listed.filter_map(|s| self.judge(chosen, now, &s)).collect();
         judged.extend(self.converters(chosen, now));
+        // Of one effect by several converters the least by chance.
+        judged.sort_by(|a, b| a.p.total_cmp(&b.p));
+        let mut told = HashSet::new();
+        judged.retain(|c| told.insert(c.candidate.id()));
         judged
     }
 
@@ -365,6 +372,13 @@ impl<'a> Search<'a> {
                 .filter(|c| score(&best) - score(c) < CONFUSED && significant(c))
                 .map(|c| (c.candidate.id(), score(&best) - score(c)))
                 .collect();
+            // Of one effect by several converters the best.
+            let mut told = HashMap::new();
+            for (id, worse) in &best.alternatives {
+                let least = told.entry(id.clone()).or_insert(*worse);
+                *least = least.min(*worse);
+            }
+            best.alternatives.retain(|(id, worse)| told[id] == *worse);
             chosen.push(best);
             let before: Vec<String> = chosen.iter().map(|c| c.candidate.id()).collect();
             now = self.fit(&chosen)?;
@@ -380,30 +394,35 @@ impl<'a> Search<'a> {
     fn again(&self, chosen: &mut Vec<Chosen>, now: &mut Fitted) -> Option<()> {
         let mut i = 0;
         while i < chosen.len() && chosen.len() > 1 {
-            let mut rest = chosen.clone();
-            let one = rest.remove(i);
-            let without = self.fit(&rest)?;
-            let model = self.model(&rest);
-            let drop = (without.deviance - now.deviance).max(0.0);
-            let listed = one.candidate.is_listed();
-            let p = self.chance(drop, one.columns.ncols(), model.ncols(), &one.candidate);
+            let (worth, p, without) = self.worth(chosen, i, now)?;
+            let listed = chosen[i].candidate.is_listed();
             if p > if listed { FALSE_LISTED } else { FALSE_FOUND } {
-                *chosen = rest;
+                chosen.remove(i);
                 *now = without;
                 i = 0;
             } else {
-                chosen[i].p = p;
-                chosen[i].worth = drop;
+                (chosen[i].worth, chosen[i].p) = (worth, p);
                 i += 1;
             }
         }
         Some(())
     }
+
+    /// What chosen effect `k` is worth beside the others: the drop of the deviance, its chance after the whole search, and the fit without it.
+    fn worth(&self, chosen: &[Chosen], k: usize, now: &Fitted) -> Option<(f64, f64, Fitted)> {
+        let mut rest = chosen.to_vec();
+        let one = rest.remove(k);
+        let without = self.fit(&rest)?;
+        let columns = self.model(&rest).ncols();
+        let drop = (without.deviance - now.deviance).max(0.0);
+        let p = self.chance(drop, one.columns.ncols(), columns, &one.candidate);
+        Some((drop, p, without))
+    }
 }
 
 /// How good a candidate is among others with more or fewer coefficients: the drop of the deviance less what each coefficient
-/// costs (Akaike's two, doubled, as for each there are several candidates), and each of the converters that it is the best of. Of products that are the same in this recording the
-/// shortest is told.
+/// costs (Akaike's two, doubled, as for each there are several candidates), and each of the converters that it is the best of. Of products
+/// that are the same in this recording the shortest is told.
 fn score(c: &Chosen) -> f64 {
     let coefficients = c.columns.ncols() as f64 + if c.form > 0.0 { 1.0 } else { 0.0 };
     let order = match &c.candidate.kind {

@@ -52,7 +52,7 @@ pub(super) fn wrap(out: &mut String, head: &str, text: &str) {
 }
 
 /// `value ± half`, both to the second digit of `half`.
-fn plus_minus(value: f64, half: f64) -> String {
+pub(super) fn plus_minus(value: f64, half: f64) -> String {
     if !(half > 0.0) || !half.is_finite() {
         return format!("{} (fixed)", three(value + 0.0));
     }

@@ -146,7 +146,9 @@ pub fn first_weight(step: f64, lowest: f64, highest: f64) -> f64 {
 
 /// Share of the time that the bit of this weight is set while readings scatter about `mean` with `sd`, both in its unit.
 fn share_set(mean: f64, sd: f64, weight: f64) -> f64 {
+    // It is the same every two weights; far from the zero there is no number beside the next turn.
     let (mean, sd) = (mean / weight, sd / weight);
+    let mean = mean - 2.0 * (0.5 * mean).floor();
     if !mean.is_finite() || !sd.is_finite() {
         return f64::NAN;
     }
@@ -160,7 +162,7 @@ fn share_set(mean: f64, sd: f64, weight: f64) -> f64 {
     // It turns at every whole number: on at odd ones, off at even ones.
     let reach = 6.0 * sd;
     let (first, last) = ((mean - reach).ceil(), (mean + reach).floor());
-    let odd = |turn: f64| turn.rem_euclid(2.0) == 1.0;
+    let odd = |turn: f64| (turn as i64) & 1 == 1;
     let mut share = f64::from(u8::from(odd(first - 1.0)));
     let mut turn = first;
     while turn <= last {

@@ -11,6 +11,7 @@
 
 use std::f64::consts::PI;
 
+use mimu_core::effects::FARTHEST_ZERO;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use statrs::function::factorial::ln_binomial;
@@ -27,11 +28,11 @@ use crate::diagnose::spread::{By, Components, Fitted};
 const OVERSAMPLED: f64 = 2.5;
 /// Most periods.
 const PERIODS: usize = 4000;
-/// Most waves at readings: of a recording by hand every 10 ms of a turn is one, and all periods of all would take a minute.
+/// Most places times readings: of a recording by hand every 10 ms of a turn is a reading, and all periods of all would take a minute.
 const EVALUATIONS: usize = 4_000_000;
-/// Periods that are looked at all the same.
-const FEWEST_PERIODS: usize = 100;
-/// Cycles in a standard deviation of the readings: more, and noise has levelled nine tenths of the wave.
+/// Places that are looked at all the same.
+const FEWEST: usize = 100;
+/// Cycles in a standard deviation of the readings: more, and noise has levelled five sixths of the wave.
 const FINEST: f64 = 0.3;
 /// Most places of a step.
 const STEPS: usize = 256;
@@ -47,9 +48,11 @@ const RIDGE: f64 = 1e-3;
 /// Of these, the ones whose weights and zeros are refined where the noise is known; else one.
 const REFINED: usize = 3;
 /// Most places of a zero, on either side, that the mass of its likelihood is summed from.
-const PLACES: f64 = 1000.0;
+const PLACES: usize = 1000;
 /// Deviance from which a place has no part in it.
 const NEGLIGIBLE: f64 = 20.0;
+/// Deviance by which the middle of the interval may be worse than the best place.
+const VALLEY: f64 = 6.0;
 /// Part of it that is outside the interval, on either side.
 const OUTSIDE: f64 = 0.025;
 /// Phases and directions that a period stands for, as tests.
@@ -58,6 +61,8 @@ const PHASES: f64 = 4.0;
 const PROMISING: f64 = 0.05;
 /// Part of a column that the others do not span, below which it is none of its own.
 const INDEPENDENT: f64 = 1e-2;
+/// Part of a column's square that is left of it beside the model, below which it is in the model.
+const ROUNDING: f64 = 1e-9;
 /// Rows up to which the noise is taken apart by all of its covariances.
 const DENSE: usize = 1500;
 
@@ -72,8 +77,6 @@ struct Sight {
     left: DVector<f64>,
     /// Sum of their squares, as the noise has it.
     total: f64,
-    lowest: f64,
-    highest: f64,
     /// That readings are multiples of, raw, where they are.
     step: Option<f64>,
     /// Whether the noise is that beside all errors: else it is taken for what is left, errors included.
@@ -103,9 +106,7 @@ impl Normal {
         let known = |k: usize| variance[k].sqrt() <= sigma * size(set[k]);
         (least > INDEPENDENT && (0..p).all(known)).then(|| root.solve(&with_left).dot(&with_left))
     }
-}
 
-impl Normal {
     /// What all columns together explain, those that there are.
     fn explains_with_ridge(&self) -> Option<f64> {
         let p = self.with_left.len();
@@ -183,25 +184,20 @@ impl Sight {
         }
         let mut readings = search.by_dwell.readings(moments);
         readings.retain(|r| r.mean.is_finite() && r.sd.is_finite());
-        let range = |(a, b): (f64, f64), r: &RowReading| (a.min(r.mean), b.max(r.mean));
-        let (lowest, highest) = readings
-            .iter()
-            .fold((f64::INFINITY, f64::NEG_INFINITY), range);
+        // With all covariances it is across the model already; without them not quite, and a column nearly in the model would seem to
+        // explain what is in it.
+        let model = basis(&weighted);
+        let left = DVector::from_fn(n, |i, _| pull[(i, 0)] / root[i]);
+        let left = &left - &model * model.tr_mul(&left);
         Some(Self {
-            left: DVector::from_fn(n, |i, _| pull[(i, 0)] / root[i]),
-            model: basis(&weighted).transpose(),
+            left,
+            model: model.transpose(),
             root,
             total,
             readings,
-            lowest,
-            highest,
             step: rows.step,
             noise_known: false,
         })
-    }
-
-    fn range(&self) -> f64 {
-        self.highest - self.lowest
     }
 
     /// Of one axis alone.
@@ -217,16 +213,16 @@ impl Sight {
     }
 
     /// What some bits of a converter cost: each its coefficient, all that they are chosen, and weight and zero what it takes to name them,
-    /// which is the more the more often the finest bit turns. A single step pays for neither, and a usual weight for itself. Without this a
+    /// which is the more the more often the finest bit turns. A single step pays for neither, and nobody for a usual weight. Without this a
     /// step of ten noises took on two fine bits, for a deviance of 20 that the best of 1024 zeros has by chance, and they drew it from its place.
     /// At first sight errors are most of the noise, all bits but the largest are hidden, and none is asked for more than its coefficient.
-    fn price(&self, bits: &[usize], weight: f64) -> f64 {
+    fn price(&self, bits: &[usize], weight: f64, range: f64) -> f64 {
         let coefficients = COEFFICIENT * bits.len() as f64;
         if !self.noise_known {
             return coefficients;
         }
         let finest = bits.iter().max().map_or(0, |bit| *bit as i32);
-        let turns = self.range() / (weight * 0.5_f64.powi(finest));
+        let turns = range / (weight * 0.5_f64.powi(finest));
         let named = if self.is_usual(weight) { 2.0 } else { 4.0 };
         let choice = 2.0 * ln_binomial(BITS as u64, bits.len() as u64);
         coefficients + choice + named * turns.max(1.0).ln()
@@ -234,15 +230,18 @@ impl Sight {
 
     /// The same of the converters of a candidate.
     fn price_of(&self, candidate: &Candidate) -> f64 {
-        let of = |first: usize, axis: usize| {
+        let of = |first: usize, axis: usize, readings: &[RowReading]| {
             let own = candidate.active.iter().filter_map(|k| k.checked_sub(first));
             let bits: Vec<usize> = own.filter(|bit| *bit < BITS).collect();
             match candidate.codes[axis] {
-                Some(converter) if !bits.is_empty() => self.price(&bits, converter.weight),
+                Some(converter) if !bits.is_empty() => {
+                    self.price(&bits, converter.weight, range(readings))
+                }
                 _ => 0.0,
             }
         };
-        of(0, 0) + (0..3).map(|axis| of(first_of(axis), axis)).sum::<f64>()
+        let each = (0..3).map(|axis| of(first_of(axis), axis, &self.of(Some(axis))));
+        of(0, 0, &self.readings) + each.sum::<f64>()
     }
 
     /// Normal equations of so many functions of the reading, which `values` writes.
@@ -272,7 +271,17 @@ impl Sight {
             with_left.axpy(self.left[row], &of_row, 1.0);
             in_model.ger(1.0, &self.model.column(row), &of_row, 1.0);
         }
+        let before = matrix.diagonal();
         matrix.gemm_tr(-1.0, &in_model, &in_model, 1.0);
+        // Of what the model spans, as a bit that never turns, rounding leaves a little.
+        for k in 0..count {
+            if matrix[(k, k)] > ROUNDING * before[k] {
+                continue;
+            }
+            matrix.row_mut(k).fill(0.0);
+            matrix.column_mut(k).fill(0.0);
+            with_left[k] = 0.0;
+        }
         Normal { matrix, with_left }
     }
 
@@ -300,13 +309,14 @@ impl Sight {
         let normal = self.bits(readings, &converter, &all);
         let excited = |k: &usize| normal.matrix[(*k, *k)].max(0.0).sqrt() * TYPICAL > EXCITED;
         let offered: Vec<usize> = (0..BITS).filter(excited).collect();
+        let range = range(readings);
         let sets = (1..1usize << offered.len()).filter_map(|set| {
             let bits: Vec<usize> = (0..offered.len())
                 .filter(|k| set & (1 << k) != 0)
                 .map(|k| offered[k])
                 .collect();
             let drop = self.drop(normal.explains(&bits, TYPICAL / EXCITED)?);
-            let price = self.price(&bits, converter.weight);
+            let price = self.price(&bits, converter.weight, range);
             Some(Hypothesis {
                 converter,
                 bits,
@@ -322,8 +332,9 @@ impl Sight {
     /// may turn where this one turns on or where it turns off.
     fn above(&self, readings: &[RowReading], weight: f64, zero: f64) -> Converter {
         let mut converter = Converter::of(weight, zero);
+        let (lowest, highest) = ends(readings);
         for level in 1..BITS {
-            if converter.weight >= self.range() {
+            if converter.weight >= highest - lowest {
                 break;
             }
             let either = [0.0, converter.weight]
@@ -331,17 +342,14 @@ impl Sight {
             let bits: Vec<usize> = (0..=level).collect();
             let explains = |c: &Converter| {
                 let normal = self.bits(readings, c, &bits);
-                // Bits that do not turn in the range are no columns.
-                let seen = |k: &usize| normal.matrix[(*k, *k)] > 1e-12;
-                let seen: Vec<usize> = bits.iter().copied().filter(seen).collect();
-                normal.explains(&seen, f64::INFINITY).unwrap_or(0.0)
+                normal.explains_with_ridge().unwrap_or(0.0)
             };
             let [a, b] = either.each_ref().map(explains);
             converter = if b > a { either[1] } else { either[0] };
         }
         // Code 0 below all readings.
         let period = 2.0 * converter.weight;
-        converter.zero -= period * ((converter.zero - self.lowest) / period).ceil();
+        converter.zero -= period * ((converter.zero - lowest) / period).ceil();
         converter
     }
 
@@ -356,7 +364,8 @@ impl Sight {
     fn refine(&self, readings: &[RowReading], from: Hypothesis) -> Hypothesis {
         let mut best = from;
         let finest = best.bits.last().copied().unwrap_or(0);
-        let middle = 0.5 * (self.lowest + self.highest);
+        let (lowest, highest) = ends(readings);
+        let middle = 0.5 * (lowest + highest);
         let usual = self.is_usual(best.converter.weight);
         let mut step = 0.25;
         while step > 0.01 {
@@ -368,7 +377,7 @@ impl Sight {
             };
             // About the middle of the readings: else a weight would have to be refined together with the zero.
             let scaled = |by: f64| {
-                let factor = 1.0 + 2.0 * by / self.range().max(weight);
+                let factor = 1.0 + 2.0 * by / (highest - lowest).max(weight);
                 Converter {
                     weight: weight * factor,
                     zero: middle - (middle - zero) * factor,
@@ -393,9 +402,14 @@ impl Sight {
         best
     }
 
-    /// With weight, zero and bits as they fit best together, and how many bits there were to choose from.
+    /// With weight, zero and bits as they fit best together, and how many bits there were to choose from; `None` of what no device could
+    /// remove.
     fn settled(&self, readings: &[RowReading], from: Hypothesis) -> Option<(Hypothesis, usize)> {
         let refined = self.refine(readings, from);
+        let Converter { weight, zero, .. } = refined.converter;
+        if zero.abs() > FARTHEST_ZERO * weight {
+            return None;
+        }
         // With weight and zero in their places other bits may be seen.
         let (chosen, offered) = self.choose(readings, refined.converter)?;
         let refined = self.refine(readings, chosen);
@@ -410,7 +424,7 @@ impl Sight {
         let Converter { weight, zero, .. } = from.converter;
         let finest = from.bits.iter().max().map_or(0, |bit| *bit as i32);
         let most = 0.5 * weight * 0.5_f64.powi(finest);
-        let step = (0.5 * median_sd(readings)).max(most / PLACES);
+        let step = (0.5 * median_sd(readings)).max(most / affordable(readings, PLACES) as f64);
         let at = |by: f64| {
             let converter = Converter {
                 zero: zero + by,
@@ -445,18 +459,22 @@ impl Sight {
             reaches(OUTSIDE) - 0.5 * step,
             reaches(1.0 - OUTSIDE) + 0.5 * step,
         );
-        let converter = Converter {
-            zero: zero + 0.5 * (up + down),
-            zero_within: 0.5 * (up - down),
+        let middle = 0.5 * (up + down);
+        let moved = |by: f64, within: f64| Converter {
+            zero: zero + by,
+            zero_within: within,
             ..from.converter
         };
-        match self.with(readings, &from, &converter) {
-            Some(drop) => Hypothesis {
-                converter,
-                drop,
-                ..from
-            },
-            None => from,
+        // Between two places that do as well the middle may not.
+        let there = at(middle).filter(|drop| *drop > from.drop - VALLEY);
+        let (converter, drop) = match there {
+            Some(drop) => (moved(middle, 0.5 * (up - down)), drop),
+            None => (moved(0.0, up.max(-down)), from.drop),
+        };
+        Hypothesis {
+            converter,
+            drop,
+            ..from
         }
     }
 
@@ -464,11 +482,9 @@ impl Sight {
     /// were looked at.
     fn first_sight(&self, readings: &[RowReading]) -> (Vec<(f64, Converter)>, f64) {
         let sd = median_sd(readings);
-        let cycle = 1.0 / (OVERSAMPLED * self.range());
-        let most = (EVALUATIONS / readings.len().max(1)).clamp(FEWEST_PERIODS, PERIODS);
-        let finest = (FINEST / sd / cycle).min(most as f64);
-        let first = (0.5 / self.range() / cycle) as usize;
-        let waves: Vec<(f64, Converter)> = (first.max(1)..finest as usize)
+        let cycle = 1.0 / (OVERSAMPLED * range(readings));
+        let finest = (FINEST / sd / cycle).min(affordable(readings, PERIODS) as f64);
+        let waves: Vec<(f64, Converter)> = (1..finest as usize)
             .into_par_iter()
             .filter_map(|k| self.wave(readings, k as f64 * cycle))
             .collect();
@@ -493,17 +509,19 @@ impl Sight {
         let Some(step) = self.step else {
             return Vec::new();
         };
-        let weight = step * (self.range() / step).log2().ceil().exp2();
+        let (lowest, highest) = ends(readings);
+        let weight = step * ((highest - lowest) / step).log2().ceil().exp2();
         let all: [usize; BITS] = std::array::from_fn(|bit| bit);
+        let zeros = affordable(readings, ZEROS);
         let at = |k: usize| {
             // Bits of a zero one weight further are the same, but for the sign of the first.
-            let zero = self.lowest - weight * (k + 1) as f64 / ZEROS as f64;
+            let zero = lowest - weight * (k + 1) as f64 / zeros as f64;
             let converter = Converter::of(weight, zero);
             let normal = self.bits(readings, &converter, &all);
             Some((self.drop(normal.explains_with_ridge()?), converter))
         };
-        let zeros: Vec<_> = (0..ZEROS).into_par_iter().filter_map(at).collect();
-        peaks(zeros, FOLLOWED_ZEROS)
+        let all: Vec<_> = (0..zeros).into_par_iter().filter_map(at).collect();
+        peaks(all, FOLLOWED_ZEROS)
     }
 
     fn wave(&self, readings: &[RowReading], frequency: f64) -> Option<(f64, Converter)> {
@@ -522,20 +540,20 @@ impl Sight {
 
     fn step(&self, readings: &[RowReading], at: f64) -> Option<(f64, Converter)> {
         // So heavy that it turns nowhere else.
-        let weight = 2.0 * self.range();
+        let weight = 2.0 * range(readings);
         let zero = at - weight;
         let converter = Converter::of(weight, zero);
         let normal = self.normal(readings, 1, |r, out| {
             out[0] = converter.share(0, r.mean, r.sd);
         });
         let own = normal.matrix[(0, 0)];
-        (own > 1e-12).then(|| (self.drop(normal.with_left[0].powi(2) / own), converter))
+        (own > 0.0).then(|| (self.drop(normal.with_left[0].powi(2) / own), converter))
     }
 
     /// Errors by the code of an axis, or of all alike. `None` where there are no readings to speak of.
     fn look(&self, axis: Option<usize>) -> Option<Outcome> {
         let readings = self.of(axis);
-        if !(self.range() > 0.0) {
+        if !(range(&readings) > 0.0) {
             return None;
         }
         let (followed, places) = self.first_sight(&readings);
@@ -555,18 +573,23 @@ impl Sight {
                 converter,
                 bits: vec![0],
                 drop,
-                price: self.price(&[0], converter.weight),
+                price: self.price(&[0], converter.weight, range(&readings)),
             },
             places,
             offered: 1,
             p,
         };
-        if p > PROMISING {
+        // With all bits at work no single wave may stand out; a usual weight is tried all the same where the noise is known.
+        if p > PROMISING && !self.noise_known {
             return Some(first);
         }
         // At first sight it is enough to know whether codes do better than what else there is; they are looked for again.
         let (usual, places, refined) = match self.noise_known {
-            true => (self.usual(&readings), places + ZEROS as f64, REFINED),
+            true => (
+                self.usual(&readings),
+                places + affordable(&readings, ZEROS) as f64,
+                REFINED,
+            ),
             false => (Vec::new(), places, 1),
         };
         let mut whole: Vec<Converter> = followed
@@ -585,7 +608,8 @@ impl Sight {
             .filter_map(|chosen| self.settled(&readings, chosen));
         let found = all.max_by(|a, b| a.0.score().total_cmp(&b.0.score()));
         let Some((best, offered)) = found else {
-            return Some(first);
+            let best = self.centred(&readings, first.best.clone());
+            return Some(Outcome { best, ..first });
         };
         let choices = places * (offered as f64).exp2();
         let p = chance(best.drop, best.bits.len() as f64, choices);
@@ -596,6 +620,24 @@ impl Sight {
             p,
         })
     }
+}
+
+/// So many places, or as many as so many readings leave time for: of periods the longest.
+fn affordable(readings: &[RowReading], places: usize) -> usize {
+    (EVALUATIONS / readings.len().max(1)).clamp(FEWEST, places)
+}
+
+/// Lowest and highest reading.
+fn ends(readings: &[RowReading]) -> (f64, f64) {
+    let wider = |(a, b): (f64, f64), r: &RowReading| (a.min(r.mean), b.max(r.mean));
+    readings
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), wider)
+}
+
+fn range(readings: &[RowReading]) -> f64 {
+    let (lowest, highest) = ends(readings);
+    highest - lowest
 }
 
 /// How far samples scatter in a dwell, raw.
@@ -695,30 +737,33 @@ impl Search<'_> {
         let mut again = one.clone();
         again.active.clear();
         (again.converters, again.choices) = (1.0, 1.0);
-        for axis in 0..3 {
+        for axis in 0..if shared { 1 } else { 3 } {
             let axes = if shared { None } else { Some(axis) };
-            let found = sight.look(axes)?;
+            let readings = sight.of(axes);
             let as_it_was = one.codes[axis].and_then(|converter| {
-                let readings = sight.of(axes);
                 let (chosen, _) = sight.choose(&readings, converter)?;
-                Some(sight.settled(&readings, chosen)?.0)
+                sight.settled(&readings, chosen)
             });
-            let promising = (found.p < PROMISING).then(|| found.best.clone());
-            let best = as_it_was.into_iter().chain(promising);
-            let Some(best) = best.max_by(|a, b| a.score().total_cmp(&b.score())) else {
-                again.codes[axis] = None;
+            let found = sight.look(axes);
+            let places = found.as_ref().map_or(1.0, |f| f.places);
+            let promising = found.filter(|f| f.p < PROMISING);
+            let promising = promising.map(|f| (f.best, f.offered));
+            let all = as_it_was.into_iter().chain(promising);
+            let best = all.max_by(|a, b| a.0.score().total_cmp(&b.0.score()));
+            again.codes[axis] = best.as_ref().map(|(best, _)| best.converter);
+            let Some((best, offered)) = best else {
                 continue;
             };
-            again.converters *= found.places;
-            again.choices *= found.places * (found.offered as f64).exp2();
-            if shared {
-                again.codes = [Some(best.converter); 3];
-                again.active = best.bits;
-                break;
-            }
-            again.codes[axis] = Some(best.converter);
-            let bits = best.bits.iter().map(|bit| first_of(axis) + bit);
-            again.active.extend(bits);
+            again.converters *= places;
+            again.choices *= places * (offered as f64).exp2();
+            let first = if shared { 0 } else { first_of(axis) };
+            again.active.extend(best.bits.iter().map(|bit| first + bit));
+        }
+        if shared {
+            again.codes = [again.codes[0]; 3];
+        }
+        if again.active.is_empty() {
+            return None;
         }
         let dearer = sight.price_of(&again) - sight.price_of(one);
         Some((again, dearer))

@@ -8,7 +8,7 @@ use crate::diagnose::decision::{Accepted, Decision, Split};
 use crate::diagnose::next::Next;
 use crate::diagnose::{SensorDiagnosis, Verdict};
 use crate::fit::Figure;
-use crate::report::text::{readable, three, warn, wrap};
+use crate::report::text::{plus_minus, readable, three, warn, wrap};
 
 /// Result of `mimu diagnose`.
 pub fn diagnosis_text(report: &DiagnosisReport) -> String {
@@ -189,18 +189,11 @@ fn effect(out: &mut String, a: &Accepted, shown: &impl Fn(f64) -> String) {
 /// A converter in words.
 pub(super) fn converter(c: &ConverterTable) -> String {
     format!(
-        "converter of {}: bit 0 turns every {} raw from {} ± {} on; errors are in units of the first",
+        "converter of {}, raw: bit 0 turns every {} from {} on; errors are in units of bit 0",
         c.axes,
-        plain(c.weight_of_bit_0_raw),
-        plain(c.reading_of_code_0_raw),
-        three(c.within_raw)
+        three(c.weight_of_bit_0_raw),
+        plus_minus(c.reading_of_code_0_raw, c.within_raw)
     )
-}
-
-/// Six significant digits.
-fn plain(value: f64) -> String {
-    let digits = 5 - value.abs().max(1e-9).log10().floor() as i32;
-    format!("{value:.*}", digits.clamp(0, 12) as usize)
 }
 
 /// How a law on no list does in the place of an effect; `worse` in deviance.
