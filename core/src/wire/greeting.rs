@@ -116,7 +116,7 @@ pub const EFFECTS: [&str; 22] = [
 /// Bits of those that are no effects by name, but [`Effect::code`].
 const CODES: u32 = 0b11 << 20;
 
-/// The bits of the effects that this build removes: beside [`CODES`] found by asking for each, so that they cannot be out of date.
+/// The bits of the effects that this build removes: those by name are found by asking for each, so that they cannot be out of date.
 pub fn effects_of_this_build() -> u32 {
     // None takes no numbers at all, so that a known one is refused for their count.
     let known = |id| !matches!(Effect::<f32>::named(id, &[], None), Err(Refused::Unknown));
