@@ -31,8 +31,8 @@ use triad::{Memory, Slowly, Triad, lagged, put};
 
 /// Temperature that warmth counts from, °C.
 pub const REFERENCE_C: f64 = 25.0;
-/// Weights of bit 0 that the reading of code 0 may be away from a reading of 0: farther, rounding in single precision is more than a
-/// converter's codes are kept away from their turns.
+/// Weights of bit 0 that the reading of code 0 may be away from a reading of 0: farther, rounding in single precision comes near
+/// what a converter's codes are kept away from their turns by.
 pub const FARTHEST_ZERO: f64 = 64.0;
 /// Lag of the filter by which the rate of change of the temperature is taken, s: unfiltered it would be noise.
 pub const RATE_LAG_S: f64 = 30.0;
