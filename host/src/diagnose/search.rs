@@ -44,7 +44,7 @@ pub struct Chosen {
     pub p: f64,
     /// By how much the deviance grows without it.
     pub worth: f64,
-    /// Others that would do nearly as well in its place, and by how much worse their deviance is.
+    /// Others that would do nearly as well in its place, and by how much worse their score is.
     pub alternatives: Vec<(String, f64)>,
 }
 
@@ -335,7 +335,7 @@ impl<'a> Search<'a> {
 
     /// The effects that the rows ask for.
     ///
-    /// A named effect goes before a term found from the data unless the term is better by 12 in deviance: with two thousand terms
+    /// A named effect goes before a term found from the data unless the term is better by 12 in score: with two thousand terms
     /// some product is always near an effect.
     pub fn run(&self) -> Option<(Vec<Chosen>, Fitted)> {
         let mut chosen: Vec<Chosen> = Vec::new();
@@ -438,9 +438,9 @@ const SETTLED: usize = 3;
 /// What a coefficient costs.
 const COEFFICIENT: f64 = 4.0;
 
-/// Deviance by which a term found from the data has to be better than an effect with a name.
+/// Score by which a term found from the data has to be better than an effect with a name.
 const PREFERENCE: f64 = 12.0;
-/// Deviance within which two candidates are told to be confused: odds of one to four hundred.
+/// Score within which two candidates are told to be confused: odds of one to four hundred.
 const CONFUSED: f64 = 12.0;
 
 /// Columns of size 1.
