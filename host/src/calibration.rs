@@ -1,11 +1,13 @@
 //! The calibration file: TOML that a program reads and a person can apply with a pocket calculator.
 
 mod effect;
+mod on_device;
 mod staging;
 mod writing;
 
 pub use effect::{CoefficientTable, ConverterTable, EffectTable, FormTable};
-pub(crate) use effect::{Condition, depends, variable as device_variable};
+pub(crate) use effect::{Condition, depends};
+pub(crate) use on_device::{NO_SENSE, OnDevice, What};
 pub use staging::{Staged, stage};
 pub use writing::{figure, to_toml};
 
@@ -271,7 +273,7 @@ impl Calibration {
     /// The same as the device removes it, up to N effects of each triad that run with every sample and N that do not.
     /// Refused, by its id, is one that this build of `core` cannot remove.
     pub fn core_effects<T: RealField + Copy, const N: usize>(&self) -> Result<Effects<T, N>> {
-        effect::core_effects(self)
+        on_device::core_effects(self)
     }
 
     /// The table of `sensor`.

@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 use mimu::calibration::{Calibration, EffectTable, stage, to_toml};
-use mimu::diagnose::{Recordings, diagnose, next};
-use mimu::error::Result;
+use mimu::diagnose::{Diagnosis, Recordings, diagnose, next};
+use mimu::error::{Error, Result};
 use mimu::fit::{Method, Options};
 use mimu::report::{self, DiagnosisReport, Made};
 use mimu::verify::verify;
@@ -74,7 +74,7 @@ pub fn run(args: &DiagnoseArgs) -> Result<()> {
         None => None,
     };
     let first = all.remove(0);
-    let diagnosis = diagnose(
+    let mut diagnosis = diagnose(
         Recordings {
             first,
             more: all,
@@ -87,21 +87,38 @@ pub fn run(args: &DiagnoseArgs) -> Result<()> {
         .round(jiff::Unit::Second)
         .unwrap_or_default()
         .to_string();
-    let known = given.map_or(Vec::new(), |g| g.effect_tables);
+    let known = known(given.as_ref(), &mut diagnosis);
     let found = diagnosis
         .sensors
         .iter()
         .flat_map(|s| &s.decision.accepted)
         .filter(|a| a.chosen.candidate.is_error())
         .map(EffectTable::from);
-    let effects: Vec<EffectTable> = known.iter().cloned().chain(found).collect();
+    let mut effects = known.clone();
+    for table in found {
+        table.join(&mut effects).map_err(|problem| {
+            let place = args
+                .calibration
+                .as_ref()
+                .map_or_else(String::new, |p| p.display().to_string());
+            let remedy = "diagnose with a calibration without it";
+            Error::new(place, problem, remedy)
+        })?;
+    }
     let after = to_toml(&diagnosis.after, &effects, &now);
     let mut judged = None;
     if let (Some(other), Some(path)) = (second, &args.verify) {
         // By the files that they would be: what is judged is what is given away.
         let before = to_toml(&diagnosis.before, &known, &now);
         let by = |text: &str| verify(&other, &Calibration::parse(text, "calibration")?);
-        judged = Some((path.display().to_string(), [by(&before)?, by(&after)?]));
+        let path = path.display();
+        match (by(&before), by(&after)) {
+            (Ok(before), Ok(after)) => judged = Some((path.to_string(), [before, after])),
+            (Err(refusal), _) | (_, Err(refusal)) => {
+                let warning = format!("{path} cannot judge the calibration: {refusal}");
+                diagnosis.after.warnings.push(warning);
+            }
+        }
     }
     let mut files = Vec::new();
     if let Some(path) = &args.output {
@@ -144,6 +161,24 @@ pub fn run(args: &DiagnoseArgs) -> Result<()> {
         &report::diagnosis_json(&found),
         files,
     )
+}
+
+/// The effects that the unit is known to have. Those of a sensor that the recordings lack have no matrix in the new file.
+fn known(given: Option<&Calibration>, diagnosis: &mut Diagnosis) -> Vec<EffectTable> {
+    let Some(given) = given else {
+        return Vec::new();
+    };
+    let after = &mut diagnosis.after;
+    let pairs = given.effects().iter().zip(&given.effect_tables);
+    let (kept, lost): (Vec<_>, Vec<_>) =
+        pairs.partition(|(effect, _)| after.sensor(effect.candidate.sensor).is_some());
+    for (effect, table) in lost {
+        after.warnings.push(format!(
+            "{} of the calibration is not in the new one, as the {} is not recorded",
+            table.id, effect.candidate.sensor
+        ));
+    }
+    kept.into_iter().map(|(_, table)| table.clone()).collect()
 }
 
 /// The command as it was typed, without the path of the program.

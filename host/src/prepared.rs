@@ -36,6 +36,17 @@ impl Prepared {
         let condensed = Condensed::read(recording, integrate, progress)?;
         let place = recording.samples.display().to_string();
         refuse_dead_channels(&condensed, &place)?;
+        if let (Some(power), Some(first)) = (manifest.power_on_s, condensed.blocks.first())
+            && power > first.start_s
+        {
+            let problem = format!(
+                "power_on_s is {power:?} s, and the first sample at {:?} s",
+                first.start_s
+            );
+            let remedy =
+                "write the t_s at which the power came to recording.toml, or leave the key out";
+            return Err(Error::new(place, problem, remedy));
+        }
         let dwells = Dwells::find(&condensed, &manifest, still_factor).map_err(|e| Error {
             place: format!("{place}, {}", e.place),
             ..e
@@ -83,6 +94,12 @@ impl Prepared {
                 })
             })
             .collect()
+    }
+
+    /// When the power came, on the clock of the recording, s: what the manifest says, or the first sample.
+    pub fn power_on_s(&self) -> f64 {
+        let first = || self.condensed.blocks.first().map_or(0.0, |b| b.start_s);
+        self.manifest.power_on_s.unwrap_or_else(first)
     }
 
     /// Variances of the size of specific force over each of `poses` by noise, (m/s²)².

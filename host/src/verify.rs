@@ -3,8 +3,8 @@
 use mimu_core::compensation::Affine;
 use nalgebra::{Matrix3, Vector3};
 
-use crate::calibration::{Calibration, Condition, depends};
-use crate::diagnose::removal::remove;
+use crate::calibration::Calibration;
+use crate::diagnose::removal::{removable, remove};
 use crate::dwell::Sensor;
 use crate::error::{Error, Result};
 use crate::estimate::rotation::{Turn, direction_error};
@@ -126,38 +126,7 @@ fn without_effects(prepared: &Prepared, calibration: &Calibration) -> Result<Opt
     if effects.is_empty() {
         return Ok(None);
     }
-    let dwells = &prepared.dwells.list;
-    let mut blocks = dwells.iter().enumerate().flat_map(|(i, dwell)| {
-        let from = match (prepared.manifest.reference, i.checked_sub(1)) {
-            // By hand the turns are judged too, and they lie between the dwells.
-            (Reference::Gravity, Some(before)) => dwells[before].blocks.end,
-            _ => dwell.blocks.start,
-        };
-        &prepared.condensed.blocks[from..dwell.blocks.end]
-    });
-    let cold = blocks.find(|b| !b.temp_c.mean.is_finite());
-    for effect in effects {
-        let sensor = effect.candidate.sensor;
-        let lacks = |problem: String| {
-            let problem = format!("{} cannot be removed: {problem}", effect.candidate.id());
-            let remedy = "record it, or use a calibration without this effect";
-            Err(Error::new(&prepared.place, problem, remedy))
-        };
-        if !prepared.has(sensor) {
-            continue;
-        }
-        for (other, condition) in [
-            (Sensor::Gyro, Condition::Rate),
-            (Sensor::Accel, Condition::Force),
-        ] {
-            if !prepared.has(other) && depends(effect, condition) {
-                return lacks(format!("the recording has no {other} columns"));
-            }
-        }
-        if let (Some(block), true) = (cold, depends(effect, Condition::Temperature)) {
-            return lacks(format!("temp_c is missing at {} s", block.start_s));
-        }
-    }
+    removable(prepared, effects)?;
     let [gyro, accel] = Sensor::BOTH.map(|s| calibration.inverse(s));
     let cleaned = remove(prepared, gyro.as_ref(), accel.as_ref(), effects);
     let singular = || {

@@ -1,20 +1,16 @@
-//! Effects in a calibration file, and as the device takes them.
+//! Effects in a calibration file.
 
 use std::fmt::Write as _;
 
-use mimu_core::RealField;
-use mimu_core::effects::Variable as DeviceVariable;
-use mimu_core::effects::{
-    Effect as DeviceEffect, Effects, FARTHEST_ZERO, Refused, Sensor as DeviceSensor,
-};
-use nalgebra::{Vector3, convert};
+use mimu_core::effects::FARTHEST_ZERO;
+use nalgebra::Vector3;
 use serde::Deserialize;
 
 use super::Calibration;
 use super::writing::{number, quoted};
-use crate::diagnose::candidate::{Candidate, Codes, Kind, Monomial, OfConverter, Variable};
+use crate::diagnose::candidate::{Candidate, Codes, Kind, Monomial, Variable};
 use crate::diagnose::decision::Accepted;
-use crate::diagnose::effect::{Effect, Moment, Reading, Scope};
+use crate::diagnose::effect::{Effect, Moment, Reading};
 use crate::diagnose::library;
 use crate::diagnose::library::readout::Converter;
 use crate::diagnose::removal::{Removed, errors};
@@ -70,8 +66,8 @@ pub struct ConverterTable {
     pub weight_of_bit_0_raw: f64,
     /// Reading of its code 0, raw.
     pub reading_of_code_0_raw: f64,
-    /// It is known to within so much, raw, with 95 %.
-    pub within_raw: f64,
+    /// The last is known to within so much, raw, with 95 %.
+    pub reading_of_code_0_within_raw: f64,
 }
 
 impl ConverterTable {
@@ -81,7 +77,7 @@ impl ConverterTable {
             axes: axes.into(),
             weight_of_bit_0_raw: converter.weight,
             reading_of_code_0_raw: converter.zero,
-            within_raw: converter.zero_within,
+            reading_of_code_0_within_raw: converter.zero_within,
         };
         match codes {
             [Some(x), Some(y), Some(z)] if x == y && y == z => vec![table("xyz", x)],
@@ -108,7 +104,7 @@ impl ConverterTable {
                 ));
             }
             let (weight, zero) = (table.weight_of_bit_0_raw, table.reading_of_code_0_raw);
-            let within = table.within_raw;
+            let within = table.reading_of_code_0_within_raw;
             let farthest = FARTHEST_ZERO * weight;
             let wrong = if !(weight > 0.0 && weight.is_finite()) {
                 Some((
@@ -124,7 +120,7 @@ impl ConverterTable {
                 Some(("reading_of_code_0_raw", zero, why))
             } else if !(within >= 0.0 && within.is_finite()) {
                 Some((
-                    "within_raw",
+                    "reading_of_code_0_within_raw",
                     within,
                     "has to be a number that is not negative".into(),
                 ))
@@ -221,6 +217,34 @@ impl EffectTable {
         }
     }
 
+    /// Adds it to the effects of a unit. One that is known there was taken out before this was found, so that it is what is left of it:
+    /// of the same law the coefficients add up. Another time constant is another effect beside it; of codes an axis has one converter.
+    /// Refused is a second one, in words.
+    pub fn join(self, all: &mut Vec<Self>) -> std::result::Result<(), String> {
+        let form = |t: &Self| t.form.as_ref().map(|f| f.value.to_bits());
+        let same = |t: &&mut Self| t.id == self.id && form(t) == form(&self);
+        let Some(known) = all.iter_mut().find(same) else {
+            all.push(self);
+            return Ok(());
+        };
+        if !self.converters.is_empty() {
+            return Err(format!(
+                "[[effect]] {}: what is left of it is of another converter, and an axis has one",
+                self.id
+            ));
+        }
+        for more in self.coefficients {
+            match known.coefficients.iter_mut().find(|c| c.name == more.name) {
+                Some(c) => {
+                    c.value += more.value;
+                    c.sigma = c.sigma.hypot(more.sigma);
+                }
+                None => known.coefficients.push(more),
+            }
+        }
+        Ok(())
+    }
+
     /// The effect that the table states, or what is wrong and what to do.
     fn removed(&self) -> std::result::Result<Removed, (String, &'static str)> {
         const OTHER_VERSION: &str = "use the version of mimu that wrote it";
@@ -257,7 +281,10 @@ impl EffectTable {
                 return Err((problem, EDITED));
             }
             (None, Some(f)) => {
-                let problem = format!("form {:?} is there, and this effect has none", f.name);
+                let problem = format!(
+                    "form {:?} is there, and an effect of this id has none now",
+                    f.name
+                );
                 return Err((problem, EDITED));
             }
         };
@@ -298,16 +325,16 @@ impl EffectTable {
             };
             return Err((problem.into(), EDITED));
         }
-        let alone = |axis: &usize| candidate.codes[*axis].is_none();
-        if let Some(axis) = candidate
-            .reads_code()
-            .then(|| candidate.axes())
-            .and_then(|all| all.into_iter().find(alone))
-        {
-            return Err((
-                format!("{} has coefficients and no converter", AXES[axis]),
-                EDITED,
-            ));
+        if candidate.reads_code() {
+            let axes = candidate.axes();
+            for (axis, name) in AXES.iter().enumerate() {
+                let problem = match (axes.contains(&axis), candidate.codes[axis]) {
+                    (true, None) => format!("{name} has coefficients and no converter"),
+                    (false, Some(_)) => format!("{name} has a converter and no coefficients"),
+                    _ => continue,
+                };
+                return Err((problem, EDITED));
+            }
         }
         Ok(Removed {
             candidate,
@@ -340,11 +367,11 @@ impl EffectTable {
             for c in &self.converters {
                 writeln!(
                     out,
-                    "  {{ axes = {}, weight_of_bit_0_raw = {}, reading_of_code_0_raw = {}, within_raw = {} }},",
+                    "  {{ axes = {}, weight_of_bit_0_raw = {}, reading_of_code_0_raw = {}, reading_of_code_0_within_raw = {} }},",
                     quoted(&c.axes),
                     number(c.weight_of_bit_0_raw),
                     number(c.reading_of_code_0_raw),
-                    number(c.within_raw)
+                    number(c.reading_of_code_0_within_raw)
                 )?;
             }
             writeln!(out, "]")?;
@@ -402,6 +429,7 @@ pub(crate) fn depends(effect: &Removed, on: Condition) -> bool {
     let mut at = Moment {
         session: 0,
         t_s: 1.0,
+        on_s: 1.0,
         duration_s: 1.0,
         rate: one,
         force: one,
@@ -446,7 +474,10 @@ pub(super) fn read(calibration: &Calibration, place: &str) -> Result<Vec<Removed
         let removed = table
             .removed()
             .map_err(|(problem, remedy)| refuse(problem, remedy))?;
-        if all.iter().any(|r| r.candidate.id() == table.id) {
+        if all
+            .iter()
+            .any(|r| r.candidate.id() == table.id && r.form == removed.form)
+        {
             return Err(refuse(
                 "it is there twice".into(),
                 "diagnose the recording again",
@@ -464,94 +495,6 @@ pub(super) fn read(calibration: &Calibration, place: &str) -> Result<Vec<Removed
             }
         }
         all.push(removed);
-    }
-    Ok(all)
-}
-
-/// An effect as `core` removes it: of converters of the axes one for each.
-fn on_device<T: RealField + Copy>(
-    removed: &Removed,
-) -> std::result::Result<Vec<DeviceEffect<T>>, Refused> {
-    let candidate = &removed.candidate;
-    let sensor = match candidate.sensor {
-        Sensor::Gyro => DeviceSensor::Gyro,
-        Sensor::Accel => DeviceSensor::Accel,
-    };
-    match &candidate.kind {
-        Kind::Effect(_) if candidate.reads_code() => {
-            let of = |c: OfConverter| {
-                let Converter { weight, zero, .. } = c.converter;
-                let errors = c.errors.map(convert);
-                DeviceEffect::code(sensor, c.axis, &errors, convert(weight), convert(zero))
-            };
-            let all = candidate.by_converter(&removed.values);
-            all.into_iter().map(of).collect()
-        }
-        Kind::Effect(effect) => {
-            // Those of a recording stand last, and no file has them.
-            let of_unit = effect
-                .coefficients
-                .iter()
-                .filter(|c| c.scope == Scope::Unit);
-            let mut all = vec![T::zero(); of_unit.count()];
-            for (k, value) in candidate.active.iter().zip(&removed.values) {
-                if let Some(slot) = all.get_mut(*k) {
-                    *slot = convert(*value);
-                }
-            }
-            let form = effect.form.map(|_| convert(removed.form));
-            Ok(vec![DeviceEffect::named(effect.id, &all, form)?])
-        }
-        Kind::Term(axis, monomial) => {
-            let variables: Vec<DeviceVariable> = monomial.0.iter().map(|v| variable(*v)).collect();
-            let value = removed.values.first().copied().unwrap_or_default();
-            let term = DeviceEffect::term(sensor, *axis, convert(value), &variables)?;
-            Ok(vec![term])
-        }
-        // A bias that has jumped once says nothing of the next recording.
-        Kind::Jump { .. } => Err(Refused::Unknown),
-    }
-}
-
-/// A variable of a term in the words of `core`.
-pub(crate) fn variable(of: Variable) -> DeviceVariable {
-    use DeviceVariable as Device;
-    let axes = |all: [Device; 3], axis: usize| all[axis];
-    match of {
-        Variable::Rate(i) => axes([Device::RateX, Device::RateY, Device::RateZ], i),
-        Variable::Force(i) => axes([Device::ForceX, Device::ForceY, Device::ForceZ], i),
-        Variable::Temperature => Device::Temperature,
-        Variable::TemperatureRate => Device::TemperatureRate,
-        Variable::Time => Device::Time,
-    }
-}
-
-/// The effects of a calibration as the device removes them; one that `core` lacks is refused by its id.
-pub(super) fn core_effects<T: RealField + Copy, const N: usize>(
-    calibration: &Calibration,
-) -> Result<Effects<T, N>> {
-    let place = format!("calibration of {:?}", calibration.device);
-    let model = |sensor: Sensor| {
-        calibration.inverse(sensor).ok_or_else(|| {
-            let problem = format!("there is no [{sensor}], and the device needs both");
-            Error::new(&place, problem, "calibrate both sensors")
-        })
-    };
-    let [gyro, accel] = [model(Sensor::Gyro)?, model(Sensor::Accel)?];
-    let singular = || Error::new(&place, "C is singular", "fit the recording again");
-    let mut all = Effects::new(&gyro, &accel).ok_or_else(singular)?;
-    for removed in calibration.effects() {
-        let parts = on_device(removed);
-        let pushed = parts.and_then(|all_of| all_of.into_iter().try_for_each(|e| all.push(e)));
-        pushed.map_err(|refused| {
-            let problem = match refused {
-                Refused::Full => format!("the device has no room for it: at most {N} of a kind"),
-                _ => "the device cannot remove it".to_string(),
-            };
-            let remedy = "update the device, or use the calibration without effects";
-            let id = removed.candidate.id();
-            Error::new(format!("{place}, [[effect]] {id}"), problem, remedy)
-        })?;
     }
     Ok(all)
 }

@@ -1,17 +1,14 @@
 //! A calibration file as the bytes that the device stores, and what stands in the way of it.
 
 use mimu_core::compensation::{Affine, Compensation};
-use mimu_core::effects::{Effect, REFERENCE_C, Sensor as DeviceSensor};
+use mimu_core::effects::{REFERENCE_C, Sensor as DeviceSensor};
 use mimu_core::stored::{self, MAX_LENGTH, NODES, ROOM, Record, Stored};
 use mimu_core::table::Node;
-use mimu_core::wire::{Capabilities, EFFECTS};
+use mimu_core::wire::Capabilities;
 use nalgebra::{Matrix3, Vector3};
 
 use super::who::{Who, unusable};
-use crate::calibration::{Calibration, device_variable};
-use crate::diagnose::candidate::{Kind, OfConverter};
-use crate::diagnose::library::readout::BITS;
-use crate::diagnose::removal::Removed;
+use crate::calibration::{Calibration, NO_SENSE, OnDevice, What};
 use crate::dwell::Sensor;
 use crate::error::{Error, Result};
 use crate::recording::RawUnit;
@@ -31,35 +28,6 @@ pub struct Image {
     pub warnings: Vec<String>,
 }
 
-/// An effect, or a converter of one, in the words of the device.
-#[derive(Debug, Clone)]
-struct OnDevice {
-    id: String,
-    sensor: DeviceSensor,
-    /// All coefficients of a named effect, or the one of a term; none of a converter.
-    numbers: Vec<f32>,
-    what: What,
-}
-
-#[derive(Debug, Clone)]
-enum What {
-    Named(Option<f32>),
-    Code(Code),
-    Term(u8, Vec<mimu_core::effects::Variable>),
-}
-
-/// Errors of a converter.
-#[derive(Debug, Clone)]
-struct Code {
-    axis: Option<u8>,
-    /// Weight of its first bit, V.
-    weight: f32,
-    /// Reading of its code 0, V.
-    zero: f32,
-    /// Of its bits, in units of the weight.
-    errors: [f32; BITS],
-}
-
 impl Image {
     /// The image of a calibration of one temperature; `place` is its file. Refused: raw readings in anything but volts, which are
     /// what the device measures, one triad alone, and effects that no device removes.
@@ -77,13 +45,8 @@ impl Image {
             ));
             REFERENCE_C
         });
-        let effects: Vec<OnDevice> = calibration
-            .effects()
-            .iter()
-            .map(|removed| on_device(removed, place))
-            .collect::<Result<Vec<_>>>()?
-            .concat();
-        let records: Vec<Record<'_>> = effects.iter().map(OnDevice::record).collect();
+        let effects = on_device(calibration, place)?;
+        let records: Vec<Record<'_>> = effects.iter().map(record).collect();
         let node = Node {
             temp_c: temp_c as f32,
             model,
@@ -136,12 +99,7 @@ impl Image {
                 return refuse(at(), problem);
             }
         }
-        let effects: Vec<OnDevice> = calibration
-            .effects()
-            .iter()
-            .map(|removed| on_device(removed, place))
-            .collect::<Result<Vec<_>>>()?
-            .concat();
+        let effects = on_device(calibration, place)?;
         check_room(&effects, usize::from(who.effects_room), place)?;
         let (nodes, room) = (
             self.node_temp_c.len(),
@@ -193,116 +151,61 @@ fn model(calibration: &Calibration, sensor: Sensor, place: &str) -> Result<Affin
     })
 }
 
-fn on_device(removed: &Removed, place: &str) -> Result<Vec<OnDevice>> {
-    let candidate = &removed.candidate;
-    let id = candidate.id();
-    let none = |problem: &str| {
-        Err(Error::new(
-            format!("{place}, [[effect]] {id}"),
-            problem,
-            "use the calibration without it, on the PC alone",
-        ))
-    };
-    let sensor = match candidate.sensor {
-        Sensor::Gyro => DeviceSensor::Gyro,
-        Sensor::Accel => DeviceSensor::Accel,
-    };
-    let (numbers, what) = match &candidate.kind {
-        Kind::Effect(effect) => {
-            if !EFFECTS.contains(&effect.id) {
-                return none("no device removes this effect");
-            }
-            if candidate.reads_code() {
-                let of = |c: OfConverter| OnDevice {
-                    id: id.clone(),
-                    sensor,
-                    numbers: Vec::new(),
-                    what: What::Code(Code {
-                        axis: c.axis.map(|axis| axis as u8),
-                        weight: c.converter.weight as f32,
-                        zero: c.converter.zero as f32,
-                        errors: c.errors.map(|e| e as f32),
-                    }),
-                };
-                let all = candidate.by_converter(&removed.values);
-                return Ok(all.into_iter().map(of).collect());
-            }
-            let mut all = vec![0.0; effect.coefficients.len()];
-            for (k, value) in candidate.active.iter().zip(&removed.values) {
-                all[*k] = *value as f32;
-            }
-            let form = effect.form.map(|_| removed.form as f32);
-            (all, What::Named(form))
-        }
-        Kind::Term(axis, monomial) => {
-            let variables = monomial.0.iter().map(|v| device_variable(*v)).collect();
-            let value = removed.values.first().copied().unwrap_or_default();
-            (vec![value as f32], What::Term(*axis as u8, variables))
-        }
-        Kind::Jump { .. } => {
-            return none("a bias that has jumped once says nothing of the time after it");
-        }
-    };
-    Ok(vec![OnDevice {
-        id,
-        sensor,
-        numbers,
-        what,
-    }])
+/// The effects of a calibration in the words of the device; refused by name is one that no device removes.
+fn on_device(calibration: &Calibration, place: &str) -> Result<Vec<OnDevice<f32>>> {
+    let parts = calibration.effects().iter().map(|removed| {
+        OnDevice::of(removed).map_err(|why| {
+            let at = format!("{place}, [[effect]] {}", removed.candidate.id());
+            Error::new(at, why, "use the calibration without it, on the PC alone")
+        })
+    });
+    Ok(parts.collect::<Result<Vec<_>>>()?.concat())
 }
 
-impl OnDevice {
-    fn record(&self) -> Record<'_> {
-        match &self.what {
-            What::Named(form) => Record::Named {
-                id: &self.id,
-                coefficients: &self.numbers,
-                form: *form,
-            },
-            What::Code(code) => Record::Code {
-                sensor: self.sensor,
-                axis: code.axis,
-                weight: code.weight,
-                zero: code.zero,
-                errors: &code.errors,
-            },
-            What::Term(axis, variables) => Record::Term {
-                sensor: self.sensor,
-                axis: *axis,
-                coefficient: self.numbers[0],
-                variables,
-            },
-        }
-    }
-
-    fn effect(&self) -> std::result::Result<Effect<f32>, mimu_core::effects::Refused> {
-        match &self.what {
-            What::Named(form) => Effect::named(&self.id, &self.numbers, *form),
-            What::Code(code) => Effect::code(
-                self.sensor,
-                code.axis.map(usize::from),
-                &code.errors,
-                code.weight,
-                code.zero,
-            ),
-            What::Term(axis, variables) => {
-                Effect::term(self.sensor, usize::from(*axis), self.numbers[0], variables)
-            }
-        }
+/// As it is stored.
+fn record(effect: &OnDevice<f32>) -> Record<'_> {
+    let sensor = effect.sensor;
+    match &effect.what {
+        What::Named { coefficients, form } => Record::Named {
+            id: &effect.id,
+            coefficients,
+            form: *form,
+        },
+        What::Code {
+            axis,
+            errors,
+            weight,
+            zero,
+        } => Record::Code {
+            sensor,
+            axis: axis.map(|axis| axis as u8),
+            weight: *weight,
+            zero: *zero,
+            errors,
+        },
+        What::Term {
+            axis,
+            coefficient,
+            variables,
+        } => Record::Term {
+            sensor,
+            axis: *axis as u8,
+            coefficient: *coefficient,
+            variables,
+        },
     }
 }
 
 /// Refuses the first effect that has no room among `room` of its triad and kind: with every sample, or with temperature and time only.
-fn check_room(effects: &[OnDevice], room: usize, place: &str) -> Result<()> {
+fn check_room(effects: &[OnDevice<f32>], room: usize, place: &str) -> Result<()> {
     let mut taken = [[0; 2]; 2];
     for effect in effects {
         let at = format!("{place}, [[effect]] {}", effect.id);
         let Ok(compiled) = effect.effect() else {
-            let problem = "its numbers make no sense to the device";
-            return Err(Error::new(at, problem, "diagnose the recording again"));
+            return Err(Error::new(at, NO_SENSE, "diagnose the recording again"));
         };
         // Of these each axis has room for one, and a file that has two for an axis was refused.
-        if matches!(effect.what, What::Code(..)) {
+        if matches!(effect.what, What::Code { .. }) {
             continue;
         }
         let triad = usize::from(effect.sensor == DeviceSensor::Accel);

@@ -357,7 +357,9 @@ impl Candidate {
 
     /// Whether its regressors move with temperature or time; found by moving them, so that no effect has to say it.
     pub fn is_slow(&self) -> bool {
-        self.moves_with(|at| (at.t_s, at.warm_c, at.late_c) = (200.0, 9.0, 6.0))
+        self.moves_with(|at| {
+            (at.t_s, at.on_s, at.warm_c, at.late_c) = (200.0, 200.0, 9.0, 6.0);
+        })
     }
 
     /// Whether its regressors change where `change` does that to a moment at 100 s, 5 °C above the reference, 4 °C behind the lag.
@@ -365,6 +367,7 @@ impl Candidate {
         let early = Moment {
             session: 0,
             t_s: 100.0,
+            on_s: 100.0,
             duration_s: 1.0,
             rate: Vector3::new(0.3, 0.5, 0.7),
             force: Vector3::new(3.0, 5.0, 7.0),

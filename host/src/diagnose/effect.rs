@@ -16,6 +16,8 @@ pub struct Moment {
     pub session: usize,
     /// Middle of the stretch, s since the recording began.
     pub t_s: f64,
+    /// The same since the power came, as the device counts it; since the recording began where nobody knows.
+    pub on_s: f64,
     /// Its length, s.
     pub duration_s: f64,
     /// Rate, rad/s.

@@ -26,7 +26,7 @@ pub mod spread;
 use decision::{Decision, decide, noisier};
 use mimu_core::compensation::Affine;
 use nalgebra::{Matrix3, Vector3};
-use removal::{Removed, remove};
+use removal::{Removed, removable, remove};
 use rows::{Free, Rows, Session};
 
 use crate::calibration::Calibration;
@@ -154,6 +154,24 @@ impl Recordings<'_> {
                     ),
                     "give recordings that the same converter wrote",
                 ));
+            }
+        }
+        for sensor in Sensor::BOTH {
+            let table = self.given.and_then(|c| c.table(sensor));
+            if let Some(table) = table.filter(|t| t.raw_unit != raw_unit) {
+                return Err(Error::new(
+                    &self.first.place,
+                    format!(
+                        "raw_unit is {raw_unit}, and [{sensor}] of the calibration is for {}",
+                        table.raw_unit
+                    ),
+                    "give a calibration from recordings that the same converter wrote",
+                ));
+            }
+        }
+        if let Some(given) = self.given {
+            for recording in std::iter::once(&self.first).chain(self.later()) {
+                removable(recording, given.effects())?;
             }
         }
         let given = self.given.map(|c| (c.device.as_str(), "the calibration"));

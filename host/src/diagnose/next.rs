@@ -39,7 +39,7 @@ const ALTERNATIVES: usize = 3;
 pub struct Confused {
     /// That which was accepted, and the other.
     pub ids: [String; 2],
-    /// How much worse the other is, in deviance.
+    /// How much worse the other is, in score.
     pub difference: f64,
     /// What tells them apart, in words.
     pub experiment: String,

@@ -7,8 +7,11 @@ use super::candidate::Candidate;
 use super::effect::{Behind, Moment, Reading, warmth};
 use super::rows::{directions, elsewhere, late};
 use crate::blocks::Block;
-use crate::dwell::Sensor;
+use crate::calibration::{Condition, depends};
+use crate::dwell::{Fault, Sensor};
+use crate::error::{Error, Result};
 use crate::prepared::Prepared;
+use crate::recording::Reference;
 
 /// An effect with its numbers.
 #[derive(Debug, Clone)]
@@ -47,6 +50,43 @@ pub fn errors(effects: &[Removed], moments: &[Moment]) -> Vec<Vector3<f64>> {
         }
     }
     all
+}
+
+/// Refuses a recording that lacks what one of `effects` has to be known by where it is to be taken out: channels, or a temperature.
+pub fn removable(prepared: &Prepared, effects: &[Removed]) -> Result<()> {
+    let dwells = &prepared.dwells.list;
+    let mut blocks = dwells.iter().enumerate().flat_map(|(i, dwell)| {
+        let from = match (prepared.manifest.reference, i.checked_sub(1)) {
+            // By hand the turns are judged too, and they lie between the dwells.
+            (Reference::Gravity, Some(before)) => dwells[before].blocks.end,
+            _ => dwell.blocks.start,
+        };
+        &prepared.condensed.blocks[from..dwell.blocks.end]
+    });
+    let cold = blocks.find(|b| !b.temp_c.mean.is_finite());
+    for effect in effects {
+        let sensor = effect.candidate.sensor;
+        let lacks = |problem: String| {
+            let problem = format!("{} cannot be removed: {problem}", effect.candidate.id());
+            let remedy = "record it, or use a calibration without this effect";
+            Err(Error::new(&prepared.place, problem, remedy))
+        };
+        if !prepared.has(sensor) {
+            continue;
+        }
+        for (other, condition) in [
+            (Sensor::Gyro, Condition::Rate),
+            (Sensor::Accel, Condition::Force),
+        ] {
+            if !prepared.has(other) && depends(effect, condition) {
+                return lacks(format!("the recording has no {other} columns"));
+            }
+        }
+        if let (Some(block), true) = (cold, depends(effect, Condition::Temperature)) {
+            return lacks(format!("temp_c is missing at {} s", block.start_s));
+        }
+    }
+    Ok(())
 }
 
 /// A recording with `effects` taken out of the readings: of each triad, given with its inverse model, in the raw domain. `None` if a
@@ -149,11 +189,11 @@ fn of_sensor(
     let (direction, scale, _) = directions(model)?;
     let blocks = &prepared.condensed.blocks;
     let t0_s = blocks.first()?.start_s;
-    // As the device: before the first temperature it is the reference.
-    let warm: Vec<(f64, f64)> = warmth(blocks)
-        .into_iter()
-        .map(|(t, w)| (t, if w.is_nan() { 0.0 } else { w }))
-        .collect();
+    // Before the first temperature it is that one, as a lag begins there on the device too; without any the reference, as there.
+    let warm = warmth(blocks);
+    let first = warm.iter().map(|w| w.1).find(|w| w.is_finite());
+    let known = |w: f64| if w.is_nan() { first.unwrap_or(0.0) } else { w };
+    let warm: Vec<(f64, f64)> = warm.into_iter().map(|(t, w)| (t, known(w))).collect();
     let all = Stretches {
         sensor,
         direction,
@@ -177,13 +217,19 @@ fn of_sensor(
             .collect(),
     };
     let from = sensor.channels().start;
-    let raw = |b: &Block, from: usize| Vector3::from_fn(|i, _| b.raw[from + i].mean);
+    let held: [Vec<f64>; 6] = std::array::from_fn(|channel| held(blocks, channel));
+    let raw = |at: usize, from: usize| Vector3::from_fn(|i, _| held[from + i][at]);
     let apply = |model: Option<&Affine<f64>>, u: Vector3<f64>| {
         model.map_or(Vector3::repeat(f64::NAN), |m| m.apply(&u))
+    };
+    let reading = |at: usize| Reading {
+        mean: raw(at, from),
+        ..Reading::of(&blocks[at].raw[from..from + 3], &scale)
     };
     let moment = |at: usize, t_s: f64, rate: Vector3<f64>, force: Vector3<f64>| Moment {
         session: 0,
         t_s: t_s - t0_s,
+        on_s: t_s - prepared.power_on_s(),
         duration_s: f64::from(blocks[at].rows) * prepared.condensed.period_s,
         rate,
         force,
@@ -191,12 +237,12 @@ fn of_sensor(
         sensed: direction * if sensor == Sensor::Gyro { rate } else { force },
         warm_c: warm[at].1,
         late_c: warm[at].1,
-        reading: Reading::of(&blocks[at].raw[from..from + 3], &scale),
+        reading: reading(at),
     };
     let mut of_block = Vec::with_capacity(blocks.len());
-    for (at, block) in blocks.iter().enumerate() {
-        let [rate, force] = [0, 1].map(|s| apply(models[s], raw(block, 3 * s)));
-        of_block.push(all.error(&moment(at, warm[at].0, rate, force), at));
+    for (at, (t_s, _)) in warm.iter().enumerate() {
+        let [rate, force] = [0, 1].map(|s| apply(models[s], raw(at, 3 * s)));
+        of_block.push(all.error(&moment(at, *t_s, rate, force), at));
     }
     if sensor == Sensor::Gyro {
         for piece in &mut out.condensed.increments {
@@ -205,7 +251,7 @@ fn of_sensor(
                 .partition_point(|b| b.last_s < t_s)
                 .min(blocks.len() - 1);
             let mean = Vector3::from(piece.integral) / piece.duration_s;
-            let force = apply(models[1], raw(&blocks[at], 3));
+            let force = apply(models[1], raw(at, 3));
             let mut moment = moment(at, t_s, model.apply(&mean), force);
             moment.reading.mean = mean;
             moment.duration_s = piece.duration_s;
@@ -222,15 +268,57 @@ fn of_sensor(
     }
     for dwell in &mut out.dwells.list {
         let range = dwell.blocks.clone();
-        let total: f64 = blocks[range.clone()]
-            .iter()
-            .map(|b| f64::from(b.rows))
-            .sum();
-        let pairs = blocks[range.clone()].iter().zip(&of_block[range]);
-        let mean: Vector3<f64> = pairs.map(|(b, e)| e * (f64::from(b.rows) / total)).sum();
         for i in 0..3 {
-            dwell.raw[from + i].mean -= scale[i] * mean[i];
+            // As the mean of the dwell was made: of the samples that there are.
+            let samples = |b: &Block| f64::from(b.raw[from + i].n);
+            let total: f64 = blocks[range.clone()].iter().map(samples).sum();
+            let pairs = blocks[range.clone()].iter().zip(&of_block[range.clone()]);
+            let mean: f64 = pairs.map(|(b, e)| e[i] * (samples(b) / total)).sum();
+            if total > 0.0 {
+                dwell.raw[from + i].mean -= scale[i] * mean;
+            }
         }
     }
+    leave_out_unknown(sensor, effects, out);
     Some(())
+}
+
+/// A dwell without a reading of the other triad is none for this one, if an effect goes by that.
+fn leave_out_unknown(sensor: Sensor, effects: &[&Removed], out: &mut Prepared) {
+    let (other, condition) = match sensor {
+        Sensor::Gyro => (Sensor::Accel, Condition::Force),
+        Sensor::Accel => (Sensor::Gyro, Condition::Rate),
+    };
+    let Some(effect) = effects.iter().find(|e| depends(e, condition)) else {
+        return;
+    };
+    for dwell in &mut out.dwells.list {
+        let empty = |c: &usize| dwell.raw[*c].n == 0 && dwell.raw[*c].clipped == 0;
+        let Some(fault) = other.channels().find(empty).map(Fault::Missing) else {
+            continue;
+        };
+        let slot = match sensor {
+            Sensor::Gyro => &mut dwell.gyro_fault,
+            Sensor::Accel => &mut dwell.accel_fault,
+        };
+        if slot.is_none() {
+            *slot = Some(fault);
+            out.dwells.warnings.push(format!(
+                "dwell {}: not used for the {sensor}: {fault}, and {} cannot be removed without it",
+                dwell.step,
+                effect.candidate.id()
+            ));
+        }
+    }
+}
+
+/// What a channel read in each block, raw: where it has no samples, what it read before, or what it read first.
+fn held(blocks: &[Block], channel: usize) -> Vec<f64> {
+    let read = |b: &Block| (b.raw[channel].n > 0).then_some(b.raw[channel].mean);
+    let mut last = blocks.iter().find_map(read).unwrap_or(f64::NAN);
+    let each = blocks.iter().map(|b| {
+        last = read(b).unwrap_or(last);
+        last
+    });
+    each.collect()
 }

@@ -122,6 +122,8 @@ pub fn record(
         Reference::Gravity,
     );
     manifest.latitude_deg = options.latitude_deg;
+    // Its clock starts with it. After a reset without a power failure the device counts from zero as well.
+    manifest.power_on_s = Some(0.0);
     manifest.recorded = Some(Recorded {
         tool: concat!("mimu ", env!("CARGO_PKG_VERSION")).into(),
         firmware: who.firmware.clone(),

@@ -144,6 +144,10 @@ pub struct Manifest {
     pub latitude_deg: Option<f64>,
     /// What is known of the true input.
     pub reference: Reference,
+    /// When the power came, on the clock of `t_s`, s: what goes by the time since then is counted from there. Without it, from the first
+    /// sample.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub power_on_s: Option<f64>,
     /// It was not ended: what records it was killed, or is still at it. Its last row may be cut, and is left out then.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub unfinished: bool,
@@ -184,6 +188,7 @@ impl Manifest {
             raw_unit,
             latitude_deg: None,
             reference,
+            power_on_s: None,
             unfinished: false,
             step_labels: Vec::new(),
             turn_steps: Vec::new(),
@@ -247,6 +252,15 @@ impl Manifest {
                 at("latitude_deg"),
                 format!("{latitude} is not a latitude"),
                 "write degrees from -90 to 90, north positive",
+            ));
+        }
+        if let Some(power) = self.power_on_s
+            && !power.is_finite()
+        {
+            return Err(Error::new(
+                at("power_on_s"),
+                format!("{power} is no time"),
+                "write the t_s at which the power came, or leave the key out",
             ));
         }
         let rails = self.rails.unwrap_or_default();

@@ -328,7 +328,7 @@ pub fn verify_text(verification: &Verification) -> String {
                 out,
                 "{:<7}{:>14}{:>14}",
                 "",
-                "effects left",
+                "effects left in",
                 format!("{} {unit}", three(affine * factor))
             );
         }

@@ -1,4 +1,5 @@
 use super::*;
+use crate::calibration::OnDevice;
 use crate::diagnose::effect::REFERENCE_C;
 use mimu_core::effects;
 
@@ -79,7 +80,9 @@ fn every_effect_that_is_found_can_be_removed_by_the_device() {
             form: 60.0,
             values,
         };
-        assert!(on_device::<f32>(&removed).is_ok(), "{}", effect.id);
+        for part in OnDevice::<f32>::of(&removed).unwrap() {
+            assert!(part.effect().is_ok(), "{}", effect.id);
+        }
     }
 }
 
@@ -109,6 +112,59 @@ fn an_effect_that_the_device_lacks_is_refused() {
             form: 0.0,
             values: Vec::new(),
         };
-        assert_eq!(on_device::<f32>(&removed).unwrap_err(), Refused::Unknown);
+        assert!(OnDevice::<f32>::of(&removed).is_err());
     }
+}
+
+#[test]
+fn an_effect_that_is_found_again_adds_to_what_is_known() {
+    let table = |id: &str, value: f64, form: f64| {
+        let candidate = candidate(id).unwrap();
+        let values = vec![value; candidate.active.len()];
+        let sigmas = vec![3e-6; values.len()];
+        let removed = Removed {
+            candidate,
+            form,
+            values,
+        };
+        EffectTable::new(&removed, &sigmas)
+    };
+    let mut all = vec![table("gyro_g_sensitivity", 1e-4, 0.0)];
+    all[0].coefficients.remove(0);
+    table("gyro_g_sensitivity", 2e-5, 0.0)
+        .join(&mut all)
+        .unwrap();
+    assert_eq!(all.len(), 1);
+    let of = |name: &str| {
+        let found = all[0].coefficients.iter().find(|c| c.name == name);
+        found.map(|c| (c.value, c.sigma)).unwrap()
+    };
+    assert_eq!(of("xx"), (2e-5, 3e-6));
+    let (value, sigma) = of("zy");
+    assert!((value - 1.2e-4).abs() < 1e-18 && (sigma - 18_f64.sqrt() * 1e-6).abs() < 1e-18);
+    // Of exponentials each has its own time.
+    table("gyro_warm_up", 1e-3, 60.0).join(&mut all).unwrap();
+    table("gyro_warm_up", 1e-3, 90.0).join(&mut all).unwrap();
+    assert_eq!(all.len(), 3);
+    table("gyro_warm_up", 1e-3, 90.0).join(&mut all).unwrap();
+    assert_eq!(all[2].coefficients[0].value, 2e-3);
+    let coded = || {
+        let plain = candidate("gyro_readout_code").unwrap();
+        let candidate = plain.behind_one(Converter::of(1.6, 0.0));
+        let values = vec![1e-4; candidate.active.len()];
+        let sigmas = values.clone();
+        let removed = Removed {
+            candidate,
+            form: 0.0,
+            values,
+        };
+        EffectTable::new(&removed, &sigmas)
+    };
+    coded().join(&mut all).unwrap();
+    assert!(
+        coded()
+            .join(&mut all)
+            .unwrap_err()
+            .contains("an axis has one")
+    );
 }

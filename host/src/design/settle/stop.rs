@@ -35,6 +35,7 @@ impl Stop {
             session: 0,
             reading: Reading::NONE,
             t_s: self.t_s,
+            on_s: self.t_s,
             duration_s: self.dwell_s,
             rate,
             force,
@@ -73,6 +74,7 @@ pub fn slow(candidate: &Candidate) -> Slow {
         session: 0,
         reading: Reading::NONE,
         t_s: 137.0,
+        on_s: 137.0,
         duration_s: 1.0,
         rate: Vector3::new(1.3, -0.7, 2.1),
         force: Vector3::new(4.1, -7.3, 5.2),
@@ -87,7 +89,11 @@ pub fn slow(candidate: &Candidate) -> Slow {
         out
     };
     let now = values(&at);
-    let later = Moment { t_s: 911.0, ..at };
+    let later = Moment {
+        t_s: 911.0,
+        on_s: 911.0,
+        ..at
+    };
     let warmer = Moment { warm_c: 21.7, ..at };
     let before = Moment { late_c: 19.9, ..at };
     Slow {

@@ -65,7 +65,7 @@ impl Variable {
             Self::Force(i) => at.force[i],
             Self::Temperature => at.warm_c,
             Self::TemperatureRate => (at.warm_c - at.late_c) / RATE_LAG_S,
-            Self::Time => at.t_s,
+            Self::Time => at.on_s,
         }
     }
 }

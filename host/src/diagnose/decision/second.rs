@@ -66,7 +66,10 @@ pub(super) fn second(rows: &Rows, effects: &[Removed]) -> Option<Vec<Second>> {
     };
     let mut all = Vec::new();
     for (i, error) in errors.iter().enumerate() {
-        let others = errors.iter().enumerate().filter(|(j, _)| *j != i);
+        // One that the recording says nothing of, for want of a temperature or a channel, says nothing of the others either.
+        let finite = |e: &DVector<f64>| e.iter().all(|v| v.is_finite());
+        let others = errors.iter().enumerate();
+        let others = others.filter(|(j, e)| *j != i && finite(e));
         let y = others.fold(rows.y.clone(), |y, (_, e)| y - e);
         let (without, with) = (left(&y)?, left(&(&y - error))?);
         all.push(Second {

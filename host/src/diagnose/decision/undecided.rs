@@ -10,7 +10,7 @@ pub struct Undecided {
     pub id: String,
     /// The law.
     pub law: &'static str,
-    /// By how much the law is worse, in deviance with what its coefficients cost; negative where it is better.
+    /// By how much the law is worse, in score, the deviance with what coefficients cost; negative where it is better.
     pub worse: f64,
     /// What would tell them apart.
     pub settled_by: &'static str,

@@ -22,11 +22,11 @@ const SETTLING: Option<Form> = Some(Form {
 });
 
 fn linear(at: &Moment, _: f64, out: &mut [f64]) {
-    per_axis(out, |_| at.t_s);
+    per_axis(out, |_| at.on_s);
 }
 
 fn settling(at: &Moment, time_constant_s: f64, out: &mut [f64]) {
-    let left = (-at.t_s / time_constant_s).exp();
+    let left = (-at.on_s / time_constant_s).exp();
     per_axis(out, |_| left);
 }
 

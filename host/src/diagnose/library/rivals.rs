@@ -37,7 +37,7 @@ const fn creep(sensor: Sensor, coefficients: &'static [Coefficient]) -> Effect {
         coefficients,
         typical: &[1.0; 3],
         form: ONSET,
-        regressors: |at, onset_s, out| per_axis(out, |_| (at.t_s / onset_s).ln_1p()),
+        regressors: |at, onset_s, out| per_axis(out, |_| (at.on_s / onset_s).ln_1p()),
         needs: "",
     }
 }

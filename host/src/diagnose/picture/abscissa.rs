@@ -41,7 +41,7 @@ impl Field {
     /// Its value, SI; of temperatures above [`REFERENCE_C`].
     pub fn of(self, at: &Moment) -> f64 {
         match self {
-            Self::Time => at.t_s,
+            Self::Time => at.on_s,
             Self::Rate(i) => at.rate[i],
             Self::Force(i) => at.force[i],
             Self::AngularAcceleration(i) => at.angular_acceleration[i],
@@ -54,7 +54,7 @@ impl Field {
     /// `at` with another value of it.
     pub fn with(self, mut at: Moment, value: f64) -> Moment {
         match self {
-            Self::Time => at.t_s = value,
+            Self::Time => at.on_s = value,
             Self::Rate(i) => at.rate[i] = value,
             Self::Force(i) => at.force[i] = value,
             Self::AngularAcceleration(i) => at.angular_acceleration[i] = value,
@@ -245,6 +245,7 @@ mod tests {
             session: 0,
             reading: crate::diagnose::effect::Reading::NONE,
             t_s: 0.0,
+            on_s: 0.0,
             duration_s: 1.0,
             rate: Vector3::zeros(),
             force: Vector3::zeros(),

@@ -39,6 +39,8 @@ pub(super) struct Part {
 pub(super) struct Builder<'a> {
     pub prepared: &'a Prepared,
     pub sensor: Sensor,
+    /// Whether the recording has the other sensor too: the table may know its input, but no device could remove what goes by it.
+    pub other_measured: bool,
     pub t0_s: f64,
     pub warm: Vec<(f64, f64)>,
     pub rows: Vec<Row>,
@@ -62,6 +64,10 @@ pub(super) fn part(session: &Session, sensor: Sensor, free: Free) -> Option<Part
     let builder = Builder {
         prepared,
         sensor,
+        other_measured: match sensor {
+            Sensor::Gyro => session.accel.is_some(),
+            Sensor::Accel => session.gyro.is_some(),
+        },
         t0_s: blocks.first()?.start_s,
         warm,
         rows: Vec::new(),
@@ -106,6 +112,7 @@ impl Builder<'_> {
         Moment {
             session: 0,
             t_s: t_s - self.t0_s,
+            on_s: t_s - self.prepared.power_on_s(),
             duration_s,
             rate,
             force,
@@ -137,6 +144,13 @@ impl Builder<'_> {
                 given
             } else {
                 force
+            };
+            let unknown = Vector3::repeat(f64::NAN);
+            let table = prepared.manifest.reference == Reference::Table;
+            let (rate, given) = match self.sensor {
+                Sensor::Gyro if table && !self.other_measured => (rate, unknown),
+                Sensor::Accel if table && !self.other_measured => (unknown, given),
+                _ => (rate, given),
             };
             let t_s = 0.5 * (block.start_s + block.last_s);
             let duration_s = f64::from(block.rows) * prepared.condensed.period_s;

@@ -92,7 +92,7 @@ fn accepted(sensor: Sensor, a: &Accepted) -> Value {
         "held_out": split(a.split),
         "chance": a.chosen.p,
         "alternatives": a.chosen.alternatives.iter()
-            .map(|(id, worse)| json!({ "id": id, "deviance_worse_by": worse }))
+            .map(|(id, worse)| json!({ "id": id, "score_worse_by": worse }))
             .collect::<Vec<_>>(),
     });
     if let Some(second) = a.second {
@@ -114,7 +114,7 @@ fn accepted(sensor: Sensor, a: &Accepted) -> Value {
                 "axes": c.axes,
                 "weight_of_bit_0_raw": c.weight_of_bit_0_raw,
                 "reading_of_code_0_raw": c.reading_of_code_0_raw,
-                "within_raw": c.within_raw,
+                "reading_of_code_0_within_raw": c.reading_of_code_0_within_raw,
             })
         };
         value["converters"] = converters.iter().map(table).collect();

@@ -285,7 +285,7 @@ fn confused(next: &Next) -> Markup {
             h2 { "What tells the confused ones apart" }
             dl { @for c in &next.confused {
                 dt { code { (c.ids[0]) } " or " code { (c.ids[1]) } }
-                dd { "worse by " (number(c.difference, 1.0, "")) " in deviance; " (c.experiment) }
+                dd { "worse by " (number(c.difference, 1.0, "")) " in score; " (c.experiment) }
             } }
         }
     }

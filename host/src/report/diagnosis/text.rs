@@ -179,7 +179,7 @@ fn effect(out: &mut String, a: &Accepted, shown: &impl Fn(f64) -> String) {
     }
     let alternatives = &a.chosen.alternatives;
     for (id, worse) in alternatives.iter().take(SHOWN) {
-        let _ = writeln!(out, "    or {id}, worse by {worse:.1} in deviance");
+        let _ = writeln!(out, "    or {id}, worse by {worse:.1} in score");
     }
     if alternatives.len() > SHOWN {
         let _ = writeln!(out, "    or one of {} more", alternatives.len() - SHOWN);
@@ -192,15 +192,15 @@ pub(super) fn converter(c: &ConverterTable) -> String {
         "converter of {}, raw: bit 0 turns every {} from {} on; errors are in units of bit 0",
         c.axes,
         three(c.weight_of_bit_0_raw),
-        plus_minus(c.reading_of_code_0_raw, c.within_raw)
+        plus_minus(c.reading_of_code_0_raw, c.reading_of_code_0_within_raw)
     )
 }
 
-/// How a law on no list does in the place of an effect; `worse` in deviance.
+/// How a law on no list does in the place of an effect; `worse` in score.
 pub(super) fn by_score(worse: f64) -> String {
     match worse > 0.0 {
-        true => format!("nearly as well, worse by {worse:.1} in deviance"),
-        false => format!("as well, better by {:.1} in deviance", -worse),
+        true => format!("nearly as well, worse by {worse:.1} in score"),
+        false => format!("as well, better by {:.1} in score", -worse),
     }
 }
 
@@ -248,7 +248,7 @@ fn confused(out: &mut String, next: &Next) {
     for c in &next.confused {
         let _ = writeln!(
             out,
-            "{} or {} (worse by {:.1} in deviance)",
+            "{} or {} (worse by {:.1} in score)",
             c.ids[0], c.ids[1], c.difference
         );
         wrap(out, "  told apart by ", &c.experiment);

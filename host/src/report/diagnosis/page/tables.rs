@@ -184,7 +184,7 @@ pub fn alternatives(s: &SensorDiagnosis, one: &Accepted) -> Markup {
         } @else {
             p { "In this recording it can be confused with:" }
             div class="scroll" { table {
-                thead { tr { th { "instead" } th class="n" { "worse by, in deviance" } th class="n" { "odds" } } }
+                thead { tr { th { "instead" } th class="n" { "worse by, in score" } th class="n" { "odds" } } }
                 tbody { @for (id, worse) in &one.chosen.alternatives {
                     tr {
                         td { code { (id) } }
