@@ -96,6 +96,7 @@ pub fn decide(rows: &Rows, dwell_ends: &[(usize, f64)], unseen: Option<&Rows>) -
     let dof = rows.y.len() as f64 - search.basis.ncols() as f64;
     let omnibus_p = ChiSquared::new(dof).map_or(1.0, |d| d.sf(known.chi2));
     let (chosen, mut with) = search.run()?;
+    let said = |value: f64| rows.figure.said(rows.sensor, value);
     let mut rejected = Vec::new();
     let mut kept: Vec<Chosen> = Vec::new();
     let mut jumps = Vec::new();
@@ -173,12 +174,19 @@ pub fn decide(rows: &Rows, dwell_ends: &[(usize, f64)], unseen: Option<&Rows>) -
                     format!("it rests to {:.0} % on one dwell", 100.0 * share)
                 }
                 (Some(a), Some(b)) if !(b < a) => {
-                    format!("the held-out error does not go down: {a:.3e} without, {b:.3e} with")
+                    format!(
+                        "the held-out error does not go down: {} without, {} with",
+                        said(a),
+                        said(b)
+                    )
                 }
                 _ if seconds[i].is_some_and(|s| s.contradicts()) => {
-                    let [a, b] = seconds[i].map_or([f64::NAN; 2], |s| s.rms);
+                    let nan = [f64::NAN; 2];
+                    let ([a, b], [c, d]) = seconds[i].map_or((nan, nan), |s| (s.chi2, s.rms));
                     format!(
-                        "the error of the second recording does not go down: {a:.3e} without, {b:.3e} with"
+                        "the error of the second recording does not go down: chi-square {a:.0} without, {b:.0} with; rms {} and {}",
+                        said(c),
+                        said(d)
                     )
                 }
                 (_, None) => "what is left when a block is held out does not determine it".into(),
@@ -266,7 +274,11 @@ pub fn decide(rows: &Rows, dwell_ends: &[(usize, f64)], unseen: Option<&Rows>) -
         };
         let figures = match (held, now) {
             (Some((sample, held)), (before, Some(out))) => format!(
-                "; in sample {before:.3e} to {sample:.3e}, held out {out:.3e} to {held:.3e}"
+                "; in sample {} to {}, held out {} to {}",
+                said(before),
+                said(sample),
+                said(out),
+                said(held)
             ),
             _ => String::new(),
         };

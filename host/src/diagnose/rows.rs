@@ -26,6 +26,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use super::effect::{Behind, Moment};
 use crate::dwell::Sensor;
 use crate::prepared::Prepared;
+use crate::report::three;
 use crate::triad::Forward;
 
 pub(crate) use lag::{elsewhere, late};
@@ -60,6 +61,21 @@ pub enum Figure {
     Direction,
     /// Rate at rest, rad/s.
     Rest,
+}
+
+impl Figure {
+    /// A value as a person reads it.
+    pub fn said(self, sensor: Sensor, value: f64) -> String {
+        let (factor, unit) = match (self, sensor) {
+            (Self::Direction, _) => (1f64.to_degrees(), "deg"),
+            (_, Sensor::Gyro) => (1f64.to_degrees(), "deg/s"),
+            (_, Sensor::Accel) => (1e3, "mm/s²"),
+        };
+        match value.is_finite() {
+            true => format!("{} {unit}", three(value * factor)),
+            false => "nothing that can be told".into(),
+        }
+    }
 }
 
 /// Which affine parameters the recordings have to determine themselves.
