@@ -7,11 +7,12 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::sync::{Arc, Mutex};
 
-use mimu::diagnose::{Diagnosis, diagnose};
+use mimu::diagnose::{Diagnosis, diagnose, next::next};
 use mimu::dwell::Sensor;
 use mimu::estimate::Observation;
 use mimu::fit::{Method, Options};
 use mimu::prepared::Prepared;
+use mimu::report::{DiagnosisReport, Made, diagnosis_json, diagnosis_page, diagnosis_text};
 use mimu::stillness::STILL_FACTOR;
 use mimu_rig::random::Random;
 use mimu_rig::rig_file::{EffectFile, RigFile, RigTruth};
@@ -181,6 +182,31 @@ fn clean(plan: &str, file: &RigFile, seed: u64) -> Arc<Prepared> {
     known().entry(seed).or_insert(recorded).clone()
 }
 
+/// A diagnosis that everything was said and drawn of: none may fail for what was found.
+pub fn reported(diagnosis: Diagnosis) -> Diagnosis {
+    let report = DiagnosisReport {
+        next: next(&diagnosis),
+        diagnosis,
+        second: None,
+    };
+    let made = Made {
+        recording: "blind".into(),
+        command: "mimu diagnose blind".into(),
+        created: "2026-01-01T00:00:00Z".into(),
+    };
+    let page = diagnosis_page(&report, &made).expect("a page");
+    let text = diagnosis_text(&report);
+    let json = diagnosis_json(&report).to_string();
+    for effect in &report.diagnosis.effects {
+        let id = effect.candidate.id();
+        assert!(
+            [&page, &text, &json].iter().all(|said| said.contains(&id)),
+            "{id}"
+        );
+    }
+    report.diagnosis
+}
+
 /// Records and diagnoses a unit with `ids`.
 pub fn case(ids: &[&str], seed: u64) -> Case {
     let plan = plan(seed);
@@ -220,6 +246,7 @@ pub fn case(ids: &[&str], seed: u64) -> Case {
             };
         }
     };
+    let found = reported(found);
     let judged = sensors.first().copied().unwrap_or(Sensor::Gyro);
     let of = |sensor: Sensor| found.sensors.iter().find(|s| s.sensor == sensor);
     let held_out = |s| of(s).map_or(f64::NAN, |s| s.decision.held_out_rms[1]);

@@ -9,7 +9,7 @@ mod undecided;
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use super::candidate::Kind;
+use super::candidate::{Kind, Monomial, Variable};
 use super::removal::Removed;
 use super::rows::Rows;
 use super::search::{Chosen, Search};
@@ -342,6 +342,19 @@ fn notes(rows: &Rows, chosen: &[Chosen]) -> Vec<String> {
             c.candidate.id()
         )
     }));
+    // Its level part goes by the heading, and on a table that shows one heading in each attitude by products of the force.
+    let only_force = |m: &Monomial| m.0.iter().all(|v| matches!(v, Variable::Force(_)));
+    let level = chosen.iter().filter(|c| {
+        matches!(&c.candidate.kind, Kind::Term(_, m) if only_force(m)) && !notes.is_empty()
+    });
+    let level: Vec<String> = level.map(|c| c.candidate.id()).collect();
+    if !level.is_empty() {
+        notes.push(format!(
+            "{}: may be the level part of the Earth's rate, which goes by the heading and is another elsewhere: show each attitude at \
+             several headings",
+            level.join(", ")
+        ));
+    }
     let elsewhere = chosen.iter().filter(|c| c.candidate.elsewhere);
     notes.extend(elsewhere.map(|c| {
         format!(

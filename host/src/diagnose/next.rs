@@ -282,6 +282,9 @@ fn pairs(diagnosis: &Diagnosis) -> Vec<Pair> {
 impl Pair {
     fn suspects(&self, group: usize) -> Option<[Suspect; 2]> {
         let other = self.other.clone()?;
+        if !Suspect::can_be(&self.found) {
+            return None;
+        }
         let found = Suspect {
             candidate: self.found.clone(),
             sizes: self.values.clone(),
@@ -299,9 +302,13 @@ impl Pair {
 
     fn settled(&self, base: &Question) -> Confused {
         let experiment = match self.suspects(0) {
-            None => match library::by_id(&self.id) {
-                Some(effect) => effect.needs.into(),
-                None => "the same recording again: a jump does not come back where it was".into(),
+            // Of the two, what no dwell is planned for.
+            None => match (&self.found.kind, library::by_id(&self.id)) {
+                (Kind::Effect(found), _) if !Suspect::can_be(&self.found) => found.needs.into(),
+                (_, Some(effect)) => effect.needs.into(),
+                (_, None) => {
+                    "the same recording again: a jump does not come back where it was".into()
+                }
             },
             Some(suspects) => settle(&Question {
                 suspects: suspects.to_vec(),

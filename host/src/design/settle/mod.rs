@@ -83,11 +83,10 @@ pub enum Sought {
 impl Suspect {
     /// An effect by name, each of its coefficients at the size of data sheets.
     ///
-    /// `None` of an error of the code: which codes a dwell meets is decided by the noise and the bias of the unit, and by no plan;
-    /// and of what is no error, which no session need be longer for.
+    /// `None` of what cannot be planned for.
     pub fn listed(effect: &'static Effect) -> Option<Self> {
         let candidate = Candidate::new(effect.sensor, Kind::Effect(effect));
-        (effect.is_error() && !candidate.reads_code()).then(|| Self {
+        Self::can_be(&candidate).then(|| Self {
             sizes: candidate
                 .active
                 .iter()
@@ -97,6 +96,15 @@ impl Suspect {
             sought: Sought::Each,
             group: 0,
         })
+    }
+
+    /// Whether an experiment can be planned for it. Not for an error of the code: which codes a dwell meets is decided by the noise and the
+    /// bias of the unit, and by no plan; nor for what is no error, which no session need be longer for.
+    pub fn can_be(candidate: &Candidate) -> bool {
+        match candidate.kind {
+            Kind::Effect(effect) => effect.is_error() && !candidate.reads_code(),
+            _ => true,
+        }
     }
 }
 

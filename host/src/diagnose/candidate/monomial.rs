@@ -15,7 +15,7 @@ pub enum Variable {
     Temperature,
     /// Its rate of change, behind a lag of [`RATE_LAG_S`]: unfiltered it would be noise.
     TemperatureRate,
-    /// Time since the recording began.
+    /// Time since power-on, or since the recording began where nobody knows.
     Time,
 }
 

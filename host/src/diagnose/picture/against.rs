@@ -78,6 +78,8 @@ pub struct Panel {
 struct Group {
     axis: usize,
     on: Dependence,
+    /// Places among the regressors, and among the coefficients: one of all axes has three regressors.
+    slots: Vec<usize>,
     members: Vec<usize>,
 }
 
@@ -89,18 +91,22 @@ fn groups(rows: &Rows, one: &Accepted) -> Vec<Group> {
         return Vec::new();
     };
     let mut groups: Vec<Group> = Vec::new();
-    for (k, axis) in candidate.axes().into_iter().enumerate() {
-        let on = dependence(candidate, form, k, like);
+    for (slot, (member, axis)) in candidate.slots().into_iter().enumerate() {
+        let on = dependence(candidate, form, slot, like);
         let alone = matches!(on, Dependence::Alone(_));
         match groups
             .iter_mut()
             .find(|g| alone && g.axis == axis && g.on == on)
         {
-            Some(group) => group.members.push(k),
+            Some(group) => {
+                group.slots.push(slot);
+                group.members.push(member);
+            }
             None => groups.push(Group {
                 axis,
                 on,
-                members: vec![k],
+                slots: vec![slot],
+                members: vec![member],
             }),
         }
     }
@@ -225,7 +231,7 @@ fn variable(
         Dependence::Alone(field) => {
             let mut all = vec![0.0; candidate.axes().len()];
             candidate.regressors(&field.with(like, x), form, &mut all);
-            group.members.iter().map(|k| all[*k]).collect()
+            group.slots.iter().map(|k| all[*k]).collect()
         }
         _ => vec![x],
     };

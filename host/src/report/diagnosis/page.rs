@@ -9,7 +9,7 @@ mod tables;
 use maud::{Markup, PreEscaped, html};
 
 use super::DiagnosisReport;
-use super::text::USUAL;
+use super::text::{USUAL, by};
 use crate::diagnose::decision::{Accepted, FALSE_LEFTOVER, LEVERAGE};
 use crate::diagnose::next::Next;
 use crate::diagnose::picture::{Against, Picture};
@@ -285,7 +285,10 @@ fn confused(next: &Next) -> Markup {
             h2 { "What tells the confused ones apart" }
             dl { @for c in &next.confused {
                 dt { code { (c.ids[0]) } " or " code { (c.ids[1]) } }
-                dd { "worse by " (number(c.difference, 1.0, "")) " in score; " (c.experiment) }
+                dd {
+                    @if c.difference < 0.0 { (by(c.difference)) } @else { "worse by " (number(c.difference, 1.0, "")) }
+                    " in score; " (c.experiment)
+                }
             } }
         }
     }

@@ -179,7 +179,7 @@ fn effect(out: &mut String, a: &Accepted, shown: &impl Fn(f64) -> String) {
     }
     let alternatives = &a.chosen.alternatives;
     for (id, worse) in alternatives.iter().take(SHOWN) {
-        let _ = writeln!(out, "    or {id}, worse by {worse:.1} in score");
+        let _ = writeln!(out, "    or {id}, {} in score", by(*worse));
     }
     if alternatives.len() > SHOWN {
         let _ = writeln!(out, "    or one of {} more", alternatives.len() - SHOWN);
@@ -196,12 +196,22 @@ pub(super) fn converter(c: &ConverterTable) -> String {
     )
 }
 
+/// By how much a score is worse or, beside what was found since, better.
+pub(super) fn by(worse: f64) -> String {
+    match worse >= 0.0 {
+        true => format!("worse by {worse:.1}"),
+        false => format!("better by {:.1}", -worse),
+    }
+}
+
 /// How a law on no list does in the place of an effect; `worse` in score.
 pub(super) fn by_score(worse: f64) -> String {
-    match worse > 0.0 {
-        true => format!("nearly as well, worse by {worse:.1} in score"),
-        false => format!("as well, better by {:.1} in score", -worse),
-    }
+    let how = if worse > 0.0 {
+        "nearly as well"
+    } else {
+        "as well"
+    };
+    format!("{how}, {} in score", by(worse))
 }
 
 /// Fewer residuals beyond the affine parameters than this say nothing.
@@ -248,8 +258,10 @@ fn confused(out: &mut String, next: &Next) {
     for c in &next.confused {
         let _ = writeln!(
             out,
-            "{} or {} (worse by {:.1} in score)",
-            c.ids[0], c.ids[1], c.difference
+            "{} or {} ({} in score)",
+            c.ids[0],
+            c.ids[1],
+            by(c.difference)
         );
         wrap(out, "  told apart by ", &c.experiment);
     }
