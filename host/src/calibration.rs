@@ -6,7 +6,6 @@ mod staging;
 mod writing;
 
 pub use effect::{CoefficientTable, ConverterTable, EffectTable, FormTable};
-pub(crate) use effect::{Condition, depends};
 pub(crate) use on_device::{NO_SENSE, OnDevice, What};
 pub use staging::{Staged, stage};
 pub use writing::{figure, to_toml};

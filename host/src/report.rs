@@ -21,8 +21,8 @@ pub use device::{
 };
 pub use diagnosis::{DiagnosisReport, Made, diagnosis_json, diagnosis_page, diagnosis_text};
 pub use json::{fit_json, import_json, verify_json};
-pub(crate) use text::three;
 pub use text::{dwell_table, fit_text, import_text, verify_text};
+pub(crate) use text::{readable, three};
 
 use crate::estimate::AXES;
 use crate::recording::RawUnit;

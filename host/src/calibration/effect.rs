@@ -3,17 +3,16 @@
 use std::fmt::Write as _;
 
 use mimu_core::effects::FARTHEST_ZERO;
-use nalgebra::Vector3;
 use serde::Deserialize;
 
 use super::Calibration;
 use super::writing::{number, quoted};
 use crate::diagnose::candidate::{Candidate, Codes, Kind, Monomial, Variable};
 use crate::diagnose::decision::Accepted;
-use crate::diagnose::effect::{Effect, Moment, Reading};
+use crate::diagnose::effect::Effect;
 use crate::diagnose::library;
 use crate::diagnose::library::readout::Converter;
-use crate::diagnose::removal::{Removed, errors};
+use crate::diagnose::removal::{Condition, Removed, depends};
 use crate::dwell::Sensor;
 use crate::error::{Error, Result};
 use crate::estimate::AXES;
@@ -413,55 +412,6 @@ fn candidate(id: &str) -> Option<Candidate> {
     let plain =
         (1..=3).contains(&monomial.0.len()) && monomial.0.is_sorted() && monomial.name() == product;
     plain.then(|| Candidate::new(sensor, Kind::Term(axis, monomial)))
-}
-
-/// A condition that an effect may need, or not.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Condition {
-    Rate,
-    Force,
-    Temperature,
-}
-
-/// Whether the error by an effect depends on a condition: tried, so that no effect has to say it.
-pub(crate) fn depends(effect: &Removed, on: Condition) -> bool {
-    let one = Vector3::repeat(1.0);
-    let mut at = Moment {
-        session: 0,
-        t_s: 1.0,
-        on_s: 1.0,
-        duration_s: 1.0,
-        rate: one,
-        force: one,
-        angular_acceleration: one,
-        sensed: one,
-        warm_c: 1.0,
-        late_c: 1.0,
-        reading: Reading {
-            mean: one,
-            sd: one,
-            scale: one,
-        },
-    };
-    let none = Vector3::repeat(f64::NAN);
-    let own = |sensor| effect.candidate.sensor == sensor;
-    match on {
-        Condition::Rate => {
-            at.rate = none;
-            if own(Sensor::Gyro) {
-                at.sensed = none;
-            }
-        }
-        Condition::Force => {
-            at.force = none;
-            if own(Sensor::Accel) {
-                at.sensed = none;
-            }
-        }
-        Condition::Temperature => (at.warm_c, at.late_c) = (f64::NAN, f64::NAN),
-    }
-    let error = errors(std::slice::from_ref(effect), &[at]);
-    error.iter().any(|e| e.iter().any(|v| v.is_nan()))
 }
 
 /// Checks the effect tables of a calibration and gives what they state; `place` is its path.

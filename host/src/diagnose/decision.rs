@@ -344,11 +344,11 @@ fn notes(rows: &Rows, chosen: &[Chosen]) -> Vec<String> {
     }));
     // Its level part goes by the heading, and on a table that shows one heading in each attitude by products of the force.
     let only_force = |m: &Monomial| m.0.iter().all(|v| matches!(v, Variable::Force(_)));
-    let level = chosen.iter().filter(|c| {
-        matches!(&c.candidate.kind, Kind::Term(_, m) if only_force(m)) && !notes.is_empty()
-    });
+    let level = chosen
+        .iter()
+        .filter(|c| matches!(&c.candidate.kind, Kind::Term(_, m) if only_force(m)));
     let level: Vec<String> = level.map(|c| c.candidate.id()).collect();
-    if !level.is_empty() {
+    if !level.is_empty() && chosen.iter().any(|c| !c.candidate.is_error()) {
         notes.push(format!(
             "{}: may be the level part of the Earth's rate, which goes by the heading and is another elsewhere: show each attitude at \
              several headings",

@@ -7,7 +7,6 @@ use super::candidate::Candidate;
 use super::effect::{Behind, Moment, Reading, warmth};
 use super::rows::{directions, elsewhere, late};
 use crate::blocks::Block;
-use crate::calibration::{Condition, depends};
 use crate::dwell::{Fault, Sensor};
 use crate::error::{Error, Result};
 use crate::prepared::Prepared;
@@ -50,6 +49,55 @@ pub fn errors(effects: &[Removed], moments: &[Moment]) -> Vec<Vector3<f64>> {
         }
     }
     all
+}
+
+/// A condition that an effect may need, or not.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Condition {
+    Rate,
+    Force,
+    Temperature,
+}
+
+/// Whether the error by an effect depends on a condition: tried, so that no effect has to say it.
+pub(crate) fn depends(effect: &Removed, on: Condition) -> bool {
+    let one = Vector3::repeat(1.0);
+    let mut at = Moment {
+        session: 0,
+        t_s: 1.0,
+        on_s: 1.0,
+        duration_s: 1.0,
+        rate: one,
+        force: one,
+        angular_acceleration: one,
+        sensed: one,
+        warm_c: 1.0,
+        late_c: 1.0,
+        reading: Reading {
+            mean: one,
+            sd: one,
+            scale: one,
+        },
+    };
+    let none = Vector3::repeat(f64::NAN);
+    let own = |sensor| effect.candidate.sensor == sensor;
+    match on {
+        Condition::Rate => {
+            at.rate = none;
+            if own(Sensor::Gyro) {
+                at.sensed = none;
+            }
+        }
+        Condition::Force => {
+            at.force = none;
+            if own(Sensor::Accel) {
+                at.sensed = none;
+            }
+        }
+        Condition::Temperature => (at.warm_c, at.late_c) = (f64::NAN, f64::NAN),
+    }
+    let error = errors(std::slice::from_ref(effect), &[at]);
+    error.iter().any(|e| e.iter().any(|v| v.is_nan()))
 }
 
 /// Refuses a recording that lacks what one of `effects` has to be known by where it is to be taken out: channels, or a temperature.

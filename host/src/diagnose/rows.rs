@@ -25,8 +25,9 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use super::effect::{Behind, Moment};
 use crate::dwell::Sensor;
+use crate::fit;
 use crate::prepared::Prepared;
-use crate::report::three;
+use crate::report::{readable, three};
 use crate::triad::Forward;
 
 pub(crate) use lag::{elsewhere, late};
@@ -66,11 +67,12 @@ pub enum Figure {
 impl Figure {
     /// A value as a person reads it.
     pub fn said(self, sensor: Sensor, value: f64) -> String {
-        let (factor, unit) = match (self, sensor) {
-            (Self::Direction, _) => (1f64.to_degrees(), "deg"),
-            (_, Sensor::Gyro) => (1f64.to_degrees(), "deg/s"),
-            (_, Sensor::Accel) => (1e3, "mm/s²"),
+        let figure = match self {
+            Self::Input | Self::Rest => fit::Figure::Input,
+            Self::Size => fit::Figure::GravitySize,
+            Self::Direction => fit::Figure::Direction,
         };
+        let (factor, unit) = readable(figure, sensor);
         match value.is_finite() {
             true => format!("{} {unit}", three(value * factor)),
             false => "nothing that can be told".into(),

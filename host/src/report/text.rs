@@ -67,7 +67,7 @@ pub(super) fn plus_minus(value: f64, half: f64) -> String {
 }
 
 /// Factor and unit in which a person reads a figure.
-pub(super) fn readable(figure: Figure, sensor: Sensor) -> (f64, &'static str) {
+pub(crate) fn readable(figure: Figure, sensor: Sensor) -> (f64, &'static str) {
     match (figure, sensor) {
         (Figure::Direction, _) => (1f64.to_degrees(), "deg"),
         (_, Sensor::Gyro) => (1f64.to_degrees(), "deg/s"),

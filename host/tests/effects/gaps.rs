@@ -48,6 +48,7 @@ fn samples_that_are_missing_from_the_other_triad_do_not_make_an_error() {
     }
     let after = removed(&holes, &calibration);
     for axis in 0..3 {
+        // A dwell shows one force: other blocks of it differ by noise, 2.5 mm/s² a sample of 9.8 m/s².
         let off = |p: &Prepared| p.dwells.list[5].raw[axis].mean;
         let moved = (off(&whole) - off(&expected)).abs();
         assert!((off(&after) - off(&expected)).abs() < 1e-3 * moved);
