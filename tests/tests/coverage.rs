@@ -2,16 +2,16 @@
 //! the cases, parameter by parameter.
 
 use mimu::blocks::Condensed;
-use mimu::dwell::Sensor;
 use mimu::estimate::known_input::{
     inverse_form, kalman, least_squares, opposite_rates, six_positions,
 };
 use mimu::estimate::{Estimated, Failure, Observation};
 use mimu::fit::{Method, Options, fit};
-use mimu::recording::{
+use mimu::quantity::Sensor;
+use mimu::stillness::STILL_FACTOR;
+use mimu_recording::{
     Batch, Columns, Manifest, RawUnit, Recording, Reference, SampleFormat, Writer,
 };
-use mimu::stillness::STILL_FACTOR;
 use mimu_rig::ideal::Ideal;
 use mimu_rig::random::Random;
 use mimu_tests::bench;

@@ -1,8 +1,8 @@
 //! Diagnosis of units whose truth is known, and of recordings by other people. All of the first is `make blind`.
 
 use mimu::diagnose::{Diagnosis, Verdict, diagnose};
-use mimu::dwell::Sensor;
 use mimu::fit::{Method, Options};
+use mimu::quantity::Sensor;
 use mimu::stillness::STILL_FACTOR;
 use mimu_rig::located::Source;
 use mimu_rig::plan::Plan;

@@ -3,8 +3,8 @@
 use mimu::allan::Kind;
 use mimu::allan::model::Term;
 use mimu::allan::recording::{Options, Part, Survey, survey};
-use mimu::dwell::Sensor;
-use mimu::recording::Recording;
+use mimu::quantity::Sensor;
+use mimu_recording::Recording;
 use mimu_rig::located::Source;
 use mimu_rig::plan::Plan;
 use mimu_rig::random::Random;

@@ -5,11 +5,11 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use mimu::dwell::Sensor;
 use mimu::fit::{Fit, Method};
-use mimu::recording::RawUnit;
+use mimu::quantity::Sensor;
 use mimu::triad::invert;
 use mimu_core::compensation::Affine;
+use mimu_recording::RawUnit;
 use mimu_tests::recordings::{Foreign, Samples, data_set, numbers, rms};
 use nalgebra::{Matrix3, Vector3};
 use tempfile::TempDir;

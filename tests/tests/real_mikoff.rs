@@ -2,8 +2,8 @@
 //!
 //! Their model goes from SI to raw: accelerometer `M f + b` with M upper triangular, gyro `(I + [eps x]) (M w + b)`.
 
-use mimu::dwell::Sensor;
 use mimu::fit::Fit;
+use mimu::quantity::Sensor;
 use mimu::triad::invert;
 use mimu_core::compensation::Affine;
 use mimu_tests::recordings::{

@@ -2,7 +2,7 @@
 //!
 //! Known answers: what IMU-TK itself computes from these files, in sample and with the same four blocks of dwells held out.
 
-use mimu::dwell::Sensor;
+use mimu::quantity::Sensor;
 use mimu_core::compensation::Affine;
 use mimu_tests::recordings::{Models, upper_triangular_frame, verdict, xsens};
 use nalgebra::{Matrix3, Vector3};

@@ -3,11 +3,11 @@
 //! Between recordings a unit is switched off: its biases are others after it, and nothing may be made of that.
 
 use mimu::diagnose::{Diagnosis, Recordings, Verdict, diagnose};
-use mimu::dwell::Sensor;
 use mimu::fit::{Method, Options};
 use mimu::prepared::Prepared;
-use mimu::recording::RawUnit;
+use mimu::quantity::Sensor;
 use mimu::stillness::STILL_FACTOR;
+use mimu_recording::RawUnit;
 use mimu_rig::rig_file::RigFile;
 use mimu_tests::bench;
 use mimu_tests::blind::{plan, unit};

@@ -1,10 +1,10 @@
 //! The noise of the unit at rest in the hands of the other commands.
 
 use mimu::design::budget::DwellNoise;
-use mimu::dwell::Sensor;
 use mimu::fit::{Method, Options, fit};
 use mimu::noise_file::NoiseFile;
 use mimu::prepared::Prepared;
+use mimu::quantity::Sensor;
 use mimu::stillness::STILL_FACTOR;
 use mimu_rig::random::Random;
 use mimu_tests::bench;
