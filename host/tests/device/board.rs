@@ -9,12 +9,12 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
+use mimu_board::front::Front;
+use mimu_board::image::{Image, release_image};
+use mimu_board::running::Board;
+use mimu_board::schematic::{DIVIDER_RATIO, Volts, WIRING};
+use mimu_board::serve::{Pace, Served};
 use mimu_core::stored;
-use mimu_rig::board::front::Front;
-use mimu_rig::board::image::{Image, release_image};
-use mimu_rig::board::running::Board;
-use mimu_rig::board::schematic::{DIVIDER_RATIO, Volts, WIRING};
-use mimu_rig::board::serve::{Pace, Served};
 use mimu_rig::located::Source;
 use mimu_rig::plan::Plan;
 use mimu_rig::rig_file::{RigFile, RigTruth};
