@@ -282,25 +282,3 @@ fn a_rate_step_passes_the_gyro_with_the_lag_of_40_hertz() {
         assert!((now - expected).abs() < 1e-9, "{now} {expected}");
     }
 }
-
-/// `cargo test --release -p mimu-rig --test sensors -- --ignored --nocapture`
-#[test]
-#[ignore = "speed: by itself, in release"]
-fn a_step_and_its_conversion_take_less_than_a_microsecond() {
-    for text in ["", "draw_effects = 5"] {
-        let truth = truth(text, 1);
-        let mut unit = Unit::new(&truth.unit, 1, 1e-3);
-        let mut converter = Converter::new(&truth.converter, &truth.unit, 1);
-        let motion = still([0.1, 0.2, 0.3], [0.0, 0.0, 9.8]);
-        let (count, start, mut sum) = (2_000_000, std::time::Instant::now(), 0.0);
-        for _ in 0..count {
-            sum += converter.read(&unit.step(&motion, 25.0)).gyro[0];
-        }
-        let each_ns = start.elapsed().as_secs_f64() / f64::from(count) * 1e9;
-        println!(
-            "{text:>16}: {each_ns:.0} ns (mean reading {:.4})",
-            sum / f64::from(count)
-        );
-        assert!(each_ns < 1000.0);
-    }
-}

@@ -21,14 +21,34 @@ fn cases(ids: &[&str], seeds: u64) -> Vec<Case> {
 
 #[test]
 fn clean_units_are_told_to_be_clean() {
+    clean(2);
+}
+
+#[test]
+#[ignore = "nightly: more seeds"]
+fn eight_clean_units_are_told_to_be_clean() {
+    clean(8);
+}
+
+fn clean(seeds: u64) {
     // Of all the 200 of `make blind` at most two may not be.
-    for case in cases(&[], 8) {
+    for case in cases(&[], seeds) {
         assert_eq!(case.verdict, "clean", "{case:?}");
     }
 }
 
 #[test]
 fn single_effects_and_a_pair_are_named_and_brought_down_to_the_noise() {
+    named_and_removed(1);
+}
+
+#[test]
+#[ignore = "nightly: more seeds"]
+fn of_more_units_effects_are_named_and_brought_down_to_the_noise() {
+    named_and_removed(2);
+}
+
+fn named_and_removed(seeds: u64) {
     for ids in [
         &["gyro_g_sensitivity"][..],
         &["gyro_thermal_bias"],
@@ -39,7 +59,7 @@ fn single_effects_and_a_pair_are_named_and_brought_down_to_the_noise() {
         &["accel_converters"],
         &["gyro_scale_asymmetry", "accel_scale_cubic"],
     ] {
-        for case in cases(ids, 2) {
+        for case in cases(ids, seeds) {
             let sorted = |ids: &[String]| {
                 let mut ids = ids.to_vec();
                 ids.sort();
@@ -53,6 +73,16 @@ fn single_effects_and_a_pair_are_named_and_brought_down_to_the_noise() {
 
 #[test]
 fn what_is_on_no_list_is_told_to_be_unexplained() {
+    unexplained(1);
+}
+
+#[test]
+#[ignore = "nightly: more seeds"]
+fn of_more_units_what_is_on_no_list_is_told_to_be_unexplained() {
+    unexplained(2);
+}
+
+fn unexplained(seeds: u64) {
     for id in [
         "x_accel_stress_hysteresis",
         "x_usb_beat",
@@ -62,7 +92,7 @@ fn what_is_on_no_list_is_told_to_be_unexplained() {
         // Fine bits of a gyro's codes follow the turns about the other axes.
         "x_supply_coupling",
     ] {
-        for case in cases(&[id], 2) {
+        for case in cases(&[id], seeds) {
             assert_eq!(case.verdict, "unexplained", "{case:?}");
         }
     }
@@ -169,15 +199,29 @@ fn missing(seed: u64, codes: f64, at: f64) -> [f64; 2] {
 
 #[test]
 fn where_codes_are_skipped_the_place_and_how_many_are_found() {
-    let units: Vec<[f64; 2]> = (0..20)
+    let units = skipped(4);
+    // Fewer than 3 of 4 have a probability of 1.4 % where the intervals are of 95 %.
+    assert!(units.iter().filter(|u| u[1] < 1.0).count() >= 3, "{units:?}");
+}
+
+#[test]
+#[ignore = "nightly: more seeds"]
+fn where_codes_are_skipped_the_place_is_in_its_interval_as_often_as_it_says() {
+    let units = skipped(20);
+    let held = units.iter().filter(|u| u[1] < 1.0).count();
+    println!("the place is in the interval of {held} of {}", units.len());
+    // Fewer than 17 of 20 have a probability of 1.6 %.
+    assert!(held >= 17, "{units:?}");
+}
+
+/// [`missing`] of so many units; how many codes are skipped is found to 15 %.
+fn skipped(seeds: u64) -> Vec<[f64; 2]> {
+    let units: Vec<[f64; 2]> = (0..seeds)
         .into_par_iter()
         .map(|seed| missing(seed, 20.0, if seed % 2 == 0 { 0.42 } else { 0.55 }))
         .collect();
-    let held = units.iter().filter(|u| u[1] < 1.0).count();
-    println!("the place is in the interval of {held} of {}", units.len());
-    // Fewer than 17 of 20 have a probability of 1.6 % where the intervals are of 95 %.
-    assert!(held >= 17, "{units:?}");
     assert!(units.iter().all(|u| (u[0] - 1.0).abs() < 0.15), "{units:?}");
+    units
 }
 
 fn diagnosed(fit: mimu::fit::Fit) -> Diagnosis {
