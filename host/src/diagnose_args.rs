@@ -4,9 +4,10 @@ use std::path::PathBuf;
 
 use clap::Args;
 use mimu::calibration::{Calibration, EffectTable, stage, to_toml};
-use mimu::diagnose::{Diagnosis, Recordings, diagnose, next};
+use mimu::diagnose::{Diagnosis, Recordings, diagnose};
 use mimu::error::{Error, Result};
 use mimu::fit::{Method, Options};
+use mimu::next_experiment;
 use mimu::report::{self, DiagnosisReport, Made};
 use mimu::verify::verify;
 
@@ -124,13 +125,13 @@ pub fn run(args: &DiagnoseArgs) -> Result<()> {
     if let Some(path) = &args.output {
         files.push(stage(path, after)?);
     }
-    let next = next::next(&diagnosis);
+    let next = next_experiment::next(&diagnosis);
     let mut said = String::new();
     if let Some(path) = &args.plan {
-        said = match next::together(&diagnosis, &next) {
-            Some(answer) => {
+        said = match next_experiment::together(&diagnosis, &next) {
+            Some((setup, answer)) => {
                 let manifest = &diagnosis.before.prepared.manifest;
-                let text = answer.plan(Some(&manifest.device), manifest.sample_rate_hz);
+                let text = answer.plan(&setup, Some(&manifest.device), manifest.sample_rate_hz);
                 files.push(stage(path, text)?);
                 format!("\nplan of the next experiment: {}\n", path.display())
             }

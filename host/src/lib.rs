@@ -14,6 +14,7 @@
 //! | [`calibration`], [`verify`] | the file, and judging it by another recording                     |
 //! | [`diagnose`]    | the effect behind a residual: found, added, proved on other data              |
 //! | [`design`]      | experiments: which attitudes and rates, how many, for how long                |
+//! | [`next_experiment`] | what to record next, where a diagnosis leaves something open              |
 //! | [`allan`]       | noise from a recording at rest: Allan deviation and noise model                |
 //! | [`device`], [`record`] | the device at a serial port, and recordings of it                         |
 //! | [`noise_file`], [`export`] | its result for the other commands, and for other programs          |
@@ -31,6 +32,7 @@ pub mod estimate;
 pub mod export;
 pub mod fit;
 pub mod increment;
+pub mod next_experiment;
 pub mod noise;
 pub mod noise_file;
 pub mod plausible;

@@ -7,10 +7,11 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::sync::{Arc, Mutex};
 
-use mimu::diagnose::{Diagnosis, diagnose, next::next};
+use mimu::diagnose::{Diagnosis, diagnose};
 use mimu::dwell::Sensor;
 use mimu::estimate::Observation;
 use mimu::fit::{Method, Options};
+use mimu::next_experiment::next;
 use mimu::prepared::Prepared;
 use mimu::report::{DiagnosisReport, Made, diagnosis_json, diagnosis_page, diagnosis_text};
 use mimu::stillness::STILL_FACTOR;

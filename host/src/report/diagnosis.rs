@@ -9,7 +9,7 @@ pub use page::{Made, diagnosis_page};
 pub use text::diagnosis_text;
 
 use crate::diagnose::Diagnosis;
-use crate::diagnose::next::Next;
+use crate::next_experiment::Next;
 use crate::verify::Verification;
 
 /// A diagnosis, and the calibration before and after on a recording that it was not made from.

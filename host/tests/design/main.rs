@@ -2,9 +2,9 @@
 
 mod brute_force;
 mod command;
+mod next_experiment;
 mod polynomials;
 mod schemes;
-mod settle;
 mod sphere;
 mod time;
 

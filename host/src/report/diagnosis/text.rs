@@ -5,9 +5,9 @@ use std::fmt::Write as _;
 use super::DiagnosisReport;
 use crate::calibration::ConverterTable;
 use crate::diagnose::decision::{Accepted, Decision, Split};
-use crate::diagnose::next::Next;
 use crate::diagnose::{SensorDiagnosis, Verdict};
 use crate::fit::Figure;
+use crate::next_experiment::Next;
 use crate::report::text::{plus_minus, readable, three, warn, wrap};
 
 /// Result of `mimu diagnose`.
