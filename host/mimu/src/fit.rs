@@ -56,6 +56,18 @@ impl Method {
     }
 }
 
+impl Default for Options {
+    /// Least squares of both triads, judged on four contiguous blocks.
+    fn default() -> Self {
+        Self {
+            method: Method::LeastSquares,
+            holdout_blocks: 4,
+            still_factor: STILL_FACTOR,
+            only: None,
+        }
+    }
+}
+
 impl Options {
     fn wants(&self, sensor: Sensor) -> bool {
         self.only.is_none_or(|only| only == sensor)
