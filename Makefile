@@ -32,7 +32,7 @@ test: toolchain ## formatting, lints, documentation, firmware, all tests but the
 	  took="$$took$$(printf '%-12s %4d s' $$stage $$(( $$(date +%s) - begun )))\n"; \
 	done; printf '\n%b' "$$took"
 
-# Each crate is compiled once: what would be compiled again by the next build is written down for that, which takes a third longer.
+# A fresh build compiles each crate once, so that nothing need be kept for compiling it again in parts.
 test $(STAGES) nightly: export CARGO_INCREMENTAL = 0
 
 fmt:
