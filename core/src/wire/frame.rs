@@ -2,6 +2,7 @@
 
 use cobs::{DecodeResult, DecoderState};
 use crc::{CRC_32_ISO_HDLC, Crc};
+use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
 /// Most bytes of a message. The longest is a compensated batch, some ten less.
@@ -83,8 +84,7 @@ impl<'a> Frame<'a> {
 #[derive(Debug)]
 pub struct Decoder {
     cobs: DecoderState,
-    buffer: [u8; MAX_PAYLOAD + CHECK],
-    length: usize,
+    decoded: Vec<u8, { MAX_PAYLOAD + CHECK }>,
     /// The rest until the next zero is not looked at.
     discarding: bool,
     garbled: u32,
@@ -101,8 +101,7 @@ impl Decoder {
     pub const fn new() -> Self {
         Self {
             cobs: DecoderState::Idle,
-            buffer: [0; MAX_PAYLOAD + CHECK],
-            length: 0,
+            decoded: Vec::new(),
             discarding: false,
             garbled: 0,
         }
@@ -116,15 +115,14 @@ impl Decoder {
         if self.discarding {
             return None;
         }
+        if matches!(self.cobs, DecoderState::Idle) {
+            self.decoded.clear();
+        }
         match self.cobs.feed(byte) {
             Ok(DecodeResult::NoData) => {}
-            Ok(DecodeResult::DataContinue(decoded)) => match self.buffer.get_mut(self.length) {
-                Some(place) => {
-                    *place = decoded;
-                    self.length += 1;
-                }
-                None => self.discarding = true,
-            },
+            Ok(DecodeResult::DataContinue(decoded)) => {
+                self.discarding = self.decoded.push(decoded).is_err();
+            }
             // Both need a zero.
             Ok(DecodeResult::DataComplete) | Err(_) => self.discarding = true,
         }
@@ -143,24 +141,21 @@ impl Decoder {
 
     fn end(&mut self) -> Option<Frame<'_>> {
         let discarded = core::mem::replace(&mut self.discarding, false);
-        let length = core::mem::replace(&mut self.length, 0);
         let state = core::mem::replace(&mut self.cobs, DecoderState::Idle);
         if matches!(state, DecoderState::Idle) {
             return None;
         }
         let complete = matches!(state, DecoderState::Grab(0) | DecoderState::GrabChain(0));
-        let length = length.saturating_sub(CHECK);
-        let whole = self
-            .buffer
-            .split_at_checked(length)
-            .is_some_and(|(p, c)| c.first_chunk() == Some(&CRC.checksum(p).to_le_bytes()));
-        // A frame shorter than its CRC has length 0 here, and the CRC of nothing is 0: what is left in the buffer does not count.
-        match whole && complete && !discarded && length > 0 {
-            true => self.buffer.get(..length).map(Frame),
-            false => {
-                self.garbled = self.garbled.saturating_add(1);
-                None
-            }
+        let payload = self
+            .decoded
+            .split_last_chunk()
+            .filter(|(payload, check)| **check == CRC.checksum(payload).to_le_bytes())
+            .map(|(payload, _)| payload)
+            // The CRC of nothing is 0.
+            .filter(|payload| !payload.is_empty() && complete && !discarded);
+        if payload.is_none() {
+            self.garbled = self.garbled.saturating_add(1);
         }
+        payload.map(Frame)
     }
 }

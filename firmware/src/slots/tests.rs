@@ -46,6 +46,7 @@ struct Memory {
     tear: u8,
 }
 
+const SECTOR: usize = 128 * 1024;
 const USED: usize = 1 + MAX_LENGTH / WORD;
 const PER_SECTOR: usize = SECTOR / WORD;
 
@@ -167,10 +168,13 @@ fn calibration(k: u8, nodes: usize) -> Vec<u8> {
 fn found(memory: &Memory) -> (Option<Vec<u8>>, [Slot; 2]) {
     let mut memory = memory.clone();
     memory.left = usize::MAX;
-    let mut buffer = [0; MAX_LENGTH];
+    let mut buffer = heapless::Vec::new();
     let slots = block_on(Slots::open(memory, &mut buffer));
     let in_use = slots.in_use();
-    let bytes = in_use.map(|(length, _)| buffer[..length as usize].to_vec());
+    let bytes = in_use.map(|(length, _)| {
+        assert_eq!(buffer.len(), length as usize);
+        buffer.to_vec()
+    });
     if let (Some(bytes), Some((_, expected))) = (&bytes, in_use) {
         assert_eq!(hash(bytes), expected);
     }
@@ -181,7 +185,7 @@ fn found(memory: &Memory) -> (Option<Vec<u8>>, [Slot; 2]) {
 fn store(memory: &mut Memory, bytes: &[u8], left: usize, tear: u8) -> bool {
     memory.left = left;
     memory.tear = tear;
-    let mut buffer = [0; MAX_LENGTH];
+    let mut buffer = heapless::Vec::new();
     let mut slots = block_on(Slots::open(memory.clone(), &mut buffer));
     let stored = block_on(slots.store(bytes)).is_ok();
     *memory = slots.flash;

@@ -1,7 +1,7 @@
 //! The host's end of the serial line, for tests: calls and what the device sends, in virtual time.
 
 use mimu_core::wire::{
-    CHUNK, Call, Decoder, Event, MAX_FRAME, Message, Refusal, Reply, Request, encode,
+    CHUNK, Call, Decoder, Event, MAX_FRAME, Message, Refusal, Reply, Request, Sums, encode,
 };
 use mimu_rig::board::running::Board;
 
@@ -35,8 +35,8 @@ pub enum Answer {
 pub struct Sample {
     /// Milliseconds since sampling began.
     pub number: u32,
-    /// Sums of codes: gyro x, y, z, accel x, y, z.
-    pub sums: [u32; 6],
+    /// Sums of codes.
+    pub sums: Sums,
 }
 
 /// A board and the host at its line.
