@@ -154,14 +154,14 @@ fn the_layout_is_that_of_the_table_in_the_documentation() {
         // 2.25 V at the converter of the third axis, whose second bit is of 1 V and not set; and 1.25 V, where it is.
         accel: Vector3::new(2.475, 0.0, 1.0),
     };
-    let clean = single::without_code_errors(&stored.effects.unwrap(), &read);
+    let clean = single::without_code_errors(stored.effects.as_ref().unwrap(), &read);
     assert_eq!(clean.accel, read.accel);
     assert!((clean.gyro - right).amax() < 1e-6, "{}", clean.gyro);
     let set = Sample {
         accel: Vector3::new(2.475, 0.0, 0.0),
         ..read
     };
-    let clean = single::without_code_errors(&stored.effects.unwrap(), &set);
+    let clean = single::without_code_errors(stored.effects.as_ref().unwrap(), &set);
     assert_eq!(clean.accel, Vector3::new(2.475, 0.0, 0.004));
 }
 

@@ -146,7 +146,7 @@ impl<T: RealField + Copy, const N: usize> Triad<T, N> {
     }
 
     /// The input of the triad without its errors; `own` says which of the conditions that is. They are left as they were.
-    #[inline(never)]
+    #[inline]
     pub fn remove(
         &self,
         memory: &mut Memory<T, N>,
@@ -154,9 +154,20 @@ impl<T: RealField + Copy, const N: usize> Triad<T, N> {
         input: &Vector3<T>,
         at: &mut Conditions<T>,
     ) -> Vector3<T> {
-        if self.fast.is_empty() && self.slow.is_empty() {
-            return *input;
+        match self.fast.is_empty() && self.slow.is_empty() {
+            true => *input,
+            false => input - self.error(memory, own, input, at),
         }
+    }
+
+    /// Error of the input, body frame.
+    fn error(
+        &self,
+        memory: &mut Memory<T, N>,
+        own: Sensor,
+        input: &Vector3<T>,
+        at: &mut Conditions<T>,
+    ) -> Vector3<T> {
         let rounds = match memory.before {
             Some(_) => 1,
             None => COLD,
@@ -179,7 +190,7 @@ impl<T: RealField + Copy, const N: usize> Triad<T, N> {
             memory.before = Some(self.directions.to_body * e);
         }
         put(&mut at.values, own, input);
-        input - memory.before.unwrap_or(Vector3::zeros())
+        memory.before.unwrap_or(Vector3::zeros())
     }
 }
 
