@@ -5,6 +5,8 @@ use crc::{CRC_32_ISO_HDLC, Crc};
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
+use super::message::{Call, Message};
+
 /// Most bytes of a message. The longest is a compensated batch, some ten less.
 pub const MAX_PAYLOAD: usize = 512;
 
@@ -29,7 +31,7 @@ impl core::fmt::Display for EncodeError {
 
 impl core::error::Error for EncodeError {}
 
-/// Writes the frame of a [`Call`](super::Call) or [`Message`](super::Message) to the beginning of `out`; returns its length.
+/// Writes the frame of a [`Call`] or [`Message`] to the beginning of `out`; returns its length.
 pub fn encode<T: Serialize>(message: &T, out: &mut [u8; MAX_FRAME]) -> Result<usize, EncodeError> {
     let mut payload = [0; MAX_PAYLOAD + CHECK];
     let room = payload.get_mut(..MAX_PAYLOAD).ok_or(EncodeError)?;
@@ -55,16 +57,16 @@ pub fn encode<T: Serialize>(message: &T, out: &mut [u8; MAX_FRAME]) -> Result<us
 pub struct Frame<'a>(pub &'a [u8]);
 
 impl<'a> Frame<'a> {
-    /// The message in it: all of it, or `None`. A [greeting](super::Message::Greeting) may be followed by what later versions have
+    /// The message in it: all of it, or `None`. A [greeting](Message::Greeting) may be followed by what later versions have
     /// appended to it.
-    pub fn message(&self) -> Option<super::Message<'a>> {
+    pub fn message(&self) -> Option<Message<'a>> {
         let (message, rest) = postcard::take_from_bytes(self.0).ok()?;
-        let greeting = matches!(message, super::Message::Greeting { .. });
+        let greeting = matches!(message, Message::Greeting { .. });
         (rest.is_empty() || greeting).then_some(message)
     }
 
     /// The call in it: all of it, or `None`.
-    pub fn call(&self) -> Option<super::Call<'a>> {
+    pub fn call(&self) -> Option<Call<'a>> {
         self.all()
     }
 
