@@ -36,7 +36,7 @@ pub use code::FARTHEST_ZERO;
 pub use directions::Directions;
 pub use effect::{Effect, Refused, Sensor, Variable};
 
-/// Temperature that warmth counts from, °C.
+/// Temperature that temperature offsets count from, °C.
 pub const REFERENCE_C: f64 = 25.0;
 /// Lag of the filter by which the rate of change of the temperature is taken, s: unfiltered it would be noise.
 pub const RATE_LAG_S: f64 = 30.0;
@@ -79,8 +79,8 @@ pub struct State<T: RealField, const N: usize> {
     time: T,
     lost: T,
     /// The last temperature above the reference that was a number, °C.
-    warm: Option<T>,
-    /// The temperature behind [`RATE_LAG_S`], less itself, °C.
+    temperature_offset: Option<T>,
+    /// The temperature lagged by [`RATE_LAG_S`], minus itself, °C.
     rate_lag: T,
     gyro: Memory<T, N>,
     accel: Memory<T, N>,
@@ -102,7 +102,7 @@ impl<T: RealField + Copy, const N: usize> State<T, N> {
             },
             time: T::zero(),
             lost: T::zero(),
-            warm: None,
+            temperature_offset: None,
             rate_lag: T::zero(),
             gyro: Memory::none(),
             accel: Memory::none(),
@@ -161,19 +161,19 @@ impl<T: RealField + Copy, const N: usize> Effects<T, N> {
         state.lost = (time - state.time) - step;
         state.time = time;
 
-        let before = state.warm;
-        let warm = match temp_c.is_finite() {
+        let before = state.temperature_offset;
+        let temperature_offset = match temp_c.is_finite() {
             true => temp_c - convert(REFERENCE_C),
             false => before.unwrap_or(T::zero()),
         };
         if temp_c.is_finite() {
-            state.warm = Some(warm);
+            state.temperature_offset = Some(temperature_offset);
         }
-        let risen = warm - before.unwrap_or(warm);
+        let risen = temperature_offset - before.unwrap_or(temperature_offset);
         let rate_lag: T = convert(RATE_LAG_S);
         state.rate_lag = lagged(state.rate_lag, dt, risen, rate_lag);
         let [.., temperature, rate, since] = &mut state.at.values;
-        *temperature = warm;
+        *temperature = temperature_offset;
         *rate = -state.rate_lag / rate_lag;
         *since = time;
 

@@ -65,7 +65,7 @@ const FACTORS: usize = 3;
 const CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
 const HASH: Crc<u64, NoTable> = Crc::<u64, NoTable>::new(&CRC_64_XZ);
 
-/// What a calibration is told apart by: CRC-64/XZ over all of its bytes. Not the CRC-32 once more, which over anything that ends in its
+/// What a calibration is identified by: CRC-64/XZ over all of its bytes. Not the CRC-32 once more, which over anything that ends in its
 /// own CRC-32 is always the same.
 pub fn hash(bytes: &[u8]) -> u64 {
     HASH.checksum(bytes)
@@ -92,7 +92,7 @@ pub enum Record<'a> {
         /// All of its coefficients, SI.
         coefficients: &'a [f32],
         /// Nonlinear constant of an effect that has any: time constant, s.
-        form: Option<f32>,
+        nonlinear: Option<f32>,
     },
     /// As in [`Effect::term`].
     Term {
@@ -173,7 +173,7 @@ pub fn encode(
     to.u16(0)?;
     to.bytes(&[count(nodes.len())?, count(effects.len())?, 0, 0])?;
     for matrix in found_with {
-        // The device inverts nothing, so what is singular is told by what is no number.
+        // The device inverts nothing, so a singular matrix is marked by what is no number.
         let nothing = Matrix3::repeat(f32::NAN);
         let none = Directions {
             sensed: nothing,
@@ -195,13 +195,13 @@ pub fn encode(
             Record::Named {
                 id,
                 coefficients,
-                form,
+                nonlinear,
             } => {
                 to.bytes(&[NAMED, count(id.len())?])?;
                 to.bytes(id.as_bytes())?;
                 to.bytes(&[count(coefficients.len())?])?;
                 coefficients.iter().try_for_each(|c| to.f32(*c))?;
-                to.f32(form.unwrap_or(0.0))?;
+                to.f32(nonlinear.unwrap_or(0.0))?;
             }
             Record::Term {
                 sensor,

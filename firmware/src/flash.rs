@@ -234,7 +234,7 @@ async fn finished(pause_us: u64) -> Result<(), Error> {
 
 /// Bit of CCR by which the highest priorities ignore bus errors of data.
 const BFHFNMIGN: u32 = 1 << 8;
-/// Bits of CFSR by which a data bus error is told, precise or not, and its address is valid.
+/// Bits of CFSR by which a data bus error is reported, precise or not, and its address is valid.
 const DATA_BUS_ERRORS: u32 = 1 << 9 | 1 << 10 | 1 << 15;
 
 /// Reads a word of the calibration sectors, by its number.

@@ -7,7 +7,7 @@
 //! | [`channels`]          | the channels of a sample, and their order in a scan              |
 //! | [`convert`]           | sums of converter codes, and what they stand for                 |
 //! | [`pipeline`]          | what happens to a sample: compensation, batches, Kalman banks    |
-//! | [`bank`]              | a Kalman bank that is told its input and fed from the stream     |
+//! | [`bank`]              | a Kalman bank that is given its input and fed from the stream     |
 //! | [`upload`]            | a calibration on its way to the device                           |
 //! | [`slots`]             | where calibrations are kept, safe against a failing supply       |
 //! | `adc`                 | the converter's driver, the only place with its registers        |

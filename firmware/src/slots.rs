@@ -47,14 +47,14 @@ impl Front {
     }
 
     fn from_word(word: &[u8; WORD]) -> Option<Self> {
-        let (said, check) = word.split_last_chunk::<8>()?;
-        let u32_at = |at: usize| Some(u32::from_le_bytes(*said.get(at..)?.first_chunk()?));
+        let (body, check) = word.split_last_chunk::<8>()?;
+        let u32_at = |at: usize| Some(u32::from_le_bytes(*body.get(at..)?.first_chunk()?));
         let front = Self {
             generation: u32_at(4)?,
             length: u32_at(8)?,
-            hash: u64::from_le_bytes(*said.get(12..)?.first_chunk()?),
+            hash: u64::from_le_bytes(*body.get(12..)?.first_chunk()?),
         };
-        let whole = said.starts_with(&MAGIC) && hash(said).to_le_bytes() == *check;
+        let whole = body.starts_with(&MAGIC) && hash(body).to_le_bytes() == *check;
         (whole && (front.length as usize) <= MAX_LENGTH).then_some(front)
     }
 }

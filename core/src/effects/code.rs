@@ -24,7 +24,7 @@ pub(super) struct Code<T> {
 }
 
 /// A multiple of what nine bits can count: keeps codes down to 32 weights below the zero positive, and their bits the same. More would
-/// cost what single precision tells codes apart by, 1/1024 here. And half a code, where the last bit is worth 128: codes that are that of
+/// cost what single precision resolves, 1/1024 here. And half a code, where the last bit is worth 128: codes that are that of
 /// a turn would be on either side by rounding.
 const ABOVE_ZERO: f64 = 8192.0 + 1.0 / 256.0;
 

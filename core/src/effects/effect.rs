@@ -3,7 +3,7 @@
 use nalgebra::{RealField, convert};
 
 use super::code::{BITS, FARTHEST_ZERO};
-use super::law::{COEFFICIENTS, Evaluation, FACTORS, Fast, Form, Law, Slowly, term};
+use super::law::{COEFFICIENTS, Evaluation, FACTORS, Fast, Law, Nonlinear, Slowly, term};
 
 /// Triad whose readings err.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -82,7 +82,7 @@ pub(super) enum Kind<T: RealField> {
 impl<T: RealField + Copy> Effect<T> {
     /// The effect of a public id like `gyro_scale_cubic`, with all of its coefficients (SI, those of a matrix by rows) and the
     /// nonlinear constant of one that has any: a time constant, s.
-    pub fn named(id: &str, coefficients: &[T], form: Option<T>) -> Result<Self, Refused> {
+    pub fn named(id: &str, coefficients: &[T], nonlinear: Option<T>) -> Result<Self, Refused> {
         let (sensor, name) = match (id.strip_prefix("gyro_"), id.strip_prefix("accel_")) {
             (Some(name), _) => (Sensor::Gyro, name),
             (_, Some(name)) => (Sensor::Accel, name),
@@ -93,9 +93,9 @@ impl<T: RealField + Copy> Effect<T> {
             let needed = law.coefficients;
             return Err(Refused::Count { needed });
         }
-        let form = match (law.form, form) {
-            (Form::None, None) => T::one(),
-            (Form::TimeConstant | Form::Lag, Some(value))
+        let nonlinear = match (law.nonlinear, nonlinear) {
+            (Nonlinear::None, None) => T::one(),
+            (Nonlinear::TimeConstant | Nonlinear::Lag, Some(value))
                 if value > T::zero() && value.is_finite() =>
             {
                 value
@@ -118,8 +118,8 @@ impl<T: RealField + Copy> Effect<T> {
             Evaluation::Slow(run) => Kind::Slow(Slowly::Law {
                 law: run,
                 coefficients: all,
-                form,
-                lags: law.form == Form::Lag,
+                nonlinear,
+                lags: law.nonlinear == Nonlinear::Lag,
             }),
         };
         Ok(Self { sensor, kind })
@@ -164,7 +164,7 @@ impl<T: RealField + Copy> Effect<T> {
     /// `weight`: of bit 0, the highest, raw; each of the nine bits has half the weight of the one before. `errors`: what a reading has too
     /// much where the bit is set, in units of `weight`. `zero`: the reading of code 0, raw; not 0 where something was subtracted from the
     /// readings. A reading of less than 1/65536 of `weight` below the turn of a bit counts as one of the turn, whichever way it was
-    /// rounded. The code of all nine bits set, and one more, is again 0: what lies beyond is not told apart. Refused where a number is not
+    /// rounded. The code of all nine bits set, and one more, is again 0: what lies beyond is not distinguished. Refused where a number is not
     /// finite, the weight not positive, or `zero` farther from a reading of 0 than [`FARTHEST_ZERO`] weights.
     ///
     /// ```

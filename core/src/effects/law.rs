@@ -40,7 +40,7 @@ pub(super) enum Slowly<T: RealField> {
     Law {
         law: SlowLaw<T>,
         coefficients: [T; COEFFICIENTS],
-        form: T,
+        nonlinear: T,
         lags: bool,
     },
     /// A term of slow variables, which is a bias.
@@ -49,12 +49,12 @@ pub(super) enum Slowly<T: RealField> {
 
 /// What the errors are computed from that move with temperature and time.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Ambience<T> {
+pub(super) struct Ambient<T> {
     /// Time since power-on, s.
     pub time: T,
     /// Temperature above the reference, °C.
-    pub warm: T,
-    /// The same behind the lag of the effect, less itself, °C.
+    pub temperature_offset: T,
+    /// Lagged temperature minus the temperature, °C.
     pub lag: T,
 }
 
@@ -67,8 +67,8 @@ pub(super) struct Slow<T: RealField> {
     pub across: Matrix3<T>,
 }
 
-/// Adds an effect by coefficients, nonlinear constant and ambience.
-pub(super) type SlowLaw<T> = fn(&[T; COEFFICIENTS], T, &Ambience<T>, &mut Slow<T>);
+/// Adds an effect by coefficients, nonlinear constant and ambient.
+pub(super) type SlowLaw<T> = fn(&[T; COEFFICIENTS], T, &Ambient<T>, &mut Slow<T>);
 
 /// How an effect is evaluated: what it adds to the error of the three sensors, SI.
 #[derive(Debug, Clone, Copy)]
@@ -81,12 +81,12 @@ pub(super) enum Evaluation<T: RealField> {
 
 /// Nonlinear constant of an effect.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Form {
+pub(super) enum Nonlinear {
     /// It has none.
     None,
     /// A time constant, s.
     TimeConstant,
-    /// The time constant of [`Ambience::lag`], s.
+    /// The time constant of [`Ambient::lag`], s.
     Lag,
 }
 
@@ -97,7 +97,7 @@ pub(super) struct Law<T: RealField> {
     pub name: &'static str,
     /// How many coefficients it takes. A matrix is by rows; rows are sensors.
     pub coefficients: usize,
-    pub form: Form,
+    pub nonlinear: Nonlinear,
     pub evaluation: Evaluation<T>,
 }
 
@@ -116,32 +116,32 @@ impl<T: RealField + Copy> Law<T> {
         Self::fast("scale_asymmetry", 3, scale_asymmetry),
         Self::fast("cross_axis_product", 9, cross_axis_product),
         Self::fast("size_effect", 9, size_effect),
-        Self::slow("bias_drift", 3, Form::None, |c, _, at, e| {
+        Self::slow("bias_drift", 3, Nonlinear::None, |c, _, at, e| {
             e.bias += each(c) * at.time;
         }),
         Self::slow(
             "warm_up",
             3,
-            Form::TimeConstant,
+            Nonlinear::TimeConstant,
             |c, time_constant, at, e| {
                 // Not `exp`, which nothing else here uses and which would be in the image for this.
                 let left = (-at.time / time_constant).exp_m1() + T::one();
                 e.bias += each(c) * left;
             },
         ),
-        Self::slow("thermal_bias", 6, Form::None, |c, _, at, e| {
+        Self::slow("thermal_bias", 6, Nonlinear::None, |c, _, at, e| {
             let bend = Vector3::new(c[3], c[4], c[5]);
-            e.bias += (each(c) + bend * at.warm) * at.warm;
+            e.bias += (each(c) + bend * at.temperature_offset) * at.temperature_offset;
         }),
-        Self::slow("thermal_scale", 3, Form::None, |c, _, at, e| {
-            e.along += each(c) * at.warm;
+        Self::slow("thermal_scale", 3, Nonlinear::None, |c, _, at, e| {
+            e.along += each(c) * at.temperature_offset;
         }),
-        Self::slow("thermal_misalignment", 6, Form::None, |c, _, at, e| {
+        Self::slow("thermal_misalignment", 6, Nonlinear::None, |c, _, at, e| {
             let none = T::zero();
             let tilt = Matrix3::new(none, c[0], c[1], c[2], none, c[3], c[4], c[5], none);
-            e.across += tilt * at.warm;
+            e.across += tilt * at.temperature_offset;
         }),
-        Self::slow("thermal_lag", 3, Form::Lag, |c, _, at, e| {
+        Self::slow("thermal_lag", 3, Nonlinear::Lag, |c, _, at, e| {
             e.bias += each(c) * at.lag;
         }),
     ];
@@ -150,16 +150,21 @@ impl<T: RealField + Copy> Law<T> {
         Self {
             name,
             coefficients,
-            form: Form::None,
+            nonlinear: Nonlinear::None,
             evaluation: Evaluation::Fast(law),
         }
     }
 
-    const fn slow(name: &'static str, coefficients: usize, form: Form, law: SlowLaw<T>) -> Self {
+    const fn slow(
+        name: &'static str,
+        coefficients: usize,
+        nonlinear: Nonlinear,
+        law: SlowLaw<T>,
+    ) -> Self {
         Self {
             name,
             coefficients,
-            form,
+            nonlinear,
             evaluation: Evaluation::Slow(law),
         }
     }

@@ -6,7 +6,7 @@ use nalgebra::{Matrix3, RealField, Vector3};
 use super::code::Code;
 use super::directions::Directions;
 use super::effect::{Kind, Refused, Sensor};
-use super::law::{Ambience, Conditions, Fast, Slow, Slowly, Values};
+use super::law::{Ambient, Conditions, Fast, Slow, Slowly, Values};
 
 /// Evaluations of a sample that none goes before.
 const COLD: usize = 2;
@@ -29,7 +29,7 @@ pub(super) struct Memory<T: RealField, const N: usize> {
     bias: Vector3<T>,
     /// Error of the sample before, body frame; `None` if there was none.
     before: Option<Vector3<T>>,
-    /// Of each slow effect: the temperature behind its lag, less itself, °C. Kept as the difference: the lagged temperature itself
+    /// Of each slow effect: its lagged temperature, minus itself, °C. Kept as the difference: the lagged temperature itself
     /// would stand still in single precision once its step is below the last digit of some 10 °C.
     lags: [T; N],
 }
@@ -51,7 +51,7 @@ impl<T: RealField + Copy, const N: usize> Memory<T, N> {
     }
 }
 
-/// A step of `late - warm` over `dt` behind a first-order lag, `step` being that of `warm`: exact if it is a ramp.
+/// A step of the lagged temperature minus the temperature over `dt` behind a first-order lag, `step` being that of the temperature: exact if it is a ramp.
 pub(super) fn lagged<T: RealField + Copy>(difference: T, dt: T, step: T, lag: T) -> T {
     let z = dt / lag;
     // No time passed: all of the step is yet to come.
@@ -101,7 +101,7 @@ impl<T: RealField + Copy, const N: usize> Triad<T, N> {
 
     /// Folds the slow effects; the slow variables of the conditions are set.
     pub fn slow(&self, memory: &mut Memory<T, N>, dt: T, risen: T, at: &Conditions<T>) {
-        let [.., warm, _, time] = at.values;
+        let [.., temperature_offset, _, time] = at.values;
         let mut total = Slow {
             bias: Vector3::zeros(),
             along: Vector3::zeros(),
@@ -112,17 +112,21 @@ impl<T: RealField + Copy, const N: usize> Triad<T, N> {
                 Slowly::Law {
                     law,
                     coefficients,
-                    form,
+                    nonlinear,
                     lags,
                 } => {
                     if *lags {
-                        *lag = lagged(*lag, dt, risen, *form);
+                        *lag = lagged(*lag, dt, risen, *nonlinear);
                     }
                     let lag = *lag;
                     law(
                         coefficients,
-                        *form,
-                        &Ambience { time, warm, lag },
+                        *nonlinear,
+                        &Ambient {
+                            time,
+                            temperature_offset,
+                            lag,
+                        },
                         &mut total,
                     );
                 }

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::message::{Call, Message};
 
-/// Most bytes of a message. The longest is a compensated batch, some ten less.
+/// Most bytes of a message. The longest is a compensated batch, some ten shorter.
 pub const MAX_PAYLOAD: usize = 512;
 
 const CHECK: usize = 4;

@@ -181,7 +181,7 @@ fn found(memory: &Memory) -> (Option<Vec<u8>>, [Slot; 2]) {
     (bytes, slots.state())
 }
 
-/// Stores on a memory whose supply fails after so many operations; whether it said that it has.
+/// Stores on a memory whose supply fails after so many operations; whether it reported that it has.
 fn store(memory: &mut Memory, bytes: &[u8], left: usize, tear: u8) -> bool {
     memory.left = left;
     memory.tear = tear;
@@ -219,14 +219,14 @@ fn wherever_the_supply_fails_the_old_or_the_new_one_is_whole() {
         for tear in 0..4 {
             for left in 1..=operations + 1 {
                 let mut memory = before.clone();
-                let said = store(&mut memory, &new, left, tear);
+                let reported = store(&mut memory, &new, left, tear);
                 let (after, _) = found(&memory);
                 assert!(
                     after == old || after.as_ref() == Some(&new),
                     "{left} {tear}"
                 );
-                assert!(!said || after.as_ref() == Some(&new), "{left} {tear}");
-                assert_eq!(said, left > operations, "{left} {tear}");
+                assert!(!reported || after.as_ref() == Some(&new), "{left} {tear}");
+                assert_eq!(reported, left > operations, "{left} {tear}");
                 // And it can go on from there.
                 assert!(store(&mut memory, &third, usize::MAX, 0));
                 assert_eq!(found(&memory).0.as_ref(), Some(&third), "{left} {tear}");
