@@ -173,7 +173,7 @@ fn image() -> Vec<u8> {
         Record::Named {
             id: "gyro_warm_up",
             coefficients: &[0.1, 0.2, 0.3],
-            form: Some(60.0),
+            nonlinear: Some(60.0),
         },
         Record::Term {
             sensor: Sensor::Accel,
