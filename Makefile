@@ -3,8 +3,16 @@
 TOOLCHAIN := $(shell sed -n 's/^channel = "\(.*\)"/\1/p' rust-toolchain.toml)
 TARGET := thumbv7em-none-eabihf
 CARGO := cargo +$(TOOLCHAIN)
+# One by one: built together, the second would be given the vector table that the first brings.
+FIRMWARE := $(CARGO) build --locked -p mimu-firmware --release --target $(TARGET)
+COUNTED := $(CARGO) build --locked -p mimu-counted --release --target $(TARGET)
+# All whose tests run on the PC.
+ON_PC := --workspace --exclude mimu-counted --exclude mimu-no-panic
 
-.PHONY: help test demo papers blind bench budget device fuzz audit toolchain
+# Of `make test`, and each also by itself: `make clippy`. Tests are linked before they run, so that both times are seen.
+STAGES := fmt clippy rustdoc images no-panic build-tests run-tests
+
+.PHONY: help test $(STAGES) nightly demo papers blind bench budget device fuzz audit toolchain
 
 help: ## this list
 	@sed -n 's/^\([a-z]*\):.*## /  make \1\t/p' Makefile
@@ -17,25 +25,48 @@ toolchain:
 	  && rustup component list --toolchain $(TOOLCHAIN) --installed | grep -q rustfmt \
 	  || rustup toolchain install $(TOOLCHAIN) --profile minimal -c rustfmt -c clippy -t $(TARGET)
 
-test: toolchain ## formatting, lints, documentation, firmware, all tests
+test: toolchain ## formatting, lints, documentation, firmware, all tests but the nightly ones
+	@set -e; took=; for stage in $(STAGES); do \
+	  echo "== $$stage"; begun=$$(date +%s); \
+	  $(MAKE) --no-print-directory $$stage; \
+	  took="$$took$$(printf '%-12s %4d s' $$stage $$(( $$(date +%s) - begun )))\n"; \
+	done; printf '\n%b' "$$took"
+
+# A fresh build compiles each crate once, so that nothing need be kept for compiling it again in parts.
+test $(STAGES) nightly: export CARGO_INCREMENTAL = 0
+
+fmt:
 	$(CARGO) fmt --all --check
+
+clippy:
 	$(CARGO) clippy --locked --all-targets -- -D warnings
-	$(CARGO) clippy --locked -p mimu-no-panic --release --target $(TARGET) -- -D warnings
-	$(CARGO) clippy --locked -p mimu-firmware -p mimu-counted --release --target $(TARGET) -- -D warnings
+	$(CARGO) clippy --locked -p mimu-firmware -p mimu-counted -p mimu-no-panic --release --target $(TARGET) -- -D warnings
 	$(CARGO) clippy --locked -p mimu-firmware --release --features usb --target $(TARGET) -- -D warnings
+
+rustdoc:
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --locked --no-deps
-# Before the image without it, which has the same name and is what the tests run.
+
+# With USB first, as the image without it has the same name and is what the tests run.
+images:
 	$(CARGO) build --locked -p mimu-firmware --release --features usb --target $(TARGET)
-	$(CARGO) build --locked -p mimu-firmware --release --target $(TARGET)
-	$(CARGO) build --locked -p mimu-counted --release --target $(TARGET)
+	$(FIRMWARE)
+	$(COUNTED)
+
+no-panic:
 	./tests/no_panic/check.sh $(CARGO)
-	$(CARGO) test --locked
-	$(CARGO) test --locked -p mimu-firmware --lib
-	$(CARGO) run --locked -p mimu-tests --bin papers -- --check
-	$(CARGO) run --locked -p mimu-tests --bin budget -- --check
+
+build-tests:
+	$(CARGO) test --locked $(ON_PC) --no-run
+
+run-tests:
+	$(CARGO) test --locked $(ON_PC)
+
+nightly: toolchain blind fuzz ## what takes hours: more seeds, ten minutes of samples, 300 supply cuts, coverage, blind, fuzz; prints its figures
+	$(FIRMWARE)
+	$(CARGO) test --locked --release $(ON_PC) -- --ignored --nocapture --test-threads=2
 
 demo: toolchain ## import and fit a recording: the best real one at hand, or the small one in tests/
-	$(CARGO) build --locked --release -p mimu
+	$(CARGO) build --locked --release --bin mimu
 	./tests/demo.sh target/release/mimu
 
 papers: toolchain ## compute every figure and plot of docs/papers.md
@@ -45,21 +76,21 @@ blind: toolchain ## undeclared effects on hundreds of units, and what the diagno
 	$(CARGO) run --locked --release -p mimu-tests --bin blind
 
 bench: toolchain ## rates and peak memory on four hours at 1 kHz, and of a diagnosis
-	$(CARGO) bench --locked -p mimu --bench four_hours
+	$(CARGO) bench --locked -p mimu-cli --bench four_hours
 	$(CARGO) bench --locked -p mimu-tests --bench diagnosis
+	$(CARGO) bench --locked -p mimu-rig --bench step
 
 budget: toolchain ## instructions, load and memory of the firmware, counted on the emulated board
-	$(CARGO) build --locked -p mimu-firmware --release --target $(TARGET)
-	$(CARGO) build --locked -p mimu-counted --release --target $(TARGET)
-	$(CARGO) run --locked -p mimu-tests --bin budget
+	$(FIRMWARE)
+	$(COUNTED)
+	$(CARGO) run --locked -p mimu-board-tests --bin budget
 
-device: toolchain ## ten minutes of the device's samples, and 300 power cuts while a calibration is stored, drawn into docs/device
-	$(CARGO) build --locked -p mimu-firmware --release --target $(TARGET)
-	MIMU_DEVICE_SECONDS=600 MIMU_CUTS=300 $(CARGO) test --locked --release -p mimu-tests \
-	  --test device_serial --test device_power -- --nocapture
+device: toolchain ## of the nightly tests those of the device; draws docs/device/supply-cuts.svg
+	$(FIRMWARE)
+	$(CARGO) test --locked --release -p mimu-board-tests -- --ignored --nocapture
 
 fuzz: toolchain ## mutated recordings, manifests and calibrations for ten minutes, or MIMU_FUZZ_SECONDS
-	MIMU_FUZZ_SECONDS=$${MIMU_FUZZ_SECONDS:-600} $(CARGO) test --locked --release -p mimu --test fuzz -- --nocapture
+	MIMU_FUZZ_SECONDS=$${MIMU_FUZZ_SECONDS:-600} $(CARGO) test --locked --release -p mimu-cli --test all fuzz -- --nocapture
 
 audit: toolchain ## licences, advisories as far as the registry has them, duplicate dependencies
 	@command -v cargo-deny >/dev/null || $(CARGO) install --locked cargo-deny

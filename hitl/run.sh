@@ -2,7 +2,7 @@
 # Hardware in the loop: the release image on a real board, from flashing to a recording. The unit lies still, z up.
 #
 # NOT RUN YET on a board: nobody has had one at hand. All but flashing and resetting can be tried on the emulated board:
-#   mimu-rig serve &   then   MIMU_NO_PROBE=1 MIMU_PORT=/dev/pts/N hitl/run.sh cal.toml
+#   mimu-board serve &   then   MIMU_NO_PROBE=1 MIMU_PORT=/dev/pts/N hitl/run.sh cal.toml
 #
 #   hitl/run.sh [CALIBRATION.toml]     a calibration in volts; without one, what needs it is left out, and said
 #   MIMU_PORT=/dev/ttyACM0             port of the board; without it the only one at which a device greets

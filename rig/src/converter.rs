@@ -2,8 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::pins::Pins;
 use crate::random::Random;
-use crate::unit::{Pins, UnitTruth};
+use crate::unit::UnitTruth;
 
 /// Unit of a recording's raw readings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]

@@ -1,7 +1,8 @@
 //! The virtual bench: inertial units with known truth, and what moves and heats them.
 //!
 //! Physics from datasheets and kinematics, so that estimators can be judged by it. It shares no model code with
-//! them. `docs/bench.md` has the command and all keys of its files.
+//! them. `docs/bench.md` has the command and all keys of its files. The crate `mimu-board` puts the firmware on an emulated
+//! microcontroller behind the pins of such a unit.
 //!
 //! | the experiment                 |                                                                   |
 //! |--------------------------------|-------------------------------------------------------------------|
@@ -17,16 +18,13 @@
 //! | [`mod@unit`], [`sensor`], [`filter`] | from motion and chamber to the voltages at the pins         |
 //! | [`noise`], [`thermal`]         | what disturbs every sensor                                        |
 //! | [`effects`]                    | what the affine model lacks, switched on one by one               |
-//! | [`converter`]                  | from the pins to the readings of a recording                      |
+//! | [`pins`], [`converter`]        | from the pins to the readings of a recording                      |
 //! | [`catalog`], [`rig_file`], [`refusal`] | sensors by their data sheets; RIG.toml, and the truth drawn by it |
 //! | [`ideal`]                      | forward models of papers, for Monte Carlo studies                 |
-//! | [`board`]                      | the firmware on an emulated microcontroller behind these pins     |
 
 pub mod axis;
-pub mod board;
 pub mod catalog;
 pub mod chain;
-pub(crate) mod controller;
 pub mod converter;
 pub mod effects;
 pub mod filter;
@@ -35,6 +33,7 @@ pub mod ideal;
 pub mod located;
 pub mod motion;
 pub mod noise;
+pub mod pins;
 pub mod place;
 pub mod plan;
 pub mod random;

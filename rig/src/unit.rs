@@ -4,8 +4,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::effects::{Active, Condition, Disturbance, EffectTruth};
+use crate::effects::{Active, Condition, Disturbance, EffectTruth, Sensors};
 use crate::motion::Motion;
+use crate::pins::Pins;
 use crate::random::Random;
 use crate::sensor::{Axis, TriadTruth};
 use crate::thermal::{Thermal, ThermalTruth};
@@ -67,25 +68,6 @@ pub struct UnitTruth {
     pub effects: Vec<EffectTruth>,
 }
 
-/// Voltages at the pins at one instant. Of a digital part: its counts before rounding.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Pins {
-    /// RATEOUT of the gyros x, y, z, V.
-    pub gyro_v: [f64; 3],
-    /// 2.5 V reference pins of the gyros, V.
-    pub gyro_reference_v: [f64; 3],
-    /// TEMP pins of the gyros, V.
-    pub gyro_temp_v: [f64; 3],
-    /// Outputs of the accelerometer x, y, z, V.
-    pub accel_v: [f64; 3],
-    /// Supply of the accelerometer, V.
-    pub supply_v: f64,
-    /// Reference of the converter, V.
-    pub converter_reference_v: f64,
-    /// What the unit's temperature sensor says, °C.
-    pub temp_c: f64,
-}
-
 /// State of a voltage.
 #[derive(Debug, Clone)]
 struct Voltage {
@@ -135,6 +117,11 @@ impl Unit {
                 Axis::new(&of.axes[i], of.ratiometric, &name, dt_s, seed)
             })
         };
+        let sensors = Sensors {
+            gyro: &truth.gyro,
+            accel: &truth.accel,
+            converter_reference_nominal_v: truth.converter_reference.nominal_v,
+        };
         Self {
             gyro: triad(&truth.gyro, "gyro"),
             accel: triad(&truth.accel, "accel"),
@@ -152,7 +139,7 @@ impl Unit {
             effects: truth
                 .effects
                 .iter()
-                .map(|e| e.activate(truth, seed, dt_s))
+                .map(|e| e.activate(sensors, seed, dt_s))
                 .collect(),
         }
     }

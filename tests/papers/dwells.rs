@@ -4,16 +4,16 @@ use mimu::design::Problem;
 use mimu::design::model::{Model, Setting, Terms};
 use mimu::design::reach::Carrier;
 use mimu::design::schemes::Scheme;
-use mimu::dwell::Sensor;
 use mimu::estimate::Observation;
-use mimu::recording::Reference;
+use mimu::quantity::Sensor;
+use mimu_recording::Reference;
 use mimu_rig::hands::{Hands, HandsTruth};
 use mimu_rig::located::Source;
 use mimu_rig::motion::Carrier as _;
 use mimu_rig::plan::Plan;
 use nalgebra::Vector3;
 
-use crate::page::{Block, Table, three};
+use crate::page::{Block, Table, significant};
 use crate::plot::{Band, Chart, Line, Mark};
 
 /// Poses of the session that the designs are measured against.
@@ -115,7 +115,7 @@ fn study(
         table.row([
             name.to_string(),
             dwells.to_string(),
-            sigma.map_or_else(|| "undetermined".into(), three),
+            sigma.map_or_else(|| "undetermined".into(), significant),
             ours.map_or_else(|| "-".to_string(), |n| format!("{n} dwells")),
         ]);
     };
@@ -147,7 +147,7 @@ fn study(
         mark("Xsens session", poses.len(), sigma);
         let sigma = sigma.expect("it was fitted");
         let ours = needed(&ours, sigma).map_or_else(|| "-".into(), |n| n.to_string());
-        [poses.len().to_string(), three(sigma), ours]
+        [poses.len().to_string(), significant(sigma), ours]
     });
     let chart = Chart {
         file: file.to_string(),

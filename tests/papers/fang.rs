@@ -4,17 +4,17 @@ use mimu::design::Problem;
 use mimu::design::model::{Model, Setting, Terms};
 use mimu::design::reach::Carrier;
 use mimu::design::schemes::{FANG_FILTERS, Scheme};
-use mimu::dwell::Sensor;
 use mimu::estimate::known_input::{kalman, least_squares, six_positions};
 use mimu::estimate::{Estimated, Observation};
-use mimu::recording::Reference;
+use mimu::quantity::Sensor;
 use mimu::triad::{Angles, Forward, Physical};
 use mimu_core::kalman::Filter;
+use mimu_recording::Reference;
 use mimu_rig::ideal::{self, FANG_TABLE_3, Ideal};
 use mimu_rig::random::Random;
 use nalgebra::{Matrix3, Vector3};
 
-use crate::page::{Block, Table, three};
+use crate::page::{Block, Table, significant};
 
 /// Runs of the Monte Carlo.
 const RUNS: u64 = 1000;
@@ -183,7 +183,7 @@ fn errors_of(truth: &Ideal, of_truth: &[Vector3<f64>; 4], angles: Angles, readin
     ]);
     for contender in contenders() {
         let [_, squares] = monte_carlo(&contender, truth, of_truth, angles, readings);
-        let cells = squares.iter().map(|s| three(over_axes(s)));
+        let cells = squares.iter().map(|s| significant(over_axes(s)));
         let start = [
             contender.name.to_string(),
             contender.positions.len().to_string(),
@@ -245,7 +245,7 @@ fn decompositions() -> Table {
             };
             match error.amax() {
                 rounding if rounding < 1e-12 => "0".to_string(),
-                largest => three(largest),
+                largest => significant(largest),
             }
         });
         table.row(

@@ -73,8 +73,8 @@ impl Table {
     }
 }
 
-/// `x` with three digits.
-pub fn three(x: f64) -> String {
+/// `x` to three significant digits, as the pages of the papers are written: an exponent from seven digits on.
+pub fn significant(x: f64) -> String {
     if x == 0.0 || !x.is_finite() {
         return format!("{x}");
     }

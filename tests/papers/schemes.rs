@@ -5,10 +5,10 @@ use mimu::design::judgement::Judgement;
 use mimu::design::model::{Model, Setting, Terms};
 use mimu::design::reach::{Carrier, Rates};
 use mimu::design::schemes::Scheme;
-use mimu::dwell::Sensor;
-use mimu::recording::Reference;
+use mimu::quantity::Sensor;
+use mimu_recording::Reference;
 
-use crate::page::{Block, Table, three};
+use crate::page::{Block, Table, significant};
 
 /// Sigmas of the parameters that `belongs` picks, as one number or lowest to highest.
 fn sigmas(judged: &Judgement, belongs: impl Fn(&str) -> bool) -> String {
@@ -18,9 +18,9 @@ fn sigmas(judged: &Judgement, belongs: impl Fn(&str) -> bool) -> String {
         [low.min(s), high.max(s)]
     });
     match (low.is_finite(), high.is_finite()) {
-        (true, true) if high < 1.005 * low => three(low),
-        (true, true) => format!("{} to {}", three(low), three(high)),
-        (true, false) => format!("{} to undetermined", three(low)),
+        (true, true) if high < 1.005 * low => significant(low),
+        (true, true) => format!("{} to {}", significant(low), significant(high)),
+        (true, false) => format!("{} to undetermined", significant(low)),
         _ => "undetermined".to_string(),
     }
 }

@@ -1,15 +1,15 @@
 //! xu: its schedules, Tables 1 and 2 as truth, and the scatter of its five repeats as noise.
 
 use mimu::design::schemes::Scheme;
-use mimu::dwell::Sensor;
 use mimu::estimate::known_input::{inverse_form, kalman, least_squares, opposite_rates};
 use mimu::estimate::{Estimated, Failure, Observation};
+use mimu::quantity::Sensor;
 use mimu_core::compensation::Affine;
 use mimu_rig::ideal::Inverse;
 use mimu_rig::random::Random;
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
-use crate::page::{Block, Table, three};
+use crate::page::{Block, Table, significant};
 
 /// Runs of the Monte Carlo.
 const RUNS: u64 = 1000;
@@ -192,9 +192,9 @@ fn repeats(experiment: &Experiment, names: &[String; 12], unit: &str) -> Table {
         table.row([
             names[k].clone(),
             format!("{:.5}", mean(&experiment.table[k])),
-            three(scatter(&experiment.table[k])),
-            three(sigma[row] * gains[k]),
-            three(ours[k]),
+            significant(scatter(&experiment.table[k])),
+            significant(sigma[row] * gains[k]),
+            significant(ours[k]),
         ]);
     }
     table
@@ -265,8 +265,8 @@ fn estimators(experiment: &Experiment) -> Table {
             [inside.iter().min(), inside.iter().max()].map(|k| share(k.expect("twelve")));
         table.row([
             name.to_string(),
-            three((c / n / 9.0).sqrt()),
-            three((o / n / 3.0).sqrt()),
+            significant((c / n / 9.0).sqrt()),
+            significant((o / n / 3.0).sqrt()),
             format!("{:.1}", inside.iter().map(share).sum::<f64>() / 12.0),
             format!("{low:.1} to {high:.1}"),
         ]);
@@ -354,7 +354,7 @@ fn attenuation(experiment: &Experiment) -> f64 {
 pub fn blocks() -> Vec<Block> {
     let (g, a) = (gyro(), accel());
     let block = |name, table| Block::table(name, &table);
-    let noise = |e: &Experiment| e.noise().0.map(three).join(", ");
+    let noise = |e: &Experiment| e.noise().0.map(significant).join(", ");
     let facts = format!(
         "- Noise of a dwell mean, x, y, z: gyro {} deg/s; accelerometer {} g.\n- Regressing on the noisy side shrinks C by at most {:.1e} (gyro) and {:.1e} (accelerometer).",
         noise(&g),

@@ -4,8 +4,8 @@ use std::fmt::Write as _;
 
 use mimu::noise_file::NoiseFile;
 use mimu::prepared::Prepared;
-use mimu::recording::Recording;
 use mimu::stillness::STILL_FACTOR;
+use mimu_recording::Recording;
 use mimu_rig::located::Source;
 use mimu_rig::plan::Plan;
 use mimu_rig::random::Random;

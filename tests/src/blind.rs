@@ -7,13 +7,14 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::sync::{Arc, Mutex};
 
-use mimu::diagnose::{Diagnosis, diagnose, library, next::next};
-use mimu::dwell::Sensor;
+use mimu::diagnose::{Diagnosis, diagnose, library};
 use mimu::estimate::Observation;
 use mimu::fit::{Method, Options};
+use mimu::next_experiment::next;
 use mimu::prepared::Prepared;
-use mimu::report::{DiagnosisReport, Made, diagnosis_json, diagnosis_page, diagnosis_text};
+use mimu::quantity::Sensor;
 use mimu::stillness::STILL_FACTOR;
+use mimu_cli::report::{DiagnosisReport, Made, diagnosis_json, diagnosis_page, diagnosis_text};
 use mimu_rig::random::Random;
 use mimu_rig::rig_file::{EffectFile, RigFile, RigTruth};
 use nalgebra::{DMatrix, DVector};

@@ -1,7 +1,7 @@
 //! Whether 95 % intervals hold the truth in 95 % of the cases, parameter by parameter, over the whole path of a recording.
 
-use mimu::dwell::Sensor;
 use mimu::fit::{Fit, Method, Options, fit};
+use mimu::quantity::Sensor;
 use mimu::stillness::STILL_FACTOR;
 use mimu::triad::Triad;
 use mimu_rig::random::Random;

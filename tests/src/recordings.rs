@@ -2,13 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
-use mimu::error::Result;
 use mimu::fit::{Fit, Method, Options, fit};
 use mimu::prepared::Prepared;
-use mimu::recording::{ImportOptions, RawUnit, Recording, Reference, import};
 use mimu::stillness::STILL_FACTOR;
 use mimu::triad::half_width_95;
 use mimu_core::compensation::Affine;
+use mimu_recording::error::Result;
+use mimu_recording::{ImportOptions, RawUnit, Recording, Reference, import};
 use nalgebra::{DMatrix, DVector, Matrix3, UnitQuaternion, Vector3};
 use tempfile::TempDir;
 
@@ -155,7 +155,7 @@ impl Models {
     /// The gyro is fitted in the frame that the accelerometer's estimate defines, as if that were exact, so the two
     /// covariances are independent of each other.
     pub fn of(fit: &Fit) -> Self {
-        use mimu::dwell::Sensor::{Accel, Gyro};
+        use mimu::quantity::Sensor::{Accel, Gyro};
         let triads = [Accel, Gyro].map(|s| {
             &fit.sensor(s)
                 .expect("both sensors were recorded")
@@ -254,7 +254,7 @@ pub fn numbers(file: &Path) -> Vec<Vec<f64>> {
 /// First row and row after the last of every dwell that both sensors can use.
 pub fn dwell_rows(fit: &Fit) -> Vec<std::ops::Range<usize>> {
     let usable = fit.prepared.dwells.list.iter().filter(|d| {
-        mimu::dwell::Sensor::BOTH
+        mimu::quantity::Sensor::BOTH
             .iter()
             .all(|s| d.fault(*s).is_none())
     });
@@ -327,8 +327,8 @@ pub fn verdict(fit: &Fit, accel: &Affine<f64>, gyro: &Affine<f64>) -> Result<Ver
         found.expect("both sensors can be judged")
     };
     let (accel, gyro) = (
-        of(mimu::dwell::Sensor::Accel),
-        of(mimu::dwell::Sensor::Gyro),
+        of(mimu::quantity::Sensor::Accel),
+        of(mimu::quantity::Sensor::Gyro),
     );
     Ok(Verdict {
         size_mps2: accel.rms,

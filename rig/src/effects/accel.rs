@@ -44,7 +44,7 @@ pub(super) const SPECS: [Spec; 4] = [
         parameters: &[matrix("arms_mm", 5.0)],
         build: |b| {
             let arms = b.matrix("arms_mm").map(|row| row.map(|x| 1e-3 * x));
-            let directions = b.unit.accel.axes.each_ref().map(|a| a.direction);
+            let directions = b.sensors.accel.axes.each_ref().map(|a| a.direction);
             input(move |at, add| {
                 let (w, alpha) = (at.motion.rate, at.motion.angular_acceleration);
                 for i in 0..3 {

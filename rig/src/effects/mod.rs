@@ -19,9 +19,10 @@ mod unlisted_gyro;
 use std::collections::BTreeMap;
 
 use crate::motion::Motion;
+use crate::pins::Pins;
 use crate::random::Random;
+use crate::sensor::TriadTruth;
 use crate::thermal::Temperatures;
-use crate::unit::{Pins, UnitTruth};
 
 /// Radians per second in a degree per second.
 pub(crate) const DPS: f64 = std::f64::consts::PI / 180.0;
@@ -146,10 +147,19 @@ impl Active {
     }
 }
 
+/// The sensors of the unit that an effect is in.
+#[derive(Clone, Copy)]
+pub(crate) struct Sensors<'a> {
+    pub(crate) gyro: &'a TriadTruth,
+    pub(crate) accel: &'a TriadTruth,
+    /// What the reference of the converter that reads analog ones should be, V.
+    pub(crate) converter_reference_nominal_v: f64,
+}
+
 /// What the making of an effect can ask for.
 struct Build<'a> {
     effect: &'a EffectTruth,
-    unit: &'a UnitTruth,
+    sensors: Sensors<'a>,
     seed: u64,
     dt_s: f64,
 }
@@ -274,11 +284,11 @@ impl EffectTruth {
     }
 
     /// Puts the effect to work in a unit.
-    pub(crate) fn activate(&self, unit: &UnitTruth, seed: u64, dt_s: f64) -> Active {
+    pub(crate) fn activate(&self, sensors: Sensors<'_>, seed: u64, dt_s: f64) -> Active {
         let spec = spec(self.id).expect("made from a spec");
         (spec.build)(&Build {
             effect: self,
-            unit,
+            sensors,
             seed,
             dt_s,
         })

@@ -4,8 +4,8 @@
 use std::f64::consts::TAU;
 
 use super::{Active, Build, Draw, Parameter, Shape, Spec, axes, form, read_out, scalar, sized};
+use crate::pins::Pins;
 use crate::sensor::TriadTruth;
-use crate::unit::Pins;
 
 /// Mismatch of the capacitors of the six top bits, in codes of 16 bits. Assumed: a few codes, the order of
 /// the integral nonlinearity that makers state for 16-bit converters in microcontrollers.
@@ -29,39 +29,39 @@ pub(super) const SPECS: [Spec; 9] = [
         id: "gyro_readout_code",
         about: "each of the six top bits of the code, when set, is worth so much more",
         parameters: &MISMATCH,
-        build: |b| mismatch(b, &b.unit.gyro, |pins| &mut pins.gyro_v),
+        build: |b| mismatch(b, b.sensors.gyro, |pins| &mut pins.gyro_v),
     },
     Spec {
         id: "accel_readout_code",
         about: "each of the six top bits of the code, when set, is worth so much more",
         parameters: &MISMATCH,
-        build: |b| mismatch(b, &b.unit.accel, |pins| &mut pins.accel_v),
+        build: |b| mismatch(b, b.sensors.accel, |pins| &mut pins.accel_v),
     },
     // The charge that a capacitor array has lost by the middle of its range: codes that never come.
     Spec {
         id: "gyro_missing_codes",
         about: "from a code on, this fraction of the converter's range up, all codes are so many too high (digital: of 16 bits)",
         parameters: &MISSING,
-        build: |b| missing(b, &b.unit.gyro, |pins| &mut pins.gyro_v),
+        build: |b| missing(b, b.sensors.gyro, |pins| &mut pins.gyro_v),
     },
     Spec {
         id: "accel_missing_codes",
         about: "from a code on, this fraction of the converter's range up, all codes are so many too high (digital: of 16 bits)",
         parameters: &MISSING,
-        build: |b| missing(b, &b.unit.accel, |pins| &mut pins.accel_v),
+        build: |b| missing(b, b.sensors.accel, |pins| &mut pins.accel_v),
     },
     // Three converters, as of a part for each axis, with a bias register that is added before the bits are found.
     Spec {
         id: "gyro_converters",
         about: "each axis has a converter of its own, whose codes begin elsewhere: its six top bits, when set, are worth so much more",
         parameters: &CONVERTERS,
-        build: |b| converters(b, &b.unit.gyro, |pins| &mut pins.gyro_v),
+        build: |b| converters(b, b.sensors.gyro, |pins| &mut pins.gyro_v),
     },
     Spec {
         id: "accel_converters",
         about: "each axis has a converter of its own, whose codes begin elsewhere: its six top bits, when set, are worth so much more",
         parameters: &CONVERTERS,
-        build: |b| converters(b, &b.unit.accel, |pins| &mut pins.accel_v),
+        build: |b| converters(b, b.sensors.accel, |pins| &mut pins.accel_v),
     },
     // A short on the converter's data bus. Size: a bit low enough to pass for noise.
     Spec {
@@ -71,7 +71,7 @@ pub(super) const SPECS: [Spec; 9] = [
         build: |b| {
             let bit = 1_i64 << b.number("lsb").abs().log2().round().clamp(0.0, 15.0) as u32;
             let worth = move |code: i64| if code & bit != 0 { -bit as f64 } else { 0.0 };
-            let spans = [Span::new(b, &b.unit.gyro), Span::new(b, &b.unit.accel)];
+            let spans = [Span::new(b, b.sensors.gyro), Span::new(b, b.sensors.accel)];
             read_out(move |_, pins| {
                 let reference = pins.converter_reference_v;
                 spans[0].shift(&mut pins.gyro_v, reference, worth);
@@ -113,7 +113,9 @@ impl Span {
         Self {
             low: triad.code_low,
             span: triad.code_span,
-            nominal_v: triad.analog.then_some(b.unit.converter_reference.nominal_v),
+            nominal_v: triad
+                .analog
+                .then_some(b.sensors.converter_reference_nominal_v),
         }
     }
 

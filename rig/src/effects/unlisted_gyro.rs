@@ -72,7 +72,7 @@ pub(super) const SPECS: [Spec; 6] = [
         parameters: &[axes("dps_per_gauss", 0.3)],
         build: |b| {
             let size = b.list::<3>("dps_per_gauss");
-            let directions = b.unit.gyro.axes.each_ref().map(|a| a.direction);
+            let directions = b.sensors.gyro.axes.each_ref().map(|a| a.direction);
             input(move |at, add| {
                 let field = at.motion.attitude.inverse().turn([0.0, 0.2, -0.45]);
                 for i in 0..3 {

@@ -1,7 +1,7 @@
 //! What the device computes with a sample, each between two marks, for the emulator to count instructions.
 //!
 //! The functions are those that the firmware calls, of `mimu_core::single`, compiled there; nothing is inlined from here.
-//! `cargo run -p mimu-tests --bin budget` runs it, and knows the order.
+//! `cargo run -p mimu-board-tests --bin budget` runs it, and knows the order.
 #![no_std]
 #![no_main]
 

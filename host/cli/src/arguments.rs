@@ -1,0 +1,78 @@
+//! Arguments that several subcommands share.
+
+use std::path::{Path, PathBuf};
+
+use clap::{Args, ValueEnum};
+use mimu::noise_file::NoiseFile;
+use mimu::prepared::Prepared;
+use mimu::quantity::Sensor;
+use mimu::stillness::STILL_FACTOR;
+use mimu_recording::error::Result;
+
+#[derive(Args)]
+pub(crate) struct StillArgs {
+    /// Without a step column: largest variance of a still window, times that of the quietest
+    #[arg(long = "still", value_name = "FACTOR", default_value_t = STILL_FACTOR, value_parser = still)]
+    pub(crate) factor: f64,
+}
+
+fn still(text: &str) -> std::result::Result<f64, String> {
+    match text.parse() {
+        Ok(f) if (1.0..=1e9).contains(&f) => Ok(f),
+        _ => Err("write a number of at least 1".into()),
+    }
+}
+
+#[derive(Args)]
+pub(crate) struct NoiseArgs {
+    /// Noise of the unit at rest, by `mimu allan -o`; without it, the noise within the dwells
+    ///
+    /// It also says how the bias wanders from dwell to dwell, which no dwell can tell.
+    #[arg(long = "noise", value_name = "FILE")]
+    pub(crate) file: Option<PathBuf>,
+}
+
+impl NoiseArgs {
+    /// `prepared` with the noise of the file, if there is one.
+    pub(crate) fn state(&self, prepared: Prepared) -> Result<Prepared> {
+        match &self.file {
+            Some(path) => prepared.with_noise(&NoiseFile::read(path)?),
+            None => Ok(prepared),
+        }
+    }
+}
+
+#[derive(Args)]
+pub(crate) struct JsonArgs {
+    /// Write the result as JSON (`-`: to standard output, in place of the text)
+    #[arg(long = "json", value_name = "PATH")]
+    pub(crate) path: Option<PathBuf>,
+}
+
+impl JsonArgs {
+    /// The file to write, if it is one.
+    pub(crate) fn file(&self) -> Option<&Path> {
+        self.path.as_deref().filter(|path| *path != Path::new("-"))
+    }
+
+    /// Whether it takes the place of the text.
+    pub(crate) fn is_standard_output(&self) -> bool {
+        self.path.is_some() && self.file().is_none()
+    }
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+pub(crate) enum SensorArg {
+    Gyro,
+    Accel,
+}
+
+impl SensorArg {
+    /// The sensor.
+    pub(crate) fn sensor(self) -> Sensor {
+        match self {
+            Self::Gyro => Sensor::Gyro,
+            Self::Accel => Sensor::Accel,
+        }
+    }
+}

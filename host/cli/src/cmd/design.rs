@@ -1,0 +1,430 @@
+//! `mimu design`: arguments and what follows from them.
+
+mod effects;
+
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+use crate::report::{self, DesignReport};
+use clap::{ArgGroup, Args, ValueEnum};
+use mimu::design::Problem;
+use mimu::design::budget::{DwellNoise, Session};
+use mimu::design::model::{Model, Setting, Terms};
+use mimu::design::reach::{Carrier, RateList, Rates};
+use mimu::design::schemes::Scheme;
+use mimu::design::tour::{Motion, Order, by_lot};
+use mimu::noise_file::NoiseFile;
+use mimu::quantity::Sensor;
+use mimu_recording::Reference;
+use mimu_recording::error::{Error, Result};
+use mimu_recording::result_file::stage;
+use nalgebra::Vector3;
+
+use crate::arguments::{JsonArgs, SensorArg};
+use crate::output::{check_outputs, print};
+
+#[derive(Args)]
+#[command(group(ArgGroup::new("design").required(true).args(["n", "budget", "scheme", "compare", "effects"])))]
+pub struct DesignArgs {
+    /// Sensor to calibrate
+    #[arg(long, value_enum, default_value = "accel")]
+    sensor: SensorArg,
+    /// What is known of the input: table (all of it) or gravity (its size, at rest)
+    #[arg(long, default_value = "table")]
+    reference: Reference,
+    /// Terms to determine: affine and any of quadratic, cubic, cross, g-sensitivity
+    #[arg(long, value_name = "LIST", default_value = "affine")]
+    model: Terms,
+    /// Find the best design of N dwells
+    #[arg(short, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=200))]
+    n: Option<u16>,
+    /// Find how many dwells and how long are best within so many minutes, moves included
+    #[arg(long, value_name = "MINUTES", value_parser = |t: &str| number(t, 0.1, 2880.0))]
+    budget: Option<f64>,
+    /// Judge a published scheme
+    #[arg(long, value_enum, value_name = "NAME")]
+    scheme: Option<SchemeArg>,
+    /// Judge all published schemes beside the best designs of as many dwells
+    #[arg(long)]
+    compare: bool,
+    /// Find the smallest experiment that shows these effects (see `mimu diagnose`)
+    #[arg(long, value_name = "ID[,ID..]", value_delimiter = ',',
+          conflicts_with_all = ["model", "sigma", "instability", "walk", "order"])]
+    effects: Option<Vec<String>>,
+    /// With --effects: a recording of the unit, for its noise, sensors, rates and fixture
+    #[arg(long, value_name = "REC", requires = "effects")]
+    after: Option<PathBuf>,
+    /// With --effects: temperatures of the chamber, °C: where it begins and ends, and the two farthest from it
+    #[arg(long, value_name = "C,C,C", requires = "effects", allow_hyphen_values = true, value_parser = effects::chamber)]
+    chamber: Option<[f64; 3]>,
+    /// What carries the unit; without it three-axis, or hand with --reference gravity
+    #[arg(long, value_enum)]
+    table: Option<TableArg>,
+    /// Length of a dwell, s
+    ///
+    /// Without it 20 s; with a noise file, from which on a longer one has a sigma at most 5 % smaller.
+    #[arg(long, value_name = "S", conflicts_with = "budget",
+          value_parser = |t: &str| number(t, 0.1, 86400.0))]
+    dwell: Option<f64>,
+    /// Order of the dwells: lot without it, and published schemes as published
+    ///
+    /// Sensors wander, and what neighbouring dwells share of that goes into the parameters that the difference of their
+    /// inputs determines. With 22 dwells and a bias that walks, scale factors and misalignments have 9 times the
+    /// variance that a fit claims in the shortest order, and what it claims by lot. The lot takes longer: what it costs
+    /// is printed.
+    #[arg(long, value_enum)]
+    order: Option<OrderArg>,
+    /// Rates of the table for a gyro, deg/s: `10,100,300`, or `..300` for any up to 300, which it is without it
+    #[arg(long, value_name = "LIST", conflicts_with_all = ["scheme", "compare"])]
+    rates: Option<RateList>,
+    /// Rate at which the attitude is changed, deg/s; without it 10 on a table, 45 by hand
+    #[arg(long, value_name = "DPS", value_parser = |t: &str| number(t, 0.01, 10000.0))]
+    slew: Option<f64>,
+    /// Time from the end of a move to the dwell, s
+    #[arg(long, value_name = "S", default_value_t = 1.0, value_parser = |t: &str| number(t, 0.0, 3600.0))]
+    settle: f64,
+    /// Sigma of a dwell mean, m/s² or rad/s; without it, from --noise and --instability
+    #[arg(long, value_name = "SI", value_parser = |t: &str| number(t, 1e-12, 1e3),
+          conflicts_with_all = ["budget", "noise", "instability", "walk"])]
+    sigma: Option<f64>,
+    /// White noise N, m/s² or rad/s per √Hz, or the noise file of the unit; without it that of fang's sensors
+    #[arg(long, value_name = "SI|FILE")]
+    noise: Option<NoiseArg>,
+    /// Bias instability B, m/s² or rad/s; without it, what --noise averages to in 20 s
+    #[arg(long, value_name = "SI", value_parser = |t: &str| number(t, 0.0, 1e3))]
+    instability: Option<f64>,
+    /// Random walk K, m/s² or rad/s per √s; without it none
+    #[arg(long, value_name = "SI", value_parser = |t: &str| number(t, 0.0, 1e3))]
+    walk: Option<f64>,
+    /// Seed of the search and of the lots
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Plan to write, for a table or a person to carry out
+    #[arg(short, value_name = "FILE", conflicts_with = "compare")]
+    output: Option<PathBuf>,
+    #[command(flatten)]
+    json: JsonArgs,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum TableArg {
+    /// Every attitude, and a rate about the vertical
+    ThreeAxis,
+    /// Any turn about the body's z, tilted by at most 95 degrees
+    TwoAxis,
+    /// Six faces only
+    Faces,
+    /// Every attitude, by hand
+    Hand,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum OrderArg {
+    /// Shortest moves found
+    Shortest,
+    /// Drawn by lot from the seed
+    Lot,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum SchemeArg {
+    /// Each axis up and down
+    SixFace,
+    /// Nine positions (fang, Table 2)
+    FangNine,
+    /// 33 accelerometer positions (xu, appendix)
+    #[value(name = "xu-33")]
+    Xu33,
+    /// Rates about each axis in both directions (xu, 2.2.1)
+    XuRates,
+    /// Eight dwells on a two-axis table (niu, 3.2)
+    #[value(name = "niu-8")]
+    Niu8,
+}
+
+pub fn number(text: &str, lowest: f64, highest: f64) -> std::result::Result<f64, String> {
+    match text.parse() {
+        Ok(v) if (lowest..=highest).contains(&v) => Ok(v),
+        _ => Err(format!("write a number from {lowest:?} to {highest:?}")),
+    }
+}
+
+/// White noise, or where the noise is stated.
+#[derive(Clone)]
+enum NoiseArg {
+    Density(f64),
+    File(PathBuf),
+}
+
+impl FromStr for NoiseArg {
+    type Err = String;
+
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        match text.parse::<f64>() {
+            Ok(_) => number(text, 1e-12, 1e3).map(Self::Density),
+            Err(_) => Ok(Self::File(text.into())),
+        }
+    }
+}
+
+/// Length of a dwell where nothing is known of the unit: fang's, s.
+const DWELL_S: f64 = 20.0;
+
+impl DesignArgs {
+    fn sensor(&self) -> Sensor {
+        match self.sensor {
+            SensorArg::Gyro => Sensor::Gyro,
+            SensorArg::Accel => Sensor::Accel,
+        }
+    }
+
+    fn carrier(&self) -> Carrier {
+        match (self.table, self.reference) {
+            (Some(TableArg::ThreeAxis), _) | (None, Reference::Table) => Carrier::ThreeAxis,
+            (Some(TableArg::TwoAxis), _) => Carrier::TwoAxis,
+            (Some(TableArg::Faces), _) => Carrier::Faces,
+            (Some(TableArg::Hand), _) | (None, Reference::Gravity) => Carrier::Hand,
+        }
+    }
+
+    fn motion(&self) -> Motion {
+        let usual = Motion::of(self.carrier());
+        Motion {
+            slew: self.slew.map_or(usual.slew, f64::to_radians),
+            settle_s: self.settle,
+            ..usual
+        }
+    }
+
+    /// Noise of the sensor; what is given by hand goes before the file.
+    fn noise(&self) -> Result<DwellNoise> {
+        let stated = match &self.noise {
+            Some(NoiseArg::File(path)) => {
+                DwellNoise::stated(&NoiseFile::read(path)?, self.sensor())?
+            }
+            other => {
+                let fang = DwellNoise::fang(self.sensor());
+                let n = match other {
+                    Some(NoiseArg::Density(n)) => *n,
+                    _ => fang.n,
+                };
+                let b = fang.b * n / fang.n;
+                DwellNoise { n, b, k: 0.0 }
+            }
+        };
+        Ok(DwellNoise {
+            n: stated.n,
+            b: self.instability.unwrap_or(stated.b),
+            k: self.walk.unwrap_or(stated.k),
+        })
+    }
+
+    /// Length of a dwell, s.
+    fn dwell_s(&self, noise: &DwellNoise) -> f64 {
+        let useful = match &self.noise {
+            Some(NoiseArg::File(_)) => noise.useful_s(),
+            _ => None,
+        };
+        // Times are set on tables in tenths of a second.
+        self.dwell
+            .or(useful.map(|s| ((10.0 * s).ceil() / 10.0).max(1.0)))
+            .unwrap_or(DWELL_S)
+    }
+
+    /// Order of a design, and of a published scheme if it is not to be as published.
+    fn order(&self) -> Option<Order> {
+        self.order.map(|order| match order {
+            OrderArg::Shortest => Order::Shortest,
+            OrderArg::Lot => Order::Lot,
+        })
+    }
+
+    /// The problem, with full rates `span` for a gyro.
+    fn problem(&self, span: Vector3<f64>, rates: Rates) -> Result<Problem> {
+        match (self.sensor(), self.reference) {
+            (Sensor::Accel, reference) => {
+                Problem::accel(Model::accel(reference, &self.model), self.carrier())
+            }
+            (Sensor::Gyro, Reference::Table) => {
+                Problem::gyro(Model::gyro(&self.model, span), self.carrier(), rates)
+            }
+            (Sensor::Gyro, Reference::Gravity) => Err(Error::new(
+                "gyro, --reference gravity",
+                "by hand a gyro's known input are the turns between dwells, which are not designed here",
+                "design the accelerometer's dwells and turn by a quarter or more between them",
+            )),
+        }
+    }
+
+    /// The problem of designs at the rates that the table is to turn at.
+    fn own_problem(&self) -> Result<Problem> {
+        match (&self.rates, self.sensor()) {
+            (Some(_), Sensor::Accel) => Err(Error::new(
+                "--rates",
+                "an accelerometer is designed at rest",
+                "leave it out, or use --sensor gyro",
+            )),
+            (Some(list), Sensor::Gyro) => {
+                let span = Vector3::repeat(list.largest_dps.to_radians());
+                self.problem(span, list.rates.clone())
+            }
+            (None, _) => self.problem(Vector3::repeat(RATE_DPS.to_radians()), Rates::Any),
+        }
+    }
+
+    /// Report of a design of one pass over `settings`, in the order asked for; without one, in the order given.
+    fn report(
+        &self,
+        problem: &Problem,
+        title: String,
+        settings: &[Setting],
+        order: Option<Order>,
+    ) -> Result<DesignReport> {
+        let noise = self.noise()?;
+        let dwell_s = self.dwell_s(&noise);
+        let sigma = self.sigma.unwrap_or_else(|| noise.sigma(dwell_s));
+        let motion = self.motion();
+        let shortest = motion.shortest(settings);
+        let shortest_moves_s = motion.moves_s(&shortest).min(motion.moves_s(settings));
+        let settings = match order {
+            None => settings.to_vec(),
+            Some(Order::Shortest) => shortest,
+            Some(Order::Lot) => by_lot(settings, self.seed),
+        };
+        Ok(DesignReport {
+            title,
+            judgement: problem.judge(&settings, sigma),
+            problem: problem.clone(),
+            dwell_s,
+            noise: self.sigma.is_none().then_some(noise),
+            motion,
+            order,
+            shortest_moves_s,
+            scheme: None,
+            turned_over: false,
+            budget: None,
+        })
+    }
+
+    fn best(&self, problem: &Problem, n: usize, title: String) -> Result<DesignReport> {
+        let settings = problem.best(n, self.seed)?;
+        let order = self.order().unwrap_or(Order::Lot);
+        self.report(problem, title, &settings, Some(order))
+    }
+
+    fn scheme(&self, problem: &Problem, scheme: Scheme) -> Result<DesignReport> {
+        let settings = scheme.settings(self.sensor())?;
+        let Some((settings, turned_over)) = self.carrier().holding(&settings) else {
+            return Err(Error::new(
+                format!("--scheme {}", scheme.name()),
+                format!(
+                    "not all of its poses are within reach of --table {}",
+                    self.carrier().name()
+                ),
+                "use --table three-axis",
+            ));
+        };
+        let title = format!("scheme {}", scheme.name());
+        Ok(DesignReport {
+            scheme: Some(scheme),
+            turned_over,
+            ..self.report(problem, title, &settings, self.order())?
+        })
+    }
+
+    fn within(&self, problem: &Problem, minutes: f64) -> Result<DesignReport> {
+        let order = self.order().unwrap_or(Order::Lot);
+        let session = Session {
+            time_s: 60.0 * minutes,
+            noise: self.noise()?,
+            motion: self.motion(),
+            order,
+        };
+        let budget = session.spend(problem, self.seed)?;
+        let best = &budget.best;
+        Ok(DesignReport {
+            title: format!("best within {minutes} min (seed {})", self.seed),
+            judgement: problem.judge(&best.settings, best.sigma),
+            problem: problem.clone(),
+            dwell_s: best.dwell_s,
+            noise: Some(session.noise),
+            motion: session.motion,
+            order: Some(order),
+            shortest_moves_s: best.shortest_moves_s,
+            scheme: None,
+            turned_over: false,
+            budget: Some((session.time_s, budget)),
+        })
+    }
+
+    /// Every scheme for the sensor, each followed by the best design of as many dwells; and the schemes that are not
+    /// within the table's reach.
+    fn compare(&self) -> Result<(Vec<DesignReport>, Vec<Scheme>)> {
+        let (mut reports, mut out_of_reach) = (Vec::new(), Vec::new());
+        let mut done: Vec<(usize, Vector3<f64>)> = Vec::new();
+        for scheme in Scheme::ALL {
+            let Ok(settings) = scheme.settings(self.sensor()) else {
+                continue;
+            };
+            let (n, span) = (settings.len(), scheme.rate_span());
+            let problem = self.problem(span, Rates::Any)?;
+            if self.carrier().holding(&settings).is_none() {
+                out_of_reach.push(scheme);
+                continue;
+            }
+            reports.push(self.scheme(&problem, scheme)?);
+            let enough =
+                problem.optimum.parameters <= n * problem.reach.model.distinct_regressions();
+            if enough && !done.contains(&(n, span)) {
+                done.push((n, span));
+                reports.push(self.best(&problem, n, format!("best of {n}"))?);
+            }
+        }
+        Ok((reports, out_of_reach))
+    }
+}
+
+/// Largest rate without `--rates`, deg/s: the range of fang's gyros.
+const RATE_DPS: f64 = 300.0;
+
+pub fn run(args: &DesignArgs) -> Result<()> {
+    if let Some(ids) = &args.effects {
+        return effects::run(args, ids);
+    }
+    let stated: Vec<&Path> = match &args.noise {
+        Some(NoiseArg::File(path)) => vec![path],
+        _ => Vec::new(),
+    };
+    check_outputs(&[args.output.as_deref(), args.json.file()], &stated)?;
+    if args.compare {
+        let (reports, out_of_reach) = args.compare()?;
+        let text = report::comparison_text(&reports, &out_of_reach);
+        let json = report::comparison_json(&reports, &out_of_reach);
+        return print(&args.json, &text, &json, None);
+    }
+    let designed = match (args.scheme, args.budget, args.n) {
+        (Some(scheme), ..) => {
+            let scheme = match scheme {
+                SchemeArg::SixFace => Scheme::SixFace,
+                SchemeArg::FangNine => Scheme::FangNine,
+                SchemeArg::Xu33 => Scheme::Xu33,
+                SchemeArg::XuRates => Scheme::XuRates,
+                SchemeArg::Niu8 => Scheme::Niu8,
+            };
+            args.scheme(&args.problem(scheme.rate_span(), Rates::Any)?, scheme)?
+        }
+        (_, Some(minutes), _) => args.within(&args.own_problem()?, minutes)?,
+        (_, _, n) => {
+            let n = usize::from(n.unwrap_or_default());
+            let title = format!("best of {n} dwells found (seed {})", args.seed);
+            args.best(&args.own_problem()?, n, title)?
+        }
+    };
+    let mut text = report::design_text(&designed);
+    let mut plan = None;
+    if let Some(path) = &args.output {
+        plan = Some(stage(path, designed.plan())?);
+        text.push_str(&format!("\nplan: {}\n", path.display()));
+    }
+    print(&args.json, &text, &report::design_json(&designed), plan)
+}

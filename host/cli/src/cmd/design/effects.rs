@@ -1,0 +1,212 @@
+//! `mimu design --effects`: the next experiment.
+
+use std::path::Path;
+
+use crate::report::{self, NextReport};
+use mimu::design::budget::DwellNoise;
+use mimu::design::reach::{Carrier, RateList, Rates};
+use mimu::design::tour::Motion;
+use mimu::diagnose::library;
+use mimu::fit::{Fit, Method, Options, fit};
+use mimu::next_experiment::prediction::Target;
+use mimu::next_experiment::{CHAMBER_C, DWELL_S, RATE_DPS, SLEW, Setup, smallest};
+use mimu::noise_file::NoiseFile;
+use mimu::quantity::Sensor;
+use mimu::stillness::STILL_FACTOR;
+use mimu_recording::Reference;
+use mimu_recording::error::{Error, Result};
+use mimu_recording::result_file::stage;
+
+use super::{DesignArgs, NoiseArg};
+use crate::output::{check_outputs, print};
+use crate::reading::read;
+
+/// Sample rate where no recording says another, Hz.
+const SAMPLE_RATE_HZ: f64 = 1000.0;
+
+/// Temperatures as on the command line.
+pub(super) fn chamber(text: &str) -> std::result::Result<[f64; 3], String> {
+    let list: Vec<f64> = text
+        .split(',')
+        .filter_map(|t| t.trim().parse().ok())
+        .collect();
+    match list[..] {
+        [a, b, c] if list.iter().all(|t| (-90.0..=200.0).contains(t)) && a != b && b != c => {
+            Ok([a, b, c])
+        }
+        _ => Err(
+            "write three temperatures in °C: where it begins and ends, and two others, as 25,45,5"
+                .into(),
+        ),
+    }
+}
+
+fn targets(ids: &[String]) -> Result<Vec<Target>> {
+    let mut all: Vec<Target> = Vec::new();
+    for id in ids {
+        let Some(effect) = library::by_id(id) else {
+            let known: Vec<&str> = library::all().map(|e| e.id).collect();
+            return Err(Error::new(
+                format!("--effects {id}"),
+                "there is no effect of this name",
+                format!("choose of {}", known.join(", ")),
+            ));
+        };
+        let target = Target::listed(effect);
+        if target.candidate.reads_code() {
+            return Err(Error::new(
+                format!("--effects {id}"),
+                "which codes of a converter a dwell meets is decided by noise and bias, and no dwell can be planned for it",
+                format!("needs {}", effect.needs),
+            ));
+        }
+        if !all.iter().any(|t| t.candidate.id() == effect.id) {
+            all.push(target);
+        }
+    }
+    Ok(all)
+}
+
+impl DesignArgs {
+    /// The unit and its fixture, where no recording says them.
+    fn setup(&self) -> Setup {
+        let carrier = self.carrier();
+        let motion = self.motion();
+        let slew = match self.slew {
+            None => motion.slew.max(SLEW),
+            Some(_) => motion.slew,
+        };
+        Setup {
+            reference: match carrier {
+                Carrier::Hand => Reference::Gravity,
+                _ => self.reference,
+            },
+            carrier,
+            sensors: Sensor::BOTH.to_vec(),
+            rates: RateList {
+                largest_dps: RATE_DPS,
+                rates: Rates::Any,
+            },
+            chamber_c: CHAMBER_C,
+            noise: Sensor::BOTH.map(DwellNoise::fang),
+            dwell_s: DWELL_S,
+            motion: Motion { slew, ..motion },
+            seed: self.seed,
+        }
+    }
+
+    /// Noise of gyro and accelerometer, where it is given here.
+    fn given_noise(&self, targets: &[Target]) -> Result<Option<[DwellNoise; 2]>> {
+        match &self.noise {
+            None => Ok(None),
+            Some(NoiseArg::File(path)) => {
+                let file = NoiseFile::read(path)?;
+                let [gyro, accel] = Sensor::BOTH.map(|s| match file.of(s).is_empty() {
+                    true => Ok(DwellNoise::fang(s)),
+                    false => DwellNoise::stated(&file, s),
+                });
+                Ok(Some([gyro?, accel?]))
+            }
+            Some(NoiseArg::Density(n)) => {
+                let own = targets.first().map(|s| s.candidate.sensor);
+                if targets.iter().any(|s| Some(s.candidate.sensor) != own) {
+                    return Err(Error::new(
+                        format!("--noise {n}"),
+                        "one number cannot be the noise of gyro and accelerometer",
+                        "give the noise file of the unit, or effects of one sensor",
+                    ));
+                }
+                Ok(Some(Sensor::BOTH.map(|s| match Some(s) == own {
+                    true => DwellNoise {
+                        n: *n,
+                        b: 0.0,
+                        k: 0.0,
+                    },
+                    false => DwellNoise::fang(s),
+                })))
+            }
+        }
+    }
+}
+
+/// A recording of the unit, fitted.
+fn after(path: &Path, args: &DesignArgs) -> Result<Fit> {
+    let outputs = [args.output.as_deref(), args.json.file()];
+    let prepared = read(path, STILL_FACTOR, &outputs, &[])?;
+    let prepared = match &args.noise {
+        Some(NoiseArg::File(file)) => prepared.with_noise(&NoiseFile::read(file)?)?,
+        _ => prepared,
+    };
+    let options = Options {
+        method: Method::LeastSquares,
+        holdout_blocks: 0,
+        still_factor: STILL_FACTOR,
+        only: None,
+    };
+    fit(prepared, options)
+}
+
+pub(super) fn run(args: &DesignArgs, ids: &[String]) -> Result<()> {
+    let stated: Vec<&Path> = match &args.noise {
+        Some(NoiseArg::File(path)) => vec![path],
+        _ => Vec::new(),
+    };
+    check_outputs(&[args.output.as_deref(), args.json.file()], &stated)?;
+    let targets = targets(ids)?;
+    let recording = args
+        .after
+        .as_deref()
+        .map(|path| after(path, args))
+        .transpose()?;
+    let mut setup = args.setup();
+    if let Some(fit) = &recording {
+        let own = Setup::of(fit, args.table.is_some().then(|| args.carrier()));
+        setup = Setup {
+            motion: args.slew.map_or(own.motion, |_| args.motion()),
+            seed: args.seed,
+            ..own
+        };
+    }
+    setup.rates = args.rates.clone().unwrap_or(setup.rates);
+    setup.chamber_c = args.chamber.unwrap_or(setup.chamber_c);
+    setup.dwell_s = args.dwell.unwrap_or(setup.dwell_s);
+    setup.noise = args.given_noise(&targets)?.unwrap_or(setup.noise);
+    let missing = targets
+        .iter()
+        .find(|t| !setup.sensors.contains(&t.candidate.sensor));
+    if let (Some(missing), Some(path)) = (missing, &args.after) {
+        return Err(Error::new(
+            path.display(),
+            format!(
+                "it has no {} to show {} with",
+                missing.candidate.sensor,
+                missing.candidate.id()
+            ),
+            "give a recording with both sensors, or leave the effect out",
+        ));
+    }
+    let Some(answer) = smallest(&setup, &targets) else {
+        return Err(Error::new(
+            format!("--effects {}", ids.join(",")),
+            format!(
+                "no recipe with --table {} and these rates determines every coefficient of it",
+                setup.carrier.name()
+            ),
+            "use another --table, --reference or --rates, or fewer effects at once",
+        ));
+    };
+    let manifest = recording.as_ref().map(|f| &f.prepared.manifest);
+    let report = NextReport {
+        setup: &setup,
+        answer: &answer,
+        device: manifest.map(|m| m.device.clone()),
+        sample_rate_hz: manifest.map_or(SAMPLE_RATE_HZ, |m| m.sample_rate_hz),
+    };
+    let mut text = report::next_text(&report);
+    let mut plan = None;
+    if let Some(path) = &args.output {
+        plan = Some(stage(path, report.plan())?);
+        text.push_str(&format!("\nplan: {}\n", path.display()));
+    }
+    print(&args.json, &text, &report::next_json(&report), plan)
+}

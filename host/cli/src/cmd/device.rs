@@ -1,0 +1,279 @@
+//! `mimu device`: arguments and what follows from them.
+
+mod comparison;
+mod transfer;
+
+use std::io::Write as _;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use crate::report;
+use clap::{Args, Subcommand, ValueEnum};
+use mimu_core::wire::Request;
+use mimu_device::{Answer, Session, Stream, self_test, stream};
+use mimu_recording::RAW_COLUMNS;
+use mimu_recording::error::{Error, Result};
+use signal_hook::consts::TERM_SIGNALS;
+
+use crate::arguments::JsonArgs;
+use crate::output::{check_outputs, print};
+
+#[derive(Args)]
+pub struct DeviceArgs {
+    #[command(subcommand)]
+    command: DeviceCommand,
+}
+
+#[derive(Subcommand)]
+enum DeviceCommand {
+    /// Who it is, why it started, what it can do and what it holds
+    Info(PlainArgs),
+    /// Samples as they come, as CSV
+    Stream(StreamArgs),
+    /// Store a calibration on the device
+    Upload(transfer::UploadArgs),
+    /// Fetch the stored calibration
+    Download(transfer::DownloadArgs),
+    /// Deflect the sensors electrically and measure it; the unit has to stand still
+    SelfTest(PlainArgs),
+    /// What it has counted: lost samples, garbled frames, flash errors
+    Counters(CountersArgs),
+    /// Compare its compensated stream with the PC's compensation of its raw stream
+    Check(comparison::CheckArgs),
+    /// Run its Kalman bank under known inputs and compare it with the PC's on the same samples
+    Kalman(comparison::KalmanArgs),
+}
+
+#[derive(Args)]
+pub struct PortArgs {
+    /// Serial port; without it, the only one at which a device greets
+    #[arg(id = "port", long = "port", value_name = "PATH")]
+    pub path: Option<String>,
+}
+
+#[derive(Args)]
+struct PlainArgs {
+    #[command(flatten)]
+    port: PortArgs,
+    #[command(flatten)]
+    json: JsonArgs,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum StreamArg {
+    /// Readings, V at the sensors
+    Raw,
+    /// Compensated on the device, rad/s and m/s²
+    Compensated,
+}
+
+#[derive(Args)]
+struct StreamArgs {
+    /// Which samples
+    #[arg(value_enum, default_value = "raw")]
+    which: StreamArg,
+    /// How long (`10s`, `500ms`, `2min`), by the device's time; without it until Ctrl-C
+    #[arg(long = "for", value_name = "TIME", value_parser = duration)]
+    duration: Option<Duration>,
+    #[command(flatten)]
+    port: PortArgs,
+    #[command(flatten)]
+    json: JsonArgs,
+}
+
+#[derive(Args)]
+struct CountersArgs {
+    /// Set them to zero afterwards
+    #[arg(long)]
+    reset: bool,
+    #[command(flatten)]
+    port: PortArgs,
+    #[command(flatten)]
+    json: JsonArgs,
+}
+
+/// `500ms`, `10s`, `2min`, `1h`; a number alone is in seconds.
+pub fn duration(text: &str) -> std::result::Result<Duration, String> {
+    let unit = text.trim_start_matches(|c: char| c.is_ascii_digit() || c == '.');
+    let factor = match unit {
+        "ms" => 1e-3,
+        "" | "s" => 1.0,
+        "min" => 60.0,
+        "h" => 3600.0,
+        _ => f64::NAN,
+    };
+    let number: f64 = text[..text.len() - unit.len()].parse().unwrap_or(f64::NAN);
+    match number * factor {
+        // A year, beyond which nobody means it.
+        seconds if (1e-3..=3.2e7).contains(&seconds) => Ok(Duration::from_secs_f64(seconds)),
+        _ => Err("write a time like 500ms, 10s, 2min or 1h".into()),
+    }
+}
+
+/// Whether Ctrl-C, or a request to terminate, has come. The second one ends the program at once.
+pub fn interruption() -> Result<Arc<AtomicBool>> {
+    let flag = Arc::new(AtomicBool::new(false));
+    for signal in TERM_SIGNALS {
+        signal_hook::flag::register_conditional_default(*signal, flag.clone())
+            .and_then(|_| signal_hook::flag::register(*signal, flag.clone()))
+            .map_err(|error| Error::new("Ctrl-C", error, "run it with --for"))?;
+    }
+    Ok(flag)
+}
+
+fn open(port: &PortArgs) -> Result<Session> {
+    let session = Session::open(port.path.as_deref())?;
+    if let Some(warning) = session.who().version_warning() {
+        eprintln!("warning: {warning}");
+    }
+    Ok(session)
+}
+
+pub fn run(args: &DeviceArgs) -> Result<()> {
+    match &args.command {
+        DeviceCommand::Info(args) => info(args),
+        DeviceCommand::Stream(args) => run_stream(args),
+        DeviceCommand::Upload(args) => transfer::run_upload(args),
+        DeviceCommand::Download(args) => transfer::run_download(args),
+        DeviceCommand::SelfTest(args) => run_self_test(args),
+        DeviceCommand::Counters(args) => counters(args),
+        DeviceCommand::Check(args) => comparison::run_check(args),
+        DeviceCommand::Kalman(args) => comparison::run_kalman(args),
+    }
+}
+
+fn info(args: &PlainArgs) -> Result<()> {
+    check_outputs(&[args.json.file()], &[])?;
+    // The warning about versions is part of the result.
+    let session = Session::open(args.port.path.as_deref())?;
+    let (port, who) = (session.port(), session.who());
+    let (text, value) = (report::info_text(port, who), report::info_json(port, who));
+    print(&args.json, &text, &value, None)
+}
+
+fn run_stream(args: &StreamArgs) -> Result<()> {
+    check_outputs(&[args.json.file()], &[])?;
+    let which = match args.which {
+        StreamArg::Raw => Stream::Raw,
+        StreamArg::Compensated => Stream::Compensated,
+    };
+    let mut session = open(&args.port)?;
+    let stop = interruption()?;
+    let rate_hz = f64::from(session.who().sample_rate_hz);
+    let mut out = std::io::BufWriter::new(std::io::stdout().lock());
+    // The summary takes the place of the samples.
+    let rows = !args.json.is_standard_output();
+    let mut closed = false;
+    if rows {
+        closed |= writeln!(out, "n,t_s,temp_c,flags,{}", RAW_COLUMNS.join(",")).is_err();
+    }
+    let ended = || stop.load(Ordering::Relaxed);
+    let mut last = 0;
+    let found = stream(
+        &mut session,
+        which,
+        args.duration,
+        ended,
+        |head, number, sample| {
+            if rows && !closed {
+                let t_s = f64::from(number) / rate_hz;
+                let (g, a) = (&sample.gyro, &sample.accel);
+                let row = writeln!(
+                    out,
+                    "{number},{t_s},{},{},{},{},{},{},{},{}",
+                    head.temp_c, head.flags, g.x, g.y, g.z, a.x, a.y, a.z
+                );
+                // A batch at a time, so that whoever reads is not behind.
+                let new = head.first != last;
+                last = head.first;
+                closed = row
+                    .and_then(|()| if new { out.flush() } else { Ok(()) })
+                    .is_err();
+                // `mimu device stream | head` is no error.
+                if closed {
+                    stop.store(true, Ordering::Relaxed);
+                }
+            }
+            Ok(())
+        },
+    )?;
+    let _ = out.flush();
+    drop(out);
+    let port = session.port();
+    let value = report::stream_json(port, which, &found);
+    if rows {
+        if !closed {
+            eprint!("{}", report::stream_text(port, which, &found));
+        }
+        return print(&args.json, "", &value, None);
+    }
+    print(&args.json, "", &value, None)
+}
+
+fn run_self_test(args: &PlainArgs) -> Result<()> {
+    check_outputs(&[args.json.file()], &[])?;
+    let mut session = open(&args.port)?;
+    let found = self_test(&mut session)?;
+    let (port, test) = (session.port(), &found.test);
+    let text = report::self_test_text(port, &found);
+    print(
+        &args.json,
+        &text,
+        &report::self_test_json(port, &found),
+        None,
+    )?;
+    let failed: Vec<&str> = ["gyro x", "gyro y", "gyro z", "accel"]
+        .into_iter()
+        .enumerate()
+        .filter(|(bit, _)| test.passed >> bit & 1 == 0)
+        .map(|(_, name)| name)
+        .collect();
+    let failed = failed.join(", ");
+    match &found.moved {
+        _ if failed.is_empty() => Ok(()),
+        Some(moved) => Err(Error::new(
+            port,
+            format!("the self-test failed ({failed}), and the unit moved during it: {moved}"),
+            "keep the unit still and test again",
+        )),
+        None => Err(Error::new(
+            port,
+            format!("the self-test failed: {failed}"),
+            "check the wiring of the self-test pins and of these sensors",
+        )),
+    }
+}
+
+fn counters(args: &CountersArgs) -> Result<()> {
+    check_outputs(&[args.json.file()], &[])?;
+    let mut session = open(&args.port)?;
+    let purpose = "for its counters";
+    let patience = Duration::from_secs(2);
+    let counters = match session.call(Request::Counters, purpose, patience)? {
+        Answer::Counters(counters) => counters,
+        _ => return Err(session.unexpected(purpose)),
+    };
+    if args.reset {
+        session.done(Request::ResetCounters, "to reset its counters")?;
+    }
+    let port = session.port();
+    let text = report::counters_text(port, &counters, args.reset);
+    let value = report::counters_json(port, &counters, args.reset);
+    print(&args.json, &text, &value, None)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_are_read_with_their_units() {
+        assert_eq!(duration("500ms"), Ok(Duration::from_millis(500)));
+        assert_eq!(duration("2min"), Ok(Duration::from_secs(120)));
+        assert_eq!(duration("1.5"), Ok(Duration::from_millis(1500)));
+        for bad in ["", "s", "-1s", "1 s", "1d", "1e400s", "0s", "nan", "é"] {
+            assert!(duration(bad).is_err(), "{bad}");
+        }
+    }
+}

@@ -1,0 +1,199 @@
+//! `mimu diagnose`: arguments and what follows from them.
+
+use std::path::PathBuf;
+
+use crate::report::{self, DiagnosisReport, Made};
+use clap::Args;
+use mimu::calibration::{Calibration, EffectTable, to_toml};
+use mimu::diagnose::{Diagnosis, Recordings, diagnose};
+use mimu::fit::{Method, Options};
+use mimu::next_experiment;
+use mimu::verify::verify;
+use mimu_recording::error::{Error, Result};
+use mimu_recording::result_file::stage;
+
+use crate::arguments::{JsonArgs, NoiseArgs, StillArgs};
+use crate::output::print;
+use crate::reading::read;
+
+#[derive(Args)]
+pub struct DiagnoseArgs {
+    /// Directory of the recording, and of more of the same unit: effects are found in all of them, each with its own biases;
+    /// the calibration is that of the first
+    #[arg(required = true, value_name = "REC")]
+    recordings: Vec<PathBuf>,
+    /// Another recording of the unit, which nothing is found in: an effect that it contradicts is not accepted
+    #[arg(long, value_name = "REC")]
+    verify: Option<PathBuf>,
+    /// Keep the matrices of this calibration, and find the biases only: for a unit that is never turned, like in a chamber
+    ///
+    /// Its effects are taken out first, and go into the new file.
+    #[arg(long, value_name = "FILE")]
+    calibration: Option<PathBuf>,
+    /// Calibration file to write, with the effects
+    #[arg(short, value_name = "FILE")]
+    output: Option<PathBuf>,
+    /// Page to write: residuals, effects and figures as one HTML file
+    #[arg(long, value_name = "FILE")]
+    page: Option<PathBuf>,
+    /// Plan of the next experiment to write: what this recording could not show, and what it could not tell apart
+    #[arg(long, value_name = "FILE")]
+    plan: Option<PathBuf>,
+    #[command(flatten)]
+    still: StillArgs,
+    #[command(flatten)]
+    noise: NoiseArgs,
+    #[command(flatten)]
+    json: JsonArgs,
+}
+
+pub fn run(args: &DiagnoseArgs) -> Result<()> {
+    let options = Options {
+        method: Method::LeastSquares,
+        holdout_blocks: 0,
+        still_factor: args.still.factor,
+        only: None,
+    };
+    let outputs = [
+        args.output.as_deref(),
+        args.page.as_deref(),
+        args.plan.as_deref(),
+        args.json.file(),
+    ];
+    let inputs = [args.noise.file.as_deref(), args.calibration.as_deref()];
+    let open = |path: &PathBuf| {
+        let prepared = read(path, args.still.factor, &outputs, &inputs)?;
+        args.noise.state(prepared)
+    };
+    let given = match &args.calibration {
+        Some(path) => Some(Calibration::read(path)?),
+        None => None,
+    };
+    let mut all = Vec::new();
+    for path in &args.recordings {
+        all.push(open(path)?);
+    }
+    let second = match &args.verify {
+        Some(path) => Some(open(path)?),
+        None => None,
+    };
+    let first = all.remove(0);
+    let mut diagnosis = diagnose(
+        Recordings {
+            first,
+            more: all,
+            second: second.clone(),
+            given: given.as_ref(),
+        },
+        options,
+    )?;
+    let now = jiff::Timestamp::now()
+        .round(jiff::Unit::Second)
+        .unwrap_or_default()
+        .to_string();
+    let known = known(given.as_ref(), &mut diagnosis);
+    let found = diagnosis
+        .sensors
+        .iter()
+        .flat_map(|s| &s.decision.accepted)
+        .filter(|a| a.chosen.candidate.is_error())
+        .map(EffectTable::from);
+    let mut effects = known.clone();
+    for table in found {
+        table.join(&mut effects).map_err(|problem| {
+            let place = args
+                .calibration
+                .as_ref()
+                .map_or_else(String::new, |p| p.display().to_string());
+            let remedy = "diagnose with a calibration without it";
+            Error::new(place, problem, remedy)
+        })?;
+    }
+    let after = to_toml(&diagnosis.after, &effects, &now);
+    let mut judged = None;
+    if let (Some(other), Some(path)) = (second, &args.verify) {
+        // By the files that they would be: what is judged is what is given away.
+        let before = to_toml(&diagnosis.before, &known, &now);
+        let by = |text: &str| verify(&other, &Calibration::parse(text, "calibration")?);
+        let path = path.display();
+        match (by(&before), by(&after)) {
+            (Ok(before), Ok(after)) => judged = Some((path.to_string(), [before, after])),
+            (Err(refusal), _) | (_, Err(refusal)) => {
+                let warning = format!("{path} cannot judge the calibration: {refusal}");
+                diagnosis.after.warnings.push(warning);
+            }
+        }
+    }
+    let mut files = Vec::new();
+    if let Some(path) = &args.output {
+        files.push(stage(path, after)?);
+    }
+    let next = next_experiment::next(&diagnosis);
+    let mut said = String::new();
+    if let Some(path) = &args.plan {
+        said = match next_experiment::together(&diagnosis, &next) {
+            Some((setup, answer)) => {
+                let manifest = &diagnosis.before.prepared.manifest;
+                let text = answer.plan(&setup, Some(&manifest.device), manifest.sample_rate_hz);
+                files.push(stage(path, text)?);
+                format!("\nplan of the next experiment: {}\n", path.display())
+            }
+            None => "\nplan of the next experiment: none written, as there is nothing that one of this kind would settle\n".into(),
+        };
+    }
+    let found = DiagnosisReport {
+        diagnosis,
+        next,
+        second: judged,
+    };
+    let named: Vec<String> = args
+        .recordings
+        .iter()
+        .map(|r| r.display().to_string())
+        .collect();
+    if let Some(path) = &args.page {
+        let made = Made {
+            recording: named.join(", "),
+            command: command_line(),
+            created: now,
+        };
+        files.push(stage(path, report::diagnosis_page(&found, &made)?)?);
+    }
+    print(
+        &args.json,
+        &(report::diagnosis_text(&found) + &said),
+        &report::diagnosis_json(&found),
+        files,
+    )
+}
+
+/// The effects that the unit is known to have. Those of a sensor that the recordings lack have no matrix in the new file.
+fn known(given: Option<&Calibration>, diagnosis: &mut Diagnosis) -> Vec<EffectTable> {
+    let Some(given) = given else {
+        return Vec::new();
+    };
+    let after = &mut diagnosis.after;
+    let pairs = given.effects().iter().zip(&given.effect_tables);
+    let (kept, lost): (Vec<_>, Vec<_>) =
+        pairs.partition(|(effect, _)| after.sensor(effect.candidate.sensor).is_some());
+    for (effect, table) in lost {
+        after.warnings.push(format!(
+            "{} of the calibration is not in the new one, as the {} is not recorded",
+            table.id, effect.candidate.sensor
+        ));
+    }
+    kept.into_iter().map(|(_, table)| table.clone()).collect()
+}
+
+/// The command as it was typed, without the path of the program.
+fn command_line() -> String {
+    let arguments = std::env::args_os().skip(1);
+    let shown = arguments.map(|a| match a.to_string_lossy() {
+        a if a.contains([' ', '\'', '"']) => format!("{a:?}"),
+        a => a.into_owned(),
+    });
+    std::iter::once("mimu".to_string())
+        .chain(shown)
+        .collect::<Vec<_>>()
+        .join(" ")
+}

@@ -1,0 +1,106 @@
+//! `mimu fit`.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use mimu::calibration::to_toml;
+use mimu::fit::{Method, Options, fit};
+use mimu_recording::Reference;
+use mimu_recording::error::{Error, Result};
+use mimu_recording::result_file::stage;
+
+use crate::arguments::{JsonArgs, NoiseArgs, SensorArg, StillArgs};
+use crate::output::print;
+use crate::reading::read;
+use crate::report;
+
+#[derive(Args)]
+pub(crate) struct FitArgs {
+    /// Directory of the recording
+    recording: PathBuf,
+    /// Refit without each of N contiguous blocks of time and report the error on it
+    #[arg(long, value_name = "blocks=N", default_value = "blocks=4", value_parser = holdout)]
+    holdout: usize,
+    /// Estimator where the input is known (reference = "table"); least-squares without it
+    #[arg(long, value_enum)]
+    method: Option<MethodArg>,
+    /// Calibrate one of the two only: when the experiment does not determine the other
+    #[arg(long, value_enum, value_name = "SENSOR")]
+    only: Option<SensorArg>,
+    #[command(flatten)]
+    still: StillArgs,
+    #[command(flatten)]
+    noise: NoiseArgs,
+    /// List the dwells
+    #[arg(long)]
+    dwells: bool,
+    /// Calibration file to write
+    #[arg(short, value_name = "FILE")]
+    output: Option<PathBuf>,
+    #[command(flatten)]
+    json: JsonArgs,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum MethodArg {
+    /// Forward form, all dwells at once (fang)
+    LeastSquares,
+    /// Forward form, bank of Kalman filters (fang)
+    Kalman,
+    /// Inverse form, differences of opposite rates (xu)
+    Xu,
+    /// Scale factors and biases only, from six positions
+    SixPositions,
+}
+
+fn holdout(text: &str) -> std::result::Result<usize, String> {
+    let count = text.strip_prefix("blocks=").unwrap_or(text);
+    match count.parse() {
+        Ok(1) => Err("one block leaves nothing to fit to: at least 2, or 0 for none".into()),
+        Ok(n) if n <= 1000 => Ok(n),
+        _ => Err("write blocks=N with N from 2 to 1000, or blocks=0 for none".into()),
+    }
+}
+
+pub(crate) fn run(args: &FitArgs) -> Result<()> {
+    let options = Options {
+        method: match args.method {
+            None | Some(MethodArg::LeastSquares) => Method::LeastSquares,
+            Some(MethodArg::Kalman) => Method::Kalman,
+            Some(MethodArg::Xu) => Method::Xu,
+            Some(MethodArg::SixPositions) => Method::SixPositions,
+        },
+        holdout_blocks: args.holdout,
+        still_factor: args.still.factor,
+        only: args.only.map(SensorArg::sensor),
+    };
+    let outputs = [args.output.as_deref(), args.json.file()];
+    let inputs = [args.noise.file.as_deref()];
+    let prepared = read(&args.recording, options.still_factor, &outputs, &inputs)?;
+    let prepared = args.noise.state(prepared)?;
+    if args.method.is_some() && prepared.manifest.reference == Reference::Gravity {
+        return Err(Error::new(
+            args.recording.display(),
+            "--method chooses between estimators for known inputs, and reference is \"gravity\"",
+            "leave --method out, or give the steps their inputs (reference = \"table\")",
+        ));
+    }
+    let fitted = fit(prepared, options)?;
+    let mut text = report::fit_text(&fitted);
+    if args.dwells {
+        text.push('\n');
+        text.push_str(&report::dwell_table(
+            &fitted.prepared.dwells.list,
+            &fitted.prepared.manifest,
+        ));
+    }
+    let mut calibration = None;
+    if let Some(path) = &args.output {
+        let now = jiff::Timestamp::now()
+            .round(jiff::Unit::Second)
+            .unwrap_or_default();
+        calibration = Some(stage(path, to_toml(&fitted, &[], &now.to_string()))?);
+        text.push_str(&format!("\ncalibration: {}\n", path.display()));
+    }
+    print(&args.json, &text, &report::fit_json(&fitted), calibration)
+}

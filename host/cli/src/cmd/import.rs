@@ -1,0 +1,115 @@
+//! `mimu import`.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use mimu::quantity::normal_gravity;
+use mimu_recording::error::Result;
+use mimu_recording::{
+    ColumnList, ImportOptions, RawUnit, Reference, SampleFormat, Scale, Separator, import,
+};
+
+use crate::arguments::JsonArgs;
+use crate::output::{check_outputs, print, progress};
+use crate::report;
+
+#[derive(Args)]
+pub(crate) struct ImportArgs {
+    /// Text files (any separator) or Parquet; the later ones are joined onto the times of the first
+    #[arg(required = true)]
+    files: Vec<PathBuf>,
+    /// Columns of a file from the left (`t_s,accel_x,-`; `-` skips one), or by the names in its header
+    /// (`gyro_x=wx,t_s=time`); once for each file
+    ///
+    /// Known are t_s, step (numbers or labels), temp_c, gyro_x.., accel_x.., ref_rate_x_dps..,
+    /// ref_force_x_mps2.., and sample, an index from which the time follows with --rate-hz.
+    #[arg(long, value_name = "LIST")]
+    columns: Vec<ColumnList>,
+    /// Sample rate, Hz; without it, the inverse of the median time step
+    #[arg(long)]
+    rate_hz: Option<f64>,
+    /// Local gravity, m/s²; without it, normal gravity at sea level of --latitude, or 9.80665 and a warning
+    #[arg(long)]
+    gravity: Option<f64>,
+    /// Unit of the raw columns, after --scale: V, count or SI (rad/s and m/s²)
+    #[arg(long, value_name = "UNIT")]
+    raw_unit: RawUnit,
+    /// What is known of the input: table (ref_ columns or --inputs) or gravity (its size, at rest)
+    #[arg(long)]
+    reference: Reference,
+    /// Factor for a column, or for gyro or accel: `gyro=0.0174533`
+    #[arg(long, value_name = "COLUMN=FACTOR")]
+    scale: Vec<Scale>,
+    /// Name of the unit; without it, the name of the recording
+    #[arg(long)]
+    device: Option<String>,
+    /// Latitude, degrees
+    #[arg(long, allow_negative_numbers = true)]
+    latitude: Option<f64>,
+    /// CSV with the known input of each step: step, ref_rate_x_dps.., ref_force_x_mps2.., turn_x_deg..
+    #[arg(long, value_name = "FILE")]
+    inputs: Option<PathBuf>,
+    /// Separator of text files: comma, semicolon, tab or space; found out without it
+    #[arg(long)]
+    separator: Option<Separator>,
+    /// Format of the samples: parquet or csv
+    #[arg(long, default_value = "parquet")]
+    format: SampleFormat,
+    /// Replace an existing recording
+    #[arg(long)]
+    replace: bool,
+    /// Directory of the new recording
+    #[arg(short, value_name = "DIR")]
+    output: PathBuf,
+    #[command(flatten)]
+    json: JsonArgs,
+}
+
+/// Sample rates below this are more likely a wrong unit of time.
+const SLOW_HZ: f64 = 5.0;
+
+pub(crate) fn run(args: ImportArgs) -> Result<()> {
+    let (gravity, assumed) = match (args.gravity, args.latitude) {
+        (Some(gravity), _) => (gravity, None),
+        (None, Some(latitude)) => (normal_gravity(latitude), None),
+        (None, None) if args.reference == Reference::Table => (9.80665, None),
+        (None, None) => (9.80665, Some("gravity is taken to be 9.80665 m/s²; it ranges from 9.78 at the equator to 9.83 at the poles, and every scale factor of the accelerometer with it: give --gravity or --latitude".to_string())),
+    };
+    let options = ImportOptions {
+        columns: args.columns,
+        separator: args.separator,
+        rate_hz: args.rate_hz,
+        scales: args.scale,
+        device: args.device,
+        latitude_deg: args.latitude,
+        inputs: args.inputs,
+        format: args.format,
+        replace: args.replace,
+        ..ImportOptions::new(args.files, gravity, args.raw_unit, args.reference)
+    };
+    let inputs: Vec<&Path> = options
+        .files
+        .iter()
+        .chain(&options.inputs)
+        .map(|p| p.as_path())
+        .collect();
+    check_outputs(&[args.json.file()], &inputs)?;
+    let bar = progress("importing");
+    let mut summary = import(&options, &args.output, |share| {
+        bar.set_position((share * 1000.0) as u64)
+    })?;
+    bar.finish_and_clear();
+    summary.warnings.extend(assumed);
+    if summary.sample_rate_hz < SLOW_HZ {
+        summary.warnings.push(format!(
+            "{} Hz is slow for an inertial unit: if the times are in milliseconds, import with --scale t_s=0.001",
+            summary.sample_rate_hz
+        ));
+    }
+    print(
+        &args.json,
+        &report::import_text(&summary),
+        &report::import_json(&summary),
+        None,
+    )
+}

@@ -1,0 +1,11 @@
+//! The subcommands, one a file: each a struct of arguments and a `run`.
+
+pub(crate) mod allan;
+pub(crate) mod design;
+pub(crate) mod device;
+pub(crate) mod diagnose;
+pub(crate) mod export;
+pub(crate) mod fit;
+pub(crate) mod import;
+pub(crate) mod record;
+pub(crate) mod verify;

@@ -1,0 +1,47 @@
+//! `mimu verify`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use mimu::calibration::Calibration;
+use mimu::verify::verify;
+use mimu_recording::error::Result;
+
+use crate::arguments::{JsonArgs, NoiseArgs, StillArgs};
+use crate::output::print;
+use crate::reading::read;
+use crate::report;
+
+#[derive(Args)]
+pub(crate) struct VerifyArgs {
+    /// Directory of the recording
+    recording: PathBuf,
+    /// Calibration file
+    #[arg(long, value_name = "FILE")]
+    calibration: PathBuf,
+    #[command(flatten)]
+    still: StillArgs,
+    #[command(flatten)]
+    noise: NoiseArgs,
+    #[command(flatten)]
+    json: JsonArgs,
+}
+
+pub(crate) fn run(args: &VerifyArgs) -> Result<()> {
+    let calibration = Calibration::read(&args.calibration)?;
+    let outputs = [args.json.file()];
+    let prepared = read(
+        &args.recording,
+        args.still.factor,
+        &outputs,
+        &[Some(&args.calibration), args.noise.file.as_deref()],
+    )?;
+    let prepared = args.noise.state(prepared)?;
+    let verified = verify(&prepared, &calibration)?;
+    print(
+        &args.json,
+        &report::verify_text(&verified),
+        &report::verify_json(&verified),
+        None,
+    )
+}

@@ -1,0 +1,125 @@
+//! Noise coefficients in the formats of other programs.
+
+use std::fmt::Write as _;
+
+use mimu::allan::model::Term;
+use mimu::noise_file::{NoiseChannel, NoiseFile};
+use mimu::quantity::Sensor;
+use mimu_recording::error::{Error, Result};
+
+/// What the person has decided about Kalibr's file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct KalibrOptions {
+    /// Topic of the messages.
+    pub rostopic: String,
+    /// Messages a second; `None`: the rate of the recording.
+    pub update_rate_hz: Option<f64>,
+    /// Random walk to state where the record shows none, SI per √s: gyro, accelerometer.
+    pub walk_fallback: [Option<f64>; 2],
+}
+
+/// Text of Kalibr's `imu.yaml`.
+///
+/// Kalibr's continuous-time densities are the coefficients themselves: its discrete noise is `density/√dt` a sample, which
+/// has N = density, and its bias walks by `random_walk √dt` a sample, which has K = random_walk (Kalibr wiki, "IMU noise
+/// model"). The worst axis of each sensor is stated, as the file has one number for three.
+///
+/// Errors: a sensor is missing or not in SI; a coefficient that the record does not show on any axis and without a fallback.
+pub fn kalibr(file: &NoiseFile, options: &KalibrOptions) -> Result<String> {
+    let mut out = format!(
+        "# {}: noise from {:.0} s at rest, by mimu {}.\n\
+         # Continuous-time densities of the worst axis; {} % interval behind each.\n",
+        file.device,
+        file.duration_s,
+        env!("CARGO_PKG_VERSION"),
+        100.0 * file.confidence,
+    );
+    for sensor in [Sensor::Accel, Sensor::Gyro] {
+        let (prefix, unit) = match sensor {
+            Sensor::Accel => ("accelerometer", ["m/s^2/sqrt(Hz)", "m/s^3/sqrt(Hz)"]),
+            Sensor::Gyro => ("gyroscope", ["rad/s/sqrt(Hz)", "rad/s^2/sqrt(Hz)"]),
+        };
+        let entries = [
+            (Term::N, "noise_density", unit[0], None),
+            (
+                Term::K,
+                "random_walk",
+                unit[1],
+                options.walk_fallback[sensor as usize],
+            ),
+        ];
+        for (term, key, unit, fallback) in entries {
+            let (value, comment) = worst(file, sensor, term, fallback)?;
+            let _ = writeln!(out, "{prefix}_{key}: {value:.6e}  # {unit}, {comment}");
+        }
+    }
+    let rate = options.update_rate_hz.unwrap_or(file.sample_rate_hz);
+    let topic = serde_json::Value::from(options.rostopic.as_str());
+    let _ = writeln!(out, "\nrostopic: {topic}\nupdate_rate: {rate:.3}  # Hz");
+    Ok(out)
+}
+
+/// The largest coefficient of `term` among the axes of `sensor`, and what to say of it.
+fn worst(
+    file: &NoiseFile,
+    sensor: Sensor,
+    term: Term,
+    fallback: Option<f64>,
+) -> Result<(f64, String)> {
+    let (channels, place) = (file.of(sensor), &file.place);
+    let Some(first) = channels.first() else {
+        return Err(Error::new(
+            place,
+            format!("there is no channel of the {sensor}"),
+            "record both sensors: Kalibr's file needs both",
+        ));
+    };
+    if first.unit != sensor.unit() {
+        return Err(Error::new(
+            format!("{place}, channel {}", first.name),
+            format!("it is in {} and not in {}", first.unit, sensor.unit()),
+            "run mimu allan with --calibration",
+        ));
+    }
+    let mut largest: Option<(f64, String)> = None;
+    let mut missing: Vec<(&NoiseChannel, &str)> = Vec::new();
+    for channel in channels {
+        match channel.get(term) {
+            Ok(c) if largest.as_ref().is_none_or(|(v, _)| c.value > *v) => {
+                largest = Some((
+                    c.value,
+                    format!("{}: {:.2e} to {:.2e}", channel.name, c.lower, c.upper),
+                ));
+            }
+            Ok(_) => {}
+            Err(why) => missing.push((channel, why)),
+        }
+    }
+    if let (Some((value, said)), true) = (&largest, missing.is_empty()) {
+        return Ok((*value, said.clone()));
+    }
+    let names: Vec<&str> = missing.iter().map(|(c, _)| c.name.as_str()).collect();
+    if let Some(fallback) = fallback {
+        // The larger of the two: the axes that show it are no better for the others.
+        return Ok(match largest {
+            Some((value, said)) if value >= fallback => {
+                (value, format!("{said}; not seen on {}", names.join(", ")))
+            }
+            _ => (
+                fallback,
+                format!("stated by hand: not seen on {}", names.join(", ")),
+            ),
+        });
+    }
+    let (channel, why) = missing[0];
+    let remedy = match (term, sensor) {
+        (Term::K, Sensor::Gyro) => "record for longer, or state one with --gyro-walk",
+        (Term::K, Sensor::Accel) => "record for longer, or state one with --accel-walk",
+        _ => "record again, at rest",
+    };
+    Err(Error::new(
+        format!("{place}, channel {}", channel.name),
+        format!("{} ({}): {why}", term.letter(), term.name()),
+        remedy,
+    ))
+}

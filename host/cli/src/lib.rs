@@ -1,0 +1,86 @@
+//! The command `mimu`: one subcommand a file, and all presentation of results.
+//!
+//! | module | what |
+//! |---|---|
+//! | `cmd` | the subcommands: arguments, and what is done with them |
+//! | `arguments` | arguments that several share |
+//! | `reading`, `output` | the recording in; text, JSON and files out |
+//! | [`report`] | results as JSON, text and page |
+//! | `export` | noise coefficients for other programs |
+
+mod arguments;
+mod cmd;
+mod export;
+mod output;
+mod reading;
+pub mod report;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+use cmd::{allan, design, device, diagnose, fit, import, record, verify};
+
+/// Calibration of inertial units made of analog MEMS sensors.
+///
+/// Exit status 0: done; 1: the data were refused, with one line that says what is wrong, where, and
+/// what to do; 2: wrong usage.
+#[derive(Parser)]
+#[command(name = "mimu", version, max_term_width = 100)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Make a recording of foreign files
+    Import(import::ImportArgs),
+    /// Calibrate the gyro and the accelerometer of a recording
+    Fit(fit::FitArgs),
+    /// Judge a calibration by another recording
+    Verify(verify::VerifyArgs),
+    /// Find the effect behind the residual of a calibrated unit
+    Diagnose(diagnose::DiagnoseArgs),
+    /// Design the experiment: which attitudes and rates, how many, for how long
+    Design(design::DesignArgs),
+    /// Noise of a unit at rest: Allan deviation, N, B, K, Q and R
+    Allan(allan::AllanArgs),
+    /// Write noise coefficients in the format of another program
+    Export(cmd::export::ExportArgs),
+    /// Record the raw stream of a device
+    Record(record::RecordArgs),
+    /// Talk with a device: info, stream, upload, download, self-test, counters, check, kalman
+    Device(device::DeviceArgs),
+}
+
+/// Parses the arguments of the process and runs the subcommand; prints an error in one line.
+pub fn run() -> ExitCode {
+    let done = match Cli::parse().command {
+        Command::Import(args) => import::run(args),
+        Command::Fit(args) => fit::run(&args),
+        Command::Verify(args) => verify::run(&args),
+        Command::Diagnose(args) => diagnose::run(&args),
+        Command::Design(args) => design::run(&args),
+        Command::Allan(args) => allan::run(&args),
+        Command::Export(args) => cmd::export::run(&args),
+        Command::Record(args) => record::run(&args),
+        Command::Device(args) => device::run(&args),
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("mimu: {error}");
+            ExitCode::from(1)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn arguments_are_consistent() {
+        <Cli as clap::CommandFactory>::command().debug_assert();
+    }
+}

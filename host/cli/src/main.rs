@@ -1,0 +1,5 @@
+//! The command `mimu`.
+
+fn main() -> std::process::ExitCode {
+    mimu_cli::run()
+}

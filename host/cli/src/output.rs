@@ -1,0 +1,66 @@
+//! What a subcommand leaves: text or JSON, files that appear whole or not at all, and progress while it works.
+
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+use indicatif::{ProgressBar, ProgressStyle};
+use mimu_recording::error::{Error, Result};
+use mimu_recording::result_file::{Staged, stage};
+
+use crate::arguments::JsonArgs;
+
+/// Refuses outputs that cannot be written, before the work, and those that would overwrite an input or each other.
+pub(crate) fn check_outputs(outputs: &[Option<&Path>], inputs: &[&Path]) -> Result<()> {
+    let mut taken: Vec<PathBuf> = inputs
+        .iter()
+        .filter_map(|p| p.canonicalize().ok())
+        .collect();
+    for path in outputs.iter().flatten() {
+        // Only a try: dropped, it leaves nothing.
+        let folder = stage(path, String::new())?.folder();
+        let name = path.file_name().unwrap_or_default();
+        let full = path.canonicalize().unwrap_or_else(|_| folder.join(name));
+        if !full.exists() || full.is_file() {
+            if taken.contains(&full) {
+                let problem = "this is an input, or another result goes there";
+                return Err(Error::new(path.display(), problem, "choose another name"));
+            }
+            taken.push(full);
+        }
+    }
+    Ok(())
+}
+
+/// Progress in thousandths, on a terminal only.
+pub(crate) fn progress(what: &'static str) -> ProgressBar {
+    let bar = ProgressBar::new(1000).with_message(what);
+    if let Ok(style) = ProgressStyle::with_template("{msg} {bar:40} {percent:>3} % {eta}") {
+        bar.set_style(style);
+    }
+    bar
+}
+
+/// Prints the text, or writes the JSON and prints the text unless both would go to standard output. All files appear
+/// when all of them are written.
+pub(crate) fn print(
+    json: &JsonArgs,
+    text: &str,
+    value: &serde_json::Value,
+    files: impl IntoIterator<Item = Staged>,
+) -> Result<()> {
+    let pretty = format!("{value:#}\n");
+    let file = json.file().map(|path| stage(path, pretty.clone()));
+    for staged in files.into_iter().chain(file.transpose()?) {
+        staged.publish()?;
+    }
+    let shown = match (&json.path, json.file()) {
+        (Some(_), None) => &pretty,
+        _ => text,
+    };
+    let mut out = std::io::stdout().lock();
+    match out.write_all(shown.as_bytes()).and_then(|()| out.flush()) {
+        // `mimu fit ... | head` is no error.
+        Err(e) if e.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
+        other => other.map_err(|e| Error::io(Path::new("standard output"), &e)),
+    }
+}

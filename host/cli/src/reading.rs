@@ -1,0 +1,29 @@
+//! Reading the recording of a subcommand.
+
+use std::path::Path;
+
+use mimu::prepared::Prepared;
+use mimu_recording::error::Result;
+use mimu_recording::{MANIFEST_FILE, Recording};
+
+use crate::output::{check_outputs, progress};
+
+/// Opens and reads a recording, after checking that the results can be written and take the place of no input.
+pub(crate) fn read(
+    directory: &Path,
+    still_factor: f64,
+    outputs: &[Option<&Path>],
+    others: &[Option<&Path>],
+) -> Result<Prepared> {
+    let recording = Recording::open(directory)?;
+    let manifest = directory.join(MANIFEST_FILE);
+    let mut inputs: Vec<&Path> = vec![&manifest, &recording.samples];
+    inputs.extend(others.iter().flatten());
+    check_outputs(outputs, &inputs)?;
+    let bar = progress("reading");
+    let prepared = Prepared::read(&recording, still_factor, |share| {
+        bar.set_position((share * 1000.0) as u64)
+    });
+    bar.finish_and_clear();
+    prepared
+}

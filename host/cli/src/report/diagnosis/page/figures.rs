@@ -1,0 +1,251 @@
+//! The figures: residuals in time, effects against what they depend on, what is left against noise.
+
+use std::ops::Range;
+
+use maud::{Markup, html};
+
+use super::svg::{Frame, power_of_ten, px, range, times_ten};
+use mimu::diagnose::picture::{Against, Kind, Panel, Picture, Quantile, Track};
+use mimu::quantity::Figure;
+use mimu::quantity::Sensor;
+
+/// Width and height of a figure, pixels.
+const SIZE: (f64, f64) = (560.0, 232.0);
+/// Room for the numbers and the name of the ordinate.
+const LEFT: f64 = 62.0;
+const RIGHT: f64 = 8.0;
+const TOP: f64 = 26.0;
+const BOTTOM: f64 = 40.0;
+/// Between two drawings with one ordinate.
+const GAP: f64 = 18.0;
+const MINUTE_S: f64 = 60.0;
+
+/// Factor and unit in which a person reads residuals.
+pub fn unit(kind: Kind, sensor: Sensor) -> (f64, &'static str) {
+    match kind {
+        Kind::Angle => Figure::Direction.readable(sensor),
+        Kind::Input => Figure::Input.readable(sensor),
+    }
+}
+
+fn frames<const N: usize>(x: &Range<f64>, y: &Range<f64>) -> [Frame; N] {
+    let width = (SIZE.0 - LEFT - RIGHT - GAP * (N - 1) as f64) / N as f64;
+    std::array::from_fn(|i| {
+        let left = LEFT + i as f64 * (width + GAP);
+        Frame {
+            across: left..left + width,
+            down: TOP..SIZE.1 - BOTTOM,
+            x: x.clone(),
+            y: y.clone(),
+        }
+    })
+}
+
+/// Rows from which on marks are drawn smaller.
+const MANY: usize = 60;
+
+/// `rows` is how many marks there are.
+fn drawing(label: &str, rows: usize, inside: &Markup) -> Markup {
+    html! {
+        svg class=[(rows > MANY).then_some("many")] role="img" aria-label=(label) viewBox={ "0 0 " (px(SIZE.0)) " " (px(SIZE.1)) }
+            xmlns="http://www.w3.org/2000/svg" { (inside) }
+    }
+}
+
+/// Ordinates of a drawing in the unit that a person reads, as multiples of a power of ten.
+struct Ordinate {
+    by: f64,
+    name: String,
+    ends: Range<f64>,
+}
+
+impl Ordinate {
+    /// Of `values`, SI, and zero.
+    fn new(kind: Kind, sensor: Sensor, what: &str, values: impl Iterator<Item = f64>) -> Self {
+        let (factor, unit) = unit(kind, sensor);
+        let ends = range(values.map(|v| v * factor).chain([0.0]));
+        let power = power_of_ten(&ends);
+        let scale = 10f64.powi(-power);
+        Self {
+            by: factor * scale,
+            name: format!("{what}, {}{unit}", times_ten(power)),
+            ends: ends.start * scale..ends.end * scale,
+        }
+    }
+}
+
+/// Residuals of a track in time, before and after; `after` where there are effects.
+pub fn in_time(sensor: Sensor, track: &Track, blocks_s: &[f64], after: bool) -> Markup {
+    let samples = &track.samples;
+    let shown = if after { 2 } else { 1 };
+    let values = samples.iter().flat_map(|s| {
+        let both = (0..shown).flat_map(|k| [s.residual[k], s.held_out[k]]);
+        both.chain([s.residual[0] + s.sigma, s.residual[0] - s.sigma])
+    });
+    let y = Ordinate::new(track.kind, sensor, "residual", values);
+    let x = range(samples.iter().map(|s| s.t_s / MINUTE_S));
+    let ends: Vec<f64> = blocks_s.iter().map(|e| e / MINUTE_S).collect();
+    let one = |frame: &Frame, k: usize, heading: &str| {
+        html! {
+            (frame.stretches("block", &ends))
+            (frame.axes(heading, k == 0))
+            (frame.bars("sigma", samples.iter().map(|s| (s.t_s / MINUTE_S, s.residual[k] * y.by, s.sigma * y.by))))
+            (frame.diamonds("held", samples.iter().map(|s| (s.t_s / MINUTE_S, s.held_out[k] * y.by))))
+            (frame.dots("dot", samples.iter().map(|s| (s.t_s / MINUTE_S, s.residual[k] * y.by))))
+        }
+    };
+    let name = title(sensor, track);
+    let inside = match after {
+        true => {
+            let [left, right] = frames::<2>(&x, &y.ends);
+            html! {
+                (left.y_name(&y.name))
+                (left.x_name("time, min", &right))
+                (one(&left, 0, &name))
+                (one(&right, 1, "after"))
+            }
+        }
+        false => {
+            let [only] = frames::<1>(&x, &y.ends);
+            html! { (only.y_name(&y.name)) (only.x_name("time, min", &only)) (one(&only, 0, &name)) }
+        }
+    };
+    drawing(
+        &format!("residual of {name} in time"),
+        samples.len(),
+        &inside,
+    )
+}
+
+/// Name of a track with the sensor: `gyro x`, `gyro rest x`, `turns, first direction`.
+fn title(sensor: Sensor, track: &Track) -> String {
+    match track.name.as_str() {
+        name @ ("x" | "y" | "z") => format!("{sensor} {name}"),
+        name => match name.strip_prefix("rest ") {
+            Some(axis) => format!("{sensor} {axis} at rest"),
+            None => name.into(),
+        },
+    }
+}
+
+/// An effect against what it depends on, left in and taken out.
+pub fn against(sensor: Sensor, panel: &Panel) -> Markup {
+    let (points, curve) = (&panel.points, &panel.curve);
+    let values = points
+        .iter()
+        .flat_map(|p| {
+            [
+                p.partial,
+                p.predicted,
+                p.after,
+                p.held_out,
+                p.partial + p.sigma,
+                p.partial - p.sigma,
+            ]
+        })
+        .chain(
+            curve
+                .iter()
+                .flat_map(|c| [c.value - c.half, c.value + c.half]),
+        );
+    let y = Ordinate::new(panel.kind, sensor, "residual", values);
+    let (by, offset, name) = match &panel.against {
+        Against::Variable(a) => (a.factor, a.offset, format!("{}, {}", a.name, a.unit)),
+        Against::Fitted => {
+            let unit = unit(panel.kind, sensor);
+            (unit.0, 0.0, format!("the effect by the fit, {}", unit.1))
+        }
+    };
+    let ends = range(points.iter().map(|p| p.x * by + offset));
+    let power = power_of_ten(&ends);
+    let scale = 10f64.powi(-power);
+    let ends = ends.start * scale..ends.end * scale;
+    let name = match power {
+        0 => name,
+        // The unit stands behind the last comma.
+        power => match name.rsplit_once(", ") {
+            Some((name, unit)) => format!("{name}, {}{unit}", times_ten(power)),
+            None => name,
+        },
+    };
+    let x = |v: f64| (v * by + offset) * scale;
+    let [left, right] = frames::<2>(&ends, &y.ends);
+    let band: Vec<(f64, f64, f64)> = curve
+        .iter()
+        .map(|c| (x(c.x), (c.value - c.half) * y.by, (c.value + c.half) * y.by))
+        .collect();
+    let inside = html! {
+        (left.y_name(&y.name))
+        (left.x_name(&name, &right))
+        (left.axes(&panel.title, true))
+        @match panel.against {
+            Against::Variable(_) => (left.band("band", &band)),
+            Against::Fitted => (left.bars("bandbar", curve.iter().map(|c| (x(c.x), c.value * y.by, c.half * y.by)))),
+        }
+        (left.bars("sigma", points.iter().map(|p| (x(p.x), p.partial * y.by, p.sigma * y.by))))
+        (left.diamonds("held", points.iter().map(|p| (x(p.x), p.predicted * y.by))))
+        (left.dots("dot", points.iter().map(|p| (x(p.x), p.partial * y.by))))
+        (left.line("fit", curve.iter().map(|c| (x(c.x), c.value * y.by))))
+        (right.axes("effect taken out", false))
+        (right.bars("sigma", points.iter().map(|p| (x(p.x), p.after * y.by, p.sigma * y.by))))
+        (right.diamonds("held", points.iter().map(|p| (x(p.x), p.held_out * y.by))))
+        (right.dots("dot", points.iter().map(|p| (x(p.x), p.after * y.by))))
+    };
+    drawing(
+        &format!("{} against {name}", panel.title),
+        points.len(),
+        &inside,
+    )
+}
+
+/// Residuals in sigmas of the known noise against what noise alone would give.
+pub fn quantiles(picture: &Picture, after: bool) -> Markup {
+    const X: &str = "normal quantile, σ";
+    const Y: &str = "residual, σ";
+    let all = &picture.quantiles;
+    let shown = if after { 2 } else { 1 };
+    let x = range(all.iter().map(|q| q.normal));
+    let last = shown - 1;
+    // Before an effect is taken out a row may be hundreds of sigmas off; after, the line of noise has to be seen.
+    let y = |k: usize| range(all.iter().flat_map(|q| [q.found[k], q.band[0], q.band[1]]));
+    let one = |frame: &Frame, k: usize, heading: &str| {
+        let of = |q: &Quantile| (q.normal, q.found[k]);
+        let band: Vec<(f64, f64, f64)> = all
+            .iter()
+            .map(|q| (q.normal, q.band[0], q.band[1]))
+            .collect();
+        html! {
+            (frame.axes(heading, true))
+            (frame.band("band", &band))
+            (frame.line("fit", all.iter().map(|q| (q.normal, q.normal))))
+            (frame.dots("dot small", all.iter().map(of)))
+        }
+    };
+    let inside = match after {
+        true => {
+            let [mut left, mut right] = frames::<2>(&x, &y(0));
+            left.across.end -= 18.0;
+            right.across.start += 18.0;
+            right.y = y(last);
+            html! {
+                (left.y_name(Y))
+                (left.x_name(X, &right))
+                (one(&left, 0, &format!("{}: before", picture.sensor)))
+                (one(&right, 1, "after (its own scale)"))
+            }
+        }
+        false => {
+            let [only] = frames::<1>(&x, &y(0));
+            html! {
+                (only.y_name(Y))
+                (only.x_name(X, &only))
+                (one(&only, 0, picture.sensor.name()))
+            }
+        }
+    };
+    drawing(
+        "residuals against the normal distribution",
+        all.len(),
+        &inside,
+    )
+}

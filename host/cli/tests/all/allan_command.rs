@@ -1,0 +1,385 @@
+//! The commands `mimu allan` and `mimu export`: what they write and what they refuse.
+
+use std::fmt::Write as _;
+use std::path::Path;
+use std::process::{Command, Output};
+
+use mimu::noise_file::NoiseFile;
+use mimu_rig::noise::{Coefficients, Noise};
+use mimu_rig::plan::Plan;
+use mimu_rig::rig_file::{RigFile, RigTruth};
+
+fn mimu(folder: &Path, arguments: &str) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_mimu"));
+    command.current_dir(folder).args(arguments.split(' '));
+    command.output().unwrap()
+}
+
+fn refused(folder: &Path, arguments: &str) -> String {
+    let out = mimu(folder, arguments);
+    let error = String::from_utf8(out.stderr).unwrap();
+    assert_eq!(out.status.code(), Some(1), "{arguments}: {error}");
+    assert_eq!(error.lines().count(), 1, "{error}");
+    assert!(out.stdout.is_empty());
+    error
+}
+
+fn done(folder: &Path, arguments: &str) -> String {
+    let out = mimu(folder, arguments);
+    let error = String::from_utf8(out.stderr).unwrap();
+    assert!(out.status.success(), "{arguments}: {error}");
+    String::from_utf8(out.stdout).unwrap()
+}
+
+const RATE_HZ: f64 = 100.0;
+const N: f64 = 1e-3;
+const K: f64 = 2e-4;
+
+/// Rows of six channels at rest: white noise, and a random walk in the accelerometers.
+fn at_rest(rows: usize) -> Vec<[f64; 7]> {
+    let channel = |i: usize| {
+        let walk = if i < 3 { 0.0 } else { K };
+        let of = Coefficients {
+            white: N,
+            instability: 0.0,
+            walk,
+        };
+        Noise::new(&of, &i.to_string(), 1.0 / RATE_HZ, 3)
+    };
+    let mut noise: Vec<Noise> = (0..6).map(channel).collect();
+    let row = |k: usize| -> [f64; 7] {
+        std::array::from_fn(|i| match i {
+            0 => k as f64 / RATE_HZ,
+            i => noise[i - 1].step() + if i == 6 { 9.8 } else { 0.0 },
+        })
+    };
+    (0..rows).map(row).collect()
+}
+
+/// Writes the recording `r` in SI.
+fn write(folder: &Path, rows: &[[f64; 7]]) {
+    write_as(folder, "r", rows, None);
+}
+
+/// Writes a recording in SI into a folder of its own, with a temperature if it has one.
+fn write_as(folder: &Path, name: &str, rows: &[[f64; 7]], temp_c: Option<f64>) {
+    let folder = folder.join(name);
+    std::fs::create_dir_all(&folder).unwrap();
+    let manifest = format!(
+        "format = \"mimu-recording/1\"\ndevice = \"u\"\nsample_rate_hz = {RATE_HZ:?}\n\
+         gravity_mps2 = 9.8\nraw_unit = \"SI\"\nreference = \"gravity\"\n"
+    );
+    std::fs::write(folder.join("recording.toml"), manifest).unwrap();
+    let mut csv = "t_s,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z".to_string();
+    csv.push_str(if temp_c.is_some() { ",temp_c\n" } else { "\n" });
+    for row in rows {
+        let cell = |v: &f64| match v.is_finite() {
+            true => v.to_string(),
+            false => String::new(),
+        };
+        let cells: Vec<String> = row.iter().chain(&temp_c).map(cell).collect();
+        let _ = writeln!(csv, "{}", cells.join(","));
+    }
+    std::fs::write(folder.join("samples.csv"), csv).unwrap();
+}
+
+#[test]
+fn json_has_the_agreed_keys_and_the_truth_within_its_intervals() {
+    let folder = tempfile::tempdir().unwrap();
+    write(folder.path(), &at_rest(60_000));
+    let text = done(
+        folder.path(),
+        "allan r --json a.json --plot a.svg -o noise.toml",
+    );
+    let json = std::fs::read(folder.path().join("a.json")).unwrap();
+    let json: serde_json::Value = serde_json::from_slice(&json).unwrap();
+    assert_eq!(json["format"], "mimu-allan/1");
+    let channels = json["channels"].as_array().unwrap();
+    assert_eq!(channels.len(), 6);
+    let mut outside = 0;
+    for channel in channels {
+        let name = channel["name"].as_str().unwrap();
+        let points = channel["tau_s"].as_array().unwrap().len();
+        for key in ["adev", "lower", "upper", "fang_7"] {
+            assert_eq!(channel[key].as_array().unwrap().len(), points);
+        }
+        let mut check = |key: &str, truth: f64, unit: &str| {
+            let c = &channel[key];
+            assert_eq!(c["unit"], unit);
+            assert!(c["sigma"].is_number());
+            let ends = ["lower", "upper"].map(|e| c[e].as_f64().unwrap());
+            outside += usize::from(!(ends[0]..=ends[1]).contains(&truth));
+        };
+        if name.starts_with("gyro") {
+            check("n", N, "rad/s/sqrt(Hz)");
+            assert!(channel["k"].is_null());
+            let why = channel["reasons"]["k"].as_str().unwrap();
+            assert!(
+                why.contains("record at least") && why.contains("deg/h/√h"),
+                "{why}"
+            );
+        } else {
+            check("n", N, "m/s^2/sqrt(Hz)");
+            check("k", K, "m/s^2/sqrt(s)");
+        }
+    }
+    // Nine intervals of 95 %.
+    assert!(outside <= 2, "{outside} outside");
+    assert!(text.contains("deg/√h") && text.contains("µg/√Hz") && text.contains("fang (7)"));
+    let svg = std::fs::read_to_string(folder.path().join("a.svg")).unwrap();
+    assert!(svg.starts_with("<svg") && svg.contains("gyro_x") && svg.contains("Accelerometers"));
+}
+
+#[test]
+fn recordings_at_several_temperatures_stand_in_one_file_with_theirs() {
+    let folder = tempfile::tempdir().unwrap();
+    let rows = at_rest(12_000);
+    write_as(folder.path(), "cold", &rows[..6000], Some(-10.0));
+    write_as(folder.path(), "warm", &rows[6000..], Some(40.5));
+    write_as(folder.path(), "unknown", &rows[..6000], None);
+    let text = done(folder.path(), "allan cold warm -o noise.toml --json a.json");
+    assert!(text.contains("u in cold") && text.contains("-10.0 °C") && text.contains("40.5 °C"));
+    let json = std::fs::read(folder.path().join("a.json")).unwrap();
+    let json: serde_json::Value = serde_json::from_slice(&json).unwrap();
+    let channels = json["channels"].as_array().unwrap();
+    let of = |c: &serde_json::Value| (c["recording"].clone(), c["temp_c"].as_f64().unwrap());
+    assert_eq!(channels.len(), 12);
+    assert_eq!(of(&channels[5]), ("cold".into(), -10.0));
+    assert_eq!(of(&channels[6]), ("warm".into(), 40.5));
+    let file = NoiseFile::read(&folder.path().join("noise.toml")).unwrap();
+    let temperatures: Vec<_> = file.channel.iter().map(|c| c.temp_c.unwrap()).collect();
+    assert_eq!(temperatures, [[-10.0; 6], [40.5; 6]].concat());
+
+    for (arguments, says) in [
+        ("allan cold warm --plot a.svg", "one recording at a time"),
+        ("allan cold unknown", "unknown: it has no temp_c"),
+        ("allan cold cold", "given twice"),
+    ] {
+        let error = refused(folder.path(), arguments);
+        assert!(error.contains(says), "{error}");
+    }
+    for (key, other) in [
+        ("device = \"u\"", "device = \"v\""),
+        ("raw_unit = \"SI\"", "raw_unit = \"V\""),
+    ] {
+        let manifest = folder.path().join("warm/recording.toml");
+        let text = std::fs::read_to_string(&manifest).unwrap();
+        std::fs::write(&manifest, text.replace(key, other)).unwrap();
+        let error = refused(folder.path(), "allan cold warm");
+        let what = key.split(' ').next().unwrap();
+        assert!(error.contains(&format!("its {what} is")), "{error}");
+        std::fs::write(&manifest, text).unwrap();
+    }
+}
+
+#[test]
+fn kalibr_gets_the_worst_axis_and_no_coefficient_that_was_not_seen() {
+    let folder = tempfile::tempdir().unwrap();
+    write(folder.path(), &at_rest(60_000));
+    done(folder.path(), "allan r -o noise.toml --json a.json");
+    let error = refused(folder.path(), "export --kalibr imu.yaml --noise noise.toml");
+    assert!(
+        error.contains("gyro_x")
+            && error.contains("record at least")
+            && error.contains("--gyro-walk"),
+        "{error}"
+    );
+    assert!(!folder.path().join("imu.yaml").exists());
+    done(
+        folder.path(),
+        "export --kalibr imu.yaml --noise noise.toml --gyro-walk 1e-6 --rostopic /a",
+    );
+    let yaml = std::fs::read_to_string(folder.path().join("imu.yaml")).unwrap();
+    let value = |key: &str| -> f64 {
+        let line = yaml.lines().find(|l| l.starts_with(key)).unwrap();
+        line[key.len() + 1..]
+            .split('#')
+            .next()
+            .unwrap()
+            .trim()
+            .parse()
+            .unwrap()
+    };
+    let json = std::fs::read(folder.path().join("a.json")).unwrap();
+    let json: serde_json::Value = serde_json::from_slice(&json).unwrap();
+    let worst = |from: usize, key: &str| {
+        let channels = json["channels"].as_array().unwrap()[from..from + 3].iter();
+        channels
+            .map(|c| c[key]["value"].as_f64().unwrap())
+            .fold(0.0, f64::max)
+    };
+    for (key, known) in [
+        ("accelerometer_noise_density", worst(3, "n")),
+        ("accelerometer_random_walk", worst(3, "k")),
+        ("gyroscope_noise_density", worst(0, "n")),
+        ("gyroscope_random_walk", 1e-6),
+        ("update_rate", RATE_HZ),
+    ] {
+        assert!(
+            (value(key) / known - 1.0).abs() < 1e-5,
+            "{key}: {} {known}",
+            value(key)
+        );
+    }
+    assert!(yaml.contains("rostopic: \"/a\"") && yaml.contains("stated by hand"));
+}
+
+/// What is wrong with a row of some number.
+type Spoil = fn(usize, &mut [f64; 7]);
+
+#[test]
+fn what_is_not_at_rest_or_not_alive_is_refused_with_its_place() {
+    let rest = at_rest(6000);
+    let cases: [(&str, Spoil, &[&str]); 6] = [
+        (
+            "moving",
+            |k, row| {
+                if (4000..4300).contains(&k) {
+                    row[1] += (k as f64).sin()
+                }
+            },
+            &["40.0 s", "gyro_x", "--from 0.0 --to 40.0"],
+        ),
+        (
+            "turning slowly",
+            |k, row| {
+                if k >= 5000 {
+                    row[3] += 0.5
+                }
+            },
+            &["50.0 s", "gyro_z"],
+        ),
+        (
+            "stuck",
+            |k, row| {
+                if (2000..2400).contains(&k) {
+                    row[5] = 0.25
+                }
+            },
+            &["accel_y", "stuck at 0.25", "20.00 s"],
+        ),
+        (
+            "constant",
+            |_, row| row[2] = 1.5,
+            &["gyro_y", "1.5 throughout"],
+        ),
+        ("rate", |_, row| row[0] *= 2.0, &["sample_rate_hz"]),
+        (
+            "backwards",
+            |k, row| {
+                if k == 77 {
+                    row[0] -= 1.0
+                }
+            },
+            &["data row 78", "does not go on"],
+        ),
+    ];
+    for (name, spoil, says) in cases {
+        let folder = tempfile::tempdir().unwrap();
+        let mut rows = rest.clone();
+        rows.iter_mut()
+            .enumerate()
+            .for_each(|(k, row)| spoil(k, row));
+        write(folder.path(), &rows);
+        let error = refused(folder.path(), "allan r -o n.toml");
+        for word in says {
+            assert!(error.contains(word), "{name}: {error}");
+        }
+        assert!(!folder.path().join("n.toml").exists());
+    }
+    let folder = tempfile::tempdir().unwrap();
+    write(folder.path(), &rest[..7]);
+    assert!(
+        refused(folder.path(), "allan r")
+            .contains("7 samples to compute noise from, and it takes 64")
+    );
+    write(folder.path(), &rest);
+    assert!(refused(folder.path(), "allan r --from 70").contains("--from"));
+    assert!(
+        refused(folder.path(), "allan r --from 30 --to 20").contains("30 s is not before 20 s")
+    );
+    assert!(refused(folder.path(), "allan r --step 2").contains("no column step"));
+}
+
+#[test]
+fn the_longest_stretch_without_a_gap_or_an_empty_cell_is_used_and_told_of() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut rows = at_rest(6000);
+    rows[1500][2] = f64::NAN;
+    for row in &mut rows[5000..] {
+        row[0] += 3.0;
+    }
+    write(folder.path(), &rows);
+    let json: serde_json::Value =
+        serde_json::from_str(&done(folder.path(), "allan r --json -")).unwrap();
+    let samples = |i: usize| json["channels"][i]["samples"].as_u64().unwrap();
+    assert_eq!([samples(0), samples(1)], [5000, 3499]);
+    let warnings = json["warnings"].to_string();
+    assert!(
+        warnings.contains("before data row 5001") && warnings.contains("data row 1501"),
+        "{warnings}"
+    );
+    // By hand the end is chosen instead.
+    let json: serde_json::Value =
+        serde_json::from_str(&done(folder.path(), "allan r --from 53 --json -")).unwrap();
+    assert_eq!(json["channels"][0]["samples"], 1000);
+    assert_eq!(json["warnings"].as_array().unwrap().len(), 0);
+}
+
+#[test]
+fn drift_at_the_long_end_is_told_and_hadamard_shown_beside_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut rows = at_rest(30_000);
+    for row in &mut rows {
+        row[1] += 3e-5 * row[0];
+    }
+    write(folder.path(), &rows);
+    let json: serde_json::Value =
+        serde_json::from_str(&done(folder.path(), "allan r --json -")).unwrap();
+    assert!(
+        json["warnings"].to_string().contains("gyro_x: a drift"),
+        "{}",
+        json["warnings"]
+    );
+    let r = json["channels"][0]["r"]["value"].as_f64().unwrap();
+    assert!((r / 3e-5 - 1.0).abs() < 0.3, "{r}");
+    let last = |of: &serde_json::Value| of.as_array().unwrap().last().unwrap().as_f64().unwrap();
+    let hadamard = &json["channels"][0]["hadamard"];
+    assert!(last(&hadamard["hdev"]) < 0.3 * last(&json["channels"][0]["adev"]));
+    assert!(json["channels"][1]["hadamard"].is_null());
+}
+
+#[test]
+fn readings_in_volts_become_si_by_the_calibration_of_the_unit() {
+    let folder = tempfile::tempdir().unwrap();
+    let plan = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../rig/plans/table.toml");
+    let plan = Plan::read(&plan).unwrap();
+    let truth = RigTruth::resolve(&RigFile::default(), 5).unwrap();
+    let output = mimu_rig::record::Output::new(&folder.path().join("r"), &plan).unwrap();
+    mimu_rig::record::write(&plan, &truth, 5, &output).unwrap();
+    let error = refused(folder.path(), "allan r");
+    assert!(
+        error.contains("moves") && error.contains("--from"),
+        "{error}"
+    );
+    done(folder.path(), "fit r -o cal.toml");
+    let rest = "allan r --step 2 --json -";
+    let raw: serde_json::Value = serde_json::from_str(&done(folder.path(), rest)).unwrap();
+    assert_eq!(raw["channels"][0]["unit"], "V");
+    let si = done(folder.path(), &format!("{rest} --calibration cal.toml"));
+    let si: serde_json::Value = serde_json::from_str(&si).unwrap();
+    // Twenty seconds behind a filter of 40 Hz; the converter adds some noise of its own.
+    let mut outside = 0;
+    for (i, sensor) in [(0, &truth.unit.gyro), (3, &truth.unit.accel)] {
+        for axis in 0..3 {
+            let n = &si["channels"][i + axis]["n"];
+            let known = sensor.axes[axis].noise.white;
+            let [lower, upper] = ["lower", "upper"].map(|e| n[e].as_f64().unwrap() / known);
+            assert!(lower > 0.7 && upper < 1.4, "{i} {axis}: {lower} {upper}");
+            outside += usize::from(!(lower..=upper).contains(&1.0));
+        }
+    }
+    assert!(outside <= 1, "{outside} of six");
+    let error = refused(folder.path(), "export --kalibr imu.yaml --noise cal.toml");
+    assert!(error.contains("cal.toml, line"), "{error}");
+}

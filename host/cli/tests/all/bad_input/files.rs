@@ -1,0 +1,413 @@
+//! Files, arguments and outputs as they should not be: damaged, missing, in the way, of another unit.
+
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+
+use super::answer::*;
+use super::column_of_dwell;
+use super::generator::*;
+
+#[test]
+fn a_damaged_text_is_refused_with_its_row() {
+    let text = on_table().csv();
+    let lines: Vec<&str> = text.lines().collect();
+    let cut = text.rfind(',').unwrap();
+    let cases: Vec<(&str, Vec<u8>, &[&str])> = vec![
+        ("no bytes", vec![], &["samples.csv", "empty"]),
+        (
+            "a header",
+            format!("{}\n", lines[0]).into(),
+            &["row 2", "a header and no row"],
+        ),
+        (
+            "a header and empty lines",
+            format!("{}\n\n \n", lines[0]).into(),
+            &["no row"],
+        ),
+        (
+            "cut in a row",
+            text[..cut].into(),
+            &["row 6901", "truncated"],
+        ),
+        // In the header and two rows: a column without a name, which the other rows lack.
+        (
+            "a cell too many",
+            text.replacen('\n', ",\n", 3).into(),
+            &["row 4", "14 cells and the header 15"],
+        ),
+        (
+            "a cell too few",
+            lines.join("\n").replacen(",-", "", 1).into(),
+            &["row 2", "13 cells and the header 14"],
+        ),
+        (
+            "a word",
+            text.replacen("\n0.5,", "\n0.5x,", 1).into(),
+            &["row 52, column t_s", "0.5x"],
+        ),
+        (
+            "an infinite time",
+            text.replacen("\n0.5,", "\ninf,", 1).into(),
+            &["row 52, column t_s", "infinite"],
+        ),
+        (
+            "decimal commas",
+            text.replace(',', ";").replace('.', ",").into(),
+            &["row 1", "t_s is missing", "mimu import"],
+        ),
+        (
+            "a zero byte",
+            [&b"t_s,gyro_x\0"[..], text.as_bytes()].concat(),
+            &["not text"],
+        ),
+        (
+            "another file",
+            b"PAR1\0\0\0".to_vec(),
+            &["not text", "samples.parquet"],
+        ),
+        ("one long line", vec![b'7'; 3 << 20], &["no line break"]),
+    ];
+    for (name, bytes, words) in cases {
+        println!("{name}");
+        let place = Place::with(&on_table());
+        fs::write(place.recording().join("samples.csv"), bytes).unwrap();
+        place.fit(&[]).refused(words);
+    }
+}
+
+/// A recording with its samples as Parquet.
+fn as_parquet(samples: &Samples) -> Place {
+    let place = Place::with(samples);
+    let csv = place.recording().join("samples.csv");
+    let (csv, out) = (csv.display().to_string(), place.text("parquet"));
+    let gravity = GRAVITY.to_string();
+    let run = mimu([
+        "import",
+        &csv,
+        "--rate-hz",
+        "100",
+        "--gravity",
+        &gravity,
+        "--raw-unit",
+        "count",
+        "--reference",
+        "gravity",
+        "-o",
+        &out,
+    ]);
+    assert_eq!(run.status, Some(0), "{}", run.stderr);
+    fs::remove_dir_all(place.recording()).unwrap();
+    fs::rename(place.path("parquet"), place.recording()).unwrap();
+    place
+}
+
+#[test]
+fn a_damaged_parquet_file_is_refused() {
+    let place = as_parquet(&by_hand());
+    right(&place.fit(&[]).json());
+    let path = place.recording().join("samples.parquet");
+    let good = fs::read(&path).unwrap();
+    for length in [0, 4, 1000, good.len() / 2, good.len() - 1] {
+        fs::write(&path, &good[..length]).unwrap();
+        place.fit(&[]).refused(&["samples.parquet", "Parquet"]);
+    }
+    let mut broken = good.clone();
+    broken[2000..6000].fill(0xa5);
+    fs::write(&path, &broken).unwrap();
+    place.fit(&[]).refused(&["samples.parquet", "write"]);
+    fs::write(&path, "t_s,gyro_x\n").unwrap();
+    place.fit(&[]).refused(&["samples.parquet", "Parquet"]);
+}
+
+#[test]
+fn a_place_without_a_recording_is_named() {
+    let place = Place::with(&by_hand());
+    place.fit(&[]).json();
+    let file = place.recording().join("samples.csv").display().to_string();
+    mimu(["fit", &file]).refused(&["samples.csv", "a recording is a directory", "mimu import"]);
+    mimu(["fit", &place.text("nowhere")]).refused(&["nowhere", "no such directory"]);
+    fs::create_dir(place.path("bare")).unwrap();
+    mimu(["fit", &place.text("bare")]).refused(&["bare", "no recording.toml", "mimu import"]);
+    fs::write(place.recording().join("samples.parquet"), "").unwrap();
+    place
+        .fit(&[])
+        .refused(&["both samples.csv and samples.parquet"]);
+    fs::remove_file(place.recording().join("samples.parquet")).unwrap();
+    fs::remove_file(place.recording().join("samples.csv")).unwrap();
+    place
+        .fit(&[])
+        .refused(&["neither samples.csv nor samples.parquet"]);
+    fs::create_dir(place.recording().join("samples.csv")).unwrap();
+    place.fit(&[]).refused(&["samples.csv", "directory"]);
+    fs::write(place.recording().join("recording.toml"), [0xff, 0xfe]).unwrap();
+    place.fit(&[]).refused(&["recording.toml, line 1", "UTF-8"]);
+}
+
+#[test]
+fn an_output_that_cannot_be_written_is_refused_before_anything_appears() {
+    let place = Place::with(&by_hand());
+    let recording = place.text("rec");
+    let (missing, good) = (place.text("none/x.toml"), place.text("cal.toml"));
+    let fit = |arguments: &[&str]| {
+        let fixed = ["fit", recording.as_str()];
+        mimu(fixed.into_iter().chain(arguments.iter().copied()))
+    };
+    fit(&["-o", &missing]).refused(&["none/x.toml", "folder does not exist", "create it"]);
+    fit(&["-o", &good, "--json", &missing]).refused(&["none/x.toml", "folder does not exist"]);
+    fit(&["-o", &recording]).refused(&["rec", "directory"]);
+    fit(&["-o", &good, "--json", &good]).refused(&["cal.toml", "another result"]);
+    let samples = place.recording().join("samples.csv");
+    let before = fs::read(&samples).unwrap();
+    fit(&["-o", &samples.display().to_string()]).refused(&["samples.csv", "an input"]);
+    assert_eq!(fs::read(&samples).unwrap(), before);
+    // The file system of the system itself, which refuses even its owner.
+    if Path::new("/proc/version").exists() {
+        fit(&["-o", "/proc/cal.toml"]).refused(&["/proc/cal.toml"]);
+    }
+    assert_eq!(place.names(), ["rec"]);
+}
+
+#[cfg(unix)]
+#[test]
+fn a_pipe_is_written_to_and_not_replaced() {
+    use std::os::unix::fs::FileTypeExt as _;
+    let place = Place::with(&by_hand());
+    let pipe = place.path("pipe");
+    let made = Command::new("mkfifo").arg(&pipe).status();
+    assert!(made.unwrap().success());
+    let reader = std::thread::spawn({
+        let pipe = pipe.clone();
+        move || fs::read_to_string(pipe).unwrap()
+    });
+    let run = mimu(["fit", &place.text("rec"), "-o", &place.text("pipe")]);
+    assert_eq!(run.status, Some(0), "{}", run.stderr);
+    assert!(reader.join().unwrap().contains("mimu-calibration/1"));
+    assert!(fs::metadata(pipe).unwrap().file_type().is_fifo());
+}
+
+#[test]
+fn wrong_usage_has_status_2() {
+    let place = Place::with(&by_hand());
+    let recording = place.text("rec");
+    for arguments in [
+        &["--holdout", "blocks=1"][..],
+        &["--holdout", "blocks=1000000000000"],
+        &["--holdout", "blocks=99999999999999999999999"],
+        &["--holdout", "four"],
+        &["--still", "0"],
+        &["--still", "nan"],
+        &["--still", "-3"],
+        &["--method", "guess"],
+        &["--unknown"],
+    ] {
+        let run = mimu(
+            ["fit", &recording]
+                .into_iter()
+                .chain(arguments.iter().copied()),
+        );
+        assert_eq!(run.status, Some(2), "{arguments:?}: {}", run.stderr);
+        assert!(run.stdout.is_empty(), "{arguments:?}");
+    }
+    assert_eq!(mimu([""; 0]).status, Some(2));
+}
+
+#[test]
+fn no_text_for_people_shows_a_number_that_is_none() {
+    for samples in [
+        by_hand(),
+        on_table(),
+        by_hand_at(9, 1, Random::direction),
+        on_table_at(&[0.0], &[0, 1, 2]),
+    ] {
+        let mut odd = samples.clone();
+        column_of_dwell(&mut odd, "accel_y", &[3]);
+        odd.edit("accel_z", 0..300, |_| f64::NAN);
+        for samples in [samples, odd] {
+            let place = Place::with(&samples);
+            let run = mimu([
+                "fit",
+                &place.text("rec"),
+                "--dwells",
+                "-o",
+                &place.text("cal.toml"),
+            ]);
+            if run.status == Some(1) {
+                run.refusal();
+                continue;
+            }
+            let calibration = fs::read_to_string(place.path("cal.toml")).unwrap();
+            let again = mimu([
+                "verify",
+                &place.text("rec"),
+                "--calibration",
+                &place.text("cal.toml"),
+            ]);
+            assert_eq!(again.status, Some(0), "{}", again.stderr);
+            for text in [run.stdout, again.stdout, calibration] {
+                for word in text.split(|c: char| !c.is_alphanumeric()) {
+                    assert!(
+                        !["nan", "inf"].contains(&word.to_lowercase().as_str()),
+                        "{text}"
+                    );
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_damaged_calibration_file_is_refused_with_its_place() {
+    let place = Place::with(&by_hand());
+    let path = place.text("cal.toml");
+    let run = mimu(["fit", &place.text("rec"), "-o", &path]);
+    assert_eq!(run.status, Some(0), "{}", run.stderr);
+    let good = fs::read_to_string(&path).unwrap();
+    let verify = || mimu(["verify", &place.text("rec"), "--calibration", &path]);
+    assert_eq!(verify().status, Some(0));
+    let line = |start: &str| {
+        good.lines()
+            .find(|l| l.starts_with(start))
+            .unwrap()
+            .to_string()
+    };
+    let offset = line("o = ");
+    let digit = offset.replacen("0.", "1.", 1);
+    assert_ne!(offset, digit);
+    let cut = good.find("[accel.judged]").unwrap();
+    let cases: Vec<(String, &[&str])> = vec![
+        (
+            good.replacen("[gyro]\n", "[gyro]\nscale = 3\n", 1),
+            &["cal.toml, line", "scale"],
+        ),
+        (
+            good.replacen(&offset, "o = [nan, 0.0, 0.0]", 1),
+            &["[gyro]", "not a number"],
+        ),
+        (good.replacen(&offset, &digit, 1), &["[gyro]", "edited"]),
+        (
+            good.replacen("calibration/1", "calibration/9", 1),
+            &["calibration/9", "version of mimu"],
+        ),
+        (
+            good.replacen("direction = \"raw to SI\"", "direction = \"SI to raw\"", 1),
+            &["[gyro]", "SI to raw"],
+        ),
+        (
+            good[..cut].to_string(),
+            &["cal.toml, line", "judged", "cut"],
+        ),
+        (good[..good.len() - 9].to_string(), &["cal.toml, line"]),
+        (String::new(), &["cal.toml", "missing field"]),
+        (place.text("rec"), &["cal.toml, line 1"]),
+    ];
+    for (text, words) in cases {
+        assert_ne!(text, good);
+        fs::write(&path, text).unwrap();
+        verify().refused(words);
+    }
+    fs::write(&path, [0xff, 0x00]).unwrap();
+    verify().refused(&["cal.toml, line 1", "UTF-8"]);
+    fs::remove_file(&path).unwrap();
+    verify().refused(&["cal.toml", "no such file"]);
+}
+
+#[test]
+fn a_recording_that_does_not_fit_its_calibration_is_told_apart() {
+    let place = Place::with(&by_hand());
+    let calibration = place.text("cal.toml");
+    let run = mimu(["fit", &place.text("rec"), "-o", &calibration]);
+    assert_eq!(run.status, Some(0), "{}", run.stderr);
+    let verify = |samples: &Samples| {
+        samples.write(&place.path("other"));
+        mimu([
+            "verify",
+            &place.text("other"),
+            "--calibration",
+            &calibration,
+            "--json",
+            "-",
+        ])
+    };
+    let fresh = by_hand_at(12, 9, Random::direction);
+    let result = verify(&fresh).json();
+    assert_eq!(warnings(&result), [""; 0]);
+    for sensor in ["gyro", "accel"] {
+        let figure = |key: &str| result["sensors"][sensor][key].as_f64().unwrap();
+        assert!(figure("rms") < 2.0 * figure("noise_floor"), "{result:#}");
+        assert!(figure("rms_raw") > 5.0 * figure("rms"), "{result:#}");
+    }
+    let mut other = fresh.clone();
+    other.set("device", "\"unit-8\"");
+    warned(
+        &verify(&other).json(),
+        &["for \"unit-7\", the recording of \"unit-8\""],
+    );
+    warned(
+        &verify(&by_hand()).json(),
+        &["the recording that the calibration was made from"],
+    );
+    let mut other = fresh.clone();
+    other.set("raw_unit", "\"V\"");
+    verify(&other).refused(&["raw unit is V", "for count"]);
+    let mut table = on_table();
+    table.names.truncate(11);
+    table.rows.iter_mut().for_each(|row| row.truncate(11));
+    let gyro_only = verify(&table).json();
+    assert!(gyro_only["sensors"]["accel"].is_null());
+    verify(&by_hand_at(1, 1, Random::direction)).json();
+    let mut blank = on_table();
+    for name in blank.names.clone().iter().filter(|n| n.starts_with("ref_")) {
+        let all = blank.all();
+        blank.edit(name, all, |_| f64::NAN);
+    }
+    verify(&blank).refused(&["nothing to judge"]);
+}
+
+#[test]
+fn an_import_that_fails_leaves_nothing_behind() {
+    let place = Place::new();
+    let mut table = on_table();
+    table.rows.truncate(500);
+    fs::write(place.path("good.csv"), table.csv()).unwrap();
+    let word = table.csv().replacen("\n2.5,", "\n2.5,x", 1);
+    fs::write(place.path("word.csv"), word).unwrap();
+    fs::write(place.path("inputs.csv"), "step,turn_x_deg\n0,90\n0,180\n").unwrap();
+    fs::write(place.path("bare.csv"), "1,2,3\n4,5,6\n").unwrap();
+    let before = place.names();
+    let import = |file: &str, arguments: &[&str]| {
+        let (file, out) = (place.text(file), place.text("out"));
+        let fixed = [
+            "import",
+            &file,
+            "--raw-unit",
+            "count",
+            "--reference",
+            "gravity",
+            "-o",
+            &out,
+        ];
+        mimu(fixed.into_iter().chain(arguments.iter().copied()))
+    };
+    let inputs = place.text("inputs.csv");
+    let missing = place.text("none/x.json");
+    import("word.csv", &[]).refused(&["word.csv, row 252, column step", "x"]);
+    import("good.csv", &["--gravity", "1"]).refused(&["gravity", "looks like g"]);
+    import("good.csv", &["--rate-hz", "nan"]).refused(&["not a sample rate", "--rate-hz"]);
+    import("good.csv", &["--rate-hz", "1e-300"]).refused(&["sample_rate_hz", "1e-300"]);
+    import("good.csv", &["--scale", "accel=1e300"]).refused(&["column accel_x", "too large"]);
+    import("good.csv", &["--latitude", "91"]).refused(&["latitude_deg", "91"]);
+    import("good.csv", &["--inputs", &inputs])
+        .refused(&["inputs.csv, row 3, column step", "twice"]);
+    import("good.csv", &["--json", &missing]).refused(&["none/x.json", "folder does not exist"]);
+    import("bare.csv", &[]).refused(&["bare.csv", "--columns"]);
+    import("bare.csv", &["--columns", "gyro_x,gyro_y,gyro_z"]).refused(&["bare.csv", "--rate-hz"]);
+    import("nothing.csv", &[]).refused(&["nothing.csv", "no such file"]);
+    assert_eq!(
+        import("good.csv", &["--columns", "t_s,acc_x"]).status,
+        Some(2)
+    );
+    assert_eq!(place.names(), before);
+    assert_eq!(import("good.csv", &[]).status, Some(0));
+    import("good.csv", &[]).refused(&["out", "exists already"]);
+}

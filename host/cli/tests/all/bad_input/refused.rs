@@ -1,0 +1,315 @@
+//! What cannot be right is refused, and leaves no file.
+
+use super::answer::*;
+use super::damage::*;
+use super::generator::*;
+
+#[test]
+fn what_cannot_be_right_is_refused_in_one_line_and_leaves_no_file() {
+    let cases: &[Case] = &[
+        (
+            "a channel without a number",
+            by_hand,
+            |s| {
+                let all = s.all();
+                s.edit("accel_y", all, |_| f64::NAN);
+            },
+            &["samples.csv, column accel_y", "empty"],
+        ),
+        (
+            "an empty time",
+            by_hand,
+            |s| s.edit("t_s", 77..78, |_| f64::NAN),
+            &["row 79, column t_s", "empty"],
+        ),
+        (
+            "shuffled rows",
+            by_hand,
+            |s| {
+                let mut random = Random(5);
+                for i in (1..s.rows.len()).rev() {
+                    s.rows.swap(i, random.bits() as usize % (i + 1));
+                }
+            },
+            &["data row 2, t_s", "goes back", "sort"],
+        ),
+        (
+            "one swapped pair",
+            by_hand,
+            |s| s.rows.swap(500, 501),
+            &["data row 502, t_s", "from 5.01 s to 5 s"],
+        ),
+        (
+            "two rows with one time",
+            by_hand,
+            |s| s.rows[101][0] = s.rows[100][0],
+            &["data row 102, t_s", "the time 1 s"],
+        ),
+        (
+            "a misspelt column",
+            by_hand,
+            |s| s.names[3] = "gyro_w".into(),
+            &["row 1", "gyro_z is missing"],
+        ),
+        (
+            "a column twice",
+            by_hand,
+            |s| s.names[3] = "gyro_y".into(),
+            &["row 1", "\"gyro_y\" appears twice"],
+        ),
+        (
+            "no time column",
+            by_hand,
+            |s| s.names[0] = "time".into(),
+            &["row 1", "t_s is missing"],
+        ),
+        (
+            "gyro for accelerometer",
+            by_hand,
+            swap_sensors,
+            &["accel", "wrong columns"],
+        ),
+        (
+            "gyro for accelerometer on the table",
+            on_table,
+            swap_sensors,
+            &["gyro", "do not follow", "swapped"],
+        ),
+        (
+            "one gyro axis for one of the accelerometer",
+            by_hand,
+            |s| swap(s, "gyro_x", "accel_x"),
+            &["accel", "column accel_x"],
+        ),
+        (
+            "the same on the table",
+            on_table,
+            |s| swap(s, "gyro_x", "accel_x"),
+            &["do not follow", "swapped"],
+        ),
+        (
+            "half at half the rate",
+            by_hand,
+            |s| {
+                let half = s.rows.len() / 2;
+                keep_every(s, 2, half);
+            },
+            &["data row 4417, t_s", "the rate is mixed"],
+        ),
+        (
+            "twice the rate",
+            by_hand,
+            |s| s.set("sample_rate_hz", "200.0"),
+            &["t_s", "sample_rate_hz = 200", "the first is 0.010000 s"],
+        ),
+        (
+            "five per cent off the rate",
+            by_hand,
+            |s| s.set("sample_rate_hz", "95.0"),
+            &["t_s", "0.010526 s"],
+        ),
+        (
+            "milliseconds for seconds",
+            by_hand,
+            |s| scale(s, "t_s", 1000.0),
+            &["t_s", "the first is 10.000000 s", "unit of t_s"],
+        ),
+        (
+            "no such rate",
+            by_hand,
+            |s| s.set("sample_rate_hz", "1e300"),
+            &["recording.toml, sample_rate_hz", "1e300"],
+        ),
+        (
+            "a channel that is stuck",
+            by_hand,
+            |s| {
+                let all = s.all();
+                stick(s, "gyro_y", all);
+            },
+            &["samples.csv, column gyro_y", "stuck", "wiring"],
+        ),
+        (
+            "a number that no sensor gives",
+            by_hand,
+            |s| s.edit("accel_x", 100..101, |_| 1e300),
+            &["row 102, column accel_x", "too large"],
+        ),
+        (
+            "rails in another unit",
+            by_hand,
+            |s| s.set("rails.accel", "[0.0, 3.3]"),
+            &["accelerometer", "20 accel_x saturated"],
+        ),
+        (
+            "five poses",
+            || by_hand_at(5, 1, Random::direction),
+            |_| {},
+            &["accel", "4 of the 9", "5 still poses"],
+        ),
+        (
+            "poses about one axis",
+            || by_hand_at(20, 1, |_| [1.0, 0.0, 0.0]),
+            |_| {},
+            &["accel", "one plane across x", "x up, down and slanted"],
+        ),
+        (
+            "no rates about z",
+            || on_table_at(&[-90.0, 0.0, 90.0], &[0, 1]),
+            |_| {},
+            &["gyro", "P_xz", "inputs along z"],
+        ),
+        (
+            "all inputs equal",
+            on_table,
+            |s| {
+                for name in s.names.clone() {
+                    if name.starts_with("ref_") {
+                        let all = s.all();
+                        s.edit(&name, all, |x| if x.is_nan() { x } else { 1.0 });
+                    }
+                }
+            },
+            &["gyro: all dwells have the same input"],
+        ),
+        (
+            "one input with the wrong sign",
+            on_table,
+            |s| {
+                let dwell = s.dwells[4].clone();
+                s.edit("ref_rate_x_dps", dwell, |x| -x);
+            },
+            &["gyro", "do not follow", "dwell 4 the least"],
+        ),
+        (
+            "hands that never rest",
+            by_hand,
+            |s| {
+                let moving: Vec<usize> = (0..19)
+                    .flat_map(|k| s.turn(k).start + 20..s.turn(k).end - 20)
+                    .collect();
+                s.rows = moving.iter().map(|&i| s.rows[i].clone()).collect();
+                for (i, row) in s.rows.iter_mut().enumerate() {
+                    row[0] = i as f64 / RATE_HZ;
+                }
+            },
+            &["still"],
+        ),
+        (
+            "gravity in g",
+            by_hand,
+            |s| s.set("gravity_mps2", "1.0"),
+            &["recording.toml, gravity_mps2", "looks like g", "9.80665"],
+        ),
+        (
+            "SI readings in g",
+            by_hand,
+            |s| {
+                s.set("raw_unit", "\"SI\"");
+                scale(s, "accel", 1.0 / 1640.0 / GRAVITY);
+                scale(s, "gyro", 1.0 / 5000.0);
+            },
+            &["raw_unit = \"SI\"", "in g", "--scale accel="],
+        ),
+        (
+            "known forces in g",
+            on_table,
+            |s| scale(s, "ref_force", 1.0 / GRAVITY),
+            &["ref_force", "in g", "m/s²"],
+        ),
+        (
+            "a table recording without its inputs",
+            by_hand,
+            |s| s.set("reference", "\"table\""),
+            &["no usable dwell has a known input", "ref_ columns"],
+        ),
+        (
+            "a table recording by gravity",
+            on_table,
+            |s| s.set("reference", "\"gravity\""),
+            &["accel"],
+        ),
+        (
+            "gravity without an accelerometer",
+            by_hand,
+            |s| {
+                s.names.truncate(4);
+                s.rows.iter_mut().for_each(|row| row.truncate(4));
+            },
+            &["no accelerometer"],
+        ),
+        (
+            "a step for every row",
+            on_table,
+            |s| {
+                let step = s.column("step");
+                for (i, row) in s.rows.iter_mut().enumerate() {
+                    row[step] = i as f64;
+                }
+            },
+            &["6900 too short"],
+        ),
+        (
+            "all steps in transit",
+            on_table,
+            |s| {
+                let all = s.all();
+                s.edit("step", all, |_| -1.0);
+            },
+            &["dwells", "in transit", "column step"],
+        ),
+        (
+            "a fraction of a step",
+            on_table,
+            |s| s.edit("step", 90..91, |_| 1.5),
+            &["row 92, column step", "1.5"],
+        ),
+        (
+            "one row",
+            by_hand,
+            |s| s.rows.truncate(1),
+            &["only one row"],
+        ),
+        (
+            "a tenth of a second",
+            by_hand,
+            |s| s.rows.truncate(12),
+            &["0.12 s", "record for longer"],
+        ),
+        (
+            "an unknown key",
+            by_hand,
+            |s| s.set("sample_rate", "3"),
+            &["recording.toml, line 7", "sample_rate"],
+        ),
+        (
+            "a missing key",
+            by_hand,
+            |s| s.set("reference", ""),
+            &["recording.toml", "reference", "add the key"],
+        ),
+        (
+            "an unknown unit",
+            by_hand,
+            |s| s.set("raw_unit", "\"mV\""),
+            &["recording.toml, line 6", "mV"],
+        ),
+    ];
+    for (name, base, damage, words) in cases {
+        println!("{name}");
+        let mut samples = base();
+        damage(&mut samples);
+        let place = Place::with(&samples);
+        let (calibration, json) = (place.text("cal.toml"), place.text("fit.json"));
+        let run = mimu([
+            "fit",
+            &place.text("rec"),
+            "-o",
+            &calibration,
+            "--json",
+            &json,
+        ]);
+        run.refused(words);
+        assert_eq!(place.names(), ["rec"], "{name}");
+    }
+}

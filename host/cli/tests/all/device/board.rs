@@ -1,0 +1,399 @@
+//! The command against the firmware itself: the release image on the emulated board, with a unit of known truth at its pins.
+//!
+//! The truth is the bench's: what the unit senses follows from the plan, what it reads from the published matrices of its rig file.
+
+use std::os::unix::process::CommandExt as _;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use mimu_board::front::Front;
+use mimu_board::image::{Image, release_image};
+use mimu_board::running::Board;
+use mimu_board::schematic::{DIVIDER_RATIO, Volts, WIRING};
+use mimu_board::serve::{Pace, Served};
+use mimu_core::stored;
+use mimu_rig::located::Source;
+use mimu_rig::plan::Plan;
+use mimu_rig::rig_file::{RigFile, RigTruth};
+use nalgebra::{Matrix3, Vector3};
+use serde_json::Value;
+
+use super::calibration::{Forward, text_of};
+use super::recording::rows;
+use super::{Place, Ran, command, mimu, start};
+
+const GRAVITY: f64 = 9.793;
+/// What the firmware takes the reference pin of a gyro to have (data sheet).
+const NOMINAL_REFERENCE_V: f64 = 2.5;
+
+/// A board that runs while its port is open.
+struct Bench {
+    port: String,
+    /// The virtual clock, ms.
+    now_ms: Arc<AtomicU64>,
+    end: Arc<AtomicBool>,
+    thread: Option<JoinHandle<Served>>,
+}
+
+fn in_repository(path: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../..")
+        .join(path)
+}
+
+fn image() -> Image {
+    let path = release_image();
+    let path = match path.is_absolute() {
+        true => path,
+        false => in_repository(&path.display().to_string()),
+    };
+    Image::read(&path).unwrap_or_else(|problem| panic!("{problem}"))
+}
+
+impl Bench {
+    /// Switched on, and past the greeting that it sends by itself.
+    fn new(front: Front) -> Self {
+        let mut board = Board::new(&image(), front).unwrap();
+        board.run_to(100_000_000).unwrap();
+        assert!(!board.receive().is_empty(), "the firmware greets");
+        let mut served = Served::new(board, Pace::Fast, None).unwrap();
+        let port = served.path().display().to_string();
+        let now_ms = Arc::new(AtomicU64::new(0));
+        let end = Arc::new(AtomicBool::new(false));
+        let (clock, ended) = (now_ms.clone(), end.clone());
+        let thread = std::thread::spawn(move || {
+            while !ended.load(Ordering::Relaxed) {
+                served.step().unwrap();
+                let ns = served.board().standing().ns;
+                clock.store(ns / 1_000_000, Ordering::Relaxed);
+            }
+            served
+        });
+        Self {
+            port,
+            now_ms,
+            end,
+            thread: Some(thread),
+        }
+    }
+
+    /// A unit carried through a plan.
+    fn carried(plan: &str, truth: &RigTruth) -> Self {
+        let plan = Plan::parse(Source::new("plan", plan)).unwrap();
+        Self::new(Front::bench(&plan, truth, 7).unwrap())
+    }
+
+    fn run(&self, place: &Place, arguments: &[&str]) -> Ran {
+        mimu(place, &[arguments, &["--port", &self.port]].concat())
+    }
+
+    fn json(&self, place: &Place, arguments: &[&str]) -> Value {
+        self.run(place, &[arguments, &["--json", "-"]].concat())
+            .json()
+    }
+
+    /// Ends it. Nothing was lost on the line, and no rule of the part's manual was broken.
+    fn end(mut self) {
+        self.end.store(true, Ordering::Relaxed);
+        let mut served = self.thread.take().unwrap().join().unwrap();
+        assert_eq!(served.traffic().lost, 0);
+        assert_eq!(served.board().findings().unwrap().broken, [""; 0]);
+        assert_eq!(served.board().restarts().unwrap(), []);
+    }
+}
+
+/// The unit of fang's table 4.
+fn unit() -> RigTruth {
+    let file = RigFile::read(&in_repository("rig/rigs/fang.toml")).unwrap();
+    RigTruth::resolve(&file, 7).unwrap()
+}
+
+/// What its readings are by the firmware's volts: those of the gyros relative to the first one's reference pin, those of the
+/// accelerometer relative to its supply, which is nominal in the rig file.
+fn forward(truth: &RigTruth) -> Forward {
+    let matrix = |m: [[f64; 3]; 3]| Matrix3::from_fn(|i, j| m[i][j]);
+    let unit = &truth.file.unit;
+    let (gyro, accel) = (
+        unit.gyro_affine.as_ref().unwrap(),
+        unit.accel_affine.as_ref().unwrap(),
+    );
+    let reference = unit.gyro_reference_v.unwrap()[0];
+    let ratio = NOMINAL_REFERENCE_V / reference;
+    [
+        (
+            matrix(gyro.matrix) * ratio,
+            Vector3::from(gyro.bias) * ratio,
+        ),
+        (matrix(accel.matrix), Vector3::from(accel.bias)),
+    ]
+}
+
+const AT_REST: &str = "format = \"mimu-plan/1\"\ndevice = \"unit-007\"\nsample_rate_hz = 1000.0\ncarrier = \"table\"\n\
+     latitude_deg = 30.5\ngravity_mps2 = 9.793\nlead_in_s = 1.0\n[[step]]\nup = [0.0, 0.0, 1.0]\ndwell_s = 1000.0\n";
+
+fn significant(value: &Value) -> Vector3<f64> {
+    Vector3::from_fn(|i, _| value[i].as_f64().unwrap())
+}
+
+/// Largest difference.
+fn off(value: &Value, wanted: Vector3<f64>) -> f64 {
+    (significant(value) - wanted).amax()
+}
+
+#[test]
+fn a_session_from_the_greeting_to_a_killed_recording() {
+    let (place, truth) = (Place::new(), unit());
+    let bench = Bench::carried(AT_REST, &truth);
+    let up = Vector3::new(0.0, 0.0, GRAVITY);
+
+    let info = bench.json(&place, &["device", "info"]);
+    assert_eq!(info["board"], "NUCLEO-H743ZI2");
+    assert_eq!(info["start"]["reason"], "power-on");
+    assert_eq!(info["sample_rate_hz"], 1000);
+    assert!(info["stored"].is_null());
+    bench
+        .run(&place, &["device", "stream", "compensated"])
+        .refused(&["holds no calibration", "mimu device upload"]);
+
+    raw_stream(&bench, &place);
+    let models = forward(&truth);
+    let raw = bench.json(&place, &["device", "stream", "--for", "500ms"]);
+    assert_eq!((&raw["samples"], &raw["missing"]), (&500.into(), &0.into()));
+    // 3.5 mV of noise with 40 Hz of bandwidth over half a second: sigma 0.6 mV.
+    let [(_, gyro_v), (p, accel_v)] = models;
+    assert!(off(&raw["gyro"]["mean"], gyro_v) < 3e-3, "{raw}");
+    assert!(off(&raw["accel"]["mean"], p * up + accel_v) < 3e-3, "{raw}");
+
+    calibration(&bench, &place, &models);
+    let si = bench.json(
+        &place,
+        &["device", "stream", "compensated", "--for", "500ms"],
+    );
+    assert!(off(&si["gyro"]["mean"], Vector3::zeros()) < 0.01, "{si}");
+    assert!(off(&si["accel"]["mean"], up) < 0.035, "{si}");
+
+    let tested = bench.json(&place, &["device", "self-test"]);
+    for sensor in ["gyro_x", "gyro_y", "gyro_z", "accel"] {
+        assert_eq!(tested["passed"][sensor], true, "{tested}");
+    }
+    assert!(tested["moved"].is_null(), "{tested}");
+    // What the bench's sensors do (data sheet: 0.27 V typically), by the firmware's volts.
+    assert!(off(&tested["gyro_st1_v"], Vector3::repeat(-0.27)) < 8e-3);
+    assert!(off(&tested["gyro_st2_v"], Vector3::repeat(0.27)) < 8e-3);
+
+    let force = format!("0,0,{GRAVITY}");
+    let filtered = bench.json(
+        &place,
+        &["device", "kalman", "--force-mps2", &force, "--for", "1s"],
+    );
+    let distance = filtered["largest_distance_sigma"].as_f64().unwrap();
+    assert!(distance < 0.05, "{distance}");
+    for i in 0..3 {
+        // One input knows one combination: what the sensor reads under it.
+        let mean: Vec<f64> = (0..4)
+            .map(|k| filtered["device"][i]["mean"][k].as_f64().unwrap())
+            .collect();
+        let reads = mean[0] + GRAVITY * mean[3];
+        let wanted = (p * up + accel_v)[i];
+        assert!((reads - wanted).abs() < 3e-3, "{reads} V, not {wanted}");
+    }
+
+    killed(&bench, &place);
+
+    let counted = bench.json(&place, &["device", "counters"]);
+    for name in [
+        "late",
+        "converter_overruns",
+        "stalls",
+        "queue_overruns",
+        "batches_dropped",
+        "frames_garbled",
+        "receiver_overruns",
+        "flash_uncorrectable",
+    ] {
+        assert_eq!(counted["counters"][name], 0, "{name}: {counted}");
+    }
+    // The stream that was asked for without a calibration.
+    assert_eq!(counted["counters"]["refused"], 1);
+    port_of_others(&bench, &place);
+    bench.end();
+}
+
+/// Samples come one after the other, by their numbers and times.
+fn raw_stream(bench: &Bench, place: &Place) {
+    let ran = bench.run(place, &["device", "stream", "--for", "200ms"]);
+    assert_eq!(ran.status, Some(0), "{}", ran.stderr);
+    let mut lines = ran.stdout.lines();
+    assert!(
+        lines
+            .next()
+            .unwrap()
+            .starts_with("n,t_s,temp_c,flags,gyro_x")
+    );
+    let numbers: Vec<(u32, f64)> = lines
+        .map(|line| {
+            let mut cells = line.split(',');
+            let mut next = || cells.next().unwrap();
+            (next().parse().unwrap(), next().parse().unwrap())
+        })
+        .collect();
+    assert_eq!(numbers.len(), 200);
+    for (k, (number, t_s)) in (0..).zip(&numbers) {
+        assert_eq!(*number, numbers[0].0 + k);
+        assert_eq!(*t_s, f64::from(*number) / 1000.0);
+    }
+}
+
+/// Up, down, and what the device makes of it.
+fn calibration(bench: &Bench, place: &Place, models: &Forward) {
+    let file = place.path("unit.toml");
+    std::fs::write(&file, text_of(models, "V", "")).unwrap();
+    let sent = bench.json(place, &["device", "upload", "unit.toml"]);
+    assert_eq!(sent["was_there"], false);
+    let again = bench.json(place, &["device", "upload", "unit.toml"]);
+    assert_eq!(
+        (&again["was_there"], &again["hash"]),
+        (&true.into(), &sent["hash"])
+    );
+    let info = bench.json(place, &["device", "info"]);
+    assert_eq!(info["stored"]["hash"], sent["hash"]);
+
+    let got = bench.json(place, &["device", "download", "-o", "unit.bin"]);
+    let bytes = std::fs::read(place.path("unit.bin")).unwrap();
+    assert_eq!(sent["hash"], format!("{:016x}", stored::hash(&bytes)));
+    for (sensor, (p, _)) in ["gyro", "accel"].into_iter().zip(models) {
+        let c = &got["nodes"][0][sensor]["C"];
+        let product = Matrix3::from_fn(|i, j| c[i][j].as_f64().unwrap()) * p;
+        assert!(
+            (product - Matrix3::identity()).amax() < 1e-6,
+            "{sensor}: {product}"
+        );
+    }
+
+    let checked = bench.json(
+        place,
+        &[
+            "device",
+            "check",
+            "--calibration",
+            "unit.toml",
+            "--for",
+            "1s",
+        ],
+    );
+    assert_eq!(checked["holds"], true, "{checked}");
+    assert_eq!(
+        (&checked["gyro"]["ulps"], &checked["accel"]["ulps"]),
+        (&0.into(), &0.into())
+    );
+}
+
+/// `kill -9` in the middle of a recording, and another one that ends by itself.
+fn killed(bench: &Bench, place: &Place) {
+    let mut child = start(
+        place,
+        &[
+            "record",
+            "-o",
+            "cut",
+            "--gravity",
+            "9.793",
+            "--port",
+            &bench.port,
+        ],
+    );
+    let samples = place.path("cut/samples.csv");
+    let until = Instant::now() + Duration::from_secs(120);
+    while std::fs::metadata(&samples).map_or(0, |m| m.len()) < 150_000 {
+        assert!(Instant::now() < until, "nothing is recorded");
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    // Time stands still as soon as nobody has the port open.
+    child.kill().unwrap();
+    child.wait().unwrap();
+    std::thread::sleep(Duration::from_millis(50));
+    let now_ms = bench.now_ms.load(Ordering::Relaxed) as f64;
+    let (recording, cut) = rows(place, "cut");
+    assert!(recording.manifest.unfinished);
+    let ms = |t_s: &f64| (t_s * 1000.0).round();
+    assert!(cut.t_s.windows(2).all(|p| ms(&p[1]) - ms(&p[0]) == 1.0));
+    let last = ms(cut.t_s.last().unwrap());
+    // Sampling began some 50 ms after the clock.
+    assert!(last + 1000.0 > now_ms, "{last} ms of {now_ms}");
+
+    let ended = bench.json(
+        place,
+        &[
+            "record",
+            "-o",
+            "whole",
+            "--for",
+            "500ms",
+            "--gravity",
+            "9.793",
+        ],
+    );
+    assert_eq!(
+        (&ended["samples"], &ended["missing"]),
+        (&500.into(), &0.into())
+    );
+    let (recording, whole) = rows(place, "whole");
+    assert!(!recording.manifest.unfinished);
+    assert_eq!(whole.t_s.len(), 500);
+}
+
+/// The same port while another program has it, and without permission.
+fn port_of_others(bench: &Bench, place: &Place) {
+    let held = serialport::new(&bench.port, 1_000_000)
+        .open_native()
+        .unwrap();
+    bench.run(place, &["device", "info"]).refused(&["busy"]);
+    drop(held);
+    let nobody_may = std::os::unix::fs::PermissionsExt::from_mode(0o000);
+    std::fs::set_permissions(&bench.port, nobody_may).unwrap();
+    let mut info = command(place, &["device", "info", "--port", &bench.port]);
+    // Root may open everything, and has to become somebody else; others need not.
+    let as_nobody = info.current_dir("/").uid(65534).gid(65534).output();
+    let said = match as_nobody {
+        Ok(out) => String::from_utf8(out.stderr).unwrap(),
+        Err(_) => bench.run(place, &["device", "info"]).stderr,
+    };
+    if said.is_empty() {
+        println!("skipped: this is root, and nobody else may run the program from here");
+        return;
+    }
+    assert!(said.contains("no permission to open the port"), "{said}");
+}
+
+/// Turned by hand all the time.
+const TURNED: &str = "format = \"mimu-plan/1\"\ndevice = \"unit-007\"\nsample_rate_hz = 1000.0\ncarrier = \"hands\"\n\
+     latitude_deg = 30.5\ngravity_mps2 = 9.793\nlead_in_s = 0.0\n[[step]]\nposes = 100\ndwell_s = 0.01\n";
+
+#[test]
+fn a_self_test_of_a_unit_that_is_turned_and_one_of_open_pins_are_told_apart() {
+    let place = Place::new();
+    let mut truth = unit();
+    // Two turns or three within a self-test, each about an axis of its own: no two states see the same rates.
+    truth.hands.turn_s = [0.4, 0.5];
+    truth.hands.pause_s = [0.01, 0.02];
+    let moving = Bench::carried(TURNED, &truth);
+    let told = moving.run(&place, &["device", "self-test"]);
+    told.refused(&["self-test failed", "the unit moved", "keep the unit still"]);
+    assert!(told.stdout.contains("FAILED"), "{}", told.stdout);
+    moving.end();
+
+    // Voltages that nothing changes: no sensor heeds its self-test pin.
+    let mut volts = Volts::GROUND;
+    for (k, (_, _, input)) in WIRING.into_iter().enumerate() {
+        let of_accel = (3..6).contains(&k);
+        volts.input[input] = if of_accel { 1.65 } else { 2.5 * DIVIDER_RATIO };
+    }
+    let open = Bench::new(Front::Still(volts));
+    let told = open.run(&place, &["device", "self-test"]);
+    let line = told.refused(&["gyro x, gyro y, gyro z, accel", "check the wiring"]);
+    assert!(!line.contains("moved"), "{line}");
+    open.end();
+}

@@ -1,0 +1,284 @@
+//! Calibrations up and down, tests and comparisons.
+
+use mimu_core::stored;
+use mimu_core::wire::{EFFECTS, Refusal};
+
+use super::calibration::{EFFECTS as ALL_EFFECTS, forward};
+use super::peer::{Peer, Script};
+use super::{Place, mimu};
+
+/// The bytes that a device takes for this calibration file.
+fn uploaded(place: &Place, calibration: &str) -> Vec<u8> {
+    let peer = Peer::new(Script::default());
+    let arguments = [
+        "device",
+        "upload",
+        calibration,
+        "--port",
+        &peer.path,
+        "--json",
+        "-",
+    ];
+    mimu(place, &arguments).json();
+    let seen = peer.seen.lock().unwrap();
+    seen.stored.clone().unwrap()
+}
+
+#[test]
+fn a_calibration_arrives_whole_over_a_line_that_loses_and_garbles() {
+    let place = Place::new();
+    let calibration = place.calibration("V", ALL_EFFECTS);
+    let peer = Peer::new(Script {
+        losing: 4,
+        ..Script::default()
+    });
+    let upload = [
+        "device",
+        "upload",
+        &calibration,
+        "--port",
+        &peer.path,
+        "--json",
+        "-",
+    ];
+    let result = mimu(&place, &upload).json();
+    assert_eq!(result["was_there"], false);
+    assert!(result["repeated"].as_u64().unwrap() > 0, "{result}");
+    let held = peer.seen.lock().unwrap().stored.clone().unwrap();
+    assert_eq!(result["hash"], format!("{:016x}", stored::hash(&held)));
+
+    // What arrived is the file's numbers: C by rows from the inverse of the hand-written P, little end first behind 156 bytes.
+    let [(p, b), _] = forward();
+    let c = p.try_inverse().unwrap();
+    let float = |at: usize| f32::from_le_bytes(held[at..at + 4].try_into().unwrap());
+    assert_eq!(float(156), 26.5, "temperature of the node");
+    for i in 0..3 {
+        for j in 0..3 {
+            assert_eq!(float(160 + 4 * (3 * i + j)), c[(i, j)] as f32);
+        }
+        assert_eq!(float(196 + 4 * i), -(c * b)[i] as f32);
+    }
+
+    let download = [
+        "device", "download", "-o", "back.bin", "--port", &peer.path, "--json", "-",
+    ];
+    let back = mimu(&place, &download).json();
+    assert_eq!(std::fs::read(place.path("back.bin")).unwrap(), held);
+    assert_eq!(back["effects"][0]["id"], "gyro_g_sensitivity");
+    let g = &back["effects"][0]["coefficients"];
+    assert_eq!(g.as_array().unwrap().len(), 9);
+    assert_eq!(g[2].as_f64().unwrap() as f32, 0.0004);
+    assert_eq!(back["effects"][2]["id"], "term:accel_y~rate_x*force_y");
+    assert_eq!(
+        back["nodes"][0]["gyro"]["C"][0][1].as_f64().unwrap() as f32,
+        c[(0, 1)] as f32
+    );
+
+    // Nothing is written twice.
+    let commits = peer.count("UploadCommit");
+    let again = mimu(&place, &upload).json();
+    assert_eq!(again["was_there"], true);
+    assert_eq!(peer.count("UploadCommit"), commits);
+}
+
+#[test]
+fn a_device_that_restarts_in_the_middle_of_an_upload_gets_all_of_it_again() {
+    let place = Place::new();
+    let calibration = place.calibration("V", ALL_EFFECTS);
+    let whole = uploaded(&place, &calibration);
+    let peer = Peer::new(Script {
+        restart_at_chunk: Some(256),
+        ..Script::default()
+    });
+    let upload = [
+        "device",
+        "upload",
+        &calibration,
+        "--port",
+        &peer.path,
+        "--json",
+        "-",
+    ];
+    let result = mimu(&place, &upload).json();
+    assert_eq!(result["restarts"], 1);
+    assert_eq!(
+        peer.seen.lock().unwrap().stored.as_deref(),
+        Some(&whole[..])
+    );
+}
+
+#[test]
+fn what_the_device_cannot_use_is_named_before_anything_is_sent() {
+    let place = Place::new();
+    let calibration = place.calibration("V", ALL_EFFECTS);
+    let quadratic = EFFECTS
+        .iter()
+        .position(|id| *id == "accel_scale_quadratic")
+        .unwrap();
+    let peer = Peer::new(Script {
+        effects: Script::default().effects & !(1 << quadratic),
+        ..Script::default()
+    });
+    mimu(
+        &place,
+        &["device", "upload", &calibration, "--port", &peer.path],
+    )
+    .refused(&["accel_scale_quadratic", "cannot remove it", "9.8.7"]);
+    let counts = place.calibration("count", "");
+    mimu(&place, &["device", "upload", &counts, "--port", &peer.path])
+        .refused(&["raw_unit", "count"]);
+    assert_eq!(peer.count("UploadBegin"), 0);
+    assert_eq!(peer.count("UploadChunk"), 0);
+}
+
+#[test]
+fn a_refused_upload_says_what_the_device_holds() {
+    let place = Place::new();
+    let old = uploaded(&place, &place.calibration("V", ""));
+    let hash = format!("{:016x}", stored::hash(&old));
+    let calibration = place.calibration("V", ALL_EFFECTS);
+    let peer = Peer::new(Script {
+        stored: Some(old.clone()),
+        refuse_commit: Some(Refusal::FlashFailed),
+        ..Script::default()
+    });
+    mimu(
+        &place,
+        &["device", "upload", &calibration, "--port", &peer.path],
+    )
+    .refused(&["flash", &format!("keeps the calibration {hash}")]);
+    assert_eq!(peer.seen.lock().unwrap().stored, Some(old));
+    let empty = Peer::new(Script::default());
+    mimu(
+        &place,
+        &["device", "download", "-o", "x.bin", "--port", &empty.path],
+    )
+    .refused(&["holds no calibration"]);
+    assert!(!place.path("x.bin").exists());
+}
+
+#[test]
+fn counters_and_self_test_are_told() {
+    let place = Place::new();
+    let peer = Peer::new(Script::default());
+    let counters = [
+        "device", "counters", "--reset", "--port", &peer.path, "--json", "-",
+    ];
+    assert_eq!(mimu(&place, &counters).json()["counters"]["late"], 17);
+    assert_eq!(peer.count("ResetCounters"), 1);
+    let test = ["device", "self-test", "--port", &peer.path, "--json", "-"];
+    assert_eq!(mimu(&place, &test).json()["passed"]["gyro_z"], true);
+    let failing = Peer::new(Script {
+        self_test_passed: 0b1011,
+        ..Script::default()
+    });
+    mimu(&place, &["device", "self-test", "--port", &failing.path])
+        .refused(&["self-test failed", "gyro z"]);
+}
+
+#[test]
+fn the_compensated_stream_is_compared_sample_by_sample() {
+    let place = Place::new();
+    for (effects, bent) in [("", 0.0), (ALL_EFFECTS, 0.0), ("", 1e-4)] {
+        let calibration = place.calibration("V", effects);
+        let peer = Peer::new(Script {
+            stored: Some(uploaded(&place, &calibration)),
+            bent,
+            speed: 2.0,
+            ..Script::default()
+        });
+        let fixed = [
+            "device",
+            "check",
+            "--calibration",
+            &calibration,
+            "--for",
+            "2s",
+        ];
+        let run = mimu(
+            &place,
+            &[&fixed[..], &["--port", &peer.path, "--json", "-"]].concat(),
+        );
+        if bent > 0.0 {
+            run.refused(&["otherwise than the PC"]);
+            continue;
+        }
+        let result = run.json();
+        assert!(result["samples"].as_u64().unwrap() >= 1990, "{result}");
+        for sensor in ["gyro", "accel"] {
+            // The same operations on the same numbers.
+            assert_eq!(result[sensor]["ulps"], 0, "{result}");
+            let double = result[sensor]["double"].as_f64().unwrap();
+            // Terms of up to 9 rad/s and 21 m/s² in numbers of 24 bits: rounding is there, and no more than that.
+            assert!(double > 0.0 && double < 2e-5, "{result}");
+        }
+        assert_eq!(result["holds"], true);
+    }
+    // Another calibration than the one it holds.
+    let held = uploaded(&place, &place.calibration("V", ALL_EFFECTS));
+    let other = place.calibration("V", "");
+    let peer = Peer::new(Script {
+        stored: Some(held),
+        ..Script::default()
+    });
+    mimu(
+        &place,
+        &[
+            "device",
+            "check",
+            "--calibration",
+            &other,
+            "--port",
+            &peer.path,
+        ],
+    )
+    .refused(&["another calibration", "upload"]);
+}
+
+#[test]
+fn the_kalman_bank_is_compared_on_the_samples_that_it_took_in() {
+    let place = Place::new();
+    let peer = Peer::new(Script {
+        speed: 2.0,
+        ..Script::default()
+    });
+    let fixed = [
+        "device",
+        "kalman",
+        "--force-mps2",
+        "0,0,9.81",
+        "--force-mps2",
+        "0,9.81,0",
+    ];
+    let run = mimu(
+        &place,
+        &[
+            &fixed[..],
+            &["--for", "1s", "--port", &peer.path, "--json", "-"],
+        ]
+        .concat(),
+    );
+    let result = run.json();
+    let inputs = result["inputs"].as_array().unwrap();
+    assert_eq!(inputs.len(), 2);
+    let taken = |i: usize| {
+        let of = |key: &str| inputs[i][key].as_u64().unwrap();
+        of("last") - of("first") + 1
+    };
+    // A second each, and what came until the device was told to stop.
+    assert!(
+        (1000..3000).contains(&taken(0)) && (1000..3000).contains(&taken(1)),
+        "{result}"
+    );
+    let largest = result["largest_distance_sigma"].as_f64().unwrap();
+    assert!(largest < 0.1, "{largest}");
+    // b + 9.81 P3 is the mean of what the script sends under the first input, whatever a bank makes of it.
+    let mean: f64 = (inputs[0]["first"].as_u64().unwrap()..=inputs[0]["last"].as_u64().unwrap())
+        .map(|n| f64::from(super::peer::sums(n as u32)[3]))
+        .sum::<f64>()
+        / taken(0) as f64
+        * f64::from(super::peer::ACCEL_VOLTS);
+    let x = &result["device"][0]["mean"];
+    let found = x[0].as_f64().unwrap() + 9.81 * x[3].as_f64().unwrap();
+    assert!((found - mean).abs() < 2e-4, "{found} {mean}");
+}

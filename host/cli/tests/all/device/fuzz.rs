@@ -1,0 +1,237 @@
+//! The host's ear under whatever a line can carry: random bytes, flipped bits, cut, doubled and shuffled frames. It never panics and
+//! never stops hearing: a whole frame after all of that is heard.
+//!
+//! ```text
+//! MIMU_FUZZ_CASES=1000000 MIMU_FUZZ_SEED=2 cargo test --release -p mimu-cli --test all device::fuzz -- --nocapture
+//! ```
+
+use mimu_core::compensation::{Affine, Compensation};
+use mimu_core::effects::{Sensor, Variable};
+use mimu_core::stored::{self, Record};
+use mimu_core::table::Node;
+use mimu_core::wire::{
+    BatchHead, Counters, Event as WireEvent, MAX_FRAME, Message, RAW_BYTES, RawBatch, Refusal,
+    Reply, encode,
+};
+use mimu_device::{Answer, Ear, Event, Heard, contents};
+use nalgebra::{Matrix3, Vector3};
+
+/// SplitMix64.
+struct Random(u64);
+
+impl Random {
+    fn bits(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    fn below(&mut self, end: usize) -> usize {
+        (self.bits() % end as u64) as usize
+    }
+}
+
+fn frame(message: &Message<'_>) -> Vec<u8> {
+    let mut out = [0; MAX_FRAME];
+    let length = encode(message, &mut out).unwrap();
+    out[..length].to_vec()
+}
+
+/// Frames of several kinds, one of them of a length that no device sends.
+fn frames() -> Vec<Vec<u8>> {
+    let head = BatchHead {
+        first: u32::MAX - 3,
+        samples_lost: 0,
+        batches_dropped: 0,
+        temp_c: f32::NAN,
+        flags: 0xff,
+    };
+    let samples: Vec<u8> = (0..20 * RAW_BYTES).map(|i| i as u8).collect();
+    let batch = |samples| {
+        let (gyro_volts, accel_volts) = (f32::INFINITY, 1e-5);
+        frame(&Message::Event(WireEvent::Raw(RawBatch {
+            head,
+            gyro_volts,
+            accel_volts,
+            samples,
+        })))
+    };
+    let stored = |bytes| {
+        let (offset, length) = (u32::MAX, 0);
+        let reply = Reply::Stored {
+            offset,
+            length,
+            bytes,
+        };
+        frame(&Message::Reply { id: 7, reply })
+    };
+    let refusal = Refusal::WrongHash { found: u64::MAX };
+    vec![
+        batch(&samples),
+        batch(&samples[..7]),
+        batch(&[]),
+        stored(&samples[..200]),
+        frame(&Message::Refused { id: 1, refusal }),
+        frame(&Message::Reply {
+            id: 65535,
+            reply: Reply::Counters(Counters::default()),
+        }),
+    ]
+}
+
+fn damage(bytes: &mut Vec<u8>, random: &mut Random) {
+    for _ in 0..random.below(4) {
+        if bytes.is_empty() {
+            return;
+        }
+        let at = random.below(bytes.len());
+        match random.below(7) {
+            0 => bytes[at] ^= 1 << random.below(8),
+            1 => bytes[at] = random.bits() as u8,
+            2 => bytes.truncate(at),
+            3 => drop(bytes.drain(..at)),
+            4 => bytes.insert(at, random.bits() as u8),
+            5 => drop(bytes.remove(at)),
+            _ => bytes.extend((0..random.below(2000)).map(|_| random.bits() as u8)),
+        }
+    }
+}
+
+fn environment(name: &str, default: u64) -> u64 {
+    std::env::var(name)
+        .ok()
+        .map_or(default, |text| text.parse().expect(name))
+}
+
+#[test]
+fn no_bytes_make_the_ear_fail_or_deaf() {
+    let seed = environment("MIMU_FUZZ_SEED", 1);
+    let cases = environment("MIMU_FUZZ_CASES", 40_000);
+    let frames = frames();
+    let last = frame(&Message::Reply {
+        id: 4711,
+        reply: Reply::Done,
+    });
+    let (mut heard, mut garbled) = (0_u64, 0_u64);
+    for case in 0..cases {
+        let mut random = Random(seed ^ case.wrapping_mul(0x2545_f491_4f6c_dd1d));
+        let mut ear = Ear::default();
+        let mut bytes = Vec::new();
+        for _ in 0..random.below(5) {
+            let mut next = frames[random.below(frames.len())].clone();
+            damage(&mut next, &mut random);
+            bytes.extend(next);
+        }
+        let mut end = None;
+        let mut take = |ear: &mut Ear, bytes: &[u8]| {
+            ear.take(bytes, |message| {
+                heard += 1;
+                if let Heard::Event(Event::Raw(samples)) = &message {
+                    assert!((1..=20).contains(&samples.values.len()), "case {case}");
+                }
+                end = Some(message);
+            });
+        };
+        // In pieces, as a port gives them.
+        let middle = random.below(bytes.len() + 1);
+        take(&mut ear, &bytes[..middle]);
+        take(&mut ear, &bytes[middle..]);
+        take(&mut ear, &last);
+        assert_eq!(end, Some(Heard::Answer(4711, Answer::Done)), "case {case}");
+        garbled += u64::from(ear.count().garbled);
+    }
+    println!("seed {seed}: {cases} cases, {heard} messages, {garbled} garbled frames");
+    assert!(
+        heard > cases && garbled > 0,
+        "damage has to leave some frames whole, and not all"
+    );
+}
+
+/// CRC-32/ISO-HDLC, bit by bit.
+fn crc(bytes: &[u8]) -> u32 {
+    !bytes.iter().fold(!0, |crc, byte| {
+        (0..8).fold(crc ^ u32::from(*byte), |crc, _| {
+            crc >> 1 ^ (0xedb8_8320 & 0_u32.wrapping_sub(crc & 1))
+        })
+    })
+}
+
+/// A stored calibration of two nodes, a named effect with a time constant, and a term.
+fn image() -> Vec<u8> {
+    let affine = Affine {
+        matrix: Matrix3::identity(),
+        offset: Vector3::repeat(-2.5),
+    };
+    let model = Compensation {
+        gyro: affine,
+        accel: affine,
+    };
+    let nodes = [10.0, 30.0].map(|temp_c| Node { temp_c, model });
+    let records = [
+        Record::Named {
+            id: "gyro_warm_up",
+            coefficients: &[0.1, 0.2, 0.3],
+            nonlinear: Some(60.0),
+        },
+        Record::Term {
+            sensor: Sensor::Accel,
+            axis: 1,
+            coefficient: 0.5,
+            variables: &[Variable::RateX, Variable::ForceY],
+        },
+    ];
+    let mut bytes = vec![0; 1024];
+    let matrices = [&affine.matrix, &affine.matrix];
+    let length = stored::encode(matrices, &nodes, &records, &mut bytes).unwrap();
+    bytes.truncate(length);
+    bytes
+}
+
+#[test]
+fn damage_that_the_crc_does_not_see_makes_no_reader_of_a_stored_calibration_fail() {
+    let seed = environment("MIMU_FUZZ_SEED", 1);
+    let (whole, mut readable) = (image(), 0);
+    assert_eq!(
+        contents(&whole).unwrap().effects[1].id,
+        "term:accel_y~rate_x*force_y"
+    );
+    let cases = environment("MIMU_FUZZ_CASES", 40_000);
+    for case in 0..cases {
+        let mut random = Random(seed ^ case.wrapping_mul(0x2545_f491_4f6c_dd1d));
+        let mut bytes = whole[..whole.len() - 4].to_vec();
+        for _ in 0..1 + random.below(3) {
+            // Half of them where the counts and the effects are, which is little among so many numbers.
+            let at = match random.below(4) {
+                0 => random.below(12),
+                1 => 284 + random.below(bytes.len().saturating_sub(284).max(1)),
+                _ => random.below(bytes.len().max(1)),
+            };
+            match (random.below(8), bytes.get_mut(at)) {
+                (0, Some(_)) => bytes.truncate(at),
+                (1, Some(_)) => bytes.insert(at, random.bits() as u8),
+                (2 | 3, Some(byte)) => *byte = random.bits() as u8,
+                (_, Some(byte)) => *byte ^= 1 << random.below(8),
+                (_, None) => {}
+            }
+        }
+        let length = (bytes.len() as u16 + 4).to_le_bytes();
+        if let Some(place) = bytes.get_mut(6..8) {
+            place.copy_from_slice(&length);
+        }
+        bytes.extend(crc(&bytes).to_le_bytes());
+        let usable = stored::decode(&bytes);
+        assert_eq!(
+            contents(&bytes).err(),
+            usable.as_ref().err().copied(),
+            "case {case}"
+        );
+        readable += u64::from(usable.is_ok());
+    }
+    println!("seed {seed}: {cases} cases, {readable} readable");
+    assert!(
+        readable > cases / 20 && readable < cases,
+        "{readable} of {cases}"
+    );
+}

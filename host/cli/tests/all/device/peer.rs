@@ -1,0 +1,257 @@
+//! A device by script at the other end of a pseudo-terminal: speaks the protocol as `core::wire` documents it, and misbehaves as told.
+//!
+//! It knows nothing of the host's code. The readings that it sends are a formula ([`sums`]), so that a test can say what has to arrive.
+
+mod answers;
+mod samples;
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use mimu_core::wire::{
+    Decoder, MAGIC, MAX_FRAME, Message, PROTOCOL, Refusal, Reply, Version, effects_of_this_build,
+    encode,
+};
+
+use super::terminal::Terminal;
+use samples::{Calibrated, Running};
+
+pub const GYRO_VOLTS: f32 = 4.2e-5;
+pub const ACCEL_VOLTS: f32 = 2.518e-5;
+pub const TEMP_C: f32 = 31.25;
+pub const UNIT_ID: [u8; 12] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 0xab];
+
+/// Sums of codes of sample n: about 2.5 and 1.65 V, with something like noise.
+pub fn sums(n: u32) -> [u32; 6] {
+    std::array::from_fn(|i| {
+        let mixed = (n ^ 0x9e37_79b9_u32.wrapping_mul(i as u32 + 1)).wrapping_mul(0x85eb_ca6b);
+        let noise = (mixed >> 13) % 64;
+        [59_000, 60_000, 61_000, 65_000, 66_000, 70_000][i] + noise
+    })
+}
+
+/// What happens once, when a sample is due.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Act {
+    /// Its batch is not sent.
+    Drop,
+    /// A byte of the frame of its batch is another.
+    Garble,
+    /// The device restarts: it counts from 0 again and has forgotten everything but its calibration.
+    Restart,
+    /// The port is gone.
+    Vanish,
+}
+
+/// What answers at the port.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Voice {
+    /// A device.
+    Device,
+    /// Nothing.
+    Silence,
+    /// Bytes of something else.
+    Garbage,
+    /// Whole frames that are no greetings.
+    Stranger,
+}
+
+#[derive(Debug, Clone)]
+pub struct Script {
+    pub voice: Voice,
+    pub protocol: Version,
+    pub magic: [u8; 4],
+    pub effects: u32,
+    pub stored: Option<Vec<u8>>,
+    /// Every so many answers one is lost, if not 0; and as many are garbled.
+    pub losing: u32,
+    pub refuse_commit: Option<Refusal>,
+    /// It restarts instead of taking the chunk of this offset, once.
+    pub restart_at_chunk: Option<u32>,
+    /// By number of the sample since the stream began, in order: how long a program takes to begin does not matter then.
+    pub acts: Vec<(u32, Act)>,
+    /// Samples a millisecond.
+    pub speed: f64,
+    /// Added to the compensated gyro x, rad/s: a device that computes wrongly.
+    pub bent: f32,
+    pub self_test_passed: u8,
+}
+
+impl Default for Script {
+    fn default() -> Self {
+        Self {
+            voice: Voice::Device,
+            protocol: PROTOCOL,
+            magic: MAGIC,
+            effects: effects_of_this_build(),
+            stored: None,
+            losing: 0,
+            refuse_commit: None,
+            restart_at_chunk: None,
+            acts: Vec::new(),
+            speed: 1.0,
+            bent: 0.0,
+            self_test_passed: 0b1111,
+        }
+    }
+}
+
+/// What the peer has seen, for tests to look at.
+#[derive(Debug, Default)]
+pub struct Seen {
+    /// Names of the requests.
+    pub requests: Vec<String>,
+    /// The calibration that it holds.
+    pub stored: Option<Vec<u8>>,
+    /// Number of the next sample.
+    pub next: u32,
+}
+
+pub struct Peer {
+    pub path: String,
+    pub seen: Arc<Mutex<Seen>>,
+    stop: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Peer {
+    pub fn new(script: Script) -> Self {
+        let (port, path) = Terminal::open();
+        let seen = Arc::new(Mutex::new(Seen {
+            stored: script.stored.clone(),
+            ..Seen::default()
+        }));
+        let stop = Arc::new(AtomicBool::new(false));
+        let device = Device {
+            port: Some(port),
+            seen: seen.clone(),
+            stop: stop.clone(),
+            script,
+            began: Instant::now(),
+            next: 0,
+            streams: (false, false),
+            streamed_from: None,
+            upload: None,
+            answers: 0,
+            lost: 0,
+            dropped: 0,
+            calibrated: None,
+            banks: [None, None],
+        };
+        let thread = std::thread::spawn(move || device.run());
+        Self {
+            path,
+            seen,
+            stop,
+            thread: Some(thread),
+        }
+    }
+
+    pub fn count(&self, request: &str) -> usize {
+        let seen = self.seen.lock().unwrap();
+        seen.requests.iter().filter(|r| *r == request).count()
+    }
+}
+
+impl Drop for Peer {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Relaxed);
+        if let Some(thread) = self.thread.take() {
+            thread.join().unwrap();
+        }
+    }
+}
+
+struct Device {
+    port: Option<Terminal>,
+    seen: Arc<Mutex<Seen>>,
+    stop: Arc<AtomicBool>,
+    script: Script,
+    began: Instant,
+    next: u32,
+    /// Raw and compensated.
+    streams: (bool, bool),
+    /// First sample of the stream.
+    streamed_from: Option<u32>,
+    upload: Option<(usize, u64, Vec<u8>)>,
+    answers: u32,
+    lost: u32,
+    dropped: u32,
+    calibrated: Option<Calibrated>,
+    banks: [Option<Running>; 2],
+}
+
+impl Device {
+    fn run(mut self) {
+        let mut decoder = Decoder::new();
+        let mut bytes = [0; 4096];
+        while !self.stop.load(Ordering::Relaxed) {
+            let count = match &mut self.port {
+                Some(port) => port.read(&mut bytes),
+                None => {
+                    std::thread::sleep(Duration::from_millis(2));
+                    0
+                }
+            };
+            match self.script.voice {
+                Voice::Device => {
+                    for byte in &bytes[..count] {
+                        let Some(frame) = decoder.push(*byte) else {
+                            continue;
+                        };
+                        match frame.call() {
+                            Some(call) => self.answer(&call),
+                            None => {
+                                let id = frame.id().unwrap_or_default();
+                                let refusal = Refusal::Unknown;
+                                self.send(&Message::Refused { id, refusal });
+                            }
+                        }
+                    }
+                    self.sample();
+                }
+                Voice::Silence => {}
+                Voice::Garbage if count > 0 => self.write(b"login: \r\nPassword: \xff\x80\r\n"),
+                Voice::Stranger if count > 0 => {
+                    let reply = Reply::Done;
+                    self.send(&Message::Reply { id: 0, reply });
+                }
+                _ => {}
+            }
+            self.seen.lock().unwrap().next = self.next;
+        }
+    }
+
+    fn write(&mut self, mut bytes: &[u8]) {
+        while let Some(port) = &mut self.port
+            && !bytes.is_empty()
+            && !self.stop.load(Ordering::Relaxed)
+        {
+            let count = port.write(bytes);
+            bytes = &bytes[count..];
+        }
+    }
+
+    fn frame(&mut self, message: &Message<'_>, garble: bool) {
+        let mut frame = [0; MAX_FRAME];
+        let length = encode(message, &mut frame).unwrap();
+        if garble {
+            // Never a zero, which would only cut the frame in two.
+            let byte = &mut frame[length / 2];
+            *byte = if *byte == 0x55 { 0xaa } else { 0x55 };
+        }
+        self.write(&frame[..length]);
+    }
+
+    fn send(&mut self, message: &Message<'_>) {
+        self.answers += 1;
+        let losing = self.script.losing;
+        let turn = if losing > 0 { self.answers % losing } else { 1 };
+        match losing > 0 && turn == 0 {
+            true => {}
+            false => self.frame(message, losing > 1 && turn == losing / 2),
+        }
+    }
+}

@@ -1,0 +1,162 @@
+//! Samples, batch by batch, and what is made of them.
+
+use std::sync::atomic::Ordering;
+
+use mimu_core::effects;
+use mimu_core::kalman::Bank;
+use mimu_core::stored::{self, ROOM, Stored};
+use mimu_core::wire::{
+    BATCH, BatchHead, CompensatedBatch, Event, KalmanState, Message, RawBatch, Sums, flags, volts,
+};
+use nalgebra::Vector3;
+
+use super::{ACCEL_VOLTS, Act, Device, GYRO_VOLTS, TEMP_C, sums};
+
+pub(super) struct Calibrated {
+    pub(super) stored: Stored,
+    pub(super) effects: effects::State<f32, ROOM>,
+    pub(super) followed: u32,
+}
+
+pub(super) struct Running {
+    pub(super) filters: Bank<f32>,
+    pub(super) noise: Vector3<f32>,
+    pub(super) input: Option<Vector3<f32>>,
+    pub(super) state: KalmanState,
+    pub(super) offered: u32,
+}
+
+impl Device {
+    /// Sends the batches that are due.
+    pub(super) fn sample(&mut self) {
+        let ms = self.began.elapsed().as_secs_f64() * 1e3 * self.script.speed;
+        while f64::from(self.next) + BATCH as f64 <= ms && !self.stop.load(Ordering::Relaxed) {
+            let first = self.next;
+            self.next += BATCH as u32;
+            let streamed = self
+                .streamed_from
+                .map_or(0, |from| self.next.saturating_sub(from));
+            let act = match self.script.acts.first() {
+                Some(&(at, act)) if at < streamed => {
+                    self.script.acts.remove(0);
+                    Some(act)
+                }
+                _ => None,
+            };
+            match act {
+                Some(Act::Restart) => return self.restart(),
+                Some(Act::Vanish) => self.port = None,
+                Some(Act::Drop) => self.dropped += 1,
+                _ => {}
+            }
+            self.batch(first, act);
+        }
+    }
+
+    pub(super) fn batch(&mut self, first: u32, act: Option<Act>) {
+        let head = BatchHead {
+            first,
+            samples_lost: self.lost,
+            batches_dropped: self.dropped,
+            temp_c: TEMP_C,
+            flags: if first.is_multiple_of(1000) {
+                flags::SATURATED
+            } else {
+                0
+            },
+        };
+        let held = self.seen.lock().unwrap().stored.clone();
+        if let (None, Some(bytes)) = (&self.calibrated, held) {
+            self.calibrated = Some(Calibrated {
+                stored: stored::decode(&bytes).unwrap(),
+                effects: effects::State::new(1000.0),
+                followed: 0,
+            });
+        }
+        let (mut raw, mut compensated) = (Vec::new(), Vec::new());
+        let mut model = None;
+        if let Some(c) = &mut self.calibrated {
+            let mut state = c.stored.table.state();
+            c.stored.table.follow(&mut state, TEMP_C);
+            if let Some(all) = &c.stored.effects {
+                let dt_s = first.wrapping_sub(c.followed) as f32 / 1000.0;
+                all.slow(&mut c.effects, dt_s, TEMP_C);
+                c.followed = first;
+            }
+            model = Some(state.model);
+        }
+        for n in first..first + BATCH as u32 {
+            let [gx, gy, gz, ax, ay, az] = sums(n);
+            let sums = Sums {
+                gyro: [gx, gy, gz],
+                accel: [ax, ay, az],
+            };
+            raw.extend_from_slice(&RawBatch::pack(&sums));
+            let reading = volts(&sums, GYRO_VOLTS, ACCEL_VOLTS);
+            if let (Some(c), Some(model)) = (&mut self.calibrated, &model) {
+                let mut sample = model.apply(&reading);
+                if let Some(all) = &c.stored.effects {
+                    sample = all.remove(&mut c.effects, &sample);
+                }
+                sample.gyro.x += self.script.bent;
+                compensated.extend_from_slice(&CompensatedBatch::pack(&sample));
+            }
+            for i in 0..2 {
+                let of = if i == 0 { reading.gyro } else { reading.accel };
+                let due = self.banks[i]
+                    .as_mut()
+                    .is_some_and(|bank| bank.offer(n, &of));
+                if let (true, Some(bank)) = (due, &self.banks[i]) {
+                    let state = bank.state();
+                    self.frame(&Message::Event(Event::Kalman(state)), false);
+                }
+            }
+        }
+        if act == Some(Act::Drop) {
+            return;
+        }
+        let garble = act == Some(Act::Garble);
+        if self.streams.0 {
+            let batch = RawBatch {
+                head,
+                gyro_volts: GYRO_VOLTS,
+                accel_volts: ACCEL_VOLTS,
+                samples: &raw,
+            };
+            self.frame(&Message::Event(Event::Raw(batch)), garble);
+        }
+        if self.streams.1 && !compensated.is_empty() {
+            let samples = &compensated;
+            let batch = CompensatedBatch { head, samples };
+            self.frame(&Message::Event(Event::Compensated(batch)), garble);
+        }
+    }
+}
+
+impl Running {
+    pub(super) fn offer(&mut self, n: u32, reading: &Vector3<f32>) -> bool {
+        self.state.last = n;
+        match self.input {
+            None => self.state.skipped += 1,
+            Some(input) => {
+                self.filters.update(&input, reading, &self.noise).unwrap();
+                self.state.updates += 1;
+            }
+        }
+        self.offered += 1;
+        self.offered.is_multiple_of(200)
+    }
+
+    pub(super) fn state(&self) -> KalmanState {
+        let mut state = self.state;
+        for (axis, filter) in state.axes.iter_mut().zip(&self.filters.axes) {
+            axis.mean = filter.mean().into();
+            let p = filter.covariance();
+            let upper = (0..4).flat_map(|i| (i..4).map(move |j| (i, j)));
+            for (out, at) in axis.covariance.iter_mut().zip(upper) {
+                *out = p[at];
+            }
+        }
+        state
+    }
+}

@@ -1,0 +1,272 @@
+//! `mimu record`: gaps, restarts, kills, and a port that vanishes.
+
+use std::io::Write as _;
+use std::process::Stdio;
+use std::time::{Duration, Instant};
+
+use mimu_recording::{Batch, Recording};
+
+use super::peer::{ACCEL_VOLTS, Act, GYRO_VOLTS, Peer, Script, TEMP_C, sums};
+use super::{Place, command, mimu, start};
+
+/// All rows of a recording.
+pub fn rows(place: &Place, name: &str) -> (Recording, Batch) {
+    let recording = Recording::open(&place.path(name)).unwrap();
+    let mut all = Batch::default();
+    let read = recording.for_each_batch(
+        |_| {},
+        |batch| {
+            all.t_s.extend_from_slice(&batch.t_s);
+            all.step.extend_from_slice(&batch.step);
+            all.temp_c.extend_from_slice(&batch.temp_c);
+            for (all, more) in all.raw.iter_mut().zip(&batch.raw) {
+                all.extend_from_slice(more);
+            }
+            Ok(())
+        },
+    );
+    read.unwrap();
+    (recording, all)
+}
+
+/// Every row is what the script sends for the sample of its time, and times rise.
+fn check_rows(rows: &Batch) {
+    for (i, t_s) in rows.t_s.iter().enumerate() {
+        let n = (t_s * 1000.0).round();
+        assert_eq!(*t_s, n / 1000.0, "times are n/1000 s to the last bit");
+        assert!(i == 0 || *t_s > rows.t_s[i - 1]);
+        let sums = sums(n as u32);
+        for axis in 0..6 {
+            let step = if axis < 3 { GYRO_VOLTS } else { ACCEL_VOLTS };
+            assert_eq!(
+                rows.raw[axis][i],
+                f64::from(sums[axis] as f32 * step),
+                "sample {n}"
+            );
+        }
+        assert_eq!(rows.temp_c[i], f64::from(TEMP_C));
+    }
+}
+
+/// Last sample before a gap and first after it, ms since the first.
+fn gaps(rows: &Batch) -> Vec<(f64, f64)> {
+    let pairs = rows.t_s.windows(2);
+    let ms = |t: f64| (t * 1000.0).round();
+    let gaps = pairs.filter(|p| ms(p[1]) - ms(p[0]) > 1.0);
+    let first = ms(rows.t_s[0]);
+    gaps.map(|p| (ms(p[0]) - first, ms(p[1]) - first)).collect()
+}
+
+#[test]
+fn lost_and_garbled_batches_are_gaps_that_are_counted_and_never_closed() {
+    let place = Place::new();
+    let peer = Peer::new(Script {
+        speed: 4.0,
+        acts: vec![
+            (12_000, Act::Drop),
+            (13_000, Act::Garble),
+            (13_020, Act::Drop),
+        ],
+        ..Script::default()
+    });
+    let arguments = [
+        "record", "--port", &peer.path, "-o", "rec", "--for", "20s", "--json", "-",
+    ];
+    let result = mimu(&place, &arguments).json();
+    assert_eq!(result["format"], "mimu-record/1");
+    assert_eq!(
+        (&result["missing"], &result["gaps"]),
+        (&60.into(), &2.into())
+    );
+    assert_eq!(result["line"]["garbled"], 1);
+    let (recording, rows) = rows(&place, "rec");
+    check_rows(&rows);
+    assert_eq!(gaps(&rows), [(11_999.0, 12_020.0), (12_999.0, 13_040.0)]);
+    assert_eq!(rows.t_s.len() as u64, result["samples"].as_u64().unwrap());
+    assert_eq!(rows.t_s.len(), 20_000 - 60);
+    assert!(recording.warnings.is_empty(), "{:?}", recording.warnings);
+    let recorded = recording.manifest.recorded.unwrap();
+    assert_eq!(
+        (recorded.missing, recorded.firmware.as_str()),
+        (60, "9.8.7")
+    );
+    assert!(!recording.manifest.unfinished);
+}
+
+#[test]
+fn dwells_by_time_begin_and_end_with_their_sample_and_parquet_holds_the_same() {
+    let place = Place::new();
+    let peer = Peer::new(Script {
+        speed: 4.0,
+        ..Script::default()
+    });
+    let fixed = [
+        "record", "--port", &peer.path, "-o", "rec", "--for", "3s", "--json", "-",
+    ];
+    let more = [
+        "--step-every",
+        "700ms,300ms",
+        "--format",
+        "parquet",
+        "--gravity",
+        "9.81",
+    ];
+    let result = mimu(&place, &[&fixed[..], &more].concat()).json();
+    assert_eq!(result["dwells"], 3);
+    assert!(place.path("rec/samples.parquet").exists());
+    assert!(!place.path("rec/samples.csv").exists());
+    let (recording, rows) = rows(&place, "rec");
+    assert_eq!(recording.manifest.gravity_mps2, 9.81);
+    check_rows(&rows);
+    let expected = |k: usize| {
+        if k % 1000 < 700 {
+            (k / 1000) as i32
+        } else {
+            -1
+        }
+    };
+    let steps: Vec<i32> = (0..3000).map(expected).collect();
+    assert_eq!(rows.step, steps);
+    // It is there already, and stays.
+    let before = std::fs::read(place.path("rec/samples.parquet")).unwrap();
+    mimu(&place, &fixed).refused(&["rec", "exists already"]);
+    assert_eq!(
+        std::fs::read(place.path("rec/samples.parquet")).unwrap(),
+        before
+    );
+}
+
+#[test]
+fn lines_on_standard_input_begin_and_end_dwells() {
+    let place = Place::new();
+    let peer = Peer::new(Script::default());
+    let arguments = [
+        "record", "--port", &peer.path, "-o", "rec", "--for", "4s", "--steps",
+    ];
+    let mut command = command(&place, &arguments);
+    let mut child = command
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut keys = child.stdin.take().unwrap();
+    for _ in 0..3 {
+        std::thread::sleep(Duration::from_millis(700));
+        keys.write_all(b"\n").unwrap();
+    }
+    assert!(child.wait().unwrap().success());
+    let (_, rows) = rows(&place, "rec");
+    let mut runs = rows.step.clone();
+    runs.dedup();
+    assert_eq!(runs, [-1, 0, -1, 1]);
+}
+
+#[test]
+fn a_killed_recording_is_there_up_to_the_last_second() {
+    let place = Place::new();
+    let peer = Peer::new(Script::default());
+    let mut child = start(&place, &["record", "--port", &peer.path, "-o", "rec"]);
+    // The moment does not matter: the rows are there when it is killed, or the file would not be as long.
+    let until = Instant::now() + Duration::from_secs(60);
+    let samples = place.path("rec/samples.csv");
+    while std::fs::metadata(&samples).map_or(0, |m| m.len()) < 300_000 {
+        assert!(Instant::now() < until, "nothing is recorded");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    let sent = peer.seen.lock().unwrap().next;
+    // SIGKILL: nothing of the program runs any more.
+    child.kill().unwrap();
+    child.wait().unwrap();
+    let (recording, rows) = rows(&place, "rec");
+    check_rows(&rows);
+    assert!(gaps(&rows).is_empty());
+    let last = rows.t_s.last().unwrap() * 1000.0;
+    assert!(last + 1000.0 > f64::from(sent), "{last} of {sent}");
+    assert!(recording.manifest.unfinished);
+    let warning = recording.warnings.join("");
+    assert!(warning.contains("not ended"), "{warning}");
+
+    // A power failure may leave half a row, whose last number reads like a whole one.
+    let whole = std::fs::read(&samples).unwrap();
+    let end = whole.iter().rposition(|b| *b == b'\n').unwrap();
+    let cut = whole[..end].iter().rposition(|b| *b == b'\n').unwrap() + 1;
+    std::fs::write(&samples, &whole[..end - 3]).unwrap();
+    let (recording, fewer) = self::rows(&place, "rec");
+    assert!(recording.warnings.join("").contains("cut"));
+    check_rows(&fewer);
+    let lines = whole[..cut].iter().filter(|b| **b == b'\n').count();
+    assert_eq!(fewer.t_s.len(), lines - 1);
+
+    // And the other commands take it.
+    let out = mimu(&place, &["allan", "rec", "--json", "-"]);
+    assert!(
+        out.status == Some(0) || out.stderr.contains("; "),
+        "{}",
+        out.stderr
+    );
+}
+
+#[test]
+fn a_recording_goes_on_over_a_restart_and_tells_it() {
+    let place = Place::new();
+    let peer = Peer::new(Script {
+        acts: vec![(6_000, Act::Restart)],
+        speed: 2.0,
+        ..Script::default()
+    });
+    let arguments = [
+        "record", "--port", &peer.path, "-o", "rec", "--for", "9s", "--json", "-",
+    ];
+    let result = mimu(&place, &arguments).json();
+    let restart = &result["restarts"][0];
+    assert!(
+        restart["start"].as_str().unwrap().contains("panic"),
+        "{result}"
+    );
+    let (recording, rows) = rows(&place, "rec");
+    let [(before, after)] = gaps(&rows)[..] else {
+        panic!("one gap: {:?}", gaps(&rows));
+    };
+    let t_s = restart["t_s"].as_f64().unwrap() - rows.t_s[0];
+    assert!((after / 1000.0 - t_s).abs() < 1e-9);
+    assert!(before < 6_000.0 && rows.t_s.windows(2).all(|p| p[1] > p[0]));
+    assert_eq!(recording.manifest.recorded.unwrap().restarts.len(), 1);
+}
+
+#[test]
+fn a_port_that_vanishes_ends_the_recording_with_what_there_is() {
+    let place = Place::new();
+    let peer = Peer::new(Script {
+        acts: vec![(8_000, Act::Vanish)],
+        speed: 2.0,
+        ..Script::default()
+    });
+    let run = mimu(&place, &["record", "--port", &peer.path, "-o", "rec"]);
+    run.refused(&[&peer.path, "vanished", "samples are kept in rec"]);
+    let (recording, rows) = rows(&place, "rec");
+    assert!(!recording.manifest.unfinished);
+    check_rows(&rows);
+    assert!(rows.t_s.last().unwrap() - rows.t_s[0] > 7.5);
+}
+
+#[test]
+fn ctrl_c_ends_a_recording_and_does_not_cut_it() {
+    let place = Place::new();
+    let peer = Peer::new(Script::default());
+    let mut child = start(&place, &["record", "--port", &peer.path, "-o", "rec"]);
+    let until = Instant::now() + Duration::from_secs(60);
+    while std::fs::metadata(place.path("rec/samples.csv")).map_or(0, |m| m.len()) < 100_000 {
+        assert!(Instant::now() < until, "nothing is recorded");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    let pid = child.id().to_string();
+    let killed = std::process::Command::new("kill")
+        .args(["-INT", &pid])
+        .status();
+    assert!(killed.unwrap().success());
+    assert!(child.wait().unwrap().success());
+    let (recording, rows) = rows(&place, "rec");
+    assert!(!recording.manifest.unfinished);
+    check_rows(&rows);
+    assert_eq!(peer.count("Stop"), 1);
+}

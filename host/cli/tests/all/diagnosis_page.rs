@@ -1,0 +1,336 @@
+//! The page of a diagnosis: what it draws is what the unit has, what it says is what the JSON says.
+
+use std::fmt::Write as _;
+use std::path::Path;
+use std::process::{Command, Output};
+
+use mimu::diagnose::diagnose;
+use mimu::diagnose::picture::{Against, Picture};
+use mimu::fit::{Method, Options};
+use mimu::prepared::Prepared;
+use mimu::quantity::Sensor;
+use mimu::stillness::STILL_FACTOR;
+use mimu_recording::Recording;
+use mimu_rig::located::Source;
+use mimu_rig::plan::Plan;
+use mimu_rig::rig_file::{RigFile, RigTruth};
+use serde_json::Value;
+
+/// A name that would break a page that does not escape it.
+const DEVICE: &str = r#"<b>unit</b> & "7""#;
+/// Cubic of the gyros at 300 deg/s, deg/s.
+const CUBIC_DPS: [f64; 3] = [1.2, -0.9, 1.5];
+
+/// Faces and corners at rest, and eight rates about each axis, 4 s each.
+fn plan() -> String {
+    let mut plan = format!(
+        "format = \"mimu-plan/1\"\ndevice = {DEVICE:?}\nsample_rate_hz = 100.0\ncarrier = \"table\"\n"
+    );
+    let mut step = |up: [f64; 3], rate: f64| {
+        let _ = writeln!(
+            plan,
+            "[[step]]\nup = {up:?}\nrate_dps = {rate:?}\ndwell_s = 4.0"
+        );
+    };
+    for rate in [30.0, -30.0, 280.0, -280.0, 100.0, -100.0, 200.0, -200.0] {
+        for axis in 0..3 {
+            step(
+                std::array::from_fn(|i| f64::from(u8::from(i == axis))),
+                rate,
+            );
+        }
+        step([-1.0, 0.0, 0.0], 0.0);
+        step([0.0, -1.0, 0.0], 0.0);
+        step([0.0, 0.0, -1.0], 0.0);
+        step([1.0, -1.0, rate.signum()], 0.0);
+    }
+    plan
+}
+
+/// Records a unit with white noise, of which `effect` is all that an affine model lacks.
+fn record(folder: &Path, name: &str, effect: &str, seed: u64) {
+    let still = "instability_si = [0.0, 0.0, 0.0]\nwalk_si = [0.0, 0.0, 0.0]\n";
+    let rig = format!(
+        "format = \"mimu-rig/1\"\nearth_rate = false\n[unit.gyro_axes]\n{still}[unit.accel_axes]\n{still}\
+         [thermal]\non_before_s = inf\n{effect}"
+    );
+    let file = RigFile::parse(&Source::new("rig", rig)).unwrap();
+    let plan = Plan::parse(Source::new("plan", plan())).unwrap();
+    // One unit, whatever the noise of the recording.
+    let truth = RigTruth::resolve(&file, 3).unwrap();
+    let output = mimu_rig::record::Output::new(&folder.join(name), &plan).unwrap();
+    mimu_rig::record::write(&plan, &truth, seed, &output).unwrap();
+}
+
+fn cubic() -> String {
+    format!("[[effect]]\nid = \"gyro_scale_cubic\"\ndps_at_300dps = {CUBIC_DPS:?}\n")
+}
+
+fn mimu(folder: &Path, arguments: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_mimu"));
+    command
+        .current_dir(folder)
+        .args(arguments)
+        .output()
+        .unwrap()
+}
+
+#[test]
+fn the_effect_that_is_drawn_is_the_one_that_the_unit_has() {
+    let folder = tempfile::tempdir().unwrap();
+    record(folder.path(), "r", &cubic(), 1);
+    let recording = Recording::open(&folder.path().join("r")).unwrap();
+    let prepared = Prepared::read(&recording, STILL_FACTOR, |_| ()).unwrap();
+    let options = Options {
+        method: Method::LeastSquares,
+        holdout_blocks: 0,
+        still_factor: STILL_FACTOR,
+        only: None,
+    };
+    let found = diagnose(prepared.into(), options).unwrap();
+    let gyro = found
+        .sensors
+        .iter()
+        .find(|s| s.sensor == Sensor::Gyro)
+        .unwrap();
+    let picture = Picture::of(gyro).unwrap();
+    assert_eq!(
+        gyro.decision.accepted[0].chosen.candidate.id(),
+        "gyro_scale_cubic"
+    );
+    assert_eq!(picture.effects[0].len(), 3);
+    for (panel, size) in picture.effects[0].iter().zip(CUBIC_DPS) {
+        let Against::Variable(abscissa) = &panel.against else {
+            panic!("{panel:?}");
+        };
+        assert_eq!(abscissa.unit, "deg/s");
+        let truth = |x: f64| size.to_radians() * (x.to_degrees() / 300.0).powi(3);
+        // Less the best straight line, which a scale factor and a bias take up.
+        let n = panel.points.len() as f64;
+        let mean = |f: &dyn Fn(f64) -> f64| panel.points.iter().map(|p| f(p.x)).sum::<f64>() / n;
+        let (mx, mt) = (mean(&|x| x), mean(&truth));
+        let slope = mean(&|x| (x - mx) * truth(x)) / mean(&|x| (x - mx).powi(2));
+        let straightened = |x: f64| truth(x) - mt - slope * (x - mx);
+        let chi2: f64 = panel
+            .points
+            .iter()
+            .map(|p| ((p.partial - straightened(p.x)) / p.sigma).powi(2))
+            .sum();
+        // 56 dwells; four parameters of the line are estimated beside it: 0.7 to 1.35 is three sigmas.
+        assert!(
+            (0.65..1.4).contains(&(chi2 / n)),
+            "{}: {}",
+            panel.title,
+            chi2 / n
+        );
+        // The band is of 95 %, and the whole curve errs as one: by three sigmas nowhere.
+        for c in &panel.curve {
+            assert!(
+                (c.value - straightened(c.x)).abs() < 1.6 * c.half + 1e-12,
+                "{c:?}"
+            );
+        }
+        let most = panel
+            .points
+            .iter()
+            .map(|p| p.partial.abs())
+            .fold(0.0, f64::max);
+        let left = panel
+            .points
+            .iter()
+            .map(|p| p.after.abs())
+            .fold(0.0, f64::max);
+        // The largest of 56 residuals is three sigmas by itself, and the cubic less its best line some eight.
+        assert!(most > 2.0 * left, "{}: {most} {left}", panel.title);
+    }
+    // The residuals drawn are those that the figures are of.
+    for k in 0..2 {
+        let all = || picture.tracks.iter().flat_map(|t| &t.samples);
+        let rms = |of: &dyn Fn(&mimu::diagnose::picture::Sample) -> f64| {
+            (all().map(|s| of(s).powi(2)).sum::<f64>() / all().count() as f64).sqrt()
+        };
+        assert!((rms(&|s| s.residual[k]) / gyro.decision.rms[k] - 1.0).abs() < 1e-9);
+        assert!((rms(&|s| s.held_out[k]) / gyro.decision.held_out_rms[k] - 1.0).abs() < 1e-9);
+    }
+    let last = picture.steps.last().unwrap();
+    assert!((last.held_out_rms / gyro.decision.held_out_rms[1] - 1.0).abs() < 1e-9);
+}
+
+/// Reading JSON may cost the last bit.
+fn same(a: f64, b: f64) -> bool {
+    (a - b).abs() <= 4.0 * f64::EPSILON * b.abs()
+}
+
+/// Text of an element and all within.
+fn text(node: roxmltree::Node) -> String {
+    node.descendants()
+        .filter_map(|n| n.is_text().then(|| n.text()).flatten())
+        .collect()
+}
+
+/// All numbers below `node`: value, what a person reads.
+fn numbers(node: roxmltree::Node) -> Vec<(f64, String)> {
+    node.descendants()
+        .filter(|n| n.tag_name().name() == "data")
+        .map(|n| (n.attribute("value").unwrap().parse().unwrap(), text(n)))
+        .collect()
+}
+
+#[test]
+fn numbers_of_the_page_are_those_of_the_json_and_are_read_in_its_units() {
+    let folder = tempfile::tempdir().unwrap();
+    record(folder.path(), "r", &cubic(), 1);
+    record(folder.path(), "again", &cubic(), 2);
+    let out = mimu(
+        folder.path(),
+        &[
+            "diagnose", "r", "--verify", "again", "--page", "p.html", "--json", "p.json",
+        ],
+    );
+    assert!(out.status.success(), "{out:?}");
+    let page = std::fs::read_to_string(folder.path().join("p.html")).unwrap();
+    let json = std::fs::read_to_string(folder.path().join("p.json")).unwrap();
+    let json: Value = serde_json::from_str(&json).unwrap();
+    let options = roxmltree::ParsingOptions {
+        allow_dtd: true,
+        ..Default::default()
+    };
+    let document = roxmltree::Document::parse_with_options(&page, options).unwrap();
+    let shown = numbers(document.root());
+    let mut checked = 0;
+    let mut seen = |value: &Value, factor: f64, unit: &str| {
+        let value = value.as_f64().unwrap();
+        let fits = |text: &str| {
+            let number = text.trim_end_matches(unit).trim().replace('−', "-");
+            // Three digits.
+            (number.parse::<f64>()).is_ok_and(|n| (n / (value * factor) - 1.0).abs() < 6e-3)
+        };
+        let found = shown
+            .iter()
+            .any(|(v, text)| same(*v, value) && text.ends_with(unit) && fits(text));
+        let near: Vec<_> = shown
+            .iter()
+            .filter(|(v, _)| (v / value - 1.0).abs() < 0.01)
+            .collect();
+        assert!(found, "{value} {unit}, near it {near:?}");
+        checked += 1;
+    };
+    let deg = 180.0 / std::f64::consts::PI;
+    for (sensor, factor, unit) in [("gyro", deg, "deg/s"), ("accel", 1e3, "mm/s²")] {
+        let figures = &json["sensors"][sensor];
+        for key in ["rms_before", "held_out_rms_before", "noise_floor"] {
+            seen(&figures[key], factor, unit);
+        }
+        for when in ["before", "after"] {
+            seen(
+                &json["second"][when]["sensors"][sensor]["rms"],
+                factor,
+                unit,
+            );
+        }
+    }
+    // The board sits off the table's axis, which an accelerometer feels.
+    let effects = json["effects"].as_array().unwrap();
+    let of_cubic = |e: &&Value| e["id"] == "gyro_scale_cubic";
+    let effect = effects.iter().find(of_cubic).unwrap();
+    for key in ["rms_after", "held_out_rms_after"] {
+        seen(&json["sensors"]["gyro"][key], deg, "deg/s");
+    }
+    for key in ["held_out_rms_before", "held_out_rms_after"] {
+        seen(&effect[key], deg, "deg/s");
+    }
+    for coefficient in effect["coefficients"].as_array().unwrap() {
+        // ppm/(deg/s)²; of the standard deviation twice is shown.
+        seen(&coefficient["value"], 1e6 / (deg * deg), "");
+        seen(&coefficient["sigma"], 2.0 * 1e6 / (deg * deg), "");
+    }
+    assert_eq!(checked, 20);
+    // And the other way: the table of errors has no number that the JSON has not.
+    let table = document
+        .descendants()
+        .find(|n| n.tag_name().name() == "table")
+        .unwrap();
+    for (value, text) in numbers(table) {
+        let known = json["sensors"].as_object().unwrap().values().any(|s| {
+            s.as_object()
+                .unwrap()
+                .values()
+                .any(|v| v.as_f64().is_some_and(|v| same(v, value)))
+        });
+        assert!(known, "{text}");
+    }
+}
+
+#[test]
+fn the_page_needs_nothing_else_and_escapes_names() {
+    let folder = tempfile::tempdir().unwrap();
+    record(folder.path(), "a & <b>", "", 1);
+    let out = mimu(folder.path(), &["diagnose", "a & <b>", "--page", "p.html"]);
+    assert!(out.status.success(), "{out:?}");
+    let page = std::fs::read_to_string(folder.path().join("p.html")).unwrap();
+    let options = roxmltree::ParsingOptions {
+        allow_dtd: true,
+        ..Default::default()
+    };
+    let document = roxmltree::Document::parse_with_options(&page, options).unwrap();
+    let named = |name: &'static str| {
+        document
+            .descendants()
+            .filter(move |n| n.tag_name().name() == name)
+    };
+    assert_eq!(
+        text(named("h1").next().unwrap()),
+        format!("Diagnosis of {DEVICE}")
+    );
+    assert!(named("code").any(|n| text(n) == "a & <b>"));
+    assert!(named("code").any(|n| text(n) == "mimu diagnose \"a & <b>\" --page p.html"));
+    for name in ["script", "link", "img", "iframe", "b"] {
+        assert_eq!(named(name).count(), 0, "{name}");
+    }
+    for node in document.descendants() {
+        assert!(
+            node.attributes()
+                .all(|a| !["src", "href"].contains(&a.name()))
+        );
+    }
+    let style = text(named("style").next().unwrap());
+    assert!(!style.contains("url(") && !style.contains("@import"));
+    let drawings = || named("svg").filter(|n| n.attribute("role").is_some());
+    assert!(drawings().count() >= 8);
+    // Nothing but pixels in them: no number that is none.
+    for path in named("path") {
+        let d = path.attribute("d").unwrap();
+        assert!(!d.contains("NaN") && !d.contains("inf"), "{d}");
+    }
+}
+
+#[test]
+fn where_the_diagnosis_is_refused_there_is_no_page() {
+    let folder = tempfile::tempdir().unwrap();
+    record(folder.path(), "r", "", 1);
+    for (arguments, named) in [
+        (&["diagnose", "nowhere", "--page", "p.html"][..], "nowhere"),
+        (
+            &["diagnose", "r", "--verify", "nowhere", "--page", "p.html"],
+            "nowhere",
+        ),
+        (&["diagnose", "r", "--page", "no/p.html"], "no/p.html"),
+        (
+            &["diagnose", "r", "--page", "r/recording.toml"],
+            "r/recording.toml",
+        ),
+        (
+            &["diagnose", "r", "--page", "p.html", "--json", "p.html"],
+            "p.html",
+        ),
+    ] {
+        let out = mimu(folder.path(), arguments);
+        let error = String::from_utf8(out.stderr).unwrap();
+        assert_eq!(out.status.code(), Some(1), "{arguments:?}: {error}");
+        assert!(
+            error.lines().count() == 1 && error.contains(named),
+            "{error}"
+        );
+        assert!(!folder.path().join("p.html").exists());
+    }
+}

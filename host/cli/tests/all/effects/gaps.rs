@@ -1,0 +1,146 @@
+//! Effects taken out of recordings that lack something: samples, a temperature, the time since power-on.
+
+use mimu::blocks::Moments;
+use mimu::calibration::{Calibration, to_toml};
+use mimu::diagnose::removal::{Removed, remove};
+use mimu::diagnose::{Recordings, diagnose};
+use mimu::dwell::Fault;
+use mimu::fit::{Method, Options};
+use mimu::prepared::Prepared;
+use mimu::quantity::Sensor;
+use mimu::stillness::STILL_FACTOR;
+use mimu_recording::RawUnit;
+
+use super::unit::{SAG, fitted, named, prepared, record, table};
+
+/// A recording, and its calibration with effects, given by id and the value of all coefficients.
+fn unit(effects: &[(&str, f64, usize)]) -> (Prepared, Calibration) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("recording");
+    record(&path, false, true);
+    let tables: Vec<_> = effects
+        .iter()
+        .map(|(id, value, count)| {
+            let mut removed: Removed = named(id, &vec![*value; *count]);
+            removed.form = if id.ends_with("lag") { 60.0 } else { 0.0 };
+            table(&removed)
+        })
+        .collect();
+    let text = to_toml(&fitted(&path), &tables, "2026-01-01T00:00:00Z");
+    (
+        prepared(&path),
+        Calibration::parse(&text, "cal.toml").unwrap(),
+    )
+}
+
+fn removed(from: &Prepared, calibration: &Calibration) -> Prepared {
+    let [gyro, accel] = Sensor::BOTH.map(|s| calibration.inverse(s).unwrap());
+    remove(from, Some(&gyro), Some(&accel), calibration.effects()).unwrap()
+}
+
+#[test]
+fn samples_that_are_missing_from_the_other_triad_do_not_make_an_error() {
+    let (whole, calibration) = unit(&[("gyro_g_sensitivity", SAG, 9)]);
+    let expected = removed(&whole, &calibration);
+    let mut holes = whole.clone();
+    let blocks = whole.dwells.list[5].blocks.clone();
+    for at in blocks.start + 2..blocks.start + 5 {
+        holes.condensed.blocks[at].raw[3..].fill(Moments::default());
+    }
+    let after = removed(&holes, &calibration);
+    for axis in 0..3 {
+        // A dwell shows one force: other blocks of it differ by noise, 2.5 mm/s² a sample of 9.8 m/s².
+        let off = |p: &Prepared| p.dwells.list[5].raw[axis].mean;
+        let moved = (off(&whole) - off(&expected)).abs();
+        assert!((off(&after) - off(&expected)).abs() < 1e-3 * moved);
+        assert!(moved > 0.0);
+    }
+    // Nothing at all in a dwell: it is left out, and said.
+    let mut hole = whole.clone();
+    for at in blocks {
+        hole.condensed.blocks[at].raw[3..].fill(Moments::default());
+    }
+    for mean in &mut hole.dwells.list[5].raw[3..] {
+        mean.n = 0;
+    }
+    let after = removed(&hole, &calibration);
+    assert_eq!(after.dwells.list[5].gyro_fault, Some(Fault::Missing(3)));
+    let said = after.dwells.warnings.join("\n");
+    assert!(
+        said.contains("accel_x missing") && said.contains("gyro_g_sensitivity"),
+        "{said}"
+    );
+}
+
+#[test]
+fn a_lag_begins_at_the_first_temperature() {
+    let (mut whole, calibration) = unit(&[("gyro_thermal_lag", 1e-3, 3)]);
+    let first = whole.condensed.blocks[0].temp_c;
+    for block in &mut whole.condensed.blocks {
+        block.temp_c = first;
+    }
+    // At one temperature all the time there is no lag, whatever the temperature and when it was first read.
+    let mut late = whole.clone();
+    for block in &mut late.condensed.blocks[..30] {
+        block.temp_c.mean = f64::NAN;
+    }
+    let after = removed(&late, &calibration);
+    for (a, b) in after.dwells.list.iter().zip(&late.dwells.list) {
+        assert_eq!(a.raw, b.raw);
+    }
+}
+
+#[test]
+fn what_goes_by_time_is_counted_from_power_on() {
+    const DRIFT: f64 = 1e-6;
+    let (mut from, calibration) = unit(&[("gyro_bias_drift", DRIFT, 3)]);
+    let begun = removed(&from, &calibration);
+    from.manifest.power_on_s = Some(from.condensed.blocks[0].start_s - 600.0);
+    let on = removed(&from, &calibration);
+    let inverse = calibration.inverse(Sensor::Gyro).unwrap();
+    for (a, b) in begun.dwells.list.iter().zip(&on.dwells.list) {
+        let more =
+            inverse.apply(&a.raw_mean(Sensor::Gyro)) - inverse.apply(&b.raw_mean(Sensor::Gyro));
+        // Along the sensors' own directions, a few degrees from the body's.
+        assert!(
+            more.iter().all(|m| (m / (600.0 * DRIFT) - 1.0).abs() < 0.1),
+            "{more}"
+        );
+    }
+}
+
+#[test]
+fn a_given_calibration_has_to_fit_the_recording() {
+    let options = || Options {
+        method: Method::LeastSquares,
+        holdout_blocks: 0,
+        only: None,
+        still_factor: STILL_FACTOR,
+    };
+    let refusal = |first: Prepared, given: &Calibration| {
+        let recordings = Recordings {
+            first,
+            more: Vec::new(),
+            second: None,
+            given: Some(given),
+        };
+        diagnose(recordings, options()).unwrap_err().to_string()
+    };
+    let (from, calibration) = unit(&[("gyro_thermal_bias", 1e-5, 6)]);
+    let mut counts = from.clone();
+    counts.manifest.raw_unit = RawUnit::Count;
+    let said = refusal(counts, &calibration);
+    assert!(
+        said.contains("raw_unit is count") && said.contains("[gyro]"),
+        "{said}"
+    );
+    let mut cold = from;
+    for block in &mut cold.condensed.blocks {
+        block.temp_c.mean = f64::NAN;
+    }
+    let said = refusal(cold, &calibration);
+    assert!(
+        said.contains("gyro_thermal_bias cannot be removed: temp_c is missing"),
+        "{said}"
+    );
+}

@@ -1,0 +1,276 @@
+//! Effects in a calibration: written, read, removed on the PC and by the device alike, and shown by `mimu verify`.
+
+mod codes;
+mod gaps;
+mod refused;
+mod unit;
+
+use std::process::Command;
+
+use mimu::calibration::{Calibration, EffectTable, to_toml};
+use mimu::diagnose::candidate::{Candidate, Kind, Monomial, Variable};
+use mimu::diagnose::library;
+use mimu::diagnose::library::readout::Converter;
+use mimu::diagnose::removal::{Removed, remove};
+use mimu::quantity::Sensor;
+use mimu_core::compensation::Sample;
+use mimu_core::effects::{Effects, State};
+use mimu_device::Image;
+use nalgebra::Vector3;
+
+use unit::{BIT_0_V, CUBIC, SAG, THERMAL, fitted, named, record, removed, table};
+
+/// All that is known by name, some of it with some of its coefficients only, and three terms; ten times what data sheets say.
+fn every_effect() -> Vec<Removed> {
+    let mut all: Vec<Removed> = library::all()
+        .filter(|effect| effect.is_error())
+        .enumerate()
+        .map(|(n, effect)| {
+            let mut candidate = Candidate::new(effect.sensor, Kind::Effect(effect));
+            if candidate.reads_code() {
+                let zero = 0.123;
+                let weight = BIT_0_V;
+                candidate = candidate.behind_one(Converter::of(weight, zero));
+            }
+            if n % 2 == 1 {
+                candidate.active.remove(1);
+            }
+            let sign = |k: usize| if (n + k).is_multiple_of(3) { -1.0 } else { 1.0 };
+            let values: Vec<f64> = candidate
+                .active
+                .iter()
+                .map(|k| sign(*k) * effect.typical[*k] * (10.0 + 3.0 * (*k as f64).sqrt()))
+                .collect();
+            let form = effect.form.map_or(0.0, |f| 2.0 * f.from);
+            removed(candidate, form, &values)
+        })
+        .collect();
+    let term = |sensor, axis, v: &[Variable], value| {
+        removed(
+            Candidate::new(sensor, Kind::Term(axis, Monomial(v.to_vec()))),
+            0.0,
+            &[value],
+        )
+    };
+    use Variable::{Force, Rate, Temperature, TemperatureRate, Time};
+    all.push(term(Sensor::Gyro, 0, &[Rate(0), Force(1), Force(1)], 1e-4));
+    all.push(term(Sensor::Gyro, 1, &[TemperatureRate, Time], 1e-4));
+    all.push(term(Sensor::Accel, 2, &[Rate(2), Temperature], 1e-3));
+    all
+}
+
+#[test]
+fn every_effect_comes_back_from_the_file_and_the_device_removes_what_the_pc_does() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("recording");
+    record(&path, false, true);
+    let fit = fitted(&path);
+    let effects = every_effect();
+    let tables: Vec<EffectTable> = effects.iter().map(table).collect();
+    let text = to_toml(&fit, &tables, "2026-01-01T00:00:00Z");
+    let calibration = Calibration::parse(&text, "cal.toml").unwrap();
+    assert_eq!(calibration.effects().len(), effects.len());
+    for (read, written) in calibration.effects().iter().zip(&effects) {
+        assert_eq!(read.candidate.id(), written.candidate.id());
+        assert_eq!(read.candidate.active, written.candidate.active);
+        assert_eq!((read.form, &read.values), (written.form, &written.values));
+        assert_eq!(read.candidate.codes, written.candidate.codes);
+    }
+
+    // Of a block the PC knows mean and scatter, from which bits follow another way.
+    let effects: Vec<Removed> = every_effect()
+        .into_iter()
+        .filter(|e| !e.candidate.reads_code())
+        .collect();
+    let tables: Vec<EffectTable> = effects.iter().map(table).collect();
+    let text = to_toml(&fit, &tables, "2026-01-01T00:00:00Z");
+    let calibration = Calibration::parse(&text, "cal.toml").unwrap();
+    let before = &fit.prepared;
+    let [gyro, accel] = Sensor::BOTH.map(|s| calibration.inverse(s).unwrap());
+    let after = remove(before, Some(&gyro), Some(&accel), calibration.effects()).unwrap();
+    let device: Effects<f64, 8> = calibration.core_effects().unwrap();
+    let mut state = State::new(10.0);
+    let mut t = before.condensed.blocks[0].start_s;
+    let mut moved = [0.0_f64; 2];
+    for (block, clean) in before.condensed.blocks.iter().zip(&after.condensed.blocks) {
+        let middle = 0.5 * (block.start_s + block.last_s);
+        device.slow(&mut state, middle - t, block.temp_c.mean);
+        t = middle;
+        let si = |block: &mimu::blocks::Block| {
+            let raw = |from: usize| Vector3::from_fn(|i, _| block.raw[from + i].mean);
+            Sample {
+                gyro: gyro.apply(&raw(0)),
+                accel: accel.apply(&raw(3)),
+            }
+        };
+        // No block follows the one before sample by sample: evaluated twice, as on the PC, and without an angular acceleration.
+        state.gap();
+        let by_device = device.remove(&mut state, &si(block));
+        let (by_host, raw) = (si(clean), si(block));
+        // The same formula in another order: rounding.
+        assert!((by_device.gyro - by_host.gyro).norm() < 1e-12);
+        assert!((by_device.accel - by_host.accel).norm() < 1e-12);
+        moved[0] = moved[0].max((by_host.gyro - raw.gyro).norm());
+        moved[1] = moved[1].max((by_host.accel - raw.accel).norm());
+    }
+    assert!(moved[0] > 0.01 && moved[1] > 0.1, "{moved:?}");
+}
+
+/// What is of one recording alone, as where the die was when it began, the device has no room for.
+#[test]
+fn every_effect_goes_into_the_bytes_of_a_device() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("recording");
+    record(&path, false, true);
+    let fit = fitted(&path);
+    // Of roots no sum is another, and a second look at a code never moves an error by just as much as it is.
+    for effect in every_effect() {
+        let id = effect.candidate.id();
+        let text = to_toml(&fit, &[table(&effect)], "2026-01-01T00:00:00Z");
+        let calibration = Calibration::parse(&text, "cal.toml").unwrap();
+        let image = Image::new(&calibration, "cal.toml").unwrap();
+        let stored = image.stored().unwrap();
+        assert_eq!(image.effects, [id.as_str()]);
+        let single = stored.effects.expect("one");
+        let double: Effects<f64, 8> = calibration.core_effects().unwrap();
+        let (mut of_single, mut of_double) = (State::new(10.0), State::new(10.0));
+        let (mut most, mut beside) = (0.0_f64, 0);
+        for k in 0..600 {
+            let t = f64::from(k) * 0.5;
+            let temp_c = 25.0 + 10.0 * (0.02 * t).sin();
+            single.slow(&mut of_single, 0.5, temp_c as f32);
+            double.slow(&mut of_double, 0.5, temp_c);
+            let raw = Sample {
+                gyro: Vector3::new(1.7, 1.5, 1.9).map(|v| v + 0.3 * (0.7 * t).sin()),
+                accel: Vector3::new(1.2, 1.9, 1.6).map(|v| v + 0.3 * (0.9 * t).cos()),
+            };
+            let raw_single = Sample {
+                gyro: raw.gyro.cast::<f32>(),
+                accel: raw.accel.cast::<f32>(),
+            };
+            let removed = |from: &Sample<f64>| {
+                let [gyro, accel] = Sensor::BOTH.map(|s| calibration.inverse(s).unwrap());
+                Sample {
+                    gyro: gyro.apply(&from.gyro),
+                    accel: accel.apply(&from.accel),
+                }
+            };
+            let si = removed(&double.without_code_errors(&raw));
+            let by_double = double.remove(&mut of_double, &si);
+            let coded = single.without_code_errors(&raw_single);
+            let si_single = removed(&Sample {
+                gyro: coded.gyro.cast(),
+                accel: coded.accel.cast(),
+            });
+            let by_single = single.remove(
+                &mut of_single,
+                &Sample {
+                    gyro: si_single.gyro.cast(),
+                    accel: si_single.accel.cast(),
+                },
+            );
+            let off = (by_single.gyro.cast::<f64>() - by_double.gyro).norm()
+                + (by_single.accel.cast::<f64>() - by_double.accel).norm();
+            let plain = removed(&raw);
+            let moved =
+                (by_double.gyro - plain.gyro).norm() + (by_double.accel - plain.accel).norm();
+            // Rounding, which an angular acceleration takes over 0.1 s.
+            beside += u32::from(off > 1e-3 * moved + 1e-4);
+            most = most.max(moved);
+        }
+        assert!(most > 1e-5, "{id}: {most}");
+        // Codes are counted in single precision, to a thousandth of the finest bit: of three axes as many samples are on the other side.
+        let allowed = if effect.candidate.reads_code() { 6 } else { 0 };
+        assert!(beside <= allowed, "{id}: {beside} of 600");
+    }
+}
+
+fn mimu(arguments: &[&str]) -> (bool, String) {
+    let run = Command::new(env!("CARGO_BIN_EXE_mimu"))
+        .args(arguments)
+        .output()
+        .unwrap();
+    let text = if run.status.success() {
+        run.stdout
+    } else {
+        run.stderr
+    };
+    (run.status.success(), String::from_utf8(text).unwrap())
+}
+
+#[test]
+fn verifying_shows_the_error_with_the_effects_removed_and_left() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let text = |name: &str| path(name).to_str().unwrap().to_string();
+    record(&path("clean"), false, true);
+    record(&path("flawed"), true, true);
+    record(&path("cold"), true, false);
+    let effects = [
+        named(
+            "gyro_g_sensitivity",
+            &[0.0, 0.0, SAG, SAG, 0.0, 0.0, 0.0, 0.0, 0.0],
+        ),
+        named("gyro_thermal_bias", &[0.0, 0.0, THERMAL, 0.0, 0.0, 0.0]),
+        named("accel_scale_cubic", &[CUBIC; 3]),
+    ];
+    // The affine part is that of the unit without flaws, and the effects are its flaws: only noise can be left.
+    let fit = fitted(&path("clean"));
+    let tables = effects.each_ref().map(table);
+    std::fs::write(
+        path("cal.toml"),
+        to_toml(&fit, &tables, "2026-01-01T00:00:00Z"),
+    )
+    .unwrap();
+    let calibration = text("cal.toml");
+    let arguments = |recording: &str| {
+        let recording = text(recording);
+        [
+            "verify".into(),
+            recording,
+            "--calibration".into(),
+            calibration.clone(),
+        ]
+    };
+    let run = |recording: &str, more: &[&str]| {
+        let all = arguments(recording);
+        mimu(
+            &all.iter()
+                .map(String::as_str)
+                .chain(more.iter().copied())
+                .collect::<Vec<_>>(),
+        )
+    };
+    let (done, json) = run("flawed", &["--json", "-"]);
+    assert!(done, "{json}");
+    let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+    for sensor in ["gyro", "accel"] {
+        let figure = |key: &str| json["sensors"][sensor][key].as_f64().unwrap();
+        let floor = figure("noise_floor");
+        assert!(
+            figure("rms") < 1.5 * floor,
+            "{sensor}: {} {floor}",
+            figure("rms")
+        );
+        assert!(
+            figure("rms_affine") > 10.0 * floor,
+            "{sensor}: {}",
+            figure("rms_affine")
+        );
+        assert!(figure("rms_raw") > figure("rms_affine"), "{sensor}");
+    }
+    let (_, shown) = run("flawed", &[]);
+    assert_eq!(shown.matches("effects left in").count(), 2, "{shown}");
+
+    let (done, refusal) = run("cold", &[]);
+    assert!(!done);
+    assert!(
+        refusal.contains("gyro_thermal_bias") && refusal.contains("temp_c is missing"),
+        "{refusal}"
+    );
+
+    // Without effects nothing is said of them.
+    std::fs::write(path("cal.toml"), to_toml(&fit, &[], "2026-01-01T00:00:00Z")).unwrap();
+    let (done, json) = run("cold", &["--json", "-"]);
+    assert!(done && !json.contains("rms_affine"), "{json}");
+}

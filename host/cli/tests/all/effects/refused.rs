@@ -1,0 +1,138 @@
+//! Effects in a calibration file that cannot be right, or that the device has no room for.
+
+use mimu::calibration::{Calibration, to_toml};
+use mimu::diagnose::candidate::{Candidate, Kind};
+use mimu::diagnose::library;
+use mimu::quantity::Sensor;
+
+use super::unit::{fitted, named, record, removed, table};
+
+#[test]
+fn an_effect_that_was_edited_or_that_nobody_knows_is_refused_by_its_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("recording");
+    record(&path, false, true);
+    let fit = fitted(&path);
+    let effect = library::by_id("gyro_warm_up").unwrap();
+    let candidate = Candidate::new(Sensor::Gyro, Kind::Effect(effect));
+    let warm_up = table(&removed(candidate, 90.0, &[1e-3, 2e-3, 3e-3]));
+    let sag = table(&named("gyro_g_sensitivity", &[1e-5; 9]));
+    let text = to_toml(&fit, &[warm_up, sag], "2026-01-01T00:00:00Z");
+    let calibration = Calibration::parse(&text, "cal.toml").unwrap();
+    let device = calibration.core_effects::<f32, 8>();
+    assert!(device.is_ok());
+
+    let edits = [
+        (
+            "id = \"gyro_warm_up\"",
+            "id = \"gyro_magnetic\"",
+            "gyro_magnetic",
+            "knows no effect",
+        ),
+        (
+            "id = \"gyro_warm_up\"",
+            "id = \"accel_warm_up\"",
+            "accel_warm_up",
+            "sensor is",
+        ),
+        (
+            "id = \"gyro_warm_up\"",
+            "id = \"gyro_g_sensitivity\"",
+            "gyro_g_sensitivity",
+            "has none",
+        ),
+        (
+            "{ name = \"y\", value",
+            "{ name = \"w\", value",
+            "gyro_warm_up",
+            "is none of its: x, y, z",
+        ),
+        (
+            "{ name = \"y\", value",
+            "{ name = \"x\", value",
+            "gyro_warm_up",
+            "twice",
+        ),
+        (
+            "unit = \"rad/s\" }",
+            "unit = \"deg/s\" }",
+            "gyro_warm_up",
+            "unit of",
+        ),
+        (
+            "value = 0.002",
+            "value = nan",
+            "gyro_warm_up",
+            "not a number",
+        ),
+        (
+            "sigma = 2.000e-5",
+            "sigma = -1.0",
+            "gyro_warm_up",
+            "not a number",
+        ),
+        (
+            "value = 90.0",
+            "value = 0.0",
+            "gyro_warm_up",
+            "time_constant_s",
+        ),
+        ("form = {", "# form = {", "gyro_warm_up", "time_constant_s"),
+        (
+            "x = C (u - S e) + o",
+            "x = C (u + S e) + o",
+            "gyro_warm_up",
+            "can be applied",
+        ),
+    ];
+    for (from, to, id, says) in edits {
+        assert!(text.contains(from), "{from}");
+        let at = text.find("[[effect]]").unwrap();
+        let (triads, effects) = text.split_at(at);
+        let edited = format!("{triads}{}", effects.replacen(from, to, 1));
+        let refusal = Calibration::parse(&edited, "cal.toml")
+            .unwrap_err()
+            .to_string();
+        assert!(refusal.contains(id) && refusal.contains(says), "{refusal}");
+        assert!(!refusal.contains('\n'), "{refusal}");
+    }
+    let (first, rest) = text.split_once("\n[[effect]]").unwrap();
+    let twice = format!(
+        "{first}\n[[effect]]{rest}\n[[effect]]{}",
+        rest.split("\n[[effect]]").next().unwrap()
+    );
+    let refusal = Calibration::parse(&twice, "cal.toml")
+        .unwrap_err()
+        .to_string();
+    assert!(refusal.contains("there twice"), "{refusal}");
+    // The sag is by the force.
+    let from = text.find("\n[accel]").unwrap();
+    let gyro_only = format!("{}\n[[effect]]{rest}", &text[..from]);
+    let refusal = Calibration::parse(&gyro_only, "cal.toml")
+        .unwrap_err()
+        .to_string();
+    assert!(
+        refusal.contains("gyro_g_sensitivity") && refusal.contains("[accel]"),
+        "{refusal}"
+    );
+}
+
+#[test]
+fn more_effects_than_the_device_has_room_for_are_refused_by_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("recording");
+    record(&path, false, true);
+    let effects = ["gyro_bias_drift", "accel_bias_drift", "gyro_thermal_scale"]
+        .map(|id| table(&named(id, &[1e-7; 3])));
+    let text = to_toml(&fitted(&path), &effects, "2026-01-01T00:00:00Z");
+    let calibration = Calibration::parse(&text, "cal.toml").unwrap();
+    assert!(calibration.core_effects::<f32, 2>().is_ok());
+    let refusal = calibration
+        .core_effects::<f32, 1>()
+        .unwrap_err()
+        .to_string();
+    assert!(
+        refusal.contains("gyro_thermal_scale") && refusal.contains("at most 1"),
+        "{refusal}"
+    );
+}

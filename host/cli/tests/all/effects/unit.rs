@@ -1,0 +1,185 @@
+//! The unit of these tests, a recording of it, and effects to give it.
+
+use mimu::calibration::EffectTable;
+use mimu::diagnose::candidate::{Candidate, Kind};
+use mimu::diagnose::library;
+use mimu::diagnose::library::readout::TYPICAL;
+use mimu::diagnose::removal::Removed;
+use mimu::fit::{Fit, Method, Options, fit};
+use mimu::prepared::Prepared;
+use mimu::stillness::STILL_FACTOR;
+use mimu_recording::Recording;
+use nalgebra::{Matrix3, Vector3};
+use std::fmt::Write as _;
+use std::path::Path;
+
+pub const DWELLS: usize = 72;
+pub const RATE_HZ: f64 = 50.0;
+pub const DWELL_S: f64 = 2.0;
+pub const G: f64 = 9.80665;
+/// Standard deviations of a sample, V.
+pub const NOISE: [f64; 2] = [1e-4, 2e-4];
+
+/// Forward model of the bench's unit, V per SI: rows are sensors.
+pub fn forward(sensor: usize) -> (Matrix3<f64>, Vector3<f64>) {
+    match sensor {
+        0 => (
+            Matrix3::new(0.4, 0.01, -0.02, 0.01, 0.5, 0.02, -0.01, 0.02, 0.3),
+            Vector3::new(1.6, 1.7, 1.5),
+        ),
+        _ => (
+            Matrix3::new(0.08, 0.001, 0.0, -0.001, 0.07, 0.002, 0.001, 0.0, 0.09),
+            Vector3::new(1.65, 1.6, 1.7),
+        ),
+    }
+}
+
+/// Temperature of the bench, °C: a ramp.
+pub fn temp_c(t: f64) -> f64 {
+    22.0 + 0.15 * t
+}
+
+/// Sag of the gyros, rad/s by m/s².
+pub const SAG: f64 = 4e-4;
+/// Cubic of the accelerometer, by (m/s²)².
+///
+/// An effect is removed by the reading that errs: of the cubic's error, 0.03 m/s² at most, its slope of 0.9 % stays.
+pub const CUBIC: f64 = 3e-5;
+/// Thermal bias of gyro z, rad/s/K.
+pub const THERMAL: f64 = 5e-4;
+
+/// Weight of bit 0 of the converters, V.
+pub const BIT_0_V: f64 = 1.6384;
+/// Bits of each converter of the accelerometer that are worth more than they say, V, three times what data sheets say and less.
+pub const WORTH_V: [[(i32, f64); 3]; 3] = {
+    let one = TYPICAL * BIT_0_V;
+    [
+        [(0, 3.0 * one), (3, -2.0 * one), (6, one)],
+        [(1, -3.0 * one), (2, 2.0 * one), (5, -one)],
+        [(0, -2.0 * one), (4, 3.0 * one), (7, -one)],
+    ]
+};
+/// Readings of code 0, V: what has been subtracted is no multiple of anything.
+pub const ZERO_V: [f64; 3] = [-0.0713, -1.1234, -0.5061];
+
+/// What the converters of the accelerometer add to a reading of `u` of an axis, V.
+pub fn worth(axis: usize, u: f64) -> f64 {
+    let each = WORTH_V[axis].iter().map(|(bit, worth)| {
+        let code = ((u - ZERO_V[axis]) / (BIT_0_V * 0.5_f64.powi(*bit))).floor();
+        if code.rem_euclid(2.0) == 1.0 {
+            *worth
+        } else {
+            0.0
+        }
+    });
+    each.sum()
+}
+
+/// Records the unit on a table, with its flaws or without; `temp` says whether temp_c is recorded.
+pub fn record(folder: &Path, flawed: bool, temp: bool) {
+    write_recording(folder, flawed, false, temp);
+}
+
+pub fn write_recording(folder: &Path, flawed: bool, converted: bool, temp: bool) {
+    std::fs::create_dir(folder).unwrap();
+    let manifest = format!(
+        "format = \"mimu-recording/1\"\ndevice = \"bench\"\nsample_rate_hz = {RATE_HZ:?}\n\
+         gravity_mps2 = {G}\nraw_unit = \"V\"\nreference = \"table\"\n"
+    );
+    std::fs::write(folder.join("recording.toml"), manifest).unwrap();
+    let mut out = String::from("t_s,step,");
+    if temp {
+        out.push_str("temp_c,");
+    }
+    out.push_str("gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z,");
+    out.push_str("ref_rate_x_dps,ref_rate_y_dps,ref_rate_z_dps,");
+    out.push_str("ref_force_x_mps2,ref_force_y_mps2,ref_force_z_mps2\n");
+    let mut seed = 7 + u64::from(flawed);
+    // Sum of twelve uniform numbers: near enough to normal.
+    let mut normal = move || {
+        let mut next = || {
+            seed = seed
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            (seed >> 11) as f64 / (1u64 << 53) as f64
+        };
+        (0..12).map(|_| next()).sum::<f64>() - 6.0
+    };
+    let rows = (DWELL_S * RATE_HZ) as usize;
+    for k in 0..DWELLS * rows {
+        let (t, step) = (k as f64 / RATE_HZ, k / rows);
+        let s = step as f64;
+        // Directions and rates that repeat late: by the golden angle.
+        let force = Vector3::new((2.4 * s).sin(), (2.4 * s).cos(), (0.9 * s).sin()).normalize() * G;
+        let rate_dps = Vector3::new((1.3 * s).sin(), (1.7 * s).cos(), (2.9 * s).sin()) * 60.0;
+        let mut inputs = [rate_dps.map(f64::to_radians), force];
+        write!(out, "{t:.4},{step}").unwrap();
+        if temp {
+            write!(out, ",{:.6}", temp_c(t)).unwrap();
+        }
+        for (sensor, input) in inputs.iter_mut().enumerate() {
+            let (p, b) = forward(sensor);
+            let scale = Vector3::from_fn(|i, _| p.row(i).norm());
+            let error = match (flawed, sensor) {
+                (false, _) => Vector3::zeros(),
+                (_, 0) => Vector3::new(SAG * force.z, SAG * force.x, THERMAL * (temp_c(t) - 25.0)),
+                _ => Vector3::from_fn(|i, _| {
+                    CUBIC * (p.row(i).transpose().dot(&force) / scale[i]).powi(3)
+                }),
+            };
+            let read = p * *input + b + scale.component_mul(&error);
+            for (axis, u) in read.iter().enumerate() {
+                let u = u + NOISE[sensor] * normal();
+                let more = if converted && sensor == 1 {
+                    worth(axis, u)
+                } else {
+                    0.0
+                };
+                write!(out, ",{:.9}", u + more).unwrap();
+            }
+        }
+        for v in rate_dps.iter().chain(force.iter()) {
+            write!(out, ",{v:.9}").unwrap();
+        }
+        out.push('\n');
+    }
+    std::fs::write(folder.join("samples.csv"), out).unwrap();
+}
+
+pub fn prepared(folder: &Path) -> Prepared {
+    let recording = Recording::open(folder).unwrap();
+    Prepared::read(&recording, STILL_FACTOR, |_| ()).unwrap()
+}
+
+pub fn fitted(folder: &Path) -> Fit {
+    let options = Options {
+        method: Method::LeastSquares,
+        holdout_blocks: 0,
+        still_factor: STILL_FACTOR,
+        only: None,
+    };
+    fit(prepared(folder), options).unwrap()
+}
+
+pub fn removed(candidate: Candidate, form: f64, values: &[f64]) -> Removed {
+    let values = values.to_vec();
+    Removed {
+        candidate,
+        form,
+        values,
+    }
+}
+
+pub fn named(id: &str, values: &[f64]) -> Removed {
+    let effect = library::by_id(id).unwrap();
+    removed(
+        Candidate::new(effect.sensor, Kind::Effect(effect)),
+        0.0,
+        values,
+    )
+}
+
+pub fn table(effect: &Removed) -> EffectTable {
+    let sigmas: Vec<f64> = effect.values.iter().map(|v| 0.01 * v.abs()).collect();
+    EffectTable::new(effect, &sigmas)
+}

@@ -1,0 +1,516 @@
+//! Mutated recordings, manifests, calibrations and foreign files, all the way through the library.
+//!
+//! Every case ends in a result without a NaN, or in an error of one line with its three parts; never in a panic or a
+//! hang. A few seconds in an ordinary test run; longer by hand:
+//!
+//! ```text
+//! MIMU_FUZZ_SECONDS=600 MIMU_FUZZ_SEED=2 cargo test --release -p mimu-cli --test all fuzz -- --nocapture
+//! ```
+//!
+//! A failure prints the number of its case; `MIMU_FUZZ_CASE` runs that one alone.
+
+mod mutation;
+
+use std::fmt::Write as _;
+use std::fs;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::{Duration, Instant};
+
+use mimu::calibration::{Calibration, to_toml};
+use mimu::fit::{Fit, Method, Options, fit};
+use mimu::prepared::Prepared;
+use mimu::quantity::Sensor;
+use mimu::verify::verify;
+use mimu_cli::report;
+use mimu_recording::error::{Error, Result};
+use mimu_recording::{
+    ColumnList, ImportOptions, RawUnit, Recording, Reference, SampleFormat, import,
+};
+
+use mutation::*;
+
+const DEFAULT_SEED: u64 = 20_260_101;
+const DEFAULT_SECONDS: u64 = 12;
+/// A case takes some milliseconds; this long, it hangs.
+const HANG: Duration = Duration::from_secs(30);
+
+const MANIFEST: &str = r#"format = "mimu-recording/1"
+device = "unit-7"
+sample_rate_hz = 20.0
+gravity_mps2 = 9.81
+raw_unit = "count"
+reference = "REFERENCE"
+latitude_deg = 30.5
+step_labels = ["first", "second"]
+turn_steps = [25]
+
+[rails]
+gyro = [-32768.0, 32767.0]
+"#;
+
+/// Readings of a sensor at `x`: another matrix for gyro and accelerometer, which is all that matters here.
+fn reading(sensor: usize, x: [f64; 3], random: &mut Random) -> [i64; 3] {
+    let scale = [5000.0, 1600.0][sensor];
+    [0, 1, 2].map(|i| {
+        let skewed = x[i] + 0.01 * x[(i + 1) % 3] - 0.02 * x[(i + 2) % 3];
+        let noise: f64 = (0..4).map(|_| random.uniform() - 0.5).sum();
+        (scale * skewed + 40.0 * (i as f64 - 1.0) + 10.0 * noise).round() as i64
+    })
+}
+
+/// Poses with turns about a changing axis between them, at 20 Hz. With `table`, the inputs are told.
+fn samples(table: bool) -> String {
+    const POSE: usize = 30;
+    const TURN: usize = 16;
+    let mut random = Random(7);
+    let mut out = String::from("t_s,step,temp_c,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z");
+    if table {
+        out.push_str(",ref_rate_x_dps,ref_rate_y_dps,ref_rate_z_dps,ref_force_x_mps2,ref_force_y_mps2,ref_force_z_mps2");
+    }
+    out.push('\n');
+    let mut up = [0.0, 0.0, 1.0];
+    let mut row = 0;
+    for pose in 0..13_usize {
+        let axis: [f64; 3] = [
+            0.3 + (pose % 3) as f64,
+            1.0 - (pose % 2) as f64,
+            0.7 - (pose % 5) as f64,
+        ];
+        let size = axis.iter().map(|a| a * a).sum::<f64>().sqrt();
+        let axis = axis.map(|a| a / size);
+        let angle = 1.2 + 0.1 * (pose % 4) as f64;
+        for k in 0..POSE + TURN {
+            let turning = k >= POSE;
+            let mut rate = [0.0; 3];
+            if turning {
+                let part = (k - POSE) as f64 / TURN as f64;
+                let size = angle * (1.0 - (2.0 * std::f64::consts::PI * part).cos())
+                    / (TURN as f64 / 20.0);
+                rate = axis.map(|a| a * size);
+                // A direction that rests in the world turns by up × rate in the body.
+                let step = rate.map(|r| r / 20.0);
+                let turned = [
+                    up[1] * step[2] - up[2] * step[1],
+                    up[2] * step[0] - up[0] * step[2],
+                    up[0] * step[1] - up[1] * step[0],
+                ];
+                let moved = [0, 1, 2].map(|i| up[i] + turned[i]);
+                let size = moved.iter().map(|a| a * a).sum::<f64>().sqrt();
+                up = moved.map(|a| a / size);
+            } else if table {
+                rate = axis.map(|a| a * (pose % 3) as f64);
+            }
+            let force = up.map(|u| 9.81 * u);
+            let step = if turning { -1 } else { pose as i64 };
+            let [gx, gy, gz] = reading(0, rate, &mut random);
+            let [ax, ay, az] = reading(1, force, &mut random);
+            let t = f64::from(row) / 20.0;
+            let _ = write!(
+                out,
+                "{t},{step},25.{},{gx},{gy},{gz},{ax},{ay},{az}",
+                row % 10
+            );
+            if table {
+                let cells = rate.map(f64::to_degrees).into_iter().chain(force);
+                for cell in cells {
+                    let _ = match turning {
+                        true => write!(out, ","),
+                        false => write!(out, ",{cell:.4}"),
+                    };
+                }
+            }
+            out.push('\n');
+            row += 1;
+        }
+    }
+    out
+}
+
+/// Without the column `step`, so that dwells are looked for.
+fn without_steps(text: &str) -> String {
+    let line = |line: &str| {
+        let cells = line.split(',').enumerate().filter(|(i, _)| *i != 1);
+        cells.map(|(_, cell)| cell).collect::<Vec<_>>().join(",") + "\n"
+    };
+    text.lines().map(line).collect()
+}
+
+/// What the cases start from.
+struct Seeds {
+    /// Samples with what is known of their input.
+    csv: Vec<(String, &'static str)>,
+    parquet: Vec<(Vec<u8>, &'static str)>,
+    calibration: String,
+    inputs: String,
+}
+
+const INPUTS: &str = "step,ref_force_x_mps2,ref_force_y_mps2,ref_force_z_mps2,turn_x_deg,ref_rate_y_dps,ref_rate_z_dps\n\
+                      0,0,0,9.81,0,0,0\n1,0,9.81,0,90,0,0\n2,9.81,0,0,,1.5,0\n3,0,0,-9.81,-360,0,0\n";
+
+fn options(random: &mut Random) -> Options {
+    let methods = [
+        Method::LeastSquares,
+        Method::Kalman,
+        Method::Xu,
+        Method::SixPositions,
+    ];
+    Options {
+        method: methods[if random.one_in(2) { 0 } else { random.below(4) }],
+        holdout_blocks: [0, 2, 4, 1000][random.below(4)],
+        only: [None, None, Some(Sensor::Gyro), Some(Sensor::Accel)][random.below(4)],
+        still_factor: [10.0, 1.0, 1e9][if random.one_in(2) { 0 } else { random.below(3) }],
+    }
+}
+
+fn write_recording(folder: &Path, manifest: &[u8], name: &str, samples: &[u8]) {
+    let _ = fs::remove_dir_all(folder);
+    fs::create_dir_all(folder).unwrap();
+    fs::write(folder.join("recording.toml"), manifest).unwrap();
+    fs::write(folder.join(name), samples).unwrap();
+}
+
+fn manifest(reference: &str) -> Vec<u8> {
+    MANIFEST.replace("REFERENCE", reference).into_bytes()
+}
+
+fn fit_recording(folder: &Path, options: Options) -> Result<Fit> {
+    let recording = Recording::open(folder)?;
+    fit(
+        Prepared::read(&recording, options.still_factor, |_| {})?,
+        options,
+    )
+}
+
+impl Seeds {
+    fn new(folder: &Path) -> Self {
+        let (by_table, by_hand) = (samples(true), samples(false));
+        let csv = vec![
+            (without_steps(&by_hand), "gravity"),
+            (by_hand.clone(), "gravity"),
+            (by_table.clone(), "table"),
+            (without_steps(&by_table), "table"),
+        ];
+        let options = Options {
+            method: Method::LeastSquares,
+            holdout_blocks: 4,
+            only: None,
+            still_factor: 10.0,
+        };
+        let mut calibration = String::new();
+        let mut parquet = Vec::new();
+        for (text, reference) in &csv {
+            write_recording(
+                &folder.join("seed"),
+                &manifest(reference),
+                "samples.csv",
+                text.as_bytes(),
+            );
+            let fitted = fit_recording(&folder.join("seed"), options).expect("the seeds are valid");
+            calibration = to_toml(&fitted, &[], "2026-01-01T00:00:00Z");
+            let files = vec![folder.join("seed/samples.csv")];
+            let known = if *reference == "table" {
+                Reference::Table
+            } else {
+                Reference::Gravity
+            };
+            let out = folder.join("parquet");
+            let _ = fs::remove_dir_all(&out);
+            import(
+                &ImportOptions::new(files, 9.81, RawUnit::Count, known),
+                &out,
+                |_| {},
+            )
+            .expect("valid");
+            parquet.push((fs::read(out.join("samples.parquet")).unwrap(), *reference));
+        }
+        Self {
+            csv,
+            parquet,
+            calibration,
+            inputs: INPUTS.into(),
+        }
+    }
+}
+
+/// Whether an error is one line with its three parts.
+fn well_formed(error: &Error) -> std::result::Result<(), String> {
+    let line = error.to_string();
+    let parts = [&error.place, &error.problem, &error.remedy];
+    if parts.iter().any(|p| p.trim().is_empty())
+        || line.contains(char::is_control)
+        || line.lines().count() != 1
+    {
+        return Err(format!("a bad message: {error:?}"));
+    }
+    Ok(())
+}
+
+/// Whether a fit is one of numbers, in itself and as people and programs see it.
+fn numbers(fit: &Fit) -> std::result::Result<(), String> {
+    let json = report::fit_json(fit);
+    for sensor in json["sensors"].as_object().into_iter().flatten() {
+        for parameter in sensor.1["parameters"].as_array().into_iter().flatten() {
+            for key in ["value", "sigma", "lower", "upper"] {
+                // JSON has no NaN: it becomes null.
+                if !parameter[key].is_number() {
+                    return Err(format!("{}: {parameter}", sensor.0));
+                }
+            }
+        }
+        for key in ["rms", "noise_floor"] {
+            if !sensor.1[key].is_number() {
+                return Err(format!("{} {key}: {}", sensor.0, sensor.1[key]));
+            }
+        }
+    }
+    report::fit_text(fit);
+    report::dwell_table(&fit.prepared.dwells.list, &fit.prepared.manifest);
+    Calibration::parse(&to_toml(fit, &[], "2026-01-01T00:00:00Z"), "written")
+        .map(drop)
+        .map_err(|error| format!("what was written cannot be read: {error}"))
+}
+
+/// Runs one case; what is wrong with its answer.
+fn run(seeds: &Seeds, folder: &Path, random: &mut Random) -> std::result::Result<bool, String> {
+    let options = options(random);
+    let recording = folder.join("rec");
+    let answer = match random.below(8) {
+        0..=3 => {
+            let (text, reference) = &seeds.csv[random.below(seeds.csv.len())];
+            let mut manifest = manifest(reference);
+            if random.one_in(10) {
+                manifest = mutate(&manifest, random);
+            }
+            let samples = match random.one_in(3) {
+                true => mutate(text.as_bytes(), random),
+                false => mutate_numbers(text, random),
+            };
+            write_recording(&recording, &manifest, "samples.csv", &samples);
+            fit_recording(&recording, options).map(Some)
+        }
+        4 => {
+            let (bytes, reference) = &seeds.parquet[random.below(seeds.parquet.len())];
+            let mut bytes = bytes.clone();
+            for _ in 0..1 + random.below(3) {
+                if !bytes.is_empty() {
+                    mutate_bytes(&mut bytes, random);
+                }
+            }
+            write_recording(&recording, &manifest(reference), "samples.parquet", &bytes);
+            fit_recording(&recording, options).map(Some)
+        }
+        5 => {
+            let (text, reference) = &seeds.csv[random.below(seeds.csv.len())];
+            write_recording(
+                &recording,
+                &mutate(&manifest(reference), random),
+                "samples.csv",
+                text.as_bytes(),
+            );
+            fit_recording(&recording, options).map(Some)
+        }
+        6 => verify_mutated(seeds, &recording, random).map(|()| None),
+        _ => import_mutated(seeds, folder, random)
+            .and_then(|()| fit_recording(&recording, options).map(Some)),
+    };
+    match answer {
+        Ok(Some(fit)) => numbers(&fit).map(|()| true),
+        Ok(None) => Ok(true),
+        Err(error) => well_formed(&error).map(|()| false),
+    }
+}
+
+fn verify_mutated(seeds: &Seeds, recording: &Path, random: &mut Random) -> Result<()> {
+    let mut calibration = seeds.calibration.clone().into_bytes();
+    if random.one_in(2) {
+        calibration = mutate(&calibration, random);
+    }
+    let path = recording.with_file_name("cal.toml");
+    fs::write(&path, calibration).unwrap();
+    let calibration = Calibration::read(&path)?;
+    let (text, reference) = &seeds.csv[random.below(seeds.csv.len())];
+    let text = if random.one_in(2) {
+        mutate(text.as_bytes(), random)
+    } else {
+        mutate_numbers(text, random)
+    };
+    write_recording(recording, &manifest(reference), "samples.csv", &text);
+    let prepared = Prepared::read(&Recording::open(recording)?, 10.0, |_| {})?;
+    let verified = verify(&prepared, &calibration)?;
+    report::verify_text(&verified);
+    report::verify_json(&verified);
+    Ok(())
+}
+
+fn import_mutated(seeds: &Seeds, folder: &Path, random: &mut Random) -> Result<()> {
+    let _ = fs::remove_dir_all(folder.join("rec"));
+    let (text, _) = &seeds.csv[1 + random.below(2)];
+    let text = match random.below(4) {
+        0 => text.replace(',', ";"),
+        1 => text.replace(',', "\t"),
+        2 => text.replace(',', "  "),
+        _ => text.clone(),
+    };
+    let text = mutate(text.as_bytes(), random);
+    let parquet = random.one_in(6);
+    let file = folder.join(if parquet {
+        "foreign.parquet"
+    } else {
+        "foreign.txt"
+    });
+    match parquet {
+        true => {
+            let mut bytes = seeds.parquet[1].0.clone();
+            mutate_bytes(&mut bytes, random);
+            fs::write(&file, bytes).unwrap();
+        }
+        false => fs::write(&file, &text).unwrap(),
+    }
+    let mut files = vec![file];
+    let list = |random: &mut Random, text: &str| -> Result<ColumnList> {
+        match random.one_in(2) {
+            true => text.parse(),
+            false => String::from_utf8_lossy(&mutate(text.as_bytes(), random)).parse(),
+        }
+    };
+    let mut columns = Vec::new();
+    if random.one_in(2) {
+        let all = "t_s,step,-,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z";
+        let names = "t_s=t_s,step=step,gyro_x=gyro_x,gyro_y=gyro_y,gyro_z=gyro_z";
+        let counted = "sample,step,temp_c,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z";
+        let chosen = random.of(&[all, names, counted]);
+        columns.push(list(random, chosen)?);
+    }
+    if random.one_in(4) {
+        // Joined to another file in time.
+        let second = folder.join("second.txt");
+        let (text, _) = &seeds.csv[0];
+        fs::write(&second, mutate(text.as_bytes(), random)).unwrap();
+        files.push(second);
+        columns = vec![
+            list(random, "t_s=t_s,gyro_x=gyro_x,gyro_y=gyro_y,gyro_z=gyro_z")?,
+            list(
+                random,
+                "t_s=t_s,accel_x=accel_x,accel_y=accel_y,accel_z=accel_z",
+            )?,
+        ];
+    }
+    let mut scales = Vec::new();
+    if random.one_in(2) {
+        let scale = [
+            "gyro=57.2958",
+            "accel=1e-3",
+            "t_s=0.001",
+            "gyro_x=-1",
+            "accel=1e29",
+            "t_s=1e300",
+        ];
+        let chosen = mutate(random.of(&scale).as_bytes(), random);
+        scales.push(String::from_utf8_lossy(&chosen).parse()?);
+    }
+    let mut inputs: Option<PathBuf> = None;
+    if random.one_in(3) {
+        let path = folder.join("inputs.csv");
+        fs::write(&path, mutate(seeds.inputs.as_bytes(), random)).unwrap();
+        inputs = Some(path);
+    }
+    let reference = if random.one_in(2) {
+        Reference::Table
+    } else {
+        Reference::Gravity
+    };
+    let rates = [
+        None,
+        Some(20.0),
+        Some(1e-300),
+        Some(1e300),
+        Some(0.01),
+        Some(7.0),
+    ];
+    let options = ImportOptions {
+        columns,
+        rate_hz: rates[random.below(rates.len())],
+        scales,
+        inputs,
+        format: if random.one_in(2) {
+            SampleFormat::Csv
+        } else {
+            SampleFormat::Parquet
+        },
+        ..ImportOptions::new(files, 9.81, RawUnit::Count, reference)
+    };
+    import(&options, &folder.join("rec"), |_| {}).map(|summary| {
+        report::import_text(&summary);
+        report::import_json(&summary);
+    })
+}
+
+fn environment(name: &str) -> Option<u64> {
+    let text = std::env::var(name).ok()?;
+    Some(
+        text.parse()
+            .unwrap_or_else(|_| panic!("{name}={text} is no number")),
+    )
+}
+
+/// Ends the process when a case makes no progress: a thread that hangs cannot be stopped.
+fn watch(case: Arc<AtomicU64>, seed: u64) {
+    std::thread::spawn(move || {
+        let (mut last, mut since) = (u64::MAX, Instant::now());
+        loop {
+            std::thread::sleep(Duration::from_millis(500));
+            let now = case.load(Ordering::Relaxed);
+            if now != last {
+                (last, since) = (now, Instant::now());
+            } else if since.elapsed() > HANG {
+                eprintln!("hangs: MIMU_FUZZ_SEED={seed} MIMU_FUZZ_CASE={now}");
+                std::process::abort();
+            }
+        }
+    });
+}
+
+#[test]
+fn no_mutation_ends_in_a_panic_a_hang_or_a_number_that_is_none() {
+    let seed = environment("MIMU_FUZZ_SEED").unwrap_or(DEFAULT_SEED);
+    let seconds = environment("MIMU_FUZZ_SECONDS").unwrap_or(DEFAULT_SECONDS);
+    let only = environment("MIMU_FUZZ_CASE");
+    let folder = tempfile::tempdir().unwrap();
+    let seeds = Seeds::new(folder.path());
+    let current = Arc::new(AtomicU64::new(0));
+    watch(current.clone(), seed);
+    let default_hook = std::panic::take_hook();
+    if only.is_none() {
+        // Readers catch the panics of their decoders, which would fill the screen.
+        std::panic::set_hook(Box::new(|_| {}));
+    }
+    let (start, mut case, mut accepted) = (Instant::now(), only.unwrap_or(0), 0_u64);
+    let mut failures: Vec<String> = Vec::new();
+    while start.elapsed() < Duration::from_secs(seconds) && failures.len() < 10 {
+        current.store(case, Ordering::Relaxed);
+        let mut random = Random(seed ^ case.wrapping_mul(0x2545_f491_4f6c_dd1d));
+        match catch_unwind(AssertUnwindSafe(|| run(&seeds, folder.path(), &mut random))) {
+            Ok(Ok(fitted)) => accepted += u64::from(fitted),
+            Ok(Err(wrong)) => failures.push(format!(
+                "MIMU_FUZZ_SEED={seed} MIMU_FUZZ_CASE={case}: {wrong}"
+            )),
+            Err(_) => failures.push(format!(
+                "MIMU_FUZZ_SEED={seed} MIMU_FUZZ_CASE={case}: panic"
+            )),
+        }
+        case += 1;
+        if only.is_some() {
+            break;
+        }
+    }
+    std::panic::set_hook(default_hook);
+    println!("seed {seed}: {case} cases, {accepted} of them with a result");
+    assert!(failures.is_empty(), "{}", failures.join("\n"));
+    assert!(
+        only.is_some() || accepted > 0,
+        "mutations that are all refused test little"
+    );
+}

@@ -1,0 +1,11 @@
+//! The command, from its arguments to its exit status.
+
+mod allan_command;
+mod bad_input;
+mod design_command;
+mod device;
+mod diagnosis_page;
+mod effects;
+mod fuzz;
+mod pocket_calculator;
+mod readme;

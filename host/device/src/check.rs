@@ -1,0 +1,334 @@
+//! The compensated stream against this program's own compensation of the raw stream, sample by sample.
+
+use std::time::{Duration, Instant};
+
+use mimu_core::compensation::Sample;
+use mimu_core::effects;
+use mimu_core::single;
+use mimu_core::stored::{ROOM, Stored};
+use mimu_core::table;
+use mimu_core::wire::{BatchHead, Request};
+use nalgebra::Vector3;
+
+use super::heard::{Event, Samples};
+use super::image::{Image, remembers};
+use super::session::Session;
+use mimu::calibration::Calibration;
+use mimu::quantity::Sensor;
+use mimu_recording::error::{Error, Result};
+
+/// Longest silence of a stream.
+const SILENCE: Duration = Duration::from_secs(3);
+
+/// Part of a reading that single precision may be off by at the turn of a bit: a reading, its product, and the sum with the code at
+/// reading 0, which is up to 64 weights where the reading is of one.
+const TURN: f64 = 64.0 * f32::EPSILON as f64;
+
+/// Largest differences of one triad.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Difference {
+    /// Between device and PC in the same single precision, in units of the last place of the larger of the two.
+    pub ulps: u32,
+    /// The same, rad/s or m/s².
+    pub single: f64,
+    /// Between device and the PC in double precision from the calibration file, rad/s or m/s².
+    pub double: f64,
+    /// The last, as a share of what rounding can make of it at most ([`rounding`]).
+    pub share: f64,
+}
+
+/// What a comparison has found.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Checked {
+    /// Samples compared.
+    pub samples: u64,
+    /// Samples of one stream whose counterpart was lost on the way.
+    pub unpaired: u64,
+    /// Gyro and accelerometer.
+    pub differences: [Difference; 2],
+    /// Ids of effects that remember what was before the comparison, so that double precision could not be judged.
+    pub remembering: Vec<String>,
+}
+
+impl Checked {
+    /// Whether device and PC differ by rounding only. With effects that remember the time before, only time tells.
+    pub fn holds(&self) -> bool {
+        self.samples > 0 && self.differences.iter().all(|d| d.share <= 1.0)
+    }
+}
+
+/// The PC's side, twice: as the device computes, and in double precision from the file.
+struct Twin {
+    rate_hz: u32,
+    stored: Stored,
+    model: table::State<f32>,
+    single: effects::State<f32, ROOM>,
+    affine: [mimu_core::compensation::Affine<f64>; 2],
+    effects: effects::Effects<f64, ROOM>,
+    double: effects::State<f64, ROOM>,
+    /// Number of the first sample of the batch before; time since power-on is counted by it, as on the device.
+    followed: u32,
+    /// Of the sample that would come next.
+    next: Option<u32>,
+}
+
+/// Compares for `duration` of samples. Refused if the device holds another calibration than that of the file.
+pub fn check(
+    session: &mut Session,
+    calibration: &Calibration,
+    place: &str,
+    duration: Duration,
+    mut progress: impl FnMut(f64),
+) -> Result<Checked> {
+    let image = Image::new(calibration, place)?;
+    let held = session.hello()?.stored.map(|s| s.hash);
+    if held != Some(image.hash) {
+        let problem = match held {
+            None => "the device holds no calibration".to_string(),
+            Some(hash) => format!(
+                "the device holds another calibration ({hash:016x}) than that of the file ({:016x})",
+                image.hash
+            ),
+        };
+        let remedy = format!("upload it first: `mimu device upload {place}`");
+        return Err(Error::new(session.port(), problem, remedy));
+    }
+    let mut twin = Twin::new(calibration, &image, session.who().sample_rate_hz, place)?;
+    let wanted = (duration.as_secs_f64() * f64::from(session.who().sample_rate_hz)) as u64;
+    let mut found = Checked {
+        samples: 0,
+        unpaired: 0,
+        differences: [Difference::default(); 2],
+        remembering: image
+            .effects
+            .iter()
+            .filter(|id| remembers(id))
+            .cloned()
+            .collect(),
+    };
+    let both = Request::Stream {
+        raw: true,
+        compensated: true,
+    };
+    session.begin_stream(both)?;
+    let mut raw: Option<Samples> = None;
+    let mut heard = Instant::now();
+    while found.samples < wanted {
+        match session.event()? {
+            // The raw batch is always sent before the compensated one of the same samples.
+            Some(Event::Raw(batch)) => {
+                let lost = raw.replace(batch);
+                found.unpaired += lost.map_or(0, |b| b.values.len() as u64);
+            }
+            Some(Event::Compensated(batch)) => {
+                let pair = raw.take().filter(|r| r.head.first == batch.head.first);
+                match pair.filter(|r| r.values.len() == batch.values.len()) {
+                    Some(raw) => twin.compare(&raw, &batch, &mut found),
+                    None => found.unpaired += batch.values.len() as u64,
+                }
+                if found.unpaired > wanted.max(1000) {
+                    let problem = "more samples are lost on the line than compared";
+                    let remedy = "check the cable, and end what else keeps the computer busy";
+                    return Err(Error::new(session.port(), problem, remedy));
+                }
+                heard = Instant::now();
+                progress(found.samples as f64 / wanted as f64);
+            }
+            Some(Event::Started(_)) => {
+                let remedy = "run it again; `mimu device info` says why it restarted";
+                return Err(Error::new(
+                    session.port(),
+                    "the device restarted meanwhile",
+                    remedy,
+                ));
+            }
+            Some(Event::Kalman(_)) => {}
+            None if heard.elapsed() > SILENCE => {
+                let problem = "the compensated stream does not come";
+                return Err(Error::new(
+                    session.port(),
+                    problem,
+                    "reset the board and run it again",
+                ));
+            }
+            None => {}
+        }
+    }
+    session.done(Request::Stop, "to stop streaming")?;
+    session.forget_events();
+    Ok(found)
+}
+
+impl Twin {
+    fn new(calibration: &Calibration, image: &Image, rate_hz: u32, place: &str) -> Result<Self> {
+        let unusable = |_| Error::new(place, "the device could not use it", "fit it again");
+        let stored = image.stored().map_err(unusable)?;
+        let model = |sensor| {
+            let missing = || Error::new(place, "a sensor is missing", "calibrate both sensors");
+            calibration.inverse(sensor).ok_or_else(missing)
+        };
+        Ok(Self {
+            rate_hz,
+            model: stored.table.state(),
+            single: effects::State::new(rate_hz as f32),
+            stored,
+            affine: [model(Sensor::Gyro)?, model(Sensor::Accel)?],
+            effects: calibration.core_effects()?,
+            double: effects::State::new(f64::from(rate_hz)),
+            followed: 0,
+            next: None,
+        })
+    }
+
+    /// Follows the device through a batch, and notes how far it is off.
+    fn compare(&mut self, raw: &Samples, device: &Samples, found: &mut Checked) {
+        let head = &raw.head;
+        self.follow(head);
+        let first = self.next != Some(head.first);
+        if first {
+            self.single.gap();
+            self.double.gap();
+        }
+        for (k, (raw, device)) in raw.values.iter().zip(&device.values).enumerate() {
+            let single = self.single(raw);
+            let (double, bounds) = self.double(raw);
+            // The angular acceleration of a sample is its difference to the one before, which is not known of the first.
+            if first && k == 0 && self.stored.effects.is_some() {
+                continue;
+            }
+            found.samples += 1;
+            let pairs = [
+                (&device.gyro, &single.gyro, &double.gyro, &bounds[0]),
+                (&device.accel, &single.accel, &double.accel, &bounds[1]),
+            ];
+            for (difference, (device, single, double, bound)) in
+                found.differences.iter_mut().zip(pairs)
+            {
+                difference.note(device, single, double, bound);
+            }
+        }
+        self.next = Some(head.first.wrapping_add(raw.values.len() as u32));
+    }
+
+    fn follow(&mut self, head: &BatchHead) {
+        self.stored.table.follow(&mut self.model, head.temp_c);
+        let passed = head.first.wrapping_sub(self.followed);
+        self.followed = head.first;
+        if let Some(all) = &self.stored.effects {
+            // By the same operation as the firmware, which is what decides the last digit.
+            let dt_s = passed as f32 / self.rate_hz as f32;
+            all.slow(&mut self.single, dt_s, head.temp_c);
+        }
+        let (dt_s, temp_c) = (
+            f64::from(passed) / f64::from(self.rate_hz),
+            f64::from(head.temp_c),
+        );
+        self.effects.slow(&mut self.double, dt_s, temp_c);
+    }
+
+    /// As the device computes.
+    fn single(&mut self, raw: &Sample<f32>) -> Sample<f32> {
+        let model = &self.model.model;
+        match &self.stored.effects {
+            Some(all) => {
+                let raw = single::without_code_errors(all, raw);
+                all.remove(&mut self.single, &model.apply(&raw))
+            }
+            None => model.apply(raw),
+        }
+    }
+
+    /// Readings without errors by the code, in double precision. Within rounding of a turn either side is right, and a bit's error apart: the
+    /// one that single precision takes.
+    fn without_code_errors(&self, raw: &Sample<f32>) -> [Vector3<f64>; 2] {
+        let exact = [raw.gyro, raw.accel].map(|u| u.map(f64::from));
+        let Some(stored) = &self.stored.effects else {
+            return exact;
+        };
+        let single = single::without_code_errors(stored, raw);
+        let single = [single.gyro, single.accel].map(|u| u.map(f64::from));
+        let beside = |by: f64| {
+            let [gyro, accel] = exact.map(|u| u * (1.0 + by));
+            let clean = self.effects.without_code_errors(&Sample { gyro, accel });
+            [exact[0] - gyro + clean.gyro, exact[1] - accel + clean.accel]
+        };
+        let sides = [0.0, TURN, -TURN].map(beside);
+        [0, 1].map(|triad| {
+            Vector3::from_fn(|axis, _| {
+                let off =
+                    |side: &[Vector3<f64>; 2]| (side[triad][axis] - single[triad][axis]).abs();
+                let nearest = sides.iter().min_by(|a, b| off(a).total_cmp(&off(b)));
+                nearest.map_or(f64::NAN, |side| side[triad][axis])
+            })
+        })
+    }
+
+    /// In double precision, with what rounding can make of it.
+    fn double(&mut self, raw: &Sample<f32>) -> (Sample<f64>, [Vector3<f64>; 2]) {
+        let raw = self.without_code_errors(raw);
+        let [gyro, accel] = [0, 1].map(|i| self.affine[i].apply(&raw[i]));
+        let bounds = [0, 1].map(|i| rounding(&self.affine[i], &raw[i]));
+        let sample = Sample { gyro, accel };
+        (self.effects.remove(&mut self.double, &sample), bounds)
+    }
+}
+
+/// Most that single precision can make of `x = C u + o` for a reading, SI: C, o and the four operations of a sum of four terms each round
+/// by half a unit of the last place, ε/2, of what is not larger than the sum S of the sizes of the terms: 3 ε S for the affine part.
+/// As much again for effects, whose errors are small beside S.
+pub fn rounding(model: &mimu_core::compensation::Affine<f64>, raw: &Vector3<f64>) -> Vector3<f64> {
+    let sizes = model.matrix.abs() * raw.abs() + model.offset.abs();
+    sizes * (6.0 * f64::from(f32::EPSILON))
+}
+
+impl Difference {
+    fn note(
+        &mut self,
+        device: &Vector3<f32>,
+        single: &Vector3<f32>,
+        double: &Vector3<f64>,
+        bound: &Vector3<f64>,
+    ) {
+        for i in 0..3 {
+            self.ulps = self.ulps.max(ulps(device[i], single[i]));
+            let device = f64::from(device[i]);
+            // A NaN on one side is as far off as can be.
+            let off = |of: f64| match (device - of).abs() {
+                x if x.is_nan() => f64::INFINITY,
+                x => x,
+            };
+            self.single = self.single.max(off(f64::from(single[i])));
+            self.double = self.double.max(off(double[i]));
+            self.share = self
+                .share
+                .max(off(double[i]) / bound[i].max(f64::MIN_POSITIVE));
+        }
+    }
+}
+
+/// Floating-point numbers from one to the other.
+pub fn ulps(a: f32, b: f32) -> u32 {
+    // In the order of the numbers, so that neighbours differ by one, across zero too.
+    let place = |x: f32| match x.to_bits() {
+        bits if bits >> 31 == 0 => i64::from(bits),
+        bits => -i64::from(bits & 0x7fff_ffff),
+    };
+    match a.is_nan() || b.is_nan() {
+        true => u32::MAX,
+        false => u32::try_from((place(a) - place(b)).unsigned_abs()).unwrap_or(u32::MAX),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn neighbours_are_one_unit_apart_across_zero_too() {
+        assert_eq!(ulps(1.0, 1.0 + f32::EPSILON), 1);
+        assert_eq!(ulps(0.0, -0.0), 0);
+        assert_eq!(ulps(f32::from_bits(1), -f32::from_bits(1)), 2);
+        assert_eq!(ulps(1.0, 2.0), 1 << 23);
+        assert_eq!(ulps(f32::NAN, 1.0), u32::MAX);
+    }
+}

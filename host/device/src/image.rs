@@ -1,0 +1,226 @@
+//! A calibration file as the bytes that the device stores, and what stands in the way of it.
+
+use mimu_core::compensation::{Affine, Compensation};
+use mimu_core::effects::{REFERENCE_C, Sensor as DeviceSensor};
+use mimu_core::stored::{self, MAX_LENGTH, NODES, ROOM, Record, Stored};
+use mimu_core::table::Node;
+use mimu_core::wire::Capabilities;
+use nalgebra::{Matrix3, Vector3};
+
+use super::who::{Who, unusable};
+use mimu::calibration::{Calibration, NO_SENSE, OnDevice, What};
+use mimu::quantity::Sensor;
+use mimu_recording::RawUnit;
+use mimu_recording::error::{Error, Result};
+
+/// A calibration as the device stores it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Image {
+    /// What is sent: see [`mimu_core::stored`].
+    pub bytes: Vec<u8>,
+    /// What it is told apart by.
+    pub hash: u64,
+    /// Temperatures of its nodes, °C. A single one is for all temperatures.
+    pub node_temp_c: Vec<f32>,
+    /// Ids of its effects.
+    pub effects: Vec<String>,
+    /// One sentence for each thing that had to be assumed.
+    pub warnings: Vec<String>,
+}
+
+impl Image {
+    /// The image of a calibration of one temperature; `place` is its file. Refused: raw readings in anything but volts, which are
+    /// what the device measures, one triad alone, and effects that no device removes.
+    pub fn new(calibration: &Calibration, place: &str) -> Result<Self> {
+        let models = [Sensor::Gyro, Sensor::Accel].map(|sensor| model(calibration, sensor, place));
+        let [gyro, accel] = models;
+        let model = Compensation {
+            gyro: gyro?,
+            accel: accel?,
+        };
+        let mut warnings = Vec::new();
+        let temp_c = calibration.recording.temp_c.unwrap_or_else(|| {
+            warnings.push(format!(
+                "{place}: the temperature is not known; the device uses the calibration at all of them, and lists it at {REFERENCE_C} °C"
+            ));
+            REFERENCE_C
+        });
+        let effects = on_device(calibration, place)?;
+        let records: Vec<Record<'_>> = effects.iter().map(record).collect();
+        let node = Node {
+            temp_c: temp_c as f32,
+            model,
+        };
+        let mut bytes = vec![0; MAX_LENGTH];
+        let found_with = [&model.gyro.matrix, &model.accel.matrix];
+        let length = stored::encode(found_with, &[node], &records, &mut bytes).map_err(|_| {
+            let problem = format!("it is longer than the {MAX_LENGTH} bytes that a device stores");
+            Error::new(place, problem, "use fewer effects")
+        })?;
+        bytes.truncate(length);
+        // What would be refused over there is refused here, and by its name.
+        check_room(&effects, ROOM, place)?;
+        stored::decode(&bytes).map_err(|refused| {
+            let problem = format!("the device could not use it: {}", unusable(&refused));
+            Error::new(place, problem, "fit the recording again")
+        })?;
+        Ok(Self {
+            hash: stored::hash(&bytes),
+            bytes,
+            node_temp_c: vec![node.temp_c],
+            effects: calibration
+                .effects()
+                .iter()
+                .map(|e| e.candidate.id())
+                .collect(),
+            warnings,
+        })
+    }
+
+    /// Refuses what the device of this greeting could not use, by the name of the effect: before anything is sent.
+    pub fn check_device(&self, calibration: &Calibration, who: &Who, place: &str) -> Result<()> {
+        let refuse = |at: String, problem: String| {
+            let remedy = "flash newer firmware, or diagnose without it";
+            Err(Error::new(at, problem, remedy))
+        };
+        if who.raw_unit != "V" {
+            let unit = &who.raw_unit;
+            let problem = format!("it is for raw readings in V, and the device's are in {unit}");
+            return refuse(place.into(), problem);
+        }
+        for id in &self.effects {
+            let at = || format!("{place}, [[effect]] {id}");
+            let removed = match id.starts_with("term:") {
+                true => who.capabilities.contains(Capabilities::TERMS),
+                false => who.effect_ids().contains(&id.as_str()),
+            };
+            if !removed {
+                let problem = format!("the device (firmware {}) cannot remove it", who.firmware);
+                return refuse(at(), problem);
+            }
+        }
+        let effects = on_device(calibration, place)?;
+        check_room(&effects, usize::from(who.effects_room), place)?;
+        let (nodes, room) = (
+            self.node_temp_c.len(),
+            usize::from(who.nodes_room).min(NODES),
+        );
+        if nodes > room {
+            return refuse(
+                place.into(),
+                format!("it has {nodes} temperature nodes, and the device has room for {room}"),
+            );
+        }
+        let (length, room) = (self.bytes.len(), who.stored_room);
+        if length > room as usize {
+            return refuse(
+                place.into(),
+                format!("it takes {length} bytes, and the device has room for {room}"),
+            );
+        }
+        Ok(())
+    }
+
+    /// The same calibration as the device computes with it.
+    pub fn stored(&self) -> std::result::Result<Stored, stored::Refused> {
+        stored::decode(&self.bytes)
+    }
+}
+
+/// Inverse model of a triad, raw in V.
+fn model(calibration: &Calibration, sensor: Sensor, place: &str) -> Result<Affine<f32>> {
+    let at = || format!("{place}, [{sensor}]");
+    let Some(table) = calibration.table(sensor) else {
+        let problem = "it is not there, and the device needs both sensors";
+        return Err(Error::new(at(), problem, "calibrate both sensors"));
+    };
+    if table.raw_unit != RawUnit::Volt {
+        return Err(Error::new(
+            at(),
+            format!(
+                "raw_unit is \"{}\", and the device measures V",
+                table.raw_unit
+            ),
+            "calibrate from a recording of the device (`mimu record`)",
+        ));
+    }
+    let single = |x: f64| x as f32;
+    Ok(Affine {
+        matrix: Matrix3::from_fn(|i, j| single(table.C[i][j])),
+        offset: Vector3::from(table.o.map(single)),
+    })
+}
+
+/// The effects of a calibration in the words of the device; refused by name is one that no device removes.
+fn on_device(calibration: &Calibration, place: &str) -> Result<Vec<OnDevice<f32>>> {
+    let parts = calibration.effects().iter().map(|removed| {
+        OnDevice::of(removed).map_err(|why| {
+            let at = format!("{place}, [[effect]] {}", removed.candidate.id());
+            Error::new(at, why, "use the calibration without it, on the PC alone")
+        })
+    });
+    Ok(parts.collect::<Result<Vec<_>>>()?.concat())
+}
+
+/// As it is stored.
+fn record(effect: &OnDevice<f32>) -> Record<'_> {
+    let sensor = effect.sensor;
+    match &effect.what {
+        What::Named { coefficients, form } => Record::Named {
+            id: &effect.id,
+            coefficients,
+            nonlinear: *form,
+        },
+        What::Code {
+            axis,
+            errors,
+            weight,
+            zero,
+        } => Record::Code {
+            sensor,
+            axis: axis.map(|axis| axis as u8),
+            weight: *weight,
+            zero: *zero,
+            errors,
+        },
+        What::Term {
+            axis,
+            coefficient,
+            variables,
+        } => Record::Term {
+            sensor,
+            axis: *axis as u8,
+            coefficient: *coefficient,
+            variables,
+        },
+    }
+}
+
+/// Refuses the first effect that has no room among `room` of its triad and kind: with every sample, or with temperature and time only.
+fn check_room(effects: &[OnDevice<f32>], room: usize, place: &str) -> Result<()> {
+    let mut taken = [[0; 2]; 2];
+    for effect in effects {
+        let at = format!("{place}, [[effect]] {}", effect.id);
+        let Ok(compiled) = effect.effect() else {
+            return Err(Error::new(at, NO_SENSE, "diagnose the recording again"));
+        };
+        // Of these each axis has room for one, and a file that has two for an axis was refused.
+        if matches!(effect.what, What::Code { .. }) {
+            continue;
+        }
+        let triad = usize::from(effect.sensor == DeviceSensor::Accel);
+        let count = &mut taken[triad][usize::from(compiled.is_slow())];
+        *count += 1;
+        if *count > room {
+            let problem = format!("the device has room for {room} effects of a kind and triad");
+            return Err(Error::new(at, problem, "use the calibration without it"));
+        }
+    }
+    Ok(())
+}
+
+/// Whether the effects of these ids remember what was before, so that a comparison that begins in the middle cannot know it: the
+/// temperature of some minutes ago, in lags and in its rate of change.
+pub fn remembers(id: &str) -> bool {
+    id.ends_with("_thermal_lag") || id.contains("temp_rate")
+}

@@ -1,0 +1,329 @@
+//! The Kalman bank on the device, told the inputs that are applied, and the same bank here in double precision on the same samples.
+
+use std::collections::BTreeMap;
+use std::time::{Duration, Instant};
+
+use mimu_core::compensation::Sample;
+use mimu_core::kalman::{Bank, STATES};
+use mimu_core::wire::{Capabilities, KalmanState, Prior, Request, Triad};
+use nalgebra::Vector3;
+
+use super::heard::{Answer, Event};
+use super::session::{PATIENCE, Session};
+use mimu_recording::error::{Error, Result};
+
+/// Shortest stretch under one input: the device reports five times a second, and a report from within tells which samples it took in.
+pub const SHORTEST: Duration = Duration::from_secs(1);
+/// Samples that the noise is taken from, if it is not given: a second.
+const NOISE_SAMPLES: usize = 1000;
+/// Variance that a reading has at least, V²: that of rounding to a step of 25 µV, which the converter's sums have.
+const LEAST_VARIANCE: f64 = 25e-6 * 25e-6 / 12.0;
+/// Longest silence of the stream or of the bank.
+const SILENCE: Duration = Duration::from_secs(3);
+
+/// What to run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct KalmanPlan {
+    /// Which sensors.
+    pub triad: Triad,
+    /// True inputs one after the other: rad/s or m/s² in the body frame (specific force at rest points up).
+    pub inputs: Vec<[f32; 3]>,
+    /// How long each.
+    pub each: Duration,
+    /// Variances of single readings of the sensors x, y, z, V²; `None`: from a second of readings before the first input.
+    pub noise: Option<[f32; 3]>,
+}
+
+/// Estimate of one sensor: `[b, P1, P2, P3]`, V and V per rad/s or per m/s².
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AxisEstimate {
+    /// Means.
+    pub mean: [f64; STATES],
+    /// Standard deviations.
+    pub sigma: [f64; STATES],
+}
+
+/// What a run has found.
+#[derive(Debug, Clone, PartialEq)]
+pub struct KalmanRun {
+    /// Which sensors.
+    pub triad: Triad,
+    /// Variances that were used, V².
+    pub noise: [f32; 3],
+    /// Inputs with the numbers of the first and the last sample that were taken in under each.
+    pub inputs: Vec<([f32; 3], u32, u32)>,
+    /// Samples that at least one filter of the device rejected.
+    pub rejected: u32,
+    /// By the device, sensors x, y, z.
+    pub device: [AxisEstimate; 3],
+    /// By this program, on the same samples.
+    pub host: [AxisEstimate; 3],
+    /// States as they converged: samples taken in, and the sensors.
+    pub history: Vec<(u32, [AxisEstimate; 3])>,
+}
+
+impl KalmanRun {
+    /// Differences of the means, device less host, in standard deviations of the host.
+    pub fn distances(&self) -> [[f64; STATES]; 3] {
+        std::array::from_fn(|i| {
+            let (device, host) = (&self.device[i], &self.host[i]);
+            std::array::from_fn(|k| (device.mean[k] - host.mean[k]) / host.sigma[k])
+        })
+    }
+
+    /// The largest of them.
+    pub fn largest(&self) -> f64 {
+        let all = self.distances();
+        let sizes = all.iter().flatten().map(|d| match d.abs() {
+            d if d.is_nan() => f64::INFINITY,
+            d => d,
+        });
+        sizes.fold(0.0, f64::max)
+    }
+}
+
+/// What was heard of a run.
+struct Log {
+    samples: BTreeMap<u32, Sample<f32>>,
+    reports: Vec<KalmanState>,
+    heard: Instant,
+}
+
+/// Runs a bank on the device. `apply` is called before each input, and returns when it is applied; `progress` hears the share that is done.
+pub fn kalman(
+    session: &mut Session,
+    plan: &KalmanPlan,
+    mut apply: impl FnMut(&[f32; 3]) -> Result<()>,
+    mut progress: impl FnMut(f64),
+) -> Result<KalmanRun> {
+    if !session.who().capabilities.contains(Capabilities::KALMAN) {
+        let problem = "the device runs no Kalman bank";
+        return Err(Error::new(session.port(), problem, "flash newer firmware"));
+    }
+    let (triad, each) = (plan.triad, plan.each.max(SHORTEST));
+    let mut log = Log {
+        samples: BTreeMap::new(),
+        reports: Vec::new(),
+        heard: Instant::now(),
+    };
+    session.forget_events();
+    let raw = Request::Stream {
+        raw: true,
+        compensated: false,
+    };
+    let rate_hz = f64::from(session.who().sample_rate_hz);
+    let mut noise = plan.noise;
+    let mut ends: Vec<u32> = Vec::new();
+    for (at, input) in plan.inputs.iter().enumerate() {
+        apply(input)?;
+        log.heard = Instant::now();
+        session.begin_stream(raw)?;
+        // A stream begins with a batch, an input with a sample: those in between would be missing here.
+        let before = log.samples.len();
+        while log.samples.len() == before {
+            log.listen(session, triad)?;
+        }
+        if at == 0 {
+            if noise.is_none() {
+                while log.samples.len() < NOISE_SAMPLES {
+                    log.listen(session, triad)?;
+                }
+            }
+            let noise = *noise.get_or_insert_with(|| variances(&log.samples, triad));
+            let span = plan
+                .inputs
+                .as_flattened()
+                .iter()
+                .fold(0.0, |s: f32, v| s.max(v.abs()));
+            // At rest the span means nothing, as long as it is positive.
+            let span = if span > 0.0 { span } else { 1.0 };
+            let prior = Prior::Diffuse { span };
+            let start = Request::KalmanStart {
+                triad,
+                noise,
+                prior,
+            };
+            session.done(start, "to start a Kalman bank")?;
+        }
+        let set = |input| Request::KalmanInput { triad, input };
+        session.done(set(Some(*input)), "to take an input")?;
+        // By the device's time, as everything here.
+        let (from, wanted) = (log.samples.len(), (each.as_secs_f64() * rate_hz) as usize);
+        while log.samples.len() < from + wanted {
+            log.listen(session, triad)?;
+            let share = (log.samples.len() - from) as f64 / wanted as f64;
+            progress((at as f64 + share.min(1.0)) / plan.inputs.len() as f64);
+        }
+        session.done(set(None), "to take no input")?;
+        ends.push(log.settled(session, triad)?);
+        session.done(Request::Stop, "to stop streaming")?;
+    }
+    let purpose = "to end a Kalman bank";
+    let end = session.call(Request::KalmanEnd { triad }, purpose, PATIENCE)?;
+    let Answer::Kalman(last) = end else {
+        return Err(session.unexpected(purpose));
+    };
+    let noise = noise.unwrap_or_default();
+    let inputs = taken_in(session.port(), plan, &ends, &log.reports)?;
+    let host = replay(session.port(), plan, &noise, &inputs, &log.samples)?;
+    Ok(KalmanRun {
+        triad,
+        noise,
+        inputs,
+        rejected: last.rejected,
+        device: estimates(&last),
+        host,
+        history: log
+            .reports
+            .iter()
+            .map(|r| (r.updates, estimates(r)))
+            .collect(),
+    })
+}
+
+impl Log {
+    fn listen(&mut self, session: &mut Session, triad: Triad) -> Result<()> {
+        match session.event()? {
+            Some(Event::Raw(batch)) => {
+                let numbers = (0..).map(|k| batch.head.first.wrapping_add(k));
+                self.samples.extend(numbers.zip(batch.values));
+                self.heard = Instant::now();
+            }
+            Some(Event::Kalman(state)) if state.triad == triad => self.reports.push(*state),
+            Some(Event::Started(_)) => {
+                let remedy = "run it again; `mimu device info` says why it restarted";
+                return Err(Error::new(
+                    session.port(),
+                    "the device restarted meanwhile",
+                    remedy,
+                ));
+            }
+            Some(_) => {}
+            None if self.heard.elapsed() > SILENCE => {
+                let problem = "the raw stream does not come";
+                return Err(Error::new(
+                    session.port(),
+                    problem,
+                    "reset the board and run it again",
+                ));
+            }
+            None => {}
+        }
+        Ok(())
+    }
+
+    /// Listens until two reports in turn have taken in as many samples; how many.
+    fn settled(&mut self, session: &mut Session, triad: Triad) -> Result<u32> {
+        let (from, since) = (self.reports.len(), Instant::now());
+        loop {
+            self.listen(session, triad)?;
+            if let [.., a, b] = &self.reports[from..]
+                && a.updates == b.updates
+            {
+                return Ok(b.updates);
+            }
+            if since.elapsed() > SILENCE {
+                let problem = "the Kalman bank does not report";
+                return Err(Error::new(session.port(), problem, "run it again"));
+            }
+        }
+    }
+}
+
+/// Which samples were taken in under each input: those before a report from within the stretch, back to the last of the stretch before.
+fn taken_in(
+    port: &str,
+    plan: &KalmanPlan,
+    ends: &[u32],
+    reports: &[KalmanState],
+) -> Result<Vec<([f32; 3], u32, u32)>> {
+    let mut before = 0;
+    let mut all = Vec::new();
+    for (input, end) in plan.inputs.iter().zip(ends) {
+        let within = reports
+            .iter()
+            .find(|r| r.updates > before && r.updates < *end);
+        let Some(report) = within else {
+            let problem = "the bank's reports were lost on the line, so its samples are not known";
+            return Err(Error::new(port, problem, "run it again"));
+        };
+        let first = report.last.wrapping_sub(report.updates - before - 1);
+        all.push((*input, first, first.wrapping_add(end - before - 1)));
+        before = *end;
+    }
+    Ok(all)
+}
+
+/// The same bank in double precision, diffuse from the same noise and span.
+fn replay(
+    port: &str,
+    plan: &KalmanPlan,
+    noise: &[f32; 3],
+    inputs: &[([f32; 3], u32, u32)],
+    samples: &BTreeMap<u32, Sample<f32>>,
+) -> Result<[AxisEstimate; 3]> {
+    let noise = Vector3::from(noise.map(f64::from));
+    let span = plan
+        .inputs
+        .as_flattened()
+        .iter()
+        .fold(0.0, |s: f32, v| s.max(v.abs()));
+    let span = if span > 0.0 { f64::from(span) } else { 1.0 };
+    let mut bank = Bank::<f64>::diffuse(&noise, span);
+    let mut missing = 0;
+    for (input, first, last) in inputs {
+        let input = Vector3::from(input.map(f64::from));
+        for k in 0..=last.wrapping_sub(*first) {
+            let Some(sample) = samples.get(&first.wrapping_add(k)) else {
+                missing += 1;
+                continue;
+            };
+            let reading = reading(sample, plan.triad).map(f64::from);
+            // What the device rejects, a number that is none, is rejected here as well.
+            let _ = bank.update(&input, &reading, &noise);
+        }
+    }
+    if missing > 0 {
+        let problem =
+            format!("{missing} of the samples that the bank took in were lost on the line");
+        return Err(Error::new(port, problem, "run it again"));
+    }
+    Ok(bank.axes.map(|filter| {
+        let (mean, covariance) = (filter.mean(), filter.covariance());
+        AxisEstimate {
+            mean: std::array::from_fn(|k| mean[k]),
+            sigma: std::array::from_fn(|k| covariance[(k, k)].sqrt()),
+        }
+    }))
+}
+
+fn reading(sample: &Sample<f32>, triad: Triad) -> Vector3<f32> {
+    match triad {
+        Triad::Gyro => sample.gyro,
+        Triad::Accel => sample.accel,
+    }
+}
+
+/// Variances of single readings from the differences of neighbours, V²: what is slower than a sample does not count.
+fn variances(samples: &BTreeMap<u32, Sample<f32>>, triad: Triad) -> [f32; 3] {
+    let readings: Vec<_> = samples
+        .values()
+        .map(|s| reading(s, triad).map(f64::from))
+        .collect();
+    let squares: Vector3<f64> = readings
+        .windows(2)
+        .map(|pair| (pair[1] - pair[0]).map(|d| 0.5 * d * d))
+        .sum();
+    let count = readings.len().saturating_sub(1).max(1) as f64;
+    std::array::from_fn(|i| (squares[i] / count).max(LEAST_VARIANCE) as f32)
+}
+
+fn estimates(state: &KalmanState) -> [AxisEstimate; 3] {
+    state.axes.map(|axis| {
+        let [c00, _, _, _, c11, _, _, c22, _, c33] = axis.covariance;
+        AxisEstimate {
+            mean: axis.mean.map(f64::from),
+            sigma: [c00, c11, c22, c33].map(|v| f64::from(v).sqrt()),
+        }
+    })
+}

@@ -1,0 +1,42 @@
+//! The device, seen from the PC: who is at the port, and what can be asked of it.
+//!
+//! | module       | what it is                                                                             |
+//! |--------------|----------------------------------------------------------------------------------------|
+//! | `port`       | the serial port, and why it cannot be opened                                           |
+//! | `heard`      | bytes into messages; what is garbled is counted                                        |
+//! | `line`, `session` | calls, each repeated until it is answered or refused                              |
+//! | `who`        | the greeting: what is there, and whether it can be talked to                           |
+//! | `image`      | a calibration file as the bytes that the device stores                                 |
+//! | `upload`     | sending them and fetching them back                                                    |
+//! | `contents`   | what stands in them                                                                    |
+//! | `self_test`  | the self-test, and whether the unit stood still for it                                 |
+//! | `stream`     | samples as they come                                                                   |
+//! | `check`      | the device's compensation against the PC's, sample by sample                           |
+//! | [`record`]   | recording its raw stream                                                               |
+//! | `kalman`     | the device's Kalman bank against the PC's, on the same samples                         |
+
+mod check;
+mod contents;
+mod heard;
+mod image;
+mod kalman;
+mod line;
+mod port;
+pub mod record;
+mod self_test;
+mod session;
+mod stream;
+mod upload;
+mod who;
+
+pub use check::{Checked, Difference, check, rounding, ulps};
+pub use contents::{Contents, ConverterContents, EffectContents, NodeContents, contents};
+pub use heard::{Answer, Ear, Event, Heard, LineCount, Samples};
+pub use image::{Image, remembers};
+pub use kalman::{AxisEstimate, KalmanPlan, KalmanRun, SHORTEST, kalman};
+pub use port::{BAUD, Port, ports};
+pub use self_test::{SelfTested, self_test};
+pub use session::{Session, refused};
+pub use stream::{Stream, Streamed, stream};
+pub use upload::{Uploaded, download, upload};
+pub use who::{Started, Who, slot, unusable};

@@ -1,0 +1,102 @@
+//! Calls and answers on an open port, before and after it is known who is there.
+
+use std::collections::VecDeque;
+use std::time::{Duration, Instant};
+
+use mimu_core::wire::{Call, MAX_FRAME, Request, encode};
+
+use super::heard::{Answer, Ear, Event, Heard};
+use super::port::Port;
+use super::who::check;
+use mimu_recording::error::{Error, Result};
+
+/// Times that a call is made: a garbled frame is lost, either way, and every call may be repeated.
+pub(super) const ATTEMPTS: u32 = 4;
+/// Most that is waiting to be looked at: a minute of both streams. Beyond, somebody has forgotten to look.
+const WAITING: usize = 6000;
+
+/// A port, and what has been heard on it.
+#[derive(Debug)]
+pub(super) struct Line {
+    pub port: Port,
+    pub ear: Ear,
+    pub waiting: VecDeque<Event>,
+    pub overflowed: u64,
+    /// How many of those that wait came before the last answer.
+    pub before_answer: usize,
+    /// Calls that had to be made again.
+    pub repeated: u32,
+    last_id: u16,
+}
+
+impl Line {
+    pub fn new(port: Port) -> Self {
+        Self {
+            port,
+            ear: Ear::default(),
+            waiting: VecDeque::new(),
+            overflowed: 0,
+            before_answer: 0,
+            repeated: 0,
+            // Not always 1, so that answers to a program before this one are nobody's.
+            last_id: std::process::id() as u16,
+        }
+    }
+
+    /// Makes a call until it is answered, each time waiting so long; `None` if it never is.
+    pub fn ask(&mut self, request: Request<'_>, wait: Duration) -> Result<Option<Answer>> {
+        let mut frame = [0; MAX_FRAME];
+        for attempt in 0..ATTEMPTS {
+            if attempt > 0 {
+                self.repeated += 1;
+            }
+            // 0 is for what nobody has asked.
+            self.last_id = self.last_id.checked_add(1).unwrap_or(1);
+            let id = self.last_id;
+            let call = Call { id, request };
+            let length = encode(&call, &mut frame)
+                .map_err(|e| Error::new(self.port.name(), e, "report this"))?;
+            self.port.write(&frame[..length])?;
+            let until = Instant::now() + wait;
+            while Instant::now() < until {
+                if let Some(answer) = self.listen(Some(id))? {
+                    return Ok(Some(answer));
+                }
+            }
+        }
+        Ok(None)
+    }
+
+    /// Reads once; the answer to the call of this number, if it came. Events wait.
+    pub fn listen(&mut self, wanted: Option<u16>) -> Result<Option<Answer>> {
+        let mut bytes = [0; 4096];
+        let count = self.port.read(&mut bytes)?;
+        let mut answer = None;
+        let mut stranger = None;
+        let (waiting, overflowed) = (&mut self.waiting, &mut self.overflowed);
+        let before_answer = &mut self.before_answer;
+        self.ear.take(&bytes[..count], |heard| match heard {
+            Heard::Event(event) if waiting.len() < WAITING => waiting.push_back(event),
+            Heard::Event(_) => *overflowed += 1,
+            // Answers to calls that were given up are late, and nobody's.
+            Heard::Answer(id, of) if Some(id) == wanted => {
+                *before_answer = waiting.len();
+                answer = Some(of);
+            }
+            Heard::Answer(..) => {}
+            Heard::Stranger(_, magic, version) => stranger = Some((magic, version)),
+        });
+        match stranger {
+            Some((magic, version)) => {
+                check(self.port.name(), magic, version)?;
+                // Of this protocol, and with something in its greeting that is not known here.
+                Err(Error::new(
+                    self.port.name(),
+                    "the device is newer than this program: its greeting says what is not known here",
+                    "update mimu on this computer",
+                ))
+            }
+            None => Ok(answer),
+        }
+    }
+}

@@ -1,0 +1,261 @@
+//! Talking with a device: calls, each answered or refused, and what comes without being asked.
+
+use std::time::Duration;
+
+use mimu_core::wire::{Refusal, Request};
+
+use super::heard::{Answer, Event, LineCount};
+use super::line::{ATTEMPTS, Line};
+use super::port::{Port, listed, ports};
+use super::who::{Who, unusable};
+use mimu_recording::error::{Error, Result};
+
+/// Longest wait for an answer that needs no work: a frame takes 5 ms, and one of samples may be before it. With the times that a call
+/// is made it is long enough for a device that is still storing what a program before this one has committed.
+pub(super) const PATIENCE: Duration = Duration::from_millis(1500);
+
+/// An open line to a device that has greeted and can be talked to.
+#[derive(Debug)]
+pub struct Session {
+    line: Line,
+    who: Who,
+}
+
+impl Session {
+    /// Opens the port and greets. Without a name, tries all ports: exactly one has to greet.
+    pub fn open(port: Option<&str>) -> Result<Self> {
+        if let Some(name) = port {
+            return Self::greet(Port::open(name)?);
+        }
+        let names = ports();
+        let mut found: Vec<Self> = Vec::new();
+        let mut reasons = Vec::new();
+        for name in &names {
+            match Port::open(name).and_then(Self::greet) {
+                Ok(session) => found.push(session),
+                Err(error) => reasons.push(format!("{}: {}", error.place, error.problem)),
+            }
+        }
+        match (found.pop(), found.as_slice()) {
+            (Some(only), []) => Ok(only),
+            (Some(_), _) => Err(Error::new(
+                "ports",
+                "more than one device greets",
+                listed(&names),
+            )),
+            (None, _) => {
+                let problem = match reasons.is_empty() {
+                    true => "no serial port is there".to_string(),
+                    false => format!(
+                        "no device greets ({})",
+                        reasons.join("; ").replace(';', ",")
+                    ),
+                };
+                let remedy = "plug the board in, or name its port with --port";
+                Err(Error::new("ports", problem, remedy))
+            }
+        }
+    }
+
+    fn greet(port: Port) -> Result<Self> {
+        let mut line = Line::new(port);
+        let Some(Answer::Greeting(who)) = line.ask(Request::Hello, PATIENCE)? else {
+            return Err(no_greeting(line.port.name(), &line.ear.count()));
+        };
+        let mut session = Self { line, who: *who };
+        if !session.line.waiting.is_empty() {
+            // It still streams for a program that did not end it.
+            session.done(Request::Stop, "to stop streaming")?;
+            session.forget_events();
+        }
+        Ok(session)
+    }
+
+    /// Who it is, by its last greeting.
+    pub fn who(&self) -> &Who {
+        &self.who
+    }
+
+    /// Path of the port.
+    pub fn port(&self) -> &str {
+        self.line.port.name()
+    }
+
+    /// What has been heard so far.
+    pub fn count(&self) -> LineCount {
+        self.line.ear.count()
+    }
+
+    /// Calls that had to be made again because no answer came.
+    pub fn repeated(&self) -> u32 {
+        self.line.repeated
+    }
+
+    /// Greets again.
+    pub fn hello(&mut self) -> Result<&Who> {
+        match self.call(Request::Hello, "to greet", PATIENCE)? {
+            Answer::Greeting(who) => self.who = *who,
+            _ => return Err(self.unexpected("to greet")),
+        }
+        Ok(&self.who)
+    }
+
+    /// Makes a call until it is answered; `purpose` ends the sentence "it was asked ...". A refusal is an error here.
+    pub fn call(&mut self, request: Request<'_>, purpose: &str, wait: Duration) -> Result<Answer> {
+        match self.attempt(request, purpose, wait)? {
+            Answer::Refused(refusal) => Err(refused(self.line.port.name(), purpose, &refusal)),
+            answer => Ok(answer),
+        }
+    }
+
+    /// The same for calls that are answered by [`Answer::Done`].
+    pub fn done(&mut self, request: Request<'_>, purpose: &str) -> Result<()> {
+        match self.call(request, purpose, PATIENCE)? {
+            Answer::Done => Ok(()),
+            _ => Err(self.unexpected(purpose)),
+        }
+    }
+
+    /// The same, and a refusal is an answer.
+    pub(super) fn attempt(
+        &mut self,
+        request: Request<'_>,
+        purpose: &str,
+        wait: Duration,
+    ) -> Result<Answer> {
+        match self.line.ask(request, wait)? {
+            Some(answer) => Ok(answer),
+            None => Err(Error::new(
+                self.line.port.name(),
+                format!(
+                    "the device does not answer: it was asked {purpose}, {ATTEMPTS} times in {:.0} s ({} frames were garbled)",
+                    wait.as_secs_f64() * f64::from(ATTEMPTS),
+                    self.line.ear.count().garbled
+                ),
+                "check the cable, reset the board and run it again",
+            )),
+        }
+    }
+
+    /// An answer of another kind than was asked for.
+    pub fn unexpected(&self, purpose: &str) -> Error {
+        Error::new(
+            self.line.port.name(),
+            format!("it was asked {purpose} and has answered something else"),
+            "report this, with the output of `mimu device info`",
+        )
+    }
+
+    /// The next event, or `None` if none came within a little while ([`Port::read`]).
+    pub fn event(&mut self) -> Result<Option<Event>> {
+        if self.line.waiting.is_empty() {
+            self.line.listen(None)?;
+        }
+        if self.line.overflowed > 0 {
+            return Err(Error::new(
+                self.line.port.name(),
+                format!("{} events came while nobody looked", self.line.overflowed),
+                "close other programs and run it again",
+            ));
+        }
+        let event = self.line.waiting.pop_front();
+        if let Some(Event::Started(who)) = &event {
+            self.who = (**who).clone();
+        }
+        Ok(event)
+    }
+
+    /// Has the device stream, and forgets what came before it said so: batches of an older stream may still have been on the way,
+    /// and would be followed by a gap.
+    pub fn begin_stream(&mut self, request: Request<'_>) -> Result<()> {
+        self.done(request, "to stream")?;
+        let old = self.line.before_answer.min(self.line.waiting.len());
+        self.line.waiting.drain(..old);
+        self.line.overflowed = 0;
+        Ok(())
+    }
+
+    /// Forgets the events that wait.
+    pub fn forget_events(&mut self) {
+        self.line.waiting.clear();
+        self.line.overflowed = 0;
+    }
+}
+
+/// Why what is at the port is not a mimu device.
+fn no_greeting(port: &str, count: &LineCount) -> Error {
+    match (count.bytes, count.frames) {
+        (0, _) => Error::new(
+            port,
+            "nothing answers: it is not a mimu device, or it is not running",
+            "check its power and its firmware, or choose another port",
+        ),
+        (bytes, 0) => Error::new(
+            port,
+            format!("garbage: {bytes} bytes came and no whole frame, so this is not a mimu device"),
+            "choose another port, or flash mimu-firmware (1 Mbaud, 8N1)",
+        ),
+        (_, frames) => Error::new(
+            port,
+            format!("{frames} whole frames came and no greeting, so this is not mimu's firmware"),
+            "choose another port, or flash mimu-firmware",
+        ),
+    }
+}
+
+/// A refusal of the device as one line.
+pub fn refused(port: &str, purpose: &str, refusal: &Refusal) -> Error {
+    let (why, remedy) = match refusal {
+        Refusal::Unknown => (
+            "it knows no such request".into(),
+            "flash the firmware that belongs to this program",
+        ),
+        Refusal::NoCalibration => (
+            "it holds no calibration".into(),
+            "upload one: `mimu device upload CAL`",
+        ),
+        Refusal::NoUpload => (
+            "it knows of no upload: it has restarted, or another program has ended it".into(),
+            "upload again",
+        ),
+        Refusal::TooLong { room } => (
+            format!("it has room for {room} bytes"),
+            "use fewer temperature nodes or effects",
+        ),
+        Refusal::WrongOffset { expected } => {
+            (format!("it expects byte {expected} next"), "upload again")
+        }
+        Refusal::Incomplete { received } => (
+            format!("it has received {received} bytes only"),
+            "upload again",
+        ),
+        Refusal::WrongHash { found } => (
+            format!("what it received has the hash {found:016x}, which is another"),
+            "upload again",
+        ),
+        Refusal::NotUsable(reason) => (
+            format!(
+                "the bytes are no calibration that it can use: {}",
+                unusable(reason)
+            ),
+            "update device and program to the same version",
+        ),
+        Refusal::FlashFailed => (
+            "its flash did not take or give it; the calibration before is still in use".into(),
+            "upload again; if it stays so, the flash is worn out",
+        ),
+        Refusal::NoBank => (
+            "no Kalman bank of this triad runs: it has restarted, or it was ended".into(),
+            "run it again",
+        ),
+        Refusal::BadNumber => (
+            "a number is not finite, or a variance is not positive".into(),
+            "check the numbers",
+        ),
+        Refusal::Busy => (
+            "it is busy with something else".into(),
+            "wait a few seconds and run it again",
+        ),
+    };
+    Error::new(port, format!("the device refuses {purpose}: {why}"), remedy)
+}

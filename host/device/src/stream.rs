@@ -1,0 +1,113 @@
+//! One of the streams, sample by sample, and what can be said of it in a line.
+
+use std::time::{Duration, Instant};
+
+use mimu_core::compensation::Sample;
+use mimu_core::wire::{BatchHead, Request};
+
+use super::heard::{Event, LineCount};
+use super::session::Session;
+use mimu_recording::error::{Error, Result};
+
+/// Longest silence of a stream.
+const SILENCE: Duration = Duration::from_secs(3);
+
+/// Which stream.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Stream {
+    /// Readings, V at the sensors.
+    Raw,
+    /// Compensated on the device, rad/s and m/s² in the body frame.
+    Compensated,
+}
+
+/// What was received.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Streamed {
+    /// Samples.
+    pub samples: u64,
+    /// Numbers that are missing between the first and the last.
+    pub missing: u64,
+    /// Number of the first.
+    pub first: Option<u32>,
+    /// Means, gyro before accelerometer.
+    pub mean: [f64; 6],
+    /// Standard deviations.
+    pub deviation: [f64; 6],
+    /// °C, the last.
+    pub temp_c: f64,
+    /// What was heard on the line.
+    pub line: LineCount,
+}
+
+/// Receives samples for `duration` of the device's time, or until `stop` says so. `take` is given each with its number.
+pub fn stream(
+    session: &mut Session,
+    which: Stream,
+    duration: Option<Duration>,
+    mut stop: impl FnMut() -> bool,
+    mut take: impl FnMut(&BatchHead, u32, &Sample<f32>) -> Result<()>,
+) -> Result<Streamed> {
+    let rate_hz = f64::from(session.who().sample_rate_hz);
+    let wanted = duration.map(|d| (d.as_secs_f64() * rate_hz).round() as u64);
+    let mut found = Streamed::default();
+    let mut squares = [0.0; 6];
+    let mut expected: Option<u32> = None;
+    let mut heard = Instant::now();
+    let before = session.count();
+    let request = Request::Stream {
+        raw: which == Stream::Raw,
+        compensated: which == Stream::Compensated,
+    };
+    session.begin_stream(request)?;
+    'all: while !stop() {
+        let batch = match (session.event()?, which) {
+            (Some(Event::Raw(batch)), Stream::Raw)
+            | (Some(Event::Compensated(batch)), Stream::Compensated) => batch,
+            (Some(Event::Started(_)), _) => {
+                let remedy = "run it again; `mimu device info` says why it restarted";
+                return Err(Error::new(
+                    session.port(),
+                    "the device restarted meanwhile",
+                    remedy,
+                ));
+            }
+            (Some(_), _) => continue,
+            (None, _) if heard.elapsed() > SILENCE => {
+                let problem = "the stream does not come";
+                return Err(Error::new(
+                    session.port(),
+                    problem,
+                    "reset the board and run it again",
+                ));
+            }
+            (None, _) => continue,
+        };
+        heard = Instant::now();
+        found.temp_c = f64::from(batch.head.temp_c);
+        for (k, sample) in (0..).zip(&batch.values) {
+            let number = batch.head.first.wrapping_add(k);
+            let lost = number.wrapping_sub(expected.unwrap_or(number));
+            found.missing += u64::from(lost);
+            found.first.get_or_insert(number);
+            if wanted.is_some_and(|wanted| found.samples + found.missing >= wanted) {
+                break 'all;
+            }
+            expected = Some(number.wrapping_add(1));
+            found.samples += 1;
+            // Welford: of a bias of volts and a noise of microvolts the plain sums lose the noise.
+            let values = sample.gyro.iter().chain(sample.accel.iter());
+            for (i, value) in values.enumerate() {
+                let off = f64::from(*value) - found.mean[i];
+                found.mean[i] += off / found.samples as f64;
+                squares[i] += off * (f64::from(*value) - found.mean[i]);
+            }
+            take(&batch.head, number, sample)?;
+        }
+    }
+    session.done(Request::Stop, "to stop streaming")?;
+    session.forget_events();
+    found.deviation = squares.map(|s| (s / found.samples.saturating_sub(1).max(1) as f64).sqrt());
+    found.line = session.count().since(&before);
+    Ok(found)
+}

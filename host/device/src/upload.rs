@@ -1,0 +1,180 @@
+//! Sending a calibration, and fetching the one that is stored.
+
+use std::time::Duration;
+
+use mimu_core::stored;
+use mimu_core::wire::{CHUNK, Refusal, Request};
+
+use super::heard::Answer;
+use super::image::Image;
+use super::session::{PATIENCE, Session, refused};
+use super::who::slot;
+use mimu_recording::error::{Error, Result};
+
+/// Longest wait for a commit: a sector is erased, which takes about a second, and 4 kB are programmed.
+const COMMIT: Duration = Duration::from_secs(15);
+/// Times that an upload begins anew: a device that restarts in the middle of it has forgotten it.
+const BEGINNINGS: u32 = 3;
+
+/// How an upload went.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Uploaded {
+    /// Bytes of the calibration.
+    pub length: usize,
+    /// What it is told apart by.
+    pub hash: u64,
+    /// Hash of the calibration before, if there was one.
+    pub before: Option<u64>,
+    /// The device held it already, and nothing was written.
+    pub was_there: bool,
+    /// Messages that had to be sent again.
+    pub repeated: u32,
+    /// Times that the device restarted and the upload began anew.
+    pub restarts: u32,
+}
+
+/// Sends a calibration, has it stored, and reads it back byte by byte. `progress` hears the share that is done, up to 1.
+///
+/// Whatever fails, and whenever: the device holds the old calibration or the new one, whole. The error says which, if the device still
+/// says it.
+pub fn upload(session: &mut Session, image: &Image, progress: impl Fn(f64)) -> Result<Uploaded> {
+    let before = session.hello()?.stored.map(|s| s.hash);
+    let repeated = session.repeated();
+    let was_there = before == Some(image.hash);
+    let mut restarts = 0;
+    if !was_there {
+        while !send(session, image, &progress).map_err(|error| told(session, image, error))? {
+            restarts += 1;
+            if restarts == BEGINNINGS {
+                let problem = format!("the device restarted in each of {BEGINNINGS} uploads");
+                let remedy = "check its supply; `mimu device info` says why it restarted";
+                let error = Error::new(session.port(), problem, remedy);
+                return Err(told(session, image, error));
+            }
+        }
+    }
+    let back = download(session)?;
+    if back != image.bytes {
+        return Err(Error::new(
+            session.port(),
+            "what is read back is not what was sent",
+            "upload again; if it stays so, the flash is worn out",
+        ));
+    }
+    progress(1.0);
+    Ok(Uploaded {
+        length: image.bytes.len(),
+        hash: image.hash,
+        before,
+        was_there,
+        repeated: session.repeated() - repeated,
+        restarts,
+    })
+}
+
+/// Sends it once; `false` if the device has forgotten the beginning.
+fn send(session: &mut Session, image: &Image, progress: &impl Fn(f64)) -> Result<bool> {
+    let (length, hash) = (image.bytes.len() as u32, image.hash);
+    let begin = Request::UploadBegin { length, hash };
+    session.done(begin, "to take a calibration")?;
+    let mut offset = 0;
+    while offset < image.bytes.len() {
+        let part = &image.bytes[offset..image.bytes.len().min(offset + CHUNK)];
+        let chunk = Request::UploadChunk {
+            offset: offset as u32,
+            bytes: part,
+        };
+        let purpose = "to take a part of the calibration";
+        match session.attempt(chunk, purpose, PATIENCE)? {
+            Answer::Done => offset += part.len(),
+            Answer::Refused(Refusal::NoUpload) => return Ok(false),
+            // It knows better what it has.
+            Answer::Refused(Refusal::WrongOffset { expected }) if (expected as usize) < offset => {
+                offset = expected as usize;
+            }
+            Answer::Refused(refusal) => return Err(refused(session.port(), purpose, &refusal)),
+            _ => return Err(session.unexpected(purpose)),
+        }
+        progress(0.5 * offset as f64 / image.bytes.len() as f64);
+    }
+    let purpose = "to store the calibration";
+    match session.attempt(Request::UploadCommit, purpose, COMMIT)? {
+        Answer::Done => {}
+        // Either it restarted in between, or it has stored it and the answer was lost: the greeting tells the two apart.
+        Answer::Refused(Refusal::NoUpload) => {
+            return Ok(session.hello()?.stored.is_some_and(|s| s.hash == hash));
+        }
+        Answer::Refused(refusal) => return Err(refused(session.port(), purpose, &refusal)),
+        _ => return Err(session.unexpected(purpose)),
+    }
+    if session.hello()?.stored.is_none_or(|s| s.hash != hash) {
+        return Err(Error::new(
+            session.port(),
+            "it says that the calibration is stored, and greets with another",
+            "upload again",
+        ));
+    }
+    Ok(true)
+}
+
+/// `error`, with what the device holds now.
+fn told(session: &mut Session, image: &Image, error: Error) -> Error {
+    let holds = match session.hello() {
+        Ok(who) => match who.stored {
+            None => "the device holds no calibration, as before".to_string(),
+            Some(s) if s.hash == image.hash => "the device holds the new calibration".to_string(),
+            Some(s) => format!("the device keeps the calibration {:016x}", s.hash),
+        },
+        Err(_) => "the device holds the old calibration or the new one, whole: `mimu device info` says which".into(),
+    };
+    Error {
+        problem: format!("{}; {holds}", error.problem).replace("; ", ", "),
+        ..error
+    }
+}
+
+/// The calibration in use, as the device stores it: read in parts, its hash compared with that of the greeting.
+pub fn download(session: &mut Session) -> Result<Vec<u8>> {
+    let Some(info) = session.hello()?.stored else {
+        let [a, b] = session.who().slots;
+        return Err(Error::new(
+            session.port(),
+            format!(
+                "the device holds no calibration (its two places: {}, {})",
+                slot(&a),
+                slot(&b)
+            ),
+            "upload one: `mimu device upload CAL`",
+        ));
+    };
+    let purpose = "for its calibration";
+    let mut all: Vec<u8> = Vec::with_capacity(info.length as usize);
+    while all.len() < info.length as usize {
+        let request = Request::Download {
+            offset: all.len() as u32,
+            length: CHUNK as u16,
+        };
+        match session.call(request, purpose, PATIENCE)? {
+            Answer::Stored { offset, bytes, .. }
+                if offset as usize == all.len() && !bytes.is_empty() =>
+            {
+                all.extend_from_slice(&bytes);
+            }
+            _ => return Err(session.unexpected(purpose)),
+        }
+    }
+    let found = stored::hash(&all);
+    if found != info.hash || all.len() != info.length as usize {
+        return Err(Error::new(
+            session.port(),
+            format!(
+                "{} bytes of hash {found:016x} came, and {} of {:016x} are stored",
+                all.len(),
+                info.length,
+                info.hash
+            ),
+            "download again; if it stays so, upload the calibration again",
+        ));
+    }
+    Ok(all)
+}

@@ -1,0 +1,310 @@
+//! The calibration file: TOML that a program reads and a person can apply with a pocket calculator.
+
+mod effect;
+mod on_device;
+mod writing;
+
+pub use effect::{CoefficientTable, ConverterTable, EffectTable, FormTable};
+pub use on_device::{NO_SENSE, OnDevice, What};
+pub use writing::to_toml;
+
+use std::path::Path;
+
+use mimu_core::RealField;
+use mimu_core::compensation::Affine;
+use mimu_core::effects::Effects;
+use nalgebra::{Matrix3, Vector3};
+use serde::Deserialize;
+
+use crate::diagnose::removal::Removed;
+use crate::quantity::Sensor;
+use crate::triad::Forward;
+use mimu_recording::error::{Error, Result};
+use mimu_recording::{RawUnit, Reference, read_text};
+
+/// Version of the layout.
+const FORMAT: &str = "mimu-calibration/1";
+
+/// A calibration as a file holds it.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Calibration {
+    /// `mimu-calibration/1`.
+    pub format: String,
+    /// Unit that it is for.
+    pub device: String,
+    /// When it was made, RFC 3339.
+    pub created: String,
+    /// Program and version that made it.
+    pub tool: String,
+    /// What it was made from.
+    pub recording: Origin,
+    /// Gyro triad.
+    #[serde(default)]
+    pub gyro: Option<TriadTable>,
+    /// Accelerometer triad.
+    #[serde(default)]
+    pub accel: Option<TriadTable>,
+    /// What the affine models lack.
+    #[serde(default, rename = "effect")]
+    pub effect_tables: Vec<EffectTable>,
+    /// The same as it is taken out.
+    #[serde(skip)]
+    effects: Vec<Removed>,
+}
+
+/// The recording that a calibration was made from.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Origin {
+    /// SHA-256 of its samples file.
+    pub sha256: String,
+    /// What was known of its input.
+    pub reference: Reference,
+    /// Unit of its raw columns.
+    pub raw_unit: RawUnit,
+    /// Local gravity, m/s².
+    pub gravity_mps2: f64,
+    /// Mean temperature of the dwells, °C, if known.
+    #[serde(default)]
+    pub temp_c: Option<f64>,
+}
+
+/// One triad in a calibration file.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[allow(non_snake_case)] // C, P: the letters of the formulas, in the file as in the papers
+pub struct TriadTable {
+    /// `x = C u + o`.
+    pub formula: String,
+    /// `raw to SI`.
+    pub direction: String,
+    /// Unit of u.
+    pub raw_unit: RawUnit,
+    /// Unit of x.
+    pub unit: String,
+    /// Axes that x is given in.
+    pub frame: String,
+    /// SI per raw unit, by rows.
+    pub C: [[f64; 3]; 3],
+    /// SI.
+    pub o: [f64; 3],
+    /// Standard deviations of C.
+    pub sigma_C: [[f64; 3]; 3],
+    /// Standard deviations of o.
+    pub sigma_o: [f64; 3],
+    /// Halves of the 95 % intervals of C.
+    pub interval_C: [[f64; 3]; 3],
+    /// Halves of the 95 % intervals of o.
+    pub interval_o: [f64; 3],
+    /// Order of the covariance.
+    pub parameters: Vec<String>,
+    /// 12x12.
+    pub covariance: Vec<Vec<f64>>,
+    /// How well it did.
+    pub judged: Judged,
+    /// The same calibration the other way.
+    pub forward: ForwardTable,
+    /// And as physical quantities.
+    pub physical: PhysicalTable,
+}
+
+/// Error figures of the fit.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Judged {
+    /// How it was estimated.
+    pub estimator: String,
+    /// What the figures are about.
+    pub figure: String,
+    /// Unit of the figures.
+    pub unit: String,
+    /// On the data it was fitted to.
+    pub rms: f64,
+    /// On data it had not seen.
+    #[serde(default)]
+    pub held_out_rms: Option<f64>,
+    /// If noise were all.
+    pub noise_floor: f64,
+    /// Dwells used.
+    pub dwells: usize,
+    /// Condition of the experiment.
+    pub condition: f64,
+}
+
+/// Forward model, SI to raw.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[allow(non_snake_case)]
+pub struct ForwardTable {
+    /// `u = P x + b`.
+    pub formula: String,
+    /// `SI to raw`.
+    pub direction: String,
+    /// Raw per SI, by rows.
+    pub P: [[f64; 3]; 3],
+    /// Raw.
+    pub b: [f64; 3],
+}
+
+/// Physical quantities with their standard deviations.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PhysicalTable {
+    /// How `P` is made of them.
+    pub formula: String,
+    /// Raw per SI.
+    pub scale_factor: [f64; 3],
+    /// Standard deviations.
+    pub sigma_scale_factor: [f64; 3],
+    /// Raw.
+    pub bias: [f64; 3],
+    /// Standard deviations.
+    pub sigma_bias: [f64; 3],
+    /// θx, θy, θz, degrees.
+    pub misalignment_deg: [f64; 3],
+    /// Standard deviations.
+    pub sigma_misalignment_deg: [f64; 3],
+    /// βyz, βzy, βzx, degrees.
+    pub non_orthogonality_deg: [f64; 3],
+    /// Standard deviations.
+    pub sigma_non_orthogonality_deg: [f64; 3],
+}
+
+impl Calibration {
+    /// Reads and checks a calibration file.
+    pub fn read(path: &Path) -> Result<Self> {
+        let text = read_text(path)?;
+        Self::parse(&text, &path.display().to_string())
+    }
+
+    /// Parses and checks the text of a calibration file; `place` is its path.
+    pub fn parse(text: &str, place: &str) -> Result<Self> {
+        let mut calibration: Self = toml::from_str(text).map_err(|e| {
+            let message = e.message().trim();
+            // A missing key has the table that lacks it for its place.
+            let line = e.span().map_or(1, |s| {
+                let before = text.get(..s.start).unwrap_or(text);
+                1 + before.matches('\n').count()
+            });
+            let remedy = if message.starts_with("missing field") {
+                "the file is cut or was edited: copy it again, or fit the recording again"
+            } else {
+                "correct the line, or fit the recording again"
+            };
+            Error::new(format!("{place}, line {line}"), message, remedy)
+        })?;
+        if calibration.format != FORMAT {
+            let problem = format!(
+                "format is {:?}, and this program reads {FORMAT:?}",
+                calibration.format
+            );
+            return Err(Error::new(
+                place,
+                problem,
+                "use the version of mimu that wrote it",
+            ));
+        }
+        for sensor in Sensor::BOTH {
+            let Some(table) = calibration.table(sensor) else {
+                continue;
+            };
+            let place = format!("{place}, [{sensor}]");
+            let numbers = table
+                .C
+                .iter()
+                .flatten()
+                .chain(&table.o)
+                .chain(table.covariance.iter().flatten());
+            if !numbers.into_iter().all(|x| x.is_finite()) {
+                return Err(Error::new(
+                    place,
+                    "C, o or covariance has an entry that is not a number",
+                    "fit the recording again",
+                ));
+            }
+            if table.direction != "raw to SI" || table.formula != "x = C u + o" {
+                let problem = format!(
+                    "formula {:?}, direction {:?}: only x = C u + o, raw to SI, can be applied",
+                    table.formula, table.direction
+                );
+                return Err(Error::new(
+                    place,
+                    problem,
+                    "use the version of mimu that wrote it",
+                ));
+            }
+            if table.covariance.len() != 12 || table.covariance.iter().any(|r| r.len() != 12) {
+                return Err(Error::new(
+                    place,
+                    "covariance is not 12 by 12",
+                    "fit the recording again",
+                ));
+            }
+            let inverse = calibration.inverse(sensor);
+            let Some(forward) = inverse.as_ref().and_then(Forward::of) else {
+                return Err(Error::new(
+                    place,
+                    "C is singular",
+                    "fit the recording again",
+                ));
+            };
+            check_both_ways(table, &forward, &place)?;
+        }
+        if calibration.gyro.is_none() && calibration.accel.is_none() {
+            return Err(Error::new(
+                place,
+                "there is neither [gyro] nor [accel]",
+                "fit the recording again",
+            ));
+        }
+        calibration.effects = effect::read(&calibration, place)?;
+        Ok(calibration)
+    }
+
+    /// What the affine models lack.
+    pub fn effects(&self) -> &[Removed] {
+        &self.effects
+    }
+
+    /// The same as the device removes it, up to N effects of each triad that run with every sample and N that do not.
+    /// Refused, by its id, is one that this build of `core` cannot remove.
+    pub fn core_effects<T: RealField + Copy, const N: usize>(&self) -> Result<Effects<T, N>> {
+        on_device::core_effects(self)
+    }
+
+    /// The table of `sensor`.
+    pub fn table(&self, sensor: Sensor) -> Option<&TriadTable> {
+        match sensor {
+            Sensor::Gyro => self.gyro.as_ref(),
+            Sensor::Accel => self.accel.as_ref(),
+        }
+    }
+
+    /// The inverse model of `sensor`.
+    pub fn inverse(&self, sensor: Sensor) -> Option<Affine<f64>> {
+        let table = self.table(sensor)?;
+        Some(Affine {
+            matrix: Matrix3::from_fn(|i, j| table.C[i][j]),
+            offset: Vector3::from(table.o),
+        })
+    }
+}
+
+/// Refuses a file in which the two directions of the calibration disagree: one of them was edited.
+fn check_both_ways(table: &TriadTable, forward: &Forward, place: &str) -> Result<()> {
+    let (matrix, offset) = (forward.matrix, forward.bias);
+    let off_p = Matrix3::from_fn(|i, j| table.forward.P[i][j] - matrix[(i, j)]);
+    let off_b = Vector3::from(table.forward.b) - offset;
+    // Both are written to all their digits; what an inversion loses stays far below.
+    let alike = off_p.norm() <= 1e-6 * matrix.norm()
+        && off_b.norm() <= 1e-6 * (offset.norm() + matrix.norm());
+    if alike {
+        return Ok(());
+    }
+    Err(Error::new(
+        place,
+        "C and o are not the inverse of forward.P and forward.b: the file was edited",
+        "fit the recording again",
+    ))
+}

@@ -1,0 +1,248 @@
+//! Most out of so many minutes: how many dwells, how long, and how often the whole again.
+
+use rayon::prelude::*;
+
+use super::model::Setting;
+use super::problem::Problem;
+use super::refinement::Region as _;
+use super::tour::{Motion, Order, by_lot};
+use crate::allan::model::FLOOR;
+use crate::noise::AllanModel;
+use crate::noise_file::NoiseFile;
+use crate::quantity::Sensor;
+use mimu_recording::error::{Error, Result};
+
+/// Noise of a sensor as density and floor, from which the sigma of a dwell mean follows.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DwellNoise {
+    /// White noise N, SI unit times √s (the same as per √Hz).
+    pub n: f64,
+    /// Bias instability B, SI unit.
+    pub b: f64,
+    /// Rate random walk K, SI unit per √s.
+    pub k: f64,
+}
+
+/// Time up to which fang, section 3, finds noise white, s.
+const FANG_WHITE_S: f64 = 20.0;
+
+impl DwellNoise {
+    /// Of fang's sensors. N from the variances of Table 5 at 25 °C, taken to be those of samples at 1 kHz,
+    /// and the scale factors of Table 4, both averaged over the axes; B such that the floor is reached at 20
+    /// s (section 3: white noise within, drift beyond; no number for B is given); K = 0.
+    pub fn fang(sensor: Sensor) -> Self {
+        let (variances, scales, si) = match sensor {
+            Sensor::Gyro => ([1.27, 0.92, 1.92], [5.07, 5.09, 5.17], 1f64.to_radians()),
+            Sensor::Accel => ([3.57, 4.23, 2.47], [80.80, 80.14, 80.84], 1.0),
+        };
+        let volts = (variances.iter().sum::<f64>() / 3.0 * 1e-5).sqrt();
+        let volts_per_unit = scales.iter().sum::<f64>() / 3.0 * 1e-3;
+        let n = volts / volts_per_unit * si * 1e-3f64.sqrt();
+        Self {
+            n,
+            b: n / (FANG_WHITE_S * FLOOR).sqrt(),
+            k: 0.0,
+        }
+    }
+
+    /// Of the worst axis of `sensor` in a noise file: of each coefficient the largest, over all temperatures.
+    ///
+    /// Errors: the file lacks the sensor, or is not in SI.
+    pub fn stated(file: &NoiseFile, sensor: Sensor) -> Result<Self> {
+        let mut worst = Self {
+            n: 0.0,
+            b: 0.0,
+            k: 0.0,
+        };
+        let channels = file.of(sensor);
+        if channels.is_empty() {
+            return Err(Error::new(
+                &file.place,
+                format!("there is no channel of the {sensor}"),
+                "run mimu allan on a recording that has it",
+            ));
+        }
+        for channel in channels {
+            if channel.unit != sensor.unit() {
+                return Err(Error::new(
+                    format!("{}, channel {}", file.place, channel.name),
+                    format!("it is in {} and not in {}", channel.unit, sensor.unit()),
+                    "run mimu allan with --calibration",
+                ));
+            }
+            let AllanModel {
+                white,
+                flicker,
+                walk,
+            } = channel.model();
+            worst.n = worst.n.max(white.sqrt());
+            worst.b = worst.b.max((flicker / FLOOR).sqrt());
+            worst.k = worst.k.max((3.0 * walk).sqrt());
+        }
+        Ok(worst)
+    }
+
+    /// Dwell from which on a longer one is not worth it, s: its sigma is within 5 % of the least that any has. That is fang's
+    /// argument (section 3) for 20 s. `None` where white noise is all.
+    pub fn useful_s(&self) -> Option<f64> {
+        let AllanModel {
+            white,
+            flicker,
+            walk,
+        } = self.allan();
+        // Least at √(white/walk), 2 √(white walk) above the floor. Solves white/t + walk t + flicker = (1.05)² least.
+        let over = 1.05 * 1.05 * (flicker + 2.0 * (white * walk).sqrt()) - flicker;
+        (over > 0.0 && white > 0.0)
+            .then(|| 2.0 * white / (over + (over * over - 4.0 * white * walk).max(0.0).sqrt()))
+    }
+
+    /// The three terms, as an Allan variance.
+    fn allan(&self) -> AllanModel {
+        AllanModel {
+            white: self.n.powi(2),
+            flicker: FLOOR * self.b.powi(2),
+            walk: self.k.powi(2) / 3.0,
+        }
+    }
+
+    /// Sigma of the mean over `dwell_s`, SI unit: `√(N²/T + (0.664 B)² + K² T/3)`.
+    pub fn sigma(&self, dwell_s: f64) -> f64 {
+        self.allan().variance(dwell_s).sqrt()
+    }
+
+    /// Dwell beyond which the mean gets worse, s.
+    fn longest_s(&self) -> f64 {
+        (self.allan().white / self.allan().walk).sqrt()
+    }
+
+    /// Shares of white noise, floor and random walk in the variance of a dwell mean.
+    pub fn shares(&self, dwell_s: f64) -> [f64; 3] {
+        let a = self.allan();
+        [a.white / dwell_s, a.flicker, a.walk * dwell_s].map(|v| v / a.variance(dwell_s))
+    }
+}
+
+/// One way to spend the time.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Spending {
+    /// The settings of all dwells, in order.
+    pub settings: Vec<Setting>,
+    /// Passes over the design.
+    pub passes: usize,
+    /// Length of each dwell, s.
+    pub dwell_s: f64,
+    /// Time of all moves, s.
+    pub moves_s: f64,
+    /// The same if each pass took the shortest way found, s.
+    pub shortest_moves_s: f64,
+    /// Sigma of one dwell mean, SI unit.
+    pub sigma: f64,
+    /// Normalised mean sigma of the parameters over all passes; see
+    /// [`super::judgement::Judgement::mean_sigma`].
+    pub mean_sigma: f64,
+}
+
+impl Spending {
+    /// Dwells of one pass.
+    pub fn each_pass(&self) -> usize {
+        self.settings.len() / self.passes
+    }
+
+    /// Time of all dwells and moves, s.
+    pub fn time_s(&self) -> f64 {
+        self.settings.len() as f64 * self.dwell_s + self.moves_s
+    }
+}
+
+/// The ways looked at.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Budget {
+    /// The one with the smallest mean sigma.
+    pub best: Spending,
+    /// The best with each number of dwells in a pass, ascending.
+    pub by_size: Vec<Spending>,
+}
+
+/// Most dwells in a pass.
+const MOST: usize = 40;
+/// Most passes.
+const PASSES: usize = 50;
+/// Shortest dwell, s: a controller and a settling filter allow no shorter ones.
+const SHORTEST_S: f64 = 1.0;
+
+/// What a session may take, and what it is made with.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Session {
+    /// Time for all dwells and moves, s.
+    pub time_s: f64,
+    /// Noise of the sensor.
+    pub noise: DwellNoise,
+    /// Moves between the dwells.
+    pub motion: Motion,
+    /// Order of the dwells within a pass.
+    pub order: Order,
+}
+
+impl Session {
+    /// The number of dwells in a pass, the number of passes and the length of a dwell that make the parameters' mean
+    /// sigma smallest. `seed` is that of the searches and of the lots, which each pass draws anew.
+    pub fn spend(&self, problem: &Problem, seed: u64) -> Result<Budget> {
+        let widths = problem.reach.widths();
+        let least = widths.iter().max().copied().unwrap_or(0);
+        let sizes: Vec<usize> = (least..=MOST.max(least)).collect();
+        let ways: Vec<Option<Spending>> = sizes
+            .into_par_iter()
+            .map(|n| {
+                let settings = problem.best(n, seed)?;
+                let unit = problem.judge(&settings, 1.0).mean_sigma;
+                let shortest = self.motion.shortest(&settings);
+                let ways = (1..=PASSES).filter_map(|k| self.passes(&shortest, k, unit, seed));
+                Ok(ways.min_by(|a, b| a.mean_sigma.total_cmp(&b.mean_sigma)))
+            })
+            .collect::<Result<_>>()?;
+        let by_size: Vec<Spending> = ways.into_iter().flatten().collect();
+        let best = by_size
+            .iter()
+            .min_by(|a, b| a.mean_sigma.total_cmp(&b.mean_sigma));
+        match best.cloned() {
+            Some(best) => Ok(Budget { best, by_size }),
+            None => Err(Error::new(
+                format!("--budget {} min", self.time_s / 60.0),
+                format!("{least} dwells of {SHORTEST_S} s and the moves between them take longer"),
+                "allow more time, or a table that moves faster",
+            )),
+        }
+    }
+
+    /// So many passes over settings whose mean sigma is `unit` for a sigma of 1; `None` if there is no time for them.
+    fn passes(
+        &self,
+        shortest: &[Setting],
+        passes: usize,
+        unit: f64,
+        seed: u64,
+    ) -> Option<Spending> {
+        // Not there and back: two dwells in a row at the same setting share the drift.
+        let there = shortest.repeat(passes);
+        let shortest_moves_s = self.motion.moves_s(&there);
+        let settings = match self.order {
+            Order::Shortest => there,
+            Order::Lot => (0..passes as u64)
+                .flat_map(|pass| by_lot(shortest, seed.wrapping_add(pass)))
+                .collect(),
+        };
+        let moves_s = self.motion.moves_s(&settings);
+        let most_s = (self.time_s - moves_s) / settings.len() as f64;
+        let dwell_s = most_s.min(self.noise.longest_s().max(SHORTEST_S));
+        let sigma = self.noise.sigma(dwell_s);
+        (dwell_s >= SHORTEST_S).then_some(Spending {
+            settings,
+            passes,
+            dwell_s,
+            moves_s,
+            shortest_moves_s,
+            sigma,
+            mean_sigma: unit * sigma / (passes as f64).sqrt(),
+        })
+    }
+}

@@ -1,0 +1,136 @@
+//! What a set of settings determines, and how well.
+
+use super::information::{Inverse, Rows};
+use super::lack_of_fit::{Notice, notices};
+use super::model::{Parameter, Setting};
+use super::problem::Problem;
+use crate::estimate::least_squares::Observability;
+
+/// Half of a 95 % interval in sigmas, where the noise of a dwell mean is known.
+pub const HALF_95: f64 = 1.959_963_984_540_054;
+
+/// A parameter as a design determines it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Determined {
+    /// The parameter.
+    pub parameter: Parameter,
+    /// Its sigma, normalised: times [`Parameter::si`] in SI, times [`Parameter::shown`] for people. Infinite
+    /// if undetermined.
+    pub sigma: f64,
+    /// That over the sigma if all the other parameters were known: 1 if orthogonal to them. Its square is the
+    /// variance inflation factor.
+    pub inflation: f64,
+}
+
+/// Inflation from which on a parameter is all but unobservable: 99 % of its regressor is explained by the
+/// others.
+pub const WEAK: f64 = 10.0;
+
+/// A design, judged.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Judgement {
+    /// The settings, one a dwell, in the order given.
+    pub settings: Vec<Setting>,
+    /// `det(F'F/n)`, fang (22), of one sensor where all three have the same regressors, else the product over
+    /// them.
+    pub determinant: f64,
+    /// Against the continuous optimum over the reach: 1 is the best possible, 0 singular.
+    pub d_efficiency: f64,
+    /// Sigma of a dwell mean, SI, that the parameters' sigmas are for.
+    pub sigma: f64,
+    /// All parameters of the triad.
+    pub parameters: Vec<Determined>,
+    /// Geometric mean of the semi-axes of the parameters' one-sigma ellipsoid, normalised: what the criterion
+    /// minimises. Infinite if singular.
+    pub mean_sigma: f64,
+    /// Largest over smallest singular value of F; infinite if singular.
+    pub condition: f64,
+    /// Degrees of freedom of a regression left by different inputs: these notice a wrong model.
+    pub lack_of_fit_dof: usize,
+    /// Degrees of freedom of a regression left by repeated inputs: these tell the noise, whatever the model.
+    pub repetition_dof: usize,
+    /// What it would notice of the terms that the model lacks.
+    pub notices: Vec<Notice>,
+}
+
+impl Problem {
+    /// Judges `settings`, one dwell each, whose means have the sigma `sigma` (SI unit of the sensor).
+    ///
+    /// They need not be within reach: the efficiency is against what is.
+    pub fn judge(&self, settings: &[Setting], sigma: f64) -> Judgement {
+        let model = &self.reach.model;
+        let n = settings.len();
+        let log_det = self.log_det(settings);
+        let p = self.optimum.parameters;
+        let mut parameters = Vec::new();
+        let mut condition = 0.0_f64;
+        let distinct = self.distinct(settings).len();
+        let mut width = 0;
+        for regression in 0..model.regressions() {
+            let list = model.parameters(regression);
+            width = list.len();
+            let mut rows = Rows::new(&[width]);
+            let mut row = Vec::new();
+            for s in settings {
+                row.clear();
+                model.regressors(regression, s, &mut row);
+                rows.push(&row);
+            }
+            let f = rows.matrix(0);
+            let observability = Observability::of(&f);
+            condition = condition.max(observability.condition);
+            let inverse = Inverse::of(&rows, (0..n).map(|i| (i, 1.0)));
+            for (k, parameter) in list.into_iter().enumerate() {
+                let alone = f.column(k).norm();
+                let unseen = observability.undetermined.iter().any(|(u, _)| *u == k);
+                let variance = match &inverse {
+                    Some(inverse) => inverse.block(0)[(k, k)],
+                    // Some parameters of a singular design are determined all the same.
+                    None if unseen || alone == 0.0 => f64::INFINITY,
+                    None => pseudo_variance(&f, k),
+                };
+                parameters.push(Determined {
+                    parameter,
+                    sigma: sigma * variance.sqrt(),
+                    inflation: variance.sqrt() * alone,
+                });
+            }
+        }
+        Judgement {
+            settings: settings.to_vec(),
+            determinant: (log_det - p as f64 * (n as f64).ln()).exp(),
+            d_efficiency: self.optimum.efficiency(log_det, n),
+            sigma,
+            parameters,
+            mean_sigma: sigma * (-log_det / (2.0 * p as f64)).exp(),
+            condition,
+            lack_of_fit_dof: distinct.saturating_sub(width),
+            repetition_dof: n - distinct,
+            notices: notices(model, settings),
+        }
+    }
+}
+
+/// Variance of a parameter that a singular design determines, from the directions that it does determine.
+fn pseudo_variance(f: &nalgebra::DMatrix<f64>, k: usize) -> f64 {
+    let normal = (f.transpose() * f).pseudo_inverse(1e-8);
+    normal.map_or(f64::INFINITY, |inverse| inverse[(k, k)])
+}
+
+impl Judgement {
+    /// Names of the parameters that it does not determine.
+    pub fn undetermined(&self) -> Vec<&str> {
+        let none = self.parameters.iter().filter(|p| p.sigma.is_infinite());
+        none.map(|p| p.parameter.name.as_str()).collect()
+    }
+
+    /// Determined parameters that are all but unobservable, with their inflation.
+    pub fn weak(&self) -> Vec<(&str, f64)> {
+        let weak = self
+            .parameters
+            .iter()
+            .filter(|p| p.inflation >= WEAK && p.sigma.is_finite());
+        weak.map(|p| (p.parameter.name.as_str(), p.inflation))
+            .collect()
+    }
+}

@@ -1,0 +1,46 @@
+//! D-optimal design of calibration experiments: which attitudes and rates, how many, for how long.
+//!
+//! | module                        | what                                                                     |
+//! |-------------------------------|--------------------------------------------------------------------------|
+//! | [`model`], [`reach`]          | regressors of a calibration model; settings that a table or a hand reaches |
+//! | [`information`]               | rows of regressors, determinant and inverse of `F'F`                     |
+//! | [`exchange`], [`refinement`]  | exact designs of n dwells: on candidates, then between them              |
+//! | [`continuous`]                | the optimum that no n dwells can beat, with a proof of how near it is    |
+//! | [`judgement`], [`lack_of_fit`] | what a set of settings determines, how well, and what it would notice   |
+//! | [`tour`], [`budget`]          | order and time of a sequence; most out of so many minutes                |
+//! | [`schemes`]                   | published schemes                                                        |
+//! | [`problem`]                   | a model, what it can be measured with, and the best designs of it        |
+//! | [`plan`]                      | a design as the file that a table or a person carries out                |
+//!
+//! The criterion is fang (22), `det(F'F/n)`, of the parameters of all three sensors together. The gyro by hand,
+//! whose known input are the turns between dwells, is no design of dwells and not treated here.
+//!
+//! ```
+//! use mimu::design::{Problem, model::{Model, Terms}, reach::Carrier, schemes::Scheme};
+//! use mimu::quantity::Sensor;
+//! use mimu_recording::Reference;
+//!
+//! let model = Model::accel(Reference::Table, &Terms::default());
+//! let problem = Problem::accel(model, Carrier::ThreeAxis)?;
+//! let six = problem.best(6, 1)?;
+//! let ours = problem.judge(&six, 1e-3);
+//! let fang = problem.judge(&Scheme::FangNine.settings(Sensor::Accel)?, 1e-3);
+//! assert!((ours.d_efficiency - 1.0).abs() < 1e-6 && fang.d_efficiency < 0.95);
+//! # Ok::<(), mimu_recording::error::Error>(())
+//! ```
+
+pub mod budget;
+pub mod continuous;
+pub mod exchange;
+pub mod information;
+pub mod judgement;
+pub mod lack_of_fit;
+pub mod model;
+pub mod plan;
+pub mod problem;
+pub mod reach;
+pub mod refinement;
+pub mod schemes;
+pub mod tour;
+
+pub use problem::Problem;

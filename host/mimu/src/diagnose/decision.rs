@@ -1,0 +1,383 @@
+//! From the rows of one sensor to a verdict: what is tried, what is accepted, what is left.
+
+mod hold_out;
+mod leftover;
+mod reading;
+mod second;
+mod tried;
+mod undecided;
+
+use nalgebra::{DMatrix, DVector};
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+use super::candidate::{Kind, Monomial, Variable};
+use super::removal::Removed;
+use super::rows::Rows;
+use super::search::{Chosen, Search, beside};
+use super::spread::{By, Fitted};
+use hold_out::leverage;
+use leftover::leftover;
+pub(super) use leftover::noisier;
+use reading::of_readings;
+use second::second;
+use tried::candidates;
+use undecided::undecided;
+
+pub use hold_out::Split;
+pub(super) use hold_out::{held_out, rms};
+pub use leftover::{FALSE_LEFTOVER, Leftover};
+pub use second::Second;
+pub use undecided::Undecided;
+
+/// One dwell that has more than this share in what an effect rests on decides it alone.
+pub const LEVERAGE: f64 = 0.7;
+/// An accepted effect with its coefficients.
+#[derive(Debug, Clone)]
+pub struct Accepted {
+    /// The candidate, its form and how it was found.
+    pub chosen: Chosen,
+    /// Coefficients, SI, in the order of the candidate's active ones.
+    pub values: DVector<f64>,
+    /// Their covariance.
+    pub covariance: DMatrix<f64>,
+    /// Held-out root mean square without it and with it, beside the others.
+    pub held_out: [f64; 2],
+    /// How it was held out.
+    pub split: Split,
+    /// What it does to the second recording, if there is one that can be judged by.
+    pub second: Option<Second>,
+}
+
+/// What was decided on one sensor.
+#[derive(Debug, Clone)]
+pub struct Decision {
+    /// Accepted effects.
+    pub accepted: Vec<Accepted>,
+    /// Effects that were found and not accepted, with the reason; and the best of those that were not found.
+    pub rejected: Vec<(String, String)>,
+    /// Effects that the experiment could not show, with what would.
+    pub not_excited: Vec<(String, String)>,
+    /// Structure that is left.
+    pub leftover: Vec<Leftover>,
+    /// Root mean square of the judged rows before and after, in sample.
+    pub rms: [f64; 2],
+    /// The same held out; not a number where no block could be.
+    pub held_out_rms: [f64; 2],
+    /// How they were held out.
+    pub split: Split,
+    /// The last, with every fourth dwell held out instead: a block of time may hold a range of temperature to itself, and is then
+    /// extrapolated to; between dwells that were seen nothing is.
+    pub interleaved_rms: f64,
+    /// What noise alone would leave.
+    pub noise_floor: f64,
+    /// Accepted effects whose physics the rows do not decide.
+    pub undecided: Vec<Undecided>,
+    /// What a person should know of the accepted effects.
+    pub notes: Vec<String>,
+    /// Rows, and affine parameters that they had to determine first: what is left between them is all that can be judged by.
+    pub rows: [usize; 2],
+    /// Probability of chance that the rows before scatter as they do, by the known noise alone.
+    pub omnibus_p: f64,
+}
+
+impl Decision {
+    /// What is left that no usual sensor does.
+    pub fn unexplained(&self) -> impl Iterator<Item = &Leftover> {
+        self.leftover.iter().filter(|l| !l.usual)
+    }
+}
+
+/// Decides on the rows of one sensor; `dwell_ends` are the times between dwells, where a bias may have jumped: index of the
+/// recording and s. `unseen` are the rows of a second recording, which nothing is found in: what it contradicts is not accepted.
+pub fn decide(rows: &Rows, dwell_ends: &[(usize, f64)], unseen: Option<&Rows>) -> Option<Decision> {
+    let (all, mut not_excited) = candidates(rows, dwell_ends);
+    let search = Search::new(rows, all);
+    let null = search.fit(&[])?;
+    let known = search.spread.fit_at(&search.basis, &search.spread.none())?;
+    let dof = rows.y.len() as f64 - search.basis.ncols() as f64;
+    let omnibus_p = ChiSquared::new(dof).map_or(1.0, |d| d.sf(known.chi2));
+    let (chosen, mut with) = search.run()?;
+    let said = |value: f64| rows.figure.said(rows.sensor, value);
+    let mut rejected = Vec::new();
+    let mut kept: Vec<Chosen> = Vec::new();
+    let mut jumps = Vec::new();
+    for one in chosen {
+        match one.candidate.kind {
+            Kind::Jump { .. } => jumps.push(one),
+            _ => kept.push(one),
+        }
+    }
+    // Jumps are told of and not fitted.
+    if !jumps.is_empty() {
+        with = search.fit(&kept)?;
+    }
+    // What does not hold out goes, the least worth first.
+    let held_rms = |chosen: &[Chosen], fit: &Fitted, split: Split| {
+        held_out(&search, &search.model(chosen), fit, split).map(|r| rms(rows, &r))
+    };
+    // All rates in one block of time, and without it there is no calibration.
+    let usual = match held_rms(&[], &null, Split::Blocks) {
+        Some(_) => Split::Blocks,
+        None => Split::Interleaved,
+    };
+    let split_of = |rest: &[Chosen], one: &Chosen, with: &Fitted| {
+        let [dwell, block] = leverage(rows, &search.model(rest), &one.columns);
+        let mut all = rest.to_vec();
+        all.push(one.clone());
+        let alone = block > LEVERAGE || held_rms(&all, with, usual).is_none();
+        (dwell, if alone { Split::Interleaved } else { usual })
+    };
+    let elsewhere = |kept: &[Chosen], values: &[DVector<f64>]| -> Vec<Option<Second>> {
+        let each = kept.iter().zip(values);
+        let given: Vec<Removed> = each
+            .map(|(c, values)| {
+                let (candidate, values) = c.candidate.lasting(values.as_slice());
+                Removed {
+                    candidate,
+                    form: c.form,
+                    values,
+                }
+            })
+            .collect();
+        match unseen.and_then(|u| second(u, &given)) {
+            Some(all) => all.into_iter().map(Some).collect(),
+            None => vec![None; kept.len()],
+        }
+    };
+    // One way of holding out for all: where a warm-up is seen in one block only, a model that has not seen that block misses it by so
+    // much that nothing else in the model would show.
+    let common = |kept: &[Chosen], with: &Fitted| {
+        let each = (0..kept.len()).map(|i| {
+            let mut rest = kept.to_vec();
+            let one = rest.remove(i);
+            split_of(&rest, &one, with)
+        });
+        let (shares, splits): (Vec<f64>, Vec<Split>) = each.unzip();
+        let split = match splits.contains(&Split::Interleaved) {
+            true => Split::Interleaved,
+            false => usual,
+        };
+        (shares, split)
+    };
+    loop {
+        let seconds = elsewhere(&kept, &shares(&search, &kept, &with));
+        let (weights, split) = common(&kept, &with);
+        let held = held_rms(&kept, &with, split);
+        let mut worst: Option<(usize, String, bool)> = None;
+        for i in (0..kept.len()).rev() {
+            let mut rest = kept.clone();
+            rest.remove(i);
+            let share = weights[i];
+            let without = search.fit(&rest)?;
+            let [a, b] = [held_rms(&rest, &without, split), held];
+            let why = match (a, b) {
+                _ if share > LEVERAGE => {
+                    format!("it rests to {:.0} % on one dwell", 100.0 * share)
+                }
+                (Some(a), Some(b)) if !(b < a) => {
+                    format!(
+                        "the held-out error does not go down: {} without, {} with",
+                        said(a),
+                        said(b)
+                    )
+                }
+                _ if seconds[i].is_some_and(|s| s.contradicts()) => {
+                    let nan = [f64::NAN; 2];
+                    let ([a, b], [c, d]) = seconds[i].map_or((nan, nan), |s| (s.chi2, s.rms));
+                    format!(
+                        "the error of the second recording does not go down: chi-square {a:.0} without, {b:.0} with; rms {} and {}",
+                        said(c),
+                        said(d)
+                    )
+                }
+                (_, None) => "what is left when a block is held out does not determine it".into(),
+                _ => continue,
+            };
+            let too_few_dwells = share > LEVERAGE || b.is_none();
+            worst = Some((i, why, too_few_dwells));
+            break;
+        }
+        let Some((i, why, too_few_dwells)) = worst else {
+            break;
+        };
+        let candidate = kept.remove(i).candidate;
+        // More dwells may prove it: it is asked for in the next experiment.
+        if let Kind::Effect(effect) = &candidate.kind
+            && too_few_dwells
+            && !not_excited.iter().any(|n| n.0 == effect.id)
+        {
+            not_excited.push((effect.id.into(), effect.needs.into()));
+        }
+        rejected.push((candidate.id(), why));
+        with = search.fit(&kept)?;
+    }
+    let model = search.model(&kept);
+    let last = search
+        .spread
+        .fit(&model, &with.components, By::Restricted)?;
+    let mut accepted = Vec::new();
+    let split = common(&kept, &with).1;
+    let values = shares(&search, &kept, &last);
+    let seconds = elsewhere(&kept, &values);
+    let mut from = search.basis.ncols();
+    for (i, one) in kept.iter().enumerate() {
+        let count = one.columns.ncols();
+        let mut rest = kept.clone();
+        rest.remove(i);
+        let without = search.fit(&rest)?;
+        let held = [
+            held_rms(&rest, &without, split),
+            held_rms(&kept, &with, split),
+        ];
+        accepted.push(Accepted {
+            chosen: one.clone(),
+            split,
+            values: values[i].clone(),
+            second: seconds[i],
+            covariance: last
+                .covariance
+                .view((from, from), (count, count))
+                .into_owned(),
+            held_out: held.map(|h| h.unwrap_or(f64::NAN)),
+        });
+        from += count;
+    }
+    // Beside the jumps that were found: every slow effect would seem to explain a little of them.
+    let with_jumps: Vec<Chosen> = kept.iter().chain(&jumps).cloned().collect();
+    let all = match jumps.is_empty() {
+        true => with.clone(),
+        false => search.fit(&with_jumps)?,
+    };
+    for one in search.others(&with_jumps, &all) {
+        let id = one.candidate.id();
+        let told = |all: &[(String, String)]| all.iter().any(|r| r.0 == id);
+        if told(&rejected) || told(&not_excited) {
+            continue;
+        }
+        let mut more = kept.clone();
+        more.push(one.clone());
+        let held = search
+            .fit(&more)
+            .and_then(|f| Some((f.clone(), held_rms(&more, &f, usual)?)))
+            .map(|(f, held)| {
+                (
+                    rms(rows, &(&rows.y - search.model(&more) * &f.coefficients)),
+                    held,
+                )
+            });
+        let now = (
+            rms(rows, &(&rows.y - search.model(&kept) * &with.coefficients)),
+            held_rms(&kept, &with, usual),
+        );
+        let chance = match one.p {
+            p if p > 0.5 => "no better than chance".to_string(),
+            p => format!("by chance once in {:.0}", 1.0 / p),
+        };
+        let figures = match (held, now) {
+            (Some((sample, held)), (before, Some(out))) => format!(
+                "; in sample {} to {}, held out {} to {}",
+                said(before),
+                said(sample),
+                said(out),
+                said(held)
+            ),
+            _ => String::new(),
+        };
+        rejected.push((id, chance + &figures));
+    }
+    let residuals = |fit: &Fitted, model: &DMatrix<f64>| &rows.y - model * &fit.coefficients;
+    let base = search
+        .spread
+        .fit(&search.basis, &null.components, By::Restricted)?;
+    let of_readings = of_readings(&search, &model, &last, split);
+    // What scatters beside them.
+    let whole = of_readings
+        .iter()
+        .fold(model.clone(), |m, r| beside(&m, &r.columns));
+    let mut left = leftover(&search, &whole, &last, !kept.is_empty(), &jumps);
+    left.extend(of_readings.into_iter().map(|r| r.left));
+    let by =
+        |chosen: &[Chosen], fit: &Fitted, split| held_rms(chosen, fit, split).unwrap_or(f64::NAN);
+    let held = |chosen: &[Chosen], fit: &Fitted| by(chosen, fit, split);
+    let floor: f64 = rows.strata.iter().map(|s| known_in(s, rows.judged.0)).sum();
+    Some(Decision {
+        rms: [
+            rms(rows, &residuals(&base, &search.basis)),
+            rms(rows, &residuals(&last, &model)),
+        ],
+        held_out_rms: [held(&[], &null), held(&kept, &last)],
+        interleaved_rms: by(&kept, &last, Split::Interleaved),
+        split,
+        noise_floor: (floor / (rows.judged.0 / rows.judged.1) as f64).sqrt(),
+        accepted,
+        rejected,
+        not_excited,
+        leftover: left,
+        undecided: undecided(&search, &kept),
+        notes: notes(rows, &kept),
+        rows: [rows.y.len(), search.basis.ncols()],
+        omnibus_p,
+    })
+}
+
+fn known_in(stratum: &super::rows::Stratum, judged: usize) -> f64 {
+    let rows = stratum.rows.clone().take_while(|r| *r < judged).count();
+    stratum.known.diagonal().rows(0, rows).sum()
+}
+
+/// Coefficients of each of the chosen.
+fn shares(search: &Search, chosen: &[Chosen], fit: &Fitted) -> Vec<DVector<f64>> {
+    let mut from = search.basis.ncols();
+    let mut all = Vec::new();
+    for one in chosen {
+        let count = one.columns.ncols();
+        all.push(fit.coefficients.rows(from, count).into_owned());
+        from += count;
+    }
+    all
+}
+
+/// What a person should know of the chosen.
+fn notes(rows: &Rows, chosen: &[Chosen]) -> Vec<String> {
+    let mut notes = Vec::new();
+    let inputs = chosen.iter().filter(|c| !c.candidate.is_error());
+    notes.extend(inputs.map(|c| {
+        format!(
+            "{}: the unit is right to read it; the calibration is found without it, and nothing takes it out of readings",
+            c.candidate.id()
+        )
+    }));
+    // Its level part goes by the heading, and on a table that shows one heading in each attitude by products of the force.
+    let only_force = |m: &Monomial| m.0.iter().all(|v| matches!(v, Variable::Force(_)));
+    let level = chosen
+        .iter()
+        .filter(|c| matches!(&c.candidate.kind, Kind::Term(_, m) if only_force(m)));
+    let level: Vec<String> = level.map(|c| c.candidate.id()).collect();
+    if !level.is_empty() && chosen.iter().any(|c| !c.candidate.is_error()) {
+        notes.push(format!(
+            "{}: may be the level part of the Earth's rate, which goes by the heading and is another elsewhere: show each attitude at \
+             several headings",
+            level.join(", ")
+        ));
+    }
+    let elsewhere = chosen.iter().filter(|c| c.candidate.elsewhere);
+    notes.extend(elsewhere.map(|c| {
+        format!(
+            "{}: the thermometer warms up by itself in the first minute, and the sensor is on another die; the device has no other \
+             thermometer, and errs by that for so long after power-on",
+            c.candidate.id()
+        )
+    }));
+    let slow = chosen.iter().filter(|c| c.candidate.is_slow());
+    let ids: Vec<String> = slow.map(|c| c.candidate.id()).collect();
+    let Some(order) = rows.one_way().filter(|_| !ids.is_empty()) else {
+        return notes;
+    };
+    notes.push(format!(
+        "{}: the temperature only {} while time goes on (rank correlation {order:.2}), so that what follows temperature and what \
+         follows time look alike, and a lag of the die looks like a bias; let it come back within one recording",
+        ids.join(", "),
+        if order > 0.0 { "rises" } else { "falls" },
+    ));
+    notes
+}

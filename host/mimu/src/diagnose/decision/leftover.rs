@@ -1,0 +1,111 @@
+//! Structure that nothing explains.
+
+use nalgebra::DMatrix;
+
+use crate::diagnose::rows::{Session, directions};
+use crate::diagnose::search::{Chosen, Search};
+use crate::diagnose::spread::{By, Fitted, Spread};
+use crate::quantity::AXES;
+use crate::quantity::Sensor;
+use crate::quantity::significant;
+
+/// A bias that wanders by this many times the noise of a dwell mean is no usual one, and the verdict says so even where nobody has
+/// recorded how far it may: sensors of the usual kind wander by up to three in half an hour. A walk is not all of it: they flicker as
+/// well, so that clean units scatter more than their samples do.
+const WANDERS: f64 = 4.0;
+/// Probability that the rows of a clean sensor scatter so much that structure is told of.
+pub const FALSE_LEFTOVER: f64 = 1e-3;
+
+/// Structure that is left.
+#[derive(Debug, Clone)]
+pub struct Leftover {
+    /// Stratum: an axis, `turns`.
+    pub stratum: String,
+    /// Axis, if it is of one.
+    pub axis: Option<usize>,
+    /// What it goes with, if with anything.
+    pub against: String,
+    /// Root mean square beyond the noise, unit of the rows.
+    pub strength: f64,
+    /// Whether the biases of usual sensors do as much by themselves, nobody has recorded what this one does at rest, and no effect was
+    /// found: told, but no verdict rests on it. Beside an effect it may be what the effect does not explain.
+    pub usual: bool,
+}
+
+/// Scatter beyond the known noise, stratum by stratum, and what it goes with; `found` says whether effects are in the model.
+pub(super) fn leftover(
+    search: &Search,
+    model: &DMatrix<f64>,
+    last: &Fitted,
+    found: bool,
+    jumps: &[Chosen],
+) -> Vec<Leftover> {
+    let rows = search.rows;
+    let mut left = Vec::new();
+    let spread = Spread::new(rows, true);
+    let Some(last) = spread.fit(model, &last.components, By::Likelihood) else {
+        return left;
+    };
+    for (s, stratum) in rows.strata.iter().enumerate() {
+        let (excess, walk) = (last.components.excess[s], last.components.walk[s]);
+        let unit = stratum.walk.as_ref().map_or(0.0, |w| w.diagonal().mean());
+        let strength = (excess + walk * unit).sqrt();
+        let jump = jumps
+            .iter()
+            .find(|j| j.candidate.axes().first().copied() == stratum.axis);
+        // Without the components of this stratum: does the known noise do? A bias wanders, and while nobody has recorded
+        // by how much, that it does is no news.
+        let mut bare = last.components.clone();
+        bare.excess[s] = 0.0;
+        if stratum.wander_known {
+            bare.walk[s] = 0.0;
+        }
+        let Some(bare) = spread.fit_at(model, &bare) else {
+            continue;
+        };
+        let worse = bare.deviance - last.deviance;
+        // Two components at the edge of what they can be: chi-square of two degrees of freedom is on the safe side.
+        let p = (-0.5 * worse).exp() * rows.strata.len() as f64;
+        let floor = stratum.known.diagonal().mean().sqrt();
+        let far = strength > WANDERS * floor;
+        if p > FALSE_LEFTOVER && jump.is_none() && (stratum.wander_known || !far) {
+            continue;
+        }
+        let against = match jump {
+            Some(jump) => jump.candidate.id(),
+            None if walk * unit > excess => "time: the bias wanders".into(),
+            None => "no quantity recorded: the dwells do not repeat".into(),
+        };
+        left.push(Leftover {
+            stratum: stratum.name.clone(),
+            axis: stratum.axis,
+            against,
+            strength,
+            usual: !stratum.wander_known && !far && jump.is_none() && !found,
+        });
+    }
+    left
+}
+
+/// Noise beyond what a record at rest said of a channel: what has made it is in no model, and hides whatever is smaller.
+pub(in crate::diagnose) fn noisier(session: &Session, sensor: Sensor) -> Vec<Leftover> {
+    let scale = session.model(sensor).and_then(|m| directions(&m));
+    let Some((_, scale, _)) = scale else {
+        return Vec::new();
+    };
+    let of = |axis: usize| {
+        let channel = sensor.channels().start + axis;
+        let (beyond, times) = session.prepared.noise.beyond_stated(channel)?;
+        Some(Leftover {
+            stratum: format!("means of {} over a second", AXES[axis]),
+            axis: Some(axis),
+            against: format!(
+                "no quantity recorded: within the dwells it is {} times as noisy as the noise file says",
+                significant(times)
+            ),
+            strength: beyond / scale[axis],
+            usual: false,
+        })
+    };
+    (0..3).filter_map(of).collect()
+}

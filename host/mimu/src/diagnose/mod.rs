@@ -1,0 +1,347 @@
+//! What is wrong when a calibrated unit still errs: the effect behind the residual, found, added and proved on data that was
+//! not used for it, or the statement that nothing explains it.
+//!
+//! | module        | what                                                                            |
+//! |---------------|---------------------------------------------------------------------------------|
+//! | [`effect`], [`library`] | effects by name: physics, regressors, what excites them                   |
+//! | [`candidate`] | what is tried: effects, terms found from the data, jumps                         |
+//! | [`rows`]      | what the affine model leaves of dwells and turns, as one linear problem          |
+//! | [`spread`]    | how that scatters: known noise, more of it, a bias that walks                    |
+//! | [`search`]    | which effects the rows ask for                                                   |
+//! | [`decision`]  | which of them are accepted, and what is left                                     |
+//! | [`removal`]   | taking them out of readings                                                      |
+//! | [`picture`]   | what of it can be drawn                                                          |
+
+pub mod candidate;
+pub mod decision;
+pub mod effect;
+pub mod library;
+pub mod picture;
+pub mod removal;
+pub mod rows;
+pub mod search;
+pub mod spread;
+
+use decision::{Decision, decide, noisier};
+use mimu_core::compensation::Affine;
+use nalgebra::{Matrix3, Vector3};
+use removal::{Removed, removable, remove};
+use rows::{Free, Rows, Session};
+
+use crate::calibration::Calibration;
+use crate::estimate::session_bias;
+use crate::fit::{Fit, Options, fit, fit_biases};
+use crate::prepared::Prepared;
+use crate::quantity::Sensor;
+use mimu_recording::error::{Error, Result};
+use mimu_recording::{RawUnit, Reference};
+
+/// What a diagnosis says.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Verdict {
+    /// Noise explains what the affine model leaves.
+    Clean,
+    /// The effects found explain it.
+    Explained,
+    /// Something is left that nothing explains, or a law that is on no list explains it as well as the effect found.
+    Unexplained,
+}
+
+impl Verdict {
+    /// Name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Clean => "clean",
+            Self::Explained => "explained",
+            Self::Unexplained => "unexplained",
+        }
+    }
+}
+
+/// What was found on one sensor.
+#[derive(Debug, Clone)]
+pub struct SensorDiagnosis {
+    /// Which.
+    pub sensor: Sensor,
+    /// What the affine model leaves of it, the effects of the other sensor taken out.
+    pub rows: Rows,
+    /// What its rows led to.
+    pub decision: Decision,
+}
+
+/// What was found in a recording.
+#[derive(Debug, Clone)]
+pub struct Diagnosis {
+    /// The affine fit before.
+    pub before: Fit,
+    /// The affine fit of the readings without the effects.
+    pub after: Fit,
+    /// Gyro, then accelerometer, as far as there are any.
+    pub sensors: Vec<SensorDiagnosis>,
+    /// The effects, as they are taken out.
+    pub effects: Vec<Removed>,
+    /// What it amounts to.
+    pub verdict: Verdict,
+    /// The recordings that effects were found in, the first first.
+    pub sources: Vec<Source>,
+}
+
+/// A recording, told apart from others.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Source {
+    /// Its file of samples.
+    pub place: String,
+    /// Samples.
+    pub rows: u64,
+    /// Between samples, s.
+    pub period_s: f64,
+    /// Of the samples.
+    pub sha256: String,
+}
+
+impl From<&Prepared> for Source {
+    fn from(prepared: &Prepared) -> Self {
+        let condensed = &prepared.condensed;
+        Self {
+            place: prepared.place.clone(),
+            rows: condensed.rows,
+            period_s: condensed.period_s,
+            sha256: condensed.sha256.clone(),
+        }
+    }
+}
+
+/// What a diagnosis is made from.
+#[derive(Debug, Clone)]
+pub struct Recordings<'a> {
+    /// The recording that the calibration is made from.
+    pub first: Prepared,
+    /// More of the same unit: effects are found in all of them together; each has biases of its own.
+    pub more: Vec<Prepared>,
+    /// One that nothing is found in, and that effects are judged by.
+    pub second: Option<Prepared>,
+    /// The calibration of the unit, where the first recording cannot make one: its matrices are kept, and its effects taken out.
+    pub given: Option<&'a Calibration>,
+}
+
+impl From<Prepared> for Recordings<'_> {
+    fn from(first: Prepared) -> Self {
+        Self {
+            first,
+            more: Vec::new(),
+            second: None,
+            given: None,
+        }
+    }
+}
+
+impl Recordings<'_> {
+    fn later(&self) -> impl Iterator<Item = &Prepared> {
+        self.more.iter().chain(&self.second)
+    }
+
+    /// Refuses recordings that cannot be of one unit.
+    fn check(&self) -> Result<()> {
+        let (unit, raw_unit) = (&self.first.manifest.device, self.first.manifest.raw_unit);
+        for other in self.later() {
+            if other.manifest.raw_unit != raw_unit {
+                return Err(Error::new(
+                    &other.place,
+                    format!(
+                        "raw_unit is {}, and that of the first recording {raw_unit}",
+                        other.manifest.raw_unit
+                    ),
+                    "give recordings that the same converter wrote",
+                ));
+            }
+        }
+        for sensor in Sensor::BOTH {
+            let table = self.given.and_then(|c| c.table(sensor));
+            if let Some(table) = table.filter(|t| t.raw_unit != raw_unit) {
+                return Err(Error::new(
+                    &self.first.place,
+                    format!(
+                        "raw_unit is {raw_unit}, and [{sensor}] of the calibration is for {}",
+                        table.raw_unit
+                    ),
+                    "give a calibration from recordings that the same converter wrote",
+                ));
+            }
+        }
+        if let Some(given) = self.given {
+            for recording in std::iter::once(&self.first).chain(self.later()) {
+                removable(recording, given.effects())?;
+            }
+        }
+        let given = self.given.map(|c| (c.device.as_str(), "the calibration"));
+        let recordings = self
+            .later()
+            .map(|r| (r.manifest.device.as_str(), r.place.as_str()));
+        if let Some((device, place)) = recordings.chain(given).find(|(d, _)| d != unit) {
+            return Err(Error::new(
+                place,
+                format!("device is {device:?}, and that of the first recording {unit:?}"),
+                "effects are a unit's own: give recordings of one unit; if they are, import both with the same --device, or mend it in recording.toml",
+            ));
+        }
+        Ok(())
+    }
+}
+
+/// Whether nothing but the biases can be found: matrices for the gyro and the accelerometer, raw to SI.
+///
+/// They are those of the given calibration. Without one, readings in SI of a unit that was never turned are what they say.
+fn matrices(recordings: &Recordings) -> Option<[Option<Affine<f64>>; 2]> {
+    if let Some(given) = recordings.given {
+        return Some(Sensor::BOTH.map(|s| given.inverse(s)));
+    }
+    let first = &recordings.first;
+    let unit = Affine {
+        matrix: Matrix3::identity(),
+        offset: Vector3::zeros(),
+    };
+    let never_turned = match first.manifest.reference {
+        Reference::Gravity => !first.has(Sensor::Accel),
+        Reference::Table => Sensor::BOTH.iter().all(|s| {
+            let inputs: Vec<_> = first.observations(*s).iter().map(|o| o.input).collect();
+            inputs.windows(2).all(|w| w[0] == w[1])
+        }),
+    };
+    (first.manifest.raw_unit == RawUnit::Si && never_turned).then_some([Some(unit); 2])
+}
+
+/// Times between the dwells, s since the recording began, and which recording.
+fn dwell_ends(recordings: &[&Prepared]) -> Vec<(usize, f64)> {
+    let mut all = Vec::new();
+    for (session, prepared) in recordings.iter().enumerate() {
+        let t0_s = prepared.condensed.blocks.first().map_or(0.0, |b| b.start_s);
+        let ends = prepared.dwells.list.windows(2);
+        all.extend(ends.map(|d| (session, 0.5 * (d[0].last_s + d[1].start_s) - t0_s)));
+    }
+    all
+}
+
+/// A later recording beside the calibration of the first: its matrices, and biases of its own.
+fn session<'a>(prepared: &'a Prepared, models: &[Option<Affine<f64>>; 2]) -> Session<'a> {
+    let [gyro, accel] = [0, 1].map(|i| {
+        let known = models[i]?;
+        let own = session_bias::estimate(prepared, Sensor::BOTH[i], &known);
+        Some(own.map_or(known, |e| e.triad.inverse))
+    });
+    Session {
+        prepared,
+        gyro,
+        accel,
+    }
+}
+
+/// Diagnoses a unit.
+///
+/// The accelerometer comes first: without a table it is what the gyro is judged by.
+pub fn diagnose(recordings: Recordings, options: Options) -> Result<Diagnosis> {
+    recordings.check()?;
+    let place = recordings.first.place.clone();
+    let singular = || {
+        Error::new(
+            &place,
+            "the calibration is singular",
+            "look at the columns of the recording",
+        )
+    };
+    let held = matrices(&recordings);
+    let free = match held {
+        Some(_) => Free::Bias,
+        None => Free::Affine,
+    };
+    let calibrate = |prepared: Prepared| match held {
+        Some(matrices) => fit_biases(prepared, options, matrices),
+        None => fit(prepared, options),
+    };
+    let without = |prepared: &Prepared| match (recordings.given, held) {
+        (Some(given), Some([gyro, accel])) => {
+            remove(prepared, gyro.as_ref(), accel.as_ref(), given.effects())
+        }
+        _ => Some(prepared.clone()),
+    };
+    let before = calibrate(without(&recordings.first).ok_or_else(singular)?)?;
+    let mut later: Vec<Prepared> = Vec::new();
+    for prepared in recordings.later() {
+        later.push(without(prepared).ok_or_else(singular)?);
+    }
+    let found_in = 1 + recordings.more.len();
+    let sources = std::iter::once(&recordings.first).chain(&recordings.more);
+    let sources = sources.map(Source::from).collect();
+    let mut now = before.clone();
+    let mut effects: Vec<Removed> = Vec::new();
+    let mut sensors = Vec::new();
+    for sensor in [Sensor::Accel, Sensor::Gyro] {
+        if now.sensor(sensor).is_none() {
+            continue;
+        }
+        let models = Sensor::BOTH.map(|s| now.sensor(s).map(|f| f.estimated.triad.inverse));
+        let head = Session {
+            prepared: &now.prepared,
+            gyro: models[0],
+            accel: models[1],
+        };
+        let others = later.iter().map(|p| session(p, &models));
+        let sessions: Vec<Session> = std::iter::once(head).chain(others).collect();
+        let (ours, unseen) = sessions.split_at(found_in);
+        let rows = Rows::of(ours, sensor, free).ok_or_else(singular)?;
+        let unseen = Rows::of(unseen, sensor, free);
+        let all: Vec<&Prepared> = ours.iter().map(|s| s.prepared).collect();
+        let decided = decide(&rows, &dwell_ends(&all), unseen.as_ref());
+        let mut decision = decided.ok_or_else(singular)?;
+        let noisier = ours.iter().enumerate().flat_map(|(k, s)| {
+            let mut all = noisier(s, sensor);
+            for one in all.iter_mut().filter(|_| ours.len() > 1) {
+                one.stratum = format!("{} of recording {}", one.stratum, k + 1);
+            }
+            all
+        });
+        decision.leftover.extend(noisier);
+        let found: Vec<Removed> = decision
+            .accepted
+            .iter()
+            .map(|a| Removed {
+                candidate: a.chosen.candidate.clone(),
+                form: a.chosen.form,
+                values: a.values.iter().copied().collect(),
+            })
+            .collect();
+        if !found.is_empty() {
+            let elsewhere: Vec<Removed> = found.iter().map(Removed::lasting).collect();
+            let clean = |(k, s): (usize, &Session)| {
+                let effects = if k == 0 { &found } else { &elsewhere };
+                remove(s.prepared, s.gyro.as_ref(), s.accel.as_ref(), effects).ok_or_else(singular)
+            };
+            let cleaned = sessions.iter().enumerate().map(clean);
+            let mut cleaned: Vec<Prepared> = cleaned.collect::<Result<_>>()?;
+            let first = cleaned.remove(0);
+            effects.extend(found);
+            later = cleaned;
+            now = calibrate(first)?;
+        }
+        sensors.push(SensorDiagnosis {
+            sensor,
+            rows,
+            decision,
+        });
+    }
+    sensors.reverse();
+    let open = |d: &Decision| d.unexplained().next().is_some() || !d.undecided.is_empty();
+    let left = sensors.iter().any(|s| open(&s.decision));
+    let verdict = match (left, effects.is_empty()) {
+        (true, _) => Verdict::Unexplained,
+        (false, true) => Verdict::Clean,
+        (false, false) => Verdict::Explained,
+    };
+    Ok(Diagnosis {
+        before,
+        after: now,
+        sensors,
+        effects,
+        verdict,
+        sources,
+    })
+}

@@ -1,0 +1,305 @@
+//! What a diagnosis looks like: residuals before and after against time and against what an effect depends on, with the
+//! effect as it was fitted, and how what is left compares with noise. Computed here, drawn elsewhere.
+
+mod abscissa;
+mod against;
+
+use nalgebra::{DMatrix, DVector};
+use statrs::distribution::{Beta, ChiSquared, ContinuousCDF, Normal};
+
+pub use abscissa::Abscissa;
+pub use against::{Against, At, Curve, Panel};
+
+use super::SensorDiagnosis;
+use super::decision::{Split, held_out, rms};
+use super::rows::Rows;
+use super::search::{Chosen, Search};
+use super::spread::{By, Fitted};
+use crate::quantity::Sensor;
+
+/// What residuals are of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// Angle by which gravity is missed after a turn, rad.
+    Angle,
+    /// Input of the sensor, its SI unit.
+    Input,
+}
+
+/// A row at a time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sample {
+    /// Middle of the dwell or turn, s since the recording began.
+    pub t_s: f64,
+    /// Standard deviation by the known noise.
+    pub sigma: f64,
+    /// Residual of the affine calibration, and with the effects, in sample.
+    pub residual: [f64; 2],
+    /// The same held out, not a number where it could not be.
+    pub held_out: [f64; 2],
+}
+
+/// Residuals of one kind in order of time.
+#[derive(Debug, Clone)]
+pub struct Track {
+    /// Of what: an axis, a direction across gravity.
+    pub name: String,
+    /// What they are of.
+    pub kind: Kind,
+    /// Rows of it.
+    pub samples: Vec<Sample>,
+    rows: Vec<usize>,
+    axis: Option<usize>,
+}
+
+/// Error figures of a model.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Step {
+    /// What the model has more than the one before.
+    pub adds: String,
+    /// Root mean square in sample.
+    pub rms: f64,
+    /// Held out, not a number where it could not be.
+    pub held_out_rms: f64,
+}
+
+/// Residuals in units of the known noise, in ascending order.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Quantile {
+    /// What noise alone would be expected to give here.
+    pub normal: f64,
+    /// The middle 95 % of that, each by itself.
+    pub band: [f64; 2],
+    /// What it is before and after.
+    pub found: [f64; 2],
+}
+
+/// What is drawn of one sensor.
+#[derive(Debug, Clone)]
+pub struct Picture {
+    /// Sensor.
+    pub sensor: Sensor,
+    /// Residuals in time.
+    pub tracks: Vec<Track>,
+    /// Ends of the blocks that are held out in turn, s; empty where every fourth dwell is.
+    pub blocks_s: Vec<f64>,
+    /// Panels of each accepted effect, in the order of acceptance.
+    pub effects: Vec<Vec<Panel>>,
+    /// Affine calibration, then each effect beside the ones before.
+    pub steps: Vec<Step>,
+    /// Residuals against the normal distribution.
+    pub quantiles: Vec<Quantile>,
+    /// Chi-square by the known noise, its degrees of freedom and the probability of chance, before and after.
+    pub omnibus: [(f64, usize, f64); 2],
+}
+
+/// A model, fitted.
+struct Model<'a> {
+    search: &'a Search<'a>,
+    columns: DMatrix<f64>,
+    /// With the noise that the decision holds out by.
+    judged: Fitted,
+    /// In-sample residuals, by the noise that its coefficients are estimated with.
+    residuals: DVector<f64>,
+    last: Fitted,
+}
+
+impl<'a> Model<'a> {
+    /// With the chosen effects, as the decision fits it.
+    fn new(search: &'a Search<'a>, chosen: &[Chosen]) -> Option<Self> {
+        let columns = search.model(chosen);
+        let tested = search.fit(chosen)?;
+        let last = search
+            .spread
+            .fit(&columns, &tested.components, By::Restricted)?;
+        Some(Self {
+            residuals: &search.rows.y - &columns * &last.coefficients,
+            search,
+            columns,
+            judged: match chosen.is_empty() {
+                true => tested,
+                false => last.clone(),
+            },
+            last,
+        })
+    }
+
+    fn held_out(&self, split: Split) -> Option<DVector<f64>> {
+        held_out(self.search, &self.columns, &self.judged, split)
+    }
+
+    /// Residuals in sigmas of the known noise, their chi-square and its chance.
+    fn by_known_noise(&self) -> Option<(DVector<f64>, (f64, usize, f64))> {
+        let (rows, spread) = (self.search.rows, &self.search.spread);
+        let none = spread.none();
+        let fit = spread.fit_at(&self.columns, &none)?;
+        let left = &rows.y - &self.columns * &fit.coefficients;
+        let left = DMatrix::from_column_slice(left.len(), 1, left.as_slice());
+        let white = spread.whitener(&none)?.whiten(&left).column(0).into_owned();
+        let dof = rows.y.len().saturating_sub(self.columns.ncols());
+        let p = ChiSquared::new(dof as f64).map_or(1.0, |d| d.sf(fit.chi2));
+        Some((white, (fit.chi2, dof, p)))
+    }
+}
+
+impl Picture {
+    /// Of what was found on one sensor. `None` where a model of it is singular, which the decision would have refused.
+    pub fn of(found: &SensorDiagnosis) -> Option<Self> {
+        let (rows, decision) = (&found.rows, &found.decision);
+        let search = Search::new(rows, Vec::new());
+        let kept: Vec<Chosen> = decision.accepted.iter().map(|a| a.chosen.clone()).collect();
+        let models: Vec<Model> = (0..=kept.len())
+            .map(|n| Model::new(&search, &kept[..n]))
+            .collect::<Option<_>>()?;
+        let held: Vec<Option<DVector<f64>>> =
+            models.iter().map(|m| m.held_out(decision.split)).collect();
+        let steps = models
+            .iter()
+            .zip(&held)
+            .enumerate()
+            .map(|(n, (m, held))| Step {
+                adds: match n.checked_sub(1) {
+                    None => "affine calibration".into(),
+                    Some(i) => kept[i].candidate.id(),
+                },
+                rms: rms(rows, &m.residuals),
+                held_out_rms: held.as_ref().map_or(f64::NAN, |h| rms(rows, h)),
+            });
+        let steps = steps.collect();
+        let (first, last) = (models.first()?, models.last()?);
+        let at = |held: &Option<DVector<f64>>, r: usize| held.as_ref().map_or(f64::NAN, |h| h[r]);
+        let sample = |r: usize, sigma: f64| Sample {
+            t_s: middle(rows, r),
+            sigma,
+            residual: [first.residuals[r], last.residuals[r]],
+            held_out: [at(&held[0], r), at(&held[kept.len()], r)],
+        };
+        let tracks = tracks(rows, sample);
+        let effects = decision
+            .accepted
+            .iter()
+            .map(|a| against::panels(rows, &search, &last.last, a, &tracks))
+            .collect::<Option<_>>()?;
+        let (before, omnibus_before) = first.by_known_noise()?;
+        let (after, omnibus_after) = last.by_known_noise()?;
+        Some(Self {
+            sensor: found.sensor,
+            blocks_s: match decision.split {
+                Split::Blocks => blocks(rows),
+                Split::Interleaved => Vec::new(),
+            },
+            tracks,
+            effects,
+            steps,
+            quantiles: quantiles([&before, &after]),
+            omnibus: [omnibus_before, omnibus_after],
+        })
+    }
+}
+
+/// Middle of a row, s since the recording began.
+fn middle(rows: &Rows, row: usize) -> f64 {
+    rows.mean(row, &rows.moments(None), |at| at.t_s)
+}
+
+/// The rows stratum by stratum; of turns each direction by itself.
+fn tracks(rows: &Rows, sample: impl Fn(usize, f64) -> Sample) -> Vec<Track> {
+    let mut all = Vec::new();
+    for stratum in &rows.strata {
+        let judged = stratum.rows.start < rows.judged.0;
+        let directions = if judged { rows.judged.1 } else { 1 };
+        for direction in 0..directions {
+            let of_it: Vec<usize> = stratum
+                .rows
+                .clone()
+                .skip(direction)
+                .step_by(directions)
+                .collect();
+            let sigma = |r: usize| {
+                let i = r - stratum.rows.start;
+                stratum.known[(i, i)].sqrt()
+            };
+            all.push(Track {
+                name: match (directions, direction) {
+                    (1, _) => stratum.name.clone(),
+                    (_, 0) => format!("{}, first direction", stratum.name),
+                    _ => format!("{}, second direction", stratum.name),
+                },
+                kind: if directions > 1 {
+                    Kind::Angle
+                } else {
+                    Kind::Input
+                },
+                samples: of_it.iter().map(|r| sample(*r, sigma(*r))).collect(),
+                rows: of_it,
+                axis: stratum.axis,
+            });
+        }
+    }
+    all
+}
+
+/// Times between the blocks that are held out; none of several recordings, whose times lie over each other.
+fn blocks(rows: &Rows) -> Vec<f64> {
+    if rows.strata.iter().any(|s| s.session > 0) {
+        return Vec::new();
+    }
+    let mut ends: Vec<(usize, f64)> = (0..rows.y.len())
+        .map(|r| {
+            let block = Split::Blocks.part(rows, rows.dwells(r)[1]);
+            (block, middle(rows, r))
+        })
+        .collect();
+    ends.sort_by(|a, b| a.1.total_cmp(&b.1));
+    ends.windows(2)
+        .filter(|w| w[0].0 != w[1].0)
+        .map(|w| 0.5 * (w[0].1 + w[1].1))
+        .collect()
+}
+
+fn quantiles(found: [&DVector<f64>; 2]) -> Vec<Quantile> {
+    let sorted = found.map(|f| {
+        let mut f: Vec<f64> = f.iter().copied().collect();
+        f.sort_by(f64::total_cmp);
+        f
+    });
+    let n = sorted[0].len();
+    let normal = Normal::standard();
+    (0..n)
+        .map(|i| {
+            // Blom's plotting position; the i-th of n is distributed as Beta(i, n + 1 - i).
+            let p = (i as f64 + 0.625) / (n as f64 + 0.25);
+            let ends = Beta::new((i + 1) as f64, (n - i) as f64)
+                .map_or([p; 2], |b| [0.025, 0.975].map(|q| b.inverse_cdf(q)));
+            Quantile {
+                normal: normal.inverse_cdf(p),
+                band: ends.map(|e| normal.inverse_cdf(e.clamp(1e-12, 1.0 - 1e-12))),
+                found: [sorted[0][i], sorted[1][i]],
+            }
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quantiles_of_normal_order_statistics_are_those_of_the_tables() {
+        // Expected largest of ten standard normals: 1.5388 (Harter 1961); Blom's position comes within 0.01. The largest of
+        // ten is below its 97.5 % point with probability p^10 = 0.975: p = 0.997471, 2.8028 sigmas.
+        let ten = DVector::from_fn(10, |i, _| i as f64);
+        let found = quantiles([&ten, &ten]);
+        assert!(
+            (found[9].normal - 1.5388).abs() < 0.01,
+            "{}",
+            found[9].normal
+        );
+        assert!(
+            (found[9].band[1] - 2.8028).abs() < 1e-3,
+            "{}",
+            found[9].band[1]
+        );
+        assert!((found[0].normal + found[9].normal).abs() < 1e-9);
+    }
+}

@@ -1,0 +1,382 @@
+//! An effect against what it depends on.
+//!
+//! Component plus residual, and not the added-variable plot: of two residuals against each other nobody reads a rate or a
+//! temperature. What the affine calibration takes up of the component is taken out of it all the same, as the added-variable
+//! plot does: its mean, and its best straight line where the variable is one that the calibration is linear in. Otherwise a
+//! cubic would be drawn with the scale factor that it was never seen to have.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::abscissa::{Dependence, abscissa, dependence};
+use super::{Abscissa, Kind, Track};
+use crate::diagnose::decision::Accepted;
+use crate::diagnose::effect::Moment;
+use crate::diagnose::rows::Rows;
+use crate::diagnose::search::Search;
+use crate::diagnose::spread::Fitted;
+use crate::quantity::AXES;
+
+/// Points of a curve.
+const POINTS: usize = 81;
+/// Of one with steps.
+const POINTS_OF_STEPS: usize = 801;
+
+/// What a panel has on its abscissa.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Against {
+    /// What the effect depends on.
+    Variable(Abscissa),
+    /// What the effect does to the row, beside the affine calibration: where a row is a whole turn, or the size of gravity, it is
+    /// no function of one quantity.
+    Fitted,
+}
+
+/// A row in a panel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct At {
+    /// Abscissa, SI.
+    pub x: f64,
+    /// Standard deviation by the known noise.
+    pub sigma: f64,
+    /// Residual with the effect left in: what is left, plus the effect as fitted.
+    pub partial: f64,
+    /// What the model that has not seen the row says that this is; not a number where there is none.
+    pub predicted: f64,
+    /// What is left, in sample.
+    pub after: f64,
+    /// What is left, held out.
+    pub held_out: f64,
+}
+
+/// The effect as fitted.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Curve {
+    /// Abscissa, SI.
+    pub x: f64,
+    /// Its value.
+    pub value: f64,
+    /// Half of its 95 % interval, by the covariance of the coefficients.
+    pub half: f64,
+}
+
+/// The part of an effect on one axis that depends on one quantity.
+#[derive(Debug, Clone)]
+pub struct Panel {
+    /// Axis, and coefficients.
+    pub title: String,
+    /// What the ordinate is of.
+    pub kind: Kind,
+    /// Abscissa.
+    pub against: Against,
+    /// Rows.
+    pub points: Vec<At>,
+    /// Ascending in x.
+    pub curve: Vec<Curve>,
+}
+
+/// Coefficients of one panel.
+struct Group {
+    axis: usize,
+    on: Dependence,
+    /// Places among the regressors, and among the coefficients: one of all axes has three regressors.
+    slots: Vec<usize>,
+    members: Vec<usize>,
+}
+
+/// Coefficients that depend on one quantity and are of one axis belong together: line and bend of a thermal bias.
+fn groups(rows: &Rows, one: &Accepted) -> Vec<Group> {
+    let (candidate, form) = (&one.chosen.candidate, one.chosen.form);
+    let moments = rows.moments(None);
+    let Some(like) = moments.first().filter(|_| !candidate.reads_code()) else {
+        return Vec::new();
+    };
+    let mut groups: Vec<Group> = Vec::new();
+    for (slot, (member, axis)) in candidate.slots().into_iter().enumerate() {
+        let on = dependence(candidate, form, slot, like);
+        let alone = matches!(on, Dependence::Alone(_));
+        match groups
+            .iter_mut()
+            .find(|g| alone && g.axis == axis && g.on == on)
+        {
+            Some(group) => {
+                group.slots.push(slot);
+                group.members.push(member);
+            }
+            None => groups.push(Group {
+                axis,
+                on,
+                slots: vec![slot],
+                members: vec![member],
+            }),
+        }
+    }
+    groups
+}
+
+/// Straight line by least squares, or the mean alone.
+fn line(x: &[f64], y: &[f64], sloped: bool) -> (f64, f64) {
+    let n = x.len() as f64;
+    let (mx, my) = (x.iter().sum::<f64>() / n, y.iter().sum::<f64>() / n);
+    let sxx: f64 = x.iter().map(|x| (x - mx).powi(2)).sum();
+    let sxy: f64 = x.iter().zip(y).map(|(x, y)| (x - mx) * (y - my)).sum();
+    let slope = if sloped && sxx > 0.0 { sxy / sxx } else { 0.0 };
+    (my - slope * mx, slope)
+}
+
+/// Panels of an accepted effect. `None` where its columns are singular.
+pub(super) fn panels(
+    rows: &Rows,
+    search: &Search,
+    last: &Fitted,
+    one: &Accepted,
+    tracks: &[Track],
+) -> Option<Vec<Panel>> {
+    let mut panels = Vec::new();
+    if one.chosen.candidate.reads_code() {
+        let input = tracks.iter().filter(|t| t.kind == Kind::Input);
+        panels.extend(input.filter_map(|t| coded(rows, one, t)));
+    }
+    for group in groups(rows, one) {
+        let of_axis = tracks
+            .iter()
+            .filter(|t| t.kind == Kind::Input && t.axis == Some(group.axis));
+        for track in of_axis {
+            panels.extend(variable(rows, search, one, &group, track));
+        }
+    }
+    // Whole rows, beside the affine parameters.
+    let white = search.spread.whitener(&last.components)?;
+    let (basis, columns) = (&search.basis, &one.chosen.columns);
+    let share = white
+        .whiten(basis)
+        .svd(true, true)
+        .solve(&white.whiten(columns), 1e-12)
+        .ok()?;
+    let across = columns - basis * share;
+    for track in tracks.iter().filter(|t| t.axis.is_none()) {
+        panels.push(whole(one, &across, track));
+    }
+    Some(panels)
+}
+
+fn whole(one: &Accepted, across: &DMatrix<f64>, track: &Track) -> Panel {
+    let fitted = across * &one.values;
+    let mut curve: Vec<Curve> = track
+        .rows
+        .iter()
+        .map(|r| {
+            let by = across.row(*r).transpose();
+            Curve {
+                x: fitted[*r],
+                value: fitted[*r],
+                half: 2.0 * by.dot(&(&one.covariance * &by)).max(0.0).sqrt(),
+            }
+        })
+        .collect();
+    curve.sort_by(|a, b| a.x.total_cmp(&b.x));
+    Panel {
+        title: track.name.clone(),
+        kind: track.kind,
+        against: Against::Fitted,
+        points: points(track, |i| {
+            let effect = fitted[track.rows[i]];
+            (effect, effect)
+        }),
+        curve,
+    }
+}
+
+/// `at` gives abscissa and effect of each row of the track.
+fn points(track: &Track, at: impl Fn(usize) -> (f64, f64)) -> Vec<At> {
+    let of = |(i, s): (usize, &super::Sample)| {
+        let (x, effect) = at(i);
+        let partial = s.residual[1] + effect;
+        At {
+            x,
+            sigma: s.sigma,
+            partial,
+            predicted: partial - s.held_out[1],
+            after: s.residual[1],
+            held_out: s.held_out[1],
+        }
+    };
+    track.samples.iter().enumerate().map(of).collect()
+}
+
+/// `None` where the recording does not move the variable.
+fn variable(
+    rows: &Rows,
+    search: &Search,
+    one: &Accepted,
+    group: &Group,
+    track: &Track,
+) -> Option<Panel> {
+    let (candidate, form) = (&one.chosen.candidate, one.chosen.form);
+    let moments = rows.moments(candidate.behind(form));
+    let column = |k: usize, r: usize| one.chosen.columns[(r, k)];
+    let x: Vec<f64> = track
+        .rows
+        .iter()
+        .map(|r| match &group.on {
+            Dependence::Alone(field) => rows.mean(*r, &moments, |at| field.of(at)),
+            _ => column(group.members[0], *r),
+        })
+        .collect();
+    let (low, high) = ends(&x);
+    if !(high - low > 1e-9 * high.abs().max(low.abs())) {
+        return None;
+    }
+    let like = *moments.first()?;
+    let values = |x: f64| match &group.on {
+        Dependence::Alone(field) => {
+            let mut all = vec![0.0; candidate.axes().len()];
+            candidate.regressors(&field.with(like, x), form, &mut all);
+            group.slots.iter().map(|k| all[*k]).collect()
+        }
+        _ => vec![x],
+    };
+    let names: Vec<String> = candidate.names().into_iter().map(|n| n.0).collect();
+    let members: Vec<&str> = group.members.iter().map(|k| names[*k].as_str()).collect();
+    let axis = AXES[group.axis];
+    let drawn = Drawn {
+        one,
+        track,
+        members: &group.members,
+        sloped: affine_in(search, &x, track),
+        x,
+        points: POINTS,
+    };
+    let title = match members[..] {
+        [name] if name != axis => format!("{} {axis}, {name}", candidate.sensor),
+        _ => format!("{} {axis}", candidate.sensor),
+    };
+    Some(drawn.panel(
+        title,
+        abscissa(&group.on, candidate, group.members[0]),
+        values,
+    ))
+}
+
+/// Errors by the code of the axis of `track`, against what it reads. `None` where it has none.
+fn coded(rows: &Rows, one: &Accepted, track: &Track) -> Option<Panel> {
+    let axis = track.axis?;
+    let candidate = &one.chosen.candidate;
+    let slots = candidate.slots();
+    let ours = || slots.iter().enumerate().filter(|(_, s)| s.1 == axis);
+    let members: Vec<usize> = ours().map(|(_, s)| s.0).collect();
+    let moments = rows.moments(None);
+    let mut like = *moments.first().filter(|_| !members.is_empty())?;
+    let of_rows = |value: &dyn Fn(&Moment) -> f64| -> Vec<f64> {
+        let rows_of = track.rows.iter();
+        rows_of.map(|r| rows.mean(*r, &moments, value)).collect()
+    };
+    let sds = of_rows(&|at| at.reading.sd[axis]);
+    like.reading.sd[axis] = sds.iter().sum::<f64>() / sds.len() as f64;
+    let values = |x: f64| {
+        let mut at = like;
+        at.reading.mean[axis] = x;
+        let mut all = vec![0.0; slots.len()];
+        candidate.regressors(&at, 0.0, &mut all);
+        ours().map(|(slot, _)| all[slot]).collect()
+    };
+    let drawn = Drawn {
+        one,
+        track,
+        members: &members,
+        x: of_rows(&|at| at.reading.mean[axis]),
+        // What it reads is linear in the input.
+        sloped: true,
+        points: POINTS_OF_STEPS,
+    };
+    let reading = Abscissa {
+        name: format!("what {} {} reads", candidate.sensor, AXES[axis]),
+        unit: "raw".into(),
+        factor: 1.0,
+        offset: 0.0,
+    };
+    let title = format!("{} {}", candidate.sensor, AXES[axis]);
+    Some(drawn.panel(title, reading, values))
+}
+
+/// Coefficients of an effect that are functions of one abscissa, on one track.
+struct Drawn<'a> {
+    one: &'a Accepted,
+    track: &'a Track,
+    /// Indices of the coefficients.
+    members: &'a [usize],
+    /// Of each row of the track.
+    x: Vec<f64>,
+    /// Whether the affine calibration can do a straight line in x.
+    sloped: bool,
+    /// Points of the curve.
+    points: usize,
+}
+
+impl Drawn<'_> {
+    /// `values` gives the regressors of the members at an abscissa.
+    fn panel(&self, title: String, abscissa: Abscissa, values: impl Fn(f64) -> Vec<f64>) -> Panel {
+        let column = |k: usize, r: usize| self.one.chosen.columns[(r, k)];
+        let lines: Vec<(f64, f64)> = self
+            .members
+            .iter()
+            .map(|k| {
+                let y: Vec<f64> = self.track.rows.iter().map(|r| column(*k, *r)).collect();
+                line(&self.x, &y, self.sloped)
+            })
+            .collect();
+        let less = |m: usize, x: f64, value: f64| value - lines[m].0 - lines[m].1 * x;
+        let value = |k: &usize| self.one.values[*k];
+        let count = self.members.len();
+        let covariance = DMatrix::from_fn(count, count, |i, j| {
+            self.one.covariance[(self.members[i], self.members[j])]
+        });
+        let (low, high) = ends(&self.x);
+        let curve = (0..self.points).map(|i| {
+            let x = low + (high - low) * i as f64 / (self.points - 1) as f64;
+            let values = values(x);
+            let at = DVector::from_fn(count, |m, _| less(m, x, values[m]));
+            Curve {
+                x,
+                value: self
+                    .members
+                    .iter()
+                    .zip(&at)
+                    .map(|(k, v)| value(k) * v)
+                    .sum(),
+                half: 2.0 * at.dot(&(&covariance * &at)).max(0.0).sqrt(),
+            }
+        });
+        let effect = |i: usize| {
+            let members = self.members.iter().enumerate();
+            members
+                .map(|(m, k)| value(k) * less(m, self.x[i], column(*k, self.track.rows[i])))
+                .sum()
+        };
+        Panel {
+            title,
+            kind: self.track.kind,
+            against: Against::Variable(abscissa),
+            curve: curve.collect(),
+            points: points(self.track, |i| (self.x[i], effect(i))),
+        }
+    }
+}
+
+fn ends(x: &[f64]) -> (f64, f64) {
+    x.iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| {
+            (l.min(*v), h.max(*v))
+        })
+}
+
+/// Whether the affine calibration can do a straight line in `x`, the values of the rows of `track`.
+fn affine_in(search: &Search, x: &[f64], track: &Track) -> bool {
+    let mean = x.iter().sum::<f64>() / x.len() as f64;
+    let mut column = DVector::zeros(search.rows.y.len());
+    for (r, x) in track.rows.iter().zip(x) {
+        column[*r] = x - mean;
+    }
+    let left = &column - &search.basis * search.basis.tr_mul(&column);
+    // Hundredths: the input is known by the dwell, and the reading is of the sensor's own direction.
+    left.norm() < 0.01 * column.norm()
+}

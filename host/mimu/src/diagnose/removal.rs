@@ -1,0 +1,373 @@
+//! Taking effects out of readings, by what the device itself measures.
+
+use mimu_core::compensation::Affine;
+use nalgebra::{Matrix3, Vector3};
+
+use super::candidate::Candidate;
+use super::effect::{Behind, Moment, Reading, warmth};
+use super::rows::{directions, elsewhere, late};
+use crate::blocks::Block;
+use crate::dwell::Fault;
+use crate::prepared::Prepared;
+use crate::quantity::Sensor;
+use mimu_recording::Reference;
+use mimu_recording::error::{Error, Result};
+
+/// An effect with its numbers.
+#[derive(Debug, Clone)]
+pub struct Removed {
+    /// Which.
+    pub candidate: Candidate,
+    /// Its nonlinear constant, 0 if it has none.
+    pub form: f64,
+    /// Coefficients, SI, in the order of the candidate's active ones.
+    pub values: Vec<f64>,
+}
+
+impl Removed {
+    /// It without what is of the recording that it was found in alone.
+    pub fn lasting(&self) -> Self {
+        let (candidate, values) = self.candidate.lasting(&self.values);
+        Self {
+            candidate,
+            values,
+            form: self.form,
+        }
+    }
+
+    /// Adds its error of the three axes at a moment, SI.
+    fn add(&self, at: &Moment, error: &mut Vector3<f64>) {
+        self.candidate.add_error(at, self.form, &self.values, error);
+    }
+}
+
+/// Errors of the axes of the sensor at some moments, SI. Of effects with a lag the moments have to come with that lag.
+pub fn errors(effects: &[Removed], moments: &[Moment]) -> Vec<Vector3<f64>> {
+    let mut all = vec![Vector3::zeros(); moments.len()];
+    for effect in effects {
+        for (error, moment) in all.iter_mut().zip(moments) {
+            effect.add(moment, error);
+        }
+    }
+    all
+}
+
+/// A condition that an effect may need, or not.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Condition {
+    Rate,
+    Force,
+    Temperature,
+}
+
+/// Whether the error by an effect depends on a condition: tried, so that no effect has to say it.
+pub(crate) fn depends(effect: &Removed, on: Condition) -> bool {
+    let one = Vector3::repeat(1.0);
+    let mut at = Moment {
+        session: 0,
+        t_s: 1.0,
+        on_s: 1.0,
+        duration_s: 1.0,
+        rate: one,
+        force: one,
+        angular_acceleration: one,
+        sensed: one,
+        warm_c: 1.0,
+        late_c: 1.0,
+        reading: Reading {
+            mean: one,
+            sd: one,
+            scale: one,
+        },
+    };
+    let none = Vector3::repeat(f64::NAN);
+    let own = |sensor| effect.candidate.sensor == sensor;
+    match on {
+        Condition::Rate => {
+            at.rate = none;
+            if own(Sensor::Gyro) {
+                at.sensed = none;
+            }
+        }
+        Condition::Force => {
+            at.force = none;
+            if own(Sensor::Accel) {
+                at.sensed = none;
+            }
+        }
+        Condition::Temperature => (at.warm_c, at.late_c) = (f64::NAN, f64::NAN),
+    }
+    let error = errors(std::slice::from_ref(effect), &[at]);
+    error.iter().any(|e| e.iter().any(|v| v.is_nan()))
+}
+
+/// Refuses a recording that lacks what one of `effects` has to be known by where it is to be taken out: channels, or a temperature.
+pub fn removable(prepared: &Prepared, effects: &[Removed]) -> Result<()> {
+    let dwells = &prepared.dwells.list;
+    let mut blocks = dwells.iter().enumerate().flat_map(|(i, dwell)| {
+        let from = match (prepared.manifest.reference, i.checked_sub(1)) {
+            // By hand the turns are judged too, and they lie between the dwells.
+            (Reference::Gravity, Some(before)) => dwells[before].blocks.end,
+            _ => dwell.blocks.start,
+        };
+        &prepared.condensed.blocks[from..dwell.blocks.end]
+    });
+    let cold = blocks.find(|b| !b.temp_c.mean.is_finite());
+    for effect in effects {
+        let sensor = effect.candidate.sensor;
+        let lacks = |problem: String| {
+            let problem = format!("{} cannot be removed: {problem}", effect.candidate.id());
+            let remedy = "record it, or use a calibration without this effect";
+            Err(Error::new(&prepared.place, problem, remedy))
+        };
+        if !prepared.has(sensor) {
+            continue;
+        }
+        for (other, condition) in [
+            (Sensor::Gyro, Condition::Rate),
+            (Sensor::Accel, Condition::Force),
+        ] {
+            if !prepared.has(other) && depends(effect, condition) {
+                return lacks(format!("the recording has no {other} columns"));
+            }
+        }
+        if let (Some(block), true) = (cold, depends(effect, Condition::Temperature)) {
+            return lacks(format!("temp_c is missing at {} s", block.start_s));
+        }
+    }
+    Ok(())
+}
+
+/// A recording with `effects` taken out of the readings: of each triad, given with its inverse model, in the raw domain. `None` if a
+/// calibration is singular.
+///
+/// The conditions are what the device has: its own compensated readings and its temperature, not the table's. An error that is
+/// a function of what its own sensor reads is evaluated twice, the second time without the error by the first: of an error
+/// with slope k its share k would stay, and k² does.
+pub fn remove(
+    prepared: &Prepared,
+    gyro: Option<&Affine<f64>>,
+    accel: Option<&Affine<f64>>,
+    effects: &[Removed],
+) -> Option<Prepared> {
+    let mut out = prepared.clone();
+    for sensor in Sensor::BOTH {
+        let ours: Vec<&Removed> = effects
+            .iter()
+            .filter(|e| e.candidate.sensor == sensor)
+            .collect();
+        let models = [gyro, accel];
+        if models[sensor as usize].is_some() && !ours.is_empty() {
+            of_sensor(prepared, sensor, models, &ours, &mut out)?;
+        }
+    }
+    Some(out)
+}
+
+/// The moments that readings of a sensor are corrected at.
+struct Stretches<'a> {
+    sensor: Sensor,
+    /// Sensitive directions by rows, and how errors along them become errors in the body frame.
+    direction: Matrix3<f64>,
+    to_body: Matrix3<f64>,
+    effects: &'a [&'a Removed],
+    /// Of each effect that does not go by what the thermometer shows: the temperature and that behind the lag, by block.
+    late: Vec<Option<Vec<(f64, f64)>>>,
+}
+
+impl Stretches<'_> {
+    /// The moment as it is where the sensor errs by `error`.
+    fn without(&self, at: &Moment, error: &Vector3<f64>) -> Moment {
+        let mut clean = at.read_without(error);
+        let input = match self.sensor {
+            Sensor::Gyro => &mut clean.rate,
+            Sensor::Accel => &mut clean.force,
+        };
+        *input -= self.to_body * error;
+        clean.sensed = self.direction * *input;
+        clean
+    }
+
+    /// Errors of the axes at a moment within block `at`, SI.
+    fn error(&self, moment: &Moment, at: usize) -> Vector3<f64> {
+        let sum = |moment: &Moment, codes: bool| {
+            let mut error = Vector3::zeros();
+            for (effect, late) in self.effects.iter().zip(&self.late) {
+                if effect.candidate.reads_code() != codes {
+                    continue;
+                }
+                let now = (moment.warm_c, moment.warm_c);
+                let (warm_c, late_c) = late.as_ref().map_or(now, |l| l[at]);
+                let moment = Moment {
+                    warm_c,
+                    late_c,
+                    ..*moment
+                };
+                effect.add(&moment, &mut error);
+            }
+            error
+        };
+        // As the device: where the error is steeper than the input, a second look would lead away. Each axis has a code of its own, and
+        // its errors go first, as all else is a function of what would have been read without them.
+        let first = sum(moment, true);
+        let second = sum(&self.without(moment, &first), true);
+        let codes = first.zip_map(&second, |first, second| {
+            match (second - first).powi(2) < first.powi(2) {
+                true => second,
+                false => first,
+            }
+        });
+        let moment = &self.without(moment, &codes);
+        let first = sum(moment, false);
+        let second = sum(&self.without(moment, &first), false);
+        match (second - first).norm_squared() < first.norm_squared() {
+            true => codes + second,
+            false => codes + first,
+        }
+    }
+}
+
+fn of_sensor(
+    prepared: &Prepared,
+    sensor: Sensor,
+    models: [Option<&Affine<f64>>; 2],
+    effects: &[&Removed],
+    out: &mut Prepared,
+) -> Option<()> {
+    let model = models[sensor as usize]?;
+    let (direction, scale, _) = directions(model)?;
+    let blocks = &prepared.condensed.blocks;
+    let t0_s = blocks.first()?.start_s;
+    // Before the first temperature it is that one, as a lag begins there on the device too; without any the reference, as there.
+    let warm = warmth(blocks);
+    let first = warm.iter().map(|w| w.1).find(|w| w.is_finite());
+    let known = |w: f64| if w.is_nan() { first.unwrap_or(0.0) } else { w };
+    let warm: Vec<(f64, f64)> = warm.into_iter().map(|(t, w)| (t, known(w))).collect();
+    let all = Stretches {
+        sensor,
+        direction,
+        to_body: direction.try_inverse()?,
+        effects,
+        late: effects
+            .iter()
+            .map(|e| {
+                let Behind {
+                    lag_s,
+                    elsewhere: other,
+                } = e.candidate.behind(e.form)?;
+                let other = if other { elsewhere(&warm) } else { None };
+                let warm = other.as_ref().unwrap_or(&warm);
+                let now = warm.iter().map(|w| w.1);
+                Some(match lag_s {
+                    Some(lag_s) => now.zip(late(warm, lag_s)).collect(),
+                    None => now.map(|w| (w, w)).collect(),
+                })
+            })
+            .collect(),
+    };
+    let from = sensor.channels().start;
+    let held: [Vec<f64>; 6] = std::array::from_fn(|channel| held(blocks, channel));
+    let raw = |at: usize, from: usize| Vector3::from_fn(|i, _| held[from + i][at]);
+    let apply = |model: Option<&Affine<f64>>, u: Vector3<f64>| {
+        model.map_or(Vector3::repeat(f64::NAN), |m| m.apply(&u))
+    };
+    let reading = |at: usize| Reading {
+        mean: raw(at, from),
+        ..Reading::of(&blocks[at].raw[from..from + 3], &scale)
+    };
+    let moment = |at: usize, t_s: f64, rate: Vector3<f64>, force: Vector3<f64>| Moment {
+        session: 0,
+        t_s: t_s - t0_s,
+        on_s: t_s - prepared.power_on_s(),
+        duration_s: f64::from(blocks[at].rows) * prepared.condensed.period_s,
+        rate,
+        force,
+        angular_acceleration: Vector3::zeros(),
+        sensed: direction * if sensor == Sensor::Gyro { rate } else { force },
+        warm_c: warm[at].1,
+        late_c: warm[at].1,
+        reading: reading(at),
+    };
+    let mut of_block = Vec::with_capacity(blocks.len());
+    for (at, (t_s, _)) in warm.iter().enumerate() {
+        let [rate, force] = [0, 1].map(|s| apply(models[s], raw(at, 3 * s)));
+        of_block.push(all.error(&moment(at, *t_s, rate, force), at));
+    }
+    if sensor == Sensor::Gyro {
+        for piece in &mut out.condensed.increments {
+            let t_s = piece.end_s - 0.5 * piece.duration_s;
+            let at = blocks
+                .partition_point(|b| b.last_s < t_s)
+                .min(blocks.len() - 1);
+            let mean = Vector3::from(piece.integral) / piece.duration_s;
+            let force = apply(models[1], raw(at, 3));
+            let mut moment = moment(at, t_s, model.apply(&mean), force);
+            moment.reading.mean = mean;
+            moment.duration_s = piece.duration_s;
+            let error = all.error(&moment, at);
+            for i in 0..3 {
+                piece.integral[i] -= scale[i] * error[i] * piece.duration_s;
+            }
+        }
+    }
+    for (block, error) in out.condensed.blocks.iter_mut().zip(&of_block) {
+        for i in 0..3 {
+            block.raw[from + i].mean -= scale[i] * error[i];
+        }
+    }
+    for dwell in &mut out.dwells.list {
+        let range = dwell.blocks.clone();
+        for i in 0..3 {
+            // As the mean of the dwell was made: of the samples that there are.
+            let samples = |b: &Block| f64::from(b.raw[from + i].n);
+            let total: f64 = blocks[range.clone()].iter().map(samples).sum();
+            let pairs = blocks[range.clone()].iter().zip(&of_block[range.clone()]);
+            let mean: f64 = pairs.map(|(b, e)| e[i] * (samples(b) / total)).sum();
+            if total > 0.0 {
+                dwell.raw[from + i].mean -= scale[i] * mean;
+            }
+        }
+    }
+    leave_out_unknown(sensor, effects, out);
+    Some(())
+}
+
+/// A dwell without a reading of the other triad is none for this one, if an effect goes by that.
+fn leave_out_unknown(sensor: Sensor, effects: &[&Removed], out: &mut Prepared) {
+    let (other, condition) = match sensor {
+        Sensor::Gyro => (Sensor::Accel, Condition::Force),
+        Sensor::Accel => (Sensor::Gyro, Condition::Rate),
+    };
+    let Some(effect) = effects.iter().find(|e| depends(e, condition)) else {
+        return;
+    };
+    for dwell in &mut out.dwells.list {
+        let empty = |c: &usize| dwell.raw[*c].n == 0 && dwell.raw[*c].clipped == 0;
+        let Some(fault) = other.channels().find(empty).map(Fault::Missing) else {
+            continue;
+        };
+        let slot = match sensor {
+            Sensor::Gyro => &mut dwell.gyro_fault,
+            Sensor::Accel => &mut dwell.accel_fault,
+        };
+        if slot.is_none() {
+            *slot = Some(fault);
+            out.dwells.warnings.push(format!(
+                "dwell {}: not used for the {sensor}: {fault}, and {} cannot be removed without it",
+                dwell.step,
+                effect.candidate.id()
+            ));
+        }
+    }
+}
+
+/// What a channel read in each block, raw: where it has no samples, what it read before, or what it read first.
+fn held(blocks: &[Block], channel: usize) -> Vec<f64> {
+    let read = |b: &Block| (b.raw[channel].n > 0).then_some(b.raw[channel].mean);
+    let mut last = blocks.iter().find_map(read).unwrap_or(f64::NAN);
+    let each = blocks.iter().map(|b| {
+        last = read(b).unwrap_or(last);
+        last
+    });
+    each.collect()
+}

@@ -1,0 +1,317 @@
+//! What is left of recordings after the affine model, as the rows of one linear problem: residuals, what the affine
+//! parameters could still do to them, and what an effect would.
+//!
+//! | reference, sensor | one row is                                                     | unit   |
+//! |-------------------|----------------------------------------------------------------|--------|
+//! | table             | a dwell and sensor axis: reading less prediction, over the scale factor | SI |
+//! | gravity, accel    | a dwell: size of the force less gravity                        | m/s²   |
+//! | gravity, gyro     | a turn and direction across gravity: prediction error of gravity | rad  |
+//! |                   | a dwell and axis: rate at rest                                 | rad/s  |
+//!
+//! Of several recordings the matrix is one, the biases are each session's own: a bias is another after every power-on, and an
+//! effect must not be made of that.
+
+mod build;
+mod gravity;
+mod join;
+mod known;
+mod lag;
+
+use std::borrow::Cow;
+use std::ops::Range;
+
+use mimu_core::compensation::Affine;
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+
+use super::effect::{Behind, Moment};
+use crate::prepared::Prepared;
+use crate::quantity;
+use crate::quantity::Sensor;
+use crate::quantity::significant;
+use crate::triad::Forward;
+
+pub(crate) use lag::{elsewhere, late};
+
+/// Rows that share their noise.
+#[derive(Debug, Clone)]
+pub struct Stratum {
+    /// Name: an axis, `turns`, `rest x`; with the number of the recording where there are several.
+    pub name: String,
+    /// Axis, where all of its rows are of one.
+    pub axis: Option<usize>,
+    /// Index of its recording.
+    pub session: usize,
+    /// Its rows.
+    pub rows: Range<usize>,
+    /// Known covariance, unit of the rows squared.
+    pub known: DMatrix<f64>,
+    /// Covariance of a random walk with K = 1 unit/√s between the rows; `None` where rows are no means of dwells.
+    pub walk: Option<DMatrix<f64>>,
+    /// Whether the known covariance holds what the bias wanders.
+    pub wander_known: bool,
+}
+
+/// What the error figures of some rows are about.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Figure {
+    /// Error of a known input, SI.
+    Input,
+    /// Size of the specific force less gravity, m/s².
+    Size,
+    /// Direction of gravity predicted by a turn, rad.
+    Direction,
+    /// Rate at rest, rad/s.
+    Rest,
+}
+
+impl Figure {
+    /// A value as a person reads it.
+    pub fn said(self, sensor: Sensor, value: f64) -> String {
+        let figure = match self {
+            Self::Input | Self::Rest => quantity::Figure::Input,
+            Self::Size => quantity::Figure::GravitySize,
+            Self::Direction => quantity::Figure::Direction,
+        };
+        let (factor, unit) = figure.readable(sensor);
+        match value.is_finite() {
+            true => format!("{} {unit}", significant(value * factor)),
+            false => "nothing that can be told".into(),
+        }
+    }
+}
+
+/// Which affine parameters the recordings have to determine themselves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Free {
+    /// Matrix and biases.
+    Affine,
+    /// The biases; the matrix is known.
+    Bias,
+}
+
+/// A recording with the calibration that its residuals are of.
+#[derive(Debug, Clone, Copy)]
+pub struct Session<'a> {
+    /// The recording.
+    pub prepared: &'a Prepared,
+    /// Gyro, raw to rad/s.
+    pub gyro: Option<Affine<f64>>,
+    /// Accelerometer, raw to m/s².
+    pub accel: Option<Affine<f64>>,
+}
+
+impl Session<'_> {
+    /// Calibration of `sensor`.
+    pub fn model(&self, sensor: Sensor) -> Option<Affine<f64>> {
+        match sensor {
+            Sensor::Gyro => self.gyro,
+            Sensor::Accel => self.accel,
+        }
+    }
+}
+
+/// The moments that a row is made of.
+#[derive(Debug, Clone)]
+struct Row {
+    /// Indices of its moments.
+    moments: Range<usize>,
+    /// What an error of each axis of the sensor (SI) at a moment adds to the row: one for all, or one each.
+    weights: Vec<Vector3<f64>>,
+    /// Index of the dwell, or of the dwells that a turn begins and ends in; counted through all recordings.
+    dwells: [usize; 2],
+}
+
+/// The rows of one sensor.
+#[derive(Debug, Clone)]
+pub struct Rows {
+    /// Sensor.
+    pub sensor: Sensor,
+    /// Residuals.
+    pub y: DVector<f64>,
+    /// Derivatives by the parameters of the affine model, scaled to columns of one size.
+    pub nuisance: DMatrix<f64>,
+    /// Strata, which cover the rows in order.
+    pub strata: Vec<Stratum>,
+    /// What the error figures are about.
+    pub figure: Figure,
+    /// How many of the rows, from the first on, the error figures are about, and how many of these make one dwell or turn.
+    pub judged: (usize, usize),
+    /// Step that the readings of the three axes alike are multiples of, raw, in all recordings; `None` where they are not.
+    pub step: Option<f64>,
+    rows: Vec<Row>,
+    moments: Vec<Moment>,
+    /// Recording and block of each moment.
+    block: Vec<(usize, usize)>,
+    /// Of each recording: time of each block, s, and its temperature, °C above the reference.
+    warm: Vec<Vec<(f64, f64)>>,
+    /// The same without what the thermometer warms up by itself, where it does.
+    elsewhere: Vec<Option<Vec<(f64, f64)>>>,
+    /// Number of the first dwell of each recording, and that of all dwells.
+    first: Vec<usize>,
+}
+
+/// Rank correlation from which on temperature and time are one. A ramp up and half of the way back has 0.5.
+const ONE_WAY: f64 = 0.95;
+
+/// Sensitive directions of the sensors, by rows, unit vectors; and the scale factors, raw/SI.
+pub(super) fn directions(inverse: &Affine<f64>) -> Option<(Matrix3<f64>, Vector3<f64>, Forward)> {
+    let forward = Forward::of(inverse)?;
+    let scale = Vector3::from_fn(|i, _| forward.matrix.row(i).norm());
+    let unit = Matrix3::from_fn(|i, j| forward.matrix[(i, j)] / scale[i]);
+    Some((unit, scale, forward))
+}
+
+impl Rows {
+    /// The rows of `sensor` in all of `sessions`, whose calibrations share one matrix.
+    ///
+    /// Figures are about recordings of the kind of the first. `None` if the first has no rows, or its calibration is singular.
+    pub fn of(sessions: &[Session], sensor: Sensor, free: Free) -> Option<Self> {
+        let parts: Vec<_> = sessions
+            .iter()
+            .enumerate()
+            .filter_map(|(i, s)| Some((i, build::part(s, sensor, free)?)))
+            .collect();
+        join::join(sensor, parts, sessions.len())
+    }
+
+    /// Dwells that row `row` is about, counted through all recordings.
+    pub fn dwells(&self, row: usize) -> [usize; 2] {
+        self.rows[row].dwells
+    }
+
+    /// Number of dwells.
+    pub fn dwell_count(&self) -> usize {
+        self.first.last().copied().unwrap_or(0)
+    }
+
+    /// Place of a dwell in its recording, and how many this has.
+    pub fn place(&self, dwell: usize) -> (usize, usize) {
+        let after = self.first.partition_point(|f| *f <= dwell);
+        let [from, to] = [after.saturating_sub(1), after].map(|i| self.first[i]);
+        (dwell - from, to - from)
+    }
+
+    /// Mean of a quantity over the moments of row `row`, by their lengths; `moments` are all, as [`Self::moments`] gives them.
+    pub fn mean(&self, row: usize, moments: &[Moment], value: impl Fn(&Moment) -> f64) -> f64 {
+        let of_row = &moments[self.rows[row].moments.clone()];
+        let total: f64 = of_row.iter().map(|m| m.duration_s).sum();
+        of_row.iter().map(|m| value(m) * m.duration_s / total).sum()
+    }
+
+    /// The same rows with one moment for each dwell, whose reading scatters as its samples do: for what depends on the reading alone.
+    pub fn by_dwell(&self) -> Self {
+        let mut out = self.clone();
+        out.moments.clear();
+        out.block.clear();
+        let mut merged: Vec<(Range<usize>, usize)> = Vec::new();
+        for row in &mut out.rows {
+            let range = row.moments.clone();
+            let at = out.moments.len();
+            if row.dwells[0] != row.dwells[1] {
+                out.moments.extend_from_slice(&self.moments[range.clone()]);
+                out.block.extend_from_slice(&self.block[range]);
+                row.moments = at..out.moments.len();
+                continue;
+            }
+            let known = merged.iter().rev().find(|m| m.0 == range).map(|m| m.1);
+            let at = known.unwrap_or_else(|| {
+                out.moments
+                    .push(Moment::pooled(&self.moments[range.clone()]));
+                out.block.push(self.block[range.start]);
+                merged.push((range, at));
+                at
+            });
+            row.moments = at..at + 1;
+            row.weights = vec![row.weights.iter().sum()];
+        }
+        out
+    }
+
+    /// The moments of rows [by dwell](Self::by_dwell), each reading without what `residuals` say of it: the dwell's noise, which
+    /// is in the row as well and would make any function of the reading seem to explain it, and the error that is sought.
+    pub fn moments_without(&self, residuals: &DVector<f64>) -> Vec<Moment> {
+        let mut moments = self.moments.clone();
+        for (row, residual) in self.rows.iter().zip(residuals.iter()) {
+            if let ([moment], [weight]) = (&mut moments[row.moments.clone()], &row.weights[..]) {
+                let error = weight * (residual / weight.norm_squared());
+                *moment = moment.read_without(&error);
+            }
+        }
+        moments
+    }
+
+    /// Lowest and highest reading of its axes, raw, averaged over a moment.
+    pub fn reading_range(&self) -> (f64, f64) {
+        let all = self.moments.iter().flat_map(|m| m.reading.mean.iter());
+        all.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| {
+            (a.min(*v), b.max(*v))
+        })
+    }
+
+    /// The moments, with the temperature that an effect goes by.
+    pub fn moments(&self, behind: Option<Behind>) -> Cow<'_, [Moment]> {
+        let Some(Behind { lag_s, elsewhere }) = behind else {
+            return Cow::Borrowed(&self.moments);
+        };
+        let each = self.warm.iter().zip(&self.elsewhere);
+        let warm: Vec<&[(f64, f64)]> = each
+            .map(|(warm, other)| other.as_deref().filter(|_| elsewhere).unwrap_or(warm))
+            .collect();
+        let late: Vec<Vec<f64>> = warm
+            .iter()
+            .map(|w| match lag_s {
+                Some(lag_s) => late(w, lag_s),
+                None => w.iter().map(|w| w.1).collect(),
+            })
+            .collect();
+        let mut moments = self.moments.clone();
+        for (moment, (session, at)) in moments.iter_mut().zip(&self.block) {
+            moment.warm_c = warm[*session][*at].1;
+            moment.late_c = late[*session][*at];
+        }
+        Cow::Owned(moments)
+    }
+
+    /// Whether the thermometer of a recording warms up by itself.
+    pub fn thermometer_warms_up(&self) -> bool {
+        self.elsewhere.iter().any(Option::is_some)
+    }
+
+    /// Rank correlation of temperature and time where they go together in all recordings, so that what follows one follows the
+    /// other; `None` where the temperature comes back.
+    pub fn one_way(&self) -> Option<f64> {
+        let correlations: Vec<f64> = self.warm.iter().filter_map(|w| lag::order(w)).collect();
+        let least = correlations
+            .iter()
+            .copied()
+            .fold(f64::INFINITY, |a, b| if b.abs() < a.abs() { b } else { a });
+        let alike = correlations.iter().all(|c| c.signum() == least.signum());
+        (least.is_finite() && alike && least.abs() > ONE_WAY).then_some(least)
+    }
+
+    /// Columns of some regressors, each the error of one axis: `values` writes those of a moment.
+    pub fn columns(
+        &self,
+        moments: &[Moment],
+        axes: &[usize],
+        values: impl Fn(&Moment, &mut [f64]),
+    ) -> DMatrix<f64> {
+        let p = axes.len();
+        let mut at = vec![0.0; p * moments.len()];
+        for (moment, out) in moments.iter().zip(at.chunks_mut(p.max(1))) {
+            values(moment, out);
+        }
+        let mut columns = DMatrix::zeros(self.rows.len(), p);
+        for (r, row) in self.rows.iter().enumerate() {
+            for (m, weight) in row.moments.clone().zip(&row.weights) {
+                for (k, axis) in axes.iter().enumerate() {
+                    let w = weight[*axis];
+                    if w != 0.0 {
+                        columns[(r, k)] += w * at[p * m + k];
+                    }
+                }
+            }
+        }
+        columns
+    }
+}

@@ -1,0 +1,226 @@
+//! The rows of one recording.
+
+use std::ops::Range;
+
+use mimu_core::compensation::Affine;
+use nalgebra::{DMatrix, Matrix3, Vector3};
+
+use super::{Figure, Free, Row, Session, Stratum, directions};
+use crate::diagnose::effect::{Moment, Reading, warmth};
+use crate::noise::wander::{Slow, Span};
+use crate::prepared::Prepared;
+use crate::quantity::Sensor;
+use mimu_recording::Reference;
+
+/// The rows of one recording, not yet beside those of others.
+pub(super) struct Part {
+    /// Reference of the recording: of one kind, the parameters of the matrix are the same.
+    pub reference: Reference,
+    /// Residuals.
+    pub y: Vec<f64>,
+    /// Derivatives by the affine parameters.
+    pub nuisance: DMatrix<f64>,
+    /// Which columns of it are biases.
+    pub biases: Vec<usize>,
+    /// Strata.
+    pub strata: Vec<Stratum>,
+    /// What the judged rows are about.
+    pub figure: Figure,
+    /// As in [`super::Rows`].
+    pub judged: (usize, usize),
+    /// As in [`super::Rows`], of this recording.
+    pub step: Option<f64>,
+    pub rows: Vec<Row>,
+    pub moments: Vec<Moment>,
+    pub block: Vec<usize>,
+    pub warm: Vec<(f64, f64)>,
+}
+
+pub(super) struct Builder<'a> {
+    pub prepared: &'a Prepared,
+    pub sensor: Sensor,
+    /// Whether the recording has the other sensor too: the table may know its input, but no device could remove what goes by it.
+    pub other_measured: bool,
+    pub t0_s: f64,
+    pub warm: Vec<(f64, f64)>,
+    pub rows: Vec<Row>,
+    pub moments: Vec<Moment>,
+    pub block: Vec<usize>,
+    pub direction: Matrix3<f64>,
+    pub scale: Vector3<f64>,
+}
+
+/// The rows of `sensor` in a recording. `None` if there are none, or the calibration is singular.
+pub(super) fn part(session: &Session, sensor: Sensor, free: Free) -> Option<Part> {
+    let inverse = session.model(sensor)?;
+    let accel = session.accel;
+    let prepared = session.prepared;
+    if !prepared.has(sensor) {
+        return None;
+    }
+    let (direction, scale, forward) = directions(&inverse)?;
+    let blocks = &prepared.condensed.blocks;
+    let warm = warmth(blocks);
+    let builder = Builder {
+        prepared,
+        sensor,
+        other_measured: match sensor {
+            Sensor::Gyro => session.accel.is_some(),
+            Sensor::Accel => session.gyro.is_some(),
+        },
+        t0_s: blocks.first()?.start_s,
+        warm,
+        rows: Vec::new(),
+        moments: Vec::new(),
+        block: Vec::new(),
+        direction,
+        scale,
+    };
+    let mut part = match (prepared.manifest.reference, sensor) {
+        (Reference::Table, _) => builder.known(&scale, &forward, accel.as_ref()),
+        (Reference::Gravity, Sensor::Accel) => builder.sizes(&inverse),
+        (Reference::Gravity, Sensor::Gyro) => builder.turns(&inverse, accel.as_ref()),
+    }?;
+    if free == Free::Bias {
+        part.nuisance = part.nuisance.select_columns(&part.biases);
+        part.biases = (0..part.biases.len()).collect();
+    }
+    Some(part)
+}
+
+/// The step of several channels, if they have one in common: their mean, to within what rounding in a text file leaves.
+pub(super) fn common_step(steps: &[Option<f64>]) -> Option<f64> {
+    let steps: Vec<f64> = steps.iter().copied().collect::<Option<_>>()?;
+    let mean = steps.iter().sum::<f64>() / steps.len() as f64;
+    let alike = steps.iter().all(|s| (s / mean - 1.0).abs() < 1e-3);
+    alike.then_some(mean)
+}
+
+impl Builder<'_> {
+    pub(super) fn moment(
+        &self,
+        at: usize,
+        t_s: f64,
+        duration_s: f64,
+        rate: Vector3<f64>,
+        force: Vector3<f64>,
+    ) -> Moment {
+        let input = match self.sensor {
+            Sensor::Gyro => rate,
+            Sensor::Accel => force,
+        };
+        Moment {
+            session: 0,
+            t_s: t_s - self.t0_s,
+            on_s: t_s - self.prepared.power_on_s(),
+            duration_s,
+            rate,
+            force,
+            angular_acceleration: Vector3::zeros(),
+            sensed: self.direction * input,
+            warm_c: self.warm[at].1,
+            late_c: self.warm[at].1,
+            reading: Reading::of(
+                &self.prepared.condensed.blocks[at].raw[self.sensor.channels()],
+                &self.scale,
+            ),
+        }
+    }
+
+    /// The moments of a dwell, block by block: what is known of the input, or rest under `force`.
+    pub(super) fn dwell(&mut self, index: usize, force: Vector3<f64>) -> Range<usize> {
+        let prepared = self.prepared;
+        let first = self.moments.len();
+        let dwell = &prepared.dwells.list[index];
+        for at in dwell.blocks.clone() {
+            let block = &prepared.condensed.blocks[at];
+            let known = |from: usize| Vector3::from_fn(|i, _| block.reference[from + i].mean);
+            let (rate, given) = match prepared.manifest.reference {
+                Reference::Table => (known(0).map(f64::to_radians), known(3)),
+                Reference::Gravity => (Vector3::zeros(), force),
+            };
+            // A rate table's list of rates may leave the force out: at a constant rate the accelerometer has it.
+            let given = if given.iter().all(|f| f.is_finite()) {
+                given
+            } else {
+                force
+            };
+            let unknown = Vector3::repeat(f64::NAN);
+            let table = prepared.manifest.reference == Reference::Table;
+            let (rate, given) = match self.sensor {
+                Sensor::Gyro if table && !self.other_measured => (rate, unknown),
+                Sensor::Accel if table && !self.other_measured => (unknown, given),
+                _ => (rate, given),
+            };
+            let t_s = 0.5 * (block.start_s + block.last_s);
+            let duration_s = f64::from(block.rows) * prepared.condensed.period_s;
+            let moment = self.moment(at, t_s, duration_s, rate, given);
+            self.moments.push(moment);
+            self.block.push(at);
+        }
+        first..self.moments.len()
+    }
+
+    /// Mean over dwell `index` of an error of axis `axis` weighted by `by`.
+    pub(super) fn mean_row(&mut self, index: usize, moments: &Range<usize>, by: Vector3<f64>) {
+        let total: f64 = self.moments[moments.clone()]
+            .iter()
+            .map(|m| m.duration_s)
+            .sum();
+        let weights = self.moments[moments.clone()]
+            .iter()
+            .map(|m| by * (m.duration_s / total))
+            .collect();
+        self.rows.push(Row {
+            moments: moments.clone(),
+            weights,
+            dwells: [index, index],
+        });
+    }
+    pub(super) fn finish(
+        self,
+        y: Vec<f64>,
+        nuisance: DMatrix<f64>,
+        biases: Vec<usize>,
+        strata: Vec<Stratum>,
+        figure: (Figure, usize, usize),
+    ) -> Option<Part> {
+        (!y.is_empty()).then(|| Part {
+            reference: self.prepared.manifest.reference,
+            y,
+            nuisance,
+            biases,
+            strata,
+            figure: figure.0,
+            judged: (figure.1, figure.2),
+            step: common_step(&self.prepared.condensed.reading_step[self.sensor.channels()]),
+            rows: self.rows,
+            moments: self.moments,
+            block: self.block,
+            warm: self.warm,
+        })
+    }
+
+    /// Force on dwell `index` by the accelerometer, not a number where there is none.
+    pub(super) fn force(&self, index: usize, accel: Option<&Affine<f64>>) -> Vector3<f64> {
+        let raw = self.prepared.dwells.list[index].raw_mean(Sensor::Accel);
+        accel.map_or(Vector3::repeat(f64::NAN), |a| a.apply(&raw))
+    }
+
+    pub(super) fn spans(&self, dwells: &[usize]) -> (Vec<Span>, Span) {
+        let list = &self.prepared.dwells.list;
+        let span = |d: usize| [list[d].start_s, list[d].start_s + list[d].duration_s];
+        let spans: Vec<Span> = dwells.iter().map(|d| span(*d)).collect();
+        let session = [span(0)[0], span(list.len() - 1)[1]];
+        (spans, session)
+    }
+
+    pub(super) fn walk(&self, dwells: &[usize]) -> DMatrix<f64> {
+        let (spans, session) = self.spans(dwells);
+        let unit = Slow {
+            instability: 0.0,
+            walk: 1.0,
+        };
+        unit.covariance(&spans, session)
+    }
+}

@@ -1,0 +1,186 @@
+//! Rows of a unit that only gravity's size is known of.
+
+use std::ops::Range;
+
+use mimu_core::compensation::Affine;
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+
+use super::build::{Builder, Part};
+use super::{Figure, Row, Stratum};
+use crate::diagnose::effect::Moment;
+use crate::estimate::rotation::sensitivity;
+use crate::prepared::si_covariance;
+use crate::quantity::Sensor;
+
+impl Builder<'_> {
+    /// Errors along the sensors as errors in the body frame: inverse of the sensitive directions.
+    fn to_body(&self) -> Option<Matrix3<f64>> {
+        self.direction.try_inverse()
+    }
+
+    /// A row for each pose.
+    pub(super) fn sizes(mut self, inverse: &Affine<f64>) -> Option<Part> {
+        let prepared = self.prepared;
+        let g = prepared.manifest.gravity_mps2;
+        let observations = prepared.observations(Sensor::Accel);
+        let n = observations.len();
+        let dwells: Vec<usize> = observations.iter().map(|o| o.dwell).collect();
+        let body = self.to_body()?;
+        let moments: Vec<Range<usize>> = observations
+            .iter()
+            .map(|o| self.dwell(o.dwell, inverse.apply(&o.raw)))
+            .collect();
+        let mut y = Vec::new();
+        let mut nuisance = DMatrix::zeros(n, 9);
+        let lower = [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2)];
+        let centre = observations.iter().map(|o| o.raw).sum::<Vector3<f64>>() / n.max(1) as f64;
+        for (i, o) in observations.iter().enumerate() {
+            let force = inverse.apply(&o.raw);
+            let up = force.normalize();
+            self.mean_row(o.dwell, &moments[i], body.tr_mul(&up));
+            y.push(force.norm() - g);
+            for (k, (r, c)) in lower.into_iter().enumerate() {
+                nuisance[(i, k)] = up[r] * (o.raw[c] - centre[c]);
+            }
+            for k in 0..3 {
+                nuisance[(i, 6 + k)] = up[k];
+            }
+        }
+        let variances = prepared.size_variances(inverse, &observations);
+        let strata = vec![Stratum {
+            name: "size of gravity".into(),
+            axis: None,
+            session: 0,
+            rows: 0..n,
+            known: DMatrix::from_diagonal(&DVector::from_vec(variances)),
+            walk: Some(self.walk(&dwells)),
+            wander_known: prepared.noise.is_stated(Sensor::Accel),
+        }];
+        self.finish(y, nuisance, vec![6, 7, 8], strata, (Figure::Size, n, 1))
+    }
+
+    /// Two rows for each turn, which `accel` is needed for, and one for each dwell and axis, where the rate is none.
+    pub(super) fn turns(
+        mut self,
+        inverse: &Affine<f64>,
+        accel: Option<&Affine<f64>>,
+    ) -> Option<Part> {
+        let prepared = self.prepared;
+        let body = self.to_body()?;
+        let turns = accel.map_or(Vec::new(), |a| prepared.turns(a).0);
+        let rest = prepared.observations(Sensor::Gyro);
+        let mean_square = inverse.matrix.norm_squared() / 3.0;
+        let mut y = Vec::new();
+        let mut turn_rows: Vec<[f64; 12]> = Vec::new();
+        let blocks = &prepared.condensed.blocks;
+        for turn in &turns {
+            let first = self.moments.len();
+            for (k, piece) in turn.increments.iter().enumerate() {
+                let t_s = piece.end_s - 0.5 * piece.duration_s;
+                let at = blocks
+                    .partition_point(|b| b.last_s < t_s)
+                    .min(blocks.len() - 1);
+                let raw = Vector3::from(piece.integral) / piece.duration_s;
+                let rate = inverse.apply(&raw);
+                let reading = Vector3::from_fn(|i, _| blocks[at].raw[3 + i].mean);
+                let force = accel.map_or(Vector3::repeat(f64::NAN), |a| a.apply(&reading));
+                let mut moment = self.moment(at, t_s, piece.duration_s, rate, force);
+                moment.reading.mean = raw;
+                if k > 0 {
+                    let before: &Moment = &self.moments[first + k - 1];
+                    moment.angular_acceleration = (rate - before.rate) / (moment.t_s - before.t_s);
+                }
+                self.moments.push(moment);
+                self.block.push(at);
+            }
+            let moments = first..self.moments.len();
+            let found = sensitivity(turn, inverse);
+            for side in 0..2 {
+                let mut columns = [0.0; 12];
+                let mut weights = Vec::with_capacity(moments.len());
+                for (by, piece) in found.by.iter().zip(turn.increments) {
+                    for i in 0..3 {
+                        for j in 0..3 {
+                            columns[3 * i + j] += by[side][i] * piece.integral[j];
+                        }
+                        columns[9 + i] += by[side][i] * piece.duration_s;
+                    }
+                    weights.push(body.tr_mul(&by[side]) * piece.duration_s);
+                }
+                y.push(found.error[side]);
+                turn_rows.push(columns);
+                self.rows.push(Row {
+                    moments: moments.clone(),
+                    weights,
+                    dwells: [turn.from, turn.to],
+                });
+            }
+        }
+        let (m, n) = (y.len(), rest.len());
+        let dwells: Vec<usize> = rest.iter().map(|o| o.dwell).collect();
+        let moments: Vec<Range<usize>> = dwells
+            .iter()
+            .map(|d| self.dwell(*d, self.force(*d, accel)))
+            .collect();
+        let mut nuisance = DMatrix::zeros(m + 3 * n, 12);
+        for (row, columns) in turn_rows.iter().enumerate() {
+            for (k, v) in columns.iter().enumerate() {
+                nuisance[(row, k)] = *v;
+            }
+        }
+        let walk = (n > 0).then(|| self.walk(&dwells));
+        let wander = prepared.noise.wander(Sensor::Gyro, &prepared.dwells.list);
+        // The reading that rest should have, and not that of each dwell: its noise is what the row is about, and a matrix of
+        // zeros would explain it wholly, with `rate_x` of coefficient -1 beside for the turns.
+        let at_rest = rest.iter().map(|o| o.raw).sum::<Vector3<f64>>() / n.max(1) as f64;
+        let turn_variances: Vec<f64> = turns
+            .iter()
+            .flat_map(|t| [0.5 * t.floor(mean_square).powi(2); 2])
+            .collect();
+        let mut strata = Vec::new();
+        if m > 0 {
+            strata.push(Stratum {
+                name: "turns".into(),
+                axis: None,
+                session: 0,
+                rows: 0..m,
+                known: DMatrix::from_diagonal(&DVector::from_vec(turn_variances)),
+                walk: None,
+                wander_known: true,
+            });
+        }
+        for axis in 0..3 {
+            for (i, o) in rest.iter().enumerate() {
+                let row = y.len();
+                self.mean_row(o.dwell, &moments[i], body.row(axis).transpose());
+                y.push(inverse.apply(&o.raw)[axis]);
+                for k in 0..3 {
+                    nuisance[(row, 3 * axis + k)] = at_rest[k];
+                }
+                nuisance[(row, 9 + axis)] = 1.0;
+            }
+            let c = inverse.matrix.row(axis);
+            let known = DMatrix::from_fn(n, n, |i, j| match (i == j, &wander) {
+                (true, _) => si_covariance(&inverse.matrix, &rest[i].variance)[(axis, axis)],
+                (_, Some(w)) => (0..3)
+                    .map(|k| c[k] * c[k] * w[k][(dwells[i], dwells[j])])
+                    .sum(),
+                _ => 0.0,
+            });
+            strata.push(Stratum {
+                name: format!("rest {}", crate::quantity::AXES[axis]),
+                axis: Some(axis),
+                session: 0,
+                rows: m + axis * n..m + (axis + 1) * n,
+                known,
+                walk: walk.clone(),
+                wander_known: wander.is_some(),
+            });
+        }
+        let figure = match m {
+            0 => (Figure::Rest, 3 * n, 1),
+            m => (Figure::Direction, m, 2),
+        };
+        self.finish(y, nuisance, vec![9, 10, 11], strata, figure)
+    }
+}

@@ -1,0 +1,144 @@
+//! The rows of several recordings beside each other.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::build::{Part, common_step};
+use super::{Row, Rows, elsewhere};
+use crate::quantity::Sensor;
+use mimu_recording::Reference;
+
+/// Columns of size 1, those of zero left.
+fn scaled(mut nuisance: DMatrix<f64>) -> DMatrix<f64> {
+    for mut column in nuisance.column_iter_mut() {
+        let norm = column.norm();
+        if norm > 0.0 {
+            column /= norm;
+        }
+    }
+    nuisance
+}
+
+/// For each part the place of its nuisance columns among those of all, and how many there are: the matrix shared by all
+/// recordings of one kind, biases each for itself.
+fn places(parts: &[(usize, Part)]) -> (Vec<Vec<usize>>, usize) {
+    let mut shared: Vec<(Reference, Vec<usize>)> = Vec::new();
+    let mut count = 0;
+    let mut new = |many: usize| {
+        count += many;
+        (count - many..count).collect::<Vec<usize>>()
+    };
+    let mut all = Vec::new();
+    for (_, part) in parts {
+        let matrix = part.nuisance.ncols() - part.biases.len();
+        let known = shared.iter().find(|s| s.0 == part.reference);
+        let of_matrix = match known {
+            Some((_, places)) => places.clone(),
+            None => {
+                let places = new(matrix);
+                shared.push((part.reference, places.clone()));
+                places
+            }
+        };
+        let of_biases = new(part.biases.len());
+        let (mut matrix, mut biases) = (of_matrix.into_iter(), of_biases.into_iter());
+        let place = |k: usize| match part.biases.contains(&k) {
+            true => biases.next(),
+            false => matrix.next(),
+        };
+        all.push((0..part.nuisance.ncols()).filter_map(place).collect());
+    }
+    (all, count)
+}
+
+/// One problem of `parts`, each with the number of its recording out of `sessions`. `None` if the first recording is missing.
+pub(super) fn join(sensor: Sensor, parts: Vec<(usize, Part)>, sessions: usize) -> Option<Rows> {
+    let (0, head) = parts.first()? else {
+        return None;
+    };
+    let (figure, together) = (head.figure, head.judged.1);
+    let (places, columns) = places(&parts);
+    // The judged rows stand first, and a stratum is judged whole.
+    let judged_rows = |part: &Part| match part.figure == figure {
+        true => part.judged.0,
+        false => 0,
+    };
+    let mut order: Vec<(usize, usize)> = Vec::new();
+    for judged in [true, false] {
+        for (p, (_, part)) in parts.iter().enumerate() {
+            let ours = |s: &usize| (part.strata[*s].rows.end <= judged_rows(part)) == judged;
+            order.extend((0..part.strata.len()).filter(ours).map(|s| (p, s)));
+        }
+    }
+    let total: usize = parts.iter().map(|p| p.1.y.len()).sum();
+    let judged = parts.iter().map(|p| judged_rows(&p.1)).sum();
+
+    let steps: Vec<Option<f64>> = parts.iter().map(|p| p.1.step).collect();
+    let step = common_step(&steps);
+    let mut first = vec![0];
+    let mut moments = Vec::new();
+    let mut block = Vec::new();
+    let mut warm = vec![Vec::new(); sessions];
+    let mut from_moment = Vec::new();
+    for session in 0..sessions {
+        let dwells = match parts.iter().find(|p| p.0 == session) {
+            Some((_, part)) => {
+                from_moment.push(moments.len());
+                moments.extend(part.moments.iter().map(|m| {
+                    let mut moment = *m;
+                    moment.session = session;
+                    moment
+                }));
+                block.extend(part.block.iter().map(|b| (session, *b)));
+                warm[session].clone_from(&part.warm);
+                let last = part.rows.iter().flat_map(|r| r.dwells).max();
+                1 + last.unwrap_or(0)
+            }
+            None => 0,
+        };
+        first.push(first[session] + dwells);
+    }
+
+    let mut y = DVector::zeros(total);
+    let mut nuisance = DMatrix::zeros(total, columns);
+    let mut strata = Vec::new();
+    let mut rows = Vec::with_capacity(total);
+    for (p, s) in order {
+        let (session, part) = &parts[p];
+        let from = rows.len();
+        let mut stratum = part.strata[s].clone();
+        for r in stratum.rows.clone() {
+            y[rows.len()] = part.y[r];
+            for (k, place) in places[p].iter().enumerate() {
+                nuisance[(rows.len(), *place)] = part.nuisance[(r, k)];
+            }
+            let row = &part.rows[r];
+            let offset = from_moment[p];
+            rows.push(Row {
+                moments: row.moments.start + offset..row.moments.end + offset,
+                weights: row.weights.clone(),
+                dwells: row.dwells.map(|d| d + first[*session]),
+            });
+        }
+        stratum.rows = from..rows.len();
+        stratum.session = *session;
+        if sessions > 1 {
+            stratum.name += &format!(" of recording {}", session + 1);
+        }
+        strata.push(stratum);
+    }
+    Some(Rows {
+        sensor,
+        y,
+        nuisance: scaled(nuisance),
+        strata,
+        figure,
+        judged: (judged, together),
+        step,
+        rows,
+        moments,
+        block,
+        elsewhere: warm.iter().map(|w| elsewhere(w)).collect(),
+        warm,
+        first,
+    })
+}

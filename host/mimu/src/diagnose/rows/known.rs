@@ -1,0 +1,66 @@
+//! Rows of dwells whose input is known.
+
+use std::ops::Range;
+
+use mimu_core::compensation::Affine;
+use nalgebra::{DMatrix, Vector3};
+
+use super::build::{Builder, Part};
+use super::{Figure, Stratum};
+use crate::triad::Forward;
+
+impl Builder<'_> {
+    /// A row for each dwell and sensor axis; `accel` is the calibrated accelerometer, for the forces on a gyro.
+    pub(super) fn known(
+        mut self,
+        scale: &Vector3<f64>,
+        forward: &Forward,
+        accel: Option<&Affine<f64>>,
+    ) -> Option<Part> {
+        let prepared = self.prepared;
+        let observations = prepared.observations(self.sensor);
+        let n = observations.len();
+        if n == 0 {
+            return None;
+        }
+        let dwells: Vec<usize> = observations.iter().map(|o| o.dwell).collect();
+        let wander = prepared.noise.wander(self.sensor, &prepared.dwells.list);
+        let moments: Vec<Range<usize>> = dwells
+            .iter()
+            .map(|d| self.dwell(*d, self.force(*d, accel)))
+            .collect();
+        let walk = self.walk(&dwells);
+        let mut y = Vec::new();
+        let mut nuisance = DMatrix::zeros(3 * n, 12);
+        let mut strata = Vec::new();
+        for axis in 0..3 {
+            for (i, o) in observations.iter().enumerate() {
+                let row = y.len();
+                let predicted = forward.apply(&o.input)[axis];
+                self.mean_row(o.dwell, &moments[i], Vector3::ith(axis, 1.0));
+                y.push((o.raw[axis] - predicted) / scale[axis]);
+                nuisance[(row, 4 * axis)] = 1.0;
+                for k in 0..3 {
+                    nuisance[(row, 4 * axis + 1 + k)] = o.input[k];
+                }
+            }
+            let s2 = scale[axis] * scale[axis];
+            let known = DMatrix::from_fn(n, n, |i, j| match (i == j, &wander) {
+                (true, _) => observations[i].variance[axis] / s2,
+                (_, Some(w)) => w[axis][(dwells[i], dwells[j])] / s2,
+                _ => 0.0,
+            });
+            strata.push(Stratum {
+                name: crate::quantity::AXES[axis].into(),
+                axis: Some(axis),
+                session: 0,
+                rows: axis * n..(axis + 1) * n,
+                known,
+                walk: Some(walk.clone()),
+                wander_known: wander.is_some(),
+            });
+        }
+        let figure = (Figure::Input, 3 * n, 1);
+        self.finish(y, nuisance, vec![0, 4, 8], strata, figure)
+    }
+}

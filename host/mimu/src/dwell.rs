@@ -1,0 +1,369 @@
+//! Dwells: the stretches over which a reading is averaged.
+//!
+//! They are given by the `step` column, or found where all channels are still. Either way each is
+//! judged sensor by sensor: a reading at a rail, a stuck channel or a unit in motion would ruin the
+//! mean without any trace in it.
+
+use std::fmt;
+use std::ops::Range;
+
+use crate::blocks::{Condensed, Level, Rails, Stretch, pool, quantile};
+use crate::quantity::{Sensor, plural};
+use crate::rails::{self, longest_run_by_chance};
+use crate::stillness::{self, Detection, SHORTEST_S};
+use mimu_recording::error::{Error, Result};
+use mimu_recording::{Manifest, RAW_COLUMNS};
+
+/// Variance of a given step over the median of all steps, at most; a fivefold standard deviation.
+const STEP_FACTOR: f64 = 25.0;
+/// Share of clipped samples from which on a mean is refused: below, it moves by less than a tenth
+/// of a standard deviation of one sample.
+const CLIPPED_SHARE: f64 = 0.01;
+
+/// Why a dwell is not used for a sensor.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Fault {
+    /// Shorter than [`SHORTEST_S`].
+    TooShort,
+    /// The variance is far above that of the other dwells.
+    NotStill,
+    /// Samples of the channel (0..6) lie at a rail.
+    Saturated(usize),
+    /// The channel (0..6) repeats one value.
+    Stuck(usize),
+    /// The channel (0..6) has no samples.
+    Missing(usize),
+}
+
+impl fmt::Display for Fault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::TooShort => f.write_str("too short"),
+            Self::NotStill => f.write_str("not still"),
+            Self::Saturated(c) => write!(f, "{} saturated", RAW_COLUMNS[c]),
+            Self::Stuck(c) => write!(f, "{} stuck", RAW_COLUMNS[c]),
+            Self::Missing(c) => write!(f, "{} missing", RAW_COLUMNS[c]),
+        }
+    }
+}
+
+/// Mean of a raw channel over a dwell.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Mean {
+    /// Number of samples averaged.
+    pub n: u64,
+    /// Their mean, raw units.
+    pub mean: f64,
+    /// Variance of one sample, raw units squared.
+    pub variance: f64,
+    /// Samples at a rail, left out.
+    pub clipped: u64,
+}
+
+/// One dwell.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Dwell {
+    /// Number by the `step` column, or in order of time.
+    pub step: i32,
+    /// Data row of its first sample, from 0.
+    pub first_row: u64,
+    /// Number of samples.
+    pub rows: u64,
+    /// Instant of the first sample, s.
+    pub start_s: f64,
+    /// Instant of the last sample, s.
+    pub last_s: f64,
+    /// Rows over rate: n samples span n periods, not n - 1.
+    pub duration_s: f64,
+    /// Its blocks.
+    pub blocks: Range<usize>,
+    /// Gyro x, y, z, accelerometer x, y, z, raw.
+    pub raw: [Mean; 6],
+    /// Known input in SI: rates (rad/s), specific forces (m/s²). Not a number where unknown.
+    pub reference: [f64; 6],
+    /// Mean temperature, °C, or not a number.
+    pub temp_c: f64,
+    /// Whether it is a turn of known angle, of which only the mean rate is known.
+    pub turn: bool,
+    /// Why it is not used for the gyro, if so.
+    pub gyro_fault: Option<Fault>,
+    /// Why it is not used for the accelerometer, if so.
+    pub accel_fault: Option<Fault>,
+}
+
+impl Dwell {
+    /// Why it is not used for `sensor`, if so.
+    pub fn fault(&self, sensor: Sensor) -> Option<Fault> {
+        match sensor {
+            Sensor::Gyro => self.gyro_fault,
+            Sensor::Accel => self.accel_fault,
+        }
+    }
+
+    /// Time over which the channels of `sensor` are averaged, s: masked samples are gone, and the mean is that of a shorter
+    /// dwell.
+    pub fn averaged_s(&self, sensor: Sensor) -> f64 {
+        let fewest = self.raw[sensor.channels()]
+            .iter()
+            .map(|m| m.n)
+            .min()
+            .unwrap_or(0);
+        self.duration_s * fewest as f64 / self.rows as f64
+    }
+
+    /// Mean raw reading of `sensor`.
+    pub fn raw_mean(&self, sensor: Sensor) -> nalgebra::Vector3<f64> {
+        let from = sensor.channels().start;
+        nalgebra::Vector3::from_fn(|i, _| self.raw[from + i].mean)
+    }
+
+    /// Known input of `sensor`, SI; `None` where any of its axes is unknown.
+    pub fn input(&self, sensor: Sensor) -> Option<nalgebra::Vector3<f64>> {
+        let from = sensor.channels().start;
+        let input = nalgebra::Vector3::from_fn(|i, _| self.reference[from + i]);
+        input.iter().all(|x| x.is_finite()).then_some(input)
+    }
+}
+
+/// The dwells of a recording and how they were found.
+#[derive(Debug, Clone)]
+pub struct Dwells {
+    /// In order of time.
+    pub list: Vec<Dwell>,
+    /// How they were found; `None` if the `step` column says.
+    pub detection: Option<Detection>,
+    /// Rails of the six channels, as declared or as found.
+    pub rails: [Rails; 6],
+    /// Longest run of equal samples that chance explains, of the six channels; infinite where nothing can be told.
+    pub longest_run: [f64; 6],
+    /// What a person should know.
+    pub warnings: Vec<String>,
+}
+
+impl Dwells {
+    /// The dwells of a recording. `still_factor`: see [`stillness::STILL_FACTOR`].
+    pub fn find(condensed: &Condensed, manifest: &Manifest, still_factor: f64) -> Result<Self> {
+        let mut warnings = Vec::new();
+        let longest_run = [0, 1, 2, 3, 4, 5]
+            .map(|c| longest_run_by_chance(condensed, c).unwrap_or(f64::INFINITY));
+        let rails = rails::find(condensed, manifest, &longest_run, &mut warnings);
+        let (ranges, detection) = if condensed.has_steps {
+            (by_step(condensed), None)
+        } else {
+            let (ranges, detection) = stillness::find(condensed, manifest, still_factor)?;
+            (ranges, Some(detection))
+        };
+        let mut list: Vec<Dwell> = ranges
+            .into_iter()
+            .enumerate()
+            .map(|(i, (step, blocks))| {
+                let step = step.unwrap_or(i as i32);
+                let turn = manifest.turn_steps.contains(&step);
+                Dwell {
+                    turn,
+                    ..dwell(condensed, step, blocks, &rails)
+                }
+            })
+            .collect();
+        if list.is_empty() {
+            let (problem, remedy) = match condensed.has_steps {
+                true => (
+                    "every row is in transit: its step is empty or -1",
+                    "number the dwells in the column step, or leave the column out to have them found",
+                ),
+                false => (
+                    "no stretch of the recording is still",
+                    "hold the unit still for some seconds in every pose, or raise --still",
+                ),
+            };
+            return Err(Error::new("dwells", problem, remedy));
+        }
+        judge(&mut list, condensed, &longest_run, detection.is_none());
+        warn(&list, manifest, &mut warnings);
+        Ok(Self {
+            list,
+            detection,
+            rails,
+            longest_run,
+            warnings,
+        })
+    }
+}
+
+impl Dwells {
+    /// The dwells that are not used for `sensor`, as a remark: ` (not used: 3 too short, 1 accel_z saturated)`; empty
+    /// if all are used.
+    pub fn unused(&self, sensor: Sensor) -> String {
+        let mut counts: Vec<(String, usize)> = Vec::new();
+        for fault in self.list.iter().filter_map(|d| d.fault(sensor)) {
+            let name = fault.to_string();
+            match counts.iter_mut().find(|(known, _)| *known == name) {
+                Some((_, count)) => *count += 1,
+                None => counts.push((name, 1)),
+            }
+        }
+        let all: Vec<String> = counts.iter().map(|(f, n)| format!("{n} {f}")).collect();
+        match all.is_empty() {
+            true => String::new(),
+            false => format!(" (not used: {})", all.join(", ")),
+        }
+    }
+}
+
+fn by_step(condensed: &Condensed) -> Vec<Stretch> {
+    let mut ranges: Vec<Stretch> = Vec::new();
+    for (i, block) in condensed.blocks.iter().enumerate() {
+        match ranges.last_mut() {
+            Some((step, range)) if *step == Some(block.step) && range.end == i => range.end = i + 1,
+            _ if block.step >= 0 => ranges.push((Some(block.step), i..i + 1)),
+            _ => {}
+        }
+    }
+    ranges
+}
+
+fn dwell(condensed: &Condensed, step: i32, range: Range<usize>, rails: &[Rails; 6]) -> Dwell {
+    let blocks = &condensed.blocks[range.clone()];
+    let rows: u64 = blocks.iter().map(|b| u64::from(b.rows)).sum();
+    let mut raw = [Mean::default(); 6];
+    for (c, mean) in raw.iter_mut().enumerate() {
+        let mut clipped = 0;
+        let pooled = pool(blocks.iter().map(|b| {
+            let (kept, masked) = b.raw[c].without_rails(rails[c]);
+            clipped += u64::from(masked);
+            kept
+        }));
+        *mean = Mean {
+            n: u64::from(pooled.n),
+            mean: pooled.mean,
+            variance: if pooled.n > 1 {
+                pooled.m2 / f64::from(pooled.n - 1)
+            } else {
+                0.0
+            },
+            clipped,
+        };
+    }
+    let average = |level: fn(&crate::blocks::Block, usize) -> Level, c: usize| {
+        let first = level(&blocks[0], c).mean;
+        let sum: f64 = blocks
+            .iter()
+            .map(|b| f64::from(b.rows) * (level(b, c).mean - first))
+            .sum();
+        first + sum / rows as f64
+    };
+    let mut reference = [0, 1, 2, 3, 4, 5].map(|c| average(|b, c| b.reference[c], c));
+    for rate in &mut reference[Sensor::Gyro.channels()] {
+        *rate = rate.to_radians();
+    }
+    Dwell {
+        step,
+        first_row: blocks[0].first_row,
+        rows,
+        start_s: blocks[0].start_s,
+        last_s: blocks[blocks.len() - 1].last_s,
+        duration_s: rows as f64 * condensed.period_s,
+        blocks: range,
+        raw,
+        reference,
+        temp_c: average(|b, _| b.temp_c, 0),
+        turn: false,
+        gyro_fault: None,
+        accel_fault: None,
+    }
+}
+
+/// Finds out which dwells are no good for which sensor.
+fn judge(list: &mut [Dwell], condensed: &Condensed, longest_run: &[f64; 6], given: bool) {
+    for sensor in Sensor::BOTH {
+        let channels = || sensor.channels().filter(|&c| condensed.has_raw[c]);
+        let typical: Vec<f64> = channels()
+            .map(|c| {
+                let mut all: Vec<f64> = list.iter().map(|d| d.raw[c].variance).collect();
+                quantile(&mut all, 0.5).unwrap_or(0.0)
+            })
+            .collect();
+        for dwell in list.iter_mut() {
+            // A turn of known angle has a known mean rate, and is anything but still.
+            let turn = dwell.turn;
+            let mut fault = None;
+            for (k, c) in channels().enumerate() {
+                let mean = dwell.raw[c];
+                let constant = mean.n > 1 && mean.variance == 0.0;
+                fault = fault.or(if mean.n == 0 && mean.clipped == 0 {
+                    Some(Fault::Missing(c))
+                } else if mean.clipped as f64 > CLIPPED_SHARE * dwell.rows as f64 {
+                    Some(Fault::Saturated(c))
+                } else if constant && mean.n as f64 > longest_run[c] {
+                    Some(Fault::Stuck(c))
+                } else if given
+                    && !turn
+                    && mean.variance > STEP_FACTOR * typical[k]
+                    && typical[k] > 0.0
+                {
+                    Some(Fault::NotStill)
+                } else {
+                    None
+                });
+            }
+            if dwell.duration_s < SHORTEST_S - 0.5 * condensed.period_s && !turn {
+                fault = fault.or(Some(Fault::TooShort));
+            }
+            match sensor {
+                Sensor::Gyro => dwell.gyro_fault = fault,
+                Sensor::Accel => dwell.accel_fault = fault,
+            }
+        }
+    }
+}
+
+fn warn(list: &[Dwell], manifest: &Manifest, warnings: &mut Vec<String>) {
+    let mut by_fault: Vec<(String, Vec<String>)> = Vec::new();
+    for dwell in list {
+        for sensor in Sensor::BOTH {
+            let Some(fault) = dwell.fault(sensor) else {
+                continue;
+            };
+            if matches!(fault, Fault::TooShort) && sensor == Sensor::Accel {
+                continue; // said once, for both
+            }
+            let key = match fault {
+                Fault::TooShort => format!("shorter than {SHORTEST_S} s"),
+                Fault::NotStill => format!("not still enough for the {sensor}"),
+                other => other.to_string(),
+            };
+            let name = manifest
+                .step_labels
+                .get(dwell.step as usize)
+                .cloned()
+                .unwrap_or_else(|| dwell.step.to_string());
+            match by_fault.iter_mut().find(|(k, _)| *k == key) {
+                Some((_, steps)) => steps.push(name),
+                None => by_fault.push((key, vec![name])),
+            }
+        }
+    }
+    for (fault, steps) in by_fault {
+        let count = steps.len();
+        let shown = steps[..count.min(8)].join(", ");
+        let more = if count > 8 { ", ..." } else { "" };
+        let (noun, verb) = if count == 1 {
+            ("dwell", "is")
+        } else {
+            ("dwells", "are")
+        };
+        warnings.push(format!(
+            "{count} {noun} ({shown}{more}) {verb} not used: {fault}"
+        ));
+    }
+    let clipped: u64 = list
+        .iter()
+        .flat_map(|d| d.raw.iter().map(|m| m.clipped))
+        .sum();
+    if clipped > 0 {
+        warnings.push(format!(
+            "{} within dwells at a rail of the converter: masked",
+            plural(clipped, "sample")
+        ));
+    }
+}

@@ -1,0 +1,634 @@
+//! Estimators for dwells whose input is known: a rate table, or a levelled cube.
+
+use mimu_core::compensation::Affine;
+use mimu_core::kalman::Filter;
+use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, Vector3};
+
+use super::least_squares::{
+    Errors, Observability, Scatter, excess_of, excess_variance, solve_with_excess,
+};
+use super::{Estimated, Failure, Observation};
+use crate::quantity::AXES;
+use crate::triad::{Covariance, Forward, Part, Triad};
+
+/// Two inputs are opposite if their sum is below this share of their size: a table's repeatability.
+const OPPOSITE_SHARE: f64 = 0.01;
+/// An input below this share of the largest is rest.
+const REST_SHARE: f64 = 1e-3;
+/// An input is along an axis if the rest of it is below this share.
+const ALONG_SHARE: f64 = 0.02;
+
+/// Size of the largest input; the unit in which designs are judged.
+fn span(observations: &[Observation]) -> f64 {
+    observations
+        .iter()
+        .map(|o| o.input.norm())
+        .fold(0.0, f64::max)
+        .max(f64::MIN_POSITIVE)
+}
+
+/// Rows `[1, x, y, z]`, inputs in units of `span`.
+fn design(observations: &[Observation], span: f64) -> DMatrix<f64> {
+    DMatrix::from_fn(observations.len(), 4, |i, j| match j {
+        0 => 1.0,
+        _ => observations[i].input[j - 1] / span,
+    })
+}
+
+/// Whether the inputs determine `[b, P1, P2, P3]`, fang (29), (30). The same for all three sensors.
+pub fn observability(observations: &[Observation]) -> Result<Observability, Failure> {
+    let found = Observability::of(&design(observations, span(observations)));
+    if found.is_complete() {
+        return Ok(found);
+    }
+    let inputs: Vec<&str> = (0..3)
+        .filter(|axis| found.undetermined.iter().any(|(k, _)| *k == axis + 1))
+        .map(|axis| AXES[axis])
+        .collect();
+    let bias = found.undetermined.iter().any(|(k, _)| *k == 0);
+    let mut parameters: Vec<String> = inputs
+        .iter()
+        .map(|a| {
+            format!("P_x{a}, P_y{a}, P_z{a} (scale factor {a} and the misalignments towards {a})")
+        })
+        .collect();
+    if bias {
+        parameters.insert(0, "the biases".into());
+    }
+    let axes = inputs.join(", ");
+    let add = if observations.len() < 4 {
+        format!(
+            "only {} dwells can be used, and 4 parameters a sensor need at least 4 different inputs",
+            observations.len()
+        )
+    } else if bias {
+        format!(
+            "no difference between bias and a constant input along {axes}: add dwells with the opposite input, or none, along {axes}"
+        )
+    } else {
+        format!("add dwells with inputs along {axes}, in both directions")
+    };
+    Err(Failure::Undetermined {
+        parameters: parameters.join(", "),
+        add,
+    })
+}
+
+/// What is known of the errors of the readings of sensor `axis`. `wander` is what the means of all dwells share, axis by axis
+/// ([`crate::noise::Noise::wander`]), and part of their variances.
+fn errors(observations: &[Observation], axis: usize, wander: Option<&[DMatrix<f64>; 3]>) -> Errors {
+    let n = observations.len();
+    let variances = positive(DVector::from_fn(n, |i, _| observations[i].variance[axis]));
+    let Some(wander) = wander else {
+        return Errors::Independent(variances);
+    };
+    Errors::Correlated(DMatrix::from_fn(n, n, |i, j| match i == j {
+        true => variances[i],
+        false => wander[axis][(observations[i].dwell, observations[j].dwell)],
+    }))
+}
+
+/// Least squares in the forward form, fang (15), (17): `u = P x + b`, sensor by sensor.
+///
+/// The noisy reading is regressed on the known input, so that nothing is attenuated. With the `wander` that the means share,
+/// it is generalized least squares: of neighbouring dwells the difference counts, which is free of it.
+pub fn least_squares(
+    observations: &[Observation],
+    wander: Option<&[DMatrix<f64>; 3]>,
+) -> Result<Estimated, Failure> {
+    let observability = observability(observations)?;
+    let span = span(observations);
+    let design = design(observations, span);
+    let mut axes = Vec::new();
+    for axis in 0..3 {
+        let raw = DVector::from_fn(observations.len(), |i, _| observations[i].raw[axis]);
+        let errors = errors(observations, axis, wander);
+        let (solution, scatter) = solve_with_excess(&design, &raw, &errors)
+            .ok_or_else(|| Failure::NoSolution("the design is singular".into()))?;
+        axes.push((solution.parameters, solution.covariance, scatter));
+    }
+    forward(&axes, span, observability.condition)
+}
+
+/// One scalar measurement of a filter: `raw = b + P x + noise`.
+struct Measurement {
+    input: Vector3<f64>,
+    raw: f64,
+    variance: f64,
+}
+
+/// The readings of sensor `axis` as measurements with independent noise: each less its prediction from the errors of those before,
+/// and divided by what is left of the bias. Of independent readings it is themselves.
+fn innovations(
+    observations: &[Observation],
+    span: f64,
+    axis: usize,
+    errors: &Errors,
+    excess: f64,
+) -> Option<Vec<Measurement>> {
+    let covariance = match errors {
+        Errors::Independent(variances) => {
+            let own = observations.iter().zip(variances.iter());
+            return Some(
+                own.map(|(o, v)| Measurement {
+                    input: o.input / span,
+                    raw: o.raw[axis],
+                    variance: v + excess,
+                })
+                .collect(),
+            );
+        }
+        Errors::Correlated(covariance) => covariance,
+    };
+    let n = observations.len();
+    let root = (covariance + DMatrix::identity(n, n) * excess).cholesky()?;
+    let rows = DMatrix::from_fn(n, 5, |i, j| match j {
+        0 => 1.0,
+        4 => observations[i].raw[axis],
+        _ => observations[i].input[j - 1] / span,
+    });
+    let white = root.l_dirty().solve_lower_triangular(&rows)?;
+    let measurement = |i: usize| {
+        let bias = white[(i, 0)];
+        Measurement {
+            input: Vector3::new(white[(i, 1)], white[(i, 2)], white[(i, 3)]) / bias,
+            raw: white[(i, 4)] / bias,
+            variance: 1.0 / (bias * bias),
+        }
+    };
+    Some((0..n).map(measurement).collect())
+}
+
+/// The Kalman bank of fang (23)-(28), fed the dwell means one scalar at a time with a diffuse prior.
+///
+/// Its noise is that of the dwell means; where the innovations' residual shows more, the bank is run again with
+/// the excess added, as in [`least_squares`], with which it agrees to rounding. A `wander` that the means share is no noise of
+/// one measurement: each is then fed less what those before predict of its error.
+pub fn kalman(
+    observations: &[Observation],
+    wander: Option<&[DMatrix<f64>; 3]>,
+) -> Result<Estimated, Failure> {
+    let observability = observability(observations)?;
+    let span = span(observations);
+    let dof = observations.len() as f64 - 4.0;
+    let axis = |axis: usize| {
+        let errors = errors(observations, axis, wander);
+        let known = DVector::from_fn(observations.len(), |i, _| observations[i].variance[axis]);
+        let floor = positive(known).max();
+        let mut scatter = Scatter {
+            excess: 0.0,
+            chi2: 0.0,
+            dof,
+        };
+        let mut round = 0;
+        loop {
+            let mut filter = Filter::<f64>::diffuse(floor + scatter.excess, 1.0);
+            let measurements = innovations(observations, span, axis, &errors, scatter.excess)
+                .ok_or_else(|| Failure::NoSolution("the noise of the dwells is none".into()))?;
+            for (m, o) in measurements.iter().zip(observations) {
+                filter
+                    .update(&m.input, m.raw, m.variance)
+                    .map_err(|e| Failure::NoSolution(format!("dwell {}: {e}", o.dwell)))?;
+            }
+            let mean = DVector::from_column_slice(filter.mean().as_slice());
+            let residuals = DVector::from_fn(observations.len(), |i, _| {
+                let o = &observations[i];
+                o.raw[axis] - mean[0] - mean.fixed_rows::<3>(1).dot(&(o.input / span))
+            });
+            let found = excess_of(&residuals, &errors, dof);
+            let settled = (found.excess - scatter.excess).abs() <= 1e-6 * scatter.excess;
+            scatter = Scatter {
+                chi2: if round == 0 { found.chi2 } else { scatter.chi2 },
+                ..found
+            };
+            round += 1;
+            if settled || round == 30 {
+                let covariance = DMatrix::from_column_slice(4, 4, filter.covariance().as_slice());
+                return Ok((mean, covariance, scatter));
+            }
+        }
+    };
+    let axes = (0..3).map(axis).collect::<Result<Vec<_>, _>>()?;
+    forward(&axes, span, observability.condition)
+}
+
+/// Puts `[b, P1, P2, P3]` of the three sensors (inputs in units of `span`) together.
+fn forward(
+    axes: &[(DVector<f64>, DMatrix<f64>, Scatter)],
+    span: f64,
+    condition: f64,
+) -> Result<Estimated, Failure> {
+    let mut model = Forward {
+        matrix: Matrix3::zeros(),
+        bias: Vector3::zeros(),
+    };
+    let mut parts = Vec::new();
+    for (axis, (parameters, of_axis, scatter)) in axes.iter().enumerate() {
+        let mut covariance = Covariance::zeros();
+        // Where b, P1, P2, P3 of this sensor stand among the twelve.
+        let places = [9 + axis, 3 * axis, 3 * axis + 1, 3 * axis + 2];
+        let unit = [1.0, span, span, span];
+        model.bias[axis] = parameters[0];
+        for j in 0..3 {
+            model.matrix[(axis, j)] = parameters[j + 1] / span;
+        }
+        for i in 0..4 {
+            for j in 0..4 {
+                covariance[(places[i], places[j])] = of_axis[(i, j)] / (unit[i] * unit[j]);
+            }
+        }
+        parts.push(Part {
+            covariance,
+            dof: scatter.variance_dof(),
+        });
+    }
+    let scatter: Vec<_> = axes
+        .iter()
+        .zip(AXES)
+        .map(|(a, name)| (name.to_string(), a.2))
+        .collect();
+    let triad = Triad::from_forward(model, parts).ok_or_else(|| {
+        Failure::NoSolution(
+            "the three sensors measure one plane only (singular scale-factor matrix)".into(),
+        )
+    })?;
+    Ok(Estimated {
+        triad,
+        scatter,
+        condition,
+        notes: Vec::new(),
+    })
+}
+
+/// Variances, with a floor where a noiseless recording has none: 1e-12 of the largest, or of one.
+fn positive(variances: DVector<f64>) -> DVector<f64> {
+    let floor = 1e-12 * variances.max();
+    variances.map(|v| {
+        if v > floor {
+            v
+        } else if floor > 0.0 {
+            floor
+        } else {
+            1e-24
+        }
+    })
+}
+
+/// xu's inverse form for rates: C from the differences of opposite rates, (3)-(8), o from the readings at rest, (9)-(11).
+///
+/// Unweighted, as published. It regresses the known input on the noisy reading, which shrinks C by the
+/// ratio of noise variance to signal variance: below 1e-8 for dwell means of seconds, but not for single samples.
+/// The covariance is that of this estimator under the noise of the means, and correlates the rows, which share the
+/// readings.
+pub fn opposite_rates(observations: &[Observation]) -> Result<Estimated, Failure> {
+    observability(observations)?;
+    let mut free: Vec<&Observation> = observations.iter().collect();
+    let (mut pairs, mut rest, mut single) = (Vec::new(), Vec::new(), 0);
+    while let Some(first) = free.pop() {
+        let size = first.input.norm();
+        if size < REST_SHARE * span(observations) {
+            rest.push(first);
+            continue;
+        }
+        let opposite = free
+            .iter()
+            .enumerate()
+            .map(|(i, o)| (i, (o.input + first.input).norm()))
+            .filter(|(_, sum)| *sum <= OPPOSITE_SHARE * size)
+            .min_by(|a, b| a.1.total_cmp(&b.1));
+        match opposite {
+            Some((i, _)) => pairs.push((first, free.swap_remove(i))),
+            None => single += 1,
+        }
+    }
+    if rest.is_empty() {
+        return Err(Failure::Undetermined {
+            parameters: "o (xu (10))".into(),
+            add: "xu's form takes the offset from dwells at rest: add some, or use --method least-squares".into(),
+        });
+    }
+    let span = span(observations);
+    let differences = DMatrix::from_fn(pairs.len(), 3, |i, j| {
+        (pairs[i].0.input[j] - pairs[i].1.input[j]) / (2.0 * span)
+    });
+    let observability = Observability::of(&differences);
+    if !observability.is_complete() {
+        let axes: Vec<&str> = observability
+            .undetermined
+            .iter()
+            .map(|(k, _)| AXES[*k])
+            .collect();
+        return Err(Failure::Undetermined {
+            parameters: format!("C, for want of opposite rates about {}", axes.join(", ")),
+            add: "add the opposite of each rate, or use --method least-squares".into(),
+        });
+    }
+    let reading = DMatrix::from_fn(pairs.len(), 3, |i, j| pairs[i].0.raw[j] - pairs[i].1.raw[j]);
+    let known = DMatrix::from_fn(pairs.len(), 3, |i, j| {
+        pairs[i].0.input[j] - pairs[i].1.input[j]
+    });
+    let pseudo = (reading.transpose() * &reading)
+        .try_inverse()
+        .ok_or_else(|| Failure::NoSolution("the readings do not change with the rate".into()))?
+        * reading.transpose();
+    let c_transposed = &pseudo * &known;
+    let matrix = Matrix3::from_fn(|i, j| c_transposed[(j, i)]);
+    let count = rest.len() as f64;
+    let at_rest = rest.iter().map(|o| o.raw).sum::<Vector3<f64>>() / count;
+    // (9) and not (10): a dwell taken for rest may turn a little, and that is known.
+    let offsets: Vec<Vector3<f64>> = rest.iter().map(|o| o.input - matrix * o.raw).collect();
+    let offset = offsets.iter().sum::<Vector3<f64>>() / count;
+    let inverse = Affine { matrix, offset };
+
+    // Errors of a difference in SI: C times the error of the readings.
+    let si =
+        |variance: Vector3<f64>| matrix * Matrix3::from_diagonal(&variance) * matrix.transpose();
+    let noise: Vec<Matrix3<f64>> = pairs
+        .iter()
+        .map(|(a, b)| si(a.variance + b.variance))
+        .collect();
+    let rest_variance: Vec<Matrix3<f64>> = rest.iter().map(|o| si(o.variance)).collect();
+    let mut rest_noise = rest_variance.iter().sum::<Matrix3<f64>>() / (count * count);
+    let residual = &known - &reading * &c_transposed;
+    let mut notes = Vec::new();
+    if single > 0 {
+        notes.push(format!(
+            "{single} rates have no opposite and are not used by --method xu"
+        ));
+    }
+    let scatter_of = |values: Vec<f64>, variances: &[Matrix3<f64>], axis: usize, dof: f64| {
+        let variances: Vec<f64> = variances
+            .iter()
+            .map(|v| v[(axis, axis)].max(f64::MIN_POSITIVE))
+            .collect();
+        excess_variance(&values, &variances, dof)
+    };
+    let mut scatter: Vec<_> = (0..3)
+        .map(|axis| {
+            let values = residual.column(axis).iter().copied().collect();
+            (
+                AXES[axis].to_string(),
+                scatter_of(values, &noise, axis, pairs.len() as f64 - 3.0),
+            )
+        })
+        .collect();
+    // The readings at rest scatter by themselves: what pairs scatter by may be the table's rate.
+    let mut rest_dof = [f64::INFINITY; 3];
+    for axis in 0..3 {
+        let values = offsets.iter().map(|o| o[axis] - offset[axis]).collect();
+        let of_rest = scatter_of(values, &rest_variance, axis, count - 1.0);
+        let of_pairs = scatter[axis].1;
+        // Where rest itself shows nothing, it may be for having been too few.
+        let (excess, dof) = if of_rest.excess > 0.0 {
+            (of_rest.excess, of_rest.variance_dof())
+        } else {
+            (0.5 * of_pairs.excess, of_pairs.variance_dof())
+        };
+        rest_dof[axis] = dof;
+        rest_noise[(axis, axis)] += excess / count;
+        if of_rest.excess > 0.0 {
+            scatter.push((format!("{} at rest", AXES[axis]), of_rest));
+        }
+    }
+    let covariance = rows_covariance(&pseudo, |p, r, s| {
+        noise[p][(r, s)] + if r == s { scatter[r].1.excess } else { 0.0 }
+    });
+    // o_r = -c_r . G0: its errors come from c_r and from the readings at rest.
+    let mut by_c = SMatrix::<f64, 12, 9>::zeros();
+    for r in 0..3 {
+        for j in 0..3 {
+            by_c[(3 * r + j, 3 * r + j)] = 1.0;
+            by_c[(9 + r, 3 * r + j)] = -at_rest[j];
+        }
+    }
+    let parts = by_row(
+        |a, b| (a / 3 == b / 3).then_some(a / 3),
+        &covariance,
+        &scatter,
+    )
+    .into_iter()
+    .map(|(covariance, dof)| Part {
+        covariance: by_c * covariance * by_c.transpose(),
+        dof,
+    });
+    let of_rest = (0..3).map(|r| {
+        let mut covariance = Covariance::zeros();
+        covariance[(9 + r, 9 + r)] = rest_noise[(r, r)];
+        Part {
+            covariance,
+            dof: rest_dof[r],
+        }
+    });
+    let mut rest_between = Covariance::zeros();
+    rest_between
+        .fixed_view_mut::<3, 3>(9, 9)
+        .copy_from(&(rest_noise - Matrix3::from_diagonal(&rest_noise.diagonal())));
+    let known = Part {
+        covariance: rest_between,
+        dof: f64::INFINITY,
+    };
+    let triad = Triad::from_inverse(inverse, parts.chain(of_rest).chain([known]).collect())
+        .ok_or_else(|| Failure::NoSolution("C is singular".into()))?;
+    Ok(Estimated {
+        triad,
+        scatter,
+        condition: observability.condition,
+        notes,
+    })
+}
+
+/// Cuts a covariance into what belongs to one row of the model, whose size the row's scatter tells, and what
+/// correlates the rows, which is known beforehand. `row_of` says which row an element belongs to.
+fn by_row<const N: usize>(
+    row_of: impl Fn(usize, usize) -> Option<usize>,
+    covariance: &SMatrix<f64, N, N>,
+    scatter: &[(String, Scatter)],
+) -> Vec<(SMatrix<f64, N, N>, f64)> {
+    let of = |row: Option<usize>| {
+        SMatrix::from_fn(|a, b| {
+            if row_of(a, b) == row {
+                covariance[(a, b)]
+            } else {
+                0.0
+            }
+        })
+    };
+    let rows = (0..3).map(|r| (of(Some(r)), scatter[r].1.variance_dof()));
+    rows.chain([(of(None), f64::INFINITY)]).collect()
+}
+
+/// Covariance of three rows that are all estimated by `left` (3 or 4 by observations) when the errors of one
+/// observation are correlated across the rows as `noise(observation, row, row)` says. Row-major order, 3 a row.
+fn rows_covariance(
+    left: &DMatrix<f64>,
+    noise: impl Fn(usize, usize, usize) -> f64,
+) -> SMatrix<f64, 9, 9> {
+    SMatrix::from_fn(|a, b| {
+        let (r, i, s, j) = (a / 3, a % 3, b / 3, b % 3);
+        (0..left.ncols())
+            .map(|p| left[(i, p)] * noise(p, r, s) * left[(j, p)])
+            .sum()
+    })
+}
+
+/// xu's inverse form for poses, (12)-(16): `f = C u + o` by unweighted least squares over the readings.
+///
+/// See [`opposite_rates`] for what regressing on the noisy side means.
+pub fn inverse_form(observations: &[Observation]) -> Result<Estimated, Failure> {
+    let observability = observability(observations)?;
+    let n = observations.len();
+    // Centred and scaled, or the readings' common offset makes the normal matrix singular to rounding.
+    let centre = observations.iter().map(|o| o.raw).sum::<Vector3<f64>>() / n as f64;
+    let unit = observations
+        .iter()
+        .map(|o| (o.raw - centre).norm())
+        .fold(0.0, f64::max)
+        .max(f64::MIN_POSITIVE);
+    let design = DMatrix::from_fn(n, 4, |i, j| {
+        if j == 3 {
+            1.0
+        } else {
+            (observations[i].raw[j] - centre[j]) / unit
+        }
+    });
+    let left = (design.transpose() * &design)
+        .try_inverse()
+        .ok_or_else(|| Failure::NoSolution("the readings lie in one plane".into()))?
+        * design.transpose();
+    let known = DMatrix::from_fn(n, 3, |i, j| observations[i].input[j]);
+    let solution = &left * &known;
+    let matrix = Matrix3::from_fn(|i, j| solution[(j, i)] / unit);
+    let at_centre = Vector3::from_fn(|i, _| solution[(3, i)]);
+    let inverse = Affine {
+        matrix,
+        offset: at_centre - matrix * centre,
+    };
+    let noise: Vec<Matrix3<f64>> = observations
+        .iter()
+        .map(|o| matrix * Matrix3::from_diagonal(&o.variance) * matrix.transpose())
+        .collect();
+    let residual = &known - &design * &solution;
+    let scatter: Vec<_> = (0..3)
+        .map(|axis| {
+            let r: Vec<f64> = residual.column(axis).iter().copied().collect();
+            let v: Vec<f64> = noise
+                .iter()
+                .map(|m| m[(axis, axis)].max(f64::MIN_POSITIVE))
+                .collect();
+            (
+                AXES[axis].to_string(),
+                excess_variance(&r, &v, n as f64 - 4.0),
+            )
+        })
+        .collect();
+    // Covariance in the centred parameters, [c_r1 c_r2 c_r3 o_r] for each row, then to C and o.
+    let mut full = Covariance::zeros();
+    let place = |r: usize, i: usize| if i == 3 { 9 + r } else { 3 * r + i };
+    for r in 0..3 {
+        for s in 0..3 {
+            for i in 0..4 {
+                for j in 0..4 {
+                    full[(place(r, i), place(s, j))] = (0..n)
+                        .map(|p| {
+                            let extra = if r == s { scatter[r].1.excess } else { 0.0 };
+                            left[(i, p)] * (noise[p][(r, s)] + extra) * left[(j, p)]
+                        })
+                        .sum();
+                }
+            }
+        }
+    }
+    let mut change = SMatrix::<f64, 12, 12>::identity();
+    for r in 0..3 {
+        for j in 0..3 {
+            change[(3 * r + j, 3 * r + j)] = 1.0 / unit;
+            change[(9 + r, 3 * r + j)] = -centre[j] / unit;
+        }
+    }
+    let row = |a: usize| if a < 9 { a / 3 } else { a - 9 };
+    let parts = by_row(|a, b| (row(a) == row(b)).then(|| row(a)), &full, &scatter)
+        .into_iter()
+        .map(|(covariance, dof)| Part { covariance, dof }.seen_by(&change))
+        .collect();
+    let triad = Triad::from_inverse(inverse, parts)
+        .ok_or_else(|| Failure::NoSolution("C is singular".into()))?;
+    Ok(Estimated {
+        triad,
+        scatter,
+        condition: observability.condition,
+        notes: Vec::new(),
+    })
+}
+
+/// The classical six positions, as baseline: every axis up and down, or turned both ways. Scale factor
+/// `(u⁺ - u⁻) / (x⁺ - x⁻)` and bias `(u⁺ + u⁻) / 2` of each sensor by itself; misalignments are taken to be zero.
+pub fn six_positions(observations: &[Observation]) -> Result<Estimated, Failure> {
+    let mut model = Forward {
+        matrix: Matrix3::zeros(),
+        bias: Vector3::zeros(),
+    };
+    let (mut parts, mut scatter) = (Vec::new(), Vec::new());
+    for axis in 0..3 {
+        let mut covariance = Covariance::zeros();
+        let mut ends = [(0.0, 0.0, 0.0, 0.0); 2]; // sums of reading, input, variance; number
+        let mut used = Vec::new();
+        let along = |o: &&Observation| {
+            let size = o.input.norm();
+            size > 1e-3 * span(observations)
+                && o.input[axis].abs() > size * (1.0 - ALONG_SHARE * ALONG_SHARE).sqrt()
+        };
+        for o in observations.iter().filter(along) {
+            let end = &mut ends[usize::from(o.input[axis] > 0.0)];
+            end.0 += o.raw[axis];
+            end.1 += o.input[axis];
+            end.2 += o.variance[axis];
+            end.3 += 1.0;
+            used.push(o);
+        }
+        if ends.iter().any(|e| e.3 == 0.0) {
+            return Err(Failure::Undetermined {
+                parameters: format!("scale factor and bias {} (six-position method)", AXES[axis]),
+                add: format!(
+                    "add dwells with {0} along +{0} and -{0}, or use --method least-squares",
+                    AXES[axis]
+                ),
+            });
+        }
+        let [mut down, mut up] = ends.map(|e| (e.0 / e.3, e.1 / e.3, e.2 / (e.3 * e.3)));
+        let (width, middle) = (up.1 - down.1, up.1 + down.1);
+        let scale = (up.0 - down.0) / width;
+        model.matrix[(axis, axis)] = scale;
+        model.bias[axis] = 0.5 * (up.0 + down.0 - scale * middle);
+        // Repeated positions show what the noise does not.
+        let residuals: Vec<f64> = used
+            .iter()
+            .map(|o| o.raw[axis] - scale * o.input[axis] - model.bias[axis])
+            .collect();
+        let variances: Vec<f64> = used
+            .iter()
+            .map(|o| o.variance[axis].max(f64::MIN_POSITIVE))
+            .collect();
+        let of_axis = excess_variance(&residuals, &variances, used.len() as f64 - 2.0);
+        down.2 += of_axis.excess / ends[0].3;
+        up.2 += of_axis.excess / ends[1].3;
+        scatter.push((AXES[axis].to_string(), of_axis));
+        // Bias at the middle of the two inputs, which is zero to the table's repeatability.
+        covariance[(4 * axis, 4 * axis)] = (up.2 + down.2) / (width * width);
+        covariance[(9 + axis, 9 + axis)] = 0.25 * (up.2 + down.2);
+        let both = 0.5 * (up.2 - down.2) / width;
+        covariance[(4 * axis, 9 + axis)] = both;
+        covariance[(9 + axis, 4 * axis)] = both;
+        parts.push(Part {
+            covariance,
+            dof: of_axis.variance_dof(),
+        });
+    }
+    let triad = Triad::from_forward(model, parts)
+        .ok_or_else(|| Failure::NoSolution("a sensor does not respond".into()))?;
+    Ok(Estimated {
+        triad,
+        scatter,
+        condition: 1.0,
+        notes: Vec::new(),
+    })
+}

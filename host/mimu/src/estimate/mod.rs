@@ -1,0 +1,78 @@
+//! Estimators: from dwell means and rotations to a calibrated triad with its covariance.
+//!
+//! | module            | reference | what it is                                               |
+//! |-------------------|-----------|----------------------------------------------------------|
+//! | [`known_input`]   | table     | forward least squares, Kalman bank, xu's inverse form, six positions |
+//! | [`gravity_size`]  | gravity   | accelerometer from the size of gravity over many poses   |
+//! | [`rotation`]      | gravity   | gyro from the turns between dwells                       |
+//! | [`session_bias`]  | both      | biases alone, where the matrix is known                  |
+//! | [`least_squares`] | both      | the algebra under all of them                            |
+
+pub mod gravity_size;
+pub mod known_input;
+pub mod least_squares;
+pub mod rotation;
+pub mod session_bias;
+
+use nalgebra::Vector3;
+
+use crate::triad::Triad;
+use least_squares::Scatter;
+
+/// One dwell as an estimator sees it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Observation {
+    /// Index of the dwell it comes from.
+    pub dwell: usize,
+    /// Mean raw reading.
+    pub raw: Vector3<f64>,
+    /// Variance of `raw` by the noise within dwells, raw units squared.
+    pub variance: Vector3<f64>,
+    /// True input in SI; not a number where only the size of gravity is known.
+    pub input: Vector3<f64>,
+}
+
+/// What an estimator found for one triad.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Estimated {
+    /// The calibration.
+    pub triad: Triad,
+    /// Scatter by axis where the axes are fitted one by one, by group otherwise.
+    pub scatter: Vec<(String, Scatter)>,
+    /// Condition number of the scaled design.
+    pub condition: f64,
+    /// What a person should know.
+    pub notes: Vec<String>,
+}
+
+/// Why there is no estimate.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Failure {
+    /// The experiment leaves parameters undetermined: their names, and what to add.
+    Undetermined {
+        /// Names of the parameters.
+        parameters: String,
+        /// What to add to the experiment.
+        add: String,
+    },
+    /// The iteration did not converge or the result is singular: what was seen.
+    NoSolution(String),
+}
+
+impl Failure {
+    /// As an error about `sensor`.
+    pub fn into_error(self, sensor: crate::quantity::Sensor) -> mimu_recording::error::Error {
+        match self {
+            Self::Undetermined { parameters, add } => mimu_recording::error::Error::new(
+                sensor,
+                format!("the experiment leaves {parameters} undetermined"),
+                add,
+            ),
+            Self::NoSolution(seen) => mimu_recording::error::Error::new(
+                sensor,
+                seen,
+                "look at the recording: wrong columns, wrong reference, or motion within dwells",
+            ),
+        }
+    }
+}

@@ -1,0 +1,499 @@
+//! Noise of a dwell mean, from the Allan deviation within the dwells.
+//!
+//! A mean of n samples is not sigma/√n when the noise is correlated: the Allan variance at the length
+//! of the dwell is what two successive means differ by (fang (8), section 3). What wanders more slowly than a dwell lasts only a
+//! longer record at rest can tell: its noise file, and [`wander`].
+
+pub mod wander;
+
+use nalgebra::{DMatrix, Vector3};
+
+use mimu_core::compensation::Affine;
+
+use self::wander::{Slow, Span};
+use crate::allan::model::FLOOR;
+use crate::blocks::{Block, Condensed};
+use crate::dwell::Dwell;
+use crate::noise_file::NoiseFile;
+use crate::quantity::Sensor;
+use mimu_recording::error::{Error, Result};
+use mimu_recording::{Manifest, RAW_COLUMNS, RawUnit};
+
+/// Allan variance of one raw channel as `N²/τ + B² + K² τ`: white noise, bias instability and rate
+/// random walk, each at least zero.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct AllanModel {
+    /// N², raw units squared times s.
+    pub white: f64,
+    /// Level of the flicker floor, raw units squared (that is (0.664 B)²).
+    pub flicker: f64,
+    /// K²/3, raw units squared per s.
+    pub walk: f64,
+}
+
+impl AllanModel {
+    /// Variance of the mean over `tau_s`, raw units squared.
+    pub fn variance(&self, tau_s: f64) -> f64 {
+        self.white / tau_s + self.flicker + self.walk * tau_s
+    }
+
+    /// Its slow part.
+    fn slow(&self) -> Slow {
+        Slow {
+            instability: (self.flicker / FLOOR).sqrt(),
+            walk: (3.0 * self.walk).sqrt(),
+        }
+    }
+}
+
+/// Noise of one raw channel by a record at rest, at one temperature or several (fang, Table 5).
+#[derive(Debug, Clone, PartialEq)]
+pub struct Stated {
+    /// Temperature, °C, ascending, and the model there; of a single one the temperature does not count.
+    nodes: Vec<(f64, AllanModel)>,
+}
+
+impl Stated {
+    /// The model at `temp_c`: between the temperatures of the records interpolated linearly in the variances, beyond them that of the
+    /// nearest. Where it is not known, that of the lowest.
+    fn at(&self, temp_c: f64) -> AllanModel {
+        let k = self.nodes.partition_point(|n| n.0 <= temp_c);
+        if k == 0 || k == self.nodes.len() {
+            return self.nodes[k.saturating_sub(1)].1;
+        }
+        let [(t0, a), (t1, b)] = [self.nodes[k - 1], self.nodes[k]];
+        let share = (temp_c - t0) / (t1 - t0);
+        let mix = |a: f64, b: f64| a + share * (b - a);
+        AllanModel {
+            white: mix(a.white, b.white),
+            flicker: mix(a.flicker, b.flicker),
+            walk: mix(a.walk, b.walk),
+        }
+    }
+}
+
+/// Noise of one raw channel within dwells.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct ChannelNoise {
+    /// The three terms fitted to the Allan variance.
+    pub model: AllanModel,
+    /// The Allan variance itself, (averaging time in s, raw units squared), where the model does not fit it: noise that is
+    /// filtered, or a vibration.
+    pub curve: Option<Vec<(f64, f64)>>,
+}
+
+impl ChannelNoise {
+    /// Variance of the mean over `tau_s`, raw units squared.
+    ///
+    /// The model is preferred, as it averages over all octaves; but of noise with a correlation time of half a second its
+    /// rate random walk made the mean over 10 s four times too noisy. Where it does not fit, the measured curve is
+    /// followed, and beyond its end its last slope, from that of white noise to that of a random walk.
+    pub fn variance(&self, tau_s: f64) -> f64 {
+        let Some(curve) = &self.curve else {
+            return self.model.variance(tau_s);
+        };
+        let k = curve
+            .partition_point(|p| p.0 < tau_s)
+            .clamp(1, curve.len() - 1);
+        let [(t0, v0), (t1, v1)] = [curve[k - 1], curve[k]];
+        let slope = ((v1 / v0).ln() / (t1 / t0).ln()).clamp(-1.0, 1.0);
+        v1 * (tau_s / t1).powf(slope)
+    }
+}
+
+/// Noise of the six raw channels of a unit at rest.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Noise {
+    /// Gyro x, y, z, accelerometer x, y, z: within the dwells.
+    pub channels: [ChannelNoise; 6],
+    /// What a record at rest said of them, where it is used.
+    stated: [Option<Stated>; 6],
+    /// Variances of a mean over a second, raw units squared, within the dwells and as a record at rest said, where it did not hold.
+    other: [Option<[f64; 2]>; 6],
+    /// From the first dwell to the end of the last, s.
+    session: Span,
+}
+
+/// A noise file whose variance of a mean over 1 s is off by this factor, up or down, is not that of this recording.
+const ANOTHER_NOISE: f64 = 2.0;
+
+impl Noise {
+    /// Pools the overlapping Allan variance within all usable dwells at rest or at a constant rate, and fits the
+    /// model to it.
+    pub fn within(dwells: &[Dwell], condensed: &Condensed) -> Self {
+        let mut channels: [ChannelNoise; 6] = Default::default();
+        for sensor in Sensor::BOTH {
+            for c in sensor.channels() {
+                if condensed.has_raw[c] {
+                    let usable = dwells
+                        .iter()
+                        .filter(|d| d.fault(sensor).is_none() && !d.turn);
+                    channels[c] = within(usable, condensed, |b| {
+                        (b.raw[c].n > 0).then_some(b.raw[c].mean)
+                    });
+                }
+            }
+        }
+        let end = |d: &Dwell| d.start_s + d.duration_s;
+        Self {
+            channels,
+            stated: Default::default(),
+            other: Default::default(),
+            session: [
+                dwells.first().map_or(0.0, |d| d.start_s),
+                dwells.last().map_or(0.0, end),
+            ],
+        }
+    }
+
+    /// Takes the noise of `file` in place of that within the dwells; a channel whose dwells are not as noisy as the file says
+    /// keeps its own, and is told of.
+    ///
+    /// Errors: the file is in another unit than the readings, or lacks a channel.
+    pub fn state(
+        &mut self,
+        file: &NoiseFile,
+        manifest: &Manifest,
+        dwells: &[Dwell],
+        warnings: &mut Vec<String>,
+    ) -> Result<()> {
+        if file.device != manifest.device {
+            warnings.push(format!(
+                "the noise file is of {:?}, the recording of {:?}",
+                file.device, manifest.device
+            ));
+        }
+        let present = |c: &usize| dwells.iter().any(|d| d.raw[*c].n > 0);
+        for c in (0..6).filter(present) {
+            let name = RAW_COLUMNS[c];
+            let unit = match manifest.raw_unit {
+                RawUnit::Si => Sensor::BOTH[c / 3].unit(),
+                other => &other.to_string(),
+            };
+            let mut nodes = Vec::new();
+            for channel in file.channel.iter().filter(|k| k.name == name) {
+                if channel.unit != unit {
+                    return Err(Error::new(
+                        format!("{}, channel {name}", file.place),
+                        format!("it is in {}, and the readings are in {unit}", channel.unit),
+                        match manifest.raw_unit {
+                            RawUnit::Si => "run mimu allan with --calibration",
+                            _ => {
+                                "run mimu allan on a recording in the same unit, without --calibration"
+                            }
+                        },
+                    ));
+                }
+                nodes.push((channel.temp_c.unwrap_or(f64::NAN), channel.model()));
+            }
+            if nodes.is_empty() {
+                return Err(Error::new(
+                    &file.place,
+                    format!("there is no channel {name}"),
+                    "run mimu allan on a recording that has it",
+                ));
+            }
+            if nodes.len() > 1 && nodes.iter().any(|n| n.0.is_nan()) {
+                return Err(Error::new(
+                    format!("{}, channel {name}", file.place),
+                    "it is there more than once, and not always with a temperature",
+                    "run mimu allan on recordings with temp_c, or on one",
+                ));
+            }
+            nodes.sort_by(|a, b| a.0.total_cmp(&b.0));
+            let stated = Stated { nodes };
+            let mean_c = dwells.iter().map(|d| d.temp_c).sum::<f64>() / dwells.len() as f64;
+            let second = [
+                self.channels[c].variance(1.0),
+                stated.at(mean_c).variance(1.0),
+            ];
+            let ratio = second[0] / second[1];
+            if (1.0 / ANOTHER_NOISE..=ANOTHER_NOISE).contains(&ratio) {
+                self.stated[c] = Some(stated);
+            } else {
+                self.other[c] = Some(second);
+                warnings.push(format!(
+                    "{name}: the mean over a second is {} times as noisy within the dwells as {} says, so the noise within the dwells is used",
+                    crate::quantity::significant(ratio.sqrt()),
+                    file.place
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    /// Noise of the size of specific force, m/s², as `accel` gives it: what a fit to the size of gravity sees. A unit that
+    /// creeps on its support tilts, which shows in the channels and not in the size.
+    pub fn of_size(dwells: &[Dwell], condensed: &Condensed, accel: &Affine<f64>) -> ChannelNoise {
+        let from = Sensor::Accel.channels().start;
+        let usable = dwells.iter().filter(|d| d.accel_fault.is_none() && !d.turn);
+        within(usable, condensed, |b| {
+            let raw = Vector3::from_fn(|i, _| b.raw[from + i].mean);
+            let all = (0..3).all(|i| b.raw[from + i].n > 0);
+            all.then(|| accel.apply(&raw).norm())
+        })
+    }
+
+    /// Whether a record at rest says the noise of all channels of `sensor`.
+    pub fn is_stated(&self, sensor: Sensor) -> bool {
+        self.stated[sensor.channels()].iter().all(Option::is_some)
+    }
+
+    /// Channel `c`, where the dwells are noisier than a record at rest said: by how much, as the standard deviation of a mean over a
+    /// second, raw; and how many times as noisy as it said.
+    pub fn beyond_stated(&self, c: usize) -> Option<(f64, f64)> {
+        let [within, stated] = self.other[c]?;
+        let more = within > stated;
+        more.then(|| ((within - stated).sqrt(), (within / stated).sqrt()))
+    }
+
+    /// Variance of the difference of two successive means over `tau_s` of channel `c`, halved, raw units squared.
+    pub fn variance(&self, c: usize, tau_s: f64, temp_c: f64) -> f64 {
+        match &self.stated[c] {
+            Some(stated) => stated.at(temp_c).variance(tau_s),
+            None => self.channels[c].variance(tau_s),
+        }
+    }
+
+    /// Variances of the mean reading of `sensor` over `dwell`, raw units squared; where a record at rest says how it wanders,
+    /// of the mean less that of the session.
+    pub fn of_mean(&self, sensor: Sensor, dwell: &Dwell) -> Vector3<f64> {
+        let from = sensor.channels().start;
+        let averaged_s = dwell.averaged_s(sensor);
+        Vector3::from_fn(|i, _| match &self.stated[from + i] {
+            None => self.channels[from + i].variance(averaged_s),
+            Some(stated) => {
+                let model = stated.at(dwell.temp_c);
+                let wander = model.slow().covariance(&[span(dwell)], self.session);
+                model.white / averaged_s + wander[(0, 0)]
+            }
+        })
+    }
+
+    /// What the mean readings of `sensor` over `dwells` share of its wander, raw units squared, axis by axis: part of the
+    /// variances of [`Noise::of_mean`]. `None` where no record at rest says anything of it.
+    pub fn wander(&self, sensor: Sensor, dwells: &[Dwell]) -> Option<[DMatrix<f64>; 3]> {
+        let from = sensor.channels().start;
+        let stated = || self.stated[from..from + 3].iter().flatten();
+        let wanders = |s: &Stated| s.nodes.iter().any(|n| n.1.flicker + n.1.walk > 0.0);
+        if !stated().any(wanders) {
+            return None;
+        }
+        let spans: Vec<Span> = dwells.iter().map(span).collect();
+        Some(std::array::from_fn(|i| match &self.stated[from + i] {
+            None => DMatrix::zeros(dwells.len(), dwells.len()),
+            Some(stated) => {
+                // A noise whose size follows the temperature: each mean has the amplitude of its own.
+                let of = |part: fn(&mut AllanModel) -> &mut f64| {
+                    let amplitude: Vec<f64> = dwells
+                        .iter()
+                        .map(|d| part(&mut stated.at(d.temp_c)).sqrt())
+                        .collect();
+                    let mut one = AllanModel::default();
+                    *part(&mut one) = 1.0;
+                    let c = one.slow().covariance(&spans, self.session);
+                    DMatrix::from_fn(spans.len(), spans.len(), |i, j| {
+                        c[(i, j)] * amplitude[i] * amplitude[j]
+                    })
+                };
+                of(|m| &mut m.flicker) + of(|m| &mut m.walk)
+            }
+        }))
+    }
+}
+
+/// Time that a dwell takes.
+fn span(dwell: &Dwell) -> Span {
+    [dwell.start_s, dwell.start_s + dwell.duration_s]
+}
+
+/// Noise of `value` of the blocks within `dwells`.
+fn within<'a>(
+    dwells: impl Iterator<Item = &'a Dwell>,
+    condensed: &Condensed,
+    value: impl Fn(&Block) -> Option<f64>,
+) -> ChannelNoise {
+    let rows = condensed.blocks.iter().map(|b| b.rows).max().unwrap_or(1);
+    let block_s = f64::from(rows) * condensed.period_s;
+    // Sum of squared differences and their number, by octave of block length.
+    let mut octaves: Vec<(f64, f64, f64)> = Vec::new();
+    for dwell in dwells {
+        let blocks = &condensed.blocks[dwell.blocks.clone()];
+        let means: Vec<f64> = blocks
+            .iter()
+            .filter(|b| b.rows == rows)
+            .filter_map(&value)
+            .collect();
+        let mut sums = Vec::with_capacity(means.len() + 1);
+        sums.push(0.0);
+        for m in &means {
+            sums.push(sums[sums.len() - 1] + (m - means[0]));
+        }
+        for octave in 0.. {
+            let m = 1usize << octave;
+            if 2 * m > means.len() {
+                break;
+            }
+            if octaves.len() <= octave {
+                octaves.push((0.0, 0.0, 0.0));
+            }
+            let terms = means.len() + 1 - 2 * m;
+            let sum: f64 = (0..terms)
+                .map(|j| (sums[j + 2 * m] - 2.0 * sums[j + m] + sums[j]) / m as f64)
+                .map(|d| d * d)
+                .sum();
+            octaves[octave].0 += 0.5 * sum;
+            octaves[octave].1 += terms as f64;
+            // Differences that share no sample, as the weight of the point.
+            octaves[octave].2 += (means.len() / (2 * m)) as f64;
+        }
+    }
+    let points: Vec<(f64, f64, f64)> = octaves
+        .iter()
+        .enumerate()
+        .filter(|(_, o)| o.1 > 0.0)
+        .map(|(k, o)| (block_s * f64::from(1u32 << k), o.0 / o.1, o.2))
+        .collect();
+    let model = fit(&points);
+    // A variance of n independent differences is known to √(2/n) of itself.
+    let fits = |&(tau, variance, n): &(f64, f64, f64)| {
+        (variance / model.variance(tau)).ln().abs() <= MISFIT_SIGMAS * (2.0 / n).sqrt()
+    };
+    let known: Vec<(f64, f64)> = points
+        .iter()
+        .filter(|p| p.2 >= CURVE_DIFFERENCES && p.1 > 0.0)
+        .map(|p| (p.0, p.1))
+        .collect();
+    let misfit = points.iter().any(|p| p.2 >= CURVE_DIFFERENCES && !fits(p));
+    ChannelNoise {
+        model,
+        curve: (misfit && known.len() >= 2).then_some(known),
+    }
+}
+
+/// A point of the Allan curve this many of its sigmas from the model refuses the model.
+const MISFIT_SIGMAS: f64 = 4.0;
+/// Points with fewer independent differences than this decide nothing: their variance is known to a half only.
+const CURVE_DIFFERENCES: f64 = 8.0;
+
+/// A smaller variance is none: the square of its weight would overflow.
+const SMALLEST: f64 = 1e-100;
+
+/// What a further term must lower the deviance by: significant at 0.5 %.
+const TERM_DEVIANCE: f64 = 8.0;
+
+/// Fits the three terms to `(tau, variance, number of independent differences)`, none of them negative.
+///
+/// A variance of n differences is gamma distributed, and that likelihood is maximized (iterated least squares, weighted by
+/// the model). Weights by the measured variance would let one small value from two differences outweigh a hundred.
+/// With three terms every subset can be tried. A term that does not lower the deviance by [`TERM_DEVIANCE`] is left out:
+/// taken whenever it is positive, the noise of the curve alone made the means of white noise a tenth too noisy (errors in
+/// sigmas of 0.88 where 1 is right).
+fn fit(points: &[(f64, f64, f64)]) -> AllanModel {
+    let points: Vec<_> = points.iter().filter(|p| p.1 > SMALLEST).collect();
+    let mut best = (f64::INFINITY, AllanModel::default());
+    for subset in 1..8usize {
+        let terms: Vec<usize> = (0..3).filter(|k| subset & (1 << k) != 0).collect();
+        if terms.len() > points.len() {
+            continue;
+        }
+        let basis = |tau: f64, k: usize| [1.0 / tau, 1.0, tau][k];
+        let a = nalgebra::DMatrix::from_fn(points.len(), terms.len(), |i, j| {
+            basis(points[i].0, terms[j])
+        });
+        let y = nalgebra::DVector::from_fn(points.len(), |i, _| points[i].1);
+        let mut model = y.clone();
+        let mut x = nalgebra::DVector::zeros(terms.len());
+        for _ in 0..50 {
+            let weights = nalgebra::DVector::from_fn(points.len(), |i, _| {
+                (0.5 * points[i].2).sqrt() / model[i]
+            });
+            let mut weighted = a.clone();
+            for (mut row, w) in weighted.row_iter_mut().zip(weights.iter()) {
+                row *= *w;
+            }
+            // Columns differ by the square of the longest time: scaled, or the smallest is lost.
+            let scale: Vec<f64> = weighted.column_iter().map(|c| c.norm()).collect();
+            for (mut column, s) in weighted.column_iter_mut().zip(&scale) {
+                column /= *s;
+            }
+            let Ok(scaled) = weighted
+                .svd(true, true)
+                .solve(&y.component_mul(&weights), 1e-12)
+            else {
+                break;
+            };
+            let next = nalgebra::DVector::from_fn(terms.len(), |j, _| scaled[j] / scale[j]);
+            let done = (&next - &x).amax() <= 1e-9 * next.amax();
+            x = next;
+            model = (&a * &x).zip_map(&y, |m, v| m.max(1e-3 * v));
+            if done {
+                break;
+            }
+        }
+        if x.iter().any(|v| !(*v > 0.0)) {
+            continue;
+        }
+        let deviance: f64 = points
+            .iter()
+            .zip(model.iter())
+            .map(|(p, m)| p.2 * (p.1 / m - 1.0 - (p.1 / m).ln()))
+            .sum();
+        let cost = deviance + TERM_DEVIANCE * terms.len() as f64;
+        if cost < best.0 {
+            let mut coefficients = [0.0; 3];
+            for (k, v) in terms.iter().zip(x.iter()) {
+                coefficients[*k] = *v;
+            }
+            let [white, flicker, walk] = coefficients;
+            best = (
+                cost,
+                AllanModel {
+                    white,
+                    flicker,
+                    walk,
+                },
+            );
+        }
+    }
+    best.1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn terms_that_made_a_curve_are_found_again() {
+        let truth = AllanModel {
+            white: 4e-6,
+            flicker: 1e-7,
+            walk: 2e-9,
+        };
+        let points: Vec<_> = (0..12)
+            .map(|k| 0.1 * f64::from(1 << k))
+            .map(|t| (t, truth.variance(t), 1e4))
+            .collect();
+        let found = fit(&points);
+        for (a, b) in [
+            (truth.white, found.white),
+            (truth.flicker, found.flicker),
+            (truth.walk, found.walk),
+        ] {
+            assert!((a / b - 1.0).abs() < 1e-9, "{found:?}");
+        }
+    }
+
+    #[test]
+    fn white_noise_alone_is_given_no_other_term() {
+        let points: Vec<_> = (0..6)
+            .map(|k| 0.1 * f64::from(1 << k))
+            .map(|t| (t, 4e-6 / t, 10.0))
+            .collect();
+        let found = fit(&points);
+        assert!(
+            (found.white / 4e-6 - 1.0).abs() < 1e-9 && found.variance(100.0) < 4.1e-8,
+            "{found:?}"
+        );
+    }
+}

@@ -1,0 +1,182 @@
+//! The noise file `mimu-noise/1`: what `mimu allan` found, for the commands that rest on it.
+
+use std::path::Path;
+
+use serde::Deserialize;
+
+use crate::allan::model::{FLOOR, Term};
+use crate::noise::AllanModel;
+use crate::quantity::Sensor;
+use mimu_recording::error::{Error, Result};
+use mimu_recording::{RAW_COLUMNS, read_text};
+
+/// Version of the noise file.
+pub const NOISE_FORMAT: &str = "mimu-noise/1";
+
+/// A noise file as `mimu allan -o` writes it.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct NoiseFile {
+    /// [`NOISE_FORMAT`].
+    pub format: String,
+    /// Unit under test.
+    pub device: String,
+    /// Samples a second.
+    pub sample_rate_hz: f64,
+    /// Length of the record, s; of several, of the shortest.
+    pub duration_s: f64,
+    /// Probability of the intervals.
+    pub confidence: f64,
+    /// Its channels; of records at several temperatures, each channel once for each.
+    pub channel: Vec<NoiseChannel>,
+    /// Path, for messages.
+    #[serde(skip)]
+    pub place: String,
+}
+
+/// One channel of a noise file.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct NoiseChannel {
+    /// Column: `gyro_x` to `accel_z`.
+    pub name: String,
+    /// Unit of its readings.
+    pub unit: String,
+    /// Samples that it was computed from.
+    pub samples: u64,
+    /// Mean temperature, °C, where it was recorded.
+    pub temp_c: Option<f64>,
+    /// Quantization.
+    pub q: Option<FileCoefficient>,
+    /// White noise.
+    pub n: Option<FileCoefficient>,
+    /// Bias instability.
+    pub b: Option<FileCoefficient>,
+    /// Rate random walk.
+    pub k: Option<FileCoefficient>,
+    /// Rate ramp.
+    pub r: Option<FileCoefficient>,
+    /// Why there is no quantization.
+    pub q_reason: Option<String>,
+    /// Why there is no white noise.
+    pub n_reason: Option<String>,
+    /// Why there is no bias instability.
+    pub b_reason: Option<String>,
+    /// Why there is no rate random walk.
+    pub k_reason: Option<String>,
+    /// Why there is no rate ramp.
+    pub r_reason: Option<String>,
+}
+
+/// A coefficient of a noise file.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FileCoefficient {
+    /// Estimate.
+    pub value: f64,
+    /// Its standard deviation.
+    pub sigma: f64,
+    /// Lower end of the interval.
+    pub lower: f64,
+    /// Upper end.
+    pub upper: f64,
+    /// Unit of all of them.
+    pub unit: String,
+}
+
+impl NoiseChannel {
+    /// The coefficient of `term`, or why there is none.
+    pub fn get(&self, term: Term) -> std::result::Result<&FileCoefficient, &str> {
+        let (value, reason) = match term {
+            Term::Q => (&self.q, &self.q_reason),
+            Term::N => (&self.n, &self.n_reason),
+            Term::B => (&self.b, &self.b_reason),
+            Term::K => (&self.k, &self.k_reason),
+            Term::R => (&self.r, &self.r_reason),
+        };
+        let unknown = "the noise file does not say why";
+        value.as_ref().ok_or(reason.as_deref().unwrap_or(unknown))
+    }
+
+    /// N, B and K as Allan variance, in the unit of the channel squared. What the record did not show is none; quantization
+    /// and ramp are no noise of a mean.
+    pub fn model(&self) -> AllanModel {
+        let squared = |term| self.get(term).map_or(0.0, |c| c.value.powi(2));
+        AllanModel {
+            white: squared(Term::N),
+            flicker: FLOOR * squared(Term::B),
+            walk: squared(Term::K) / 3.0,
+        }
+    }
+}
+
+impl NoiseFile {
+    /// Reads and checks a noise file.
+    pub fn read(path: &Path) -> Result<Self> {
+        Self::parse(&read_text(path)?, &path.display().to_string())
+    }
+
+    /// Parses and checks the text of a noise file; `place` is its path.
+    pub fn parse(text: &str, place: &str) -> Result<Self> {
+        let mut file: Self = toml::from_str(text).map_err(|e| {
+            let line = e.span().map_or(1, |s| {
+                1 + text.get(..s.start).unwrap_or(text).matches('\n').count()
+            });
+            Error::new(
+                format!("{place}, line {line}"),
+                e.message().trim(),
+                "correct the line, or run mimu allan again",
+            )
+        })?;
+        if file.format != NOISE_FORMAT {
+            return Err(Error::new(
+                place,
+                format!(
+                    "format is {:?}, and this program reads {NOISE_FORMAT:?}",
+                    file.format
+                ),
+                "use the version of mimu that wrote it",
+            ));
+        }
+        for channel in &file.channel {
+            if !RAW_COLUMNS.contains(&channel.name.as_str()) {
+                return Err(Error::new(
+                    format!("{place}, channel {:?}", channel.name),
+                    "there is no such channel",
+                    format!("it is one of {}", RAW_COLUMNS.join(", ")),
+                ));
+            }
+            for term in Term::ALL {
+                let Ok(c) = channel.get(term) else { continue };
+                let good = |v: f64| v.is_finite() && v > 0.0;
+                if !good(c.value) || !good(c.upper) {
+                    return Err(Error::new(
+                        format!("{place}, channel {}, {}", channel.name, term.letter()),
+                        format!(
+                            "value {} with the upper end {} is no noise",
+                            c.value, c.upper
+                        ),
+                        "run mimu allan again",
+                    ));
+                }
+            }
+            if channel.model().variance(1.0) == 0.0 {
+                let why = channel.get(Term::N).err().unwrap_or_default();
+                return Err(Error::new(
+                    format!("{place}, channel {}", channel.name),
+                    format!("it has neither N nor B nor K: N {why}"),
+                    "run mimu allan on a longer record",
+                ));
+            }
+        }
+        file.place = place.into();
+        Ok(file)
+    }
+
+    /// The channels of `sensor`, in the order of the file.
+    pub fn of(&self, sensor: Sensor) -> Vec<&NoiseChannel> {
+        let names = &RAW_COLUMNS[sensor.channels()];
+        let ours = |c: &&NoiseChannel| names.contains(&c.name.as_str());
+        self.channel.iter().filter(ours).collect()
+    }
+}

@@ -1,0 +1,261 @@
+//! A recording made ready for estimation: condensed, its dwells found, their noise measured.
+
+use mimu_core::compensation::Affine;
+use nalgebra::{Matrix3, Vector3};
+
+use crate::blocks::Condensed;
+use crate::dwell::Dwells;
+use crate::estimate::rotation::{Motion, Turn};
+use crate::estimate::{Failure, Observation};
+use crate::noise::Noise;
+use crate::noise_file::NoiseFile;
+use crate::quantity::Sensor;
+use crate::rails::refuse_dead_channels;
+use mimu_recording::error::{Error, Result};
+use mimu_recording::{Batch, Manifest, Recording, Reference};
+
+/// A recording, condensed, with its dwells and their noise.
+#[derive(Debug, Clone)]
+pub struct Prepared {
+    /// Its manifest.
+    pub manifest: Manifest,
+    /// What one pass left of it.
+    pub condensed: Condensed,
+    /// Its dwells.
+    pub dwells: Dwells,
+    /// Noise within them.
+    pub noise: Noise,
+    /// Path of the samples, for messages.
+    pub place: String,
+}
+
+impl Prepared {
+    /// Reads `recording` and finds its dwells. `progress` is told the share that is read.
+    pub fn read(recording: &Recording, still_factor: f64, progress: impl Fn(f64)) -> Result<Self> {
+        let manifest = recording.manifest.clone();
+        let integrate = manifest.reference == Reference::Gravity;
+        let condensed = Condensed::read(recording, integrate, progress)?;
+        let place = recording.samples.display().to_string();
+        Self::of_condensed(manifest, condensed, still_factor, place)
+    }
+
+    /// Finds the dwells of `samples` in memory. `still_factor`: see [`crate::stillness::STILL_FACTOR`].
+    ///
+    /// Errors: those of a recording on disk; columns of different lengths.
+    pub fn of(manifest: Manifest, samples: &Batch, still_factor: f64) -> Result<Self> {
+        let integrate = manifest.reference == Reference::Gravity;
+        let condensed = Condensed::of(samples, manifest.sample_rate_hz, integrate)?;
+        let place = manifest.device.clone();
+        Self::of_condensed(manifest, condensed, still_factor, place)
+    }
+
+    fn of_condensed(
+        manifest: Manifest,
+        condensed: Condensed,
+        still_factor: f64,
+        place: String,
+    ) -> Result<Self> {
+        refuse_dead_channels(&condensed, &place)?;
+        if let (Some(power), Some(first)) = (manifest.power_on_s, condensed.blocks.first())
+            && power > first.start_s
+        {
+            let problem = format!(
+                "power_on_s is {power:?} s, and the first sample at {:?} s",
+                first.start_s
+            );
+            let remedy =
+                "write the t_s at which the power came to recording.toml, or leave the key out";
+            return Err(Error::new(place, problem, remedy));
+        }
+        let dwells = Dwells::find(&condensed, &manifest, still_factor).map_err(|e| Error {
+            place: format!("{place}, {}", e.place),
+            ..e
+        })?;
+        let noise = Noise::within(&dwells.list, &condensed);
+        Ok(Self {
+            manifest,
+            condensed,
+            dwells,
+            noise,
+            place,
+        })
+    }
+
+    /// With the noise that a record at rest has shown in place of that within the dwells. Errors: see [`Noise::state`].
+    pub fn with_noise(mut self, file: &NoiseFile) -> Result<Self> {
+        let Dwells { list, warnings, .. } = &mut self.dwells;
+        self.noise.state(file, &self.manifest, list, warnings)?;
+        Ok(self)
+    }
+
+    /// Whether the recording has the channels of `sensor`.
+    pub fn has(&self, sensor: Sensor) -> bool {
+        sensor.channels().all(|c| self.condensed.has_raw[c])
+    }
+
+    /// Usable dwells of `sensor`; where there is a table, those with a known input.
+    pub fn observations(&self, sensor: Sensor) -> Vec<Observation> {
+        let table = self.manifest.reference == Reference::Table;
+        let usable = self
+            .dwells
+            .list
+            .iter()
+            .enumerate()
+            // A turn of known angle is no pose.
+            .filter(|(_, d)| d.fault(sensor).is_none() && (table || !d.turn));
+        usable
+            .filter_map(|(i, d)| {
+                let input = d.input(sensor);
+                (input.is_some() || !table).then(|| Observation {
+                    dwell: i,
+                    raw: d.raw_mean(sensor),
+                    variance: self.noise.of_mean(sensor, d),
+                    input: input.unwrap_or_else(|| Vector3::repeat(f64::NAN)),
+                })
+            })
+            .collect()
+    }
+
+    /// When the power came, on the clock of the recording, s: what the manifest says, or the first sample.
+    pub fn power_on_s(&self) -> f64 {
+        let first = || self.condensed.blocks.first().map_or(0.0, |b| b.start_s);
+        self.manifest.power_on_s.unwrap_or_else(first)
+    }
+
+    /// Variances of the size of specific force over each of `poses` by noise, (m/s²)².
+    pub fn size_variances(&self, accel: &Affine<f64>, poses: &[Observation]) -> Vec<f64> {
+        if self.noise.is_stated(Sensor::Accel) {
+            let size = |o: &Observation| {
+                let by = accel.matrix.tr_mul(&accel.apply(&o.raw).normalize());
+                by.component_mul(&by).dot(&o.variance)
+            };
+            return poses.iter().map(size).collect();
+        }
+        let noise = Noise::of_size(&self.dwells.list, &self.condensed, accel);
+        poses
+            .iter()
+            .map(|o| noise.variance(self.dwells.list[o.dwell].averaged_s(Sensor::Accel)))
+            .collect()
+    }
+
+    /// Turns between usable dwells, with the directions of gravity by `accel`; also how many could not be used and why.
+    pub fn turns(&self, accel: &Affine<f64>) -> (Vec<Turn<'_>>, Vec<String>) {
+        let increments = &self.condensed.increments;
+        let usable: Vec<usize> = (0..self.dwells.list.len())
+            .filter(|&i| {
+                let dwell = &self.dwells.list[i];
+                !dwell.turn && Sensor::BOTH.iter().all(|s| dwell.fault(*s).is_none())
+            })
+            .collect();
+        let (mut turns, mut refused) = (Vec::new(), Vec::new());
+        for pair in usable.windows(2) {
+            let (a, b) = (&self.dwells.list[pair[0]], &self.dwells.list[pair[1]]);
+            let from = increments.partition_point(|i| i.end_s <= a.last_s);
+            let to = increments.partition_point(|i| i.end_s < b.start_s) + 1;
+            let pieces = &increments[from.min(increments.len())..to.min(increments.len())];
+            let blocks = &self.condensed.blocks[a.blocks.end..b.blocks.start];
+            let why = if pieces.iter().any(|i| !i.whole) {
+                Some("samples are missing".to_string())
+            } else {
+                Sensor::Gyro.channels().find_map(|c| {
+                    let rails = self.dwells.rails[c];
+                    let axis = crate::quantity::AXES[c];
+                    if blocks.iter().any(|b| rails.touched_by(&b.raw[c])) {
+                        Some(format!("gyro_{axis} is at its rail"))
+                    } else {
+                        // Hands do not keep a code for a tenth of a second.
+                        let chance = self.dwells.longest_run[c];
+                        let stuck = |m: &crate::blocks::Moments| {
+                            m.m2 == 0.0 && m.n > 3 && f64::from(m.n) > chance
+                        };
+                        let stuck = blocks.iter().any(|b| stuck(&b.raw[c]));
+                        stuck.then(|| format!("gyro_{axis} is stuck"))
+                    }
+                })
+            };
+            if let Some(why) = why {
+                refused.push(format!(
+                    "the turn from dwell {} to {} is not used: {why}",
+                    a.step, b.step
+                ));
+                continue;
+            }
+            let variance = |d: &crate::dwell::Dwell| {
+                let si = si_covariance(&accel.matrix, &self.noise.of_mean(Sensor::Accel, d));
+                si.trace() / 3.0
+            };
+            let g = self.manifest.gravity_mps2;
+            let duration_s: f64 = pieces.iter().map(|i| i.duration_s).sum();
+            // The integral is the mean times the duration.
+            let gyro = Sensor::Gyro.channels();
+            let rate_variance = gyro
+                .map(|c| self.noise.variance(c, duration_s, a.temp_c))
+                .sum::<f64>()
+                / 3.0;
+            turns.push(Turn {
+                from: pair[0],
+                to: pair[1],
+                increments: pieces,
+                before: accel.apply(&a.raw_mean(Sensor::Accel)),
+                after: accel.apply(&b.raw_mean(Sensor::Accel)),
+                raw: [a, b].map(|d| d.raw_mean(Sensor::Accel)),
+                direction_variance: (variance(a) + variance(b)) / (g * g),
+                integral_variance: duration_s * duration_s * rate_variance,
+                duration_s,
+            });
+        }
+        (turns, refused)
+    }
+
+    /// Pairs of blocks in motion, for the first guess of the gyro.
+    pub fn motions(&self, accel: &Affine<f64>) -> Vec<Motion> {
+        let mut still = vec![false; self.condensed.blocks.len()];
+        for dwell in &self.dwells.list {
+            still[dwell.blocks.clone()].fill(true);
+        }
+        let mean = |i: usize, s: Sensor| {
+            let from = s.channels().start;
+            Vector3::from_fn(|k, _| match self.condensed.blocks[i].raw[from + k] {
+                moments if moments.n > 0 => moments.mean,
+                _ => f64::NAN,
+            })
+        };
+        (1..still.len())
+            .filter(|&i| !still[i] && !self.condensed.blocks[i].after_gap)
+            .map(|i| {
+                let [before, after] = [i - 1, i].map(|i| accel.apply(&mean(i, Sensor::Accel)));
+                let centre = |i: usize| {
+                    let b = &self.condensed.blocks[i];
+                    0.5 * (b.start_s + b.last_s)
+                };
+                Motion {
+                    force: (before + after) * 0.5,
+                    change: after - before,
+                    raw: (mean(i - 1, Sensor::Gyro) + mean(i, Sensor::Gyro)) * 0.5,
+                    duration_s: centre(i) - centre(i - 1),
+                }
+            })
+            .filter(|m| m.change.iter().chain(&m.raw).all(|x| x.is_finite()))
+            .collect()
+    }
+
+    /// A failure of an estimator, with the place and with the dwells that it had to do without.
+    pub(crate) fn refused(&self, failure: Failure, sensor: Sensor) -> Error {
+        let Error {
+            place,
+            problem,
+            remedy,
+        } = failure.into_error(sensor);
+        let unused = self.dwells.unused(sensor);
+        Error::new(
+            format!("{}, {place}", self.place),
+            format!("{problem}{unused}"),
+            remedy,
+        )
+    }
+}
+
+/// Covariance in SI of independent raw readings with `variance`.
+pub fn si_covariance(matrix: &Matrix3<f64>, variance: &Vector3<f64>) -> Matrix3<f64> {
+    matrix * Matrix3::from_diagonal(variance) * matrix.transpose()
+}

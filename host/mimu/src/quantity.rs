@@ -1,0 +1,176 @@
+//! Sensors, axes, units, and how numbers are written: in one place, for messages, files and everything that people read.
+
+use std::fmt;
+use std::ops::Range;
+
+use mimu_recording::RawUnit;
+
+/// Names of the axes.
+pub const AXES: [&str; 3] = ["x", "y", "z"];
+
+/// A sensor triad.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Sensor {
+    /// Gyro triad.
+    Gyro,
+    /// Accelerometer triad.
+    Accel,
+}
+
+impl Sensor {
+    /// Both triads.
+    pub const BOTH: [Self; 2] = [Self::Gyro, Self::Accel];
+
+    /// Its three channels among the six.
+    pub fn channels(self) -> Range<usize> {
+        match self {
+            Self::Gyro => 0..3,
+            Self::Accel => 3..6,
+        }
+    }
+
+    /// `gyro` or `accel`, as in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Gyro => "gyro",
+            Self::Accel => "accel",
+        }
+    }
+
+    /// SI unit of its input.
+    pub fn unit(self) -> &'static str {
+        match self {
+            Self::Gyro => "rad/s",
+            Self::Accel => "m/s^2",
+        }
+    }
+}
+
+impl fmt::Display for Sensor {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// What an error figure is about.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Figure {
+    /// Compensated dwell mean less known input, over dwells and axes: SI of the sensor.
+    Input,
+    /// Size of the compensated dwell mean less gravity, m/s².
+    GravitySize,
+    /// Angle between the predicted and the measured direction of gravity after each turn, rad.
+    Direction,
+}
+
+impl Figure {
+    /// Unit of the figure.
+    pub fn unit(self, sensor: Sensor) -> &'static str {
+        match self {
+            Self::Direction => "rad",
+            _ => sensor.unit(),
+        }
+    }
+
+    /// What it is about, as a sentence fragment.
+    pub fn description(self) -> &'static str {
+        match self {
+            Self::Input => "compensated dwell mean less known input, over dwells and axes",
+            Self::GravitySize => "size of the compensated dwell mean less gravity",
+            Self::Direction => "angle between predicted and measured gravity after each turn",
+        }
+    }
+
+    /// Factor from SI, and unit, in which a person reads the figure of `sensor`.
+    pub fn readable(self, sensor: Sensor) -> (f64, &'static str) {
+        match (self, sensor) {
+            (Self::Direction, _) => (1f64.to_degrees(), "deg"),
+            (_, Sensor::Gyro) => (1f64.to_degrees(), "deg/s"),
+            (_, Sensor::Accel) => (1e3, "mm/s²"),
+        }
+    }
+}
+
+/// Names of the twelve parameters of the inverse model, `C_xx` to `o_z`, in the order of the covariance.
+pub fn inverse_names() -> [String; 12] {
+    std::array::from_fn(|i| {
+        if i < 9 {
+            format!("C_{}{}", AXES[i / 3], AXES[i % 3])
+        } else {
+            format!("o_{}", AXES[i - 9])
+        }
+    })
+}
+
+/// Unit of a raw reading of a sensor whose SI unit is `si`.
+pub fn raw_unit(raw: RawUnit, si: &str) -> String {
+    match raw {
+        RawUnit::Si => si.to_string(),
+        other => other.to_string(),
+    }
+}
+
+/// Unit of a scale factor, raw per SI.
+pub fn scale_unit(raw: RawUnit, si: &str) -> String {
+    match raw {
+        RawUnit::Si => "1".to_string(),
+        other => format!("{other}/({si})"),
+    }
+}
+
+/// `value` to three significant digits, without an exponent where that reads well.
+pub fn significant(value: f64) -> String {
+    if value == 0.0 || !value.is_finite() {
+        return format!("{value}");
+    }
+    let digits = 2 - value.abs().log10().floor() as i32;
+    if (-3..=6).contains(&digits) {
+        format!("{value:.*}", digits.max(0) as usize)
+    } else {
+        format!("{value:.2e}")
+    }
+}
+
+/// `value ± half`, both to the second significant digit of `half`.
+pub fn plus_minus(value: f64, half: f64) -> String {
+    if !(half > 0.0) || !half.is_finite() {
+        return format!("{} (fixed)", significant(value + 0.0));
+    }
+    let digits = (1 - half.log10().floor() as i32).clamp(0, 9) as usize;
+    // Rounding may give -0.00.
+    let value = if value.abs() < 0.5 * 10f64.powi(-(digits as i32)) {
+        0.0
+    } else {
+        value
+    };
+    format!("{value:.digits$} ± {half:.digits$}")
+}
+
+/// `1 sample`, `2 samples`.
+pub fn plural(n: u64, noun: &str) -> String {
+    if n == 1 {
+        format!("1 {noun}")
+    } else {
+        format!("{n} {noun}s")
+    }
+}
+
+/// Normal gravity at sea level, m/s² (WGS 84, Somigliana), at a latitude in degrees. Local gravity differs by some
+/// 3e-4 m/s², and by 3.1e-6 m/s² for each metre of height.
+pub fn normal_gravity(latitude_deg: f64) -> f64 {
+    let sin2 = latitude_deg.to_radians().sin().powi(2);
+    9.780_325_335_9 * (1.0 + 0.001_931_852_652_41 * sin2)
+        / (1.0 - 0.006_694_379_990_14 * sin2).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn normal_gravity_is_that_of_the_ellipsoid_at_the_equator_and_the_poles() {
+        // NIMA TR8350.2, table 3.4.
+        assert!((normal_gravity(0.0) - 9.780_325_335_9).abs() < 1e-9);
+        assert!((normal_gravity(-90.0) - 9.832_184_937_8).abs() < 1e-8);
+    }
+}

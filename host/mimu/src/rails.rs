@@ -1,0 +1,180 @@
+//! Channels that do not follow their input: at a rail of the converter, stuck, or dead.
+
+use crate::blocks::{Condensed, Moments, Rails, quantile};
+use mimu_recording::error::{Error, Result};
+use mimu_recording::{Manifest, RAW_COLUMNS};
+
+/// Natural logarithm of the odds against a run of equal samples by chance in the whole recording.
+const RUN_LOG_ODDS: f64 = 14.0;
+
+/// Longest run of equal samples that chance explains in channel `c`, from how often neighbours are
+/// equal where the channel works. `None`: they mostly are, and nothing can be told.
+pub(crate) fn longest_run_by_chance(condensed: &Condensed, c: usize) -> Option<f64> {
+    let mut shares: Vec<f64> = condensed
+        .blocks
+        .iter()
+        .map(|b| b.raw[c])
+        .filter(|m| m.n > 1)
+        .map(|m| f64::from(m.repeats) / f64::from(m.n - 1))
+        .collect();
+    let share = quantile(&mut shares, 0.5)?.max(1e-3);
+    let odds = RUN_LOG_ODDS + (condensed.rows as f64).ln();
+    (share < 0.8).then(|| (1.0 + odds / -share.ln()).max(5.0))
+}
+
+/// Blocks in a row that have to be calm at an extreme.
+const CALM_BLOCKS: usize = 3;
+/// Standard deviation of a calm block, times that of quiet ones: the quietest tenth of the blocks of this channel elsewhere, and the
+/// quietest twentieth of those of each other channel of the sensor, which are alike. (By itself neither will do: a gyro
+/// that is turned one way only rests at an end of its range, and elsewhere there is but motion.) Of ten
+/// samples of the same noise one block in four hundred is as calm, and three in a row one in sixty millions.
+const CALM: f64 = 0.4;
+/// Share of the range that counts as near an extreme.
+const NEAR: f64 = 0.1;
+
+/// Where a channel comes to a calm end: a sensor at its own rail, of whose noise only the converter's is left. `sign` is
+/// 1 for the high end and -1 for the low one; the answer is the innermost value there.
+///
+/// Repeated values, which tell a converter's rail, do not occur: behind a rail of the sensor the converter goes on making noise.
+fn calm_end(condensed: &Condensed, c: usize, sign: f64, range: [f64; 2]) -> Option<f64> {
+    let [low, high] = range;
+    let near = NEAR * (high - low);
+    let end = if sign > 0.0 { high } else { low };
+    let deviation = |m: &Moments| (m.m2 / f64::from(m.n.max(2) - 1)).sqrt();
+    let blocks_of = |c: usize| {
+        let all = condensed.blocks.iter().map(move |b| b.raw[c]);
+        all.filter(|m| m.n > 2)
+    };
+    let blocks: Vec<Moments> = blocks_of(c).collect();
+    let elsewhere = blocks
+        .iter()
+        .filter(|m| m.mean > low + near && m.mean < high - near);
+    let mut quiet = quantile(&mut elsewhere.map(deviation).collect::<Vec<_>>(), 0.1)?;
+    let sensor = if c < 3 { 0..3 } else { 3..6 };
+    for other in sensor.filter(|o| *o != c && condensed.has_raw[*o]) {
+        let mut deviations: Vec<f64> = blocks_of(other).map(|m| deviation(&m)).collect();
+        quiet = quiet.min(quantile(&mut deviations, 0.05)?);
+    }
+    let calm = |m: &Moments| deviation(m) < CALM * quiet && (m.mean - end).abs() < near;
+    // The outermost calm stretch: a pose near the end is calm at another value than the rail.
+    let stretches = blocks.chunk_by(|a, b| calm(a) && calm(b));
+    let calm_stretches = stretches.filter(|s| s.len() >= CALM_BLOCKS && calm(&s[0]));
+    let inner = |s: &[Moments]| {
+        let values = s.iter().map(|m| if sign > 0.0 { m.min } else { m.max });
+        values.fold(end, |a, b| if sign > 0.0 { a.min(b) } else { a.max(b) })
+    };
+    let widest = calm_stretches
+        .map(inner)
+        .max_by(|a, b| (sign * a).total_cmp(&(sign * b)))?;
+    let spread = (end - widest).abs();
+    // An extreme that was passed in motion lies beyond any rail: what is calm inside of it is no rail.
+    (spread < 20.0 * CALM * quiet).then_some(widest)
+}
+
+/// Rails of the six channels: as declared, or where the largest or smallest
+/// value of a whole recording is repeated more often in a row than chance allows, or is as calm as no noise of the sensor is.
+pub(crate) fn find(
+    condensed: &Condensed,
+    manifest: &Manifest,
+    longest_run: &[f64; 6],
+    warnings: &mut Vec<String>,
+) -> [Rails; 6] {
+    let mut rails = [Rails::default(); 6];
+    for (c, rail) in rails.iter_mut().enumerate() {
+        if !condensed.has_raw[c] {
+            continue;
+        }
+        let declared = manifest
+            .rails
+            .and_then(|r| if c < 3 { r.gyro } else { r.accel });
+        if let Some([low, high]) = declared {
+            *rail = Rails {
+                low: Some(low),
+                high: Some(high),
+            };
+            continue;
+        }
+        let moments = || {
+            condensed
+                .blocks
+                .iter()
+                .map(move |b| b.raw[c])
+                .filter(|m| m.n > 0)
+        };
+        let high = moments().map(|m| m.max).fold(f64::NEG_INFINITY, f64::max);
+        let low = moments().map(|m| m.min).fold(f64::INFINITY, f64::min);
+        let chance = longest_run[c];
+        if low == high {
+            continue;
+        }
+        for (value, name) in [(high, "highest"), (low, "lowest")] {
+            // Blocks are short: a run goes on through those that hold nothing else.
+            let (mut longest, mut run) = (0.0_f64, 0.0);
+            for m in moments() {
+                if m.min == m.max && m.max == value {
+                    run += f64::from(m.n);
+                } else {
+                    run = 0.0;
+                    if m.run_value == value {
+                        longest = longest.max(f64::from(m.run));
+                    }
+                }
+                longest = longest.max(run);
+            }
+            if longest > chance {
+                warnings.push(format!(
+                    "{}: the {name} value {value} comes {longest} times in a row, chance explains {:.0}: taken for a rail",
+                    RAW_COLUMNS[c], chance.floor()
+                ));
+                if value == high {
+                    rail.high = Some(value)
+                } else {
+                    rail.low = Some(value)
+                }
+                continue;
+            }
+            let sign = if value == high { 1.0 } else { -1.0 };
+            if let Some(inner) = calm_end(condensed, c, sign, [low, high]) {
+                warnings.push(format!(
+                    "{}: at its {name} values, from {inner} on, the noise is gone: taken for a rail of the sensor",
+                    RAW_COLUMNS[c]
+                ));
+                if value == high {
+                    rail.high = Some(inner)
+                } else {
+                    rail.low = Some(inner)
+                }
+            }
+        }
+    }
+    rails
+}
+
+/// Refuses a recording in which a channel never changes.
+pub fn refuse_dead_channels(condensed: &Condensed, place: &str) -> Result<()> {
+    for c in 0..6 {
+        if !condensed.has_raw[c] {
+            continue;
+        }
+        let mut moments = condensed
+            .blocks
+            .iter()
+            .map(|b| b.raw[c])
+            .filter(|m| m.n > 0);
+        let Some(first) = moments.next() else {
+            return Err(Error::new(
+                format!("{place}, column {}", RAW_COLUMNS[c]),
+                "every cell is empty or not a number",
+                "leave the sensor's columns out, or import the right ones",
+            ));
+        };
+        if first.min == first.max && moments.all(|m| m.min == first.min && m.max == first.min) {
+            return Err(Error::new(
+                format!("{place}, column {}", RAW_COLUMNS[c]),
+                format!("the channel is stuck at {} throughout", first.min),
+                "check its wiring, or that the right column was imported",
+            ));
+        }
+    }
+    Ok(())
+}

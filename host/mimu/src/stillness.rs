@@ -1,0 +1,240 @@
+//! Finding dwells where nobody says where they are: stretches in which no channel varies.
+
+use crate::blocks::{Block, Condensed, Level, Stretch, pool, quantile};
+use crate::quantity::Sensor;
+use mimu_recording::error::{Error, Result};
+use mimu_recording::{Manifest, Reference};
+
+/// Length of the window whose variance decides on stillness, s. Long enough that a slow turn shows in the accelerometer: the
+/// force then runs straight by g ω, a variance of (g ω)²/12, which beside a noise of 7 mm/s² reaches [`STILL_FACTOR`] at
+/// 0.4 deg/s. Short enough for hands.
+pub const WINDOW_S: f64 = 1.0;
+
+/// Left out at both ends of a dwell that was found, s: stillness begins and ends within a window.
+pub const GUARD_S: f64 = 0.2;
+/// A dwell that is shorter is flagged and not used, s.
+pub const SHORTEST_S: f64 = 1.0;
+
+/// Variance of a still window over the quietest, at most. Of six recordings by hand, all give the same number of dwells from
+/// 15 to 30 (38, and 22 five times); at 10 one has a fragment more, too short to be used; at 7 and 5 some are split.
+/// Below the plateau and not in it, as what is let in goes into the means.
+pub const STILL_FACTOR: f64 = 10.0;
+
+/// What the gyro is allowed beyond that in recordings by hand with an accelerometer to watch as well. Hands tremble in angle:
+/// of 22 rests of each of five units, some had 50 to 230 times the quietest variance in the gyro while the accelerometer
+/// saw nothing, and without them the held-out error was threefold. The mean rate of a rest is what it turned by in all
+/// over its length, and the tremor leaves next to none.
+const GYRO_TREMOR: f64 = 30.0;
+
+/// The thresholds that found the dwells.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Detection {
+    /// Window of the variance, s.
+    pub window_s: f64,
+    /// Left out at both ends, s.
+    pub guard_s: f64,
+    /// Shortest dwell that is used, s.
+    pub shortest_s: f64,
+    /// Largest variance of a still window in the accelerometer, in units of `floor` squared.
+    pub still_factor: f64,
+    /// The same in the gyro.
+    pub gyro_still_factor: f64,
+    /// Standard deviation of one sample in the quietest twentieth of the recording, raw units.
+    pub floor: [f64; 6],
+}
+
+pub(crate) fn find(
+    condensed: &Condensed,
+    manifest: &Manifest,
+    factor: f64,
+) -> Result<(Vec<Stretch>, Detection)> {
+    let blocks = &condensed.blocks;
+    let block_s = blocks.iter().map(|b| b.rows).max().unwrap_or(1) as f64 * condensed.period_s;
+    let width = ((WINDOW_S / block_s).round() as usize).max(2);
+    if blocks.len() < width {
+        let problem = format!(
+            "the recording lasts {:.2} s, less than the {WINDOW_S} s in which stillness shows",
+            condensed.rows as f64 * condensed.period_s
+        );
+        return Err(Error::new("dwells", problem, "record for longer"));
+    }
+    let channels: Vec<usize> = (0..6).filter(|&c| condensed.has_raw[c]).collect();
+    let windows = windows(blocks, width, &channels);
+    let mut floor = [0.0; 6];
+    for &c in &channels {
+        let mut of_channel: Vec<f64> = windows
+            .iter()
+            .flatten()
+            .map(|w| w.variance[c])
+            .filter(|v| *v > 0.0)
+            .collect();
+        // A noiseless simulation has no floor: then anything that varies at all is motion.
+        floor[c] = quantile(&mut of_channel, 0.05).unwrap_or(0.0);
+    }
+    // A hand that holds still trembles in angle and not in force.
+    let by_hand = manifest.reference == Reference::Gravity && condensed.has_raw[3];
+    let gyro = if by_hand {
+        GYRO_TREMOR * factor
+    } else {
+        factor
+    };
+    let factors = [gyro, gyro, gyro, factor, factor, factor];
+    let quiet = |w: &Window| {
+        channels
+            .iter()
+            .all(|&c| w.variance[c] <= factors[c] * floor[c])
+    };
+    let at_rest: Vec<&Window> = windows.iter().flatten().filter(|w| quiet(w)).collect();
+    let rates = Sensor::Gyro
+        .channels()
+        .filter(|&c| by_hand && condensed.has_raw[c]);
+    let rates: Vec<_> = rates
+        .map(|c| (c, rate_at_rest(&at_rest, c, (factor * floor[c]).sqrt())))
+        .collect();
+    let turning = |w: &Window| rates.iter().any(|(c, range)| !range.contains(&w.mean[*c]));
+    let spans = reference_spans(condensed);
+    let mut still = vec![false; blocks.len()];
+    for (i, window) in windows.iter().enumerate() {
+        let Some(window) = window else { continue };
+        let quiet = quiet(window) && !turning(window);
+        let constant = manifest.reference == Reference::Gravity
+            || constant_input(blocks[i..i + width].iter().map(|b| &b.reference), &spans);
+        if quiet && constant {
+            still[i..i + width].fill(true);
+        }
+    }
+    // Two steps of a table may follow each other without a still window being disturbed.
+    let guard = (GUARD_S / block_s).round() as usize;
+    let mut ranges = Vec::new();
+    let mut start = None;
+    for i in 0..=blocks.len() {
+        let open = i < blocks.len()
+            && still[i]
+            && (start.is_none()
+                || (!blocks[i].after_gap
+                    && same_input(&blocks[i - 1].reference, &blocks[i].reference, &spans)));
+        match (open, start) {
+            (true, None) => start = Some(i),
+            (false, Some(from)) => {
+                // At the ends of the recording nothing was set in motion.
+                let from = if from == 0 { 0 } else { from + guard };
+                let to = if i == blocks.len() {
+                    i
+                } else {
+                    i.saturating_sub(guard)
+                };
+                if to > from {
+                    ranges.push((None, from..to));
+                }
+                start = (i < blocks.len() && still[i]).then_some(i);
+            }
+            _ => {}
+        }
+    }
+    let detection = Detection {
+        window_s: width as f64 * block_s,
+        guard_s: guard as f64 * block_s,
+        shortest_s: SHORTEST_S,
+        still_factor: factor,
+        gyro_still_factor: gyro,
+        floor: floor.map(f64::sqrt),
+    };
+    Ok((ranges, detection))
+}
+
+/// Mean and variance of the six raw channels over [`WINDOW_S`].
+struct Window {
+    mean: [f64; 6],
+    variance: [f64; 6],
+}
+
+/// The window that begins at each block; `None` where there is a gap in it.
+fn windows(blocks: &[Block], width: usize, channels: &[usize]) -> Vec<Option<Window>> {
+    let window = |window: &[Block]| {
+        let (mut mean, mut variance) = ([0.0; 6], [0.0; 6]);
+        for &c in channels {
+            let pooled = pool(window.iter().map(|b| b.raw[c]));
+            mean[c] = pooled.mean;
+            variance[c] = match pooled.n {
+                0 | 1 => f64::INFINITY,
+                n => pooled.m2 / f64::from(n - 1),
+            };
+        }
+        Window { mean, variance }
+    };
+    let whole = |w: &[Block]| !w[1..].iter().any(|b| b.after_gap);
+    blocks
+        .windows(width)
+        .map(|w| whole(w).then(|| window(w)))
+        .collect()
+}
+
+/// Mean readings of channel `c` that a window at rest may have: about the median of the windows that vary little, by
+/// `margin` and by five of their own deviations, which hold a drift of the bias.
+///
+/// A turn about the vertical does not show in the accelerometer, and a slow one hardly in the variance of the gyro.
+fn rate_at_rest(at_rest: &[&Window], c: usize, margin: f64) -> std::ops::RangeInclusive<f64> {
+    let mut means: Vec<f64> = at_rest.iter().map(|w| w.mean[c]).collect();
+    let Some(middle) = quantile(&mut means, 0.5) else {
+        return f64::NEG_INFINITY..=f64::INFINITY;
+    };
+    let mut deviations: Vec<f64> = means.iter().map(|m| (m - middle).abs()).collect();
+    let sigma = 1.4826 * quantile(&mut deviations, 0.5).unwrap_or(0.0);
+    let reach = margin + 5.0 * sigma;
+    middle - reach..=middle + reach
+}
+
+/// Largest less smallest value of each reference channel in the recording, by sensor.
+fn reference_spans(condensed: &Condensed) -> [f64; 6] {
+    let mut spans = [0.0; 6];
+    for sensor in Sensor::BOTH {
+        let mut span: f64 = 0.0;
+        for c in sensor.channels() {
+            let levels = || {
+                condensed
+                    .blocks
+                    .iter()
+                    .map(move |b| &b.reference[c])
+                    .filter(|l| l.mean.is_finite())
+            };
+            let high = levels().map(|l| l.max).fold(f64::NEG_INFINITY, f64::max);
+            let low = levels().map(|l| l.min).fold(f64::INFINITY, f64::min);
+            span = span.max(high - low);
+        }
+        spans[sensor.channels()].fill(span);
+    }
+    spans
+}
+
+/// An input counts as constant while it moves by less than this share of its span: an encoder's noise,
+/// but no ramp of the table.
+const CONSTANT_SHARE: f64 = 2e-3;
+
+/// And always while it moves by less than this, deg/s or m/s²: where nothing moves, the span is that of the jitter.
+const CONSTANT: [f64; 2] = [0.01, 1e-3];
+
+fn tolerance(c: usize, spans: &[f64; 6]) -> f64 {
+    (CONSTANT_SHARE * spans[c]).max(CONSTANT[c / 3])
+}
+
+fn constant_input<'a>(
+    levels: impl Iterator<Item = &'a [Level; 6]> + Clone,
+    spans: &[f64; 6],
+) -> bool {
+    (0..6).all(|c| {
+        let known = levels.clone().map(|l| l[c]).filter(|l| l.mean.is_finite());
+        let high = known
+            .clone()
+            .map(|l| l.max)
+            .fold(f64::NEG_INFINITY, f64::max);
+        let low = known.map(|l| l.min).fold(f64::INFINITY, f64::min);
+        high - low <= tolerance(c, spans)
+    })
+}
+
+fn same_input(a: &[Level; 6], b: &[Level; 6], spans: &[f64; 6]) -> bool {
+    (0..6).all(|c| {
+        let unknown = [a[c].mean, b[c].mean].map(f64::is_nan);
+        unknown == [true; 2] || (a[c].mean - b[c].mean).abs() <= tolerance(c, spans)
+    })
+}

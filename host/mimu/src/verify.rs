@@ -1,0 +1,287 @@
+//! Judging a calibration by another recording.
+
+use mimu_core::compensation::Affine;
+use nalgebra::{Matrix3, Vector3};
+
+use crate::calibration::Calibration;
+use crate::diagnose::removal::{removable, remove};
+use crate::estimate::rotation::{Turn, direction_error};
+use crate::fit::refuse_wrong_gravity;
+use crate::prepared::{Prepared, si_covariance};
+use crate::quantity::Figure;
+use crate::quantity::Sensor;
+use crate::triad::Forward;
+use mimu_recording::Reference;
+use mimu_recording::error::{Error, Result};
+
+/// What a calibration does to one triad of a recording. Figures as in [`Figure`].
+#[derive(Debug, Clone)]
+pub struct SensorVerification {
+    /// Which.
+    pub sensor: Sensor,
+    /// What the figures are about.
+    pub figure: Figure,
+    /// With one scale factor and one bias for all axes and no misalignment, what a
+    /// datasheet would give: the means of the calibration's own.
+    pub rms_raw: f64,
+    /// With the calibration, but with its effects left in; `None` if it has none.
+    pub rms_affine: Option<f64>,
+    /// With the calibration.
+    pub rms: f64,
+    /// The largest error with the calibration.
+    pub max: f64,
+    /// If noise were all.
+    pub noise_floor: f64,
+    /// Compensated gyro dwell means without a table, rad/s.
+    pub static_rms: Option<f64>,
+    /// Number of dwells or turns judged.
+    pub count: usize,
+}
+
+/// What a calibration does to a recording.
+#[derive(Debug, Clone)]
+pub struct Verification {
+    /// Gyro, then accelerometer, as far as both the calibration and the recording have them.
+    pub sensors: Vec<SensorVerification>,
+    /// What a person should know.
+    pub warnings: Vec<String>,
+}
+
+/// Judges `calibration` by a recording.
+pub fn verify(prepared: &Prepared, calibration: &Calibration) -> Result<Verification> {
+    let manifest = &prepared.manifest;
+    let mut warnings = prepared.condensed.warnings.clone();
+    warnings.extend(prepared.dwells.warnings.iter().cloned());
+    if calibration.recording.raw_unit != manifest.raw_unit {
+        let problem = format!(
+            "its raw unit is {}, the calibration is for {}",
+            manifest.raw_unit, calibration.recording.raw_unit
+        );
+        return Err(Error::new(
+            &prepared.place,
+            problem,
+            "import it in the other unit, or use the calibration of this unit",
+        ));
+    }
+    if calibration.device != manifest.device {
+        warnings.push(format!(
+            "the calibration is for {:?}, the recording of {:?}",
+            calibration.device, manifest.device
+        ));
+    }
+    if calibration.recording.sha256 == prepared.condensed.sha256 {
+        warnings.push("this is the recording that the calibration was made from: the figures say nothing about new data".into());
+    }
+    let cleaned = without_effects(prepared, calibration)?;
+    let mut sensors = Vec::new();
+    for sensor in Sensor::BOTH {
+        if calibration.inverse(sensor).is_none() || !prepared.has(sensor) {
+            continue;
+        }
+        let observations = prepared.observations(sensor);
+        if !observations.is_empty() {
+            refuse_wrong_gravity(prepared, sensor, &observations)?;
+        }
+        let affine = judge(prepared, calibration, sensor);
+        let with_effects = cleaned.as_ref().and_then(|c| judge(c, calibration, sensor));
+        let (judged, refused) = match (affine, with_effects) {
+            // What the readings are judged by without a calibration is what the unit gave.
+            (Some((affine, _)), Some((clean, refused))) => {
+                let judged = SensorVerification {
+                    rms_raw: affine.rms_raw,
+                    rms_affine: Some(affine.rms),
+                    ..clean
+                };
+                (judged, refused)
+            }
+            (Some(affine), None) if cleaned.is_none() => affine,
+            _ => {
+                warnings.push(format!(
+                    "{sensor}: the recording has nothing to judge it by"
+                ));
+                continue;
+            }
+        };
+        warnings.extend(refused);
+        sensors.push(judged);
+    }
+    if sensors.is_empty() {
+        return Err(Error::new(
+            &prepared.place,
+            "the recording has nothing to judge this calibration by",
+            "record dwells with a known input, or poses and turns by hand",
+        ));
+    }
+    for s in sensors.iter().filter(|s| s.rms > s.rms_raw) {
+        warnings.push(format!(
+            "{}: worse than without calibration: is it that of this unit?",
+            s.sensor
+        ));
+    }
+    Ok(Verification { sensors, warnings })
+}
+
+/// The recording without the effects of the calibration, if it has any.
+fn without_effects(prepared: &Prepared, calibration: &Calibration) -> Result<Option<Prepared>> {
+    let effects = calibration.effects();
+    if effects.is_empty() {
+        return Ok(None);
+    }
+    removable(prepared, effects)?;
+    let [gyro, accel] = Sensor::BOTH.map(|s| calibration.inverse(s));
+    let cleaned = remove(prepared, gyro.as_ref(), accel.as_ref(), effects);
+    let singular = || {
+        let place = format!("calibration of {:?}", calibration.device);
+        Error::new(place, "C is singular", "fit the recording again")
+    };
+    cleaned.map(Some).ok_or_else(singular)
+}
+
+/// The figures of one sensor and what could not be used; `None` if the recording has nothing to judge it by.
+fn judge(
+    prepared: &Prepared,
+    calibration: &Calibration,
+    sensor: Sensor,
+) -> Option<(SensorVerification, Vec<String>)> {
+    let inverse = calibration.inverse(sensor)?;
+    let mut warnings = Vec::new();
+    let judged = match (prepared.manifest.reference, sensor) {
+        (Reference::Table, _) => known(prepared, sensor, &inverse),
+        (Reference::Gravity, Sensor::Accel) => size(prepared, &inverse),
+        (Reference::Gravity, Sensor::Gyro) => {
+            let accel = calibration.inverse(Sensor::Accel)?;
+            turns(prepared, &inverse, &accel, &mut warnings)
+        }
+    };
+    judged.map(|j| (j, warnings))
+}
+
+/// The calibration of a unit whose sensors are all alike and perfectly mounted: every sensor with the mean scale factor
+/// and the mean bias of the three, along the axis that it is nearest to.
+///
+/// `None` if the calibration is singular.
+pub fn nominal(calibrated: &Affine<f64>) -> Option<Affine<f64>> {
+    let Forward { matrix: p, bias } = Forward::of(calibrated)?;
+    let scale = (0..3).map(|i| p.row(i).norm()).sum::<f64>() / 3.0;
+    let bias = bias.sum() / 3.0;
+    let mut forward = Matrix3::zeros();
+    for i in 0..3 {
+        let axis = p.row(i).transpose().iamax();
+        forward[(i, axis)] = scale * p[(i, axis)].signum();
+    }
+    // Two sensors nearest to one axis are no triad: then as they come.
+    let matrix = forward
+        .try_inverse()
+        .unwrap_or_else(|| Matrix3::from_diagonal_element(1.0 / scale));
+    Some(Affine {
+        matrix,
+        offset: -(matrix * Vector3::repeat(bias)),
+    })
+}
+
+fn rms(values: &[f64]) -> f64 {
+    (values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64).sqrt()
+}
+
+fn largest(values: &[f64]) -> f64 {
+    values.iter().map(|v| v.abs()).fold(0.0, f64::max)
+}
+
+/// The figures of errors before and after; `None` if there is nothing to judge by. One of `floor` a dwell or turn.
+fn judged(
+    sensor: Sensor,
+    figure: Figure,
+    raw: &[f64],
+    after: &[f64],
+    floor: &[f64],
+) -> Option<SensorVerification> {
+    (!after.is_empty()).then(|| SensorVerification {
+        sensor,
+        figure,
+        rms_raw: rms(raw),
+        rms_affine: None,
+        rms: rms(after),
+        max: largest(after),
+        noise_floor: rms(floor),
+        static_rms: None,
+        count: floor.len(),
+    })
+}
+
+fn known(
+    prepared: &Prepared,
+    sensor: Sensor,
+    calibrated: &Affine<f64>,
+) -> Option<SensorVerification> {
+    let observations = prepared.observations(sensor);
+    let errors = |model: &Affine<f64>| -> Vec<f64> {
+        observations
+            .iter()
+            .flat_map(|o| <[f64; 3]>::from(model.apply(&o.raw) - o.input))
+            .collect()
+    };
+    let floor: Vec<f64> = observations
+        .iter()
+        .map(|o| (si_covariance(&calibrated.matrix, &o.variance).trace() / 3.0).sqrt())
+        .collect();
+    let after = errors(calibrated);
+    judged(
+        sensor,
+        Figure::Input,
+        &errors(&nominal(calibrated)?),
+        &after,
+        &floor,
+    )
+}
+
+fn size(prepared: &Prepared, calibrated: &Affine<f64>) -> Option<SensorVerification> {
+    let g = prepared.manifest.gravity_mps2;
+    let observations = prepared.observations(Sensor::Accel);
+    let errors = |model: &Affine<f64>| -> Vec<f64> {
+        observations
+            .iter()
+            .map(|o| model.apply(&o.raw).norm() - g)
+            .collect()
+    };
+    let variances = prepared.size_variances(calibrated, &observations);
+    let floor: Vec<f64> = variances.iter().map(|v| v.sqrt()).collect();
+    let after = errors(calibrated);
+    judged(
+        Sensor::Accel,
+        Figure::GravitySize,
+        &errors(&nominal(calibrated)?),
+        &after,
+        &floor,
+    )
+}
+
+fn turns(
+    prepared: &Prepared,
+    gyro: &Affine<f64>,
+    accel: &Affine<f64>,
+    warnings: &mut Vec<String>,
+) -> Option<SensorVerification> {
+    let (by_calibration, refused) = prepared.turns(accel);
+    warnings.extend(refused);
+    let (by_nominal, _) = prepared.turns(&nominal(accel)?);
+    let errors = |turns: &[Turn], model: &Affine<f64>| -> Vec<f64> {
+        turns
+            .iter()
+            .map(|t| direction_error(t, model).norm())
+            .collect()
+    };
+    let c2 = gyro.matrix.norm_squared() / 3.0;
+    let floor: Vec<f64> = by_calibration.iter().map(|t| t.floor(c2)).collect();
+    let after = errors(&by_calibration, gyro);
+    let rest: Vec<f64> = prepared
+        .observations(Sensor::Gyro)
+        .iter()
+        .flat_map(|o| <[f64; 3]>::from(gyro.apply(&o.raw)))
+        .collect();
+    let before = errors(&by_nominal, &nominal(gyro)?);
+    let judged = judged(Sensor::Gyro, Figure::Direction, &before, &after, &floor)?;
+    Some(SensorVerification {
+        static_rms: Some(rms(&rest)),
+        ..judged
+    })
+}

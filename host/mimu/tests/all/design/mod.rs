@@ -1,0 +1,38 @@
+//! The search finds the optimum wherever it is known from elsewhere, and designs are judged as arithmetic does.
+
+mod brute_force;
+mod next_experiment;
+mod polynomials;
+mod schemes;
+mod sphere;
+mod time;
+
+use mimu::design::Problem;
+use mimu::design::model::{Model, Terms};
+use mimu::design::reach::{Carrier, RateList};
+use mimu_recording::Reference;
+use nalgebra::Vector3;
+
+fn terms(list: &str) -> Terms {
+    list.parse().unwrap()
+}
+
+fn accel(reference: Reference, list: &str) -> Problem {
+    Problem::accel(Model::accel(reference, &terms(list)), Carrier::ThreeAxis).unwrap()
+}
+
+fn gyro(list: &str, rates: &str) -> Problem {
+    let rates: RateList = rates.parse().unwrap();
+    let span = Vector3::repeat(rates.largest_dps.to_radians());
+    Problem::gyro(
+        Model::gyro(&terms(list), span),
+        Carrier::ThreeAxis,
+        rates.rates,
+    )
+    .unwrap()
+}
+
+/// Whether two figures agree to a relative difference.
+fn close(a: f64, b: f64, relative: f64) -> bool {
+    (a - b).abs() <= relative * b.abs()
+}

@@ -1,0 +1,302 @@
+//! Published schemes, and what a judgement says of them.
+
+use std::f64::consts::PI;
+
+use mimu::design::judgement::Judgement;
+use mimu::design::model::{GRAVITY, Model, Term, Terms};
+use mimu::design::reach::{Carrier, Rates};
+use mimu::design::schemes::{FANG_FILTERS, Scheme};
+use mimu::design::{Problem, lack_of_fit};
+use mimu::estimate::{Observation, gravity_size, known_input};
+use mimu::quantity::Sensor;
+use mimu_recording::Reference;
+use nalgebra::Vector3;
+
+use super::{accel, close, terms};
+
+#[test]
+fn six_faces_are_d_optimal_and_fangs_nine_are_not() {
+    let problem = accel(Reference::Table, "affine");
+    let judge = |s: Scheme| problem.judge(&s.settings(Sensor::Accel).unwrap(), 1.0);
+    let six = judge(Scheme::SixFace);
+    assert!((six.d_efficiency - 1.0).abs() < 1e-7);
+    let nine = judge(Scheme::FangNine);
+    assert!(
+        close(nine.d_efficiency, 0.937_236, 1e-6),
+        "{}",
+        nine.d_efficiency
+    );
+    // Its filters: det F = 1 by the rows of (26), so det(F'F/4) = 1/256, for each axis.
+    let all = Scheme::FangNine.settings(Sensor::Accel).unwrap();
+    for filter in FANG_FILTERS {
+        let judged = problem.judge(&filter.map(|i| all[i]), 1.0);
+        assert!(close(judged.determinant, 1.0 / 256.0, 1e-9));
+        assert!(close(
+            judged.d_efficiency,
+            (27.0_f64 / 256.0).powf(0.25),
+            1e-6
+        ));
+        // Nine dwells for every sensor halve the variance of its worst parameter and more.
+        let worst = |j: &Judgement| {
+            j.parameters[..4]
+                .iter()
+                .map(|p| p.sigma)
+                .fold(0.0, f64::max)
+        };
+        assert!(worst(&judged) > 1.5 * worst(&nine));
+    }
+}
+
+#[test]
+fn inflation_is_that_of_the_sigma_over_what_it_were_with_the_others_known() {
+    // fang's filter for x: by hand the variance of P_xy is 7/2 and that of the bias 1/2; alone 1/(1/2) and 1/4.
+    let problem = accel(Reference::Table, "affine");
+    let all = Scheme::FangNine.settings(Sensor::Accel).unwrap();
+    let judged = problem.judge(&FANG_FILTERS[0].map(|i| all[i]), 1.0);
+    for (name, inflation) in [("P_xy", 1.75_f64.sqrt()), ("b_x", 2_f64.sqrt())] {
+        let found = judged.parameters.iter().find(|p| p.parameter.name == name);
+        assert!(close(found.unwrap().inflation, inflation, 1e-9), "{name}");
+    }
+    // Orthogonal regressors: none.
+    let six = problem.judge(&Scheme::SixFace.settings(Sensor::Accel).unwrap(), 1.0);
+    assert!(
+        six.parameters
+            .iter()
+            .all(|p| close(p.inflation, 1.0, 1e-12))
+    );
+}
+
+#[test]
+fn sigmas_of_six_faces_are_those_of_the_arithmetic() {
+    // Bias: mean of six. Scale factor: half the difference of two, over gravity.
+    let problem = accel(Reference::Table, "affine");
+    let judged = problem.judge(&Scheme::SixFace.settings(Sensor::Accel).unwrap(), 0.003);
+    for p in &judged.parameters {
+        let si = p.sigma * p.parameter.si;
+        let known = match p.parameter.name.starts_with('b') {
+            true => 0.003 / 6_f64.sqrt(),
+            false => 0.003 / (2_f64.sqrt() * 9.80665),
+        };
+        assert!(close(si, known, 1e-12), "{}: {si}", p.parameter.name);
+    }
+    assert_eq!((judged.lack_of_fit_dof, judged.repetition_dof), (2, 0));
+    assert!(close(judged.condition, 3_f64.sqrt(), 1e-9));
+}
+
+#[test]
+fn the_estimators_claim_the_sigmas_that_the_design_promised() {
+    let (settings, sigma) = (Scheme::Xu33.settings(Sensor::Accel).unwrap(), 1e-3);
+    let observations: Vec<Observation> = settings
+        .iter()
+        .enumerate()
+        .map(|(dwell, s)| Observation {
+            dwell,
+            raw: s.up * GRAVITY,
+            variance: Vector3::repeat(sigma * sigma),
+            input: s.up * GRAVITY,
+        })
+        .collect();
+    // Columns of C or P by rows, then o or b: known_input gives P, b; gravity_size C, o.
+    let known = known_input::least_squares(&observations, None)
+        .unwrap()
+        .triad
+        .forward_covariance;
+    let variances = vec![sigma * sigma; settings.len()];
+    let size = gravity_size::estimate(&observations, &variances, GRAVITY)
+        .unwrap()
+        .triad;
+    for (reference, covariance) in [
+        (Reference::Table, known),
+        (Reference::Gravity, size.inverse_covariance),
+    ] {
+        let judged = accel(reference, "affine").judge(&settings, sigma);
+        for p in &judged.parameters {
+            let axes: Vec<usize> = p.parameter.name[2..]
+                .bytes()
+                .map(|c| usize::from(c - b'x'))
+                .collect();
+            let place = match axes[..] {
+                [i, j] => 3 * i + j,
+                _ => 9 + axes[0],
+            };
+            let claimed = covariance[(place, place)].sqrt();
+            let promised = p.sigma * p.parameter.si;
+            assert!(
+                close(claimed, promised, 1e-5),
+                "{}: {claimed} {promised}",
+                p.parameter.name
+            );
+        }
+    }
+}
+
+#[test]
+fn six_faces_cannot_notice_cubes_and_products() {
+    let settings = Scheme::SixFace.settings(Sensor::Accel).unwrap();
+    let model = Model::accel(Reference::Table, &Terms::default());
+    let found = lack_of_fit::notices(&model, &settings);
+    let of = |term: Term| found.iter().find(|n| n.term == term).unwrap();
+    // On faces x³ = x and xy = 0. x² is 1 on two and 0 on four: apart from the mean, 4/3 of its square is left.
+    assert_eq!((of(Term::Cubic).noticed, of(Term::Cubic).size), (0, None));
+    assert_eq!((of(Term::Cross).noticed, of(Term::Cross).size), (0, None));
+    assert_eq!(of(Term::Quadratic).noticed, 3);
+    let size = lack_of_fit::NOTICED / (4.0_f64 / 3.0).sqrt();
+    assert!(close(of(Term::Quadratic).size.unwrap(), size, 1e-9));
+}
+
+#[test]
+fn published_schemes_are_worth_what_plain_arithmetic_makes_of_the_printed_tables() {
+    // det(F'F/n) of the positions as printed, by elimination, over that of the optimum, which the tests in `sphere`
+    // have in closed form.
+    let gyro = Model::gyro(&terms("affine"), Scheme::XuRates.rate_span());
+    let gyro = Problem::gyro(gyro, Carrier::ThreeAxis, Rates::Any).unwrap();
+    let known = accel(Reference::Table, "affine");
+    let size = accel(Reference::Gravity, "affine");
+    for (problem, scheme, determinant, efficiency) in [
+        (&known, Scheme::SixFace, 1.0 / 27.0, 1.0),
+        (&known, Scheme::FangNine, 0.028_577_960_68, 0.937_236),
+        (&known, Scheme::Xu33, 0.027_217_694_80, 0.925_878),
+        (&known, Scheme::Niu8, 1.0 / 64.0, 0.805_927),
+        (&gyro, Scheme::XuRates, 4.136_584_323e-4, 0.325_088),
+        (&size, Scheme::FangNine, 2.581_174_792e-9, 0.698_715),
+        (&size, Scheme::Xu33, 3.702_093_339e-9, 0.727_283),
+    ] {
+        let settings = scheme.settings(problem.reach.model.sensor).unwrap();
+        let judged = problem.judge(&settings, 1.0);
+        let name = scheme.name();
+        assert!(
+            close(judged.determinant, determinant, 1e-9),
+            "{name}: {}",
+            judged.determinant
+        );
+        assert!(
+            close(judged.d_efficiency, efficiency, 2e-6),
+            "{name}: {}",
+            judged.d_efficiency
+        );
+    }
+}
+
+#[test]
+fn a_singular_design_names_what_it_leaves_open() {
+    let problem = accel(Reference::Gravity, "affine");
+    let judged = problem.judge(&Scheme::SixFace.settings(Sensor::Accel).unwrap(), 1.0);
+    assert_eq!(judged.d_efficiency, 0.0);
+    assert_eq!(judged.undetermined(), ["C_yx", "C_zx", "C_zy"]);
+}
+
+#[test]
+fn products_cannot_be_told_apart_by_the_size_of_gravity() {
+    let model = Model::accel(Reference::Gravity, &terms("affine,cross"));
+    let refused = Problem::accel(model, Carrier::ThreeAxis).unwrap_err();
+    assert!(refused.problem.contains("cross_x_yz"), "{refused}");
+}
+
+#[test]
+fn niu_and_xu_positions_are_as_published() {
+    let xu = Scheme::Xu33.settings(Sensor::Accel).unwrap();
+    // Appendix: F_x(7) = [g sin 30°, 0, -g cos 30°], F_y(10) = [-g cos 75°, g sin 75°, 0].
+    let (s, c) = (30_f64.to_radians().sin(), 30_f64.to_radians().cos());
+    assert!((xu[6].up - Vector3::new(s, 0.0, -c)).norm() < 1e-12);
+    let (s, c) = (75_f64.to_radians().sin(), 75_f64.to_radians().cos());
+    assert!((xu[20].up - Vector3::new(-c, s, 0.0)).norm() < 1e-12);
+    assert_eq!(xu.len(), 33);
+    // Adjacent dwells of niu are a quarter turn apart, or a turn about the vertical.
+    let niu = Scheme::Niu8.settings(Sensor::Accel).unwrap();
+    for k in 0..8 {
+        let angle = niu[k].up.angle(&niu[(k + 1) % 8].up);
+        assert!(angle == 0.0 || (angle - PI / 2.0).abs() < 1e-12);
+    }
+    assert!(niu.iter().all(|s| s.up.z <= 0.0));
+    // 9 + 9 + 11 rates both ways, and rest three times.
+    let rates = Scheme::XuRates.settings(Sensor::Gyro).unwrap();
+    assert_eq!(rates.len(), 2 * 29 + 3);
+    assert_eq!(rates.iter().filter(|s| s.rate == 0.0).count(), 3);
+}
+
+/// Poses, and turns as (body axis, sense, how that axis points).
+type Cycle = Vec<([i32; 3], (usize, i32, i32))>;
+
+/// Every cycle of eight quarter turns on a table that tilts by -90, 0 or 90 degrees about a horizontal axis and turns about
+/// the unit's z without end, begun at tilt 0: for each the poses it holds, and its turns as (body axis, sense,
+/// how that axis points).
+fn cycles() -> Vec<Cycle> {
+    fn go(tilt: i32, turn: i32, cycle: &mut Cycle, all: &mut Vec<Cycle>) {
+        if cycle.len() == 8 {
+            if (tilt, turn) == (0, 0) {
+                all.push(cycle.clone());
+            }
+            return;
+        }
+        // The direction of the body that points up, z up at tilt 0; and the body axis along the tilt axis.
+        let (c, s) = [(1, 0), (0, 1), (-1, 0), (0, -1)][turn as usize];
+        let up = [tilt * s, tilt * c, i32::from(tilt == 0)];
+        let (axis, points) = if c == 0 { (1, -s) } else { (0, c) };
+        for sense in [1, -1] {
+            if (tilt + sense).abs() <= 1 {
+                cycle.push((up, (axis, points * sense, points)));
+                go(tilt + sense, turn, cycle, all);
+                cycle.pop();
+            }
+            cycle.push((up, (2, sense, tilt)));
+            go(tilt, (turn + sense).rem_euclid(4), cycle, all);
+            cycle.pop();
+        }
+    }
+    let mut all = Vec::new();
+    go(0, 0, &mut Vec::new(), &mut all);
+    all
+}
+
+#[test]
+fn every_cycle_that_fits_nius_words_holds_the_same_eight_poses() {
+    let (mut fitting, mut as_built) = (0, 0);
+    // z down is up here: the table is the same upside down, with y turned about as well.
+    let built: Vec<[i32; 3]> = Scheme::Niu8
+        .settings(Sensor::Accel)
+        .unwrap()
+        .iter()
+        .map(|s| [s.up.x as i32, -s.up.y as i32, -s.up.z as i32])
+        .collect();
+    for cycle in cycles() {
+        let held = |pose: [i32; 3]| cycle.iter().filter(|(up, _)| *up == pose).count();
+        let sides = [[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]];
+        let turns = |axis, sense| cycle.iter().any(|(_, t)| (t.0, t.1) == (axis, sense));
+        let both_ways = (0..3).all(|axis| turns(axis, 1) && turns(axis, -1));
+        if !both_ways || held([0, 0, 1]) == 0 || sides.iter().any(|s| held(*s) == 0) {
+            continue;
+        }
+        fitting += 1;
+        assert!(held([0, 0, 1]) == 4 && sides.iter().all(|s| held(*s) == 1));
+        // x and y point the same way in all their turns, as the appendix says. z cannot.
+        let ways = |axis| {
+            let each = cycle.iter().filter(|(_, t)| t.0 == axis);
+            each.map(|(_, t)| t.2)
+                .collect::<std::collections::BTreeSet<_>>()
+                .len()
+        };
+        assert!(ways(0) == 1 && ways(1) == 1 && ways(2) > 1);
+        let poses: Vec<[i32; 3]> = cycle.iter().map(|(up, _)| *up).collect();
+        as_built += u32::from((0..8).any(|k| {
+            let (end, start) = built.split_at(k);
+            [start, end].concat() == poses
+        }));
+    }
+    assert!(fitting == 24 && as_built > 0, "{fitting} {as_built}");
+}
+
+#[test]
+fn on_two_axes_the_unit_stands_the_other_way_up_or_the_scheme_is_out_of_reach() {
+    let niu = Scheme::Niu8.settings(Sensor::Accel).unwrap();
+    let (held, turned) = Carrier::TwoAxis.holding(&niu).unwrap();
+    assert!(turned && held.iter().all(|s| Carrier::TwoAxis.reaches(&s.up)));
+    let model = Model::accel(Reference::Table, &Terms::default());
+    let problem = Problem::accel(model, Carrier::TwoAxis).unwrap();
+    let (as_held, published) = (problem.judge(&held, 1.0), problem.judge(&niu, 1.0));
+    assert!(close(as_held.determinant, published.determinant, 1e-12));
+    assert!(Carrier::ThreeAxis.holding(&niu) == Some((niu, false)));
+    for scheme in [Scheme::SixFace, Scheme::FangNine, Scheme::Xu33] {
+        let settings = scheme.settings(Sensor::Accel).unwrap();
+        assert!(Carrier::TwoAxis.holding(&settings).is_none());
+    }
+}

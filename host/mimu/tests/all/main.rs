@@ -1,0 +1,5 @@
+//! Estimators and designs against answers that come from elsewhere.
+
+mod allan_model;
+mod allan_vectors;
+mod design;

@@ -1,0 +1,277 @@
+//! The known input of each step, from a table beside the samples.
+
+use std::collections::{BTreeSet, HashMap};
+use std::path::{Path, PathBuf};
+
+use super::step_labels::StepLabels;
+use crate::cell::{self, shorten};
+use crate::columns::REFERENCE_COLUMNS;
+use crate::error::{Error, Result};
+
+/// Angle turned during a whole step, in degrees.
+const TURN_COLUMNS: [&str; 3] = ["turn_x_deg", "turn_y_deg", "turn_z_deg"];
+
+/// Longest table of inputs in bytes; one row a step does not fill a hundredth of it.
+const LONGEST: u64 = 64 << 20;
+
+/// Known inputs by step.
+///
+/// A CSV file with the column `step` (label or number) and any of the `ref_` columns of a
+/// recording, and `turn_x_deg` and so on: the angle that was turned in all, from which the mean
+/// rate follows with the duration of the step.
+#[derive(Debug)]
+pub(super) struct Inputs {
+    path: PathBuf,
+    /// Which of the `ref_` columns it fills.
+    pub columns: [bool; 6],
+    /// Whether it has an angle anywhere, so that the samples of each step must be counted.
+    pub has_turns: bool,
+    /// Numbers of the steps met so far that are turns.
+    pub turns: BTreeSet<i32>,
+    steps: HashMap<String, Step>,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Step {
+    row: u64,
+    input: [f64; 6],
+    turn_deg: [f64; 3],
+    used: bool,
+}
+
+impl Inputs {
+    /// Reads the table.
+    pub fn read(path: &Path) -> Result<Inputs> {
+        let io = |error: std::io::Error| Error::io(path, &error);
+        if std::fs::metadata(path).map_err(io)?.len() > LONGEST {
+            let problem = "this is too long for a table with one row a step";
+            return Err(Error::new(
+                path.display(),
+                problem,
+                "give the table of inputs, not the samples",
+            ));
+        }
+        let bytes = std::fs::read(path).map_err(io)?;
+        super::binary::refuse_binary(path, &bytes[..bytes.len().min(4096)])?;
+        Self::parse(&bytes, path)
+    }
+
+    fn parse(bytes: &[u8], path: &Path) -> Result<Inputs> {
+        let at = |row: u64| format!("{}, row {row}", path.display());
+        let mut reader = csv::ReaderBuilder::new()
+            .has_headers(false)
+            .flexible(true)
+            .comment(Some(b'#'))
+            .trim(csv::Trim::All)
+            .from_reader(bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes));
+        let mut record = csv::ByteRecord::new();
+        let mut names: Vec<String> = Vec::new();
+        let mut inputs = Inputs {
+            path: path.to_owned(),
+            columns: [false; 6],
+            has_turns: false,
+            turns: BTreeSet::new(),
+            steps: HashMap::new(),
+        };
+        while reader
+            .read_byte_record(&mut record)
+            .map_err(|error| Error::new(path.display(), error, "correct the file"))?
+        {
+            let row = record.position().map_or(1, csv::Position::line);
+            if names.is_empty() {
+                names = inputs.header(&record, &at(row))?;
+                continue;
+            }
+            if record.iter().all(<[u8]>::is_empty) {
+                continue;
+            }
+            if record.len() != names.len() {
+                let problem = format!(
+                    "the row has {} cells and the header {}",
+                    record.len(),
+                    names.len()
+                );
+                return Err(Error::new(at(row), problem, "correct the row"));
+            }
+            inputs.step(&record, &names, row)?;
+        }
+        if inputs.steps.is_empty() {
+            let remedy = "write a header with step and one row for each step";
+            return Err(Error::new(path.display(), "there is no step", remedy));
+        }
+        Ok(inputs)
+    }
+
+    fn header(&mut self, record: &csv::ByteRecord, place: &str) -> Result<Vec<String>> {
+        let names: Vec<String> = record
+            .iter()
+            .map(|name| String::from_utf8_lossy(name).into_owned())
+            .collect();
+        for (i, name) in names.iter().enumerate() {
+            let shown = shorten(name.as_bytes());
+            if names[..i].contains(name) {
+                let problem = format!("column {shown} appears twice");
+                return Err(Error::new(place, problem, "remove one of them"));
+            }
+            let reference = REFERENCE_COLUMNS.iter().position(|known| known == name);
+            let turn = TURN_COLUMNS.iter().position(|known| known == name);
+            match reference.or(turn) {
+                Some(column) => self.columns[column] = true,
+                None if name == "step" => {}
+                None => {
+                    return Err(Error::new(
+                        place,
+                        format!("column {shown} is unknown"),
+                        "use step, the ref_ columns of a recording, and turn_x_deg, turn_y_deg, turn_z_deg",
+                    ));
+                }
+            }
+        }
+        if !names.iter().any(|name| name == "step") {
+            return Err(Error::new(
+                place,
+                "column step is missing",
+                "add it: the label or number of the step",
+            ));
+        }
+        if self.columns == [false; 6] {
+            return Err(Error::new(
+                place,
+                "there is no column with an input",
+                "add a ref_ or turn_ column",
+            ));
+        }
+        Ok(names)
+    }
+
+    fn step(&mut self, record: &csv::ByteRecord, names: &[String], row: u64) -> Result<()> {
+        let path = self.path.display().to_string();
+        let at = |name: &str| format!("{path}, row {row}, column {name}");
+        let mut label = String::new();
+        let mut step = Step {
+            row,
+            input: [f64::NAN; 6],
+            turn_deg: [f64::NAN; 3],
+            used: false,
+        };
+        for (text, name) in record.iter().zip(names) {
+            if name == "step" {
+                label = String::from_utf8_lossy(text).into_owned();
+                continue;
+            }
+            let value = cell::number(text)
+                .map_err(|refusal| Error::new(at(name), refusal.problem, refusal.remedy))?;
+            if let Some(i) = REFERENCE_COLUMNS.iter().position(|known| known == name) {
+                step.input[i] = value;
+            } else if let Some(i) = TURN_COLUMNS.iter().position(|known| known == name) {
+                step.turn_deg[i] = value;
+            }
+        }
+        for ((turn, rate), name) in step.turn_deg.iter().zip(step.input).zip(TURN_COLUMNS) {
+            self.has_turns |= !turn.is_nan();
+            if !turn.is_nan() && !rate.is_nan() {
+                let problem = "both the rate and the angle are given";
+                return Err(Error::new(at(name), problem, "leave one of them empty"));
+            }
+        }
+        if label.is_empty() {
+            return Err(Error::new(
+                at("step"),
+                "the cell is empty",
+                "write the label or number of the step",
+            ));
+        }
+        let place = at("step");
+        if self.steps.insert(label.clone(), step).is_some() {
+            let problem = format!("step {} appears twice", shorten(label.as_bytes()));
+            return Err(Error::new(place, problem, "leave one row for each step"));
+        }
+        Ok(())
+    }
+
+    /// Input during step `number`, which lasts `duration_s`, in deg/s and m/s²; `None` where the
+    /// table does not have it.
+    pub fn input(&mut self, number: i32, labels: &StepLabels, duration_s: f64) -> Option<[f64; 6]> {
+        let label = labels.label(number).map(str::to_owned);
+        let key = label
+            .filter(|label| self.steps.contains_key(label))
+            .unwrap_or_else(|| number.to_string());
+        let step = self.steps.get_mut(&key)?;
+        step.used = true;
+        if step.turn_deg.iter().any(|turn| !turn.is_nan()) {
+            self.turns.insert(number);
+        }
+        let mut input = step.input;
+        for (rate, turn) in input.iter_mut().zip(step.turn_deg) {
+            if !turn.is_nan() {
+                *rate = turn / duration_s;
+            }
+        }
+        Some(input)
+    }
+
+    /// One sentence for the rows that no sample belongs to, if there are any.
+    pub fn unused(&self) -> Option<String> {
+        let mut unused: Vec<(u64, &str)> = self
+            .steps
+            .iter()
+            .filter(|(_, step)| !step.used)
+            .map(|(label, step)| (step.row, label.as_str()))
+            .collect();
+        unused.sort_unstable();
+        let names: Vec<&str> = unused.iter().take(10).map(|(_, label)| *label).collect();
+        (!names.is_empty()).then(|| {
+            format!(
+                "{}: no sample belongs to {} of its steps: {}",
+                self.path.display(),
+                unused.len(),
+                names.join(", ")
+            )
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parse(text: &str) -> Result<Inputs> {
+        Inputs::parse(text.as_bytes(), Path::new("inputs.csv"))
+    }
+
+    #[test]
+    fn an_angle_becomes_the_mean_rate_of_its_step() {
+        let mut inputs = parse("step,turn_x_deg,ref_force_z_mps2\nx_rot,360,\n1,,-9.81\n").unwrap();
+        assert!(inputs.has_turns);
+        assert_eq!(inputs.columns, [true, false, false, false, false, true]);
+        let mut labels = StepLabels::default();
+        labels.number(b"x_rot").unwrap();
+        let input = inputs.input(0, &labels, 4.0).unwrap();
+        assert_eq!(input[0], 90.0);
+        assert!(input[5].is_nan());
+        assert_eq!(inputs.unused().unwrap().matches("1").count(), 2);
+        assert_eq!(inputs.input(1, &labels, 4.0).unwrap()[5], -9.81);
+        assert_eq!(inputs.unused(), None);
+        assert!(inputs.input(2, &labels, 4.0).is_none());
+    }
+
+    #[test]
+    fn a_bad_table_is_refused_with_row_and_column() {
+        for (text, words) in [
+            ("", "no step"),
+            ("step,turn_x_deg\n", "no step"),
+            ("turn_x_deg\n1\n", "column step"),
+            ("step\n1\n", "no column"),
+            ("step,turn_w_deg\n", "turn_w_deg"),
+            ("step,step,turn_x_deg\n", "twice"),
+            ("step,turn_x_deg\na,1\na,2\n", "row 3, column step"),
+            ("step,turn_x_deg\na,b\n", "row 2, column turn_x_deg"),
+            ("step,turn_x_deg\na\n", "row 2: the row has 1"),
+            ("step,turn_x_deg,ref_rate_x_dps\na,1,1\n", "both the rate"),
+            ("step,turn_x_deg\n,1\n", "empty"),
+        ] {
+            let error = parse(text).unwrap_err().to_string();
+            assert!(error.contains(words), "{error}");
+        }
+    }
+}

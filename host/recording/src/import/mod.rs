@@ -1,0 +1,433 @@
+//! Import of foreign files: text of any common shape, and Parquet.
+
+mod assignment;
+mod binary;
+mod foreign;
+mod inputs;
+mod join;
+mod options;
+mod parquet_table;
+mod separator;
+mod step_labels;
+#[cfg(test)]
+mod tests;
+mod text_table;
+
+use std::collections::{BTreeSet, HashMap};
+use std::path::{Path, PathBuf};
+
+pub use assignment::{ColumnList, Role, Scale};
+pub use options::ImportOptions;
+pub use separator::Separator;
+
+use foreign::{ForeignFile, HowToRead, Row, sample_period};
+use inputs::Inputs;
+use join::{Follower, Joined, check_order};
+use options::file_name;
+
+use super::batch::Batch;
+use super::cell::shorten;
+use super::columns::{Column, Columns, Layout};
+use super::digest;
+use super::manifest::{Manifest, Reference, Source};
+use super::writer::Writer;
+use crate::error::{Error, Result};
+
+/// Rows that are written at a time.
+const BATCH: usize = 1 << 14;
+
+/// Lines of the source files that held no row.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct SkippedLines {
+    /// Headers and whatever else stood above the data.
+    pub header: u64,
+    /// Lines that begin with # or %.
+    pub comment: u64,
+    /// Empty lines.
+    pub blank: u64,
+}
+
+/// What an import has done.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ImportSummary {
+    /// The recording.
+    pub recording: PathBuf,
+    /// Rows written.
+    pub rows: u64,
+    /// Sample rate in Hz, given or found.
+    pub sample_rate_hz: f64,
+    /// Lines without a row, over all files.
+    pub skipped: SkippedLines,
+    /// Rows of the first file that another file does not reach in time.
+    pub dropped_outside: u64,
+    /// Rows of the first file that lie in a gap of another file.
+    pub dropped_in_gaps: u64,
+    /// Rows with values interpolated from another file.
+    pub interpolated: u64,
+    /// Raw cells that are empty.
+    pub empty_cells: u64,
+    /// One sentence for each thing that a person should know.
+    pub warnings: Vec<String>,
+}
+
+/// Imports foreign files as a recording at `out`; `progress` hears the share of the first file
+/// that has been read.
+pub fn import(
+    options: &ImportOptions,
+    out: &Path,
+    progress: impl Fn(f64),
+) -> Result<ImportSummary> {
+    check(options, out)?;
+    let mut import = Import::open(options)?;
+    let mut manifest = import.manifest(options, out);
+    manifest.check("import")?;
+    let mut writer = Writer::create(out, import.columns, options.format, options.replace)?;
+    import.run(&mut writer, &progress)?;
+    import.finish_summary(&writer)?;
+    for file in options.files.iter().chain(&options.inputs) {
+        manifest.sources.push(Source {
+            file: file_name(file),
+            sha256: digest::sha256(file)?,
+        });
+    }
+    if let Some(inputs) = &import.inputs {
+        manifest.turn_steps = inputs.turns.iter().copied().collect();
+    }
+    manifest.step_labels = std::mem::take(&mut import.first.labels).into_labels();
+    import.summary.recording = writer.finish(&manifest)?;
+    Ok(import.summary)
+}
+
+/// A rate without the digits that only the rounding of large time stamps has put there.
+fn tidy(rate_hz: f64) -> f64 {
+    format!("{rate_hz:.7e}").parse().unwrap_or(rate_hz)
+}
+
+fn check(options: &ImportOptions, out: &Path) -> Result<()> {
+    let refuse = |problem: String, remedy: &str| Err(Error::new("import", problem, remedy));
+    let (files, lists) = (options.files.len(), options.columns.len());
+    if files == 0 {
+        return refuse("no file is given".to_owned(), "name the files to import");
+    }
+    if lists != 0 && lists != files {
+        return refuse(
+            format!("there are {files} files and {lists} lists of columns"),
+            "give --columns once for each file, in their order",
+        );
+    }
+    if let Some(rate) = options.rate_hz
+        && !(rate.is_finite() && rate > 0.0)
+    {
+        return refuse(
+            format!("{rate} is not a sample rate"),
+            "give samples per second with --rate-hz",
+        );
+    }
+    super::manifest::check_gravity(options.gravity_mps2, "import, gravity")?;
+    // A source inside the recording that is to be replaced would be deleted with it.
+    for file in options.files.iter().chain(&options.inputs) {
+        let (Ok(file), Ok(out)) = (file.canonicalize(), out.canonicalize()) else {
+            continue;
+        };
+        if file.starts_with(&out) {
+            let problem = format!("{} lies in the recording to write", file.display());
+            return refuse(problem, "choose another name for the recording");
+        }
+    }
+    Ok(())
+}
+
+/// An import under way.
+struct Import {
+    first: ForeignFile,
+    followers: Vec<Follower>,
+    rate_hz: f64,
+    columns: Columns,
+    /// Column of each value, in the order in which the files give them.
+    order: Vec<Column>,
+    inputs: Option<Inputs>,
+    /// Rows of each step of the first file, where angles must be divided by durations.
+    step_rows: HashMap<i32, u64>,
+    /// Inputs of the steps met so far; `None` where they are not known.
+    known: HashMap<i32, Option<[f64; 6]>>,
+    time_steps_back: u64,
+    summary: ImportSummary,
+}
+
+impl Import {
+    fn open(options: &ImportOptions) -> Result<Import> {
+        let mut warnings = Vec::new();
+        let first = ForeignFile::open(&options.files[0], &options.how(0))?;
+        let found = match first.has_time() {
+            true => Some(sample_period(&options.files[0], &options.how(0))),
+            false => None,
+        };
+        let rate_hz = match (options.rate_hz, found) {
+            (Some(rate), found) => {
+                if let Some(Ok(period)) = found
+                    && !(0.99..=1.01).contains(&(period * rate))
+                {
+                    warnings.push(format!(
+                        "{}: the times are {period} s apart, which is not the rate of {rate} Hz that was given; \
+                         if they are not in seconds, scale them (--scale t_s=0.001)",
+                        options.files[0].display()
+                    ));
+                }
+                rate
+            }
+            (None, Some(period)) => tidy(1.0 / period?),
+            (None, None) => {
+                // Opening has refused this already: without a time column the rate is needed.
+                return Err(Error::new(
+                    "import",
+                    "the rate is not known",
+                    "give it with --rate-hz",
+                ));
+            }
+        };
+        let mut followers = Vec::new();
+        for (index, path) in options.files.iter().enumerate().skip(1) {
+            let how = HowToRead {
+                rate_hz: Some(rate_hz),
+                ..options.how(index)
+            };
+            let file = ForeignFile::open(path, &how)?;
+            if file.has_step() {
+                let problem = "the column step is not in the first file";
+                let remedy = "name the file with the steps first";
+                return Err(Error::new(path.display(), problem, remedy));
+            }
+            let period = sample_period(path, &how)?;
+            followers.push(Follower::new(file, period, 1.0 / rate_hz));
+        }
+        let order: Vec<Column> = first
+            .columns()
+            .chain(
+                followers
+                    .iter()
+                    .flat_map(|follower| follower.file.columns()),
+            )
+            .collect();
+        let inputs = options.inputs.as_deref().map(Inputs::read).transpose()?;
+        let mut names: Vec<&str> = vec![Column::Time.name()];
+        names.extend(order.iter().map(|column| column.name()));
+        if first.has_step() {
+            names.push(Column::Step.name());
+        }
+        let given = inputs.as_ref().map_or([false; 6], |inputs| inputs.columns);
+        let given = (0..6)
+            .filter(|&i| given[i])
+            .map(|i| Column::Reference(i).name());
+        names.extend(given);
+        // The same rules as for a recording's header: nothing twice, all axes of a sensor.
+        let columns = Layout::from_names(&names, "import, all columns together")?.columns;
+        if inputs.is_some() && !first.has_step() {
+            let problem = "a table of inputs is given, and no column is step";
+            return Err(Error::new(
+                "import",
+                problem,
+                "name the column with the steps",
+            ));
+        }
+        if options.reference == Reference::Table && columns.reference == [false; 6] {
+            return Err(Error::new(
+                "import, reference",
+                "the reference is to be the table, and there is no ref_ column",
+                "add the ref_ columns or a table of inputs, or say --reference gravity",
+            ));
+        }
+        for file in followers
+            .iter()
+            .map(|follower| &follower.file)
+            .chain([&first])
+        {
+            warnings.extend_from_slice(file.warnings());
+        }
+        let mut import = Import {
+            rate_hz,
+            columns,
+            order,
+            step_rows: HashMap::new(),
+            known: HashMap::new(),
+            time_steps_back: 0,
+            summary: ImportSummary {
+                recording: PathBuf::new(),
+                rows: 0,
+                sample_rate_hz: rate_hz,
+                skipped: SkippedLines::default(),
+                dropped_outside: 0,
+                dropped_in_gaps: 0,
+                interpolated: 0,
+                empty_cells: 0,
+                warnings,
+            },
+            inputs,
+            first,
+            followers,
+        };
+        if import
+            .inputs
+            .as_ref()
+            .is_some_and(|inputs| inputs.has_turns)
+        {
+            import.count_steps(&options.how(0))?;
+        }
+        Ok(import)
+    }
+
+    /// First pass: the duration of a step is known only when all of it has been seen.
+    fn count_steps(&mut self, how: &HowToRead<'_>) -> Result<()> {
+        let mut file = ForeignFile::open(self.first.path(), how)?;
+        let mut row = Row::default();
+        while file.next(&mut row)? {
+            *self.step_rows.entry(row.step).or_default() += 1;
+        }
+        Ok(())
+    }
+
+    fn manifest(&self, options: &ImportOptions, out: &Path) -> Manifest {
+        let device = options.device.clone().unwrap_or_else(|| file_name(out));
+        let mut manifest = Manifest::new(
+            device,
+            self.rate_hz,
+            options.gravity_mps2,
+            options.raw_unit,
+            options.reference,
+        );
+        manifest.latitude_deg = options.latitude_deg;
+        manifest.imported_with = options.arguments();
+        manifest
+    }
+
+    fn run(&mut self, writer: &mut Writer, progress: &impl Fn(f64)) -> Result<()> {
+        let mut row = Row::default();
+        let mut values = Vec::new();
+        let mut batch = Batch::default();
+        let mut last_t_s = f64::NEG_INFINITY;
+        while self.first.next(&mut row)? {
+            if !self.followers.is_empty() {
+                check_order(&self.first, &row, last_t_s)?;
+            } else if row.t_s <= last_t_s {
+                self.time_steps_back += 1;
+                if self.time_steps_back == 1 {
+                    let place = self.first.place(row.number);
+                    self.summary.warnings.push(format!(
+                        "{place}, column t_s: the time {} s does not lie after {last_t_s} s of the row before",
+                        row.t_s
+                    ));
+                }
+            }
+            last_t_s = row.t_s;
+            values.clear();
+            values.extend_from_slice(&row.values);
+            if self.join(row.t_s, &mut values)? {
+                self.push(&row, &values, &mut batch);
+            }
+            if batch.len() == BATCH {
+                writer.write(&batch)?;
+                batch.clear();
+                progress(self.first.progress());
+            }
+        }
+        writer.write(&batch)?;
+        progress(1.0);
+        Ok(())
+    }
+
+    /// Appends what the other files have at that time; `false` where the row is to be dropped.
+    fn join(&mut self, t_s: f64, values: &mut Vec<f64>) -> Result<bool> {
+        let mut worst = Joined::Exactly;
+        for follower in &mut self.followers {
+            match follower.values_at(t_s, values)? {
+                Joined::Exactly => {}
+                Joined::Interpolated if worst != Joined::Exactly => {}
+                other => worst = other,
+            }
+        }
+        match worst {
+            Joined::Exactly => return Ok(true),
+            Joined::Interpolated => self.summary.interpolated += 1,
+            Joined::Outside => self.summary.dropped_outside += 1,
+            Joined::Gap => self.summary.dropped_in_gaps += 1,
+        }
+        Ok(worst == Joined::Interpolated)
+    }
+
+    fn push(&mut self, row: &Row, values: &[f64], batch: &mut Batch) {
+        batch.t_s.push(row.t_s);
+        if self.columns.step {
+            batch.step.push(row.step);
+        }
+        for (column, &value) in self.order.iter().zip(values) {
+            if matches!(column, Column::Raw(_)) {
+                self.summary.empty_cells += u64::from(value.is_nan());
+            }
+            if let Some(target) = batch.values_mut(*column) {
+                target.push(value);
+            }
+        }
+        if let Some(inputs) = &mut self.inputs {
+            let labels = &self.first.labels;
+            let known = match row.step {
+                -1 => None,
+                step => *self.known.entry(step).or_insert_with(|| {
+                    // n samples span n periods: each stands for the time until the next.
+                    let rows = self.step_rows.get(&step).copied().unwrap_or(0);
+                    inputs.input(step, labels, rows as f64 / self.rate_hz)
+                }),
+            };
+            for (i, target) in batch.reference.iter_mut().enumerate() {
+                if inputs.columns[i] {
+                    target.push(known.map_or(f64::NAN, |input| input[i]));
+                }
+            }
+        }
+    }
+
+    fn finish_summary(&mut self, writer: &Writer) -> Result<()> {
+        let summary = &mut self.summary;
+        summary.rows = writer.rows();
+        if summary.rows == 0 {
+            return Err(Error::new(
+                "import",
+                "the files have no time in common",
+                "check that their times begin at the same instant and are in the same unit",
+            ));
+        }
+        for file in self.followers.iter().map(|f| &f.file).chain([&self.first]) {
+            let skipped = file.skipped();
+            summary.skipped.header += skipped.header;
+            summary.skipped.comment += skipped.comment;
+            summary.skipped.blank += skipped.blank;
+        }
+        if summary.interpolated > 0 {
+            summary.warnings.push(format!(
+                "{} rows were interpolated between the times of another file, which lowers the white noise of its columns",
+                summary.interpolated
+            ));
+        }
+        if self.time_steps_back > 1 {
+            let times = self.time_steps_back;
+            summary
+                .warnings
+                .push(format!("the time does not increase in {times} rows"));
+        }
+        if let Some(inputs) = &self.inputs {
+            let unknown = self.known.iter().filter(|(_, input)| input.is_none());
+            let steps: BTreeSet<i32> = unknown.map(|(&step, _)| step).collect();
+            if !steps.is_empty() {
+                let name = |&step: &i32| match self.first.labels.label(step) {
+                    Some(label) => shorten(label.as_bytes()),
+                    None => step.to_string(),
+                };
+                let names: Vec<String> = steps.iter().take(10).map(name).collect();
+                let (count, names) = (steps.len(), names.join(", "));
+                summary.warnings.push(format!(
+                    "the inputs of {count} steps are not known: {names}"
+                ));
+            }
+            summary.warnings.extend(inputs.unused());
+        }
+        Ok(())
+    }
+}

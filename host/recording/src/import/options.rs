@@ -1,0 +1,116 @@
+//! What to import and how.
+
+use std::path::{Path, PathBuf};
+
+use super::assignment::{ColumnList, Scale};
+use super::foreign::HowToRead;
+use super::separator::Separator;
+use crate::manifest::{RawUnit, Reference};
+use crate::writer::SampleFormat;
+
+/// What to import and how.
+#[derive(Debug, Clone)]
+pub struct ImportOptions {
+    /// Files; the later ones are joined onto the times of the first.
+    pub files: Vec<PathBuf>,
+    /// One list for each file; none at all where the headers have the names of a recording.
+    pub columns: Vec<ColumnList>,
+    /// Separator of text files; found out where it is `None`.
+    pub separator: Option<Separator>,
+    /// Sample rate in Hz; without it, the inverse of the median time step of the first file.
+    pub rate_hz: Option<f64>,
+    /// Local gravity in m/s².
+    pub gravity_mps2: f64,
+    /// Unit of the raw columns, after scaling.
+    pub raw_unit: RawUnit,
+    /// What is known of the true input.
+    pub reference: Reference,
+    /// Factors for columns; several for the same column multiply.
+    pub scales: Vec<Scale>,
+    /// Name of the unit; without it, the name of the recording.
+    pub device: Option<String>,
+    /// Latitude in degrees.
+    pub latitude_deg: Option<f64>,
+    /// Table of the known input of each step.
+    pub inputs: Option<PathBuf>,
+    /// Format of the samples.
+    pub format: SampleFormat,
+    /// Whether an existing recording is replaced.
+    pub replace: bool,
+}
+
+impl ImportOptions {
+    /// Options with the values that have no default.
+    pub fn new(
+        files: Vec<PathBuf>,
+        gravity_mps2: f64,
+        raw_unit: RawUnit,
+        reference: Reference,
+    ) -> Self {
+        Self {
+            files,
+            columns: Vec::new(),
+            separator: None,
+            rate_hz: None,
+            gravity_mps2,
+            raw_unit,
+            reference,
+            scales: Vec::new(),
+            device: None,
+            latitude_deg: None,
+            inputs: None,
+            format: SampleFormat::default(),
+            replace: false,
+        }
+    }
+
+    /// The options as arguments of `mimu import`, for the manifest. File names only: where the
+    /// files were on somebody's machine helps nobody and may not be meant to be passed on.
+    pub(super) fn arguments(&self) -> Vec<String> {
+        let mut arguments: Vec<String> = self.files.iter().map(|file| file_name(file)).collect();
+        let mut option = |name: &str, value: String| {
+            arguments.push(name.to_owned());
+            arguments.push(value);
+        };
+        for list in &self.columns {
+            option("--columns", list.to_string());
+        }
+        if let Some(separator) = self.separator {
+            option("--separator", separator.to_string());
+        }
+        if let Some(rate) = self.rate_hz {
+            option("--rate-hz", rate.to_string());
+        }
+        option("--gravity", self.gravity_mps2.to_string());
+        option("--raw-unit", self.raw_unit.to_string());
+        option("--reference", self.reference.to_string());
+        for scale in &self.scales {
+            option("--scale", scale.to_string());
+        }
+        if let Some(device) = &self.device {
+            option("--device", device.clone());
+        }
+        if let Some(latitude) = self.latitude_deg {
+            option("--latitude", latitude.to_string());
+        }
+        if let Some(inputs) = &self.inputs {
+            option("--inputs", file_name(inputs));
+        }
+        arguments
+    }
+
+    pub(super) fn how(&self, file: usize) -> HowToRead<'_> {
+        HowToRead {
+            list: self.columns.get(file),
+            separator: self.separator,
+            scales: &self.scales,
+            rate_hz: self.rate_hz,
+        }
+    }
+}
+
+/// Name of a file without its folder.
+pub(super) fn file_name(path: &Path) -> String {
+    let name = path.file_name().unwrap_or(path.as_os_str());
+    name.to_string_lossy().into_owned()
+}

@@ -1,0 +1,193 @@
+//! Rows of a foreign Parquet file.
+
+use std::path::{Path, PathBuf};
+
+use parquet::data_type::ByteArray;
+
+use super::assignment::{ColumnList, Role};
+use super::text_table::Cells;
+use crate::cell::{is_reading, no_reading};
+use crate::columns::Column;
+use crate::csv_writer::write_number;
+use crate::error::{Error, Result};
+use crate::in_order::broke_down;
+use crate::parquet_file::{Cursor, Leaf, ParquetFile};
+
+/// Rows that are decoded at a time.
+const SLICE: usize = 1 << 14;
+
+/// A Parquet file, positioned at its next row.
+pub(super) struct ParquetTable {
+    path: PathBuf,
+    rows: u64,
+    columns: Vec<Source>,
+    /// Rows of the slice that have been handed out, and those that it has.
+    at: usize,
+    filled: usize,
+    row: u64,
+    pub warnings: Vec<String>,
+}
+
+struct Source {
+    role: Role,
+    name: String,
+    leaf: Leaf,
+    cursor: Cursor,
+    values: Vec<f64>,
+    texts: Vec<ByteArray>,
+}
+
+impl std::fmt::Debug for ParquetTable {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("ParquetTable")
+            .field("path", &self.path)
+            .finish_non_exhaustive()
+    }
+}
+
+impl ParquetTable {
+    /// Opens the file; without `list` its columns must have the names of a recording's.
+    pub fn open(path: &Path, list: Option<&ColumnList>) -> Result<ParquetTable> {
+        let file = ParquetFile::open(path)?;
+        let names = file.names();
+        let mut warnings = Vec::new();
+        let wanted: Vec<(Role, String)> = match list {
+            Some(ColumnList::ByName(wanted)) => wanted.clone(),
+            Some(ColumnList::ByPosition(items)) => {
+                if items.len() != names.len() {
+                    return Err(Error::new(
+                        path.display(),
+                        format!(
+                            "the file has {} columns and --columns {}",
+                            names.len(),
+                            items.len()
+                        ),
+                        "name every column, - for one to skip, or choose by name: gyro_x=wx",
+                    ));
+                }
+                let both = items.iter().zip(&names);
+                both.filter_map(|(role, name)| Some(((*role)?, name.clone())))
+                    .collect()
+            }
+            None => {
+                let (known, unknown): (Vec<Role>, Vec<&String>) = (
+                    Role::all()
+                        .filter(|role| names.iter().any(|n| n == role.name()))
+                        .collect(),
+                    names
+                        .iter()
+                        .filter(|n| Role::all().all(|role| role.name() != *n))
+                        .collect(),
+                );
+                for name in unknown {
+                    warnings.push(format!("{}: column {name} is ignored", path.display()));
+                }
+                known
+                    .into_iter()
+                    .map(|role| (role, role.name().to_owned()))
+                    .collect()
+            }
+        };
+        let mut columns = Vec::new();
+        for (role, name) in wanted {
+            let leaf = file.leaf(&name)?;
+            if leaf.is_text() && role != Role::Column(Column::Step) {
+                return Err(Error::new(
+                    format!("{}, column {name}", path.display()),
+                    format!("it holds text, and {} is a number", role.name()),
+                    "write it as DOUBLE, FLOAT, INT32 or INT64",
+                ));
+            }
+            columns.push(Source {
+                role,
+                name,
+                leaf,
+                cursor: Cursor::new(&file, leaf),
+                values: Vec::new(),
+                texts: Vec::new(),
+            });
+        }
+        if columns.is_empty() {
+            return Err(Error::new(
+                path.display(),
+                "no column has the name of a recording's column",
+                "say what the columns are, as in --columns gyro_x=wx,gyro_y=wy,gyro_z=wz",
+            ));
+        }
+        Ok(ParquetTable {
+            path: path.to_owned(),
+            rows: file.rows(),
+            columns,
+            at: 0,
+            filled: 0,
+            row: 0,
+            warnings,
+        })
+    }
+
+    /// Roles in the order of [`Cells::numbers`].
+    pub fn roles(&self) -> Vec<Role> {
+        self.columns.iter().map(|column| column.role).collect()
+    }
+
+    /// Share of the file that has been read.
+    pub fn progress(&self) -> f64 {
+        self.row as f64 / self.rows.max(1) as f64
+    }
+
+    /// Reads the next row into `cells` and returns its number from 1, or `None` at the end.
+    pub fn next(&mut self, cells: &mut Cells) -> Result<Option<u64>> {
+        if self.row == self.rows {
+            return Ok(None);
+        }
+        if self.at == self.filled {
+            self.fill()?;
+        }
+        cells.numbers.clear();
+        cells.step.clear();
+        for column in &self.columns {
+            let step = column.role == Role::Column(Column::Step);
+            if column.leaf.is_text() {
+                cells.step.extend_from_slice(column.texts[self.at].data());
+                cells.numbers.push(f64::NAN);
+                continue;
+            }
+            let value = column.values[self.at];
+            if !is_reading(value) {
+                let (path, row) = (self.path.display(), self.row + 1);
+                let place = format!("{path}, row {row}, column {}", column.name);
+                let refusal = no_reading(value, &format!("{value:e}"));
+                return Err(Error::new(place, refusal.problem, refusal.remedy));
+            }
+            if step {
+                write_number(value, &mut cells.step);
+            }
+            cells.numbers.push(value);
+        }
+        self.at += 1;
+        self.row += 1;
+        Ok(Some(self.row))
+    }
+
+    fn fill(&mut self) -> Result<()> {
+        let count = (self.rows - self.row).min(SLICE as u64) as usize;
+        for column in &mut self.columns {
+            column.values.clear();
+            column.texts.clear();
+            // The decoders have panicked on damaged files before; a damaged file is no bug of ours.
+            let decode = std::panic::AssertUnwindSafe(|| match column.leaf.is_text() {
+                true => column.cursor.read_text(count, &mut column.texts),
+                false => column.cursor.read(count, &mut column.values),
+            });
+            let decoded = std::panic::catch_unwind(decode)
+                .map_err(|_| broke_down(&self.path.display().to_string()))?;
+            decoded.map_err(|problem| {
+                let place = format!("{}, column {}", self.path.display(), column.name);
+                Error::new(place, problem, "write the file again from its source")
+            })?;
+        }
+        self.at = 0;
+        self.filled = count;
+        Ok(())
+    }
+}

@@ -1,0 +1,413 @@
+//! Rows of a foreign text file, whatever its separator and whatever stands above its data.
+
+use std::fs::File;
+use std::io::{BufRead, BufReader, Chain, Cursor, Read};
+use std::path::{Path, PathBuf};
+
+use super::SkippedLines;
+use super::assignment::{ColumnList, Role};
+use super::binary::refuse_binary;
+use super::separator::Separator;
+use crate::cell::{self, Refusal, shorten};
+use crate::columns::Column;
+use crate::csv_file::BOM;
+use crate::error::{Error, Result};
+
+/// Bytes at the start within which the data must begin.
+const HEAD: u64 = 1 << 18;
+
+/// Longest line in bytes.
+const LONGEST_LINE: u64 = 1 << 20;
+
+/// The cells of a row that somebody asked for.
+#[derive(Debug, Default)]
+pub(super) struct Cells {
+    /// Numbers in the order of the table's roles; the place of a step holds nothing.
+    pub numbers: Vec<f64>,
+    /// Text of the step.
+    pub step: Vec<u8>,
+}
+
+/// A text file, positioned at its next row.
+#[derive(Debug)]
+pub(super) struct TextTable {
+    path: PathBuf,
+    reader: BufReader<Chain<Cursor<Vec<u8>>, File>>,
+    separator: Separator,
+    /// Position and role of each cell that is wanted.
+    wanted: Vec<(usize, Role)>,
+    /// Cells that a row must have; more of them must be empty.
+    width: usize,
+    line: Vec<u8>,
+    line_number: u64,
+    /// Line of the first row.
+    first_row: u64,
+    bytes: u64,
+    length: u64,
+    record: csv::ByteRecord,
+    pub skipped: SkippedLines,
+    pub warnings: Vec<String>,
+}
+
+/// What a line is, as far as that can be seen without the list of columns.
+enum Kind {
+    Blank,
+    Comment,
+    Other,
+}
+
+fn kind(line: &[u8]) -> Kind {
+    match line.trim_ascii().first() {
+        None => Kind::Blank,
+        Some(b'#' | b'%') => Kind::Comment,
+        Some(_) => Kind::Other,
+    }
+}
+
+impl TextTable {
+    /// Opens the file and finds its header and its first row; without `list` the names in the
+    /// header must be those of a recording.
+    pub fn open(
+        path: &Path,
+        list: Option<&ColumnList>,
+        separator: Option<Separator>,
+    ) -> Result<TextTable> {
+        let io = |error: std::io::Error| Error::io(path, &error);
+        let mut file = File::open(path).map_err(io)?;
+        let length = file.metadata().map_err(io)?.len();
+        let mut head = Vec::new();
+        (&mut file).take(HEAD).read_to_end(&mut head).map_err(io)?;
+        refuse_binary(path, &head)?;
+        if head.starts_with(BOM) {
+            head.drain(..BOM.len());
+        }
+        let whole_lines = match memchr::memrchr(b'\n', &head) {
+            Some(end) if head.len() as u64 >= HEAD - BOM.len() as u64 => &head[..=end],
+            _ => &head[..],
+        };
+        let lines: Vec<&[u8]> = whole_lines
+            .split(|&byte| byte == b'\n')
+            .map(|line| line.strip_suffix(b"\r").unwrap_or(line))
+            .collect();
+        let separator = separator.unwrap_or_else(|| {
+            let shown: Vec<&[u8]> = lines
+                .iter()
+                .filter(|line| matches!(kind(line), Kind::Other))
+                .copied()
+                .collect();
+            Separator::detect(&shown)
+        });
+        let mut table = TextTable {
+            path: path.to_owned(),
+            reader: BufReader::new(Cursor::new(Vec::new()).chain(file)),
+            separator,
+            wanted: Vec::new(),
+            width: 0,
+            line: Vec::new(),
+            line_number: 0,
+            first_row: 0,
+            bytes: 0,
+            length,
+            record: csv::ByteRecord::new(),
+            skipped: SkippedLines::default(),
+            warnings: Vec::new(),
+        };
+        table.find_rows(&lines, list)?;
+        let (_, file) = table.reader.into_inner().into_inner();
+        let start = Cursor::new(head).chain(file);
+        table.reader = BufReader::with_capacity(1 << 18, start);
+        Ok(table)
+    }
+
+    /// Roles in the order of [`Cells::numbers`].
+    pub fn roles(&self) -> Vec<Role> {
+        self.wanted.iter().map(|(_, role)| *role).collect()
+    }
+
+    /// Share of the file that has been read.
+    pub fn progress(&self) -> f64 {
+        self.bytes as f64 / self.length.max(1) as f64
+    }
+
+    /// Place of a line, for messages.
+    pub fn place(&self, row: u64) -> String {
+        format!("{}, row {row}", self.path.display())
+    }
+
+    /// Reads the next row into `cells` and returns its line, or `None` at the end.
+    pub fn next(&mut self, cells: &mut Cells) -> Result<Option<u64>> {
+        loop {
+            self.line.clear();
+            let read = (&mut self.reader)
+                .take(LONGEST_LINE)
+                .read_until(b'\n', &mut self.line)
+                .map_err(|error| Error::io(&self.path, &error))?;
+            if read == 0 {
+                return Ok(None);
+            }
+            self.line_number += 1;
+            self.bytes += read as u64;
+            let number = self.line_number;
+            let ended = self.line.pop_if(|last| *last == b'\n').is_some();
+            self.line.pop_if(|last| *last == b'\r');
+            if !ended && read as u64 == LONGEST_LINE {
+                let problem = "the line is longer than 1 MiB";
+                let remedy = "give a text file with one row a line";
+                return Err(Error::new(self.place(number), problem, remedy));
+            }
+            if number < self.first_row {
+                // Looked at and counted when the file was opened.
+                continue;
+            }
+            match kind(&self.line) {
+                Kind::Blank => self.skipped.blank += 1,
+                Kind::Comment => self.skipped.comment += 1,
+                Kind::Other => {
+                    self.separator.split(&self.line, &mut self.record);
+                    if let Some(refusal) = self.misfit(&self.record, ended) {
+                        return Err(Error::new(
+                            self.place(number),
+                            refusal.problem,
+                            refusal.remedy,
+                        ));
+                    }
+                    self.parse(number, cells)?;
+                    return Ok(Some(number));
+                }
+            }
+        }
+    }
+
+    fn parse(&self, line: u64, cells: &mut Cells) -> Result<()> {
+        cells.numbers.clear();
+        cells.step.clear();
+        for &(position, role) in &self.wanted {
+            let cell = &self.record[position];
+            if role == Role::Column(Column::Step) {
+                cells.step.extend_from_slice(cell);
+                cells.numbers.push(f64::NAN);
+                continue;
+            }
+            cells.numbers.push(cell::number(cell).map_err(|refusal| {
+                let place = format!("{}, column {}", self.place(line), role.name());
+                Error::new(place, refusal.problem, refusal.remedy)
+            })?);
+        }
+        Ok(())
+    }
+
+    /// What is wrong with the width of a row.
+    fn misfit(&self, record: &csv::ByteRecord, ended: bool) -> Option<Refusal> {
+        let cells = record.len();
+        if cells < self.width {
+            let problem = match ended {
+                true => format!("the row has {cells} cells and {} are expected", self.width),
+                false => format!(
+                    "the file is truncated: its last row has {cells} of {} cells",
+                    self.width
+                ),
+            };
+            return Some(Refusal {
+                problem,
+                remedy: "correct or remove the row",
+            });
+        }
+        // Spreadsheets leave separators behind where nothing stands.
+        if record.iter().skip(self.width).all(<[u8]>::is_empty) {
+            return None;
+        }
+        Some(Refusal {
+            problem: format!("the row has {cells} cells and {} are expected", self.width),
+            remedy: "correct the row, or add - to --columns for each column to skip",
+        })
+    }
+
+    /// Finds the first row among `lines` and, where columns go by name, the header above it.
+    fn find_rows(&mut self, lines: &[&[u8]], list: Option<&ColumnList>) -> Result<()> {
+        // The line that comes nearest to the header that is looked for.
+        let mut names: Vec<String> = Vec::new();
+        if let Some(ColumnList::ByPosition(items)) = list {
+            let place = |(position, role): (usize, &Option<Role>)| Some((position, (*role)?));
+            self.wanted = items.iter().enumerate().filter_map(place).collect();
+            self.width = items.len();
+        }
+        let mut record = csv::ByteRecord::new();
+        let mut last_misfit = None;
+        for (index, line) in lines.iter().enumerate() {
+            let number = index as u64 + 1;
+            match kind(line) {
+                Kind::Blank => {
+                    // The piece after the last line break is no line.
+                    self.skipped.blank += u64::from(index + 1 < lines.len());
+                    continue;
+                }
+                Kind::Comment => {
+                    self.skipped.comment += 1;
+                    continue;
+                }
+                Kind::Other => self.separator.split(line, &mut record),
+            }
+            if self.wanted.is_empty() {
+                let here: Vec<String> = record
+                    .iter()
+                    .map(|name| String::from_utf8_lossy(name).trim().to_owned())
+                    .collect();
+                self.take_header(&here, list, number)?;
+                if names.is_empty() || matches(list, &here) > matches(list, &names) {
+                    names = here;
+                }
+            } else if let Some(refusal) = self.misfit(&record, true) {
+                last_misfit = Some((number, refusal.problem));
+            } else {
+                match self.looks_like(&record) {
+                    Look::Row => {
+                        self.first_row = number;
+                        return Ok(());
+                    }
+                    Look::BrokenRow(role, refusal) => {
+                        let place = format!("{}, column {}", self.place(number), role.name());
+                        return Err(Error::new(place, refusal.problem, refusal.remedy));
+                    }
+                    Look::Words => last_misfit = Some((number, "it holds words".to_owned())),
+                }
+            }
+            self.skipped.header += 1;
+        }
+        let path = self.path.display();
+        if self.wanted.is_empty() {
+            let (problem, remedy) = match list {
+                None => (
+                    "there is no header with the names of a recording's columns".to_owned(),
+                    "say what the columns are with --columns",
+                ),
+                Some(ColumnList::ByName(wanted)) => {
+                    let missing = |(_, name): &&(Role, String)| !names.contains(name);
+                    let name = wanted.iter().find(missing).map_or("", |(_, name)| name);
+                    let name = shorten(name.as_bytes());
+                    (
+                        format!("there is no header that has the column {name}"),
+                        "check the name; it must be spelt as in the file",
+                    )
+                }
+                Some(ColumnList::ByPosition(_)) => (
+                    "all columns are skipped".to_owned(),
+                    "name the columns that are wanted",
+                ),
+            };
+            return Err(Error::new(path, problem, remedy));
+        }
+        match last_misfit {
+            Some((row, problem)) => Err(Error::new(
+                self.place(row),
+                format!(
+                    "no row fits the list of {} columns ({problem}; separator: {})",
+                    self.width, self.separator
+                ),
+                "name every column with --columns, - for one to skip",
+            )),
+            None => Err(Error::new(
+                path,
+                "there is no row of data",
+                "record it again",
+            )),
+        }
+    }
+
+    /// Takes the line as header if it has the names that are looked for.
+    fn take_header(
+        &mut self,
+        names: &[String],
+        list: Option<&ColumnList>,
+        number: u64,
+    ) -> Result<()> {
+        let wanted = match list {
+            Some(ColumnList::ByPosition(_)) => return Ok(()),
+            Some(ColumnList::ByName(wanted)) => wanted.clone(),
+            None => {
+                let known = Role::all().map(|role| (role, role.name().to_owned()));
+                let here: Vec<(Role, String)> =
+                    known.filter(|(_, name)| names.contains(name)).collect();
+                let sensor = |(role, _): &&(Role, String)| {
+                    matches!(role, Role::Column(Column::Raw(_) | Column::Temperature))
+                };
+                if here.iter().find(sensor).is_none() {
+                    return Ok(());
+                }
+                let ignored: Vec<&str> = names
+                    .iter()
+                    .filter(|name| !name.is_empty() && here.iter().all(|(_, known)| known != *name))
+                    .map(String::as_str)
+                    .collect();
+                if !ignored.is_empty() {
+                    let ignored = shorten(ignored.join(", ").as_bytes());
+                    let place = self.place(number);
+                    self.warnings
+                        .push(format!("{place}: columns {ignored} are ignored"));
+                }
+                here
+            }
+        };
+        let mut positions = Vec::new();
+        for (role, name) in wanted {
+            let mut found = (0..names.len()).filter(|&i| names[i] == name);
+            match (found.next(), found.next()) {
+                (None, _) => return Ok(()),
+                (Some(position), None) => positions.push((position, role)),
+                (Some(_), Some(_)) => {
+                    let problem = format!("column {} appears twice", shorten(name.as_bytes()));
+                    let remedy = "rename one of them, or give the columns by position";
+                    return Err(Error::new(self.place(number), problem, remedy));
+                }
+            }
+        }
+        self.wanted = positions;
+        let filled = |name: &&String| !name.is_empty();
+        self.width = names
+            .iter()
+            .rposition(|name| filled(&name))
+            .map_or(0, |last| last + 1);
+        Ok(())
+    }
+
+    /// Whether a line of the right width is a row, a row with a mistake, or words above the data.
+    fn looks_like(&self, record: &csv::ByteRecord) -> Look {
+        let mut numbers = 0;
+        let mut mistakes = 0;
+        let mut first_mistake = None;
+        for &(position, role) in &self.wanted {
+            if role == Role::Column(Column::Step) {
+                continue;
+            }
+            match cell::number(&record[position]) {
+                Ok(value) => numbers += usize::from(!value.is_nan()),
+                Err(refusal) => {
+                    mistakes += 1;
+                    first_mistake.get_or_insert((role, refusal));
+                }
+            }
+        }
+        match first_mistake {
+            None if numbers > 0 => Look::Row,
+            // Skipping this as a header would lose a row without a word.
+            Some((role, refusal)) if numbers > mistakes => Look::BrokenRow(role, refusal),
+            _ => Look::Words,
+        }
+    }
+}
+
+/// How many of the columns that are wanted by name are among `names`.
+fn matches(list: Option<&ColumnList>, names: &[String]) -> usize {
+    match list {
+        Some(ColumnList::ByName(wanted)) => {
+            let here = wanted.iter().filter(|(_, name)| names.contains(name));
+            here.count()
+        }
+        _ => 0,
+    }
+}
+
+enum Look {
+    Row,
+    BrokenRow(Role, Refusal),
+    Words,
+}

@@ -1,0 +1,40 @@
+//! Recordings: reading them in a stream, writing them whole, and importing foreign files.
+//!
+//! A recording is a directory with `recording.toml` ([`Manifest`]) and `samples.csv` or
+//! `samples.parquet`. Four hours at 1 kHz are ordinary, so nothing here holds a whole file:
+//! [`Recording::for_each_batch`] hands rows over in order, a few thousand at a time.
+
+pub mod error;
+pub mod result_file;
+
+mod batch;
+mod cell;
+mod columns;
+mod csv_file;
+mod csv_writer;
+mod digest;
+mod growing;
+mod import;
+mod in_order;
+mod manifest;
+mod parquet_file;
+mod parquet_writer;
+mod reader;
+mod recorded;
+#[cfg(test)]
+mod round_trip_tests;
+mod staging;
+mod strict_file;
+mod writer;
+
+pub use batch::Batch;
+pub use columns::{Column, Columns, RAW_COLUMNS, REFERENCE_COLUMNS};
+pub use growing::Growing;
+pub use import::{
+    ColumnList, ImportOptions, ImportSummary, Role, Scale, Separator, SkippedLines, import,
+};
+pub use manifest::read_text;
+pub use manifest::{Format, MANIFEST_FILE, Manifest, Rails, RawUnit, Reference, Source};
+pub use reader::{ReadSummary, Recording};
+pub use recorded::{Recorded, Restart};
+pub use writer::{SampleFormat, Writer};

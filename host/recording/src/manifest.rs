@@ -1,0 +1,445 @@
+//! `recording.toml`: what is known of a recording beside its samples.
+
+use std::fmt;
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use super::recorded::Recorded;
+use crate::error::{Error, Result};
+
+/// Name of the manifest in a recording's directory.
+pub const MANIFEST_FILE: &str = "recording.toml";
+
+/// Gravity on the Earth's surface with room to spare: 9.764 (Huascarán) to 9.834 (poles) m/s².
+const GRAVITY_RANGE: std::ops::RangeInclusive<f64> = 9.7..=9.9;
+
+/// No inertial sensor is slower or faster.
+const RATE_RANGE: std::ops::RangeInclusive<f64> = 0.01..=1e7;
+
+/// Version of the layout of a recording.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub enum Format {
+    /// The only one so far.
+    #[default]
+    #[serde(rename = "mimu-recording/1")]
+    V1,
+}
+
+/// Unit of the raw columns.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum RawUnit {
+    /// Volts at the converter's input.
+    #[serde(rename = "V")]
+    Volt,
+    /// The device's own counts.
+    #[serde(rename = "count")]
+    Count,
+    /// Already rad/s and m/s², from a device that applies a calibration of its own. "Raw" is then
+    /// what that device reports, and the fit finds what its calibration has left.
+    #[serde(rename = "SI")]
+    Si,
+}
+
+/// What is known of the true input.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Reference {
+    /// The `ref_` columns hold it.
+    Table,
+    /// Only the size of gravity, at rest.
+    Gravity,
+}
+
+impl fmt::Display for RawUnit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            RawUnit::Volt => "V",
+            RawUnit::Count => "count",
+            RawUnit::Si => "SI",
+        })
+    }
+}
+
+impl fmt::Display for Reference {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Reference::Table => "table",
+            Reference::Gravity => "gravity",
+        })
+    }
+}
+
+impl std::str::FromStr for RawUnit {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        match text {
+            "V" => Ok(RawUnit::Volt),
+            "count" => Ok(RawUnit::Count),
+            "SI" => Ok(RawUnit::Si),
+            _ => Err(Error::new(
+                "raw unit",
+                format!("{} is not known", super::cell::shorten(text.as_bytes())),
+                "write V, count or SI (rad/s and m/s²)",
+            )),
+        }
+    }
+}
+
+impl std::str::FromStr for Reference {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        match text {
+            "table" => Ok(Reference::Table),
+            "gravity" => Ok(Reference::Gravity),
+            _ => Err(Error::new(
+                "reference",
+                format!("{} is not known", super::cell::shorten(text.as_bytes())),
+                "write table (ref_ columns hold the input) or gravity (only its size is known)",
+            )),
+        }
+    }
+}
+
+/// Readings at which each sensor's output stops following its input, in raw units.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Rails {
+    /// Lowest and highest reading of the gyros.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gyro: Option<[f64; 2]>,
+    /// Lowest and highest reading of the accelerometers.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub accel: Option<[f64; 2]>,
+}
+
+/// A file that the recording was imported from.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Source {
+    /// Name, without its folder.
+    pub file: String,
+    /// SHA-256 of its bytes, in hexadecimal.
+    pub sha256: String,
+}
+
+/// Contents of `recording.toml`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Manifest {
+    /// Version of the layout.
+    pub format: Format,
+    /// Unit that was recorded.
+    pub device: String,
+    /// Nominal sample rate in Hz.
+    pub sample_rate_hz: f64,
+    /// Local gravity in m/s².
+    pub gravity_mps2: f64,
+    /// Unit of the raw columns.
+    pub raw_unit: RawUnit,
+    /// Latitude in degrees, north positive. Kept with the recording; no fit takes the Earth's rate out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub latitude_deg: Option<f64>,
+    /// What is known of the true input.
+    pub reference: Reference,
+    /// When the power came, on the clock of `t_s`, s: what goes by the time since then is counted from there. Without it, from the first
+    /// sample.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub power_on_s: Option<f64>,
+    /// It was not ended: what records it was killed, or is still at it. Its last row may be cut, and is left out then.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub unfinished: bool,
+    /// Text label of step i, where the source named its steps.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub step_labels: Vec<String>,
+    /// Steps that are turns of a known angle: only the mean of their rate is known, and they are anything but still.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub turn_steps: Vec<i32>,
+    /// Arguments of the import that made the recording, with file names instead of paths.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub imported_with: Vec<String>,
+    /// The device that it was recorded from.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub recorded: Option<Recorded>,
+    /// Where readings saturate.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rails: Option<Rails>,
+    /// Files that it was imported from.
+    #[serde(default, rename = "source", skip_serializing_if = "Vec::is_empty")]
+    pub sources: Vec<Source>,
+}
+
+impl Manifest {
+    /// Manifest with the keys that have no default; the others empty.
+    pub fn new(
+        device: impl Into<String>,
+        sample_rate_hz: f64,
+        gravity_mps2: f64,
+        raw_unit: RawUnit,
+        reference: Reference,
+    ) -> Self {
+        Self {
+            format: Format::V1,
+            device: device.into(),
+            sample_rate_hz,
+            gravity_mps2,
+            raw_unit,
+            latitude_deg: None,
+            reference,
+            power_on_s: None,
+            unfinished: false,
+            step_labels: Vec::new(),
+            turn_steps: Vec::new(),
+            imported_with: Vec::new(),
+            recorded: None,
+            rails: None,
+            sources: Vec::new(),
+        }
+    }
+
+    /// Reads and checks `recording.toml` at `path`.
+    pub fn read(path: &Path) -> Result<Manifest> {
+        let text = read_text(path)?;
+        Self::parse(&text, &path.display().to_string())
+    }
+
+    /// Parses and checks the text of a manifest; `place` is its file.
+    pub fn parse(text: &str, place: &str) -> Result<Manifest> {
+        let manifest: Manifest = toml::from_str(text).map_err(|error| {
+            let message = error.message().trim();
+            // A missing key has the whole file for its place, which is no line.
+            let place = match error.span() {
+                Some(span) if !message.starts_with("missing field") => {
+                    let before = text.get(..span.start).unwrap_or(text);
+                    let line = 1 + before.matches('\n').count();
+                    format!("{place}, line {line}")
+                }
+                _ => place.to_owned(),
+            };
+            let remedy = if message.starts_with("unknown field") {
+                "correct or remove the key"
+            } else if message.starts_with("missing field") {
+                "add the key"
+            } else if message.starts_with("unknown variant") {
+                "write one of the values that are expected"
+            } else {
+                "correct the line"
+            };
+            Error::new(place, message, remedy)
+        })?;
+        manifest.check(place)?;
+        Ok(manifest)
+    }
+
+    /// Checks the values; `place` is the file that they are in, or go to.
+    pub fn check(&self, place: &str) -> Result<()> {
+        let at = |key: &str| format!("{place}, {key}");
+        let rate = self.sample_rate_hz;
+        if !RATE_RANGE.contains(&rate) {
+            return Err(Error::new(
+                at("sample_rate_hz"),
+                format!("{rate:?} is not a sample rate"),
+                "write the samples per second, from 0.01 to 10 million",
+            ));
+        }
+        check_gravity(self.gravity_mps2, &at("gravity_mps2"))?;
+        if let Some(latitude) = self.latitude_deg
+            && !(-90.0..=90.0).contains(&latitude)
+        {
+            return Err(Error::new(
+                at("latitude_deg"),
+                format!("{latitude} is not a latitude"),
+                "write degrees from -90 to 90, north positive",
+            ));
+        }
+        if let Some(power) = self.power_on_s
+            && !power.is_finite()
+        {
+            return Err(Error::new(
+                at("power_on_s"),
+                format!("{power} is no time"),
+                "write the t_s at which the power came, or leave the key out",
+            ));
+        }
+        let rails = self.rails.unwrap_or_default();
+        for (sensor, rails) in [("gyro", rails.gyro), ("accel", rails.accel)] {
+            if let Some([low, high]) = rails
+                && !(low.is_finite() && high.is_finite() && low < high)
+            {
+                return Err(Error::new(
+                    at(&format!("rails.{sensor}")),
+                    format!("[{low}, {high}] is not a range"),
+                    "write [lowest, highest] in raw units",
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    /// Text of `recording.toml`.
+    pub fn to_toml(&self) -> Result<String> {
+        toml::to_string(self).map_err(|error| {
+            Error::new(
+                MANIFEST_FILE,
+                error,
+                "report this: the manifest cannot be written",
+            )
+        })
+    }
+}
+
+/// Reads a file that must be UTF-8, and says in which line it is not.
+pub fn read_text(path: &Path) -> Result<String> {
+    let bytes = std::fs::read(path).map_err(|error| Error::io(path, &error))?;
+    String::from_utf8(bytes).map_err(|error| {
+        let before = &error.as_bytes()[..error.utf8_error().valid_up_to()];
+        let line = 1 + before.iter().filter(|&&byte| byte == b'\n').count();
+        Error::new(
+            format!("{}, line {line}", path.display()),
+            "this is not UTF-8 text",
+            "save the file as UTF-8",
+        )
+    })
+}
+
+/// Checks that `gravity` (m/s²) is that of a place on Earth; `place` names where it was given.
+pub(super) fn check_gravity(gravity: f64, place: &str) -> Result<()> {
+    if GRAVITY_RANGE.contains(&gravity) {
+        return Ok(());
+    }
+    if (0.9..=1.1).contains(&gravity) {
+        return Err(Error::new(
+            place,
+            format!("{gravity} looks like g, and m/s² is asked for"),
+            "write 9.80665, or the local value if it is known",
+        ));
+    }
+    Err(Error::new(
+        place,
+        format!("{gravity} is no gravity on Earth"),
+        "write the local value in m/s², between 9.7 and 9.9",
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const GOOD: &str = r#"format = "mimu-recording/1"
+device = "unit-007"
+sample_rate_hz = 1000
+gravity_mps2 = 9.80665 # where it was recorded
+raw_unit = "V"
+reference = "table"
+"#;
+
+    fn refused(text: &str) -> String {
+        Manifest::parse(text, "r/recording.toml")
+            .unwrap_err()
+            .to_string()
+    }
+
+    #[test]
+    fn the_manifest_of_the_design_is_read() {
+        let manifest = Manifest::parse(GOOD, "x").unwrap();
+        assert_eq!(manifest.sample_rate_hz, 1000.0);
+        assert_eq!(manifest.raw_unit, RawUnit::Volt);
+        assert_eq!(manifest.reference, Reference::Table);
+    }
+
+    #[test]
+    fn every_key_comes_back_from_the_written_text() {
+        let mut manifest = Manifest::new("µ \"7\"", 102.4, 9.81, RawUnit::Si, Reference::Gravity);
+        manifest.latitude_deg = Some(-30.5);
+        manifest.rails = Some(Rails {
+            gyro: Some([0.05, 3.25]),
+            accel: None,
+        });
+        manifest.unfinished = true;
+        manifest.recorded = Some(Recorded {
+            tool: "mimu 0".into(),
+            missing: 3,
+            restarts: vec![super::super::recorded::Restart {
+                t_s: 12.5,
+                start: "watchdog".into(),
+            }],
+            ..Recorded::default()
+        });
+        manifest.step_labels = vec!["x_a".into(), "x_rot".into()];
+        manifest.imported_with = vec!["a.csv".into(), "--rate-hz".into()];
+        manifest.sources = vec![Source {
+            file: "a.csv".into(),
+            sha256: "00".into(),
+        }];
+        let text = manifest.to_toml().unwrap();
+        assert_eq!(Manifest::parse(&text, "x").unwrap(), manifest);
+    }
+
+    #[test]
+    fn an_unknown_key_is_named_with_its_line() {
+        let text = refused(&format!("{GOOD}sample_rate = 3\n"));
+        assert!(
+            text.contains("line 7") && text.contains("sample_rate"),
+            "{text}"
+        );
+        let text = refused(&format!("{GOOD}\n[rails]\nmagnet = [0, 1]\n"));
+        assert!(text.contains("line 9") && text.contains("magnet"), "{text}");
+    }
+
+    #[test]
+    fn a_missing_key_is_named() {
+        assert!(refused(&GOOD.replace("device", "#")).contains("device"));
+    }
+
+    #[test]
+    fn gravity_in_g_is_told_apart_from_nonsense() {
+        let text = refused(&GOOD.replace("9.80665", "1.0"));
+        assert!(
+            text.contains("looks like g") && text.contains("write 9.80665"),
+            "{text}"
+        );
+        let text = refused(&GOOD.replace("9.80665", "980.665"));
+        assert!(
+            text.contains("gravity_mps2") && text.contains("980.665"),
+            "{text}"
+        );
+        refused(&GOOD.replace("9.80665", "nan"));
+    }
+
+    #[test]
+    fn values_out_of_range_are_refused_with_their_key() {
+        for (from, to, word) in [
+            ("= 1000", "= 0", "sample_rate_hz"),
+            ("= 1000", "= inf", "sample_rate_hz"),
+            ("\"V\"", "\"mV\"", "mV"),
+            ("\"table\"", "\"tables\"", "tables"),
+            ("recording/1", "recording/2", "mimu-recording/2"),
+            ("device", "latitude_deg = 91\ndevice", "latitude_deg"),
+            (
+                "\"table\"\n",
+                "\"table\"\n[rails]\ngyro = [1, 0]",
+                "rails.gyro",
+            ),
+        ] {
+            let text = refused(&GOOD.replace(from, to));
+            assert!(text.contains(word), "{text}");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn random_bytes_never_panic(bytes in prop::collection::vec(any::<u8>(), 0..300)) {
+            let _ = Manifest::parse(&String::from_utf8_lossy(&bytes), "x");
+        }
+
+        #[test]
+        fn a_damaged_manifest_never_panics(at in 0..GOOD.len(), with in any::<char>()) {
+            let mut text: Vec<char> = GOOD.chars().collect();
+            text[at] = with;
+            let _ = Manifest::parse(&text.into_iter().collect::<String>(), "x");
+        }
+    }
+}

@@ -1,0 +1,93 @@
+//! What stands between the emulator's thread and the owner of a board.
+
+use std::sync::mpsc::{Receiver, Sender};
+
+use rigless::emulator::{Driver, Host, Settled, Stop};
+use rigless::session::Session;
+use rigless::time::VirtualNanos;
+
+use crate::part::Machine;
+
+/// Where a board stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Standing {
+    /// The virtual clock, ns since the board was switched on first.
+    pub ns: u64,
+    /// Instructions executed. Waiting for an interrupt executes none.
+    pub instructions: u64,
+}
+
+/// An arrival at an instruction that is watched.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Arrival {
+    /// The instruction.
+    pub address: u64,
+    /// The virtual clock, ns.
+    pub ns: u64,
+    /// Instructions executed before it.
+    pub instructions: u64,
+}
+
+/// What a stopped board can be asked for.
+pub(crate) type Errand = Box<dyn FnOnce(&mut Stopped<'_>) + Send>;
+
+/// What the board is told.
+pub(crate) enum Order {
+    /// Run to an instant, ns.
+    To(u64),
+    /// Do an errand where the board stands.
+    Do(Errand),
+}
+
+/// The board between two instructions.
+pub(crate) struct Stopped<'a> {
+    pub(crate) session: &'a mut Session<Machine>,
+    pub(crate) host: &'a mut dyn Host,
+    pub(crate) driver: &'a mut Puppet,
+    pub(crate) stop: Stop,
+}
+
+/// The driver that the emulator calls: it does as it is told.
+pub(crate) struct Puppet {
+    pub(crate) orders: Receiver<Order>,
+    pub(crate) reports: Sender<Standing>,
+    pub(crate) arrivals: Vec<Arrival>,
+}
+
+impl Driver<Machine> for Puppet {
+    fn on_settled(&mut self, _: &mut Session<Machine>, _: &mut dyn Host, settled: Settled) {
+        if let Settled::Hit(hit) = settled {
+            self.arrivals.push(Arrival {
+                address: hit.address,
+                ns: hit.at.0,
+                instructions: hit.instruction_count,
+            });
+        }
+    }
+
+    fn on_stop(
+        &mut self,
+        session: &mut Session<Machine>,
+        stop: Stop,
+        host: &mut dyn Host,
+    ) -> Option<VirtualNanos> {
+        self.reports
+            .send(Standing {
+                ns: stop.at.0,
+                instructions: stop.instruction_count,
+            })
+            .ok()?;
+        loop {
+            // An error is the board's owner gone.
+            match self.orders.recv().ok()? {
+                Order::To(ns) => return Some(VirtualNanos(ns)),
+                Order::Do(errand) => errand(&mut Stopped {
+                    session,
+                    host,
+                    driver: self,
+                    stop,
+                }),
+            }
+        }
+    }
+}

@@ -1,0 +1,210 @@
+//! The microcontroller of the board: the emulator's STM32H743 with three of its models in the bench's hands, and
+//! a reset by the supply.
+
+use rigless::device::{ErasedDevice, Level, ResetCause};
+use rigless::emulator::CoreSpec;
+use rigless::machine::stm32h743_bench::Stm32h743Bench;
+use rigless::machine::{Board, Target};
+use rigless::mcu::{Mcu, Operate};
+use rigless::snapshot::Store;
+use rigless::soc::stm32h743::Stm32h743;
+use rigless::soc::stm32h743::peripherals::gpio::{PORTS, Pin};
+use rigless::soc::stm32h743::peripherals::usart::{self, Usart};
+use rigless::soc::{Bus, Error};
+use rigless::time::VirtualNanos;
+
+use crate::flash::Watched;
+use crate::front::Front;
+use crate::line::FarEnd;
+use crate::sampler::Sampler;
+use crate::schematic::{DRIVEN, Drives, HSE_HZ, LSE_HZ};
+use crate::watchdog::Watchdog;
+
+/// The serial line to the debugger's USB bridge.
+const SERIAL: &str = "USART3";
+
+/// The microcontroller.
+#[derive(Debug)]
+pub(crate) struct Part {
+    mcu: Stm32h743,
+    pub(crate) sampler: Sampler,
+    pub(crate) flash: Watched,
+    watchdog: Watchdog,
+    slots: Slots,
+}
+
+/// Where on the bus the bench's own models answer.
+#[derive(Debug, Clone, Copy)]
+struct Slots {
+    adc1: usize,
+    flash: usize,
+    watchdog: usize,
+    serial: usize,
+    /// The ports of [`DRIVEN`].
+    ports: [usize; DRIVEN.len()],
+}
+
+/// The part as its supply comes up.
+fn powered_up() -> Result<Stm32h743, Error> {
+    let mut mcu = Stm32h743::new()?;
+    mcu.rcc.attach_crystals(HSE_HZ, LSE_HZ);
+    mcu.set_supply(3300);
+    mcu.set_analog_supply(3300);
+    Ok(mcu)
+}
+
+/// Which of the part's serial ports goes to the debugger.
+fn serial_port(mcu: &mut Stm32h743) -> &mut Usart {
+    let nth = usart::INSTANCES.iter().position(|&name| name == SERIAL);
+    &mut mcu.usart[nth.expect("the part has the port")]
+}
+
+impl Part {
+    fn new(front: Front, far_end: FarEnd) -> Result<Self, Error> {
+        let mut mcu = powered_up()?;
+        serial_port(&mut mcu).attach(far_end);
+        let mut ports = [0; DRIVEN.len()];
+        for (slot, (port, _)) in ports.iter_mut().zip(DRIVEN) {
+            *slot = mcu.bus().slot(PORTS[port])?;
+        }
+        let slots = Slots {
+            ports,
+            adc1: mcu.bus().slot("ADC1")?,
+            flash: mcu.bus().slot("Flash")?,
+            watchdog: mcu.bus().slot("IWDG")?,
+            serial: mcu.bus().slot(SERIAL)?,
+        };
+        let mut part = Self {
+            mcu,
+            sampler: Sampler::new(front),
+            flash: Watched::new(),
+            watchdog: Watchdog::new(),
+            slots,
+        };
+        part.check()?;
+        Ok(part)
+    }
+
+    /// The serial port, whose line can be garbled.
+    pub(crate) fn serial(&mut self) -> &mut Usart {
+        serial_port(&mut self.mcu)
+    }
+
+    /// Cuts the supply, or gives it back, as the run goes on from this stop.
+    pub(crate) fn supply(&mut self, at: VirtualNanos, on: bool) {
+        // Any model's context asks for it; a port's is what the part lends.
+        self.mcu
+            .drive_port(at, 0, |_, _, context| context.request_power(on));
+    }
+}
+
+impl Mcu for Part {
+    fn bus(&self) -> &Bus {
+        self.mcu.bus()
+    }
+
+    fn bus_mut(&mut self) -> &mut Bus {
+        self.mcu.bus_mut()
+    }
+
+    fn reset(&mut self, at: VirtualNanos, cause: ResetCause) {
+        if cause == ResetCause::PowerOn {
+            // The emulator's part keeps what a system reset keeps and refuses this one.
+            let mut fresh = powered_up().expect("built once already");
+            serial_port(&mut fresh).inherit(serial_port(&mut self.mcu));
+            self.mcu = fresh;
+        } else {
+            self.mcu.reset(at, cause);
+        }
+        self.sampler_reset();
+        let slot = self.slots.flash;
+        self.flash
+            .restart(self.mcu.bus_mut().slot_mut(slot).registers_mut());
+        self.watchdog = Watchdog::new();
+    }
+
+    fn poll(&mut self, now: VirtualNanos) {
+        // Nothing but the serial line has anything outside. To ask all of the 122 models at each of 20 000
+        // conversions a second takes longer than the conversions.
+        let slot = self.slots.serial;
+        let (bus, model) = self.mcu.split(slot);
+        if let Some(model) = model {
+            let (registers, mut context) = bus.drive(now, slot);
+            model.poll(registers, &mut context);
+        }
+        let drives = self.drives();
+        self.sampler.front.drive(drives);
+    }
+
+    fn split(&mut self, slot: usize) -> (&mut Bus, Option<&mut dyn ErasedDevice>) {
+        let (bus, model) = self.mcu.split(slot);
+        let model: Option<&mut dyn ErasedDevice> = match slot {
+            s if s == self.slots.adc1 => Some(&mut self.sampler),
+            s if s == self.slots.flash => Some(&mut self.flash),
+            s if s == self.slots.watchdog => Some(&mut self.watchdog),
+            _ => model,
+        };
+        (bus, model)
+    }
+}
+
+impl Part {
+    /// What the firmware drives at the sensors' own inputs.
+    fn drives(&self) -> Drives {
+        let [st1, st2, low, high] = std::array::from_fn(|k| {
+            let (port, pin) = DRIVEN[k];
+            let registers = self.mcu.bus().slots()[self.slots.ports[k]].registers();
+            let pin = Pin::new(pin).expect("a port has sixteen pins");
+            self.mcu.gpio[port].level(pin, registers) == Level::High
+        });
+        Drives {
+            st1,
+            st2,
+            g_select: [low, high],
+        }
+    }
+
+    fn sampler_reset(&mut self) {
+        rigless::device::Device::reset(&mut self.sampler);
+    }
+}
+
+/// The board as the emulator sees it.
+#[derive(Debug)]
+pub(crate) struct Machine {
+    pub(crate) part: Part,
+    core: CoreSpec,
+}
+
+impl Machine {
+    pub(crate) fn new(front: Front, far_end: FarEnd) -> Result<Self, Error> {
+        // The emulator describes this part's core nowhere else.
+        let core = Stm32h743Bench::new()?.targets().swap_remove(0).core;
+        Ok(Self {
+            part: Part::new(front, far_end)?,
+            core,
+        })
+    }
+}
+
+// Snapshots are not used: a run from its start takes no longer than it must.
+impl Store for Machine {}
+
+impl Board for Machine {
+    fn name(&self) -> &'static str {
+        "nucleo-h743zi2"
+    }
+
+    fn targets(&mut self) -> Vec<Target<'_>> {
+        let core = self.core.clone();
+        vec![Target::new("stm32h743", &mut self.part, core)]
+    }
+
+    fn target_names(&self) -> Vec<&'static str> {
+        vec!["stm32h743"]
+    }
+
+    fn mcu(&mut self, target: usize) -> Option<&mut dyn Mcu> {
+        (target == 0).then_some(&mut self.part)
+    }
+}

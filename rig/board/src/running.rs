@@ -1,0 +1,362 @@
+//! A board that runs: an image executed for so much virtual time, with everything that can be done to a board
+//! from outside in between.
+
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::thread::JoinHandle;
+
+use mimu_rig::random::Random;
+use rigless::emulator::{self, Start, Watch};
+use rigless::session::Session;
+use rigless::soc::Width;
+use rigless::time::VirtualNanos;
+
+pub use crate::driver::{Arrival, Standing};
+use crate::driver::{Order, Puppet, Stopped};
+use crate::findings::{Findings, findings};
+use crate::flash::{BANK, BASE, Operation};
+use crate::front::Front;
+use crate::image::Image;
+use crate::line::{FarEnd, Line};
+use crate::memory::{program, read};
+use crate::part::Machine;
+use crate::sampler::Conversions;
+
+/// The bank that the program is not in, where a device keeps what it stores: its first address.
+pub const STORE: u64 = BASE + BANK;
+
+/// RAM that loses its content with the supply: first address and bytes.
+const RAM: [(u64, u64); 6] = [
+    (0x0000_0000, 64 << 10),
+    (0x2000_0000, 128 << 10),
+    (0x2400_0000, 512 << 10),
+    (0x3000_0000, 288 << 10),
+    (0x3800_0000, 64 << 10),
+    // Its supply pin is wired to the board's own.
+    (0x3880_0000, 4 << 10),
+];
+
+/// Why a part restarted, and when.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Restart {
+    /// The virtual clock, ns.
+    pub ns: u64,
+    /// `Pin`, `Core`, `PowerOn`, or the watchdog by its name.
+    pub cause: String,
+}
+
+/// A board that runs an image.
+///
+/// It begins switched on at virtual time 0, before the first instruction, and moves only when told to. One image,
+/// front and sequence of calls give the same run, instruction by instruction.
+#[derive(Debug)]
+pub struct Board {
+    orders: Sender<Order>,
+    reports: Receiver<Standing>,
+    thread: Option<JoinHandle<Result<(), String>>>,
+    line: Line,
+    standing: Standing,
+}
+
+impl Board {
+    /// A board with an image in its flash, and nothing else there.
+    ///
+    /// Errors: an image that the part has no room for.
+    pub fn new(image: &Image, front: Front) -> Result<Self, String> {
+        let line = Line::default();
+        let machine = Machine::new(front, FarEnd(line.clone())).map_err(|e| e.to_string())?;
+        let (orders, orders_in) = channel();
+        let (reports_out, reports) = channel();
+        let images = vec![image.placed.clone()];
+        let thread = std::thread::Builder::new()
+            .name("board".into())
+            .spawn(move || {
+                let puppet = Puppet {
+                    orders: orders_in,
+                    reports: reports_out,
+                    arrivals: Vec::new(),
+                };
+                let session = Session::new(Box::new(machine), 0, VirtualNanos(0))
+                    .map_err(|e| e.to_string())?;
+                emulator::run(session, &Start::new(&images), puppet)
+                    .map(drop)
+                    .map_err(|e| e.to_string())
+            })
+            .map_err(|e| format!("the board's thread: {e}"))?;
+        let mut board = Self {
+            orders,
+            reports,
+            thread: Some(thread),
+            line,
+            standing: Standing {
+                ns: 0,
+                instructions: 0,
+            },
+        };
+        board.wait()?;
+        Ok(board)
+    }
+
+    fn wait(&mut self) -> Result<(), String> {
+        match self.reports.recv() {
+            Ok(standing) => {
+                self.standing = standing;
+                Ok(())
+            }
+            Err(_) => Err(self.ended()),
+        }
+    }
+
+    /// Why the emulator ended by itself.
+    fn ended(&mut self) -> String {
+        let why = match self.thread.take().map(JoinHandle::join) {
+            Some(Ok(Err(error))) => error,
+            Some(Err(panic)) => panic
+                .downcast_ref::<String>()
+                .map_or("it panicked".into(), Clone::clone),
+            _ => "it has ended already".into(),
+        };
+        format!("the emulator: {why}")
+    }
+
+    /// Does an errand on the stopped board.
+    pub(crate) fn with<T: Send + 'static>(
+        &mut self,
+        errand: impl FnOnce(&mut Stopped<'_>) -> T + Send + 'static,
+    ) -> Result<T, String> {
+        let (back, answer) = channel();
+        let errand = Box::new(move |stopped: &mut Stopped<'_>| {
+            // Nobody waits for it only where the board is gone too.
+            let _ = back.send(errand(stopped));
+        });
+        let _ = self.orders.send(Order::Do(errand));
+        answer.recv().map_err(|_| self.ended())
+    }
+
+    /// Where it stands.
+    pub fn standing(&self) -> Standing {
+        self.standing
+    }
+
+    /// Runs to an instant of the virtual clock, ns. Bytes put on the line before arrive in the meantime.
+    ///
+    /// Errors: the emulator gave up.
+    pub fn run_to(&mut self, ns: u64) -> Result<Standing, String> {
+        if ns > self.standing.ns {
+            let _ = self.orders.send(Order::To(ns));
+            self.wait()?;
+        }
+        Ok(self.standing)
+    }
+
+    /// Runs for so much virtual time, ns.
+    ///
+    /// Errors: as [`Board::run_to`].
+    pub fn run_for(&mut self, ns: u64) -> Result<Standing, String> {
+        self.run_to(self.standing.ns + ns)
+    }
+
+    /// Puts bytes on the serial line towards the device, behind those that still wait there. They arrive at the rate
+    /// that the device's port is set to.
+    pub fn send(&mut self, bytes: &[u8]) {
+        self.line.bytes().to_device.extend(bytes);
+    }
+
+    /// Bytes that still wait for the line.
+    pub fn unsent(&self) -> usize {
+        self.line.bytes().to_device.len()
+    }
+
+    /// Bytes that the device has sent since this was last asked, each with the end of its stop bit, ns.
+    pub fn receive(&mut self) -> Vec<(u64, u8)> {
+        std::mem::take(&mut self.line.bytes().from_device)
+    }
+
+    /// Garbles so many of a million bytes that arrive at the device, as noise on the line does.
+    ///
+    /// Errors: the emulator gave up, as for all that follow.
+    pub fn garble(&mut self, per_million: u32) -> Result<(), String> {
+        self.with(move |s| {
+            let errors = s.session.board_mut().part.serial().errors_mut();
+            errors.noise.name = "serial line";
+            errors.noise.per_million = per_million;
+        })
+    }
+
+    /// Puts something else in front of the pins.
+    pub fn set_front(&mut self, front: Front) -> Result<(), String> {
+        self.with(move |s| s.session.board_mut().part.sampler.front = front)
+    }
+
+    /// Conversions of ADC1 since this was last asked.
+    pub fn conversions(&mut self) -> Result<Conversions, String> {
+        self.with(|s| s.session.board_mut().part.sampler.take_conversions())
+    }
+
+    /// Reads memory, as a debugger would.
+    ///
+    /// Errors: besides, an address where no memory is.
+    pub fn memory(&mut self, address: u64, length: usize) -> Result<Vec<u8>, String> {
+        self.with(move |s| read(s.host, address, length))?
+    }
+
+    /// Reads a register of a peripheral without the firmware noticing.
+    ///
+    /// Errors: besides, an address where no register is.
+    pub fn register(&mut self, address: u64) -> Result<u64, String> {
+        self.with(move |s| {
+            use rigless::mcu::Operate;
+            let at = s.stop.at;
+            let part = &mut s.session.board_mut().part;
+            Operate::peek(part, at, address, Width::W32).map_err(|e| e.to_string())
+        })?
+    }
+
+    /// Flips one bit of flash memory.
+    ///
+    /// Errors: besides, an address that is not flash.
+    pub fn flip(&mut self, address: u64, bit: u32) -> Result<(), String> {
+        self.with(move |s| {
+            let byte = read(s.host, address, 1)?[0] ^ (1 << (bit % 8));
+            program(s.host, address, &[byte])
+        })?
+    }
+
+    /// The stored part of flash memory, bank 2, as it is.
+    pub fn store(&mut self) -> Result<Vec<u8>, String> {
+        self.memory(STORE, BANK as usize)
+    }
+
+    /// Puts a stored part of flash memory in the place of what is there, as a debugger would.
+    ///
+    /// Errors: besides, bytes that are not a whole bank.
+    pub fn set_store(&mut self, bytes: Vec<u8>) -> Result<(), String> {
+        if bytes.len() as u64 != BANK {
+            return Err(format!(
+                "a stored bank of {} bytes; it has {BANK}",
+                bytes.len()
+            ));
+        }
+        self.with(move |s| program(s.host, STORE, &bytes))?
+    }
+
+    /// Stretches of flash memory (first address, bytes) that have changed since this was last asked.
+    pub fn changed(&mut self) -> Result<Vec<(u64, u64)>, String> {
+        self.with(|s| {
+            let at = s.stop.at.0;
+            s.session.board_mut().part.flash.take_landed(at)
+        })
+    }
+
+    /// Flash operations in flight.
+    pub fn in_flight(&mut self) -> Result<Vec<Operation>, String> {
+        self.with(|s| s.session.board_mut().part.flash.in_flight(s.stop.at.0))
+    }
+
+    /// What bank 2 would hold if the supply were cut now: as it is, but for what is in flight.
+    pub fn store_if_cut(&mut self, seed: u64) -> Result<Vec<u8>, String> {
+        let mut bytes = self.store()?;
+        let at = self.standing.ns;
+        let mut random = Random::new(seed, "cut supply");
+        for o in self.in_flight()?.iter().filter(|o| o.address >= STORE) {
+            let first = (o.address - STORE) as usize;
+            let span = first..first + o.length as usize;
+            let torn = o.torn(&bytes[span.clone()], at, &mut random);
+            bytes[span].copy_from_slice(&torn);
+        }
+        Ok(bytes)
+    }
+
+    /// Cuts the supply at this instant. A flash word or sector that is being written is left in between, RAM is lost,
+    /// and nothing runs until the supply is back.
+    pub fn cut_supply(&mut self, seed: u64) -> Result<(), String> {
+        self.with(move |s| {
+            let at = s.stop.at;
+            let mut random = Random::new(seed, "cut supply");
+            for o in s.session.board_mut().part.flash.in_flight(at.0) {
+                let before = read(s.host, o.address, o.length as usize)?;
+                program(s.host, o.address, &o.torn(&before, at.0, &mut random))?;
+            }
+            for (first, length) in RAM {
+                for address in (first..first + length).step_by(8) {
+                    let noise = random.word();
+                    s.host
+                        .write(address, Width::W64, noise)
+                        .map_err(|e| e.to_string())?;
+                }
+            }
+            s.session.board_mut().part.supply(at, false);
+            Ok(())
+        })?
+    }
+
+    /// Gives the supply back: a power-on reset.
+    pub fn restore_supply(&mut self) -> Result<(), String> {
+        self.with(|s| {
+            let at = s.stop.at;
+            s.session.board_mut().part.supply(at, true);
+        })
+    }
+
+    /// Pulls the reset pin. RAM and flash stay, but for what is in flight there.
+    pub fn reset_by_pin(&mut self, seed: u64) -> Result<(), String> {
+        self.with(move |s| {
+            let at = s.stop.at;
+            let mut random = Random::new(seed, "reset pin");
+            for o in s.session.board_mut().part.flash.in_flight(at.0) {
+                let before = read(s.host, o.address, o.length as usize)?;
+                program(s.host, o.address, &o.torn(&before, at.0, &mut random))?;
+            }
+            let instructions = s.stop.instruction_count;
+            s.session.reset_by_pin(at, instructions, s.host);
+            Ok(())
+        })?
+    }
+
+    /// Restarts so far.
+    pub fn restarts(&mut self) -> Result<Vec<Restart>, String> {
+        self.with(|s| {
+            let restart = |r: &rigless::session::Reset| Restart {
+                ns: r.at.0,
+                cause: format!("{:?}", r.cause),
+            };
+            s.session.resets().iter().map(restart).collect()
+        })
+    }
+
+    /// Watches for arrivals at an instruction, until [`Board::unwatch`].
+    pub fn watch(&mut self, address: u64) -> Result<(), String> {
+        self.with(move |s| {
+            s.session.watch(Watch::Instruction(address));
+            s.session.settle_watches(s.host);
+        })
+    }
+
+    /// Ends a watch.
+    pub fn unwatch(&mut self, address: u64) -> Result<(), String> {
+        self.with(move |s| {
+            s.session.unwatch(Watch::Instruction(address));
+            s.session.settle_watches(s.host);
+        })
+    }
+
+    /// Arrivals at the instructions that are watched, since this was last asked.
+    pub fn arrivals(&mut self) -> Result<Vec<Arrival>, String> {
+        self.with(|s| std::mem::take(&mut s.driver.arrivals))
+    }
+
+    /// What the emulator found so far.
+    pub fn findings(&mut self) -> Result<Findings, String> {
+        self.with(|s| findings(s.session))
+    }
+}
+
+impl Drop for Board {
+    fn drop(&mut self) {
+        // Without orders the emulator ends.
+        let (nobody, _) = channel();
+        self.orders = nobody;
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
+}

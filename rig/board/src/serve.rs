@@ -1,0 +1,211 @@
+//! A board behind a pseudo-terminal, for whatever opens serial ports.
+
+use std::fs::{File, OpenOptions};
+use std::io::{self, ErrorKind, Read, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use crate::flash::BANK;
+use crate::running::{Board, STORE};
+use crate::terminal::Terminal;
+
+/// How fast virtual time goes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Pace {
+    /// With the clock on the wall, or as near as the machine can.
+    Wall,
+    /// As fast as the machine can, but never ahead of whoever reads: it stands still while nobody has the terminal
+    /// open, and while bytes wait to be read.
+    Fast,
+}
+
+/// Virtual time between two looks at the terminal, ns. A request waits so long at most.
+const SLICE_NS: u64 = 1_000_000;
+
+/// Bytes that may wait for the line towards the device. The rest stays in the terminal, which holds up the sender
+/// as a port's driver would.
+const WAITING: usize = 256;
+
+/// What became of the bytes.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Traffic {
+    /// From the device, read by somebody or waiting in the terminal.
+    pub delivered: u64,
+    /// From the device while nobody had the terminal open.
+    pub unheard: u64,
+    /// From the device while the terminal was full. Only at the wall's pace: a serial line cannot wait.
+    pub lost: u64,
+    /// To the device.
+    pub sent: u64,
+}
+
+/// A board with its terminal.
+#[derive(Debug)]
+pub struct Served {
+    board: Board,
+    terminal: Terminal,
+    store: Option<StoreFile>,
+    pace: Pace,
+    traffic: Traffic,
+    /// Bytes from the device that the terminal has not taken yet.
+    waiting: Vec<u8>,
+    /// When it began, by the wall's clock and by the board's, ns.
+    began: Instant,
+    first_ns: u64,
+}
+
+impl Served {
+    /// Puts a board behind a terminal. What it stores in flash is kept in a file, if one is
+    /// given: read if it is there, made if it is not.
+    ///
+    /// Errors: no terminal to be had; the file cannot be read or made, or is not one of these.
+    pub fn new(mut board: Board, pace: Pace, store: Option<&Path>) -> Result<Self, String> {
+        let store = match store {
+            Some(path) => {
+                let (file, bytes) = StoreFile::open(path)?;
+                board.set_store(bytes)?;
+                Some(file)
+            }
+            None => None,
+        };
+        let first_ns = board.standing().ns;
+        let terminal = Terminal::open().map_err(|e| format!("a pseudo-terminal: {e}"))?;
+        Ok(Self {
+            board,
+            terminal,
+            store,
+            pace,
+            traffic: Traffic::default(),
+            waiting: Vec::new(),
+            began: Instant::now(),
+            first_ns,
+        })
+    }
+
+    /// What to open.
+    pub fn path(&self) -> &Path {
+        self.terminal.path()
+    }
+
+    /// What became of the bytes so far.
+    pub fn traffic(&self) -> Traffic {
+        self.traffic
+    }
+
+    /// The board.
+    pub fn board(&mut self) -> &mut Board {
+        &mut self.board
+    }
+
+    /// Runs a millisecond of virtual time, or waits.
+    ///
+    /// Errors: the emulator, the terminal or the file gave up.
+    pub fn step(&mut self) -> Result<(), String> {
+        let broken = |e: io::Error| format!("the pseudo-terminal: {e}");
+        if self.pace == Pace::Fast && !(self.terminal.is_open() && self.waiting.is_empty()) {
+            if !self.terminal.is_open() {
+                // Poll returns at once for a terminal that nobody has open.
+                std::thread::sleep(Duration::from_millis(1));
+            }
+            self.terminal.wait_for_room(10);
+            return self.deliver().map_err(broken);
+        }
+        self.collect().map_err(broken)?;
+        let standing = self.board.run_for(SLICE_NS)?;
+        let bytes = self.board.receive();
+        self.waiting.extend(bytes.iter().map(|&(_, byte)| byte));
+        self.deliver().map_err(broken)?;
+        if let Some(store) = &mut self.store {
+            for (first, length) in self.board.changed()? {
+                if first >= STORE {
+                    let bytes = self.board.memory(first, length as usize)?;
+                    store.write(first - STORE, &bytes)?;
+                }
+            }
+        }
+        if self.pace == Pace::Wall {
+            let due = self.began + Duration::from_nanos(standing.ns - self.first_ns);
+            std::thread::sleep(due.saturating_duration_since(Instant::now()));
+        }
+        Ok(())
+    }
+
+    /// From the terminal to the line.
+    fn collect(&mut self) -> io::Result<()> {
+        let mut some = [0; WAITING];
+        let room = WAITING.saturating_sub(self.board.unsent());
+        let count = self.terminal.read(&mut some[..room])?;
+        self.board.send(&some[..count]);
+        self.traffic.sent += count as u64;
+        Ok(())
+    }
+
+    /// From the line to the terminal.
+    fn deliver(&mut self) -> io::Result<()> {
+        if !self.terminal.is_open() {
+            self.traffic.unheard += self.waiting.len() as u64;
+            self.waiting.clear();
+            return Ok(());
+        }
+        while !self.waiting.is_empty() {
+            let count = self.terminal.write(&self.waiting)?;
+            if count == 0 {
+                break;
+            }
+            self.waiting.drain(..count);
+            self.traffic.delivered += count as u64;
+        }
+        if self.pace == Pace::Wall {
+            self.traffic.lost += self.waiting.len() as u64;
+            self.waiting.clear();
+        }
+        Ok(())
+    }
+}
+
+/// A file that holds bank 2, byte by byte. Each word and each erased sector is written as it lands in the flash, so
+/// that the end of the program is no more to the device than a cut supply.
+#[derive(Debug)]
+struct StoreFile {
+    file: File,
+    path: PathBuf,
+}
+
+impl StoreFile {
+    fn open(path: &Path) -> Result<(Self, Vec<u8>), String> {
+        let name = path.display();
+        let refused = |e: io::Error| format!("{name}: {e}");
+        let mut bytes = Vec::new();
+        let mut options = OpenOptions::new();
+        options.read(true).write(true);
+        let file = match options.open(path) {
+            Ok(mut file) => {
+                file.read_to_end(&mut bytes).map_err(refused)?;
+                if bytes.len() as u64 != BANK {
+                    return Err(format!(
+                        "{name}: {} bytes, and a stored flash bank has {BANK}; name another file",
+                        bytes.len()
+                    ));
+                }
+                file
+            }
+            Err(e) if e.kind() == ErrorKind::NotFound => {
+                bytes = vec![0xFF; BANK as usize];
+                let mut file = options.create_new(true).open(path).map_err(refused)?;
+                file.write_all(&bytes).map_err(refused)?;
+                file
+            }
+            Err(e) => return Err(refused(e)),
+        };
+        let path = path.to_owned();
+        Ok((Self { file, path }, bytes))
+    }
+
+    fn write(&mut self, offset: u64, bytes: &[u8]) -> Result<(), String> {
+        let mut write = || {
+            self.file.seek(SeekFrom::Start(offset))?;
+            self.file.write_all(bytes)
+        };
+        write().map_err(|e| format!("{}: {e}", self.path.display()))
+    }
+}

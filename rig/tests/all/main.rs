@@ -1,0 +1,13 @@
+//! The bench against closed forms, data sheets and its own page.
+//!
+//! One binary, as linking one for each subject took longer than running it.
+
+mod effects;
+mod extremes;
+mod motion;
+mod noise;
+mod page;
+mod plan;
+mod record;
+mod rig_file;
+mod sensors;

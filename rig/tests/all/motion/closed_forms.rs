@@ -1,0 +1,127 @@
+//! Cones and pendulums: chains of frames with known answers.
+
+use std::f64::consts::TAU;
+
+use mimu_rig::chain::{Frame, Jet};
+use mimu_rig::place::Place;
+use mimu_rig::rotation::{Rotation, norm, scale};
+
+use super::assert_near;
+
+/// A place where the Earth does not turn.
+fn standstill(gravity: f64) -> Place {
+    Place {
+        rotation: 0.0,
+        ..Place::new(0.0, Some(gravity))
+    }
+}
+
+/// Classical coning: body z describes a cone of half-angle `a`, `frequency` rad/s, and the body does not
+/// turn about the vertical with it.
+fn cone(a: f64, frequency: f64, t: f64) -> Frame {
+    let turn = |sign: f64| Jet {
+        value: sign * frequency * t,
+        rate: sign * frequency,
+        acceleration: 0.0,
+    };
+    Frame::ground(&standstill(0.0))
+        .about_own::<2>(turn(1.0))
+        .about_own::<0>(Jet::constant(a))
+        .about_own::<2>(turn(-1.0))
+}
+
+#[test]
+fn coning_has_a_steady_axial_rate_beside_the_one_that_goes_round() {
+    // w = (-W sin a sin Wt, W sin a cos Wt, -W (1 - cos a)): the tilt is about the body
+    // direction (cos Wt, sin Wt, 0), and the rate across is at a right angle to it.
+    let (a, frequency) = (0.01_f64, TAU * 50.0);
+    for t in [0.0, 0.0013, 0.0171] {
+        let body = cone(a, frequency, t);
+        let (s, c) = (frequency * t).sin_cos();
+        let across = frequency * a.sin();
+        let expected = [-across * s, across * c, -frequency * (1.0 - a.cos())];
+        assert_near(body.rate, expected, 1e-10);
+        let expected = scale(-frequency * across, [c, s, 0.0]);
+        assert_near(body.angular_acceleration, expected, 1e-8);
+    }
+}
+
+#[test]
+fn a_cone_makes_the_axial_rate_add_up_to_its_solid_angle_while_the_attitude_comes_back() {
+    // Goodman and Robinson 1958: over one turn of the cone the integral of the axial rate is the solid
+    // angle within.
+    let (a, frequency) = (0.2_f64, TAU * 3.0);
+    let n = 200_000;
+    let dt = TAU / frequency / f64::from(n);
+    let start = cone(a, frequency, 0.0).attitude;
+    let mut integrated = start;
+    let mut axial = 0.0;
+    for k in 0..n {
+        let rate = cone(a, frequency, (f64::from(k) + 0.5) * dt).rate;
+        axial += rate[2] * dt;
+        integrated = integrated * Rotation::about(rate, norm(rate) * dt);
+    }
+    let solid_angle = TAU * (1.0 - a.cos());
+    assert!((axial + solid_angle).abs() < 1e-9, "{axial}");
+    let (_, left) = (integrated.inverse() * start).axis_angle();
+    assert!(left < 1e-8, "{left}");
+}
+
+#[test]
+fn a_pendulum_feels_gravity_and_its_swing_along_the_rod_and_nothing_across() {
+    // Rod of length L from a pivot, body z along the rod to the pivot, swing about x: L φ'' = -g sin φ, and
+    // from the energy L φ'² / 2 = g (cos φ - cos φ0). The point mass hangs freely, so that across the rod
+    // it feels nothing.
+    let (g, length, start) = (9.81, 0.7, 1.2_f64);
+    let place = standstill(g);
+    for phi in [1.2_f64, 0.9, 0.3, 0.0, -0.5, -1.2] {
+        let rate = -(2.0 * g / length * (phi.cos() - start.cos()))
+            .max(0.0)
+            .sqrt();
+        let angle = Jet {
+            value: phi,
+            rate,
+            acceleration: -g / length * phi.sin(),
+        };
+        let body = Frame::ground(&place).about_own::<0>(angle);
+        let motion = body.motion(0.0, &place, [0.0, 0.0, -length], [0.0; 3], [0.0; 3]);
+        let along = g * phi.cos() + length * rate * rate;
+        assert_near(motion.force, [0.0, 0.0, along], 1e-12);
+        // At the lowest point, by energy: g (3 - 2 cos φ0).
+        if phi == 0.0 {
+            assert!((along - g * (3.0 - 2.0 * start.cos())).abs() < 1e-12);
+        }
+    }
+}
+
+#[test]
+fn a_turn_about_any_axis_is_that_about_the_own_axis() {
+    let angle = Jet {
+        value: 0.7,
+        rate: -1.3,
+        acceleration: 2.1,
+    };
+    let before = Frame::ground(&Place::new(45.0, None)).about([0.6, 0.0, 0.8], angle);
+    for (general, own) in [
+        (
+            before.about([1.0, 0.0, 0.0], angle),
+            before.about_own::<0>(angle),
+        ),
+        (
+            before.about([0.0, 1.0, 0.0], angle),
+            before.about_own::<1>(angle),
+        ),
+        (
+            before.about([0.0, 0.0, 1.0], angle),
+            before.about_own::<2>(angle),
+        ),
+    ] {
+        assert_near(general.rate, own.rate, 1e-15);
+        assert_near(
+            general.angular_acceleration,
+            own.angular_acceleration,
+            1e-15,
+        );
+        assert!((general.attitude.inverse() * own.attitude).axis_angle().1 < 1e-15);
+    }
+}

@@ -1,0 +1,256 @@
+//! Turntables without flaws.
+
+use std::f64::consts::{FRAC_PI_2, TAU};
+
+use mimu_rig::located::Source;
+use mimu_rig::motion::{Carrier, Instant};
+use mimu_rig::place::EARTH_RATE;
+use mimu_rig::plan::Plan;
+use mimu_rig::rotation::{Vector, dot, norm, scale};
+use mimu_rig::table::{Table, TableTruth};
+
+use super::{assert_near, minus};
+
+pub fn plan(steps: &str) -> Plan {
+    let head = "format = \"mimu-plan/1\"\nsample_rate_hz = 1000.0\ncarrier = \"table\"\nlatitude_deg = 30.5\n\
+                gravity_mps2 = 9.793\n";
+    Plan::parse(Source::new("PLAN.toml", format!("{head}{steps}"))).unwrap()
+}
+
+pub fn table(steps: &str, truth: &TableTruth) -> Table {
+    Table::new(&plan(steps), truth).unwrap()
+}
+
+/// Middle of the first dwell.
+fn first_dwell(table: &mut Table) -> Instant {
+    let times = (0..).map(|k| f64::from(k) * 0.01);
+    let dwell: Vec<f64> = times
+        .skip_while(|t| table.at(*t).step != Some(0))
+        .take(1)
+        .collect();
+    table.at(dwell[0] + 0.5)
+}
+
+#[test]
+fn the_earth_turns_a_resting_board_by_its_rate_north_and_up() {
+    let latitude = 30.5_f64.to_radians();
+    let (north, up) = (EARTH_RATE * latitude.cos(), EARTH_RATE * latitude.sin());
+    for (pose, expected) in [
+        ("up = [0, 0, 1]", [0.0, north, up]),
+        // Upside down about east: y points south, z down.
+        ("up = [0, 0, -1]", [0.0, -north, -up]),
+        // Heading 90 degrees: x points north, y west.
+        ("up = [0, 0, 1]\nheading_deg = 90.0", [north, 0.0, up]),
+        // Middle axis 90 degrees about east: z points south, y up.
+        ("up = [0, 1, 0]", [0.0, up, -north]),
+    ] {
+        let mut table = table(
+            &format!("[[step]]\n{pose}\ndwell_s = 2"),
+            &TableTruth::ideal(),
+        );
+        assert_near(table.at(1.0).motion.rate, expected, 1e-18);
+        assert_eq!(table.at(1.0).stated_rate, Some([0.0; 3]));
+    }
+    // Any attitude: the component along up is the vertical one, and the size is the Earth's.
+    let mut table = table(
+        "[[step]]\nup = [1, -2, 0.5]\nheading_deg = 77\ndwell_s = 2",
+        &TableTruth::ideal(),
+    );
+    let motion = table.at(1.0).motion;
+    let along = dot(motion.rate, scale(1.0 / norm(motion.force), motion.force));
+    assert!((along - up).abs() < 1e-18 && (norm(motion.rate) - EARTH_RATE).abs() < 1e-18);
+}
+
+#[test]
+fn a_centrifuge_pulls_the_board_to_its_axis_with_the_rate_squared_times_the_radius() {
+    let truth = TableTruth {
+        offset_mm: [100.0, 0.0, 0.0],
+        ..TableTruth::ideal()
+    };
+    let mut table = table(
+        "[[step]]\nup = [0, 0, 1]\nspin_dps = 360\ndwell_s = 2",
+        &truth,
+    );
+    let motion = first_dwell(&mut table).motion;
+    // The Earth adds its vertical rate to the table's. What moves east is lighter by 2 W cos(latitude) v,
+    // after Eötvös.
+    let latitude = 30.5_f64.to_radians();
+    let rate = TAU + EARTH_RATE * latitude.sin();
+    let east = TAU * 0.1 * motion.attitude.turn([0.0, 1.0, 0.0])[0];
+    let expected = [
+        -rate * rate * 0.1,
+        0.0,
+        9.793 - 2.0 * EARTH_RATE * latitude.cos() * east,
+    ];
+    // Left is the Earth's own centrifugal acceleration along the lever, 5e-10 m/s².
+    assert_near(motion.force, expected, EARTH_RATE * EARTH_RATE * 0.1);
+}
+
+#[test]
+fn speeding_up_pushes_across_the_radius_with_the_angular_acceleration() {
+    let truth = TableTruth {
+        offset_mm: [0.0, 50.0, 0.0],
+        max_acceleration_dps2: [90.0; 3],
+        ..TableTruth::ideal()
+    };
+    let mut table = table(
+        "lead_in_s = 1\n[[step]]\nup = [0, 0, 1]\nspin_dps = 180\ndwell_s = 2",
+        &truth,
+    );
+    // Two seconds of acceleration from 1 s on.
+    let motion = table.at(1.5).motion;
+    let (acceleration, rate) = (FRAC_PI_2, FRAC_PI_2 * 0.5);
+    assert_near(motion.angular_acceleration, [0.0, 0.0, acceleration], 1e-4);
+    assert_near(
+        motion.force,
+        [-acceleration * 0.05, -rate * rate * 0.05, 9.793],
+        1e-5,
+    );
+    assert_eq!(table.at(3.5).motion.angular_acceleration[2], 0.0);
+}
+
+#[test]
+fn a_table_without_flaws_states_what_is_true() {
+    let steps = "[[step]]\nup = [0.3, -0.5, 0.4]\nheading_deg = 40\ndwell_s = 3\n\
+                 [[step]]\nup = [0, 1, 0]\nrate_dps = 120\nspin_dps = -50\ndwell_s = 3\n\
+                 [[step]]\nposes = 12\ndwell_s = 1";
+    let mut table = table(steps, &TableTruth::ideal());
+    let place = plan(steps).place;
+    let n = (table.duration_s() * 100.0) as u32;
+    for k in 0..n {
+        let Instant {
+            motion,
+            stated_rate,
+            stated_force,
+            ..
+        } = table.at(f64::from(k) * 0.01);
+        assert_near(motion.force, stated_force.unwrap(), 1e-12);
+        let earth = motion.attitude.inverse().turn(place.earth_rate());
+        assert_near(minus(motion.rate, earth), stated_rate.unwrap(), 1e-12);
+    }
+}
+
+#[test]
+fn a_pose_has_up_where_the_plan_wants_it() {
+    for up in [
+        [0.0, 0.0, 1.0],
+        [0.0, 0.0, -1.0],
+        [1.0, 0.0, 0.0],
+        [0.0, -1.0, 0.0],
+        [0.3, -0.2, -0.9],
+        [-1.0, 1.0, 1e-3],
+    ] {
+        let [x, y, z] = up;
+        let steps = format!(
+            "[[step]]\nup = [0.1, 0.7, 0.2]\ndwell_s = 1\n[[step]]\nup = [{x}, {y}, {z}]\ndwell_s = 1"
+        );
+        let mut table = table(&steps, &TableTruth::ideal());
+        let end = table.duration_s();
+        let instant = table.at(end - 0.5);
+        assert_eq!(instant.step, Some(1));
+        assert_near(instant.motion.force, scale(9.793 / norm(up), up), 1e-12);
+    }
+}
+
+#[test]
+fn the_attitude_of_a_pose_does_not_depend_on_the_way_there() {
+    let last = "[[step]]\nup = [0.3, 0.4, -0.2]\nheading_deg = 30\ndwell_s = 1";
+    let attitude = |before: &str| {
+        let mut table = table(&format!("{before}{last}"), &TableTruth::ideal());
+        let end = table.duration_s();
+        table.at(end - 0.5).motion.attitude
+    };
+    let alone = attitude("");
+    for before in [
+        "[[step]]\nup = [-0.3, -0.4, 0.1]\nheading_deg = -170\ndwell_s = 1\n",
+        "[[step]]\nup = [0, 0, -1]\nrate_dps = 77\ndwell_s = 9.3\n",
+        "[[step]]\nup = [1, 0, 0]\nspin_dps = -300\ndwell_s = 5\n",
+    ] {
+        let angle = (alone.inverse() * attitude(before)).axis_angle().1;
+        assert!(angle < 1e-12, "{angle}");
+    }
+}
+
+#[test]
+fn a_table_without_outer_axis_spins_about_its_inner_axis_and_heads_only_upright() {
+    let truth = TableTruth {
+        axes: 2,
+        middle_min_deg: -95.0,
+        middle_max_deg: 95.0,
+        ..TableTruth::ideal()
+    };
+    let instant = first_dwell(&mut table(
+        "[[step]]\nup = [0, 0, 1]\nrate_dps = 50\ndwell_s = 2",
+        &truth,
+    ));
+    assert_near(
+        instant.stated_rate.unwrap(),
+        [0.0, 0.0, 50f64.to_radians()],
+        1e-15,
+    );
+    let instant = first_dwell(&mut table(
+        "[[step]]\nup = [1, 0, 0]\nspin_dps = -50\ndwell_s = 2",
+        &truth,
+    ));
+    assert_near(
+        instant.stated_rate.unwrap(),
+        [0.0, 0.0, -50f64.to_radians()],
+        1e-15,
+    );
+    // The tilt axis turns both ways, so that all of the upper hemisphere is in reach.
+    let instant = first_dwell(&mut table(
+        "[[step]]\nup = [-1, -1, 0.5]\ndwell_s = 2",
+        &truth,
+    ));
+    assert_near(
+        instant.motion.force,
+        scale(9.793 / 1.5, [-1.0, -1.0, 0.5]),
+        1e-12,
+    );
+    // The limit itself is a matter of the plan's test.
+    assert!(Table::new(&plan("[[step]]\nup = [0, 0, -1]\ndwell_s = 2"), &truth).is_err());
+}
+
+#[test]
+fn a_board_that_stays_the_same_over_turns_of_any_number_is_the_same_to_rounding() {
+    // 300 s at 360 degrees a second: 1885 rad on the axis, then back to the first pose.
+    let steps = "[[step]]\nup = [0, 0.6, 0.8]\ndwell_s = 1\n[[step]]\nup = [0, 0.6, 0.8]\nrate_dps = 360\ndwell_s = 300\n\
+                 [[step]]\nup = [0, 0.6, 0.8]\ndwell_s = 1";
+    let mut table = table(steps, &TableTruth::ideal());
+    let first = table.at(0.5).motion;
+    let end = table.duration_s();
+    let last = table.at(end - 0.5).motion;
+    assert!((first.attitude.inverse() * last.attitude).axis_angle().1 < 1e-12);
+    assert_near(first.force, last.force, 1e-12);
+}
+
+#[test]
+fn many_poses_are_spread_evenly_over_what_the_table_reaches() {
+    let truth = TableTruth {
+        middle_min_deg: -60.0,
+        middle_max_deg: 95.0,
+        ..TableTruth::ideal()
+    };
+    let mut table = table("[[step]]\nposes = 200\ndwell_s = 0.1", &truth);
+    let mut ups: Vec<Vector> = Vec::new();
+    for k in 0..(table.duration_s() * 20.0) as usize {
+        let instant = table.at(k as f64 * 0.05);
+        if instant.step.is_some_and(|step| step as usize == ups.len()) {
+            ups.push(scale(1.0 / 9.793, instant.motion.force));
+        }
+    }
+    assert_eq!(ups.len(), 200);
+    // Each has its share of the area within 95 degrees, 2π(1 - cos 95°) / 200; its nearest neighbour is
+    // about the root of that away.
+    let lowest = ups.iter().map(|up| up[2]).fold(1.0, f64::min);
+    assert!(lowest >= 95f64.to_radians().cos() && lowest < 92f64.to_radians().cos());
+    let apart = (TAU * (1.0 - 95f64.to_radians().cos()) / 200.0).sqrt();
+    for (i, a) in ups.iter().enumerate() {
+        let others = ups.iter().enumerate().filter(|(j, _)| i != *j);
+        let nearest = others.map(|(_, b)| norm(minus(*a, *b))).fold(2.0, f64::min);
+        assert!(
+            nearest > 0.66 * apart && nearest < 1.34 * apart,
+            "{nearest} {apart}"
+        );
+    }
+}

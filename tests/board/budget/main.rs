@@ -1,0 +1,154 @@
+//! What the firmware costs, counted on the emulated board: `cargo run -p mimu-board-tests --bin budget [-- --check]`.
+//!
+//! With `--check` a figure above `budget.toml` beside it is an error. Both images are built before; `make budget` does.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::process::ExitCode;
+
+use mimu_board::front::Front;
+use mimu_board::image::Image;
+use mimu_board::running::Board;
+use mimu_board::schematic::Volts;
+use mimu_board_tests::conversation::{Answer, Conversation};
+use mimu_board_tests::{MS, STARTED, built, image, still};
+use mimu_core::wire::Request;
+
+/// Cycles of the core in a millisecond.
+const CYCLES_PER_MS: f64 = 400e3;
+
+/// Effects that run with every sample, as `tests/counted` runs them.
+const EFFECTS: [&str; 9] = [
+    "gyro_g_sensitivity",
+    "gyro_scale_quadratic",
+    "gyro_scale_cubic",
+    "gyro_scale_asymmetry",
+    "accel_scale_quadratic",
+    "accel_scale_cubic",
+    "accel_cross_axis_product",
+    "accel_size_effect",
+    "term",
+];
+
+fn main() -> ExitCode {
+    let check = std::env::args()
+        .skip(1)
+        .any(|argument| argument == "--check");
+    match figures().and_then(|figures| report(&figures, check)) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(problem) => {
+            eprintln!("budget: {problem}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn figures() -> Result<BTreeMap<String, f64>, String> {
+    let mut figures = BTreeMap::new();
+    let marked = counted()?;
+    let mut marked = marked.into_iter().map(|instructions| instructions as f64);
+    let mut next = || {
+        marked
+            .next()
+            .ok_or("tests/counted runs less than is expected")
+    };
+    figures.insert("compensation_instructions".into(), next()?);
+    // Of a bank of three filters.
+    figures.insert("kalman_update_instructions".into(), next()? / 3.0);
+    let none = next()?;
+    let mut shared = 0.0_f64;
+    for effect in EFFECTS {
+        let (one, two) = (next()?, next()?);
+        let each = two - one;
+        figures.insert(format!("{effect}_instructions"), each);
+        shared = shared.max(one - each);
+    }
+    figures.insert("no_effect_instructions".into(), none);
+    figures.insert("effects_of_a_triad_instructions".into(), shared - none);
+    // Of an axis each.
+    let (none, one, triad, both) = (next()?, next()?, next()?, next()?);
+    let each = [one - none, (triad - none) / 3.0, (both - none) / 6.0];
+    let each = each.into_iter().fold(0.0, f64::max);
+    figures.insert("readout_code_instructions".into(), each);
+    figures.insert("no_readout_code_instructions".into(), none);
+    figures.insert("readout_codes_instructions".into(), both);
+    if next().is_ok() {
+        return Err("tests/counted runs more than is expected".into());
+    }
+    let mut device = Conversation::new(still(Volts::GROUND));
+    device.greeting();
+    device.run_for(STARTED);
+    let stream = device.ask(Request::Stream {
+        raw: true,
+        compensated: false,
+    });
+    if stream != Answer::Done {
+        return Err(format!("the stream of raw readings: {stream:?}"));
+    }
+    let began = device.board.standing();
+    let ms = 1000;
+    let ended = device.board.run_for(ms * MS)?;
+    let each = (ended.instructions - began.instructions) as f64 / ms as f64;
+    figures.insert("sample_instructions".into(), each);
+    figures.insert("load_percent".into(), 100.0 * each / CYCLES_PER_MS);
+    let sizes = image().sizes();
+    figures.insert("flash_bytes".into(), sizes.flash as f64);
+    figures.insert("ram_bytes".into(), sizes.ram as f64);
+    Ok(figures)
+}
+
+/// Instructions between each pair of marks, less those of the empty pair.
+fn counted() -> Result<Vec<u64>, String> {
+    let image = Image::read(&built("mimu-counted"))?;
+    let (from, to) = (image.find("counted_from")?, image.find("counted_to")?);
+    let mut board = Board::new(&image, Front::Still(Volts::GROUND))?;
+    board.watch(from)?;
+    board.watch(to)?;
+    board.run_for(100 * MS)?;
+    let arrivals = board.arrivals()?;
+    if arrivals.is_empty()
+        || arrivals
+            .chunks(2)
+            .any(|pair| pair.len() < 2 || pair[0].address != from || pair[1].address != to)
+    {
+        return Err("the marks of tests/counted did not come in pairs".into());
+    }
+    let spans: Vec<u64> = arrivals
+        .chunks(2)
+        .map(|pair| pair[1].instructions - pair[0].instructions)
+        .collect();
+    Ok(spans[1..].iter().map(|span| span - spans[0]).collect())
+}
+
+fn report(figures: &BTreeMap<String, f64>, check: bool) -> Result<(), String> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("budget.toml");
+    let text = std::fs::read_to_string(&path).map_err(|e| format!("{}: {e}", path.display()))?;
+    let most: BTreeMap<String, toml::Value> =
+        toml::from_str(&text).map_err(|e| format!("{}: {e}", path.display()))?;
+    let number = |value: &toml::Value| {
+        value
+            .as_float()
+            .or(value.as_integer().map(|whole| whole as f64))
+    };
+    let mut over = Vec::new();
+    println!("{:<28} {:>10} {:>10}", "", "measured", "at most");
+    for (name, &measured) in figures {
+        let limit = most.get(name).and_then(number);
+        let limit = limit.ok_or_else(|| format!("{}: no number `{name}`", path.display()))?;
+        println!("{name:<28} {measured:>10.1} {limit:>10.1}");
+        // Not a number is over it too.
+        if !(measured <= limit) {
+            over.push(name.as_str());
+        }
+    }
+    if let Some(unmeasured) = most.keys().find(|name| !figures.contains_key(*name)) {
+        return Err(format!(
+            "{}: `{unmeasured}` is not measured",
+            path.display()
+        ));
+    }
+    if check && !over.is_empty() {
+        return Err(format!("over the budget: {}", over.join(", ")));
+    }
+    Ok(())
+}

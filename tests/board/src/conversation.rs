@@ -1,0 +1,204 @@
+//! The host's end of the serial line, for tests: calls and what the device sends, in virtual time.
+
+use mimu_board::running::Board;
+use mimu_core::wire::{
+    CHUNK, Call, Decoder, Event, MAX_FRAME, Message, Refusal, Reply, Request, Sums, encode,
+};
+
+use crate::MS;
+
+/// Longest virtual time that an answer may take, ms: erasing a sector takes 1 to 2 s.
+const PATIENCE_MS: u64 = 10_000;
+
+/// What came of a call.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Answer {
+    /// It was done, and the reply carries nothing.
+    Done,
+    /// It was not done.
+    Refused(Refusal),
+    /// Part of the stored calibration: length of the whole, and the part.
+    Stored(u32, Vec<u8>),
+    /// A greeting: hash of the calibration in use, and the start as text.
+    Greeting {
+        /// `None`: there is no calibration.
+        hash: Option<u64>,
+        /// Why the device started.
+        start: String,
+    },
+    /// Any other reply, as text.
+    Other(String),
+}
+
+/// A sample as it came in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Sample {
+    /// Milliseconds since sampling began.
+    pub number: u32,
+    /// Sums of codes.
+    pub sums: Sums,
+}
+
+/// A board and the host at its line.
+pub struct Conversation {
+    /// The board.
+    pub board: Board,
+    decoder: Decoder,
+    next_id: u16,
+    answers: Vec<(u16, Answer)>,
+    /// Samples of the raw stream since they were last taken.
+    pub samples: Vec<Sample>,
+    /// Samples and batches that the device says it has lost, by the last batch.
+    pub lost: (u32, u32),
+    /// Every byte that comes, where one has put a list here to keep them.
+    pub kept: Option<Vec<u8>>,
+}
+
+impl Conversation {
+    /// With a board that runs already or will.
+    pub fn new(board: Board) -> Self {
+        Self {
+            board,
+            decoder: Decoder::new(),
+            next_id: 0,
+            answers: Vec::new(),
+            samples: Vec::new(),
+            lost: (0, 0),
+            kept: None,
+        }
+    }
+
+    /// Frames that came garbled.
+    pub fn garbled(&self) -> u32 {
+        self.decoder.garbled()
+    }
+
+    /// Runs for so much virtual time, ns, and takes in what comes.
+    pub fn run_for(&mut self, ns: u64) {
+        self.board.run_for(ns).unwrap();
+        self.listen();
+    }
+
+    /// Takes in what has come.
+    pub fn listen(&mut self) {
+        for (_, byte) in self.board.receive() {
+            if let Some(kept) = &mut self.kept {
+                kept.push(byte);
+            }
+            let Some(frame) = self.decoder.push(byte) else {
+                continue;
+            };
+            let message = frame.message().expect("a whole frame holds a message");
+            match message {
+                Message::Greeting { id, greeting } => {
+                    let hash = greeting.stored.map(|stored| stored.hash);
+                    let start = format!("{:?}", greeting.start);
+                    self.answers.push((id, Answer::Greeting { hash, start }));
+                }
+                Message::Reply { id, reply } => {
+                    let answer = match reply {
+                        Reply::Done => Answer::Done,
+                        Reply::Stored { length, bytes, .. } => {
+                            Answer::Stored(length, bytes.to_vec())
+                        }
+                        other => Answer::Other(format!("{other:?}")),
+                    };
+                    self.answers.push((id, answer));
+                }
+                Message::Refused { id, refusal } => {
+                    self.answers.push((id, Answer::Refused(refusal)));
+                }
+                Message::Event(Event::Raw(batch)) => {
+                    self.lost = (batch.head.samples_lost, batch.head.batches_dropped);
+                    let sample = |(number, sums)| Sample { number, sums };
+                    self.samples.extend(batch.sums().map(sample));
+                }
+                Message::Event(_) => {}
+            }
+        }
+    }
+
+    /// Sends a request without waiting. Returns its id.
+    pub fn send(&mut self, request: Request<'_>) -> u16 {
+        self.next_id += 1;
+        let id = self.next_id;
+        let mut frame = [0; MAX_FRAME];
+        let length = encode(&Call { id, request }, &mut frame).unwrap();
+        self.board.send(&frame[..length]);
+        id
+    }
+
+    /// The answer to an id, if it has come.
+    pub fn answer(&mut self, id: u16) -> Option<Answer> {
+        let at = self.answers.iter().position(|(of, _)| *of == id)?;
+        Some(self.answers.remove(at).1)
+    }
+
+    /// Asks and waits.
+    ///
+    /// # Panics
+    ///
+    /// If no answer comes.
+    pub fn ask(&mut self, request: Request<'_>) -> Answer {
+        let id = self.send(request);
+        for _ in 0..PATIENCE_MS {
+            self.run_for(MS);
+            if let Some(answer) = self.answer(id) {
+                return answer;
+            }
+        }
+        panic!("no answer to {request:?} in {PATIENCE_MS} ms of virtual time");
+    }
+
+    /// Waits for the greeting that the device sends by itself after its start.
+    ///
+    /// # Panics
+    ///
+    /// If none comes.
+    pub fn greeting(&mut self) -> Answer {
+        for _ in 0..PATIENCE_MS {
+            self.run_for(MS);
+            if let Some(answer) = self.answer(0) {
+                return answer;
+            }
+        }
+        panic!("no greeting in {PATIENCE_MS} ms of virtual time");
+    }
+
+    /// Sends a calibration, all but the commit.
+    pub fn upload(&mut self, bytes: &[u8]) {
+        let begin = Request::UploadBegin {
+            length: bytes.len() as u32,
+            hash: mimu_core::stored::hash(bytes),
+        };
+        assert_eq!(self.ask(begin), Answer::Done);
+        for (k, part) in bytes.chunks(CHUNK).enumerate() {
+            let chunk = Request::UploadChunk {
+                offset: (k * CHUNK) as u32,
+                bytes: part,
+            };
+            assert_eq!(self.ask(chunk), Answer::Done);
+        }
+    }
+
+    /// The calibration that the device uses, byte by byte; `None` if it has none.
+    pub fn download(&mut self) -> Option<Vec<u8>> {
+        let mut all = Vec::new();
+        loop {
+            let request = Request::Download {
+                offset: all.len() as u32,
+                length: CHUNK as u16,
+            };
+            match self.ask(request) {
+                Answer::Stored(length, part) => {
+                    all.extend(part);
+                    if all.len() as u32 >= length {
+                        return Some(all);
+                    }
+                }
+                Answer::Refused(Refusal::NoCalibration) => return None,
+                other => panic!("{other:?}"),
+            }
+        }
+    }
+}

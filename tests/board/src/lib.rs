@@ -1,0 +1,51 @@
+//! The firmware's release image on the emulated board, looked at as a whole.
+//!
+//! | where                | what                                                                                 |
+//! |----------------------|--------------------------------------------------------------------------------------|
+//! | [`conversation`]     | the host's end of the serial line                                                    |
+//! | [`mod@traces`], `traces/` | what the device sent of every kind of step, which `core` computes again         |
+//! | `tests/all/`         | sampling, the line, restarts, cuts of the supply, the pseudo-terminal                |
+//! | `budget/`            | what the firmware costs, against `budget.toml`                                       |
+
+pub mod conversation;
+pub mod traces;
+
+use std::path::PathBuf;
+
+use mimu_board::front::Front;
+use mimu_board::image::Image;
+use mimu_board::running::Board;
+use mimu_board::schematic::Volts;
+
+/// A millisecond of virtual time, ns.
+pub const MS: u64 = 1_000_000;
+
+/// Time after which the firmware samples, ns: the converter's calibration takes 42 ms of it.
+pub const STARTED: u64 = 100 * MS;
+
+/// The release image: what `MIMU_FIRMWARE` names, or what was built last into the target directory.
+///
+/// # Panics
+///
+/// If it was not built.
+pub fn image() -> Image {
+    let path =
+        std::env::var_os("MIMU_FIRMWARE").map_or_else(|| built("mimu-firmware"), PathBuf::from);
+    match Image::read(&path) {
+        Ok(image) => image,
+        Err(problem) => panic!("{problem}"),
+    }
+}
+
+/// Where the release build of a program for the target is.
+pub fn built(name: &str) -> PathBuf {
+    let root = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
+    let target = std::env::var_os("CARGO_TARGET_DIR")
+        .map_or_else(|| PathBuf::from(root).join("target"), PathBuf::from);
+    target.join("thumbv7em-none-eabihf/release").join(name)
+}
+
+/// A board with the release image behind voltages that do not change.
+pub fn still(volts: Volts) -> Board {
+    Board::new(&image(), Front::Still(volts)).unwrap()
+}

@@ -1,0 +1,92 @@
+//! The release image on the emulated board, whatever it sends: when it samples, what it samples, and what the
+//! emulator says of how it uses the part.
+
+use mimu_board::schematic::{Volts, WIRING};
+use mimu_board_tests::{MS, STARTED, image, still};
+
+/// Registers of DMA1's first stream (RM0433 15.5): what is left of the round, and where it writes.
+const LEFT: u64 = 0x4002_0014;
+const RING: u64 = 0x4002_001C;
+
+#[test]
+fn the_converter_is_paced_by_the_crystal_alone_20_conversions_a_millisecond() {
+    let mut board = still(Volts::GROUND);
+    board.run_to(STARTED).unwrap();
+    board.conversions().unwrap();
+    board.run_for(1000 * MS).unwrap();
+    let second = board.conversions().unwrap();
+    assert_eq!(second.count, 20_000);
+    assert_eq!((second.shortest_ns, second.longest_ns), (50_000, 50_000));
+}
+
+#[test]
+fn each_place_of_the_ring_holds_the_code_of_its_own_pin() {
+    // Every input at a voltage of its own, those that nothing is wired to among them.
+    let mut volts = Volts::GROUND;
+    for (k, v) in volts.input.iter_mut().enumerate() {
+        *v = 0.05 + 0.16 * k as f64;
+    }
+    let mut board = still(volts);
+    board.run_to(STARTED).unwrap();
+    let ring = board.register(RING).unwrap();
+    let bytes = board.memory(ring, 80).unwrap();
+    let codes: Vec<f64> = bytes
+        .chunks(2)
+        .map(|b| f64::from(u16::from_le_bytes([b[0], b[1]])))
+        .collect();
+    for (place, code) in codes.iter().enumerate() {
+        let (net, pin, input) = WIRING[place % WIRING.len()];
+        let exact = volts.input[input] / volts.rail * 65_535.0;
+        assert!(
+            *code <= exact && exact < *code + 1.01,
+            "{net:?} at {pin}: {code}, not {exact}"
+        );
+    }
+}
+
+#[test]
+fn no_rule_of_the_reference_manual_is_broken() {
+    let mut board = still(Volts::GROUND);
+    board.run_to(2000 * MS).unwrap();
+    let findings = board.findings().unwrap();
+    assert_eq!(findings.broken, [""; 0]);
+    assert_eq!(findings.unmodelled, [""; 0]);
+    assert_eq!(board.restarts().unwrap(), []);
+}
+
+#[test]
+fn after_the_reset_pin_and_after_a_power_cut_it_samples_again_in_step() {
+    let mut board = still(Volts::GROUND);
+    board.run_to(STARTED).unwrap();
+    board.reset_by_pin(1).unwrap();
+    board.run_for(STARTED).unwrap();
+    board.cut_supply(1).unwrap();
+    board.run_for(10 * MS).unwrap();
+    board.conversions().unwrap();
+    let dead = board.run_for(10 * MS).unwrap();
+    assert_eq!(board.conversions().unwrap().count, 0);
+    board.restore_supply().unwrap();
+    let started = board.run_for(STARTED).unwrap();
+    assert!(started.instructions > dead.instructions);
+    board.conversions().unwrap();
+    board.run_for(100 * MS).unwrap();
+    let after = board.conversions().unwrap();
+    assert_eq!(after.count, 2000);
+    assert_eq!((after.shortest_ns, after.longest_ns), (50_000, 50_000));
+    let causes: Vec<String> = board
+        .restarts()
+        .unwrap()
+        .into_iter()
+        .map(|r| r.cause)
+        .collect();
+    assert_eq!(causes, ["Pin", "PowerOn"]);
+    assert!(board.register(LEFT).unwrap() <= 40);
+    assert_eq!(board.findings().unwrap().broken, [""; 0]);
+}
+
+#[test]
+fn the_image_leaves_most_of_its_memory_free() {
+    let sizes = image().sizes();
+    assert!(sizes.flash <= 65_536, "{} bytes of flash", sizes.flash);
+    assert!(sizes.ram < 32 << 10, "{} bytes of RAM", sizes.ram);
+}

@@ -1,0 +1,9 @@
+//! The firmware's release image on the emulated board.
+
+mod board;
+mod budget;
+mod power;
+mod restart;
+mod serial;
+mod terminal;
+mod traces;

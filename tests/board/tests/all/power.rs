@@ -1,0 +1,336 @@
+//! The stored calibration against a supply that is cut at any instant, and against a bit that flips.
+
+use std::path::Path;
+
+use mimu_board::flash::Change;
+use mimu_board::running::STORE;
+use mimu_board::schematic::Volts;
+use mimu_board_tests::conversation::{Answer, Conversation};
+use mimu_board_tests::{MS, still};
+use mimu_core::compensation::{Affine, Compensation};
+use mimu_core::stored;
+use mimu_core::table::Node;
+use mimu_core::wire::Request;
+use nalgebra::{Matrix3, Vector3};
+use plotters::prelude::*;
+
+/// A calibration of so many temperature nodes that no other number gives.
+fn calibration(nodes: u32, scale: f32) -> Vec<u8> {
+    let affine = |k: u32| Affine {
+        matrix: Matrix3::from_diagonal_element(scale + k as f32 * 0.001),
+        offset: Vector3::repeat(-2.5 * scale),
+    };
+    let node = |k| Node {
+        temp_c: 10.0 * k as f32,
+        model: Compensation {
+            gyro: affine(k),
+            accel: affine(k),
+        },
+    };
+    let nodes: Vec<_> = (0..nodes).map(node).collect();
+    let found_with = Matrix3::identity();
+    let mut bytes = vec![0; stored::MAX_LENGTH];
+    let length = stored::encode([&found_with, &found_with], &nodes, &[], &mut bytes).unwrap();
+    bytes.truncate(length);
+    bytes
+}
+
+/// A device that holds the old calibration, and has answered that it does.
+fn with_old(old: &[u8]) -> Conversation {
+    let mut device = Conversation::new(still(Volts::GROUND));
+    device.greeting();
+    device.upload(old);
+    assert_eq!(device.ask(Request::UploadCommit), Answer::Done);
+    device
+}
+
+/// What happens in flash while the new calibration is uploaded and committed, ns.
+struct Course {
+    began: u64,
+    committed: u64,
+    done: u64,
+    /// Slices of time in which a word was programmed.
+    words: Vec<u64>,
+    /// Slices of time in which a sector was erased.
+    erasing: Vec<u64>,
+}
+
+/// Carries out the whole of it once.
+fn course(old: &[u8], new: &[u8]) -> Course {
+    let mut device = with_old(old);
+    let began = device.board.standing().ns;
+    device.upload(new);
+    let committed = device.board.standing().ns;
+    let id = device.send(Request::UploadCommit);
+    let (mut words, mut erasing) = (Vec::new(), Vec::new());
+    while device.answer(id).is_none() {
+        // Half the time that a word takes, so that none is missed.
+        device.run_for(MS / 20);
+        let at = device.board.standing().ns;
+        let operations = device.board.in_flight().unwrap();
+        if operations
+            .iter()
+            .any(|o| matches!(o.change, Change::Program(_)))
+        {
+            words.push(at);
+        }
+        if operations.iter().any(|o| o.change == Change::Erase) {
+            erasing.push(at);
+        }
+        assert!(at < committed + 20_000 * MS, "no answer to the commit");
+    }
+    Course {
+        began,
+        committed,
+        done: device.board.standing().ns,
+        words,
+        erasing,
+    }
+}
+
+/// Instants of the cuts: evenly over the whole and a little beyond, and evenly over the words.
+fn instants(course: &Course, cuts: usize) -> Vec<u64> {
+    let in_words = cuts / 2;
+    let even = cuts - in_words;
+    let whole = course.done + 20 * MS - course.began;
+    let over_all = (0..even).map(|k| course.began + whole * k as u64 / (even as u64 - 1));
+    let over_words = (0..in_words).map(|k| {
+        let slice = course.words[k * (course.words.len() - 1) / (in_words - 1)];
+        // Not all in the same phase of a word.
+        slice + (k as u64 * 7919) % (MS / 20)
+    });
+    let mut all: Vec<u64> = over_all.chain(over_words).collect();
+    all.sort_unstable();
+    all
+}
+
+/// Starts the device with what a cut has left, and asks what it holds.
+fn after(device: &mut Conversation, store: Vec<u8>, seed: u64) -> (Option<u64>, Option<Vec<u8>>) {
+    device.board.cut_supply(seed).unwrap();
+    device.run_for(MS);
+    device.board.set_store(store).unwrap();
+    device.board.restore_supply().unwrap();
+    let Answer::Greeting { hash, .. } = device.greeting() else {
+        panic!("no greeting");
+    };
+    (hash, device.download())
+}
+
+/// Starting the device after each takes seconds, since it polls while its converter calibrates.
+#[test]
+fn whenever_the_supply_is_cut_the_old_or_the_new_calibration_is_there_whole() {
+    let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join("supply-cuts.svg");
+    cut_at_instants(8, &path);
+}
+
+#[test]
+#[ignore = "nightly: 300 starts of the device; draws docs/device/supply-cuts.svg"]
+fn at_each_of_300_instants_the_old_or_the_new_calibration_is_there_whole() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/device/supply-cuts.svg");
+    cut_at_instants(300, &path);
+}
+
+/// Cuts the supply at so many instants, half of them where words are programmed, which takes a hundredth of the time.
+fn cut_at_instants(cuts: usize, drawn: &Path) {
+    let (old, new) = (calibration(7, 3.5), calibration(16, 3.6));
+    let course = course(&old, &new);
+    assert!(!course.words.is_empty());
+
+    // The same once more: up to each instant it is the same run, and what flash would hold after a cut there does not
+    // depend on what comes later.
+    let mut device = with_old(&old);
+    assert_eq!(device.board.standing().ns, course.began);
+    device.upload(&new);
+    assert_eq!(device.board.standing().ns, course.committed);
+    let mut stores = Vec::new();
+    let all = instants(&course, cuts);
+    // The upload itself changes nothing in flash: what a cut in it leaves is what is there at its end.
+    let (uploading, committing): (Vec<u64>, Vec<u64>) =
+        all.iter().partition(|&&at| at <= course.committed);
+    for &at in &uploading {
+        stores.push((at, device.board.store().unwrap()));
+    }
+    device.send(Request::UploadCommit);
+    for (k, &at) in committing.iter().enumerate() {
+        device.board.run_to(at).unwrap();
+        stores.push((at, device.board.store_if_cut(k as u64).unwrap()));
+    }
+    assert_eq!(stores.len(), cuts);
+
+    // Two boards, since most machines that run this have two cores.
+    let judge = |part: &[(u64, Vec<u8>)]| judge(&course, [&old, &new], part);
+    let (first, second) = stores.split_at(stores.len() / 2);
+    let outcomes = std::thread::scope(|scope| {
+        let second = scope.spawn(|| judge(second));
+        [judge(first), second.join().unwrap()].concat()
+    });
+    assert!(outcomes.iter().any(|o| o.1) && outcomes.iter().any(|o| !o.1));
+    plot(&course, &outcomes, drawn);
+}
+
+/// Starts a device with what each cut has left, and looks what it holds: instants, and whether it is the new one.
+///
+/// # Panics
+///
+/// If it is neither the old calibration nor the new one, or the wrong one of them.
+fn judge(course: &Course, [old, new]: [&[u8]; 2], stores: &[(u64, Vec<u8>)]) -> Vec<(u64, bool)> {
+    let hashes = [old, new].map(stored::hash);
+    let mut device = Conversation::new(still(Volts::GROUND));
+    device.greeting();
+    let mut outcomes = Vec::new();
+    let mut last: Option<&(u64, Vec<u8>)> = None;
+    for cut in stores {
+        let (at, store) = cut;
+        // While the flash does not change, what is there was looked at already.
+        if last.is_some_and(|last| last.1 == *store) {
+            let is_new = outcomes.last().is_some_and(|o: &(u64, bool)| o.1);
+            outcomes.push((*at, is_new));
+            continue;
+        }
+        last = Some(cut);
+        let (hash, bytes) = after(&mut device, store.clone(), *at);
+        let is_new = match hash {
+            Some(hash) if hash == hashes[0] => false,
+            Some(hash) if hash == hashes[1] => true,
+            other => panic!("cut at {at} ns: calibration {other:?}, not {hashes:?}"),
+        };
+        assert_eq!(bytes.as_deref(), Some(if is_new { new } else { old }));
+        outcomes.push((*at, is_new));
+    }
+    for &(at, is_new) in &outcomes {
+        assert!(
+            is_new || at < course.done,
+            "cut at {at} ns, after the answer"
+        );
+        assert!(
+            !is_new || at > course.committed,
+            "cut at {at} ns, before the commit"
+        );
+    }
+    assert_eq!(device.board.findings().unwrap().broken, [""; 0]);
+    outcomes
+}
+
+/// Draws which calibration was there after the cut at each instant.
+fn plot(course: &Course, outcomes: &[(u64, bool)], path: &Path) {
+    let seconds = |at: u64| (at as f64 - course.began as f64) / 1e9;
+    let span = |slices: &[u64]| Some([*slices.first()?, *slices.last()?].map(seconds));
+    let words = span(&course.words).unwrap();
+    let phases = [
+        Some((
+            "upload",
+            [0.0, seconds(course.committed)],
+            RGBColor(120, 160, 210),
+        )),
+        span(&course.erasing).map(|s| ("a sector is erased", s, RGBColor(225, 165, 60))),
+        Some(("words are programmed", words, RGBColor(90, 170, 110))),
+    ];
+    let end = seconds(outcomes.last().unwrap().0);
+    let root = SVGBackend::new(path, (900, 330)).into_drawing_area();
+    root.fill(&WHITE).unwrap();
+    let panels = root.split_evenly((1, 2));
+    let ranges = [
+        ("upload and commit", 0.0, end),
+        (
+            "enlarged: where words are programmed",
+            words[0] - 0.002,
+            words[1] + 0.004,
+        ),
+    ];
+    for (k, (panel, (title, from, to))) in panels.iter().zip(ranges).enumerate() {
+        let mut chart = ChartBuilder::on(panel)
+            .caption(title, ("sans-serif", 17))
+            .margin(10)
+            .margin_right(20)
+            .x_label_area_size(40)
+            .y_label_area_size(50)
+            .build_cartesian_2d(from..to, -0.5..2.0)
+            .unwrap();
+        for (name, [begin, end], color) in phases.into_iter().flatten() {
+            let corners = [(begin.max(from), -0.5), (end.min(to), 2.0)];
+            if corners[0].0 >= corners[1].0 {
+                continue;
+            }
+            let drawn = chart
+                .draw_series([Rectangle::new(corners, color.mix(0.35).filled())])
+                .unwrap();
+            // The first panel has them all.
+            if k == 0 {
+                drawn.label(name).legend(move |(x, y)| {
+                    Rectangle::new([(x, y - 5), (x + 14, y + 5)], color.mix(0.6).filled())
+                });
+            }
+        }
+        chart
+            .configure_mesh()
+            .disable_mesh()
+            .x_desc("instant of the cut, s after the upload began")
+            .x_labels(6)
+            .y_labels(3)
+            .label_style(("sans-serif", 14))
+            .y_label_formatter(&|y| match *y {
+                0.0 => "old".into(),
+                1.0 => "new".into(),
+                _ => String::new(),
+            })
+            .draw()
+            .unwrap();
+        let points = outcomes
+            .iter()
+            .filter(|o| (from..=to).contains(&seconds(o.0)))
+            .map(|&(at, is_new)| {
+                let (y, color) = if is_new { (1.0, BLUE) } else { (0.0, RED) };
+                Circle::new((seconds(at), y), 3, color.mix(0.6).filled())
+            });
+        chart.draw_series(points).unwrap();
+        if k == 0 {
+            chart
+                .configure_series_labels()
+                .position(SeriesLabelPosition::UpperLeft)
+                .background_style(WHITE.mix(0.7))
+                .label_font(("sans-serif", 13))
+                .draw()
+                .unwrap();
+        }
+    }
+    root.present().unwrap();
+    let new = outcomes.iter().filter(|o| o.1).count();
+    println!(
+        "{} cuts: {} left the old calibration, {new} the new one, none anything else; upload {:.2} s, commit {:.2} s; {}",
+        outcomes.len(),
+        outcomes.len() - new,
+        seconds(course.committed),
+        (course.done - course.committed) as f64 / 1e9,
+        path.display()
+    );
+}
+
+#[test]
+fn a_bit_that_flips_in_the_stored_calibration_is_noticed() {
+    let bytes = calibration(7, 3.5);
+    let mut device = with_old(&bytes);
+    let hash = stored::hash(&bytes);
+    let store = device.board.store().unwrap();
+    let place = store
+        .windows(bytes.len())
+        .position(|window| window == bytes)
+        .expect("the calibration is in flash as it was sent");
+    // Bits all over it: header, numbers, check.
+    for k in 0..4 {
+        let at = STORE + (place + k * (bytes.len() - 1) / 3) as u64;
+        device.board.flip(at, k as u32).unwrap();
+        device.board.cut_supply(k as u64).unwrap();
+        device.run_for(MS);
+        device.board.restore_supply().unwrap();
+        let Answer::Greeting { hash: found, .. } = device.greeting() else {
+            panic!("no greeting");
+        };
+        assert_eq!(found, None, "bit {} at {at:#x} went unnoticed", k % 8);
+        device.board.flip(at, k as u32).unwrap();
+    }
+    device.board.reset_by_pin(1).unwrap();
+    let Answer::Greeting { hash: found, .. } = device.greeting() else {
+        panic!("no greeting");
+    };
+    assert_eq!(found, Some(hash), "the flips were taken back");
+}

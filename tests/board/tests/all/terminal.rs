@@ -1,0 +1,97 @@
+//! The emulated board behind its pseudo-terminal, as a program that opens serial ports finds it.
+
+use std::fs::File;
+use std::io::{Read, Write};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use mimu_board::front::Front;
+use mimu_board::running::{Board, STORE};
+use mimu_board::schematic::Volts;
+use mimu_board::serve::{Pace, Served};
+use mimu_board_tests::{MS, STARTED, image, still};
+use mimu_core::wire::{Call, Decoder, MAX_FRAME, Message, Request, encode};
+
+/// A device that never answers fails the test and does not hang it.
+const PATIENCE: Duration = Duration::from_secs(300);
+
+#[test]
+fn a_call_through_the_terminal_is_answered_and_no_byte_is_lost() {
+    let mut served = Served::new(still(Volts::GROUND), Pace::Fast, None).unwrap();
+    let path = served.path().to_owned();
+    // Nobody has it open: time stands still.
+    for _ in 0..3 {
+        served.step().unwrap();
+    }
+    assert_eq!(served.board().standing().ns, 0);
+
+    let port = File::options().read(true).write(true).open(path).unwrap();
+    let done = AtomicBool::new(false);
+    let traffic = std::thread::scope(|scope| {
+        let serving = scope.spawn(|| {
+            let began = Instant::now();
+            while !done.load(Ordering::Relaxed) {
+                assert!(began.elapsed() < PATIENCE, "no answer");
+                served.step().unwrap();
+            }
+            served.traffic()
+        });
+        let mut decoder = Decoder::new();
+        let mut greeting_of = |wanted: u16| {
+            let mut byte = [0];
+            loop {
+                (&port).read_exact(&mut byte).unwrap();
+                let frame = decoder.push(byte[0]);
+                if let Some(Message::Greeting { id, .. }) = frame.and_then(|f| f.message()) {
+                    assert_eq!(id, wanted);
+                    return;
+                }
+            }
+        };
+        // What the device says by itself shows that it listens.
+        greeting_of(0);
+        let mut frame = [0; MAX_FRAME];
+        let call = Call {
+            id: 7,
+            request: Request::Hello,
+        };
+        let length = encode(&call, &mut frame).unwrap();
+        (&port).write_all(&frame[..length]).unwrap();
+        greeting_of(7);
+        done.store(true, Ordering::Relaxed);
+        let traffic = serving.join().unwrap();
+        assert_eq!(traffic.sent, length as u64);
+        traffic
+    });
+    assert_eq!((traffic.lost, traffic.unheard), (0, 0));
+}
+
+#[test]
+fn what_is_in_the_file_is_in_the_flash_and_a_wrong_file_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("unit.flash");
+    let board = || Board::new(&image(), Front::Still(Volts::GROUND)).unwrap();
+    drop(Served::new(board(), Pace::Fast, Some(&path)).unwrap());
+    let mut bytes = std::fs::read(&path).unwrap();
+    assert!(bytes.iter().all(|&byte| byte == 0xFF));
+    bytes[1234] = 0x5A;
+    std::fs::write(&path, &bytes).unwrap();
+    let mut served = Served::new(board(), Pace::Fast, Some(&path)).unwrap();
+    assert_eq!(served.board().memory(STORE + 1234, 1).unwrap(), [0x5A]);
+
+    std::fs::write(&path, b"short").unwrap();
+    let refusal = Served::new(board(), Pace::Fast, Some(&path)).unwrap_err();
+    assert!(refusal.contains("5 bytes"), "{refusal}");
+}
+
+#[test]
+fn at_the_pace_of_the_wall_a_second_takes_no_less_than_a_second() {
+    let mut board = still(Volts::GROUND);
+    board.run_to(STARTED).unwrap();
+    let mut served = Served::new(board, Pace::Wall, None).unwrap();
+    let began = Instant::now();
+    while served.board().standing().ns < STARTED + 500 * MS {
+        served.step().unwrap();
+    }
+    assert!(began.elapsed() >= Duration::from_millis(500));
+}

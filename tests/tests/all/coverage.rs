@@ -1,0 +1,288 @@
+//! Errors and intervals of the estimators on units whose truth is known: a 95 % interval must contain it in 95 % of
+//! the cases, parameter by parameter.
+
+use mimu::blocks::Condensed;
+use mimu::estimate::known_input::{
+    inverse_form, kalman, least_squares, opposite_rates, six_positions,
+};
+use mimu::estimate::{Estimated, Failure, Observation};
+use mimu::fit::{Method, Options, fit};
+use mimu::quantity::Sensor;
+use mimu::stillness::STILL_FACTOR;
+use mimu_recording::{
+    Batch, Columns, Manifest, RawUnit, Recording, Reference, SampleFormat, Writer,
+};
+use mimu_rig::ideal::Ideal;
+use mimu_rig::random::Random;
+use mimu_tests::bench;
+use mimu_tests::coverage::{Dwells, Tally, by_hand, with_a_table};
+use nalgebra::Vector3;
+
+/// Every parameter within 93 to 97 %, and what so many runs scatter by: 4 sigmas, as up to 60 parameters are looked at.
+fn judge(tally: &Tally) {
+    let [mean, low, high] = tally.summary();
+    println!(
+        "{:<36}{:>6} runs: 95 % intervals hold the truth in {:.1} % ({:.1} to {:.1} by parameter), rms error {:.3} sigma",
+        tally.name,
+        tally.runs,
+        100.0 * mean,
+        100.0 * low,
+        100.0 * high,
+        tally.rms()
+    );
+    let margin = |share: f64| 4.0 * (share * (1.0 - share) / f64::from(tally.runs)).sqrt();
+    assert!(
+        low > 0.93 - margin(0.93),
+        "{}: {:?}",
+        tally.name,
+        tally.shares()
+    );
+    assert!(
+        high < 0.97 + margin(0.97),
+        "{}: {:?}",
+        tally.name,
+        tally.shares()
+    );
+}
+
+/// Dwells of 1000 samples under known rates: the faces both ways, and rest.
+fn on_a_table(unit: &Ideal, random: &mut Random) -> Vec<Observation> {
+    let rates = [-5.0, -2.0, 2.0, 5.0];
+    let turns = (0..3).flat_map(|axis| rates.map(|r| Vector3::ith(axis, r)));
+    turns
+        .chain([Vector3::zeros(); 4])
+        .enumerate()
+        .map(|(dwell, input)| Observation {
+            dwell,
+            raw: unit.read(input.into(), 1000, random).into(),
+            variance: Vector3::from(unit.sigma).map(|s| s * s / 1000.0),
+            input,
+        })
+        .collect()
+}
+
+/// Recordings of each kind in every run of the tests: an interval that holds the truth in 83 % of the cases is seen.
+const FEW: u64 = 100;
+
+/// And in a night; `make papers` takes 1000.
+const MANY: u64 = 400;
+
+#[test]
+fn intervals_hold_the_truth_where_the_input_is_known() {
+    with_a_table(FEW, Dwells::ByLot).iter().for_each(judge);
+}
+
+#[test]
+#[ignore = "nightly: more recordings"]
+fn intervals_of_many_hold_the_truth_where_the_input_is_known() {
+    with_a_table(MANY, Dwells::ByLot).iter().for_each(judge);
+}
+
+/// Without the noise of the unit at rest, down to 90 %: what neighbouring dwells share of the wander is in no interval.
+#[test]
+fn intervals_hold_the_truth_of_dwells_that_share_the_wander_where_it_is_known() {
+    with_a_table(FEW, Dwells::AsListedWithNoise)
+        .iter()
+        .for_each(judge);
+}
+
+#[test]
+#[ignore = "nightly: more recordings"]
+fn intervals_of_many_hold_the_truth_of_dwells_that_share_the_wander() {
+    with_a_table(MANY, Dwells::AsListedWithNoise)
+        .iter()
+        .for_each(judge);
+}
+
+#[test]
+fn intervals_hold_the_truth_where_only_gravity_is_known() {
+    by_hand(FEW, false).iter().for_each(judge);
+    by_hand(FEW, true).iter().for_each(judge);
+}
+
+#[test]
+#[ignore = "nightly: more recordings"]
+fn intervals_of_many_hold_the_truth_where_only_gravity_is_known() {
+    by_hand(MANY, false).iter().for_each(judge);
+    by_hand(MANY, true).iter().for_each(judge);
+}
+
+/// A table that repeats its rates to 0.1 % only, or a bias that wanders: more than the noise says, and the intervals must know.
+#[test]
+fn intervals_hold_the_truth_where_dwells_scatter_more_than_the_noise() {
+    type Estimator = fn(&[Observation]) -> Result<Estimated, Failure>;
+    let all: Vec<usize> = (0..12).collect();
+    let estimators: [(&str, Estimator, &[usize]); 5] = [
+        (
+            "least squares, scattering dwells",
+            |o| least_squares(o, None),
+            &all,
+        ),
+        ("Kalman bank, scattering dwells", |o| kalman(o, None), &all),
+        ("inverse form, scattering dwells", inverse_form, &all),
+        ("opposite rates, scattering dwells", opposite_rates, &all),
+        (
+            "six positions, scattering dwells",
+            six_positions,
+            &[0, 4, 8],
+        ),
+    ];
+    for (name, estimator, free) in estimators {
+        let mut tally = Tally::new(name, free);
+        for seed in 0..2000 {
+            let mut random = Random::new(seed, "unit");
+            let model = bench::gyro(&mut random);
+            let unit = Ideal {
+                matrix: model.matrix,
+                bias: model.bias,
+                sigma: [2e-3; 3],
+            };
+            let mut dwells = on_a_table(&unit, &mut random);
+            for dwell in &mut dwells {
+                for axis in 0..3 {
+                    dwell.raw[axis] += 1e-3 * random.normal();
+                }
+            }
+            let found = estimator(&dwells).unwrap().triad;
+            tally.add(&found, &bench::parameters(&model));
+        }
+        judge(&tally);
+    }
+}
+
+fn options(holdout_blocks: usize) -> Options {
+    Options {
+        method: Method::LeastSquares,
+        holdout_blocks,
+        only: None,
+        still_factor: STILL_FACTOR,
+    }
+}
+
+/// Held-out figures are about new data: on a unit with nothing but noise they must be a little above the noise floor,
+/// and those in sample a little below.
+#[test]
+fn held_out_error_of_a_perfect_model_is_the_noise_and_that_of_the_parameters() {
+    let plan = bench::hand_plan(40);
+    let options = options(4);
+    let mut ratios = [[0.0; 2]; 2];
+    const RUNS: u64 = 20;
+    for seed in 0..RUNS {
+        let mut random = Random::new(seed, "unit");
+        let (gyro, accel) = (bench::gyro(&mut random), bench::accel(&mut random));
+        let mut file = bench::clean(gyro, accel);
+        // Wander is more than the noise within dwells, and not what this is about.
+        for axes in [&mut file.unit.gyro_axes, &mut file.unit.accel_axes] {
+            axes.instability_si = Some([0.0; 3]);
+            axes.walk_si = Some([0.0; 3]);
+        }
+        let fitted = fit(bench::recorded(&plan, &file, seed), options).unwrap();
+        for (k, sensor) in Sensor::BOTH.into_iter().enumerate() {
+            let s = fitted.sensor(sensor).unwrap();
+            ratios[k][0] += s.rms() / s.noise_floor() / RUNS as f64;
+            ratios[k][1] += s.held_out_rms().unwrap() / s.noise_floor() / RUNS as f64;
+        }
+    }
+    println!(
+        "over noise floor, in sample and held out: gyro {:?}, accelerometer {:?}",
+        ratios[0], ratios[1]
+    );
+    for [in_sample, held_out] in ratios {
+        // 40 poses, 9 parameters: √(31/40) = 0.88 in sample; held out each block of 10 is predicted by 30.
+        assert!((0.75..1.0).contains(&in_sample), "{in_sample}");
+        assert!((1.0..1.5).contains(&held_out), "{held_out}");
+    }
+}
+
+/// A sensor clipped where its axis points up: those dwells are left out, the rest is as good as without them.
+#[test]
+fn a_saturated_dwell_is_found_and_left_out() {
+    let mut random = Random::new(5, "unit");
+    let (gyro, accel) = (bench::gyro(&mut random), bench::accel(&mut random));
+    let highest =
+        accel.bias[2] + 9.80665 * accel.matrix[2].map(|p| p * p).iter().sum::<f64>().sqrt();
+    let rail = highest - 0.03;
+    let mut file = bench::clean(gyro, accel);
+    file.unit.accel_axes.high_raw = Some(rail);
+    let prepared = bench::recorded(&bench::hand_plan(30), &file, 5);
+    let found = prepared.dwells.rails[5].high.expect("a rail");
+    // To a sigma of the sensor's noise, 247 µg/√Hz at 100 Hz and 80 mV per m/s².
+    assert!((found - rail).abs() < 2e-3, "{found} for {rail}");
+    let faults = prepared
+        .dwells
+        .list
+        .iter()
+        .filter(|d| d.accel_fault.is_some());
+    let saturated = faults.count();
+    assert!((1..8).contains(&saturated), "{saturated}");
+    let fitted = fit(prepared, options(0)).unwrap();
+    let accel = fitted.sensor(Sensor::Accel).unwrap();
+    // Tight enough to see a clipped dwell: its mean is off by up to 0.03 V, or 0.4 m/s².
+    assert!(
+        accel.rms() < 2.0 * accel.noise_floor(),
+        "{} {}",
+        accel.rms(),
+        accel.noise_floor()
+    );
+    let told = |w: &String| w.contains("accel_z saturated");
+    assert!(fitted.warnings.iter().any(told), "{:?}", fitted.warnings);
+}
+
+/// Dwell means of correlated noise scatter by more than sigma over the root of n, and the Allan deviation knows.
+#[test]
+fn noise_of_a_dwell_mean_is_that_of_correlated_noise() {
+    let (rate_hz, dwell_s): (f64, f64) = (100.0, 10.0);
+    let mut random = Random::new(3, "noise");
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("recording");
+    let columns = Columns {
+        gyro: true,
+        step: true,
+        ..Columns::default()
+    };
+    let mut writer = Writer::create(&path, columns, SampleFormat::Parquet, false).unwrap();
+    let mut batch = Batch::default();
+    // First-order Gauss-Markov noise of 0.5 s: a mean over 10 s scatters by σ √(2·0.5/10), ten times as much as
+    // σ/√1000.
+    let (keep, dwells) = ((-1.0 / (0.5 * rate_hz)).exp(), 200);
+    let drive = f64::sqrt(1.0 - keep * keep);
+    let mut state = [0.0; 3];
+    for row in 0..(dwells as f64 * dwell_s * rate_hz) as usize {
+        batch.t_s.push(row as f64 / rate_hz);
+        batch.step.push((row as f64 / (dwell_s * rate_hz)) as i32);
+        for (axis, state) in state.iter_mut().enumerate() {
+            *state = keep * *state + drive * random.normal();
+            batch.raw[axis].push(*state);
+        }
+    }
+    writer.write(&batch).unwrap();
+    writer
+        .finish(&Manifest::new(
+            "simulated",
+            rate_hz,
+            9.80665,
+            RawUnit::Volt,
+            Reference::Table,
+        ))
+        .unwrap();
+    let recording = Recording::open(&path).unwrap();
+    let condensed = Condensed::read(&recording, false, |_| ()).unwrap();
+    let found = mimu::dwell::Dwells::find(&condensed, &recording.manifest, STILL_FACTOR).unwrap();
+    let noise = mimu::noise::Noise::within(&found.list, &condensed);
+    let claimed = noise.of_mean(Sensor::Gyro, &found.list[0]).mean().sqrt();
+    let means = found
+        .list
+        .iter()
+        .flat_map(|d| [0, 1, 2].map(|c| d.raw[c].mean));
+    let scatter = (means.map(|m| m * m).sum::<f64>() / (3 * dwells) as f64).sqrt();
+    let theory = f64::sqrt(2.0 * 0.5 / dwell_s);
+    println!(
+        "scatter of 10 s means {scatter:.3}, claimed {claimed:.3}, theory {theory:.3}, white {:.3}",
+        1.0 / (dwell_s * rate_hz).sqrt()
+    );
+    // The longest octave within a dwell is 3.2 s, and what lies beyond is extrapolated.
+    assert!(
+        (0.8..1.25).contains(&(claimed / scatter)),
+        "{claimed} {scatter}"
+    );
+}

@@ -1,0 +1,14 @@
+//! Estimators and diagnosis over the whole path of a recording: from the virtual bench, and from real units.
+
+mod agreement;
+mod coverage;
+mod diagnosis;
+mod module_circles;
+mod next_experiment;
+mod noise_of_the_bench;
+mod papers;
+mod real_ferraris;
+mod real_mikoff;
+mod real_xsens;
+mod several_recordings;
+mod stated_noise;

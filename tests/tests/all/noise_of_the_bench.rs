@@ -1,0 +1,81 @@
+//! Noise coefficients of units on the virtual bench, through their filters and converters, by what `mimu allan` computes.
+
+use mimu::allan::Kind;
+use mimu::allan::model::Term;
+use mimu::allan::recording::{Options, Part, Survey, survey};
+use mimu::quantity::Sensor;
+use mimu_recording::Recording;
+use mimu_rig::located::Source;
+use mimu_rig::plan::Plan;
+use mimu_rig::random::Random;
+use mimu_rig::record::{Output, write};
+use mimu_rig::rig_file::{RigFile, RigTruth};
+use mimu_tests::bench;
+
+/// N, B and K in SI of every gyro and every accelerometer, such that half an hour shows all three: flicker takes over from white
+/// noise at two seconds, and the random walk from flicker at six.
+const TRUTH: [[f64; 3]; 2] = [[1.2e-3, 1.3e-3, 6e-4], [2.3e-3, 2.4e-3, 1.1e-3]];
+
+/// Half an hour at rest at 100 Hz.
+const PLAN: &str = "format = \"mimu-plan/1\"\nsample_rate_hz = 100.0\ncarrier = \"table\"\n\
+                    [[step]]\nup = [0.0, 0.0, 1.0]\ndwell_s = 1800.0\n";
+
+/// The survey of a unit, and volts per SI of its channels.
+fn surveyed(seed: u64) -> (Survey, [f64; 6]) {
+    let mut random = Random::new(seed, "unit");
+    let models = [bench::gyro(&mut random), bench::accel(&mut random)];
+    let volts = std::array::from_fn(|i| {
+        let row: [f64; 3] = models[i / 3].matrix[i % 3];
+        row.map(|p| p * p).iter().sum::<f64>().sqrt()
+    });
+    let [gyro, accel] = models;
+    let mut file: RigFile = bench::clean(gyro, accel);
+    let axes = [&mut file.unit.gyro_axes, &mut file.unit.accel_axes];
+    for (axes, [n, b, k]) in axes.into_iter().zip(TRUTH) {
+        axes.white_si = Some([n; 3]);
+        axes.instability_si = Some([b; 3]);
+        axes.walk_si = Some([k; 3]);
+    }
+    let plan = Plan::parse(Source::new("plan", PLAN)).unwrap();
+    let truth = RigTruth::resolve(&file, seed).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("recording");
+    write(&plan, &truth, seed, &Output::new(&path, &plan).unwrap()).unwrap();
+    let options = Options {
+        part: Part::Whole,
+        kind: Kind::Allan,
+        per_decade: 3,
+        confidence: 0.95,
+    };
+    let survey = survey(&Recording::open(&path).unwrap(), None, options, |_| ()).unwrap();
+    (survey, volts)
+}
+
+#[test]
+fn white_noise_bias_instability_and_random_walk_are_within_their_intervals() {
+    const UNITS: u64 = 6;
+    let terms = [Term::N, Term::B, Term::K];
+    let (mut told, mut inside, mut strange) = ([0; 3], [0; 3], Vec::new());
+    for seed in 1..=UNITS {
+        let (survey, volts) = surveyed(seed);
+        for (channel, volts) in survey.channels.iter().zip(volts) {
+            let model = channel.model.as_ref().unwrap();
+            let known = TRUTH[usize::from(channel.sensor == Sensor::Accel)];
+            for (i, term) in terms.into_iter().enumerate() {
+                let Ok(c) = model.get(term) else { continue };
+                told[i] += 1;
+                inside[i] += usize::from((c.lower..=c.upper).contains(&(known[i] * volts)));
+            }
+            for term in [Term::Q, Term::R] {
+                strange.extend(model.get(term).ok().map(|c| (channel.name, term, *c)));
+            }
+        }
+    }
+    println!("of 36 channels N, B, K told {told:?}, inside {inside:?}; Q or R: {strange:?}");
+    // 95 % of 36 are 34; fewer than 30 have a probability of 3e-3.
+    for (i, term) in terms.into_iter().enumerate() {
+        assert!(told[i] >= 34, "{term:?} told {}", told[i]);
+        assert!(inside[i] + 6 >= told[i], "{term:?} inside {}", inside[i]);
+    }
+    assert!(strange.len() <= 2, "{strange:?}");
+}

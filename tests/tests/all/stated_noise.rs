@@ -1,0 +1,162 @@
+//! The noise of the unit at rest in the hands of the other commands.
+
+use mimu::design::budget::DwellNoise;
+use mimu::fit::{Method, Options, fit};
+use mimu::noise_file::NoiseFile;
+use mimu::prepared::Prepared;
+use mimu::quantity::Sensor;
+use mimu::stillness::STILL_FACTOR;
+use mimu_rig::random::Random;
+use mimu_tests::bench;
+
+const SEED: u64 = 3;
+
+/// A recording with the true noise of its unit.
+fn recorded() -> (Prepared, NoiseFile) {
+    let mut random = Random::new(SEED, "unit");
+    let (gyro, accel) = (bench::gyro(&mut random), bench::accel(&mut random));
+    let file = bench::clean(gyro, accel);
+    let prepared = bench::recorded(&bench::table_plan(Some(SEED)), &file, SEED);
+    let noise = bench::noise_file(&file, SEED, prepared.condensed.period_s);
+    (prepared, noise)
+}
+
+fn gyro_floor(prepared: Prepared) -> f64 {
+    let options = Options {
+        method: Method::LeastSquares,
+        holdout_blocks: 0,
+        only: None,
+        still_factor: STILL_FACTOR,
+    };
+    let fitted = fit(prepared, options).unwrap();
+    fitted.sensor(Sensor::Gyro).unwrap().noise_floor()
+}
+
+#[test]
+fn a_noise_file_in_another_unit_is_refused_with_its_channel() {
+    let (prepared, mut noise) = recorded();
+    noise.channel[4].unit = "m/s^2".into();
+    let error = prepared.with_noise(&noise).unwrap_err();
+    assert!(error.place.contains("accel_y"), "{error}");
+    assert!(error.problem.contains("readings are in V"), "{error}");
+}
+
+#[test]
+fn a_channel_whose_dwells_are_not_as_noisy_as_the_file_says_keeps_its_own_noise_and_is_told_of() {
+    let (prepared, mut noise) = recorded();
+    let own = prepared.noise.variance(0, 3.0, f64::NAN);
+    for channel in &mut noise.channel {
+        if channel.name == "gyro_x" {
+            let quiet = 0.1 * channel.n.as_ref().unwrap().value;
+            channel.n.as_mut().unwrap().value = quiet;
+        }
+    }
+    let stated = prepared.with_noise(&noise).unwrap();
+    assert_eq!(stated.noise.variance(0, 3.0, f64::NAN), own);
+    let told: Vec<_> = stated
+        .dwells
+        .warnings
+        .iter()
+        .filter(|w| w.starts_with("gyro_x"))
+        .collect();
+    assert!(told.len() == 1 && told[0].contains("as noisy"), "{told:?}");
+    assert!(!stated.noise.is_stated(Sensor::Gyro) && stated.noise.is_stated(Sensor::Accel));
+}
+
+#[test]
+fn wander_between_the_dwells_is_in_the_noise_floor() {
+    let (prepared, mut noise) = recorded();
+    let bare = gyro_floor(prepared.clone());
+    for channel in &mut noise.channel {
+        let walk = channel.n.as_ref().unwrap().value;
+        channel.k.as_mut().unwrap().value = walk;
+    }
+    // A walk that is K = N/s: K² T/6 on the average over a session of length T, and T is 22 dwells and the moves.
+    let dwells = &prepared.dwells.list;
+    let session_s = dwells.last().unwrap().last_s - dwells[0].start_s;
+    let stated = gyro_floor(prepared.with_noise(&noise).unwrap());
+    let expected = (1.0 / 3.0 + session_s / 6.0) / (1.0 / 3.0);
+    let ratio = (stated / bare).powi(2);
+    assert!(
+        (0.7..1.4).contains(&(ratio / expected)),
+        "{ratio} {expected}"
+    );
+}
+
+#[test]
+fn noise_is_that_of_the_temperature_of_the_dwell() {
+    // fang, Table 5: variances that change with the temperature.
+    let (mut prepared, mut noise) = recorded();
+    let n = noise.channel.len();
+    for i in 0..n {
+        let mut warm = noise.channel[i].clone();
+        noise.channel[i].temp_c = Some(20.0);
+        warm.temp_c = Some(40.0);
+        let hotter = 1.2 * warm.n.as_ref().unwrap().value;
+        warm.n.as_mut().unwrap().value = hotter;
+        noise.channel.push(warm);
+    }
+    for dwell in &mut prepared.dwells.list {
+        dwell.temp_c = 30.0;
+    }
+    let stated = prepared.with_noise(&noise).unwrap();
+    let white = |t| stated.noise.variance(0, 1e-6, t) * 1e-6;
+    let cold = white(10.0);
+    for (temp_c, known) in [
+        (20.0, 1.0),
+        (30.0, 0.5 * (1.0 + 1.44)),
+        (40.0, 1.44),
+        (90.0, 1.44),
+    ] {
+        assert!(
+            (white(temp_c) / cold / known - 1.0).abs() < 1e-6,
+            "{temp_c}"
+        );
+    }
+}
+
+#[test]
+fn the_useful_dwell_is_where_the_curve_is_within_five_per_cent_of_its_least() {
+    for noise in [
+        DwellNoise {
+            n: 1e-3,
+            b: 0.0,
+            k: 1e-4,
+        },
+        DwellNoise {
+            n: 1e-3,
+            b: 3e-4,
+            k: 0.0,
+        },
+        DwellNoise {
+            n: 1e-3,
+            b: 1e-4,
+            k: 2e-5,
+        },
+    ] {
+        let useful = noise.useful_s().unwrap();
+        let least = (0..6000)
+            .map(|i| noise.sigma(1.002_f64.powi(i)))
+            .fold(f64::INFINITY, f64::min);
+        // Where only a floor is left, it is approached and never reached.
+        let least = if noise.k > 0.0 {
+            least
+        } else {
+            noise.sigma(1e12)
+        };
+        assert!(
+            (noise.sigma(useful) / least / 1.05 - 1.0).abs() < 1e-3,
+            "{noise:?}: {useful}"
+        );
+        assert!(noise.sigma(0.9 * useful) > noise.sigma(useful));
+    }
+    assert_eq!(
+        DwellNoise {
+            n: 1e-3,
+            b: 0.0,
+            k: 0.0
+        }
+        .useful_s(),
+        None
+    );
+}
