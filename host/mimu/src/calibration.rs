@@ -16,7 +16,7 @@ use mimu_core::effects::Effects;
 use nalgebra::{Matrix3, Vector3};
 use serde::Deserialize;
 
-use crate::diagnose::removal::Removed;
+use crate::effects::removal::Removed;
 use crate::quantity::Sensor;
 use crate::triad::Forward;
 use mimu_recording::error::{Error, Result};

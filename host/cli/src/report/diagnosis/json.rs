@@ -104,8 +104,8 @@ fn accepted(sensor: Sensor, a: &Accepted) -> Value {
             "expected_sigmas": number(second.expected),
         });
     }
-    if let Some(form) = a.chosen.candidate.form() {
-        value["form"] = json!({ "name": form.name, "value": a.chosen.form });
+    if let Some(form) = a.chosen.candidate.parameter() {
+        value["form"] = json!({ "name": form.name, "value": a.chosen.parameter });
     }
     let converters = ConverterTable::of(&a.chosen.candidate.codes);
     if !converters.is_empty() {

@@ -266,7 +266,7 @@ fn effect(
                 "Left, what is left plus the part of the effect named (its other parts and the other effects taken out), against "
                 "what it depends on, less what the affine calibration takes up: the mean, and the best straight line where the variable is one that "
                 "it is linear in. " (key("fit", "M0 6H24")) "effect as fitted, with its 95 % band"
-                @if candidate.form().is_some() { " (for the " code { (candidate.form().map_or("", |f| f.name)) } " found)" }
+                @if candidate.parameter().is_some() { " (for the " code { (candidate.parameter().map_or("", |f| f.name)) } " found)" }
                 ". Right, what is left, on the same scale. " (keys()) "."
                 @if whole {
                     " Where a row is a whole turn or the size of gravity, the abscissa is what the fit says that the effect does to "

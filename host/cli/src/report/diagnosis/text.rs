@@ -172,12 +172,12 @@ fn effect(out: &mut String, a: &Accepted, shown: &impl Fn(f64) -> String) {
             a.values[i]
         );
     }
-    if let Some(form) = candidate.form() {
+    if let Some(form) = candidate.parameter() {
         let _ = writeln!(
             out,
             "    {:<12}{:>12}",
             form.name,
-            significant(a.chosen.form)
+            significant(a.chosen.parameter)
         );
     }
     for c in ConverterTable::of(&candidate.codes) {

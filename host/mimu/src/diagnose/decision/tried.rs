@@ -3,13 +3,11 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use crate::diagnose::candidate::{Candidate, Kind, Monomial};
-use crate::diagnose::library;
 use crate::diagnose::rows::Rows;
-use crate::diagnose::search::Search;
-
-/// An effect whose coefficient of the size of a data sheet would not be this many sigmas is not excited.
-pub(in crate::diagnose) const EXCITED: f64 = 3.0;
+use crate::diagnose::search::{EXCITED, Search};
+use crate::effects;
+use crate::effects::candidate::{Candidate, Kind};
+use crate::effects::regressor::Product;
 
 /// Share of what a product could be at most below which it is made of rounding.
 const ROUNDING: f64 = 1e-9;
@@ -37,17 +35,17 @@ pub(super) fn candidates(
             if left > 1e-6 * all { left } else { 0.0 }
         })
     };
-    for effect in library::all().filter(|e| e.sensor == sensor) {
+    for effect in effects::all().filter(|e| e.sensor == sensor) {
         let Some(mut candidate) = Candidate::effect_in(effect, rows) else {
             not_excited.push((effect.id.into(), effect.needs.into()));
             continue;
         };
         let mut best = vec![0.0_f64; effect.coefficients.len()];
-        for form in candidate.forms() {
-            let seen = across(&candidate.columns(rows, form));
-            for (best, (seen, typical)) in best.iter_mut().zip(seen.iter().zip(effect.typical)) {
+        for parameter in candidate.parameters() {
+            let seen = across(&candidate.columns(rows, parameter));
+            for (best, (seen, c)) in best.iter_mut().zip(seen.iter().zip(effect.coefficients)) {
                 if seen.is_finite() {
-                    *best = best.max(seen * typical);
+                    *best = best.max(seen * c.typical);
                 }
             }
         }
@@ -58,15 +56,15 @@ pub(super) fn candidates(
             all.extend(candidate.variants(rows));
         }
     }
-    let terms: Vec<Vec<Candidate>> = Monomial::all()
+    let terms: Vec<Vec<Candidate>> = Product::terms()
         .into_par_iter()
-        .map(|monomial| {
-            let term = |axis| Candidate::new(sensor, Kind::Term(axis, monomial.clone()));
+        .map(|product| {
+            let term = |axis| Candidate::new(sensor, Kind::Term(axis, product));
             let columns = term(0).columns_by_axis(rows, &[0, 1, 2]);
             let seen = across(&columns);
             // A table that turns about one axis at a time has rates about the others of rounding's size: with a coefficient of
             // 5e12 their product passed for an effect.
-            let rounding = ROUNDING * monomial.largest(&rows.moments(term(0).behind(0.0)));
+            let rounding = ROUNDING * product.largest(&rows.conditions(term(0).followed(0.0)), 0);
             let seen = |axis: &usize| {
                 let column = columns.column(*axis);
                 let finite = column.iter().all(|v| v.is_finite());

@@ -7,10 +7,10 @@ use super::svg::raised;
 use super::{sentence, spoken};
 use crate::report::diagnosis::text::{by_score, converter, odds};
 use mimu::calibration::ConverterTable;
-use mimu::diagnose::candidate::{Candidate, Kind};
 use mimu::diagnose::decision::{Accepted, Decision, Leftover, Split};
 use mimu::diagnose::picture::{Kind as Rows, Picture};
 use mimu::diagnose::{Diagnosis, SensorDiagnosis};
+use mimu::effects::candidate::{Candidate, Kind};
 use mimu::quantity::Figure;
 use mimu::quantity::Sensor;
 use mimu::quantity::significant;
@@ -123,7 +123,7 @@ fn readable_coefficient(unit: &str) -> Option<(f64, &'static str)> {
 /// Sizes in data sheets of the active coefficients.
 fn typical(candidate: &Candidate) -> Vec<Option<f64>> {
     let of = |k: &usize| match candidate.kind {
-        Kind::Effect(e) => e.typical.get(*k).copied(),
+        Kind::Effect(e) => e.coefficients.get(*k).map(|c| c.typical),
         _ => None,
     };
     candidate.active.iter().map(of).collect()
@@ -152,10 +152,10 @@ pub fn coefficients(one: &Accepted) -> Markup {
                         td class="dim" { (si.replace("^2", "²")) }
                     }
                 }
-                @if let Some(form) = candidate.form() {
+                @if let Some(form) = candidate.parameter() {
                     tr {
                         td { (form.name) }
-                        td class="n" { (number(one.chosen.form, 1.0, "")) }
+                        td class="n" { (number(one.chosen.parameter, 1.0, "")) }
                         td class="n" { "–" } td { }
                         td class="n" { (number(form.from, 1.0, "")) " to " (number(form.to, 1.0, "")) " sought" }
                         td { } td { }

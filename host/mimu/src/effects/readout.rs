@@ -16,8 +16,9 @@
 
 use statrs::function::erf::erfc;
 
-use super::{all_axes, of};
-use crate::diagnose::effect::{Coefficient, Effect, Moment};
+use super::effect::{Coefficient, Effect};
+use super::quantity::{Conditions, Reading};
+use super::regressor::Regressor;
 use crate::quantity::Sensor;
 
 /// Bits that are told apart, from the first down.
@@ -25,13 +26,14 @@ pub const BITS: usize = 9;
 
 /// Of a converter of all axes, and then of each axis.
 const COEFFICIENTS: [Coefficient; 4 * BITS] = {
-    let mut all = [all_axes("", "1"); 4 * BITS];
+    let mut all = [Coefficient::of_all("", Regressor::Bit(0), TYPICAL); 4 * BITS];
     let mut bit = 0;
     while bit < BITS {
-        all[bit] = all_axes(NAMES[0][bit], "1");
+        all[bit] = Coefficient::of_all(NAMES[0][bit], Regressor::Bit(bit), TYPICAL);
         let mut axis = 0;
         while axis < 3 {
-            all[first_of(axis) + bit] = of(axis, NAMES[1 + axis][bit], "1");
+            all[first_of(axis) + bit] =
+                Coefficient::of(axis, NAMES[1 + axis][bit], Regressor::Bit(bit), TYPICAL);
             axis += 1;
         }
         bit += 1;
@@ -57,28 +59,34 @@ pub const TYPICAL: f64 = 2e-4;
 const NEEDS: &str = "raw readings as the converter gave them, at many levels over its range";
 const ABOUT: &str = "bits of the converter are worth more or less than they say, or codes never come: error by the code";
 
-pub(super) static EFFECTS: [Effect; 2] = [
+const SIZE: &str = "2e-4 of the weight of bit 0 (STM32H743: 4 to 12 codes of 65536)";
+const TAKEN_FOR: &str = "scale nonlinearity, a bias beyond a limit";
+
+pub(super) const EFFECTS: [Effect; 2] = [
     Effect {
         id: "gyro_readout_code",
         sensor: Sensor::Gyro,
         about: ABOUT,
         coefficients: &COEFFICIENTS,
-        typical: &[TYPICAL; 4 * BITS],
-        form: None,
-        regressors: bits,
+        parameter: None,
+        size: SIZE,
         needs: NEEDS,
+        taken_for: TAKEN_FOR,
     },
     Effect {
         id: "accel_readout_code",
         sensor: Sensor::Accel,
         about: ABOUT,
         coefficients: &COEFFICIENTS,
-        typical: &[TYPICAL; 4 * BITS],
-        form: None,
-        regressors: bits,
+        parameter: None,
+        size: SIZE,
         needs: NEEDS,
+        taken_for: TAKEN_FOR,
     },
 ];
+
+/// Converters of the axes.
+pub type Codes = [Option<Converter>; 3];
 
 /// How the codes of a converter stand behind readings.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -94,31 +102,20 @@ impl Converter {
     pub fn of(weight: f64, zero: f64) -> Self {
         Self { weight, zero }
     }
-
-    /// Share of the time that bit `-bit` is set while readings scatter about `mean` with `sd`, raw.
-    pub fn share(&self, bit: usize, mean: f64, sd: f64) -> f64 {
-        share_set(mean - self.zero, sd, self.weight * 0.5_f64.powi(bit as i32))
-    }
 }
 
-/// Whether an effect is one of these.
-pub fn is(effect: &Effect) -> bool {
-    EFFECTS.iter().any(|e| e.id == effect.id)
-}
-
-/// Of each bit of a converter of all axes, and then of each axis: what 1 of the weight of bit 0 too much in that of the bit adds, SI.
-///
-/// Readings are in units of bit 0, from code 0, which are those of [`Converter`] of each axis.
-fn bits(at: &Moment, _: f64, out: &mut [f64]) {
-    let reading = &at.reading;
-    let (of_all, of_axes) = out.split_at_mut(3 * BITS);
-    let mut of_bit = 1.0;
-    for (bit, all) in of_all.as_chunks_mut::<3>().0.iter_mut().enumerate() {
-        for (axis, out) in all.iter_mut().enumerate() {
-            *out = share_set(reading.mean[axis], reading.sd[axis], of_bit) / reading.scale[axis];
-            of_axes[axis * BITS + bit] = *out;
+impl Conditions {
+    /// The conditions with readings in units of the first bit of the converters, from their codes 0; not a number on an axis without.
+    pub(crate) fn in_bits(&self, codes: &Codes) -> Self {
+        let mut out = *self;
+        let Reading { mean, sd, scale } = &mut out.reading;
+        for (i, converter) in codes.iter().enumerate() {
+            let (weight, zero) = converter.map_or((f64::NAN, 0.0), |c| (c.weight, c.zero));
+            mean[i] = (mean[i] - zero) / weight;
+            sd[i] /= weight;
+            scale[i] /= weight;
         }
-        of_bit *= 0.5;
+        out
     }
 }
 
@@ -135,7 +132,7 @@ pub fn first_weight(step: f64, lowest: f64, highest: f64) -> f64 {
 }
 
 /// Share of the time that the bit of this weight is set while readings scatter about `mean` with `sd`, both in its unit.
-fn share_set(mean: f64, sd: f64, weight: f64) -> f64 {
+pub(super) fn share_set(mean: f64, sd: f64, weight: f64) -> f64 {
     // It is the same every two weights; far from the zero there is no number beside the next turn.
     let (mean, sd) = (mean / weight, sd / weight);
     let mean = mean - 2.0 * (0.5 * mean).floor();
