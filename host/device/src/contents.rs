@@ -3,7 +3,7 @@
 
 use mimu_core::stored::{self, Refused};
 
-use mimu::effects::readout::BITS;
+use mimu::effects::converter::BITS;
 
 /// A stored calibration, number by number.
 #[derive(Debug, Clone, PartialEq)]

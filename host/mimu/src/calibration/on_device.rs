@@ -9,8 +9,8 @@ use nalgebra::convert;
 
 use super::Calibration;
 use crate::effects::candidate::{Kind, OfConverter};
+use crate::effects::converter::BITS;
 use crate::effects::quantity::Quantity;
-use crate::effects::readout::BITS;
 use crate::effects::removal::Removed;
 use crate::quantity::Sensor;
 use mimu_recording::error::{Error, Result};

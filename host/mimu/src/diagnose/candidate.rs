@@ -4,9 +4,9 @@ use nalgebra::DMatrix;
 
 use super::rows::Rows;
 use crate::effects::candidate::{Candidate, Kind};
+use crate::effects::converter::{self, Converter};
 use crate::effects::effect::Effect;
 use crate::effects::quantity::Conditions;
-use crate::effects::readout::{self, Converter};
 
 impl Candidate {
     /// An effect in `rows`; `None` where it goes by codes that the steps of the readings would have to say, and they have none.
@@ -16,7 +16,7 @@ impl Candidate {
             return Some(candidate);
         }
         let (lowest, highest) = rows.reading_range();
-        let weight = readout::first_weight(rows.step?, lowest, highest);
+        let weight = converter::first_weight(rows.step?, lowest, highest);
         Some(candidate.behind_one(Converter::of(weight, 0.0)))
     }
 

@@ -368,6 +368,22 @@ fn notes(rows: &Rows, chosen: &[Chosen]) -> Vec<String> {
             c.candidate.id()
         )
     }));
+    for candidate in chosen.iter().map(|c| &c.candidate) {
+        if let Kind::Effect(effect) = &candidate.kind
+            && !candidate.inseparable.is_empty()
+        {
+            let names = candidate
+                .inseparable
+                .iter()
+                .map(|k| effect.coefficients[*k].name);
+            notes.push(format!(
+                "{}: this recording does not tell {} from the bias and the other coefficients, and they are 0 in the file; it needs {}",
+                effect.id,
+                names.collect::<Vec<_>>().join(", "),
+                effect.needs
+            ));
+        }
+    }
     // Its level part goes by the heading, and on a table that shows one heading in each attitude by products of the force.
     let only_force = |p: &Product| p.parts().all(|(q, _)| matches!(q, Quantity::Force(_)));
     let level = chosen

@@ -2,9 +2,10 @@
 
 use nalgebra::Vector3;
 
+use super::converter::{BITS, Codes, Converter};
 use super::effect::{Coefficient, Effect, NonlinearParameter, Role, Scope};
 use super::quantity::{Conditions, Need, Quantity, RATE_LAG_S};
-use super::readout::{self, Codes, Converter};
+use super::readout;
 use super::regressor::{Product, Regressor};
 use super::temperature::Followed;
 use crate::quantity::AXES;
@@ -41,6 +42,8 @@ pub struct Candidate {
     pub codes: Codes,
     /// As in [`Followed`].
     pub without_self_heating: bool,
+    /// Coefficients that the experiment shows, but not beside the active ones and the affine parameters.
+    pub inseparable: Vec<usize>,
     /// How many choices it is the best of.
     pub choices: f64,
     /// Coefficients to choose from, where the choice is part of the search.
@@ -55,7 +58,7 @@ pub struct OfConverter {
     /// Its codes.
     pub converter: Converter,
     /// Of its bits from the first down, in units of the weight of the first.
-    pub errors: [f64; readout::BITS],
+    pub errors: [f64; BITS],
 }
 
 /// Values of a nonlinear parameter that are screened.
@@ -126,6 +129,7 @@ impl Candidate {
             active,
             codes: [None; 3],
             without_self_heating: false,
+            inseparable: Vec::new(),
             choices: 1.0,
             offered: Vec::new(),
         }
@@ -133,7 +137,7 @@ impl Candidate {
 
     /// It with one converter for all axes.
     pub fn behind_one(mut self, converter: Converter) -> Self {
-        self.active = (0..readout::BITS).collect();
+        self.active = (0..BITS).collect();
         self.codes = [Some(converter); 3];
         self
     }
@@ -253,7 +257,7 @@ impl Candidate {
     pub fn by_converter(&self, values: &[f64]) -> Vec<OfConverter> {
         let all: Vec<OfConverter> = (0..3)
             .filter_map(|axis| {
-                let mut errors = [0.0; readout::BITS];
+                let mut errors = [0.0; BITS];
                 for (k, value) in self.active.iter().zip(values) {
                     let own = k.checked_sub(readout::first_of(axis));
                     let bit = if *k < errors.len() { Some(*k) } else { own };

@@ -3,6 +3,7 @@
 //! | module | what |
 //! |---|---|
 //! | [`quantity`] | what an error can be a function of |
+//! | [`converter`] | bits of the code behind a reading |
 //! | [`regressor`] | products of powers, absolute values, decays: what an error is proportional to |
 //! | [`effect`] | coefficients of regressors, with what excites and what removes them |
 //! | `gyro`, `accel`, `drift`, `thermal`, [`readout`] | the effects, one list each |
@@ -17,6 +18,7 @@
 
 pub mod alternatives;
 pub mod candidate;
+pub mod converter;
 pub mod effect;
 pub mod quantity;
 pub mod readout;

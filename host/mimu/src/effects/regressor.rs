@@ -3,8 +3,8 @@
 //! Its value, unit, formula, what it depends on and how often the device has to evaluate it all follow from the same few numbers, so
 //! that an effect states its law once.
 
+use super::converter::share_set;
 use super::quantity::{Conditions, Need, Quantity};
-use super::readout::share_set;
 use crate::quantity::Sensor;
 
 /// A product of powers of up to three quantities, with a sign.

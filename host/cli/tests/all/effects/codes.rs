@@ -3,8 +3,8 @@
 use mimu::calibration::{Calibration, to_toml};
 use mimu::effects;
 use mimu::effects::candidate::{Candidate, Kind};
-use mimu::effects::readout::{Converter, first_of};
 use mimu::effects::removal::{Removed, remove};
+use mimu::effects::{converter::Converter, readout::first_of};
 use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
 use mimu_core::compensation::Sample;

@@ -12,6 +12,9 @@ use crate::effects::regressor::Product;
 /// Share of what a product could be at most below which it is made of rounding.
 const ROUNDING: f64 = 1e-9;
 
+/// Part of a column that the others of its effect have to leave of it.
+const SEPARATE: f64 = 1e-2;
+
 /// Everything that is tried on a sensor, and the effects that its experiment does not show.
 pub(super) fn candidates(
     rows: &Rows,
@@ -50,6 +53,10 @@ pub(super) fn candidates(
             }
         }
         candidate.active.retain(|k| best[*k] > EXCITED);
+        if !candidate.reads_code() && candidate.parameter().is_none() {
+            let white = whitener.whiten(&candidate.columns(rows, 0.0));
+            separate(&mut candidate, &(&white - &q * q.tr_mul(&white)));
+        }
         if candidate.active.is_empty() {
             not_excited.push((effect.id.into(), effect.needs.into()));
         } else {
@@ -79,4 +86,24 @@ pub(super) fn candidates(
         all.extend((0..3).map(|axis| Candidate::new(sensor, jump(axis))));
     }
     (all, not_excited)
+}
+
+/// Keeps those of the active coefficients whose columns, decorrelated beside the affine parameters, are no sums of the ones before: at
+/// rest in gravity the squares of the force along three axes add up to a constant, which is a bias.
+fn separate(candidate: &mut Candidate, columns: &DMatrix<f64>) {
+    let mut spanned: Vec<DVector<f64>> = Vec::new();
+    let mut kept = Vec::new();
+    for (k, column) in candidate.active.iter().zip(columns.column_iter()) {
+        let left = spanned.iter().fold(column.into_owned(), |left, unit| {
+            let share = unit.dot(&left);
+            left - unit * share
+        });
+        if left.norm() > SEPARATE * column.norm() {
+            spanned.push(left.normalize());
+            kept.push(*k);
+        } else {
+            candidate.inseparable.push(*k);
+        }
+    }
+    candidate.active = kept;
 }
