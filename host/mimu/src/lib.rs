@@ -2,7 +2,7 @@
 //!
 //! | in order of use | what                                                                          |
 //! |-----------------|-------------------------------------------------------------------------------|
-//! | [`quantity`]    | sensors, axes, units, and how numbers are written                            |
+//! | [`quantity`]    | sensors, axes, SI units, and how numbers are written                         |
 //! | [`blocks`], [`increment`] | one pass over the samples condenses them to 0.1 s blocks and 10 ms integrals |
 //! | [`rails`], [`stillness`], [`dwell`] | which samples and which stretches can be averaged           |
 //! | [`reading_step`] | the step that readings are multiples of                                       |
@@ -10,12 +10,14 @@
 //! | [`prepared`]    | all of these for one recording                                                |
 //! | [`estimate`]    | the estimators                                                                |
 //! | [`triad`]       | calibration of one triad: both directions, covariances, physical quantities   |
-//! | [`fit`], [`plausible`] | both triads, judged on what they have not seen; what cannot be right is refused |
+//! | [`fit`]         | both triads, judged on what they have not seen; what cannot be right is refused |
 //! | [`calibration`], [`verify`] | the file, and judging it by another recording                     |
 //! | [`diagnose`]    | the effect behind a residual: found, added, proved on other data              |
 //! | [`design`]      | experiments: which attitudes and rates, how many, for how long                |
-//! | [`allan`]       | noise from a recording at rest: Allan deviation and noise model                |
+//! | [`allan`], [`survey`] | Allan deviation and noise model of a series; of the channels of a recording at rest |
 //! | [`noise_file`]  | its result for the other commands                                             |
+//! | [`result`]      | what a fit, a verification and a survey found: one type each, which JSON is    |
+//! | [`readable`]    | from SI to the units of data sheets                                           |
 
 pub mod allan;
 pub mod blocks;
@@ -28,11 +30,14 @@ pub mod fit;
 pub mod increment;
 pub mod noise;
 pub mod noise_file;
-pub mod plausible;
 pub mod prepared;
 pub mod quantity;
 pub mod rails;
+pub mod readable;
 pub mod reading_step;
+pub mod result;
 pub mod stillness;
+pub mod survey;
+mod toml_layout;
 pub mod triad;
 pub mod verify;

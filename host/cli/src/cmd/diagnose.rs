@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use crate::report::{self, DiagnosisReport, Made};
 use clap::Args;
-use mimu::calibration::{Calibration, EffectTable, to_toml};
+use mimu::calibration::{Calibration, EffectTable};
 use mimu::diagnose::{Diagnosis, Recordings, diagnose, next};
 use mimu::fit::{Method, Options};
 use mimu::verify::verify;
@@ -108,14 +108,15 @@ pub fn run(args: &DiagnoseArgs) -> Result<()> {
             Error::new(place, problem, remedy)
         })?;
     }
-    let after = to_toml(&diagnosis.after, &effects, &now);
     let mut judged = None;
     if let (Some(other), Some(path)) = (second, &args.verify) {
-        // By the files that they would be: what is judged is what is given away.
-        let before = to_toml(&diagnosis.before, &known, &now);
-        let by = |text: &str| verify(&other, &Calibration::parse(text, "calibration")?);
+        let by = |fit, effects: &[EffectTable]| {
+            verify(&other, &Calibration::of(fit, effects, &now)?)
+        };
+        let before = by(&diagnosis.before, &known);
+        let after = by(&diagnosis.after, &effects);
         let path = path.display();
-        match (by(&before), by(&after)) {
+        match (before, after) {
             (Ok(before), Ok(after)) => judged = Some((path.to_string(), [before, after])),
             (Err(refusal), _) | (_, Err(refusal)) => {
                 let warning = format!("{path} cannot judge the calibration: {refusal}");
@@ -125,7 +126,8 @@ pub fn run(args: &DiagnoseArgs) -> Result<()> {
     }
     let mut files = Vec::new();
     if let Some(path) = &args.output {
-        files.push(stage(path, after)?);
+        let made = Calibration::of(&diagnosis.after, &effects, &now)?;
+        files.push(stage(path, made.to_toml())?);
     }
     let next = next::next(&diagnosis);
     let mut said = String::new();

@@ -30,7 +30,7 @@ use removal::{Removed, removable, remove};
 use rows::{Free, Rows, Session};
 
 use crate::calibration::Calibration;
-use crate::estimate::session_bias;
+use crate::fit::session_bias;
 use crate::fit::{Fit, Options, fit, fit_biases};
 use crate::prepared::Prepared;
 use crate::quantity::Sensor;

@@ -3,7 +3,7 @@
 use serde_json::{Map, Value, json};
 
 use super::DiagnosisReport;
-use crate::report::verify_json;
+use mimu::result::verify::VerifyResult;
 use mimu::calibration::ConverterTable;
 use mimu::diagnose::decision::{Accepted, Decision, Split};
 use mimu::diagnose::{Diagnosis, SensorDiagnosis};
@@ -42,8 +42,8 @@ pub fn diagnosis_json(report: &DiagnosisReport) -> Value {
     if let Some((name, [before, after])) = &report.second {
         value["second"] = json!({
             "recording": name,
-            "before": verify_json(before),
-            "after": verify_json(after),
+            "before": VerifyResult::of(before),
+            "after": VerifyResult::of(after),
         });
     }
     value

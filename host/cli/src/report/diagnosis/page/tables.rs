@@ -14,6 +14,7 @@ use mimu::diagnose::{Diagnosis, SensorDiagnosis};
 use mimu::quantity::Figure;
 use mimu::quantity::Sensor;
 use mimu::quantity::significant;
+use mimu::readable;
 use mimu::verify::Verification;
 
 /// A line break that is HTML and XML.
@@ -94,32 +95,6 @@ pub fn errors(d: &Diagnosis, pictures: &[Picture]) -> Markup {
     }
 }
 
-/// Factor to the unit in which a person reads a coefficient, and that unit; `None` where SI is as good.
-fn readable_coefficient(unit: &str) -> Option<(f64, &'static str)> {
-    const G: f64 = 9.80665;
-    let deg = 1f64.to_degrees();
-    Some(match unit {
-        "rad/s/(m/s^2)" => (deg * G, "deg/s/g"),
-        "1/(rad/s)" => (1e6 / deg, "ppm/(deg/s)"),
-        "1/(rad/s)^2" => (1e6 / (deg * deg), "ppm/(deg/s)²"),
-        "1" => (1e6, "ppm"),
-        "1/(m/s^2)" => (1e3 * G, "mg/g²"),
-        "1/(m/s^2)^2" => (1e3 * G * G, "mg/g³"),
-        "m" => (1e3, "mm"),
-        "rad/s^2" => (deg * 3600.0, "deg/s/h"),
-        "m/s^3" => (1e3 / G * 3600.0, "mg/h"),
-        "rad/s" => (deg, "deg/s"),
-        "m/s^2" => (1e3 / G, "mg"),
-        "rad/s/K" => (deg, "deg/s/K"),
-        "rad/s/K^2" => (deg, "deg/s/K²"),
-        "m/s^2/K" => (1e3 / G, "mg/K"),
-        "m/s^2/K^2" => (1e3 / G, "mg/K²"),
-        "1/K" => (1e6, "ppm/K"),
-        "rad/K" => (1e6, "µrad/K"),
-        _ => return None,
-    })
-}
-
 /// Sizes in data sheets of the active coefficients.
 fn typical(candidate: &Candidate) -> Vec<Option<f64>> {
     let of = |k: &usize| match candidate.kind {
@@ -141,12 +116,13 @@ pub fn coefficients(one: &Accepted) -> Markup {
             tbody {
                 @for (i, ((name, si), typical)) in candidate.names().iter().zip(typical(candidate)).enumerate() {
                     @let sigma = one.covariance[(i, i)].sqrt();
-                    @let (factor, unit) = readable_coefficient(si).unwrap_or((1.0, si));
+                    @let readable = readable::coefficient(si);
+                    @let factor = readable.factor;
                     tr {
                         td { (name) }
                         td class="n" { (number(one.values[i], factor, "")) }
                         td class="n" { data value=(sigma) { (written(&significant(2.0 * sigma * factor))) } }
-                        td { (unit) }
+                        td { (readable.unit) }
                         td class="n" { @match typical { Some(t) => (number(t, factor, "")), None => "–" } }
                         td class="n dim" { (written(&format!("{:.3e}", one.values[i]))) }
                         td class="dim" { (si.replace("^2", "²")) }
