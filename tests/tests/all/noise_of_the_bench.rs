@@ -2,7 +2,7 @@
 
 use mimu::allan::Kind;
 use mimu::allan::model::Term;
-use mimu::allan::recording::{Options, Part, Survey, survey};
+use mimu::survey::{Options, Part, Survey, survey};
 use mimu::quantity::Sensor;
 use mimu_recording::Recording;
 use mimu_rig::located::Source;
