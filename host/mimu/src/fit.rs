@@ -12,6 +12,7 @@ use crate::estimate::{Estimated, Failure, Observation, gravity_size, known_input
 use crate::plausible;
 use crate::prepared::{Prepared, si_covariance};
 use crate::quantity::{Figure, Sensor};
+use crate::stillness::STILL_FACTOR;
 use crate::triad::Triad;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{RawUnit, Reference};
