@@ -23,7 +23,7 @@ pub use device::{
     info_text, kalman_json, kalman_text, record_json, record_text, self_test_json, self_test_text,
     stream_json, stream_text, upload_json, upload_text,
 };
-pub use diagnosis::{DiagnosisReport, Made, diagnosis_json, diagnosis_page, diagnosis_text};
+pub use diagnosis::{Made, diagnosis_page, diagnosis_text};
 pub use fit::{dwell_table, fit_text};
 pub use import::import_text;
 pub use verify::verify_text;

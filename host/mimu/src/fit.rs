@@ -14,6 +14,7 @@ use crate::estimate::rotation::{Turn, direction_error};
 use crate::estimate::{Estimated, Failure, Observation, gravity_size, known_input, rotation};
 use crate::prepared::{Prepared, si_covariance};
 use crate::quantity::{Figure, Sensor};
+use crate::stillness::STILL_FACTOR;
 use crate::triad::Triad;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{RawUnit, Reference};
@@ -57,6 +58,18 @@ impl Method {
             Self::Kalman => "Kalman bank",
             Self::InverseForm => "inverse form",
             Self::SixPositions => "six positions",
+        }
+    }
+}
+
+impl Default for Options {
+    /// Least squares of both triads, judged on four contiguous blocks.
+    fn default() -> Self {
+        Self {
+            method: Method::LeastSquares,
+            holdout_blocks: 4,
+            still_factor: STILL_FACTOR,
+            only: None,
         }
     }
 }

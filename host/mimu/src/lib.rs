@@ -14,10 +14,51 @@
 //! | [`calibration`], [`verify`] | the file, and judging it by another recording                     |
 //! | [`diagnose`]    | the effect behind a residual: found, added, proved on other data              |
 //! | [`design`]      | experiments: which attitudes and rates, how many, for how long                |
+//! | [`next_experiment`] | what to record next, where a diagnosis leaves something open              |
 //! | [`allan`], [`survey`] | Allan deviation and noise model of a series; of the channels of a recording at rest |
 //! | [`noise_file`]  | its result for the other commands                                             |
 //! | [`result`]      | what a fit, a verification and a survey found: one type each, which JSON is    |
 //! | [`readable`]    | from SI to the units of data sheets                                           |
+
+//!
+//! A recording from arrays, calibrated, and the calibration applied to a reading:
+//!
+//! ```
+//! use mimu::{Manifest, Options, Prepared, RawUnit, Reference, Samples, Sensor, fit};
+//!
+//! // An accelerometer of 300 mV/g with a bias of 1.65 V, held for two seconds in each of twelve poses, 100 samples a second.
+//! let g = 9.80665;
+//! let mut samples = Samples::default();
+//! let noise = |k: usize| 1e-4 * ((k as f64 * 0.618_034).fract() - 0.5);
+//! for pose in 0..12 {
+//!     let (z, turn) = (1.0 - (2 * pose + 1) as f64 / 12.0, 2.4 * pose as f64);
+//!     let across = (1.0 - z * z).sqrt();
+//!     let up = [across * turn.cos(), across * turn.sin(), z];
+//!     for k in 0..200 {
+//!         samples.t_s.push(samples.t_s.len() as f64 / 100.0);
+//!         samples.step.push(pose);
+//!         for axis in 0..3 {
+//!             let volts = 1.65 + 0.3 * up[axis] + noise(3 * samples.t_s.len() + axis);
+//!             samples.raw[3 + axis].push(volts); // gyro x, y, z stand before it
+//!         }
+//!     }
+//! }
+//! let manifest = Manifest::new("my unit", 100.0, g, RawUnit::Volt, Reference::Gravity);
+//! let options = Options::default();
+//!
+//! let prepared = Prepared::of(manifest, &samples, options.still_factor)?; // its dwells are found
+//! assert_eq!(prepared.dwells.list.len(), 12);
+//! let fitted = fit(prepared, options)?;
+//! let accel = fitted.sensor(Sensor::Accel).unwrap();
+//! let scale = accel.estimated.triad.physical(mimu::triad::Angles::Exact).scale[0];
+//! assert!((scale.value - 0.3 / g).abs() < scale.interval); // V/(m/s²), with its 95 % interval
+//! let force = accel.estimated.triad.inverse.apply(&nalgebra::Vector3::new(1.65, 1.65, 1.95));
+//! assert!((force.z - g).abs() < 0.01);
+//!
+//! let file = mimu::Calibration::of(&fitted, &[], "2026-01-01T00:00:00Z")?.to_toml();
+//! assert!(file.contains("direction = \"raw to SI\""));
+//! # Ok::<(), mimu_recording::error::Error>(())
+//! ```
 
 pub mod allan;
 pub mod blocks;
@@ -28,6 +69,7 @@ pub mod dwell;
 pub mod estimate;
 pub mod fit;
 pub mod increment;
+pub mod next_experiment;
 pub mod noise;
 pub mod noise_file;
 pub mod prepared;
@@ -41,3 +83,9 @@ pub mod survey;
 mod toml_layout;
 pub mod triad;
 pub mod verify;
+
+pub use calibration::Calibration;
+pub use fit::{Fit, Options, fit};
+pub use mimu_recording::{Batch as Samples, Manifest, RawUnit, Recording, Reference};
+pub use prepared::Prepared;
+pub use quantity::Sensor;

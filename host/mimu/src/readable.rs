@@ -187,11 +187,7 @@ mod tests {
     #[test]
     fn coefficients_of_effects_are_per_g_per_degree_a_second_and_per_kelvin() {
         // 0.1 deg/s/g is 0.001745329 rad/s for 9.80665 m/s².
-        reads(
-            &coefficient("rad/s/(m/s^2)"),
-            1.779_741e-4,
-            "0.100 deg/s/g",
-        );
+        reads(&coefficient("rad/s/(m/s^2)"), 1.779_741e-4, "0.100 deg/s/g");
         // 1 ppm of 1 deg/s.
         reads(&coefficient("1/(rad/s)"), 5.729_578e-5, "1.00 ppm/(deg/s)");
         reads(
@@ -219,11 +215,7 @@ mod tests {
         };
         // 1 deg/√h is a sixtieth of a deg/s/√Hz.
         let n = 2.908_882e-4;
-        both(
-            "rad/s/sqrt(Hz)",
-            n,
-            &["1.00 deg/√h", "0.0167 deg/s/√Hz"],
-        );
+        both("rad/s/sqrt(Hz)", n, &["1.00 deg/√h", "0.0167 deg/s/√Hz"]);
         // 22.5 µg/√Hz.
         let n = 2.206_496e-4;
         both("m/s^2/sqrt(Hz)", n, &["0.0132 m/s/√h", "22.5 µg/√Hz"]);

@@ -10,8 +10,8 @@ use std::ops::Range;
 use std::sync::mpsc::sync_channel;
 use std::thread;
 
-pub use self::stretch::Part;
 use self::columns::Columns;
+pub use self::stretch::Part;
 use self::stretch::{FEWEST, Stretch, temperature};
 use self::suitability::{Suitability, suitability};
 use crate::allan::deviation::Integrated;

@@ -20,7 +20,9 @@ pub fn to_toml(header: &str, file: &impl Serialize) -> String {
         if let Some(path) = header.map(|h| h.trim_matches(['[', ']'])) {
             let many = line.starts_with("[[");
             match path.split_once('.') {
-                Some((parent, key)) if array == Some(parent) => Nested::begin(&mut nested, key, many),
+                Some((parent, key)) if array == Some(parent) => {
+                    Nested::begin(&mut nested, key, many)
+                }
                 _ => {
                     Nested::write(&mut nested, &mut out);
                     out.push('\n');
@@ -104,7 +106,8 @@ fn laid_out(value: &str) -> String {
     let matrix = value.starts_with("[[");
     let mut out = String::new();
     for token in value.split_inclusive([',', '[', ']']) {
-        let (number, end) = token.split_at(token.len() - usize::from(token.ends_with([',', '[', ']'])));
+        let (number, end) =
+            token.split_at(token.len() - usize::from(token.ends_with([',', '[', ']'])));
         let space = if number.starts_with(' ') { " " } else { "" };
         out.push_str(space);
         match number.trim().parse::<f64>() {

@@ -2,11 +2,13 @@
 
 use std::path::PathBuf;
 
-use crate::report::{self, DiagnosisReport, Made};
+use crate::report::{self, Made};
 use clap::Args;
 use mimu::calibration::{Calibration, EffectTable};
-use mimu::diagnose::{Diagnosis, Recordings, diagnose, next};
+use mimu::diagnose::{Diagnosis, Recordings, diagnose};
 use mimu::fit::{Method, Options};
+use mimu::next_experiment;
+use mimu::result::diagnosis::DiagnosisResult;
 use mimu::verify::verify;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::result_file::stage;
@@ -110,9 +112,8 @@ pub fn run(args: &DiagnoseArgs) -> Result<()> {
     }
     let mut judged = None;
     if let (Some(other), Some(path)) = (second, &args.verify) {
-        let by = |fit, effects: &[EffectTable]| {
-            verify(&other, &Calibration::of(fit, effects, &now)?)
-        };
+        let by =
+            |fit, effects: &[EffectTable]| verify(&other, &Calibration::of(fit, effects, &now)?);
         let before = by(&diagnosis.before, &known);
         let after = by(&diagnosis.after, &effects);
         let path = path.display();
@@ -129,24 +130,21 @@ pub fn run(args: &DiagnoseArgs) -> Result<()> {
         let made = Calibration::of(&diagnosis.after, &effects, &now)?;
         files.push(stage(path, made.to_toml())?);
     }
-    let next = next::next(&diagnosis);
+    let next = next_experiment::next(&diagnosis);
     let mut said = String::new();
     if let Some(path) = &args.plan {
-        said = match next::together(&diagnosis, &next) {
-            Some(answer) => {
+        said = match next_experiment::together(&diagnosis, &next) {
+            Some((setup, answer)) => {
                 let manifest = &diagnosis.before.prepared.manifest;
-                let text = answer.plan(Some(&manifest.device), manifest.sample_rate_hz);
+                let text = answer.plan(&setup, Some(&manifest.device), manifest.sample_rate_hz);
                 files.push(stage(path, text)?);
                 format!("\nplan of the next experiment: {}\n", path.display())
             }
             None => "\nplan of the next experiment: none written, as there is nothing that one of this kind would settle\n".into(),
         };
     }
-    let found = DiagnosisReport {
-        diagnosis,
-        next,
-        second: judged,
-    };
+    let judged = judged.as_ref().map(|(name, both)| (name.as_str(), both));
+    let found = DiagnosisResult::of(&diagnosis, &next, judged);
     let named: Vec<String> = args
         .recordings
         .iter()
@@ -163,7 +161,7 @@ pub fn run(args: &DiagnoseArgs) -> Result<()> {
     print(
         &args.json,
         &(report::diagnosis_text(&found) + &said),
-        &report::diagnosis_json(&found),
+        &found,
         files,
     )
 }

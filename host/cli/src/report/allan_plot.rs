@@ -66,7 +66,10 @@ fn draw_panel(
             0.5..2.0
         }
     };
-    let x = ends(&mut channels.iter().flat_map(|c| c.tau_s.iter().copied()), 1.1);
+    let x = ends(
+        &mut channels.iter().flat_map(|c| c.tau_s.iter().copied()),
+        1.1,
+    );
     // Of the longest times only the curve and not the whole of the band has to be seen.
     let y = ends(
         &mut channels.iter().flat_map(|c| c.adev.iter().map(|d| d * by)),
@@ -78,10 +81,13 @@ fn draw_panel(
     };
     let kind = result.kind.unwrap_or_default();
     let mut chart = ChartBuilder::on(area)
-        .caption(format!(
+        .caption(
+            format!(
                 "{title} of {}",
                 result.device.as_deref().unwrap_or_default()
-            ), ("sans-serif", 18))
+            ),
+            ("sans-serif", 18),
+        )
         .margin(14)
         .x_label_area_size(46)
         .y_label_area_size(78)

@@ -123,7 +123,10 @@ fn parameters_text(out: &mut String, fit: &FitResult, name: &str, sensor: &Senso
     let mut rows = Vec::new();
     for (key, label) in kinds {
         let triple: Vec<&Parameter> = sensor.triple(key).collect();
-        let Some(first) = triple.first().filter(|_| key != "misalignment" || !by_choice) else {
+        let Some(first) = triple
+            .first()
+            .filter(|_| key != "misalignment" || !by_choice)
+        else {
             continue;
         };
         let shown = readable::parameter(&first.unit);

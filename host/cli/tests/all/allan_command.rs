@@ -125,7 +125,9 @@ fn json_has_the_agreed_keys_and_the_truth_within_its_intervals() {
     }
     // Nine intervals of 95 %.
     assert!(outside <= 2, "{outside} outside");
-    assert!(text.contains("deg/√h") && text.contains("µg/√Hz") && text.contains("independent clusters"));
+    assert!(
+        text.contains("deg/√h") && text.contains("µg/√Hz") && text.contains("independent clusters")
+    );
     let svg = std::fs::read_to_string(folder.path().join("a.svg")).unwrap();
     assert!(svg.starts_with("<svg") && svg.contains("gyro_x") && svg.contains("Accelerometers"));
 }

@@ -30,10 +30,7 @@ impl Unit {
             RawUnit::Count => "count",
             RawUnit::Si => "SI",
         };
-        Self {
-            name,
-            per_raw: 1.0,
-        }
+        Self { name, per_raw: 1.0 }
     }
 
     /// Unit of the coefficient of `term` in JSON and files.

@@ -24,10 +24,7 @@ impl Calibration {
     pub fn of(fit: &Fit, effects: &[EffectTable], created: &str) -> Result<Self> {
         let manifest = &fit.prepared.manifest;
         let dwells = fit.prepared.dwells.list.iter();
-        let temperatures: Vec<f64> = dwells
-            .map(|d| d.temp_c)
-            .filter(|t| t.is_finite())
-            .collect();
+        let temperatures: Vec<f64> = dwells.map(|d| d.temp_c).filter(|t| t.is_finite()).collect();
         let mean = temperatures.iter().sum::<f64>() / temperatures.len() as f64;
         let triad = |sensor| fit.sensor(sensor).map(|found| table(fit, found));
         let calibration = Self {

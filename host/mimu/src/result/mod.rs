@@ -3,6 +3,7 @@
 //! SI throughout; what is not a number is null in JSON.
 
 pub mod allan;
+pub mod diagnosis;
 pub mod fit;
 pub mod verify;
 

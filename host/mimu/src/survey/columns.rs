@@ -11,7 +11,11 @@ pub(super) struct Columns<'a> {
 }
 
 impl<'a> Columns<'a> {
-    pub(super) fn open(recording: &'a Recording, indices: &[usize], progress: &impl Fn(f64)) -> Result<Self> {
+    pub(super) fn open(
+        recording: &'a Recording,
+        indices: &[usize],
+        progress: &impl Fn(f64),
+    ) -> Result<Self> {
         let mut read = Vec::new();
         if !recording.is_columnar() {
             let wanted: Vec<Column> = [Column::Time, Column::Step, Column::Temperature]

@@ -1,6 +1,7 @@
 //! Import of foreign files: text of any common shape, and Parquet.
 
 mod assignment;
+mod binary;
 mod foreign;
 mod inputs;
 mod join;

@@ -26,7 +26,9 @@ fn unit(effects: &[(&str, f64, usize)]) -> (Prepared, Calibration) {
             table(&removed)
         })
         .collect();
-    let text = Calibration::of(&fitted(&path), &tables, "2026-01-01T00:00:00Z").unwrap().to_toml();
+    let text = Calibration::of(&fitted(&path), &tables, "2026-01-01T00:00:00Z")
+        .unwrap()
+        .to_toml();
     (
         prepared(&path),
         Calibration::parse(&text, "cal.toml").unwrap(),

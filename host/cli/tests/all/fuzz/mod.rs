@@ -4,7 +4,7 @@
 //! hang. A few seconds in an ordinary test run; longer by hand:
 //!
 //! ```text
-//! MIMU_FUZZ_SECONDS=600 MIMU_FUZZ_SEED=2 cargo test --release -p mimu --test fuzz -- --nocapture
+//! MIMU_FUZZ_SECONDS=600 MIMU_FUZZ_SEED=2 cargo test --release -p mimu-cli --test all fuzz -- --nocapture
 //! ```
 //!
 //! A failure prints the number of its case; `MIMU_FUZZ_CASE` runs that one alone.
@@ -22,9 +22,9 @@ use std::time::{Duration, Instant};
 use mimu::calibration::Calibration;
 use mimu::fit::{Fit, Method, Options, fit};
 use mimu::prepared::Prepared;
+use mimu::quantity::Sensor;
 use mimu::result::fit::FitResult;
 use mimu::result::verify::VerifyResult;
-use mimu::quantity::Sensor;
 use mimu::verify::verify;
 use mimu_cli::report;
 use mimu_recording::error::{Error, Result};
@@ -211,7 +211,9 @@ impl Seeds {
                 text.as_bytes(),
             );
             let fitted = fit_recording(&folder.join("seed"), options).expect("the seeds are valid");
-            calibration = Calibration::of(&fitted, &[], "2026-01-01T00:00:00Z").unwrap().to_toml();
+            calibration = Calibration::of(&fitted, &[], "2026-01-01T00:00:00Z")
+                .unwrap()
+                .to_toml();
             let files = vec![folder.join("seed/samples.csv")];
             let known = if *reference == "table" {
                 Reference::Table

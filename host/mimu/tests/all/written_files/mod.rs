@@ -27,8 +27,17 @@ fn a_calibration_written_before_is_read_with_its_effects_and_written_again_witho
 fn a_noise_file_written_before_is_read_and_written_again_without_a_loss() {
     let text = include_str!("noise-0.1.toml");
     let read = NoiseFile::parse(text, "noise").unwrap();
-    assert_eq!(read.channel[0].n.as_ref().unwrap().value, 2.2050087804444782e-4);
-    assert!(read.channel[0].q_reason.as_ref().unwrap().starts_with("not seen"));
+    assert_eq!(
+        read.channel[0].n.as_ref().unwrap().value,
+        2.2050087804444782e-4
+    );
+    assert!(
+        read.channel[0]
+            .q_reason
+            .as_ref()
+            .unwrap()
+            .starts_with("not seen")
+    );
     let again = NoiseFile::parse(&read.to_toml(), "noise").unwrap();
     assert_eq!(read, again);
 }
