@@ -4,8 +4,9 @@
 
 use std::time::Instant;
 
-use mimu::diagnose::{diagnose, next::next};
+use mimu::diagnose::diagnose;
 use mimu::fit::{Method, Options};
+use mimu::next_experiment::next;
 use mimu::prepared::Prepared;
 use mimu::stillness::STILL_FACTOR;
 use mimu_recording::Recording;
@@ -66,13 +67,13 @@ fn main() {
     let all = begun.elapsed();
     let ids: Vec<String> = found.effects.iter().map(|e| e.candidate.id()).collect();
     println!(
-        "{minutes:.1} minutes at 1 kHz: read in {:.2} s, diagnosed in {:.2} s ({}, {}), next experiment of {} suspects in {:.2} s; \
+        "{minutes:.1} minutes at 1 kHz: read in {:.2} s, diagnosed in {:.2} s ({}, {}), next experiment for {} effects in {:.2} s; \
          {:.2} s together, {:.0} MB",
         read.as_secs_f64(),
         (diagnosed - read).as_secs_f64(),
         ids.join(", "),
         found.verdict.name(),
-        planned.suspects.len(),
+        planned.targets.len(),
         (all - diagnosed).as_secs_f64(),
         all.as_secs_f64(),
         peak_mb(),

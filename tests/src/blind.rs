@@ -7,9 +7,10 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::sync::{Arc, Mutex};
 
-use mimu::diagnose::{Diagnosis, diagnose, next::next};
+use mimu::diagnose::{Diagnosis, diagnose};
 use mimu::estimate::Observation;
 use mimu::fit::{Method, Options};
+use mimu::next_experiment::next;
 use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
 use mimu::stillness::STILL_FACTOR;

@@ -14,6 +14,7 @@
 //! | [`calibration`], [`verify`] | the file, and judging it by another recording                     |
 //! | [`diagnose`]    | the effect behind a residual: found, added, proved on other data              |
 //! | [`design`]      | experiments: which attitudes and rates, how many, for how long                |
+//! | [`next_experiment`] | what to record next, where a diagnosis leaves something open              |
 //! | [`allan`]       | noise from a recording at rest: Allan deviation and noise model                |
 //! | [`noise_file`]  | its result for the other commands                                             |
 
@@ -26,6 +27,7 @@ pub mod dwell;
 pub mod estimate;
 pub mod fit;
 pub mod increment;
+pub mod next_experiment;
 pub mod noise;
 pub mod noise_file;
 pub mod plausible;

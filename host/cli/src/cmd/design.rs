@@ -47,14 +47,14 @@ pub struct DesignArgs {
     /// Judge all published schemes beside the best designs of as many dwells
     #[arg(long)]
     compare: bool,
-    /// Find the fewest dwells that show these effects (see `mimu diagnose`) and tell them apart
+    /// Find the smallest experiment that shows these effects (see `mimu diagnose`)
     #[arg(long, value_name = "ID[,ID..]", value_delimiter = ',',
           conflicts_with_all = ["model", "sigma", "instability", "walk", "order"])]
     effects: Option<Vec<String>>,
-    /// With --effects: a recording that the new one adds to; both are then diagnosed together
+    /// With --effects: a recording of the unit, for its noise, sensors, rates and fixture
     #[arg(long, value_name = "REC", requires = "effects")]
     after: Option<PathBuf>,
-    /// With --effects: temperatures of the chamber, °C: where it begins and ends, and two others
+    /// With --effects: temperatures of the chamber, °C: where it begins and ends, and the two farthest from it
     #[arg(long, value_name = "C,C,C", requires = "effects", allow_hyphen_values = true, value_parser = effects::chamber)]
     chamber: Option<[f64; 3]>,
     /// What carries the unit; without it three-axis, or hand with --reference gravity

@@ -5,8 +5,9 @@ use std::path::PathBuf;
 use crate::report::{self, DiagnosisReport, Made};
 use clap::Args;
 use mimu::calibration::{Calibration, EffectTable, to_toml};
-use mimu::diagnose::{Diagnosis, Recordings, diagnose, next};
+use mimu::diagnose::{Diagnosis, Recordings, diagnose};
 use mimu::fit::{Method, Options};
+use mimu::next_experiment;
 use mimu::verify::verify;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::result_file::stage;
@@ -127,13 +128,13 @@ pub fn run(args: &DiagnoseArgs) -> Result<()> {
     if let Some(path) = &args.output {
         files.push(stage(path, after)?);
     }
-    let next = next::next(&diagnosis);
+    let next = next_experiment::next(&diagnosis);
     let mut said = String::new();
     if let Some(path) = &args.plan {
-        said = match next::together(&diagnosis, &next) {
-            Some(answer) => {
+        said = match next_experiment::together(&diagnosis, &next) {
+            Some((setup, answer)) => {
                 let manifest = &diagnosis.before.prepared.manifest;
-                let text = answer.plan(Some(&manifest.device), manifest.sample_rate_hz);
+                let text = answer.plan(&setup, Some(&manifest.device), manifest.sample_rate_hz);
                 files.push(stage(path, text)?);
                 format!("\nplan of the next experiment: {}\n", path.display())
             }

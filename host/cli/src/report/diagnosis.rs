@@ -9,7 +9,7 @@ pub use page::{Made, diagnosis_page};
 pub use text::diagnosis_text;
 
 use mimu::diagnose::Diagnosis;
-use mimu::diagnose::next::Next;
+use mimu::next_experiment::Next;
 use mimu::verify::Verification;
 
 /// A diagnosis, and the calibration before and after on a recording that it was not made from.

@@ -2,8 +2,8 @@
 
 use rayon::prelude::*;
 
-use super::Problem;
 use super::model::Setting;
+use super::problem::Problem;
 use super::refinement::Region as _;
 use super::tour::{Motion, Order, by_lot};
 use crate::allan::model::FLOOR;

@@ -1,9 +1,9 @@
 //! What a set of settings determines, and how well.
 
-use super::Problem;
 use super::information::{Inverse, Rows};
 use super::lack_of_fit::{Notice, notices};
 use super::model::{Parameter, Setting};
+use super::problem::Problem;
 use crate::estimate::least_squares::Observability;
 
 /// Half of a 95 % interval in sigmas, where the noise of a dwell mean is known.

@@ -12,7 +12,7 @@ use super::model::{Model, Setting, Term};
 pub const NOTICED: f64 = 3.242;
 
 /// Share of a regressor outside the model (squared) below which it is aliased.
-const ALIASED: f64 = 1e-9;
+pub(crate) const ALIASED: f64 = 1e-9;
 
 /// What a design would notice of one term.
 #[derive(Debug, Clone, PartialEq)]
@@ -110,7 +110,7 @@ fn columns(settings: &[Setting], regressors: impl Fn(&Setting, &mut Vec<f64>)) -
 }
 
 /// Part of `column` outside an orthonormal basis. Twice: once leaves the rounding of the first projection.
-fn outside(basis: &[DVector<f64>], mut column: DVector<f64>) -> DVector<f64> {
+pub(crate) fn outside(basis: &[DVector<f64>], mut column: DVector<f64>) -> DVector<f64> {
     for _ in 0..2 {
         for unit in basis {
             column -= unit * unit.dot(&column);
@@ -120,7 +120,7 @@ fn outside(basis: &[DVector<f64>], mut column: DVector<f64>) -> DVector<f64> {
 }
 
 /// Adds the direction of `column` to an orthonormal basis, if it is a new one.
-fn extend(basis: &mut Vec<DVector<f64>>, column: DVector<f64>) {
+pub(crate) fn extend(basis: &mut Vec<DVector<f64>>, column: DVector<f64>) {
     let size = column.norm_squared();
     let rest = outside(basis, column);
     if rest.norm_squared() > ALIASED * size {

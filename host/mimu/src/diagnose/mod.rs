@@ -16,7 +16,6 @@ pub mod candidate;
 pub mod decision;
 pub mod effect;
 pub mod library;
-pub mod next;
 pub mod picture;
 pub mod removal;
 pub mod rows;

@@ -5,10 +5,11 @@ use std::path::Path;
 use crate::report::{self, NextReport};
 use mimu::design::budget::DwellNoise;
 use mimu::design::reach::{Carrier, RateList, Rates};
-use mimu::design::settle::{Question, Suspect, settle};
+use mimu::design::tour::Motion;
 use mimu::diagnose::library;
-use mimu::diagnose::next::{self, CHAMBER_C, DWELL_S, RATE_DPS};
 use mimu::fit::{Fit, Method, Options, fit};
+use mimu::next_experiment::prediction::Target;
+use mimu::next_experiment::{CHAMBER_C, DWELL_S, RATE_DPS, SLEW, Setup, smallest};
 use mimu::noise_file::NoiseFile;
 use mimu::quantity::Sensor;
 use mimu::stillness::STILL_FACTOR;
@@ -40,8 +41,8 @@ pub(super) fn chamber(text: &str) -> std::result::Result<[f64; 3], String> {
     }
 }
 
-fn suspects(ids: &[String]) -> Result<Vec<Suspect>> {
-    let mut all: Vec<Suspect> = Vec::new();
+fn targets(ids: &[String]) -> Result<Vec<Target>> {
+    let mut all: Vec<Target> = Vec::new();
     for id in ids {
         let Some(effect) = library::by_id(id) else {
             let known: Vec<&str> = library::all().map(|e| e.id).collect();
@@ -51,33 +52,35 @@ fn suspects(ids: &[String]) -> Result<Vec<Suspect>> {
                 format!("choose of {}", known.join(", ")),
             ));
         };
-        if all.iter().any(|s| s.candidate.id() == effect.id) {
-            continue;
-        }
-        let suspect = Suspect::listed(effect).ok_or_else(|| {
-            Error::new(
+        let target = Target::listed(effect);
+        if target.candidate.reads_code() {
+            return Err(Error::new(
                 format!("--effects {id}"),
-                "an error of the code is met by chance, and no dwell can be planned for it",
+                "which codes of a converter a dwell meets is decided by noise and bias, and no dwell can be planned for it",
                 format!("needs {}", effect.needs),
-            )
-        })?;
-        all.push(suspect);
+            ));
+        }
+        if !all.iter().any(|t| t.candidate.id() == effect.id) {
+            all.push(target);
+        }
     }
     Ok(all)
 }
 
 impl DesignArgs {
-    /// What is asked without a recording.
-    fn question(&self) -> Question<'static> {
+    /// The unit and its fixture, where no recording says them.
+    fn setup(&self) -> Setup {
         let carrier = self.carrier();
-        let fang = Sensor::BOTH.map(DwellNoise::fang);
-        let reference = match carrier {
-            Carrier::Hand => Reference::Gravity,
-            _ => self.reference,
+        let motion = self.motion();
+        let slew = match self.slew {
+            None => motion.slew.max(SLEW),
+            Some(_) => motion.slew,
         };
-        Question {
-            suspects: Vec::new(),
-            reference,
+        Setup {
+            reference: match carrier {
+                Carrier::Hand => Reference::Gravity,
+                _ => self.reference,
+            },
             carrier,
             sensors: Sensor::BOTH.to_vec(),
             rates: RateList {
@@ -85,16 +88,15 @@ impl DesignArgs {
                 rates: Rates::Any,
             },
             chamber_c: CHAMBER_C,
-            noise: fang,
+            noise: Sensor::BOTH.map(DwellNoise::fang),
             dwell_s: DWELL_S,
-            motion: self.motion(),
+            motion: Motion { slew, ..motion },
             seed: self.seed,
-            known: None,
         }
     }
 
     /// Noise of gyro and accelerometer, where it is given here.
-    fn given_noise(&self, suspects: &[Suspect]) -> Result<Option<[DwellNoise; 2]>> {
+    fn given_noise(&self, targets: &[Target]) -> Result<Option<[DwellNoise; 2]>> {
         match &self.noise {
             None => Ok(None),
             Some(NoiseArg::File(path)) => {
@@ -106,8 +108,8 @@ impl DesignArgs {
                 Ok(Some([gyro?, accel?]))
             }
             Some(NoiseArg::Density(n)) => {
-                let own = suspects.first().map(|s| s.candidate.sensor);
-                if suspects.iter().any(|s| Some(s.candidate.sensor) != own) {
+                let own = targets.first().map(|s| s.candidate.sensor);
+                if targets.iter().any(|s| Some(s.candidate.sensor) != own) {
                     return Err(Error::new(
                         format!("--noise {n}"),
                         "one number cannot be the noise of gyro and accelerometer",
@@ -127,7 +129,7 @@ impl DesignArgs {
     }
 }
 
-/// The recording that the next one is to add to, fitted.
+/// A recording of the unit, fitted.
 fn after(path: &Path, args: &DesignArgs) -> Result<Fit> {
     let outputs = [args.output.as_deref(), args.json.file()];
     let prepared = read(path, STILL_FACTOR, &outputs, &[])?;
@@ -150,42 +152,28 @@ pub(super) fn run(args: &DesignArgs, ids: &[String]) -> Result<()> {
         _ => Vec::new(),
     };
     check_outputs(&[args.output.as_deref(), args.json.file()], &stated)?;
-    let suspects = suspects(ids)?;
+    let targets = targets(ids)?;
     let recording = args
         .after
         .as_deref()
         .map(|path| after(path, args))
         .transpose()?;
-    let known = recording.as_ref().map(next::known);
-    let mut question = args.question();
+    let mut setup = args.setup();
     if let Some(fit) = &recording {
-        let carrier = args.table.is_some().then(|| args.carrier());
-        let own = next::question(fit, carrier);
-        if own.reference != fit.prepared.manifest.reference {
-            return Err(Error::new(
-                args.after.as_deref().unwrap_or(Path::new("")).display(),
-                "what it tells by another kind of reference cannot be added to",
-                "leave --after or --table out",
-            ));
-        }
-        question = Question {
+        let own = Setup::of(fit, args.table.is_some().then(|| args.carrier()));
+        setup = Setup {
             motion: args.slew.map_or(own.motion, |_| args.motion()),
             seed: args.seed,
-            known: known.as_ref(),
             ..own
         };
-    } else if args.slew.is_none() {
-        question.motion.slew = question.motion.slew.max(next::SLEW);
     }
-    question.rates = args.rates.clone().unwrap_or(question.rates);
-    question.chamber_c = args.chamber.unwrap_or(question.chamber_c);
-    question.dwell_s = args.dwell.unwrap_or(question.dwell_s);
-    question.noise = args.given_noise(&suspects)?.unwrap_or(question.noise);
-    question.suspects = suspects;
-    let missing = question
-        .suspects
+    setup.rates = args.rates.clone().unwrap_or(setup.rates);
+    setup.chamber_c = args.chamber.unwrap_or(setup.chamber_c);
+    setup.dwell_s = args.dwell.unwrap_or(setup.dwell_s);
+    setup.noise = args.given_noise(&targets)?.unwrap_or(setup.noise);
+    let missing = targets
         .iter()
-        .find(|s| !question.sensors.contains(&s.candidate.sensor));
+        .find(|t| !setup.sensors.contains(&t.candidate.sensor));
     if let (Some(missing), Some(path)) = (missing, &args.after) {
         return Err(Error::new(
             path.display(),
@@ -197,17 +185,19 @@ pub(super) fn run(args: &DesignArgs, ids: &[String]) -> Result<()> {
             "give a recording with both sensors, or leave the effect out",
         ));
     }
-    let answer = settle(&question);
-    if !answer.possible() {
+    let Some(answer) = smallest(&setup, &targets) else {
         return Err(Error::new(
             format!("--effects {}", ids.join(",")),
-            answer.words(),
-            "use another --table or --reference, or fewer effects at once",
+            format!(
+                "no recipe with --table {} and these rates determines every coefficient of it",
+                setup.carrier.name()
+            ),
+            "use another --table, --reference or --rates, or fewer effects at once",
         ));
-    }
+    };
     let manifest = recording.as_ref().map(|f| &f.prepared.manifest);
     let report = NextReport {
-        question: &question,
+        setup: &setup,
         answer: &answer,
         device: manifest.map(|m| m.device.clone()),
         sample_rate_hz: manifest.map_or(SAMPLE_RATE_HZ, |m| m.sample_rate_hz),

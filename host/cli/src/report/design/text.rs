@@ -14,7 +14,7 @@ use mimu::quantity::plural;
 use mimu::quantity::significant;
 
 /// Dwells listed: as many as the longest design.
-const LISTED: usize = 200;
+pub(super) const LISTED: usize = 200;
 
 /// Result of `mimu design`.
 pub fn design_text(report: &DesignReport) -> String {

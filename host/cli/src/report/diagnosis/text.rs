@@ -6,8 +6,8 @@ use super::DiagnosisReport;
 use crate::report::text::{warn, wrap};
 use mimu::calibration::ConverterTable;
 use mimu::diagnose::decision::{Accepted, Decision, Split};
-use mimu::diagnose::next::Next;
 use mimu::diagnose::{SensorDiagnosis, Verdict};
+use mimu::next_experiment::Next;
 use mimu::quantity::Figure;
 use mimu::quantity::{plus_minus, significant};
 

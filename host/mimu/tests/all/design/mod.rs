@@ -1,9 +1,9 @@
 //! The search finds the optimum wherever it is known from elsewhere, and designs are judged as arithmetic does.
 
 mod brute_force;
+mod next_experiment;
 mod polynomials;
 mod schemes;
-mod settle;
 mod sphere;
 mod time;
 

@@ -1,0 +1,214 @@
+//! A model, what it can be measured with, and the best designs of it.
+
+use nalgebra::Vector3;
+use rayon::prelude::*;
+
+use super::continuous::{Optimum, TOLERANCE};
+use super::information::{Inverse, Rows};
+use super::model::{Model, Setting};
+use super::reach::{Carrier, Rates, Reach};
+use super::refinement::{Region as _, refine};
+use super::{continuous, exchange, lack_of_fit};
+use crate::estimate::least_squares::Observability;
+use crate::quantity::Sensor;
+use crate::quantity::plural;
+use mimu_recording::Reference;
+use mimu_recording::error::{Error, Result};
+
+/// A model, what it can be measured with, and the optimum that designs are judged by.
+#[derive(Debug, Clone)]
+pub struct Problem {
+    /// Model and reach.
+    pub reach: Reach,
+    /// Continuous optimum over the reach.
+    pub optimum: Optimum<Setting>,
+    candidates: Vec<Setting>,
+    rows: Rows,
+}
+
+/// Random starts of a search. In 17 problems (5 to 40 dwells; affine, cubic, gravity's size) 200 found
+/// nothing that 10 had not.
+const STARTS: usize = 20;
+/// Best designs of a search that are refined between the candidates.
+const REFINED: usize = 10;
+/// Difference of `ln det` within which designs are equally good.
+const EQUAL: f64 = 1e-6;
+
+/// Distance of inputs, over the full input, below which they are the same one: 0.6 degrees. What a model
+/// lacks shows between inputs that are farther apart.
+const DIFFERENT: f64 = 0.01;
+
+impl Problem {
+    /// An accelerometer on `carrier`.
+    pub fn accel(model: Model, carrier: Carrier) -> Result<Self> {
+        Self::new(Reach {
+            model,
+            carrier,
+            rates: Rates::Any,
+        })
+    }
+
+    /// A gyro triad on `carrier`, turned at `rates`.
+    pub fn gyro(model: Model, carrier: Carrier, rates: Rates) -> Result<Self> {
+        let holds = match carrier {
+            Carrier::ThreeAxis | Carrier::Faces => None,
+            Carrier::TwoAxis => Some("a two-axis table holds a rate about one body axis only"),
+            Carrier::Hand => Some("by hand there is no known rate, only turns between dwells"),
+        };
+        match holds {
+            None => Self::new(Reach {
+                model,
+                carrier,
+                rates,
+            }),
+            Some(problem) => Err(Error::new(
+                format!("gyro, {}", carrier.name()),
+                problem,
+                "design with --table three-axis or --table faces",
+            )),
+        }
+    }
+
+    fn new(reach: Reach) -> Result<Self> {
+        if reach.model.feels_force() && reach.model.sensor == Sensor::Accel {
+            return Err(Error::new(
+                "accel",
+                "g-sensitivity is what a gyro makes of force",
+                "leave it out, or design with --sensor gyro",
+            ));
+        }
+        let candidates = reach.candidates();
+        let rows = reach.rows(&candidates);
+        let optimum = continuous::optimum(&reach, &candidates).filter(|o| o.excess <= TOLERANCE);
+        match optimum {
+            Some(optimum) => Ok(Self {
+                reach,
+                optimum,
+                candidates,
+                rows,
+            }),
+            None => Err(undetermined(&reach, &rows)),
+        }
+    }
+
+    /// Best design found of `n` dwells, in no particular order; determinate for a `seed`.
+    ///
+    /// Among equally good ones, one on different faces, which people and fixtures hold; else that which would
+    /// notice most of the terms that the model lacks ([`lack_of_fit::potential`]).
+    pub fn best(&self, n: usize, seed: u64) -> Result<Vec<Setting>> {
+        let plain = self.reach.plain();
+        let faces: Vec<Setting> = plain
+            .iter()
+            .filter(|s| Carrier::Faces.reaches(&s.up))
+            .copied()
+            .collect();
+        let search = |from: &[Setting], rows: &Rows| -> Vec<Vec<Setting>> {
+            let found = exchange::search(rows, n, STARTS, seed);
+            found
+                .iter()
+                .map(|f| f.points.iter().map(|&i| from[i]).collect())
+                .collect()
+        };
+        let on_faces = search(&faces, &self.reach.rows(&faces));
+        let on_plain = search(&plain, &self.reach.rows(&plain));
+        let on_grid = search(&self.candidates, &self.rows);
+        let refined = |designs: &[Vec<Setting>]| -> Vec<Vec<Setting>> {
+            let each = designs.par_iter().take(REFINED);
+            each.filter_map(|d| refine(&self.reach, d.clone()))
+                .map(|(points, _)| points)
+                .collect()
+        };
+        let (refined_plain, refined_grid) = (refined(&on_plain), refined(&on_grid));
+        let all = [on_faces, on_plain, refined_plain, refined_grid].concat();
+        let values: Vec<f64> = all.iter().map(|d| self.log_det(d)).collect();
+        let most = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let worth = |settings: &[Setting]| {
+            let held = settings.iter().all(|s| Carrier::Faces.reaches(&s.up));
+            match held && self.distinct(settings).len() == n {
+                true => f64::INFINITY,
+                false => lack_of_fit::potential(&self.reach.model, settings),
+            }
+        };
+        let equal = all
+            .into_iter()
+            .zip(values)
+            .filter(|(_, value)| *value > most - EQUAL);
+        let valued = equal.map(|(settings, _)| (worth(&settings), settings));
+        let best = valued
+            .reduce(|a, b| if b.0 > a.0 { b } else { a })
+            .map(|(_, settings)| settings);
+        best.ok_or_else(|| {
+            let p = self.rows.widths().iter().max().copied().unwrap_or(0);
+            Error::new(
+                format!("{}, {}", self.reach.model.sensor, self.reach.model),
+                format!(
+                    "{} cannot determine {p} parameters",
+                    plural(n as u64, "dwell")
+                ),
+                format!("design at least {p}"),
+            )
+        })
+    }
+
+    /// Logarithm of `det F'F` of one dwell at each of the settings; minus infinity if singular.
+    pub fn log_det(&self, settings: &[Setting]) -> f64 {
+        let rows = self.reach.rows(settings);
+        let inverse = Inverse::of(&rows, (0..rows.len()).map(|i| (i, 1.0)));
+        inverse.map_or(f64::NEG_INFINITY, |i| i.log_det())
+    }
+
+    /// The settings without those that are the same input to the model again.
+    pub(super) fn distinct(&self, settings: &[Setting]) -> Vec<Setting> {
+        let mut distinct: Vec<Setting> = Vec::new();
+        for s in settings {
+            if !distinct.iter().any(|d| self.same(d, s)) {
+                distinct.push(*s);
+            }
+        }
+        distinct
+    }
+
+    /// Whether two settings are the same input to the model.
+    fn same(&self, a: &Setting, b: &Setting) -> bool {
+        let model = &self.reach.model;
+        let close = |a: Vector3<f64>, b: Vector3<f64>| (a - b).norm() < DIFFERENT;
+        close(model.input(a), model.input(b)) && (!model.feels_force() || close(a.up, b.up))
+    }
+}
+
+/// Parameters that no settings within reach tell apart.
+fn undetermined(reach: &Reach, rows: &Rows) -> Error {
+    let mut names = Vec::new();
+    for block in 0..rows.widths().len() {
+        let found = Observability::of(&rows.matrix(block));
+        let parameters = reach.model.parameters(block);
+        names.extend(
+            found
+                .undetermined
+                .iter()
+                .map(|(k, _)| parameters[*k].name.clone()),
+        );
+    }
+    let place = format!("{}, {}", reach.model.sensor, reach.model);
+    if names.is_empty() {
+        let problem = "the continuous optimum was not reached";
+        return Error::new(
+            place,
+            problem,
+            "leave out terms that are hard to tell apart",
+        );
+    }
+    let of = match reach.model.reference {
+        Reference::Table => "known inputs",
+        Reference::Gravity => "the size of gravity",
+    };
+    Error::new(
+        place,
+        format!(
+            "{of} on --table {} cannot tell apart {}",
+            reach.carrier.name(),
+            names.join(", ")
+        ),
+        "leave out the term, or use another table or reference",
+    )
+}

@@ -1,0 +1,340 @@
+//! The next experiment: a short recipe for what a recording could not show, of the smallest size that does.
+//!
+//! | module         | what                                                                                |
+//! |----------------|-------------------------------------------------------------------------------------|
+//! | [`recipe`]     | the table of recipes, their sizes, and what a unit undergoes when one is carried out |
+//! | [`prediction`] | the sigma that an experiment gives each coefficient of an effect                    |
+//! | [`words`]      | an experiment in a sentence, and as a plan                                          |
+//!
+//! It stands above [`crate::design`] and [`crate::diagnose`], which do not know each other. Regressors, typical sizes and ranges of
+//! nonlinear parameters are those of the effects: one that is new there is known here.
+
+pub mod prediction;
+pub mod recipe;
+pub mod words;
+
+use rayon::prelude::*;
+
+use crate::design::budget::DwellNoise;
+use crate::design::reach::{Carrier, RateList, Rates};
+use crate::design::tour::Motion;
+use crate::diagnose::Diagnosis;
+use crate::diagnose::candidate::{Candidate, Kind, Monomial};
+use crate::diagnose::library;
+use crate::fit::Fit;
+use crate::prepared::si_covariance;
+use crate::quantity::AXES;
+use crate::quantity::Sensor;
+use mimu_recording::Reference;
+use prediction::{Prediction, Target, calibrates};
+use recipe::{Course, Experiment, RECIPES};
+
+/// Length of a dwell of the next experiment, s.
+pub const DWELL_S: f64 = 10.0;
+/// Range of rates where the recording did not go beyond it, deg/s: that of most gyros.
+pub const RATE_DPS: f64 = 300.0;
+/// Rate at which a table changes the attitude, rad/s. What the course of a session is planned with: on a slower table it takes
+/// longer than the chamber does, and ends where that has ended; on a faster one it would break off.
+pub const SLEW: f64 = std::f64::consts::PI / 3.0;
+/// Temperatures of a chamber: where it begins and ends, and two others, °C. That of the recording is the unit's, which its own
+/// power warms by some ten degrees.
+pub const CHAMBER_C: [f64; 3] = [25.0, 45.0, 5.0];
+/// Alternatives of an effect that experiments are designed for.
+const ALTERNATIVES: usize = 3;
+
+/// Two candidates that the recording does not tell apart.
+#[derive(Debug, Clone)]
+pub struct Confused {
+    /// That which was accepted, and the other.
+    pub ids: [String; 2],
+    /// How much worse the other is, in score.
+    pub difference: f64,
+    /// What tells them apart, in words.
+    pub experiment: String,
+}
+
+/// What to record next.
+#[derive(Debug, Clone, Default)]
+pub struct Next {
+    /// Effects that the recording could not show, each with the experiment in words.
+    pub not_excited: Vec<(String, String)>,
+    /// Candidates that it could not tell apart.
+    pub confused: Vec<Confused>,
+    /// What of it this kind of recording can show, for one experiment together.
+    pub targets: Vec<Target>,
+}
+
+/// A unit, and what an experiment with it can be made with.
+#[derive(Debug, Clone)]
+pub struct Setup {
+    /// What will be known of the input.
+    pub reference: Reference,
+    /// What carries the unit.
+    pub carrier: Carrier,
+    /// Sensors of the unit: each recording has to calibrate them all.
+    pub sensors: Vec<Sensor>,
+    /// Rates of the table.
+    pub rates: RateList,
+    /// Temperatures of the chamber, °C: where it begins and ends, and two others.
+    pub chamber_c: [f64; 3],
+    /// Noise of gyro and accelerometer.
+    pub noise: [DwellNoise; 2],
+    /// Length of a dwell, s.
+    pub dwell_s: f64,
+    /// Moves between dwells.
+    pub motion: Motion,
+    /// Seed of the randomised orders.
+    pub seed: u64,
+}
+
+impl Setup {
+    /// The unit of a fitted recording: its noise, sensors and rates; without a `carrier` on what it was recorded on.
+    pub fn of(fit: &Fit, carrier: Option<Carrier>) -> Self {
+        let prepared = &fit.prepared;
+        let carrier = carrier.unwrap_or(match prepared.manifest.reference {
+            Reference::Table => Carrier::ThreeAxis,
+            Reference::Gravity => Carrier::Hand,
+        });
+        let usual = Motion::of(carrier);
+        let dwells = &prepared.dwells.list;
+        let rates = dwells.iter().flat_map(|d| d.reference[..3].to_vec());
+        let largest = rates.fold(0.0, |m: f64, r| m.max(r.abs())).to_degrees();
+        Self {
+            reference: match carrier {
+                Carrier::Hand => Reference::Gravity,
+                _ => Reference::Table,
+            },
+            carrier,
+            sensors: Sensor::BOTH
+                .into_iter()
+                .filter(|s| fit.sensor(*s).is_some())
+                .collect(),
+            rates: RateList {
+                largest_dps: largest.round().max(RATE_DPS),
+                rates: Rates::Any,
+            },
+            chamber_c: CHAMBER_C,
+            noise: Sensor::BOTH.map(|s| noise(fit, s)),
+            dwell_s: DWELL_S,
+            motion: Motion {
+                slew: usual
+                    .slew
+                    .max(if carrier == Carrier::Hand { 0.0 } else { SLEW }),
+                ..usual
+            },
+            seed: 1,
+        }
+    }
+
+    /// Noise of a sensor.
+    pub fn noise_of(&self, sensor: Sensor) -> &DwellNoise {
+        match sensor {
+            Sensor::Gyro => &self.noise[0],
+            Sensor::Accel => &self.noise[1],
+        }
+    }
+}
+
+/// An experiment, and what it will show.
+#[derive(Debug, Clone)]
+pub struct Answer {
+    /// The experiment.
+    pub experiment: Experiment,
+    /// Of each target, in their order.
+    pub predictions: Vec<Prediction>,
+}
+
+impl Answer {
+    /// Sigma over the wanted one of the target that is seen worst.
+    fn worst(&self) -> f64 {
+        let each = self.predictions.iter().map(|p| p.share / p.wanted);
+        each.fold(0.0, f64::max)
+    }
+
+    /// Whether all targets are seen as wanted.
+    pub fn done(&self) -> bool {
+        self.predictions.iter().all(Prediction::done)
+    }
+}
+
+/// The first recipe, and the smallest of its sizes, at which all targets are seen as wanted; the best of all if they never are.
+/// `None` if no recipe determines all of them.
+pub fn smallest(setup: &Setup, targets: &[Target]) -> Option<Answer> {
+    let slow = targets.iter().any(Target::is_slow);
+    let judged = |recipe, size| {
+        let experiment = Experiment::of(setup, recipe, size);
+        let predictions = targets.par_iter();
+        Answer {
+            predictions: predictions
+                .map(|t| t.predicted(setup, &experiment))
+                .collect(),
+            experiment,
+        }
+    };
+    let mut best: Option<Answer> = None;
+    for recipe in RECIPES {
+        if (recipe.course != Course::Dwells) != slow {
+            continue;
+        }
+        let Some((largest, smaller)) = recipe.course.sizes().split_last() else {
+            continue;
+        };
+        let largest = judged(recipe, *largest);
+        if !largest.worst().is_finite() || !calibrates(setup, &largest.experiment) {
+            continue;
+        }
+        let enough = |a: &Answer| a.done() && calibrates(setup, &a.experiment);
+        if !largest.done() {
+            if best.as_ref().is_none_or(|b| largest.worst() < b.worst()) {
+                best = Some(largest);
+            }
+            continue;
+        }
+        let found = smaller.iter().map(|size| judged(recipe, *size));
+        return Some(found.into_iter().find(enough).unwrap_or(largest));
+    }
+    best
+}
+
+/// Noise of a sensor by the means of the dwells of a recording, as if it were white.
+fn noise(fit: &Fit, sensor: Sensor) -> DwellNoise {
+    let Some(fitted) = fit.sensor(sensor) else {
+        return DwellNoise::fang(sensor);
+    };
+    let matrix = &fitted.estimated.triad.inverse.matrix;
+    let prepared = &fit.prepared;
+    let usable = prepared
+        .dwells
+        .list
+        .iter()
+        .filter(|d| d.fault(sensor).is_none());
+    let each = usable.map(|d| {
+        let variance = si_covariance(matrix, &prepared.noise.of_mean(sensor, d));
+        variance.trace() / 3.0 * d.averaged_s(sensor)
+    });
+    let each: Vec<f64> = each.filter(|v| v.is_finite()).collect();
+    let density = (each.iter().sum::<f64>() / each.len().max(1) as f64).sqrt();
+    match density > 0.0 {
+        true => DwellNoise {
+            n: density,
+            b: 0.0,
+            k: 0.0,
+        },
+        false => DwellNoise::fang(sensor),
+    }
+}
+
+/// The candidate of this name; `None` of a jump, which is of one recording only.
+fn by_id(id: &str) -> Option<Candidate> {
+    if let Some(effect) = library::by_id(id) {
+        return Some(Candidate::new(effect.sensor, Kind::Effect(effect)));
+    }
+    let (channel, product) = id.strip_prefix("term:")?.split_once('~')?;
+    let (sensor, axis) = channel.split_once('_')?;
+    let sensor = Sensor::BOTH.into_iter().find(|s| s.name() == sensor)?;
+    let axis = AXES.iter().position(|a| *a == axis)?;
+    let monomial = Monomial::all().into_iter().find(|m| m.name() == product)?;
+    Some(Candidate::new(sensor, Kind::Term(axis, monomial)))
+}
+
+/// The experiments that show what `diagnosis` leaves open.
+pub fn next(diagnosis: &Diagnosis) -> Next {
+    let setup = Setup::of(&diagnosis.after, None);
+    let sensors = diagnosis.sensors.iter();
+    let open: Vec<&(String, String)> = sensors.flat_map(|s| &s.decision.not_excited).collect();
+    let shown = open.par_iter().map(|(id, needs)| {
+        let target = library::by_id(id).map(Target::listed);
+        let shown = target
+            .as_ref()
+            .and_then(|t| recommended(diagnosis, &setup, t));
+        let (words, here) = shown.unwrap_or_else(|| (needs.clone(), false));
+        ((id.clone(), words), target.filter(|_| here))
+    });
+    let (not_excited, targets): (Vec<_>, Vec<_>) = shown.unzip();
+    let pairs = pairs(diagnosis);
+    let told = pairs.par_iter().map(|p| p.told_apart(diagnosis, &setup));
+    let (confused, apart): (Vec<_>, Vec<_>) = told.unzip();
+    Next {
+        not_excited,
+        confused,
+        targets: targets.into_iter().chain(apart).flatten().collect(),
+    }
+}
+
+/// What shows a target, in words, and whether a recording of the same kind does: what cannot be shown by hand may be on a table.
+fn recommended(diagnosis: &Diagnosis, setup: &Setup, target: &Target) -> Option<(String, bool)> {
+    let targets = std::slice::from_ref(target);
+    if let Some(answer) = smallest(setup, targets) {
+        return Some((answer.words(setup), true));
+    }
+    if setup.carrier != Carrier::Hand {
+        return None;
+    }
+    let table = Setup::of(&diagnosis.after, Some(Carrier::ThreeAxis));
+    let answer = smallest(&table, targets)?;
+    let words = answer.words(&table);
+    Some((format!("This needs a turntable. {words}"), false))
+}
+
+/// An accepted effect and another that would do nearly as well.
+struct Pair {
+    /// The accepted one, with the coefficients found.
+    found: Candidate,
+    values: Vec<f64>,
+    id: String,
+    /// The other; `None` if it is a jump.
+    other: Option<Candidate>,
+    difference: f64,
+}
+
+fn pairs(diagnosis: &Diagnosis) -> Vec<Pair> {
+    let accepted = diagnosis.sensors.iter().flat_map(|s| &s.decision.accepted);
+    let each = accepted.flat_map(|a| {
+        let alternatives = a.chosen.alternatives.iter().take(ALTERNATIVES);
+        alternatives.map(|(id, difference)| Pair {
+            found: a.chosen.candidate.clone(),
+            values: a.values.iter().copied().collect(),
+            id: id.clone(),
+            other: by_id(id),
+            difference: *difference,
+        })
+    });
+    each.collect()
+}
+
+impl Pair {
+    fn told_apart(&self, diagnosis: &Diagnosis, setup: &Setup) -> (Confused, Option<Target>) {
+        let target = self.other.clone().map(|other| Target {
+            candidate: self.found.clone(),
+            sizes: self.values.clone(),
+            each: false,
+            rivals: vec![other],
+        });
+        let shown = target
+            .as_ref()
+            .and_then(|t| recommended(diagnosis, setup, t));
+        let (experiment, here) = shown.unwrap_or_else(|| {
+            // Of the two, what no dwell is planned for.
+            let words = match (&self.found.kind, library::by_id(&self.id)) {
+                (_, Some(effect)) => effect.needs,
+                (Kind::Effect(found), None) if self.other.is_some() => found.needs,
+                _ => "Make the same recording again: a jump does not come back where it was.",
+            };
+            (words.to_string(), false)
+        });
+        let confused = Confused {
+            ids: [self.found.id(), self.id.clone()],
+            difference: self.difference,
+            experiment,
+        };
+        (confused, target.filter(|_| here))
+    }
+}
+
+/// One experiment for all that a diagnosis leaves open and that its kind of recording can show; `None` if there is nothing.
+pub fn together(diagnosis: &Diagnosis, next: &Next) -> Option<(Setup, Answer)> {
+    let setup = Setup::of(&diagnosis.after, None);
+    let any = !next.targets.is_empty();
+    let answer = any.then(|| smallest(&setup, &next.targets)).flatten()?;
+    Some((setup, answer))
+}

@@ -1,0 +1,282 @@
+//! What an experiment will show of an effect: the sigma of each coefficient, from the information of its dwells.
+
+use nalgebra::{DVector, Vector3};
+
+use super::Setup;
+use super::recipe::Experiment;
+use crate::design::information::{Inverse, Rows};
+use crate::design::lack_of_fit::{ALIASED, extend, outside};
+use crate::diagnose::candidate::{Candidate, Kind};
+use crate::diagnose::effect::{Effect, Moment};
+use crate::diagnose::library;
+use crate::quantity::Sensor;
+use mimu_recording::Reference;
+
+/// Sigmas at which a coefficient of its typical size is to be seen. A diagnosis tests from 3 on; at 5 it finds the effect in 98 of
+/// 100 recordings even if only one coefficient differs from nothing: 5 - 2 sigmas of it are the 3 that chance makes once in 400.
+pub const SEEN: f64 = 5.0;
+/// Root of the deviance by which one of two effects is to be better. A diagnosis calls two confused below 12; the difference
+/// scatters by twice its root, and 36 is two of these above 12: 36 - 2 · 2 · 6.
+pub const APART: f64 = 6.0;
+
+/// What an experiment is to show.
+#[derive(Debug, Clone)]
+pub struct Target {
+    /// The effect.
+    pub candidate: Candidate,
+    /// Sizes of its active coefficients, SI: those of data sheets, or those that were found.
+    pub sizes: Vec<f64>,
+    /// Whether each coefficient is to be seen; or the effect, as found, to be told from `rivals`.
+    pub each: bool,
+    /// What it must not be taken for. One at a time.
+    pub rivals: Vec<Candidate>,
+}
+
+/// What is predicted for a target.
+#[derive(Debug, Clone)]
+pub struct Prediction {
+    /// Name of the effect.
+    pub id: String,
+    /// Sigma over size of the coefficient that is seen worst, or of the whole effect beside its rivals; infinite if it is not
+    /// determined.
+    pub share: f64,
+    /// The share that is enough.
+    pub wanted: f64,
+    /// Name, unit and sigma of each coefficient in it.
+    pub coefficients: Vec<(String, String, f64)>,
+}
+
+impl Prediction {
+    /// Whether it is enough.
+    pub fn done(&self) -> bool {
+        self.share <= self.wanted
+    }
+}
+
+impl Target {
+    /// A listed effect, each coefficient at its typical size, beside the affine parameters and any one of the other listed effects
+    /// of the sensor that depend on time or temperature if it does, and on neither if it does not.
+    pub fn listed(effect: &'static Effect) -> Self {
+        let candidate = Candidate::new(effect.sensor, Kind::Effect(effect));
+        let others = library::all().filter(|e| e.sensor == effect.sensor && e.id != effect.id);
+        let rivals = others.map(|e| Candidate::new(e.sensor, Kind::Effect(e)));
+        let slow = candidate.is_slow();
+        Self {
+            sizes: candidate
+                .active
+                .iter()
+                .map(|k| effect.typical[*k])
+                .collect(),
+            rivals: rivals
+                .filter(|r| !r.reads_code() && r.is_slow() == slow)
+                .collect(),
+            candidate,
+            each: true,
+        }
+    }
+
+    /// Whether it depends on time or temperature, so that it is shown by their course only.
+    pub fn is_slow(&self) -> bool {
+        self.candidate.is_slow() || (!self.each && self.rivals.iter().any(Candidate::is_slow))
+    }
+
+    /// What `experiment` will show of it.
+    pub fn predicted(&self, setup: &Setup, experiment: &Experiment) -> Prediction {
+        let count = self.sizes.len();
+        let mut sigmas = vec![0.0_f64; count];
+        let mut whole = 0.0_f64;
+        for form in quarters(&self.candidate) {
+            let own = Columns::of(setup, experiment, &self.candidate, form);
+            let alone = if self.each { 1 } else { 0 };
+            let beside = self.rivals.iter().map(Some);
+            for rival in std::iter::repeat_n(None, alone).chain(beside) {
+                let rival = rival.map(|r| Columns::of(setup, experiment, r, quarters(r)[1]));
+                if self.each {
+                    let found = own.sigmas(rival.as_ref());
+                    sigmas
+                        .iter_mut()
+                        .zip(found)
+                        .for_each(|(s, f)| *s = s.max(f));
+                } else {
+                    whole = whole.max(own.whole(&self.sizes).sigmas(rival.as_ref())[0]);
+                }
+            }
+        }
+        let names = self.candidate.names().into_iter().zip(&sigmas);
+        let shares = sigmas
+            .iter()
+            .zip(&self.sizes)
+            .map(|(s, size)| s / size.abs());
+        let wanted = if self.each { SEEN } else { APART };
+        Prediction {
+            id: self.candidate.id(),
+            share: if self.each {
+                shares.fold(0.0, f64::max)
+            } else {
+                whole
+            },
+            // Rounding of the inverse.
+            wanted: (1.0 + 1e-9) / wanted,
+            coefficients: match self.each {
+                true => names.map(|((name, unit), s)| (name, unit, *s)).collect(),
+                false => Vec::new(),
+            },
+        }
+    }
+}
+
+/// Values of its nonlinear parameter that an experiment has to be good for: the quarters of its range, in the logarithm.
+fn quarters(candidate: &Candidate) -> [f64; 3] {
+    match candidate.form_range() {
+        Some((from, to)) => [0.25, 0.5, 0.75].map(|share| from * (to / from).powf(share)),
+        None => [0.0; 3],
+    }
+}
+
+/// One linear problem of a sensor: what its dwells measure of an error of its three axes, and the affine parameters in it.
+struct Problem {
+    /// What each dwell measures, SI per SI of the error.
+    measured: Vec<Vector3<f64>>,
+    /// Orthonormal basis of the affine parameters' columns.
+    affine: Vec<DVector<f64>>,
+    /// Whether all affine parameters are determined.
+    calibrates: bool,
+}
+
+/// The problems of a sensor. With a known input each axis is one, with its bias and its row of the matrix; where gravity's
+/// magnitude alone is known, the three axes of an accelerometer are one, and a gyro shows its bias at rest.
+fn problems(setup: &Setup, sensor: Sensor, states: &[Moment]) -> Vec<Problem> {
+    let input = |at: &Moment| match sensor {
+        Sensor::Gyro => at.rate,
+        Sensor::Accel => at.force,
+    };
+    let problem = |measured: Vec<Vector3<f64>>, parameters: &[(usize, Option<usize>)]| {
+        let mut affine = Vec::new();
+        for (axis, of) in parameters {
+            let each = states.iter().zip(&measured);
+            let column = each.map(|(at, m)| m[*axis] * of.map_or(1.0, |j| input(at)[j]));
+            let column: Vec<f64> = column.collect();
+            extend(&mut affine, DVector::from_vec(column));
+        }
+        Problem {
+            calibrates: affine.len() == parameters.len(),
+            measured,
+            affine,
+        }
+    };
+    let matrix = sensor == Sensor::Accel || setup.turns();
+    if setup.reference == Reference::Gravity && sensor == Sensor::Accel {
+        let lower = (0..3).flat_map(|i| (0..=i).map(move |j| (i, Some(j))));
+        let all: Vec<_> = lower.chain((0..3).map(|i| (i, None))).collect();
+        let up = states.iter().map(|at| at.force.normalize()).collect();
+        return vec![problem(up, &all)];
+    }
+    let each = (0..3).map(|i| {
+        let row = (0..3).filter(|_| matrix).map(|j| (i, Some(j)));
+        let all: Vec<_> = std::iter::once((i, None)).chain(row).collect();
+        problem(vec![Vector3::ith(i, 1.0); states.len()], &all)
+    });
+    each.collect()
+}
+
+/// Whether an experiment determines the calibration of every sensor by itself.
+pub fn calibrates(setup: &Setup, experiment: &Experiment) -> bool {
+    setup.sensors.iter().all(|sensor| {
+        let states = experiment.states(*sensor, None);
+        problems(setup, *sensor, &states)
+            .iter()
+            .all(|p| p.calibrates)
+    })
+}
+
+/// Columns of an effect's coefficients in each problem, over the sigma of a dwell's mean.
+struct Columns {
+    /// Basis of the affine parameters, and the columns.
+    problems: Vec<(Vec<DVector<f64>>, Vec<DVector<f64>>)>,
+}
+
+impl Columns {
+    fn of(setup: &Setup, experiment: &Experiment, candidate: &Candidate, form: f64) -> Self {
+        let sensor = candidate.sensor;
+        let states = experiment.states(sensor, candidate.lag_s(form));
+        let slots = candidate.slots();
+        let regressors = states.iter().map(|at| {
+            let mut out = vec![0.0; slots.len()];
+            candidate.regressors(at, form, &mut out);
+            out
+        });
+        let regressors: Vec<Vec<f64>> = regressors.collect();
+        let sigma = setup.noise_of(sensor).sigma(experiment.dwell_s);
+        let each = problems(setup, sensor, &states).into_iter().map(|p| {
+            let zeros = DVector::<f64>::zeros(states.len());
+            let mut columns = vec![zeros; candidate.active.len()];
+            for (slot, (coefficient, axis)) in slots.iter().enumerate() {
+                for (i, values) in regressors.iter().enumerate() {
+                    columns[*coefficient][i] += p.measured[i][*axis] * values[slot] / sigma;
+                }
+            }
+            // Of a converter's codes no dwell can be planned: they are no numbers here, and count as not excited.
+            for column in &mut columns {
+                if !column.iter().all(|v| v.is_finite()) {
+                    column.fill(0.0);
+                }
+            }
+            (p.affine, columns)
+        });
+        Self {
+            problems: each.collect(),
+        }
+    }
+
+    /// All coefficients as one, at these sizes.
+    fn whole(&self, sizes: &[f64]) -> Self {
+        let sum = |columns: &[DVector<f64>]| {
+            let mut sum = DVector::zeros(columns[0].len());
+            for (column, size) in columns.iter().zip(sizes) {
+                sum.axpy(*size, column, 1.0);
+            }
+            sum
+        };
+        let each = self.problems.iter();
+        Self {
+            problems: each.map(|(a, c)| (a.clone(), vec![sum(c)])).collect(),
+        }
+    }
+
+    /// Sigma of each coefficient beside the affine parameters and, if there is one, a rival, as far as this is seen itself;
+    /// infinite where it is not determined.
+    fn sigmas(&self, rival: Option<&Self>) -> Vec<f64> {
+        let count = self.problems[0].1.len();
+        let mut information = vec![0.0; count];
+        for (p, (affine, columns)) in self.problems.iter().enumerate() {
+            let mut basis = affine.clone();
+            for column in rival.iter().flat_map(|r| &r.problems[p].1) {
+                extend(&mut basis, column.clone());
+            }
+            let seen: Vec<(usize, DVector<f64>)> = columns
+                .iter()
+                .enumerate()
+                .map(|(k, c)| (k, c.norm_squared(), outside(&basis, c.clone())))
+                .filter(|(_, all, rest)| rest.norm_squared() > ALIASED * all)
+                .map(|(k, _, rest)| (k, rest))
+                .collect();
+            if seen.is_empty() {
+                continue;
+            }
+            let mut rows = Rows::new(&[seen.len()]);
+            let n = columns[0].len();
+            for i in 0..n {
+                rows.push(&seen.iter().map(|(_, c)| c[i]).collect::<Vec<f64>>());
+            }
+            if let Some(inverse) = Inverse::of(&rows, (0..n).map(|i| (i, 1.0))) {
+                for (at, (k, _)) in seen.iter().enumerate() {
+                    information[*k] += 1.0 / inverse.block(0)[(at, at)];
+                }
+            }
+        }
+        information
+            .into_iter()
+            .map(|i: f64| i.sqrt().recip())
+            .collect()
+    }
+}

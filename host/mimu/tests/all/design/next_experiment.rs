@@ -1,0 +1,170 @@
+//! Recipes that show effects: what they predict, and that they are no larger than they have to be.
+
+use mimu::design::budget::DwellNoise;
+use mimu::design::reach::{Carrier, RateList, Rates};
+use mimu::design::tour::Motion;
+use mimu::diagnose::library;
+use mimu::next_experiment::prediction::{SEEN, Target};
+use mimu::next_experiment::recipe::{Course, Experiment, Inputs, RECIPES};
+use mimu::next_experiment::{Answer, CHAMBER_C, DWELL_S, RATE_DPS, SLEW, Setup, smallest};
+use mimu::quantity::Sensor;
+use mimu_recording::Reference;
+use nalgebra::{DMatrix, DVector};
+
+fn setup() -> Setup {
+    Setup {
+        reference: Reference::Table,
+        carrier: Carrier::ThreeAxis,
+        sensors: Sensor::BOTH.to_vec(),
+        rates: RateList {
+            largest_dps: RATE_DPS,
+            rates: Rates::Any,
+        },
+        chamber_c: CHAMBER_C,
+        noise: Sensor::BOTH.map(DwellNoise::fang),
+        dwell_s: DWELL_S,
+        motion: Motion {
+            slew: SLEW,
+            ..Motion::of(Carrier::ThreeAxis)
+        },
+        seed: 1,
+    }
+}
+
+fn target(id: &str) -> Target {
+    Target::listed(library::by_id(id).unwrap())
+}
+
+fn answer(setup: &Setup, id: &str) -> Option<Answer> {
+    smallest(setup, &[target(id)])
+}
+
+#[test]
+fn every_error_that_is_none_of_a_converter_has_a_recipe_that_shows_it() {
+    let setup = setup();
+    for effect in library::all() {
+        let shown = answer(&setup, effect.id);
+        if target(effect.id).candidate.reads_code() {
+            assert!(shown.is_none(), "{}", effect.id);
+            continue;
+        }
+        let shown = shown.unwrap_or_else(|| panic!("{}: no recipe", effect.id));
+        let words = shown.words(&setup);
+        println!("{}: {words}\n", effect.id);
+        assert_eq!(words.contains("Even this"), !shown.done(), "{words}");
+        assert!(shown.done() || !effect.is_error(), "{}: {words}", effect.id);
+    }
+}
+
+#[test]
+fn what_is_predicted_is_what_least_squares_gives() {
+    // Cubic of the x gyro beside bias, row of the matrix and, as a rival, the square; by the plan's attitudes and rates alone.
+    let setup = setup();
+    let answer = answer(&setup, "gyro_scale_cubic").unwrap();
+    let alone = |rivals: &[&str]| {
+        let cubic = Target {
+            rivals: rivals.iter().map(|r| target(r).candidate).collect(),
+            ..target("gyro_scale_cubic")
+        };
+        cubic.predicted(&setup, &answer.experiment)
+    };
+    let settings = &answer.experiment.settings;
+    for (columns, rivals) in [(4, vec![]), (5, vec!["gyro_scale_quadratic"])] {
+        let design = DMatrix::from_fn(settings.len(), columns, |i, j| {
+            let w = settings[i].up * settings[i].rate;
+            [1.0, w.x, w.y, w.z, w.x * w.x][j]
+        });
+        let cubes = settings.iter().map(|s| (s.up.x * s.rate).powi(3));
+        let cubes = DVector::from_iterator(settings.len(), cubes);
+        let fit = design.clone().svd(true, true).solve(&cubes, 1e-12).unwrap();
+        let known = setup.noise[0].sigma(DWELL_S) / (cubes - design * fit).norm();
+        let (name, unit, sigma) = &alone(&rivals).coefficients[0];
+        assert_eq!((name.as_str(), unit.as_str()), ("x", "1/(rad/s)^2"));
+        assert!((sigma / known - 1.0).abs() < 1e-9, "{sigma} {known}");
+    }
+}
+
+#[test]
+fn the_size_is_the_smallest_that_is_enough_by_the_noise_of_the_unit() {
+    for id in [
+        "gyro_scale_cubic",
+        "accel_cross_axis_product",
+        "gyro_warm_up",
+        "accel_thermal_bias",
+    ] {
+        let mut sizes = Vec::new();
+        for louder in [0.01, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0] {
+            let mut setup = setup();
+            for noise in &mut setup.noise {
+                (noise.n, noise.b) = (louder * noise.n, louder * noise.b);
+            }
+            let answer = answer(&setup, id).unwrap();
+            let Experiment { recipe, size, .. } = answer.experiment;
+            let ladder = recipe.course.sizes();
+            let at = ladder.iter().position(|s| *s == size).unwrap();
+            // Alone, by its own sigma: enough here, and not one step below.
+            let share = |size| {
+                let experiment = Experiment::of(&setup, recipe, size);
+                target(id).predicted(&setup, &experiment).share
+            };
+            assert_eq!(answer.done(), share(size) <= (1.0 + 1e-9) / SEEN);
+            assert!(answer.done() || at + 1 == ladder.len(), "{id} {louder}");
+            assert!(
+                at == 0 || share(ladder[at - 1]) > 1.0 / SEEN,
+                "{id} {louder}"
+            );
+            sizes.push((RECIPES.iter().position(|r| *r == recipe), at));
+        }
+        assert_ne!(sizes.first(), sizes.last(), "{id}");
+    }
+}
+
+#[test]
+fn what_depends_on_time_begins_cold_and_what_depends_on_temperature_goes_up_and_down() {
+    let setup = setup();
+    let warm_up = answer(&setup, "accel_warm_up").unwrap();
+    assert_eq!(warm_up.experiment.recipe.course, Course::ColdStart);
+    assert!(
+        warm_up
+            .words(&setup)
+            .starts_with("Let the unit cool down switched off")
+    );
+    for id in ["gyro_thermal_bias", "gyro_thermal_lag"] {
+        let chamber = answer(&setup, id).unwrap().experiment.chamber_c;
+        let temperatures: Vec<f64> = chamber.iter().map(|c| c.1).collect();
+        let (first, last) = (temperatures[0], temperatures[temperatures.len() - 1]);
+        assert!(first == 25.0 && last == 25.0);
+        assert!(temperatures.iter().any(|t| *t > 25.0) && temperatures.iter().any(|t| *t < 25.0));
+    }
+}
+
+#[test]
+fn what_a_fixture_cannot_show_has_no_recipe() {
+    // By hand a gyro has no known rate; on six faces products of two forces are always nothing.
+    let by_hand = Setup {
+        reference: Reference::Gravity,
+        carrier: Carrier::Hand,
+        motion: Motion::of(Carrier::Hand),
+        ..setup()
+    };
+    assert!(answer(&by_hand, "gyro_scale_cubic").is_none());
+    assert!(answer(&by_hand, "gyro_g_sensitivity").is_some());
+    let faces = Setup {
+        carrier: Carrier::Faces,
+        ..setup()
+    };
+    assert!(answer(&faces, "accel_cross_axis_product").is_none());
+    assert!(answer(&faces, "gyro_scale_cubic").is_some());
+}
+
+#[test]
+fn a_person_reads_what_to_do_with_numbers_and_units() {
+    let setup = setup();
+    let cubic = answer(&setup, "gyro_scale_cubic").unwrap();
+    assert_eq!(cubic.experiment.recipe.inputs, Inputs::Rates);
+    let words = cubic.words(&setup);
+    let says = "in each of 18 states, in a randomised order";
+    assert!(words.contains(says), "{words}");
+    let says = "rest with each axis up and down (6 attitudes); turn at ±150 and ±300 deg/s about each axis.";
+    assert!(words.ends_with(says), "{words}");
+}
