@@ -45,10 +45,12 @@ pub(crate) fn progress(what: &'static str) -> ProgressBar {
 pub(crate) fn print(
     json: &JsonArgs,
     text: &str,
-    value: &serde_json::Value,
+    value: &impl serde::Serialize,
     files: impl IntoIterator<Item = Staged>,
 ) -> Result<()> {
-    let pretty = format!("{value:#}\n");
+    let mut pretty = serde_json::to_string_pretty(value)
+        .map_err(|e| Error::new("--json", e, "report this, with the command"))?;
+    pretty.push('\n');
     let file = json.file().map(|path| stage(path, pretty.clone()));
     for staged in files.into_iter().chain(file.transpose()?) {
         staged.publish()?;

@@ -5,12 +5,14 @@
 //! | [`recipe`]     | the table of recipes, their sizes, and what a unit undergoes when one is carried out |
 //! | [`prediction`] | the sigma that an experiment gives each coefficient of an effect                    |
 //! | [`words`]      | an experiment in a sentence, and as a plan                                          |
+//! | [`result`]     | the experiment as it is reported                                                    |
 //!
 //! It stands above [`crate::design`] and [`crate::diagnose`], which do not know each other. Regressors, typical sizes and ranges of
 //! nonlinear parameters are those of the effects: one that is new there is known here.
 
 pub mod prediction;
 pub mod recipe;
+pub mod result;
 pub mod words;
 
 use rayon::prelude::*;

@@ -4,12 +4,14 @@ use std::fmt;
 use std::ops::Range;
 
 use mimu_recording::RawUnit;
+use serde::Serialize;
 
 /// Names of the axes.
 pub const AXES: [&str; 3] = ["x", "y", "z"];
 
 /// A sensor triad.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Sensor {
     /// Gyro triad.
     Gyro,
@@ -144,6 +146,14 @@ pub fn plus_minus(value: f64, half: f64) -> String {
         value
     };
     format!("{value:.digits$} ± {half:.digits$}")
+}
+
+/// A time, in seconds up to two minutes: `90 s`, `2 min 30 s`.
+pub fn minutes(seconds: f64) -> String {
+    match seconds.round() {
+        s if s < 120.0 => format!("{} s", significant(seconds)),
+        s => format!("{} min {} s", (s / 60.0).floor(), s % 60.0),
+    }
 }
 
 /// `1 sample`, `2 samples`.

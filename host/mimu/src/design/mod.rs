@@ -11,13 +11,15 @@
 //! | [`schemes`]                   | published schemes                                                        |
 //! | [`problem`]                   | a model, what it can be measured with, and the best designs of it        |
 //! | [`plan`]                      | a design as the file that a table or a person carries out                |
+//! | [`result`]                    | a judged design, and a comparison of them, as they are reported          |
 //!
 //! The criterion is fang (22), `det(F'F/n)`, of the parameters of all three sensors together. The gyro by hand,
 //! whose known input are the turns between dwells, is no design of dwells and not treated here.
 //!
 //! ```
 //! use mimu::design::{Problem, model::{Model, Terms}, reach::Carrier, schemes::Scheme};
-//! use mimu::{dwell::Sensor, recording::Reference};
+//! use mimu::quantity::Sensor;
+//! use mimu_recording::Reference;
 //!
 //! let model = Model::accel(Reference::Table, &Terms::default());
 //! let problem = Problem::accel(model, Carrier::ThreeAxis)?;
@@ -25,7 +27,7 @@
 //! let ours = problem.judge(&six, 1e-3);
 //! let fang = problem.judge(&Scheme::FangNine.settings(Sensor::Accel)?, 1e-3);
 //! assert!((ours.d_efficiency - 1.0).abs() < 1e-6 && fang.d_efficiency < 0.95);
-//! # Ok::<(), mimu::error::Error>(())
+//! # Ok::<(), mimu_recording::error::Error>(())
 //! ```
 
 pub mod budget;
@@ -39,6 +41,7 @@ pub mod plan;
 pub mod problem;
 pub mod reach;
 pub mod refinement;
+pub mod result;
 pub mod schemes;
 pub mod tour;
 
