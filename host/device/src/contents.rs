@@ -140,7 +140,7 @@ fn effect(record: &Record<'_>) -> EffectContents {
         id,
         coefficients,
         time_constant_s: match record {
-            Record::Named { form, .. } => *form,
+            Record::Named { nonlinear, .. } => *nonlinear,
             _ => None,
         },
         converter: match record {

@@ -169,7 +169,7 @@ fn record(effect: &OnDevice<f32>) -> Record<'_> {
         What::Named { coefficients, form } => Record::Named {
             id: &effect.id,
             coefficients,
-            form: *form,
+            nonlinear: *form,
         },
         What::Code {
             axis,

@@ -5,17 +5,16 @@
 //! | [`recipe`]     | the table of recipes, their sizes, and what a unit undergoes when one is carried out |
 //! | [`prediction`] | the sigma that an experiment gives each coefficient of an effect                    |
 //! | [`words`]      | an experiment in a sentence, and as a plan                                          |
-//! | [`result`]     | the experiment as it is reported                                                    |
 //!
 //! It stands above [`crate::design`] and [`crate::diagnose`], which do not know each other. Regressors, typical sizes and ranges of
 //! nonlinear parameters are those of the effects: one that is new there is known here.
 
 pub mod prediction;
 pub mod recipe;
-pub mod result;
 pub mod words;
 
 use rayon::prelude::*;
+use serde::Serialize;
 
 use crate::design::budget::DwellNoise;
 use crate::design::reach::{Carrier, RateList, Rates};
@@ -45,7 +44,7 @@ pub const CHAMBER_C: [f64; 3] = [25.0, 45.0, 5.0];
 const ALTERNATIVES: usize = 3;
 
 /// Two candidates that the recording does not tell apart.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize)]
 pub struct Confused {
     /// That which was accepted, and the other.
     pub ids: [String; 2],

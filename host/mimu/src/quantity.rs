@@ -54,15 +54,21 @@ impl fmt::Display for Sensor {
     }
 }
 
-/// What an error figure is about.
+/// What an error figure is about; a file has [`Figure::description`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Figure {
-    /// Compensated dwell mean less known input, over dwells and axes: SI of the sensor.
+    /// Compensated dwell mean minus known input, over dwells and axes: SI of the sensor.
     Input,
-    /// Size of the compensated dwell mean less gravity, m/s².
+    /// Magnitude of the compensated dwell mean minus gravity, m/s².
     GravitySize,
     /// Angle between the predicted and the measured direction of gravity after each turn, rad.
     Direction,
+}
+
+impl Serialize for Figure {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.description())
+    }
 }
 
 impl Figure {
@@ -77,18 +83,9 @@ impl Figure {
     /// What it is about, as a sentence fragment.
     pub fn description(self) -> &'static str {
         match self {
-            Self::Input => "compensated dwell mean less known input, over dwells and axes",
-            Self::GravitySize => "size of the compensated dwell mean less gravity",
+            Self::Input => "compensated dwell mean minus known input, over dwells and axes",
+            Self::GravitySize => "magnitude of the compensated dwell mean minus gravity",
             Self::Direction => "angle between predicted and measured gravity after each turn",
-        }
-    }
-
-    /// Factor from SI, and unit, in which a person reads the figure of `sensor`.
-    pub fn readable(self, sensor: Sensor) -> (f64, &'static str) {
-        match (self, sensor) {
-            (Self::Direction, _) => (1f64.to_degrees(), "deg"),
-            (_, Sensor::Gyro) => (1f64.to_degrees(), "deg/s"),
-            (_, Sensor::Accel) => (1e3, "mm/s²"),
         }
     }
 }
@@ -120,11 +117,19 @@ pub fn scale_unit(raw: RawUnit, si: &str) -> String {
     }
 }
 
+/// `value` as `digits` significant digits leave it; what a file is to hold to no more than is known.
+pub fn rounded(value: f64, digits: usize) -> f64 {
+    let text = format!("{value:.*e}", digits.saturating_sub(1));
+    text.parse().unwrap_or(value)
+}
+
 /// `value` to three significant digits, without an exponent where that reads well.
 pub fn significant(value: f64) -> String {
     if value == 0.0 || !value.is_finite() {
         return format!("{value}");
     }
+    // Rounded first: 0.0099998, which time stamps make of 0.01, would have one more.
+    let value = rounded(value, 3);
     let digits = 2 - value.abs().log10().floor() as i32;
     if (-3..=6).contains(&digits) {
         format!("{value:.*}", digits.max(0) as usize)
@@ -148,7 +153,17 @@ pub fn plus_minus(value: f64, half: f64) -> String {
     format!("{value:.digits$} ± {half:.digits$}")
 }
 
-/// A time, in seconds up to two minutes: `90 s`, `2 min 30 s`.
+/// A time as a person says it.
+pub fn duration(s: f64) -> String {
+    match s {
+        s if s < 120.0 => format!("{} s", significant(s)),
+        s if s < 7200.0 => format!("{} min", significant(s / 60.0)),
+        s if s < 172_800.0 => format!("{} h", significant(s / 3600.0)),
+        s => format!("{} days", significant(s / 86_400.0)),
+    }
+}
+
+/// The same to the second: `90.0 s`, `2 min 30 s`.
 pub fn minutes(seconds: f64) -> String {
     match seconds.round() {
         s if s < 120.0 => format!("{} s", significant(seconds)),

@@ -8,7 +8,7 @@ use super::problem::Problem;
 use super::refinement::Region as _;
 use super::tour::{Motion, Order, by_lot};
 use crate::allan::model::FLOOR;
-use crate::noise::AllanModel;
+use crate::allan::variance::AllanModel;
 use crate::noise_file::NoiseFile;
 use crate::quantity::Sensor;
 use mimu_recording::error::{Error, Result};

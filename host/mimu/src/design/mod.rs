@@ -11,7 +11,6 @@
 //! | [`schemes`]                   | published schemes                                                        |
 //! | [`problem`]                   | a model, what it can be measured with, and the best designs of it        |
 //! | [`plan`]                      | a design as the file that a table or a person carries out                |
-//! | [`result`]                    | a judged design, and a comparison of them, as they are reported          |
 //!
 //! The criterion is fang (22), `det(F'F/n)`, of the parameters of all three sensors together. The gyro by hand,
 //! whose known input are the turns between dwells, is no design of dwells and not treated here.
@@ -41,7 +40,6 @@ pub mod plan;
 pub mod problem;
 pub mod reach;
 pub mod refinement;
-pub mod result;
 pub mod schemes;
 pub mod tour;
 

@@ -3,8 +3,8 @@
 use std::fmt::Write as _;
 
 use super::text::{LISTED, wrapped};
-use mimu::next_experiment::result::NextExperiment;
 use mimu::quantity::{Figure, minutes, significant};
+use mimu::result::next_experiment::NextExperiment;
 
 /// Result of `mimu design --effects`.
 pub fn next_text(report: &NextExperiment) -> String {

@@ -6,8 +6,8 @@ use crate::report::text::{COLUMNS, wrap};
 use mimu::design::judgement::WEAK;
 use mimu::design::model::bias_unit;
 use mimu::design::plan::round;
-use mimu::design::result::{Comparison, Design, Noticed, Spent, Way};
 use mimu::quantity::{minutes, plural, significant};
+use mimu::result::design::{Comparison, Design, Noticed, Spent, Way};
 
 /// Dwells listed: as many as the longest design.
 pub(super) const LISTED: usize = 200;

@@ -2,7 +2,7 @@
 //! never stops hearing: a whole frame after all of that is heard.
 //!
 //! ```text
-//! MIMU_FUZZ_CASES=1000000 MIMU_FUZZ_SEED=2 cargo test --release -p mimu --test device fuzz -- --nocapture
+//! MIMU_FUZZ_CASES=1000000 MIMU_FUZZ_SEED=2 cargo test --release -p mimu-cli --test all device::fuzz -- --nocapture
 //! ```
 
 use mimu_core::compensation::{Affine, Compensation};
@@ -175,7 +175,7 @@ fn image() -> Vec<u8> {
         Record::Named {
             id: "gyro_warm_up",
             coefficients: &[0.1, 0.2, 0.3],
-            form: Some(60.0),
+            nonlinear: Some(60.0),
         },
         Record::Term {
             sensor: Sensor::Accel,

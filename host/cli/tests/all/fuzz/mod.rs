@@ -4,7 +4,7 @@
 //! hang. A few seconds in an ordinary test run; longer by hand:
 //!
 //! ```text
-//! MIMU_FUZZ_SECONDS=600 MIMU_FUZZ_SEED=2 cargo test --release -p mimu --test fuzz -- --nocapture
+//! MIMU_FUZZ_SECONDS=600 MIMU_FUZZ_SEED=2 cargo test --release -p mimu-cli --test all fuzz -- --nocapture
 //! ```
 //!
 //! A failure prints the number of its case; `MIMU_FUZZ_CASE` runs that one alone.

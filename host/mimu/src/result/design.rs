@@ -2,19 +2,17 @@
 
 use serde::Serialize;
 
-use super::budget::{Budget, DwellNoise, Spending};
-use super::judgement::{HALF_95, Judgement};
-use super::model::{Setting, Term, bias_unit};
-use super::plan;
-use super::problem::Problem;
-use super::reach::Carrier;
-use super::schemes::{FANG_FILTERS, Scheme};
-use super::tour::{Motion, Order};
+use super::TOOL;
+use crate::design::Problem;
+use crate::design::budget::{Budget, DwellNoise, Spending};
+use crate::design::judgement::{HALF_95, Judgement};
+use crate::design::model::{Setting, Term, bias_unit};
+use crate::design::plan;
+use crate::design::reach::Carrier;
+use crate::design::schemes::{FANG_FILTERS, Scheme};
+use crate::design::tour::{Motion, Order};
 use crate::quantity::{Sensor, minutes, significant};
 use mimu_recording::Reference;
-
-/// This program and its version.
-pub(crate) const TOOL: &str = concat!("mimu ", env!("CARGO_PKG_VERSION"));
 
 /// What a design is judged under.
 #[derive(Debug, Clone)]

@@ -2,10 +2,10 @@
 
 use serde::Serialize;
 
-use super::recipe::Course;
-use super::{Answer, Setup};
+use super::TOOL;
 use crate::design::plan::round;
-use crate::design::result::TOOL;
+use crate::next_experiment::recipe::Course;
+use crate::next_experiment::{Answer, Setup};
 use crate::quantity::Sensor;
 use mimu_recording::Reference;
 
