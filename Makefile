@@ -3,8 +3,10 @@
 TOOLCHAIN := $(shell sed -n 's/^channel = "\(.*\)"/\1/p' rust-toolchain.toml)
 TARGET := thumbv7em-none-eabihf
 CARGO := cargo +$(TOOLCHAIN)
-# Programs for the microcontroller, and all whose tests run on the PC.
-DEVICE := -p mimu-firmware -p mimu-counted
+# One by one: built together, the second would be given the vector table that the first brings.
+FIRMWARE := $(CARGO) build --locked -p mimu-firmware --release --target $(TARGET)
+COUNTED := $(CARGO) build --locked -p mimu-counted --release --target $(TARGET)
+# All whose tests run on the PC.
 ON_PC := --workspace --exclude mimu-counted --exclude mimu-no-panic
 
 # Of `make test`, and each also by itself: `make clippy`. Tests are linked before they run, so that both times are seen.
@@ -24,13 +26,13 @@ toolchain:
 	  || rustup toolchain install $(TOOLCHAIN) --profile minimal -c rustfmt -c clippy -t $(TARGET)
 
 test: toolchain ## formatting, lints, documentation, firmware, all tests but the nightly ones
-	@set -e; for stage in $(STAGES); do \
+	@set -e; took=; for stage in $(STAGES); do \
 	  echo "== $$stage"; begun=$$(date +%s); \
 	  $(MAKE) --no-print-directory $$stage; \
 	  took="$$took$$(printf '%-12s %4d s' $$stage $$(( $$(date +%s) - begun )))\n"; \
-	done; printf "\n$$took"
+	done; printf '\n%b' "$$took"
 
-# Each crate is compiled once: what would be compiled again by the next build is written down for that, which takes a third longer.
+# A fresh build compiles each crate once, so that nothing need be kept for compiling it again in parts.
 test $(STAGES) nightly: export CARGO_INCREMENTAL = 0
 
 fmt:
@@ -38,7 +40,7 @@ fmt:
 
 clippy:
 	$(CARGO) clippy --locked --all-targets -- -D warnings
-	$(CARGO) clippy --locked $(DEVICE) -p mimu-no-panic --release --target $(TARGET) -- -D warnings
+	$(CARGO) clippy --locked -p mimu-firmware -p mimu-counted -p mimu-no-panic --release --target $(TARGET) -- -D warnings
 	$(CARGO) clippy --locked -p mimu-firmware --release --features usb --target $(TARGET) -- -D warnings
 
 rustdoc:
@@ -47,7 +49,8 @@ rustdoc:
 # With USB first, as the image without it has the same name and is what the tests run.
 images:
 	$(CARGO) build --locked -p mimu-firmware --release --features usb --target $(TARGET)
-	$(CARGO) build --locked $(DEVICE) --release --target $(TARGET)
+	$(FIRMWARE)
+	$(COUNTED)
 
 no-panic:
 	./tests/no_panic/check.sh $(CARGO)
@@ -59,7 +62,7 @@ run-tests:
 	$(CARGO) test --locked $(ON_PC)
 
 nightly: toolchain blind fuzz ## what takes hours: more seeds, ten minutes of samples, 300 supply cuts, coverage, blind, fuzz; prints its figures
-	$(CARGO) build --locked $(DEVICE) --release --target $(TARGET)
+	$(FIRMWARE)
 	$(CARGO) test --locked --release $(ON_PC) -- --ignored --nocapture --test-threads=2
 
 demo: toolchain ## import and fit a recording: the best real one at hand, or the small one in tests/
@@ -78,11 +81,12 @@ bench: toolchain ## rates and peak memory on four hours at 1 kHz, and of a diagn
 	$(CARGO) bench --locked -p mimu-rig --bench step
 
 budget: toolchain ## instructions, load and memory of the firmware, counted on the emulated board
-	$(CARGO) build --locked $(DEVICE) --release --target $(TARGET)
+	$(FIRMWARE)
+	$(COUNTED)
 	$(CARGO) run --locked -p mimu-board-tests --bin budget
 
 device: toolchain ## of the nightly tests those of the device; draws docs/device/supply-cuts.svg
-	$(CARGO) build --locked $(DEVICE) --release --target $(TARGET)
+	$(FIRMWARE)
 	$(CARGO) test --locked --release -p mimu-board-tests -- --ignored --nocapture
 
 fuzz: toolchain ## mutated recordings, manifests and calibrations for ten minutes, or MIMU_FUZZ_SECONDS

@@ -20,256 +20,26 @@
 //! before it is compensated, by [`Effects::without_code_errors`]. They are those of an axis, which may have a converter to itself, and are
 //! made by [`Effect::code`].
 
+mod code;
+mod directions;
+mod effect;
 mod law;
 mod triad;
 
-use nalgebra::{Matrix3, RealField, Vector3, convert};
+use nalgebra::{RealField, Vector3, convert};
 
 use crate::compensation::{Affine, Sample};
-use law::{COEFFICIENTS, Conditions, Evaluation, Fast, Form, Law, term};
-use triad::{Memory, Slowly, Triad, lagged, put};
+use law::Conditions;
+use triad::{Memory, Triad, lagged, put};
 
-/// Temperature that warmth counts from, °C.
+pub use code::FARTHEST_ZERO;
+pub use directions::Directions;
+pub use effect::{Effect, Refused, Sensor, Variable};
+
+/// Temperature that temperature offsets count from, °C.
 pub const REFERENCE_C: f64 = 25.0;
-/// Weights of bit 0 that the reading of code 0 may be away from a reading of 0: farther, rounding in single precision comes near
-/// what a converter's codes are kept away from their turns by.
-pub const FARTHEST_ZERO: f64 = 64.0;
 /// Lag of the filter by which the rate of change of the temperature is taken, s: unfiltered it would be noise.
 pub const RATE_LAG_S: f64 = 30.0;
-
-/// Triad whose readings err.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Sensor {
-    /// Gyro; errors in rad/s.
-    Gyro,
-    /// Accelerometer; errors in m/s².
-    Accel,
-}
-
-/// A quantity that a [term](Effect::term) is a product of.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[repr(u8)]
-pub enum Variable {
-    /// Rate about body x, rad/s.
-    RateX = 1,
-    /// Rate about body y, rad/s.
-    RateY,
-    /// Rate about body z, rad/s.
-    RateZ,
-    /// Specific force along body x, m/s².
-    ForceX,
-    /// Specific force along body y, m/s².
-    ForceY,
-    /// Specific force along body z, m/s².
-    ForceZ,
-    /// Temperature above [`REFERENCE_C`], °C.
-    Temperature,
-    /// Its rate of change behind a lag of [`RATE_LAG_S`], °C/s.
-    TemperatureRate,
-    /// Time since power-on, s.
-    Time,
-}
-
-/// Why an effect is refused.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Refused {
-    /// No effect of this name can be removed here.
-    Unknown,
-    /// It takes another number of coefficients, or a term another number of variables.
-    Count {
-        /// How many (a term: at most).
-        needed: usize,
-    },
-    /// A coefficient is not a finite number, a nonlinear constant or a weight is missing, not wanted or not positive, or there is no such
-    /// axis.
-    Value,
-    /// There is no room for one more, or an axis has a code already.
-    Full,
-}
-
-/// An effect with its numbers.
-#[derive(Debug, Clone, Copy)]
-pub struct Effect<T: RealField> {
-    sensor: Sensor,
-    kind: Kind<T>,
-}
-
-#[derive(Debug, Clone, Copy)]
-enum Kind<T: RealField> {
-    Fast(Fast<T>),
-    Slow(Slowly<T>),
-    Code {
-        /// Whose readings err.
-        axes: [bool; 3],
-        /// Of nine bits, in units of the weight of bit 0.
-        errors: [T; COEFFICIENTS],
-        /// Of bit 0, raw.
-        weight: T,
-        /// Reading of code 0, raw.
-        zero: T,
-    },
-}
-
-impl<T: RealField + Copy> Effect<T> {
-    /// The effect of a public id like `gyro_scale_cubic`, with all of its coefficients (SI, those of a matrix by rows) and the
-    /// nonlinear constant of one that has any: a time constant, s.
-    pub fn named(id: &str, coefficients: &[T], form: Option<T>) -> Result<Self, Refused> {
-        let (sensor, name) = match (id.strip_prefix("gyro_"), id.strip_prefix("accel_")) {
-            (Some(name), _) => (Sensor::Gyro, name),
-            (_, Some(name)) => (Sensor::Accel, name),
-            _ => return Err(Refused::Unknown),
-        };
-        let law = Law::<T>::named(name).ok_or(Refused::Unknown)?;
-        if coefficients.len() != law.coefficients {
-            let needed = law.coefficients;
-            return Err(Refused::Count { needed });
-        }
-        let form = match (law.form, form) {
-            (Form::None, None) => T::one(),
-            (Form::TimeConstant | Form::Lag, Some(value))
-                if value > T::zero() && value.is_finite() =>
-            {
-                value
-            }
-            _ => return Err(Refused::Value),
-        };
-        let mut all = [T::zero(); COEFFICIENTS];
-        for (all, coefficient) in all.iter_mut().zip(coefficients) {
-            if !coefficient.is_finite() {
-                return Err(Refused::Value);
-            }
-            *all = *coefficient;
-        }
-        let kind = match law.evaluation {
-            Evaluation::Fast(law) => Kind::Fast(Fast {
-                law,
-                coefficients: all,
-                factors: [0; 3],
-            }),
-            Evaluation::Slow(run) => Kind::Slow(Slowly::Law {
-                law: run,
-                coefficients: all,
-                form,
-                lags: law.form == Form::Lag,
-            }),
-        };
-        Ok(Self { sensor, kind })
-    }
-
-    /// `coefficient` times the product of one to three variables, in the error of one axis (0 to 2); SI.
-    pub fn term(
-        sensor: Sensor,
-        axis: usize,
-        coefficient: T,
-        variables: &[Variable],
-    ) -> Result<Self, Refused> {
-        let needed = 3;
-        if variables.is_empty() || variables.len() > needed {
-            return Err(Refused::Count { needed });
-        }
-        let mut coefficients = [T::zero(); COEFFICIENTS];
-        let [x, y, z, ..] = &mut coefficients;
-        match [x, y, z].into_iter().nth(axis) {
-            Some(along) if coefficient.is_finite() => *along = coefficient,
-            _ => return Err(Refused::Value),
-        }
-        let mut factors = [0; 3];
-        for (factor, variable) in factors.iter_mut().zip(variables) {
-            *factor = *variable as u8;
-        }
-        let term = Fast {
-            law: term,
-            coefficients,
-            factors,
-        };
-        let slow = |v: &Variable| *v as u8 >= Variable::Temperature as u8;
-        let kind = match variables.iter().all(slow) {
-            true => Kind::Slow(Slowly::Term(term)),
-            false => Kind::Fast(term),
-        };
-        Ok(Self { sensor, kind })
-    }
-
-    /// Errors of a converter by the bits of its code, of one axis (0 to 2), or of all three alike.
-    ///
-    /// `weight`: of bit 0, the highest, raw; each of the nine bits has half the weight of the one before. `errors`: what a reading has too
-    /// much where the bit is set, in units of `weight`. `zero`: the reading of code 0, raw; not 0 where something was subtracted from the
-    /// readings. A reading of less than 1/65536 of `weight` below the turn of a bit counts as one of the turn, whichever way it was
-    /// rounded. The code of all nine bits set, and one more, is again 0: what lies beyond is not told apart. Refused where a number is not
-    /// finite, the weight not positive, or `zero` farther from a reading of 0 than [`FARTHEST_ZERO`] weights.
-    ///
-    /// ```
-    /// # use mimu_core::compensation::Sample;
-    /// # use mimu_core::effects::{Directions, Effect, Effects, Sensor};
-    /// # use nalgebra::{Matrix3, Vector3};
-    /// // Bit 0 of a converter of ±2.5 V is worth 2.5 V, and 1 mV more than that.
-    /// let code = Effect::code(Sensor::Gyro, Some(2), &[4e-4, 0., 0., 0., 0., 0., 0., 0., 0.], 2.5, -2.5).unwrap();
-    /// let directions = Directions { sensed: Matrix3::identity(), to_body: Matrix3::identity() };
-    /// let mut effects = Effects::<f64, 8>::of(directions, directions);
-    /// effects.push(code).unwrap();
-    /// let read = Sample { gyro: Vector3::new(0.5, 0.5, 0.5), accel: Vector3::repeat(1.7) };
-    /// let clean = effects.without_code_errors(&read);
-    /// assert_eq!(clean.gyro, Vector3::new(0.5, 0.5, 0.499));
-    /// assert_eq!(clean.accel, read.accel);
-    /// ```
-    pub fn code(
-        sensor: Sensor,
-        axis: Option<usize>,
-        errors: &[T; COEFFICIENTS],
-        weight: T,
-        zero: T,
-    ) -> Result<Self, Refused> {
-        let axes = match axis {
-            None => [true; 3],
-            Some(axis) => [0, 1, 2].map(|i| i == axis),
-        };
-        // What is not finite in single precision is not in this one, or becomes it in the tables.
-        let codes = convert::<_, T>(256.0) / weight;
-        let most = errors.iter().fold(T::zero(), |sum, e| sum + e.abs()) * weight;
-        let finite = [weight, codes, most].iter().all(T::is_finite);
-        let near = zero.abs() <= convert::<_, T>(FARTHEST_ZERO) * weight;
-        if !(finite && near && weight > T::zero() && axes.contains(&true)) {
-            return Err(Refused::Value);
-        }
-        let errors = *errors;
-        let kind = Kind::Code {
-            axes,
-            errors,
-            weight,
-            zero,
-        };
-        Ok(Self { sensor, kind })
-    }
-
-    /// Whether it moves with temperature and time only, so that no sample pays for it.
-    pub fn is_slow(&self) -> bool {
-        matches!(self.kind, Kind::Slow(_))
-    }
-}
-
-/// Where the sensors of a triad look.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Directions<T: RealField> {
-    /// D: sensitive directions in the body frame, rows of the forward matrix at unit length.
-    pub sensed: Matrix3<T>,
-    /// R, its inverse: errors along the sensors into errors in the body frame.
-    pub to_body: Matrix3<T>,
-}
-
-impl<T: RealField + Copy> Directions<T> {
-    /// Of a triad with this C, raw to SI; `None` if it is singular. In double precision whatever T is, and for the PC: no inverse is
-    /// taken on the device, which is sent this.
-    pub fn of(inverse: &Matrix3<f64>) -> Option<Self> {
-        let forward = inverse.try_inverse()?;
-        let scale = Vector3::from_fn(|i, _| forward.row(i).norm());
-        let positive = |s: &f64| *s > 0.0 && s.is_finite();
-        scale.iter().all(positive).then(|| Self {
-            // Zero added: of the two zeros there is one, as whether an inverse has the other is chance, and bytes are hashed.
-            sensed: Matrix3::from_fn(|i, j| convert(forward[(i, j)] / scale[i] + 0.0)),
-            to_body: (inverse * Matrix3::from_diagonal(&scale)).map(|r| convert(r + 0.0)),
-        })
-    }
-}
 
 /// Effects of a unit: immutable, for any number of streams. Up to N of each triad that run with every sample, and N that do
 /// not.
@@ -291,7 +61,7 @@ impl<T: RealField + Copy> Directions<T> {
 /// assert!(clean.gyro.norm() < 1e-15);
 /// assert_eq!(clean.accel, read.accel);
 /// ```
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct Effects<T: RealField, const N: usize> {
     gyro: Triad<T, N>,
     accel: Triad<T, N>,
@@ -309,8 +79,8 @@ pub struct State<T: RealField, const N: usize> {
     time: T,
     lost: T,
     /// The last temperature above the reference that was a number, °C.
-    warm: Option<T>,
-    /// The temperature behind [`RATE_LAG_S`], less itself, °C.
+    temperature_offset: Option<T>,
+    /// The temperature lagged by [`RATE_LAG_S`], minus itself, °C.
     rate_lag: T,
     gyro: Memory<T, N>,
     accel: Memory<T, N>,
@@ -332,7 +102,7 @@ impl<T: RealField + Copy, const N: usize> State<T, N> {
             },
             time: T::zero(),
             lost: T::zero(),
-            warm: None,
+            temperature_offset: None,
             rate_lag: T::zero(),
             gyro: Memory::none(),
             accel: Memory::none(),
@@ -391,19 +161,19 @@ impl<T: RealField + Copy, const N: usize> Effects<T, N> {
         state.lost = (time - state.time) - step;
         state.time = time;
 
-        let before = state.warm;
-        let warm = match temp_c.is_finite() {
+        let before = state.temperature_offset;
+        let temperature_offset = match temp_c.is_finite() {
             true => temp_c - convert(REFERENCE_C),
             false => before.unwrap_or(T::zero()),
         };
         if temp_c.is_finite() {
-            state.warm = Some(warm);
+            state.temperature_offset = Some(temperature_offset);
         }
-        let risen = warm - before.unwrap_or(warm);
+        let risen = temperature_offset - before.unwrap_or(temperature_offset);
         let rate_lag: T = convert(RATE_LAG_S);
         state.rate_lag = lagged(state.rate_lag, dt, risen, rate_lag);
         let [.., temperature, rate, since] = &mut state.at.values;
-        *temperature = warm;
+        *temperature = temperature_offset;
         *rate = -state.rate_lag / rate_lag;
         *since = time;
 
@@ -430,11 +200,7 @@ impl<T: RealField + Copy, const N: usize> Effects<T, N> {
         put(&mut at.values, Sensor::Accel, force);
         let before = state.previous.unwrap_or(*rate);
         let per_s = state.sample_rate_hz;
-        at.angular_acceleration = Vector3::new(
-            (rate.x - before.x) * per_s,
-            (rate.y - before.y) * per_s,
-            (rate.z - before.z) * per_s,
-        );
+        at.angular_acceleration = (rate - before) * per_s;
         state.previous = Some(*rate);
         Sample {
             gyro: self.gyro.remove(&mut state.gyro, Sensor::Gyro, rate, at),

@@ -19,6 +19,8 @@
 //! below half a unit in the last place of a 2.5 V bias in `f32`, and would be lost, so that a filter
 //! would stop learning at about 25 000 samples while its covariance goes on shrinking.
 
+use core::cmp::Ordering;
+
 use nalgebra::{Matrix4, RealField, Vector3, Vector4};
 
 /// Number of states of one filter: bias and three elements of a row of `P`.
@@ -50,8 +52,8 @@ impl core::error::Error for Rejected {}
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Filter<T: RealField> {
     mean: [Sum<T>; STATES],
-    /// Strictly upper triangle of U, by columns: 01, 02 12, 03 13 23.
-    upper: [T; 6],
+    /// Columns of U, of which only what stands above the diagonal is used.
+    upper: [[T; STATES]; STATES],
     /// W, the inverse of the diagonal of `U W⁻¹ Uᵀ`.
     information: [Sum<T>; STATES],
 }
@@ -86,7 +88,7 @@ impl<T: RealField + Copy> Filter<T> {
     pub fn with_prior(mean: [T; STATES], variance: [T; STATES]) -> Self {
         Self {
             mean: mean.map(Sum::new),
-            upper: [T::zero(); 6],
+            upper: [[T::zero(); STATES]; STATES],
             information: variance.map(|v| Sum::new(v.recip())),
         }
     }
@@ -108,7 +110,7 @@ impl<T: RealField + Copy> Filter<T> {
     /// Takes in the reading `raw` under the known `input` (SI), whose noise has the variance
     /// `noise` (raw units squared): fang (25) for one scalar, in Bierman's form.
     ///
-    /// Returns the innovation, `raw` less its prediction, with its predicted variance.
+    /// Returns the innovation, `raw` minus its prediction, with its predicted variance.
     #[inline]
     pub fn update(
         &mut self,
@@ -116,71 +118,48 @@ impl<T: RealField + Copy> Filter<T> {
         raw: T,
         noise: T,
     ) -> Result<Innovation<T>, Rejected> {
-        let h = [T::one(), input.x, input.y, input.z];
         if noise <= T::zero() {
             return Err(Rejected::NoiseNotPositive);
         }
-        let [u01, u02, u12, u03, u13, u23] = self.upper;
-        let f = [
-            h[0],
-            h[1] + u01 * h[0],
-            h[2] + u02 * h[0] + u12 * h[1],
-            h[3] + u03 * h[0] + u13 * h[1] + u23 * h[2],
-        ];
-        let v = [
-            f[0] / self.information[0].value,
-            f[1] / self.information[1].value,
-            f[2] / self.information[2].value,
-            f[3] / self.information[3].value,
-        ];
-        let a0 = noise + v[0] * f[0];
-        let a1 = a0 + v[1] * f[1];
-        let a2 = a1 + v[2] * f[2];
-        let a3 = a2 + v[3] * f[3];
-        let predicted = self.mean[0].value
-            + h[1] * self.mean[1].value
-            + h[2] * self.mean[2].value
-            + h[3] * self.mean[3].value;
+        let h = [T::one(), input.x, input.y, input.z];
+        // Column by column: b is the unscaled gain, a the variance of what is predicted by the states so far.
+        let (mut a, mut predicted) = (noise, T::zero());
+        let mut upper = self.upper;
+        let (mut b, mut growth) = ([T::zero(); STATES], [T::zero(); STATES]);
+        for j in 0..STATES {
+            let mut f = h[j];
+            for i in 0..j {
+                f += upper[j][i] * h[i];
+            }
+            let v = f / self.information[j].value;
+            // The factor by which the column of U moves.
+            let l = -f / a;
+            a += v * f;
+            growth[j] = -f * l;
+            for i in 0..j {
+                let u = upper[j][i];
+                upper[j][i] = u + b[i] * l;
+                b[i] += u * v;
+            }
+            b[j] = v;
+            predicted += h[j] * self.mean[j].value;
+        }
         let innovation = raw - predicted;
-        // l is the factor by which a column of U moves, growth what W gains: f²/a.
-        let l = [-f[0] / noise, -f[1] / a0, -f[2] / a1, -f[3] / a2];
-        let growth = [-f[0] * l[0], -f[1] * l[1], -f[2] * l[2], -f[3] * l[3]];
+        let step = innovation / a;
         // One test finds every not-a-number and infinity among raw, input, noise and state, and every overflow on the way.
-        let sum = growth[0] + growth[1] + growth[2] + growth[3];
-        if !(innovation / a3 + sum).is_finite() {
+        let sum = growth.iter().fold(T::zero(), |sum, growth| sum + *growth);
+        if !(step + sum).is_finite() {
             return Err(Rejected::NotFinite);
         }
 
-        // b is the unscaled gain, grown column by column.
-        let b01 = v[0] + u01 * v[1];
-        let b02 = b01 + u02 * v[2];
-        let b12 = v[1] + u12 * v[2];
-        let b03 = b02 + u03 * v[3];
-        let b13 = b12 + u13 * v[3];
-        let b23 = v[2] + u23 * v[3];
-        self.upper = [
-            u01 + v[0] * l[1],
-            u02 + b01 * l[2],
-            u12 + v[1] * l[2],
-            u03 + b02 * l[3],
-            u13 + b12 * l[3],
-            u23 + v[2] * l[3],
-        ];
-        // Not in loops, which stay loops where an image is compiled for size: 380 instructions instead of 167.
-        let [w0, w1, w2, w3] = &mut self.information;
-        w0.add(growth[0]);
-        w1.add(growth[1]);
-        w2.add(growth[2]);
-        w3.add(growth[3]);
-        let step = innovation / a3;
-        let [m0, m1, m2, m3] = &mut self.mean;
-        m0.add(b03 * step);
-        m1.add(b13 * step);
-        m2.add(b23 * step);
-        m3.add(v[3] * step);
+        self.upper = upper;
+        for j in 0..STATES {
+            self.information[j].add(growth[j]);
+            self.mean[j].add(b[j] * step);
+        }
         Ok(Innovation {
             value: innovation,
-            variance: a3,
+            variance: a,
         })
     }
 
@@ -191,11 +170,11 @@ impl<T: RealField + Copy> Filter<T> {
 
     /// Covariance `U W⁻¹ Uᵀ` of [`Self::mean`], 4x4, symmetric and positive definite.
     pub fn covariance(&self) -> Matrix4<T> {
-        let [u01, u02, u12, u03, u13, u23] = self.upper;
-        let (zero, one) = (T::zero(), T::one());
-        let upper = Matrix4::new(
-            one, u01, u02, u03, zero, one, u12, u13, zero, zero, one, u23, zero, zero, zero, one,
-        );
+        let upper = Matrix4::from_fn(|i, j| match i.cmp(&j) {
+            Ordering::Less => self.upper[j][i],
+            Ordering::Equal => T::one(),
+            Ordering::Greater => T::zero(),
+        });
         let scaled = upper * Matrix4::from_diagonal(&self.diagonal());
         let covariance = scaled * upper.transpose();
         // The product of the factors rounds differently above and below the diagonal.
@@ -212,7 +191,7 @@ impl<T: RealField + Copy> Filter<T> {
 /// What a measurement said beyond what was already known.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Innovation<T> {
-    /// Measurement less prediction, raw units.
+    /// Measurement minus prediction, raw units.
     pub value: T,
     /// Its predicted variance, raw units squared.
     pub variance: T,
@@ -245,11 +224,7 @@ impl<T: RealField + Copy> Bank<T> {
     /// squared) of the three sensors; `span`: size of the inputs to come (SI).
     pub fn diffuse(noise: &Vector3<T>, span: T) -> Self {
         Self {
-            axes: [
-                Filter::diffuse(noise.x, span),
-                Filter::diffuse(noise.y, span),
-                Filter::diffuse(noise.z, span),
-            ],
+            axes: [noise.x, noise.y, noise.z].map(|noise| Filter::diffuse(noise, span)),
         }
     }
 
@@ -264,10 +239,10 @@ impl<T: RealField + Copy> Bank<T> {
         raw: &Vector3<T>,
         noise: &Vector3<T>,
     ) -> Result<(), Rejected> {
-        let [x, y, z] = &mut self.axes;
-        let x = x.update(input, raw.x, noise.x);
-        let y = y.update(input, raw.y, noise.y);
-        let z = z.update(input, raw.z, noise.z);
-        x.and(y).and(z).map(|_| ())
+        let mut taken = Ok(());
+        for (axis, filter) in self.axes.iter_mut().enumerate() {
+            taken = taken.and(filter.update(input, raw[axis], noise[axis]).map(|_| ()));
+        }
+        taken
     }
 }

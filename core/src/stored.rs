@@ -26,6 +26,7 @@
 mod bytes;
 
 use crc::{CRC_32_ISO_HDLC, CRC_64_XZ, Crc, NoTable};
+use heapless::Vec;
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
@@ -33,6 +34,8 @@ use crate::compensation::{Affine, Compensation};
 use crate::effects::{self, Directions, Effect, Effects, Sensor, Variable};
 use crate::table::{self, Node, Table};
 use bytes::{Reader, Writer};
+
+pub use bytes::TooLong;
 
 /// Version of the layout.
 pub const VERSION: u16 = 3;
@@ -58,18 +61,18 @@ const COEFFICIENTS: usize = 9;
 /// Most variables of a term.
 const FACTORS: usize = 3;
 
-// Bit by bit: it is computed once in a while over some kB, and has the flash for other things.
+// Bit by bit: computed once in a while over some kB, which is not worth tables of 3 KiB.
 const CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
 const HASH: Crc<u64, NoTable> = Crc::<u64, NoTable>::new(&CRC_64_XZ);
 
-/// What a calibration is told apart by: CRC-64/XZ over all of its bytes. Not the CRC-32 once more, which over anything that ends in its
+/// What a calibration is identified by: CRC-64/XZ over all of its bytes. Not the CRC-32 once more, which over anything that ends in its
 /// own CRC-32 is always the same.
 pub fn hash(bytes: &[u8]) -> u64 {
     HASH.checksum(bytes)
 }
 
 /// A calibration in use.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct Stored {
     /// Compensation over temperature.
     pub table: Table<f32, NODES>,
@@ -89,7 +92,7 @@ pub enum Record<'a> {
         /// All of its coefficients, SI.
         coefficients: &'a [f32],
         /// Nonlinear constant of an effect that has any: time constant, s.
-        form: Option<f32>,
+        nonlinear: Option<f32>,
     },
     /// As in [`Effect::term`].
     Term {
@@ -155,10 +158,6 @@ pub enum Refused {
     },
 }
 
-/// The calibration would be longer than there is room for, or an effect is longer than any is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct TooLong;
-
 /// Writes a calibration to the beginning of `out`; returns its length. `found_with`: C of the gyro and of the accelerometer that the
 /// effects were found with. What is written is not judged; [`decode`] does that.
 pub fn encode(
@@ -174,7 +173,7 @@ pub fn encode(
     to.u16(0)?;
     to.bytes(&[count(nodes.len())?, count(effects.len())?, 0, 0])?;
     for matrix in found_with {
-        // The device inverts nothing, so what is singular is told by what is no number.
+        // The device inverts nothing, so a singular matrix is marked by what is no number.
         let nothing = Matrix3::repeat(f32::NAN);
         let none = Directions {
             sensed: nothing,
@@ -196,13 +195,13 @@ pub fn encode(
             Record::Named {
                 id,
                 coefficients,
-                form,
+                nonlinear,
             } => {
                 to.bytes(&[NAMED, count(id.len())?])?;
                 to.bytes(id.as_bytes())?;
                 to.bytes(&[count(coefficients.len())?])?;
                 coefficients.iter().try_for_each(|c| to.f32(*c))?;
-                to.f32(form.unwrap_or(0.0))?;
+                to.f32(nonlinear.unwrap_or(0.0))?;
             }
             Record::Term {
                 sensor,
@@ -261,6 +260,16 @@ fn sensor(triad: u8) -> Result<Sensor, effects::Refused> {
 
 /// The calibration in `bytes`, all of them.
 pub fn decode(bytes: &[u8]) -> Result<Stored, Refused> {
+    read(bytes, |_| {}, |_| {})
+}
+
+/// The same, and shows each node and each effect as it is stored, which what the device computes with does not give back. Of what is
+/// refused the beginning may have been shown.
+pub fn read(
+    bytes: &[u8],
+    node: impl FnMut(&Node<f32>),
+    record: impl FnMut(&Record<'_>),
+) -> Result<Stored, Refused> {
     let mut from = Reader(bytes);
     if from.bytes::<4>() != Some(MAGIC) {
         return Err(Refused::NotACalibration);
@@ -279,17 +288,23 @@ pub fn decode(bytes: &[u8]) -> Result<Stored, Refused> {
     }
     let mut from = Reader(body.get(LENGTH_AT + 2..).ok_or(Refused::Length)?);
     let [nodes, effects, ..] = from.bytes::<4>().ok_or(Refused::Length)?;
-    contents(&mut from, nodes, effects)
+    contents(&mut from, nodes, effects, node, record)
 }
 
-fn contents(from: &mut Reader<'_>, nodes: u8, effects: u8) -> Result<Stored, Refused> {
+fn contents(
+    from: &mut Reader<'_>,
+    nodes: u8,
+    effects: u8,
+    mut show_node: impl FnMut(&Node<f32>),
+    mut show_record: impl FnMut(&Record<'_>),
+) -> Result<Stored, Refused> {
     let gyro = directions(from).ok_or(Refused::Length)?;
     let accel = directions(from).ok_or(Refused::Length)?;
     let mut short = false;
     let read = (0..nodes).map_while(|_| {
         let node = node(from);
         short |= node.is_none();
-        node
+        node.inspect(&mut show_node)
     });
     let table = Table::new(read);
     if short {
@@ -308,7 +323,7 @@ fn contents(from: &mut Reader<'_>, nodes: u8, effects: u8) -> Result<Stored, Ref
     }
     let mut all = Effects::of(gyro, accel);
     for at in 0..effects {
-        let effect = effect(from).ok_or(Refused::Length)?;
+        let effect = effect(from, &mut show_record).ok_or(Refused::Length)?;
         effect
             .and_then(|effect| all.push(effect))
             .map_err(|refused| match refused {
@@ -353,33 +368,44 @@ fn node(from: &mut Reader<'_>) -> Option<Node<f32>> {
 }
 
 /// `None` if the bytes end in it.
-fn effect(from: &mut Reader<'_>) -> Option<Result<Effect<f32>, effects::Refused>> {
+fn effect(
+    from: &mut Reader<'_>,
+    mut show: impl FnMut(&Record<'_>),
+) -> Option<Result<Effect<f32>, effects::Refused>> {
+    let mut used = |record: Record<'_>| {
+        show(&record);
+        Some(record.effect())
+    };
     match from.u8()? {
         NAMED => {
             let length = from.u8()?;
             let id = from.slice(usize::from(length))?;
             let count = usize::from(from.u8()?);
-            let mut coefficients = [0.0; COEFFICIENTS];
-            let room = coefficients.get_mut(..count);
-            let Some(coefficients) = room else {
+            let mut coefficients = Vec::<f32, COEFFICIENTS>::new();
+            if coefficients.resize(count, 0.0).is_err() {
                 return Some(Err(effects::Refused::Unknown));
-            };
-            for coefficient in coefficients.iter_mut() {
+            }
+            for coefficient in &mut coefficients {
                 *coefficient = from.f32()?;
             }
             let constant = from.f32()?;
-            let constant = (constant != 0.0).then_some(constant);
-            let id = core::str::from_utf8(id).unwrap_or_default();
-            Some(Effect::named(id, coefficients, constant))
+            used(Record::Named {
+                id: core::str::from_utf8(id).unwrap_or_default(),
+                coefficients: &coefficients,
+                nonlinear: (constant != 0.0).then_some(constant),
+            })
         }
         TERM => {
             let [triad, axis, count] = from.bytes()?;
-            let mut variables = [Variable::Time; FACTORS];
-            let Some(variables) = variables.get_mut(..usize::from(count)) else {
+            let mut variables = Vec::<Variable, FACTORS>::new();
+            if variables
+                .resize(usize::from(count), Variable::Time)
+                .is_err()
+            {
                 return Some(Err(effects::Refused::Count { needed: FACTORS }));
-            };
+            }
             let mut known = true;
-            for variable in variables.iter_mut() {
+            for variable in &mut variables {
                 let number = from.u8()?;
                 match VARIABLES.iter().find(|v| **v as u8 == number) {
                     Some(found) => *variable = *found,
@@ -387,10 +413,15 @@ fn effect(from: &mut Reader<'_>) -> Option<Result<Effect<f32>, effects::Refused>
                 }
             }
             let coefficient = from.f32()?;
-            Some(sensor(triad).and_then(|sensor| match known {
-                true => Effect::term(sensor, usize::from(axis), coefficient, variables),
-                false => Err(effects::Refused::Unknown),
-            }))
+            match sensor(triad) {
+                Ok(sensor) if known => used(Record::Term {
+                    sensor,
+                    axis,
+                    coefficient,
+                    variables: &variables,
+                }),
+                _ => Some(Err(effects::Refused::Unknown)),
+            }
         }
         CODE => {
             let [triad, axis] = from.bytes()?;
@@ -399,11 +430,45 @@ fn effect(from: &mut Reader<'_>) -> Option<Result<Effect<f32>, effects::Refused>
             for error in &mut errors {
                 *error = from.f32()?;
             }
-            let axis = (axis != ALL).then_some(usize::from(axis));
-            Some(sensor(triad).and_then(|sensor| Effect::code(sensor, axis, &errors, weight, zero)))
+            match sensor(triad) {
+                Ok(sensor) => used(Record::Code {
+                    sensor,
+                    axis: (axis != ALL).then_some(axis),
+                    weight,
+                    zero,
+                    errors: &errors,
+                }),
+                Err(refused) => Some(Err(refused)),
+            }
         }
         // Of a kind that a later version has.
         _ => Some(Err(effects::Refused::Unknown)),
+    }
+}
+
+impl Record<'_> {
+    /// What the device computes with.
+    fn effect(&self) -> Result<Effect<f32>, effects::Refused> {
+        match *self {
+            Self::Named {
+                id,
+                coefficients,
+                nonlinear,
+            } => Effect::named(id, coefficients, nonlinear),
+            Self::Term {
+                sensor,
+                axis,
+                coefficient,
+                variables,
+            } => Effect::term(sensor, usize::from(axis), coefficient, variables),
+            Self::Code {
+                sensor,
+                axis,
+                weight,
+                zero,
+                errors,
+            } => Effect::code(sensor, axis.map(usize::from), errors, weight, zero),
+        }
     }
 }
 

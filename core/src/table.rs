@@ -7,6 +7,7 @@
 //! Temperature moves slowly, so this runs some times a second ([`Table::follow`]), and what runs with every sample is
 //! [`Compensation::apply`] of the model that it leaves behind.
 
+use heapless::Vec;
 use nalgebra::{RealField, convert};
 
 use crate::compensation::{Affine, Compensation};
@@ -45,11 +46,11 @@ pub enum Refused {
 }
 
 /// Nodes in the order of their temperatures: immutable, for any number of streams.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Table<T: RealField, const N: usize> {
+    /// Apart, because there always is one.
     first: Node<T>,
-    /// The others, without gaps.
-    others: [Option<Node<T>>; N],
+    others: Vec<Node<T>, N>,
 }
 
 /// Where a temperature is in a table.
@@ -75,17 +76,21 @@ pub struct State<T: RealField> {
 impl<T: RealField + Copy, const N: usize> Table<T, N> {
     /// A table of 1 to N nodes of strictly increasing temperature.
     pub fn new(nodes: impl IntoIterator<Item = Node<T>>) -> Result<Self, Refused> {
-        let mut nodes = nodes.into_iter().enumerate();
-        let (_, first) = nodes.next().ok_or(Refused::Count)?;
+        let mut nodes = nodes.into_iter();
+        let first = nodes.next().ok_or(Refused::Count)?;
         if !first.is_finite() {
             return Err(Refused::NotFinite(0));
         }
-        let mut others = [None; N];
         let mut before = first.temp_c;
-        // With the first there are N, so that the last place stays free.
-        let mut places = others.iter_mut().take(N.saturating_sub(1));
-        for (at, node) in nodes {
-            let place = places.next().ok_or(Refused::Count)?;
+        let mut table = Self {
+            first,
+            others: Vec::new(),
+        };
+        for node in nodes {
+            let at = table.len();
+            if at == N {
+                return Err(Refused::Count);
+            }
             if !node.is_finite() {
                 return Err(Refused::NotFinite(at));
             }
@@ -93,9 +98,9 @@ impl<T: RealField + Copy, const N: usize> Table<T, N> {
                 return Err(Refused::Order(at));
             }
             before = node.temp_c;
-            *place = Some(node);
+            table.others.push(node).map_err(|_| Refused::Count)?;
         }
-        Ok(Self { first, others })
+        Ok(table)
     }
 
     /// The state of a stream whose temperature is not known yet: that of [`REFERENCE_C`].
@@ -112,7 +117,7 @@ impl<T: RealField + Copy, const N: usize> Table<T, N> {
 
     /// How many nodes.
     pub fn len(&self) -> usize {
-        1 + self.others.iter().flatten().count()
+        1 + self.others.len()
     }
 
     /// Never: there is a first.
@@ -126,7 +131,7 @@ impl<T: RealField + Copy, const N: usize> Table<T, N> {
             place,
         };
         let mut low = &self.first;
-        for high in self.others.iter().map_while(Option::as_ref) {
+        for high in &self.others {
             if temp_c < low.temp_c {
                 break;
             }
@@ -139,9 +144,8 @@ impl<T: RealField + Copy, const N: usize> Table<T, N> {
             }
             low = high;
         }
-        let alone = !matches!(self.others.first(), Some(Some(_)));
         match temp_c < low.temp_c {
-            _ if alone => held(low, Place::Inside),
+            _ if self.others.is_empty() => held(low, Place::Inside),
             true => held(low, Place::Below),
             false if temp_c > low.temp_c => held(low, Place::Above),
             false => held(low, Place::Inside),

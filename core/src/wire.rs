@@ -25,7 +25,7 @@ mod greeting;
 mod message;
 
 pub use batch::{
-    BATCH, BatchHead, COMPENSATED_BYTES, CompensatedBatch, RAW_BYTES, RawBatch, flags, volts,
+    BATCH, BatchHead, COMPENSATED_BYTES, CompensatedBatch, RAW_BYTES, RawBatch, Sums, flags, volts,
 };
 pub use frame::{Decoder, EncodeError, Frame, MAX_FRAME, MAX_PAYLOAD, encode};
 pub use greeting::{

@@ -74,7 +74,7 @@ fn the_layout_is_that_of_the_table_in_the_documentation() {
         Record::Named {
             id: "gyro_warm_up",
             coefficients: &[1.0, 2.0, 3.0],
-            form: Some(60.0),
+            nonlinear: Some(60.0),
         },
         Record::Term {
             sensor: Sensor::Accel,
@@ -154,14 +154,14 @@ fn the_layout_is_that_of_the_table_in_the_documentation() {
         // 2.25 V at the converter of the third axis, whose second bit is of 1 V and not set; and 1.25 V, where it is.
         accel: Vector3::new(2.475, 0.0, 1.0),
     };
-    let clean = single::without_code_errors(&stored.effects.unwrap(), &read);
+    let clean = single::without_code_errors(stored.effects.as_ref().unwrap(), &read);
     assert_eq!(clean.accel, read.accel);
     assert!((clean.gyro - right).amax() < 1e-6, "{}", clean.gyro);
     let set = Sample {
         accel: Vector3::new(2.475, 0.0, 0.0),
         ..read
     };
-    let clean = single::without_code_errors(&stored.effects.unwrap(), &set);
+    let clean = single::without_code_errors(stored.effects.as_ref().unwrap(), &set);
     assert_eq!(clean.accel, Vector3::new(2.475, 0.0, 0.004));
 }
 
@@ -193,7 +193,7 @@ fn everything_at_its_longest_has_room() {
     let named = |id, coefficients| Record::Named {
         id,
         coefficients,
-        form: None,
+        nonlinear: None,
     };
     let mut all = Vec::new();
     for (fast, slow) in [
@@ -264,7 +264,7 @@ fn every_refusal_has_its_name() {
     let named = |id, coefficients| Record::Named {
         id,
         coefficients,
-        form: None,
+        nonlinear: None,
     };
     let one = [node(0.0, &regular())];
     let effects = |all: &[Record<'_>]| refused(&bytes(&one, all));
@@ -372,7 +372,7 @@ proptest! {
     /// Whatever the bytes are, they are refused or make a calibration; the check is made to hold, or nothing would get past it.
     #[test]
     fn no_bytes_are_too_bad_to_be_refused(noise in prop::collection::vec(any::<u8>(), 0..600), at in 12..360_usize) {
-        let named = Record::Named { id: "gyro_scale_cubic", coefficients: &[0.0; 3], form: None };
+        let named = Record::Named { id: "gyro_scale_cubic", coefficients: &[0.0; 3], nonlinear: None };
         let code = Record::Code { sensor: Sensor::Gyro, axis: Some(1), weight: 1.0, zero: 0.0, errors: &[0.0; 9] };
         let mut all = bytes(&[node(0.0, &regular())], &[named, code]);
         for (place, byte) in all.iter_mut().skip(at).zip(&noise) {

@@ -23,19 +23,23 @@
 //!   ring's first word.
 
 use embassy_stm32::Peri;
-use embassy_stm32::adc::{Adc, AnyAdcChannel};
-use embassy_stm32::dma::{Channel, InterruptHandler, ReadableRingBuffer, TransferOptions};
-use embassy_stm32::interrupt::typelevel::{Binding, DMA1_STREAM0};
+use embassy_stm32::adc::Adc;
+use embassy_stm32::dma::{Channel, ReadableRingBuffer, TransferOptions};
 use embassy_stm32::pac;
 use embassy_stm32::pac::adc::vals::{Adstp, Boost, Dmngt, Ovrmod, Pcsel, Res, SampleTime};
 use embassy_stm32::peripherals::{ADC1, DMA1_CH0};
 use embassy_time::{Duration, Instant, with_deadline};
 
-use crate::convert::Sums;
-use crate::design_parameters::{
-    ADC_HZ, BLOCK, CHANNELS, LAST_REVISION_WITHOUT_DIVIDER, SAMPLE_HZ, SAMPLING_HALF_CYCLES, SCAN,
-    SCANS,
-};
+use crate::board::{ADC_HZ, Irqs, SAMPLING_HALF_CYCLES, SCANS, Sensors};
+use crate::channels::{CHANNELS, Channels};
+use crate::design_parameters::SAMPLE_HZ;
+
+/// Conversions in one sample.
+const BLOCK: usize = SCANS * CHANNELS;
+
+/// The `REV_ID` of the last silicon that does not halve the kernel clock before the converter sees it, revision Y: everything would run
+/// twice as fast (RM0433 25.4.3).
+const LAST_REVISION_WITHOUT_DIVIDER: u16 = 0x1003;
 
 /// Words in the ring: two samples. The controller interrupts at the half and at the end, so once a
 /// sample, and the reader has the time of the other half to take it. A longer ring would give it
@@ -81,8 +85,8 @@ pub struct Sample {
     /// within a stream. Across a fault it advances by the time that passed, rounded up: a gap in
     /// the numbers is the gap in time, to within one sample.
     pub number: u32,
-    /// Sums of the conversions of each channel, in the order of [`SCAN`].
-    pub sums: Sums,
+    /// Sums of the conversions of each channel.
+    pub sums: Channels<u32>,
 }
 
 /// Why a stream ended. Samples were lost.
@@ -98,53 +102,38 @@ pub enum Fault {
 }
 
 /// ADC1 with its DMA channel and ring, powered up, calibrated and set to the scan, not yet running.
-pub struct Converter<'d, I> {
+pub struct Converter {
     // Keeps the peripheral from anybody else.
-    _adc: Adc<'d, ADC1>,
-    dma: Peri<'d, DMA1_CH0>,
-    irq: I,
-    ring: &'d mut [u16; RING],
+    _adc: Adc<'static, ADC1>,
+    dma: Peri<'static, DMA1_CH0>,
+    ring: &'static mut [u16; RING],
     first_start: Option<Instant>,
     next_number: u32,
 }
 
-impl<'d, I> Converter<'d, I>
-where
-    I: Binding<DMA1_STREAM0, InterruptHandler<DMA1_CH0>> + Copy,
-{
+impl Converter {
     /// Powers up, calibrates and configures. Takes 42 ms, nearly all of it calibration.
     ///
-    /// `pins` are in the order of [`SCAN`]. `ring` must be where DMA1 reaches it, which is all RAM
-    /// of `memory.x`; the data cache stays off, as after reset, so what the controller writes there
-    /// is what is read.
+    /// `ring` must be where DMA1 reaches it, which is all RAM of `memory.x`; the data cache stays off, as after reset, so what the
+    /// controller writes there is what is read.
     ///
     /// # Panics
     ///
-    /// If a pin is not on the channel that [`SCAN`] gives it, or on silicon older than revision V.
-    pub fn new(
-        adc: Peri<'d, ADC1>,
-        dma: Peri<'d, DMA1_CH0>,
-        irq: I,
-        ring: &'d mut [u16; RING],
-        pins: [AnyAdcChannel<'d, ADC1>; CHANNELS],
-    ) -> Self {
+    /// On silicon older than revision V.
+    pub fn new(sensors: Sensors, ring: &'static mut [u16; RING]) -> Self {
         let revision = pac::DBGMCU.idc().read().rev_id();
         defmt::assert!(
             revision > LAST_REVISION_WITHOUT_DIVIDER,
             "silicon revision {=u16:#x}: the converter would run at twice its rate",
             revision
         );
-        for (pin, signal) in pins.iter().zip(&SCAN) {
-            defmt::assert_eq!(pin.get_hw_channel(), signal.channel, "{=str}", signal.name);
-        }
 
-        let adc = Adc::new(adc);
+        let adc = Adc::new(sensors.adc);
         calibrate_at_boost();
-        configure_scan();
+        configure_scan(sensors.pins.map(|pin| pin.get_hw_channel()));
         Self {
             _adc: adc,
-            dma,
-            irq,
+            dma: sensors.dma,
             ring,
             first_start: None,
             next_number: 0,
@@ -154,7 +143,7 @@ where
     /// Starts sampling. The stream ends at its first [`Fault`]; drop it and start another.
     pub fn start(&mut self) -> Stream<'_> {
         stop();
-        let channel = Channel::new(self.dma.reborrow(), self.irq);
+        let channel = Channel::new(self.dma.reborrow(), Irqs);
         // SAFETY: the address is that of ADC1's data register, which stays valid, and reads of half
         // a word are what it allows. The ring is borrowed by the stream for as long as the
         // controller runs: dropping the stream stops it and waits until it has.
@@ -230,7 +219,7 @@ impl Stream<'_> {
         }
     }
 
-    async fn read(&mut self) -> Result<Sums, Fault> {
+    async fn read(&mut self) -> Result<Channels<u32>, Fault> {
         // Sample k is complete at k + 1 periods, and at k + 2 the controller is back at its first
         // word.
         let overwritten =
@@ -255,7 +244,7 @@ impl Stream<'_> {
                 *sum += u32::from(code);
             }
         }
-        Ok(sums)
+        Ok(Channels::from_scan_order(sums))
     }
 }
 
@@ -283,8 +272,8 @@ fn calibrate_at_boost() {
     while !adc.isr().read().adrdy() {}
 }
 
-/// Sequence, sampling times, input switches and repetition.
-fn configure_scan() {
+/// Sequence, sampling times, input switches and repetition, by the number that the converter's input of each channel has.
+fn configure_scan(inputs: Channels<u8>) {
     let adc = pac::ADC1;
     adc.cfgr().modify(|w| {
         w.set_res(Res::BITS16);
@@ -294,8 +283,7 @@ fn configure_scan() {
         w.set_ovrmod(Ovrmod::PRESERVE);
     });
     adc.sqr1().modify(|w| w.set_l(CHANNELS as u8 - 1));
-    for (place, signal) in SCAN.iter().enumerate() {
-        let channel = signal.channel;
+    for (place, channel) in inputs.in_scan_order().into_iter().enumerate() {
         // The sequence registers have room for 4, 5, 5 and 2 places.
         match place {
             0..4 => adc.sqr1().modify(|w| w.set_sq(place, channel)),

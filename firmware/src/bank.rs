@@ -1,4 +1,4 @@
-//! A Kalman bank of `core` that is told its input and fed from the stream.
+//! A Kalman bank of `core` that is given its input and fed from the stream.
 
 use mimu_core::kalman::{self, Filter};
 use mimu_core::single;

@@ -4,8 +4,6 @@ use core::cell::RefCell;
 use core::sync::atomic::{AtomicU32, Ordering};
 
 use embassy_stm32::uid::uid;
-use embassy_sync::blocking_mutex::Mutex;
-use embassy_sync::blocking_mutex::raw::NoopRawMutex;
 use embassy_time::Instant;
 use mimu_core::stored::{self, MAX_LENGTH, NODES, ROOM, Stored};
 use mimu_core::wire::{
@@ -14,60 +12,16 @@ use mimu_core::wire::{
 };
 
 use crate::bank::Bank;
+use crate::board::{self, SelfTestPins};
 use crate::design_parameters::SAMPLE_HZ;
 use crate::flash::{self, Flash};
 use crate::link::{FrameSender, Input, send};
-use crate::pipeline::{Pipeline, Streams};
+use crate::pipeline::{Pipeline, Shared, Streams};
 use crate::restart::Before;
-use crate::self_test::SelfTest;
+use crate::sampling::Tally;
+use crate::self_test;
 use crate::slots::Slots;
 use crate::upload::Upload;
-
-/// The path of the samples, between tasks of one executor: none of them holds it while it waits.
-pub type Shared = Mutex<NoopRawMutex, RefCell<Pipeline>>;
-
-/// What sampling and processing count.
-#[derive(Debug, Default)]
-pub struct Tally {
-    /// Samples taken.
-    pub samples: AtomicU32,
-    /// Number of the last.
-    pub last: AtomicU32,
-    /// See [`Fault`](crate::adc::Fault).
-    pub late: AtomicU32,
-    /// See [`Fault`](crate::adc::Fault).
-    pub converter_overruns: AtomicU32,
-    /// See [`Fault`](crate::adc::Fault).
-    pub stalls: AtomicU32,
-    /// Samples that found no room in the queue.
-    pub queue_overruns: AtomicU32,
-    /// Longest time between a sample and the end of its processing, µs.
-    pub longest_us: AtomicU32,
-}
-
-impl Tally {
-    /// All zero.
-    pub const fn new() -> Self {
-        Self {
-            samples: AtomicU32::new(0),
-            last: AtomicU32::new(0),
-            late: AtomicU32::new(0),
-            converter_overruns: AtomicU32::new(0),
-            stalls: AtomicU32::new(0),
-            queue_overruns: AtomicU32::new(0),
-            longest_us: AtomicU32::new(0),
-        }
-    }
-
-    /// Samples and faults, so that it moves as long as sampling does not stand still.
-    pub fn progress(&self) -> u32 {
-        let of = |counter: &AtomicU32| counter.load(Ordering::Relaxed);
-        of(&self.samples)
-            .wrapping_add(of(&self.late))
-            .wrapping_add(of(&self.converter_overruns))
-            .wrapping_add(of(&self.stalls))
-    }
-}
 
 /// Everything that a call can concern.
 pub struct Commands<'a> {
@@ -82,7 +36,7 @@ pub struct Commands<'a> {
     /// Of the calibration in use.
     pub stored: Option<StoredInfo>,
     /// Inputs of the sensors.
-    pub self_test: SelfTest<'a>,
+    pub self_test: SelfTestPins,
     /// Why the device started.
     pub before: &'a Before,
     /// Where answers go.
@@ -154,7 +108,10 @@ impl Commands<'_> {
             Request::Hello => return self.greet(id).await,
             Request::Download { offset, length } => self.download(offset, length, &mut part).await,
             Request::UploadCommit => self.commit().await.map(|()| Reply::Done),
-            Request::SelfTest => Ok(Reply::SelfTest(self.self_test.run(self.pipeline).await)),
+            Request::SelfTest => {
+                let result = self_test::run(&mut self.self_test, self.pipeline).await;
+                Ok(Reply::SelfTest(result))
+            }
             Request::Counters => Ok(Reply::Counters(self.counters(heard))),
             Request::ResetCounters => {
                 self.reset_counters(heard);
@@ -277,7 +234,7 @@ impl Commands<'_> {
             magic: MAGIC,
             protocol: PROTOCOL,
             firmware: env!("CARGO_PKG_VERSION"),
-            board: "NUCLEO-H743ZI2",
+            board: board::NAME,
             unit_id: uid(),
             capabilities: Capabilities::TEMPERATURE_NODES
                 .and(Capabilities::TERMS)

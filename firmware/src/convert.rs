@@ -9,13 +9,11 @@
 //! drift of 1 % would look like 5 deg/s. The 2.5 V reference of gyro x is converted along with the rest through an equal divider:
 //! a ratio to it is free of the supply and of the dividers. The accelerometer follows that supply itself, as its codes do.
 
+use crate::board::{REFERENCE_V, SCANS};
 use crate::design_parameters::{
-    CHANNELS, DIVIDER_RATIO, GYRO_REFERENCE_V, GYRO_TEMPERATURE_NULL_C, GYRO_TEMPERATURE_NULL_V,
-    GYRO_TEMPERATURE_V_PER_C, REFERENCE_TOLERANCE, REFERENCE_V, SAMPLE_HZ, SCANS, SLOW_S,
+    DIVIDER_RATIO, GYRO_REFERENCE_V, GYRO_TEMPERATURE_NULL_C, GYRO_TEMPERATURE_NULL_V,
+    GYRO_TEMPERATURE_V_PER_C, REFERENCE_TOLERANCE, SAMPLE_HZ, SLOW_S,
 };
-
-/// Sums of the conversions of one sample, in the order of [`SCAN`](crate::design_parameters::SCAN).
-pub type Sums = [u32; CHANNELS];
 
 /// The code at the converter's reference voltage. A full scale of 2^16 - 1 and not 2^16 (RM0433 25.4.35).
 pub const FULL_SCALE: u32 = u16::MAX as u32;

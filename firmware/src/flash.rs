@@ -20,14 +20,17 @@ use embedded_storage_async::nor_flash::{
     ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash,
 };
 
-use crate::design_parameters::{FLASH_SECTOR, FLASH_SECTORS, FLASH_WORD};
+use crate::board::CALIBRATION_SECTORS;
+use crate::slots::WORD;
 
+/// Size of a sector, bytes: what is erased.
+const SECTOR: usize = 128 * 1024;
 /// Bank 2 (RM0433 4.3.4).
 const BANK_START: usize = 0x0810_0000;
 /// Where the first sector is.
-const START: usize = BANK_START + FLASH_SECTORS[0] as usize * FLASH_SECTOR;
+const START: usize = BANK_START + CALIBRATION_SECTORS[0] as usize * SECTOR;
 /// Bytes in all of them.
-const LENGTH: usize = FLASH_SECTORS.len() * FLASH_SECTOR;
+const LENGTH: usize = CALIBRATION_SECTORS.len() * SECTOR;
 
 /// Keys that unlock the control register (RM0433 4.5.1).
 const KEYS: [u32; 2] = [0x4567_0123, 0xcdef_89ab];
@@ -101,9 +104,9 @@ impl ReadNorFlash for Flash {
         }
         let mut rest = bytes;
         while !rest.is_empty() {
-            let word = read_word(at / FLASH_WORD)?;
-            let from = at % FLASH_WORD;
-            let count = rest.len().min(FLASH_WORD - from);
+            let word = read_word(at / WORD)?;
+            let from = at % WORD;
+            let count = rest.len().min(WORD - from);
             let (part, others) = rest.split_at_mut(count);
             part.copy_from_slice(&word[from..from + count]);
             rest = others;
@@ -118,17 +121,17 @@ impl ReadNorFlash for Flash {
 }
 
 impl NorFlash for Flash {
-    const WRITE_SIZE: usize = FLASH_WORD;
-    const ERASE_SIZE: usize = FLASH_SECTOR;
+    const WRITE_SIZE: usize = WORD;
+    const ERASE_SIZE: usize = SECTOR;
 
     async fn erase(&mut self, from: u32, to: u32) -> Result<(), Error> {
         let (from, to) = (from as usize, to as usize);
-        let whole = from.is_multiple_of(FLASH_SECTOR) && to.is_multiple_of(FLASH_SECTOR);
+        let whole = from.is_multiple_of(SECTOR) && to.is_multiple_of(SECTOR);
         if !whole || from > to || to > LENGTH {
             return Err(Error::Range);
         }
         let _unlocked = Unlocked::new();
-        for sector in &FLASH_SECTORS[from / FLASH_SECTOR..to / FLASH_SECTOR] {
+        for sector in &CALIBRATION_SECTORS[from / SECTOR..to / SECTOR] {
             let bank = pac::FLASH.bank(1);
             bank.cr().modify(|w| {
                 w.set_ser(true);
@@ -145,7 +148,7 @@ impl NorFlash for Flash {
 
     async fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Error> {
         let offset = offset as usize;
-        let whole = offset.is_multiple_of(FLASH_WORD) && bytes.len().is_multiple_of(FLASH_WORD);
+        let whole = offset.is_multiple_of(WORD) && bytes.len().is_multiple_of(WORD);
         if !whole
             || offset
                 .checked_add(bytes.len())
@@ -155,9 +158,9 @@ impl NorFlash for Flash {
         }
         let _unlocked = Unlocked::new();
         let bank = pac::FLASH.bank(1);
-        for (k, word) in bytes.as_chunks::<FLASH_WORD>().0.iter().enumerate() {
+        for (k, word) in bytes.as_chunks::<WORD>().0.iter().enumerate() {
             bank.cr().modify(|w| w.set_pg(true));
-            let start = START + offset + k * FLASH_WORD;
+            let start = START + offset + k * WORD;
             for (k, part) in word.as_chunks::<4>().0.iter().enumerate() {
                 let value = u32::from_le_bytes(*part);
                 // SAFETY: a word of the calibration sectors, by the test above; nothing has a reference to them. With PG set a
@@ -231,13 +234,13 @@ async fn finished(pause_us: u64) -> Result<(), Error> {
 
 /// Bit of CCR by which the highest priorities ignore bus errors of data.
 const BFHFNMIGN: u32 = 1 << 8;
-/// Bits of CFSR by which a data bus error is told, precise or not, and its address is valid.
+/// Bits of CFSR by which a data bus error is reported, precise or not, and its address is valid.
 const DATA_BUS_ERRORS: u32 = 1 << 9 | 1 << 10 | 1 << 15;
 
 /// Reads a word of the calibration sectors, by its number.
-fn read_word(number: usize) -> Result<[u8; FLASH_WORD], Error> {
-    let from = core::ptr::with_exposed_provenance::<u32>(START + number * FLASH_WORD);
-    let mut bytes = [0; FLASH_WORD];
+fn read_word(number: usize) -> Result<[u8; WORD], Error> {
+    let from = core::ptr::with_exposed_provenance::<u32>(START + number * WORD);
+    let mut bytes = [0; WORD];
     clear_flags();
     // SAFETY: the address is within the sectors, since the callers check their ranges. With FAULTMASK set nothing interrupts, so that
     // the two registers are this function's; both are as before when it returns. CFSR's bits are cleared by writing ones.

@@ -1,16 +1,18 @@
-//! An analog inertial unit on a NUCLEO-H743ZI2: sampled at exactly 1 kHz, compensated, streamed, calibrated.
+//! An analog inertial unit on an STM32H743: sampled at exactly 1 kHz, compensated, streamed, calibrated.
 //!
 //! | module                | what it is                                                       |
 //! |-----------------------|------------------------------------------------------------------|
-//! | [`design_parameters`] | every electrical and timing constant, and why it is what it is   |
+//! | [`board`]             | pins, clocks, converter's timing, line, flash sectors: one file a board |
+//! | [`design_parameters`] | sensors, front end and timing, each constant with its reason     |
+//! | [`channels`]          | the channels of a sample, and their order in a scan              |
 //! | [`convert`]           | sums of converter codes, and what they stand for                 |
 //! | [`pipeline`]          | what happens to a sample: compensation, batches, Kalman banks    |
-//! | [`bank`]              | a Kalman bank that is told its input and fed from the stream     |
+//! | [`bank`]              | a Kalman bank that is given its input and fed from the stream     |
 //! | [`upload`]            | a calibration on its way to the device                           |
 //! | [`slots`]             | where calibrations are kept, safe against a failing supply       |
 //! | `adc`                 | the converter's driver, the only place with its registers        |
 //! | `flash`               | the same of the flash memory                                     |
-//! | `clocks`              | the clock tree                                                   |
+//! | `sampling`            | the task that takes samples, above all others                    |
 //! | `link`                | the line to the host: serial, or USB                             |
 //! | `commands`            | what the host asks, and what it is answered                      |
 //! | `self_test`           | deflects the sensors by their inputs                             |
@@ -22,8 +24,8 @@
 #[cfg(target_os = "none")]
 pub mod adc;
 pub mod bank;
-#[cfg(target_os = "none")]
-pub mod clocks;
+pub mod board;
+pub mod channels;
 #[cfg(target_os = "none")]
 pub mod commands;
 pub mod convert;
@@ -35,6 +37,8 @@ pub mod link;
 pub mod pipeline;
 #[cfg(target_os = "none")]
 pub mod restart;
+#[cfg(target_os = "none")]
+pub mod sampling;
 #[cfg(target_os = "none")]
 pub mod self_test;
 pub mod slots;

@@ -1,4 +1,4 @@
-//! The line to the host: frames out, bytes in. The debugger's serial bridge, or the part's own USB with the feature `usb`.
+//! The line to the host: frames out, bytes in. A serial port, or the part's own USB with the feature `usb`.
 
 use embassy_futures::select::{Either, select};
 use embassy_sync::blocking_mutex::raw::NoopRawMutex;
@@ -11,7 +11,7 @@ mod serial;
 mod usb;
 
 #[cfg(not(feature = "usb"))]
-pub use serial::{Input, Output, config, split};
+pub use serial::{Input, Output, split};
 #[cfg(feature = "usb")]
 pub use usb::{Input, Memory, Output, Usb, split};
 

@@ -3,6 +3,11 @@
 //! Once for every sample: volts, compensation, effects, banks. Once for every batch: reference and temperature, the model at that
 //! temperature, and what else moves slowly. All samples of a batch are therefore compensated by the same numbers, which the batch states.
 
+use core::cell::RefCell;
+
+use embassy_sync::blocking_mutex::Mutex;
+use embassy_sync::blocking_mutex::raw::NoopRawMutex;
+use heapless::Vec;
 use mimu_core::compensation::Sample;
 use mimu_core::effects;
 use mimu_core::single;
@@ -10,13 +15,17 @@ use mimu_core::stored::{ROOM, Stored};
 use mimu_core::table::{self, Place};
 use mimu_core::wire::{
     BATCH, BatchHead, COMPENSATED_BYTES, CompensatedBatch, Event, Message, RAW_BYTES, RawBatch,
-    Triad, flags, volts,
+    Sums, Triad, flags, volts,
 };
 use nalgebra::Vector3;
 
 use crate::bank::Bank;
-use crate::convert::{ACCEL_VOLTS, SUM_FULL_SCALE, Slow, Sums};
-use crate::design_parameters::{ACCEL, GYRO, REFERENCE, SAMPLE_HZ, TEMPERATURE};
+use crate::channels::Channels;
+use crate::convert::{ACCEL_VOLTS, SUM_FULL_SCALE, Slow};
+use crate::design_parameters::SAMPLE_HZ;
+
+/// The path of the samples, between tasks of one executor: none of them holds it while it waits.
+pub type Shared = Mutex<NoopRawMutex, RefCell<Pipeline>>;
 
 /// A calibration with what it remembers of the stream.
 struct Calibrated {
@@ -59,9 +68,8 @@ struct Batch {
     streams: Streams,
     head: BatchHead,
     gyro_volts: f32,
-    count: usize,
-    raw: [u8; BATCH * RAW_BYTES],
-    compensated: [u8; BATCH * COMPENSATED_BYTES],
+    raw: Vec<[u8; RAW_BYTES], BATCH>,
+    compensated: Vec<[u8; COMPENSATED_BYTES], BATCH>,
     /// Totals for [`Slow::update`].
     reference: u32,
     temperatures: u32,
@@ -109,9 +117,8 @@ impl Pipeline {
                     flags: 0,
                 },
                 gyro_volts: 0.0,
-                count: 0,
-                raw: [0; BATCH * RAW_BYTES],
-                compensated: [0; BATCH * COMPENSATED_BYTES],
+                raw: Vec::new(),
+                compensated: Vec::new(),
                 reference: 0,
                 temperatures: 0,
             },
@@ -193,7 +200,12 @@ impl Pipeline {
     }
 
     /// Takes the next sample. `send` is given what is to be sent and says whether there was room for it.
-    pub fn take(&mut self, number: u32, sums: &Sums, send: &mut impl FnMut(&Message<'_>) -> bool) {
+    pub fn take(
+        &mut self,
+        number: u32,
+        channels: &Channels<u32>,
+        send: &mut impl FnMut(&Message<'_>) -> bool,
+    ) {
         let lost = number.wrapping_sub(self.expected.unwrap_or(number));
         self.expected = Some(number.wrapping_add(1));
         if lost > 0 {
@@ -206,40 +218,33 @@ impl Pipeline {
                 calibrated.effects.gap();
             }
         }
-        if self.batch.count == 0 {
-            self.begin_batch(number, sums);
+        if self.batch.raw.is_empty() {
+            self.begin_batch(number, channels);
         }
 
-        let six = [
-            sums[GYRO],
-            sums[GYRO + 1],
-            sums[GYRO + 2],
-            sums[ACCEL],
-            sums[ACCEL + 1],
-            sums[ACCEL + 2],
-        ];
+        let sums = Sums {
+            gyro: channels.gyro,
+            accel: channels.accel,
+        };
         let batch = &mut self.batch;
-        batch.reference += sums[REFERENCE];
-        batch.temperatures += sums[TEMPERATURE..TEMPERATURE + 3].iter().sum::<u32>();
-        if six.iter().any(|sum| *sum == 0 || *sum == SUM_FULL_SCALE) {
+        batch.reference += channels.reference;
+        batch.temperatures += channels.temperature.iter().sum::<u32>();
+        let mut all = sums.gyro.iter().chain(&sums.accel);
+        if all.any(|sum| *sum == 0 || *sum == SUM_FULL_SCALE) {
             batch.head.flags |= flags::SATURATED;
         }
         batch.head.flags |= self.held_flags;
-        let raw = volts(&six, batch.gyro_volts, ACCEL_VOLTS);
-        if let Some(place) = batch.raw.as_chunks_mut().0.get_mut(batch.count) {
-            *place = RawBatch::pack(&six);
-        }
+        let raw = volts(&sums, batch.gyro_volts, ACCEL_VOLTS);
+        // There is room: a full batch ends below.
+        let _ = batch.raw.push(RawBatch::pack(&sums));
         // Also while nobody listens: the effects have to see every sample, and the load is then the same at all times.
         if let Some(calibrated) = &mut self.calibrated {
             let sample = calibrated.apply(&raw);
-            if let Some(place) = batch.compensated.as_chunks_mut().0.get_mut(batch.count) {
-                *place = CompensatedBatch::pack(&sample);
-            }
+            let _ = batch.compensated.push(CompensatedBatch::pack(&sample));
         }
-        batch.count += 1;
 
         self.offer(number, &raw, send);
-        if self.batch.count == BATCH {
+        if self.batch.raw.is_full() {
             self.end_batch(send);
         }
     }
@@ -271,14 +276,15 @@ impl Pipeline {
         }
     }
 
-    fn begin_batch(&mut self, number: u32, sums: &Sums) {
+    fn begin_batch(&mut self, number: u32, channels: &Channels<u32>) {
         if !self.slow.begun() {
-            let temperatures = sums[TEMPERATURE..TEMPERATURE + 3].iter().sum();
-            self.slow.update(sums[REFERENCE], temperatures, 1);
+            let temperatures = channels.temperature.iter().sum();
+            self.slow.update(channels.reference, temperatures, 1);
         }
         let temp_c = self.slow.temp_c();
         let batch = &mut self.batch;
         batch.streams = self.streams;
+        batch.compensated.clear();
         batch.gyro_volts = self.slow.gyro_volts();
         batch.reference = 0;
         batch.temperatures = 0;
@@ -303,37 +309,31 @@ impl Pipeline {
 
     fn end_batch(&mut self, send: &mut impl FnMut(&Message<'_>) -> bool) {
         let batch = &mut self.batch;
-        let count = core::mem::replace(&mut batch.count, 0);
-        if count == 0 {
+        if batch.raw.is_empty() {
             return;
         }
-        let samples = count as u32;
+        let samples = batch.raw.len() as u32;
         self.slow
             .update(batch.reference, batch.temperatures, samples);
-        let Batch {
-            streams,
-            head,
-            gyro_volts,
-            ..
-        } = *batch;
+        let (streams, head) = (batch.streams, batch.head);
         let mut dropped = 0;
         if streams.raw {
-            let batch = RawBatch {
+            let event = Event::Raw(RawBatch {
                 head,
-                gyro_volts,
+                gyro_volts: batch.gyro_volts,
                 accel_volts: ACCEL_VOLTS,
-                samples: batch.raw.get(..count * RAW_BYTES).unwrap_or(&[]),
-            };
-            dropped += u32::from(!send(&Message::Event(Event::Raw(batch))));
+                samples: batch.raw.as_flattened(),
+            });
+            dropped += u32::from(!send(&Message::Event(event)));
         }
         if streams.compensated {
-            let samples = batch.compensated.get(..count * COMPENSATED_BYTES);
-            let batch = CompensatedBatch {
+            let event = Event::Compensated(CompensatedBatch {
                 head,
-                samples: samples.unwrap_or(&[]),
-            };
-            dropped += u32::from(!send(&Message::Event(Event::Compensated(batch))));
+                samples: batch.compensated.as_flattened(),
+            });
+            dropped += u32::from(!send(&Message::Event(event)));
         }
+        batch.raw.clear();
         self.losses.batches = self.losses.batches.wrapping_add(dropped);
     }
 }

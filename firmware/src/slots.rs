@@ -16,10 +16,12 @@
 //! of them, neither of which matters.
 
 use embedded_storage_async::nor_flash::NorFlash;
+use heapless::Vec;
 use mimu_core::stored::{self, MAX_LENGTH, hash};
 use mimu_core::wire::Slot;
 
-use crate::design_parameters::{FLASH_SECTOR as SECTOR, FLASH_WORD as WORD};
+/// Size of a word of the flash memory, bytes: programmed once between erases, and whole (RM0433 4.3.9).
+pub const WORD: usize = 32;
 
 const MAGIC: [u8; 4] = *b"slot";
 
@@ -45,14 +47,14 @@ impl Front {
     }
 
     fn from_word(word: &[u8; WORD]) -> Option<Self> {
-        let (said, check) = word.split_last_chunk::<8>()?;
-        let u32_at = |at: usize| Some(u32::from_le_bytes(*said.get(at..)?.first_chunk()?));
+        let (body, check) = word.split_last_chunk::<8>()?;
+        let u32_at = |at: usize| Some(u32::from_le_bytes(*body.get(at..)?.first_chunk()?));
         let front = Self {
             generation: u32_at(4)?,
             length: u32_at(8)?,
-            hash: u64::from_le_bytes(*said.get(12..)?.first_chunk()?),
+            hash: u64::from_le_bytes(*body.get(12..)?.first_chunk()?),
         };
-        let whole = said.starts_with(&MAGIC) && hash(said).to_le_bytes() == *check;
+        let whole = body.starts_with(&MAGIC) && hash(body).to_le_bytes() == *check;
         (whole && (front.length as usize) <= MAX_LENGTH).then_some(front)
     }
 }
@@ -78,8 +80,11 @@ pub struct Slots<F> {
 }
 
 impl<F: NorFlash> Slots<F> {
-    /// Looks for calibrations. `buffer` holds the one in use afterwards, as long as [`Self::in_use`] says.
-    pub async fn open(flash: F, buffer: &mut [u8; MAX_LENGTH]) -> Self {
+    const SECTOR: usize = F::ERASE_SIZE;
+
+    /// Looks for calibrations. `buffer` holds the one in use afterwards.
+    pub async fn open(flash: F, buffer: &mut Vec<u8, MAX_LENGTH>) -> Self {
+        const { assert!(F::WRITE_SIZE == WORD && MAX_LENGTH + WORD <= F::ERASE_SIZE) };
         let mut slots = Self {
             flash,
             state: [Slot::Empty; 2],
@@ -98,10 +103,9 @@ impl<F: NorFlash> Slots<F> {
                 slots.in_use = Some(InUse { slot, front });
             }
         }
+        buffer.clear();
         if let Some(InUse { slot, front }) = slots.in_use {
-            slots
-                .read(slot, WORD, &mut buffer[..front.length as usize])
-                .await;
+            slots.read_all(slot, front.length, buffer).await;
         }
         slots
     }
@@ -145,8 +149,8 @@ impl<F: NorFlash> Slots<F> {
             return Err(Failed);
         }
         self.state[slot] = Slot::Unfinished;
-        let from = slot * SECTOR;
-        let erased = self.flash.erase(from as u32, (from + SECTOR) as u32);
+        let from = slot * Self::SECTOR;
+        let erased = self.flash.erase(from as u32, (from + Self::SECTOR) as u32);
         erased.await.map_err(|_| Failed)?;
         for (k, part) in bytes.chunks(WORD).enumerate() {
             let mut word = [0xff; WORD];
@@ -163,7 +167,7 @@ impl<F: NorFlash> Slots<F> {
 
     /// Writes a word and reads it back.
     async fn write(&mut self, slot: usize, at: usize, word: &[u8; WORD]) -> Result<(), Failed> {
-        let written = self.flash.write((slot * SECTOR + at) as u32, word);
+        let written = self.flash.write((slot * Self::SECTOR + at) as u32, word);
         written.await.map_err(|_| Failed)?;
         let mut back = [0; WORD];
         let kept = self.read(slot, at, &mut back).await && back == *word;
@@ -171,11 +175,26 @@ impl<F: NorFlash> Slots<F> {
     }
 
     async fn read(&mut self, slot: usize, at: usize, bytes: &mut [u8]) -> bool {
-        let offset = (slot * SECTOR + at) as u32;
+        let offset = (slot * Self::SECTOR + at) as u32;
         self.flash.read(offset, bytes).await.is_ok()
     }
 
-    async fn look(&mut self, slot: usize, buffer: &mut [u8; MAX_LENGTH]) -> (Slot, Option<Front>) {
+    /// Reads the calibration of a slot, so many bytes.
+    async fn read_all(
+        &mut self,
+        slot: usize,
+        length: u32,
+        buffer: &mut Vec<u8, MAX_LENGTH>,
+    ) -> bool {
+        buffer.clear();
+        buffer.resize(length as usize, 0).is_ok() && self.read(slot, WORD, buffer).await
+    }
+
+    async fn look(
+        &mut self,
+        slot: usize,
+        buffer: &mut Vec<u8, MAX_LENGTH>,
+    ) -> (Slot, Option<Front>) {
         let mut words = [[0; WORD]; 2];
         let [first, second] = &mut words;
         let readable = self.read(slot, 0, first).await & self.read(slot, WORD, second).await;
@@ -184,9 +203,8 @@ impl<F: NorFlash> Slots<F> {
             let state = if empty { Slot::Empty } else { Slot::Unfinished };
             return (state, None);
         };
-        let bytes = &mut buffer[..front.length as usize];
-        let whole = self.read(slot, WORD, bytes).await && hash(bytes) == front.hash;
-        let state = match whole.then(|| stored::decode(bytes)) {
+        let whole = self.read_all(slot, front.length, buffer).await && hash(buffer) == front.hash;
+        let state = match whole.then(|| stored::decode(buffer)) {
             None => Slot::Damaged,
             Some(Err(refused)) => Slot::NotUsable(refused),
             Some(Ok(_)) => Slot::Whole {

@@ -1,27 +1,27 @@
 //! A calibration on its way to the device.
 
+use heapless::Vec;
 use mimu_core::stored::{self, MAX_LENGTH, hash};
 use mimu_core::wire::{CHUNK, Refusal};
 
-/// What has been announced, and what has come of it.
+/// What has been announced.
 #[derive(Clone, Copy, Debug)]
 struct Announced {
     length: usize,
     hash: u64,
-    received: usize,
 }
 
-/// Room for a calibration, and how far it is filled.
+/// A calibration as far as it has been received.
 pub struct Upload<'a> {
-    buffer: &'a mut [u8; MAX_LENGTH],
+    received: &'a mut Vec<u8, MAX_LENGTH>,
     announced: Option<Announced>,
 }
 
 impl<'a> Upload<'a> {
     /// Nothing has been announced.
-    pub fn new(buffer: &'a mut [u8; MAX_LENGTH]) -> Self {
+    pub fn new(received: &'a mut Vec<u8, MAX_LENGTH>) -> Self {
         Self {
-            buffer,
+            received,
             announced: None,
         }
     }
@@ -32,47 +32,44 @@ impl<'a> Upload<'a> {
         if length > room {
             return Err(Refusal::TooLong { room });
         }
+        self.received.clear();
         self.announced = Some(Announced {
             length: length as usize,
             hash,
-            received: 0,
         });
         Ok(())
     }
 
     /// Takes a part.
     pub fn chunk(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Refusal> {
-        let announced = self.announced.as_mut().ok_or(Refusal::NoUpload)?;
+        let announced = self.announced.ok_or(Refusal::NoUpload)?;
         if bytes.is_empty() || bytes.len() > CHUNK {
             return Err(Refusal::Unknown);
         }
+        let too_long = Refusal::TooLong {
+            room: announced.length as u32,
+        };
         let offset = offset as usize;
-        if offset > announced.received {
+        let Some(again) = self.received.len().checked_sub(offset) else {
             return Err(Refusal::WrongOffset {
-                expected: announced.received as u32,
+                expected: self.received.len() as u32,
             });
+        };
+        if offset + bytes.len() > announced.length {
+            return Err(too_long);
         }
-        let end = offset + bytes.len();
-        let places = self.buffer.get_mut(offset..end);
-        match places.filter(|_| end <= announced.length) {
-            Some(places) => places.copy_from_slice(bytes),
-            None => {
-                return Err(Refusal::TooLong {
-                    room: announced.length as u32,
-                });
-            }
-        }
-        announced.received = announced.received.max(end);
-        Ok(())
+        let (again, new) = bytes.split_at(again.min(bytes.len()));
+        self.received[offset..offset + again.len()].copy_from_slice(again);
+        self.received.extend_from_slice(new).map_err(|_| too_long)
     }
 
     /// Whether all of it is there, has the hash that was announced, and can be used.
     #[inline(never)]
     pub fn check(&self) -> Result<(), Refusal> {
-        let announced = self.announced.as_ref().ok_or(Refusal::NoUpload)?;
-        if announced.received < announced.length {
+        let announced = self.announced.ok_or(Refusal::NoUpload)?;
+        if self.received.len() < announced.length {
             return Err(Refusal::Incomplete {
-                received: announced.received as u32,
+                received: self.received.len() as u32,
             });
         }
         let bytes = self.bytes();
@@ -87,8 +84,7 @@ impl<'a> Upload<'a> {
 
     /// What has been received.
     pub fn bytes(&self) -> &[u8] {
-        let received = self.announced.map_or(0, |announced| announced.received);
-        self.buffer.get(..received).unwrap_or(&[])
+        self.received
     }
 
     /// Forgets it.
@@ -103,8 +99,8 @@ mod tests {
 
     #[test]
     fn parts_have_to_come_in_order_and_may_be_repeated() {
-        let mut buffer = [0; MAX_LENGTH];
-        let mut upload = Upload::new(&mut buffer);
+        let mut received = Vec::new();
+        let mut upload = Upload::new(&mut received);
         assert_eq!(upload.chunk(0, &[1]), Err(Refusal::NoUpload));
         let room = MAX_LENGTH as u32;
         assert_eq!(upload.begin(4097, 0), Err(Refusal::TooLong { room }));

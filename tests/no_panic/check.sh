@@ -6,16 +6,10 @@ set -euo pipefail
 cd "$(dirname "$0")/../.."
 out=$(mktemp -d)
 trap 'rm -rf "$out"' EXIT
-# At the highest level of optimization, whatever the image has: a path that the compiler finds cannot be taken there is one that cannot
-# be taken at all, while at lower levels it does not look as closely.
-level=()
-for package in mimu-core mimu-no-panic postcard cobs crc; do
-    level+=(--config "profile.release.package.$package.opt-level=3")
-done
 # Assembly of everything, since what mimu-core calls must be seen as well; with one unit and no debug information it is code and nothing
 # else. In a directory of its own: the flags would have the caller's built anew.
 RUSTFLAGS="-C target-cpu=cortex-m7 -C codegen-units=1 -C debuginfo=0 --emit=asm" CARGO_PROFILE_RELEASE_LTO=off \
-    "$@" build --locked --quiet -p mimu-no-panic --release --target thumbv7em-none-eabihf --target-dir "$out" "${level[@]}"
+    "$@" build --locked --quiet -p mimu-no-panic --release --target thumbv7em-none-eabihf --target-dir "$out"
 asm=("$out"/thumbv7em-none-eabihf/release/deps/*.s)
 # From the functions of mimu-no-panic along every call, branch and address, through data too (a table of functions, say). What is
 # reached and stands in no assembly is of the precompiled core, and has to be among those that are known: panics hide behind many names

@@ -1,9 +1,12 @@
 //! The effects that the device removes by name, each in one row of one table.
 
-use nalgebra::{Matrix3, RealField, Vector3, convert};
+use nalgebra::{Matrix3, RealField, Vector3};
 
 /// Most coefficients of an effect.
 pub(super) const COEFFICIENTS: usize = 9;
+
+/// Most variables of a term.
+pub(super) const FACTORS: usize = 3;
 
 /// Values of the variables by their numbers; the first is 1, for products of fewer than three.
 pub(super) type Values<T> = [T; 10];
@@ -25,20 +28,33 @@ pub(super) struct Fast<T: RealField> {
     pub law: FastLaw<T>,
     pub coefficients: [T; COEFFICIENTS],
     /// Of a term: the numbers of its variables.
-    pub factors: [u8; 3],
+    pub factors: [u8; FACTORS],
 }
 
 /// Adds an effect to the error of the three sensors, SI.
 pub(super) type FastLaw<T> = fn(&Fast<T>, &Conditions<T>, &mut Vector3<T>);
 
+/// An effect that moves with temperature and time only.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Slowly<T: RealField> {
+    Law {
+        law: SlowLaw<T>,
+        coefficients: [T; COEFFICIENTS],
+        nonlinear: T,
+        lags: bool,
+    },
+    /// A term of slow variables, which is a bias.
+    Term(Fast<T>),
+}
+
 /// What the errors are computed from that move with temperature and time.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Ambience<T> {
+pub(super) struct Ambient<T> {
     /// Time since power-on, s.
     pub time: T,
     /// Temperature above the reference, °C.
-    pub warm: T,
-    /// The same behind the lag of the effect, less itself, °C.
+    pub temperature_offset: T,
+    /// Lagged temperature minus the temperature, °C.
     pub lag: T,
 }
 
@@ -51,8 +67,8 @@ pub(super) struct Slow<T: RealField> {
     pub across: Matrix3<T>,
 }
 
-/// Adds an effect by coefficients, nonlinear constant and ambience.
-pub(super) type SlowLaw<T> = fn(&[T; COEFFICIENTS], T, &Ambience<T>, &mut Slow<T>);
+/// Adds an effect by coefficients, nonlinear constant and ambient.
+pub(super) type SlowLaw<T> = fn(&[T; COEFFICIENTS], T, &Ambient<T>, &mut Slow<T>);
 
 /// How an effect is evaluated: what it adds to the error of the three sensors, SI.
 #[derive(Debug, Clone, Copy)]
@@ -65,12 +81,12 @@ pub(super) enum Evaluation<T: RealField> {
 
 /// Nonlinear constant of an effect.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Form {
+pub(super) enum Nonlinear {
     /// It has none.
     None,
     /// A time constant, s.
     TimeConstant,
-    /// The time constant of [`Ambience::lag`], s.
+    /// The time constant of [`Ambient::lag`], s.
     Lag,
 }
 
@@ -81,7 +97,7 @@ pub(super) struct Law<T: RealField> {
     pub name: &'static str,
     /// How many coefficients it takes. A matrix is by rows; rows are sensors.
     pub coefficients: usize,
-    pub form: Form,
+    pub nonlinear: Nonlinear,
     pub evaluation: Evaluation<T>,
 }
 
@@ -100,32 +116,32 @@ impl<T: RealField + Copy> Law<T> {
         Self::fast("scale_asymmetry", 3, scale_asymmetry),
         Self::fast("cross_axis_product", 9, cross_axis_product),
         Self::fast("size_effect", 9, size_effect),
-        Self::slow("bias_drift", 3, Form::None, |c, _, at, e| {
+        Self::slow("bias_drift", 3, Nonlinear::None, |c, _, at, e| {
             e.bias += each(c) * at.time;
         }),
         Self::slow(
             "warm_up",
             3,
-            Form::TimeConstant,
+            Nonlinear::TimeConstant,
             |c, time_constant, at, e| {
                 // Not `exp`, which nothing else here uses and which would be in the image for this.
                 let left = (-at.time / time_constant).exp_m1() + T::one();
                 e.bias += each(c) * left;
             },
         ),
-        Self::slow("thermal_bias", 6, Form::None, |c, _, at, e| {
+        Self::slow("thermal_bias", 6, Nonlinear::None, |c, _, at, e| {
             let bend = Vector3::new(c[3], c[4], c[5]);
-            e.bias += (each(c) + bend * at.warm) * at.warm;
+            e.bias += (each(c) + bend * at.temperature_offset) * at.temperature_offset;
         }),
-        Self::slow("thermal_scale", 3, Form::None, |c, _, at, e| {
-            e.along += each(c) * at.warm;
+        Self::slow("thermal_scale", 3, Nonlinear::None, |c, _, at, e| {
+            e.along += each(c) * at.temperature_offset;
         }),
-        Self::slow("thermal_misalignment", 6, Form::None, |c, _, at, e| {
+        Self::slow("thermal_misalignment", 6, Nonlinear::None, |c, _, at, e| {
             let none = T::zero();
             let tilt = Matrix3::new(none, c[0], c[1], c[2], none, c[3], c[4], c[5], none);
-            e.across += tilt * at.warm;
+            e.across += tilt * at.temperature_offset;
         }),
-        Self::slow("thermal_lag", 3, Form::Lag, |c, _, at, e| {
+        Self::slow("thermal_lag", 3, Nonlinear::Lag, |c, _, at, e| {
             e.bias += each(c) * at.lag;
         }),
     ];
@@ -134,16 +150,21 @@ impl<T: RealField + Copy> Law<T> {
         Self {
             name,
             coefficients,
-            form: Form::None,
+            nonlinear: Nonlinear::None,
             evaluation: Evaluation::Fast(law),
         }
     }
 
-    const fn slow(name: &'static str, coefficients: usize, form: Form, law: SlowLaw<T>) -> Self {
+    const fn slow(
+        name: &'static str,
+        coefficients: usize,
+        nonlinear: Nonlinear,
+        law: SlowLaw<T>,
+    ) -> Self {
         Self {
             name,
             coefficients,
-            form,
+            nonlinear,
             evaluation: Evaluation::Slow(law),
         }
     }
@@ -153,67 +174,40 @@ fn each<T: RealField + Copy>(c: &[T; COEFFICIENTS]) -> Vector3<T> {
     Vector3::new(c[0], c[1], c[2])
 }
 
-/// `M x + a`. Written out, since the product of matrices is a loop, which is left rolled where an image is compiled for size.
-#[inline(always)]
-pub(super) fn affine<T: RealField + Copy>(
-    m: &Matrix3<T>,
-    x: &Vector3<T>,
-    a: &Vector3<T>,
-) -> Vector3<T> {
-    Vector3::new(
-        a.x + m.m11 * x.x + m.m12 * x.y + m.m13 * x.z,
-        a.y + m.m21 * x.x + m.m22 * x.y + m.m23 * x.z,
-        a.z + m.m31 * x.x + m.m32 * x.y + m.m33 * x.z,
-    )
-}
-
-// The laws that run with every sample, in the order in which the compiler makes the fewest instructions of them: each adds to the
-// error term by term, which is an instruction less than to add a sum.
+// The laws that run with every sample.
 
 /// `e = M x`, M by rows.
-#[inline(always)]
-fn product<T: RealField + Copy>(c: &[T; COEFFICIENTS], x: T, y: T, z: T, e: &mut Vector3<T>) {
-    e.x = e.x + c[0] * x + c[1] * y + c[2] * z;
-    e.y = e.y + c[3] * x + c[4] * y + c[5] * z;
-    e.z = e.z + c[6] * x + c[7] * y + c[8] * z;
+fn product<T: RealField + Copy>(c: &[T; COEFFICIENTS], x: &Vector3<T>, e: &mut Vector3<T>) {
+    e.gemv(T::one(), &Matrix3::from_row_slice(c), x, T::one());
 }
 
 /// `e = G f`.
 fn g_sensitivity<T: RealField + Copy>(law: &Fast<T>, at: &Conditions<T>, e: &mut Vector3<T>) {
     let [_, _, _, _, x, y, z, ..] = at.values;
-    product(&law.coefficients, x, y, z, e);
+    product(&law.coefficients, &Vector3::new(x, y, z), e);
 }
 
 /// `e_i = c_i s_i²`.
 fn scale_quadratic<T: RealField + Copy>(law: &Fast<T>, at: &Conditions<T>, e: &mut Vector3<T>) {
-    let (c, s) = (&law.coefficients, &at.sensed);
-    e.x += c[0] * (s.x * s.x);
-    e.y += c[1] * (s.y * s.y);
-    e.z += c[2] * (s.z * s.z);
+    let s = &at.sensed;
+    *e += each(&law.coefficients).component_mul(&s.component_mul(s));
 }
 
 /// `e_i = c_i s_i³`.
 fn scale_cubic<T: RealField + Copy>(law: &Fast<T>, at: &Conditions<T>, e: &mut Vector3<T>) {
-    let (c, s) = (&law.coefficients, &at.sensed);
-    e.x += c[0] * (s.x * s.x * s.x);
-    e.y += c[1] * (s.y * s.y * s.y);
-    e.z += c[2] * (s.z * s.z * s.z);
+    let s = &at.sensed;
+    *e += each(&law.coefficients).component_mul(&s.component_mul(s).component_mul(s));
 }
 
 /// `e_i = c_i |s_i|`.
 fn scale_asymmetry<T: RealField + Copy>(law: &Fast<T>, at: &Conditions<T>, e: &mut Vector3<T>) {
-    let (c, s) = (&law.coefficients, &at.sensed);
-    // Not `abs`, which is a call.
-    let size = |s: T| if s < T::zero() { -s } else { s };
-    e.x += c[0] * size(s.x);
-    e.y += c[1] * size(s.y);
-    e.z += c[2] * size(s.z);
+    *e += each(&law.coefficients).component_mul(&at.sensed.abs());
 }
 
 /// `e = Q (s_x s_y, s_y s_z, s_z s_x)`.
 fn cross_axis_product<T: RealField + Copy>(law: &Fast<T>, at: &Conditions<T>, e: &mut Vector3<T>) {
     let s = &at.sensed;
-    product(&law.coefficients, s.x * s.y, s.y * s.z, s.z * s.x, e);
+    product(&law.coefficients, &s.component_mul(&s.yzx()), e);
 }
 
 /// `e_i = (α × r_i + ω × (ω × r_i))_i`, with r_i the place, m, where sensor i senses.
@@ -236,79 +230,5 @@ pub(super) fn term<T: RealField + Copy>(law: &Fast<T>, at: &Conditions<T>, e: &m
         value.copied().unwrap_or(T::zero())
     };
     let [first, second, third] = law.factors.map(value);
-    let product = first * second * third;
-    let c = &law.coefficients;
-    e.x += c[0] * product;
-    e.y += c[1] * product;
-    e.z += c[2] * product;
-}
-
-/// Errors of the converter of one axis by the bits of its code, nine of them: in two tables, as a table of all would be ten times as
-/// large.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Code<T> {
-    /// Codes of the last bit, 1/raw.
-    codes: T,
-    /// Codes of the last bit at reading 0, and [`ABOVE_ZERO`]: in one constant, so that a reading is at its code by one product and one
-    /// sum wherever the code is 0.
-    at_zero: T,
-    /// Errors, raw, by bits 0 to -3, and by bits -4 to -8; the least bit of an index is the last bit.
-    first: [T; 16],
-    last: [T; 32],
-}
-
-/// A multiple of what nine bits can count: keeps codes down to 32 weights below the zero positive, and their bits the same. More would
-/// cost what single precision tells codes apart by, 1/1024 here. And half a code, where the last bit is worth 128: codes that are that of
-/// a turn would be on either side by rounding.
-const ABOVE_ZERO: f64 = 8192.0 + 1.0 / 256.0;
-
-impl<T: RealField + Copy> Code<T> {
-    /// Of errors in units of the weight of bit 0, `weight`, raw, where the reading `zero`, raw, has code 0.
-    pub fn new(errors: &[T; COEFFICIENTS], weight: T, zero: T) -> Self {
-        let raw = errors.map(|error| error * weight);
-        let (four, five) = raw.split_at(4);
-        let codes = convert::<_, T>(256.0) / weight;
-        Self {
-            codes,
-            at_zero: convert::<_, T>(ABOVE_ZERO) - zero * codes,
-            first: core::array::from_fn(|bits| set(four, bits)),
-            last: core::array::from_fn(|bits| set(five, bits)),
-        }
-    }
-
-    /// A reading without its error, raw. The error is one of the code that the reading should have had, so the code is looked at
-    /// again without it; where that changes the error by more than it is, beside the turn of a bit that is far off, it would lead away.
-    ///
-    /// Called, not written out for each of six axes: a few instructions more, for a seventh of the flash.
-    #[inline(never)]
-    pub fn clean(&self, u: T) -> T {
-        let first = self.error(u);
-        let second = self.error(u - first);
-        let moved = second - first;
-        match moved * moved < first * first {
-            true => u - second,
-            false => u - first,
-        }
-    }
-
-    #[inline(always)]
-    fn error(&self, u: T) -> T {
-        let codes: f32 = (u * self.codes + self.at_zero).to_subset_unchecked();
-        // Saturates: of no number it is 0.
-        let bits = codes as u32;
-        self.first[((bits >> 5) & 15) as usize] + self.last[(bits & 31) as usize]
-    }
-}
-
-/// Sum of the errors of the bits that are set; the least bit is the last error.
-fn set<T: RealField + Copy>(errors: &[T], bits: usize) -> T {
-    let mut sum = T::zero();
-    let mut left = bits;
-    for error in errors.iter().rev() {
-        if left & 1 == 1 {
-            sum += *error;
-        }
-        left >>= 1;
-    }
-    sum
+    *e += each(&law.coefficients) * (first * second * third);
 }

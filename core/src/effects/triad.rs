@@ -1,36 +1,22 @@
 //! The effects of one triad: those that run with every sample, and the others folded into a matrix and a bias.
 
+use heapless::Vec;
 use nalgebra::{Matrix3, RealField, Vector3};
 
-use super::law::{Ambience, COEFFICIENTS, Code, Conditions, Fast, Slow, SlowLaw, Values, affine};
-use super::{Directions, Kind, Refused, Sensor};
+use super::code::Code;
+use super::directions::Directions;
+use super::effect::{Kind, Refused, Sensor};
+use super::law::{Ambient, Conditions, Fast, Slow, Slowly, Values};
 
 /// Evaluations of a sample that none goes before.
 const COLD: usize = 2;
 
-/// An effect that moves with temperature and time only.
-#[derive(Debug, Clone, Copy)]
-pub(super) enum Slowly<T: RealField> {
-    Law {
-        law: SlowLaw<T>,
-        coefficients: [T; COEFFICIENTS],
-        form: T,
-        lags: bool,
-    },
-    /// A term of slow variables, which is a bias.
-    Term(Fast<T>),
-}
-
-/// Effects of one triad, and how their errors become errors in the body frame. In this order: what lies further from the beginning
-/// than an instruction can say takes one more.
-#[derive(Debug, Clone, Copy)]
-#[repr(C)]
+/// Effects of one triad, and how their errors become errors in the body frame.
+#[derive(Debug, Clone)]
 pub(super) struct Triad<T: RealField, const N: usize> {
     directions: Directions<T>,
-    /// Without gaps.
-    fast: [Option<Fast<T>>; N],
-    /// Without gaps.
-    slow: [Option<Slowly<T>>; N],
+    fast: Vec<Fast<T>, N>,
+    slow: Vec<Slowly<T>, N>,
     /// By axis, which may each have a converter of its own.
     code: [Option<Code<T>>; 3],
 }
@@ -43,7 +29,7 @@ pub(super) struct Memory<T: RealField, const N: usize> {
     bias: Vector3<T>,
     /// Error of the sample before, body frame; `None` if there was none.
     before: Option<Vector3<T>>,
-    /// Of each slow effect: the temperature behind its lag, less itself, °C. Kept as the difference: the lagged temperature itself
+    /// Of each slow effect: its lagged temperature, minus itself, °C. Kept as the difference: the lagged temperature itself
     /// would stand still in single precision once its step is below the last digit of some 10 °C.
     lags: [T; N],
 }
@@ -65,7 +51,7 @@ impl<T: RealField + Copy, const N: usize> Memory<T, N> {
     }
 }
 
-/// A step of `late - warm` over `dt` behind a first-order lag, `step` being that of `warm`: exact if it is a ramp.
+/// A step of the lagged temperature minus the temperature over `dt` behind a first-order lag, `step` being that of the temperature: exact if it is a ramp.
 pub(super) fn lagged<T: RealField + Copy>(difference: T, dt: T, step: T, lag: T) -> T {
     let z = dt / lag;
     // No time passed: all of the step is yet to come.
@@ -81,8 +67,8 @@ impl<T: RealField + Copy, const N: usize> Triad<T, N> {
     pub fn new(directions: Directions<T>) -> Self {
         Self {
             directions,
-            fast: [None; N],
-            slow: [None; N],
+            fast: Vec::new(),
+            slow: Vec::new(),
             code: [None; 3],
         }
     }
@@ -107,42 +93,40 @@ impl<T: RealField + Copy, const N: usize> Triad<T, N> {
                     }
                 }
             }
-            Kind::Fast(fast) => {
-                let free = self.fast.iter_mut().find(|e| e.is_none());
-                *free.ok_or(Refused::Full)? = Some(*fast);
-            }
-            Kind::Slow(slow) => {
-                let free = self.slow.iter_mut().find(|e| e.is_none());
-                *free.ok_or(Refused::Full)? = Some(*slow);
-            }
+            Kind::Fast(fast) => self.fast.push(*fast).map_err(|_| Refused::Full)?,
+            Kind::Slow(slow) => self.slow.push(*slow).map_err(|_| Refused::Full)?,
         }
         Ok(())
     }
 
     /// Folds the slow effects; the slow variables of the conditions are set.
     pub fn slow(&self, memory: &mut Memory<T, N>, dt: T, risen: T, at: &Conditions<T>) {
-        let [.., warm, _, time] = at.values;
+        let [.., temperature_offset, _, time] = at.values;
         let mut total = Slow {
             bias: Vector3::zeros(),
             along: Vector3::zeros(),
             across: Matrix3::zeros(),
         };
-        for (effect, lag) in self.slow.iter().flatten().zip(&mut memory.lags) {
+        for (effect, lag) in self.slow.iter().zip(&mut memory.lags) {
             match effect {
                 Slowly::Law {
                     law,
                     coefficients,
-                    form,
+                    nonlinear,
                     lags,
                 } => {
                     if *lags {
-                        *lag = lagged(*lag, dt, risen, *form);
+                        *lag = lagged(*lag, dt, risen, *nonlinear);
                     }
                     let lag = *lag;
                     law(
                         coefficients,
-                        *form,
-                        &Ambience { time, warm, lag },
+                        *nonlinear,
+                        &Ambient {
+                            time,
+                            temperature_offset,
+                            lag,
+                        },
                         &mut total,
                     );
                 }
@@ -154,24 +138,19 @@ impl<T: RealField + Copy, const N: usize> Triad<T, N> {
     }
 
     /// Raw readings without the errors of the converters.
-    #[inline(always)]
+    #[inline]
     pub fn without_code_errors(&self, raw: &Vector3<T>) -> Vector3<T> {
         let mut clean = *raw;
-        let [x, y, z] = &self.code;
-        if let Some(code) = x {
-            clean.x = code.clean(raw.x);
-        }
-        if let Some(code) = y {
-            clean.y = code.clean(raw.y);
-        }
-        if let Some(code) = z {
-            clean.z = code.clean(raw.z);
+        for (value, code) in clean.iter_mut().zip(&self.code) {
+            if let Some(code) = code {
+                *value = code.clean(*value);
+            }
         }
         clean
     }
 
     /// The input of the triad without its errors; `own` says which of the conditions that is. They are left as they were.
-    #[inline(never)]
+    #[inline]
     pub fn remove(
         &self,
         memory: &mut Memory<T, N>,
@@ -179,11 +158,20 @@ impl<T: RealField + Copy, const N: usize> Triad<T, N> {
         input: &Vector3<T>,
         at: &mut Conditions<T>,
     ) -> Vector3<T> {
-        let none = !matches!(self.fast.first(), Some(Some(_)))
-            && !matches!(self.slow.first(), Some(Some(_)));
-        if none {
-            return *input;
+        match self.fast.is_empty() && self.slow.is_empty() {
+            true => *input,
+            false => input - self.error(memory, own, input, at),
         }
+    }
+
+    /// Error of the input, body frame.
+    fn error(
+        &self,
+        memory: &mut Memory<T, N>,
+        own: Sensor,
+        input: &Vector3<T>,
+        at: &mut Conditions<T>,
+    ) -> Vector3<T> {
         let rounds = match memory.before {
             Some(_) => 1,
             None => COLD,
@@ -192,21 +180,21 @@ impl<T: RealField + Copy, const N: usize> Triad<T, N> {
             let before = memory.before.unwrap_or(Vector3::zeros());
             // Where the error is steeper than the input, far beyond any sensor, this would lead away, and out of all numbers. The
             // one is 1 rad/s or 1 m/s²: by much less may a resting sensor be off.
-            let size = |v: &Vector3<T>| v.x * v.x + v.y * v.y + v.z * v.z;
-            let clean = match size(&before) < size(input) + T::one() {
-                true => Vector3::new(input.x - before.x, input.y - before.y, input.z - before.z),
+            let clean = match before.norm_squared() < input.norm_squared() + T::one() {
+                true => input - before,
                 false => *input,
             };
             put(&mut at.values, own, &clean);
-            at.sensed = affine(&self.directions.sensed, &clean, &Vector3::zeros());
-            let mut e = affine(&memory.slope, &clean, &memory.bias);
-            for effect in self.fast.iter().map_while(Option::as_ref) {
+            at.sensed = self.directions.sensed * clean;
+            let mut e = memory.bias;
+            e.gemv(T::one(), &memory.slope, &clean, T::one());
+            for effect in &self.fast {
                 (effect.law)(effect, at, &mut e);
             }
-            memory.before = Some(affine(&self.directions.to_body, &e, &Vector3::zeros()));
+            memory.before = Some(self.directions.to_body * e);
         }
         put(&mut at.values, own, input);
-        input - memory.before.unwrap_or(Vector3::zeros())
+        memory.before.unwrap_or(Vector3::zeros())
     }
 }
 

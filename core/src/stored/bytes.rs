@@ -2,7 +2,9 @@
 
 use nalgebra::Matrix3;
 
-use super::TooLong;
+/// The calibration would be longer than there is room for, or an effect is longer than any is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct TooLong;
 
 /// The bytes that are still to be read. Everything is `None` once they end.
 pub(super) struct Reader<'a>(pub &'a [u8]);

@@ -30,6 +30,15 @@ pub mod flags {
     pub const NO_REFERENCE: u8 = 1 << 4;
 }
 
+/// Sums of the converter's codes over the scans of a sample, so that averaging loses nothing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Sums {
+    /// Gyro x, y, z.
+    pub gyro: [u32; 3],
+    /// Accelerometer x, y, z.
+    pub accel: [u32; 3],
+}
+
 /// What holds for all samples of a batch.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct BatchHead {
@@ -56,8 +65,7 @@ pub struct RawBatch<'a> {
     pub gyro_volts: f32,
     /// Volts at the accelerometer for one step of its sum.
     pub accel_volts: f32,
-    /// Sums of the converter's codes over the scans of a sample, so that averaging loses nothing: gyro x, y, z, accel x, y, z, each
-    /// three bytes, little end first; sample after sample.
+    /// [`Sums`]: gyro x, y, z, accel x, y, z, each three bytes, little end first; sample after sample.
     pub samples: &'a [u8],
 }
 
@@ -72,8 +80,9 @@ pub struct CompensatedBatch<'a> {
 
 impl<'a> RawBatch<'a> {
     /// The bytes of a sample, from its sums; those above 2²⁴ are cut off.
-    pub fn pack(sums: &[u32; 6]) -> [u8; RAW_BYTES] {
+    pub fn pack(sums: &Sums) -> [u8; RAW_BYTES] {
         let mut bytes = [0; RAW_BYTES];
+        let sums = sums.gyro.iter().chain(&sums.accel);
         for (bytes, sum) in bytes.as_chunks_mut::<3>().0.iter_mut().zip(sums) {
             for (byte, of) in bytes.iter_mut().zip(sum.to_le_bytes()) {
                 *byte = of;
@@ -89,7 +98,7 @@ impl<'a> RawBatch<'a> {
     }
 
     /// Numbers and sums of the samples, in order.
-    pub fn sums(&self) -> impl Iterator<Item = (u32, [u32; 6])> + 'a {
+    pub fn sums(&self) -> impl Iterator<Item = (u32, Sums)> + 'a {
         let numbers = numbers(self.head.first);
         numbers.zip(self.samples.as_chunks::<RAW_BYTES>().0.iter().map(|bytes| {
             let mut sums = [0; 6];
@@ -98,7 +107,11 @@ impl<'a> RawBatch<'a> {
                     *sum = *sum << 8 | u32::from(*byte);
                 }
             }
-            sums
+            let [gx, gy, gz, ax, ay, az] = sums;
+            Sums {
+                gyro: [gx, gy, gz],
+                accel: [ax, ay, az],
+            }
         }))
     }
 
@@ -112,11 +125,11 @@ impl<'a> RawBatch<'a> {
 
 /// Reading of a sample, V, from its sums and the volts for a step of them; see [`RawBatch`].
 #[inline]
-pub fn volts(sums: &[u32; 6], gyro_volts: f32, accel_volts: f32) -> Sample<f32> {
-    let [gx, gy, gz, ax, ay, az] = sums.map(|sum| sum as f32);
+pub fn volts(sums: &Sums, gyro_volts: f32, accel_volts: f32) -> Sample<f32> {
+    let volts = |sums: [u32; 3], step: f32| Vector3::from(sums).map(|sum| sum as f32) * step;
     Sample {
-        gyro: Vector3::new(gx, gy, gz) * gyro_volts,
-        accel: Vector3::new(ax, ay, az) * accel_volts,
+        gyro: volts(sums.gyro, gyro_volts),
+        accel: volts(sums.accel, accel_volts),
     }
 }
 

@@ -2,9 +2,12 @@
 
 use cobs::{DecodeResult, DecoderState};
 use crc::{CRC_32_ISO_HDLC, Crc};
+use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
-/// Most bytes of a message. The longest is a compensated batch, some ten less.
+use super::message::{Call, Message};
+
+/// Most bytes of a message. The longest is a compensated batch, some ten shorter.
 pub const MAX_PAYLOAD: usize = 512;
 
 const CHECK: usize = 4;
@@ -28,7 +31,7 @@ impl core::fmt::Display for EncodeError {
 
 impl core::error::Error for EncodeError {}
 
-/// Writes the frame of a [`Call`](super::Call) or [`Message`](super::Message) to the beginning of `out`; returns its length.
+/// Writes the frame of a [`Call`] or [`Message`] to the beginning of `out`; returns its length.
 pub fn encode<T: Serialize>(message: &T, out: &mut [u8; MAX_FRAME]) -> Result<usize, EncodeError> {
     let mut payload = [0; MAX_PAYLOAD + CHECK];
     let room = payload.get_mut(..MAX_PAYLOAD).ok_or(EncodeError)?;
@@ -54,16 +57,16 @@ pub fn encode<T: Serialize>(message: &T, out: &mut [u8; MAX_FRAME]) -> Result<us
 pub struct Frame<'a>(pub &'a [u8]);
 
 impl<'a> Frame<'a> {
-    /// The message in it: all of it, or `None`. A [greeting](super::Message::Greeting) may be followed by what later versions have
+    /// The message in it: all of it, or `None`. A [greeting](Message::Greeting) may be followed by what later versions have
     /// appended to it.
-    pub fn message(&self) -> Option<super::Message<'a>> {
+    pub fn message(&self) -> Option<Message<'a>> {
         let (message, rest) = postcard::take_from_bytes(self.0).ok()?;
-        let greeting = matches!(message, super::Message::Greeting { .. });
+        let greeting = matches!(message, Message::Greeting { .. });
         (rest.is_empty() || greeting).then_some(message)
     }
 
     /// The call in it: all of it, or `None`.
-    pub fn call(&self) -> Option<super::Call<'a>> {
+    pub fn call(&self) -> Option<Call<'a>> {
         self.all()
     }
 
@@ -83,8 +86,7 @@ impl<'a> Frame<'a> {
 #[derive(Debug)]
 pub struct Decoder {
     cobs: DecoderState,
-    buffer: [u8; MAX_PAYLOAD + CHECK],
-    length: usize,
+    decoded: Vec<u8, { MAX_PAYLOAD + CHECK }>,
     /// The rest until the next zero is not looked at.
     discarding: bool,
     garbled: u32,
@@ -101,8 +103,7 @@ impl Decoder {
     pub const fn new() -> Self {
         Self {
             cobs: DecoderState::Idle,
-            buffer: [0; MAX_PAYLOAD + CHECK],
-            length: 0,
+            decoded: Vec::new(),
             discarding: false,
             garbled: 0,
         }
@@ -116,15 +117,14 @@ impl Decoder {
         if self.discarding {
             return None;
         }
+        if matches!(self.cobs, DecoderState::Idle) {
+            self.decoded.clear();
+        }
         match self.cobs.feed(byte) {
             Ok(DecodeResult::NoData) => {}
-            Ok(DecodeResult::DataContinue(decoded)) => match self.buffer.get_mut(self.length) {
-                Some(place) => {
-                    *place = decoded;
-                    self.length += 1;
-                }
-                None => self.discarding = true,
-            },
+            Ok(DecodeResult::DataContinue(decoded)) => {
+                self.discarding = self.decoded.push(decoded).is_err();
+            }
             // Both need a zero.
             Ok(DecodeResult::DataComplete) | Err(_) => self.discarding = true,
         }
@@ -143,24 +143,21 @@ impl Decoder {
 
     fn end(&mut self) -> Option<Frame<'_>> {
         let discarded = core::mem::replace(&mut self.discarding, false);
-        let length = core::mem::replace(&mut self.length, 0);
         let state = core::mem::replace(&mut self.cobs, DecoderState::Idle);
         if matches!(state, DecoderState::Idle) {
             return None;
         }
         let complete = matches!(state, DecoderState::Grab(0) | DecoderState::GrabChain(0));
-        let length = length.saturating_sub(CHECK);
-        let whole = self
-            .buffer
-            .split_at_checked(length)
-            .is_some_and(|(p, c)| c.first_chunk() == Some(&CRC.checksum(p).to_le_bytes()));
-        // A frame shorter than its CRC has length 0 here, and the CRC of nothing is 0: what is left in the buffer does not count.
-        match whole && complete && !discarded && length > 0 {
-            true => self.buffer.get(..length).map(Frame),
-            false => {
-                self.garbled = self.garbled.saturating_add(1);
-                None
-            }
+        let payload = self
+            .decoded
+            .split_last_chunk()
+            .filter(|(payload, check)| **check == CRC.checksum(payload).to_le_bytes())
+            .map(|(payload, _)| payload)
+            // The CRC of nothing is 0.
+            .filter(|payload| !payload.is_empty() && complete && !discarded);
+        if payload.is_none() {
+            self.garbled = self.garbled.saturating_add(1);
         }
+        payload.map(Frame)
     }
 }

@@ -5,7 +5,7 @@ use mimu_core::stored;
 use mimu_core::wire::{
     BatchHead, Call, Capabilities, CompensatedBatch, Counters, Event, Greeting, KalmanAxis,
     KalmanState, MAGIC, Message, Prior, RawBatch, Refusal, Reply, Request, SelfTest, Slot, Start,
-    StoredInfo, Triad, Version,
+    StoredInfo, Sums, Triad, Version,
 };
 use serde::{Deserialize, Serialize};
 
@@ -342,13 +342,20 @@ fn events() {
 #[test]
 fn samples_of_a_batch() {
     // 131070 = 2 * 65535 is 01fffe, 200000 is 030d40.
-    let sums = [131_070, 0, 1, 256, 65_536, 200_000];
+    let sums = Sums {
+        gyro: [131_070, 0, 1],
+        accel: [256, 65_536, 200_000],
+    };
+    let sevens = Sums {
+        gyro: [7; 3],
+        accel: [7; 3],
+    };
     let bytes = RawBatch::pack(&sums);
     assert_eq!(
         bytes.to_vec(),
         hex("feff01 000000 010000 000100 000001 400d03")
     );
-    let two = [bytes, RawBatch::pack(&[7; 6])].concat();
+    let two = [bytes, RawBatch::pack(&sevens)].concat();
     let batch = RawBatch {
         head: BatchHead {
             first: u32::MAX,
@@ -363,7 +370,7 @@ fn samples_of_a_batch() {
     };
     assert!(batch.is_whole());
     let read: Vec<_> = batch.sums().collect();
-    assert_eq!(read, [(u32::MAX, sums), (0, [7; 6])]);
+    assert_eq!(read, [(u32::MAX, sums), (0, sevens)]);
     let (number, volts) = batch.volts().nth(1).unwrap();
     assert_eq!((number, volts.gyro.y, volts.accel.z), (0, 1.75, 3.5));
 

@@ -1,9 +1,9 @@
-//! USART3, which the debugger's bridge is on, by DMA both ways.
+//! A serial port, by DMA both ways.
 
 use embassy_stm32::mode::Async;
-use embassy_stm32::usart::{Config, RingBufferedUartRx, Uart, UartTx};
+use embassy_stm32::usart::{RingBufferedUartRx, Uart, UartTx};
 
-use crate::design_parameters::{BAUD, RECEIVED};
+use crate::design_parameters::RECEIVED;
 
 /// Towards the host.
 pub struct Output(UartTx<'static, Async>);
@@ -24,13 +24,6 @@ impl Input {
     pub async fn receive(&mut self, bytes: &mut [u8]) -> Option<usize> {
         self.0.read(bytes).await.ok()
     }
-}
-
-/// Settings of the line: [`BAUD`], 8 data bits, no parity, 1 stop bit.
-pub fn config() -> Config {
-    let mut config = Config::default();
-    config.baudrate = BAUD;
-    config
 }
 
 /// Both directions.

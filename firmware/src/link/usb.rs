@@ -1,12 +1,11 @@
 //! The part's own USB, full speed, as a serial port (CDC ACM): the connector beside the debugger's.
 
-use embassy_stm32::Peri;
-use embassy_stm32::interrupt::typelevel::Binding;
-use embassy_stm32::peripherals::{PA11, PA12, USB_OTG_FS};
-use embassy_stm32::usb::{Config as DriverConfig, Driver, InterruptHandler};
+use embassy_stm32::peripherals::USB_OTG_FS;
+use embassy_stm32::usb::{Config as DriverConfig, Driver};
 use embassy_usb::class::cdc_acm::{CdcAcmClass, Receiver, Sender, State};
 use embassy_usb::{Builder, Config, UsbDevice};
 
+use crate::board::{Irqs, UsbPins};
 use crate::design_parameters::{USB_PACKET, USB_PRODUCT, USB_VENDOR};
 
 type Bus = Driver<'static, USB_OTG_FS>;
@@ -71,20 +70,17 @@ impl Input {
     }
 }
 
-/// Both directions, and the device.
+/// Both directions, and the device. `serial`: its serial number.
 pub fn split(
-    peripheral: Peri<'static, USB_OTG_FS>,
-    dp: Peri<'static, PA12>,
-    dm: Peri<'static, PA11>,
-    irq: impl Binding<embassy_stm32::interrupt::typelevel::OTG_FS, InterruptHandler<USB_OTG_FS>>
-    + 'static,
+    pins: UsbPins,
     serial: &'static str,
     memory: &'static mut Memory,
 ) -> (Output, Input, Usb) {
     let mut driver = DriverConfig::default();
     // The board powers the part by the debugger's connector; what this one has is not asked.
     driver.vbus_detection = false;
-    let bus = Driver::new_fs(peripheral, irq, dp, dm, &mut memory.output, driver);
+    let UsbPins { controller, dp, dm } = pins;
+    let bus = Driver::new_fs(controller, Irqs, dp, dm, &mut memory.output, driver);
     let mut config = Config::new(USB_VENDOR, USB_PRODUCT);
     config.product = Some("mimu");
     config.serial_number = Some(serial);

@@ -12,12 +12,11 @@ use nalgebra::Matrix3;
 
 use super::*;
 use crate::convert::NOMINAL_REFERENCE;
-use crate::design_parameters::CHANNELS;
 
 /// What was sent, as far as the tests ask.
 #[derive(Debug, PartialEq)]
 enum Sent {
-    Raw(BatchHead, f32, Vec<(u32, [u32; 6])>),
+    Raw(BatchHead, f32, Vec<(u32, Sums)>),
     Compensated(BatchHead, Vec<(u32, Sample<f32>)>),
     Kalman(u32),
 }
@@ -38,14 +37,14 @@ fn keep(message: &Message<'_>) -> Sent {
 }
 
 /// A sample at 25 °C whose gyros and accelerometers differ by number and axis.
-fn sums(number: u32) -> Sums {
+fn sums(number: u32) -> Channels<u32> {
     let reference = NOMINAL_REFERENCE.round() as u32;
-    let mut sums = [reference; CHANNELS];
-    for axis in 0..3 {
-        sums[GYRO + axis] = 50_000 + 100 * axis as u32 + number % 7;
-        sums[ACCEL + axis] = 60_000 + 300 * axis as u32 + number % 5;
+    Channels {
+        gyro: [0, 1, 2].map(|axis| 50_000 + 100 * axis + number % 7),
+        accel: [0, 1, 2].map(|axis| 60_000 + 300 * axis + number % 5),
+        temperature: [reference; 3],
+        reference,
     }
-    sums
 }
 
 fn run(pipeline: &mut Pipeline, numbers: impl IntoIterator<Item = u32>) -> Vec<Sent> {
@@ -103,8 +102,8 @@ fn nothing_is_sent_unasked_and_what_is_asked_begins_with_a_batch() {
     assert_eq!((head.first, head.flags, samples.len()), (40, 0, BATCH));
     for (k, (number, six)) in samples.iter().enumerate() {
         let of = sums(40 + k as u32);
-        assert_eq!((*number, &six[..3]), (40 + k as u32, &of[GYRO..GYRO + 3]));
-        assert_eq!(&six[3..], &of[ACCEL..ACCEL + 3]);
+        assert_eq!((*number, six.gyro), (40 + k as u32, of.gyro));
+        assert_eq!(six.accel, of.accel);
     }
     assert!((head.temp_c - 25.0).abs() < 1e-3);
     assert!((volts * NOMINAL_REFERENCE - 2.5).abs() < 1e-4);
@@ -165,8 +164,8 @@ fn compensated_samples_are_those_of_the_raw_ones_at_the_stated_temperature() {
     for ((number, six), (same, value)) in raw.iter().zip(compensated) {
         assert_eq!(number, same);
         for axis in 0..3 {
-            let gyro = f64::from(six[axis]) * f64::from(*volts);
-            let accel = f64::from(six[3 + axis]) * 3.3 / 131_070.0;
+            let gyro = f64::from(six.gyro[axis]) * f64::from(*volts);
+            let accel = f64::from(six.accel[axis]) * 3.3 / 131_070.0;
             assert!((f64::from(value.gyro[axis]) - gain * (gyro - 1.0)).abs() < 1e-5);
             assert!((f64::from(value.accel[axis]) - gain * (accel - 1.0)).abs() < 1e-5);
         }
@@ -195,7 +194,7 @@ fn errors_of_the_code_are_taken_out_of_the_reading_before_its_temperature_matter
         let mut sums = sums(number);
         for axis in 0..3 {
             // Over the whole range, in steps of none of the bits.
-            sums[ACCEL + axis] = 1000 + (number * 317 + axis as u32 * 41_003) % 129_000;
+            sums.accel[axis] = 1000 + (number * 317 + axis as u32 * 41_003) % 129_000;
         }
         pipeline.take(number, &sums, &mut |message| {
             let Sent::Compensated(head, samples) = keep(message) else {
@@ -240,7 +239,7 @@ fn saturation_and_flags_of_others_are_in_the_batch_that_has_them() {
     for number in 0..60 {
         let mut sums = sums(number);
         if number == 25 {
-            sums[ACCEL] = SUM_FULL_SCALE;
+            sums.accel[0] = SUM_FULL_SCALE;
         }
         pipeline.flag(flags::SELF_TEST, (45..50).contains(&number));
         pipeline.take(number, &sums, &mut |message| {
@@ -268,7 +267,7 @@ fn a_bank_reports_five_times_a_second_and_takes_only_what_is_known() {
     assert_eq!((state.updates, state.skipped), (497, 503));
     // The mean of the readings, about which the bias is to be.
     let mean: f64 = (503..1000)
-        .map(|k| f64::from(sums(k)[GYRO]) * 2.5 / f64::from(NOMINAL_REFERENCE.round()))
+        .map(|k| f64::from(sums(k).gyro[0]) * 2.5 / f64::from(NOMINAL_REFERENCE.round()))
         .sum::<f64>()
         / 497.0;
     assert!((f64::from(state.axes[0].mean[0]) - mean).abs() < 1e-6);

@@ -46,6 +46,7 @@ struct Memory {
     tear: u8,
 }
 
+const SECTOR: usize = 128 * 1024;
 const USED: usize = 1 + MAX_LENGTH / WORD;
 const PER_SECTOR: usize = SECTOR / WORD;
 
@@ -167,21 +168,24 @@ fn calibration(k: u8, nodes: usize) -> Vec<u8> {
 fn found(memory: &Memory) -> (Option<Vec<u8>>, [Slot; 2]) {
     let mut memory = memory.clone();
     memory.left = usize::MAX;
-    let mut buffer = [0; MAX_LENGTH];
+    let mut buffer = heapless::Vec::new();
     let slots = block_on(Slots::open(memory, &mut buffer));
     let in_use = slots.in_use();
-    let bytes = in_use.map(|(length, _)| buffer[..length as usize].to_vec());
+    let bytes = in_use.map(|(length, _)| {
+        assert_eq!(buffer.len(), length as usize);
+        buffer.to_vec()
+    });
     if let (Some(bytes), Some((_, expected))) = (&bytes, in_use) {
         assert_eq!(hash(bytes), expected);
     }
     (bytes, slots.state())
 }
 
-/// Stores on a memory whose supply fails after so many operations; whether it said that it has.
+/// Stores on a memory whose supply fails after so many operations; whether it reported that it has.
 fn store(memory: &mut Memory, bytes: &[u8], left: usize, tear: u8) -> bool {
     memory.left = left;
     memory.tear = tear;
-    let mut buffer = [0; MAX_LENGTH];
+    let mut buffer = heapless::Vec::new();
     let mut slots = block_on(Slots::open(memory.clone(), &mut buffer));
     let stored = block_on(slots.store(bytes)).is_ok();
     *memory = slots.flash;
@@ -215,14 +219,14 @@ fn wherever_the_supply_fails_the_old_or_the_new_one_is_whole() {
         for tear in 0..4 {
             for left in 1..=operations + 1 {
                 let mut memory = before.clone();
-                let said = store(&mut memory, &new, left, tear);
+                let reported = store(&mut memory, &new, left, tear);
                 let (after, _) = found(&memory);
                 assert!(
                     after == old || after.as_ref() == Some(&new),
                     "{left} {tear}"
                 );
-                assert!(!said || after.as_ref() == Some(&new), "{left} {tear}");
-                assert_eq!(said, left > operations, "{left} {tear}");
+                assert!(!reported || after.as_ref() == Some(&new), "{left} {tear}");
+                assert_eq!(reported, left > operations, "{left} {tear}");
                 // And it can go on from there.
                 assert!(store(&mut memory, &third, usize::MAX, 0));
                 assert_eq!(found(&memory).0.as_ref(), Some(&third), "{left} {tear}");

@@ -9,7 +9,7 @@ use crate::increment::{Increment, Integrator};
 use crate::quantity::plural;
 use crate::reading_step::StepFinder;
 use mimu_recording::error::{Error, Result};
-use mimu_recording::{Batch, RAW_COLUMNS, Recording};
+use mimu_recording::{Batch, Column, RAW_COLUMNS, Recording};
 
 /// Length of a block, s. A tenth of the shortest dwell that is worth having; ten samples at 100 Hz.
 const BLOCK_S: f64 = 0.1;
@@ -257,6 +257,33 @@ impl Condensed {
         condensed.sha256 = summary.sha256;
         condensed.warnings.splice(0..0, summary.warnings);
         Ok(condensed)
+    }
+
+    /// Condenses samples in memory, `rate_hz` a second. `integrate`: also integrate the gyro, as rotations need it.
+    ///
+    /// Refused is a column that is neither empty nor as long as the times.
+    pub fn of(samples: &Batch, rate_hz: f64, integrate: bool) -> Result<Self> {
+        let lengths = Column::all().map(|column| {
+            let length = samples
+                .values(column)
+                .map_or(samples.step.len(), <[f64]>::len);
+            (column, length)
+        });
+        for (column, length) in lengths {
+            if length != 0 && length != samples.len() {
+                return Err(Error::new(
+                    format!("samples in memory, column {}", column.name()),
+                    format!(
+                        "it has {length} rows, and there are {} times",
+                        samples.len()
+                    ),
+                    "give every column a value for each time, or none",
+                ));
+            }
+        }
+        let mut condenser = Condenser::new(rate_hz, integrate, "samples in memory".into());
+        condenser.push(samples)?;
+        condenser.finish()
     }
 }
 

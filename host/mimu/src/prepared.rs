@@ -12,7 +12,7 @@ use crate::noise_file::NoiseFile;
 use crate::quantity::Sensor;
 use crate::rails::refuse_dead_channels;
 use mimu_recording::error::{Error, Result};
-use mimu_recording::{Manifest, Recording, Reference};
+use mimu_recording::{Batch, Manifest, Recording, Reference};
 
 /// A recording, condensed, with its dwells and their noise.
 #[derive(Debug, Clone)]
@@ -36,6 +36,25 @@ impl Prepared {
         let integrate = manifest.reference == Reference::Gravity;
         let condensed = Condensed::read(recording, integrate, progress)?;
         let place = recording.samples.display().to_string();
+        Self::of_condensed(manifest, condensed, still_factor, place)
+    }
+
+    /// Finds the dwells of `samples` in memory. `still_factor`: see [`crate::stillness::STILL_FACTOR`].
+    ///
+    /// Errors: those of a recording on disk; columns of different lengths.
+    pub fn of(manifest: Manifest, samples: &Batch, still_factor: f64) -> Result<Self> {
+        let integrate = manifest.reference == Reference::Gravity;
+        let condensed = Condensed::of(samples, manifest.sample_rate_hz, integrate)?;
+        let place = manifest.device.clone();
+        Self::of_condensed(manifest, condensed, still_factor, place)
+    }
+
+    fn of_condensed(
+        manifest: Manifest,
+        condensed: Condensed,
+        still_factor: f64,
+        place: String,
+    ) -> Result<Self> {
         refuse_dead_channels(&condensed, &place)?;
         if let (Some(power), Some(first)) = (manifest.power_on_s, condensed.blocks.first())
             && power > first.start_s

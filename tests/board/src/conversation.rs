@@ -2,7 +2,7 @@
 
 use mimu_board::running::Board;
 use mimu_core::wire::{
-    CHUNK, Call, Decoder, Event, MAX_FRAME, Message, Refusal, Reply, Request, encode,
+    CHUNK, Call, Decoder, Event, MAX_FRAME, Message, Refusal, Reply, Request, Sums, encode,
 };
 
 use crate::MS;
@@ -35,8 +35,8 @@ pub enum Answer {
 pub struct Sample {
     /// Milliseconds since sampling began.
     pub number: u32,
-    /// Sums of codes: gyro x, y, z, accel x, y, z.
-    pub sums: [u32; 6],
+    /// Sums of codes.
+    pub sums: Sums,
 }
 
 /// A board and the host at its line.

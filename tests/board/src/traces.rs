@@ -165,7 +165,7 @@ fn with_effects() -> Vec<u8> {
     let named = |id, coefficients, form| Record::Named {
         id,
         coefficients,
-        form,
+        nonlinear: form,
     };
     let records = [
         named(

@@ -12,7 +12,7 @@ use mimu_core::single;
 use mimu_core::stored::{self, Record, Stored, TooLong};
 use mimu_core::table::{self, Node, Table};
 use mimu_core::wire::{
-    Call, CompensatedBatch, Decoder, EncodeError, MAX_FRAME, Message, RawBatch,
+    Call, CompensatedBatch, Decoder, EncodeError, MAX_FRAME, Message, RawBatch, Sums,
     effects_of_this_build, encode, volts,
 };
 use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
@@ -208,7 +208,7 @@ pub fn wire_received(decoder: &mut Decoder, byte: u8) -> Option<Message<'_>> {
 
 /// [`RawBatch`] as a host reads it.
 #[inline(never)]
-pub fn wire_raw(batch: &RawBatch<'_>, take: &mut dyn FnMut(u32, [u32; 6], Sample<f32>)) {
+pub fn wire_raw(batch: &RawBatch<'_>, take: &mut dyn FnMut(u32, Sums, Sample<f32>)) {
     if batch.is_whole() {
         for ((number, sums), (_, sample)) in batch.sums().zip(batch.volts()) {
             take(number, sums, sample);
@@ -236,7 +236,7 @@ pub fn wire_effects() -> u32 {
 /// streams.
 #[inline(never)]
 pub fn sample_path(
-    sums: &[u32; 6],
+    sums: &Sums,
     scale: [f32; 2],
     at: &table::State<f32>,
     effects: &Effects<f32, 8>,

@@ -90,7 +90,7 @@ fn curves(rates: &[f64], dt_s: f64) -> [Vec<Point>; 2] {
         edf: f64::NAN,
         lower: f64::NAN,
         upper: f64::NAN,
-        fang_7: f64::NAN,
+        sigma_independent: f64::NAN,
     };
     let second = |m: usize| {
         let terms = n + 1 - 2 * m;
@@ -180,7 +180,7 @@ fn cases() -> Vec<(&'static str, Truth)> {
 /// Of so many the shares scatter by 0.5 %.
 const RUNS: u64 = 2000;
 
-/// Of 2000 runs each, by `cargo test --release -p mimu --test allan_model table_of_coverages -- --ignored --nocapture`: how many told the
+/// Of 2000 runs each, by `cargo test --release -p mimu --test all table_of_coverages -- --ignored --nocapture`: how many told the
 /// term, and in how many per cent of these the 95 % interval held the truth. What is told only where it happens to look large is held
 /// less often ("weak"); interval or bound together are right as stated.
 ///
@@ -204,7 +204,7 @@ const RUNS: u64 = 2000;
 ///
 /// A term that was not there was told in 50 at most (B in "N, weak K"), and in 25 without a weak one.
 #[test]
-#[ignore = "2000 runs of each case take minutes"]
+#[ignore = "nightly: 2000 runs of each case take minutes"]
 fn table_of_coverages() {
     for (name, truth) in cases() {
         let begun = std::time::Instant::now();

@@ -15,56 +15,6 @@ use crate::error::{Error, Result};
 /// How many time steps the sample period is the median of.
 const STEPS_FOR_PERIOD: usize = 100_000;
 
-/// Signatures of files that are not text, and what to do with them.
-const BINARY: [(&[u8], &str, &str); 8] = [
-    (
-        b"MATLAB 5.0",
-        "a binary MATLAB file",
-        "write it as text: save -ascii in MATLAB, or writematrix to a .csv",
-    ),
-    (
-        b"\x89HDF\r\n\x1a\n",
-        "an HDF5 or MATLAB 7.3 file",
-        "write it as text: save -ascii in MATLAB, or pandas.read_hdf(...).to_csv",
-    ),
-    (
-        b"PAR1",
-        "a Parquet file",
-        "give it a name that ends in .parquet",
-    ),
-    (b"\x1f\x8b", "compressed with gzip", "unpack it with gunzip"),
-    (
-        b"PK\x03\x04",
-        "a zip archive or a spreadsheet",
-        "unpack it, or save the sheet as CSV",
-    ),
-    (b"\x93NUMPY", "a NumPy file", "write it with numpy.savetxt"),
-    (b"\xff\xfe", "UTF-16 text", "save it as UTF-8"),
-    (b"\xfe\xff", "UTF-16 text", "save it as UTF-8"),
-];
-
-/// Refuses what is no text, by its first bytes.
-pub(super) fn refuse_binary(path: &Path, head: &[u8]) -> Result<()> {
-    for (signature, kind, remedy) in BINARY {
-        if head.starts_with(signature) {
-            return Err(Error::new(
-                path.display(),
-                format!("this is {kind}"),
-                remedy,
-            ));
-        }
-    }
-    if head.contains(&0) {
-        let problem = "this is a binary file of an unknown kind";
-        return Err(Error::new(
-            path.display(),
-            problem,
-            "write it as CSV or Parquet",
-        ));
-    }
-    Ok(())
-}
-
 /// One row in the recording's units.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct Row {

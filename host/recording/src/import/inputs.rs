@@ -52,7 +52,7 @@ impl Inputs {
             ));
         }
         let bytes = std::fs::read(path).map_err(io)?;
-        super::foreign::refuse_binary(path, &bytes[..bytes.len().min(4096)])?;
+        super::binary::refuse_binary(path, &bytes[..bytes.len().min(4096)])?;
         Self::parse(&bytes, path)
     }
 

@@ -4,9 +4,10 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, Chain, Cursor, Read};
 use std::path::{Path, PathBuf};
 
+use super::SkippedLines;
 use super::assignment::{ColumnList, Role};
+use super::binary::refuse_binary;
 use super::separator::Separator;
-use super::{SkippedLines, foreign};
 use crate::cell::{self, Refusal, shorten};
 use crate::columns::Column;
 use crate::csv_file::BOM;
@@ -76,7 +77,7 @@ impl TextTable {
         let length = file.metadata().map_err(io)?.len();
         let mut head = Vec::new();
         (&mut file).take(HEAD).read_to_end(&mut head).map_err(io)?;
-        foreign::refuse_binary(path, &head)?;
+        refuse_binary(path, &head)?;
         if head.starts_with(BOM) {
             head.drain(..BOM.len());
         }

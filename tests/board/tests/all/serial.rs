@@ -94,7 +94,7 @@ fn the_raw_stream_holds_the_voltages_of_the_pins() {
     device.run_for(200 * MS);
     assert!(device.samples.len() > 100);
     for Sample { number, sums } in &device.samples {
-        for (k, &sum) in sums.iter().enumerate() {
+        for (k, &sum) in sums.gyro.iter().chain(&sums.accel).enumerate() {
             let (net, pin, input) = WIRING[k];
             // The converter rounds down, and two conversions make a sum.
             let code = (volts.input[input] / volts.rail * 65_535.0 + 1e-6).floor();

@@ -2,7 +2,7 @@
 //! never stops hearing: a whole frame after all of that is heard.
 //!
 //! ```text
-//! MIMU_FUZZ_CASES=1000000 MIMU_FUZZ_SEED=2 cargo test --release -p mimu --test device fuzz -- --nocapture
+//! MIMU_FUZZ_CASES=1000000 MIMU_FUZZ_SEED=2 cargo test --release -p mimu-cli --test all device::fuzz -- --nocapture
 //! ```
 
 use mimu_core::compensation::{Affine, Compensation};
@@ -13,6 +13,8 @@ use mimu_core::wire::{
     BatchHead, Counters, Event as WireEvent, MAX_FRAME, Message, RAW_BYTES, RawBatch, Refusal,
     Reply, encode,
 };
+use std::path::Path;
+
 use mimu_device::{Answer, Ear, Event, Heard, contents};
 use nalgebra::{Matrix3, Vector3};
 
@@ -173,7 +175,7 @@ fn image() -> Vec<u8> {
         Record::Named {
             id: "gyro_warm_up",
             coefficients: &[0.1, 0.2, 0.3],
-            form: Some(60.0),
+            nonlinear: Some(60.0),
         },
         Record::Term {
             sensor: Sensor::Accel,
@@ -194,7 +196,7 @@ fn damage_that_the_crc_does_not_see_makes_no_reader_of_a_stored_calibration_fail
     let seed = environment("MIMU_FUZZ_SEED", 1);
     let (whole, mut readable) = (image(), 0);
     assert_eq!(
-        contents(&whole).unwrap().effects[1].id,
+        contents(&whole, Path::new("image")).unwrap().effects[1].id,
         "term:accel_y~rate_x*force_y"
     );
     let cases = environment("MIMU_FUZZ_CASES", 40_000);
@@ -223,7 +225,7 @@ fn damage_that_the_crc_does_not_see_makes_no_reader_of_a_stored_calibration_fail
         bytes.extend(crc(&bytes).to_le_bytes());
         let usable = stored::decode(&bytes);
         assert_eq!(
-            contents(&bytes).err(),
+            contents(&bytes, Path::new("image")).err(),
             usable.as_ref().err().copied(),
             "case {case}"
         );

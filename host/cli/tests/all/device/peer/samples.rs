@@ -6,7 +6,7 @@ use mimu_core::effects;
 use mimu_core::kalman::Bank;
 use mimu_core::stored::{self, ROOM, Stored};
 use mimu_core::wire::{
-    BATCH, BatchHead, CompensatedBatch, Event, KalmanState, Message, RawBatch, flags, volts,
+    BATCH, BatchHead, CompensatedBatch, Event, KalmanState, Message, RawBatch, Sums, flags, volts,
 };
 use nalgebra::Vector3;
 
@@ -86,7 +86,11 @@ impl Device {
             model = Some(state.model);
         }
         for n in first..first + BATCH as u32 {
-            let sums = sums(n);
+            let [gx, gy, gz, ax, ay, az] = sums(n);
+            let sums = Sums {
+                gyro: [gx, gy, gz],
+                accel: [ax, ay, az],
+            };
             raw.extend_from_slice(&RawBatch::pack(&sums));
             let reading = volts(&sums, GYRO_VOLTS, ACCEL_VOLTS);
             if let (Some(c), Some(model)) = (&mut self.calibrated, &model) {

@@ -1,0 +1,307 @@
+//! NUCLEO-H743ZI2: converter, line to the host, flash sectors, clocks, and last the pins.
+//!
+//! RM0433 is the reference manual of the STM32H743, DS12110 its data sheet, UM2407 the manual of the board.
+
+use crate::channels::CHANNELS;
+
+/// Name of the board.
+pub const NAME: &str = "NUCLEO-H743ZI2";
+
+// ---- Converter ---------------------------------------------------------------------------------
+
+/// Reference of the converter, V: VREF+ is tied to the board's 3.3 V.
+pub const REFERENCE_V: f32 = 3.3;
+
+// ---- The line ----------------------------------------------------------------------------------
+
+/// Baud rate: 100 kB/s, twice what raw and compensated streams take together. Not 921 600, of which a kernel clock of 100 MHz
+/// makes 0.45 % more; this divides it evenly, and the debugger's bridge takes any rate.
+pub const BAUD: u32 = 1_000_000;
+
+// ---- Flash -------------------------------------------------------------------------------------
+
+/// The two sectors of `memory.x` as sectors of bank 2.
+pub const CALIBRATION_SECTORS: [u8; 2] = [6, 7];
+
+// ---- Clocks ------------------------------------------------------------------------------------
+
+/// The debugger's clock output, Hz, which drives the oscillator input: a clock, not a crystal,
+/// hence the bypass. It is a crystal's all the same, and everything below, sampling included, is a
+/// ratio of integers to it.
+const HSE_HZ: u32 = 8_000_000;
+
+/// Divider in front of both PLLs: none, for a reference of 8 MHz. The other common choice, 2 MHz,
+/// belongs to the medium VCO (RM0433 8.5.5: 2 MHz or less), which ends at 420 MHz, below what the
+/// core needs. 8 MHz belongs to the wide one without doubt, and the phase is compared four times
+/// as often.
+const PLL_PREDIVIDER: u32 = 1;
+
+/// PLL1: VCO at 800 MHz.
+const PLL1_MULTIPLIER: u32 = 100;
+
+/// PLL1 output P, the core: 400 MHz, the most that voltage scale 1 allows. The part can do 480 MHz
+/// at scale 0, which takes more current for speed that nothing here needs.
+const PLL1_P: u32 = 2;
+
+/// PLL2: VCO at 792 MHz. Its reason is [`PLL2_P`].
+const PLL2_MULTIPLIER: u32 = 99;
+
+/// PLL2 output P, the converter's kernel clock: 15.84 MHz, twice the cycles of a sample in a millisecond.
+const PLL2_P: u32 = 50;
+
+/// Clock of the converter, Hz: 7.92 MHz. Silicon from revision V on halves the kernel clock before the converter sees it (RM0433
+/// 25.4.3, figure 136).
+pub const ADC_HZ: u32 = HSE_HZ / PLL_PREDIVIDER * PLL2_MULTIPLIER / PLL2_P / 2;
+
+// The division above loses nothing.
+const _: () = {
+    assert!(HSE_HZ.is_multiple_of(PLL_PREDIVIDER));
+    assert!((HSE_HZ / PLL_PREDIVIDER * PLL2_MULTIPLIER).is_multiple_of(PLL2_P * 2));
+};
+
+// The HAL picks the VCO by its output, the medium one wherever that ends (420 MHz), although a
+// reference above 2 MHz asks for the wide one. A multiplier that lands in the overlap would be set
+// wrongly.
+const _: () = {
+    let reference = HSE_HZ / PLL_PREDIVIDER;
+    assert!(reference > 2_000_000 && reference <= 16_000_000);
+    assert!(
+        reference * PLL1_MULTIPLIER > 420_000_000 && reference * PLL1_MULTIPLIER <= 960_000_000
+    );
+    assert!(
+        reference * PLL2_MULTIPLIER > 420_000_000 && reference * PLL2_MULTIPLIER <= 960_000_000
+    );
+    assert!(reference * PLL1_MULTIPLIER / PLL1_P == 400_000_000);
+};
+
+// ---- Sampling ----------------------------------------------------------------------------------
+
+/// Sampling time of every channel in half cycles of [`ADC_HZ`]: 387.5 cycles, 49 µs. The longest
+/// that fits the number of conversions, since the channel is on the capacitor for all of it and
+/// settles through 14 kΩ.
+pub const SAMPLING_HALF_CYCLES: u32 = 775;
+
+/// Conversion proper at 16 bits in half cycles: 8.5 cycles (RM0433 25.4.23, table 214).
+const CONVERSION_HALF_CYCLES: u32 = 17;
+
+/// Scans averaged into one sample.
+///
+/// Two, for 20 000 conversions a second. A gyro's noise is 0.1 (deg/s)/√Hz, over 40 Hz about 2.4 mV
+/// at the pin, an accelerometer's 4.7 mV; the converter's own is of the order of 0.1 mV, so
+/// averaging more of it would show nowhere. It would show in the emulator that the image is tested
+/// on, which spends about 12 µs on a conversion and falls behind real time near 80 000 a second.
+pub const SCANS: usize = 2;
+
+// The converter runs freely, one scan after the other, without a trigger: its clock alone makes the
+// sample rate, and this is the proof that it is 1 kHz and not nearly so.
+//   2 scans x 10 channels x 396 cycles = 7920 cycles; 7.92 MHz / 1000 = 7920 cycles.
+const _: () = {
+    use crate::design_parameters::SAMPLE_HZ;
+    let half_cycles = SAMPLING_HALF_CYCLES + CONVERSION_HALF_CYCLES;
+    assert!(half_cycles.is_multiple_of(2) && ADC_HZ.is_multiple_of(SAMPLE_HZ));
+    assert!((SCANS * CHANNELS) as u32 * half_cycles / 2 == ADC_HZ / SAMPLE_HZ);
+    assert!((SCANS * CHANNELS) as u32 * SAMPLE_HZ <= 24_000);
+};
+
+#[cfg(all(target_os = "none", feature = "usb"))]
+pub use parts::UsbPins;
+#[cfg(target_os = "none")]
+pub use parts::{Board, Irqs, SelfTestPins, Sensors};
+
+/// The parts of the board, for the target only.
+#[cfg(target_os = "none")]
+mod parts {
+    use embassy_stm32::adc::{AdcChannel, AnyAdcChannel};
+    use embassy_stm32::gpio::{AnyPin, Level, Output, Speed};
+    use embassy_stm32::peripherals::{self, ADC1, DMA1_CH0, IWDG1};
+    use embassy_stm32::rcc::{
+        AHBPrescaler, APBPrescaler, Hse, HseMode, LsConfig, Pll, PllDiv, PllMul, PllPreDiv,
+        PllSource, Sysclk, VoltageScale, mux,
+    };
+    use embassy_stm32::time::Hertz;
+    use embassy_stm32::{Config, Peri, bind_interrupts, dma, pac};
+    #[cfg(not(feature = "usb"))]
+    use embassy_stm32::{mode::Async, usart};
+
+    use super::*;
+    use crate::channels::Channels;
+
+    bind_interrupts!(
+        /// Who answers which interrupt.
+        pub struct Irqs {
+            DMA1_STREAM0 => dma::InterruptHandler<peripherals::DMA1_CH0>;
+            #[cfg(not(feature = "usb"))]
+            DMA1_STREAM1 => dma::InterruptHandler<peripherals::DMA1_CH1>;
+            #[cfg(not(feature = "usb"))]
+            DMA1_STREAM2 => dma::InterruptHandler<peripherals::DMA1_CH2>;
+            #[cfg(not(feature = "usb"))]
+            USART3 => usart::InterruptHandler<peripherals::USART3>;
+            #[cfg(feature = "usb")]
+            OTG_FS => embassy_stm32::usb::InterruptHandler<peripherals::USB_OTG_FS>;
+        }
+    );
+
+    /// The converter, and the sensors at its inputs.
+    ///
+    /// Only ADC1: one converter has one clock, one reference and one order. Of its inputs on this
+    /// package, PA1, PA2, PA7, PC1, PC4 and PC5 go to the Ethernet PHY and PB0 to an LED, which leaves
+    /// nine. PC2_C and PC3_C (A4 and A2 on the header) belong to ADC3. The tenth is PA7, which a jumper
+    /// parts from the PHY; it has the reference, the one signal whose loss does not cost an axis. The
+    /// debugger's serial line (PD8, PD9), USB and the other LEDs have no input of ADC1.
+    ///
+    /// Which input of ADC1 a pin is, is looked up in the HAL's tables; on an emulated board they were seen to match. A0 to A3 and D3
+    /// to D13 are those of Zephyr's description of this board, CN12 that of published drawings of the Nucleo-144 family; D24, D32 and
+    /// the jumper are to be checked against the board's manual (UM2407) before anything is wired.
+    pub struct Sensors {
+        /// ADC1.
+        pub adc: Peri<'static, ADC1>,
+        /// The stream that carries its words away.
+        pub dma: Peri<'static, DMA1_CH0>,
+        /// Where every channel is connected.
+        pub pins: Channels<AnyAdcChannel<'static, ADC1>>,
+    }
+
+    /// Inputs of the sensors by which they test themselves. Low, as after reset, is no test and the finest range.
+    ///
+    /// Four outputs of the Zio header that no input of ADC1 and no other part of the board is on. A self-test input of the
+    /// ADXRS300 takes 3.3 V and more for high, which a pin of a 3.3 V part just does not reach: both go through a 74AHCT buffer at
+    /// 5 V. The accelerometer is a 3.3 V part.
+    pub struct SelfTestPins {
+        /// ST1 of the three gyros: PE13 (D3).
+        pub st1: Output<'static>,
+        /// ST2 of the three gyros: PE11 (D5).
+        pub st2: Output<'static>,
+        /// g-Select1 and g-Select2 of the accelerometer: PE9 (D6) and PD15 (D9).
+        pub range: [Output<'static>; 2],
+    }
+
+    /// USB of the part, at the connector beside the debugger's.
+    #[cfg(feature = "usb")]
+    pub struct UsbPins {
+        /// Its full-speed controller.
+        pub controller: Peri<'static, peripherals::USB_OTG_FS>,
+        /// D+.
+        pub dp: Peri<'static, peripherals::PA12>,
+        /// D-.
+        pub dm: Peri<'static, peripherals::PA11>,
+    }
+
+    /// All that the program uses of the board.
+    pub struct Board {
+        /// The sensors' outputs.
+        pub sensors: Sensors,
+        /// The sensors' inputs.
+        pub self_test: SelfTestPins,
+        /// To the host: USART3, which the debugger's bridge is on, at [`BAUD`], 8 data bits, no parity, 1 stop bit.
+        #[cfg(not(feature = "usb"))]
+        pub line: usart::Uart<'static, Async>,
+        /// To the host.
+        #[cfg(feature = "usb")]
+        pub line: UsbPins,
+        /// Restarts the program when it stands still.
+        pub watchdog: Peri<'static, IWDG1>,
+    }
+
+    impl Board {
+        /// Starts the clocks and takes the board. To be called once, first.
+        pub fn start() -> Self {
+            let p = embassy_stm32::init(clocks());
+            // Was on for `clocks` only.
+            pac::RCC.cr().modify(|w| w.set_pllon(2, false));
+            let low = |pin: Peri<'static, AnyPin>| Output::new(pin, Level::Low, Speed::Low);
+            Self {
+                sensors: Sensors {
+                    adc: p.ADC1,
+                    dma: p.DMA1_CH0,
+                    pins: Channels {
+                        gyro: [
+                            AdcChannel::<ADC1>::degrade_adc(p.PA3), // A0
+                            p.PC0.degrade_adc(),                    // A1
+                            p.PB1.degrade_adc(),                    // A3
+                        ],
+                        accel: [
+                            p.PA6.degrade_adc(), // D12
+                            p.PA5.degrade_adc(), // D13
+                            p.PA4.degrade_adc(), // D24
+                        ],
+                        temperature: [
+                            p.PA0.degrade_adc(),  // D32
+                            p.PF11.degrade_adc(), // CN12 pin 62
+                            p.PF12.degrade_adc(), // CN12 pin 59
+                        ],
+                        reference: p.PA7.degrade_adc(), // CN12 pin 15, Ethernet jumper off
+                    },
+                },
+                self_test: SelfTestPins {
+                    st1: low(p.PE13.into()),
+                    st2: low(p.PE11.into()),
+                    range: [low(p.PE9.into()), low(p.PD15.into())],
+                },
+                #[cfg(not(feature = "usb"))]
+                line: {
+                    let mut config = usart::Config::default();
+                    config.baudrate = BAUD;
+                    let (rx, tx) = (p.PD9, p.PD8);
+                    let (tx_dma, rx_dma) = (p.DMA1_CH1, p.DMA1_CH2);
+                    // Refused is a baud rate that the clock cannot make; this one it can.
+                    usart::Uart::new(p.USART3, rx, tx, tx_dma, rx_dma, Irqs, config).unwrap()
+                },
+                #[cfg(feature = "usb")]
+                line: UsbPins {
+                    controller: p.USB_OTG_FS,
+                    dp: p.PA12,
+                    dm: p.PA11,
+                },
+                watchdog: p.IWDG1,
+            }
+        }
+    }
+
+    /// The clock tree.
+    fn clocks() -> Config {
+        let pll = |multiplier: u32, p: u32| Pll {
+            source: PllSource::HSE,
+            prediv: PllPreDiv::from_bits(PLL_PREDIVIDER as u8),
+            // The registers hold multiplier and divider minus one.
+            mul: PllMul::from_bits(multiplier as u16 - 1),
+            fracn: None,
+            divp: Some(PllDiv::from_bits(p as u8 - 1)),
+            divq: None,
+            divr: None,
+        };
+        let mut config = Config::default();
+        config.rcc.hse = Some(Hse {
+            freq: Hertz(HSE_HZ),
+            mode: HseMode::Bypass,
+        });
+        config.rcc.pll1 = Some(pll(PLL1_MULTIPLIER, PLL1_P));
+        config.rcc.pll2 = Some(pll(PLL2_MULTIPLIER, PLL2_P));
+        // A PLL that is left out is switched off by a write of zeros to the register that it shares
+        // with the running ones, whose fields must not be written then (RM0433 8.7.11). The hardware
+        // ignores them, but nothing should rely on it: so the third is started, without outputs, and
+        // stopped after.
+        config.rcc.pll3 = Some(Pll {
+            divp: None,
+            ..pll(PLL2_MULTIPLIER, PLL2_P)
+        });
+        // Nothing needs a calendar; the default resets the backup domain to choose a clock for one.
+        config.rcc.ls = LsConfig::off();
+        config.rcc.sys = Sysclk::PLL1_P;
+        config.rcc.voltage_scale = VoltageScale::Scale1;
+        // At voltage scale 1 the buses end at 200 MHz, the peripherals behind them at 100 MHz.
+        config.rcc.ahb_pre = AHBPrescaler::DIV2;
+        config.rcc.apb1_pre = APBPrescaler::DIV2;
+        config.rcc.apb2_pre = APBPrescaler::DIV2;
+        config.rcc.apb3_pre = APBPrescaler::DIV2;
+        config.rcc.apb4_pre = APBPrescaler::DIV2;
+        #[cfg(feature = "usb")]
+        {
+            // 48 MHz from the oscillator that USB trims by itself: no PLL makes them beside the others.
+            config.rcc.hsi48 = Some(Default::default());
+            config.rcc.mux.usbsel = mux::Usbsel::HSI48;
+        }
+        // The default source as well, but the sample rate hangs on it.
+        config.rcc.mux.adcsel = mux::Adcsel::PLL2_P;
+        config
+    }
+}

@@ -1,0 +1,178 @@
+//! Whether a fit can be what it claims to be: what no interval shows, because the data agree with themselves.
+//!
+//! Swapped columns, a wrong unit, one dwell with the wrong input: each leaves a trace, and each would otherwise end in a
+//! calibration file. What cannot be right is refused; what may be meant is a warning.
+
+use super::sensor::{Residual, SensorFit};
+use crate::estimate::Failure;
+use crate::prepared::Prepared;
+use crate::quantity::Figure;
+use crate::quantity::Sensor;
+use crate::quantity::plural;
+use crate::quantity::significant;
+use mimu_recording::error::{Error, Result};
+use mimu_recording::{RawUnit, Reference};
+
+/// Error of a fit over the spread of its inputs from which on the readings do not follow the inputs. Swapped
+/// sensors are beyond one; the worst table is a hundred times below.
+const FOLLOWS_NOTHING: f64 = 0.3;
+/// A residual this many times the median, and the noise, is no tail of a distribution.
+const OUTLIER: f64 = 10.0;
+/// Fewer residuals have no median to speak of.
+const OUTLIER_COUNT: usize = 6;
+/// Axes turned by more than this, degrees, are more than a careless mounting.
+const TURNED_DEG: f64 = 20.0;
+
+/// Refuses or adds warnings to the fit of one sensor.
+pub fn check(prepared: &Prepared, fit: &mut SensorFit) -> Result<()> {
+    check_numbers(fit)?;
+    refuse_unrelated(prepared, fit)?;
+    let found = [
+        outliers(prepared, fit),
+        unit(prepared, fit),
+        turned(prepared, fit),
+    ];
+    fit.warnings.extend(found.into_iter().flatten());
+    Ok(())
+}
+
+/// Refuses a fit that ends in something that is not a number.
+pub fn check_numbers(fit: &SensorFit) -> Result<()> {
+    let triad = &fit.estimated.triad;
+    let models = triad.inverse.matrix.iter().chain(&triad.inverse.offset);
+    let numbers = models
+        .chain(&triad.forward.matrix)
+        .chain(&triad.forward.bias)
+        .chain(&triad.inverse_covariance)
+        .chain(&triad.forward_covariance);
+    if numbers.into_iter().all(|x| x.is_finite()) && fit.rms().is_finite() {
+        return Ok(());
+    }
+    let seen = "the fit ends in something that is not a number".to_string();
+    Err(Failure::NoSolution(seen).into_error(fit.sensor))
+}
+
+/// Root mean square of the inputs about their mean; of what the figure is about elsewhere.
+fn spread(prepared: &Prepared, fit: &SensorFit) -> f64 {
+    match fit.figure {
+        Figure::Direction => 1.0,
+        Figure::GravitySize => prepared.manifest.gravity_mps2,
+        Figure::Input => {
+            let dwell = |r: &Residual| prepared.dwells.list[r.dwell].input(fit.sensor);
+            let inputs: Vec<_> = fit.residuals.iter().filter_map(dwell).collect();
+            let n = inputs.len() as f64;
+            let mean = inputs.iter().sum::<nalgebra::Vector3<f64>>() / n;
+            let squares = inputs.iter().map(|x| (x - mean).norm_squared());
+            (squares.sum::<f64>() / (3.0 * n)).sqrt()
+        }
+    }
+}
+
+fn refuse_unrelated(prepared: &Prepared, fit: &SensorFit) -> Result<()> {
+    let share = fit.rms() / spread(prepared, fit);
+    if share <= FOLLOWS_NOTHING {
+        return Ok(());
+    }
+    let against = match fit.figure {
+        Figure::Input => "the known inputs",
+        Figure::GravitySize => "the magnitude of gravity",
+        Figure::Direction => "the turns of gravity",
+    };
+    let how = match share < 1.0 {
+        true => format!(": {:.0} % is left over", 100.0 * share),
+        false => " at all".to_string(),
+    };
+    let worst = match worst_first(fit).first() {
+        Some(worst) => format!(", dwell {} the least", name(prepared, worst)),
+        None => String::new(),
+    };
+    Err(Error::new(
+        format!("{}, {}", prepared.place, fit.sensor),
+        format!("the readings do not follow {against}{how}{worst}"),
+        "check that no columns are swapped and that every step has its own input",
+    ))
+}
+
+fn worst_first(fit: &SensorFit) -> Vec<&Residual> {
+    let mut all: Vec<&Residual> = fit.residuals.iter().collect();
+    all.sort_by(|a, b| b.value.norm().total_cmp(&a.value.norm()));
+    all
+}
+
+fn name(prepared: &Prepared, residual: &Residual) -> String {
+    let step = prepared.dwells.list[residual.dwell].step;
+    let labels = &prepared.manifest.step_labels;
+    let label = usize::try_from(step).ok().and_then(|s| labels.get(s));
+    label.cloned().unwrap_or_else(|| step.to_string())
+}
+
+fn outliers(prepared: &Prepared, fit: &SensorFit) -> Option<String> {
+    let sorted = worst_first(fit);
+    if sorted.len() < OUTLIER_COUNT {
+        return None;
+    }
+    let median = sorted[sorted.len() / 2].value.norm();
+    let off = |r: &&&Residual| {
+        let size = r.value.norm();
+        size > OUTLIER * median && size > OUTLIER * r.floor
+    };
+    let bad: Vec<_> = sorted.iter().filter(off).collect();
+    let worst = bad.first()?;
+    let names: Vec<String> = bad.iter().take(8).map(|r| name(prepared, r)).collect();
+    let what = match fit.figure {
+        Figure::Direction => "turn to dwell",
+        _ => "dwell",
+    };
+    let more = if bad.len() > names.len() { ", ..." } else { "" };
+    Some(format!(
+        "{}: {} ({what} {}{more}): off by up to {} {}, {:.0} times the median; look for the cause, as it widens all intervals",
+        fit.sensor,
+        plural(bad.len() as u64, "outlier"),
+        names.join(", "),
+        significant(worst.value.norm()),
+        fit.figure.unit(fit.sensor),
+        worst.value.norm() / median
+    ))
+}
+
+/// What claims to be in SI reads about what it measures.
+fn unit(prepared: &Prepared, fit: &SensorFit) -> Option<String> {
+    let matrix = &fit.estimated.triad.forward.matrix;
+    let scale = matrix.row_iter().map(|r| r.norm()).sum::<f64>() / 3.0;
+    if prepared.manifest.raw_unit != RawUnit::Si || (0.5..2.0).contains(&scale) {
+        return None;
+    }
+    let guess = match fit.sensor {
+        Sensor::Gyro if (40.0..80.0).contains(&scale) => ": it is in deg/s",
+        Sensor::Gyro if (0.01..0.03).contains(&scale) => ": the ref_ columns are not in deg/s",
+        _ => "",
+    };
+    Some(format!(
+        "{}: raw_unit = \"SI\", but the readings are {} times the input{guess}",
+        fit.sensor,
+        significant(scale)
+    ))
+}
+
+/// How the axes lie to those that they are referred to.
+fn turned(prepared: &Prepared, fit: &SensorFit) -> Option<String> {
+    if fit.figure == Figure::GravitySize {
+        return None; // its axes are the frame
+    }
+    let svd = fit.estimated.triad.inverse.matrix.svd(true, true);
+    let rotation = svd.u? * svd.v_t?;
+    let angle = (0.5 * (rotation.trace() - 1.0)).clamp(-1.0, 1.0).acos();
+    // What is left-handed has a warning of its own.
+    if rotation.determinant() < 0.0 || angle.to_degrees() < TURNED_DEG {
+        return None;
+    }
+    let against = match prepared.manifest.reference {
+        Reference::Table => "those of the ref_ columns",
+        Reference::Gravity => "the accelerometer's",
+    };
+    Some(format!(
+        "{}: its axes are turned by {:.0} degrees against {against}: unless it is mounted so, columns are swapped or have the wrong sign",
+        fit.sensor,
+        angle.to_degrees()
+    ))
+}

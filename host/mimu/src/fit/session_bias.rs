@@ -1,0 +1,104 @@
+//! The biases of a session, where the matrix is known from another: a unit at rest in a chamber has no more to tell, and biases
+//! are others after every power-on.
+
+use mimu_core::compensation::Affine;
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+
+use crate::estimate::least_squares::{Errors, Scatter, Solution, solve_with_excess};
+use crate::estimate::{Estimated, Failure};
+use crate::prepared::{Prepared, si_covariance};
+use crate::quantity::AXES;
+use crate::quantity::Sensor;
+use crate::triad::{Covariance, Part, Triad};
+use mimu_recording::Reference;
+
+/// Steps of the iteration for sizes: from a bias of a tenth of gravity the third changes nothing.
+const STEPS: usize = 6;
+
+/// Inverse model of `sensor` with the matrix of `known` and the biases of `prepared`, raw to SI.
+///
+/// Where the input is known, and for a gyro at rest, by the mean error of each axis; for an accelerometer by the magnitude of gravity,
+/// across which a single pose says nothing: there the bias stays that of `known`.
+pub fn estimate(
+    prepared: &Prepared,
+    sensor: Sensor,
+    known: &Affine<f64>,
+) -> Result<Estimated, Failure> {
+    let observations = prepared.observations(sensor);
+    let none = || Failure::NoSolution("no dwell can be used".into());
+    if observations.is_empty() {
+        return Err(none());
+    }
+    let matrix = known.matrix;
+    let by_size = prepared.manifest.reference == Reference::Gravity && sensor == Sensor::Accel;
+    let mut offset = known.offset;
+    let mut covariance = Covariance::zeros();
+    let mut scatter: Vec<(String, Scatter)> = Vec::new();
+    if by_size {
+        let g = prepared.manifest.gravity_mps2;
+        let mut last: Option<(Solution, Scatter)> = None;
+        let mut kept = DMatrix::zeros(3, 0);
+        for _ in 0..STEPS {
+            let model = Affine { matrix, offset };
+            let forces: Vec<Vector3<f64>> =
+                observations.iter().map(|o| model.apply(&o.raw)).collect();
+            let design = DMatrix::from_fn(forces.len(), 3, |i, k| forces[i][k] / forces[i].norm());
+            let y = DVector::from_iterator(forces.len(), forces.iter().map(|f| g - f.norm()));
+            // Directions of the bias that the poses show.
+            let svd = design.clone().svd(false, true);
+            let shown = svd.v_t.ok_or_else(none)?;
+            let strong: Vec<usize> = (0..svd.singular_values.len())
+                .filter(|k| svd.singular_values[*k] > 0.05 * svd.singular_values.max())
+                .collect();
+            kept = shown.select_rows(&strong).transpose();
+            let variances = prepared.size_variances(&model, &observations);
+            let errors = Errors::Independent(DVector::from_vec(variances));
+            let found = solve_with_excess(&(&design * &kept), &y, &errors).ok_or_else(none)?;
+            let step = &kept * &found.0.parameters;
+            offset += Vector3::new(step[0], step[1], step[2]);
+            last = Some(found);
+        }
+        let (solution, found) = last.ok_or_else(none)?;
+        let full = &kept * solution.covariance * kept.transpose();
+        covariance
+            .fixed_view_mut::<3, 3>(9, 9)
+            .copy_from(&Matrix3::from_fn(|i, j| full[(i, j)]));
+        scatter.push(("magnitude of specific force".into(), found));
+    } else {
+        for axis in 0..3 {
+            let n = observations.len();
+            let input = |i: usize| match prepared.manifest.reference {
+                Reference::Table => observations[i].input[axis],
+                Reference::Gravity => 0.0,
+            };
+            let y = DVector::from_fn(n, |i, _| {
+                input(i) - (matrix.row(axis) * observations[i].raw)[(0, 0)]
+            });
+            let variances = DVector::from_fn(n, |i, _| {
+                si_covariance(&matrix, &observations[i].variance)[(axis, axis)]
+            });
+            let design = DMatrix::from_element(n, 1, 1.0);
+            let (solution, found) =
+                solve_with_excess(&design, &y, &Errors::Independent(variances)).ok_or_else(none)?;
+            offset[axis] = solution.parameters[0];
+            covariance[(9 + axis, 9 + axis)] = solution.covariance[(0, 0)];
+            scatter.push((AXES[axis].into(), found));
+        }
+    }
+    let dof = scatter.iter().map(|s| s.1.variance_dof());
+    let part = Part {
+        covariance,
+        dof: dof.fold(f64::INFINITY, f64::min),
+    };
+    let triad = Triad::from_inverse(Affine { matrix, offset }, vec![part])
+        .ok_or_else(|| Failure::NoSolution("the given matrix is singular".into()))?;
+    Ok(Estimated {
+        triad,
+        scatter,
+        condition: 1.0,
+        notes: vec![
+            "the matrix is given, and no interval holds its error; the biases are this recording's"
+                .into(),
+        ],
+    })
+}

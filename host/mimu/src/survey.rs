@@ -1,0 +1,326 @@
+//! The noise of a recording at rest: which stretch of it, and each channel's curve and model.
+//!
+//! One channel at a time, while the next is being read: three hours at 1 kHz are 86 MB a channel.
+
+mod columns;
+mod stretch;
+mod suitability;
+
+use std::ops::Range;
+use std::sync::mpsc::sync_channel;
+use std::thread;
+
+use self::columns::Columns;
+pub use self::stretch::Part;
+use self::stretch::{FEWEST, Stretch, temperature};
+use self::suitability::{Suitability, suitability};
+use crate::allan::deviation::Integrated;
+use crate::allan::model::{Estimator, NoiseModel, Term, allan_factors, hadamard_factors};
+use crate::allan::units::Unit;
+use crate::allan::{Kind, Point, Spacing};
+use crate::calibration::Calibration;
+use crate::quantity::{Sensor, duration, significant};
+use mimu_recording::error::{Error, Result};
+use mimu_recording::{Column, RAW_COLUMNS, RawUnit, Recording};
+
+/// What to compute.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Options {
+    /// Which samples.
+    pub part: Part,
+    /// Deviation that is reported; the model is always fitted to the overlapping Allan deviation.
+    pub kind: Kind,
+    /// Averaging times in a decade.
+    pub per_decade: usize,
+    /// Probability of all intervals.
+    pub confidence: f64,
+}
+
+/// Noise of one channel.
+#[derive(Debug, Clone)]
+pub struct Channel {
+    /// Its column.
+    pub name: &'static str,
+    /// Sensor that it is of.
+    pub sensor: Sensor,
+    /// Unit of its deviations.
+    pub unit: Unit,
+    /// Samples that it was computed from.
+    pub samples: usize,
+    /// Deviation over averaging time.
+    pub curve: Vec<Point>,
+    /// Hadamard deviation, where a drift asks for it.
+    pub hadamard: Option<Vec<Point>>,
+    /// The noise model; `None` where the record has too few octaves for one.
+    pub model: Option<NoiseModel>,
+}
+
+/// Noise of a recording.
+#[derive(Debug, Clone)]
+pub struct Survey {
+    /// Directory of the recording.
+    pub recording: String,
+    /// Unit under test.
+    pub device: String,
+    /// Mean temperature, °C, where it was recorded.
+    pub temp_c: Option<f64>,
+    /// Samples a second, by the time stamps.
+    pub sample_rate_hz: f64,
+    /// Times of the first and the last sample, s.
+    pub span_s: [f64; 2],
+    /// What was computed.
+    pub options: Options,
+    /// The channels that the recording has, in the order of its columns.
+    pub channels: Vec<Channel>,
+    /// What a person should know.
+    pub warnings: Vec<String>,
+}
+
+/// Share of the Allan variance at the longest time from which on a ramp is what the curve shows there.
+const RAMP_SHARE: f64 = 0.5;
+
+/// Computes the noise of `recording`, in SI where its raw unit is or where `calibration` has the scale factors.
+///
+/// A channel in volts or counts is divided by the scale factor of its own axis and not mixed with the others into body axes:
+/// noise is the sensor's, and a misalignment of 1 % is 1e-4 of its variance.
+///
+/// Errors: the stretch is too short, the unit moves, a channel is stuck or constant, time stamps that do not fit the rate.
+pub fn survey(
+    recording: &Recording,
+    calibration: Option<&Calibration>,
+    options: Options,
+    progress: impl Fn(f64),
+) -> Result<Survey> {
+    let place = recording.samples.display().to_string();
+    let indices: Vec<usize> = (0..6)
+        .filter(|i| recording.columns.has(Column::Raw(*i)))
+        .collect();
+    let units = units(recording, calibration, &indices)?;
+    let mut columns = Columns::open(recording, &indices, &progress)?;
+    let mut warnings = recording.warnings.clone();
+    let stretch = Stretch::find(&mut columns, recording, options.part, &place, &mut warnings)?;
+    let temp_c = match recording.columns.temp_c {
+        true => temperature(&columns.take(Column::Temperature)?, &stretch.rows),
+        false => None,
+    };
+    let mut channels = Vec::new();
+    let mut judged = Vec::new();
+    let mut estimators: Vec<(usize, Estimator)> = Vec::new();
+    let (sender, receiver) = sync_channel(0);
+    thread::scope(|scope| -> Result<()> {
+        let (indices, units, place, stretch) = (&indices, &units, &place, &stretch);
+        let reader = scope.spawn(move || {
+            for (i, unit) in indices.iter().zip(units) {
+                let read = columns.take(Column::Raw(*i)).and_then(|values| {
+                    Values::of(values, &stretch.rows, *i, *unit, stretch.period_s, place)
+                });
+                // Refused only when the receiver has given up.
+                if sender.send(read).is_err() {
+                    break;
+                }
+            }
+        });
+        for (done, &i) in indices.iter().enumerate() {
+            let values = match receiver.recv() {
+                Ok(read) => read?,
+                Err(_) => break,
+            };
+            warnings.extend(values.warning);
+            let samples = values.rates.len();
+            if !estimators.iter().any(|(n, _)| *n == samples) {
+                let new = Estimator::new(samples, stretch.period_s, options.confidence);
+                estimators.push((samples, new));
+            }
+            let estimator = estimators.iter().find(|(n, _)| *n == samples);
+            let heat = temp_c
+                .as_ref()
+                .and_then(|t| t.against(&values.suitability.levels));
+            judged.push((i, values.suitability));
+            let mut channel = Channel {
+                name: RAW_COLUMNS[i],
+                sensor: if i < 3 { Sensor::Gyro } else { Sensor::Accel },
+                unit: units[done],
+                samples,
+                curve: Vec::new(),
+                hadamard: None,
+                model: None,
+            };
+            let integrated = Integrated::new(values.rates, stretch.period_s)?;
+            channel.analyse(&integrated, estimator.map(|(_, e)| e), &options);
+            channel.judge_drift(&integrated, heat, &options, &mut warnings);
+            channels.push(channel);
+            progress(0.1 + 0.9 * (done + 1) as f64 / indices.len() as f64);
+        }
+        drop(receiver);
+        reader.join().map_err(|_| {
+            Error::new(
+                place,
+                "the reader broke down on the contents",
+                "write the file again from its source",
+            )
+        })
+    })?;
+    suitability::refuse_motion(&judged, &stretch, options.part, &place, &mut warnings)?;
+    Ok(Survey {
+        recording: recording.directory.display().to_string(),
+        device: recording.manifest.device.clone(),
+        temp_c: temp_c.map(|t| t.mean_c),
+        sample_rate_hz: 1.0 / stretch.period_s,
+        span_s: stretch.span_s,
+        options,
+        channels,
+        warnings,
+    })
+}
+
+/// Unit of each channel, with the factor from raw to it.
+fn units(
+    recording: &Recording,
+    calibration: Option<&Calibration>,
+    indices: &[usize],
+) -> Result<Vec<Unit>> {
+    let raw = recording.manifest.raw_unit;
+    let unit = |&i: &usize| {
+        let sensor = if i < 3 { Sensor::Gyro } else { Sensor::Accel };
+        let Some(calibration) = calibration else {
+            return Ok(match raw {
+                RawUnit::Si => Unit::si(sensor, 1.0),
+                _ => Unit::raw(raw),
+            });
+        };
+        let Some(table) = calibration.table(sensor) else {
+            return Err(Error::new(
+                format!("{}, --calibration", RAW_COLUMNS[i]),
+                format!("the calibration has no [{sensor}]"),
+                "calibrate that sensor too, or leave --calibration out",
+            ));
+        };
+        if table.raw_unit != raw {
+            return Err(Error::new(
+                format!("{}, --calibration", RAW_COLUMNS[i]),
+                format!(
+                    "it is for readings in {}, and the recording is in {raw}",
+                    table.raw_unit
+                ),
+                "give the calibration of this unit",
+            ));
+        }
+        Ok(Unit::si(sensor, 1.0 / table.physical.scale_factor[i % 3]))
+    };
+    indices.iter().map(unit).collect()
+}
+
+/// One channel as it is computed with.
+struct Values {
+    rates: Vec<f64>,
+    suitability: Suitability,
+    warning: Option<String>,
+}
+
+impl Values {
+    /// The samples of `rows` in `unit`, checked; of a channel with empty cells the longest stretch without.
+    fn of(
+        mut values: Vec<f64>,
+        rows: &Range<usize>,
+        i: usize,
+        unit: Unit,
+        period_s: f64,
+        place: &str,
+    ) -> Result<Self> {
+        let place = format!("{place}, column {}", RAW_COLUMNS[i]);
+        values.truncate(rows.end);
+        values.drain(..rows.start);
+        let (mut warning, mut from) = (None, 0);
+        if let Some(first) = values.iter().position(|u| !u.is_finite()) {
+            let whole = stretch::longest(values.len(), |k| values[k].is_finite());
+            let row = rows.start + first + 1;
+            if whole.len() < FEWEST {
+                return Err(Error::new(
+                    format!("{place}, data row {row}"),
+                    format!("the cell is empty, and there are no {FEWEST} samples in a row"),
+                    "record again, or choose a stretch with --from and --to",
+                ));
+            }
+            warning = Some(format!(
+                "{}: empty cells, the first in data row {row}; the longest stretch without is used: {} from data row {}",
+                RAW_COLUMNS[i],
+                duration(whole.len() as f64 * period_s),
+                rows.start + whole.start + 1
+            ));
+            from = whole.start;
+            values.truncate(whole.end);
+            values.drain(..from);
+        }
+        let mut suitability = suitability(&values, period_s, &place)?;
+        if warning.is_some() {
+            suitability.begin_later(from);
+        }
+        for u in &mut values {
+            *u *= unit.per_raw;
+        }
+        Ok(Self {
+            rates: values,
+            suitability,
+            warning,
+        })
+    }
+}
+
+impl Channel {
+    fn analyse(
+        &mut self,
+        integrated: &Integrated,
+        estimator: Option<&Estimator>,
+        options: &Options,
+    ) {
+        let step = 1.0 / options.per_decade as f64;
+        let mut shown: Vec<usize> = (0..)
+            .map(|k| 10f64.powf(f64::from(k) * step).round() as usize)
+            .take_while(|m| 2 * m <= self.samples)
+            .collect();
+        shown.dedup();
+        let curve = |kind, times: &[usize]| {
+            integrated.curve(kind, &Spacing::Samples(times.into()), options.confidence)
+        };
+        let allan = curve(Kind::Allan, &allan_factors(self.samples));
+        let hadamard = curve(Kind::Hadamard, &hadamard_factors(self.samples));
+        let unit = self.unit;
+        let words = |term: Term, value: f64| unit.write(term, value);
+        self.model = estimator.and_then(|e| e.fit(&allan, &hadamard, words));
+        self.curve = curve(options.kind, &shown);
+    }
+
+    /// Warns where the long end is a drift's, and adds what the Hadamard deviation shows without it.
+    fn judge_drift(
+        &mut self,
+        integrated: &Integrated,
+        heat: Option<(f64, f64)>,
+        options: &Options,
+        warnings: &mut Vec<String>,
+    ) {
+        let longest_s = self.curve.last().map_or(0.0, |p| p.tau_s);
+        let ramp = self.model.as_ref().and_then(|model| {
+            let r = model.get(Term::R).ok()?.value * Term::R.deviation(longest_s);
+            Some((r / model.deviation(longest_s)).powi(2))
+        });
+        let ramp = ramp.filter(|share| *share > RAMP_SHARE);
+        match (heat, ramp) {
+            (Some((r, span_c)), _) => warnings.push(format!(
+                "{}: follows temp_c, which changes by {} °C (correlation {r:.2}): the long end of its curve is the chamber's and not the sensor's",
+                self.name,
+                significant(span_c)
+            )),
+            (None, Some(share)) => warnings.push(format!(
+                "{}: a drift makes {:.0} % of the variance at {}: the long end of its curve is warm-up or the chamber's, and not noise",
+                self.name,
+                100.0 * share,
+                duration(longest_s)
+            )),
+            (None, None) => return,
+        }
+        if options.kind != Kind::Hadamard {
+            let spacing = Spacing::Samples(self.curve.iter().map(|p| p.m).collect());
+            self.hadamard = Some(integrated.curve(Kind::Hadamard, &spacing, options.confidence));
+        }
+    }
+}

@@ -1,0 +1,283 @@
+//! The samples that are used: a chosen part, without a gap.
+
+use std::ops::Range;
+
+use super::columns::Columns;
+use crate::quantity::{duration, plural};
+use mimu_recording::error::{Error, Result};
+use mimu_recording::{Column, Recording};
+
+/// Fewer have no five octaves up to a quarter of them, which a model needs beside their half.
+pub(super) const FEWEST: usize = 64;
+
+/// Part of a recording.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Part {
+    /// All of it.
+    Whole,
+    /// By time stamps, s.
+    Span {
+        /// First, from the beginning if `None`.
+        from_s: Option<f64>,
+        /// Last, to the end if `None`.
+        to_s: Option<f64>,
+    },
+    /// The dwell of this number.
+    Step(i32),
+}
+
+/// A time step this many times the sample period is a gap.
+const GAP_PERIODS: f64 = 1.5;
+/// More gaps than this share of the rows are no gaps but another rate.
+const GAP_SHARE: f64 = 0.02;
+/// Relative difference from the stated rate that is a slip, and one to be told of.
+const RATE_OFF: [f64; 2] = [0.02, 1e-3];
+
+/// Rows without a gap.
+#[derive(Debug, Clone)]
+pub(super) struct Stretch {
+    /// Rows from 0.
+    pub rows: Range<usize>,
+    /// Times of the first and last, s.
+    pub span_s: [f64; 2],
+    /// Mean time step, s.
+    pub period_s: f64,
+}
+
+impl Stretch {
+    pub fn find(
+        columns: &mut Columns,
+        recording: &Recording,
+        part: Part,
+        place: &str,
+        warnings: &mut Vec<String>,
+    ) -> Result<Self> {
+        let rows = match part {
+            Part::Step(step) => Some(dwell(columns, recording, step, place)?),
+            _ => None,
+        };
+        let t = columns.take(Column::Time)?;
+        let rows = match (part, rows) {
+            (_, Some(rows)) => rows,
+            (Part::Span { from_s, to_s }, None) => span(&t, from_s, to_s, place)?,
+            (_, None) => 0..t.len(),
+        };
+        Self::without_gap(
+            &t[rows.clone()],
+            rows.start,
+            recording.manifest.sample_rate_hz,
+            place,
+            warnings,
+        )
+    }
+
+    /// The longest stretch of `t` without a gap; `first` is the row that it begins with.
+    fn without_gap(
+        t: &[f64],
+        first: usize,
+        rate_hz: f64,
+        place: &str,
+        warnings: &mut Vec<String>,
+    ) -> Result<Self> {
+        let at = |i: usize| format!("{place}, data row {}, t_s", first + i + 1);
+        if t.len() < FEWEST {
+            return Err(Error::new(
+                place,
+                format!(
+                    "{} to compute noise from, and it takes {FEWEST}",
+                    plural(t.len() as u64, "sample")
+                ),
+                "record for longer, or choose a longer stretch",
+            ));
+        }
+        let (mut gaps, mut first_gap, mut regular_s) = (0usize, None, 0.0);
+        for i in 1..t.len() {
+            let dt = t[i] - t[i - 1];
+            if !(dt > 0.0) {
+                return Err(Error::new(
+                    at(i),
+                    format!(
+                        "time does not go on, from {:.6} s to {:.6} s",
+                        t[i - 1],
+                        t[i]
+                    ),
+                    "import again without the time column and with --rate-hz, if the rows are in order",
+                ));
+            }
+            if dt * rate_hz > GAP_PERIODS {
+                gaps += 1;
+                first_gap.get_or_insert(i);
+            } else {
+                regular_s += dt;
+            }
+        }
+        let steps = t.len() - 1;
+        let remedy = "correct sample_rate_hz, or the unit of t_s";
+        if gaps as f64 > GAP_SHARE * steps as f64 {
+            let i = first_gap.unwrap_or_default();
+            let problem = format!(
+                "{gaps} of {steps} time steps do not fit sample_rate_hz = {rate_hz}: the first is {:.6} s",
+                t[i] - t[i - 1]
+            );
+            return Err(Error::new(at(i), problem, remedy));
+        }
+        let period_s = regular_s / (steps - gaps) as f64;
+        let off = 1.0 / (period_s * rate_hz) - 1.0;
+        if off.abs() > RATE_OFF[0] {
+            let problem = format!(
+                "the time stamps run at {:.3} Hz, and sample_rate_hz is {rate_hz}",
+                1.0 / period_s
+            );
+            return Err(Error::new(format!("{place}, t_s"), problem, remedy));
+        }
+        if off.abs() > RATE_OFF[1] {
+            warnings.push(format!(
+                "the time stamps run at {:.3} Hz, {:+.2} % off the stated {rate_hz} Hz; the stamps are used",
+                1.0 / period_s,
+                100.0 * off
+            ));
+        }
+        let mut rows = 0..t.len();
+        if let Some(i) = first_gap {
+            let whole = longest(steps, |k| (t[k + 1] - t[k]) * rate_hz <= GAP_PERIODS);
+            rows = whole.start..whole.end + 1;
+            warnings.push(format!(
+                "{}, the first of {} before data row {}; the longest stretch without is used: {} from {:.3} s",
+                plural(gaps as u64, "gap"),
+                duration(t[i] - t[i - 1]),
+                first + i + 1,
+                duration(rows.len() as f64 * period_s),
+                t[rows.start]
+            ));
+            if rows.len() < FEWEST {
+                return Err(Error::new(
+                    at(i),
+                    format!("there are no {FEWEST} samples without a gap"),
+                    remedy,
+                ));
+            }
+        }
+        Ok(Self {
+            span_s: [t[rows.start], t[rows.end - 1]],
+            rows: first + rows.start..first + rows.end,
+            period_s,
+        })
+    }
+}
+
+/// The longest run of indices below `n` for which `good` holds.
+pub(super) fn longest(n: usize, good: impl Fn(usize) -> bool) -> Range<usize> {
+    let (mut best, mut start) = (0..0, 0);
+    for i in 0..=n {
+        if i == n || !good(i) {
+            if i - start > best.len() {
+                best = start..i;
+            }
+            start = i + 1;
+        }
+    }
+    best
+}
+
+fn dwell(
+    columns: &mut Columns,
+    recording: &Recording,
+    step: i32,
+    place: &str,
+) -> Result<Range<usize>> {
+    if !recording.columns.step {
+        return Err(Error::new(
+            place,
+            "--step asks for a dwell, and there is no column step",
+            "choose a stretch with --from and --to",
+        ));
+    }
+    let steps = columns.take(Column::Step)?;
+    let rows = longest(steps.len(), |i| steps[i] == f64::from(step));
+    if rows.is_empty() {
+        let last = steps.iter().copied().fold(-1.0, f64::max);
+        return Err(Error::new(
+            format!("{place}, column step"),
+            format!("there is no step {step}"),
+            format!("the last is {last}"),
+        ));
+    }
+    Ok(rows)
+}
+
+fn span(t: &[f64], from_s: Option<f64>, to_s: Option<f64>, place: &str) -> Result<Range<usize>> {
+    let from = from_s.map_or(0, |s| t.partition_point(|t| *t < s));
+    let to = to_s.map_or(t.len(), |s| t.partition_point(|t| *t <= s));
+    if from < to {
+        return Ok(from..to);
+    }
+    let (first, last) = (t.first().copied(), t.last().copied());
+    Err(Error::new(
+        format!("{place}, t_s"),
+        "there is no sample between --from and --to",
+        format!(
+            "choose within {} to {} s",
+            first.unwrap_or_default(),
+            last.unwrap_or_default()
+        ),
+    ))
+}
+
+/// Temperature over a stretch.
+pub(super) struct Temperature {
+    /// Mean of the cells that are not empty, °C.
+    pub mean_c: f64,
+    /// [`SEGMENTS`] means; not finite where a cell is empty.
+    means: Vec<f64>,
+}
+
+/// Means that a correlation with temperature is computed from: what is faster than a hundredth of the record is no chamber.
+pub(super) const SEGMENTS: usize = 100;
+/// A smaller change is the temperature sensor's own noise, °C.
+const CHANGE_C: f64 = 0.2;
+/// Correlation from which on a channel follows the temperature. Two independent random walks often reach 0.8.
+const FOLLOWS: f64 = 0.9;
+
+/// Temperature over `rows`; `None` where all its cells are empty.
+pub(super) fn temperature(temp_c: &[f64], rows: &Range<usize>) -> Option<Temperature> {
+    let known = temp_c[rows.clone()].iter().filter(|t| t.is_finite());
+    let (sum, count) = known.fold((0.0, 0u64), |(sum, n), t| (sum + t, n + 1));
+    (count > 0).then(|| Temperature {
+        mean_c: sum / count as f64,
+        means: segments(&temp_c[rows.clone()]),
+    })
+}
+
+/// Means of [`SEGMENTS`] equal parts; none of fewer samples.
+pub(super) fn segments(values: &[f64]) -> Vec<f64> {
+    let mean = |part: &[f64]| part.iter().sum::<f64>() / part.len() as f64;
+    let length = values.len() / SEGMENTS;
+    match length {
+        0 => Vec::new(),
+        _ => values
+            .chunks_exact(length)
+            .take(SEGMENTS)
+            .map(mean)
+            .collect(),
+    }
+}
+
+impl Temperature {
+    /// Correlation with a channel's means, and the change of temperature, °C, where the channel follows it.
+    pub fn against(&self, levels: &[f64]) -> Option<(f64, f64)> {
+        let high = self.means.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let low = self.means.iter().copied().fold(f64::INFINITY, f64::min);
+        let known = self.means.iter().all(|t| t.is_finite());
+        if !known || levels.len() != self.means.len() || high - low < CHANGE_C {
+            return None;
+        }
+        let centred = |values: &[f64]| -> Vec<f64> {
+            let mean = values.iter().sum::<f64>() / values.len() as f64;
+            values.iter().map(|v| v - mean).collect()
+        };
+        let (a, b) = (centred(levels), centred(&self.means));
+        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let r = dot(&a, &b) / (dot(&a, &a) * dot(&b, &b)).sqrt();
+        (r.abs() >= FOLLOWS).then_some((r, high - low))
+    }
+}

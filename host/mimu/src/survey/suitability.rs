@@ -1,0 +1,170 @@
+//! Whether a channel is at rest and alive: only then is its Allan curve that of its noise.
+
+use super::stretch::{FEWEST, Part, Stretch, longest, segments};
+use crate::blocks::quantile;
+use crate::quantity::duration;
+use crate::stillness::{STILL_FACTOR, WINDOW_S};
+use mimu_recording::RAW_COLUMNS;
+use mimu_recording::error::{Error, Result};
+
+/// What a channel looked like before it was integrated.
+#[derive(Debug, Clone)]
+pub(super) struct Suitability {
+    /// Samples in a window.
+    window: usize,
+    /// Whether each window is disturbed.
+    moving: Vec<bool>,
+    /// Means of equal parts of the stretch, raw.
+    pub levels: Vec<f64>,
+}
+
+impl Suitability {
+    /// Of a channel that begins `samples` later than the stretch: nothing is known before, and its means are of other times
+    /// than the temperature's.
+    pub fn begin_later(&mut self, samples: usize) {
+        self.moving.splice(0..0, vec![false; samples / self.window]);
+        self.levels.clear();
+    }
+}
+
+/// Samples that a variance needs to be told from the quietest.
+const FEWEST_IN_WINDOW: usize = 16;
+/// A step between the means of two windows that is none of noise: ten of their sigmas.
+const STEP_SIGMAS: f64 = 10.0;
+/// Natural logarithm of the odds against a run of equal samples by chance in the whole recording.
+const RUN_LOG_ODDS: f64 = 14.0;
+/// Shorter runs of equal samples are left to the noise of a coarse converter, s.
+const RUN_S: f64 = 0.5;
+
+/// Checks the raw samples of a channel; `place` names it. Refuses one that is constant or stuck.
+pub(super) fn suitability(raw: &[f64], period_s: f64, place: &str) -> Result<Suitability> {
+    if raw.len() < FEWEST {
+        return Err(Error::new(
+            place,
+            format!("{} samples are left", raw.len()),
+            "record for longer, or choose a longer stretch",
+        ));
+    }
+    if raw.iter().all(|u| *u == raw[0]) {
+        return Err(Error::new(
+            place,
+            format!("the channel is {} throughout", raw[0]),
+            "check its wiring, or that the right column was imported",
+        ));
+    }
+    let window = ((WINDOW_S / period_s).round() as usize)
+        .clamp(FEWEST_IN_WINDOW, raw.len().max(FEWEST_IN_WINDOW));
+    let (mut means, mut variances, mut shares) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut run, mut run_end, mut length, mut step) = (1, 0, 1, f64::INFINITY);
+    for (index, part) in raw.chunks_exact(window).enumerate() {
+        let n = part.len() as f64;
+        let mean = part[0] + part.iter().map(|u| u - part[0]).sum::<f64>() / n;
+        variances.push(part.iter().map(|u| (u - mean).powi(2)).sum::<f64>() / (n - 1.0));
+        means.push(mean);
+        let mut repeats = 0;
+        let from = index * window;
+        for i in from.max(1)..from + window {
+            let change = (raw[i] - raw[i - 1]).abs();
+            if change == 0.0 {
+                repeats += 1;
+                length += 1;
+                if length > run {
+                    (run, run_end) = (length, i);
+                }
+            } else {
+                length = 1;
+                step = step.min(change);
+            }
+        }
+        shares.push(f64::from(repeats) / n);
+    }
+    let share = quantile(&mut shares, 0.5).unwrap_or(0.0).max(1e-3);
+    let by_chance = 1.0 + (RUN_LOG_ODDS + (raw.len() as f64).ln()) / -share.ln();
+    if share < 0.8 && run as f64 > by_chance && run as f64 * period_s > RUN_S {
+        return Err(Error::new(
+            format!(
+                "{place}, {}",
+                seconds_in((run_end + 1 - run) as f64 * period_s)
+            ),
+            format!(
+                "the channel is stuck at {} for {}",
+                raw[run_end],
+                duration(run as f64 * period_s)
+            ),
+            "check its wiring, or choose another stretch with --from and --to",
+        ));
+    }
+    // A converter coarser than the noise leaves some windows without any: half its step is the least that can be told.
+    let least = if step.is_finite() {
+        0.25 * step * step
+    } else {
+        0.0
+    };
+    let floor = quantile(&mut variances.clone(), 0.05)
+        .unwrap_or(0.0)
+        .max(least);
+    // A slow turn shows in no variance, but where it begins and ends the mean steps; a drift does not step.
+    let mut steps: Vec<f64> = means.windows(2).map(|m| (m[1] - m[0]).abs()).collect();
+    let sigma = 1.4826 * quantile(&mut steps.clone(), 0.5).unwrap_or(0.0);
+    let reach = STEP_SIGMAS * sigma.max((floor / window as f64).sqrt());
+    steps.insert(0, 0.0);
+    let moving = variances
+        .iter()
+        .zip(&steps)
+        .map(|(v, step)| *v > STILL_FACTOR * floor || *step > reach)
+        .collect();
+    Ok(Suitability {
+        window,
+        moving,
+        levels: segments(raw),
+    })
+}
+
+fn seconds_in(s: f64) -> String {
+    format!("{s:.2} s into the stretch")
+}
+
+/// Refuses a stretch in which the unit moves, and says where it does not. In a stretch that was chosen by hand it is a
+/// warning: a person may know better what a disturbance is.
+pub(super) fn refuse_motion(
+    channels: &[(usize, Suitability)],
+    stretch: &Stretch,
+    part: Part,
+    place: &str,
+    warnings: &mut Vec<String>,
+) -> Result<()> {
+    let windows = channels
+        .iter()
+        .map(|(_, s)| s.moving.len())
+        .min()
+        .unwrap_or(0);
+    let moves = |k: usize| channels.iter().any(|(_, s)| s.moving[k]);
+    let Some(first) = (0..windows).find(|k| moves(*k)) else {
+        return Ok(());
+    };
+    let who = channels.iter().find(|(_, s)| s.moving[first]);
+    let name = who.map_or("a channel", |(i, _)| RAW_COLUMNS[*i]);
+    let window_s = channels[0].1.window as f64 * stretch.period_s;
+    let time = |k: usize| stretch.span_s[0] + k as f64 * window_s;
+    let count = (0..windows).filter(|k| moves(*k)).count();
+    let problem = format!(
+        "the unit moves, or something shakes it, in {:.1} % of the time, first at {:.1} s ({name})",
+        100.0 * count as f64 / windows as f64,
+        time(first)
+    );
+    if part != Part::Whole {
+        warnings.push(problem);
+        return Ok(());
+    }
+    let rest = longest(windows, |k| !moves(k));
+    let remedy = match rest.len() {
+        0 => "record at rest".to_string(),
+        // The windows at both ends may hold some of the motion.
+        _ => format!(
+            "the longest rest is --from {:.1} --to {:.1}",
+            time(rest.start),
+            time(rest.end)
+        ),
+    };
+    Err(Error::new(place, problem, remedy))
+}
