@@ -15,7 +15,8 @@ pub fn to_toml(header: &str, file: &impl Serialize) -> String {
     let mut in_string = false;
     for line in text.lines() {
         let fences = line.matches("\"\"\"").count() + line.matches("'''").count();
-        let continued = std::mem::replace(&mut in_string, in_string ^ (fences % 2 == 1));
+        let continued = in_string;
+        in_string ^= fences % 2 == 1;
         let header = line.strip_prefix('[').filter(|_| !continued);
         if let Some(path) = header.map(|h| h.trim_matches(['[', ']'])) {
             let many = line.starts_with("[[");
