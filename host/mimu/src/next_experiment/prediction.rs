@@ -193,10 +193,17 @@ pub fn calibrates(setup: &Setup, experiment: &Experiment) -> bool {
     })
 }
 
-/// Columns of an effect's coefficients in each problem, over the sigma of a dwell's mean.
+/// An effect in the problems of its sensor.
 struct Columns {
-    /// Basis of the affine parameters, and the columns.
-    problems: Vec<(Vec<DVector<f64>>, Vec<DVector<f64>>)>,
+    problems: Vec<InProblem>,
+}
+
+/// An effect in one problem.
+struct InProblem {
+    /// Basis of the affine parameters.
+    affine: Vec<DVector<f64>>,
+    /// Column of each coefficient, over the sigma of a dwell's mean.
+    coefficients: Vec<DVector<f64>>,
 }
 
 impl Columns {
@@ -225,7 +232,10 @@ impl Columns {
                     column.fill(0.0);
                 }
             }
-            (p.affine, columns)
+            InProblem {
+                affine: p.affine,
+                coefficients: columns,
+            }
         });
         Self {
             problems: each.collect(),
@@ -241,20 +251,24 @@ impl Columns {
             }
             sum
         };
-        let each = self.problems.iter();
+        let each = self.problems.iter().map(|p| InProblem {
+            affine: p.affine.clone(),
+            coefficients: vec![sum(&p.coefficients)],
+        });
         Self {
-            problems: each.map(|(a, c)| (a.clone(), vec![sum(c)])).collect(),
+            problems: each.collect(),
         }
     }
 
     /// Sigma of each coefficient beside the affine parameters and, if there is one, a rival, as far as this is seen itself;
     /// infinite where it is not determined.
     fn sigmas(&self, rival: Option<&Self>) -> Vec<f64> {
-        let count = self.problems[0].1.len();
+        let count = self.problems[0].coefficients.len();
         let mut information = vec![0.0; count];
-        for (p, (affine, columns)) in self.problems.iter().enumerate() {
-            let mut basis = affine.clone();
-            for column in rival.iter().flat_map(|r| &r.problems[p].1) {
+        for (p, own) in self.problems.iter().enumerate() {
+            let columns = &own.coefficients;
+            let mut basis = own.affine.clone();
+            for column in rival.iter().flat_map(|r| &r.problems[p].coefficients) {
                 extend(&mut basis, column.clone());
             }
             let seen: Vec<(usize, DVector<f64>)> = columns
