@@ -1,19 +1,20 @@
 //! Most out of so many minutes: how many dwells, how long, and how often the whole again.
 
 use rayon::prelude::*;
+use serde::Serialize;
 
 use super::model::Setting;
 use super::problem::Problem;
 use super::refinement::Region as _;
 use super::tour::{Motion, Order, by_lot};
 use crate::allan::model::FLOOR;
-use crate::noise::AllanModel;
+use crate::allan::variance::AllanModel;
 use crate::noise_file::NoiseFile;
 use crate::quantity::Sensor;
 use mimu_recording::error::{Error, Result};
 
 /// Noise of a sensor as density and floor, from which the sigma of a dwell mean follows.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct DwellNoise {
     /// White noise N, SI unit times √s (the same as per √Hz).
     pub n: f64,

@@ -25,11 +25,13 @@ pub mod spread;
 use decision::{Decision, decide, noisier};
 use mimu_core::compensation::Affine;
 use nalgebra::{Matrix3, Vector3};
+use picture::Picture;
 use removal::{Removed, removable, remove};
 use rows::{Free, Rows, Session};
+use serde::Serialize;
 
 use crate::calibration::Calibration;
-use crate::estimate::session_bias;
+use crate::fit::session_bias;
 use crate::fit::{Fit, Options, fit, fit_biases};
 use crate::prepared::Prepared;
 use crate::quantity::Sensor;
@@ -37,7 +39,8 @@ use mimu_recording::error::{Error, Result};
 use mimu_recording::{RawUnit, Reference};
 
 /// What a diagnosis says.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Verdict {
     /// Noise explains what the affine model leaves.
     Clean,
@@ -67,6 +70,8 @@ pub struct SensorDiagnosis {
     pub rows: Rows,
     /// What its rows led to.
     pub decision: Decision,
+    /// What of it is drawn; `None` where a model of it is singular.
+    pub picture: Option<Picture>,
 }
 
 /// What was found in a recording.
@@ -87,9 +92,10 @@ pub struct Diagnosis {
 }
 
 /// A recording, told apart from others.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Source {
     /// Its file of samples.
+    #[serde(rename = "samples")]
     pub place: String,
     /// Samples.
     pub rows: u64,
@@ -322,10 +328,12 @@ pub fn diagnose(recordings: Recordings, options: Options) -> Result<Diagnosis> {
             later = cleaned;
             now = calibrate(first)?;
         }
+        let picture = Picture::of(sensor, &rows, &decision);
         sensors.push(SensorDiagnosis {
             sensor,
             rows,
             decision,
+            picture,
         });
     }
     sensors.reverse();

@@ -353,7 +353,7 @@ pub fn opposite_rates(observations: &[Observation]) -> Result<Estimated, Failure
     let mut notes = Vec::new();
     if single > 0 {
         notes.push(format!(
-            "{single} rates have no opposite and are not used by --method xu"
+            "{single} rates have no opposite and are not used by the inverse form"
         ));
     }
     let scatter_of = |values: Vec<f64>, variances: &[Matrix3<f64>], axis: usize, dof: f64| {

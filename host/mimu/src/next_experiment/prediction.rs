@@ -56,6 +56,9 @@ impl Prediction {
 impl Target {
     /// A listed effect, each coefficient at its typical size, beside the affine parameters and any one of the other listed effects
     /// of the sensor that depend on time or temperature if it does, and on neither if it does not.
+    ///
+    /// The rate of the Earth, which is no error, is nobody's rival and has none: at rest it is a g-sensitivity to the last digit, and
+    /// what tells them apart is the latitude.
     pub fn listed(effect: &'static Effect) -> Self {
         let candidate = Candidate::new(effect.sensor, Kind::Effect(effect));
         let others = library::all().filter(|e| e.sensor == effect.sensor && e.id != effect.id);
@@ -68,6 +71,7 @@ impl Target {
                 .map(|k| effect.typical[*k])
                 .collect(),
             rivals: rivals
+                .filter(|r| effect.is_error() && r.is_error())
                 .filter(|r| !r.reads_code() && r.is_slow() == slow)
                 .collect(),
             candidate,

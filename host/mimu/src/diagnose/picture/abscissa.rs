@@ -1,5 +1,7 @@
 //! What an effect is drawn against: found by asking its regressors, so that an effect says it nowhere but in its physics.
 
+use serde::Serialize;
+
 use crate::diagnose::candidate::{Candidate, Kind};
 use crate::diagnose::effect::{Moment, REFERENCE_C};
 use crate::quantity::AXES;
@@ -104,7 +106,7 @@ pub enum Dependence {
 }
 
 /// Abscissa of a drawing.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Abscissa {
     /// Name.
     pub name: String,

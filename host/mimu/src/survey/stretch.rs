@@ -2,11 +2,13 @@
 
 use std::ops::Range;
 
-use super::{Columns, FEWEST};
-use crate::allan::model::duration;
-use crate::quantity::plural;
+use super::columns::Columns;
+use crate::quantity::{duration, plural};
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{Column, Recording};
+
+/// Fewer have no five octaves up to a quarter of them, which a model needs beside their half.
+pub(super) const FEWEST: usize = 64;
 
 /// Part of a recording.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,9 +1,8 @@
 //! Whether a channel is at rest and alive: only then is its Allan curve that of its noise.
 
-use super::stretch::{Stretch, longest, segments};
-use super::{FEWEST, Part};
-use crate::allan::model::duration;
+use super::stretch::{FEWEST, Part, Stretch, longest, segments};
 use crate::blocks::quantile;
+use crate::quantity::duration;
 use crate::stillness::{STILL_FACTOR, WINDOW_S};
 use mimu_recording::RAW_COLUMNS;
 use mimu_recording::error::{Error, Result};
