@@ -13,8 +13,9 @@ use mimu::fit::{Method, Options};
 use mimu::next_experiment::next;
 use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
+use mimu::result::diagnosis::DiagnosisResult;
 use mimu::stillness::STILL_FACTOR;
-use mimu_cli::report::{DiagnosisReport, Made, diagnosis_json, diagnosis_page, diagnosis_text};
+use mimu_cli::report::{Made, diagnosis_page, diagnosis_text};
 use mimu_rig::random::Random;
 use mimu_rig::rig_file::{EffectFile, RigFile, RigTruth};
 use nalgebra::{DMatrix, DVector};
@@ -183,11 +184,7 @@ fn clean(plan: &str, file: &RigFile, seed: u64) -> Arc<Prepared> {
 
 /// A diagnosis that everything was said and drawn of: none may fail for what was found.
 pub fn reported(diagnosis: Diagnosis) -> Diagnosis {
-    let report = DiagnosisReport {
-        next: next(&diagnosis),
-        diagnosis,
-        second: None,
-    };
+    let report = DiagnosisResult::of(&diagnosis, &next(&diagnosis), None);
     let made = Made {
         recording: "blind".into(),
         command: "mimu diagnose blind".into(),
@@ -195,15 +192,15 @@ pub fn reported(diagnosis: Diagnosis) -> Diagnosis {
     };
     let page = diagnosis_page(&report, &made).expect("a page");
     let text = diagnosis_text(&report);
-    let json = diagnosis_json(&report).to_string();
-    for effect in &report.diagnosis.effects {
+    let json = serde_json::to_string(&report).expect("JSON");
+    for effect in &diagnosis.effects {
         let id = effect.candidate.id();
         assert!(
             [&page, &text, &json].iter().all(|said| said.contains(&id)),
             "{id}"
         );
     }
-    report.diagnosis
+    diagnosis
 }
 
 /// Records and diagnoses a unit with `ids`.

@@ -136,7 +136,7 @@ pub fn with_a_table(runs: u64, dwells: Dwells) -> Vec<Tally> {
     let methods = [
         ("least squares", Method::LeastSquares),
         ("Kalman bank", Method::Kalman),
-        ("inverse form (xu)", Method::Xu),
+        ("inverse form (xu)", Method::InverseForm),
         ("six positions", Method::SixPositions),
     ];
     let methods = match dwells {

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use indicatif::{ProgressBar, ProgressStyle};
 use mimu_recording::error::{Error, Result};
 use mimu_recording::result_file::{Staged, stage};
+use serde::Serialize;
 
 use crate::arguments::JsonArgs;
 
@@ -45,10 +46,12 @@ pub(crate) fn progress(what: &'static str) -> ProgressBar {
 pub(crate) fn print(
     json: &JsonArgs,
     text: &str,
-    value: &serde_json::Value,
+    result: &impl Serialize,
     files: impl IntoIterator<Item = Staged>,
 ) -> Result<()> {
-    let pretty = format!("{value:#}\n");
+    let mut pretty = serde_json::to_string_pretty(result)
+        .map_err(|e| Error::new("--json", e, "report this: the result cannot be written"))?;
+    pretty.push('\n');
     let file = json.file().map(|path| stage(path, pretty.clone()));
     for staged in files.into_iter().chain(file.transpose()?) {
         staged.publish()?;

@@ -1,12 +1,11 @@
 //! The calibration file: TOML that a program reads and a person can apply with a pocket calculator.
 
 mod effect;
+mod of_fit;
 mod on_device;
-mod writing;
 
 pub use effect::{CoefficientTable, ConverterTable, EffectTable, FormTable};
 pub use on_device::{NO_SENSE, OnDevice, What};
-pub use writing::to_toml;
 
 use std::path::Path;
 
@@ -14,19 +13,37 @@ use mimu_core::RealField;
 use mimu_core::compensation::Affine;
 use mimu_core::effects::Effects;
 use nalgebra::{Matrix3, Vector3};
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use crate::effects::removal::Removed;
 use crate::quantity::Sensor;
+use crate::toml_layout;
 use crate::triad::Forward;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{RawUnit, Reference, read_text};
 
 /// Version of the layout.
 const FORMAT: &str = "mimu-calibration/1";
+/// How a triad's numbers are applied, and from what to what.
+const FORMULA: &str = "x = C u + o";
+const INVERSE_DIRECTION: &str = "raw to SI";
+
+/// What a person has to know to apply a calibration by hand.
+const HEADER: &str = "\
+# Calibration of an inertial unit. To apply it by hand to a raw reading u = (x, y, z):
+#   first axis  = C[0][0]*u_x + C[0][1]*u_y + C[0][2]*u_z + o[0],  and so on by rows.
+";
+const HEADER_OF_EFFECTS: &str = "\
+# of a reading without the errors e of the effects below, which are added up for each sensor and are SI:
+#   u_x - S_x*e_x in place of u_x, with S_x the root of the sum of squares of P[0], and so on.
+";
+const HEADER_OF_KEYS: &str = "\
+# sigma_ is a standard deviation, interval_ half of a 95 % interval; misalignments are in the order x, y, z,
+# non-orthogonalities yz, zy, zx. sha256 is that of the samples file, temp_c the mean of its dwells in degrees Celsius.
+";
 
 /// A calibration as a file holds it.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Calibration {
     /// `mimu-calibration/1`.
@@ -46,7 +63,7 @@ pub struct Calibration {
     #[serde(default)]
     pub accel: Option<TriadTable>,
     /// What the affine models lack.
-    #[serde(default, rename = "effect")]
+    #[serde(default, rename = "effect", skip_serializing_if = "Vec::is_empty")]
     pub effect_tables: Vec<EffectTable>,
     /// The same as it is taken out.
     #[serde(skip)]
@@ -54,7 +71,7 @@ pub struct Calibration {
 }
 
 /// The recording that a calibration was made from.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Origin {
     /// SHA-256 of its samples file.
@@ -71,7 +88,7 @@ pub struct Origin {
 }
 
 /// One triad in a calibration file.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[allow(non_snake_case)] // C, P: the letters of the formulas, in the file as in the papers
 pub struct TriadTable {
@@ -110,7 +127,7 @@ pub struct TriadTable {
 }
 
 /// Error figures of the fit.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Judged {
     /// How it was estimated.
@@ -124,7 +141,7 @@ pub struct Judged {
     /// On data it had not seen.
     #[serde(default)]
     pub held_out_rms: Option<f64>,
-    /// If noise were all.
+    /// With noise alone.
     pub noise_floor: f64,
     /// Dwells used.
     pub dwells: usize,
@@ -133,7 +150,7 @@ pub struct Judged {
 }
 
 /// Forward model, SI to raw.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[allow(non_snake_case)]
 pub struct ForwardTable {
@@ -148,7 +165,7 @@ pub struct ForwardTable {
 }
 
 /// Physical quantities with their standard deviations.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PhysicalTable {
     /// How `P` is made of them.
@@ -180,7 +197,7 @@ impl Calibration {
 
     /// Parses and checks the text of a calibration file; `place` is its path.
     pub fn parse(text: &str, place: &str) -> Result<Self> {
-        let mut calibration: Self = toml::from_str(text).map_err(|e| {
+        let calibration: Self = toml::from_str(text).map_err(|e| {
             let message = e.message().trim();
             // A missing key has the table that lacks it for its place.
             let line = e.span().map_or(1, |s| {
@@ -194,10 +211,24 @@ impl Calibration {
             };
             Error::new(format!("{place}, line {line}"), message, remedy)
         })?;
-        if calibration.format != FORMAT {
+        calibration.checked(place)
+    }
+
+    /// Text of the file, for programs and for people.
+    pub fn to_toml(&self) -> String {
+        let effects = match self.effect_tables.is_empty() {
+            true => "",
+            false => HEADER_OF_EFFECTS,
+        };
+        toml_layout::to_toml(&format!("{HEADER}{effects}{HEADER_OF_KEYS}"), self)
+    }
+
+    /// What can be applied, with its effects as they are removed.
+    fn checked(mut self, place: &str) -> Result<Self> {
+        if self.format != FORMAT {
             let problem = format!(
                 "format is {:?}, and this program reads {FORMAT:?}",
-                calibration.format
+                self.format
             );
             return Err(Error::new(
                 place,
@@ -206,7 +237,7 @@ impl Calibration {
             ));
         }
         for sensor in Sensor::BOTH {
-            let Some(table) = calibration.table(sensor) else {
+            let Some(table) = self.table(sensor) else {
                 continue;
             };
             let place = format!("{place}, [{sensor}]");
@@ -223,9 +254,9 @@ impl Calibration {
                     "fit the recording again",
                 ));
             }
-            if table.direction != "raw to SI" || table.formula != "x = C u + o" {
+            if table.direction != INVERSE_DIRECTION || table.formula != FORMULA {
                 let problem = format!(
-                    "formula {:?}, direction {:?}: only x = C u + o, raw to SI, can be applied",
+                    "formula {:?}, direction {:?}: only {FORMULA}, {INVERSE_DIRECTION}, can be applied",
                     table.formula, table.direction
                 );
                 return Err(Error::new(
@@ -241,7 +272,7 @@ impl Calibration {
                     "fit the recording again",
                 ));
             }
-            let inverse = calibration.inverse(sensor);
+            let inverse = self.inverse(sensor);
             let Some(forward) = inverse.as_ref().and_then(Forward::of) else {
                 return Err(Error::new(
                     place,
@@ -251,15 +282,15 @@ impl Calibration {
             };
             check_both_ways(table, &forward, &place)?;
         }
-        if calibration.gyro.is_none() && calibration.accel.is_none() {
+        if self.gyro.is_none() && self.accel.is_none() {
             return Err(Error::new(
                 place,
                 "there is neither [gyro] nor [accel]",
                 "fit the recording again",
             ));
         }
-        calibration.effects = effect::read(&calibration, place)?;
-        Ok(calibration)
+        self.effects = effect::read(&self, place)?;
+        Ok(self)
     }
 
     /// What the affine models lack.

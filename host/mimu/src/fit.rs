@@ -1,6 +1,9 @@
 //! From a recording to a calibration of both triads, judged on what it was not fitted to.
 
 mod biases;
+pub mod plausible;
+mod sensor;
+pub mod session_bias;
 
 use mimu_core::compensation::Affine;
 use nalgebra::Vector3;
@@ -9,15 +12,17 @@ use rayon::prelude::*;
 use crate::estimate::least_squares::POORLY_DETERMINED;
 use crate::estimate::rotation::{Turn, direction_error};
 use crate::estimate::{Estimated, Failure, Observation, gravity_size, known_input, rotation};
-use crate::plausible;
 use crate::prepared::{Prepared, si_covariance};
 use crate::quantity::{Figure, Sensor};
 use crate::stillness::STILL_FACTOR;
 use crate::triad::Triad;
-use mimu_recording::error::{Error, Result};
+use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{RawUnit, Reference};
 
+use sensor::rms;
+
 pub use biases::fit_biases;
+pub use sensor::{Residual, SensorFit};
 
 /// How a triad with known input is estimated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -27,7 +32,7 @@ pub enum Method {
     /// Forward form, recursive: fang (23)-(28).
     Kalman,
     /// Inverse form: xu (3)-(11) for the gyro, (12)-(16) for the accelerometer.
-    Xu,
+    InverseForm,
     /// Six positions: scale factors and biases only.
     SixPositions,
 }
@@ -51,7 +56,7 @@ impl Method {
         match self {
             Self::LeastSquares => "least squares",
             Self::Kalman => "Kalman bank",
-            Self::Xu => "inverse form (xu)",
+            Self::InverseForm => "inverse form",
             Self::SixPositions => "six positions",
         }
     }
@@ -75,75 +80,6 @@ impl Options {
     }
 }
 
-/// One residual: where it is, and how large in sample and held out.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Residual {
-    /// Dwell, or the dwell that a turn ends in.
-    pub dwell: usize,
-    /// Vector residual: input error, direction error; for a size, the error stands first.
-    pub value: Vector3<f64>,
-    /// The same by a calibration that has not seen it. `None`: could not be held out.
-    pub held_out: Option<Vector3<f64>>,
-    /// Standard deviation that noise alone gives it (root mean square over its parts).
-    pub floor: f64,
-}
-
-/// Fit of one triad.
-#[derive(Debug, Clone)]
-pub struct SensorFit {
-    /// Which.
-    pub sensor: Sensor,
-    /// Calibration, scatter and condition.
-    pub estimated: Estimated,
-    /// What the error figures are about.
-    pub figure: Figure,
-    /// One for every dwell or turn that was used.
-    pub residuals: Vec<Residual>,
-    /// Number of dwells used.
-    pub dwells: usize,
-    /// Compensated gyro dwell means without a table, root mean square in sample and held out, rad/s.
-    pub static_rms: Option<(f64, Option<f64>)>,
-    /// Why blocks could not be held out.
-    pub not_held_out: Vec<String>,
-    /// What a person should know.
-    pub warnings: Vec<String>,
-}
-
-impl SensorFit {
-    /// Root mean square of the residuals: over axes where the input is known, of angle or size elsewhere.
-    pub fn rms(&self) -> f64 {
-        rms(self.figure, self.residuals.iter().map(|r| r.value))
-    }
-
-    /// The same of the held-out residuals; `None` if there are none.
-    pub fn held_out_rms(&self) -> Option<f64> {
-        let held = || self.residuals.iter().filter_map(|r| r.held_out);
-        (held().count() > 0).then(|| rms(self.figure, held()))
-    }
-
-    /// What [`Self::rms`] would be if noise were all.
-    pub fn noise_floor(&self) -> f64 {
-        rms(
-            Figure::GravitySize,
-            self.residuals
-                .iter()
-                .map(|r| Vector3::new(r.floor, 0.0, 0.0)),
-        )
-    }
-}
-
-fn rms(figure: Figure, values: impl Iterator<Item = Vector3<f64>>) -> f64 {
-    let (mut sum, mut n) = (0.0, 0.0);
-    for v in values {
-        sum += v.norm_squared();
-        n += match figure {
-            Figure::Input => 3.0,
-            Figure::GravitySize | Figure::Direction => 1.0,
-        };
-    }
-    (sum / n).sqrt()
-}
-
 /// Fit of a recording.
 #[derive(Debug, Clone)]
 pub struct Fit {
@@ -162,7 +98,7 @@ impl Fit {
     pub fn estimator(&self, sensor: Sensor) -> &'static str {
         match (self.prepared.manifest.reference, sensor) {
             (Reference::Table, _) => self.options.method.name(),
-            (Reference::Gravity, Sensor::Accel) => "size of gravity",
+            (Reference::Gravity, Sensor::Accel) => "magnitude of specific force",
             (Reference::Gravity, Sensor::Gyro) => "turns and rests",
         }
     }
@@ -181,8 +117,9 @@ pub fn fit(prepared: Prepared, options: Options) -> Result<Fit> {
         return Err(Error::new(
             &prepared.place,
             format!("there is no {only} to fit alone"),
-            format!("leave --only out, or add {only}_x, {only}_y, {only}_z"),
-        ));
+            format!("fit the other one, or add {only}_x, {only}_y, {only}_z"),
+        )
+        .about(Argument::Only));
     }
     let mut warnings = prepared.condensed.warnings.clone();
     warnings.extend(prepared.dwells.warnings.iter().cloned());
@@ -261,8 +198,8 @@ fn fit_known(
         let estimate = |o: &[Observation]| match (options.method, sensor) {
             (Method::LeastSquares, _) => known_input::least_squares(o, wander),
             (Method::Kalman, _) => known_input::kalman(o, wander),
-            (Method::Xu, Sensor::Gyro) => known_input::opposite_rates(o),
-            (Method::Xu, Sensor::Accel) => known_input::inverse_form(o),
+            (Method::InverseForm, Sensor::Gyro) => known_input::opposite_rates(o),
+            (Method::InverseForm, Sensor::Accel) => known_input::inverse_form(o),
             (Method::SixPositions, _) => known_input::six_positions(o),
         };
         let estimated = match estimate(&observations) {
@@ -279,11 +216,14 @@ fn fit_known(
                 continue;
             }
             Err(failure) => {
-                let mut error = prepared.refused(failure, sensor);
-                if let Some(other) = Sensor::BOTH.into_iter().find(|s| *s != sensor && wanted(s)) {
-                    error.remedy += &format!("; or fit the other one alone with --only {other}");
-                }
-                return Err(error);
+                let error = prepared.refused(failure, sensor);
+                let other = Sensor::BOTH.into_iter().find(|s| *s != sensor && wanted(s));
+                return Err(match other {
+                    Some(other) => error
+                        .map(|e| e.remedy += &format!("; or fit the {other} alone"))
+                        .about(Argument::Only),
+                    None => error,
+                });
             }
         };
         if observations
@@ -291,7 +231,7 @@ fn fit_known(
             .any(|o| prepared.dwells.list[o.dwell].turn)
             && sensor == Sensor::Gyro
         {
-            warnings.push("gyro: the turns are taken to be of exactly the stated angle about exactly the stated axis; what hands and table miss of that is in no interval".into());
+            warnings.push("gyro: the turns are taken to be of exactly the given angle about exactly the given axis; what hands and table miss of that is in no interval".into());
         }
         let error = |triad: &Triad, o: &Observation| triad.inverse.apply(&o.raw) - o.input;
         let matrix = estimated.triad.inverse.matrix;
@@ -356,7 +296,8 @@ fn refit<T: Send>(
 const FEW_DOF: f64 = 3.0;
 
 fn cannot_hold_out(block: usize, failure: Failure, sensor: Sensor) -> String {
-    let problem = failure.into_error(sensor).problem;
+    let error = failure.into_error(sensor);
+    let problem = &error.refused().problem;
     format!(
         "block {} cannot be held out: without it {problem}",
         block + 1
@@ -434,8 +375,9 @@ pub(crate) fn refuse_wrong_gravity(
             return Err(Error::new(
                 &prepared.place,
                 problem,
-                "import it with --scale accel=9.80665",
-            ));
+                "import it with the factor accel=9.80665",
+            )
+            .about(Argument::Scale));
         }
     }
     Ok(())

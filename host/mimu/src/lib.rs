@@ -2,7 +2,7 @@
 //!
 //! | in order of use | what                                                                          |
 //! |-----------------|-------------------------------------------------------------------------------|
-//! | [`quantity`]    | sensors, axes, units, and how numbers are written                            |
+//! | [`quantity`]    | sensors, axes, SI units, and how numbers are written                         |
 //! | [`blocks`], [`increment`] | one pass over the samples condenses them to 0.1 s blocks and 10 ms integrals |
 //! | [`rails`], [`stillness`], [`dwell`] | which samples and which stretches can be averaged           |
 //! | [`reading_step`] | the step that readings are multiples of                                       |
@@ -10,13 +10,15 @@
 //! | [`prepared`]    | all of these for one recording                                                |
 //! | [`estimate`]    | the estimators                                                                |
 //! | [`triad`]       | calibration of one triad: both directions, covariances, physical quantities   |
-//! | [`fit`], [`plausible`] | both triads, judged on what they have not seen; what cannot be right is refused |
+//! | [`fit`]         | both triads, judged on what they have not seen; what cannot be right is refused |
 //! | [`calibration`], [`verify`] | the file, and judging it by another recording                     |
 //! | [`diagnose`]    | the effect behind a residual: found, added, proved on other data              |
 //! | [`design`]      | experiments: which attitudes and rates, how many, for how long                |
 //! | [`next_experiment`] | what to record next, where a diagnosis leaves something open              |
-//! | [`allan`]       | noise from a recording at rest: Allan deviation and noise model                |
+//! | [`allan`], [`survey`] | Allan deviation and noise model of a series; of the channels of a recording at rest |
 //! | [`noise_file`]  | its result for the other commands                                             |
+//! | [`result`]      | what a fit, a verification and a survey found: one type each, which JSON is    |
+//! | [`readable`]    | from SI to the units of data sheets                                           |
 
 //!
 //! A recording from arrays, calibrated, and the calibration applied to a reading:
@@ -52,6 +54,9 @@
 //! assert!((scale.value - 0.3 / g).abs() < scale.interval); // V/(m/s²), with its 95 % interval
 //! let force = accel.estimated.triad.inverse.apply(&nalgebra::Vector3::new(1.65, 1.65, 1.95));
 //! assert!((force.z - g).abs() < 0.01);
+//!
+//! let file = mimu::Calibration::of(&fitted, &[], "2026-01-01T00:00:00Z")?.to_toml();
+//! assert!(file.contains("direction = \"raw to SI\""));
 //! # Ok::<(), mimu_recording::error::Error>(())
 //! ```
 
@@ -68,12 +73,15 @@ pub mod increment;
 pub mod next_experiment;
 pub mod noise;
 pub mod noise_file;
-pub mod plausible;
 pub mod prepared;
 pub mod quantity;
 pub mod rails;
+pub mod readable;
 pub mod reading_step;
+pub mod result;
 pub mod stillness;
+pub mod survey;
+mod toml_layout;
 pub mod triad;
 pub mod verify;
 

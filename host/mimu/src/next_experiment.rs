@@ -14,6 +14,7 @@ pub mod recipe;
 pub mod words;
 
 use rayon::prelude::*;
+use serde::Serialize;
 
 use crate::design::budget::DwellNoise;
 use crate::design::reach::{Carrier, RateList, Rates};
@@ -44,7 +45,7 @@ pub const CHAMBER_C: [f64; 3] = [25.0, 45.0, 5.0];
 const ALTERNATIVES: usize = 3;
 
 /// Two candidates that the recording does not tell apart.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize)]
 pub struct Confused {
     /// That which was accepted, and the other.
     pub ids: [String; 2],

@@ -11,40 +11,13 @@ use nalgebra::{DMatrix, Vector3};
 use mimu_core::compensation::Affine;
 
 use self::wander::{Slow, Span};
-use crate::allan::model::FLOOR;
+use crate::allan::variance::AllanModel;
 use crate::blocks::{Block, Condensed};
 use crate::dwell::Dwell;
 use crate::noise_file::NoiseFile;
 use crate::quantity::Sensor;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{Manifest, RAW_COLUMNS, RawUnit};
-
-/// Allan variance of one raw channel as `N²/τ + B² + K² τ`: white noise, bias instability and rate
-/// random walk, each at least zero.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct AllanModel {
-    /// N², raw units squared times s.
-    pub white: f64,
-    /// Level of the flicker floor, raw units squared (that is (0.664 B)²).
-    pub flicker: f64,
-    /// K²/3, raw units squared per s.
-    pub walk: f64,
-}
-
-impl AllanModel {
-    /// Variance of the mean over `tau_s`, raw units squared.
-    pub fn variance(&self, tau_s: f64) -> f64 {
-        self.white / tau_s + self.flicker + self.walk * tau_s
-    }
-
-    /// Its slow part.
-    fn slow(&self) -> Slow {
-        Slow {
-            instability: (self.flicker / FLOOR).sqrt(),
-            walk: (3.0 * self.walk).sqrt(),
-        }
-    }
-}
 
 /// Noise of one raw channel by a record at rest, at one temperature or several (fang, Table 5).
 #[derive(Debug, Clone, PartialEq)]
@@ -177,9 +150,9 @@ impl Noise {
                         format!("{}, channel {name}", file.place),
                         format!("it is in {}, and the readings are in {unit}", channel.unit),
                         match manifest.raw_unit {
-                            RawUnit::Si => "run mimu allan with --calibration",
+                            RawUnit::Si => "find the noise with the calibration of the unit",
                             _ => {
-                                "run mimu allan on a recording in the same unit, without --calibration"
+                                "find the noise in a recording in the same unit, without a calibration"
                             }
                         },
                     ));
@@ -264,7 +237,7 @@ impl Noise {
             None => self.channels[from + i].variance(averaged_s),
             Some(stated) => {
                 let model = stated.at(dwell.temp_c);
-                let wander = model.slow().covariance(&[span(dwell)], self.session);
+                let wander = Slow::from(model).covariance(&[span(dwell)], self.session);
                 model.white / averaged_s + wander[(0, 0)]
             }
         })
@@ -291,7 +264,7 @@ impl Noise {
                         .collect();
                     let mut one = AllanModel::default();
                     *part(&mut one) = 1.0;
-                    let c = one.slow().covariance(&spans, self.session);
+                    let c = Slow::from(one).covariance(&spans, self.session);
                     DMatrix::from_fn(spans.len(), spans.len(), |i, j| {
                         c[(i, j)] * amplitude[i] * amplitude[j]
                     })

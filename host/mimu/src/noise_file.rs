@@ -2,11 +2,12 @@
 
 use std::path::Path;
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use crate::allan::model::{FLOOR, Term};
-use crate::noise::AllanModel;
+use crate::allan::variance::AllanModel;
 use crate::quantity::Sensor;
+use crate::toml_layout::to_toml;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{RAW_COLUMNS, read_text};
 
@@ -14,7 +15,7 @@ use mimu_recording::{RAW_COLUMNS, read_text};
 pub const NOISE_FORMAT: &str = "mimu-noise/1";
 
 /// A noise file as `mimu allan -o` writes it.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct NoiseFile {
     /// [`NOISE_FORMAT`].
@@ -35,7 +36,7 @@ pub struct NoiseFile {
 }
 
 /// One channel of a noise file.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct NoiseChannel {
     /// Column: `gyro_x` to `accel_z`.
@@ -69,7 +70,7 @@ pub struct NoiseChannel {
 }
 
 /// A coefficient of a noise file.
-#[derive(Debug, Clone, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FileCoefficient {
     /// Estimate.
@@ -110,7 +111,19 @@ impl NoiseChannel {
     }
 }
 
+/// What a person has to know to use a noise file.
+const HEADER: &str = "\
+# Noise of an inertial unit at rest: sigma^2(tau) = 3 Q^2/tau^2 + N^2/tau + (2 ln 2/pi) B^2 + K^2 tau/3 + R^2 tau^2/2.
+# q quantization, n white noise, b bias instability, k rate random walk, r rate ramp, with a confidence interval each.
+# A coefficient that the record does not show is absent, and its reason is there.
+";
+
 impl NoiseFile {
+    /// Text of the file.
+    pub fn to_toml(&self) -> String {
+        to_toml(HEADER, self)
+    }
+
     /// Reads and checks a noise file.
     pub fn read(path: &Path) -> Result<Self> {
         Self::parse(&read_text(path)?, &path.display().to_string())

@@ -4,12 +4,14 @@ use std::fmt;
 use std::ops::Range;
 
 use mimu_recording::RawUnit;
+use serde::Serialize;
 
 /// Names of the axes.
 pub const AXES: [&str; 3] = ["x", "y", "z"];
 
 /// A sensor triad.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Sensor {
     /// Gyro triad.
     Gyro,
@@ -52,15 +54,21 @@ impl fmt::Display for Sensor {
     }
 }
 
-/// What an error figure is about.
+/// What an error figure is about; a file has [`Figure::description`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Figure {
-    /// Compensated dwell mean less known input, over dwells and axes: SI of the sensor.
+    /// Compensated dwell mean minus known input, over dwells and axes: SI of the sensor.
     Input,
-    /// Size of the compensated dwell mean less gravity, m/s².
+    /// Magnitude of the compensated dwell mean minus gravity, m/s².
     GravitySize,
     /// Angle between the predicted and the measured direction of gravity after each turn, rad.
     Direction,
+}
+
+impl Serialize for Figure {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.description())
+    }
 }
 
 impl Figure {
@@ -75,18 +83,9 @@ impl Figure {
     /// What it is about, as a sentence fragment.
     pub fn description(self) -> &'static str {
         match self {
-            Self::Input => "compensated dwell mean less known input, over dwells and axes",
-            Self::GravitySize => "size of the compensated dwell mean less gravity",
+            Self::Input => "compensated dwell mean minus known input, over dwells and axes",
+            Self::GravitySize => "magnitude of the compensated dwell mean minus gravity",
             Self::Direction => "angle between predicted and measured gravity after each turn",
-        }
-    }
-
-    /// Factor from SI, and unit, in which a person reads the figure of `sensor`.
-    pub fn readable(self, sensor: Sensor) -> (f64, &'static str) {
-        match (self, sensor) {
-            (Self::Direction, _) => (1f64.to_degrees(), "deg"),
-            (_, Sensor::Gyro) => (1f64.to_degrees(), "deg/s"),
-            (_, Sensor::Accel) => (1e3, "mm/s²"),
         }
     }
 }
@@ -118,11 +117,22 @@ pub fn scale_unit(raw: RawUnit, si: &str) -> String {
     }
 }
 
+/// `value` as `digits` significant digits leave it; what a file is to hold to no more than is known.
+pub fn rounded(value: f64, digits: usize) -> f64 {
+    let text = format!("{value:.*e}", digits.saturating_sub(1));
+    text.parse().unwrap_or(value)
+}
+
 /// `value` to three significant digits, without an exponent where that reads well.
 pub fn significant(value: f64) -> String {
     if value == 0.0 || !value.is_finite() {
         return format!("{value}");
     }
+    // Rounded first: 0.0099998, which time stamps make of 0.01, would have one more. What has no decimals keeps all its digits.
+    let value = match value.abs() < 100.0 {
+        true => rounded(value, 3),
+        false => value,
+    };
     let digits = 2 - value.abs().log10().floor() as i32;
     if (-3..=6).contains(&digits) {
         format!("{value:.*}", digits.max(0) as usize)
@@ -146,6 +156,24 @@ pub fn plus_minus(value: f64, half: f64) -> String {
     format!("{value:.digits$} ± {half:.digits$}")
 }
 
+/// A time as a person says it.
+pub fn duration(s: f64) -> String {
+    match s {
+        s if s < 120.0 => format!("{} s", significant(s)),
+        s if s < 7200.0 => format!("{} min", significant(s / 60.0)),
+        s if s < 172_800.0 => format!("{} h", significant(s / 3600.0)),
+        s => format!("{} days", significant(s / 86_400.0)),
+    }
+}
+
+/// The same to the second: `90.0 s`, `2 min 30 s`.
+pub fn minutes(seconds: f64) -> String {
+    match seconds.round() {
+        s if s < 120.0 => format!("{} s", significant(seconds)),
+        s => format!("{} min {} s", (s / 60.0).floor(), s % 60.0),
+    }
+}
+
 /// `1 sample`, `2 samples`.
 pub fn plural(n: u64, noun: &str) -> String {
     if n == 1 {
@@ -166,6 +194,23 @@ pub fn normal_gravity(latitude_deg: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn three_digits_are_shown_and_no_whole_number_is_cut() {
+        let cases = [
+            (0.009_999_8, "0.0100"),
+            (0.01, "0.0100"),
+            (99.96, "100"),
+            (-2.345, "-2.35"),
+            (2174.4, "2174"),
+            (1.5e-7, "1.50e-7"),
+            (0.0, "0"),
+        ];
+        for (value, text) in cases {
+            assert_eq!(significant(value), text);
+        }
+        assert_eq!(rounded(2.234_56e-6, 4), 2.235e-6);
+    }
 
     #[test]
     fn normal_gravity_is_that_of_the_ellipsoid_at_the_equator_and_the_poles() {

@@ -6,8 +6,9 @@ use crate::report;
 use crate::report::allan_plot as plot;
 use clap::{Args, ValueEnum};
 use mimu::allan::Kind;
-use mimu::allan::recording::{Options, Part, Survey, survey};
 use mimu::calibration::Calibration;
+use mimu::result::allan::AllanResult;
+use mimu::survey::{Options, Part, Survey, survey};
 use mimu_recording::error::{Error, Result};
 use mimu_recording::result_file::stage;
 use mimu_recording::{MANIFEST_FILE, Recording};
@@ -53,7 +54,7 @@ pub struct AllanArgs {
 
 #[derive(Clone, Copy, ValueEnum)]
 enum KindArg {
-    /// Overlapping Allan (fang 8)
+    /// Overlapping Allan
     Allan,
     /// Modified Allan
     Modified,
@@ -163,17 +164,18 @@ pub fn run(args: &AllanArgs) -> Result<()> {
             "record the temperature, or give one recording at a time",
         ));
     }
-    let mut text = report::allan_text(&surveys);
+    let result = AllanResult::of(&surveys);
+    let mut text = report::allan_text(&result);
     let mut staged = Vec::new();
-    if let Some(path) = &args.output {
-        staged.push(stage(path, report::allan_toml(&surveys))?);
+    if let (Some(path), Some(noise)) = (&args.output, result.noise_file()) {
+        staged.push(stage(path, noise.to_toml())?);
         text.push_str(&format!("\nnoise: {}\n", path.display()));
     }
-    if let (Some(path), [survey]) = (&args.plot, surveys.as_slice()) {
-        staged.push(stage(path, plot::svg(survey)?)?);
+    if let Some(path) = &args.plot {
+        staged.push(stage(path, plot::svg(&result)?)?);
         text.push_str(&format!("\nplot: {}\n", path.display()));
     }
-    print(&args.json, &text, &report::allan_json(&surveys), staged)
+    print(&args.json, &text, &result, staged)
 }
 
 /// Refuses a recording whose channels cannot stand in one file with those of the first.

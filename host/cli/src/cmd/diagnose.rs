@@ -2,12 +2,13 @@
 
 use std::path::PathBuf;
 
-use crate::report::{self, DiagnosisReport, Made};
+use crate::report::{self, Made};
 use clap::Args;
-use mimu::calibration::{Calibration, EffectTable, to_toml};
+use mimu::calibration::{Calibration, EffectTable};
 use mimu::diagnose::{Diagnosis, Recordings, diagnose};
 use mimu::fit::{Method, Options};
 use mimu::next_experiment;
+use mimu::result::diagnosis::DiagnosisResult;
 use mimu::verify::verify;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::result_file::stage;
@@ -109,14 +110,14 @@ pub fn run(args: &DiagnoseArgs) -> Result<()> {
             Error::new(place, problem, remedy)
         })?;
     }
-    let after = to_toml(&diagnosis.after, &effects, &now);
     let mut judged = None;
     if let (Some(other), Some(path)) = (second, &args.verify) {
-        // By the files that they would be: what is judged is what is given away.
-        let before = to_toml(&diagnosis.before, &known, &now);
-        let by = |text: &str| verify(&other, &Calibration::parse(text, "calibration")?);
+        let by =
+            |fit, effects: &[EffectTable]| verify(&other, &Calibration::of(fit, effects, &now)?);
+        let before = by(&diagnosis.before, &known);
+        let after = by(&diagnosis.after, &effects);
         let path = path.display();
-        match (by(&before), by(&after)) {
+        match (before, after) {
             (Ok(before), Ok(after)) => judged = Some((path.to_string(), [before, after])),
             (Err(refusal), _) | (_, Err(refusal)) => {
                 let warning = format!("{path} cannot judge the calibration: {refusal}");
@@ -126,7 +127,8 @@ pub fn run(args: &DiagnoseArgs) -> Result<()> {
     }
     let mut files = Vec::new();
     if let Some(path) = &args.output {
-        files.push(stage(path, after)?);
+        let made = Calibration::of(&diagnosis.after, &effects, &now)?;
+        files.push(stage(path, made.to_toml())?);
     }
     let next = next_experiment::next(&diagnosis);
     let mut said = String::new();
@@ -141,11 +143,8 @@ pub fn run(args: &DiagnoseArgs) -> Result<()> {
             None => "\nplan of the next experiment: none written, as there is nothing that one of this kind would settle\n".into(),
         };
     }
-    let found = DiagnosisReport {
-        diagnosis,
-        next,
-        second: judged,
-    };
+    let judged = judged.as_ref().map(|(name, both)| (name.as_str(), both));
+    let found = DiagnosisResult::of(&diagnosis, &next, judged);
     let named: Vec<String> = args
         .recordings
         .iter()
@@ -162,7 +161,7 @@ pub fn run(args: &DiagnoseArgs) -> Result<()> {
     print(
         &args.json,
         &(report::diagnosis_text(&found) + &said),
-        &report::diagnosis_json(&found),
+        &found,
         files,
     )
 }

@@ -7,7 +7,7 @@ use clap::Args;
 use mimu::noise_file::NoiseFile;
 use mimu_recording::error::Result;
 use mimu_recording::result_file::stage;
-use serde_json::json;
+use serde::Serialize;
 
 use crate::arguments::JsonArgs;
 use crate::cmd::design::number;
@@ -37,6 +37,14 @@ pub struct ExportArgs {
     json: JsonArgs,
 }
 
+/// What was written, and where.
+#[derive(Serialize)]
+struct ExportResult {
+    format: &'static str,
+    kalibr: String,
+    yaml: String,
+}
+
 pub fn run(args: &ExportArgs) -> Result<()> {
     check_outputs(&[Some(&args.kalibr), args.json.file()], &[&args.noise])?;
     let options = KalibrOptions {
@@ -47,6 +55,10 @@ pub fn run(args: &ExportArgs) -> Result<()> {
     let noise = NoiseFile::read(&args.noise)?;
     let yaml = kalibr(&noise, &options)?;
     let text = format!("{yaml}\nkalibr: {}\n", args.kalibr.display());
-    let value = json!({ "format": "mimu-export/1", "kalibr": args.kalibr, "yaml": yaml });
-    print(&args.json, &text, &value, Some(stage(&args.kalibr, yaml)?))
+    let result = ExportResult {
+        format: "mimu-export/1",
+        kalibr: args.kalibr.display().to_string(),
+        yaml: yaml.clone(),
+    };
+    print(&args.json, &text, &result, Some(stage(&args.kalibr, yaml)?))
 }

@@ -3,8 +3,9 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use mimu::calibration::to_toml;
+use mimu::calibration::Calibration;
 use mimu::fit::{Method, Options, fit};
+use mimu::result::fit::FitResult;
 use mimu_recording::Reference;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::result_file::stage;
@@ -43,12 +44,13 @@ pub(crate) struct FitArgs {
 
 #[derive(Clone, Copy, ValueEnum)]
 enum MethodArg {
-    /// Forward form, all dwells at once (fang)
+    /// Forward form, all dwells at once
     LeastSquares,
-    /// Forward form, bank of Kalman filters (fang)
+    /// Forward form, bank of Kalman filters
     Kalman,
-    /// Inverse form, differences of opposite rates (xu)
-    Xu,
+    /// Inverse form, differences of opposite rates
+    #[value(alias = "xu")]
+    InverseForm,
     /// Scale factors and biases only, from six positions
     SixPositions,
 }
@@ -67,7 +69,7 @@ pub(crate) fn run(args: &FitArgs) -> Result<()> {
         method: match args.method {
             None | Some(MethodArg::LeastSquares) => Method::LeastSquares,
             Some(MethodArg::Kalman) => Method::Kalman,
-            Some(MethodArg::Xu) => Method::Xu,
+            Some(MethodArg::InverseForm) => Method::InverseForm,
             Some(MethodArg::SixPositions) => Method::SixPositions,
         },
         holdout_blocks: args.holdout,
@@ -86,21 +88,20 @@ pub(crate) fn run(args: &FitArgs) -> Result<()> {
         ));
     }
     let fitted = fit(prepared, options)?;
-    let mut text = report::fit_text(&fitted);
+    let result = FitResult::of(&fitted);
+    let mut text = report::fit_text(&result);
     if args.dwells {
         text.push('\n');
-        text.push_str(&report::dwell_table(
-            &fitted.prepared.dwells.list,
-            &fitted.prepared.manifest,
-        ));
+        text.push_str(&report::dwell_table(&result.dwells));
     }
     let mut calibration = None;
     if let Some(path) = &args.output {
         let now = jiff::Timestamp::now()
             .round(jiff::Unit::Second)
             .unwrap_or_default();
-        calibration = Some(stage(path, to_toml(&fitted, &[], &now.to_string()))?);
+        let made = Calibration::of(&fitted, &[], &now.to_string())?;
+        calibration = Some(stage(path, made.to_toml())?);
         text.push_str(&format!("\ncalibration: {}\n", path.display()));
     }
-    print(&args.json, &text, &report::fit_json(&fitted), calibration)
+    print(&args.json, &text, &result, calibration)
 }

@@ -106,10 +106,5 @@ pub(crate) fn run(args: ImportArgs) -> Result<()> {
             summary.sample_rate_hz
         ));
     }
-    print(
-        &args.json,
-        &report::import_text(&summary),
-        &report::import_json(&summary),
-        None,
-    )
+    print(&args.json, &report::import_text(&summary), &summary, None)
 }

@@ -1,9 +1,203 @@
-//! What `mimu allan` says: JSON and the noise file for programs, a table for people.
+//! The noise of a unit at rest for people: coefficients, curve, and what is missing.
 
-mod file;
-mod json;
-mod text;
+use std::fmt::Write as _;
 
-pub use file::allan_toml;
-pub use json::allan_json;
-pub use text::allan_text;
+use mimu::allan::model::Term;
+use mimu::quantity::{Sensor, duration, significant};
+use mimu::readable::{self, Readable};
+use mimu::result::allan::{AllanResult, ChannelResult, RecordingResult};
+
+use crate::report::text::warn;
+
+/// Result of `mimu allan`: a block for each recording.
+pub fn allan_text(result: &AllanResult) -> String {
+    let block = |recording| recording_text(result, recording);
+    let blocks: Vec<String> = result.recordings.iter().map(block).collect();
+    blocks.join("\n")
+}
+
+fn recording_text(result: &AllanResult, recording: &RecordingResult) -> String {
+    let mut out = String::new();
+    let [from, to] = recording.span_s;
+    let temperature = recording.temp_c.map(|t| format!(", {t:.1} °C"));
+    let _ = writeln!(
+        out,
+        "{} in {}: {} at rest from {:.1} s at {:.2} Hz{}, {} deviation",
+        result.device.as_deref().unwrap_or_default(),
+        recording.recording,
+        duration(to - from),
+        from,
+        recording.sample_rate_hz,
+        temperature.unwrap_or_default(),
+        result.kind.unwrap_or_default()
+    );
+    for sensor in Sensor::BOTH {
+        let channels = result.channels(&recording.recording, sensor);
+        if !channels.is_empty() {
+            let _ = writeln!(out);
+            sensor_text(&mut out, result.confidence, sensor, &channels);
+        }
+    }
+    if !recording.warnings.is_empty() {
+        let _ = writeln!(out);
+        warn(&mut out, recording.warnings.iter());
+    }
+    out
+}
+
+/// Rows of a label and a cell for each channel.
+type Rows = Vec<(String, Vec<String>)>;
+
+fn write_rows(out: &mut String, rows: &Rows) {
+    let cells = rows.iter().flat_map(|(_, cells)| cells);
+    let width = 2 + cells.map(|c| c.chars().count()).max().unwrap_or(0);
+    for (label, cells) in rows {
+        let _ = write!(out, "  {label:<15}");
+        for cell in cells {
+            let _ = write!(out, "{cell:>width$}");
+        }
+        let _ = writeln!(out);
+    }
+}
+
+fn interval(value: f64, lower: f64, upper: f64, unit: &Readable) -> String {
+    let [v, l, u] = [value, lower, upper].map(|x| significant(x * unit.factor));
+    format!("{v} ({l}–{u})")
+}
+
+fn sensor_text(
+    out: &mut String,
+    confidence: Option<f64>,
+    sensor: Sensor,
+    channels: &[&ChannelResult],
+) {
+    let percent = 100.0 * confidence.unwrap_or(f64::NAN);
+    let _ = writeln!(
+        out,
+        "{sensor}: coefficient ({} % interval)",
+        significant(percent).trim_end_matches(".0")
+    );
+    let mut rows: Rows = vec![(String::new(), ["x", "y", "z"].map(String::from).into())];
+    for term in Term::ALL {
+        let Some(any) = channels.iter().find_map(|c| c.get(term).ok()) else {
+            continue;
+        };
+        for unit in readable::noise(&any.unit) {
+            let cells = channels.iter().map(|c| match c.get(term) {
+                Ok(k) => interval(k.value, k.lower, k.upper, &unit),
+                Err(_) => "-".into(),
+            });
+            rows.push((format!("{}, {}", term.letter(), unit.unit), cells.collect()));
+        }
+    }
+    let dwell = |c: &&ChannelResult| match (c.useful_average_s, &c.model) {
+        (Some(s), _) => duration(s),
+        (None, Some(model)) => format!("over {}", duration(model.range_s[1])),
+        (None, None) => "-".into(),
+    };
+    rows.push((
+        "useful average".into(),
+        channels.iter().map(dwell).collect(),
+    ));
+    write_rows(out, &rows);
+    curve_text(out, channels);
+    reasons(out, channels);
+}
+
+/// One point of a curve: averaging time, deviation, ends of its interval, sigma of independent clusters.
+type Point = [f64; 5];
+
+/// The point of a curve nearest to a time, if there is one within 5 %.
+fn near(time_s: f64, [tau, deviation, lower, upper, sigma]: [&[f64]; 5]) -> Option<Point> {
+    let distance = |t: &f64| (t / time_s).ln().abs();
+    let each = tau.iter().enumerate();
+    let (i, t) = each.min_by(|a, b| distance(a.1).total_cmp(&distance(b.1)))?;
+    (distance(t) < 0.05).then(|| [*t, deviation[i], lower[i], upper[i], sigma[i]])
+}
+
+/// The curve at one time a decade, with the bounds and beside them what fang (7) gives, which is one sigma.
+fn curve_text(out: &mut String, channels: &[&ChannelResult]) {
+    let unit = &readable::noise(channels[0].unit)[0];
+    let _ = writeln!(
+        out,
+        "  deviation, {}; bounds, and in brackets one sigma of independent clusters, %",
+        unit.unit
+    );
+    let mut rows = Rows::new();
+    let mut decade = 1e-6;
+    while decade < 1e9 {
+        let cell = |p: Option<Point>| match p {
+            Some([_, deviation, lower, upper, sigma]) => {
+                let [lower, upper] = [lower, upper].map(|v| 100.0 * (v / deviation - 1.0));
+                let places = if upper < 1.0 { 2 } else { 1 };
+                format!(
+                    "{} {lower:+.places$} {upper:+.places$} ({:.places$})",
+                    significant(deviation * unit.factor),
+                    100.0 * sigma / deviation
+                )
+            }
+            None => "-".into(),
+        };
+        let points = channels.iter().map(|c| {
+            let columns = [&c.tau_s, &c.adev, &c.lower, &c.upper, &c.sigma_independent];
+            near(decade, columns.map(Vec::as_slice))
+        });
+        let points: Vec<Option<Point>> = points.collect();
+        if let Some(first) = points.iter().flatten().next() {
+            let label = format!("  {} s", significant(first[0]));
+            rows.push((label, points.into_iter().map(cell).collect()));
+            let beside = channels.iter().map(|c| {
+                let h = c.hadamard.as_ref()?;
+                let columns = [&h.tau_s, &h.hdev, &h.lower, &h.upper, &h.sigma_independent];
+                near(decade, columns.map(Vec::as_slice))
+            });
+            let beside: Vec<Option<Point>> = beside.collect();
+            if beside.iter().any(Option::is_some) {
+                let cells = beside.into_iter().map(cell);
+                rows.push(("    Hadamard".into(), cells.collect()));
+            }
+        }
+        decade *= 10.0;
+    }
+    write_rows(out, &rows);
+}
+
+/// Why coefficients are missing, and where the model does not hold; the same sentence once.
+fn reasons(out: &mut String, channels: &[&ChannelResult]) {
+    let mut given: Vec<(String, Vec<&str>)> = Vec::new();
+    let mut give = |name, text: String| match given.iter_mut().find(|(t, _)| *t == text) {
+        Some((_, names)) => names.push(name),
+        None => given.push((text, vec![name])),
+    };
+    for channel in channels {
+        let missing = Term::ALL.map(|t| channel.get(t).err().map(|why| (t, why)));
+        let Some(model) = &channel.model else {
+            if let Some((_, why)) = missing[0] {
+                give(channel.name, format!("no coefficients: {why}"));
+            }
+            continue;
+        };
+        for (term, why) in missing.into_iter().flatten() {
+            give(channel.name, format!("{} {why}", term.letter()));
+        }
+        if model.range_s[0] > 1.5 * channel.tau_s.first().copied().unwrap_or(0.0) {
+            let from = duration(model.range_s[0]);
+            give(
+                channel.name,
+                format!("fitted from {from} on: the terms do not describe the curve below"),
+            );
+        }
+        if let Some(excess) = model.excess {
+            give(
+                channel.name,
+                format!(
+                    "the terms do not describe the curve: the intervals are {} times wider for it",
+                    significant(excess.sqrt())
+                ),
+            );
+        }
+    }
+    for (text, names) in given {
+        let _ = writeln!(out, "  {}: {text}", names.join(", "));
+    }
+}

@@ -3,9 +3,10 @@
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-use mimu::allan::model::{FLOOR, NoiseModel, Term};
-use mimu::allan::recording::{Channel, Survey};
+use mimu::allan::model::{FLOOR, Term};
 use mimu::quantity::Sensor;
+use mimu::readable;
+use mimu::result::allan::{AllanResult, ChannelResult, ModelResult};
 use mimu_recording::error::{Error, Result};
 
 /// Colours that stay apart for the colour-blind (Okabe and Ito).
@@ -18,11 +19,11 @@ const COLOURS: [RGBColor; 3] = [
 /// Size of one panel, pixels.
 const PANEL: (u32, u32) = (640, 520);
 
-/// The curves of a survey as SVG.
-pub fn svg(survey: &Survey) -> Result<String> {
+/// The curves of a single recording as SVG.
+pub fn svg(result: &AllanResult) -> Result<String> {
     let sensors: Vec<Sensor> = Sensor::BOTH
         .into_iter()
-        .filter(|s| survey.channels.iter().any(|c| c.sensor == *s))
+        .filter(|s| result.channels.iter().any(|c| c.sensor() == *s))
         .collect();
     let mut text = String::new();
     let size = (PANEL.0 * sensors.len() as u32, PANEL.1);
@@ -31,8 +32,8 @@ pub fn svg(survey: &Survey) -> Result<String> {
         let draw = || -> std::result::Result<(), Box<dyn std::error::Error>> {
             root.fill(&WHITE)?;
             for (panel, sensor) in root.split_evenly((1, sensors.len())).iter().zip(&sensors) {
-                let of_sensor = survey.channels.iter().filter(|c| c.sensor == *sensor);
-                draw_panel(panel, survey, *sensor, &of_sensor.collect::<Vec<_>>())?;
+                let of_sensor = result.channels.iter().filter(|c| c.sensor() == *sensor);
+                draw_panel(panel, result, *sensor, &of_sensor.collect::<Vec<_>>())?;
             }
             root.present()?;
             Ok(())
@@ -47,13 +48,12 @@ type Area<'a> = DrawingArea<SVGBackend<'a>, plotters::coord::Shift>;
 
 fn draw_panel(
     area: &Area,
-    survey: &Survey,
+    result: &AllanResult,
     sensor: Sensor,
-    channels: &[&Channel],
+    channels: &[&ChannelResult],
 ) -> std::result::Result<(), Box<dyn std::error::Error>> {
-    let usual = channels[0].unit.deviation(sensor);
+    let usual = &readable::noise(channels[0].unit)[0];
     let by = usual.factor;
-    let points = || channels.iter().flat_map(|c| c.curve.iter());
     let ends = |values: &mut dyn Iterator<Item = f64>, room: f64| {
         let (low, high) = values
             .filter(|v| v.is_finite() && *v > 0.0)
@@ -66,16 +66,28 @@ fn draw_panel(
             0.5..2.0
         }
     };
-    let x = ends(&mut points().map(|p| p.tau_s), 1.1);
+    let x = ends(
+        &mut channels.iter().flat_map(|c| c.tau_s.iter().copied()),
+        1.1,
+    );
     // Of the longest times only the curve and not the whole of the band has to be seen.
-    let y = ends(&mut points().map(|p| p.deviation * by), 1.6);
+    let y = ends(
+        &mut channels.iter().flat_map(|c| c.adev.iter().map(|d| d * by)),
+        1.6,
+    );
     let title = match sensor {
         Sensor::Gyro => "Gyros",
         Sensor::Accel => "Accelerometers",
     };
-    let kind = survey.options.kind.name();
+    let kind = result.kind.unwrap_or_default();
     let mut chart = ChartBuilder::on(area)
-        .caption(format!("{title} of {}", survey.device), ("sans-serif", 18))
+        .caption(
+            format!(
+                "{title} of {}",
+                result.device.as_deref().unwrap_or_default()
+            ),
+            ("sans-serif", 18),
+        )
         .margin(14)
         .x_label_area_size(46)
         .y_label_area_size(78)
@@ -86,7 +98,7 @@ fn draw_panel(
     chart
         .configure_mesh()
         .x_desc("averaging time, s")
-        .y_desc(format!("{kind} deviation, {}", usual.name))
+        .y_desc(format!("{kind} deviation, {}", usual.unit))
         .axis_desc_style(("sans-serif", 15))
         .label_style(("sans-serif", 13))
         .x_label_formatter(&|v| label(*v))
@@ -94,18 +106,11 @@ fn draw_panel(
         .light_line_style(WHITE)
         .bold_line_style(RGBColor(225, 225, 225))
         .draw()?;
-    let inside = |v: f64| v.clamp(y.start, y.end);
+    let at = |tau_s, deviation| clamped(tau_s, deviation, by, [y.start, y.end]);
     for (k, channel) in channels.iter().enumerate() {
         let band = COLOURS[k].mix(0.2);
-        let high = channel
-            .curve
-            .iter()
-            .map(|p| (p.tau_s, inside(p.upper * by)));
-        let low = channel
-            .curve
-            .iter()
-            .rev()
-            .map(|p| (p.tau_s, inside(p.lower * by)));
+        let high = at(&channel.tau_s, &channel.upper);
+        let low = at(&channel.tau_s, &channel.lower).rev();
         chart.draw_series([Polygon::new(
             high.chain(low).collect::<Vec<_>>(),
             band.filled(),
@@ -113,13 +118,14 @@ fn draw_panel(
     }
     for (k, channel) in channels.iter().enumerate() {
         let style = COLOURS[k].stroke_width(2);
-        let curve = channel.curve.iter().map(|p| (p.tau_s, p.deviation * by));
+        let curve = channel.tau_s.iter().zip(&channel.adev);
+        let curve = curve.map(|(t, d)| (*t, d * by));
         chart
             .draw_series(LineSeries::new(curve, style))?
             .label(channel.name)
             .legend(move |(x, y)| PathElement::new([(x, y), (x + 22, y)], style));
         if let Some(hadamard) = &channel.hadamard {
-            let curve = hadamard.iter().map(|p| (p.tau_s, inside(p.deviation * by)));
+            let curve = at(&hadamard.tau_s, &hadamard.hdev);
             chart
                 .draw_series(DashedLineSeries::new(curve, 7, 4, style))?
                 .label(format!("{}, Hadamard", channel.name))
@@ -129,10 +135,10 @@ fn draw_panel(
         }
     }
     let thin = BLACK.stroke_width(1);
-    for (k, (_, model)) in models(channels).enumerate() {
+    for (k, (_, channel, model)) in models(channels).enumerate() {
         let [from, to] = model.range_s;
-        let curve = (0..=100).map(|i| from * (to / from).powf(f64::from(i) / 100.0));
-        let curve = curve.map(|t| (t, inside(model.deviation(t) * by)));
+        let fitted = at(&channel.tau_s, &model.adev);
+        let curve = fitted.filter(|(t, _)| (from..=to).contains(t));
         let series = chart.draw_series(DashedLineSeries::new(curve, 2, 3, thin))?;
         if k == 0 {
             series.label("models").legend(move |(x, y)| {
@@ -142,7 +148,7 @@ fn draw_panel(
     }
     for term in [Term::N, Term::B, Term::K] {
         let marks: Vec<(usize, (f64, f64))> = models(channels)
-            .filter_map(|(k, model)| Some((k, read_at(model, term)?)))
+            .filter_map(|(k, channel, model)| Some((k, read_at(channel, model, term)?)))
             .map(|(k, (t, deviation))| (k, (t, deviation * by)))
             .filter(|(_, at)| x.contains(&at.0) && y.contains(&at.1))
             .collect();
@@ -170,21 +176,34 @@ fn draw_panel(
     Ok(())
 }
 
-/// The models of the channels that have one, with the channel's number.
-fn models<'a>(channels: &'a [&Channel]) -> impl Iterator<Item = (usize, &'a NoiseModel)> {
-    let with_model = |(k, c): (usize, &'a &Channel)| Some((k, c.model.as_ref()?));
+/// Points of a curve in a plot whose ordinate, `by` times the deviation, ends at `ends`.
+fn clamped<'a>(
+    tau_s: &'a [f64],
+    deviation: &'a [f64],
+    by: f64,
+    [low, high]: [f64; 2],
+) -> impl DoubleEndedIterator<Item = (f64, f64)> + Clone + 'a {
+    let each = tau_s.iter().zip(deviation);
+    each.map(move |(t, d)| (*t, (d * by).clamp(low, high)))
+}
+
+/// The channels that have a model, with the channel's number.
+fn models<'a>(
+    channels: &'a [&'a ChannelResult],
+) -> impl Iterator<Item = (usize, &'a ChannelResult, &'a ModelResult)> {
+    let with_model = |(k, c): (usize, &&'a ChannelResult)| Some((k, *c, c.model.as_ref()?));
     channels.iter().enumerate().filter_map(with_model)
 }
 
 /// Averaging time at which a plot shows a coefficient, and the deviation there: N at 1 s, K at 3 s, and B where the model has come
 /// down to its floor.
-fn read_at(model: &NoiseModel, term: Term) -> Option<(f64, f64)> {
-    let value = model.get(term).ok()?.value;
+fn read_at(channel: &ChannelResult, model: &ModelResult, term: Term) -> Option<(f64, f64)> {
+    let value = channel.get(term).ok()?.value;
     match term {
         Term::N => Some((1.0, value)),
         Term::K => Some((3.0, value)),
         Term::B => {
-            let floor_s = model.useful_average_s().unwrap_or(model.range_s[1]);
+            let floor_s = channel.useful_average_s.unwrap_or(model.range_s[1]);
             Some((floor_s, value * FLOOR.sqrt()))
         }
         Term::Q | Term::R => None,

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::process::{Command, Output};
 
 use mimu::diagnose::diagnose;
-use mimu::diagnose::picture::{Against, Picture};
+use mimu::diagnose::picture::Against;
 use mimu::fit::{Method, Options};
 use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
@@ -93,7 +93,7 @@ fn the_effect_that_is_drawn_is_the_one_that_the_unit_has() {
         .iter()
         .find(|s| s.sensor == Sensor::Gyro)
         .unwrap();
-    let picture = Picture::of(gyro).unwrap();
+    let picture = gyro.picture.as_ref().unwrap();
     assert_eq!(
         gyro.decision.accepted[0].chosen.candidate.id(),
         "gyro_scale_cubic"

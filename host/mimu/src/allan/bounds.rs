@@ -1,18 +1,14 @@
-//! Confidence bounds of a deviation: which power law the noise follows at this averaging time, how many independent
-//! squares the estimate is worth for that noise, and what a chi-square distribution of so many says.
+//! Confidence bounds of a deviation: how many independent squares the estimate has for noise of a power law, and what a
+//! chi-square distribution of so many gives.
 //!
-//! Each step has one source: the power law Riley and Greenhall, "Power law noise identification using the lag 1
-//! autocorrelation", EFTF 2004, and Howe et al., PTTI 2000, where too few samples are left for it;
-//! [`Estimator::edf`] Greenhall and Riley, "Uncertainty of stability variances based on finite differences", PTTI
+//! Each step has one source: [`Estimator::edf`] Greenhall and Riley, "Uncertainty of stability variances based on finite differences", PTTI
 //! 2003; [`interval`] NIST SP 1065, section 5.3.
 //!
 //! fang (7) is none of this: it counts clusters as if they did not overlap and were white, and is symmetric.
 
 mod edf;
-mod power_law;
 
 pub use edf::{Estimator, Sampling};
-pub(super) use power_law::power_law;
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 

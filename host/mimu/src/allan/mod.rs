@@ -2,17 +2,21 @@
 //!
 //! | module       | what                                                                       |
 //! |--------------|----------------------------------------------------------------------------|
-//! | [`deviation`] | overlapping deviations of one series, fang (3)-(8), at any averaging times |
-//! | [`bounds`]   | power law of the noise at each time, degrees of freedom, chi-square bounds |
+//! | [`deviation`] | overlapping differences of one series, fang (3)-(8)                       |
+//! | `power_law`  | power law of the noise at each averaging time                              |
+//! | [`bounds`]   | degrees of freedom for it, chi-square bounds                               |
+//! | [`curve`]    | all of these at any averaging times                                        |
 //! | [`model`]    | N, B, K, Q and R fitted to the whole curve, with intervals                 |
-//! | [`recording`] | the stretch of a recording that is used, its channels' curves and models  |
-//! | [`plot`], [`units`] | the curves as SVG; units of the coefficients as people write them   |
+//! | [`variance`] | N, B and K alone, as the variance of a mean                                |
+//! | [`units`]    | units of the coefficients in files                                         |
 
 pub mod bounds;
+pub mod curve;
 pub mod deviation;
 pub mod model;
-pub mod recording;
+mod power_law;
 pub mod units;
+pub mod variance;
 
 /// Which variance of second or third differences.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -32,6 +36,25 @@ impl Kind {
             Self::Allan => "Allan",
             Self::Modified => "modified Allan",
             Self::Hadamard => "Hadamard",
+        }
+    }
+}
+
+impl Kind {
+    /// Differences of the rates: 2 for the second difference of the integral, 3 for the third.
+    pub(super) fn order(self) -> usize {
+        match self {
+            Self::Allan | Self::Modified => 2,
+            Self::Hadamard => 3,
+        }
+    }
+
+    /// Number of differences that `points` of the integral have at cluster length `m`.
+    pub(super) fn terms(self, points: usize, m: usize) -> usize {
+        match self {
+            Self::Allan => points.saturating_sub(2 * m),
+            Self::Hadamard => points.saturating_sub(3 * m),
+            Self::Modified => (points + 1).saturating_sub(3 * m),
         }
     }
 }
@@ -67,6 +90,7 @@ pub struct Point {
     pub lower: f64,
     /// Upper bound.
     pub upper: f64,
-    /// Half of a one-sigma interval by fang (7): deviation times `1/√(2 (N/n - 1))`, for comparison.
-    pub fang_7: f64,
+    /// Standard deviation as if clusters did not overlap and were independent, fang (7): deviation times `1/√(2 (N/n - 1))`, for
+    /// comparison.
+    pub sigma_independent: f64,
 }

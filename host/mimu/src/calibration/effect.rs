@@ -1,12 +1,9 @@
 //! Effects in a calibration file.
 
-use std::fmt::Write as _;
-
 use mimu_core::effects::FARTHEST_ZERO;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use super::Calibration;
-use super::writing::{number, quoted};
 use crate::effects;
 use crate::effects::candidate::{Candidate, Kind};
 use crate::effects::converter::{Codes, Converter};
@@ -22,7 +19,7 @@ const FORMULA: &str = "x = C (u - S e) + o, e_i = sum of coefficient * regressor
 const DIRECTION: &str = "raw to SI";
 
 /// An effect in a calibration file.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct EffectTable {
     /// Public id.
@@ -36,17 +33,17 @@ pub struct EffectTable {
     /// `raw to SI`.
     pub direction: String,
     /// Its nonlinear constant, if it has one.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub form: Option<FormTable>,
     /// Of errors by the code: the converters, of all axes or one each.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub converters: Vec<ConverterTable>,
     /// Those that the experiment determined; the others are zero.
     pub coefficients: Vec<CoefficientTable>,
 }
 
 /// Nonlinear constant of an effect.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FormTable {
     /// Name, with the unit.
@@ -56,7 +53,7 @@ pub struct FormTable {
 }
 
 /// How the codes of a converter stand behind readings.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ConverterTable {
     /// Axes whose readings it gives: x, y or z, or xyz.
@@ -144,7 +141,7 @@ impl ConverterTable {
 }
 
 /// Coefficient of an effect.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CoefficientTable {
     /// Name within the effect.
@@ -315,53 +312,6 @@ impl EffectTable {
             parameter: form,
             values: values.into_iter().flatten().collect(),
         })
-    }
-
-    /// Writes it as TOML.
-    pub(super) fn write(&self, out: &mut String) -> std::fmt::Result {
-        writeln!(
-            out,
-            "\n[[effect]]\nid = {}\nsensor = {}\nabout = {}\nformula = {}\ndirection = {}",
-            quoted(&self.id),
-            quoted(&self.sensor),
-            quoted(&self.about),
-            quoted(&self.formula),
-            quoted(&self.direction)
-        )?;
-        if let Some(form) = &self.form {
-            writeln!(
-                out,
-                "form = {{ name = {}, value = {} }}",
-                quoted(&form.name),
-                number(form.value)
-            )?;
-        }
-        if !self.converters.is_empty() {
-            writeln!(out, "converters = [")?;
-            for c in &self.converters {
-                writeln!(
-                    out,
-                    "  {{ axes = {}, weight_of_bit_0_raw = {}, reading_of_code_0_raw = {}, reading_of_code_0_within_raw = {} }},",
-                    quoted(&c.axes),
-                    number(c.weight_of_bit_0_raw),
-                    number(c.reading_of_code_0_raw),
-                    number(c.reading_of_code_0_within_raw)
-                )?;
-            }
-            writeln!(out, "]")?;
-        }
-        writeln!(out, "coefficients = [")?;
-        for c in &self.coefficients {
-            writeln!(
-                out,
-                "  {{ name = {}, value = {}, sigma = {:.3e}, unit = {} }},",
-                quoted(&c.name),
-                number(c.value),
-                c.sigma,
-                quoted(&c.unit)
-            )?;
-        }
-        writeln!(out, "]")
     }
 }
 

@@ -20,11 +20,13 @@ pub mod spread;
 use decision::{Decision, decide, noisier};
 use mimu_core::compensation::Affine;
 use nalgebra::{Matrix3, Vector3};
+use picture::Picture;
 use rows::{Free, Rows, Session};
+use serde::Serialize;
 
 use crate::calibration::Calibration;
 use crate::effects::removal::{Removed, removable, remove};
-use crate::estimate::session_bias;
+use crate::fit::session_bias;
 use crate::fit::{Fit, Options, fit, fit_biases};
 use crate::prepared::Prepared;
 use crate::quantity::Sensor;
@@ -32,7 +34,8 @@ use mimu_recording::error::{Error, Result};
 use mimu_recording::{RawUnit, Reference};
 
 /// What a diagnosis says.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Verdict {
     /// Noise explains what the affine model leaves.
     Clean,
@@ -62,6 +65,8 @@ pub struct SensorDiagnosis {
     pub rows: Rows,
     /// What its rows led to.
     pub decision: Decision,
+    /// What of it is drawn; `None` where a model of it is singular.
+    pub picture: Option<Picture>,
 }
 
 /// What was found in a recording.
@@ -82,9 +87,10 @@ pub struct Diagnosis {
 }
 
 /// A recording, told apart from others.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Source {
     /// Its file of samples.
+    #[serde(rename = "samples")]
     pub place: String,
     /// Samples.
     pub rows: u64,
@@ -176,7 +182,7 @@ impl Recordings<'_> {
             return Err(Error::new(
                 place,
                 format!("device is {device:?}, and that of the first recording {unit:?}"),
-                "effects are a unit's own: give recordings of one unit; if they are, import both with the same --device, or mend it in recording.toml",
+                "effects are a unit's own: give recordings of one unit; if they are, import both with the same name of the device, or mend it in recording.toml",
             ));
         }
         Ok(())
@@ -317,10 +323,12 @@ pub fn diagnose(recordings: Recordings, options: Options) -> Result<Diagnosis> {
             later = cleaned;
             now = calibrate(first)?;
         }
+        let picture = Picture::of(sensor, &rows, &decision);
         sensors.push(SensorDiagnosis {
             sensor,
             rows,
             decision,
+            picture,
         });
     }
     sensors.reverse();

@@ -5,20 +5,20 @@ mod abscissa;
 mod against;
 
 use nalgebra::{DMatrix, DVector};
+use serde::Serialize;
 use statrs::distribution::{Beta, ChiSquared, ContinuousCDF, Normal};
 
 pub use abscissa::Abscissa;
 pub use against::{Against, At, Curve, Panel};
 
-use super::SensorDiagnosis;
-use super::decision::{Split, held_out, rms};
+use super::decision::{Decision, Split, held_out, rms};
 use super::rows::Rows;
 use super::search::{Chosen, Search};
 use super::spread::{By, Fitted};
 use crate::quantity::Sensor;
 
 /// What residuals are of.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub enum Kind {
     /// Angle by which gravity is missed after a turn, rad.
     Angle,
@@ -27,7 +27,7 @@ pub enum Kind {
 }
 
 /// A row at a time.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Sample {
     /// Middle of the dwell or turn, s since the recording began.
     pub t_s: f64,
@@ -40,7 +40,7 @@ pub struct Sample {
 }
 
 /// Residuals of one kind in order of time.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize)]
 pub struct Track {
     /// Of what: an axis, a direction across gravity.
     pub name: String,
@@ -48,12 +48,14 @@ pub struct Track {
     pub kind: Kind,
     /// Rows of it.
     pub samples: Vec<Sample>,
+    #[serde(skip)]
     rows: Vec<usize>,
+    #[serde(skip)]
     axis: Option<usize>,
 }
 
 /// Error figures of a model.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Step {
     /// What the model has more than the one before.
     pub adds: String,
@@ -64,7 +66,7 @@ pub struct Step {
 }
 
 /// Residuals in units of the known noise, in ascending order.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Quantile {
     /// What noise alone would be expected to give here.
     pub normal: f64,
@@ -74,10 +76,22 @@ pub struct Quantile {
     pub found: [f64; 2],
 }
 
+/// Chi-square test of the residuals by the known noise.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Omnibus {
+    /// Chi-square.
+    pub chi2: f64,
+    /// Degrees of freedom.
+    pub dof: usize,
+    /// Probability of chance.
+    pub p: f64,
+}
+
 /// What is drawn of one sensor.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize)]
 pub struct Picture {
     /// Sensor.
+    #[serde(skip)]
     pub sensor: Sensor,
     /// Residuals in time.
     pub tracks: Vec<Track>,
@@ -89,8 +103,8 @@ pub struct Picture {
     pub steps: Vec<Step>,
     /// Residuals against the normal distribution.
     pub quantiles: Vec<Quantile>,
-    /// Chi-square by the known noise, its degrees of freedom and the probability of chance, before and after.
-    pub omnibus: [(f64, usize, f64); 2],
+    /// Chi-square by the known noise, before and after.
+    pub omnibus: [Omnibus; 2],
 }
 
 /// A model, fitted.
@@ -129,7 +143,7 @@ impl<'a> Model<'a> {
     }
 
     /// Residuals in sigmas of the known noise, their chi-square and its chance.
-    fn by_known_noise(&self) -> Option<(DVector<f64>, (f64, usize, f64))> {
+    fn by_known_noise(&self) -> Option<(DVector<f64>, Omnibus)> {
         let (rows, spread) = (self.search.rows, &self.search.spread);
         let none = spread.none();
         let fit = spread.fit_at(&self.columns, &none)?;
@@ -138,14 +152,18 @@ impl<'a> Model<'a> {
         let white = spread.whitener(&none)?.whiten(&left).column(0).into_owned();
         let dof = rows.y.len().saturating_sub(self.columns.ncols());
         let p = ChiSquared::new(dof as f64).map_or(1.0, |d| d.sf(fit.chi2));
-        Some((white, (fit.chi2, dof, p)))
+        let omnibus = Omnibus {
+            chi2: fit.chi2,
+            dof,
+            p,
+        };
+        Some((white, omnibus))
     }
 }
 
 impl Picture {
     /// Of what was found on one sensor. `None` where a model of it is singular, which the decision would have refused.
-    pub fn of(found: &SensorDiagnosis) -> Option<Self> {
-        let (rows, decision) = (&found.rows, &found.decision);
+    pub fn of(sensor: Sensor, rows: &Rows, decision: &Decision) -> Option<Self> {
         let search = Search::new(rows, Vec::new());
         let kept: Vec<Chosen> = decision.accepted.iter().map(|a| a.chosen.clone()).collect();
         let models: Vec<Model> = (0..=kept.len())
@@ -183,7 +201,7 @@ impl Picture {
         let (before, omnibus_before) = first.by_known_noise()?;
         let (after, omnibus_after) = last.by_known_noise()?;
         Some(Self {
-            sensor: found.sensor,
+            sensor,
             blocks_s: match decision.split {
                 Split::Blocks => blocks(rows),
                 Split::Interleaved => Vec::new(),

@@ -232,7 +232,7 @@ pub fn estimate(
     .ok_or_else(|| Failure::NoSolution("C is singular".into()))?;
     Ok(Estimated {
         triad,
-        scatter: vec![("size of gravity".into(), scatter)],
+        scatter: vec![("magnitude of specific force".into(), scatter)],
         condition: shape.condition,
         notes: Vec::new(),
     })

@@ -5,14 +5,12 @@
 //! | [`known_input`]   | table     | forward least squares, Kalman bank, xu's inverse form, six positions |
 //! | [`gravity_size`]  | gravity   | accelerometer from the size of gravity over many poses   |
 //! | [`rotation`]      | gravity   | gyro from the turns between dwells                       |
-//! | [`session_bias`]  | both      | biases alone, where the matrix is known                  |
 //! | [`least_squares`] | both      | the algebra under all of them                            |
 
 pub mod gravity_size;
 pub mod known_input;
 pub mod least_squares;
 pub mod rotation;
-pub mod session_bias;
 
 use nalgebra::Vector3;
 
@@ -63,7 +61,7 @@ impl Failure {
     /// As an error about `sensor`.
     pub fn into_error(self, sensor: crate::quantity::Sensor) -> mimu_recording::error::Error {
         match self {
-            Self::Undetermined { parameters, add } => mimu_recording::error::Error::new(
+            Self::Undetermined { parameters, add } => mimu_recording::error::Error::undetermined(
                 sensor,
                 format!("the experiment leaves {parameters} undetermined"),
                 add,

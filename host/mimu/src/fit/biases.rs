@@ -3,9 +3,8 @@
 use mimu_core::compensation::Affine;
 use nalgebra::Vector3;
 
-use super::{Fit, Options, Residual, finish, refuse_wrong_gravity};
-use crate::estimate::session_bias;
-use crate::plausible;
+use super::sensor::Residual;
+use super::{Fit, Options, finish, plausible, refuse_wrong_gravity, session_bias};
 use crate::prepared::{Prepared, si_covariance};
 use crate::quantity::Figure;
 use crate::quantity::Sensor;

@@ -6,6 +6,9 @@
 
 use nalgebra::DMatrix;
 
+use crate::allan::model::FLOOR;
+use crate::allan::variance::AllanModel;
+
 /// Slow noise of one channel, by its spectrum: `S(f) = B²/(2π f) + K²/(2π f)²`, two-sided.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Slow {
@@ -13,6 +16,15 @@ pub struct Slow {
     pub instability: f64,
     /// Rate random walk K, unit/√s.
     pub walk: f64,
+}
+
+impl From<AllanModel> for Slow {
+    fn from(model: AllanModel) -> Self {
+        Self {
+            instability: (model.flicker / FLOOR).sqrt(),
+            walk: (3.0 * model.walk).sqrt(),
+        }
+    }
 }
 
 /// A stretch of time: its beginning and its end, s.

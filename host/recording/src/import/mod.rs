@@ -14,7 +14,7 @@ mod tests;
 mod text_table;
 
 use std::collections::{BTreeSet, HashMap};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 pub use assignment::{ColumnList, Role, Scale};
 pub use options::ImportOptions;
@@ -24,6 +24,7 @@ use foreign::{ForeignFile, HowToRead, Row, sample_period};
 use inputs::Inputs;
 use join::{Follower, Joined, check_order};
 use options::file_name;
+use serde::Serialize;
 
 use super::batch::Batch;
 use super::cell::shorten;
@@ -31,13 +32,13 @@ use super::columns::{Column, Columns, Layout};
 use super::digest;
 use super::manifest::{Manifest, Reference, Source};
 use super::writer::Writer;
-use crate::error::{Error, Result};
+use crate::error::{Argument, Error, Result};
 
 /// Rows that are written at a time.
 const BATCH: usize = 1 << 14;
 
 /// Lines of the source files that held no row.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub struct SkippedLines {
     /// Headers and whatever else stood above the data.
     pub header: u64,
@@ -47,16 +48,19 @@ pub struct SkippedLines {
     pub blank: u64,
 }
 
-/// What an import has done.
-#[derive(Debug, Clone, PartialEq)]
+/// What an import has done: the result of `mimu import`, as its JSON has it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ImportSummary {
-    /// The recording.
-    pub recording: PathBuf,
+    /// `mimu-import/1`.
+    pub format: &'static str,
+    /// Directory of the recording.
+    pub recording: String,
     /// Rows written.
     pub rows: u64,
     /// Sample rate in Hz, given or found.
     pub sample_rate_hz: f64,
     /// Lines without a row, over all files.
+    #[serde(rename = "skipped_lines")]
     pub skipped: SkippedLines,
     /// Rows of the first file that another file does not reach in time.
     pub dropped_outside: u64,
@@ -94,7 +98,7 @@ pub fn import(
         manifest.turn_steps = inputs.turns.iter().copied().collect();
     }
     manifest.step_labels = std::mem::take(&mut import.first.labels).into_labels();
-    import.summary.recording = writer.finish(&manifest)?;
+    import.summary.recording = writer.finish(&manifest)?.display().to_string();
     Ok(import.summary)
 }
 
@@ -112,7 +116,7 @@ fn check(options: &ImportOptions, out: &Path) -> Result<()> {
     if lists != 0 && lists != files {
         return refuse(
             format!("there are {files} files and {lists} lists of columns"),
-            "give --columns once for each file, in their order",
+            "give one list of columns for each file, in their order",
         );
     }
     if let Some(rate) = options.rate_hz
@@ -120,7 +124,7 @@ fn check(options: &ImportOptions, out: &Path) -> Result<()> {
     {
         return refuse(
             format!("{rate} is not a sample rate"),
-            "give samples per second with --rate-hz",
+            "give samples per second",
         );
     }
     super::manifest::check_gravity(options.gravity_mps2, "import, gravity")?;
@@ -178,11 +182,8 @@ impl Import {
             (None, Some(period)) => tidy(1.0 / period?),
             (None, None) => {
                 // Opening has refused this already: without a time column the rate is needed.
-                return Err(Error::new(
-                    "import",
-                    "the rate is not known",
-                    "give it with --rate-hz",
-                ));
+                return Err(Error::new("import", "the rate is not known", "give it")
+                    .about(Argument::SampleRate));
             }
         };
         let mut followers = Vec::new();
@@ -233,8 +234,9 @@ impl Import {
             return Err(Error::new(
                 "import, reference",
                 "the reference is to be the table, and there is no ref_ column",
-                "add the ref_ columns or a table of inputs, or say --reference gravity",
-            ));
+                "add the ref_ columns or a table of inputs, or say that the reference is gravity",
+            )
+            .about(Argument::Reference));
         }
         for file in followers
             .iter()
@@ -251,7 +253,8 @@ impl Import {
             known: HashMap::new(),
             time_steps_back: 0,
             summary: ImportSummary {
-                recording: PathBuf::new(),
+                format: "mimu-import/1",
+                recording: String::new(),
                 rows: 0,
                 sample_rate_hz: rate_hz,
                 skipped: SkippedLines::default(),

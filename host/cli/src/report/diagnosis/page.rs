@@ -8,19 +8,18 @@ mod tables;
 
 use maud::{Markup, PreEscaped, html};
 
-use super::DiagnosisReport;
 use super::text::{USUAL, by};
-use mimu::diagnose::decision::{Accepted, FALSE_LEFTOVER, LEVERAGE};
-use mimu::diagnose::picture::{Against, Picture};
-use mimu::diagnose::rows::Figure;
+use mimu::diagnose::Verdict;
+use mimu::diagnose::decision::{FALSE_LEFTOVER, LEVERAGE};
+use mimu::diagnose::picture::{Against, Omnibus, Panel, Picture};
 use mimu::diagnose::search::{FALSE_FOUND, FALSE_LISTED};
-use mimu::diagnose::{Diagnosis, SensorDiagnosis, Verdict};
-use mimu::next_experiment::Next;
-use mimu::quantity::Sensor;
+use mimu::quantity::Figure;
+use mimu::readable;
+use mimu::result::diagnosis::{AcceptedResult, DiagnosisResult, SensorDiagnosisResult};
 use mimu_recording::Reference;
 use mimu_recording::error::{Error, Result};
 
-use tables::{chance, figure, number};
+use tables::{chance, number};
 
 /// How the page came about.
 #[derive(Debug, Clone)]
@@ -37,53 +36,68 @@ const STYLE: &str = include_str!("page/style.css");
 /// Elements without an end, closed as XML wants it.
 const META: &str = r#"<meta charset="utf-8"/><meta name="viewport" content="width=device-width, initial-scale=1"/>"#;
 
+/// One sensor's figures and what is drawn of them.
+struct Shown<'a> {
+    name: &'static str,
+    figures: &'a SensorDiagnosisResult,
+    picture: &'a Picture,
+}
+
 /// The page of a diagnosis.
-pub fn diagnosis_page(report: &DiagnosisReport, made: &Made) -> Result<String> {
-    let d = &report.diagnosis;
-    let pictures: Option<Vec<Picture>> = d.sensors.iter().map(Picture::of).collect();
-    let pictures = pictures.ok_or_else(|| {
-        let place = d.before.prepared.place.clone();
+pub fn diagnosis_page(d: &DiagnosisResult, made: &Made) -> Result<String> {
+    let sensors: Option<Vec<Shown>> = d
+        .sensors
+        .named()
+        .map(|(name, figures)| {
+            let picture = figures.picture.as_ref()?;
+            Some(Shown {
+                name,
+                figures,
+                picture,
+            })
+        })
+        .collect();
+    let sensors = sensors.ok_or_else(|| {
         Error::new(
-            place,
+            &made.recording,
             "a model of the page is singular",
             "diagnose without --page, and report this",
         )
     })?;
-    let device = &d.before.prepared.manifest.device;
     let page = html! {
         (PreEscaped("<!DOCTYPE html>"))
         html lang="en" xmlns="http://www.w3.org/1999/xhtml" {
             head {
                 (PreEscaped(META))
-                title { "Diagnosis of " (device) ": " (d.verdict.name()) }
+                title { "Diagnosis of " (d.device) ": " (d.verdict.name()) }
                 style { (PreEscaped(STYLE)) }
             }
             body { main {
                 (head(d, made))
                 h2 { "Error before and after" }
-                (tables::errors(d, &pictures))
-                @if let Some((name, both)) = &report.second {
+                (tables::errors(&sensors))
+                @if let Some(second) = &d.second {
                     h2 { "A second recording" }
-                    p { "Of " code { (name) } " nothing was used to find or to fit the effects." }
-                    (tables::second(both))
+                    p { "Of " code { (second.recording) } " nothing was used to find or to fit the effects." }
+                    (tables::second(second))
                 }
-                @if d.sensors.iter().any(|s| !s.decision.leftover.is_empty()) {
+                @if !d.leftover.is_empty() {
                     h2 { "What is left" }
                     p { "Scatter beyond the known noise that no candidate explains:" }
                     (tables::leftover(d))
-                    @if d.sensors.iter().any(|s| s.decision.leftover.iter().any(|l| l.usual)) {
+                    @if d.leftover.iter().any(|l| l.usual) {
                         p { "*  " (USUAL) "." }
                     }
                 }
-                @for (s, picture) in d.sensors.iter().zip(&pictures) { (sensor(d, s, picture)) }
+                @for s in &sensors { (sensor(d, s)) }
                 h2 { "Tried and not accepted" }
-                (tables::rejected(&d.sensors))
+                (tables::rejected(d))
                 h2 { "Not tested: the experiment does not excite it" }
-                (tables::not_excited(&d.sensors))
-                (confused(&report.next))
-                (recorded(report))
+                (tables::not_excited(d))
+                (confused(d))
+                (recorded(d))
                 (method())
-                p class="dim" { "mimu " (env!("CARGO_PKG_VERSION")) ", " (made.created) ": " code { (made.command) } }
+                p class="dim" { (d.tool) ", " (made.created) ": " code { (made.command) } }
             } }
         }
     };
@@ -91,88 +105,81 @@ pub fn diagnosis_page(report: &DiagnosisReport, made: &Made) -> Result<String> {
 }
 
 /// Names of sensors in sentences.
-fn spoken(sensor: Sensor) -> &'static str {
+fn spoken(sensor: &str) -> &str {
     match sensor {
-        Sensor::Gyro => "gyro",
-        Sensor::Accel => "accelerometer",
+        "accel" => "accelerometer",
+        other => other,
     }
 }
 
-fn head(d: &Diagnosis, made: &Made) -> Markup {
-    let prepared = &d.before.prepared;
-    let manifest = &prepared.manifest;
-    let known = match manifest.reference {
+fn head(d: &DiagnosisResult, made: &Made) -> Markup {
+    let known = match d.reference {
         Reference::Table => "known from the table",
         Reference::Gravity => "only gravity is known",
     };
     let counts: Vec<String> = d
         .sensors
-        .iter()
-        .map(|s| {
-            let (count, together) = s.rows.judged;
-            let (what, of_one) = match s.rows.figure {
-                Figure::Direction => ("turns", together),
-                Figure::Size => ("dwells", together),
-                Figure::Input | Figure::Rest => ("dwells", 3 * together),
+        .named()
+        .map(|(name, s)| {
+            let what = if s.figure == Figure::Direction {
+                "turns"
+            } else {
+                "dwells"
             };
-            format!("{} {what} for the {}", count / of_one, spoken(s.sensor))
+            format!("{} {what} for the {}", s.judged, spoken(name))
         })
         .collect();
     html! {
-        h1 { "Diagnosis of " (manifest.device) }
+        h1 { "Diagnosis of " (d.device) }
         p class={ "verdict " (d.verdict.name()) } { (verdict(d)) }
         dl {
             dt { "Recording" } dd { code { (made.recording) } }
-            @for source in &d.sources {
+            @for source in &d.recordings {
                 dt { "Samples" } dd {
-                    @if d.sources.len() > 1 { code { (source.place) } ": " }
+                    @if d.recordings.len() > 1 { code { (source.place) } ": " }
                     (source.rows) " in " (number(source.rows as f64 * source.period_s, 1.0 / 60.0, "min"))
                     " at " (number(1.0 / source.period_s, 1.0, "Hz")) ", SHA-256 " code { (source.sha256) }
                 }
             }
-            dt { "Input" } dd { (known) "; gravity " data value=(manifest.gravity_mps2) { (format!("{:.5}", manifest.gravity_mps2)) " m/s²" } }
+            dt { "Input" } dd { (known) "; gravity " data value=(d.gravity_mps2) { (format!("{:.5}", d.gravity_mps2)) " m/s²" } }
             dt { "Judged by" } dd { (counts.join(", ")) }
             dt { "Diagnosed" } dd { (made.created) }
         }
     }
 }
 
-fn verdict(d: &Diagnosis) -> Markup {
-    let shown = |s: &SensorDiagnosis, value: f64| {
-        let (factor, unit) = figure(d, s.sensor).readable(s.sensor);
-        tables::figure_of(&s.decision, value, factor, unit)
-    };
-    let held = |s: &SensorDiagnosis, k: usize| shown(s, s.decision.held_out_rms[k]);
-    let in_sample = |s: &SensorDiagnosis| shown(s, s.decision.rms[0]);
-    let floor = |s: &SensorDiagnosis| shown(s, s.decision.noise_floor);
-    let left = || {
-        d.sensors
-            .iter()
-            .filter(|s| s.decision.unexplained().next().is_some())
-    };
-    let said = match d.verdict {
+fn verdict(d: &DiagnosisResult) -> Markup {
+    let unexplained = d.unexplained().next().is_some();
+    let meaning = match d.verdict {
         Verdict::Clean => "noise explains what the affine calibration leaves.",
         Verdict::Explained => "with the effects found, noise explains what is left.",
-        Verdict::Unexplained if left().next().is_some() => {
-            "something is left that nothing tried explains:"
+        Verdict::Unexplained if unexplained => "something is left that nothing tried explains:",
+        Verdict::Unexplained => {
+            "what was found is explained as well by an unlisted alternative model."
         }
-        Verdict::Unexplained => "what was found is explained as well by a law that is on no list.",
+    };
+    let left = || {
+        d.sensors
+            .named()
+            .filter(|(name, _)| d.unexplained().any(|l| l.sensor == *name))
     };
     html! {
-        strong { (d.verdict.name()) } ": " (said)
-        @for (n, s) in left().enumerate() { @if n > 0 { ";" } " " (tables::leftover_words(s)) }
-        @if left().next().is_some() { "." }
-        @for s in &d.sensors {
-            @if s.decision.accepted.is_empty() {
-                " Nothing is added to the " (spoken(s.sensor)) ": held-out error " (held(s, 0)) " (in sample "
-                (in_sample(s)) "), noise alone " (floor(s)) "."
+        strong { (d.verdict.name()) } ": " (meaning)
+        @for (n, (name, _)) in left().enumerate() { @if n > 0 { ";" } " " (tables::leftover_words(d, name)) }
+        @if unexplained { "." }
+        @for (name, s) in d.sensors.named() {
+            @let ours: Vec<&AcceptedResult> = d.effects.iter().filter(|a| a.sensor == name).collect();
+            @let shown = |value: f64| tables::figure_of(s, value);
+            @if ours.is_empty() {
+                " Nothing is added to the " (spoken(name)) ": held-out error " (shown(s.held_out_rms_before)) " (in sample "
+                (shown(s.rms_before)) "), noise alone " (shown(s.noise_floor)) "."
             } @else {
                 " With "
-                @for (n, a) in s.decision.accepted.iter().enumerate() {
-                    @if n > 0 { " and " } code { (a.chosen.candidate.id()) }
+                @for (n, a) in ours.iter().enumerate() {
+                    @if n > 0 { " and " } code { (a.id) }
                 }
-                " taken out, the held-out error of the " (spoken(s.sensor)) " goes from " (held(s, 0)) " to " (held(s, 1))
-                "; noise alone would leave " (floor(s)) "."
+                " taken out, the held-out error of the " (spoken(name)) " goes from " (shown(s.held_out_rms_before)) " to "
+                (shown(s.held_out_rms_after)) "; noise alone would leave " (shown(s.noise_floor)) "."
             }
         }
     }
@@ -191,22 +198,24 @@ fn keys() -> Markup {
     }
 }
 
-fn sensor(d: &Diagnosis, s: &SensorDiagnosis, picture: &Picture) -> Markup {
-    let after = !s.decision.accepted.is_empty();
+fn sensor(d: &DiagnosisResult, s: &Shown) -> Markup {
+    let picture = s.picture;
+    let ours: Vec<&AcceptedResult> = d.effects.iter().filter(|a| a.sensor == s.name).collect();
+    let after = !ours.is_empty();
     let [before, left] = &picture.omnibus;
     html! {
-        h2 class="sensor" { (spoken(s.sensor)) }
-        @for (one, panels) in s.decision.accepted.iter().zip(&picture.effects) {
+        h2 class="sensor" { (spoken(s.name)) }
+        @for (one, panels) in ours.iter().zip(&picture.effects) {
             (effect(d, s, one, panels))
         }
-        @for note in &s.decision.notes { p { strong { "Note. " } (note) "." } }
+        @for note in &s.figures.notes { p { strong { "Note. " } (note) "." } }
         @if !after {
             p { "No effect is accepted; residuals are those of the affine calibration." }
         }
         h3 { "Residuals in time" }
         figure {
             div class="figures" {
-                @for track in &picture.tracks { (figures::in_time(s.sensor, track, &picture.blocks_s, after)) }
+                @for track in &picture.tracks { (figures::in_time(picture.sensor, track, &picture.blocks_s, after)) }
             }
             figcaption {
                 (keys()) "."
@@ -236,37 +245,31 @@ fn sentence(text: &str) -> String {
     first.chain(letters).collect()
 }
 
-fn omnibus(when: &str, &(chi2, dof, p): &(f64, usize, f64)) -> Markup {
+fn omnibus(when: &str, &Omnibus { chi2, dof, p }: &Omnibus) -> Markup {
     html! {
         @if !when.is_empty() { (when) " " }
         (number(chi2, 1.0, "")) " for " (dof) " degrees of freedom, " (chance(p))
     }
 }
 
-fn effect(
-    d: &Diagnosis,
-    s: &SensorDiagnosis,
-    one: &Accepted,
-    panels: &[mimu::diagnose::picture::Panel],
-) -> Markup {
-    let candidate = &one.chosen.candidate;
-    let (factor, unit) = figure(d, s.sensor).readable(s.sensor);
+fn effect(d: &DiagnosisResult, s: &Shown, one: &AcceptedResult, panels: &[Panel]) -> Markup {
+    let readable::Readable { factor, unit } = readable::error(s.figures.unit);
     let whole = panels.iter().any(|p| p.against == Against::Fitted);
     html! {
-        h3 { code { (candidate.id()) } }
+        h3 { code { (one.id) } }
         p {
-            (sentence(candidate.about())) ". Held-out error " (number(one.held_out[0], factor, unit)) " without it, "
-            (number(one.held_out[1], factor, unit)) " with it, beside the others; " (chance(one.chosen.p))
+            (sentence(one.about)) ". Held-out error " (number(one.held_out_rms_before, factor, &unit)) " without it, "
+            (number(one.held_out_rms_after, factor, &unit)) " with it, beside the others; " (chance(one.chance))
             " after the whole search."
         }
         (tables::coefficients(one))
         figure {
-            div class="figures" { @for panel in panels { (figures::against(s.sensor, panel)) } }
+            div class="figures" { @for panel in panels { (figures::against(s.picture.sensor, panel)) } }
             figcaption {
                 "Left, what is left plus the part of the effect named (its other parts and the other effects taken out), against "
                 "what it depends on, less what the affine calibration takes up: the mean, and the best straight line where the variable is one that "
                 "it is linear in. " (key("fit", "M0 6H24")) "effect as fitted, with its 95 % band"
-                @if candidate.parameter().is_some() { " (for the " code { (candidate.parameter().map_or("", |f| f.name)) } " found)" }
+                @if let Some(form) = &one.form { " (for the " code { (form.name) } " found)" }
                 ". Right, what is left, on the same scale. " (keys()) "."
                 @if whole {
                     " Where a row is a whole turn or the size of gravity, the abscissa is what the fit says that the effect does to "
@@ -274,16 +277,16 @@ fn effect(
                 }
             }
         }
-        (tables::alternatives(s, one))
+        (tables::alternatives(d, s, one))
     }
 }
 
 /// What the next recording has to tell apart.
-fn confused(next: &Next) -> Markup {
+fn confused(d: &DiagnosisResult) -> Markup {
     html! {
-        @if !next.confused.is_empty() {
+        @if !d.confused.is_empty() {
             h2 { "What tells the confused ones apart" }
-            dl { @for c in &next.confused {
+            dl { @for c in &d.confused {
                 dt { code { (c.ids[0]) } " or " code { (c.ids[1]) } }
                 dd {
                     @if c.difference < 0.0 { (by(c.difference)) } @else { "worse by " (number(c.difference, 1.0, "")) }
@@ -294,36 +297,26 @@ fn confused(next: &Next) -> Markup {
     }
 }
 
-fn recorded(report: &DiagnosisReport) -> Markup {
-    let d = &report.diagnosis;
-    let prepared = &d.before.prepared;
-    let condensed = &prepared.condensed;
-    let clipped: u64 = prepared
-        .dwells
-        .list
-        .iter()
-        .flat_map(|dwell| dwell.raw.map(|m| m.clipped))
-        .sum();
-    let missing: u64 = condensed.missing.iter().sum();
+fn recorded(d: &DiagnosisResult) -> Markup {
+    let out = &d.left_out;
     html! {
         h2 { "The recording: masked, gaps, warnings" }
         dl {
             dt { "Dwells" } dd {
-                @for (n, s) in d.before.sensors.iter().enumerate() {
+                @for (n, (name, s)) in d.sensors.named().enumerate() {
                     @if n > 0 { "; " }
-                    (s.sensor) ": " (s.dwells) " used of " (prepared.dwells.list.len()) (prepared.dwells.unused(s.sensor))
+                    (name) ": " (s.dwells_used) " used of " (s.dwells) (s.not_used)
                 }
             }
-            dt { "Gaps" } dd { (condensed.gaps.0) ", " (number(condensed.gaps.1, 1.0, "s")) " missing" }
-            dt { "Repeated rows" } dd { (condensed.duplicates) }
-            dt { "Empty samples" } dd { (missing) " masked" }
-            dt { "Samples at a rail" } dd { (clipped) " left out of the dwell means" }
+            dt { "Gaps" } dd { (out.gaps) ", " (number(out.missing_s, 1.0, "s")) " missing" }
+            dt { "Repeated rows" } dd { (out.repeated_rows) }
+            dt { "Empty samples" } dd { (out.empty_samples) " masked" }
+            dt { "Samples at a rail" } dd { (out.clipped_samples) " left out of the dwell means" }
         }
-        @let warnings: Vec<&String> = report.warnings().collect();
-        @if warnings.is_empty() {
+        @if d.warnings.is_empty() {
             p { "No warnings." }
         } @else {
-            ul { @for w in warnings { li { (w) } } }
+            ul { @for w in &d.warnings { li { (w) } } }
         }
     }
 }

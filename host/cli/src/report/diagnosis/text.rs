@@ -2,154 +2,143 @@
 
 use std::fmt::Write as _;
 
-use super::DiagnosisReport;
 use crate::report::text::{warn, wrap};
 use mimu::calibration::ConverterTable;
-use mimu::diagnose::decision::{Accepted, Decision, Split};
-use mimu::diagnose::{SensorDiagnosis, Verdict};
-use mimu::next_experiment::Next;
-use mimu::quantity::Figure;
+use mimu::diagnose::Verdict;
+use mimu::diagnose::decision::Split;
 use mimu::quantity::{plus_minus, significant};
+use mimu::readable::{self, Readable};
+use mimu::result::diagnosis::{AcceptedResult, DiagnosisResult, SensorDiagnosisResult};
 
 /// Result of `mimu diagnose`.
-pub fn diagnosis_text(report: &DiagnosisReport) -> String {
+pub fn diagnosis_text(d: &DiagnosisResult) -> String {
     let mut out = String::new();
-    let d = &report.diagnosis;
-    let said = match d.verdict {
+    let verdict = match d.verdict {
         Verdict::Clean => "clean: noise explains what the affine calibration leaves",
         Verdict::Explained => "explained: with the effects below, noise explains what is left",
-        Verdict::Unexplained
-            if d.sensors
-                .iter()
-                .any(|s| s.decision.unexplained().next().is_some()) =>
-        {
+        Verdict::Unexplained if d.unexplained().next().is_some() => {
             "unexplained: something is left that nothing here explains"
         }
         Verdict::Unexplained => {
-            "unexplained: a law that is on no list does as well as what was found"
+            "unexplained: an unlisted alternative model does as well as what was found"
         }
     };
-    let _ = writeln!(out, "{}: {said}", d.before.prepared.manifest.device);
-    for s in &d.sensors {
-        let figure = d
-            .before
-            .sensor(s.sensor)
-            .map_or(Figure::Input, |f| f.figure);
+    let _ = writeln!(out, "{}: {verdict}", d.device);
+    for (name, s) in d.sensors.named() {
         let _ = writeln!(out);
-        sensor(&mut out, s, figure);
-        not_excited(&mut out, s, &report.next);
+        sensor(&mut out, d, name, s);
+        not_excited(&mut out, d, name);
     }
-    confused(&mut out, &report.next);
-    if let Some((name, [before, after])) = &report.second {
-        let _ = writeln!(out, "\non {name}, which nothing was fitted to");
+    confused(&mut out, d);
+    if let Some(second) = &d.second {
         let _ = writeln!(
             out,
-            "  {:<8}{:>16}{:>16}{:>16}",
-            "", "before", "after", "noise floor"
+            "\non {}, which nothing was fitted to\n  {:<8}{:>16}{:>16}{:>16}",
+            second.recording, "", "before", "after", "noise floor"
         );
-        for (b, a) in before.sensors.iter().zip(&after.sensors) {
-            let (factor, unit) = b.figure.readable(b.sensor);
-            let [x, y, z] = [b.rms, a.rms, a.noise_floor]
-                .map(|v| format!("{} {unit}", significant(v * factor)));
-            let _ = writeln!(out, "  {:<8}{x:>16}{y:>16}{z:>16}", b.sensor.name());
+        let both = second
+            .before
+            .sensors
+            .named()
+            .zip(second.after.sensors.named());
+        for ((name, before), (_, after)) in both {
+            let figure = readable::error(before.unit);
+            let [x, y, z] = [before.rms, after.rms, after.noise_floor].map(|v| figure.write(v));
+            let _ = writeln!(out, "  {name:<8}{x:>16}{y:>16}{z:>16}");
         }
     }
-    let warnings: Vec<&String> = report.warnings().collect();
-    if !warnings.is_empty() {
+    if !d.warnings.is_empty() {
         let _ = writeln!(out);
-        warn(&mut out, warnings.into_iter());
+        warn(&mut out, d.warnings.iter());
     }
     out
 }
 
-fn sensor(out: &mut String, s: &SensorDiagnosis, figure: Figure) {
-    let d = &s.decision;
-    let (factor, unit) = figure.readable(s.sensor);
-    // As many parameters as residuals leave rounding.
-    let [rows, parameters] = d.rows;
-    let shown = |v: f64| match v.is_finite() && rows > parameters {
-        true => format!("{} {unit}", significant(v * factor)),
+/// An error figure of `s`; a dash where there are as many parameters as residuals, and only rounding is left.
+fn shown(s: &SensorDiagnosisResult, value: f64) -> String {
+    match value.is_finite() && s.says_anything() {
+        true => readable::error(s.unit).write(value),
         false => "-".into(),
-    };
+    }
+}
+
+fn sensor(out: &mut String, d: &DiagnosisResult, name: &str, s: &SensorDiagnosisResult) {
     let _ = writeln!(
         out,
-        "{} ({}, rms)\n  {:<12}{:>16}{:>16}{:>16}",
-        s.sensor,
-        figure.description(),
+        "{name} ({}, rms)\n  {:<12}{:>16}{:>16}{:>16}",
+        s.figure.description(),
         "",
         "before",
         "after",
         "noise floor"
     );
-    let floor = format!("{} {unit}", significant(d.noise_floor * factor));
-    for (name, [before, after]) in [("in sample", d.rms), ("held out", d.held_out_rms)] {
-        let _ = writeln!(
-            out,
-            "  {name:<12}{:>16}{:>16}{floor:>16}",
-            shown(before),
-            shown(after)
-        );
+    let floor = readable::error(s.unit).write(s.noise_floor);
+    let both = [
+        ("in sample", s.rms_before, s.rms_after),
+        ("held out", s.held_out_rms_before, s.held_out_rms_after),
+    ];
+    for (label, before, after) in both {
+        let (before, after) = (shown(s, before), shown(s, after));
+        let _ = writeln!(out, "  {label:<12}{before:>16}{after:>16}{floor:>16}");
     }
-    if d.split == Split::Interleaved {
+    if s.held_out == Split::Interleaved {
         let _ = writeln!(
             out,
             "  held out every fourth dwell: one block of time alone shows what is needed"
         );
     }
-    if rows < parameters + FEW {
+    if s.rows < s.affine_parameters + FEW {
         let _ = writeln!(
             out,
-            "  {rows} residuals for {parameters} affine parameters: nothing can be found in them, and nothing refuted"
+            "  {} residuals for {} affine parameters: nothing can be found in them, and nothing refuted",
+            s.rows, s.affine_parameters
         );
     }
-    for a in &d.accepted {
-        effect(out, a, &shown);
+    for a in d.effects.iter().filter(|a| a.sensor == name) {
+        effect(out, s, a);
     }
-    for u in &d.undecided {
-        let law = format!("{} explains it {}", u.law, by_score(u.worse));
+    for u in d.undecided.iter().filter(|u| u.sensor == name) {
+        let law = format!("{} explains it {}", u.law, by_score(u.difference));
         wrap(out, &format!("  undecided, {}: ", u.id), &law);
-        wrap(out, "    told apart by ", u.settled_by);
+        wrap(out, "    told apart by ", u.experiment);
     }
-    for note in &d.notes {
+    for note in &s.notes {
         wrap(out, "  note: ", note);
     }
-    for l in &d.leftover {
-        let (factor, unit) = match l.stratum.starts_with("turns") {
-            true => (1f64.to_degrees(), "deg"),
-            false => Figure::Input.readable(s.sensor),
-        };
+    let leftover = || d.leftover.iter().filter(|l| l.sensor == name);
+    for l in leftover() {
         let _ = writeln!(
             out,
-            "  left over, {}: {} {unit} rms beyond the noise; goes with {}",
-            l.stratum,
-            significant(l.strength * factor),
+            "  left over, {}: {} rms beyond the noise; goes with {}",
+            l.rows,
+            readable::error(l.unit).write(l.strength),
             l.against
         );
     }
-    if d.leftover.iter().any(|l| l.usual) {
+    if leftover().any(|l| l.usual) {
         wrap(out, "    ", USUAL);
     }
-    tried(out, d);
+    for r in d.rejected.iter().filter(|r| r.sensor == name) {
+        wrap(out, &format!("  - {}: ", r.id), &r.reason);
+    }
 }
 
 /// What is said of what is left that usual sensors do.
 pub(super) const USUAL: &str = "by up to four times the noise of a dwell mean the biases of usual sensors wander; `mimu allan` of the \
                                 unit at rest, given as --noise, tells whether this one does";
 
-fn effect(out: &mut String, a: &Accepted, shown: &impl Fn(f64) -> String) {
-    let candidate = &a.chosen.candidate;
-    let about = candidate.about();
-    let _ = writeln!(out, "  + {}: {about}", candidate.id());
+fn effect(out: &mut String, s: &SensorDiagnosisResult, a: &AcceptedResult) {
+    let _ = writeln!(out, "  + {}: {}", a.id, a.about);
     let _ = writeln!(
         out,
-        "    held out {} without it, {} with it; by chance once in {}",
-        shown(a.held_out[0]),
-        shown(a.held_out[1]),
-        odds(a.chosen.p)
+        "    held out {} without it, {} with it; {}",
+        shown(s, a.held_out_rms_before),
+        shown(s, a.held_out_rms_after),
+        p_value(a.chance)
     );
     match &a.second {
-        Some(second) if second.shows() => {
-            let [x, y] = second.rms.map(shown);
+        Some(second) if second.shows => {
+            let [x, y] = [second.rms_before, second.rms_after].map(|v| shown(s, v));
             let _ = writeln!(
                 out,
                 "    second recording {x} without it, {y} with it, its affine parameters its own"
@@ -163,32 +152,28 @@ fn effect(out: &mut String, a: &Accepted, shown: &impl Fn(f64) -> String) {
         }
         None => {}
     }
-    for (i, (name, unit)) in candidate.names().iter().enumerate() {
+    for c in &a.coefficients {
+        let Readable { factor, unit } = readable::coefficient(&c.unit);
         // Twice the standard deviation: with dwells by the dozen Student's factor is within a tenth of it.
-        let half = 2.0 * a.covariance[(i, i)].sqrt();
+        let [value, half] = [c.value, 2.0 * c.sigma].map(|v| significant(v * factor));
+        let _ = writeln!(out, "    {:<12}{value:>12} ± {half} {unit}", c.name);
+    }
+    if let Some(form) = &a.form {
+        let _ = writeln!(out, "    {:<12}{:>12}", form.name, significant(form.value));
+    }
+    for c in &a.converters {
+        let _ = writeln!(out, "    {}", converter(c));
+    }
+    for other in a.alternatives.iter().take(SHOWN) {
         let _ = writeln!(
             out,
-            "    {name:<12}{:>12.3e} ± {half:.1e} {unit}",
-            a.values[i]
+            "    or {}, {} in score",
+            other.id,
+            by(other.score_worse_by)
         );
     }
-    if let Some(form) = candidate.parameter() {
-        let _ = writeln!(
-            out,
-            "    {:<12}{:>12}",
-            form.name,
-            significant(a.chosen.parameter)
-        );
-    }
-    for c in ConverterTable::of(&candidate.codes) {
-        let _ = writeln!(out, "    {}", converter(&c));
-    }
-    let alternatives = &a.chosen.alternatives;
-    for (id, worse) in alternatives.iter().take(SHOWN) {
-        let _ = writeln!(out, "    or {id}, {} in score", by(*worse));
-    }
-    if alternatives.len() > SHOWN {
-        let _ = writeln!(out, "    or one of {} more", alternatives.len() - SHOWN);
+    if a.alternatives.len() > SHOWN {
+        let _ = writeln!(out, "    or one of {} more", a.alternatives.len() - SHOWN);
     }
 }
 
@@ -210,7 +195,7 @@ pub(super) fn by(worse: f64) -> String {
     }
 }
 
-/// How a law on no list does in the place of an effect; `worse` in score.
+/// How an unlisted alternative model does in the place of an effect; `worse` in score.
 pub(super) fn by_score(worse: f64) -> String {
     let how = if worse > 0.0 {
         "nearly as well"
@@ -225,43 +210,42 @@ const FEW: usize = 3;
 /// Alternatives that are listed.
 const SHOWN: usize = 3;
 
-/// 1/p in few digits.
-pub(super) fn odds(p: f64) -> String {
-    match 1.0 / p.max(1e-300) {
-        n if n < 1e6 => format!("{n:.0}"),
-        n => format!("{n:.0e}"),
-    }
-}
-
-fn tried(out: &mut String, d: &Decision) {
-    for (id, reason) in &d.rejected {
-        wrap(out, &format!("  - {id}: "), reason);
+/// A probability of chance. Nobody's noise is Gaussian farther out than one in a million.
+pub(super) fn p_value(p: f64) -> String {
+    match p {
+        p if p < 1e-6 => "p < 1e-6".into(),
+        p => format!("p = {}", significant(p)),
     }
 }
 
 /// What the recording could not show, and what would.
-fn not_excited(out: &mut String, s: &SensorDiagnosis, next: &Next) {
-    let mut by_experiment: Vec<(&str, Vec<&str>)> = Vec::new();
-    for (id, _) in &s.decision.not_excited {
-        let Some((_, experiment)) = next.not_excited.iter().find(|n| n.0 == *id) else {
-            continue;
-        };
-        match by_experiment.iter_mut().find(|(e, _)| e == experiment) {
-            Some((_, ids)) => ids.push(id),
-            None => by_experiment.push((experiment, vec![id])),
-        }
-    }
-    for (experiment, ids) in by_experiment {
+fn not_excited(out: &mut String, d: &DiagnosisResult, sensor: &str) {
+    for (experiment, ids) in by_experiment(d, |s| s == sensor) {
         wrap(out, "  not excited: ", &ids.join(", "));
         wrap(out, "    needs ", experiment);
     }
 }
 
-fn confused(out: &mut String, next: &Next) {
-    if !next.confused.is_empty() {
+/// Effects that were not excited, of the sensors that `of` takes, by the experiment that would show them.
+pub(super) fn by_experiment(
+    d: &DiagnosisResult,
+    of: impl Fn(&str) -> bool,
+) -> Vec<(&str, Vec<&str>)> {
+    let mut all: Vec<(&str, Vec<&str>)> = Vec::new();
+    for n in d.not_excited.iter().filter(|n| of(n.sensor)) {
+        match all.iter_mut().find(|(e, _)| *e == n.experiment) {
+            Some((_, ids)) => ids.push(&n.id),
+            None => all.push((&n.experiment, vec![&n.id])),
+        }
+    }
+    all
+}
+
+fn confused(out: &mut String, d: &DiagnosisResult) {
+    if !d.confused.is_empty() {
         let _ = writeln!(out);
     }
-    for c in &next.confused {
+    for c in &d.confused {
         let _ = writeln!(
             out,
             "{} or {} ({} in score)",

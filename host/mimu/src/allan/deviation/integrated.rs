@@ -101,23 +101,23 @@ impl Integrated {
     }
 
     /// The integral.
-    pub(super) fn x(&self) -> &Series {
+    pub(in crate::allan) fn x(&self) -> &Series {
         &self.x
     }
 
     /// Sample period, s.
-    pub(super) fn dt_s(&self) -> f64 {
+    pub(in crate::allan) fn dt_s(&self) -> f64 {
         self.dt_s
     }
 
     /// What the integral's samples stand for.
-    pub(super) fn sampling(&self) -> Sampling {
+    pub(in crate::allan) fn sampling(&self) -> Sampling {
         self.sampling
     }
 
     /// What a difference of the integral over one sample is divided by to be a rate: rates are summed over
     /// samples, a phase is an integral over seconds.
-    pub(super) fn step(&self) -> f64 {
+    pub(in crate::allan) fn step(&self) -> f64 {
         match self.sampling {
             Sampling::Instants => 1.0,
             Sampling::Means => self.dt_s,

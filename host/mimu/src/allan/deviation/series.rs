@@ -17,8 +17,10 @@ use rayon::prelude::*;
 
 /// Samples in a block.
 pub const BLOCK: usize = 64;
+/// Of a series of up to so many rates all differences are used.
+pub const ALL_TERMS: usize = 1 << 20;
 /// Samples that are doubles as long as there are no more: 8 MB, in which small sets keep all their digits.
-pub const DOUBLES: usize = super::ALL_TERMS + 1;
+pub const DOUBLES: usize = ALL_TERMS + 1;
 /// Blocks that one thread packs at a time.
 const AT_A_TIME: usize = 64;
 /// Half of the steps that 24 bits count.

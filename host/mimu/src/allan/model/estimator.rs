@@ -7,9 +7,8 @@ use statrs::distribution::{ContinuousCDF, Normal};
 use super::covariance::Covariances;
 use super::differences::{Differences, Order};
 use super::estimate::Curve;
-use super::selection::{FEWEST, Selection};
-use super::unseen::SEEN;
-use super::{Coefficient, NoiseModel, Term, Unseen};
+use super::selection::{FEWEST, SEEN, Selection};
+use super::terms::{Coefficient, NoiseModel, Term, Unseen};
 use crate::allan::Point;
 
 /// Third differences over second ones that are no more than rounding errors.

@@ -2,9 +2,12 @@
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use super::Term;
 use super::differences::{PHASE, RAMP, TERMS, basis};
 use super::estimate::{Curve, Fitted};
+use super::terms::Term;
+
+/// Sigmas at which a coefficient is shown.
+pub(super) const SEEN: f64 = 3.0;
 
 /// A term has to lower the deviance by this to be in the model: 2.8 standard deviations, 0.5 %.
 const TERM_DEVIANCE: f64 = 8.0;

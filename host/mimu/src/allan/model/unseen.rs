@@ -3,12 +3,10 @@
 use super::covariance::Covariances;
 use super::differences::Differences;
 use super::estimate::{Curve, Fitted};
-use super::estimator::points;
-use super::selection::Selection;
-use super::{Estimator, Term, duration};
-
-/// Sigmas at which a coefficient is told to be seen.
-pub(super) const SEEN: f64 = 3.0;
+use super::estimator::{Estimator, points};
+use super::selection::{SEEN, Selection};
+use super::terms::Term;
+use crate::quantity::duration;
 
 impl Estimator {
     /// Upper end of the interval of a `term` that is not shown, and what it says.

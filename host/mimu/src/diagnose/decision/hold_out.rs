@@ -1,6 +1,7 @@
 //! Holding dwells out, and what an effect rests on.
 
 use nalgebra::{DMatrix, DVector};
+use serde::Serialize;
 
 use crate::diagnose::rows::Rows;
 use crate::diagnose::search::{Search, unit_columns};
@@ -16,7 +17,8 @@ pub(in crate::diagnose) fn rms(rows: &Rows, residuals: &DVector<f64>) -> f64 {
 }
 
 /// How dwells are held out.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Split {
     /// Contiguous blocks of time.
     Blocks,

@@ -1,5 +1,7 @@
 //! What an effect is drawn against: what its regressors are functions of.
 
+use serde::Serialize;
+
 use crate::effects::candidate::{Candidate, Kind};
 use crate::effects::quantity::{Quantity, REFERENCE_C};
 use crate::effects::regressor::Regressor;
@@ -16,7 +18,7 @@ pub enum Dependence {
 }
 
 /// Abscissa of a drawing.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Abscissa {
     /// Name.
     pub name: String,

@@ -6,6 +6,7 @@
 //! cubic would be drawn with the scale factor that it was never seen to have.
 
 use nalgebra::{DMatrix, DVector};
+use serde::Serialize;
 
 use super::abscissa::{Dependence, abscissa, dependence};
 use super::{Abscissa, Kind, Track};
@@ -22,7 +23,7 @@ const POINTS: usize = 81;
 const POINTS_OF_STEPS: usize = 801;
 
 /// What a panel has on its abscissa.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub enum Against {
     /// What the effect depends on.
     Variable(Abscissa),
@@ -32,7 +33,7 @@ pub enum Against {
 }
 
 /// A row in a panel.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct At {
     /// Abscissa, SI.
     pub x: f64,
@@ -49,7 +50,7 @@ pub struct At {
 }
 
 /// The effect as fitted.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Curve {
     /// Abscissa, SI.
     pub x: f64,
@@ -60,7 +61,7 @@ pub struct Curve {
 }
 
 /// The part of an effect on one axis that depends on one quantity.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize)]
 pub struct Panel {
     /// Axis, and coefficients.
     pub title: String,

@@ -2,19 +2,15 @@
 
 use maud::{Markup, PreEscaped, html};
 
-use super::figures::unit;
 use super::svg::raised;
-use super::{sentence, spoken};
-use crate::report::diagnosis::text::{by_score, converter, odds};
-use mimu::calibration::ConverterTable;
-use mimu::diagnose::decision::{Accepted, Decision, Leftover, Split};
-use mimu::diagnose::picture::{Kind as Rows, Picture};
-use mimu::diagnose::{Diagnosis, SensorDiagnosis};
-use mimu::effects::candidate::{Candidate, Kind};
-use mimu::quantity::Figure;
-use mimu::quantity::Sensor;
-use mimu::quantity::significant;
-use mimu::verify::Verification;
+use super::{Shown, sentence, spoken};
+use crate::report::diagnosis::text::{by_experiment, by_score, converter, p_value};
+use mimu::diagnose::decision::Split;
+use mimu::quantity::{Figure, significant};
+use mimu::readable;
+use mimu::result::diagnosis::{
+    AcceptedResult, DiagnosisResult, LeftoverResult, SecondResult, SensorDiagnosisResult,
+};
 
 /// A line break that is HTML and XML.
 const BR: PreEscaped<&str> = PreEscaped("<br/>");
@@ -29,10 +25,10 @@ pub fn number(si: f64, factor: f64, unit: &str) -> Markup {
 }
 
 /// An error figure: none where there are as many parameters as residuals, and only rounding is left.
-pub fn figure_of(decision: &Decision, si: f64, factor: f64, unit: &str) -> Markup {
-    let [rows, parameters] = decision.rows;
-    match rows > parameters {
-        true => number(si, factor, unit),
+pub fn figure_of(s: &SensorDiagnosisResult, si: f64) -> Markup {
+    let figure = readable::error(s.unit);
+    match s.says_anything() {
+        true => number(si, figure.factor, &figure.unit),
         false => html! { "–" },
     }
 }
@@ -46,20 +42,13 @@ fn written(text: &str) -> String {
     text.replace('-', "−")
 }
 
-/// What the error figures of a sensor are about.
-pub fn figure(d: &Diagnosis, sensor: Sensor) -> Figure {
-    d.before.sensor(sensor).map_or(Figure::Input, |f| f.figure)
-}
-
-/// Probability of chance in words.
+/// Probability of chance.
 pub fn chance(p: f64) -> Markup {
-    // Where a distribution function has underflowed.
-    let less = if p < 1e-300 { "less than " } else { "" };
-    html! { "by chance " (less) "once in " data value=(p) { (written(&odds(p))) } }
+    html! { data value=(p) { (written(&p_value(p))) } }
 }
 
 /// Errors before and after, of all sensors, in sample and held out.
-pub fn errors(d: &Diagnosis, pictures: &[Picture]) -> Markup {
+pub(super) fn errors(sensors: &[Shown]) -> Markup {
     html! {
         div class="scroll" { table {
             caption { "Root mean square error. Noise floor: what would be left if the model were complete." }
@@ -67,71 +56,34 @@ pub fn errors(d: &Diagnosis, pictures: &[Picture]) -> Markup {
                 th { "sensor" } th { "model" } th class="n" { "in sample" } th class="n" { "held out" } th class="n" { "noise floor" }
             } }
             tbody {
-                @for (s, picture) in d.sensors.iter().zip(pictures) {
-                    @let (factor, unit) = figure(d, s.sensor).readable(s.sensor);
-                    @let last = picture.steps.len() - 1;
-                    @for (n, step) in picture.steps.iter().enumerate() {
-                        @let ends = [(0, 0), (last, 1)].into_iter().find(|e| e.0 == n && (n == 0 || last > 0));
+                @for s in sensors {
+                    @let last = s.picture.steps.len() - 1;
+                    @for (n, step) in s.picture.steps.iter().enumerate() {
                         tr class=[(n == last && last > 0).then_some("total")] {
-                            td { @if n == 0 { (spoken(s.sensor)) (BR) span class="dim" { (figure(d, s.sensor).description()) } } }
+                            td { @if n == 0 { (spoken(s.name)) (BR) span class="dim" { (s.figures.figure.description()) } } }
                             td { @if n == 0 { (step.adds) } @else { "+ " code { (step.adds) } } }
                             // The first and the last are those of the decision.
-                            @let (rms, held) = match ends {
-                                Some((_, k)) => (s.decision.rms[k], s.decision.held_out_rms[k]),
-                                None => (step.rms, step.held_out_rms),
+                            @let (rms, held) = match n {
+                                0 => (s.figures.rms_before, s.figures.held_out_rms_before),
+                                n if n == last => (s.figures.rms_after, s.figures.held_out_rms_after),
+                                _ => (step.rms, step.held_out_rms),
                             };
-                            td class="n" { (figure_of(&s.decision, rms, factor, unit)) }
-                            td class="n" { (figure_of(&s.decision, held, factor, unit)) }
-                            td class="n" { (number(s.decision.noise_floor, factor, unit)) }
+                            td class="n" { (figure_of(s.figures, rms)) }
+                            td class="n" { (figure_of(s.figures, held)) }
+                            td class="n" { (figure_of(s.figures, s.figures.noise_floor)) }
                         }
                     }
                 }
             }
         } }
-        @for s in d.sensors.iter().filter(|s| s.decision.split == Split::Interleaved) {
-            p class="dim" { (spoken(s.sensor)) ": every fourth dwell is held out in turn, as one block of time alone shows what the model needs." }
+        @for s in sensors.iter().filter(|s| s.figures.held_out == Split::Interleaved) {
+            p class="dim" { (spoken(s.name)) ": every fourth dwell is held out in turn, as one block of time alone shows what the model needs." }
         }
     }
 }
 
-/// Factor to the unit in which a person reads a coefficient, and that unit; `None` where SI is as good.
-fn readable_coefficient(unit: &str) -> Option<(f64, &'static str)> {
-    const G: f64 = 9.80665;
-    let deg = 1f64.to_degrees();
-    Some(match unit {
-        "rad/s/(m/s^2)" => (deg * G, "deg/s/g"),
-        "1/(rad/s)" => (1e6 / deg, "ppm/(deg/s)"),
-        "1/(rad/s)^2" => (1e6 / (deg * deg), "ppm/(deg/s)²"),
-        "1" => (1e6, "ppm"),
-        "1/(m/s^2)" => (1e3 * G, "mg/g²"),
-        "1/(m/s^2)^2" => (1e3 * G * G, "mg/g³"),
-        "m" => (1e3, "mm"),
-        "rad/s^2" => (deg * 3600.0, "deg/s/h"),
-        "m/s^3" => (1e3 / G * 3600.0, "mg/h"),
-        "rad/s" => (deg, "deg/s"),
-        "m/s^2" => (1e3 / G, "mg"),
-        "rad/s/K" => (deg, "deg/s/K"),
-        "rad/s/K^2" => (deg, "deg/s/K²"),
-        "m/s^2/K" => (1e3 / G, "mg/K"),
-        "m/s^2/K^2" => (1e3 / G, "mg/K²"),
-        "1/K" => (1e6, "ppm/K"),
-        "rad/K" => (1e6, "µrad/K"),
-        _ => return None,
-    })
-}
-
-/// Sizes in data sheets of the active coefficients.
-fn typical(candidate: &Candidate) -> Vec<Option<f64>> {
-    let of = |k: &usize| match candidate.kind {
-        Kind::Effect(e) => e.coefficients.get(*k).map(|c| c.typical),
-        _ => None,
-    };
-    candidate.active.iter().map(of).collect()
-}
-
 /// Coefficients of an effect.
-pub fn coefficients(one: &Accepted) -> Markup {
-    let candidate = &one.chosen.candidate;
+pub fn coefficients(one: &AcceptedResult) -> Markup {
     html! {
         div class="scroll" { table {
             thead { tr {
@@ -139,57 +91,55 @@ pub fn coefficients(one: &Accepted) -> Markup {
                 th class="n" { "in data sheets" } th class="n" { "SI" } th { "SI unit" }
             } }
             tbody {
-                @for (i, ((name, si), typical)) in candidate.names().iter().zip(typical(candidate)).enumerate() {
-                    @let sigma = one.covariance[(i, i)].sqrt();
-                    @let (factor, unit) = readable_coefficient(si).unwrap_or((1.0, si));
+                @for c in &one.coefficients {
+                    @let readable::Readable { factor, unit } = readable::coefficient(&c.unit);
                     tr {
-                        td { (name) }
-                        td class="n" { (number(one.values[i], factor, "")) }
-                        td class="n" { data value=(sigma) { (written(&significant(2.0 * sigma * factor))) } }
+                        td { (c.name) }
+                        td class="n" { (number(c.value, factor, "")) }
+                        td class="n" { data value=(c.sigma) { (written(&significant(2.0 * c.sigma * factor))) } }
                         td { (unit) }
-                        td class="n" { @match typical { Some(t) => (number(t, factor, "")), None => "–" } }
-                        td class="n dim" { (written(&format!("{:.3e}", one.values[i]))) }
-                        td class="dim" { (si.replace("^2", "²")) }
+                        td class="n" { @match c.typical { Some(t) => (number(t, factor, "")), None => "–" } }
+                        td class="n dim" { (written(&format!("{:.3e}", c.value))) }
+                        td class="dim" { (c.unit.replace("^2", "²")) }
                     }
                 }
-                @if let Some(form) = candidate.parameter() {
+                @if let Some(form) = &one.form {
                     tr {
                         td { (form.name) }
-                        td class="n" { (number(one.chosen.parameter, 1.0, "")) }
+                        td class="n" { (number(form.value, 1.0, "")) }
                         td class="n" { "–" } td { }
                         td class="n" { (number(form.from, 1.0, "")) " to " (number(form.to, 1.0, "")) " sought" }
                         td { } td { }
                     }
                 }
-                @for c in ConverterTable::of(&candidate.codes) {
-                    tr { td colspan="7" { (converter(&c)) } }
+                @for c in &one.converters {
+                    tr { td colspan="7" { (converter(c)) } }
                 }
             }
         } }
     }
 }
 
-/// Candidates, and laws on no list, that would do nearly as well in the place of an effect.
-pub fn alternatives(s: &SensorDiagnosis, one: &Accepted) -> Markup {
-    let id = one.chosen.candidate.id();
-    let undecided = || s.decision.undecided.iter().filter(|u| u.id == id);
+/// Candidates, and unlisted alternative models, that would do nearly as well in the place of an effect.
+pub(super) fn alternatives(d: &DiagnosisResult, s: &Shown, one: &AcceptedResult) -> Markup {
+    let undecided = || d.undecided.iter().filter(|u| u.id == one.id);
     html! {
         @for u in undecided() {
-            p { strong { "Undecided. " } (sentence(u.law)) " explains it " (by_score(u.worse)) ". Told apart by: " (u.settled_by) "." }
+            p { strong { "Undecided. " } (sentence(u.law)) " explains it " (by_score(u.difference)) ". Told apart by: " (u.experiment) "." }
         }
-        @if one.chosen.alternatives.is_empty() {
-            @if undecided().next().is_none() && s.decision.notes.is_empty() {
+        @if one.alternatives.is_empty() {
+            @if undecided().next().is_none() && s.figures.notes.is_empty() {
                 p { "Nothing else that was tried would do nearly as well." }
             }
         } @else {
             p { "In this recording it can be confused with:" }
             div class="scroll" { table {
                 thead { tr { th { "instead" } th class="n" { "worse by, in score" } th class="n" { "odds" } } }
-                tbody { @for (id, worse) in &one.chosen.alternatives {
+                tbody { @for other in &one.alternatives {
                     tr {
-                        td { code { (id) } }
-                        td class="n" { (number(*worse, 1.0, "")) }
-                        td class="n" { "1 : " (significant((0.5 * worse.max(0.0)).exp())) }
+                        td { code { (other.id) } }
+                        td class="n" { (number(other.score_worse_by, 1.0, "")) }
+                        td class="n" { "1 : " (significant((0.5 * other.score_worse_by.max(0.0)).exp())) }
                     }
                 } }
             } }
@@ -197,78 +147,64 @@ pub fn alternatives(s: &SensorDiagnosis, one: &Accepted) -> Markup {
     }
 }
 
-/// Unit of what is left over in a stratum.
-fn leftover_unit(sensor: Sensor, left: &Leftover) -> (f64, &'static str) {
-    unit(
-        if left.stratum == "turns" {
-            Rows::Angle
-        } else {
-            Rows::Input
-        },
-        sensor,
-    )
+fn strength(left: &LeftoverResult) -> Markup {
+    let figure = readable::error(left.unit);
+    number(left.strength, figure.factor, &figure.unit)
 }
 
 /// What is left, of all sensors.
-pub fn leftover(d: &Diagnosis) -> Markup {
+pub fn leftover(d: &DiagnosisResult) -> Markup {
     html! {
         div class="scroll" { table {
             thead { tr { th { "residual" } th class="n" { "rms beyond the noise" } th { "goes with" } } }
-            tbody { @for s in &d.sensors { @for left in &s.decision.leftover {
-                @let (factor, unit) = leftover_unit(s.sensor, left);
+            tbody { @for left in &d.leftover {
                 tr {
-                    td { (spoken(s.sensor)) " " (left.stratum) }
-                    td class="n" { (number(left.strength, factor, unit)) }
+                    td { (spoken(left.sensor)) " " (left.rows) }
+                    td class="n" { (strength(left)) }
                     td { (left.against) @if left.usual { " *" } }
                 }
-            } } }
+            } }
         } }
     }
 }
 
 /// What is left of a sensor, in words: where, and the largest; what it goes with stands in the table.
-pub fn leftover_words(s: &SensorDiagnosis) -> Markup {
-    let all: Vec<&Leftover> = s.decision.unexplained().collect();
+pub fn leftover_words(d: &DiagnosisResult, sensor: &str) -> Markup {
+    let all: Vec<&LeftoverResult> = d.unexplained().filter(|l| l.sensor == sensor).collect();
     // Turns are in another unit than the rest.
-    let of_unit = |turns: bool| -> Vec<&Leftover> {
-        all.iter()
-            .copied()
-            .filter(|l| (l.stratum == "turns") == turns)
+    let of_unit = |turns: bool| -> Vec<&LeftoverResult> {
+        let ours = all.iter().copied();
+        ours.filter(|l| (l.figure == Figure::Direction) == turns)
             .collect()
     };
-    let parts: Vec<Vec<&Leftover>> = [true, false]
-        .into_iter()
-        .map(of_unit)
-        .filter(|part| !part.is_empty())
-        .collect();
+    let parts = [true, false].map(of_unit);
+    let parts: Vec<&Vec<&LeftoverResult>> = parts.iter().filter(|p| !p.is_empty()).collect();
     html! {
         @for (n, part) in parts.iter().enumerate() {
             @if n > 0 { ", " }
-            @let names: Vec<&str> = part.iter().map(|l| l.stratum.as_str()).collect();
+            @let names: Vec<&str> = part.iter().map(|l| l.rows.as_str()).collect();
             @let largest = part.iter().fold(part[0], |a, b| if b.strength > a.strength { b } else { a });
-            @let (factor, unit) = leftover_unit(s.sensor, largest);
-            (spoken(s.sensor)) " " (names.join(", ")) @if part.len() > 1 { " by up to " } @else { " by " }
-            (number(largest.strength, factor, unit)) " rms"
+            (spoken(sensor)) " " (names.join(", ")) @if part.len() > 1 { " by up to " } @else { " by " }
+            (strength(largest)) " rms"
         }
     }
 }
 
 /// Before and after on a recording that nothing was fitted to.
-pub fn second(both: &[Verification; 2]) -> Markup {
-    let [before, after] = both;
+pub fn second(both: &SecondResult) -> Markup {
     html! {
         div class="scroll" { table {
             caption { "Root mean square error with the calibration of the first recording." }
             thead { tr {
                 th { "sensor" } th class="n" { "before" } th class="n" { "after" } th class="n" { "noise floor" } th class="n" { "dwells or turns" }
             } }
-            tbody { @for (b, a) in before.sensors.iter().zip(&after.sensors) {
-                @let (factor, unit) = b.figure.readable(b.sensor);
+            tbody { @for ((name, b), (_, a)) in both.before.sensors.named().zip(both.after.sensors.named()) {
+                @let readable::Readable { factor, unit } = readable::error(b.unit);
                 tr {
-                    td { (spoken(b.sensor)) (BR) span class="dim" { (b.figure.description()) } }
-                    td class="n" { (number(b.rms, factor, unit)) }
-                    td class="n" { (number(a.rms, factor, unit)) }
-                    td class="n" { (number(a.noise_floor, factor, unit)) }
+                    td { (spoken(name)) (BR) span class="dim" { (b.figure.description()) } }
+                    td class="n" { (number(b.rms, factor, &unit)) }
+                    td class="n" { (number(a.rms, factor, &unit)) }
+                    td class="n" { (number(a.noise_floor, factor, &unit)) }
                     td class="n" { (a.count) }
                 }
             } }
@@ -277,31 +213,24 @@ pub fn second(both: &[Verification; 2]) -> Markup {
 }
 
 /// What was tried and not accepted.
-pub fn rejected(sensors: &[SensorDiagnosis]) -> Markup {
+pub fn rejected(d: &DiagnosisResult) -> Markup {
     html! {
-        @if sensors.iter().all(|s| s.decision.rejected.is_empty()) {
+        @if d.rejected.is_empty() {
             p { "Nothing came near." }
         } @else {
             div class="scroll" { table class="long" {
-                caption { "Errors in the SI unit of the residual." }
                 thead { tr { th { "effect" } th { "why not" } } }
-                tbody { @for s in sensors { @for (id, reason) in &s.decision.rejected {
-                    tr { td { code { (id) } } td { (reason) } }
-                } } }
+                tbody { @for r in &d.rejected {
+                    tr { td { code { (r.id) } } td { (r.reason) } }
+                } }
             } }
         }
     }
 }
 
 /// What the experiment could not show, by the experiment that would.
-pub fn not_excited(sensors: &[SensorDiagnosis]) -> Markup {
-    let mut by_experiment: Vec<(&str, Vec<&str>)> = Vec::new();
-    for (id, experiment) in sensors.iter().flat_map(|s| not_excited_in(&s.decision)) {
-        match by_experiment.iter_mut().find(|(e, _)| *e == experiment) {
-            Some((_, ids)) => ids.push(id),
-            None => by_experiment.push((experiment, vec![id])),
-        }
-    }
+pub fn not_excited(d: &DiagnosisResult) -> Markup {
+    let by_experiment = by_experiment(d, |_| true);
     html! {
         @if by_experiment.is_empty() {
             p { "Every effect of the library was tested." }
@@ -317,10 +246,4 @@ pub fn not_excited(sensors: &[SensorDiagnosis]) -> Markup {
             } }
         }
     }
-}
-
-fn not_excited_in(d: &Decision) -> impl Iterator<Item = (&str, &str)> {
-    d.not_excited
-        .iter()
-        .map(|(id, e)| (id.as_str(), e.as_str()))
 }

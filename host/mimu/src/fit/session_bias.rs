@@ -4,8 +4,8 @@
 use mimu_core::compensation::Affine;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
-use super::least_squares::{Errors, Scatter, Solution, solve_with_excess};
-use super::{Estimated, Failure};
+use crate::estimate::least_squares::{Errors, Scatter, Solution, solve_with_excess};
+use crate::estimate::{Estimated, Failure};
 use crate::prepared::{Prepared, si_covariance};
 use crate::quantity::AXES;
 use crate::quantity::Sensor;
@@ -17,7 +17,7 @@ const STEPS: usize = 6;
 
 /// Inverse model of `sensor` with the matrix of `known` and the biases of `prepared`, raw to SI.
 ///
-/// Where the input is known, and for a gyro at rest, by the mean error of each axis; for an accelerometer by the size of gravity,
+/// Where the input is known, and for a gyro at rest, by the mean error of each axis; for an accelerometer by the magnitude of gravity,
 /// across which a single pose says nothing: there the bias stays that of `known`.
 pub fn estimate(
     prepared: &Prepared,
@@ -63,7 +63,7 @@ pub fn estimate(
         covariance
             .fixed_view_mut::<3, 3>(9, 9)
             .copy_from(&Matrix3::from_fn(|i, j| full[(i, j)]));
-        scatter.push(("size of gravity".into(), found));
+        scatter.push(("magnitude of specific force".into(), found));
     } else {
         for axis in 0..3 {
             let n = observations.len();

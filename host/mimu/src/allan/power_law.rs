@@ -1,7 +1,8 @@
-//! Power law of the noise at one averaging time.
+//! Power law of the noise at one averaging time: Riley and Greenhall, "Power law noise identification using the lag 1
+//! autocorrelation", EFTF 2004, and Howe et al., PTTI 2000, where too few samples are left for it.
 
-use super::super::Kind;
-use super::super::deviation::{ALL_TERMS, Samples, Series, Squares, difference, sums};
+use super::Kind;
+use super::deviation::{ALL_TERMS, Samples, Series, Squares, difference, sums};
 
 /// Cluster means that the lag 1 autocorrelation needs (Riley and Greenhall 2004).
 const ENOUGH_FOR_LAG_1: usize = 30;

@@ -3,8 +3,8 @@
 //! Swapped columns, a wrong unit, one dwell with the wrong input: each leaves a trace, and each would otherwise end in a
 //! calibration file. What cannot be right is refused; what may be meant is a warning.
 
+use super::sensor::{Residual, SensorFit};
 use crate::estimate::Failure;
-use crate::fit::{Residual, SensorFit};
 use crate::prepared::Prepared;
 use crate::quantity::Figure;
 use crate::quantity::Sensor;
@@ -75,7 +75,7 @@ fn refuse_unrelated(prepared: &Prepared, fit: &SensorFit) -> Result<()> {
     }
     let against = match fit.figure {
         Figure::Input => "the known inputs",
-        Figure::GravitySize => "the size of gravity",
+        Figure::GravitySize => "the magnitude of gravity",
         Figure::Direction => "the turns of gravity",
     };
     let how = match share < 1.0 {

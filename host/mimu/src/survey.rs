@@ -2,6 +2,7 @@
 //!
 //! One channel at a time, while the next is being read: three hours at 1 kHz are 86 MB a channel.
 
+mod columns;
 mod stretch;
 mod suitability;
 
@@ -9,16 +10,17 @@ use std::ops::Range;
 use std::sync::mpsc::sync_channel;
 use std::thread;
 
+use self::columns::Columns;
 pub use self::stretch::Part;
-use self::stretch::{Stretch, temperature};
+use self::stretch::{FEWEST, Stretch, temperature};
 use self::suitability::{Suitability, suitability};
-use super::deviation::Integrated;
-use super::model::{Estimator, NoiseModel, Term, allan_factors, duration, hadamard_factors};
-use super::units::Unit;
-use super::{Kind, Point, Spacing};
+use crate::allan::deviation::Integrated;
+use crate::allan::model::{Estimator, NoiseModel, Term, allan_factors, hadamard_factors};
+use crate::allan::units::Unit;
+use crate::allan::{Kind, Point, Spacing};
 use crate::calibration::Calibration;
-use crate::quantity::Sensor;
-use mimu_recording::error::{Error, Result};
+use crate::quantity::{Sensor, duration, significant};
+use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{Column, RAW_COLUMNS, RawUnit, Recording};
 
 /// What to compute.
@@ -73,9 +75,6 @@ pub struct Survey {
     /// What a person should know.
     pub warnings: Vec<String>,
 }
-
-/// Fewer have no five octaves up to a quarter of them, which a model needs beside their half.
-const FEWEST: usize = 64;
 
 /// Share of the Allan variance at the longest time from which on a ramp is what the curve shows there.
 const RAMP_SHARE: f64 = 0.5;
@@ -191,14 +190,15 @@ fn units(
         };
         let Some(table) = calibration.table(sensor) else {
             return Err(Error::new(
-                format!("{}, --calibration", RAW_COLUMNS[i]),
+                format!("{}, calibration", RAW_COLUMNS[i]),
                 format!("the calibration has no [{sensor}]"),
-                "calibrate that sensor too, or leave --calibration out",
-            ));
+                "calibrate that sensor too, or leave the calibration out",
+            )
+            .about(Argument::Calibration));
         };
         if table.raw_unit != raw {
             return Err(Error::new(
-                format!("{}, --calibration", RAW_COLUMNS[i]),
+                format!("{}, calibration", RAW_COLUMNS[i]),
                 format!(
                     "it is for readings in {}, and the recording is in {raw}",
                     table.raw_unit
@@ -209,37 +209,6 @@ fn units(
         Ok(Unit::si(sensor, 1.0 / table.physical.scale_factor[i % 3]))
     };
     indices.iter().map(unit).collect()
-}
-
-/// Columns of a recording, each to be taken once.
-struct Columns<'a> {
-    recording: &'a Recording,
-    /// Of a CSV file, which cannot be read by columns.
-    read: Vec<(Column, Vec<f64>)>,
-}
-
-impl<'a> Columns<'a> {
-    fn open(recording: &'a Recording, indices: &[usize], progress: &impl Fn(f64)) -> Result<Self> {
-        let mut read = Vec::new();
-        if !recording.is_columnar() {
-            let wanted: Vec<Column> = [Column::Time, Column::Step, Column::Temperature]
-                .into_iter()
-                .filter(|c| recording.columns.has(*c))
-                .chain(indices.iter().map(|i| Column::Raw(*i)))
-                .collect();
-            let values = recording.read_columns(&wanted, |share| progress(0.1 * share))?;
-            read = wanted.into_iter().zip(values).collect();
-        }
-        Ok(Self { recording, read })
-    }
-
-    fn take(&mut self, column: Column) -> Result<Vec<f64>> {
-        if let Some(at) = self.read.iter().position(|(c, _)| *c == column) {
-            return Ok(self.read.swap_remove(at).1);
-        }
-        let mut values = self.recording.read_columns(&[column], |_| {})?;
-        Ok(values.pop().unwrap_or_default())
-    }
 }
 
 /// One channel as it is computed with.
@@ -270,8 +239,9 @@ impl Values {
                 return Err(Error::new(
                     format!("{place}, data row {row}"),
                     format!("the cell is empty, and there are no {FEWEST} samples in a row"),
-                    "record again, or choose a stretch with --from and --to",
-                ));
+                    "record again, or choose a stretch",
+                )
+                .about(Argument::Stretch));
             }
             warning = Some(format!(
                 "{}: empty cells, the first in data row {row}; the longest stretch without is used: {} from data row {}",
@@ -316,8 +286,8 @@ impl Channel {
         };
         let allan = curve(Kind::Allan, &allan_factors(self.samples));
         let hadamard = curve(Kind::Hadamard, &hadamard_factors(self.samples));
-        let (unit, sensor) = (self.unit, self.sensor);
-        let words = |term: Term, value: f64| unit.words(sensor, term, value);
+        let unit = self.unit;
+        let words = |term: Term, value: f64| unit.write(term, value);
         self.model = estimator.and_then(|e| e.fit(&allan, &hadamard, words));
         self.curve = curve(options.kind, &shown);
     }
@@ -340,7 +310,7 @@ impl Channel {
             (Some((r, span_c)), _) => warnings.push(format!(
                 "{}: follows temp_c, which changes by {} °C (correlation {r:.2}): the long end of its curve is the chamber's and not the sensor's",
                 self.name,
-                crate::quantity::significant(span_c)
+                significant(span_c)
             )),
             (None, Some(share)) => warnings.push(format!(
                 "{}: a drift makes {:.0} % of the variance at {}: the long end of its curve is warm-up or the chamber's, and not noise",

@@ -1,0 +1,199 @@
+//! A fit for people: fixed-width tables with units and intervals.
+
+use std::fmt::Write as _;
+
+use mimu::quantity::{plural, plus_minus, significant};
+use mimu::readable;
+use mimu::result::fit::{DwellResult, FitResult, Parameter, SensorFitResult};
+use mimu_recording::Reference;
+
+use crate::report::text::warn;
+
+/// Result of `mimu fit`.
+pub fn fit_text(fit: &FitResult) -> String {
+    let mut out = String::new();
+    let _ = writeln!(
+        out,
+        "{}: {} samples, {:.1} s at {:.2} Hz, gravity {} m/s²",
+        fit.device,
+        fit.rows,
+        fit.rows as f64 * fit.period_s,
+        1.0 / fit.period_s,
+        fit.gravity_mps2
+    );
+    let lengths = || fit.dwells.iter().map(|d| d.duration_s);
+    let (shortest, longest) = (
+        lengths().fold(f64::INFINITY, f64::min),
+        lengths().fold(0.0, f64::max),
+    );
+    let length = match (format!("{shortest:.1}"), format!("{longest:.1}")) {
+        (a, b) if a == b => format!("{a} s long"),
+        (a, b) => format!("{a} to {b} s long"),
+    };
+    let n = plural(fit.dwells.len() as u64, "dwell");
+    match &fit.detection {
+        None => {
+            let _ = writeln!(out, "{n} by the step column, {length}");
+        }
+        Some(d) => {
+            let _ = writeln!(out, "{n} found, {length}");
+            let _ = writeln!(
+                out,
+                "  still: variance over {:.1} s at most that of the quietest twentieth times {} (accel), {} (gyro);\n  {:.1} s left out at both ends; shorter than {} s not used",
+                d.window_s, d.still_factor, d.gyro_still_factor, d.guard_s, d.shortest_s
+            );
+        }
+    }
+    for (name, sensor) in fit.sensors.named() {
+        let _ = writeln!(out);
+        sensor_text(&mut out, fit, name, sensor);
+    }
+    if !fit.warnings.is_empty() {
+        let _ = writeln!(out);
+        warn(&mut out, fit.warnings.iter());
+    }
+    out
+}
+
+fn sensor_text(out: &mut String, fit: &FitResult, name: &str, sensor: &SensorFitResult) {
+    let dwells = plural(sensor.dwells as u64, "dwell");
+    let used = match sensor.unit {
+        "rad" => format!(
+            "{} between {dwells}",
+            plural(sensor.residuals.len() as u64, "turn")
+        ),
+        _ => dwells,
+    };
+    let _ = writeln!(
+        out,
+        "{name} ({}, {used}, condition {})",
+        sensor.estimator,
+        significant(sensor.condition)
+    );
+    let _ = writeln!(out, "  error: {}", sensor.figure.description());
+    let figure = readable::error(sensor.unit);
+    let mut line = |name: &str, value: Option<f64>, note: &str| {
+        let shown = value.map_or("-".into(), |v| figure.write(v));
+        let _ = writeln!(out, "    {name:<12}{shown:>16}  {note}");
+    };
+    let blocks = fit.holdout_blocks.min(sensor.dwells);
+    if blocks > 0 {
+        let missing = sensor.not_held_out.len();
+        let note = match missing {
+            0 => format!("rms over {blocks} contiguous blocks"),
+            m if m == blocks => "no block can be left out, see the warnings".into(),
+            m => format!("rms over {} of {blocks} contiguous blocks", blocks - m),
+        };
+        line("held out", sensor.held_out_rms, &note);
+    } else {
+        line("held out", None, "not asked for (--holdout blocks=4)");
+    }
+    line("in sample", Some(sensor.rms), "rms");
+    line("noise floor", Some(sensor.noise_floor), "noise-only rms");
+    if let Some(rms) = sensor.static_rms {
+        let rate = readable::error("rad/s");
+        let _ = writeln!(out, "  calibrated rate at rest, rms over dwells and axes:");
+        if let Some(held) = sensor.static_held_out_rms.flatten() {
+            let _ = writeln!(out, "    {:<12}{:>16}", "held out", rate.write(held));
+        }
+        let _ = writeln!(out, "    {:<12}{:>16}", "in sample", rate.write(rms));
+    }
+    for (group, scatter) in &sensor.scatter {
+        if scatter.significant {
+            let _ = writeln!(
+                out,
+                "  noise does not explain the residual ({group}): {} more is there, and in the intervals",
+                readable::error(&scatter.unit).write(scatter.excess_sigma)
+            );
+        }
+    }
+    parameters_text(out, fit, name, sensor);
+}
+
+/// The physical quantities by axis.
+fn parameters_text(out: &mut String, fit: &FitResult, name: &str, sensor: &SensorFitResult) {
+    // The accelerometer's own axes are the frame then.
+    let by_choice = fit.reference == Reference::Gravity && name == "accel";
+    let kinds = [
+        ("scale", "scale factor"),
+        ("bias", "bias"),
+        ("misalignment", "misalignment"),
+        ("non_orthogonality", "non-orthogonality yz, zy, zx"),
+    ];
+    let mut rows = Vec::new();
+    for (key, label) in kinds {
+        let triple: Vec<&Parameter> = sensor.triple(key).collect();
+        let Some(first) = triple
+            .first()
+            .filter(|_| key != "misalignment" || !by_choice)
+        else {
+            continue;
+        };
+        let shown = readable::parameter(&first.unit);
+        let cell = |p: &&Parameter| {
+            let half = 0.5 * (p.upper - p.lower);
+            plus_minus(p.value * shown.factor, half * shown.factor)
+        };
+        let label = match shown.unit.is_empty() {
+            true => label.to_string(),
+            false => format!("{label}, {}", shown.unit),
+        };
+        rows.push((label, triple.iter().map(cell).collect::<Vec<_>>()));
+    }
+    let cells = rows.iter().flat_map(|(_, cells)| cells);
+    let width = 2 + cells.map(|c| c.chars().count()).max().unwrap_or(0);
+    let _ = writeln!(
+        out,
+        "  {:<34}{:>width$}{:>width$}{:>width$}   95 %",
+        "", "x", "y", "z"
+    );
+    for (label, cells) in &rows {
+        let _ = write!(out, "  {label:<34}");
+        for cell in cells {
+            let _ = write!(out, "{cell:>width$}");
+        }
+        let _ = writeln!(out);
+    }
+}
+
+/// List of the dwells: `mimu fit --dwells`.
+pub fn dwell_table(dwells: &[DwellResult]) -> String {
+    let mut out = String::new();
+    let _ = write!(
+        out,
+        "{:>10} {:>9} {:>9} {:>8}",
+        "step", "first row", "start s", "length s"
+    );
+    for name in mimu_recording::RAW_COLUMNS {
+        let _ = write!(out, " {name:>10}");
+    }
+    let _ = writeln!(out, "  not used");
+    for d in dwells {
+        let name = d.label.clone().unwrap_or_else(|| d.step.to_string());
+        let _ = write!(
+            out,
+            "{name:>10} {:>9} {:>9.2} {:>8.2}",
+            d.first_row + 1,
+            d.start_s,
+            d.duration_s
+        );
+        for (mean, n) in d.raw_mean.iter().zip(d.averaged) {
+            let shown = if n > 0 { six(*mean) } else { "-".into() };
+            let _ = write!(out, " {shown:>10}");
+        }
+        let mut faults: Vec<&String> = [&d.gyro_not_used, &d.accel_not_used]
+            .into_iter()
+            .flatten()
+            .collect();
+        faults.dedup();
+        let faults: Vec<&str> = faults.into_iter().map(String::as_str).collect();
+        let _ = writeln!(out, "  {}", faults.join(", "));
+    }
+    out
+}
+
+/// Six significant digits.
+fn six(value: f64) -> String {
+    let digits = (5 - value.abs().max(1e-9).log10().floor() as i32).clamp(0, 6) as usize;
+    format!("{value:.digits$}")
+}

@@ -1,0 +1,46 @@
+//! A verification for people.
+
+use std::fmt::Write as _;
+
+use mimu::readable;
+use mimu::result::verify::VerifyResult;
+
+use crate::report::text::warn;
+
+/// Result of `mimu verify`.
+pub fn verify_text(verification: &VerifyResult) -> String {
+    let mut out = String::new();
+    let _ = writeln!(
+        out,
+        "{:<7}{:>14}{:>14}{:>14}{:>14}{:>12}",
+        "", "uncalibrated", "calibrated", "largest", "noise floor", "over"
+    );
+    for (name, s) in verification.sensors.named() {
+        let figure = readable::error(s.unit);
+        let [raw, rms, max, floor] =
+            [s.rms_raw, s.rms, s.max, s.noise_floor].map(|v| figure.write(v));
+        let noun = if s.unit == "rad" { "turns" } else { "dwells" };
+        let over = format!("{} {noun}", s.count);
+        let _ = writeln!(
+            out,
+            "{name:<7}{raw:>14}{rms:>14}{max:>14}{floor:>14}{over:>12}"
+        );
+        let below = [
+            ("effects left in", s.rms_affine.map(|v| figure.write(v))),
+            (
+                "at rest",
+                s.static_rms.map(|v| readable::error("rad/s").write(v)),
+            ),
+        ];
+        for (label, value) in below {
+            if let Some(value) = value {
+                let _ = writeln!(out, "{:<7}{label:>14}{value:>14}", "");
+            }
+        }
+    }
+    for (name, s) in verification.sensors.named() {
+        let _ = writeln!(out, "{name}: {}, rms", s.figure.description());
+    }
+    warn(&mut out, verification.warnings.iter());
+    out
+}

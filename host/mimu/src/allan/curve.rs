@@ -1,0 +1,164 @@
+//! Deviation over averaging time, with bounds.
+//!
+//! # Terms that are left out
+//!
+//! Neighbouring differences of a long cluster are nearly the same number. Of a series of more than [`ALL_TERMS`]
+//! rates every s-th is taken, with s so that at least [`STARTS_PER_CLUSTER`] of them begin within a cluster and, of
+//! Allan and Hadamard, [`KEPT_TERMS`] are kept in all. What that costs in equivalent degrees of freedom is
+//! computed for every noise in `tests/allan_vectors`: under 0.05 % for white rate noise and redder (alpha 0 to -4),
+//! which is all that an inertial sensor shows at such cluster lengths, and for any noise of the modified
+//! variance. For white and flicker phase noise, which forget from sample to sample, it does cost (up to a
+//! factor s for white, whose deviation is then still known to 0.6 %), and the edf of the point says so. With that
+//! rule the cost of a curve grows about as N from 1e6 samples on, however densely the times are spaced
+//! (`benches/allan.rs`).
+
+use super::bounds::{self, Estimator};
+use super::deviation::{ALL_TERMS, BLOCK, Integrated, Plan, Samples as _, sums_of_squares};
+use super::power_law::power_law;
+use super::{Kind, Point, Spacing};
+
+use mimu_recording::error::Result;
+use rayon::prelude::*;
+
+/// Of a longer one, at least so many starts in every cluster length.
+pub const STARTS_PER_CLUSTER: usize = 64;
+/// Of a longer one, at least so many Allan and Hadamard differences.
+pub const KEPT_TERMS: usize = 1 << 15;
+/// Averaging times that are done together: more would only hold more sums of tiles.
+const AT_A_TIME: usize = 256;
+
+/// Deviation of rates (any unit) at every averaging time of `spacing` that the series is long enough for, with
+/// bounds at `confidence` (between 0 and 1). Empty for fewer than two rates (three for [`Kind::Hadamard`]).
+///
+/// # Errors
+/// The first rate that is not a finite number. A gap must not be closed up or filled either: both put a step into
+/// the integral; give the longest stretch without one.
+pub fn curve(
+    rates: &[f64],
+    dt_s: f64,
+    kind: Kind,
+    spacing: &Spacing,
+    confidence: f64,
+) -> Result<Vec<Point>> {
+    let mut integrated = Integrated::empty(dt_s);
+    integrated.push(rates)?;
+    Ok(integrated.curve(kind, spacing, confidence))
+}
+
+/// The same from the integral (angle, velocity, "phase"), in the unit of the integral per second.
+///
+/// # Errors
+/// As [`curve`].
+pub fn curve_of_phase(
+    phase: &[f64],
+    dt_s: f64,
+    kind: Kind,
+    spacing: &Spacing,
+    confidence: f64,
+) -> Result<Vec<Point>> {
+    Ok(Integrated::of_phase(phase, dt_s)?.curve(kind, spacing, confidence))
+}
+
+impl Spacing {
+    /// The cluster lengths up to `longest`, ascending.
+    fn clusters(&self, longest: usize) -> Vec<usize> {
+        let mut all: Vec<usize> = match self {
+            Self::Octave => std::iter::successors(Some(1), |m| Some(2 * m))
+                .take_while(|&m| m <= longest)
+                .collect(),
+            Self::PerDecade(count) => {
+                let step = 1.0 / (*count).max(1) as f64;
+                (0..)
+                    .map(|i| 10f64.powf(f64::from(i) * step).round() as usize)
+                    .take_while(|&m| m <= longest)
+                    .collect()
+            }
+            Self::Samples(given) => given.clone(),
+        };
+        all.retain(|m| (1..=longest).contains(m));
+        all.sort_unstable();
+        all.dedup();
+        all
+    }
+}
+
+impl Integrated {
+    /// Deviation at every averaging time of `spacing` that has at least one difference, ascending, with bounds at
+    /// `confidence` (between 0 and 1).
+    pub fn curve(&self, kind: Kind, spacing: &Spacing, confidence: f64) -> Vec<Point> {
+        let x = self.x();
+        let longest = match kind {
+            Kind::Allan => x.len().saturating_sub(1) / 2,
+            Kind::Hadamard => x.len().saturating_sub(1) / 3,
+            Kind::Modified => x.len() / 3,
+        };
+        let plan = |m| Plan {
+            m,
+            stride: stride(kind, x.len(), m),
+            all: kind.terms(x.len(), m),
+        };
+        let plans: Vec<Plan> = spacing.clusters(longest).into_iter().map(plan).collect();
+        plans
+            .chunks(AT_A_TIME)
+            .flat_map(|plans| {
+                let sums = sums_of_squares(x, kind, plans);
+                let points: Vec<Point> = plans
+                    .par_iter()
+                    .zip(sums)
+                    .map(|(plan, sum)| self.point(kind, plan, sum, confidence))
+                    .collect();
+                points
+            })
+            .collect()
+    }
+
+    fn point(&self, kind: Kind, plan: &Plan, sum_of_squares: f64, confidence: f64) -> Point {
+        let &Plan { m, stride, all } = plan;
+        let x = self.x();
+        let terms = all.div_ceil(stride);
+        let (tau, mean) = (m as f64, sum_of_squares / terms as f64);
+        let variance = match kind {
+            Kind::Allan => mean / (2.0 * tau.powi(2)),
+            Kind::Hadamard => mean / (6.0 * tau.powi(2)),
+            Kind::Modified => mean / (2.0 * tau.powi(4)),
+        };
+        let deviation = variance.sqrt() / self.step();
+        let alpha = power_law(x, kind, m);
+        let edf = Estimator {
+            kind,
+            sampling: self.sampling(),
+            m,
+            stride,
+            terms,
+        }
+        .edf(alpha);
+        let (lower, upper) = bounds::interval(deviation, edf, confidence);
+        let clusters = (x.len() - 1) as f64 / tau;
+        Point {
+            m,
+            tau_s: tau * self.dt_s(),
+            deviation,
+            terms,
+            alpha,
+            edf,
+            lower,
+            upper,
+            sigma_independent: deviation / (2.0 * (clusters - 1.0)).sqrt(),
+        }
+    }
+}
+
+/// Every how many-th difference of clusters of `m` is used, for so many `points` of the integral.
+fn stride(kind: Kind, points: usize, m: usize) -> usize {
+    if points <= ALL_TERMS + 1 {
+        return 1;
+    }
+    let by_starts = m / STARTS_PER_CLUSTER;
+    let stride = match kind {
+        Kind::Allan | Kind::Hadamard => by_starts.min(kind.terms(points, m) / KEPT_TERMS),
+        // A term is cheap to skip to only from a kept sum. Nothing is lost with the rest: the mean over the cluster
+        // takes from phase noises, too, what they forget within it.
+        Kind::Modified => by_starts / BLOCK * BLOCK,
+    };
+    stride.max(1)
+}

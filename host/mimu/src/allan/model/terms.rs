@@ -1,0 +1,145 @@
+//! The terms of the model and what was found of each.
+
+use super::differences::{RAMP, TERMS, basis};
+
+/// Floor of a flicker noise over its coefficient, squared: `2 ln 2/π`.
+pub const FLOOR: f64 = 2.0 * std::f64::consts::LN_2 / std::f64::consts::PI;
+
+/// A coefficient that the curve shows.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Coefficient {
+    /// Estimate, in the unit of its [`Term`].
+    pub value: f64,
+    /// Standard deviation of the estimate. The interval is not symmetric: it is what to use.
+    pub sigma: f64,
+    /// Lower end of the confidence interval.
+    pub lower: f64,
+    /// Upper end.
+    pub upper: f64,
+}
+
+/// A coefficient that the curve does not show.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Unseen {
+    /// Upper end of the confidence interval, in the unit of its [`Term`]; `None` where nothing of the curve tells it.
+    pub at_most: Option<f64>,
+    /// The sentence why it is not shown.
+    pub why: String,
+}
+
+/// Terms of the model, in the order of their powers of τ.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Term {
+    /// Quantization Q, unit·s (angle or velocity).
+    Q,
+    /// White noise N: angle or velocity random walk, unit·√s (unit/√Hz).
+    N,
+    /// Bias instability B, unit.
+    B,
+    /// Rate random walk K, unit/√s.
+    K,
+    /// Rate ramp R, unit/s.
+    R,
+}
+
+impl Term {
+    /// All of them, by powers of τ.
+    pub const ALL: [Self; TERMS] = [Self::Q, Self::N, Self::B, Self::K, Self::R];
+
+    /// Name of the coefficient.
+    pub fn letter(self) -> &'static str {
+        ["Q", "N", "B", "K", "R"][self as usize]
+    }
+
+    /// What it is.
+    pub fn name(self) -> &'static str {
+        [
+            "quantization",
+            "white noise",
+            "bias instability",
+            "rate random walk",
+            "rate ramp",
+        ][self as usize]
+    }
+
+    /// Deviation at `tau_s` of the term with coefficient 1.
+    pub fn deviation(self, tau_s: f64) -> f64 {
+        match self {
+            Self::Q => 3f64.sqrt() / tau_s,
+            Self::N => 1.0 / tau_s.sqrt(),
+            Self::B => FLOOR.sqrt(),
+            Self::K => (tau_s / 3.0).sqrt(),
+            Self::R => tau_s / 2f64.sqrt(),
+        }
+    }
+
+    /// Coefficient whose Allan variance at τ = m samples has the amplitude `a` in units of the sample period.
+    pub(super) fn coefficient(self, a: f64, dt_s: f64) -> f64 {
+        a.sqrt() / self.deviation(dt_s)
+    }
+}
+
+/// The noise of one channel.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NoiseModel {
+    /// Coefficients by [`Term`].
+    pub coefficients: [Result<Coefficient, Unseen>; TERMS],
+    /// Whether the short end falls below white noise as behind a low-pass filter: of a first-order one with time constant T
+    /// the variance is `N²/τ (1 - 3 T/(2 τ))` from a few T on.
+    pub filtered: bool,
+    /// Shortest and longest averaging time that it was fitted to, s.
+    pub range_s: [f64; 2],
+    /// Misfit over its expectation, where the terms do not describe the curve: the intervals are √ of it wider.
+    pub excess: Option<f64>,
+    /// Of the terms in [`basis`].
+    pub(super) amplitudes: [f64; TERMS],
+    pub(super) dt_s: f64,
+}
+
+impl NoiseModel {
+    /// The coefficient of `term`, or why there is none.
+    pub fn get(&self, term: Term) -> Result<&Coefficient, &str> {
+        self.coefficients[term as usize]
+            .as_ref()
+            .map_err(|unseen| unseen.why.as_str())
+    }
+
+    /// Upper end of the confidence interval of `term`, whether it is shown or not.
+    pub fn at_most(&self, term: Term) -> Option<f64> {
+        match &self.coefficients[term as usize] {
+            Ok(shown) => Some(shown.upper),
+            Err(unseen) => unseen.at_most,
+        }
+    }
+
+    /// Allan deviation of the model at `tau_s`, unit of the channel. Below [`NoiseModel::range_s`] it need not be what was
+    /// measured.
+    pub fn deviation(&self, tau_s: f64) -> f64 {
+        let terms = basis(tau_s / self.dt_s);
+        let variance: f64 = terms.iter().zip(&self.amplitudes).map(|(b, a)| b * a).sum();
+        variance.max(0.0).sqrt()
+    }
+
+    /// Averaging time from which on none is better by more than 5 %, s: what a dwell is good for (fang, section 3, finds 20 s).
+    ///
+    /// Not the minimum itself: about it the curve is flat, and without a random walk there is none. `None` where longer
+    /// was still better at the longest time that was fitted to.
+    pub fn useful_average_s(&self) -> Option<f64> {
+        let [from, to] = self.range_s;
+        let times = || {
+            let steps = (200.0 * (to / from).log10()) as usize;
+            (0..=steps).map(move |i| from * 10f64.powf(i as f64 / 200.0))
+        };
+        let inside = times()
+            .map(|t| self.deviation(t))
+            .fold(f64::INFINITY, f64::min);
+        let rises = self.amplitudes[Term::K as usize] + self.amplitudes[RAMP] > 0.0;
+        // Beyond the fitted times only what is certain there counts: a floor, which stays.
+        let least = match rises {
+            true if inside < self.deviation(to) => inside,
+            true => return None,
+            false => self.amplitudes[Term::B as usize].sqrt(),
+        };
+        times().find(|t| self.deviation(*t) <= 1.05 * least)
+    }
+}

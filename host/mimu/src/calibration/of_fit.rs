@@ -1,0 +1,140 @@
+//! The calibration that a fit gives.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::{
+    Calibration, EffectTable, FORMAT, FORMULA, ForwardTable, INVERSE_DIRECTION, Judged, Origin,
+    PhysicalTable, TriadTable,
+};
+use crate::fit::{Fit, SensorFit};
+use crate::quantity::{Sensor, inverse_names, rounded};
+use crate::triad::{Angles, Estimate};
+use mimu_recording::Reference;
+use mimu_recording::error::Result;
+
+/// Digits of what says how well something is known.
+const SIGMA_DIGITS: usize = 4;
+const FIGURE_DIGITS: usize = 7;
+
+impl Calibration {
+    /// The calibration of `fit`, a fit of readings without `effects`, made at `created` (RFC 3339).
+    ///
+    /// # Errors
+    /// An effect that cannot be removed, as when its sensor is not calibrated.
+    pub fn of(fit: &Fit, effects: &[EffectTable], created: &str) -> Result<Self> {
+        let manifest = &fit.prepared.manifest;
+        let dwells = fit.prepared.dwells.list.iter();
+        let temperatures: Vec<f64> = dwells.map(|d| d.temp_c).filter(|t| t.is_finite()).collect();
+        let mean = temperatures.iter().sum::<f64>() / temperatures.len() as f64;
+        let triad = |sensor| fit.sensor(sensor).map(|found| table(fit, found));
+        let calibration = Self {
+            format: FORMAT.into(),
+            device: manifest.device.clone(),
+            created: created.into(),
+            tool: concat!("mimu ", env!("CARGO_PKG_VERSION")).into(),
+            recording: Origin {
+                sha256: fit.prepared.condensed.sha256.clone(),
+                reference: manifest.reference,
+                raw_unit: manifest.raw_unit,
+                gravity_mps2: manifest.gravity_mps2,
+                temp_c: mean.is_finite().then_some(mean),
+            },
+            gyro: triad(Sensor::Gyro),
+            accel: triad(Sensor::Accel),
+            effect_tables: effects.iter().cloned().map(readable).collect(),
+            effects: Vec::new(),
+        };
+        calibration.checked(&format!("calibration of {:?}", manifest.device))
+    }
+}
+
+/// An effect with as many digits of its sigmas as the triads have.
+fn readable(mut effect: EffectTable) -> EffectTable {
+    for c in &mut effect.coefficients {
+        c.value += 0.0;
+        c.sigma = rounded(c.sigma, SIGMA_DIGITS);
+    }
+    effect
+}
+
+fn table(fit: &Fit, found: &SensorFit) -> TriadTable {
+    let triad = &found.estimated.triad;
+    let estimates = triad.inverse_estimates();
+    let covariance = &triad.inverse_covariance;
+    let physical = triad.physical(Angles::Exact);
+    let sigmas = |i: usize| rounded(estimates[i].sigma, SIGMA_DIGITS);
+    let intervals = |i: usize| rounded(estimates[i].interval, SIGMA_DIGITS);
+    let frame = match (fit.prepared.manifest.reference, found.sensor) {
+        (Reference::Table, _) => "body: the axes of the ref_ columns",
+        (Reference::Gravity, Sensor::Accel) => {
+            "body: x along the accelerometer's x, xy plane through its y"
+        }
+        (Reference::Gravity, Sensor::Gyro) => {
+            "body: the accelerometer's (x along its x, xy plane through its y)"
+        }
+    };
+    let degrees = 1f64.to_degrees();
+    TriadTable {
+        formula: FORMULA.into(),
+        direction: INVERSE_DIRECTION.into(),
+        raw_unit: fit.prepared.manifest.raw_unit,
+        unit: found.sensor.unit().into(),
+        frame: frame.into(),
+        C: by_rows(&triad.inverse.matrix),
+        o: plain(&triad.inverse.offset),
+        sigma_C: [0, 3, 6].map(|i| [i, i + 1, i + 2].map(sigmas)),
+        sigma_o: [9, 10, 11].map(sigmas),
+        interval_C: [0, 3, 6].map(|i| [i, i + 1, i + 2].map(intervals)),
+        interval_o: [9, 10, 11].map(intervals),
+        parameters: inverse_names().into(),
+        covariance: (0..12)
+            .map(|i| (0..12).map(|j| covariance[(i, j)] + 0.0).collect())
+            .collect(),
+        judged: Judged {
+            estimator: fit.estimator(found.sensor).into(),
+            figure: found.figure.description().into(),
+            unit: found.figure.unit(found.sensor).into(),
+            rms: rounded(found.rms(), FIGURE_DIGITS),
+            held_out_rms: found.held_out_rms().map(|r| rounded(r, FIGURE_DIGITS)),
+            noise_floor: rounded(found.noise_floor(), FIGURE_DIGITS),
+            dwells: found.dwells,
+            condition: rounded(found.estimated.condition, SIGMA_DIGITS + 1),
+        },
+        forward: ForwardTable {
+            formula: "u = P x + b".into(),
+            direction: "SI to raw".into(),
+            P: by_rows(&triad.forward.matrix),
+            b: plain(&triad.forward.bias),
+        },
+        physical: PhysicalTable {
+            formula: "P = K Mo Mp, Mp = Rz Ry Rx by the misalignments, rows of Mo of unit length"
+                .into(),
+            scale_factor: values(&physical.scale, 1.0),
+            sigma_scale_factor: sigmas_of(&physical.scale, 1.0),
+            bias: values(&physical.bias, 1.0),
+            sigma_bias: sigmas_of(&physical.bias, 1.0),
+            misalignment_deg: values(&physical.misalignment, degrees),
+            sigma_misalignment_deg: sigmas_of(&physical.misalignment, degrees),
+            non_orthogonality_deg: values(&physical.non_orthogonality, degrees),
+            sigma_non_orthogonality_deg: sigmas_of(&physical.non_orthogonality, degrees),
+        },
+    }
+}
+
+// Minus zero, which only puzzles, is zero.
+
+fn by_rows(matrix: &Matrix3<f64>) -> [[f64; 3]; 3] {
+    [0, 1, 2].map(|i| [0, 1, 2].map(|j| matrix[(i, j)] + 0.0))
+}
+
+fn plain(vector: &Vector3<f64>) -> [f64; 3] {
+    [0, 1, 2].map(|i| vector[i] + 0.0)
+}
+
+fn values(triple: &[Estimate; 3], unit: f64) -> [f64; 3] {
+    triple.map(|e| e.value * unit + 0.0)
+}
+
+fn sigmas_of(triple: &[Estimate; 3], unit: f64) -> [f64; 3] {
+    triple.map(|e| rounded(e.sigma * unit, SIGMA_DIGITS))
+}

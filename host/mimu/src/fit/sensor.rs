@@ -1,0 +1,76 @@
+//! The fit of one triad and its residuals.
+
+use nalgebra::Vector3;
+
+use crate::estimate::Estimated;
+use crate::quantity::{Figure, Sensor};
+
+/// One residual: where it is, and how large in sample and held out.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Residual {
+    /// Dwell, or the dwell that a turn ends in.
+    pub dwell: usize,
+    /// Vector residual: input error, direction error; for a size, the error stands first.
+    pub value: Vector3<f64>,
+    /// The same by a calibration that has not seen it. `None`: could not be held out.
+    pub held_out: Option<Vector3<f64>>,
+    /// Standard deviation that noise alone gives it (root mean square over its parts).
+    pub floor: f64,
+}
+
+/// Fit of one triad.
+#[derive(Debug, Clone)]
+pub struct SensorFit {
+    /// Which.
+    pub sensor: Sensor,
+    /// Calibration, scatter and condition.
+    pub estimated: Estimated,
+    /// What the error figures are about.
+    pub figure: Figure,
+    /// One for every dwell or turn that was used.
+    pub residuals: Vec<Residual>,
+    /// Number of dwells used.
+    pub dwells: usize,
+    /// Compensated gyro dwell means without a table, root mean square in sample and held out, rad/s.
+    pub static_rms: Option<(f64, Option<f64>)>,
+    /// Why blocks could not be held out.
+    pub not_held_out: Vec<String>,
+    /// What a person should know.
+    pub warnings: Vec<String>,
+}
+
+impl SensorFit {
+    /// Root mean square of the residuals: over axes where the input is known, of angle or size elsewhere.
+    pub fn rms(&self) -> f64 {
+        rms(self.figure, self.residuals.iter().map(|r| r.value))
+    }
+
+    /// The same of the held-out residuals; `None` if there are none.
+    pub fn held_out_rms(&self) -> Option<f64> {
+        let held = || self.residuals.iter().filter_map(|r| r.held_out);
+        (held().count() > 0).then(|| rms(self.figure, held()))
+    }
+
+    /// What [`Self::rms`] would be with noise alone.
+    pub fn noise_floor(&self) -> f64 {
+        rms(
+            Figure::GravitySize,
+            self.residuals
+                .iter()
+                .map(|r| Vector3::new(r.floor, 0.0, 0.0)),
+        )
+    }
+}
+
+/// Root mean square: over axes where the input is known, of angle or size elsewhere.
+pub(super) fn rms(figure: Figure, values: impl Iterator<Item = Vector3<f64>>) -> f64 {
+    let (mut sum, mut n) = (0.0, 0.0);
+    for v in values {
+        sum += v.norm_squared();
+        n += match figure {
+            Figure::Input => 3.0,
+            Figure::GravitySize | Figure::Direction => 1.0,
+        };
+    }
+    (sum / n).sqrt()
+}

@@ -1,0 +1,315 @@
+//! `mimu-allan/1`: the noise of a unit at rest.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use super::TOOL;
+use crate::allan::Point;
+use crate::allan::model::{NoiseModel, Term};
+use crate::noise_file::{FileCoefficient, NOISE_FORMAT, NoiseChannel, NoiseFile};
+use crate::quantity::Sensor;
+use crate::survey::{Channel, Survey};
+
+/// Why a channel has no coefficients at all.
+const TOO_SHORT: &str = "fewer than five octaves: record for longer";
+
+/// Noise by one recording, or by several of one unit, each at its own temperature.
+#[derive(Debug, Clone, Serialize)]
+pub struct AllanResult {
+    /// `mimu-allan/1`.
+    pub format: &'static str,
+    /// Program and version.
+    pub tool: &'static str,
+    /// Unit under test.
+    pub device: Option<String>,
+    /// Deviation that the curves are of: Allan, modified Allan or Hadamard.
+    pub kind: Option<&'static str>,
+    /// Probability of all intervals.
+    pub confidence: Option<f64>,
+    /// Samples a second, of a single recording.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sample_rate_hz: Option<f64>,
+    /// Times of the first and the last sample, s, of a single recording.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub span_s: Option<[f64; 2]>,
+    /// What was used of each recording.
+    pub recordings: Vec<RecordingResult>,
+    /// Their channels, recording by recording.
+    pub channels: Vec<ChannelResult>,
+    /// What a person should know; of several recordings with their names.
+    pub warnings: Vec<String>,
+}
+
+/// What was used of a recording.
+#[derive(Debug, Clone, Serialize)]
+pub struct RecordingResult {
+    /// Directory.
+    pub recording: String,
+    /// Mean temperature, °C; null where it was not recorded.
+    pub temp_c: Option<f64>,
+    /// Samples a second, by the time stamps.
+    pub sample_rate_hz: f64,
+    /// Times of the first and the last sample, s.
+    pub span_s: [f64; 2],
+    /// What a person should know.
+    pub warnings: Vec<String>,
+}
+
+/// Noise of one channel. Deviations are in [`Self::unit`].
+#[derive(Debug, Clone, Serialize)]
+pub struct ChannelResult {
+    /// Column: `gyro_x` to `accel_z`.
+    pub name: &'static str,
+    /// Directory of its recording.
+    pub recording: String,
+    /// Mean temperature, °C; null where it was not recorded.
+    pub temp_c: Option<f64>,
+    /// rad/s, m/s^2, or the raw unit.
+    pub unit: &'static str,
+    /// Samples that it was computed from.
+    pub samples: usize,
+    /// Averaging times, s.
+    pub tau_s: Vec<f64>,
+    /// Deviations.
+    pub adev: Vec<f64>,
+    /// Lower ends of their intervals.
+    pub lower: Vec<f64>,
+    /// Upper ends.
+    pub upper: Vec<f64>,
+    /// Equivalent degrees of freedom.
+    pub edf: Vec<f64>,
+    /// Exponents of the power law `S(f) ~ f^alpha`.
+    pub alpha: Vec<i32>,
+    /// Standard deviations as if clusters were independent, fang (7), for comparison.
+    pub sigma_independent: Vec<f64>,
+    /// The noise model; null where the record is too short for one.
+    pub model: Option<ModelResult>,
+    /// Averaging time from which on none is better by more than 5 %, s; null where longer was still better.
+    pub useful_average_s: Option<f64>,
+    /// Quantization; null with its reason in [`Self::reasons`], as of the others.
+    pub q: Option<FileCoefficient>,
+    /// White noise.
+    pub n: Option<FileCoefficient>,
+    /// Bias instability.
+    pub b: Option<FileCoefficient>,
+    /// Rate random walk.
+    pub k: Option<FileCoefficient>,
+    /// Rate ramp.
+    pub r: Option<FileCoefficient>,
+    /// By its letter, why a coefficient is not there.
+    pub reasons: BTreeMap<String, String>,
+    /// By its letter, the upper end of the interval of one that is not there; null where nothing tells it.
+    pub at_most: BTreeMap<String, Option<f64>>,
+    /// Hadamard deviation, where a drift asks for it; absent elsewhere.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub hadamard: Option<HadamardResult>,
+}
+
+/// A noise model over the averaging times of its channel.
+#[derive(Debug, Clone, Serialize)]
+pub struct ModelResult {
+    /// Shortest and longest averaging time that it was fitted to, s.
+    pub range_s: [f64; 2],
+    /// Whether the short end falls below white noise, as behind a low-pass filter.
+    pub filtered: bool,
+    /// Misfit over its expectation, where the terms do not describe the curve; null where they do.
+    pub excess: Option<f64>,
+    /// Allan deviation of the model at [`ChannelResult::tau_s`].
+    pub adev: Vec<f64>,
+}
+
+/// A Hadamard curve.
+#[derive(Debug, Clone, Serialize)]
+pub struct HadamardResult {
+    /// Averaging times, s.
+    pub tau_s: Vec<f64>,
+    /// Deviations.
+    pub hdev: Vec<f64>,
+    /// Lower ends of their intervals.
+    pub lower: Vec<f64>,
+    /// Upper ends.
+    pub upper: Vec<f64>,
+    /// As [`ChannelResult::sigma_independent`].
+    pub sigma_independent: Vec<f64>,
+}
+
+impl AllanResult {
+    /// The result of surveys of one unit, each at its own temperature.
+    pub fn of(surveys: &[Survey]) -> Self {
+        let first = surveys.first();
+        let single = match surveys {
+            [single] => Some(single),
+            _ => None,
+        };
+        let warnings = surveys.iter().flat_map(|survey| {
+            let named = |w: &String| match surveys.len() {
+                1 => w.clone(),
+                _ => format!("{}: {w}", survey.recording),
+            };
+            survey.warnings.iter().map(named).collect::<Vec<_>>()
+        });
+        let recordings = surveys.iter().map(|survey| RecordingResult {
+            recording: survey.recording.clone(),
+            temp_c: survey.temp_c,
+            sample_rate_hz: survey.sample_rate_hz,
+            span_s: survey.span_s,
+            warnings: survey.warnings.clone(),
+        });
+        let channels = surveys
+            .iter()
+            .flat_map(|s| s.channels.iter().map(|c| ChannelResult::of(s, c)));
+        Self {
+            format: "mimu-allan/1",
+            tool: TOOL,
+            device: first.map(|s| s.device.clone()),
+            kind: first.map(|s| s.options.kind.name()),
+            confidence: first.map(|s| s.options.confidence),
+            sample_rate_hz: single.map(|s| s.sample_rate_hz),
+            span_s: single.map(|s| s.span_s),
+            recordings: recordings.collect(),
+            channels: channels.collect(),
+            warnings: warnings.collect(),
+        }
+    }
+
+    /// The channels of `sensor` in `recording`, in the order of its axes.
+    pub fn channels(&self, recording: &str, sensor: Sensor) -> Vec<&ChannelResult> {
+        let ours = |c: &&ChannelResult| c.recording == recording && c.sensor() == sensor;
+        self.channels.iter().filter(ours).collect()
+    }
+
+    /// The noise file for the commands that rest on it; `None` without a recording.
+    pub fn noise_file(&self) -> Option<NoiseFile> {
+        let lengths = self.recordings.iter().map(|r| r.span_s[1] - r.span_s[0]);
+        Some(NoiseFile {
+            format: NOISE_FORMAT.into(),
+            device: self.device.clone()?,
+            sample_rate_hz: self.recordings.first()?.sample_rate_hz,
+            duration_s: lengths.fold(f64::INFINITY, f64::min),
+            confidence: self.confidence?,
+            channel: self.channels.iter().map(ChannelResult::noise).collect(),
+            place: String::new(),
+        })
+    }
+}
+
+impl ChannelResult {
+    fn of(survey: &Survey, channel: &Channel) -> Self {
+        let column = |of: fn(&Point) -> f64| column(&channel.curve, of);
+        let model = channel.model.as_ref();
+        let (mut reasons, mut at_most) = (BTreeMap::new(), BTreeMap::new());
+        let [q, n, b, k, r] = Term::ALL.map(|term| {
+            let why = match model.map(|m| m.get(term)) {
+                Some(Ok(c)) => {
+                    return Some(FileCoefficient {
+                        value: c.value,
+                        sigma: c.sigma,
+                        lower: c.lower,
+                        upper: c.upper,
+                        unit: channel.unit.coefficient(term),
+                    });
+                }
+                Some(Err(why)) => why,
+                None => TOO_SHORT,
+            };
+            let key = term.letter().to_lowercase();
+            reasons.insert(key.clone(), why.to_string());
+            at_most.insert(key, model.and_then(|m| m.at_most(term)));
+            None
+        });
+        Self {
+            name: channel.name,
+            recording: survey.recording.clone(),
+            temp_c: survey.temp_c,
+            unit: channel.unit.name,
+            samples: channel.samples,
+            tau_s: column(|p| p.tau_s),
+            adev: column(|p| p.deviation),
+            lower: column(|p| p.lower),
+            upper: column(|p| p.upper),
+            edf: column(|p| p.edf),
+            alpha: channel.curve.iter().map(|p| p.alpha).collect(),
+            sigma_independent: column(|p| p.sigma_independent),
+            model: model.map(|m| ModelResult::of(m, &channel.curve)),
+            useful_average_s: model.and_then(NoiseModel::useful_average_s),
+            q,
+            n,
+            b,
+            k,
+            r,
+            reasons,
+            at_most,
+            hadamard: channel.hadamard.as_deref().map(HadamardResult::of),
+        }
+    }
+
+    /// The sensor that it is of.
+    pub fn sensor(&self) -> Sensor {
+        match self.name.starts_with(Sensor::Gyro.name()) {
+            true => Sensor::Gyro,
+            false => Sensor::Accel,
+        }
+    }
+
+    /// The coefficient of `term`, or why there is none.
+    pub fn get(&self, term: Term) -> Result<&FileCoefficient, &str> {
+        let value = match term {
+            Term::Q => &self.q,
+            Term::N => &self.n,
+            Term::B => &self.b,
+            Term::K => &self.k,
+            Term::R => &self.r,
+        };
+        let why = self.reasons.get(&term.letter().to_lowercase());
+        value.as_ref().ok_or(why.map_or("", String::as_str))
+    }
+
+    fn noise(&self) -> NoiseChannel {
+        let reason = |term| self.get(term).err().map(String::from);
+        NoiseChannel {
+            name: self.name.into(),
+            unit: self.unit.into(),
+            samples: self.samples as u64,
+            // To a thousandth: more is the thermometer's noise.
+            temp_c: self.temp_c.map(|t| (1e3 * t).round() / 1e3),
+            q: self.q.clone(),
+            n: self.n.clone(),
+            b: self.b.clone(),
+            k: self.k.clone(),
+            r: self.r.clone(),
+            q_reason: reason(Term::Q),
+            n_reason: reason(Term::N),
+            b_reason: reason(Term::B),
+            k_reason: reason(Term::K),
+            r_reason: reason(Term::R),
+        }
+    }
+}
+
+impl ModelResult {
+    fn of(model: &NoiseModel, curve: &[Point]) -> Self {
+        Self {
+            range_s: model.range_s,
+            filtered: model.filtered,
+            excess: model.excess,
+            adev: curve.iter().map(|p| model.deviation(p.tau_s)).collect(),
+        }
+    }
+}
+
+impl HadamardResult {
+    fn of(curve: &[Point]) -> Self {
+        Self {
+            tau_s: column(curve, |p| p.tau_s),
+            hdev: column(curve, |p| p.deviation),
+            lower: column(curve, |p| p.lower),
+            upper: column(curve, |p| p.upper),
+            sigma_independent: column(curve, |p| p.sigma_independent),
+        }
+    }
+}
+
+fn column(curve: &[Point], of: fn(&Point) -> f64) -> Vec<f64> {
+    curve.iter().map(of).collect()
+}

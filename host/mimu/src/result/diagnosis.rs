@@ -1,0 +1,470 @@
+//! `mimu-diagnosis/1`: the effect behind a residual, with everything that was tried and everything that is drawn.
+
+use mimu_recording::Reference;
+use serde::Serialize;
+
+use super::verify::VerifyResult;
+use super::{Sensors, TOOL};
+use crate::calibration::ConverterTable;
+use crate::diagnose::decision::{Accepted, Decision, Split};
+use crate::diagnose::picture::Picture;
+use crate::diagnose::rows::Figure as Judged;
+use crate::diagnose::{Diagnosis, SensorDiagnosis, Source, Verdict};
+use crate::effects::candidate::Kind;
+use crate::next_experiment::{Confused, Next};
+use crate::quantity::{AXES, Figure, Sensor};
+use crate::verify::Verification;
+
+/// Result of a diagnosis.
+#[derive(Debug, Clone, Serialize)]
+pub struct DiagnosisResult {
+    /// `mimu-diagnosis/1`.
+    pub format: &'static str,
+    /// Program and version.
+    pub tool: &'static str,
+    /// Unit.
+    pub device: String,
+    /// What is known of the input.
+    pub reference: Reference,
+    /// Local gravity, m/s².
+    pub gravity_mps2: f64,
+    /// Recordings that effects were found in, the first first.
+    pub recordings: Vec<Source>,
+    /// What it amounts to.
+    pub verdict: Verdict,
+    /// Accepted effects.
+    pub effects: Vec<AcceptedResult>,
+    /// Effects that were tried and not accepted.
+    pub rejected: Vec<RejectedResult>,
+    /// Effects that the recordings could not show.
+    pub not_excited: Vec<NotExcitedResult>,
+    /// Candidates that the recordings do not tell apart.
+    pub confused: Vec<Confused>,
+    /// Error figures.
+    pub sensors: Sensors<SensorDiagnosisResult>,
+    /// Accepted effects whose physics the recordings do not decide.
+    pub undecided: Vec<UndecidedResult>,
+    /// Scatter beyond the known noise that nothing explains.
+    pub leftover: Vec<LeftoverResult>,
+    /// What of the samples was left out.
+    pub left_out: LeftOutResult,
+    /// What a person should know.
+    pub warnings: Vec<String>,
+    /// The calibration before and after on a recording that nothing was fitted to.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub second: Option<SecondResult>,
+}
+
+/// An accepted effect.
+#[derive(Debug, Clone, Serialize)]
+pub struct AcceptedResult {
+    /// Public id.
+    pub id: String,
+    /// Whose readings err.
+    pub sensor: &'static str,
+    /// Physics in a line.
+    pub about: &'static str,
+    /// Its coefficients.
+    pub coefficients: Vec<CoefficientResult>,
+    /// Held-out root mean square without it, beside the other effects; unit of the sensor's figures.
+    pub held_out_rms_before: f64,
+    /// The same with it.
+    pub held_out_rms_after: f64,
+    /// How it was held out.
+    pub held_out: Split,
+    /// Probability of chance after the whole search.
+    pub chance: f64,
+    /// Candidates that would do nearly as well in its place.
+    pub alternatives: Vec<AlternativeResult>,
+    /// What it does to the second recording.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub second: Option<SecondEffectResult>,
+    /// Its nonlinear parameter.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub form: Option<FormResult>,
+    /// Of errors of a converter: how its codes stand behind the readings.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub converters: Vec<ConverterTable>,
+}
+
+/// A coefficient.
+#[derive(Debug, Clone, Serialize)]
+pub struct CoefficientResult {
+    /// Name within the effect.
+    pub name: String,
+    /// Value, in [`Self::unit`].
+    pub value: f64,
+    /// Standard deviation.
+    pub sigma: f64,
+    /// SI unit.
+    pub unit: String,
+    /// Size in data sheets; `None` for a product found from the data.
+    pub typical: Option<f64>,
+}
+
+/// A candidate that would do nearly as well.
+#[derive(Debug, Clone, Serialize)]
+pub struct AlternativeResult {
+    /// Public id.
+    pub id: String,
+    /// By how much its score is worse.
+    pub score_worse_by: f64,
+}
+
+/// What an effect does to the second recording.
+#[derive(Debug, Clone, Serialize)]
+pub struct SecondEffectResult {
+    /// Root mean square of the judged residuals without it.
+    pub rms_before: f64,
+    /// With it.
+    pub rms_after: f64,
+    /// Sum of the squares of the decorrelated residuals without it.
+    pub chi2_before: f64,
+    /// With it.
+    pub chi2_after: f64,
+    /// By how many standard deviations it should change the residuals.
+    pub expected_sigmas: f64,
+    /// Whether that is enough for the recording to say anything of it.
+    pub shows: bool,
+}
+
+/// A nonlinear parameter.
+#[derive(Debug, Clone, Serialize)]
+pub struct FormResult {
+    /// Name, with the unit.
+    pub name: &'static str,
+    /// Value.
+    pub value: f64,
+    /// Smallest value that was tried.
+    pub from: f64,
+    /// Largest.
+    pub to: f64,
+}
+
+/// An effect that was tried and not accepted.
+#[derive(Debug, Clone, Serialize)]
+pub struct RejectedResult {
+    /// Public id.
+    pub id: String,
+    /// Whose readings would err.
+    pub sensor: &'static str,
+    /// Why not.
+    pub reason: String,
+}
+
+/// An effect that the recordings could not show.
+#[derive(Debug, Clone, Serialize)]
+pub struct NotExcitedResult {
+    /// Public id.
+    pub id: String,
+    /// Whose readings would err.
+    pub sensor: &'static str,
+    /// What would show it.
+    pub experiment: String,
+}
+
+/// An accepted effect whose physics the recordings do not decide.
+#[derive(Debug, Clone, Serialize)]
+pub struct UndecidedResult {
+    /// Public id of the effect.
+    pub id: String,
+    /// Whose readings err.
+    pub sensor: &'static str,
+    /// The unlisted alternative model.
+    pub law: &'static str,
+    /// By how much its score is worse; negative where it is better.
+    pub difference: f64,
+    /// What would tell them apart.
+    pub experiment: &'static str,
+}
+
+/// Scatter beyond the known noise that nothing explains.
+#[derive(Debug, Clone, Serialize)]
+pub struct LeftoverResult {
+    /// Whose.
+    pub sensor: &'static str,
+    /// Axis, if it is of one.
+    pub axis: Option<&'static str>,
+    /// Which residuals: an axis, turns.
+    pub rows: String,
+    /// What it goes with.
+    pub against: String,
+    /// Whether the biases of usual sensors do as much, so that no verdict rests on it.
+    pub usual: bool,
+    /// Root mean square beyond the noise, in [`Self::unit`].
+    pub strength: f64,
+    /// SI unit.
+    pub unit: &'static str,
+    /// What the residuals are.
+    #[serde(skip)]
+    pub figure: Figure,
+}
+
+/// What of the samples was left out.
+#[derive(Debug, Clone, Serialize)]
+pub struct LeftOutResult {
+    /// Gaps.
+    pub gaps: u64,
+    /// Time missing in all of them, s.
+    pub missing_s: f64,
+    /// Rows that repeat the row before.
+    pub repeated_rows: u64,
+    /// Samples that are empty or not a number.
+    pub empty_samples: u64,
+    /// Samples at a rail within dwells.
+    pub clipped_samples: u64,
+}
+
+/// The calibration before and after on another recording.
+#[derive(Debug, Clone, Serialize)]
+pub struct SecondResult {
+    /// Its name.
+    pub recording: String,
+    /// By the calibration without the effects.
+    pub before: VerifyResult,
+    /// By the calibration with them.
+    pub after: VerifyResult,
+}
+
+/// Error figures of one sensor.
+#[derive(Debug, Clone, Serialize)]
+pub struct SensorDiagnosisResult {
+    /// SI unit of the figures.
+    pub unit: &'static str,
+    /// What they are about.
+    pub figure: Figure,
+    /// In sample, without effects.
+    pub rms_before: f64,
+    /// With them.
+    pub rms_after: f64,
+    /// Held out, without effects.
+    pub held_out_rms_before: f64,
+    /// With them.
+    pub held_out_rms_after: f64,
+    /// How they were held out.
+    pub held_out: Split,
+    /// With effects, every fourth dwell held out.
+    pub interleaved_rms_after: f64,
+    /// What noise alone would leave.
+    pub noise_floor: f64,
+    /// What a person should know of the accepted effects.
+    pub notes: Vec<String>,
+    /// Residuals that the model is fitted to.
+    pub rows: usize,
+    /// Affine parameters that they determine first.
+    pub affine_parameters: usize,
+    /// Probability of chance that the residuals before scatter as they do, by the known noise alone.
+    pub omnibus_chance: f64,
+    /// Dwells or turns that the figures are over.
+    pub judged: usize,
+    /// Dwells that were used.
+    pub dwells_used: usize,
+    /// Of so many.
+    pub dwells: usize,
+    /// Why the others were not, as a remark.
+    pub not_used: String,
+    /// What is drawn; `None` where a model of it is singular.
+    pub picture: Option<Picture>,
+}
+
+impl SensorDiagnosisResult {
+    /// Whether there are more residuals than affine parameters: else only rounding is left.
+    pub fn says_anything(&self) -> bool {
+        self.rows > self.affine_parameters
+    }
+}
+
+impl DiagnosisResult {
+    /// The result of a diagnosis, with what to record next, and the name and the figures of another recording without and with
+    /// the effects.
+    pub fn of(d: &Diagnosis, next: &Next, second: Option<(&str, &[Verification; 2])>) -> Self {
+        let prepared = &d.before.prepared;
+        let condensed = &prepared.condensed;
+        let clipped = prepared.dwells.list.iter().flat_map(|dwell| dwell.raw);
+        let mut warnings = d.after.warnings.clone();
+        warnings.extend(d.after.sensors.iter().flat_map(|s| s.warnings.clone()));
+        warnings.extend(
+            second
+                .iter()
+                .flat_map(|(_, [_, after])| after.warnings.clone()),
+        );
+        let of_sensor = |sensor: Sensor| {
+            let found = d.sensors.iter().find(|s| s.sensor == sensor)?;
+            Some(figures(d, found))
+        };
+        let mut result = Self {
+            format: "mimu-diagnosis/1",
+            tool: TOOL,
+            device: prepared.manifest.device.clone(),
+            reference: prepared.manifest.reference,
+            gravity_mps2: prepared.manifest.gravity_mps2,
+            recordings: d.sources.clone(),
+            verdict: d.verdict,
+            effects: Vec::new(),
+            rejected: Vec::new(),
+            not_excited: Vec::new(),
+            confused: next.confused.clone(),
+            sensors: Sensors {
+                gyro: of_sensor(Sensor::Gyro),
+                accel: of_sensor(Sensor::Accel),
+            },
+            undecided: Vec::new(),
+            leftover: Vec::new(),
+            left_out: LeftOutResult {
+                gaps: condensed.gaps.0,
+                missing_s: condensed.gaps.1,
+                repeated_rows: condensed.duplicates,
+                empty_samples: condensed.missing.iter().sum(),
+                clipped_samples: clipped.map(|m| m.clipped).sum(),
+            },
+            warnings,
+            second: second.map(|(name, [before, after])| SecondResult {
+                recording: name.into(),
+                before: VerifyResult::of(before),
+                after: VerifyResult::of(after),
+            }),
+        };
+        for s in &d.sensors {
+            result.add(s.sensor, &s.decision, next);
+        }
+        result
+    }
+
+    fn add(&mut self, sensor: Sensor, decision: &Decision, next: &Next) {
+        let name = sensor.name();
+        let accepted = decision.accepted.iter();
+        self.effects
+            .extend(accepted.map(|a| AcceptedResult::of(sensor, a)));
+        let rejected = decision.rejected.iter().map(|(id, reason)| RejectedResult {
+            id: id.clone(),
+            sensor: name,
+            reason: reason.clone(),
+        });
+        self.rejected.extend(rejected);
+        let ours = |id: &str| decision.not_excited.iter().any(|n| n.0 == id);
+        let not_excited = next.not_excited.iter().filter(|n| ours(&n.0));
+        let not_excited = not_excited.map(|(id, experiment)| NotExcitedResult {
+            id: id.clone(),
+            sensor: name,
+            experiment: experiment.clone(),
+        });
+        self.not_excited.extend(not_excited);
+        let undecided = decision.undecided.iter().map(|u| UndecidedResult {
+            id: u.id.clone(),
+            sensor: name,
+            law: u.law,
+            difference: u.worse,
+            experiment: u.settled_by,
+        });
+        self.undecided.extend(undecided);
+        let leftover = decision.leftover.iter().map(|l| {
+            let figure = match l.stratum.starts_with("turns") {
+                true => Figure::Direction,
+                false => Figure::Input,
+            };
+            LeftoverResult {
+                sensor: name,
+                axis: l.axis.map(|a| AXES[a]),
+                rows: l.stratum.clone(),
+                against: l.against.clone(),
+                usual: l.usual,
+                strength: l.strength,
+                unit: figure.unit(sensor),
+                figure,
+            }
+        });
+        self.leftover.extend(leftover);
+    }
+
+    /// Left over beyond what usual sensors do by themselves.
+    pub fn unexplained(&self) -> impl Iterator<Item = &LeftoverResult> {
+        self.leftover.iter().filter(|l| !l.usual)
+    }
+}
+
+fn figures(d: &Diagnosis, found: &SensorDiagnosis) -> SensorDiagnosisResult {
+    let decision = &found.decision;
+    let fit = d.before.sensor(found.sensor);
+    let figure = fit.map_or(Figure::Input, |f| f.figure);
+    let (count, together) = found.rows.judged;
+    let of_one = match found.rows.figure {
+        Judged::Direction | Judged::Size => together,
+        Judged::Input | Judged::Rest => 3 * together,
+    };
+    let dwells = &d.before.prepared.dwells;
+    SensorDiagnosisResult {
+        unit: figure.unit(found.sensor),
+        figure,
+        rms_before: decision.rms[0],
+        rms_after: decision.rms[1],
+        held_out_rms_before: decision.held_out_rms[0],
+        held_out_rms_after: decision.held_out_rms[1],
+        held_out: decision.split,
+        interleaved_rms_after: decision.interleaved_rms,
+        noise_floor: decision.noise_floor,
+        notes: decision.notes.clone(),
+        rows: decision.rows[0],
+        affine_parameters: decision.rows[1],
+        omnibus_chance: decision.omnibus_p,
+        judged: count / of_one,
+        dwells_used: fit.map_or(0, |f| f.dwells),
+        dwells: dwells.list.len(),
+        not_used: dwells.unused(found.sensor),
+        picture: found.picture.clone(),
+    }
+}
+
+impl AcceptedResult {
+    fn of(sensor: Sensor, a: &Accepted) -> Self {
+        let candidate = &a.chosen.candidate;
+        let typical = |k: &usize| match candidate.kind {
+            Kind::Effect(e) => e.coefficients.get(*k).map(|c| c.typical),
+            _ => None,
+        };
+        let coefficients = candidate.names().into_iter().zip(&candidate.active);
+        let coefficients =
+            coefficients
+                .enumerate()
+                .map(|(i, ((name, unit), k))| CoefficientResult {
+                    name,
+                    value: a.values[i],
+                    sigma: a.covariance[(i, i)].sqrt(),
+                    unit,
+                    typical: typical(k),
+                });
+        Self {
+            id: candidate.id(),
+            sensor: sensor.name(),
+            about: candidate.about(),
+            coefficients: coefficients.collect(),
+            held_out_rms_before: a.held_out[0],
+            held_out_rms_after: a.held_out[1],
+            held_out: a.split,
+            chance: a.chosen.p,
+            alternatives: a
+                .chosen
+                .alternatives
+                .iter()
+                .map(|(id, worse)| AlternativeResult {
+                    id: id.clone(),
+                    score_worse_by: *worse,
+                })
+                .collect(),
+            second: a.second.map(|s| SecondEffectResult {
+                rms_before: s.rms[0],
+                rms_after: s.rms[1],
+                chi2_before: s.chi2[0],
+                chi2_after: s.chi2[1],
+                expected_sigmas: s.expected,
+                shows: s.shows(),
+            }),
+            form: candidate.parameter().map(|f| FormResult {
+                name: f.name,
+                value: a.chosen.parameter,
+                from: f.from,
+                to: f.to,
+            }),
+            converters: ConverterTable::of(&candidate.codes),
+        }
+    }
+}

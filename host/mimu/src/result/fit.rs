@@ -1,0 +1,399 @@
+//! `mimu-fit/1`: a calibration of both triads, how it was found, and how well it does.
+
+use std::collections::BTreeMap;
+
+use mimu_recording::{RawUnit, Reference};
+use serde::Serialize;
+
+use super::{Sensors, TOOL};
+use crate::dwell::Dwell;
+use crate::fit::{Fit, Method, SensorFit};
+use crate::quantity::{AXES, Figure, Sensor, inverse_names, raw_unit, scale_unit};
+use crate::stillness;
+use crate::triad::{Angles, Estimate};
+
+/// Result of a fit.
+#[derive(Debug, Clone, Serialize)]
+pub struct FitResult {
+    /// `mimu-fit/1`.
+    pub format: &'static str,
+    /// Program and version.
+    pub tool: &'static str,
+    /// Unit under test.
+    pub device: String,
+    /// SHA-256 of the samples file.
+    pub sha256: String,
+    /// What is known of the input.
+    pub reference: Reference,
+    /// Unit of the raw readings.
+    pub raw_unit: RawUnit,
+    /// Local gravity, m/s².
+    pub gravity_mps2: f64,
+    /// Estimator where the input is known.
+    pub method: &'static str,
+    /// Samples.
+    pub rows: u64,
+    /// Time between samples, s.
+    pub period_s: f64,
+    /// Times without samples.
+    pub gaps: Gaps,
+    /// Samples whose time stamp repeats that before.
+    pub duplicates: u64,
+    /// Contiguous blocks that were left out in turn.
+    pub holdout_blocks: usize,
+    /// Its triads.
+    pub sensors: Sensors<SensorFitResult>,
+    /// How the dwells were found; null where the `step` column says.
+    pub detection: Option<Detection>,
+    /// All dwells, used or not.
+    pub dwells: Vec<DwellResult>,
+    /// What a person should know.
+    pub warnings: Vec<String>,
+}
+
+/// Times without samples.
+#[derive(Debug, Clone, Serialize)]
+pub struct Gaps {
+    /// How many.
+    pub count: u64,
+    /// How long in all, s.
+    pub missing_s: f64,
+}
+
+/// How dwells were found.
+#[derive(Debug, Clone, Serialize)]
+pub struct Detection {
+    /// Window of the variance, s.
+    pub window_s: f64,
+    /// Left out at both ends, s.
+    pub guard_s: f64,
+    /// Shorter ones are not used, s.
+    pub shortest_s: f64,
+    /// Largest variance of the accelerometer, in units of `floor_raw` squared.
+    pub still_factor: f64,
+    /// The same of the gyro.
+    pub gyro_still_factor: f64,
+    /// Standard deviation of a sample in the quietest twentieth of the recording, raw.
+    pub floor_raw: [f64; 6],
+}
+
+/// One dwell.
+#[derive(Debug, Clone, Serialize)]
+pub struct DwellResult {
+    /// Number by the `step` column, or in order of time.
+    pub step: i32,
+    /// Its name in the manifest; absent without one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub label: Option<String>,
+    /// Data row of its first sample, from 0.
+    pub first_row: u64,
+    /// Samples.
+    pub rows: u64,
+    /// Time of the first, s.
+    pub start_s: f64,
+    /// Length, s.
+    pub duration_s: f64,
+    /// Mean temperature, °C; null where unknown.
+    pub temp_c: f64,
+    /// Mean readings, gyro x, y, z, accelerometer x, y, z; raw.
+    pub raw_mean: [f64; 6],
+    /// Samples that each is the mean of.
+    pub averaged: [u64; 6],
+    /// Samples at a rail.
+    pub clipped: [u64; 6],
+    /// Why it is not used for the gyro; null if it is.
+    pub gyro_not_used: Option<String>,
+    /// Why it is not used for the accelerometer; null if it is.
+    pub accel_not_used: Option<String>,
+}
+
+/// Fit of one triad.
+#[derive(Debug, Clone, Serialize)]
+pub struct SensorFitResult {
+    /// How it was estimated.
+    pub estimator: &'static str,
+    /// `C_xx` to `o_z` (raw to SI, `x = C u + o`), then as physical quantities: `scale_`, `bias_`, `misalignment_` of x, y, z and
+    /// `non_orthogonality_` of yz, zy, zx.
+    pub parameters: Vec<Parameter>,
+    /// Root mean square of the residuals, in [`Self::unit`].
+    pub rms: f64,
+    /// The same of those that were held out; null if none were.
+    pub held_out_rms: Option<f64>,
+    /// What noise alone would give, in [`Self::unit`].
+    pub noise_floor: f64,
+    /// SI unit of the figures.
+    pub unit: &'static str,
+    /// What they are about.
+    pub figure: Figure,
+    /// Dwells used.
+    pub dwells: usize,
+    /// Condition of the experiment.
+    pub condition: f64,
+    /// The physical quantities to first order in the angles, fang (14): for comparison with what others publish.
+    pub small_angle: SmallAngle,
+    /// By group of observations, whether noise explains their residuals.
+    pub scatter: BTreeMap<String, ScatterResult>,
+    /// Why blocks could not be held out.
+    pub not_held_out: Vec<String>,
+    /// One for every dwell or turn that was used.
+    pub residuals: Vec<ResidualResult>,
+    /// Compensated gyro dwell means without a table, rad/s; absent with one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub static_rms: Option<f64>,
+    /// The same held out; null if none were held out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub static_held_out_rms: Option<Option<f64>>,
+}
+
+/// A parameter with its uncertainty.
+#[derive(Debug, Clone, Serialize)]
+pub struct Parameter {
+    /// Name.
+    pub name: String,
+    /// Estimate.
+    pub value: f64,
+    /// Standard deviation.
+    pub sigma: f64,
+    /// Lower end of the 95 % interval.
+    pub lower: f64,
+    /// Upper end.
+    pub upper: f64,
+    /// Unit of all four.
+    pub unit: String,
+}
+
+/// Values with their standard deviations.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct Triple {
+    /// Estimates.
+    pub value: [f64; 3],
+    /// Standard deviations.
+    pub sigma: [f64; 3],
+}
+
+/// Physical quantities to first order in the angles.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct SmallAngle {
+    /// Scale factors, raw per SI.
+    pub scale: Triple,
+    /// Biases, raw.
+    pub bias: Triple,
+    /// θx, θy, θz, rad.
+    pub misalignment_rad: Triple,
+    /// βyz, βzy, βzx, rad.
+    pub non_orthogonality_yz_zy_zx_rad: Triple,
+}
+
+/// Whether noise explains residuals.
+#[derive(Debug, Clone, Serialize)]
+pub struct ScatterResult {
+    /// Sum of squares over what noise gives each.
+    pub chi2: f64,
+    /// Degrees of freedom.
+    pub dof: f64,
+    /// Standard deviation of what is there beside noise, in [`Self::unit`].
+    pub excess_sigma: f64,
+    /// Its unit: SI, or the raw unit.
+    pub unit: String,
+    /// Whether noise does not explain them; what is there beside it is then in the intervals.
+    pub significant: bool,
+}
+
+/// Residual of a dwell or a turn.
+#[derive(Debug, Clone, Serialize)]
+pub struct ResidualResult {
+    /// Dwell, or that which the turn ends in.
+    pub step: i32,
+    /// Residual, SI; of a magnitude the first.
+    pub value: [f64; 3],
+    /// The same by a fit that has not seen it; null where there is none.
+    pub held_out: Option<[f64; 3]>,
+    /// Standard deviation that noise alone gives it, SI.
+    pub floor: f64,
+}
+
+impl FitResult {
+    /// The result of `fit`.
+    pub fn of(fit: &Fit) -> Self {
+        let (condensed, manifest) = (&fit.prepared.condensed, &fit.prepared.manifest);
+        let of = |sensor: Sensor| Some(SensorFitResult::of(fit, fit.sensor(sensor)?));
+        let labels = &manifest.step_labels;
+        let dwells = fit.prepared.dwells.list.iter();
+        let of_sensors = fit.sensors.iter().flat_map(|s| &s.warnings);
+        Self {
+            format: "mimu-fit/1",
+            tool: TOOL,
+            device: manifest.device.clone(),
+            sha256: condensed.sha256.clone(),
+            reference: manifest.reference,
+            raw_unit: manifest.raw_unit,
+            gravity_mps2: manifest.gravity_mps2,
+            method: fit.options.method.name(),
+            rows: condensed.rows,
+            period_s: condensed.period_s,
+            gaps: Gaps {
+                count: condensed.gaps.0,
+                missing_s: condensed.gaps.1,
+            },
+            duplicates: condensed.duplicates,
+            holdout_blocks: fit.options.holdout_blocks,
+            sensors: Sensors {
+                gyro: of(Sensor::Gyro),
+                accel: of(Sensor::Accel),
+            },
+            detection: fit.prepared.dwells.detection.map(Detection::of),
+            dwells: dwells.map(|d| DwellResult::of(d, labels)).collect(),
+            warnings: fit.warnings.iter().chain(of_sensors).cloned().collect(),
+        }
+    }
+}
+
+impl Detection {
+    fn of(d: stillness::Detection) -> Self {
+        Self {
+            window_s: d.window_s,
+            guard_s: d.guard_s,
+            shortest_s: d.shortest_s,
+            still_factor: d.still_factor,
+            gyro_still_factor: d.gyro_still_factor,
+            floor_raw: d.floor,
+        }
+    }
+}
+
+impl DwellResult {
+    fn of(dwell: &Dwell, labels: &[String]) -> Self {
+        let fault = |sensor| dwell.fault(sensor).map(|f| f.to_string());
+        let label = usize::try_from(dwell.step).ok().and_then(|s| labels.get(s));
+        Self {
+            step: dwell.step,
+            label: label.cloned(),
+            first_row: dwell.first_row,
+            rows: dwell.rows,
+            start_s: dwell.start_s,
+            duration_s: dwell.duration_s,
+            temp_c: dwell.temp_c,
+            raw_mean: dwell.raw.map(|m| m.mean),
+            averaged: dwell.raw.map(|m| m.n),
+            clipped: dwell.raw.map(|m| m.clipped),
+            gyro_not_used: fault(Sensor::Gyro),
+            accel_not_used: fault(Sensor::Accel),
+        }
+    }
+}
+
+impl SensorFitResult {
+    fn of(fit: &Fit, found: &SensorFit) -> Self {
+        let scatter = found.estimated.scatter.iter().map(|(group, s)| {
+            let result = ScatterResult {
+                chi2: s.chi2,
+                dof: s.dof,
+                excess_sigma: s.excess.sqrt(),
+                unit: excess_unit(fit, found, group),
+                significant: s.is_significant(),
+            };
+            (group.clone(), result)
+        });
+        let residuals = found.residuals.iter().map(|r| ResidualResult {
+            step: fit.prepared.dwells.list[r.dwell].step,
+            value: r.value.into(),
+            held_out: r.held_out.map(Into::into),
+            floor: r.floor,
+        });
+        let small = found.estimated.triad.physical(Angles::Small);
+        Self {
+            estimator: fit.estimator(found.sensor),
+            parameters: parameters(fit.prepared.manifest.raw_unit, found),
+            rms: found.rms(),
+            held_out_rms: found.held_out_rms(),
+            noise_floor: found.noise_floor(),
+            unit: found.figure.unit(found.sensor),
+            figure: found.figure,
+            dwells: found.dwells,
+            condition: found.estimated.condition,
+            small_angle: SmallAngle {
+                scale: Triple::of(&small.scale),
+                bias: Triple::of(&small.bias),
+                misalignment_rad: Triple::of(&small.misalignment),
+                non_orthogonality_yz_zy_zx_rad: Triple::of(&small.non_orthogonality),
+            },
+            scatter: scatter.collect(),
+            not_held_out: found.not_held_out.clone(),
+            residuals: residuals.collect(),
+            static_rms: found.static_rms.map(|(rms, _)| rms),
+            static_held_out_rms: found.static_rms.map(|(_, held_out)| held_out),
+        }
+    }
+
+    /// The parameters `name_x`, `name_y`, `name_z`, or those of the pairs of axes.
+    pub fn triple(&self, name: &str) -> impl Iterator<Item = &Parameter> {
+        let ours = move |p: &&Parameter| {
+            let rest = p.name.strip_prefix(name);
+            rest.is_some_and(|r| r.starts_with('_'))
+        };
+        self.parameters.iter().filter(ours)
+    }
+}
+
+/// Unit of the excess of a group of observations.
+fn excess_unit(fit: &Fit, found: &SensorFit, group: &str) -> String {
+    let si = found.sensor.unit();
+    match found.figure {
+        Figure::Direction if group == "rest" => si.into(),
+        Figure::Direction | Figure::GravitySize => found.figure.unit(found.sensor).into(),
+        // Axes of the forward form are in raw units, of the inverse form in SI.
+        Figure::Input if fit.options.method == Method::InverseForm => si.into(),
+        Figure::Input => raw_unit(fit.prepared.manifest.raw_unit, si),
+    }
+}
+
+impl Triple {
+    fn of(estimates: &[Estimate; 3]) -> Self {
+        Self {
+            value: estimates.map(|e| e.value),
+            sigma: estimates.map(|e| e.sigma),
+        }
+    }
+}
+
+fn parameters(raw: RawUnit, found: &SensorFit) -> Vec<Parameter> {
+    let triad = &found.estimated.triad;
+    let si = found.sensor.unit();
+    let inverse_unit = match raw {
+        RawUnit::Si => "1".to_string(),
+        other => format!("({si})/{other}"),
+    };
+    let mut all = Vec::new();
+    let mut add = |name: String, e: Estimate, unit: &str| {
+        all.push(Parameter {
+            name,
+            value: e.value,
+            sigma: e.sigma,
+            lower: e.value - e.interval,
+            upper: e.value + e.interval,
+            unit: unit.into(),
+        });
+    };
+    let estimates = triad.inverse_estimates();
+    for (i, (name, estimate)) in inverse_names().into_iter().zip(estimates).enumerate() {
+        add(name, estimate, if i < 9 { &inverse_unit } else { si });
+    }
+    let physical = triad.physical(Angles::Exact);
+    let pairs = ["yz", "zy", "zx"];
+    for (name, axes, estimates, unit) in [
+        ("scale", AXES, physical.scale, scale_unit(raw, si)),
+        ("bias", AXES, physical.bias, raw_unit(raw, si)),
+        ("misalignment", AXES, physical.misalignment, "rad".into()),
+        (
+            "non_orthogonality",
+            pairs,
+            physical.non_orthogonality,
+            "rad".into(),
+        ),
+    ] {
+        for (axis, estimate) in axes.iter().zip(estimates) {
+            add(format!("{name}_{axis}"), estimate, &unit);
+        }
+    }
+    all
+}
