@@ -205,7 +205,7 @@ mod tests {
         reads(&coefficient("m/s^3"), 2.724_069e-6, "1.00 mg/h");
         reads(&coefficient("rad/s^2"), 4.848_137e-6, "1.00 deg/s/h");
         reads(&coefficient("m"), 0.012, "12.0 mm");
-        reads(&coefficient("rad/s/(m/s^2)^2"), 1.0, "1.00 rad/s/(m/s²)²");
+        reads(&coefficient("rad/s/(m/s^2)^3"), 1.0, "1.00 rad/s/(m/s²)³");
     }
 
     #[test]
