@@ -98,7 +98,7 @@ fn scale(value: &mut toml::Value, factor: f64) {
 
 /// Whether an effect of the bench is one that the diagnosis knows by name.
 pub fn is_listed(id: &str) -> bool {
-    library::by_id(id).is_some()
+    effects::by_id(id).is_some()
 }
 
 /// Whether the effect `found` is what the bench's `id` does: codes that never come, and converters of each axis, are functions of the code.

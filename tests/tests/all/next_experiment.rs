@@ -73,7 +73,7 @@ fn shown_by_the_next(id: &str, unit: &RigFile, rates_dps: &[f64], seed: u64, tru
     let open: Next = next(&first);
     let told = open.not_excited.iter().find(|n| n.0 == id);
     assert!(told.is_some(), "{:?} {:?}", found(&first), open.not_excited);
-    let target = Target::listed(library::by_id(id).unwrap());
+    let target = Target::listed(effects::by_id(id).unwrap());
     let second = diagnosed(&plan(&first, &[target]), unit, seed + 1);
     assert_eq!(found(&second), [id]);
     let sensors = second.sensors.iter();
