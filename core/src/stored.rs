@@ -260,6 +260,16 @@ fn sensor(triad: u8) -> Result<Sensor, effects::Refused> {
 
 /// The calibration in `bytes`, all of them.
 pub fn decode(bytes: &[u8]) -> Result<Stored, Refused> {
+    read(bytes, |_| {}, |_| {})
+}
+
+/// The same, and shows each node and each effect as it is stored, which what the device computes with does not give back. Of what is
+/// refused the beginning may have been shown.
+pub fn read(
+    bytes: &[u8],
+    node: impl FnMut(&Node<f32>),
+    record: impl FnMut(&Record<'_>),
+) -> Result<Stored, Refused> {
     let mut from = Reader(bytes);
     if from.bytes::<4>() != Some(MAGIC) {
         return Err(Refused::NotACalibration);
@@ -278,17 +288,23 @@ pub fn decode(bytes: &[u8]) -> Result<Stored, Refused> {
     }
     let mut from = Reader(body.get(LENGTH_AT + 2..).ok_or(Refused::Length)?);
     let [nodes, effects, ..] = from.bytes::<4>().ok_or(Refused::Length)?;
-    contents(&mut from, nodes, effects)
+    contents(&mut from, nodes, effects, node, record)
 }
 
-fn contents(from: &mut Reader<'_>, nodes: u8, effects: u8) -> Result<Stored, Refused> {
+fn contents(
+    from: &mut Reader<'_>,
+    nodes: u8,
+    effects: u8,
+    mut show_node: impl FnMut(&Node<f32>),
+    mut show_record: impl FnMut(&Record<'_>),
+) -> Result<Stored, Refused> {
     let gyro = directions(from).ok_or(Refused::Length)?;
     let accel = directions(from).ok_or(Refused::Length)?;
     let mut short = false;
     let read = (0..nodes).map_while(|_| {
         let node = node(from);
         short |= node.is_none();
-        node
+        node.inspect(&mut show_node)
     });
     let table = Table::new(read);
     if short {
@@ -307,7 +323,7 @@ fn contents(from: &mut Reader<'_>, nodes: u8, effects: u8) -> Result<Stored, Ref
     }
     let mut all = Effects::of(gyro, accel);
     for at in 0..effects {
-        let effect = effect(from).ok_or(Refused::Length)?;
+        let effect = effect(from, &mut show_record).ok_or(Refused::Length)?;
         effect
             .and_then(|effect| all.push(effect))
             .map_err(|refused| match refused {
@@ -352,7 +368,14 @@ fn node(from: &mut Reader<'_>) -> Option<Node<f32>> {
 }
 
 /// `None` if the bytes end in it.
-fn effect(from: &mut Reader<'_>) -> Option<Result<Effect<f32>, effects::Refused>> {
+fn effect(
+    from: &mut Reader<'_>,
+    mut show: impl FnMut(&Record<'_>),
+) -> Option<Result<Effect<f32>, effects::Refused>> {
+    let mut used = |record: Record<'_>| {
+        show(&record);
+        Some(record.effect())
+    };
     match from.u8()? {
         NAMED => {
             let length = from.u8()?;
@@ -366,9 +389,11 @@ fn effect(from: &mut Reader<'_>) -> Option<Result<Effect<f32>, effects::Refused>
                 *coefficient = from.f32()?;
             }
             let constant = from.f32()?;
-            let constant = (constant != 0.0).then_some(constant);
-            let id = core::str::from_utf8(id).unwrap_or_default();
-            Some(Effect::named(id, &coefficients, constant))
+            used(Record::Named {
+                id: core::str::from_utf8(id).unwrap_or_default(),
+                coefficients: &coefficients,
+                nonlinear: (constant != 0.0).then_some(constant),
+            })
         }
         TERM => {
             let [triad, axis, count] = from.bytes()?;
@@ -388,10 +413,15 @@ fn effect(from: &mut Reader<'_>) -> Option<Result<Effect<f32>, effects::Refused>
                 }
             }
             let coefficient = from.f32()?;
-            Some(sensor(triad).and_then(|sensor| match known {
-                true => Effect::term(sensor, usize::from(axis), coefficient, &variables),
-                false => Err(effects::Refused::Unknown),
-            }))
+            match sensor(triad) {
+                Ok(sensor) if known => used(Record::Term {
+                    sensor,
+                    axis,
+                    coefficient,
+                    variables: &variables,
+                }),
+                _ => Some(Err(effects::Refused::Unknown)),
+            }
         }
         CODE => {
             let [triad, axis] = from.bytes()?;
@@ -400,11 +430,45 @@ fn effect(from: &mut Reader<'_>) -> Option<Result<Effect<f32>, effects::Refused>
             for error in &mut errors {
                 *error = from.f32()?;
             }
-            let axis = (axis != ALL).then_some(usize::from(axis));
-            Some(sensor(triad).and_then(|sensor| Effect::code(sensor, axis, &errors, weight, zero)))
+            match sensor(triad) {
+                Ok(sensor) => used(Record::Code {
+                    sensor,
+                    axis: (axis != ALL).then_some(axis),
+                    weight,
+                    zero,
+                    errors: &errors,
+                }),
+                Err(refused) => Some(Err(refused)),
+            }
         }
         // Of a kind that a later version has.
         _ => Some(Err(effects::Refused::Unknown)),
+    }
+}
+
+impl Record<'_> {
+    /// What the device computes with.
+    fn effect(&self) -> Result<Effect<f32>, effects::Refused> {
+        match *self {
+            Self::Named {
+                id,
+                coefficients,
+                nonlinear,
+            } => Effect::named(id, coefficients, nonlinear),
+            Self::Term {
+                sensor,
+                axis,
+                coefficient,
+                variables,
+            } => Effect::term(sensor, usize::from(axis), coefficient, variables),
+            Self::Code {
+                sensor,
+                axis,
+                weight,
+                zero,
+                errors,
+            } => Effect::code(sensor, axis.map(usize::from), errors, weight, zero),
+        }
     }
 }
 

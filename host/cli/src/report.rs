@@ -14,14 +14,10 @@ mod text;
 mod verify;
 
 pub use allan::allan_text;
-pub use design::{
-    DesignReport, NextReport, comparison_json, comparison_text, design_json, design_text,
-    next_json, next_text,
-};
+pub use design::{comparison_text, design_text, next_text};
 pub use device::{
-    check_json, check_text, counters_json, counters_text, download_json, download_text, info_json,
-    info_text, kalman_json, kalman_text, record_json, record_text, self_test_json, self_test_text,
-    stream_json, stream_text, upload_json, upload_text,
+    check_text, counters_text, download_text, info_text, kalman_text, record_text, self_test_text,
+    stream_text, upload_text,
 };
 pub use diagnosis::{Made, diagnosis_page, diagnosis_text};
 pub use fit::{dwell_table, fit_text};

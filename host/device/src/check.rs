@@ -9,6 +9,7 @@ use mimu_core::stored::{ROOM, Stored};
 use mimu_core::table;
 use mimu_core::wire::{BatchHead, Request};
 use nalgebra::Vector3;
+use serde::Serialize;
 
 use super::heard::{Event, Samples};
 use super::image::{Image, remembers};
@@ -25,36 +26,35 @@ const SILENCE: Duration = Duration::from_secs(3);
 const TURN: f64 = 64.0 * f32::EPSILON as f64;
 
 /// Largest differences of one triad.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Difference {
     /// Between device and PC in the same single precision, in units of the last place of the larger of the two.
     pub ulps: u32,
-    /// The same, rad/s or m/s².
+    /// The same, in [`Self::unit`].
     pub single: f64,
-    /// Between device and the PC in double precision from the calibration file, rad/s or m/s².
+    /// Between device and the PC in double precision from the calibration file, in [`Self::unit`].
     pub double: f64,
     /// The last, as a share of what rounding can make of it at most ([`rounding`]).
-    pub share: f64,
+    pub rounding_share: f64,
+    /// rad/s or m/s^2.
+    pub unit: &'static str,
 }
 
-/// What a comparison has found.
-#[derive(Debug, Clone, PartialEq)]
+/// What a comparison has found: the result of `mimu device check`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Checked {
     /// Samples compared.
     pub samples: u64,
     /// Samples of one stream whose counterpart was lost on the way.
     pub unpaired: u64,
-    /// Gyro and accelerometer.
-    pub differences: [Difference; 2],
+    /// Of the gyro.
+    pub gyro: Difference,
+    /// Of the accelerometer.
+    pub accel: Difference,
     /// Ids of effects that remember what was before the comparison, so that double precision could not be judged.
-    pub remembering: Vec<String>,
-}
-
-impl Checked {
+    pub not_judged_for: Vec<String>,
     /// Whether device and PC differ by rounding only. With effects that remember the time before, only time tells.
-    pub fn holds(&self) -> bool {
-        self.samples > 0 && self.differences.iter().all(|d| d.share <= 1.0)
-    }
+    pub holds: bool,
 }
 
 /// The PC's side, twice: as the device computes, and in double precision from the file.
@@ -86,20 +86,22 @@ pub fn check(
         let problem = match held {
             None => "the device holds no calibration".to_string(),
             Some(hash) => format!(
-                "the device holds another calibration ({hash:016x}) than that of the file ({:016x})",
+                "the device holds another calibration ({hash}) than that of the file ({})",
                 image.hash
             ),
         };
         let remedy = format!("upload it first: `mimu device upload {place}`");
-        return Err(Error::new(session.port(), problem, remedy));
+        return Err(Error::device(session.port(), problem, remedy));
     }
     let mut twin = Twin::new(calibration, &image, session.who().sample_rate_hz, place)?;
     let wanted = (duration.as_secs_f64() * f64::from(session.who().sample_rate_hz)) as u64;
     let mut found = Checked {
         samples: 0,
         unpaired: 0,
-        differences: [Difference::default(); 2],
-        remembering: image
+        gyro: Difference::none(Sensor::Gyro),
+        accel: Difference::none(Sensor::Accel),
+        holds: false,
+        not_judged_for: image
             .effects
             .iter()
             .filter(|id| remembers(id))
@@ -129,14 +131,14 @@ pub fn check(
                 if found.unpaired > wanted.max(1000) {
                     let problem = "more samples are lost on the line than compared";
                     let remedy = "check the cable, and end what else keeps the computer busy";
-                    return Err(Error::new(session.port(), problem, remedy));
+                    return Err(Error::device(session.port(), problem, remedy));
                 }
                 heard = Instant::now();
                 progress(found.samples as f64 / wanted as f64);
             }
             Some(Event::Started(_)) => {
                 let remedy = "run it again; `mimu device info` says why it restarted";
-                return Err(Error::new(
+                return Err(Error::device(
                     session.port(),
                     "the device restarted meanwhile",
                     remedy,
@@ -145,7 +147,7 @@ pub fn check(
             Some(Event::Kalman(_)) => {}
             None if heard.elapsed() > SILENCE => {
                 let problem = "the compensated stream does not come";
-                return Err(Error::new(
+                return Err(Error::device(
                     session.port(),
                     problem,
                     "reset the board and run it again",
@@ -156,15 +158,17 @@ pub fn check(
     }
     session.done(Request::Stop, "to stop streaming")?;
     session.forget_events();
+    found.holds =
+        found.samples > 0 && found.gyro.rounding_share <= 1.0 && found.accel.rounding_share <= 1.0;
     Ok(found)
 }
 
 impl Twin {
     fn new(calibration: &Calibration, image: &Image, rate_hz: u32, place: &str) -> Result<Self> {
-        let unusable = |_| Error::new(place, "the device could not use it", "fit it again");
+        let unusable = |_| Error::device(place, "the device could not use it", "fit it again");
         let stored = image.stored().map_err(unusable)?;
         let model = |sensor| {
-            let missing = || Error::new(place, "a sensor is missing", "calibrate both sensors");
+            let missing = || Error::device(place, "a sensor is missing", "calibrate both sensors");
             calibration.inverse(sensor).ok_or_else(missing)
         };
         Ok(Self {
@@ -197,15 +201,12 @@ impl Twin {
                 continue;
             }
             found.samples += 1;
-            let pairs = [
-                (&device.gyro, &single.gyro, &double.gyro, &bounds[0]),
-                (&device.accel, &single.accel, &double.accel, &bounds[1]),
-            ];
-            for (difference, (device, single, double, bound)) in
-                found.differences.iter_mut().zip(pairs)
-            {
-                difference.note(device, single, double, bound);
-            }
+            found
+                .gyro
+                .note(&device.gyro, &single.gyro, &double.gyro, &bounds[0]);
+            found
+                .accel
+                .note(&device.accel, &single.accel, &double.accel, &bounds[1]);
         }
         self.next = Some(head.first.wrapping_add(raw.values.len() as u32));
     }
@@ -282,6 +283,16 @@ pub fn rounding(model: &mimu_core::compensation::Affine<f64>, raw: &Vector3<f64>
 }
 
 impl Difference {
+    fn none(sensor: Sensor) -> Self {
+        Self {
+            ulps: 0,
+            single: 0.0,
+            double: 0.0,
+            rounding_share: 0.0,
+            unit: sensor.unit(),
+        }
+    }
+
     fn note(
         &mut self,
         device: &Vector3<f32>,
@@ -299,8 +310,8 @@ impl Difference {
             };
             self.single = self.single.max(off(f64::from(single[i])));
             self.double = self.double.max(off(double[i]));
-            self.share = self
-                .share
+            self.rounding_share = self
+                .rounding_share
                 .max(off(double[i]) / bound[i].max(f64::MIN_POSITIVE));
         }
     }

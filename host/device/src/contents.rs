@@ -1,35 +1,64 @@
-//! What stands in a stored calibration, for people: the numbers of the layout of [`mimu_core::stored`], which the device turns into
-//! what it computes with and does not give back.
+//! What stands in a stored calibration, for people: nodes and effects as [`mimu_core::stored`] reads them.
 
-use mimu_core::stored::{self, Refused};
+use std::path::Path;
 
-use mimu::diagnose::library::readout::BITS;
+use mimu_core::compensation::Affine;
+use mimu_core::effects::{Sensor, Variable};
+use mimu_core::stored::{self, Record, Refused};
+use mimu_core::table::Node;
+use serde::Serialize;
 
-/// A stored calibration, number by number.
-#[derive(Debug, Clone, PartialEq)]
+use super::who::Hash;
+use mimu::quantity::{self, AXES};
+
+/// A stored calibration, number by number: the result of `mimu device download`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Contents {
-    /// Sensitive directions of gyro and accelerometer in the body frame, by rows, and their inverse: of the calibration that the
-    /// effects were found with.
-    pub directions: [[[[f32; 3]; 3]; 2]; 2],
+    /// File that the bytes are written to.
+    pub file: String,
+    /// Their number.
+    pub bytes: usize,
+    /// What the calibration is told apart by.
+    pub hash: Hash,
+    /// `x = C u + o`.
+    pub formula: &'static str,
+    /// `raw to SI`.
+    pub direction: &'static str,
+    /// Unit of u, at the sensors.
+    pub raw_unit: &'static str,
+    /// Frame of x.
+    pub frame: &'static str,
     /// Temperature nodes, the coldest first.
     pub nodes: Vec<NodeContents>,
     /// What the affine model lacks.
     pub effects: Vec<EffectContents>,
 }
 
-/// A temperature node: `x = C u + o`, raw to SI, u in V at the sensors.
-#[derive(Debug, Clone, PartialEq)]
+/// A temperature node.
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NodeContents {
     /// °C.
     pub temp_c: f32,
-    /// C of gyro and accelerometer, rad/s and m/s² per V, by rows.
-    pub c: [[[f32; 3]; 3]; 2],
-    /// o of both, rad/s and m/s².
-    pub o: [[f32; 3]; 2],
+    /// Of the gyro.
+    pub gyro: Inverse,
+    /// Of the accelerometer.
+    pub accel: Inverse,
+}
+
+/// `x = C u + o` of a triad, raw to SI, u in V at the sensors, x in the body frame.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[allow(non_snake_case)]
+pub struct Inverse {
+    /// By rows, [`Self::unit`] per V.
+    pub C: [[f32; 3]; 3],
+    /// In [`Self::unit`].
+    pub o: [f32; 3],
+    /// Of x: rad/s or m/s^2.
+    pub unit: &'static str,
 }
 
 /// An effect, SI.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct EffectContents {
     /// Public id; of a term in the form `term:accel_y~rate_x*force_y`.
     pub id: String,
@@ -42,7 +71,7 @@ pub struct EffectContents {
 }
 
 /// A converter.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ConverterContents {
     /// Axes that it reads: x, y, z or xyz.
     pub axes: &'static str,
@@ -52,129 +81,98 @@ pub struct ConverterContents {
     pub reading_of_code_0_v: f32,
 }
 
-/// Bytes of the layout that are read with the others before them.
-struct Rest<'a>(&'a [u8]);
-
-impl Rest<'_> {
-    fn take<const N: usize>(&mut self) -> Option<[u8; N]> {
-        let (taken, rest) = self.0.split_first_chunk::<N>()?;
-        self.0 = rest;
-        Some(*taken)
-    }
-
-    fn f32(&mut self) -> Option<f32> {
-        self.take().map(f32::from_le_bytes)
-    }
-
-    fn significant(&mut self) -> Option<[f32; 3]> {
-        Some([self.f32()?, self.f32()?, self.f32()?])
-    }
-
-    fn matrix(&mut self) -> Option<[[f32; 3]; 3]> {
-        Some([
-            self.significant()?,
-            self.significant()?,
-            self.significant()?,
-        ])
-    }
-
-    fn node(&mut self) -> Option<NodeContents> {
-        let temp_c = self.f32()?;
-        let (gyro_c, gyro_o) = (self.matrix()?, self.significant()?);
-        let (accel_c, accel_o) = (self.matrix()?, self.significant()?);
-        Some(NodeContents {
-            temp_c,
-            c: [gyro_c, accel_c],
-            o: [gyro_o, accel_o],
-        })
-    }
-
-    fn effect(&mut self) -> Option<EffectContents> {
-        match self.take()? {
-            [0] => self.named(),
-            [1] => self.term(),
-            _ => self.code(),
-        }
-    }
-
-    fn named(&mut self) -> Option<EffectContents> {
-        let [length] = self.take()?;
-        let (id, rest) = self.0.split_at_checked(usize::from(length))?;
-        self.0 = rest;
-        let [count] = self.take()?;
-        Some(EffectContents {
-            coefficients: (0..count).map(|_| self.f32()).collect::<Option<_>>()?,
-            time_constant_s: Some(self.f32()?).filter(|form| *form != 0.0),
-            id: String::from_utf8_lossy(id).into_owned(),
-            converter: None,
-        })
-    }
-
-    fn code(&mut self) -> Option<EffectContents> {
-        let [triad, axis] = self.take()?;
-        let converter = ConverterContents {
-            axes: ["x", "y", "z", "xyz"].get(usize::from(axis))?,
-            weight_of_bit_0_v: self.f32()?,
-            reading_of_code_0_v: self.f32()?,
-        };
-        Some(EffectContents {
-            id: format!("{}_readout_code", SENSORS.get(usize::from(triad))?),
-            coefficients: (0..BITS).map(|_| self.f32()).collect::<Option<_>>()?,
-            time_constant_s: None,
-            converter: Some(converter),
-        })
-    }
-
-    fn term(&mut self) -> Option<EffectContents> {
-        let [triad, axis, count] = self.take()?;
-        let mut names: Vec<&str> = Vec::new();
-        for _ in 0..count {
-            let [variable] = self.take()?;
-            names.push(VARIABLES.get(usize::from(variable).checked_sub(1)?)?);
-        }
-        let sensor = SENSORS.get(usize::from(triad))?;
-        let axis = ["x", "y", "z"].get(usize::from(axis))?;
-        Some(EffectContents {
-            id: format!("term:{sensor}_{axis}~{}", names.join("*")),
-            coefficients: vec![self.f32()?],
-            time_constant_s: None,
-            converter: None,
-        })
-    }
-}
-
-const SENSORS: [&str; 2] = ["gyro", "accel"];
-
-/// By the numbers of [`mimu_core::effects::Variable`], which begin at 1.
-const VARIABLES: [&str; 9] = [
-    "rate_x",
-    "rate_y",
-    "rate_z",
-    "force_x",
-    "force_y",
-    "force_z",
-    "temp",
-    "temp_rate",
-    "time",
-];
-
-/// What stands in `bytes`. Refused where the device would refuse it.
-pub fn contents(bytes: &[u8]) -> Result<Contents, Refused> {
-    stored::decode(bytes)?;
-    read(bytes).ok_or(Refused::Length)
-}
-
-fn read(bytes: &[u8]) -> Option<Contents> {
-    let (_magic, rest) = bytes.split_first_chunk::<4>()?;
-    let mut rest = Rest(rest);
-    let [_version, _length] = [rest.take::<2>()?, rest.take::<2>()?];
-    let [nodes, effects, ..] = rest.take::<4>()?;
-    Some(Contents {
-        directions: [
-            [rest.matrix()?, rest.matrix()?],
-            [rest.matrix()?, rest.matrix()?],
-        ],
-        nodes: (0..nodes).map(|_| rest.node()).collect::<Option<_>>()?,
-        effects: (0..effects).map(|_| rest.effect()).collect::<Option<_>>()?,
+/// What stands in `bytes`, which go to `file`. Refused where the device would refuse it.
+pub fn contents(bytes: &[u8], file: &Path) -> Result<Contents, Refused> {
+    let (mut nodes, mut effects) = (Vec::new(), Vec::new());
+    stored::read(
+        bytes,
+        |stored| nodes.push(node(stored)),
+        |record| effects.push(effect(record)),
+    )?;
+    Ok(Contents {
+        file: file.display().to_string(),
+        bytes: bytes.len(),
+        hash: Hash(stored::hash(bytes)),
+        formula: "x = C u + o",
+        direction: "raw to SI",
+        raw_unit: "V",
+        frame: "body",
+        nodes,
+        effects,
     })
+}
+
+fn node(node: &Node<f32>) -> NodeContents {
+    let inverse = |model: &Affine<f32>, sensor: quantity::Sensor| Inverse {
+        C: std::array::from_fn(|i| std::array::from_fn(|j| model.matrix[(i, j)])),
+        o: model.offset.into(),
+        unit: sensor.unit(),
+    };
+    NodeContents {
+        temp_c: node.temp_c,
+        gyro: inverse(&node.model.gyro, quantity::Sensor::Gyro),
+        accel: inverse(&node.model.accel, quantity::Sensor::Accel),
+    }
+}
+
+fn effect(record: &Record<'_>) -> EffectContents {
+    let axis_name = |axis: u8| AXES.get(usize::from(axis)).copied().unwrap_or("?");
+    let (id, coefficients) = match record {
+        Record::Named {
+            id, coefficients, ..
+        } => ((*id).to_owned(), coefficients.to_vec()),
+        Record::Term {
+            sensor,
+            axis,
+            coefficient,
+            variables,
+        } => {
+            let names: Vec<&str> = variables.iter().map(|v| variable(*v)).collect();
+            let (sensor, axis) = (triad(*sensor), axis_name(*axis));
+            let id = format!("term:{sensor}_{axis}~{}", names.join("*"));
+            (id, vec![*coefficient])
+        }
+        Record::Code { sensor, errors, .. } => {
+            (format!("{}_readout_code", triad(*sensor)), errors.to_vec())
+        }
+    };
+    EffectContents {
+        id,
+        coefficients,
+        time_constant_s: match record {
+            Record::Named { nonlinear, .. } => *nonlinear,
+            _ => None,
+        },
+        converter: match record {
+            Record::Code {
+                axis, weight, zero, ..
+            } => Some(ConverterContents {
+                axes: axis.map_or("xyz", axis_name),
+                weight_of_bit_0_v: *weight,
+                reading_of_code_0_v: *zero,
+            }),
+            _ => None,
+        },
+    }
+}
+
+fn triad(sensor: Sensor) -> &'static str {
+    match sensor {
+        Sensor::Gyro => "gyro",
+        Sensor::Accel => "accel",
+    }
+}
+
+fn variable(variable: Variable) -> &'static str {
+    match variable {
+        Variable::RateX => "rate_x",
+        Variable::RateY => "rate_y",
+        Variable::RateZ => "rate_z",
+        Variable::ForceX => "force_x",
+        Variable::ForceY => "force_y",
+        Variable::ForceZ => "force_z",
+        Variable::Temperature => "temp",
+        Variable::TemperatureRate => "temp_rate",
+        Variable::Time => "time",
+    }
 }

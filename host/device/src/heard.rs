@@ -5,6 +5,7 @@ use mimu_core::wire::{
     BatchHead, Counters, Decoder, Event as WireEvent, Frame, KalmanState, Message, Refusal, Reply,
     SelfTest, Version,
 };
+use serde::Serialize;
 
 use super::who::{Who, beginning};
 
@@ -68,7 +69,7 @@ pub enum Heard {
 }
 
 /// What has been heard, counted.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub struct LineCount {
     /// Bytes received.
     pub bytes: u64,

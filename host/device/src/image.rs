@@ -7,7 +7,7 @@ use mimu_core::table::Node;
 use mimu_core::wire::Capabilities;
 use nalgebra::{Matrix3, Vector3};
 
-use super::who::{Who, unusable};
+use super::who::{Hash, Who, unusable};
 use mimu::calibration::{Calibration, NO_SENSE, OnDevice, What};
 use mimu::quantity::Sensor;
 use mimu_recording::RawUnit;
@@ -19,7 +19,7 @@ pub struct Image {
     /// What is sent: see [`mimu_core::stored`].
     pub bytes: Vec<u8>,
     /// What it is told apart by.
-    pub hash: u64,
+    pub hash: Hash,
     /// Temperatures of its nodes, °C. A single one is for all temperatures.
     pub node_temp_c: Vec<f32>,
     /// Ids of its effects.
@@ -65,7 +65,7 @@ impl Image {
             Error::new(place, problem, "fit the recording again")
         })?;
         Ok(Self {
-            hash: stored::hash(&bytes),
+            hash: Hash(stored::hash(&bytes)),
             bytes,
             node_temp_c: vec![node.temp_c],
             effects: calibration
@@ -92,7 +92,7 @@ impl Image {
             let at = || format!("{place}, [[effect]] {id}");
             let removed = match id.starts_with("term:") {
                 true => who.capabilities.contains(Capabilities::TERMS),
-                false => who.effect_ids().contains(&id.as_str()),
+                false => who.effects.contains(&id.as_str()),
             };
             if !removed {
                 let problem = format!("the device (firmware {}) cannot remove it", who.firmware);
@@ -100,10 +100,10 @@ impl Image {
             }
         }
         let effects = on_device(calibration, place)?;
-        check_room(&effects, usize::from(who.effects_room), place)?;
+        check_room(&effects, usize::from(who.room.effects), place)?;
         let (nodes, room) = (
             self.node_temp_c.len(),
-            usize::from(who.nodes_room).min(NODES),
+            usize::from(who.room.nodes).min(NODES),
         );
         if nodes > room {
             return refuse(
@@ -111,7 +111,7 @@ impl Image {
                 format!("it has {nodes} temperature nodes, and the device has room for {room}"),
             );
         }
-        let (length, room) = (self.bytes.len(), who.stored_room);
+        let (length, room) = (self.bytes.len(), who.room.bytes);
         if length > room as usize {
             return refuse(
                 place.into(),

@@ -7,9 +7,11 @@ use mimu_core::compensation::Sample;
 use mimu_core::kalman::{Bank, STATES};
 use mimu_core::wire::{Capabilities, KalmanState, Prior, Request, Triad};
 use nalgebra::Vector3;
+use serde::Serialize;
 
 use super::heard::{Answer, Event};
 use super::session::{PATIENCE, Session};
+use mimu::quantity::Sensor;
 use mimu_recording::error::{Error, Result};
 
 /// Shortest stretch under one input: the device reports five times a second, and a report from within tells which samples it took in.
@@ -35,7 +37,7 @@ pub struct KalmanPlan {
 }
 
 /// Estimate of one sensor: `[b, P1, P2, P3]`, V and V per rad/s or per m/s².
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct AxisEstimate {
     /// Means.
     pub mean: [f64; STATES],
@@ -43,43 +45,69 @@ pub struct AxisEstimate {
     pub sigma: [f64; STATES],
 }
 
-/// What a run has found.
-#[derive(Debug, Clone, PartialEq)]
+/// What a run has found: the result of `mimu device kalman`. Forward model `u = P x + b`, SI to raw.
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct KalmanRun {
-    /// Which sensors.
-    pub triad: Triad,
+    /// Which sensors: gyro or accel.
+    pub triad: Sensor,
+    /// Names of the four states of a sensor.
+    pub parameters: [&'static str; STATES],
+    /// `SI to raw`.
+    pub direction: &'static str,
+    /// Units of the states.
+    pub units: [&'static str; STATES],
+    /// Unit of the inputs.
+    pub input_unit: &'static str,
     /// Variances that were used, V².
-    pub noise: [f32; 3],
-    /// Inputs with the numbers of the first and the last sample that were taken in under each.
-    pub inputs: Vec<([f32; 3], u32, u32)>,
+    pub noise_v2: [f32; 3],
+    /// Inputs, one after the other.
+    pub inputs: Vec<Applied>,
     /// Samples that at least one filter of the device rejected.
     pub rejected: u32,
     /// By the device, sensors x, y, z.
     pub device: [AxisEstimate; 3],
     /// By this program, on the same samples.
     pub host: [AxisEstimate; 3],
-    /// States as they converged: samples taken in, and the sensors.
-    pub history: Vec<(u32, [AxisEstimate; 3])>,
+    /// Differences of the means, device minus host, in standard deviations of the host.
+    pub distance_sigma: [[f64; STATES]; 3],
+    /// The largest of them.
+    pub largest_distance_sigma: f64,
+    /// States as they converged.
+    pub history: Vec<Converging>,
 }
 
-impl KalmanRun {
-    /// Differences of the means, device less host, in standard deviations of the host.
-    pub fn distances(&self) -> [[f64; STATES]; 3] {
-        std::array::from_fn(|i| {
-            let (device, host) = (&self.device[i], &self.host[i]);
-            std::array::from_fn(|k| (device.mean[k] - host.mean[k]) / host.sigma[k])
-        })
-    }
+/// An input that was applied.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Applied {
+    /// rad/s or m/s², body frame.
+    pub input: [f32; 3],
+    /// Number of the first sample that was taken in under it.
+    pub first: u32,
+    /// Of the last.
+    pub last: u32,
+}
 
-    /// The largest of them.
-    pub fn largest(&self) -> f64 {
-        let all = self.distances();
-        let sizes = all.iter().flatten().map(|d| match d.abs() {
-            d if d.is_nan() => f64::INFINITY,
-            d => d,
-        });
-        sizes.fold(0.0, f64::max)
-    }
+/// A report of the device while it runs.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Converging {
+    /// Samples taken in.
+    pub updates: u32,
+    /// Sensors x, y, z.
+    pub axes: [AxisEstimate; 3],
+}
+
+fn distances(device: &[AxisEstimate; 3], host: &[AxisEstimate; 3]) -> [[f64; STATES]; 3] {
+    std::array::from_fn(|i| {
+        std::array::from_fn(|k| (device[i].mean[k] - host[i].mean[k]) / host[i].sigma[k])
+    })
+}
+
+fn largest(distances: &[[f64; STATES]; 3]) -> f64 {
+    let sizes = distances.iter().flatten().map(|d| match d.abs() {
+        d if d.is_nan() => f64::INFINITY,
+        d => d,
+    });
+    sizes.fold(0.0, f64::max)
 }
 
 /// What was heard of a run.
@@ -98,7 +126,11 @@ pub fn kalman(
 ) -> Result<KalmanRun> {
     if !session.who().capabilities.contains(Capabilities::KALMAN) {
         let problem = "the device runs no Kalman bank";
-        return Err(Error::new(session.port(), problem, "flash newer firmware"));
+        return Err(Error::device(
+            session.port(),
+            problem,
+            "flash newer firmware",
+        ));
     }
     let (triad, each) = (plan.triad, plan.each.max(SHORTEST));
     let mut log = Log {
@@ -166,17 +198,32 @@ pub fn kalman(
     let noise = noise.unwrap_or_default();
     let inputs = taken_in(session.port(), plan, &ends, &log.reports)?;
     let host = replay(session.port(), plan, &noise, &inputs, &log.samples)?;
+    let device = estimates(&last);
+    let distance_sigma = distances(&device, &host);
+    let (sensor, scale, input_unit) = match triad {
+        Triad::Gyro => (Sensor::Gyro, "V/(rad/s)", "rad/s"),
+        Triad::Accel => (Sensor::Accel, "V/(m/s²)", "m/s²"),
+    };
     Ok(KalmanRun {
-        triad,
-        noise,
+        triad: sensor,
+        parameters: ["b", "P1", "P2", "P3"],
+        direction: "SI to raw",
+        units: ["V", scale, scale, scale],
+        input_unit,
+        noise_v2: noise,
         inputs,
         rejected: last.rejected,
-        device: estimates(&last),
+        device,
         host,
+        largest_distance_sigma: largest(&distance_sigma),
+        distance_sigma,
         history: log
             .reports
             .iter()
-            .map(|r| (r.updates, estimates(r)))
+            .map(|r| Converging {
+                updates: r.updates,
+                axes: estimates(r),
+            })
             .collect(),
     })
 }
@@ -192,7 +239,7 @@ impl Log {
             Some(Event::Kalman(state)) if state.triad == triad => self.reports.push(*state),
             Some(Event::Started(_)) => {
                 let remedy = "run it again; `mimu device info` says why it restarted";
-                return Err(Error::new(
+                return Err(Error::device(
                     session.port(),
                     "the device restarted meanwhile",
                     remedy,
@@ -201,7 +248,7 @@ impl Log {
             Some(_) => {}
             None if self.heard.elapsed() > SILENCE => {
                 let problem = "the raw stream does not come";
-                return Err(Error::new(
+                return Err(Error::device(
                     session.port(),
                     problem,
                     "reset the board and run it again",
@@ -224,7 +271,7 @@ impl Log {
             }
             if since.elapsed() > SILENCE {
                 let problem = "the Kalman bank does not report";
-                return Err(Error::new(session.port(), problem, "run it again"));
+                return Err(Error::device(session.port(), problem, "run it again"));
             }
         }
     }
@@ -236,7 +283,7 @@ fn taken_in(
     plan: &KalmanPlan,
     ends: &[u32],
     reports: &[KalmanState],
-) -> Result<Vec<([f32; 3], u32, u32)>> {
+) -> Result<Vec<Applied>> {
     let mut before = 0;
     let mut all = Vec::new();
     for (input, end) in plan.inputs.iter().zip(ends) {
@@ -245,10 +292,14 @@ fn taken_in(
             .find(|r| r.updates > before && r.updates < *end);
         let Some(report) = within else {
             let problem = "the bank's reports were lost on the line, so its samples are not known";
-            return Err(Error::new(port, problem, "run it again"));
+            return Err(Error::device(port, problem, "run it again"));
         };
         let first = report.last.wrapping_sub(report.updates - before - 1);
-        all.push((*input, first, first.wrapping_add(end - before - 1)));
+        all.push(Applied {
+            input: *input,
+            first,
+            last: first.wrapping_add(end - before - 1),
+        });
         before = *end;
     }
     Ok(all)
@@ -259,7 +310,7 @@ fn replay(
     port: &str,
     plan: &KalmanPlan,
     noise: &[f32; 3],
-    inputs: &[([f32; 3], u32, u32)],
+    inputs: &[Applied],
     samples: &BTreeMap<u32, Sample<f32>>,
 ) -> Result<[AxisEstimate; 3]> {
     let noise = Vector3::from(noise.map(f64::from));
@@ -271,7 +322,7 @@ fn replay(
     let span = if span > 0.0 { f64::from(span) } else { 1.0 };
     let mut bank = Bank::<f64>::diffuse(&noise, span);
     let mut missing = 0;
-    for (input, first, last) in inputs {
+    for Applied { input, first, last } in inputs {
         let input = Vector3::from(input.map(f64::from));
         for k in 0..=last.wrapping_sub(*first) {
             let Some(sample) = samples.get(&first.wrapping_add(k)) else {
@@ -286,7 +337,7 @@ fn replay(
     if missing > 0 {
         let problem =
             format!("{missing} of the samples that the bank took in were lost on the line");
-        return Err(Error::new(port, problem, "run it again"));
+        return Err(Error::device(port, problem, "run it again"));
     }
     Ok(bank.axes.map(|filter| {
         let (mean, covariance) = (filter.mean(), filter.covariance());

@@ -13,6 +13,7 @@
 //! | `stream`     | samples as they come                                                                   |
 //! | `check`      | the device's compensation against the PC's, sample by sample                           |
 //! | [`record`]   | recording its raw stream                                                               |
+//! | `result`     | what a command found, with where: the JSON that it writes                              |
 //! | `kalman`     | the device's Kalman bank against the PC's, on the same samples                         |
 
 mod check;
@@ -23,6 +24,7 @@ mod kalman;
 mod line;
 mod port;
 pub mod record;
+mod result;
 mod self_test;
 mod session;
 mod stream;
@@ -30,13 +32,14 @@ mod upload;
 mod who;
 
 pub use check::{Checked, Difference, check, rounding, ulps};
-pub use contents::{Contents, ConverterContents, EffectContents, NodeContents, contents};
+pub use contents::{Contents, ConverterContents, EffectContents, Inverse, NodeContents, contents};
 pub use heard::{Answer, Ear, Event, Heard, LineCount, Samples};
 pub use image::{Image, remembers};
-pub use kalman::{AxisEstimate, KalmanPlan, KalmanRun, SHORTEST, kalman};
+pub use kalman::{Applied, AxisEstimate, Converging, KalmanPlan, KalmanRun, SHORTEST, kalman};
 pub use port::{BAUD, Port, ports};
-pub use self_test::{SelfTested, self_test};
+pub use result::{Counted, DeviceResult};
+pub use self_test::{Passed, SelfTested, self_test};
 pub use session::{Session, refused};
-pub use stream::{Stream, Streamed, stream};
+pub use stream::{Moments, Stream, Streamed, stream};
 pub use upload::{Uploaded, download, upload};
-pub use who::{Started, Who, slot, unusable};
+pub use who::{Hash, Held, Room, Started, Who, unusable};

@@ -4,6 +4,7 @@ use std::time::{Duration, Instant};
 
 use mimu_core::compensation::Sample;
 use mimu_core::wire::{BatchHead, Request};
+use serde::Serialize;
 
 use super::heard::{Event, LineCount};
 use super::session::Session;
@@ -13,7 +14,8 @@ use mimu_recording::error::{Error, Result};
 const SILENCE: Duration = Duration::from_secs(3);
 
 /// Which stream.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Stream {
     /// Readings, V at the sensors.
     Raw,
@@ -21,23 +23,60 @@ pub enum Stream {
     Compensated,
 }
 
-/// What was received.
-#[derive(Debug, Clone, Default, PartialEq)]
+/// What was received: the result of `mimu device stream`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Streamed {
+    /// Which stream.
+    pub stream: Stream,
     /// Samples.
     pub samples: u64,
     /// Numbers that are missing between the first and the last.
     pub missing: u64,
     /// Number of the first.
     pub first: Option<u32>,
-    /// Means, gyro before accelerometer.
-    pub mean: [f64; 6],
-    /// Standard deviations.
-    pub deviation: [f64; 6],
     /// °C, the last.
     pub temp_c: f64,
+    /// Gyro.
+    pub gyro: Moments,
+    /// Accelerometer.
+    pub accel: Moments,
     /// What was heard on the line.
     pub line: LineCount,
+}
+
+/// Mean and standard deviation of the samples of a triad, x, y, z.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Moments {
+    /// Of both.
+    pub unit: &'static str,
+    /// Means.
+    pub mean: [f64; 3],
+    /// Standard deviations.
+    pub deviation: [f64; 3],
+}
+
+impl Streamed {
+    fn new(stream: Stream) -> Self {
+        let units = match stream {
+            Stream::Raw => ["V", "V"],
+            Stream::Compensated => ["rad/s", "m/s^2"],
+        };
+        let [gyro, accel] = units.map(|unit| Moments {
+            unit,
+            mean: [0.0; 3],
+            deviation: [0.0; 3],
+        });
+        Self {
+            stream,
+            samples: 0,
+            missing: 0,
+            first: None,
+            temp_c: 0.0,
+            gyro,
+            accel,
+            line: LineCount::default(),
+        }
+    }
 }
 
 /// Receives samples for `duration` of the device's time, or until `stop` says so. `take` is given each with its number.
@@ -50,8 +89,7 @@ pub fn stream(
 ) -> Result<Streamed> {
     let rate_hz = f64::from(session.who().sample_rate_hz);
     let wanted = duration.map(|d| (d.as_secs_f64() * rate_hz).round() as u64);
-    let mut found = Streamed::default();
-    let mut squares = [0.0; 6];
+    let mut found = Streamed::new(which);
     let mut expected: Option<u32> = None;
     let mut heard = Instant::now();
     let before = session.count();
@@ -66,7 +104,7 @@ pub fn stream(
             | (Some(Event::Compensated(batch)), Stream::Compensated) => batch,
             (Some(Event::Started(_)), _) => {
                 let remedy = "run it again; `mimu device info` says why it restarted";
-                return Err(Error::new(
+                return Err(Error::device(
                     session.port(),
                     "the device restarted meanwhile",
                     remedy,
@@ -75,7 +113,7 @@ pub fn stream(
             (Some(_), _) => continue,
             (None, _) if heard.elapsed() > SILENCE => {
                 let problem = "the stream does not come";
-                return Err(Error::new(
+                return Err(Error::device(
                     session.port(),
                     problem,
                     "reset the board and run it again",
@@ -95,19 +133,28 @@ pub fn stream(
             }
             expected = Some(number.wrapping_add(1));
             found.samples += 1;
-            // Welford: of a bias of volts and a noise of microvolts the plain sums lose the noise.
-            let values = sample.gyro.iter().chain(sample.accel.iter());
-            for (i, value) in values.enumerate() {
-                let off = f64::from(*value) - found.mean[i];
-                found.mean[i] += off / found.samples as f64;
-                squares[i] += off * (f64::from(*value) - found.mean[i]);
+            // Welford: of a bias of volts and a noise of microvolts the plain sums lose the noise. The deviations are sums of
+            // squares until the end.
+            let triads = [
+                (&mut found.gyro, &sample.gyro),
+                (&mut found.accel, &sample.accel),
+            ];
+            for (moments, values) in triads {
+                for (i, value) in values.iter().map(|v| f64::from(*v)).enumerate() {
+                    let off = value - moments.mean[i];
+                    moments.mean[i] += off / found.samples as f64;
+                    moments.deviation[i] += off * (value - moments.mean[i]);
+                }
             }
             take(&batch.head, number, sample)?;
         }
     }
     session.done(Request::Stop, "to stop streaming")?;
     session.forget_events();
-    found.deviation = squares.map(|s| (s / found.samples.saturating_sub(1).max(1) as f64).sqrt());
+    let freedom = found.samples.saturating_sub(1).max(1) as f64;
+    for moments in [&mut found.gyro, &mut found.accel] {
+        moments.deviation = moments.deviation.map(|s| (s / freedom).sqrt());
+    }
     found.line = session.count().since(&before);
     Ok(found)
 }

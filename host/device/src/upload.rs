@@ -4,11 +4,12 @@ use std::time::Duration;
 
 use mimu_core::stored;
 use mimu_core::wire::{CHUNK, Refusal, Request};
+use serde::Serialize;
 
 use super::heard::Answer;
 use super::image::Image;
 use super::session::{PATIENCE, Session, refused};
-use super::who::slot;
+use super::who::Hash;
 use mimu_recording::error::{Error, Result};
 
 /// Longest wait for a commit: a sector is erased, which takes about a second, and 4 kB are programmed.
@@ -16,21 +17,27 @@ const COMMIT: Duration = Duration::from_secs(15);
 /// Times that an upload begins anew: a device that restarts in the middle of it has forgotten it.
 const BEGINNINGS: u32 = 3;
 
-/// How an upload went.
-#[derive(Debug, Clone, PartialEq, Eq)]
+/// How an upload went: the result of `mimu device upload`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Uploaded {
-    /// Bytes of the calibration.
-    pub length: usize,
-    /// What it is told apart by.
-    pub hash: u64,
+    /// What the calibration is told apart by.
+    pub hash: Hash,
+    /// Its length.
+    pub bytes: usize,
     /// Hash of the calibration before, if there was one.
-    pub before: Option<u64>,
+    pub before: Option<Hash>,
     /// The device held it already, and nothing was written.
     pub was_there: bool,
     /// Messages that had to be sent again.
     pub repeated: u32,
     /// Times that the device restarted and the upload began anew.
     pub restarts: u32,
+    /// Temperatures of its nodes, °C.
+    pub node_temp_c: Vec<f32>,
+    /// Ids of its effects.
+    pub effects: Vec<String>,
+    /// One sentence for each thing that had to be assumed.
+    pub warnings: Vec<String>,
 }
 
 /// Sends a calibration, has it stored, and reads it back byte by byte. `progress` hears the share that is done, up to 1.
@@ -48,14 +55,14 @@ pub fn upload(session: &mut Session, image: &Image, progress: impl Fn(f64)) -> R
             if restarts == BEGINNINGS {
                 let problem = format!("the device restarted in each of {BEGINNINGS} uploads");
                 let remedy = "check its supply; `mimu device info` says why it restarted";
-                let error = Error::new(session.port(), problem, remedy);
+                let error = Error::device(session.port(), problem, remedy);
                 return Err(told(session, image, error));
             }
         }
     }
     let back = download(session)?;
     if back != image.bytes {
-        return Err(Error::new(
+        return Err(Error::device(
             session.port(),
             "what is read back is not what was sent",
             "upload again; if it stays so, the flash is worn out",
@@ -63,19 +70,25 @@ pub fn upload(session: &mut Session, image: &Image, progress: impl Fn(f64)) -> R
     }
     progress(1.0);
     Ok(Uploaded {
-        length: image.bytes.len(),
         hash: image.hash,
+        bytes: image.bytes.len(),
         before,
         was_there,
         repeated: session.repeated() - repeated,
         restarts,
+        node_temp_c: image.node_temp_c.clone(),
+        effects: image.effects.clone(),
+        warnings: image.warnings.clone(),
     })
 }
 
 /// Sends it once; `false` if the device has forgotten the beginning.
 fn send(session: &mut Session, image: &Image, progress: &impl Fn(f64)) -> Result<bool> {
     let (length, hash) = (image.bytes.len() as u32, image.hash);
-    let begin = Request::UploadBegin { length, hash };
+    let begin = Request::UploadBegin {
+        length,
+        hash: hash.0,
+    };
     session.done(begin, "to take a calibration")?;
     let mut offset = 0;
     while offset < image.bytes.len() {
@@ -108,7 +121,7 @@ fn send(session: &mut Session, image: &Image, progress: &impl Fn(f64)) -> Result
         _ => return Err(session.unexpected(purpose)),
     }
     if session.hello()?.stored.is_none_or(|s| s.hash != hash) {
-        return Err(Error::new(
+        return Err(Error::device(
             session.port(),
             "it says that the calibration is stored, and greets with another",
             "upload again",
@@ -123,33 +136,26 @@ fn told(session: &mut Session, image: &Image, error: Error) -> Error {
         Ok(who) => match who.stored {
             None => "the device holds no calibration, as before".to_string(),
             Some(s) if s.hash == image.hash => "the device holds the new calibration".to_string(),
-            Some(s) => format!("the device keeps the calibration {:016x}", s.hash),
+            Some(s) => format!("the device keeps the calibration {}", s.hash),
         },
         Err(_) => "the device holds the old calibration or the new one, whole: `mimu device info` says which".into(),
     };
-    Error {
-        problem: format!("{}; {holds}", error.problem).replace("; ", ", "),
-        ..error
-    }
+    error.map(|e| e.problem = format!("{}; {holds}", e.problem).replace("; ", ", "))
 }
 
 /// The calibration in use, as the device stores it: read in parts, its hash compared with that of the greeting.
 pub fn download(session: &mut Session) -> Result<Vec<u8>> {
     let Some(info) = session.hello()?.stored else {
-        let [a, b] = session.who().slots;
-        return Err(Error::new(
+        let [a, b] = &session.who().slots;
+        return Err(Error::device(
             session.port(),
-            format!(
-                "the device holds no calibration (its two places: {}, {})",
-                slot(&a),
-                slot(&b)
-            ),
+            format!("the device holds no calibration (its two places: {a}, {b})"),
             "upload one: `mimu device upload CAL`",
         ));
     };
     let purpose = "for its calibration";
-    let mut all: Vec<u8> = Vec::with_capacity(info.length as usize);
-    while all.len() < info.length as usize {
+    let mut all: Vec<u8> = Vec::with_capacity(info.bytes as usize);
+    while all.len() < info.bytes as usize {
         let request = Request::Download {
             offset: all.len() as u32,
             length: CHUNK as u16,
@@ -163,14 +169,14 @@ pub fn download(session: &mut Session) -> Result<Vec<u8>> {
             _ => return Err(session.unexpected(purpose)),
         }
     }
-    let found = stored::hash(&all);
-    if found != info.hash || all.len() != info.length as usize {
-        return Err(Error::new(
+    let found = Hash(stored::hash(&all));
+    if found != info.hash || all.len() != info.bytes as usize {
+        return Err(Error::device(
             session.port(),
             format!(
-                "{} bytes of hash {found:016x} came, and {} of {:016x} are stored",
+                "{} bytes of hash {found} came, and {} of {} are stored",
                 all.len(),
-                info.length,
+                info.bytes,
                 info.hash
             ),
             "download again; if it stays so, upload the calibration again",

@@ -2,16 +2,18 @@
 
 use std::fmt;
 
+use serde::{Serialize, Serializer};
+
 use mimu_core::stored::{Refused, VERSION};
 use mimu_core::wire::{
-    Capabilities, Compatibility, EFFECTS, Greeting, MAGIC, PROTOCOL, Slot, Start, StoredInfo,
-    Version, compatibility,
+    Capabilities, Compatibility, EFFECTS, Greeting, MAGIC, PROTOCOL, Slot, Start, Version,
+    compatibility,
 };
 
 use mimu_recording::error::{Error, Result};
 
-/// A [`Greeting`], kept.
-#[derive(Debug, Clone, PartialEq)]
+/// A [`Greeting`], kept: the result of `mimu device info`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Who {
     /// What it speaks.
     pub protocol: Version,
@@ -21,16 +23,13 @@ pub struct Who {
     pub board: String,
     /// The microcontroller's own number, 24 hexadecimal digits.
     pub unit_id: String,
-    /// What it can do.
+    /// What it can do; by name in JSON.
+    #[serde(serialize_with = "named")]
     pub capabilities: Capabilities,
-    /// The effects that it removes, bit by bit as in [`EFFECTS`].
-    pub effects: u32,
-    /// Most effects of each triad that run with every sample, and as many that do not.
-    pub effects_room: u8,
-    /// Most temperature nodes.
-    pub nodes_room: u8,
-    /// Most bytes of a stored calibration.
-    pub stored_room: u32,
+    /// Ids of the effects that it removes.
+    pub effects: Vec<&'static str>,
+    /// What it has room for.
+    pub room: Room,
     /// Samples per second.
     pub sample_rate_hz: u32,
     /// Channels of a sample in their order.
@@ -42,13 +41,56 @@ pub struct Who {
     /// Starts without a power failure in between, this one counted.
     pub starts: u32,
     /// The calibration in use.
-    pub stored: Option<StoredInfo>,
-    /// What is in the two places for a calibration.
-    pub slots: [Slot; 2],
+    pub stored: Option<Held>,
+    /// What is in the two places for a calibration, in words.
+    pub slots: [String; 2],
+    /// One sentence if the device is older or newer and can be talked to all the same.
+    pub warnings: Vec<String>,
+}
+
+/// The most that a device stores.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct Room {
+    /// Effects of each triad that run with every sample, and as many that do not.
+    pub effects: u8,
+    /// Temperature nodes.
+    pub nodes: u8,
+    /// Bytes of a calibration.
+    pub bytes: u32,
+}
+
+/// The calibration that a device uses, as it greets with it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct Held {
+    /// What it is told apart by.
+    pub hash: Hash,
+    /// Its length.
+    pub bytes: u32,
+    /// Temperature nodes.
+    pub nodes: u8,
+    /// Effects.
+    pub effects: u8,
+}
+
+/// What a calibration is told apart by. In JSON 16 hexadecimal digits: many programs read numbers of 53 bits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Hash(pub u64);
+
+impl fmt::Display for Hash {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:016x}", self.0)
+    }
+}
+
+impl Serialize for Hash {
+    fn serialize<S: Serializer>(&self, to: S) -> std::result::Result<S::Ok, S::Error> {
+        to.collect_str(self)
+    }
 }
 
 /// Why the device started: [`Start`], kept.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[serde(tag = "reason", rename_all = "kebab-case")]
 pub enum Started {
     /// Power came, or was too low in between.
     PowerOn,
@@ -58,27 +100,22 @@ pub enum Started {
     Watchdog,
     /// The program asked for it.
     Software,
-    /// A panic: end of the source file's path, and line.
-    Panic(String, u32),
-    /// A fault of the processor: address of the instruction, and the fault status register CFSR.
-    Fault(u32, u32),
+    /// A panic.
+    Panic {
+        /// End of the source file's path.
+        file: String,
+        /// Line.
+        line: u32,
+    },
+    /// A fault of the processor.
+    Fault {
+        /// Address of the instruction.
+        pc: u32,
+        /// The fault status register CFSR.
+        cfsr: u32,
+    },
     /// None of these.
     Other,
-}
-
-impl Started {
-    /// Name for programs.
-    pub fn name(&self) -> &'static str {
-        match self {
-            Self::PowerOn => "power-on",
-            Self::ResetPin => "reset-pin",
-            Self::Watchdog => "watchdog",
-            Self::Software => "software",
-            Self::Panic(..) => "panic",
-            Self::Fault(..) => "fault",
-            Self::Other => "other",
-        }
-    }
 }
 
 impl fmt::Display for Started {
@@ -88,8 +125,8 @@ impl fmt::Display for Started {
             Self::ResetPin => f.write_str("reset pin"),
             Self::Watchdog => f.write_str("watchdog: the program did not come round"),
             Self::Software => f.write_str("restarted by the program"),
-            Self::Panic(file, line) => write!(f, "panic in {file}, line {line}"),
-            Self::Fault(pc, cfsr) => write!(f, "fault at {pc:#010x}, CFSR {cfsr:#010x}"),
+            Self::Panic { file, line } => write!(f, "panic in {file}, line {line}"),
+            Self::Fault { pc, cfsr } => write!(f, "fault at {pc:#010x}, CFSR {cfsr:#010x}"),
             Self::Other => f.write_str("unknown"),
         }
     }
@@ -102,8 +139,11 @@ impl From<Start<'_>> for Started {
             Start::ResetPin => Self::ResetPin,
             Start::Watchdog => Self::Watchdog,
             Start::Software => Self::Software,
-            Start::Panic { file, line } => Self::Panic(file.into(), line),
-            Start::Fault { pc, cfsr } => Self::Fault(pc, cfsr),
+            Start::Panic { file, line } => Self::Panic {
+                file: file.into(),
+                line,
+            },
+            Start::Fault { pc, cfsr } => Self::Fault { pc, cfsr },
             Start::Other => Self::Other,
         }
     }
@@ -121,57 +161,68 @@ impl From<&Greeting<'_>> for Who {
                 .map(|b| format!("{b:02x}"))
                 .collect(),
             capabilities: greeting.capabilities,
-            effects: greeting.effects,
-            effects_room: greeting.effects_room,
-            nodes_room: greeting.nodes_room,
-            stored_room: greeting.stored_room,
+            effects: EFFECTS
+                .iter()
+                .enumerate()
+                .filter(|(bit, _)| greeting.effects >> bit & 1 == 1)
+                .map(|(_, id)| *id)
+                .collect(),
+            room: Room {
+                effects: greeting.effects_room,
+                nodes: greeting.nodes_room,
+                bytes: greeting.stored_room,
+            },
             sample_rate_hz: greeting.sample_rate_hz,
             channels: greeting.channels.split(',').map(str::to_owned).collect(),
             raw_unit: greeting.raw_unit.into(),
             start: greeting.start.into(),
             starts: greeting.starts,
-            stored: greeting.stored,
-            slots: greeting.slots,
+            stored: greeting.stored.map(|held| Held {
+                hash: Hash(held.hash),
+                bytes: held.length,
+                nodes: held.nodes,
+                effects: held.effects,
+            }),
+            slots: greeting.slots.each_ref().map(slot),
+            warnings: version_warning(greeting.protocol).into_iter().collect(),
         }
     }
 }
 
 impl Who {
-    /// Ids of the effects that it removes.
-    pub fn effect_ids(&self) -> Vec<&'static str> {
-        let bits = EFFECTS.iter().enumerate();
-        bits.filter(|(bit, _)| self.effects >> bit & 1 == 1)
-            .map(|(_, id)| *id)
-            .collect()
-    }
-
     /// Names of what it can do.
     pub fn capability_names(&self) -> Vec<&'static str> {
-        [
-            (Capabilities::TEMPERATURE_NODES, "temperature nodes"),
-            (Capabilities::TERMS, "terms"),
-            (Capabilities::KALMAN, "kalman"),
-            (Capabilities::SELF_TEST, "self-test"),
-            (Capabilities::USB, "native usb"),
-        ]
-        .into_iter()
-        .filter(|(bit, _)| self.capabilities.contains(*bit))
-        .map(|(_, name)| name)
-        .collect()
+        names(self.capabilities).collect()
     }
+}
 
-    /// One sentence if the device is older or newer and can be talked to all the same.
-    pub fn version_warning(&self) -> Option<String> {
-        let versions = versions(self.protocol);
-        match self.protocol.minor.cmp(&PROTOCOL.minor) {
-            std::cmp::Ordering::Equal => None,
-            std::cmp::Ordering::Less => Some(format!(
-                "the device is older than this program ({versions}): it refuses what it does not know yet"
-            )),
-            std::cmp::Ordering::Greater => Some(format!(
-                "the device is newer than this program ({versions}): what it has learned since is not used"
-            )),
-        }
+fn named<S: Serializer>(of: &Capabilities, to: S) -> std::result::Result<S::Ok, S::Error> {
+    to.collect_seq(names(*of))
+}
+
+fn names(of: Capabilities) -> impl Iterator<Item = &'static str> {
+    [
+        (Capabilities::TEMPERATURE_NODES, "temperature nodes"),
+        (Capabilities::TERMS, "terms"),
+        (Capabilities::KALMAN, "kalman"),
+        (Capabilities::SELF_TEST, "self-test"),
+        (Capabilities::USB, "native usb"),
+    ]
+    .into_iter()
+    .filter(move |(bit, _)| of.contains(*bit))
+    .map(|(_, name)| name)
+}
+
+fn version_warning(device: Version) -> Option<String> {
+    let versions = versions(device);
+    match device.minor.cmp(&PROTOCOL.minor) {
+        std::cmp::Ordering::Equal => None,
+        std::cmp::Ordering::Less => Some(format!(
+            "the device is older than this program ({versions}): it refuses what it does not know yet"
+        )),
+        std::cmp::Ordering::Greater => Some(format!(
+            "the device is newer than this program ({versions}): what it has learned since is not used"
+        )),
     }
 }
 
@@ -222,7 +273,7 @@ pub(super) fn check(port: &str, magic: [u8; 4], protocol: Version) -> Result<()>
     };
     let versions = versions(protocol);
     match compatibility(&stub) {
-        Compatibility::NotMimu => Err(Error::new(
+        Compatibility::NotMimu => Err(Error::device(
             port,
             format!(
                 "wrong firmware: it greets as \"{}\", and not as \"{}\"",
@@ -231,12 +282,12 @@ pub(super) fn check(port: &str, magic: [u8; 4], protocol: Version) -> Result<()>
             ),
             "flash mimu-firmware (README, flashing), or choose another port",
         )),
-        Compatibility::DeviceOlder { usable: false } => Err(Error::new(
+        Compatibility::DeviceOlder { usable: false } => Err(Error::device(
             port,
             format!("the device is older than this program: {versions}"),
             "flash the firmware that belongs to this program (README, flashing)",
         )),
-        Compatibility::DeviceNewer { usable: false } => Err(Error::new(
+        Compatibility::DeviceNewer { usable: false } => Err(Error::device(
             port,
             format!("the device is newer than this program: {versions}"),
             "update mimu on this computer",
@@ -272,7 +323,7 @@ pub fn unusable(refused: &Refused) -> String {
 }
 
 /// What is in a place for a calibration, in words.
-pub fn slot(slot: &Slot) -> String {
+fn slot(slot: &Slot) -> String {
     match slot {
         Slot::Empty => "empty".into(),
         Slot::Whole { generation } => format!("whole, number {generation}"),

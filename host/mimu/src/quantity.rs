@@ -10,7 +10,8 @@ use serde::Serialize;
 pub const AXES: [&str; 3] = ["x", "y", "z"];
 
 /// A sensor triad.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Sensor {
     /// Gyro triad.
     Gyro,
@@ -162,6 +163,14 @@ pub fn duration(s: f64) -> String {
         s if s < 7200.0 => format!("{} min", significant(s / 60.0)),
         s if s < 172_800.0 => format!("{} h", significant(s / 3600.0)),
         s => format!("{} days", significant(s / 86_400.0)),
+    }
+}
+
+/// The same to the second: `90.0 s`, `2 min 30 s`.
+pub fn minutes(seconds: f64) -> String {
+    match seconds.round() {
+        s if s < 120.0 => format!("{} s", significant(seconds)),
+        s => format!("{} min {} s", (s / 60.0).floor(), s % 60.0),
     }
 }
 

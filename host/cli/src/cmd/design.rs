@@ -5,7 +5,7 @@ mod effects;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use crate::report::{self, DesignReport};
+use crate::report;
 use clap::{ArgGroup, Args, ValueEnum};
 use mimu::design::Problem;
 use mimu::design::budget::{DwellNoise, Session};
@@ -15,6 +15,7 @@ use mimu::design::schemes::Scheme;
 use mimu::design::tour::{Motion, Order, by_lot};
 use mimu::noise_file::NoiseFile;
 use mimu::quantity::Sensor;
+use mimu::result::design::{Comparison, Conditions, Design};
 use mimu_recording::Reference;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::result_file::stage;
@@ -279,7 +280,7 @@ impl DesignArgs {
         title: String,
         settings: &[Setting],
         order: Option<Order>,
-    ) -> Result<DesignReport> {
+    ) -> Result<Design> {
         let noise = self.noise()?;
         let dwell_s = self.dwell_s(&noise);
         let sigma = self.sigma.unwrap_or_else(|| noise.sigma(dwell_s));
@@ -291,28 +292,25 @@ impl DesignArgs {
             Some(Order::Shortest) => shortest,
             Some(Order::Lot) => by_lot(settings, self.seed),
         };
-        Ok(DesignReport {
+        let conditions = Conditions {
             title,
-            judgement: problem.judge(&settings, sigma),
-            problem: problem.clone(),
             dwell_s,
             noise: self.sigma.is_none().then_some(noise),
             motion,
             order,
             shortest_moves_s,
-            scheme: None,
-            turned_over: false,
-            budget: None,
-        })
+        };
+        let judgement = problem.judge(&settings, sigma);
+        Ok(Design::new(problem, judgement, conditions))
     }
 
-    fn best(&self, problem: &Problem, n: usize, title: String) -> Result<DesignReport> {
+    fn best(&self, problem: &Problem, n: usize, title: String) -> Result<Design> {
         let settings = problem.best(n, self.seed)?;
         let order = self.order().unwrap_or(Order::Lot);
         self.report(problem, title, &settings, Some(order))
     }
 
-    fn scheme(&self, problem: &Problem, scheme: Scheme) -> Result<DesignReport> {
+    fn scheme(&self, problem: &Problem, scheme: Scheme) -> Result<Design> {
         let settings = scheme.settings(self.sensor())?;
         let Some((settings, turned_over)) = self.carrier().holding(&settings) else {
             return Err(Error::new(
@@ -325,14 +323,11 @@ impl DesignArgs {
             ));
         };
         let title = format!("scheme {}", scheme.name());
-        Ok(DesignReport {
-            scheme: Some(scheme),
-            turned_over,
-            ..self.report(problem, title, &settings, self.order())?
-        })
+        let design = self.report(problem, title, &settings, self.order())?;
+        Ok(design.of_scheme(problem, scheme, turned_over))
     }
 
-    fn within(&self, problem: &Problem, minutes: f64) -> Result<DesignReport> {
+    fn within(&self, problem: &Problem, minutes: f64) -> Result<Design> {
         let order = self.order().unwrap_or(Order::Lot);
         let session = Session {
             time_s: 60.0 * minutes,
@@ -342,24 +337,22 @@ impl DesignArgs {
         };
         let budget = session.spend(problem, self.seed)?;
         let best = &budget.best;
-        Ok(DesignReport {
+        let conditions = Conditions {
             title: format!("best within {minutes} min (seed {})", self.seed),
-            judgement: problem.judge(&best.settings, best.sigma),
-            problem: problem.clone(),
             dwell_s: best.dwell_s,
             noise: Some(session.noise),
             motion: session.motion,
             order: Some(order),
             shortest_moves_s: best.shortest_moves_s,
-            scheme: None,
-            turned_over: false,
-            budget: Some((session.time_s, budget)),
-        })
+        };
+        let judgement = problem.judge(&best.settings, best.sigma);
+        let design = Design::new(problem, judgement, conditions);
+        Ok(design.within(session.time_s, &session.noise, &budget))
     }
 
     /// Every scheme for the sensor, each followed by the best design of as many dwells; and the schemes that are not
     /// within the table's reach.
-    fn compare(&self) -> Result<(Vec<DesignReport>, Vec<Scheme>)> {
+    fn compare(&self) -> Result<Comparison> {
         let (mut reports, mut out_of_reach) = (Vec::new(), Vec::new());
         let mut done: Vec<(usize, Vector3<f64>)> = Vec::new();
         for scheme in Scheme::ALL {
@@ -380,7 +373,7 @@ impl DesignArgs {
                 reports.push(self.best(&problem, n, format!("best of {n}"))?);
             }
         }
-        Ok((reports, out_of_reach))
+        Ok(Comparison::new(reports, &out_of_reach))
     }
 }
 
@@ -397,10 +390,9 @@ pub fn run(args: &DesignArgs) -> Result<()> {
     };
     check_outputs(&[args.output.as_deref(), args.json.file()], &stated)?;
     if args.compare {
-        let (reports, out_of_reach) = args.compare()?;
-        let text = report::comparison_text(&reports, &out_of_reach);
-        let json = report::comparison_json(&reports, &out_of_reach);
-        return print(&args.json, &text, &json, None);
+        let comparison = args.compare()?;
+        let text = report::comparison_text(&comparison);
+        return print(&args.json, &text, &comparison, None);
     }
     let designed = match (args.scheme, args.budget, args.n) {
         (Some(scheme), ..) => {
@@ -423,8 +415,8 @@ pub fn run(args: &DesignArgs) -> Result<()> {
     let mut text = report::design_text(&designed);
     let mut plan = None;
     if let Some(path) = &args.output {
-        plan = Some(stage(path, designed.plan())?);
+        plan = Some(stage(path, designed.plan(args.motion().slew))?);
         text.push_str(&format!("\nplan: {}\n", path.display()));
     }
-    print(&args.json, &text, &report::design_json(&designed), plan)
+    print(&args.json, &text, &designed, plan)
 }

@@ -11,7 +11,7 @@ use std::time::Duration;
 use crate::report;
 use clap::{Args, Subcommand, ValueEnum};
 use mimu_core::wire::Request;
-use mimu_device::{Answer, Session, Stream, self_test, stream};
+use mimu_device::{Answer, Counted, DeviceResult, Session, Stream, self_test, stream};
 use mimu_recording::RAW_COLUMNS;
 use mimu_recording::error::{Error, Result};
 use signal_hook::consts::TERM_SIGNALS;
@@ -124,7 +124,7 @@ pub fn interruption() -> Result<Arc<AtomicBool>> {
 
 fn open(port: &PortArgs) -> Result<Session> {
     let session = Session::open(port.path.as_deref())?;
-    if let Some(warning) = session.who().version_warning() {
+    for warning in &session.who().warnings {
         eprintln!("warning: {warning}");
     }
     Ok(session)
@@ -147,9 +147,8 @@ fn info(args: &PlainArgs) -> Result<()> {
     check_outputs(&[args.json.file()], &[])?;
     // The warning about versions is part of the result.
     let session = Session::open(args.port.path.as_deref())?;
-    let (port, who) = (session.port(), session.who());
-    let (text, value) = (report::info_text(port, who), report::info_json(port, who));
-    print(&args.json, &text, &value, None)
+    let result = DeviceResult::new("info", session.port(), session.who());
+    print(&args.json, &report::info_text(&result), &result, None)
 }
 
 fn run_stream(args: &StreamArgs) -> Result<()> {
@@ -200,37 +199,24 @@ fn run_stream(args: &StreamArgs) -> Result<()> {
     )?;
     let _ = out.flush();
     drop(out);
-    let port = session.port();
-    let value = report::stream_json(port, which, &found);
-    if rows {
-        if !closed {
-            eprint!("{}", report::stream_text(port, which, &found));
-        }
-        return print(&args.json, "", &value, None);
+    let result = DeviceResult::new("stream", session.port(), found);
+    if rows && !closed {
+        eprint!("{}", report::stream_text(&result));
     }
-    print(&args.json, "", &value, None)
+    print(&args.json, "", &result, None)
 }
 
 fn run_self_test(args: &PlainArgs) -> Result<()> {
     check_outputs(&[args.json.file()], &[])?;
     let mut session = open(&args.port)?;
     let found = self_test(&mut session)?;
-    let (port, test) = (session.port(), &found.test);
-    let text = report::self_test_text(port, &found);
-    print(
-        &args.json,
-        &text,
-        &report::self_test_json(port, &found),
-        None,
-    )?;
-    let failed: Vec<&str> = ["gyro x", "gyro y", "gyro z", "accel"]
-        .into_iter()
-        .enumerate()
-        .filter(|(bit, _)| test.passed >> bit & 1 == 0)
-        .map(|(_, name)| name)
-        .collect();
+    let port = session.port();
+    let result = DeviceResult::new("self-test", port, found);
+    print(&args.json, &report::self_test_text(&result), &result, None)?;
+    let sensors = result.found.passed.sensors().into_iter();
+    let failed: Vec<&str> = sensors.filter(|s| !s.1).map(|s| s.0).collect();
     let failed = failed.join(", ");
-    match &found.moved {
+    match &result.found.moved {
         _ if failed.is_empty() => Ok(()),
         Some(moved) => Err(Error::new(
             port,
@@ -257,10 +243,12 @@ fn counters(args: &CountersArgs) -> Result<()> {
     if args.reset {
         session.done(Request::ResetCounters, "to reset its counters")?;
     }
-    let port = session.port();
-    let text = report::counters_text(port, &counters, args.reset);
-    let value = report::counters_json(port, &counters, args.reset);
-    print(&args.json, &text, &value, None)
+    let counted = Counted {
+        counters,
+        reset: args.reset,
+    };
+    let result = DeviceResult::new("counters", session.port(), counted);
+    print(&args.json, &report::counters_text(&result), &result, None)
 }
 
 #[cfg(test)]

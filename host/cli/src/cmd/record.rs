@@ -82,7 +82,7 @@ pub fn run(args: &RecordArgs) -> Result<()> {
         format: args.format,
     };
     let mut session = Session::open(args.port.path.as_deref())?;
-    if let Some(warning) = session.who().version_warning() {
+    for warning in &session.who().warnings {
         eprintln!("warning: {warning}");
     }
     let stop = interruption()?;
@@ -102,16 +102,13 @@ pub fn run(args: &RecordArgs) -> Result<()> {
     })?;
     spinner.finish_and_clear();
     bar.finish_and_clear();
-    let port = session.port();
-    let text = report::record_text(port, &args.output, &summary);
-    let value = report::record_json(port, &args.output, &summary);
-    print(&args.json, &text, &value, None)?;
+    print(&args.json, &report::record_text(&summary), &summary, None)?;
     summary.broken_off.map_or(Ok(()), Err)
 }
 
 /// The line that a terminal shows.
 fn told(standing: &Standing, steps: bool) -> String {
-    let length = standing.span_s.map_or(0.0, |(first, last)| last - first);
+    let length = standing.last_s.unwrap_or_default() - standing.first_s.unwrap_or_default();
     let dwell = match (steps, standing.step) {
         (false, _) => String::new(),
         (true, Some(step)) => format!(", dwell {step}: Enter ends it"),

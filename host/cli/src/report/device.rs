@@ -1,20 +1,198 @@
-//! What the device says, and what was recorded from it.
+//! What the device says, and what was recorded from it, as text.
 
-mod json;
-mod text;
+use std::fmt::Write as _;
 
-pub use json::{
-    check_json, counters_json, download_json, info_json, kalman_json, record_json, self_test_json,
-    stream_json, upload_json,
+use super::text::warn;
+use mimu::quantity::{AXES, significant};
+use mimu_core::wire::Counters;
+use mimu_device::record::RecordSummary;
+use mimu_device::{
+    Checked, Contents, Counted, DeviceResult, KalmanRun, LineCount, SelfTested, Streamed, Uploaded,
+    Who,
 };
-pub use text::{
-    check_text, counters_text, download_text, info_text, kalman_text, record_text, self_test_text,
-    stream_text, upload_text,
-};
 
-use mimu_core::wire::{Counters, SelfTest, Triad};
+/// Writing to a string does not fail.
+macro_rules! line {
+    ($out:expr, $($of:tt)*) => { let _ = writeln!($out, $($of)*); };
+}
 
-/// Names of the counters with their units, in the order of the table of messages.
+/// Result of `mimu device info`.
+pub fn info_text(result: &DeviceResult<&Who>) -> String {
+    let (port, who) = (&result.port, result.found);
+    let mut out = String::new();
+    line!(out, "{port}: {}, firmware {}", who.board, who.firmware);
+    line!(out, "unit          {}", who.unit_id);
+    line!(
+        out,
+        "protocol      {}.{}",
+        who.protocol.major,
+        who.protocol.minor
+    );
+    line!(
+        out,
+        "started       {}, {} since power came",
+        who.start,
+        starts(who.starts)
+    );
+    line!(
+        out,
+        "samples       {} Hz, {} in {}",
+        who.sample_rate_hz,
+        who.channels.join(", "),
+        who.raw_unit
+    );
+    match who.stored {
+        None => {
+            line!(out, "calibration   none");
+        }
+        Some(s) => {
+            line!(
+                out,
+                "calibration   {}, {} bytes, temperature nodes: {}, effects: {}",
+                s.hash,
+                s.bytes,
+                s.nodes,
+                s.effects
+            );
+        }
+    }
+    for (name, of) in ["first", "second"].iter().zip(&who.slots) {
+        line!(out, "{name:<6} place  {of}");
+    }
+    line!(out, "can           {}", who.capability_names().join(", "));
+    line!(
+        out,
+        "room          {} temperature nodes, {} effects of a kind and triad, {} bytes",
+        who.room.nodes,
+        who.room.effects,
+        who.room.bytes
+    );
+    line!(out, "removes       {}", who.effects.join(", "));
+    warn(&mut out, who.warnings.iter());
+    out
+}
+
+fn starts(count: u32) -> String {
+    match count {
+        1 => "1 start".into(),
+        n => format!("{n} starts"),
+    }
+}
+
+/// Result of `mimu device upload`.
+pub fn upload_text(result: &DeviceResult<Uploaded>) -> String {
+    let mut out = String::new();
+    let (port, done) = (&result.port, &result.found);
+    let (hash, bytes) = (done.hash, done.bytes);
+    if done.was_there {
+        line!(
+            out,
+            "{port}: holds {hash} already ({bytes} bytes, read back)"
+        );
+    } else {
+        let before = done.before.map_or("none".into(), |hash| hash.to_string());
+        line!(
+            out,
+            "{port}: stored {hash} ({bytes} bytes, read back); before: {before}"
+        );
+    }
+    if !done.effects.is_empty() {
+        line!(out, "effects: {}", done.effects.join(", "));
+    }
+    if done.repeated > 0 || done.restarts > 0 {
+        line!(
+            out,
+            "messages sent again: {}, restarts of the device: {}",
+            done.repeated,
+            done.restarts
+        );
+    }
+    warn(&mut out, done.warnings.iter());
+    out
+}
+
+/// Result of `mimu device download`.
+pub fn download_text(result: &DeviceResult<Contents>) -> String {
+    let mut out = String::new();
+    let (port, found) = (&result.port, &result.found);
+    line!(
+        out,
+        "{port}: calibration {}, {} bytes",
+        found.hash,
+        found.bytes
+    );
+    line!(
+        out,
+        "{}, {}: u in {} at the sensors, x in rad/s and m/s², {} frame",
+        found.formula,
+        found.direction,
+        found.raw_unit,
+        found.frame
+    );
+    for node in &found.nodes {
+        line!(out, "\nat {} °C", node.temp_c);
+        for (sensor, model) in [("gyro", &node.gyro), ("accel", &node.accel)] {
+            line!(out, "  {sensor:<6} {:>42}   {:>14}", "C", "o");
+            for (row, o) in model.C.iter().zip(model.o) {
+                line!(
+                    out,
+                    "         {:>14e}{:>14e}{:>14e}   {o:>14e}",
+                    row[0],
+                    row[1],
+                    row[2]
+                );
+            }
+        }
+    }
+    for effect in &found.effects {
+        let numbers: Vec<String> = effect
+            .coefficients
+            .iter()
+            .map(|c| format!("{c:e}"))
+            .collect();
+        line!(out, "\neffect {}: {}", effect.id, numbers.join(", "));
+        if let Some(time) = effect.time_constant_s {
+            line!(out, "  time constant {time} s");
+        }
+        if let Some(converter) = &effect.converter {
+            line!(
+                out,
+                "  converter of {}: bit 0 is worth {} V, code 0 reads {} V",
+                converter.axes,
+                converter.weight_of_bit_0_v,
+                converter.reading_of_code_0_v
+            );
+        }
+    }
+    line!(out, "\nimage: {}", found.file);
+    out
+}
+
+/// Result of `mimu device self-test`.
+pub fn self_test_text(result: &DeviceResult<SelfTested>) -> String {
+    let found = &result.found;
+    let mut out = String::new();
+    line!(out, "{}: self-test", result.port);
+    let word = |ok: bool| if ok { "passed" } else { "FAILED" };
+    let volts = |v: &[f32; 3]| format!("{:.3}, {:.3}, {:.3} V", v[0], v[1], v[2]);
+    for (i, (sensor, passed)) in found.passed.sensors().into_iter().enumerate() {
+        let detail = match (found.gyro_st1_v.get(i), found.gyro_st2_v.get(i)) {
+            (Some(st1), Some(st2)) => format!("ST1 {st1:+.3} V, ST2 {st2:+.3} V"),
+            _ => format!(
+                "finest range {}, coarsest {}",
+                volts(&found.accel_fine_v),
+                volts(&found.accel_coarse_v)
+            ),
+        };
+        line!(out, "{sensor:<6}   {}   {detail}", word(passed));
+    }
+    if let Some(moved) = &found.moved {
+        line!(out, "the unit did not stand still: {moved}");
+    }
+    out
+}
+
+/// In the order of the table of messages.
 fn counters(of: &Counters) -> [(&'static str, u32); 14] {
     [
         ("uptime_ms", of.uptime_ms),
@@ -34,22 +212,190 @@ fn counters(of: &Counters) -> [(&'static str, u32); 14] {
     ]
 }
 
-/// Whether gyro x, y, z and the accelerometer answered as their datasheets state.
-fn passed(test: &SelfTest) -> [bool; 4] {
-    [0, 1, 2, 3].map(|bit| test.passed >> bit & 1 == 1)
+/// Result of `mimu device counters`.
+pub fn counters_text(result: &DeviceResult<Counted>) -> String {
+    let mut out = String::new();
+    line!(
+        out,
+        "{}: counted since the start, or since they were reset",
+        result.port
+    );
+    for (name, value) in counters(&result.found.counters) {
+        line!(out, "{name:<20} {value:>10}");
+    }
+    if result.found.reset {
+        line!(out, "the counters were reset");
+    }
+    out
 }
 
-fn triad_name(triad: Triad) -> &'static str {
-    match triad {
-        Triad::Gyro => "gyro",
-        Triad::Accel => "accel",
+fn line_text(out: &mut String, count: &LineCount) {
+    if count.garbled > 0 || count.not_understood > 0 {
+        line!(
+            out,
+            "line: {} frames garbled, {} not understood, {} whole",
+            count.garbled,
+            count.not_understood,
+            count.frames
+        );
     }
 }
 
-/// Units of `[b, P1, P2, P3]`, of the input, and of the input where a person reads.
-fn triad_units(triad: Triad) -> (&'static str, &'static str) {
-    match triad {
-        Triad::Gyro => ("V/(rad/s)", "rad/s"),
-        Triad::Accel => ("V/(m/s²)", "m/s²"),
+/// Result of `mimu device stream`, beside the samples.
+pub fn stream_text(result: &DeviceResult<Streamed>) -> String {
+    let mut out = String::new();
+    let found = &result.found;
+    line!(
+        out,
+        "{}: {} samples, {} missing, {:.2} °C",
+        result.port,
+        found.samples,
+        found.missing,
+        found.temp_c
+    );
+    for (sensor, moments) in [("gyro", &found.gyro), ("accel", &found.accel)] {
+        for (i, axis) in AXES.iter().enumerate() {
+            line!(
+                out,
+                "{sensor:<5} {axis}  mean {:>13.6}  deviation {:>9} {}",
+                moments.mean[i],
+                significant(moments.deviation[i]),
+                printed(moments.unit)
+            );
+        }
     }
+    line_text(&mut out, &found.line);
+    out
+}
+
+/// A unit of a file as it is printed.
+fn printed(unit: &str) -> String {
+    unit.replace("^2", "²")
+}
+
+/// Result of `mimu device check`.
+pub fn check_text(result: &DeviceResult<Checked>) -> String {
+    let mut out = String::new();
+    let found = &result.found;
+    line!(
+        out,
+        "{}: {} samples compared, {} without a counterpart",
+        result.port,
+        found.samples,
+        found.unpaired
+    );
+    line!(out, "largest difference, device minus PC:");
+    for (sensor, d) in [("gyro", &found.gyro), ("accel", &found.accel)] {
+        let unit = printed(d.unit);
+        line!(
+            out,
+            "{sensor:<6} same precision {} ulps ({} {unit}), double precision {} {unit}, {:.0} % of what rounding allows",
+            d.ulps,
+            significant(d.single),
+            significant(d.double),
+            100.0 * d.rounding_share
+        );
+    }
+    if found.holds {
+        line!(out, "device and PC agree to rounding");
+    } else if !found.not_judged_for.is_empty() {
+        line!(
+            out,
+            "not judged: {} depends on temperatures before the comparison",
+            found.not_judged_for.join(", ")
+        );
+    } else {
+        line!(out, "device and PC DIFFER");
+    }
+    out
+}
+
+/// Result of `mimu device kalman`.
+pub fn kalman_text(result: &DeviceResult<KalmanRun>) -> String {
+    let mut out = String::new();
+    let run = &result.found;
+    line!(
+        out,
+        "{}: Kalman bank of the {}, forward model u = P x + b, {}",
+        result.port,
+        run.triad,
+        run.direction
+    );
+    for applied in &run.inputs {
+        let [x, y, z] = applied.input;
+        line!(
+            out,
+            "input {x:>9} {y:>9} {z:>9} {}   samples {} to {}",
+            run.input_unit,
+            applied.first,
+            applied.last
+        );
+    }
+    line!(
+        out,
+        "              device          sigma            PC   difference / sigma"
+    );
+    for (i, axis) in AXES.iter().enumerate() {
+        for (k, (name, unit)) in run.parameters.iter().zip(run.units).enumerate() {
+            line!(
+                out,
+                "{axis} {name:<3} {:>14.7} {:>14} {:>13.7}   {:>10}   {unit}",
+                run.device[i].mean[k],
+                significant(run.device[i].sigma[k]),
+                run.host[i].mean[k],
+                significant(run.distance_sigma[i][k]),
+            );
+        }
+    }
+    line!(
+        out,
+        "largest difference {} sigma; samples rejected: {}",
+        significant(run.largest_distance_sigma),
+        run.rejected
+    );
+    out
+}
+
+/// Result of `mimu record`.
+pub fn record_text(summary: &RecordSummary) -> String {
+    let mut out = String::new();
+    let s = &summary.standing;
+    line!(
+        out,
+        "{}: {} samples from {:.3} to {:.3} s, {} missing in {} gaps, {:.2} °C",
+        summary.port,
+        s.samples,
+        s.first_s.unwrap_or_default(),
+        s.last_s.unwrap_or_default(),
+        s.missing,
+        s.gaps,
+        s.temp_c
+    );
+    if s.dwells > 0 {
+        line!(out, "dwells: {}", s.dwells);
+    }
+    line_text(&mut out, &s.line);
+    let mut warnings: Vec<String> = s
+        .restarts
+        .iter()
+        .map(|r| format!("the device restarted before {:.3} s: {}", r.t_s, r.start))
+        .collect();
+    for (count, what) in [
+        (
+            s.saturated,
+            "in batches with a reading at the end of the converter's range",
+        ),
+        (
+            s.without_reference,
+            "without the gyros' reference: their drift with the supply is in them",
+        ),
+        (s.self_test, "while the self-test deflected the sensors"),
+    ] {
+        if count > 0 {
+            warnings.push(format!("{count} samples {what}"));
+        }
+    }
+    warn(&mut out, warnings.iter());
+    line!(out, "recording: {}", summary.recording);
+    out
 }

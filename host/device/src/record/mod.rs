@@ -11,9 +11,14 @@ use std::time::{Duration, Instant};
 
 use mimu_core::wire::{Request, flags};
 
+use serde::{Serialize, Serializer};
+
 pub use steps::Steps;
 
-use crate::{Event, LineCount, Samples, Session, Started};
+use crate::heard::{Event, LineCount, Samples};
+use crate::result::TOOL;
+use crate::session::Session;
+use crate::who::Started;
 use clock::Clock;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{
@@ -52,7 +57,7 @@ pub struct Wish {
 }
 
 /// How a recording stands.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Standing {
     /// Samples written.
     pub samples: u64,
@@ -60,11 +65,14 @@ pub struct Standing {
     pub missing: u64,
     /// Stretches of missing samples.
     pub gaps: u64,
-    /// Times of the first and the last sample, s.
-    pub span_s: Option<(f64, f64)>,
+    /// Time of the first sample, s.
+    pub first_s: Option<f64>,
+    /// Time of the last, s.
+    pub last_s: Option<f64>,
     /// Dwells begun.
     pub dwells: u32,
     /// Dwell that runs.
+    #[serde(skip)]
     pub step: Option<i32>,
     /// Restarts of the device.
     pub restarts: Vec<Restart>,
@@ -82,13 +90,27 @@ pub struct Standing {
     pub line: LineCount,
 }
 
-/// A recording that was ended.
-#[derive(Debug, Clone, PartialEq)]
+/// A recording that was ended: the result of `mimu record`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RecordSummary {
+    /// `mimu-record/1`.
+    pub format: &'static str,
+    /// This program and its version.
+    pub tool: &'static str,
+    /// Port of the device.
+    pub port: String,
+    /// Directory.
+    pub recording: String,
     /// How it stood in the end.
+    #[serde(flatten)]
     pub standing: Standing,
     /// Why it ended before it was to: the recording is whole up to there.
+    #[serde(serialize_with = "as_words")]
     pub broken_off: Option<Error>,
+}
+
+fn as_words<S: Serializer>(of: &Option<Error>, to: S) -> std::result::Result<S::Ok, S::Error> {
+    of.as_ref().map(Error::to_string).serialize(to)
 }
 
 /// Records. `look` is shown how it stands, some times a second, and says what is wanted; `finishing` hears the share that is done of
@@ -125,7 +147,7 @@ pub fn record(
     // Its clock starts with it. After a reset without a power failure the device counts from zero as well.
     manifest.power_on_s = Some(0.0);
     manifest.recorded = Some(Recorded {
-        tool: concat!("mimu ", env!("CARGO_PKG_VERSION")).into(),
+        tool: TOOL.into(),
         firmware: who.firmware.clone(),
         board: who.board.clone(),
         unit_id: who.unit_id.clone(),
@@ -170,6 +192,10 @@ pub fn record(
         )),
         Err(error) if standing.samples == 0 => Err(error),
         ended => Ok(RecordSummary {
+            format: "mimu-record/1",
+            tool: TOOL,
+            port: session.port().to_owned(),
+            recording: options.directory.display().to_string(),
             broken_off: ended
                 .err()
                 .map(|error| kept(error, standing.samples, &options.directory)),
@@ -180,14 +206,8 @@ pub fn record(
 
 /// `error`, with where to find what was received.
 fn kept(error: Error, samples: u64, directory: &Path) -> Error {
-    Error {
-        problem: format!(
-            "{} ({samples} samples are kept in {})",
-            error.problem,
-            directory.display()
-        ),
-        ..error
-    }
+    let kept = format!(" ({samples} samples are kept in {})", directory.display());
+    error.map(|e| e.problem += &kept)
 }
 
 struct Run {
@@ -329,11 +349,8 @@ impl Run {
                 *counter += count as u64;
             }
         }
-        let last = self.clock.seconds(first + count as u64 - 1);
-        let from = standing
-            .span_s
-            .map_or(self.clock.seconds(first), |(from, _)| from);
-        standing.span_s = Some((from, last));
+        standing.first_s.get_or_insert(self.clock.seconds(first));
+        standing.last_s = Some(self.clock.seconds(first + count as u64 - 1));
         Ok(())
     }
 }

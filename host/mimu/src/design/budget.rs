@@ -1,6 +1,7 @@
 //! Most out of so many minutes: how many dwells, how long, and how often the whole again.
 
 use rayon::prelude::*;
+use serde::Serialize;
 
 use super::model::Setting;
 use super::problem::Problem;
@@ -10,10 +11,10 @@ use crate::allan::model::FLOOR;
 use crate::allan::variance::AllanModel;
 use crate::noise_file::NoiseFile;
 use crate::quantity::Sensor;
-use mimu_recording::error::{Error, Result};
+use mimu_recording::error::{Argument, Error, Result};
 
 /// Noise of a sensor as density and floor, from which the sigma of a dwell mean follows.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct DwellNoise {
     /// White noise N, SI unit times √s (the same as per √Hz).
     pub n: f64,
@@ -67,8 +68,9 @@ impl DwellNoise {
                 return Err(Error::new(
                     format!("{}, channel {}", file.place, channel.name),
                     format!("it is in {} and not in {}", channel.unit, sensor.unit()),
-                    "run mimu allan with --calibration",
-                ));
+                    "convert the readings by a calibration before their noise is found",
+                )
+                .about(Argument::Calibration));
             }
             let AllanModel {
                 white,
@@ -207,7 +209,7 @@ impl Session {
         match best.cloned() {
             Some(best) => Ok(Budget { best, by_size }),
             None => Err(Error::new(
-                format!("--budget {} min", self.time_s / 60.0),
+                format!("budget of {} min", self.time_s / 60.0),
                 format!("{least} dwells of {SHORTEST_S} s and the moves between them take longer"),
                 "allow more time, or a table that moves faster",
             )),

@@ -119,18 +119,8 @@ fn pseudo_variance(f: &nalgebra::DMatrix<f64>, k: usize) -> f64 {
 
 impl Judgement {
     /// Names of the parameters that it does not determine.
-    pub fn undetermined(&self) -> Vec<&str> {
+    pub fn undetermined(&self) -> Vec<String> {
         let none = self.parameters.iter().filter(|p| p.sigma.is_infinite());
-        none.map(|p| p.parameter.name.as_str()).collect()
-    }
-
-    /// Determined parameters that are all but unobservable, with their inflation.
-    pub fn weak(&self) -> Vec<(&str, f64)> {
-        let weak = self
-            .parameters
-            .iter()
-            .filter(|p| p.inflation >= WEAK && p.sigma.is_finite());
-        weak.map(|p| (p.parameter.name.as_str(), p.inflation))
-            .collect()
+        none.map(|p| p.parameter.name.clone()).collect()
     }
 }

@@ -243,7 +243,7 @@ impl Model {
             )
         };
         let bias = |letter: char, i: usize| {
-            let (unit, shown_unit, shown) = self.bias_unit();
+            let (unit, shown_unit, shown) = bias_unit(self.sensor);
             parameter(
                 format!("{letter}_{}", AXES[i]),
                 unit,
@@ -305,13 +305,13 @@ impl Model {
         }
         list
     }
+}
 
-    /// Unit of a bias in SI, that in which a person reads it, and the second over the first.
-    pub fn bias_unit(&self) -> (&'static str, &'static str, f64) {
-        match self.sensor {
-            Sensor::Gyro => ("rad/s", "deg/s", 1f64.to_degrees()),
-            Sensor::Accel => ("m/s^2", "mg", 1e3 / GRAVITY),
-        }
+/// Unit of a bias in SI, that in which a person reads it, and the second over the first.
+pub fn bias_unit(sensor: Sensor) -> (&'static str, &'static str, f64) {
+    match sensor {
+        Sensor::Gyro => ("rad/s", "deg/s", 1f64.to_degrees()),
+        Sensor::Accel => ("m/s^2", "mg", 1e3 / GRAVITY),
     }
 }
 

@@ -3,8 +3,10 @@
 //! SI throughout; what is not a number is null in JSON.
 
 pub mod allan;
+pub mod design;
 pub mod diagnosis;
 pub mod fit;
+pub mod next_experiment;
 pub mod verify;
 
 use serde::Serialize;

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::report::{self, NextReport};
+use crate::report;
 use mimu::design::budget::DwellNoise;
 use mimu::design::reach::{Carrier, RateList, Rates};
 use mimu::design::tour::Motion;
@@ -12,6 +12,7 @@ use mimu::next_experiment::prediction::Target;
 use mimu::next_experiment::{CHAMBER_C, DWELL_S, RATE_DPS, SLEW, Setup, smallest};
 use mimu::noise_file::NoiseFile;
 use mimu::quantity::Sensor;
+use mimu::result::next_experiment::NextExperiment;
 use mimu::stillness::STILL_FACTOR;
 use mimu_recording::Reference;
 use mimu_recording::error::{Error, Result};
@@ -196,17 +197,14 @@ pub(super) fn run(args: &DesignArgs, ids: &[String]) -> Result<()> {
         ));
     };
     let manifest = recording.as_ref().map(|f| &f.prepared.manifest);
-    let report = NextReport {
-        setup: &setup,
-        answer: &answer,
-        device: manifest.map(|m| m.device.clone()),
-        sample_rate_hz: manifest.map_or(SAMPLE_RATE_HZ, |m| m.sample_rate_hz),
-    };
-    let mut text = report::next_text(&report);
+    let result = NextExperiment::new(&setup, &answer);
+    let mut text = report::next_text(&result);
     let mut plan = None;
     if let Some(path) = &args.output {
-        plan = Some(stage(path, report.plan())?);
+        let device = manifest.map(|m| m.device.as_str());
+        let sample_rate_hz = manifest.map_or(SAMPLE_RATE_HZ, |m| m.sample_rate_hz);
+        plan = Some(stage(path, answer.plan(&setup, device, sample_rate_hz))?);
         text.push_str(&format!("\nplan: {}\n", path.display()));
     }
-    print(&args.json, &text, &report::next_json(&report), plan)
+    print(&args.json, &text, &result, plan)
 }

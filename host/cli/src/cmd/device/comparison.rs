@@ -8,7 +8,7 @@ use crate::report;
 use clap::Args;
 use mimu::calibration::Calibration;
 use mimu_core::wire::Triad;
-use mimu_device::{KalmanPlan, SHORTEST, check, kalman};
+use mimu_device::{DeviceResult, KalmanPlan, SHORTEST, check, kalman};
 use mimu_recording::error::{Error, Result};
 
 use super::{PortArgs, duration, open};
@@ -73,9 +73,9 @@ pub fn run_check(args: &CheckArgs) -> Result<()> {
     })?;
     bar.finish_and_clear();
     let port = session.port();
-    let text = report::check_text(port, &found);
-    print(&args.json, &text, &report::check_json(port, &found), None)?;
-    match found.holds() || !found.remembering.is_empty() {
+    let result = DeviceResult::new("check", port, found);
+    print(&args.json, &report::check_text(&result), &result, None)?;
+    match result.found.holds || !result.found.not_judged_for.is_empty() {
         true => Ok(()),
         false => Err(Error::new(
             port,
@@ -129,9 +129,8 @@ pub fn run_kalman(args: &KalmanArgs) -> Result<()> {
         bar.set_position((share * 1000.0) as u64)
     })?;
     bar.finish_and_clear();
-    let port = session.port();
-    let text = report::kalman_text(port, &run);
-    print(&args.json, &text, &report::kalman_json(port, &run), None)
+    let result = DeviceResult::new("kalman", session.port(), run);
+    print(&args.json, &report::kalman_text(&result), &result, None)
 }
 
 #[cfg(test)]

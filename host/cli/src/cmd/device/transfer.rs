@@ -6,7 +6,7 @@ use crate::report;
 use clap::Args;
 use mimu::calibration::Calibration;
 use mimu_core::stored::{Refused, VERSION};
-use mimu_device::{Image, contents, download, unusable, upload};
+use mimu_device::{DeviceResult, Image, contents, download, unusable, upload};
 use mimu_recording::error::{Error, Result};
 use mimu_recording::result_file::stage;
 
@@ -47,14 +47,8 @@ pub fn run_upload(args: &UploadArgs) -> Result<()> {
         bar.set_position((share * 1000.0) as u64)
     })?;
     bar.finish_and_clear();
-    let port = session.port();
-    let text = report::upload_text(port, &image, &done);
-    print(
-        &args.json,
-        &text,
-        &report::upload_json(port, &image, &done),
-        None,
-    )
+    let result = DeviceResult::new("upload", session.port(), done);
+    print(&args.json, &report::upload_text(&result), &result, None)
 }
 
 pub fn run_download(args: &DownloadArgs) -> Result<()> {
@@ -62,7 +56,7 @@ pub fn run_download(args: &DownloadArgs) -> Result<()> {
     let mut session = open(&args.port)?;
     let bytes = download(&mut session)?;
     let port = session.port();
-    let contents = contents(&bytes).map_err(|refused| {
+    let contents = contents(&bytes, &args.output).map_err(|refused| {
         let problem = format!(
             "this program cannot read what it stores: {}",
             unusable(&refused)
@@ -77,7 +71,7 @@ pub fn run_download(args: &DownloadArgs) -> Result<()> {
         Error::new(port, problem, remedy)
     })?;
     let file = stage(&args.output, bytes.as_slice())?;
-    let text = report::download_text(port, &args.output, &bytes, &contents);
-    let value = report::download_json(port, &args.output, &bytes, &contents);
-    print(&args.json, &text, &value, Some(file))
+    let result = DeviceResult::new("download", port, contents);
+    let text = report::download_text(&result);
+    print(&args.json, &text, &result, Some(file))
 }

@@ -2,45 +2,39 @@
 
 use std::fmt::Write as _;
 
-use super::DesignReport;
 use crate::report::text::{COLUMNS, wrap};
-use mimu::design::budget::{Budget, Spending};
-use mimu::design::judgement::{HALF_95, Judgement};
-use mimu::design::lack_of_fit::Notice;
+use mimu::design::judgement::WEAK;
+use mimu::design::model::bias_unit;
 use mimu::design::plan::round;
-use mimu::design::schemes::Scheme;
-use mimu::design::tour::Order;
-use mimu::quantity::plural;
-use mimu::quantity::significant;
+use mimu::quantity::{minutes, plural, significant};
+use mimu::result::design::{Comparison, Design, Noticed, Spent, Way};
 
 /// Dwells listed: as many as the longest design.
 pub(super) const LISTED: usize = 200;
 
 /// Result of `mimu design`.
-pub fn design_text(report: &DesignReport) -> String {
+pub fn design_text(report: &Design) -> String {
     let mut out = String::new();
-    let j = &report.judgement;
     let _ = writeln!(out, "{}", report.subject());
     let mut line = |name: &str, text: String| {
         let _ = writeln!(out, "  {name:<22}{text}");
     };
     line("design", report.title.clone());
-    let n = j.settings.len();
-    let best = (report.problem.optimum.log_det).exp();
+    let n = report.positions.len();
     line(
         "D-efficiency",
         format!(
             "{:.4}, of the continuous optimum over the reach",
-            j.d_efficiency
+            report.d_efficiency
         ),
     );
     line(
         "det(F'F/n)",
         format!(
             "{}, optimum {}{}",
-            significant(j.determinant),
-            significant(best),
-            match report.problem.reach.model.distinct_regressions() {
+            significant(report.determinant),
+            significant(report.optimum.determinant),
+            match report.regressions {
                 1 => "",
                 _ => ": product over the three sensors",
             }
@@ -48,8 +42,8 @@ pub fn design_text(report: &DesignReport) -> String {
     );
     line(
         "condition",
-        if j.condition.is_finite() {
-            significant(j.condition)
+        if report.condition.is_finite() {
+            significant(report.condition)
         } else {
             "singular".into()
         },
@@ -58,10 +52,10 @@ pub fn design_text(report: &DesignReport) -> String {
         "time",
         format!(
             "{}: {} of {} s, moves {}",
-            minutes(report.time_s()),
+            minutes(report.time_s),
             plural(n as u64, "dwell"),
             significant(report.dwell_s),
-            minutes(report.moves_s())
+            minutes(report.moves_s)
         ),
     );
     line("order", order(report));
@@ -70,22 +64,22 @@ pub fn design_text(report: &DesignReport) -> String {
         "left over",
         format!(
             "{} of freedom to notice a wrong model, {} from repetitions",
-            match j.lack_of_fit_dof {
+            match report.dof.lack_of_fit {
                 1 => "1 degree".into(),
                 dof => format!("{dof} degrees"),
             },
-            j.repetition_dof
+            report.dof.repetition
         ),
     );
     for (name, text) in noticed(report) {
         line(name, text);
     }
-    if let Some(filters) = report.filters() {
+    if let Some(filters) = &report.filters {
         let shares = filters
             .each_ref()
             .map(|f| format!("{:.4}", f.d_efficiency))
             .join(", ");
-        let gain = filters[0].mean_sigma / j.mean_sigma;
+        let gain = filters[0].mean_sigma / report.mean_sigma;
         let text = format!(
             "the filters for x, y and z see four of the nine positions each, fang (26)-(28): \
              D-efficiency {shares}, and sigmas {} times those of all nine for each",
@@ -93,7 +87,7 @@ pub fn design_text(report: &DesignReport) -> String {
         );
         wrapped(&mut out, "as published", &text);
     }
-    if let Some(assumed) = report.scheme.and_then(Scheme::assumed) {
+    if let Some(assumed) = report.assumed {
         wrapped(&mut out, "assumed", assumed);
     }
     if report.turned_over {
@@ -101,11 +95,11 @@ pub fn design_text(report: &DesignReport) -> String {
                     change sign, and the table reaches all poses";
         wrapped(&mut out, "mounted", text);
     }
-    if let Some((budget_s, budget)) = &report.budget {
-        spent(&mut out, report, *budget_s, budget);
+    if let Some(budget) = &report.budget {
+        spent(&mut out, report.noise.is_some(), budget);
     }
     settings(&mut out, report);
-    parameters(&mut out, j);
+    parameters(&mut out, report);
     out
 }
 
@@ -114,17 +108,10 @@ pub(super) fn wrapped(out: &mut String, name: &str, text: &str) {
     wrap(out, &format!("  {name:<22}"), text);
 }
 
-pub(super) fn minutes(seconds: f64) -> String {
-    match seconds.round() {
-        s if s < 120.0 => format!("{} s", significant(seconds)),
-        s => format!("{} min {} s", (s / 60.0).floor(), s % 60.0),
-    }
-}
-
-fn sigma(report: &DesignReport) -> String {
-    let (_, unit, factor) = report.problem.reach.model.bias_unit();
+fn sigma(report: &Design) -> String {
+    let (_, unit, factor) = bias_unit(report.sensor);
     let shown = |v: f64| significant(v * factor);
-    let mean = shown(report.judgement.sigma);
+    let mean = shown(report.dwell_sigma.value);
     match report.noise {
         None => format!("{mean} {unit}, given"),
         Some(noise) => {
@@ -142,15 +129,13 @@ fn sigma(report: &DesignReport) -> String {
 }
 
 /// Order of the dwells, and what it costs.
-fn order(report: &DesignReport) -> String {
+fn order(report: &Design) -> String {
     let name = match report.order {
-        None => "as published",
-        Some(Order::Shortest) => {
-            return "shortest found; neighbours share drift (see --order)".into();
-        }
-        Some(Order::Lot) => "drawn by lot",
+        "shortest" => return "shortest found; neighbours share drift (see --order)".into(),
+        "lot" => "drawn by lot",
+        _ => "as published",
     };
-    let longer = report.moves_s() - report.shortest_moves_s;
+    let longer = report.moves_s - report.shortest_moves_s;
     match longer >= 0.05 {
         true => format!("{name}, {} longer than the shortest found", minutes(longer)),
         false => format!("{name}, as short as the shortest found"),
@@ -158,12 +143,11 @@ fn order(report: &DesignReport) -> String {
 }
 
 /// What is noticed and what is not, as lines.
-fn noticed(report: &DesignReport) -> Vec<(&'static str, String)> {
+fn noticed(report: &Design) -> Vec<(&'static str, String)> {
     let mut lines = Vec::new();
-    for notice in &report.judgement.notices {
-        let (factor, unit) = report.noticed(notice);
-        let name = notice.term.name();
-        let text = match notice.size {
+    for notice in &report.notices {
+        let (name, unit) = (notice.term, notice.unit);
+        let text = match notice.smallest {
             None => ("cannot notice", format!("{name}: aliased with the model")),
             Some(size) => {
                 let all = notice.noticed == notice.parameters;
@@ -180,7 +164,7 @@ fn noticed(report: &DesignReport) -> Vec<(&'static str, String)> {
                     label,
                     format!(
                         "{name} from {} {unit} on (9 times in 10){part}",
-                        significant(size * factor)
+                        significant(size)
                     ),
                 )
             }
@@ -191,19 +175,19 @@ fn noticed(report: &DesignReport) -> Vec<(&'static str, String)> {
 }
 
 /// Order of the dwells.
-fn settings(out: &mut String, report: &DesignReport) {
-    let rate = if report.gyro() { "  rate, deg/s" } else { "" };
+fn settings(out: &mut String, report: &Design) {
+    let rate = report.rates_dps.as_ref().map_or("", |_| "  rate, deg/s");
     let _ = writeln!(
         out,
         "\n  {:<7}{:>9}{:>9}{:>9}{rate}",
         "dwell", "up: x", "y", "z"
     );
-    let all = &report.judgement.settings;
-    for (k, s) in all.iter().enumerate().take(LISTED) {
-        let [x, y, z] = <[f64; 3]>::from(s.up).map(|c| round(c, 1e4));
+    let all = &report.positions;
+    for (k, up) in all.iter().enumerate().take(LISTED) {
+        let [x, y, z] = up.map(|c| round(c, 1e4));
         let _ = write!(out, "  {:<7}{x:>9.4}{y:>9.4}{z:>9.4}", k + 1);
-        if report.gyro() {
-            let _ = write!(out, "{:>13.2}", round(s.rate.to_degrees(), 1e2));
+        if let Some(rate) = report.rates_dps.as_ref().and_then(|rates| rates.get(k)) {
+            let _ = write!(out, "{:>13.2}", round(*rate, 1e2));
         }
         let _ = writeln!(out);
     }
@@ -216,20 +200,15 @@ fn settings(out: &mut String, report: &DesignReport) {
     }
 }
 
-fn parameters(out: &mut String, j: &Judgement) {
-    let cells: Vec<String> = j
-        .parameters
+fn parameters(out: &mut String, report: &Design) {
+    let cells: Vec<String> = report
+        .sigma_per_parameter
         .iter()
-        .map(|p| match p.sigma * p.parameter.shown {
-            s if s.is_finite() => {
-                format!(
-                    "{} ± {} {}",
-                    p.parameter.name,
-                    significant(HALF_95 * s),
-                    p.parameter.shown_unit
-                )
+        .map(|p| match p.data_sheet.half_width_95 {
+            half if half.is_finite() => {
+                format!("{} ± {} {}", p.name, significant(half), p.data_sheet.unit)
             }
-            _ => format!("{} undetermined", p.parameter.name),
+            _ => format!("{} undetermined", p.name),
         })
         .collect();
     let width = 2 + cells.iter().map(|c| c.chars().count()).max().unwrap_or(0);
@@ -251,21 +230,28 @@ fn parameters(out: &mut String, j: &Judgement) {
             .collect();
         let _ = writeln!(out, "  {}", line.trim_end());
     }
-    for (name, inflation) in j.weak() {
+    let weak = report.sigma_per_parameter.iter();
+    for p in weak.filter(|p| p.inflation >= WEAK && p.value.is_finite()) {
         let _ = writeln!(
             out,
-            "warning: {name} is all but unobservable: sigma {} times what it were with the others known",
-            significant(inflation)
+            "warning: {} is all but unobservable: sigma {} times what it were with the others known",
+            p.name,
+            significant(p.inflation)
         );
     }
 }
 
 /// How a budget is spent, and what else was looked at.
-fn spent(out: &mut String, report: &DesignReport, budget_s: f64, budget: &Budget) {
+fn spent(out: &mut String, by_noise: bool, budget: &Spent) {
     let best = &budget.best;
-    let moving = best.moves_s / budget_s;
-    if let Some(noise) = report.noise {
-        let [white, floor, walk] = noise.shares(best.dwell_s).map(|s| 100.0 * s);
+    let moving = best.moves_s / budget.time_s;
+    if by_noise {
+        let shares = [
+            budget.shares.white,
+            budget.shares.instability,
+            budget.shares.walk,
+        ];
+        let [white, floor, walk] = shares.map(|s| 100.0 * s);
         let limit = match (moving > 0.5, white >= floor.max(walk), floor >= walk) {
             (true, ..) => "moves: a faster table",
             (_, true, _) => "white noise: more time",
@@ -288,27 +274,27 @@ fn spent(out: &mut String, report: &DesignReport, budget_s: f64, budget: &Budget
         "a pass", "passes", "dwell, s", "moves", "sigma over best"
     );
     let shown = [4, 5, 6, 8, 9, 10, 12, 14, 16, 20, 25, 30, 35, 40];
-    let is_best = |s: &Spending| s.each_pass() == best.each_pass();
-    for s in &budget.by_size {
-        if is_best(s) || shown.contains(&s.each_pass()) {
+    let is_best = |w: &Way| w.dwells_a_pass == best.dwells_a_pass;
+    for way in &budget.ways {
+        if is_best(way) || shown.contains(&way.dwells_a_pass) {
             let _ = writeln!(
                 out,
                 "  {:<10}{:>8}{:>10}{:>7.0} %{:>16.3}{}",
-                s.each_pass(),
-                s.passes,
-                significant(s.dwell_s),
-                100.0 * s.moves_s / budget_s,
-                s.mean_sigma / best.mean_sigma,
-                if is_best(s) { "  <" } else { "" }
+                way.dwells_a_pass,
+                way.passes,
+                significant(way.dwell_s),
+                100.0 * way.moves_s / budget.time_s,
+                way.mean_sigma / best.mean_sigma,
+                if is_best(way) { "  <" } else { "" }
             );
         }
     }
 }
 
 /// Result of `mimu design --compare`: one design a line.
-pub fn comparison_text(reports: &[DesignReport], out_of_reach: &[Scheme]) -> String {
+pub fn comparison_text(comparison: &Comparison) -> String {
     let mut out = String::new();
-    if let Some(first) = reports.first() {
+    if let Some(first) = comparison.designs.first() {
         let _ = writeln!(
             out,
             "{}: {} s a dwell",
@@ -322,35 +308,28 @@ pub fn comparison_text(reports: &[DesignReport], out_of_reach: &[Scheme]) -> Str
         "\n  {:<19}{:>6}{:>13}{:>14}{:>15}{:>5}  can notice",
         "design", "dwells", "D-efficiency", "mean sigma", "time", "dof"
     );
-    for r in reports {
-        let j = &r.judgement;
-        // Geometric mean of the spans: for the range of each axis alike.
-        let full = r.problem.reach.model.span.product().cbrt();
-        let ppm = match j.mean_sigma / full * 1e6 {
+    for design in &comparison.designs {
+        let ppm = match 1e6 * design.mean_sigma_of_full_scale {
             v if v.is_finite() => format!("{} ppm", significant(v)),
             _ => "-".into(),
         };
-        let noticed = |n: &&Notice| n.noticed == n.parameters;
-        let names: Vec<&str> = j
-            .notices
-            .iter()
-            .filter(noticed)
-            .map(|n| n.term.name())
-            .collect();
+        let noticed = |n: &&Noticed| n.noticed == n.parameters;
+        let notices = design.notices.iter();
+        let names: Vec<&str> = notices.filter(noticed).map(|n| n.term).collect();
         let notices = match names.len() {
             0 => "-".into(),
-            all if all > 1 && all == j.notices.len() => "all terms".into(),
+            all if all > 1 && all == design.notices.len() => "all terms".into(),
             _ => names.join(", "),
         };
         let _ = writeln!(
             out,
             "  {:<19}{:>6}{:>13.4}{:>14}{:>15}{:>5}  {notices}",
-            r.title,
-            j.settings.len(),
-            j.d_efficiency,
+            design.title,
+            design.positions.len(),
+            design.d_efficiency,
             ppm,
-            minutes(r.time_s()),
-            j.lack_of_fit_dof,
+            minutes(design.time_s),
+            design.dof.lack_of_fit,
         );
     }
     let _ = writeln!(
@@ -358,13 +337,13 @@ pub fn comparison_text(reports: &[DesignReport], out_of_reach: &[Scheme]) -> Str
         "\n  mean sigma: geometric mean over the parameters, of full scale; dof: left to notice a wrong model;\n  \
          can notice: terms beyond the model that show in the residuals in every direction"
     );
-    if !out_of_reach.is_empty() {
-        let names: Vec<&str> = out_of_reach.iter().map(|s| s.name()).collect();
-        let _ = writeln!(out, "  out of this table's reach: {}", names.join(", "));
+    if !comparison.out_of_reach.is_empty() {
+        let names = comparison.out_of_reach.join(", ");
+        let _ = writeln!(out, "  out of this table's reach: {names}");
     }
-    for scheme in reports.iter().filter_map(|r| r.scheme) {
-        if let Some(assumed) = scheme.assumed() {
-            wrapped(&mut out, scheme.name(), assumed);
+    for design in &comparison.designs {
+        if let (Some(scheme), Some(assumed)) = (design.scheme, design.assumed) {
+            wrapped(&mut out, scheme, assumed);
         }
     }
     out

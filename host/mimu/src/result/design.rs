@@ -1,0 +1,410 @@
+//! A design as it is reported: each result is one type, and JSON is that type.
+
+use serde::Serialize;
+
+use super::TOOL;
+use crate::design::Problem;
+use crate::design::budget::{Budget, DwellNoise, Spending};
+use crate::design::judgement::{HALF_95, Judgement};
+use crate::design::model::{Setting, Term, bias_unit};
+use crate::design::plan;
+use crate::design::reach::Carrier;
+use crate::design::schemes::{FANG_FILTERS, Scheme};
+use crate::design::tour::{Motion, Order};
+use crate::quantity::{Sensor, minutes, significant};
+use mimu_recording::Reference;
+
+/// What a design is judged under.
+#[derive(Debug, Clone)]
+pub struct Conditions {
+    /// What it is: `best of 9 dwells found (seed 1)`, `scheme fang-nine`.
+    pub title: String,
+    /// Length of a dwell, s.
+    pub dwell_s: f64,
+    /// Noise that the sigma of a dwell mean follows from; `None` if that was given.
+    pub noise: Option<DwellNoise>,
+    /// Moves between the dwells.
+    pub motion: Motion,
+    /// Order of the dwells; `None` as published.
+    pub order: Option<Order>,
+    /// Time of the moves in the shortest order found, s.
+    pub shortest_moves_s: f64,
+}
+
+/// A judged design: the result of `mimu design`, `mimu-design/1`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Design {
+    /// `mimu-design/1`.
+    pub format: &'static str,
+    /// This program and its version.
+    pub tool: &'static str,
+    /// See [`Conditions::title`].
+    pub title: String,
+    /// Sensor.
+    pub sensor: Sensor,
+    /// What is known of the input.
+    pub reference: Reference,
+    /// `affine`, and other terms.
+    pub model: String,
+    /// What carries the unit, as on the command line.
+    pub table: &'static str,
+    /// Direction in the body frame that points up, a dwell each, in order.
+    pub positions: Vec<[f64; 3]>,
+    /// Rate about the vertical in each dwell of a gyro, deg/s.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rates_dps: Option<Vec<f64>>,
+    /// Against the continuous optimum over the reach: 1 is the best possible, 0 singular.
+    pub d_efficiency: f64,
+    /// `det(F'F/n)`, fang (22).
+    pub determinant: f64,
+    /// Sensors whose determinants that is the product of: 1 where all have the same regressors.
+    pub regressions: usize,
+    /// What no design exceeds.
+    pub optimum: Best,
+    /// Largest over smallest singular value of F; infinite, null in JSON, if singular.
+    pub condition: f64,
+    /// Of all parameters of the triad.
+    pub sigma_per_parameter: Vec<ParameterSigma>,
+    /// Geometric mean of the semi-axes of the parameters' one-sigma ellipsoid, normalised: SI unit of the sensor at full input. Infinite
+    /// if singular.
+    pub mean_sigma: f64,
+    /// The same over the full input, the geometric mean of the axes'.
+    pub mean_sigma_of_full_scale: f64,
+    /// Names of the parameters that it does not determine.
+    pub undetermined: Vec<String>,
+    /// What is left over.
+    pub dof: Freedom,
+    /// What it would notice of the terms that the model lacks.
+    pub notices: Vec<Noticed>,
+    /// Length of a dwell, s.
+    pub dwell_s: f64,
+    /// Sigma of a dwell mean, SI.
+    pub dwell_sigma: Quantity,
+    /// Noise that this follows from; `None` if it was given.
+    pub noise: Option<DwellNoise>,
+    /// `published`, `shortest` or `lot`.
+    pub order: &'static str,
+    /// Whether the unit had to be turned over for the table to reach the scheme's poses: see [`Carrier::holding`].
+    pub turned_over: bool,
+    /// Time of the moves between the dwells, s.
+    pub moves_s: f64,
+    /// The same in the shortest order found, s.
+    pub shortest_moves_s: f64,
+    /// Time of all dwells and moves, s.
+    pub time_s: f64,
+    /// Name of the published scheme that it is.
+    pub scheme: Option<&'static str>,
+    /// What had to be assumed of that.
+    pub assumed: Option<&'static str>,
+    /// fang's filters for x, y and z with four positions each, where that is what was judged.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub filters: Option<[Filter; 3]>,
+    /// What was looked at to spend a budget.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub budget: Option<Spent>,
+    #[serde(skip)]
+    settings: Vec<Setting>,
+    #[serde(skip)]
+    carrier: Carrier,
+}
+
+/// The continuous optimum over the reach.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Best {
+    /// `det(F'F/n)` of it.
+    pub determinant: f64,
+    /// By how much the equivalence theorem is missed: the proof of how near it is.
+    pub excess: f64,
+}
+
+/// A value and its unit.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Quantity {
+    /// In that unit.
+    pub value: f64,
+    /// SI.
+    pub unit: &'static str,
+}
+
+/// How well a parameter is determined.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ParameterSigma {
+    /// `b_x`, `P_xy`, `C_yx`, `quadratic_z`, ...
+    pub name: String,
+    /// Sigma, SI; infinite, null in JSON, if it is not determined.
+    pub value: f64,
+    /// Of it; "1" for a ratio.
+    pub unit: &'static str,
+    /// Half of the 95 % interval if the noise is known, SI.
+    pub half_width_95: f64,
+    /// The same in the unit of data sheets.
+    pub data_sheet: DataSheet,
+    /// Sigma over what it were if all the other parameters were known.
+    pub inflation: f64,
+}
+
+/// Half of a 95 % interval in the unit of data sheets, which shares of full scale have only beside a full scale.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct DataSheet {
+    /// In that unit.
+    pub half_width_95: f64,
+    /// mg, deg/s, ppm, µrad, ppm FS, (deg/s)/g.
+    pub unit: &'static str,
+}
+
+/// Degrees of freedom of a regression that the parameters leave.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct Freedom {
+    /// By different inputs: these notice a wrong model.
+    pub lack_of_fit: usize,
+    /// By repeated inputs: these tell the noise, whatever the model.
+    pub repetition: usize,
+}
+
+/// What it would notice of a term that the model lacks.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Noticed {
+    /// Name of the term.
+    pub term: &'static str,
+    /// Parameters that it has.
+    pub parameters: usize,
+    /// How many directions among them leave a trace in the residuals.
+    pub noticed: usize,
+    /// Smallest size that is noticed 9 times in 10, of the parameter that is noticed worst; `None`: aliased with the model.
+    pub smallest: Option<f64>,
+    /// Of that: ppm FS or (deg/s)/g.
+    pub unit: &'static str,
+}
+
+/// A filter of fang's three, judged by its own positions.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Filter {
+    /// As [`Design::d_efficiency`].
+    pub d_efficiency: f64,
+    /// As [`Design::determinant`].
+    pub determinant: f64,
+    /// As [`Design::mean_sigma`].
+    pub mean_sigma: f64,
+}
+
+/// How a budget is spent, and what else was looked at.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Spent {
+    /// The budget, s.
+    pub time_s: f64,
+    /// The way with the smallest mean sigma.
+    pub best: Way,
+    /// The best with each number of dwells in a pass.
+    pub ways: Vec<Way>,
+    /// What the variance of a dwell mean consists of.
+    pub shares: Shares,
+}
+
+/// One way to spend the time.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Way {
+    /// Dwells of one pass.
+    pub dwells_a_pass: usize,
+    /// Passes over the design.
+    pub passes: usize,
+    /// Length of each dwell, s.
+    pub dwell_s: f64,
+    /// Time of all moves, s.
+    pub moves_s: f64,
+    /// As [`Design::mean_sigma`], over all passes.
+    pub mean_sigma: f64,
+}
+
+/// Shares in the variance of a dwell mean, of 1.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Shares {
+    /// White noise.
+    pub white: f64,
+    /// Bias instability.
+    pub instability: f64,
+    /// Rate random walk.
+    pub walk: f64,
+}
+
+impl From<&Spending> for Way {
+    fn from(of: &Spending) -> Self {
+        Self {
+            dwells_a_pass: of.each_pass(),
+            passes: of.passes,
+            dwell_s: of.dwell_s,
+            moves_s: of.moves_s,
+            mean_sigma: of.mean_sigma,
+        }
+    }
+}
+
+impl Design {
+    /// Of what was judged.
+    pub fn new(problem: &Problem, judgement: Judgement, conditions: Conditions) -> Self {
+        let model = &problem.reach.model;
+        let sigma = judgement.sigma;
+        let parameters = judgement.parameters.iter().map(|p| ParameterSigma {
+            name: p.parameter.name.clone(),
+            value: p.sigma * p.parameter.si,
+            unit: p.parameter.unit,
+            half_width_95: HALF_95 * p.sigma * p.parameter.si,
+            data_sheet: DataSheet {
+                half_width_95: HALF_95 * p.sigma * p.parameter.shown,
+                unit: p.parameter.shown_unit,
+            },
+            inflation: p.inflation,
+        });
+        let notices = judgement.notices.iter().map(|notice| {
+            let (factor, unit) = match notice.term {
+                Term::GSensitivity => (sigma.to_degrees(), "(deg/s)/g"),
+                _ => (1e6 * sigma / model.span.min(), "ppm FS"),
+            };
+            Noticed {
+                term: notice.term.name(),
+                parameters: notice.parameters,
+                noticed: notice.noticed,
+                smallest: notice.size.map(|s| s * factor),
+                unit,
+            }
+        });
+        let settings = judgement.settings.iter();
+        let moves_s = conditions.motion.moves_s(&judgement.settings);
+        Self {
+            format: "mimu-design/1",
+            tool: TOOL,
+            title: conditions.title,
+            sensor: model.sensor,
+            reference: model.reference,
+            model: model.to_string(),
+            table: problem.reach.carrier.name(),
+            positions: settings.clone().map(|s| s.up.into()).collect(),
+            rates_dps: (model.sensor == Sensor::Gyro)
+                .then(|| settings.map(|s| s.rate.to_degrees()).collect()),
+            d_efficiency: judgement.d_efficiency,
+            determinant: judgement.determinant,
+            regressions: model.distinct_regressions(),
+            optimum: Best {
+                determinant: problem.optimum.log_det.exp(),
+                excess: problem.optimum.excess,
+            },
+            condition: judgement.condition,
+            sigma_per_parameter: parameters.collect(),
+            mean_sigma: judgement.mean_sigma,
+            // Geometric mean of the spans: for the range of each axis alike.
+            mean_sigma_of_full_scale: judgement.mean_sigma / model.span.product().cbrt(),
+            undetermined: judgement.undetermined(),
+            dof: Freedom {
+                lack_of_fit: judgement.lack_of_fit_dof,
+                repetition: judgement.repetition_dof,
+            },
+            notices: notices.collect(),
+            dwell_s: conditions.dwell_s,
+            dwell_sigma: Quantity {
+                value: sigma,
+                unit: bias_unit(model.sensor).0,
+            },
+            noise: conditions.noise,
+            order: conditions.order.map_or("published", Order::name),
+            turned_over: false,
+            moves_s,
+            shortest_moves_s: conditions.shortest_moves_s,
+            time_s: moves_s + conditions.dwell_s * judgement.settings.len() as f64,
+            scheme: None,
+            assumed: None,
+            filters: None,
+            budget: None,
+            carrier: problem.reach.carrier,
+            settings: judgement.settings,
+        }
+    }
+
+    /// The same as a published scheme, the unit turned over for it or not.
+    pub fn of_scheme(mut self, problem: &Problem, scheme: Scheme, turned_over: bool) -> Self {
+        let model = &problem.reach.model;
+        let as_published = model.terms.is_empty() && model.reference == Reference::Table;
+        self.filters = (scheme == Scheme::FangNine && as_published).then(|| {
+            FANG_FILTERS.map(|filter| {
+                let settings = filter.map(|i| self.settings[i]);
+                let judged = problem.judge(&settings, self.dwell_sigma.value);
+                Filter {
+                    d_efficiency: judged.d_efficiency,
+                    determinant: judged.determinant,
+                    mean_sigma: judged.mean_sigma,
+                }
+            })
+        });
+        self.scheme = Some(scheme.name());
+        self.assumed = scheme.assumed();
+        self.turned_over = turned_over;
+        self
+    }
+
+    /// The same as the best way to spend a budget, with noise as given.
+    pub fn within(mut self, time_s: f64, noise: &DwellNoise, budget: &Budget) -> Self {
+        let [white, instability, walk] = noise.shares(budget.best.dwell_s);
+        self.budget = Some(Spent {
+            time_s,
+            best: (&budget.best).into(),
+            ways: budget.by_size.iter().map(Way::from).collect(),
+            shares: Shares {
+                white,
+                instability,
+                walk,
+            },
+        });
+        self
+    }
+
+    /// Sensor, model, reference and table in one line.
+    pub fn subject(&self) -> String {
+        let reference = match self.reference {
+            Reference::Table => "known input",
+            Reference::Gravity => "size of gravity",
+        };
+        format!(
+            "{}, {}, {reference}, {}",
+            self.sensor, self.model, self.table
+        )
+    }
+
+    /// Plan of the design, `mimu-plan/1`, with moves at `slew` rad/s.
+    pub fn plan(&self, slew: f64) -> String {
+        let about = format!(
+            "{}: {}\norder {}{}\nD-efficiency {:.4}, {} with moves at {} deg/s",
+            self.subject(),
+            self.title,
+            self.order,
+            if self.turned_over {
+                ", unit turned over about x"
+            } else {
+                ""
+            },
+            self.d_efficiency,
+            minutes(self.time_s),
+            significant(slew.to_degrees()),
+        );
+        plan::to_toml(&about, self.carrier, &self.settings, self.dwell_s)
+    }
+}
+
+/// Published schemes beside the best designs of as many dwells: the result of `mimu design --compare`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Comparison {
+    /// `mimu-design-comparison/1`.
+    pub format: &'static str,
+    /// The designs.
+    pub designs: Vec<Design>,
+    /// Names of the schemes that the table cannot hold.
+    pub out_of_reach: Vec<&'static str>,
+}
+
+impl Comparison {
+    /// Of these.
+    pub fn new(designs: Vec<Design>, out_of_reach: &[Scheme]) -> Self {
+        Self {
+            format: "mimu-design-comparison/1",
+            designs,
+            out_of_reach: out_of_reach.iter().map(|s| s.name()).collect(),
+        }
+    }
+}
