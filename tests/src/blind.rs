@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::sync::{Arc, Mutex};
 
-use mimu::diagnose::{Diagnosis, diagnose};
+use mimu::diagnose::{Diagnosis, diagnose, library};
 use mimu::estimate::Observation;
 use mimu::fit::{Method, Options};
 use mimu::next_experiment::next;
@@ -96,26 +96,24 @@ fn scale(value: &mut toml::Value, factor: f64) {
     }
 }
 
-/// The effect that the diagnosis has to name where a unit has the bench's `id`: what is a function of the converter's code is one.
-fn named(id: &str) -> String {
-    for (sensor, of_code) in [
-        ("gyro", "gyro_readout_code"),
-        ("accel", "accel_readout_code"),
-    ] {
-        if ["missing_codes", "converters"]
-            .iter()
-            .any(|k| id == format!("{sensor}_{k}"))
-        {
-            return of_code.into();
-        }
-    }
-    id.into()
+/// Whether an effect of the bench is one that the diagnosis knows by name.
+pub fn is_listed(id: &str) -> bool {
+    library::by_id(id).is_some()
+}
+
+/// Whether the effect `found` is what the bench's `id` does: codes that never come, and converters of each axis, are functions of the code.
+pub fn is_right(found: &str, id: &str) -> bool {
+    let of_code = ["missing_codes", "converters"]
+        .iter()
+        .any(|k| id.ends_with(k));
+    let sensor = id.split('_').next().unwrap_or_default();
+    found == id || of_code && found == format!("{sensor}_readout_code")
 }
 
 /// One unit of the suite.
 #[derive(Debug, Clone)]
 pub struct Case {
-    /// Effects that it has, as the diagnosis has to name them.
+    /// Effects that it has.
     pub truth: Vec<String>,
     /// Root mean square over the noise floor that each effect leaves in the dwell means after an affine fit.
     pub strength: Vec<f64>,
@@ -225,7 +223,7 @@ pub fn case(ids: &[&str], seed: u64) -> Case {
     }
     let noise = bench::noise_file(&file, seed, with.condensed.period_s);
     let with = with.with_noise(&noise).expect("its noise");
-    let truth: Vec<String> = ids.iter().map(|s| named(s)).collect();
+    let truth: Vec<String> = ids.iter().map(|id| (*id).into()).collect();
     let found: Diagnosis = match diagnose(with.into(), options()) {
         Ok(found) => found,
         // An error so large that the readings no longer follow their inputs is refused before anything is diagnosed.

@@ -309,14 +309,9 @@ pub struct Verdict {
 }
 
 /// Judges the calibration `accel`, `gyro` (raw to SI) by the dwells and turns of `fit`.
-///
-/// It goes through the file format: what stands in a calibration by hand must be judged like one that was fitted.
 pub fn verdict(fit: &Fit, accel: &Affine<f64>, gyro: &Affine<f64>) -> Result<Verdict> {
     use mimu::calibration::Calibration;
-    let mut calibration = Calibration::parse(
-        &Calibration::of(fit, &[], "2020-01-01T00:00:00Z")?.to_toml(),
-        "by hand",
-    )?;
+    let mut calibration = Calibration::of(fit, &[], "2020-01-01T00:00:00Z")?;
     let tables = [&mut calibration.accel, &mut calibration.gyro];
     for (table, model) in tables.into_iter().zip([accel, gyro]) {
         let table = table.as_mut().expect("both sensors were recorded");

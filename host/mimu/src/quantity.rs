@@ -128,8 +128,11 @@ pub fn significant(value: f64) -> String {
     if value == 0.0 || !value.is_finite() {
         return format!("{value}");
     }
-    // Rounded first: 0.0099998, which time stamps make of 0.01, would have one more.
-    let value = rounded(value, 3);
+    // Rounded first: 0.0099998, which time stamps make of 0.01, would have one more. What has no decimals keeps all its digits.
+    let value = match value.abs() < 100.0 {
+        true => rounded(value, 3),
+        false => value,
+    };
     let digits = 2 - value.abs().log10().floor() as i32;
     if (-3..=6).contains(&digits) {
         format!("{value:.*}", digits.max(0) as usize)
@@ -191,6 +194,23 @@ pub fn normal_gravity(latitude_deg: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn three_digits_are_shown_and_no_whole_number_is_cut() {
+        let cases = [
+            (0.009_999_8, "0.0100"),
+            (0.01, "0.0100"),
+            (99.96, "100"),
+            (-2.345, "-2.35"),
+            (2174.4, "2174"),
+            (1.5e-7, "1.50e-7"),
+            (0.0, "0"),
+        ];
+        for (value, text) in cases {
+            assert_eq!(significant(value), text);
+        }
+        assert_eq!(rounded(2.234_56e-6, 4), 2.235e-6);
+    }
 
     #[test]
     fn normal_gravity_is_that_of_the_ellipsoid_at_the_equator_and_the_poles() {

@@ -1,4 +1,4 @@
-//! Result files as TOML that people read: rows of a matrix one below the other, small numbers with an exponent.
+//! Result files as TOML that people read: rows of a matrix one below the other, small tables on a line, small numbers with an exponent.
 
 use serde::Serialize;
 
@@ -9,22 +9,97 @@ use serde::Serialize;
 pub fn to_toml(header: &str, file: &impl Serialize) -> String {
     let text = toml::to_string(file).expect("a table of numbers and strings");
     let mut out = header.to_string();
+    // Name of the array of tables that the line is in, and what is nested in this one of them.
+    let mut array = None;
+    let mut nested: Vec<Nested> = Vec::new();
     let mut in_string = false;
     for line in text.lines() {
         let fences = line.matches("\"\"\"").count() + line.matches("'''").count();
-        match line.split_once(" = ") {
-            // What has a quote is a string or holds one: digits in it are not numbers.
-            Some((key, value)) if !in_string && !line.contains(['"', '\'']) => {
-                out.push_str(key);
-                out.push_str(" = ");
-                out.push_str(&laid_out(value));
-            }
-            _ => out.push_str(line),
-        }
-        out.push('\n');
+        let continued = in_string;
         in_string ^= fences % 2 == 1;
+        let header = line.strip_prefix('[').filter(|_| !continued);
+        if let Some(path) = header.map(|h| h.trim_matches(['[', ']'])) {
+            let many = line.starts_with("[[");
+            match path.split_once('.') {
+                Some((parent, key)) if array == Some(parent) => {
+                    Nested::begin(&mut nested, key, many)
+                }
+                _ => {
+                    Nested::write(&mut nested, &mut out);
+                    out.push('\n');
+                    out.push_str(line);
+                    out.push('\n');
+                    array = many.then_some(path);
+                }
+            }
+            continue;
+        }
+        let line = match line.split_once(" = ") {
+            // What has a quote is a string or holds one: digits in it are not numbers.
+            Some((key, value)) if !continued && !line.contains(['"', '\'']) => {
+                format!("{key} = {}", laid_out(value))
+            }
+            _ => line.to_string(),
+        };
+        match nested.last_mut() {
+            Some(table) => table.push(line, continued),
+            None if continued || !line.is_empty() => {
+                out.push_str(&line);
+                out.push('\n');
+            }
+            None => {}
+        }
     }
+    Nested::write(&mut nested, &mut out);
     out
+}
+
+/// A table in one of an array of tables, or an array of them: written on a line each.
+struct Nested {
+    key: String,
+    many: bool,
+    tables: Vec<Vec<String>>,
+}
+
+impl Nested {
+    fn begin(all: &mut Vec<Self>, key: &str, many: bool) {
+        match all.last_mut().filter(|last| last.key == key) {
+            Some(last) => last.tables.push(Vec::new()),
+            None => all.push(Self {
+                key: key.into(),
+                many,
+                tables: vec![Vec::new()],
+            }),
+        }
+    }
+
+    /// Adds a line, or to the string that the last one has begun.
+    fn push(&mut self, line: String, continued: bool) {
+        let Some(table) = self.tables.last_mut() else {
+            return;
+        };
+        match table.last_mut().filter(|_| continued) {
+            Some(last) => {
+                last.push('\n');
+                last.push_str(&line);
+            }
+            None if !line.is_empty() => table.push(line),
+            None => {}
+        }
+    }
+
+    fn write(all: &mut Vec<Self>, out: &mut String) {
+        for Self { key, many, tables } in all.drain(..) {
+            let tables = tables.iter().map(|t| format!("{{ {} }}", t.join(", ")));
+            match many {
+                true => {
+                    let rows: String = tables.map(|t| format!("  {t},\n")).collect();
+                    out.push_str(&format!("{key} = [\n{rows}]\n"));
+                }
+                false => tables.for_each(|t| out.push_str(&format!("{key} = {t}\n"))),
+            }
+        }
+    }
 }
 
 /// A number or an array of them.
@@ -63,6 +138,20 @@ mod tests {
         count: u64,
         rows: [[f64; 2]; 2],
         empty: Vec<f64>,
+        part: Part,
+        list: Vec<Entry>,
+    }
+
+    #[derive(Debug, PartialEq, Serialize, serde::Deserialize)]
+    struct Part {
+        x: f64,
+    }
+
+    #[derive(Debug, PartialEq, Serialize, serde::Deserialize)]
+    struct Entry {
+        one: Option<Part>,
+        many: Vec<Part>,
+        about: String,
     }
 
     #[test]
@@ -70,17 +159,25 @@ mod tests {
         let names = [
             "plain",
             "0.00000001",
-            "a\nx = 0.00000001\n",
+            "a\nx = 0.00000001\n\n[list.one]\n",
             "it's \"0.00000001\"",
             "'''\"\"\"\nx = [[0.00000001]]",
+            "\n\n\n[[list]]",
         ];
         for name in names {
+            let entry = |n: i32| Entry {
+                one: (n > 1).then_some(Part { x: 1e-9 }),
+                many: (0..n).map(|k| Part { x: f64::from(k) }).collect(),
+                about: name.into(),
+            };
             let file = File {
                 name: name.into(),
                 small: 5.740194614108059e-12,
                 count: 3,
                 rows: [[0.1 + 0.2, -1e300], [f64::MIN_POSITIVE, 1e-5]],
                 empty: Vec::new(),
+                part: Part { x: -3e-7 },
+                list: vec![entry(0), entry(1), entry(2)],
             };
             let text = to_toml("# header\n", &file);
             assert!(text.starts_with("# header\nname = "));
@@ -90,16 +187,40 @@ mod tests {
     }
 
     #[test]
-    fn a_matrix_is_written_by_rows_with_exponents() {
+    fn a_matrix_is_written_by_rows_and_what_an_entry_holds_on_a_line_each() {
         let file = File {
             name: "unit".into(),
             small: 2.5e-7,
             count: 12,
             rows: [[1.0, -2e-9], [1e22, 4.5]],
             empty: Vec::new(),
+            part: Part { x: 0.5 },
+            list: vec![Entry {
+                one: Some(Part { x: 1e-9 }),
+                many: vec![Part { x: 1.0 }, Part { x: 2.0 }],
+                about: "a".into(),
+            }],
         };
-        let text = to_toml("", &file);
-        let expected = "name = \"unit\"\nsmall = 2.5e-7\ncount = 12\nrows = [\n  [1.0, -2e-9],\n  [1e22, 4.5],\n]\nempty = []\n";
-        assert_eq!(text, expected);
+        let expected = r#"name = "unit"
+small = 2.5e-7
+count = 12
+rows = [
+  [1.0, -2e-9],
+  [1e22, 4.5],
+]
+empty = []
+
+[part]
+x = 0.5
+
+[[list]]
+about = "a"
+one = { x = 1e-9 }
+many = [
+  { x = 1.0 },
+  { x = 2.0 },
+]
+"#;
+        assert_eq!(to_toml("", &file), expected);
     }
 }

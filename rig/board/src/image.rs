@@ -76,11 +76,13 @@ impl Image {
             .ok_or_else(|| format!("the image has no symbol {symbol}"))
     }
 
-    /// Address of the only symbol whose mangled name contains this.
+    /// Address of the only symbol whose mangled name contains this, but for tables of the compiler's, which have the name of their
+    /// function in theirs.
     ///
     /// Errors: no symbol does, or several.
     pub fn find(&self, part: &str) -> Result<u64, String> {
-        let mut found = self.symbols.iter().filter(|(name, _)| name.contains(part));
+        let meant = |name: &str| name.contains(part) && !name.starts_with(".L");
+        let mut found = self.symbols.iter().filter(|(name, _)| meant(name));
         match (found.next(), found.next()) {
             (Some((_, &address)), None) => Ok(address),
             (None, _) => Err(format!("the image has no symbol with {part} in it")),

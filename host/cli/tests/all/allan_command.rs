@@ -100,7 +100,7 @@ fn json_has_the_agreed_keys_and_the_truth_within_its_intervals() {
     for channel in channels {
         let name = channel["name"].as_str().unwrap();
         let points = channel["tau_s"].as_array().unwrap().len();
-        for key in ["adev", "lower", "upper", "fang_7"] {
+        for key in ["adev", "lower", "upper", "sigma_independent"] {
             assert_eq!(channel[key].as_array().unwrap().len(), points);
         }
         let mut check = |key: &str, truth: f64, unit: &str| {
@@ -125,7 +125,9 @@ fn json_has_the_agreed_keys_and_the_truth_within_its_intervals() {
     }
     // Nine intervals of 95 %.
     assert!(outside <= 2, "{outside} outside");
-    assert!(text.contains("deg/√h") && text.contains("µg/√Hz") && text.contains("fang (7)"));
+    assert!(
+        text.contains("deg/√h") && text.contains("µg/√Hz") && text.contains("independent clusters")
+    );
     let svg = std::fs::read_to_string(folder.path().join("a.svg")).unwrap();
     assert!(svg.starts_with("<svg") && svg.contains("gyro_x") && svg.contains("Accelerometers"));
 }

@@ -62,7 +62,7 @@ pub struct ConverterTable {
     pub weight_of_bit_0_raw: f64,
     /// Reading of its code 0, raw.
     pub reading_of_code_0_raw: f64,
-    /// The last is known to within so much, raw, with 95 %.
+    /// The last is known to within so much, raw, with 95 %; 0 where it is taken as given, as every diagnosis does now.
     pub reading_of_code_0_within_raw: f64,
 }
 
@@ -73,7 +73,7 @@ impl ConverterTable {
             axes: axes.into(),
             weight_of_bit_0_raw: converter.weight,
             reading_of_code_0_raw: converter.zero,
-            reading_of_code_0_within_raw: converter.zero_within,
+            reading_of_code_0_within_raw: 0.0,
         };
         match codes {
             [Some(x), Some(y), Some(z)] if x == y && y == z => vec![table("xyz", x)],
@@ -130,11 +130,7 @@ impl ConverterTable {
                 ));
             }
             for axis in ours {
-                let converter = Converter {
-                    weight,
-                    zero,
-                    zero_within: within,
-                };
+                let converter = Converter::of(weight, zero);
                 if codes[axis].replace(converter).is_some() {
                     return Err(format!("there are two converters of {}", AXES[axis]));
                 }

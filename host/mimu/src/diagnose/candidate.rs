@@ -45,8 +45,6 @@ pub struct Candidate {
     pub elsewhere: bool,
     /// How many choices it is the best of.
     pub choices: f64,
-    /// How many of them were converters, rather than bits of one.
-    pub converters: f64,
     /// Coefficients to choose from, where the choice is part of the search.
     pub offered: Vec<usize>,
 }
@@ -144,7 +142,6 @@ impl Candidate {
             codes: [None; 3],
             elsewhere: false,
             choices: 1.0,
-            converters: 1.0,
             offered: Vec::new(),
         }
     }
@@ -220,6 +217,12 @@ impl Candidate {
         all.filter(|(_, c)| c.scope == Scope::Recording && is_active(c.axis))
             .map(|(k, _)| k)
             .collect()
+    }
+
+    /// Whether it is a smooth nonlinearity of an axis: a function of the input along its own direction, and of nothing else.
+    pub fn is_nonlinearity(&self) -> bool {
+        const OF_SCALE: [&str; 3] = ["_scale_quadratic", "_scale_cubic", "_scale_asymmetry"];
+        matches!(self.kind, Kind::Effect(e) if OF_SCALE.iter().any(|end| e.id.ends_with(end)))
     }
 
     /// Whether the readings err by it.

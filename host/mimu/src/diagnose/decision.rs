@@ -2,6 +2,7 @@
 
 mod hold_out;
 mod leftover;
+mod reading;
 mod second;
 mod tried;
 mod undecided;
@@ -12,11 +13,12 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 use super::candidate::{Kind, Monomial, Variable};
 use super::removal::Removed;
 use super::rows::Rows;
-use super::search::{Chosen, Search};
+use super::search::{Chosen, Search, beside};
 use super::spread::{By, Fitted};
 use hold_out::leverage;
 use leftover::leftover;
 pub(super) use leftover::noisier;
+use reading::of_readings;
 use second::second;
 use tried::candidates;
 use undecided::undecided;
@@ -25,7 +27,6 @@ pub use hold_out::Split;
 pub(super) use hold_out::{held_out, rms};
 pub use leftover::{FALSE_LEFTOVER, Leftover};
 pub use second::Second;
-pub(super) use tried::EXCITED;
 pub use undecided::Undecided;
 
 /// One dwell that has more than this share in what an effect rests on decides it alone.
@@ -242,12 +243,12 @@ pub fn decide(rows: &Rows, dwell_ends: &[(usize, f64)], unseen: Option<&Rows>) -
         from += count;
     }
     // Beside the jumps that were found: every slow effect would seem to explain a little of them.
-    let beside: Vec<Chosen> = kept.iter().chain(&jumps).cloned().collect();
+    let with_jumps: Vec<Chosen> = kept.iter().chain(&jumps).cloned().collect();
     let all = match jumps.is_empty() {
         true => with.clone(),
-        false => search.fit(&beside)?,
+        false => search.fit(&with_jumps)?,
     };
-    for one in search.others(&beside, &all) {
+    for one in search.others(&with_jumps, &all) {
         let id = one.candidate.id();
         let told = |all: &[(String, String)]| all.iter().any(|r| r.0 == id);
         if told(&rejected) || told(&not_excited) {
@@ -284,13 +285,17 @@ pub fn decide(rows: &Rows, dwell_ends: &[(usize, f64)], unseen: Option<&Rows>) -
         };
         rejected.push((id, chance + &figures));
     }
-    // Errors by the code are looked for even where those of the usual converter would not be seen.
-    not_excited.retain(|(id, _)| !accepted.iter().any(|a| a.chosen.candidate.id() == *id));
     let residuals = |fit: &Fitted, model: &DMatrix<f64>| &rows.y - model * &fit.coefficients;
     let base = search
         .spread
         .fit(&search.basis, &null.components, By::Restricted)?;
-    let left = leftover(&search, &model, &last, !kept.is_empty(), &jumps);
+    let of_readings = of_readings(&search, &model, &last, split);
+    // What scatters beside them.
+    let whole = of_readings
+        .iter()
+        .fold(model.clone(), |m, r| beside(&m, &r.columns));
+    let mut left = leftover(&search, &whole, &last, !kept.is_empty(), &jumps);
+    left.extend(of_readings.into_iter().map(|r| r.left));
     let by =
         |chosen: &[Chosen], fit: &Fitted, split| held_rms(chosen, fit, split).unwrap_or(f64::NAN);
     let held = |chosen: &[Chosen], fit: &Fitted| by(chosen, fit, split);

@@ -187,7 +187,7 @@ impl Recordings<'_> {
             return Err(Error::new(
                 place,
                 format!("device is {device:?}, and that of the first recording {unit:?}"),
-                "effects are a unit's own: give recordings of one unit; if they are, import both with the same --device, or mend it in recording.toml",
+                "effects are a unit's own: give recordings of one unit; if they are, import both with the same name of the device, or mend it in recording.toml",
             ));
         }
         Ok(())

@@ -121,21 +121,6 @@ struct Row {
     dwells: [usize; 2],
 }
 
-/// What one axis reads at a moment of a row.
-#[derive(Debug, Clone, Copy)]
-pub struct RowReading {
-    /// Index of the row.
-    pub row: usize,
-    /// Axis.
-    pub axis: usize,
-    /// Mean, raw.
-    pub mean: f64,
-    /// Standard deviation of a sample, raw.
-    pub sd: f64,
-    /// What an error of the reading, raw, adds to the row.
-    pub weight: f64,
-}
-
 /// The rows of one sensor.
 #[derive(Debug, Clone)]
 pub struct Rows {
@@ -253,24 +238,6 @@ impl Rows {
             }
         }
         moments
-    }
-
-    /// What the rows read at `moments`, which are theirs at some readings: every axis that an error would show of.
-    pub fn readings(&self, moments: &[Moment]) -> Vec<RowReading> {
-        let mut all = Vec::new();
-        for (r, row) in self.rows.iter().enumerate() {
-            for (at, weight) in row.moments.clone().zip(&row.weights) {
-                let reading = &moments[at].reading;
-                all.extend((0..3).filter(|i| weight[*i] != 0.0).map(|axis| RowReading {
-                    row: r,
-                    axis,
-                    mean: reading.mean[axis],
-                    sd: reading.sd[axis],
-                    weight: weight[axis] / reading.scale[axis],
-                }));
-            }
-        }
-        all
     }
 
     /// Lowest and highest reading of its axes, raw, averaged over a moment.

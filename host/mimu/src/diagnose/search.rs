@@ -4,12 +4,8 @@
 //! fitted with noise of their own, and judged by the likelihood ratio, as a probability after the whole search. The noise of
 //! a model that lacks an effect is too large, and a test that keeps it would miss what makes it so.
 
-mod converter;
 mod refine;
 mod screen;
-
-use std::collections::{HashMap, HashSet};
-use std::sync::{Mutex, PoisonError};
 
 use nalgebra::DMatrix;
 use rayon::prelude::*;
@@ -62,8 +58,6 @@ pub struct Search<'a> {
     /// Columns of each, turned, for each form that is screened; none of those that are another beside other effects.
     turned: Vec<Vec<(f64, DMatrix<f64>)>>,
     tests: [f64; 2],
-    /// The converters that were found last, and beside which deviance: the last round and [`Self::others`] ask for the same.
-    converters: Mutex<Option<(f64, Vec<Chosen>)>>,
 }
 
 /// Columns that span what `columns` do.
@@ -83,6 +77,30 @@ pub fn beside(matrix: &DMatrix<f64>, more: &DMatrix<f64>) -> DMatrix<f64> {
     let mut all = matrix.clone().resize_horizontally(p + q, 0.0);
     all.columns_mut(p, q).copy_from(more);
     all
+}
+
+/// Part of a column beyond which it is no sum of others, rounding aside.
+const OF_ITS_OWN: f64 = 1e-6;
+
+/// Those of `columns`, at size 1, that are no sums of `model` and of those before them.
+pub(super) fn independent_of(columns: &DMatrix<f64>, model: &DMatrix<f64>) -> DMatrix<f64> {
+    let columns = unit_columns(columns);
+    let mut spanned = basis(&unit_columns(model));
+    let mut kept = Vec::new();
+    for (k, column) in columns.column_iter().enumerate() {
+        // Twice, as once leaves rounding in the direction of what was taken away.
+        let once = column - &spanned * spanned.tr_mul(&column);
+        let left = &once - &spanned * spanned.tr_mul(&once);
+        if left.norm() > OF_ITS_OWN {
+            let left = left.normalize();
+            spanned = beside(
+                &spanned,
+                &DMatrix::from_column_slice(left.len(), 1, left.as_slice()),
+            );
+            kept.push(k);
+        }
+    }
+    columns.select_columns(&kept)
 }
 
 /// Probability that chance makes F with these degrees of freedom as large.
@@ -130,56 +148,36 @@ impl<'a> Search<'a> {
             by_dwell: rows.by_dwell(),
             spread,
             candidates,
-            converters: Mutex::new(None),
         }
     }
 
+    /// The rows by dwells, for functions of the reading.
+    pub(super) fn by_dwell(&self) -> &Rows {
+        &self.by_dwell
+    }
+
     /// Moments by dwell, without what `fitted` of `model` does not explain of their readings.
-    fn freed(&self, model: &DMatrix<f64>, fitted: &Fitted) -> Vec<Moment> {
+    pub(super) fn freed(&self, model: &DMatrix<f64>, fitted: &Fitted) -> Vec<Moment> {
         let left = &self.rows.y - model * &fitted.coefficients;
         self.by_dwell.moments_without(&left)
     }
 
-    /// Finds the bits of the codes again beside what has been added since: errors of other kinds move the readings too. And, where
-    /// neither weight nor zero were given, these.
-    fn read_again(&self, chosen: &mut [Chosen], now: &mut Fitted) -> Option<()> {
+    /// Takes the bits of a code again from the readings without the errors of what has been added since: those move the readings too.
+    fn read_again(&self, chosen: &mut [Chosen], now: &mut Fitted) {
         for k in 0..chosen.len() {
-            let sought = chosen[k].candidate.converters > 1.0;
-            if !chosen[k].candidate.reads_code() || !(sought || chosen.len() > 1) {
+            if !chosen[k].candidate.reads_code() || chosen.len() == 1 {
                 continue;
             }
             let moments = self.moments_beside(chosen, k, now);
-            let candidate = chosen[k].candidate.clone();
-            chosen[k].columns = candidate.columns_at(&self.by_dwell, &moments, chosen[k].form);
-            *now = self.fit(chosen)?;
-            if !sought {
-                continue;
+            let one = &chosen[k];
+            let columns = one.candidate.columns_at(&self.by_dwell, &moments, one.form);
+            let before = std::mem::replace(&mut chosen[k].columns, columns);
+            match self.fit(chosen) {
+                Some(fit) => *now = fit,
+                // At these readings two bits turn together.
+                None => chosen[k].columns = before,
             }
-            for _ in 0..SETTLED {
-                let moments = self.moments_beside(chosen, k, now);
-                let mut rest = chosen.to_vec();
-                let mut one = rest.remove(k);
-                let noise = &now.components;
-                let settled = self.settle_converters(&one.candidate, &rest, &moments, noise);
-                let Some((candidate, dearer)) = settled else {
-                    break;
-                };
-                one.columns = candidate.columns_at(&self.by_dwell, &moments, one.form);
-                one.candidate = candidate;
-                rest.insert(k, one);
-                let Some(fit) = self.fit(&rest) else {
-                    break;
-                };
-                if fit.deviance + dearer > now.deviance - 0.1 {
-                    break;
-                }
-                chosen[k] = rest.swap_remove(k);
-                *now = fit;
-            }
-            let (worth, p, _) = self.worth(chosen, k, now)?;
-            (chosen[k].worth, chosen[k].p) = (worth, p);
         }
-        Some(())
     }
 
     /// Moments by dwell whose readings are free from noise and from the error of chosen effect `k`.
@@ -215,14 +213,19 @@ impl<'a> Search<'a> {
     /// By F: where the size of the noise is found from the rows, `n ln(1 + p F/dof)` is the drop, exactly; where it is known
     /// and F's `dof` is large, it is chi-square.
     fn chance(&self, drop: f64, p: usize, columns: usize, candidate: &Candidate) -> f64 {
+        let tests = self.tests[usize::from(!candidate.is_listed())] * candidate.choices;
+        (self.exceeds_by_chance(drop, p, columns) * tests).min(1.0)
+    }
+
+    /// The same of one test.
+    pub(super) fn exceeds_by_chance(&self, drop: f64, p: usize, columns: usize) -> f64 {
         let n = self.rows.y.len() as f64;
         let dof = self.dof(columns + p);
         if !(drop > 0.0) || dof < 2.0 {
             return 1.0;
         }
         let f = ((drop / n).exp_m1()) * dof / p as f64;
-        let tests = self.tests[usize::from(!candidate.is_listed())] * candidate.choices;
-        (exceeds(f, p as f64, dof) * tests).min(1.0)
+        exceeds(f, p as f64, dof)
     }
 
     /// A candidate beside the chosen, its form refined, with noise of its own: the drop of the deviance and its chance.
@@ -260,23 +263,6 @@ impl<'a> Search<'a> {
         })
     }
 
-    /// As [`Self::converters_beside`], once.
-    fn converters(&self, chosen: &[Chosen], null: &Fitted) -> Vec<Chosen> {
-        // Nobody leaves it half written, and nobody waits for it while a search goes on.
-        let last = || {
-            self.converters
-                .lock()
-                .unwrap_or_else(PoisonError::into_inner)
-        };
-        let known = last().clone();
-        if let Some((_, found)) = known.filter(|k| k.0 == null.deviance) {
-            return found;
-        }
-        let found = self.converters_beside(chosen, null);
-        *last() = Some((null.deviance, found.clone()));
-        found
-    }
-
     /// The best candidates beside the chosen, each with noise of its own, the least by chance first.
     fn finalists(&self, chosen: &[Chosen], null: &Fitted) -> Vec<Chosen> {
         let screened = self.screen(chosen, null);
@@ -291,7 +277,6 @@ impl<'a> Search<'a> {
             .into_par_iter()
             .filter_map(|s| self.judge(chosen, null, s))
             .collect();
-        judged.extend(self.converters(chosen, null));
         judged.sort_by(|a, b| a.p.total_cmp(&b.p).then(b.worth.total_cmp(&a.worth)));
         judged
     }
@@ -303,11 +288,7 @@ impl<'a> Search<'a> {
             .into_par_iter()
             .filter(|s| self.candidates[s.index].is_listed());
         let mut judged: Vec<Chosen> = listed.filter_map(|s| self.judge(chosen, now, &s)).collect();
-        judged.extend(self.converters(chosen, now));
-        // Of one effect by several converters the least by chance.
         judged.sort_by(|a, b| a.p.total_cmp(&b.p));
-        let mut told = HashSet::new();
-        judged.retain(|c| told.insert(c.candidate.id()));
         judged
     }
 
@@ -372,17 +353,15 @@ impl<'a> Search<'a> {
                 .filter(|c| score(&best) - score(c) < CONFUSED && significant(c))
                 .map(|c| (c.candidate.id(), score(&best) - score(c)))
                 .collect();
-            // Of one effect by several converters the best.
-            let mut told = HashMap::new();
-            for (id, worse) in &best.alternatives {
-                let least = told.entry(id.clone()).or_insert(*worse);
-                *least = least.min(*worse);
-            }
-            best.alternatives.retain(|(id, worse)| told[id] == *worse);
             chosen.push(best);
             let before: Vec<String> = chosen.iter().map(|c| c.candidate.id()).collect();
-            now = self.fit(&chosen)?;
-            self.read_again(&mut chosen, &mut now)?;
+            let Some(fit) = self.fit(&chosen) else {
+                // Beside the others it is determined by some noise and not by other.
+                gone.extend(chosen.pop().map(|c| c.candidate.id()));
+                continue;
+            };
+            now = fit;
+            self.read_again(&mut chosen, &mut now);
             self.again(&mut chosen, &mut now)?;
             let stays = |id: &String| chosen.iter().any(|c| c.candidate.id() == *id);
             gone.extend(before.into_iter().filter(|id| !stays(id)));
@@ -421,22 +400,19 @@ impl<'a> Search<'a> {
 }
 
 /// How good a candidate is among others with more or fewer coefficients: the drop of the deviance less what each coefficient
-/// costs (Akaike's two, doubled, as for each there are several candidates), and each of the converters that it is the best of. Of products
-/// that are the same in this recording the shortest is told.
+/// costs (Akaike's two, doubled, as for each there are several candidates). Of products that are the same in this recording the
+/// shortest is told.
 fn score(c: &Chosen) -> f64 {
     let coefficients = c.columns.ncols() as f64 + if c.form > 0.0 { 1.0 } else { 0.0 };
     let order = match &c.candidate.kind {
         Kind::Term(_, monomial) => monomial.0.len() as f64,
         _ => 0.0,
     };
-    c.worth - COEFFICIENT * coefficients - order - 2.0 * c.candidate.converters.ln()
+    c.worth - COEFFICIENT * coefficients - order
 }
 
-/// Rounds in which converters and readings are found in turn.
-const SETTLED: usize = 3;
-
 /// What a coefficient costs.
-const COEFFICIENT: f64 = 4.0;
+pub(super) const COEFFICIENT: f64 = 4.0;
 
 /// Score by which a term found from the data has to be better than an effect with a name.
 const PREFERENCE: f64 = 12.0;

@@ -56,6 +56,9 @@ impl Prediction {
 impl Target {
     /// A listed effect, each coefficient at its typical size, beside the affine parameters and any one of the other listed effects
     /// of the sensor that depend on time or temperature if it does, and on neither if it does not.
+    ///
+    /// The rate of the Earth, which is no error, is nobody's rival and has none: at rest it is a g-sensitivity to the last digit, and
+    /// what tells them apart is the latitude.
     pub fn listed(effect: &'static Effect) -> Self {
         let candidate = Candidate::new(effect.sensor, Kind::Effect(effect));
         let others = library::all().filter(|e| e.sensor == effect.sensor && e.id != effect.id);
@@ -68,6 +71,7 @@ impl Target {
                 .map(|k| effect.typical[*k])
                 .collect(),
             rivals: rivals
+                .filter(|r| effect.is_error() && r.is_error())
                 .filter(|r| !r.reads_code() && r.is_slow() == slow)
                 .collect(),
             candidate,
@@ -189,10 +193,17 @@ pub fn calibrates(setup: &Setup, experiment: &Experiment) -> bool {
     })
 }
 
-/// Columns of an effect's coefficients in each problem, over the sigma of a dwell's mean.
+/// An effect in the problems of its sensor.
 struct Columns {
-    /// Basis of the affine parameters, and the columns.
-    problems: Vec<(Vec<DVector<f64>>, Vec<DVector<f64>>)>,
+    problems: Vec<InProblem>,
+}
+
+/// An effect in one problem.
+struct InProblem {
+    /// Basis of the affine parameters.
+    affine: Vec<DVector<f64>>,
+    /// Column of each coefficient, over the sigma of a dwell's mean.
+    coefficients: Vec<DVector<f64>>,
 }
 
 impl Columns {
@@ -221,7 +232,10 @@ impl Columns {
                     column.fill(0.0);
                 }
             }
-            (p.affine, columns)
+            InProblem {
+                affine: p.affine,
+                coefficients: columns,
+            }
         });
         Self {
             problems: each.collect(),
@@ -237,20 +251,24 @@ impl Columns {
             }
             sum
         };
-        let each = self.problems.iter();
+        let each = self.problems.iter().map(|p| InProblem {
+            affine: p.affine.clone(),
+            coefficients: vec![sum(&p.coefficients)],
+        });
         Self {
-            problems: each.map(|(a, c)| (a.clone(), vec![sum(c)])).collect(),
+            problems: each.collect(),
         }
     }
 
     /// Sigma of each coefficient beside the affine parameters and, if there is one, a rival, as far as this is seen itself;
     /// infinite where it is not determined.
     fn sigmas(&self, rival: Option<&Self>) -> Vec<f64> {
-        let count = self.problems[0].1.len();
+        let count = self.problems[0].coefficients.len();
         let mut information = vec![0.0; count];
-        for (p, (affine, columns)) in self.problems.iter().enumerate() {
-            let mut basis = affine.clone();
-            for column in rival.iter().flat_map(|r| &r.problems[p].1) {
+        for (p, own) in self.problems.iter().enumerate() {
+            let columns = &own.coefficients;
+            let mut basis = own.affine.clone();
+            for column in rival.iter().flat_map(|r| &r.problems[p].coefficients) {
                 extend(&mut basis, column.clone());
             }
             let seen: Vec<(usize, DVector<f64>)> = columns

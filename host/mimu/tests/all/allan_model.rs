@@ -90,7 +90,7 @@ fn curves(rates: &[f64], dt_s: f64) -> [Vec<Point>; 2] {
         edf: f64::NAN,
         lower: f64::NAN,
         upper: f64::NAN,
-        fang_7: f64::NAN,
+        sigma_independent: f64::NAN,
     };
     let second = |m: usize| {
         let terms = n + 1 - 2 * m;

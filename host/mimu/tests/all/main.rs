@@ -3,3 +3,4 @@
 mod allan_model;
 mod allan_vectors;
 mod design;
+mod written_files;

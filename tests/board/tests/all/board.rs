@@ -2,7 +2,7 @@
 //! emulator says of how it uses the part.
 
 use mimu_board::schematic::{Volts, WIRING};
-use mimu_board_tests::{MS, STARTED, image, still};
+use mimu_board_tests::{MS, STARTED, still};
 
 /// Registers of DMA1's first stream (RM0433 15.5): what is left of the round, and where it writes.
 const LEFT: u64 = 0x4002_0014;
@@ -82,11 +82,4 @@ fn after_the_reset_pin_and_after_a_power_cut_it_samples_again_in_step() {
     assert_eq!(causes, ["Pin", "PowerOn"]);
     assert!(board.register(LEFT).unwrap() <= 40);
     assert_eq!(board.findings().unwrap().broken, [""; 0]);
-}
-
-#[test]
-fn the_image_leaves_most_of_its_memory_free() {
-    let sizes = image().sizes();
-    assert!(sizes.flash <= 65_536, "{} bytes of flash", sizes.flash);
-    assert!(sizes.ram < 32 << 10, "{} bytes of RAM", sizes.ram);
 }

@@ -81,9 +81,10 @@ fn task(name: &str) -> u64 {
 /// after its end, which none is.
 fn panics() -> u64 {
     const FLASH: u64 = 0x0800_0000;
-    let panic = image().find("panic_const_async_fn_resumed").unwrap();
+    let image = image();
+    let panic = image.find("panic_const_async_fn_resumed").unwrap();
     let bytes = still(Volts::GROUND)
-        .memory(FLASH, (panic - FLASH) as usize)
+        .memory(FLASH, image.sizes().flash as usize)
         .unwrap();
     let half = |at: usize| u32::from(u16::from_le_bytes([bytes[at], bytes[at + 1]]));
     let calls_it = |at: &usize| {
@@ -95,13 +96,15 @@ fn panics() -> u64 {
         let distance =
             sign << 24 | j(13) << 23 | j(11) << 22 | (upper & 0x3ff) << 12 | (lower & 0x7ff) << 1;
         let distance = (distance as i32) << 7 >> 7;
-        // R0 from a literal, encoding T1 (A7.7.44).
-        let loads = half(*at - 2) & 0xff00 == 0x4800;
+        // R0 by its halves: MOVW, encoding T3 (A7.7.76), and MOVT (A7.7.79).
+        let low = half(*at - 8) & 0xfbf0 == 0xf240 && half(*at - 6) & 0x8f00 == 0;
+        let high = half(*at - 4) & 0xfbf0 == 0xf2c0 && half(*at - 2) & 0x8f00 == 0;
+        let loads = low && high;
         let target = (FLASH + *at as u64 + 4).wrapping_add_signed(i64::from(distance));
         is_call && loads && target == panic
     };
-    let call = (2..bytes.len() - 4).step_by(2).find(calls_it);
-    FLASH + call.expect("the image has such a call") as u64 - 2
+    let call = (8..bytes.len() - 4).step_by(2).find(calls_it);
+    FLASH + call.expect("the image has such a call") as u64 - 8
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Errors by the code: removed by block and by sample, and refused where their converters make no sense.
 
-use mimu::calibration::{Calibration, to_toml};
+use mimu::calibration::Calibration;
 use mimu::diagnose::candidate::{Candidate, Kind};
 use mimu::diagnose::library;
 use mimu::diagnose::library::readout::{Converter, first_of};
@@ -41,7 +41,9 @@ fn errors_by_the_code_are_taken_out_block_by_block_and_sample_by_sample() {
     record(&clean, false, false);
     write_recording(&coded, false, true, false);
     let fit = fitted(&clean);
-    let text = to_toml(&fit, &[table(&converters())], "2026-01-01T00:00:00Z");
+    let text = Calibration::of(&fit, &[table(&converters())], "2026-01-01T00:00:00Z")
+        .unwrap()
+        .to_toml();
     let calibration = Calibration::parse(&text, "cal.toml").unwrap();
     let [gyro, accel] = Sensor::BOTH.map(|s| calibration.inverse(s).unwrap());
     let coded_blocks = prepared(&coded);
@@ -110,7 +112,9 @@ fn converters_that_make_no_sense_are_refused() {
     let path = folder.path().join("recording");
     record(&path, false, false);
     let fit = fitted(&path);
-    let text = to_toml(&fit, &[table(&converters())], "2026-01-01T00:00:00Z");
+    let text = Calibration::of(&fit, &[table(&converters())], "2026-01-01T00:00:00Z")
+        .unwrap()
+        .to_toml();
     let of_y = "{ axes = \"y\", ";
     for (from, to, says) in [
         (

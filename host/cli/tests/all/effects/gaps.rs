@@ -1,7 +1,7 @@
 //! Effects taken out of recordings that lack something: samples, a temperature, the time since power-on.
 
 use mimu::blocks::Moments;
-use mimu::calibration::{Calibration, to_toml};
+use mimu::calibration::Calibration;
 use mimu::diagnose::removal::{Removed, remove};
 use mimu::diagnose::{Recordings, diagnose};
 use mimu::dwell::Fault;
@@ -26,7 +26,9 @@ fn unit(effects: &[(&str, f64, usize)]) -> (Prepared, Calibration) {
             table(&removed)
         })
         .collect();
-    let text = to_toml(&fitted(&path), &tables, "2026-01-01T00:00:00Z");
+    let text = Calibration::of(&fitted(&path), &tables, "2026-01-01T00:00:00Z")
+        .unwrap()
+        .to_toml();
     (
         prepared(&path),
         Calibration::parse(&text, "cal.toml").unwrap(),

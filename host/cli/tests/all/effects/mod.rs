@@ -7,7 +7,7 @@ mod unit;
 
 use std::process::Command;
 
-use mimu::calibration::{Calibration, EffectTable, to_toml};
+use mimu::calibration::{Calibration, EffectTable};
 use mimu::diagnose::candidate::{Candidate, Kind, Monomial, Variable};
 use mimu::diagnose::library;
 use mimu::diagnose::library::readout::Converter;
@@ -67,7 +67,9 @@ fn every_effect_comes_back_from_the_file_and_the_device_removes_what_the_pc_does
     let fit = fitted(&path);
     let effects = every_effect();
     let tables: Vec<EffectTable> = effects.iter().map(table).collect();
-    let text = to_toml(&fit, &tables, "2026-01-01T00:00:00Z");
+    let text = Calibration::of(&fit, &tables, "2026-01-01T00:00:00Z")
+        .unwrap()
+        .to_toml();
     let calibration = Calibration::parse(&text, "cal.toml").unwrap();
     assert_eq!(calibration.effects().len(), effects.len());
     for (read, written) in calibration.effects().iter().zip(&effects) {
@@ -83,7 +85,9 @@ fn every_effect_comes_back_from_the_file_and_the_device_removes_what_the_pc_does
         .filter(|e| !e.candidate.reads_code())
         .collect();
     let tables: Vec<EffectTable> = effects.iter().map(table).collect();
-    let text = to_toml(&fit, &tables, "2026-01-01T00:00:00Z");
+    let text = Calibration::of(&fit, &tables, "2026-01-01T00:00:00Z")
+        .unwrap()
+        .to_toml();
     let calibration = Calibration::parse(&text, "cal.toml").unwrap();
     let before = &fit.prepared;
     let [gyro, accel] = Sensor::BOTH.map(|s| calibration.inverse(s).unwrap());
@@ -126,7 +130,9 @@ fn every_effect_goes_into_the_bytes_of_a_device() {
     // Of roots no sum is another, and a second look at a code never moves an error by just as much as it is.
     for effect in every_effect() {
         let id = effect.candidate.id();
-        let text = to_toml(&fit, &[table(&effect)], "2026-01-01T00:00:00Z");
+        let text = Calibration::of(&fit, &[table(&effect)], "2026-01-01T00:00:00Z")
+            .unwrap()
+            .to_toml();
         let calibration = Calibration::parse(&text, "cal.toml").unwrap();
         let image = Image::new(&calibration, "cal.toml").unwrap();
         let stored = image.stored().unwrap();
@@ -219,7 +225,9 @@ fn verifying_shows_the_error_with_the_effects_removed_and_left() {
     let tables = effects.each_ref().map(table);
     std::fs::write(
         path("cal.toml"),
-        to_toml(&fit, &tables, "2026-01-01T00:00:00Z"),
+        Calibration::of(&fit, &tables, "2026-01-01T00:00:00Z")
+            .unwrap()
+            .to_toml(),
     )
     .unwrap();
     let calibration = text("cal.toml");
@@ -270,7 +278,13 @@ fn verifying_shows_the_error_with_the_effects_removed_and_left() {
     );
 
     // Without effects nothing is said of them.
-    std::fs::write(path("cal.toml"), to_toml(&fit, &[], "2026-01-01T00:00:00Z")).unwrap();
+    std::fs::write(
+        path("cal.toml"),
+        Calibration::of(&fit, &[], "2026-01-01T00:00:00Z")
+            .unwrap()
+            .to_toml(),
+    )
+    .unwrap();
     let (done, json) = run("cold", &["--json", "-"]);
     assert!(done && !json.contains("rms_affine"), "{json}");
 }

@@ -1,6 +1,6 @@
 //! Effects in a calibration file that cannot be right, or that the device has no room for.
 
-use mimu::calibration::{Calibration, to_toml};
+use mimu::calibration::Calibration;
 use mimu::diagnose::candidate::{Candidate, Kind};
 use mimu::diagnose::library;
 use mimu::quantity::Sensor;
@@ -17,7 +17,9 @@ fn an_effect_that_was_edited_or_that_nobody_knows_is_refused_by_its_name() {
     let candidate = Candidate::new(Sensor::Gyro, Kind::Effect(effect));
     let warm_up = table(&removed(candidate, 90.0, &[1e-3, 2e-3, 3e-3]));
     let sag = table(&named("gyro_g_sensitivity", &[1e-5; 9]));
-    let text = to_toml(&fit, &[warm_up, sag], "2026-01-01T00:00:00Z");
+    let text = Calibration::of(&fit, &[warm_up, sag], "2026-01-01T00:00:00Z")
+        .unwrap()
+        .to_toml();
     let calibration = Calibration::parse(&text, "cal.toml").unwrap();
     let device = calibration.core_effects::<f32, 8>();
     assert!(device.is_ok());
@@ -66,7 +68,7 @@ fn an_effect_that_was_edited_or_that_nobody_knows_is_refused_by_its_name() {
             "not a number",
         ),
         (
-            "sigma = 2.000e-5",
+            "sigma = 2e-5",
             "sigma = -1.0",
             "gyro_warm_up",
             "not a number",
@@ -124,7 +126,9 @@ fn more_effects_than_the_device_has_room_for_are_refused_by_name() {
     record(&path, false, true);
     let effects = ["gyro_bias_drift", "accel_bias_drift", "gyro_thermal_scale"]
         .map(|id| table(&named(id, &[1e-7; 3])));
-    let text = to_toml(&fitted(&path), &effects, "2026-01-01T00:00:00Z");
+    let text = Calibration::of(&fitted(&path), &effects, "2026-01-01T00:00:00Z")
+        .unwrap()
+        .to_toml();
     let calibration = Calibration::parse(&text, "cal.toml").unwrap();
     assert!(calibration.core_effects::<f32, 2>().is_ok());
     let refusal = calibration

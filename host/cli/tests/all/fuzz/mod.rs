@@ -19,10 +19,12 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
-use mimu::calibration::{Calibration, to_toml};
+use mimu::calibration::Calibration;
 use mimu::fit::{Fit, Method, Options, fit};
 use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
+use mimu::result::fit::FitResult;
+use mimu::result::verify::VerifyResult;
 use mimu::verify::verify;
 use mimu_cli::report;
 use mimu_recording::error::{Error, Result};
@@ -154,7 +156,7 @@ fn options(random: &mut Random) -> Options {
     let methods = [
         Method::LeastSquares,
         Method::Kalman,
-        Method::Xu,
+        Method::InverseForm,
         Method::SixPositions,
     ];
     Options {
@@ -209,7 +211,9 @@ impl Seeds {
                 text.as_bytes(),
             );
             let fitted = fit_recording(&folder.join("seed"), options).expect("the seeds are valid");
-            calibration = to_toml(&fitted, &[], "2026-01-01T00:00:00Z");
+            calibration = Calibration::of(&fitted, &[], "2026-01-01T00:00:00Z")
+                .unwrap()
+                .to_toml();
             let files = vec![folder.join("seed/samples.csv")];
             let known = if *reference == "table" {
                 Reference::Table
@@ -250,7 +254,8 @@ fn well_formed(error: &Error) -> std::result::Result<(), String> {
 
 /// Whether a fit is one of numbers, in itself and as people and programs see it.
 fn numbers(fit: &Fit) -> std::result::Result<(), String> {
-    let json = report::fit_json(fit);
+    let result = FitResult::of(fit);
+    let json = serde_json::to_value(&result).map_err(|e| e.to_string())?;
     for sensor in json["sensors"].as_object().into_iter().flatten() {
         for parameter in sensor.1["parameters"].as_array().into_iter().flatten() {
             for key in ["value", "sigma", "lower", "upper"] {
@@ -266,11 +271,17 @@ fn numbers(fit: &Fit) -> std::result::Result<(), String> {
             }
         }
     }
-    report::fit_text(fit);
-    report::dwell_table(&fit.prepared.dwells.list, &fit.prepared.manifest);
-    Calibration::parse(&to_toml(fit, &[], "2026-01-01T00:00:00Z"), "written")
-        .map(drop)
-        .map_err(|error| format!("what was written cannot be read: {error}"))
+    report::fit_text(&result);
+    report::dwell_table(&result.dwells);
+    let made = Calibration::of(fit, &[], "2026-01-01T00:00:00Z")
+        .map_err(|error| format!("the fit makes no calibration: {error}"))?;
+    let written = made.to_toml();
+    let read = Calibration::parse(&written, "written")
+        .map_err(|error| format!("what was written cannot be read: {error}"))?;
+    match read.to_toml() == written {
+        true => Ok(()),
+        false => Err(format!("what was read is not what was written: {written}")),
+    }
 }
 
 /// Runs one case; what is wrong with its answer.
@@ -339,9 +350,9 @@ fn verify_mutated(seeds: &Seeds, recording: &Path, random: &mut Random) -> Resul
     };
     write_recording(recording, &manifest(reference), "samples.csv", &text);
     let prepared = Prepared::read(&Recording::open(recording)?, 10.0, |_| {})?;
-    let verified = verify(&prepared, &calibration)?;
-    report::verify_text(&verified);
-    report::verify_json(&verified);
+    let result = VerifyResult::of(&verify(&prepared, &calibration)?);
+    report::verify_text(&result);
+    serde_json::to_string(&result).expect("a result is JSON");
     Ok(())
 }
 
@@ -444,7 +455,7 @@ fn import_mutated(seeds: &Seeds, folder: &Path, random: &mut Random) -> Result<(
     };
     import(&options, &folder.join("rec"), |_| {}).map(|summary| {
         report::import_text(&summary);
-        report::import_json(&summary);
+        serde_json::to_string(&summary).expect("a result is JSON");
     })
 }
 

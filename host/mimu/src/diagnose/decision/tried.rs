@@ -39,7 +39,7 @@ pub(super) fn candidates(
     };
     for effect in library::all().filter(|e| e.sensor == sensor) {
         let Some(mut candidate) = Candidate::effect_in(effect, rows) else {
-            // Readings that are in no steps: the search for converters does without.
+            not_excited.push((effect.id.into(), effect.needs.into()));
             continue;
         };
         let mut best = vec![0.0_f64; effect.coefficients.len()];

@@ -1,5 +1,6 @@
 //! Effects whose physics the rows do not decide.
 
+use super::reading::worse_with_steps;
 use crate::diagnose::library::rivals::rivals;
 use crate::diagnose::search::{Chosen, Search};
 
@@ -36,6 +37,16 @@ pub(super) fn undecided(search: &Search, kept: &[Chosen]) -> Vec<Undecided> {
                     settled_by: rival.settled_by,
                 });
             }
+        }
+        if one.candidate.is_nonlinearity()
+            && let Some(worse) = worse_with_steps(search, kept, i).filter(|w| *w < DECIDED)
+        {
+            all.push(Undecided {
+                id,
+                law: "steps at some readings of an axis, as codes that never come,",
+                worse,
+                settled_by: "inputs a few noises apart, where the error changes: a step changes it at once",
+            });
         }
     }
     all

@@ -6,9 +6,10 @@
 //! behind a multiplexer, they share the errors; where each has its own, or a firmware has subtracted a bias from each, the bits
 //! turn elsewhere on each.
 //!
-//! Neither the width of the code nor its scale nor its offset has to be told. Readings of one converter are multiples of a step (of
-//! a code, or of a fraction of one where several are averaged): powers of two times that from a reading of zero are tried
-//! first, as the usual case. Then any weight and any zero, by what the residuals do against the readings.
+//! Readings of one converter are multiples of a step: of a code, or of a fraction of one where several are averaged. The weights of
+//! its bits are powers of two times that, from a code 0 that reads 0. Converters of any other weight and zero are read from a
+//! calibration and removed, but not searched for: among thousands of periods and phases one is always near a residual, and such a
+//! search named codes in recordings that had none.
 //!
 //! Noise carries a reading across a turn and back, so over a dwell a bit is set for a share of the time: that is what a mean
 //! depends on, and it bends where the code jumps.
@@ -86,29 +87,18 @@ pub struct Converter {
     pub weight: f64,
     /// Reading of code 0, raw.
     pub zero: f64,
-    /// It is known to within so much, raw, with 95 %; 0 where it was given.
-    pub zero_within: f64,
 }
 
 impl Converter {
     /// One of a given zero.
     pub fn of(weight: f64, zero: f64) -> Self {
-        Self {
-            weight,
-            zero,
-            zero_within: 0.0,
-        }
+        Self { weight, zero }
     }
 
     /// Share of the time that bit `-bit` is set while readings scatter about `mean` with `sd`, raw.
     pub fn share(&self, bit: usize, mean: f64, sd: f64) -> f64 {
         share_set(mean - self.zero, sd, self.weight * 0.5_f64.powi(bit as i32))
     }
-}
-
-/// That of a sensor.
-pub fn of_sensor(sensor: Sensor) -> Option<&'static Effect> {
-    EFFECTS.iter().find(|e| e.sensor == sensor)
 }
 
 /// Whether an effect is one of these.

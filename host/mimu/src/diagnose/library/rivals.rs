@@ -42,86 +42,6 @@ const fn creep(sensor: Sensor, coefficients: &'static [Coefficient]) -> Effect {
     }
 }
 
-/// Limits of usual gyros, and of what a table turns at.
-const RATE_LIMIT: Option<Form> = Some(Form {
-    name: "limit_rad_s",
-    from: 0.1,
-    to: 20.0,
-    kind: FormKind::Free,
-});
-
-const FORCE_LIMIT: Option<Form> = Some(Form {
-    name: "limit_m_s2",
-    from: 1.0,
-    to: 200.0,
-    kind: FormKind::Free,
-});
-
-const SMALL_RATE: Option<Form> = Some(Form {
-    name: "limit_rad_s",
-    from: 1e-3,
-    to: 1.0,
-    kind: FormKind::Free,
-});
-
-const SMALL_FORCE: Option<Form> = Some(Form {
-    name: "limit_m_s2",
-    from: 0.01,
-    to: 5.0,
-    kind: FormKind::Free,
-});
-
-/// A stage of the amplifier that no longer follows, or a reading that is put right beyond a limit: on either side of zero input alike,
-/// where codes have no reason to be.
-const fn beyond(
-    sensor: Sensor,
-    coefficients: &'static [Coefficient],
-    limit: Option<Form>,
-) -> Effect {
-    Effect {
-        id: "beyond_a_limit",
-        sensor,
-        about: "a bias while the input of the axis is beyond a limit, one way or the other",
-        coefficients,
-        typical: &[1.0; 3],
-        form: limit,
-        regressors: |at, limit, out| {
-            per_axis(out, |i| f64::from(u8::from(at.sensed[i].abs() > limit)))
-        },
-        needs: "",
-    }
-}
-
-/// What rubs, or a stage that rests: the scale factor is another about zero input.
-const fn within(
-    sensor: Sensor,
-    coefficients: &'static [Coefficient],
-    limit: Option<Form>,
-) -> Effect {
-    Effect {
-        id: "within_a_limit",
-        sensor,
-        about: "another scale factor while the input of the axis is small",
-        coefficients,
-        typical: &[1.0; 3],
-        form: limit,
-        regressors: |at, limit, out| {
-            per_axis(out, |i| match at.sensed[i] {
-                small if small.abs() < limit => small,
-                _ => 0.0,
-            })
-        },
-        needs: "",
-    }
-}
-
-const SCALES: [Coefficient; 3] = each("1");
-
-const GYRO_POWERS: [Coefficient; 12] =
-    by_axis(["1/(rad/s)", "1/(rad/s)^2", "1/(rad/s)^3", "1/(rad/s)^4"]);
-const ACCEL_POWERS: [Coefficient; 12] =
-    by_axis(["1/(m/s^2)", "1/(m/s^2)^2", "1/(m/s^2)^3", "1/(m/s^2)^4"]);
-
 /// Coefficients of these units, for one axis after the other.
 const fn by_axis<const N: usize, const UNITS: usize>(
     units: [&'static str; UNITS],
@@ -133,23 +53,6 @@ const fn by_axis<const N: usize, const UNITS: usize>(
         k += 1;
     }
     all
-}
-
-const fn smooth(sensor: Sensor, coefficients: &'static [Coefficient]) -> Effect {
-    Effect {
-        id: "smooth",
-        sensor,
-        about: "a smooth nonlinearity of up to fifth order",
-        coefficients,
-        typical: &[1.0; 12],
-        form: None,
-        regressors: |at, _, out| {
-            for (k, out) in out.iter_mut().enumerate() {
-                *out = at.sensed[k / 4].powi(2 + k as i32 % 4);
-            }
-        },
-        needs: "",
-    }
 }
 
 const GYRO_TURNING: [Coefficient; 9] = by_axis(["1", "1/(rad/s)", "1/(rad/s)"]);
@@ -176,16 +79,13 @@ const fn by_turning(sensor: Sensor, coefficients: &'static [Coefficient]) -> Eff
     }
 }
 
-const CLOSER: &str =
-    "inputs a few noises apart, where the error was found to change: codes change it at once";
-
 const BY_HAND: &str =
     "the same rates from another supply, and turned by hand: codes do not mind what turns the unit";
 
 const LONGER: &str =
     "a cold start recorded for several hours: an exponential ends, a logarithm does not";
 
-static RIVALS: [Rival; 11] = [
+static RIVALS: [Rival; 5] = [
     Rival {
         law: by_turning(Sensor::Gyro, &GYRO_TURNING),
         of: &[
@@ -199,36 +99,6 @@ static RIVALS: [Rival; 11] = [
         law: by_turning(Sensor::Accel, &ACCEL_TURNING),
         of: &["accel_readout_code", "accel_size_effect"],
         settled_by: BY_HAND,
-    },
-    Rival {
-        law: beyond(Sensor::Gyro, &GYRO_BIASES, RATE_LIMIT),
-        of: &["gyro_readout_code"],
-        settled_by: CLOSER,
-    },
-    Rival {
-        law: beyond(Sensor::Accel, &ACCEL_BIASES, FORCE_LIMIT),
-        of: &["accel_readout_code"],
-        settled_by: CLOSER,
-    },
-    Rival {
-        law: within(Sensor::Gyro, &SCALES, SMALL_RATE),
-        of: &["gyro_readout_code"],
-        settled_by: CLOSER,
-    },
-    Rival {
-        law: within(Sensor::Accel, &SCALES, SMALL_FORCE),
-        of: &["accel_readout_code"],
-        settled_by: CLOSER,
-    },
-    Rival {
-        law: smooth(Sensor::Gyro, &GYRO_POWERS),
-        of: &["gyro_readout_code"],
-        settled_by: CLOSER,
-    },
-    Rival {
-        law: smooth(Sensor::Accel, &ACCEL_POWERS),
-        of: &["accel_readout_code"],
-        settled_by: CLOSER,
     },
     Rival {
         law: creep(Sensor::Gyro, &GYRO_BIASES),

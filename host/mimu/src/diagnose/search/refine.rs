@@ -2,12 +2,9 @@
 
 use nalgebra::DMatrix;
 
-use super::{COEFFICIENT, Search, basis, beside, unit_columns};
+use super::{COEFFICIENT, Search, beside, independent_of, unit_columns};
 use crate::diagnose::candidate::Candidate;
 use crate::diagnose::spread::{By, Components, Fitted};
-
-/// Part of a column beyond which it is no sum of others, rounding aside.
-const OF_ITS_OWN: f64 = 1e-6;
 
 /// A model with noise of its own that a candidate is put beside.
 pub(super) struct Beside<'a> {
@@ -49,25 +46,7 @@ impl Beside<'_> {
 
     /// The same of a law that is to do what the model does not yet: what of it is in the model already is no fault of it, and costs nothing.
     pub fn law(&self, law: &Candidate, first: f64) -> Option<(f64, With)> {
-        let own = basis(&unit_columns(&self.model));
-        self.walk(law, first, |columns| {
-            let mut spanned = own.clone();
-            let mut kept = Vec::new();
-            for (k, column) in unit_columns(&columns).column_iter().enumerate() {
-                // Twice, as once leaves rounding in the direction of what was taken away.
-                let once = column - &spanned * spanned.tr_mul(&column);
-                let left = &once - &spanned * spanned.tr_mul(&once);
-                if left.norm() > OF_ITS_OWN {
-                    let left = left.normalize();
-                    spanned = beside(
-                        &spanned,
-                        &DMatrix::from_column_slice(left.len(), 1, left.as_slice()),
-                    );
-                    kept.push(k);
-                }
-            }
-            columns.select_columns(&kept)
-        })
+        self.walk(law, first, |columns| independent_of(&columns, &self.model))
     }
 
     fn walk(

@@ -1,6 +1,7 @@
 //! The definitions, term by term, and what follows from them.
 
-use mimu::allan::deviation::{ALL_TERMS, curve, curve_of_phase};
+use mimu::allan::curve::{curve, curve_of_phase};
+use mimu::allan::deviation::ALL_TERMS;
 use mimu::allan::{Kind, Point, Spacing};
 
 use super::Random;
@@ -113,7 +114,7 @@ fn a_series_that_does_not_vary_has_no_deviation_and_bounds_that_are_numbers() {
     for kind in [Kind::Allan, Kind::Modified, Kind::Hadamard] {
         for point in curve(&[2.5; 1000], 1.0, kind, &Spacing::Octave, 0.95).expect("finite") {
             assert_eq!((point.deviation, point.lower, point.upper), (0.0, 0.0, 0.0));
-            assert!(point.edf >= 1.0 && point.fang_7 == 0.0);
+            assert!(point.edf >= 1.0 && point.sigma_independent == 0.0);
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Equivalent degrees of freedom against covariances, and intervals against what they claim.
 
 use mimu::allan::bounds::{Estimator, Sampling, interval};
-use mimu::allan::deviation::curve;
+use mimu::allan::curve::curve;
 use mimu::allan::{Kind, Spacing};
 use mimu_rig::noise::{Coefficients, Noise};
 

@@ -1,6 +1,6 @@
 //! The test suite of NIST SP 1065, section 12: nine hand-sized values and a thousand by rule.
 
-use mimu::allan::deviation::curve;
+use mimu::allan::curve::curve;
 use mimu::allan::{Kind, Point, Spacing};
 
 /// Rates of table 30's series ("NBS14", section 12.2).

@@ -1,7 +1,8 @@
 //! What rounding costs in long series. Rates are whole multiples of 2^-30, so that integers give the integral, and
 //! its differences and their sums, without any.
 
-use mimu::allan::deviation::{ALL_TERMS, Integrated, curve};
+use mimu::allan::curve::curve;
+use mimu::allan::deviation::{ALL_TERMS, Integrated};
 use mimu::allan::{Kind, Point, Spacing};
 
 use super::Random;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use flate2::read::GzDecoder;
 use mimu::allan::bounds::{Estimator, Sampling, interval};
-use mimu::allan::deviation::{curve, curve_of_phase};
+use mimu::allan::curve::{curve, curve_of_phase};
 use mimu::allan::{Kind, Point, Spacing};
 
 /// One line of a result.

@@ -1,0 +1,229 @@
+//! Whether what is left of an axis is a function of what the axis itself reads.
+//!
+//! A converter that is not linear, codes that never come, an amplifier that rests or no longer follows: each leaves a function of the
+//! reading that no smooth law makes. Which of them it is, dwell means do not say, so that the answer is a line of what is left and no
+//! effect. The function is taken as constant between places that divide the range of the readings evenly, and tested beside a smooth
+//! one: what is said has to be too large for chance, has to predict dwells that it has not seen, and has to do better than the same
+//! function of the readings of the other axes, as which a quantity that nobody recorded may look as well.
+
+use nalgebra::DMatrix;
+
+use super::hold_out::{Split, held_out, rms};
+use super::leftover::{FALSE_LEFTOVER, Leftover};
+use crate::diagnose::effect::Moment;
+use crate::diagnose::rows::Rows;
+use crate::diagnose::search::{COEFFICIENT, Chosen, Search, beside, independent_of, unit_columns};
+use crate::diagnose::spread::{By, Fitted};
+use crate::quantity::AXES;
+
+/// Pieces that the range of the readings is divided into.
+const PIECES: [usize; 3] = [4, 16, 64];
+/// Order of the smooth function: that of the effects that have a name.
+const SMOOTH: i32 = 3;
+/// Functions that are tried: axes and divisions.
+const TRIED: f64 = (3 * PIECES.len()) as f64;
+
+/// A function of its reading that is left of an axis.
+pub(super) struct OfReading {
+    /// What is said of it.
+    pub left: Leftover,
+    /// Columns that take it up, the smooth ones included.
+    pub columns: DMatrix<f64>,
+}
+
+/// Readings of the dwells without their noise.
+struct Readings<'a> {
+    rows: &'a Rows,
+    conditions: Vec<Moment>,
+    /// Lowest reading and range of each axis, raw.
+    range: [(f64, f64); 3],
+}
+
+impl<'a> Readings<'a> {
+    fn new(rows: &'a Rows, conditions: Vec<Moment>) -> Self {
+        let range = |axis: usize| {
+            let all = conditions.iter().map(|m| m.reading.mean[axis]);
+            let (low, high) = all
+                .filter(|u| u.is_finite())
+                .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), u| {
+                    (a.min(u), b.max(u))
+                });
+            (low, high - low)
+        };
+        Self {
+            rows,
+            range: std::array::from_fn(range),
+            conditions,
+        }
+    }
+
+    /// Columns of errors of `axis` by functions of what axis `read` reads, as a share of its range.
+    fn columns(
+        &self,
+        axis: usize,
+        read: usize,
+        count: usize,
+        value: impl Fn(f64, usize) -> f64,
+    ) -> DMatrix<f64> {
+        let (low, range) = self.range[read];
+        self.rows
+            .columns(&self.conditions, &vec![axis; count], |at, out| {
+                let share = (at.reading.mean[read] - low) / range;
+                for (k, out) in out.iter_mut().enumerate() {
+                    *out = value(share, k);
+                }
+            })
+    }
+
+    fn smooth(&self, axis: usize) -> DMatrix<f64> {
+        let power = |k: usize| i32::try_from(k).map_or(SMOOTH, |k| k + 2);
+        self.columns(axis, axis, (SMOOTH - 1) as usize, |share, k| {
+            (2.0 * share - 1.0).powi(power(k))
+        })
+    }
+
+    fn steps(&self, axis: usize, read: usize, pieces: usize) -> DMatrix<f64> {
+        self.columns(axis, read, pieces - 1, |share, k| {
+            f64::from(u8::from(share * pieces as f64 > (k + 1) as f64))
+        })
+    }
+}
+
+/// The functions of their own reading that are left of the axes beside `model`, whose fit is `last`.
+pub(super) fn of_readings(
+    search: &Search,
+    model: &DMatrix<f64>,
+    last: &Fitted,
+    split: Split,
+) -> Vec<OfReading> {
+    let readings = Readings::new(search.by_dwell(), search.freed(model, last));
+    (0..3)
+        .filter(|axis| readings.range[*axis].1 > 0.0)
+        .filter_map(|axis| of_axis(search, model, last, &readings, axis, split))
+        .collect()
+}
+
+fn of_axis(
+    search: &Search,
+    model: &DMatrix<f64>,
+    last: &Fitted,
+    readings: &Readings,
+    axis: usize,
+    split: Split,
+) -> Option<OfReading> {
+    let rows = search.rows;
+    let fit = |m: &DMatrix<f64>| search.spread.fit(m, &last.components, By::Likelihood);
+    let smooth = independent_of(&readings.smooth(axis), model);
+    let null = beside(model, &smooth);
+    let without = fit(&null)?;
+    let with_steps = |read: usize, pieces: usize| {
+        let steps = readings.steps(axis, read, pieces);
+        if steps.iter().any(|v| !v.is_finite()) {
+            return None;
+        }
+        let steps = independent_of(&steps, &null);
+        if steps.ncols() == 0 {
+            return None;
+        }
+        let fitted = fit(&beside(&null, &steps))?;
+        let drop = without.deviance - fitted.deviance;
+        let p = search.exceeds_by_chance(drop, steps.ncols(), null.ncols());
+        Some((p * TRIED, steps, fitted))
+    };
+    let found = PIECES
+        .into_iter()
+        .filter_map(|pieces| Some((pieces, with_steps(axis, pieces)?)));
+    let (pieces, (p, steps, fitted)) = found.min_by(|a, b| a.1.0.total_cmp(&b.1.0))?;
+    if p > FALSE_LEFTOVER {
+        return None;
+    }
+    let all = beside(&null, &steps);
+    let held = |m: &DMatrix<f64>, f: &Fitted| Some(rms(rows, &held_out(search, m, f, split)?));
+    if !(held(&all, &fitted)? < held(&null, &without)?) {
+        return None;
+    }
+    let others = (0..3).filter(|other| *other != axis && readings.range[*other].1 > 0.0);
+    if others
+        .filter_map(|other| with_steps(other, pieces))
+        .any(|other| other.0 <= p)
+    {
+        return None;
+    }
+    let of_axis = rows.strata.iter().find(|s| s.axis == Some(axis));
+    let stratum = of_axis.or(rows.strata.first())?;
+    let squares = |m: &DMatrix<f64>, f: &Fitted| {
+        let left = &rows.y - m * &f.coefficients;
+        left.rows(stratum.rows.start, stratum.rows.len())
+            .norm_squared()
+    };
+    let explained = squares(&null, &without) - squares(&all, &fitted);
+    let columns = beside(&smooth, &steps);
+    Some(OfReading {
+        left: Leftover {
+            stratum: of_axis.map_or(AXES[axis].into(), |s| s.name.clone()),
+            axis: Some(axis),
+            against: "reading".into(),
+            strength: (explained.max(0.0) / stratum.rows.len() as f64).sqrt(),
+            usual: false,
+        },
+        columns: unit_columns(&columns),
+    })
+}
+
+/// By how much the score is less with steps at some readings in the place of a smooth nonlinearity, `one` of the chosen, and of all
+/// errors by the code; negative where it is better. Codes that never come, and bits of converters with another zero, are such steps, and
+/// look like a smooth nonlinearity where few inputs were shown.
+pub(super) fn worse_with_steps(search: &Search, chosen: &[Chosen], one: usize) -> Option<f64> {
+    const PLACES: usize = PIECES[2];
+    let (group, rest): (Vec<_>, Vec<_>) = chosen
+        .iter()
+        .cloned()
+        .enumerate()
+        .partition(|(k, c)| *k == one || c.candidate.reads_code());
+    let rest: Vec<Chosen> = rest.into_iter().map(|c| c.1).collect();
+    let columns: usize = group.iter().map(|c| c.1.columns.ncols()).sum();
+    let (null, now) = (search.fit(&rest)?, search.fit(chosen)?);
+    let model = search.model(&rest);
+    let readings = Readings::new(search.by_dwell(), search.freed(&model, &null));
+    let axes = (0..3).filter(|axis| readings.range[*axis].1 > 0.0);
+    let all: Vec<DMatrix<f64>> = axes
+        .map(|axis| readings.steps(axis, axis, PLACES))
+        .collect();
+    let steps = all.into_iter().reduce(|a, b| beside(&a, &b))?;
+    let whitener = search.spread.whitener(&null.components)?;
+    let y = DMatrix::from_column_slice(search.rows.y.len(), 1, search.rows.y.as_slice());
+    let q = whitener.whiten(&model).qr().q();
+    let across = |m: DMatrix<f64>| &m - &q * q.tr_mul(&m);
+    let (mut left, white) = (across(whitener.whiten(&y)), whitener.whiten(&steps));
+    let sizes: Vec<f64> = white.column_iter().map(|c| c.norm()).collect();
+    let mut white = across(white);
+    // A place is searched as well, as the nonlinear parameter of an effect is, but among so many.
+    let price = COEFFICIENT + 2.0 * (PLACES as f64).ln();
+    let mut taken: Vec<usize> = Vec::new();
+    while taken.len() < columns {
+        let explained = |k: usize| {
+            let column = white.column(k);
+            let own = column.norm() > 1e-3 * sizes[k];
+            own.then(|| column.dot(&left.column(0)).powi(2) / column.norm_squared())
+        };
+        let each = (0..white.ncols()).filter_map(|k| Some((k, explained(k)?)));
+        let Some((best, _)) = each.max_by(|a, b| a.1.total_cmp(&b.1)) else {
+            break;
+        };
+        let unit = white.column(best).normalize();
+        left -= &unit * (unit.tr_mul(&left));
+        white -= &unit * (unit.tr_mul(&white));
+        taken.push(best);
+    }
+    let cost = |count: usize| price * count as f64;
+    let scores = (1..=taken.len()).filter_map(|count| {
+        let with = beside(
+            &model,
+            &unit_columns(&steps.select_columns(&taken[..count])),
+        );
+        let fitted = search.spread.fit(&with, &null.components, By::Likelihood)?;
+        Some(null.deviance - fitted.deviance - cost(count))
+    });
+    let best = scores.max_by(f64::total_cmp)?;
+    Some(null.deviance - now.deviance - COEFFICIENT * columns as f64 - best)
+}
