@@ -7,7 +7,8 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::sync::{Arc, Mutex};
 
-use mimu::diagnose::{Diagnosis, diagnose, library};
+use mimu::diagnose::{Diagnosis, diagnose};
+use mimu::effects;
 use mimu::estimate::Observation;
 use mimu::fit::{Method, Options};
 use mimu::next_experiment::next;

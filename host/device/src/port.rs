@@ -149,7 +149,7 @@ mod tests {
             (ErrorKind::NoDevice, "busy"),
             (ErrorKind::Unknown, "the system's words"),
         ] {
-            let error = serialport::Error::device(kind, "the system's words");
+            let error = serialport::Error::new(kind, "the system's words");
             let line = not_opened("/nowhere/port", &error).to_string();
             assert!(line.contains(word) && line.contains("; "), "{line}");
         }

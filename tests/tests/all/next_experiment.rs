@@ -1,6 +1,7 @@
 //! From a recording that cannot show an effect, or tell two apart, to the one that does: the bench carries out what is planned.
 
-use mimu::diagnose::{Diagnosis, diagnose, library};
+use mimu::diagnose::{Diagnosis, diagnose};
+use mimu::effects;
 use mimu::fit::{Method, Options};
 use mimu::next_experiment::prediction::Target;
 use mimu::next_experiment::{Next, Setup, next, smallest};

@@ -5,12 +5,12 @@ use std::path::{Path, PathBuf};
 use super::SkippedLines;
 use super::assignment::{ColumnList, Role, Scale};
 use super::parquet_table::ParquetTable;
-use super::separator::Separator;
 use super::step_labels::StepLabels;
 use super::text_table::{Cells, TextTable};
 use crate::cell::{is_reading, no_reading, no_time};
 use crate::columns::Column;
 use crate::error::{Argument, Error, Result};
+use crate::separator::Separator;
 
 /// How many time steps the sample period is the median of.
 const STEPS_FOR_PERIOD: usize = 100_000;

@@ -7,7 +7,6 @@ mod inputs;
 mod join;
 mod options;
 mod parquet_table;
-mod separator;
 mod step_labels;
 #[cfg(test)]
 mod tests;
@@ -18,7 +17,6 @@ use std::path::Path;
 
 pub use assignment::{ColumnList, Role, Scale};
 pub use options::ImportOptions;
-pub use separator::Separator;
 
 use foreign::{ForeignFile, HowToRead, Row, sample_period};
 use inputs::Inputs;

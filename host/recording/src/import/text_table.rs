@@ -7,11 +7,11 @@ use std::path::{Path, PathBuf};
 use super::SkippedLines;
 use super::assignment::{ColumnList, Role};
 use super::binary::refuse_binary;
-use super::separator::Separator;
 use crate::cell::{self, Refusal, shorten};
 use crate::columns::Column;
 use crate::csv_file::BOM;
 use crate::error::{Argument, Error, Result};
+use crate::separator::Separator;
 
 /// Bytes at the start within which the data must begin.
 const HEAD: u64 = 1 << 18;
