@@ -7,7 +7,8 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::sync::{Arc, Mutex};
 
-use mimu::diagnose::{Diagnosis, diagnose, library};
+use mimu::diagnose::{Diagnosis, diagnose};
+use mimu::effects;
 use mimu::estimate::Observation;
 use mimu::fit::{Method, Options};
 use mimu::next_experiment::next;
@@ -98,7 +99,7 @@ fn scale(value: &mut toml::Value, factor: f64) {
 
 /// Whether an effect of the bench is one that the diagnosis knows by name.
 pub fn is_listed(id: &str) -> bool {
-    library::by_id(id).is_some()
+    effects::by_id(id).is_some()
 }
 
 /// Whether the effect `found` is what the bench's `id` does: codes that never come, and converters of each axis, are functions of the code.

@@ -111,6 +111,7 @@ impl<T: RealField + Copy> Law<T> {
     /// nothing. An effect is added here and nowhere else.
     const TABLE: &'static [Self] = &[
         Self::fast("g_sensitivity", 9, g_sensitivity),
+        Self::fast("g_squared", 9, g_squared),
         Self::fast("scale_quadratic", 3, scale_quadratic),
         Self::fast("scale_cubic", 3, scale_cubic),
         Self::fast("scale_asymmetry", 3, scale_asymmetry),
@@ -185,6 +186,12 @@ fn product<T: RealField + Copy>(c: &[T; COEFFICIENTS], x: &Vector3<T>, e: &mut V
 fn g_sensitivity<T: RealField + Copy>(law: &Fast<T>, at: &Conditions<T>, e: &mut Vector3<T>) {
     let [_, _, _, _, x, y, z, ..] = at.values;
     product(&law.coefficients, &Vector3::new(x, y, z), e);
+}
+
+/// `e = G (f_x², f_y², f_z²)`.
+fn g_squared<T: RealField + Copy>(law: &Fast<T>, at: &Conditions<T>, e: &mut Vector3<T>) {
+    let [_, _, _, _, x, y, z, ..] = at.values;
+    product(&law.coefficients, &Vector3::new(x * x, y * y, z * z), e);
 }
 
 /// `e_i = c_i s_i²`.

@@ -88,7 +88,7 @@ impl Capabilities {
 }
 
 /// Ids of effects by the bits of [`Greeting::effects`]. Append only.
-pub const EFFECTS: [&str; 22] = [
+pub const EFFECTS: [&str; 23] = [
     "gyro_g_sensitivity",
     "gyro_scale_quadratic",
     "gyro_scale_cubic",
@@ -111,6 +111,7 @@ pub const EFFECTS: [&str; 22] = [
     "accel_thermal_lag",
     "gyro_readout_code",
     "accel_readout_code",
+    "gyro_g_squared",
 ];
 
 /// Bits of those that are no effects by name, but [`Effect::code`].

@@ -107,7 +107,7 @@ fn worst(
             }
             _ => (
                 fallback,
-                format!("stated by hand: not seen on {}", names.join(", ")),
+                format!("given by hand: not seen on {}", names.join(", ")),
             ),
         });
     }

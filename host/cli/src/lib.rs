@@ -6,11 +6,13 @@
 //! | `arguments` | arguments that several share |
 //! | `reading`, `output` | the recording in; text, JSON and files out |
 //! | [`report`] | results as JSON, text and page |
+//! | `hint` | flags of the command beside what an error says to set otherwise |
 //! | `export` | noise coefficients for other programs |
 
 mod arguments;
 mod cmd;
 mod export;
+mod hint;
 mod output;
 mod reading;
 pub mod report;
@@ -69,7 +71,7 @@ pub fn run() -> ExitCode {
     match done {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("mimu: {error}");
+            eprintln!("mimu: {}", hint::line(&error));
             ExitCode::from(1)
         }
     }

@@ -10,6 +10,7 @@ mod device;
 mod diagnosis;
 mod fit;
 mod import;
+mod svg;
 mod text;
 mod verify;
 

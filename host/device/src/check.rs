@@ -91,7 +91,7 @@ pub fn check(
             ),
         };
         let remedy = format!("upload it first: `mimu device upload {place}`");
-        return Err(Error::new(session.port(), problem, remedy));
+        return Err(Error::device(session.port(), problem, remedy));
     }
     let mut twin = Twin::new(calibration, &image, session.who().sample_rate_hz, place)?;
     let wanted = (duration.as_secs_f64() * f64::from(session.who().sample_rate_hz)) as u64;
@@ -131,14 +131,14 @@ pub fn check(
                 if found.unpaired > wanted.max(1000) {
                     let problem = "more samples are lost on the line than compared";
                     let remedy = "check the cable, and end what else keeps the computer busy";
-                    return Err(Error::new(session.port(), problem, remedy));
+                    return Err(Error::device(session.port(), problem, remedy));
                 }
                 heard = Instant::now();
                 progress(found.samples as f64 / wanted as f64);
             }
             Some(Event::Started(_)) => {
                 let remedy = "run it again; `mimu device info` says why it restarted";
-                return Err(Error::new(
+                return Err(Error::device(
                     session.port(),
                     "the device restarted meanwhile",
                     remedy,
@@ -147,7 +147,7 @@ pub fn check(
             Some(Event::Kalman(_)) => {}
             None if heard.elapsed() > SILENCE => {
                 let problem = "the compensated stream does not come";
-                return Err(Error::new(
+                return Err(Error::device(
                     session.port(),
                     problem,
                     "reset the board and run it again",
@@ -165,10 +165,10 @@ pub fn check(
 
 impl Twin {
     fn new(calibration: &Calibration, image: &Image, rate_hz: u32, place: &str) -> Result<Self> {
-        let unusable = |_| Error::new(place, "the device could not use it", "fit it again");
+        let unusable = |_| Error::device(place, "the device could not use it", "fit it again");
         let stored = image.stored().map_err(unusable)?;
         let model = |sensor| {
-            let missing = || Error::new(place, "a sensor is missing", "calibrate both sensors");
+            let missing = || Error::device(place, "a sensor is missing", "calibrate both sensors");
             calibration.inverse(sensor).ok_or_else(missing)
         };
         Ok(Self {

@@ -126,7 +126,11 @@ pub fn kalman(
 ) -> Result<KalmanRun> {
     if !session.who().capabilities.contains(Capabilities::KALMAN) {
         let problem = "the device runs no Kalman bank";
-        return Err(Error::new(session.port(), problem, "flash newer firmware"));
+        return Err(Error::device(
+            session.port(),
+            problem,
+            "flash newer firmware",
+        ));
     }
     let (triad, each) = (plan.triad, plan.each.max(SHORTEST));
     let mut log = Log {
@@ -235,7 +239,7 @@ impl Log {
             Some(Event::Kalman(state)) if state.triad == triad => self.reports.push(*state),
             Some(Event::Started(_)) => {
                 let remedy = "run it again; `mimu device info` says why it restarted";
-                return Err(Error::new(
+                return Err(Error::device(
                     session.port(),
                     "the device restarted meanwhile",
                     remedy,
@@ -244,7 +248,7 @@ impl Log {
             Some(_) => {}
             None if self.heard.elapsed() > SILENCE => {
                 let problem = "the raw stream does not come";
-                return Err(Error::new(
+                return Err(Error::device(
                     session.port(),
                     problem,
                     "reset the board and run it again",
@@ -267,7 +271,7 @@ impl Log {
             }
             if since.elapsed() > SILENCE {
                 let problem = "the Kalman bank does not report";
-                return Err(Error::new(session.port(), problem, "run it again"));
+                return Err(Error::device(session.port(), problem, "run it again"));
             }
         }
     }
@@ -288,7 +292,7 @@ fn taken_in(
             .find(|r| r.updates > before && r.updates < *end);
         let Some(report) = within else {
             let problem = "the bank's reports were lost on the line, so its samples are not known";
-            return Err(Error::new(port, problem, "run it again"));
+            return Err(Error::device(port, problem, "run it again"));
         };
         let first = report.last.wrapping_sub(report.updates - before - 1);
         all.push(Applied {
@@ -333,7 +337,7 @@ fn replay(
     if missing > 0 {
         let problem =
             format!("{missing} of the samples that the bank took in were lost on the line");
-        return Err(Error::new(port, problem, "run it again"));
+        return Err(Error::device(port, problem, "run it again"));
     }
     Ok(bank.axes.map(|filter| {
         let (mean, covariance) = (filter.mean(), filter.covariance());

@@ -55,7 +55,7 @@ impl Line {
             let id = self.last_id;
             let call = Call { id, request };
             let length = encode(&call, &mut frame)
-                .map_err(|e| Error::new(self.port.name(), e, "report this"))?;
+                .map_err(|e| Error::device(self.port.name(), e, "report this"))?;
             self.port.write(&frame[..length])?;
             let until = Instant::now() + wait;
             while Instant::now() < until {
@@ -90,7 +90,7 @@ impl Line {
             Some((magic, version)) => {
                 check(self.port.name(), magic, version)?;
                 // Of this protocol, and with something in its greeting that is not known here.
-                Err(Error::new(
+                Err(Error::device(
                     self.port.name(),
                     "the device is newer than this program: its greeting says what is not known here",
                     "update mimu on this computer",

@@ -64,7 +64,7 @@ impl Port {
                     if patience == 0 {
                         let problem = "the port takes no bytes";
                         let remedy = "unplug the board and plug it in again";
-                        return Err(Error::new(&self.name, problem, remedy));
+                        return Err(Error::device(&self.name, problem, remedy));
                     }
                 }
                 Err(_) => return Err(self.gone()),
@@ -74,7 +74,7 @@ impl Port {
     }
 
     fn gone(&self) -> Error {
-        Error::new(
+        Error::device(
             &self.name,
             "the port has vanished",
             "check the cable and the board, and run it again",
@@ -90,7 +90,7 @@ impl std::fmt::Debug for Port {
 
 /// Ports of this computer that a board can be at: those on USB, or all of them if none says that it is.
 pub fn ports() -> Vec<String> {
-    // A system that cannot list its ports has none to offer; --port still opens one.
+    // A system that cannot list its ports has none to offer; one that is named still opens.
     let all = serialport::available_ports().unwrap_or_default();
     let on_usb =
         |p: &&serialport::SerialPortInfo| matches!(p.port_type, SerialPortType::UsbPort(_));
@@ -108,7 +108,7 @@ pub fn ports() -> Vec<String> {
 pub(super) fn listed(names: &[String]) -> String {
     match names {
         [] => "no serial port is there: plug the board in".into(),
-        names => format!("name one of {} with --port", names.join(", ")),
+        names => format!("name one of {}", names.join(", ")),
     }
 }
 
@@ -134,7 +134,7 @@ fn not_opened(name: &str, error: &serialport::Error) -> Error {
             ),
         },
     };
-    Error::new(name, problem, remedy)
+    Error::device(name, problem, remedy)
 }
 
 #[cfg(test)]

@@ -8,7 +8,7 @@ use super::heard::{Answer, Event, LineCount};
 use super::line::{ATTEMPTS, Line};
 use super::port::{Port, listed, ports};
 use super::who::{Who, unusable};
-use mimu_recording::error::{Error, Result};
+use mimu_recording::error::{Argument, Error, Result};
 
 /// Longest wait for an answer that needs no work: a frame takes 5 ms, and one of samples may be before it. With the times that a call
 /// is made it is long enough for a device that is still storing what a program before this one has committed.
@@ -33,16 +33,20 @@ impl Session {
         for name in &names {
             match Port::open(name).and_then(Self::greet) {
                 Ok(session) => found.push(session),
-                Err(error) => reasons.push(format!("{}: {}", error.place, error.problem)),
+                Err(error) => {
+                    let refused = error.refused();
+                    reasons.push(format!("{}: {}", refused.place, refused.problem));
+                }
             }
         }
         match (found.pop(), found.as_slice()) {
             (Some(only), []) => Ok(only),
-            (Some(_), _) => Err(Error::new(
-                "ports",
-                "more than one device greets",
-                listed(&names),
-            )),
+            (Some(_), _) => {
+                Err(
+                    Error::device("ports", "more than one device greets", listed(&names))
+                        .about(Argument::Port),
+                )
+            }
             (None, _) => {
                 let problem = match reasons.is_empty() {
                     true => "no serial port is there".to_string(),
@@ -51,8 +55,8 @@ impl Session {
                         reasons.join("; ").replace(';', ",")
                     ),
                 };
-                let remedy = "plug the board in, or name its port with --port";
-                Err(Error::new("ports", problem, remedy))
+                let remedy = "plug the board in, or name its port";
+                Err(Error::device("ports", problem, remedy).about(Argument::Port))
             }
         }
     }
@@ -125,7 +129,7 @@ impl Session {
     ) -> Result<Answer> {
         match self.line.ask(request, wait)? {
             Some(answer) => Ok(answer),
-            None => Err(Error::new(
+            None => Err(Error::device(
                 self.line.port.name(),
                 format!(
                     "the device does not answer: it was asked {purpose}, {ATTEMPTS} times in {:.0} s ({} frames were garbled)",
@@ -139,7 +143,7 @@ impl Session {
 
     /// An answer of another kind than was asked for.
     pub fn unexpected(&self, purpose: &str) -> Error {
-        Error::new(
+        Error::device(
             self.line.port.name(),
             format!("it was asked {purpose} and has answered something else"),
             "report this, with the output of `mimu device info`",
@@ -152,7 +156,7 @@ impl Session {
             self.line.listen(None)?;
         }
         if self.line.overflowed > 0 {
-            return Err(Error::new(
+            return Err(Error::device(
                 self.line.port.name(),
                 format!("{} events came while nobody looked", self.line.overflowed),
                 "close other programs and run it again",
@@ -185,17 +189,17 @@ impl Session {
 /// Why what is at the port is not a mimu device.
 fn no_greeting(port: &str, count: &LineCount) -> Error {
     match (count.bytes, count.frames) {
-        (0, _) => Error::new(
+        (0, _) => Error::device(
             port,
             "nothing answers: it is not a mimu device, or it is not running",
             "check its power and its firmware, or choose another port",
         ),
-        (bytes, 0) => Error::new(
+        (bytes, 0) => Error::device(
             port,
             format!("garbage: {bytes} bytes came and no whole frame, so this is not a mimu device"),
             "choose another port, or flash mimu-firmware (1 Mbaud, 8N1)",
         ),
-        (_, frames) => Error::new(
+        (_, frames) => Error::device(
             port,
             format!("{frames} whole frames came and no greeting, so this is not mimu's firmware"),
             "choose another port, or flash mimu-firmware",
@@ -257,5 +261,5 @@ pub fn refused(port: &str, purpose: &str, refusal: &Refusal) -> Error {
             "wait a few seconds and run it again",
         ),
     };
-    Error::new(port, format!("the device refuses {purpose}: {why}"), remedy)
+    Error::device(port, format!("the device refuses {purpose}: {why}"), remedy)
 }

@@ -104,7 +104,7 @@ pub fn stream(
             | (Some(Event::Compensated(batch)), Stream::Compensated) => batch,
             (Some(Event::Started(_)), _) => {
                 let remedy = "run it again; `mimu device info` says why it restarted";
-                return Err(Error::new(
+                return Err(Error::device(
                     session.port(),
                     "the device restarted meanwhile",
                     remedy,
@@ -113,7 +113,7 @@ pub fn stream(
             (Some(_), _) => continue,
             (None, _) if heard.elapsed() > SILENCE => {
                 let problem = "the stream does not come";
-                return Err(Error::new(
+                return Err(Error::device(
                     session.port(),
                     problem,
                     "reset the board and run it again",

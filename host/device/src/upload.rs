@@ -55,14 +55,14 @@ pub fn upload(session: &mut Session, image: &Image, progress: impl Fn(f64)) -> R
             if restarts == BEGINNINGS {
                 let problem = format!("the device restarted in each of {BEGINNINGS} uploads");
                 let remedy = "check its supply; `mimu device info` says why it restarted";
-                let error = Error::new(session.port(), problem, remedy);
+                let error = Error::device(session.port(), problem, remedy);
                 return Err(told(session, image, error));
             }
         }
     }
     let back = download(session)?;
     if back != image.bytes {
-        return Err(Error::new(
+        return Err(Error::device(
             session.port(),
             "what is read back is not what was sent",
             "upload again; if it stays so, the flash is worn out",
@@ -121,7 +121,7 @@ fn send(session: &mut Session, image: &Image, progress: &impl Fn(f64)) -> Result
         _ => return Err(session.unexpected(purpose)),
     }
     if session.hello()?.stored.is_none_or(|s| s.hash != hash) {
-        return Err(Error::new(
+        return Err(Error::device(
             session.port(),
             "it says that the calibration is stored, and greets with another",
             "upload again",
@@ -140,17 +140,14 @@ fn told(session: &mut Session, image: &Image, error: Error) -> Error {
         },
         Err(_) => "the device holds the old calibration or the new one, whole: `mimu device info` says which".into(),
     };
-    Error {
-        problem: format!("{}; {holds}", error.problem).replace("; ", ", "),
-        ..error
-    }
+    error.map(|e| e.problem = format!("{}; {holds}", e.problem).replace("; ", ", "))
 }
 
 /// The calibration in use, as the device stores it: read in parts, its hash compared with that of the greeting.
 pub fn download(session: &mut Session) -> Result<Vec<u8>> {
     let Some(info) = session.hello()?.stored else {
         let [a, b] = &session.who().slots;
-        return Err(Error::new(
+        return Err(Error::device(
             session.port(),
             format!("the device holds no calibration (its two places: {a}, {b})"),
             "upload one: `mimu device upload CAL`",
@@ -174,7 +171,7 @@ pub fn download(session: &mut Session) -> Result<Vec<u8>> {
     }
     let found = Hash(stored::hash(&all));
     if found != info.hash || all.len() != info.bytes as usize {
-        return Err(Error::new(
+        return Err(Error::device(
             session.port(),
             format!(
                 "{} bytes of hash {found} came, and {} of {} are stored",

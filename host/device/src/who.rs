@@ -273,7 +273,7 @@ pub(super) fn check(port: &str, magic: [u8; 4], protocol: Version) -> Result<()>
     };
     let versions = versions(protocol);
     match compatibility(&stub) {
-        Compatibility::NotMimu => Err(Error::new(
+        Compatibility::NotMimu => Err(Error::device(
             port,
             format!(
                 "wrong firmware: it greets as \"{}\", and not as \"{}\"",
@@ -282,12 +282,12 @@ pub(super) fn check(port: &str, magic: [u8; 4], protocol: Version) -> Result<()>
             ),
             "flash mimu-firmware (README, flashing), or choose another port",
         )),
-        Compatibility::DeviceOlder { usable: false } => Err(Error::new(
+        Compatibility::DeviceOlder { usable: false } => Err(Error::device(
             port,
             format!("the device is older than this program: {versions}"),
             "flash the firmware that belongs to this program (README, flashing)",
         )),
-        Compatibility::DeviceNewer { usable: false } => Err(Error::new(
+        Compatibility::DeviceNewer { usable: false } => Err(Error::device(
             port,
             format!("the device is newer than this program: {versions}"),
             "update mimu on this computer",

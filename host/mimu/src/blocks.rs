@@ -8,7 +8,7 @@
 use crate::increment::{Increment, Integrator};
 use crate::quantity::plural;
 use crate::reading_step::StepFinder;
-use mimu_recording::error::{Error, Result};
+use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{Batch, Column, RAW_COLUMNS, Recording};
 
 /// Length of a block, s. A tenth of the shortest dwell that is worth having; ten samples at 100 Hz.
@@ -423,8 +423,8 @@ impl Condenser {
             Error::new(
                 place,
                 problem,
-                "import again without the time column and with --rate-hz, if the rows are in order",
-            )
+                "import again without the time column and with the sample rate, if the rows are in order",
+            ).about(Argument::SampleRate)
         } else {
             let problem = format!("time goes back from {before} s to {now} s");
             Error::new(

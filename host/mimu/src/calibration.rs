@@ -15,7 +15,7 @@ use mimu_core::effects::Effects;
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
-use crate::diagnose::removal::Removed;
+use crate::effects::removal::Removed;
 use crate::quantity::Sensor;
 use crate::toml_layout;
 use crate::triad::Forward;

@@ -11,7 +11,7 @@ use crate::blocks::{Condensed, Level, Rails, Stretch, pool, quantile};
 use crate::quantity::{Sensor, plural};
 use crate::rails::{self, longest_run_by_chance};
 use crate::stillness::{self, Detection, SHORTEST_S};
-use mimu_recording::error::{Error, Result};
+use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{Manifest, RAW_COLUMNS};
 
 /// Variance of a given step over the median of all steps, at most; a fivefold standard deviation.
@@ -173,10 +173,14 @@ impl Dwells {
                 ),
                 false => (
                     "no stretch of the recording is still",
-                    "hold the unit still for some seconds in every pose, or raise --still",
+                    "hold the unit still for some seconds in every pose, or allow a larger variance",
                 ),
             };
-            return Err(Error::new("dwells", problem, remedy));
+            let error = Error::undetermined("dwells", problem, remedy);
+            return Err(match condensed.has_steps {
+                true => error,
+                false => error.about(Argument::StillFactor),
+            });
         }
         judge(&mut list, condensed, &longest_run, detection.is_none());
         warn(&list, manifest, &mut warnings);

@@ -16,7 +16,7 @@ use crate::prepared::{Prepared, si_covariance};
 use crate::quantity::{Figure, Sensor};
 use crate::stillness::STILL_FACTOR;
 use crate::triad::Triad;
-use mimu_recording::error::{Error, Result};
+use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{RawUnit, Reference};
 
 use sensor::rms;
@@ -117,8 +117,9 @@ pub fn fit(prepared: Prepared, options: Options) -> Result<Fit> {
         return Err(Error::new(
             &prepared.place,
             format!("there is no {only} to fit alone"),
-            format!("leave --only out, or add {only}_x, {only}_y, {only}_z"),
-        ));
+            format!("fit the other one, or add {only}_x, {only}_y, {only}_z"),
+        )
+        .about(Argument::Only));
     }
     let mut warnings = prepared.condensed.warnings.clone();
     warnings.extend(prepared.dwells.warnings.iter().cloned());
@@ -215,11 +216,14 @@ fn fit_known(
                 continue;
             }
             Err(failure) => {
-                let mut error = prepared.refused(failure, sensor);
-                if let Some(other) = Sensor::BOTH.into_iter().find(|s| *s != sensor && wanted(s)) {
-                    error.remedy += &format!("; or fit the other one alone with --only {other}");
-                }
-                return Err(error);
+                let error = prepared.refused(failure, sensor);
+                let other = Sensor::BOTH.into_iter().find(|s| *s != sensor && wanted(s));
+                return Err(match other {
+                    Some(other) => error
+                        .map(|e| e.remedy += &format!("; or fit the {other} alone"))
+                        .about(Argument::Only),
+                    None => error,
+                });
             }
         };
         if observations
@@ -292,7 +296,8 @@ fn refit<T: Send>(
 const FEW_DOF: f64 = 3.0;
 
 fn cannot_hold_out(block: usize, failure: Failure, sensor: Sensor) -> String {
-    let problem = failure.into_error(sensor).problem;
+    let error = failure.into_error(sensor);
+    let problem = &error.refused().problem;
     format!(
         "block {} cannot be held out: without it {problem}",
         block + 1
@@ -370,8 +375,9 @@ pub(crate) fn refuse_wrong_gravity(
             return Err(Error::new(
                 &prepared.place,
                 problem,
-                "import it with --scale accel=9.80665",
-            ));
+                "import it with the factor accel=9.80665",
+            )
+            .about(Argument::Scale));
         }
     }
     Ok(())

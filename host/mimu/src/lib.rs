@@ -66,6 +66,7 @@ pub mod calibration;
 pub mod design;
 pub mod diagnose;
 pub mod dwell;
+pub mod effects;
 pub mod estimate;
 pub mod fit;
 pub mod increment;

@@ -20,8 +20,9 @@ use crate::design::budget::DwellNoise;
 use crate::design::reach::{Carrier, RateList, Rates};
 use crate::design::tour::Motion;
 use crate::diagnose::Diagnosis;
-use crate::diagnose::candidate::{Candidate, Kind, Monomial};
-use crate::diagnose::library;
+use crate::effects;
+use crate::effects::candidate::{Candidate, Kind};
+use crate::effects::regressor::Product;
 use crate::fit::Fit;
 use crate::prepared::si_covariance;
 use crate::quantity::AXES;
@@ -227,15 +228,15 @@ fn noise(fit: &Fit, sensor: Sensor) -> DwellNoise {
 
 /// The candidate of this name; `None` of a jump, which is of one recording only.
 fn by_id(id: &str) -> Option<Candidate> {
-    if let Some(effect) = library::by_id(id) {
+    if let Some(effect) = effects::by_id(id) {
         return Some(Candidate::new(effect.sensor, Kind::Effect(effect)));
     }
     let (channel, product) = id.strip_prefix("term:")?.split_once('~')?;
     let (sensor, axis) = channel.split_once('_')?;
     let sensor = Sensor::BOTH.into_iter().find(|s| s.name() == sensor)?;
     let axis = AXES.iter().position(|a| *a == axis)?;
-    let monomial = Monomial::all().into_iter().find(|m| m.name() == product)?;
-    Some(Candidate::new(sensor, Kind::Term(axis, monomial)))
+    let term = Product::terms().into_iter().find(|p| p.name() == product)?;
+    Some(Candidate::new(sensor, Kind::Term(axis, term)))
 }
 
 /// The experiments that show what `diagnosis` leaves open.
@@ -244,7 +245,7 @@ pub fn next(diagnosis: &Diagnosis) -> Next {
     let sensors = diagnosis.sensors.iter();
     let open: Vec<&(String, String)> = sensors.flat_map(|s| &s.decision.not_excited).collect();
     let shown = open.par_iter().map(|(id, needs)| {
-        let target = library::by_id(id).map(Target::listed);
+        let target = effects::by_id(id).map(Target::listed);
         let shown = target
             .as_ref()
             .and_then(|t| recommended(diagnosis, &setup, t));
@@ -316,7 +317,7 @@ impl Pair {
             .and_then(|t| recommended(diagnosis, setup, t));
         let (experiment, here) = shown.unwrap_or_else(|| {
             // Of the two, what no dwell is planned for.
-            let words = match (&self.found.kind, library::by_id(&self.id)) {
+            let words = match (&self.found.kind, effects::by_id(&self.id)) {
                 (_, Some(effect)) => effect.needs,
                 (Kind::Effect(found), None) if self.other.is_some() => found.needs,
                 _ => "Make the same recording again: a jump does not come back where it was.",

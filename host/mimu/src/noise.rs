@@ -150,9 +150,9 @@ impl Noise {
                         format!("{}, channel {name}", file.place),
                         format!("it is in {}, and the readings are in {unit}", channel.unit),
                         match manifest.raw_unit {
-                            RawUnit::Si => "run mimu allan with --calibration",
+                            RawUnit::Si => "find the noise with the calibration of the unit",
                             _ => {
-                                "run mimu allan on a recording in the same unit, without --calibration"
+                                "find the noise in a recording in the same unit, without a calibration"
                             }
                         },
                     ));

@@ -67,10 +67,8 @@ impl Prepared {
                 "write the t_s at which the power came to recording.toml, or leave the key out";
             return Err(Error::new(place, problem, remedy));
         }
-        let dwells = Dwells::find(&condensed, &manifest, still_factor).map_err(|e| Error {
-            place: format!("{place}, {}", e.place),
-            ..e
-        })?;
+        let dwells = Dwells::find(&condensed, &manifest, still_factor)
+            .map_err(|e| e.map(|e| e.place = format!("{place}, {}", e.place)))?;
         let noise = Noise::within(&dwells.list, &condensed);
         Ok(Self {
             manifest,
@@ -241,17 +239,11 @@ impl Prepared {
 
     /// A failure of an estimator, with the place and with the dwells that it had to do without.
     pub(crate) fn refused(&self, failure: Failure, sensor: Sensor) -> Error {
-        let Error {
-            place,
-            problem,
-            remedy,
-        } = failure.into_error(sensor);
         let unused = self.dwells.unused(sensor);
-        Error::new(
-            format!("{}, {place}", self.place),
-            format!("{problem}{unused}"),
-            remedy,
-        )
+        failure.into_error(sensor).map(|e| {
+            e.place = format!("{}, {}", self.place, e.place);
+            e.problem += &unused;
+        })
     }
 }
 

@@ -84,6 +84,7 @@ pub fn coefficient(si: &str) -> Readable {
         si,
         &[
             ("rad/s/(m/s^2)", DEG * G, "deg/s/g"),
+            ("rad/s/(m/s^2)^2", DEG * G * G, "deg/s/g²"),
             ("1/(rad/s)", 1e6 / DEG, "ppm/(deg/s)"),
             ("1/(rad/s)^2", 1e6 / (DEG * DEG), "ppm/(deg/s)²"),
             ("1", 1e6, "ppm"),

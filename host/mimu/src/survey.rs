@@ -20,7 +20,7 @@ use crate::allan::units::Unit;
 use crate::allan::{Kind, Point, Spacing};
 use crate::calibration::Calibration;
 use crate::quantity::{Sensor, duration, significant};
-use mimu_recording::error::{Error, Result};
+use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{Column, RAW_COLUMNS, RawUnit, Recording};
 
 /// What to compute.
@@ -190,14 +190,15 @@ fn units(
         };
         let Some(table) = calibration.table(sensor) else {
             return Err(Error::new(
-                format!("{}, --calibration", RAW_COLUMNS[i]),
+                format!("{}, calibration", RAW_COLUMNS[i]),
                 format!("the calibration has no [{sensor}]"),
-                "calibrate that sensor too, or leave --calibration out",
-            ));
+                "calibrate that sensor too, or leave the calibration out",
+            )
+            .about(Argument::Calibration));
         };
         if table.raw_unit != raw {
             return Err(Error::new(
-                format!("{}, --calibration", RAW_COLUMNS[i]),
+                format!("{}, calibration", RAW_COLUMNS[i]),
                 format!(
                     "it is for readings in {}, and the recording is in {raw}",
                     table.raw_unit
@@ -238,8 +239,9 @@ impl Values {
                 return Err(Error::new(
                     format!("{place}, data row {row}"),
                     format!("the cell is empty, and there are no {FEWEST} samples in a row"),
-                    "record again, or choose a stretch with --from and --to",
-                ));
+                    "record again, or choose a stretch",
+                )
+                .about(Argument::Stretch));
             }
             warning = Some(format!(
                 "{}: empty cells, the first in data row {row}; the longest stretch without is used: {} from data row {}",

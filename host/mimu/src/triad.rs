@@ -57,6 +57,14 @@ fn inversion_jacobian(b: &Matrix3<f64>, c: &Vector3<f64>) -> SMatrix<f64, 12, 12
     jacobian
 }
 
+/// Sensitive directions of the sensors, by rows, unit vectors; and the scale factors, raw/SI.
+pub fn directions(inverse: &Affine<f64>) -> Option<(Matrix3<f64>, Vector3<f64>, Forward)> {
+    let forward = Forward::of(inverse)?;
+    let scale = Vector3::from_fn(|i, _| forward.matrix.row(i).norm());
+    let unit = Matrix3::from_fn(|i, j| forward.matrix[(i, j)] / scale[i]);
+    Some((unit, scale, forward))
+}
+
 /// Forward model of a triad, SI to raw: `u = P x + b`, fang (15), (17). A type of its own, so that it is not taken for the
 /// inverse one, which has the same twelve numbers.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -4,7 +4,7 @@ use mimu_core::compensation::Affine;
 use nalgebra::{Matrix3, Vector3};
 
 use crate::calibration::Calibration;
-use crate::diagnose::removal::{removable, remove};
+use crate::effects::removal::{removable, remove};
 use crate::estimate::rotation::{Turn, direction_error};
 use crate::fit::refuse_wrong_gravity;
 use crate::prepared::{Prepared, si_covariance};

@@ -11,6 +11,7 @@ use super::cell::{self, Refusal, shorten};
 use super::columns::{Column, Layout};
 use super::in_order::{in_order, worker_count};
 use crate::error::{Error, Result};
+use crate::separator::Separator;
 
 #[cfg(test)]
 mod tests;
@@ -70,10 +71,10 @@ impl CsvFile {
             ));
         }
         let mut record = csv::ByteRecord::new();
-        split_quoted(header.trim_ascii_end(), &mut record);
+        Separator::Comma.split(header.trim_ascii_end(), &mut record);
         let names: Vec<String> = record
             .iter()
-            .map(|name| String::from_utf8_lossy(name.trim_ascii()).into_owned())
+            .map(|name| String::from_utf8_lossy(name).into_owned())
             .collect();
         let layout = Layout::from_names(&names, &format!("{place}, row 1"))?;
         // Something after the header: a row, or at least the attempt at one.
@@ -151,17 +152,6 @@ impl CsvFile {
         }
         Ok(rows)
     }
-}
-
-/// Splits a line that holds quotes.
-fn split_quoted(line: &[u8], record: &mut csv::ByteRecord) {
-    let mut reader = csv::ReaderBuilder::new()
-        .has_headers(false)
-        .flexible(true)
-        .from_reader(line);
-    record.clear();
-    // Reading from memory cannot fail, and any bytes at all make a record.
-    let _ = reader.read_byte_record(record);
 }
 
 /// Rows of one chunk.
@@ -323,7 +313,7 @@ impl<'a> Worker<'a> {
                 ));
             }
             let row = if quotes && memchr(b'"', line).is_some() {
-                split_quoted(line, &mut self.record);
+                Separator::Comma.split(line, &mut self.record);
                 parse_cells(slots, self.record.iter(), &mut values, &mut steps)
             } else {
                 parse_plain(slots, line, &mut values, &mut steps)
@@ -331,7 +321,7 @@ impl<'a> Worker<'a> {
             match row {
                 Ok(()) => {}
                 Err(fault) => {
-                    split_quoted(line, &mut self.record);
+                    Separator::Comma.split(line, &mut self.record);
                     let cells = self.record.len();
                     return Err(match fault {
                         // A missing or doubled cell shifts the others: the width is then the cause.

@@ -85,6 +85,6 @@ mod tests {
         let path = folder.path().join("x");
         std::fs::write(&path, vec![0; 1 << 20]).unwrap();
         let fail = || Err::<(), _>(Error::new("here", "no", "try"));
-        assert_eq!(beside(&path, fail).unwrap_err().problem, "no");
+        assert_eq!(beside(&path, fail).unwrap_err().refused().problem, "no");
     }
 }

@@ -1,37 +1,141 @@
-//! One error for everything that refuses: the place, what is wrong there, and what to do.
+//! Errors: what kind, the place, what is wrong there, and what to do.
 
 use std::fmt;
 use std::path::Path;
 
-/// Why something was refused, as the one line that a person reads: `PLACE: PROBLEM; REMEDY`.
-///
-/// One struct and not an enum of causes: callers only ever print it and exit with status 1, and a
-/// line that lacks one of the three parts is what makes command-line tools tiresome, so none can be
-/// left out.
+/// What was refused, as the one line that a person reads: `PLACE: PROBLEM; REMEDY`. A line that lacks one of the three parts is
+/// what makes tools tiresome, so none can be left out.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Error {
+pub struct Refused {
     /// File with row and column, or step, axis, parameter: as narrow as is known.
     pub place: String,
     /// What is wrong there, with the offending value.
     pub problem: String,
     /// What the reader can do about it.
     pub remedy: String,
+    /// What the caller can set otherwise; a command adds the names of its flags.
+    pub arguments: Vec<Argument>,
+}
+
+/// Why something was refused.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Error {
+    /// The operating system refused a file, a folder or a port.
+    Io(std::io::ErrorKind, Refused),
+    /// A file, its samples or a setting is not what it has to be.
+    Invalid(Refused),
+    /// The experiment does not determine what was asked for.
+    Undetermined(Refused),
+    /// A device does not answer, or refused.
+    Device(Refused),
+}
+
+/// Something that a caller sets, which an error may suggest to set otherwise.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Argument {
+    /// Which column is what.
+    Columns,
+    /// Samples a second.
+    SampleRate,
+    /// Factor of a column.
+    Scale,
+    /// What is known of the true input.
+    Reference,
+    /// Name of the unit.
+    Device,
+    /// Largest variance of a dwell.
+    StillFactor,
+    /// The estimator.
+    Method,
+    /// Which of the two sensors is calibrated.
+    Only,
+    /// Beginning and end of a stretch of time.
+    Stretch,
+    /// A calibration to convert readings by.
+    Calibration,
+    /// What carries the unit.
+    Table,
+    /// Sensor that an experiment is designed for.
+    Sensor,
+    /// Serial port.
+    Port,
 }
 
 /// Result with [`Error`].
 pub type Result<T> = std::result::Result<T, Error>;
 
 impl Error {
-    /// An error at `place` (file, row, column, step or axis).
+    /// Something that is not what it has to be, at `place` (file, row, column, step or axis).
     pub fn new(
         place: impl fmt::Display,
         problem: impl fmt::Display,
         remedy: impl fmt::Display,
     ) -> Self {
-        Self {
+        Self::Invalid(Refused {
             place: place.to_string(),
             problem: problem.to_string(),
             remedy: remedy.to_string(),
+            arguments: Vec::new(),
+        })
+    }
+
+    /// An experiment that does not determine what was asked for.
+    pub fn undetermined(
+        place: impl fmt::Display,
+        problem: impl fmt::Display,
+        remedy: impl fmt::Display,
+    ) -> Self {
+        Self::Undetermined(Self::new(place, problem, remedy).into_refused())
+    }
+
+    /// A device that does not answer, or refused.
+    pub fn device(
+        place: impl fmt::Display,
+        problem: impl fmt::Display,
+        remedy: impl fmt::Display,
+    ) -> Self {
+        Self::Device(Self::new(place, problem, remedy).into_refused())
+    }
+
+    /// It, saying that `argument` can be set otherwise.
+    pub fn about(mut self, argument: Argument) -> Self {
+        self.refused_mut().arguments.push(argument);
+        self
+    }
+
+    /// It, with another place, problem or remedy.
+    pub fn map(mut self, change: impl FnOnce(&mut Refused)) -> Self {
+        change(self.refused_mut());
+        self
+    }
+
+    /// What was refused.
+    pub fn refused(&self) -> &Refused {
+        match self {
+            Self::Io(_, refused)
+            | Self::Invalid(refused)
+            | Self::Undetermined(refused)
+            | Self::Device(refused) => refused,
+        }
+    }
+
+    fn refused_mut(&mut self) -> &mut Refused {
+        match self {
+            Self::Io(_, refused)
+            | Self::Invalid(refused)
+            | Self::Undetermined(refused)
+            | Self::Device(refused) => refused,
+        }
+    }
+
+    fn into_refused(self) -> Refused {
+        match self {
+            Self::Io(_, refused)
+            | Self::Invalid(refused)
+            | Self::Undetermined(refused)
+            | Self::Device(refused) => refused,
         }
     }
 
@@ -50,13 +154,22 @@ impl Error {
             .next()
             .unwrap_or_default()
             .to_lowercase();
-        Self::new(path.display(), text, remedy)
+        Self::Io(
+            error.kind(),
+            Self::new(path.display(), text, remedy).into_refused(),
+        )
     }
 }
 
 impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let line = format!("{}: {}; {}", self.place, self.problem, self.remedy);
+        let Refused {
+            place,
+            problem,
+            remedy,
+            ..
+        } = self.refused();
+        let line = format!("{place}: {problem}; {remedy}");
         // A file name or a cell may hold a line break, or what moves a terminal's cursor; the promise is one line.
         let breaks = |c: char| c.is_control() || matches!(c, '\u{2028}' | '\u{2029}');
         f.write_str(&line.replace(breaks, " "))

@@ -126,7 +126,7 @@ mod tests {
             }
         };
         let error = in_order("here", u64::MAX, 3, |_| |_| (), stop).unwrap_err();
-        assert_eq!(error.problem, "stop");
+        assert_eq!(error.refused().problem, "stop");
     }
 
     #[test]

@@ -23,6 +23,7 @@ mod reader;
 mod recorded;
 #[cfg(test)]
 mod round_trip_tests;
+mod separator;
 mod staging;
 mod strict_file;
 mod writer;
@@ -30,11 +31,10 @@ mod writer;
 pub use batch::Batch;
 pub use columns::{Column, Columns, RAW_COLUMNS, REFERENCE_COLUMNS};
 pub use growing::Growing;
-pub use import::{
-    ColumnList, ImportOptions, ImportSummary, Role, Scale, Separator, SkippedLines, import,
-};
+pub use import::{ColumnList, ImportOptions, ImportSummary, Role, Scale, SkippedLines, import};
 pub use manifest::read_text;
 pub use manifest::{Format, MANIFEST_FILE, Manifest, Rails, RawUnit, Reference, Source};
 pub use reader::{ReadSummary, Recording};
 pub use recorded::{Recorded, Restart};
+pub use separator::Separator;
 pub use writer::{SampleFormat, Writer};

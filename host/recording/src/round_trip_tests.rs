@@ -282,7 +282,7 @@ fn an_error_of_the_consumer_ends_the_reading() {
                 },
             )
             .unwrap_err();
-        assert_eq!((calls, error.problem.as_str()), (3, "enough"));
+        assert_eq!((calls, error.refused().problem.as_str()), (3, "enough"));
     }
 }
 

@@ -6,7 +6,7 @@ use crate::rotation::dot;
 /// Rate at which the errors of the scale are stated, rad/s: full scale of an ADXRS300.
 const FULL: f64 = 300.0 * DPS;
 
-pub(super) const SPECS: [Spec; 4] = [
+pub(super) const SPECS: [Spec; 5] = [
     // The proof mass sags under force and the sense comb reads the sag as rate. ADXRS300: linear acceleration
     // effect 0.2 deg/s/g, any axis.
     Spec {
@@ -20,6 +20,23 @@ pub(super) const SPECS: [Spec; 4] = [
             input(move |at, add| {
                 for i in 0..3 {
                     add.gyro[i] += dot(m[i], at.motion.force);
+                }
+            })
+        },
+    },
+    // Springs that are stiffer one way than the other rectify: of a force its square remains. Size assumed: a quarter of the
+    // g-sensitivity per g.
+    Spec {
+        id: "gyro_g_squared",
+        about: "rectification: error = matrix · (fx², fy², fz²) (body axes)",
+        parameters: &[matrix("matrix_dps_per_g2", 0.05)],
+        build: |b| {
+            let m = b
+                .matrix("matrix_dps_per_g2")
+                .map(|row| row.map(|x| x * DPS / (G * G)));
+            input(move |at, add| {
+                for i in 0..3 {
+                    add.gyro[i] += dot(m[i], at.motion.force.map(|f| f * f));
                 }
             })
         },

@@ -12,6 +12,7 @@ use mimu_core::effects::{Directions, Effect, Effects, Refused, Sensor, State, Va
 use mimu_core::kalman::Bank;
 use mimu_core::single;
 use mimu_core::stored::ROOM;
+use mimu_core::wire::EFFECTS;
 use nalgebra::{Matrix3, Vector3};
 use panic_halt as _;
 
@@ -73,7 +74,10 @@ fn main() -> ! {
     };
     remove(&none());
     let term = Effect::term(Sensor::Gyro, 1, 1e-3, &TERM);
-    for effect in EFFECTS.map(named).into_iter().chain([term]) {
+    // Those that run with every sample.
+    let fast = |effect: &Result<Effect<f32>, Refused>| matches!(effect, Ok(e) if !e.is_slow());
+    let named = EFFECTS.iter().map(|id| named(id)).filter(fast);
+    for effect in named.chain([term]) {
         let mut all = none();
         let Ok(effect) = effect else { continue };
         // Alone, it pays for what all of a triad share; the second shows what each costs.
@@ -105,18 +109,6 @@ fn main() -> ! {
         cortex_m::asm::wfi();
     }
 }
-
-/// Effects that run with every sample.
-const EFFECTS: [&str; 8] = [
-    "gyro_g_sensitivity",
-    "gyro_scale_quadratic",
-    "gyro_scale_cubic",
-    "gyro_scale_asymmetry",
-    "accel_scale_quadratic",
-    "accel_scale_cubic",
-    "accel_cross_axis_product",
-    "accel_size_effect",
-];
 
 /// Variables of a term, as many as there can be.
 const TERM: [Variable; 3] = [Variable::RateX, Variable::ForceY, Variable::ForceZ];

@@ -61,8 +61,8 @@ fn on_a_table(unit: &Ideal, random: &mut Random) -> Vec<Observation> {
         .collect()
 }
 
-/// Recordings of each kind in every run of the tests: an interval that holds the truth in 83 % of the cases is seen.
-const FEW: u64 = 100;
+/// Recordings of each kind in every run of the tests: an interval that holds the truth in 85 % of the cases is seen.
+const FEW: u64 = 200;
 
 /// And in a night; `make papers` takes 1000.
 const MANY: u64 = 400;

@@ -59,6 +59,7 @@ fn of_more_units_effects_are_named_and_brought_down_to_the_noise() {
 fn named_and_removed(seeds: u64) {
     for ids in [
         &["gyro_g_sensitivity"][..],
+        &["gyro_g_squared"],
         &["gyro_thermal_bias"],
         &["accel_scale_quadratic"],
         &["accel_cross_axis_product"],

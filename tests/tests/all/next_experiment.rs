@@ -1,6 +1,7 @@
 //! From a recording that cannot show an effect, or tell two apart, to the one that does: the bench carries out what is planned.
 
-use mimu::diagnose::{Diagnosis, diagnose, library};
+use mimu::diagnose::{Diagnosis, diagnose};
+use mimu::effects;
 use mimu::fit::{Method, Options};
 use mimu::next_experiment::prediction::Target;
 use mimu::next_experiment::{Next, Setup, next, smallest};
@@ -69,7 +70,7 @@ fn shown_by_the_next(id: &str, unit: &RigFile, rates_dps: &[f64], seed: u64, tru
     let open: Next = next(&first);
     let told = open.not_excited.iter().find(|n| n.0 == id);
     assert!(told.is_some(), "{:?} {:?}", found(&first), open.not_excited);
-    let target = Target::listed(library::by_id(id).unwrap());
+    let target = Target::listed(effects::by_id(id).unwrap());
     let second = diagnosed(&plan(&first, &[target]), unit, seed + 1);
     assert_eq!(found(&second), [id]);
     let sensors = second.sensors.iter();

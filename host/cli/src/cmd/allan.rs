@@ -172,7 +172,7 @@ pub fn run(args: &AllanArgs) -> Result<()> {
         text.push_str(&format!("\nnoise: {}\n", path.display()));
     }
     if let Some(path) = &args.plot {
-        staged.push(stage(path, plot::svg(&result)?)?);
+        staged.push(stage(path, plot::svg(&result))?);
         text.push_str(&format!("\nplot: {}\n", path.display()));
     }
     print(&args.json, &text, &result, staged)

@@ -1,190 +1,165 @@
 //! Allan curves as SVG: gyros beside accelerometers, bounds as bands, fitted models, and where the coefficients are read.
 
-use plotters::prelude::*;
-use plotters::style::text_anchor::{HPos, Pos, VPos};
+use std::ops::Range;
 
+use maud::{Markup, html};
+
+use super::svg::{Frame, px};
 use mimu::allan::model::{FLOOR, Term};
 use mimu::quantity::Sensor;
 use mimu::readable;
 use mimu::result::allan::{AllanResult, ChannelResult, ModelResult};
-use mimu_recording::error::{Error, Result};
+
+/// Width and height of one panel, pixels.
+const PANEL: (f64, f64) = (640.0, 520.0);
 
 /// Colours that stay apart for the colour-blind (Okabe and Ito).
-const COLOURS: [RGBColor; 3] = [
-    RGBColor(230, 159, 0),
-    RGBColor(0, 114, 178),
-    RGBColor(0, 158, 115),
-];
+const STYLE: &str = "text{font:14px sans-serif;fill:#000}.tick{font-size:13px}.name{font-size:15px}.heading{font-size:18px}\
+path{fill:none;stroke-width:2}.grid{stroke:#e1e1e1;stroke-width:1}.axis{stroke:#000;stroke-width:1}\
+.x{stroke:#e69f00}.y{stroke:#0072b2}.z{stroke:#009e73}\
+.band{stroke:none;opacity:.2}.x.band{fill:#e69f00}.y.band{fill:#0072b2}.z.band{fill:#009e73}\
+.hadamard{stroke-dasharray:7 4}.model{stroke:#000;stroke-width:1;stroke-dasharray:2 3}\
+circle{fill:#fff;stroke-width:2}.key{fill:#fff;opacity:.85;stroke:#c8c8c8}";
 
-/// Size of one panel, pixels.
-const PANEL: (u32, u32) = (640, 520);
+/// Classes of the channels in [`STYLE`].
+const CLASSES: [&str; 3] = ["x", "y", "z"];
 
 /// The curves of a single recording as SVG.
-pub fn svg(result: &AllanResult) -> Result<String> {
-    let sensors: Vec<Sensor> = Sensor::BOTH
+pub fn svg(result: &AllanResult) -> String {
+    let of = |sensor: Sensor| result.channels.iter().filter(move |c| c.sensor() == sensor);
+    let panels: Vec<(Sensor, Vec<&ChannelResult>)> = Sensor::BOTH
         .into_iter()
-        .filter(|s| result.channels.iter().any(|c| c.sensor() == *s))
+        .map(|sensor| (sensor, of(sensor).collect()))
+        .filter(|(_, channels): &(_, Vec<_>)| !channels.is_empty())
         .collect();
-    let mut text = String::new();
-    let size = (PANEL.0 * sensors.len() as u32, PANEL.1);
-    let drawn = {
-        let root = SVGBackend::with_string(&mut text, size).into_drawing_area();
-        let draw = || -> std::result::Result<(), Box<dyn std::error::Error>> {
-            root.fill(&WHITE)?;
-            for (panel, sensor) in root.split_evenly((1, sensors.len())).iter().zip(&sensors) {
-                let of_sensor = result.channels.iter().filter(|c| c.sensor() == *sensor);
-                draw_panel(panel, result, *sensor, &of_sensor.collect::<Vec<_>>())?;
+    let (width, height) = (PANEL.0 * panels.len() as f64, PANEL.1);
+    let drawn = html! {
+        svg xmlns="http://www.w3.org/2000/svg" width=(width) height=(height) viewBox={ "0 0 " (width) " " (height) } {
+            style { (STYLE) }
+            rect width=(width) height=(height) fill="#fff" {}
+            @for (k, (sensor, channels)) in panels.iter().enumerate() {
+                g transform={ "translate(" (PANEL.0 * k as f64) ")" } { (panel(result, *sensor, channels)) }
             }
-            root.present()?;
-            Ok(())
-        };
-        draw().map_err(|e| e.to_string())
-    };
-    drawn.map_err(|e| Error::new("--plot", e, "compute without --plot, and report this"))?;
-    Ok(text)
-}
-
-type Area<'a> = DrawingArea<SVGBackend<'a>, plotters::coord::Shift>;
-
-fn draw_panel(
-    area: &Area,
-    result: &AllanResult,
-    sensor: Sensor,
-    channels: &[&ChannelResult],
-) -> std::result::Result<(), Box<dyn std::error::Error>> {
-    let usual = &readable::noise(channels[0].unit)[0];
-    let by = usual.factor;
-    let ends = |values: &mut dyn Iterator<Item = f64>, room: f64| {
-        let (low, high) = values
-            .filter(|v| v.is_finite() && *v > 0.0)
-            .fold((f64::INFINITY, 0.0f64), |(low, high), v| {
-                (low.min(v), high.max(v))
-            });
-        if low < high {
-            low / room..high * room
-        } else {
-            0.5..2.0
         }
     };
-    let x = ends(
-        &mut channels.iter().flat_map(|c| c.tau_s.iter().copied()),
-        1.1,
-    );
+    drawn.into_string() + "\n"
+}
+
+fn panel(result: &AllanResult, sensor: Sensor, channels: &[&ChannelResult]) -> Markup {
+    let usual = &readable::noise(channels[0].unit)[0];
+    let by = usual.factor;
+    let x = ends(channels.iter().flat_map(|c| c.tau_s.iter().copied()), 1.1);
     // Of the longest times only the curve and not the whole of the band has to be seen.
     let y = ends(
-        &mut channels.iter().flat_map(|c| c.adev.iter().map(|d| d * by)),
+        channels.iter().flat_map(|c| c.adev.iter().map(|d| d * by)),
         1.6,
     );
+    let frame = Frame {
+        across: 92.0..PANEL.0 - 14.0,
+        down: 44.0..PANEL.1 - 60.0,
+        x: x.start.log10()..x.end.log10(),
+        y: y.start.log10()..y.end.log10(),
+    };
     let title = match sensor {
         Sensor::Gyro => "Gyros",
         Sensor::Accel => "Accelerometers",
     };
+    let title = format!(
+        "{title} of {}",
+        result.device.as_deref().unwrap_or_default()
+    );
     let kind = result.kind.unwrap_or_default();
-    let mut chart = ChartBuilder::on(area)
-        .caption(
-            format!(
-                "{title} of {}",
-                result.device.as_deref().unwrap_or_default()
-            ),
-            ("sans-serif", 18),
-        )
-        .margin(14)
-        .x_label_area_size(46)
-        .y_label_area_size(78)
-        .build_cartesian_2d(
-            x.clone().log_scale().with_key_points(ticks(&x)),
-            y.clone().log_scale().with_key_points(ticks(&y)),
-        )?;
-    chart
-        .configure_mesh()
-        .x_desc("averaging time, s")
-        .y_desc(format!("{kind} deviation, {}", usual.unit))
-        .axis_desc_style(("sans-serif", 15))
-        .label_style(("sans-serif", 13))
-        .x_label_formatter(&|v| label(*v))
-        .y_label_formatter(&|v| label(*v))
-        .light_line_style(WHITE)
-        .bold_line_style(RGBColor(225, 225, 225))
-        .draw()?;
-    let at = |tau_s, deviation| clamped(tau_s, deviation, by, [y.start, y.end]);
-    for (k, channel) in channels.iter().enumerate() {
-        let band = COLOURS[k].mix(0.2);
-        let high = at(&channel.tau_s, &channel.upper);
-        let low = at(&channel.tau_s, &channel.lower).rev();
-        chart.draw_series([Polygon::new(
-            high.chain(low).collect::<Vec<_>>(),
-            band.filled(),
-        )])?;
-    }
-    for (k, channel) in channels.iter().enumerate() {
-        let style = COLOURS[k].stroke_width(2);
-        let curve = channel.tau_s.iter().zip(&channel.adev);
-        let curve = curve.map(|(t, d)| (*t, d * by));
-        chart
-            .draw_series(LineSeries::new(curve, style))?
-            .label(channel.name)
-            .legend(move |(x, y)| PathElement::new([(x, y), (x + 22, y)], style));
+    let point = |t: f64, deviation: f64| {
+        let inside = (deviation * by).clamp(y.start, y.end);
+        (t.log10(), inside.log10())
+    };
+    let curve = |tau_s: &[f64], deviation: &[f64]| -> Vec<(f64, f64)> {
+        let each = tau_s.iter().zip(deviation);
+        each.map(|(t, d)| point(*t, *d)).collect()
+    };
+    let line = |class: &str, points: Vec<(f64, f64)>| frame.line(class, points.into_iter());
+    // Line and name of each entry of the key.
+    let mut key: Vec<(String, String)> = Vec::new();
+    let mut curves: Vec<Markup> = Vec::new();
+    for (class, channel) in CLASSES.iter().zip(channels) {
+        curves.push(line(class, curve(&channel.tau_s, &channel.adev)));
+        key.push(((*class).into(), channel.name.into()));
         if let Some(hadamard) = &channel.hadamard {
-            let curve = at(&hadamard.tau_s, &hadamard.hdev);
-            chart
-                .draw_series(DashedLineSeries::new(curve, 7, 4, style))?
-                .label(format!("{}, Hadamard", channel.name))
-                .legend(move |(x, y)| {
-                    plotters::element::DashedPathElement::new([(x, y), (x + 22, y)], 7, 4, style)
-                });
+            let class = format!("{class} hadamard");
+            curves.push(line(&class, curve(&hadamard.tau_s, &hadamard.hdev)));
+            key.push((class, format!("{}, Hadamard", channel.name)));
         }
     }
-    let thin = BLACK.stroke_width(1);
-    for (k, (_, channel, model)) in models(channels).enumerate() {
-        let [from, to] = model.range_s;
-        let fitted = at(&channel.tau_s, &model.adev);
-        let curve = fitted.filter(|(t, _)| (from..=to).contains(t));
-        let series = chart.draw_series(DashedLineSeries::new(curve, 2, 3, thin))?;
-        if k == 0 {
-            series.label("models").legend(move |(x, y)| {
-                plotters::element::DashedPathElement::new([(x, y), (x + 22, y)], 2, 3, thin)
-            });
-        }
+    for (_, channel, model) in models(channels) {
+        let [from, to] = model.range_s.map(f64::log10);
+        let mut points = curve(&channel.tau_s, &model.adev);
+        points.retain(|(t, _)| (from..=to).contains(t));
+        curves.push(line("model", points));
     }
-    for term in [Term::N, Term::B, Term::K] {
-        let marks: Vec<(usize, (f64, f64))> = models(channels)
-            .filter_map(|(k, channel, model)| Some((k, read_at(channel, model, term)?)))
-            .map(|(k, (t, deviation))| (k, (t, deviation * by)))
-            .filter(|(_, at)| x.contains(&at.0) && y.contains(&at.1))
-            .collect();
-        for (k, at) in &marks {
-            chart.draw_series([EmptyElement::at(*at)
-                + Circle::new((0, 0), 4, WHITE.filled())
-                + Circle::new((0, 0), 4, COLOURS[*k].stroke_width(2))])?;
-        }
-        // One letter for all three: above the highest of them.
-        if let Some((_, at)) = marks.iter().max_by(|a, b| a.1.1.total_cmp(&b.1.1)) {
-            let style = ("sans-serif", 14)
-                .into_text_style(area)
-                .pos(Pos::new(HPos::Center, VPos::Bottom));
-            let letter = Text::new(term.letter(), (0, -7), style);
-            chart.draw_series([EmptyElement::at(*at) + letter])?;
-        }
+    if models(channels).next().is_some() {
+        key.push(("model".into(), "models".into()));
     }
-    chart
-        .configure_series_labels()
-        .background_style(WHITE.mix(0.85))
-        .border_style(RGBColor(200, 200, 200))
-        .label_font(("sans-serif", 14))
-        .position(SeriesLabelPosition::LowerLeft)
-        .draw()?;
-    Ok(())
+    html! {
+        (frame.grid(&title, &labelled(&x), &labelled(&y), true))
+        path class="axis" d={ "M" (px(frame.across.start)) " " (px(frame.down.start)) "V" (px(frame.down.end)) "H" (px(frame.across.end)) } {}
+        (frame.x_name("averaging time, s", &frame))
+        (frame.y_name(&format!("{kind} deviation, {}", usual.unit)))
+        @for (class, channel) in CLASSES.iter().zip(channels) {
+            @let high = curve(&channel.tau_s, &channel.upper);
+            @let low = curve(&channel.tau_s, &channel.lower);
+            (line(&format!("{class} band"), high.into_iter().chain(low.into_iter().rev()).collect()))
+        }
+        @for curve in &curves { (curve) }
+        @for term in [Term::N, Term::B, Term::K] { (marks(&frame, channels, term, by)) }
+        (legend(&frame, &key))
+    }
 }
 
-/// Points of a curve in a plot whose ordinate, `by` times the deviation, ends at `ends`.
-fn clamped<'a>(
-    tau_s: &'a [f64],
-    deviation: &'a [f64],
-    by: f64,
-    [low, high]: [f64; 2],
-) -> impl DoubleEndedIterator<Item = (f64, f64)> + Clone + 'a {
-    let each = tau_s.iter().zip(deviation);
-    each.map(move |(t, d)| (*t, (d * by).clamp(low, high)))
+/// Where a coefficient is read: a circle for each channel, and one letter above the highest of them.
+fn marks(frame: &Frame, channels: &[&ChannelResult], term: Term, by: f64) -> Markup {
+    let marks: Vec<(usize, f64, f64)> = models(channels)
+        .filter_map(|(k, channel, model)| Some((k, read_at(channel, model, term)?)))
+        .map(|(k, (t, deviation))| (k, t.log10(), (deviation * by).log10()))
+        .filter(|(_, x, y)| frame.x.contains(x) && frame.y.contains(y))
+        .map(|(k, x, y)| (k, frame.at_x(x), frame.at_y(y)))
+        .collect();
+    html! {
+        @for (k, x, y) in &marks { circle class=(CLASSES[*k]) cx=(px(*x)) cy=(px(*y)) r="4" {} }
+        @if let Some((_, x, y)) = marks.iter().min_by(|a, b| a.2.total_cmp(&b.2)) {
+            text x=(px(*x)) y=(px(y - 9.0)) text-anchor="middle" { (term.letter()) }
+        }
+    }
+}
+
+/// At the lower left, where falling curves are not.
+fn legend(frame: &Frame, key: &[(String, String)]) -> Markup {
+    let letters = key.iter().map(|(_, name)| name.chars().count()).max();
+    let (width, height) = (
+        46.0 + 7.6 * letters.unwrap_or(0) as f64,
+        10.0 + 18.0 * key.len() as f64,
+    );
+    let (left, top) = (frame.across.start + 6.0, frame.down.end - 6.0 - height);
+    html! {
+        rect class="key" x=(px(left)) y=(px(top)) width=(px(width)) height=(px(height)) {}
+        @for (row, (class, name)) in key.iter().enumerate() {
+            @let y = top + 14.0 + 18.0 * row as f64;
+            path class=(class) d={ "M" (px(left + 8.0)) " " (px(y)) "h24" } {}
+            text x=(px(left + 38.0)) y=(px(y + 5.0)) { (name) }
+        }
+    }
+}
+
+/// The ends of positive values, with so much room as a factor.
+fn ends(values: impl Iterator<Item = f64>, room: f64) -> Range<f64> {
+    let (low, high) = values
+        .filter(|v| v.is_finite() && *v > 0.0)
+        .fold((f64::INFINITY, 0.0f64), |(low, high), v| {
+            (low.min(v), high.max(v))
+        });
+    match low < high {
+        true => low / room..high * room,
+        false => 0.5..2.0,
+    }
 }
 
 /// The channels that have a model, with the channel's number.
@@ -210,8 +185,8 @@ fn read_at(channel: &ChannelResult, model: &ModelResult, term: Term) -> Option<(
     }
 }
 
-/// Round numbers in the range: powers of ten, and 2 and 5 times them where those are few.
-fn ticks(range: &std::ops::Range<f64>) -> Vec<f64> {
+/// Round numbers in the range as the places and labels of a logarithmic axis: powers of ten, and 2 and 5 times them where those are few.
+fn labelled(range: &Range<f64>) -> Vec<(f64, String)> {
     let (low, high) = (range.start, range.end);
     let decades = low.log10().floor() as i32..=high.log10().ceil() as i32;
     let steps: &[u32] = if (high / low).log10() > 3.0 {
@@ -222,7 +197,9 @@ fn ticks(range: &std::ops::Range<f64>) -> Vec<f64> {
     let all = decades.flat_map(|d| steps.iter().map(move |m| format!("{m}e{d}")));
     // From text: powers of ten by multiplication are off by a rounding, which a label would show.
     let all = all.filter_map(|t| t.parse().ok());
-    all.filter(|t| (low..=high).contains(t)).collect()
+    all.filter(|t| (low..=high).contains(t))
+        .map(|t: f64| (t.log10(), label(t)))
+        .collect()
 }
 
 fn label(value: f64) -> String {

@@ -223,7 +223,7 @@ fn kalibr_gets_the_worst_axis_and_no_coefficient_that_was_not_seen() {
             value(key)
         );
     }
-    assert!(yaml.contains("rostopic: \"/a\"") && yaml.contains("stated by hand"));
+    assert!(yaml.contains("rostopic: \"/a\"") && yaml.contains("given by hand"));
 }
 
 /// What is wrong with a row of some number.

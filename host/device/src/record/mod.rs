@@ -206,14 +206,8 @@ pub fn record(
 
 /// `error`, with where to find what was received.
 fn kept(error: Error, samples: u64, directory: &Path) -> Error {
-    Error {
-        problem: format!(
-            "{} ({samples} samples are kept in {})",
-            error.problem,
-            directory.display()
-        ),
-        ..error
-    }
+    let kept = format!(" ({samples} samples are kept in {})", directory.display());
+    error.map(|e| e.problem += &kept)
 }
 
 struct Run {

@@ -4,12 +4,12 @@ use mimu_core::effects::FARTHEST_ZERO;
 use serde::{Deserialize, Serialize};
 
 use super::Calibration;
-use crate::diagnose::candidate::{Candidate, Codes, Kind, Monomial, Variable};
-use crate::diagnose::decision::Accepted;
-use crate::diagnose::effect::Effect;
-use crate::diagnose::library;
-use crate::diagnose::library::readout::Converter;
-use crate::diagnose::removal::{Condition, Removed, depends};
+use crate::effects;
+use crate::effects::candidate::{Candidate, Kind};
+use crate::effects::converter::{Codes, Converter};
+use crate::effects::quantity::{Need, Quantity};
+use crate::effects::regressor::Product;
+use crate::effects::removal::Removed;
 use crate::quantity::AXES;
 use crate::quantity::Sensor;
 use mimu_recording::error::{Error, Result};
@@ -154,24 +154,6 @@ pub struct CoefficientTable {
     pub unit: String,
 }
 
-impl From<&Accepted> for EffectTable {
-    fn from(accepted: &Accepted) -> Self {
-        let removed = Removed {
-            candidate: accepted.chosen.candidate.clone(),
-            form: accepted.chosen.form,
-            values: accepted.values.iter().copied().collect(),
-        };
-        let sigmas: Vec<f64> = accepted
-            .covariance
-            .diagonal()
-            .map(f64::sqrt)
-            .iter()
-            .copied()
-            .collect();
-        Self::new(&removed, &sigmas)
-    }
-}
-
 impl EffectTable {
     /// The table of an effect whose coefficients have these standard deviations.
     ///
@@ -181,7 +163,7 @@ impl EffectTable {
         let removed = &removed.lasting();
         let candidate = &removed.candidate;
         let (about, form) = match &candidate.kind {
-            Kind::Effect(e) => (e.about, e.form),
+            Kind::Effect(e) => (e.about, e.parameter),
             Kind::Term(..) => ("found from the data: the product in its id", None),
             Kind::Jump { .. } => ("the bias is another from then on", None),
         };
@@ -195,7 +177,7 @@ impl EffectTable {
             direction: DIRECTION.into(),
             form: form.map(|f| FormTable {
                 name: f.name.into(),
-                value: removed.form,
+                value: removed.parameter,
             }),
             converters: ConverterTable::of(&candidate.codes),
             coefficients: coefficients
@@ -259,10 +241,7 @@ impl EffectTable {
             );
             return Err((problem, EDITED));
         }
-        let wanted = match candidate.kind {
-            Kind::Effect(Effect { form, .. }) => form.map(|f| f.name),
-            _ => None,
-        };
+        let wanted = candidate.parameter().map(|p| p.name);
         let form = match (wanted, &self.form) {
             (None, None) => 0.0,
             (Some(name), Some(f)) if f.name == name && f.value > 0.0 && f.value.is_finite() => {
@@ -330,7 +309,7 @@ impl EffectTable {
         }
         Ok(Removed {
             candidate,
-            form,
+            parameter: form,
             values: values.into_iter().flatten().collect(),
         })
     }
@@ -339,25 +318,24 @@ impl EffectTable {
 /// The candidate of an id, with all of its coefficients.
 fn candidate(id: &str) -> Option<Candidate> {
     let Some(term) = id.strip_prefix("term:") else {
-        let effect = library::by_id(id).filter(|e| e.is_error())?;
+        let effect = effects::by_id(id).filter(|e| e.is_error())?;
         return Some(Candidate::new(effect.sensor, Kind::Effect(effect)));
     };
     let (of, product) = term.split_once('~')?;
     let (sensor, axis) = of.split_once('_')?;
     let sensor = Sensor::BOTH.into_iter().find(|s| s.name() == sensor)?;
     let axis = AXES.iter().position(|a| *a == axis)?;
-    let mut variables = Vec::new();
+    let mut quantities = Vec::new();
     for factor in product.split('*') {
         let (name, power) = factor.split_once('^').unwrap_or((factor, "1"));
         let power: usize = power.parse().ok().filter(|p| *p <= 3)?;
-        let variable = Variable::ALL.into_iter().find(|v| v.name() == name)?;
-        variables.extend(std::iter::repeat_n(variable, power));
+        let mut all = Quantity::OF_TERMS.into_iter();
+        let quantity = all.find(|q| q.name().as_deref() == Some(name))?;
+        quantities.extend(std::iter::repeat_n(quantity, power));
     }
-    let monomial = Monomial(variables);
     // One spelling for each.
-    let plain =
-        (1..=3).contains(&monomial.0.len()) && monomial.0.is_sorted() && monomial.name() == product;
-    plain.then(|| Candidate::new(sensor, Kind::Term(axis, monomial)))
+    let term = Product::term(&quantities).filter(|p| p.name() == product)?;
+    Some(Candidate::new(sensor, Kind::Term(axis, term)))
 }
 
 /// Checks the effect tables of a calibration and gives what they state; `place` is its path.
@@ -372,18 +350,15 @@ pub(super) fn read(calibration: &Calibration, place: &str) -> Result<Vec<Removed
             .map_err(|(problem, remedy)| refuse(problem, remedy))?;
         if all
             .iter()
-            .any(|r| r.candidate.id() == table.id && r.form == removed.form)
+            .any(|r| r.candidate.id() == table.id && r.parameter == removed.parameter)
         {
             return Err(refuse(
                 "it is there twice".into(),
                 "diagnose the recording again",
             ));
         }
-        for (sensor, condition) in [
-            (Sensor::Gyro, Condition::Rate),
-            (Sensor::Accel, Condition::Force),
-        ] {
-            let needed = removed.candidate.sensor == sensor || depends(&removed, condition);
+        for (sensor, need) in [(Sensor::Gyro, Need::Rate), (Sensor::Accel, Need::Force)] {
+            let needed = removed.candidate.sensor == sensor || removed.candidate.needs(need);
             if needed && calibration.table(sensor).is_none() {
                 let problem =
                     format!("it cannot be removed without [{sensor}], which is not there");

@@ -8,10 +8,10 @@ use mimu_core::wire::EFFECTS;
 use nalgebra::convert;
 
 use super::Calibration;
-use crate::diagnose::candidate::{Kind, OfConverter, Variable};
-use crate::diagnose::effect::Scope;
-use crate::diagnose::library::readout::BITS;
-use crate::diagnose::removal::Removed;
+use crate::effects::candidate::{Kind, OfConverter};
+use crate::effects::converter::BITS;
+use crate::effects::quantity::Quantity;
+use crate::effects::removal::Removed;
 use crate::quantity::Sensor;
 use mimu_recording::error::{Error, Result};
 
@@ -88,25 +88,26 @@ impl<T: RealField + Copy> OnDevice<T> {
             }
             Kind::Effect(effect) => {
                 // Those of a recording stand last; no file has them, and the device takes none.
-                let of_unit = effect
-                    .coefficients
-                    .iter()
-                    .filter(|c| c.scope == Scope::Unit);
-                let mut coefficients = vec![T::zero(); of_unit.count()];
+                let mut coefficients = vec![T::zero(); effect.of_unit().count()];
                 for (k, value) in candidate.active.iter().zip(&removed.values) {
                     if let Some(slot) = coefficients.get_mut(*k) {
                         *slot = convert(*value);
                     }
                 }
-                let form = effect.form.map(|_| convert(removed.form));
+                let form = effect.parameter.map(|_| convert(removed.parameter));
                 Ok(vec![one(What::Named { coefficients, form })])
             }
-            Kind::Term(axis, monomial) => {
+            Kind::Term(axis, product) => {
                 let value = removed.values.first().copied().unwrap_or_default();
+                let mut variables = Vec::new();
+                for (quantity, power) in product.parts() {
+                    let variable = variable(quantity).ok_or("no device knows a factor of it")?;
+                    variables.extend(std::iter::repeat_n(variable, usize::from(power)));
+                }
                 Ok(vec![one(What::Term {
                     axis: *axis,
                     coefficient: convert(value),
-                    variables: monomial.0.iter().map(|v| variable(*v)).collect(),
+                    variables,
                 })])
             }
             Kind::Jump { .. } => {
@@ -137,16 +138,16 @@ impl<T: RealField + Copy> OnDevice<T> {
 }
 
 /// A variable of a term.
-fn variable(of: Variable) -> DeviceVariable {
+fn variable(of: Quantity) -> Option<DeviceVariable> {
     use DeviceVariable as Device;
-    let axes = |all: [Device; 3], axis: usize| all[axis];
-    match of {
-        Variable::Rate(i) => axes([Device::RateX, Device::RateY, Device::RateZ], i),
-        Variable::Force(i) => axes([Device::ForceX, Device::ForceY, Device::ForceZ], i),
-        Variable::Temperature => Device::Temperature,
-        Variable::TemperatureRate => Device::TemperatureRate,
-        Variable::Time => Device::Time,
-    }
+    Some(match of {
+        Quantity::Rate(i) => [Device::RateX, Device::RateY, Device::RateZ][i],
+        Quantity::Force(i) => [Device::ForceX, Device::ForceY, Device::ForceZ][i],
+        Quantity::Temperature => Device::Temperature,
+        Quantity::TemperatureRate => Device::TemperatureRate,
+        Quantity::Time => Device::Time,
+        _ => return None,
+    })
 }
 
 /// The effects of a calibration as the device removes them; one that `core` lacks is refused by its id.

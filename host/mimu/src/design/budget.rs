@@ -11,7 +11,7 @@ use crate::allan::model::FLOOR;
 use crate::allan::variance::AllanModel;
 use crate::noise_file::NoiseFile;
 use crate::quantity::Sensor;
-use mimu_recording::error::{Error, Result};
+use mimu_recording::error::{Argument, Error, Result};
 
 /// Noise of a sensor as density and floor, from which the sigma of a dwell mean follows.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -68,8 +68,9 @@ impl DwellNoise {
                 return Err(Error::new(
                     format!("{}, channel {}", file.place, channel.name),
                     format!("it is in {} and not in {}", channel.unit, sensor.unit()),
-                    "run mimu allan with --calibration",
-                ));
+                    "convert the readings by a calibration before their noise is found",
+                )
+                .about(Argument::Calibration));
             }
             let AllanModel {
                 white,
@@ -208,7 +209,7 @@ impl Session {
         match best.cloned() {
             Some(best) => Ok(Budget { best, by_size }),
             None => Err(Error::new(
-                format!("--budget {} min", self.time_s / 60.0),
+                format!("budget of {} min", self.time_s / 60.0),
                 format!("{least} dwells of {SHORTEST_S} s and the moves between them take longer"),
                 "allow more time, or a table that moves faster",
             )),

@@ -1,12 +1,13 @@
 //! Regressors of the calibration models, their parameters and units.
 
+use std::borrow::Cow;
 use std::fmt;
 use std::str::FromStr;
 
 use nalgebra::Vector3;
 
-use crate::quantity::AXES;
-use crate::quantity::Sensor;
+use crate::quantity::{AXES, Sensor};
+use crate::readable;
 use mimu_recording::Reference;
 
 /// Standard gravity, m/s²: size of the specific force at rest. Where a table stands it differs by parts in a
@@ -108,7 +109,7 @@ pub struct Parameter {
     /// Parameter in SI over its normalised value, which is in the sensor's SI unit at full input.
     pub si: f64,
     /// Unit in which a person reads it.
-    pub shown_unit: &'static str,
+    pub shown_unit: Cow<'static, str>,
     /// That over the normalised value.
     pub shown: f64,
 }
@@ -243,13 +244,14 @@ impl Model {
             )
         };
         let bias = |letter: char, i: usize| {
-            let (unit, shown_unit, shown) = bias_unit(self.sensor);
+            let unit = self.sensor.unit();
+            let shown = readable::parameter(unit);
             parameter(
                 format!("{letter}_{}", AXES[i]),
                 unit,
                 1.0,
-                shown_unit,
-                shown,
+                shown.unit,
+                shown.factor,
             )
         };
         match self.reference {
@@ -307,14 +309,6 @@ impl Model {
     }
 }
 
-/// Unit of a bias in SI, that in which a person reads it, and the second over the first.
-pub fn bias_unit(sensor: Sensor) -> (&'static str, &'static str, f64) {
-    match sensor {
-        Sensor::Gyro => ("rad/s", "deg/s", 1f64.to_degrees()),
-        Sensor::Accel => ("m/s^2", "mg", 1e3 / GRAVITY),
-    }
-}
-
 impl fmt::Display for Model {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str("affine")?;
@@ -333,14 +327,14 @@ fn parameter(
     name: String,
     unit: &'static str,
     si: f64,
-    shown_unit: &'static str,
+    shown_unit: impl Into<Cow<'static, str>>,
     shown: f64,
 ) -> Parameter {
     Parameter {
         name,
         unit,
         si,
-        shown_unit,
+        shown_unit: shown_unit.into(),
         shown,
     }
 }

@@ -13,7 +13,7 @@ use crate::estimate::least_squares::Observability;
 use crate::quantity::Sensor;
 use crate::quantity::plural;
 use mimu_recording::Reference;
-use mimu_recording::error::{Error, Result};
+use mimu_recording::error::{Argument, Error, Result};
 
 /// A model, what it can be measured with, and the optimum that designs are judged by.
 #[derive(Debug, Clone)]
@@ -64,8 +64,9 @@ impl Problem {
             Some(problem) => Err(Error::new(
                 format!("gyro, {}", carrier.name()),
                 problem,
-                "design with --table three-axis or --table faces",
-            )),
+                "design for a three-axis table, or for one that shows the faces",
+            )
+            .about(Argument::Table)),
         }
     }
 
@@ -74,8 +75,9 @@ impl Problem {
             return Err(Error::new(
                 "accel",
                 "g-sensitivity is what a gyro makes of force",
-                "leave it out, or design with --sensor gyro",
-            ));
+                "leave it out, or design for the gyro",
+            )
+            .about(Argument::Sensor));
         }
         let candidates = reach.candidates();
         let rows = reach.rows(&candidates);
@@ -200,12 +202,12 @@ fn undetermined(reach: &Reach, rows: &Rows) -> Error {
     }
     let of = match reach.model.reference {
         Reference::Table => "known inputs",
-        Reference::Gravity => "the size of gravity",
+        Reference::Gravity => "the magnitude of gravity",
     };
-    Error::new(
+    Error::undetermined(
         place,
         format!(
-            "{of} on --table {} cannot tell apart {}",
+            "{of} on the table {} cannot tell apart {}",
             reach.carrier.name(),
             names.join(", ")
         ),

@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 use super::model::Setting;
 use crate::quantity::Sensor;
-use mimu_recording::error::{Error, Result};
+use mimu_recording::error::{Argument, Error, Result};
 
 /// A published scheme.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -133,10 +133,11 @@ impl Scheme {
 
     fn refuse<T>(self, what: &str, sensor: &str) -> Result<T> {
         Err(Error::new(
-            format!("--scheme {}", self.name()),
+            format!("scheme {}", self.name()),
             format!("this is a scheme {what}"),
-            format!("use it with --sensor {sensor}"),
-        ))
+            format!("use it for the {sensor}"),
+        )
+        .about(Argument::Sensor))
     }
 }
 

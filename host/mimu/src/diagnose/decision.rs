@@ -10,11 +10,14 @@ mod undecided;
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use super::candidate::{Kind, Monomial, Variable};
-use super::removal::Removed;
 use super::rows::Rows;
 use super::search::{Chosen, Search, beside};
 use super::spread::{By, Fitted};
+use crate::calibration::EffectTable;
+use crate::effects::candidate::Kind;
+use crate::effects::quantity::Quantity;
+use crate::effects::regressor::Product;
+use crate::effects::removal::Removed;
 use hold_out::leverage;
 use leftover::leftover;
 pub(super) use leftover::noisier;
@@ -34,7 +37,7 @@ pub const LEVERAGE: f64 = 0.7;
 /// An accepted effect with its coefficients.
 #[derive(Debug, Clone)]
 pub struct Accepted {
-    /// The candidate, its form and how it was found.
+    /// The candidate, its parameter and how it was found.
     pub chosen: Chosen,
     /// Coefficients, SI, in the order of the candidate's active ones.
     pub values: DVector<f64>,
@@ -46,6 +49,24 @@ pub struct Accepted {
     pub split: Split,
     /// What it does to the second recording, if there is one that can be judged by.
     pub second: Option<Second>,
+}
+
+impl From<&Accepted> for EffectTable {
+    fn from(accepted: &Accepted) -> Self {
+        let removed = Removed {
+            candidate: accepted.chosen.candidate.clone(),
+            parameter: accepted.chosen.parameter,
+            values: accepted.values.iter().copied().collect(),
+        };
+        let sigmas: Vec<f64> = accepted
+            .covariance
+            .diagonal()
+            .map(f64::sqrt)
+            .iter()
+            .copied()
+            .collect();
+        Self::new(&removed, &sigmas)
+    }
 }
 
 /// What was decided on one sensor.
@@ -134,7 +155,7 @@ pub fn decide(rows: &Rows, dwell_ends: &[(usize, f64)], unseen: Option<&Rows>) -
                 let (candidate, values) = c.candidate.lasting(values.as_slice());
                 Removed {
                     candidate,
-                    form: c.form,
+                    parameter: c.parameter,
                     values,
                 }
             })
@@ -347,8 +368,24 @@ fn notes(rows: &Rows, chosen: &[Chosen]) -> Vec<String> {
             c.candidate.id()
         )
     }));
+    for candidate in chosen.iter().map(|c| &c.candidate) {
+        if let Kind::Effect(effect) = &candidate.kind
+            && !candidate.inseparable.is_empty()
+        {
+            let names = candidate
+                .inseparable
+                .iter()
+                .map(|k| effect.coefficients[*k].name);
+            notes.push(format!(
+                "{}: this recording does not tell {} from the bias and the other coefficients, and they are 0 in the file; it needs {}",
+                effect.id,
+                names.collect::<Vec<_>>().join(", "),
+                effect.needs
+            ));
+        }
+    }
     // Its level part goes by the heading, and on a table that shows one heading in each attitude by products of the force.
-    let only_force = |m: &Monomial| m.0.iter().all(|v| matches!(v, Variable::Force(_)));
+    let only_force = |p: &Product| p.parts().all(|(q, _)| matches!(q, Quantity::Force(_)));
     let level = chosen
         .iter()
         .filter(|c| matches!(&c.candidate.kind, Kind::Term(_, m) if only_force(m)));
@@ -360,8 +397,8 @@ fn notes(rows: &Rows, chosen: &[Chosen]) -> Vec<String> {
             level.join(", ")
         ));
     }
-    let elsewhere = chosen.iter().filter(|c| c.candidate.elsewhere);
-    notes.extend(elsewhere.map(|c| {
+    let heated = chosen.iter().filter(|c| c.candidate.without_self_heating);
+    notes.extend(heated.map(|c| {
         format!(
             "{}: the thermometer warms up by itself in the first minute, and the sensor is on another die; the device has no other \
              thermometer, and errs by that for so long after power-on",

@@ -3,21 +3,16 @@
 //!
 //! | module        | what                                                                            |
 //! |---------------|---------------------------------------------------------------------------------|
-//! | [`effect`], [`library`] | effects by name: physics, regressors, what excites them                   |
-//! | [`candidate`] | what is tried: effects, terms found from the data, jumps                         |
+//! | `candidate`   | what is tried of the [effects](crate::effects), and its columns                  |
 //! | [`rows`]      | what the affine model leaves of dwells and turns, as one linear problem          |
 //! | [`spread`]    | how that scatters: known noise, more of it, a bias that walks                    |
 //! | [`search`]    | which effects the rows ask for                                                   |
 //! | [`decision`]  | which of them are accepted, and what is left                                     |
-//! | [`removal`]   | taking them out of readings                                                      |
 //! | [`picture`]   | what of it can be drawn                                                          |
 
-pub mod candidate;
+mod candidate;
 pub mod decision;
-pub mod effect;
-pub mod library;
 pub mod picture;
-pub mod removal;
 pub mod rows;
 pub mod search;
 pub mod spread;
@@ -26,11 +21,11 @@ use decision::{Decision, decide, noisier};
 use mimu_core::compensation::Affine;
 use nalgebra::{Matrix3, Vector3};
 use picture::Picture;
-use removal::{Removed, removable, remove};
 use rows::{Free, Rows, Session};
 use serde::Serialize;
 
 use crate::calibration::Calibration;
+use crate::effects::removal::{Removed, removable, remove};
 use crate::fit::session_bias;
 use crate::fit::{Fit, Options, fit, fit_biases};
 use crate::prepared::Prepared;
@@ -187,7 +182,7 @@ impl Recordings<'_> {
             return Err(Error::new(
                 place,
                 format!("device is {device:?}, and that of the first recording {unit:?}"),
-                "effects are a unit's own: give recordings of one unit; if they are, import both with the same --device, or mend it in recording.toml",
+                "effects are a unit's own: give recordings of one unit; if they are, import both with the same name of the device, or mend it in recording.toml",
             ));
         }
         Ok(())
@@ -311,14 +306,14 @@ pub fn diagnose(recordings: Recordings, options: Options) -> Result<Diagnosis> {
             .iter()
             .map(|a| Removed {
                 candidate: a.chosen.candidate.clone(),
-                form: a.chosen.form,
+                parameter: a.chosen.parameter,
                 values: a.values.iter().copied().collect(),
             })
             .collect();
         if !found.is_empty() {
-            let elsewhere: Vec<Removed> = found.iter().map(Removed::lasting).collect();
+            let lasting: Vec<Removed> = found.iter().map(Removed::lasting).collect();
             let clean = |(k, s): (usize, &Session)| {
-                let effects = if k == 0 { &found } else { &elsewhere };
+                let effects = if k == 0 { &found } else { &lasting };
                 remove(s.prepared, s.gyro.as_ref(), s.accel.as_ref(), effects).ok_or_else(singular)
             };
             let cleaned = sessions.iter().enumerate().map(clean);

@@ -217,7 +217,7 @@ impl Picture {
 
 /// Middle of a row, s since the recording began.
 fn middle(rows: &Rows, row: usize) -> f64 {
-    rows.mean(row, &rows.moments(None), |at| at.t_s)
+    rows.mean(row, &rows.conditions(None), |at| at.t_s)
 }
 
 /// The rows stratum by stratum; of turns each direction by itself.

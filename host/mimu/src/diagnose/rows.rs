@@ -15,22 +15,19 @@ mod build;
 mod gravity;
 mod join;
 mod known;
-mod lag;
 
 use std::borrow::Cow;
 use std::ops::Range;
 
 use mimu_core::compensation::Affine;
-use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+use nalgebra::{DMatrix, DVector, Vector3};
 
-use super::effect::{Behind, Moment};
+use crate::effects::quantity::Conditions;
+use crate::effects::temperature::{Followed, lagged, rank_correlation};
 use crate::prepared::Prepared;
 use crate::quantity;
 use crate::quantity::Sensor;
 use crate::quantity::significant;
-use crate::triad::Forward;
-
-pub(crate) use lag::{elsewhere, late};
 
 /// Rows that share their noise.
 #[derive(Debug, Clone)]
@@ -110,12 +107,12 @@ impl Session<'_> {
     }
 }
 
-/// The moments that a row is made of.
+/// The conditions that a row is made of.
 #[derive(Debug, Clone)]
 struct Row {
-    /// Indices of its moments.
-    moments: Range<usize>,
-    /// What an error of each axis of the sensor (SI) at a moment adds to the row: one for all, or one each.
+    /// Indices of its conditions.
+    conditions: Range<usize>,
+    /// What an error of each axis of the sensor (SI) at a conditions adds to the row: one for all, or one each.
     weights: Vec<Vector3<f64>>,
     /// Index of the dwell, or of the dwells that a turn begins and ends in; counted through all recordings.
     dwells: [usize; 2],
@@ -139,27 +136,19 @@ pub struct Rows {
     /// Step that the readings of the three axes alike are multiples of, raw, in all recordings; `None` where they are not.
     pub step: Option<f64>,
     rows: Vec<Row>,
-    moments: Vec<Moment>,
-    /// Recording and block of each moment.
+    conditions: Vec<Conditions>,
+    /// Recording and block of each conditions.
     block: Vec<(usize, usize)>,
     /// Of each recording: time of each block, s, and its temperature, °C above the reference.
-    warm: Vec<Vec<(f64, f64)>>,
+    temperature: Vec<Vec<(f64, f64)>>,
     /// The same without what the thermometer warms up by itself, where it does.
-    elsewhere: Vec<Option<Vec<(f64, f64)>>>,
+    without_self_heating: Vec<Option<Vec<(f64, f64)>>>,
     /// Number of the first dwell of each recording, and that of all dwells.
     first: Vec<usize>,
 }
 
 /// Rank correlation from which on temperature and time are one. A ramp up and half of the way back has 0.5.
 const ONE_WAY: f64 = 0.95;
-
-/// Sensitive directions of the sensors, by rows, unit vectors; and the scale factors, raw/SI.
-pub(super) fn directions(inverse: &Affine<f64>) -> Option<(Matrix3<f64>, Vector3<f64>, Forward)> {
-    let forward = Forward::of(inverse)?;
-    let scale = Vector3::from_fn(|i, _| forward.matrix.row(i).norm());
-    let unit = Matrix3::from_fn(|i, j| forward.matrix[(i, j)] / scale[i]);
-    Some((unit, scale, forward))
-}
 
 impl Rows {
     /// The rows of `sensor` in all of `sessions`, whose calibrations share one matrix.
@@ -191,96 +180,111 @@ impl Rows {
         (dwell - from, to - from)
     }
 
-    /// Mean of a quantity over the moments of row `row`, by their lengths; `moments` are all, as [`Self::moments`] gives them.
-    pub fn mean(&self, row: usize, moments: &[Moment], value: impl Fn(&Moment) -> f64) -> f64 {
-        let of_row = &moments[self.rows[row].moments.clone()];
+    /// Mean of a quantity over the conditions of row `row`, by their lengths; `conditions` are all, as [`Self::conditions`] gives them.
+    pub fn mean(
+        &self,
+        row: usize,
+        conditions: &[Conditions],
+        value: impl Fn(&Conditions) -> f64,
+    ) -> f64 {
+        let of_row = &conditions[self.rows[row].conditions.clone()];
         let total: f64 = of_row.iter().map(|m| m.duration_s).sum();
         of_row.iter().map(|m| value(m) * m.duration_s / total).sum()
     }
 
-    /// The same rows with one moment for each dwell, whose reading scatters as its samples do: for what depends on the reading alone.
+    /// The same rows with one conditions for each dwell, whose reading scatters as its samples do: for what depends on the reading alone.
     pub fn by_dwell(&self) -> Self {
         let mut out = self.clone();
-        out.moments.clear();
+        out.conditions.clear();
         out.block.clear();
         let mut merged: Vec<(Range<usize>, usize)> = Vec::new();
         for row in &mut out.rows {
-            let range = row.moments.clone();
-            let at = out.moments.len();
+            let range = row.conditions.clone();
+            let at = out.conditions.len();
             if row.dwells[0] != row.dwells[1] {
-                out.moments.extend_from_slice(&self.moments[range.clone()]);
+                out.conditions
+                    .extend_from_slice(&self.conditions[range.clone()]);
                 out.block.extend_from_slice(&self.block[range]);
-                row.moments = at..out.moments.len();
+                row.conditions = at..out.conditions.len();
                 continue;
             }
             let known = merged.iter().rev().find(|m| m.0 == range).map(|m| m.1);
             let at = known.unwrap_or_else(|| {
-                out.moments
-                    .push(Moment::pooled(&self.moments[range.clone()]));
+                out.conditions
+                    .push(Conditions::pooled(&self.conditions[range.clone()]));
                 out.block.push(self.block[range.start]);
                 merged.push((range, at));
                 at
             });
-            row.moments = at..at + 1;
+            row.conditions = at..at + 1;
             row.weights = vec![row.weights.iter().sum()];
         }
         out
     }
 
-    /// The moments of rows [by dwell](Self::by_dwell), each reading without what `residuals` say of it: the dwell's noise, which
+    /// The conditions of rows [by dwell](Self::by_dwell), each reading without what `residuals` say of it: the dwell's noise, which
     /// is in the row as well and would make any function of the reading seem to explain it, and the error that is sought.
-    pub fn moments_without(&self, residuals: &DVector<f64>) -> Vec<Moment> {
-        let mut moments = self.moments.clone();
+    pub fn conditions_without(&self, residuals: &DVector<f64>) -> Vec<Conditions> {
+        let mut conditions = self.conditions.clone();
         for (row, residual) in self.rows.iter().zip(residuals.iter()) {
-            if let ([moment], [weight]) = (&mut moments[row.moments.clone()], &row.weights[..]) {
+            if let ([conditions], [weight]) =
+                (&mut conditions[row.conditions.clone()], &row.weights[..])
+            {
                 let error = weight * (residual / weight.norm_squared());
-                *moment = moment.read_without(&error);
+                *conditions = conditions.read_without(&error);
             }
         }
-        moments
+        conditions
     }
 
-    /// Lowest and highest reading of its axes, raw, averaged over a moment.
+    /// Lowest and highest reading of its axes, raw, averaged over a conditions.
     pub fn reading_range(&self) -> (f64, f64) {
-        let all = self.moments.iter().flat_map(|m| m.reading.mean.iter());
+        let all = self.conditions.iter().flat_map(|m| m.reading.mean.iter());
         all.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| {
             (a.min(*v), b.max(*v))
         })
     }
 
-    /// The moments, with the temperature that an effect goes by.
-    pub fn moments(&self, behind: Option<Behind>) -> Cow<'_, [Moment]> {
-        let Some(Behind { lag_s, elsewhere }) = behind else {
-            return Cow::Borrowed(&self.moments);
+    /// The conditions, with the temperature that an effect goes by.
+    pub fn conditions(&self, followed: Option<Followed>) -> Cow<'_, [Conditions]> {
+        let Some(followed) = followed else {
+            return Cow::Borrowed(&self.conditions);
         };
-        let each = self.warm.iter().zip(&self.elsewhere);
+        let each = self.temperature.iter().zip(&self.without_self_heating);
         let warm: Vec<&[(f64, f64)]> = each
-            .map(|(warm, other)| other.as_deref().filter(|_| elsewhere).unwrap_or(warm))
+            .map(|(recorded, other)| {
+                let other = other.as_deref().filter(|_| followed.without_self_heating);
+                other.unwrap_or(recorded)
+            })
             .collect();
         let late: Vec<Vec<f64>> = warm
             .iter()
-            .map(|w| match lag_s {
-                Some(lag_s) => late(w, lag_s),
+            .map(|w| match followed.lag_s {
+                Some(lag_s) => lagged(w, lag_s),
                 None => w.iter().map(|w| w.1).collect(),
             })
             .collect();
-        let mut moments = self.moments.clone();
-        for (moment, (session, at)) in moments.iter_mut().zip(&self.block) {
-            moment.warm_c = warm[*session][*at].1;
-            moment.late_c = late[*session][*at];
+        let mut conditions = self.conditions.clone();
+        for (at_one, (session, at)) in conditions.iter_mut().zip(&self.block) {
+            at_one.temperature_offset = warm[*session][*at].1;
+            at_one.lagged_temperature = late[*session][*at];
         }
-        Cow::Owned(moments)
+        Cow::Owned(conditions)
     }
 
     /// Whether the thermometer of a recording warms up by itself.
-    pub fn thermometer_warms_up(&self) -> bool {
-        self.elsewhere.iter().any(Option::is_some)
+    pub fn thermometer_heats_itself(&self) -> bool {
+        self.without_self_heating.iter().any(Option::is_some)
     }
 
     /// Rank correlation of temperature and time where they go together in all recordings, so that what follows one follows the
     /// other; `None` where the temperature comes back.
     pub fn one_way(&self) -> Option<f64> {
-        let correlations: Vec<f64> = self.warm.iter().filter_map(|w| lag::order(w)).collect();
+        let correlations: Vec<f64> = self
+            .temperature
+            .iter()
+            .filter_map(|w| rank_correlation(w))
+            .collect();
         let least = correlations
             .iter()
             .copied()
@@ -289,21 +293,21 @@ impl Rows {
         (least.is_finite() && alike && least.abs() > ONE_WAY).then_some(least)
     }
 
-    /// Columns of some regressors, each the error of one axis: `values` writes those of a moment.
+    /// Columns of some regressors, each the error of one axis: `values` writes those of a conditions.
     pub fn columns(
         &self,
-        moments: &[Moment],
+        conditions: &[Conditions],
         axes: &[usize],
-        values: impl Fn(&Moment, &mut [f64]),
+        values: impl Fn(&Conditions, &mut [f64]),
     ) -> DMatrix<f64> {
         let p = axes.len();
-        let mut at = vec![0.0; p * moments.len()];
-        for (moment, out) in moments.iter().zip(at.chunks_mut(p.max(1))) {
-            values(moment, out);
+        let mut at = vec![0.0; p * conditions.len()];
+        for (conditions, out) in conditions.iter().zip(at.chunks_mut(p.max(1))) {
+            values(conditions, out);
         }
         let mut columns = DMatrix::zeros(self.rows.len(), p);
         for (r, row) in self.rows.iter().enumerate() {
-            for (m, weight) in row.moments.clone().zip(&row.weights) {
+            for (m, weight) in row.conditions.clone().zip(&row.weights) {
                 for (k, axis) in axes.iter().enumerate() {
                     let w = weight[*axis];
                     if w != 0.0 {

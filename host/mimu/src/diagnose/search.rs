@@ -11,10 +11,11 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
-use super::candidate::{Candidate, Kind};
-use super::effect::{Effect, Moment};
 use super::rows::Rows;
 use super::spread::{By, Fitted, Spread};
+use crate::effects::candidate::{Candidate, Kind};
+use crate::effects::effect::Effect;
+use crate::effects::quantity::Conditions;
 use refine::Beside;
 use screen::Screened;
 
@@ -33,7 +34,7 @@ pub struct Chosen {
     /// Which.
     pub candidate: Candidate,
     /// Value of its nonlinear constant, 0 if it has none.
-    pub form: f64,
+    pub parameter: f64,
     /// Its columns.
     pub columns: DMatrix<f64>,
     /// Probability of chance, after the whole search.
@@ -55,7 +56,7 @@ pub struct Search<'a> {
     /// Basis of what the affine parameters can do.
     pub basis: DMatrix<f64>,
     candidates: Vec<Candidate>,
-    /// Columns of each, turned, for each form that is screened; none of those that are another beside other effects.
+    /// Columns of each, turned, for each parameter that is screened; none of those that are another beside other effects.
     turned: Vec<Vec<(f64, DMatrix<f64>)>>,
     tests: [f64; 2],
 }
@@ -129,8 +130,8 @@ impl<'a> Search<'a> {
             .flat_map_iter(|group| match group {
                 [one] if one.reads_code() => vec![Vec::new()],
                 [one] => {
-                    let at = |form| (form, spread.turn(&one.columns(rows, form)));
-                    vec![one.forms().into_iter().map(at).collect()]
+                    let at = |parameter| (parameter, spread.turn(&one.columns(rows, parameter)));
+                    vec![one.parameters().into_iter().map(at).collect()]
                 }
                 of_axes => {
                     let axes: Vec<usize> = of_axes.iter().flat_map(|c| c.axes()).collect();
@@ -157,9 +158,9 @@ impl<'a> Search<'a> {
     }
 
     /// Moments by dwell, without what `fitted` of `model` does not explain of their readings.
-    pub(super) fn freed(&self, model: &DMatrix<f64>, fitted: &Fitted) -> Vec<Moment> {
+    pub(super) fn freed(&self, model: &DMatrix<f64>, fitted: &Fitted) -> Vec<Conditions> {
         let left = &self.rows.y - model * &fitted.coefficients;
-        self.by_dwell.moments_without(&left)
+        self.by_dwell.conditions_without(&left)
     }
 
     /// Takes the bits of a code again from the readings without the errors of what has been added since: those move the readings too.
@@ -168,9 +169,11 @@ impl<'a> Search<'a> {
             if !chosen[k].candidate.reads_code() || chosen.len() == 1 {
                 continue;
             }
-            let moments = self.moments_beside(chosen, k, now);
+            let conditions = self.conditions_beside(chosen, k, now);
             let one = &chosen[k];
-            let columns = one.candidate.columns_at(&self.by_dwell, &moments, one.form);
+            let columns = one
+                .candidate
+                .columns_at(&self.by_dwell, &conditions, one.parameter);
             let before = std::mem::replace(&mut chosen[k].columns, columns);
             match self.fit(chosen) {
                 Some(fit) => *now = fit,
@@ -181,13 +184,13 @@ impl<'a> Search<'a> {
     }
 
     /// Moments by dwell whose readings are free from noise and from the error of chosen effect `k`.
-    fn moments_beside(&self, chosen: &[Chosen], k: usize, now: &Fitted) -> Vec<Moment> {
+    fn conditions_beside(&self, chosen: &[Chosen], k: usize, now: &Fitted) -> Vec<Conditions> {
         let before = chosen[..k].iter().map(|c| c.columns.ncols()).sum::<usize>();
         let first = self.basis.ncols() + before;
         let columns = &chosen[k].columns;
         let own = columns * now.coefficients.rows(first, columns.ncols());
         let left = &self.rows.y - self.model(chosen) * &now.coefficients + own;
-        self.by_dwell.moments_without(&left)
+        self.by_dwell.conditions_without(&left)
     }
 
     /// Columns of the affine parameters and of the chosen.
@@ -228,7 +231,7 @@ impl<'a> Search<'a> {
         exceeds(f, p as f64, dof)
     }
 
-    /// A candidate beside the chosen, its form refined, with noise of its own: the drop of the deviance and its chance.
+    /// A candidate beside the chosen, its parameter refined, with noise of its own: the drop of the deviance and its chance.
     fn judge(&self, chosen: &[Chosen], null: &Fitted, screened: &Screened) -> Option<Chosen> {
         let candidate = &self.candidates[screened.index];
         let beside_these = Beside {
@@ -236,14 +239,14 @@ impl<'a> Search<'a> {
             model: self.model(chosen),
             null,
         };
-        let (candidate, form, fitted) = match candidate.reads_code() {
+        let (candidate, parameter, fitted) = match candidate.reads_code() {
             true => {
-                let (candidate, fitted) = beside_these.bits(candidate, screened.form)?;
-                (candidate, screened.form, fitted)
+                let (candidate, fitted) = beside_these.bits(candidate, screened.parameter)?;
+                (candidate, screened.parameter, fitted)
             }
             false => {
-                let (form, fitted) = beside_these.form(candidate, screened.form)?;
-                (candidate.clone(), form, fitted)
+                let (parameter, fitted) = beside_these.parameter(candidate, screened.parameter)?;
+                (candidate.clone(), parameter, fitted)
             }
         };
         let (drop, columns) = (fitted.drop, fitted.columns);
@@ -255,7 +258,7 @@ impl<'a> Search<'a> {
         );
         Some(Chosen {
             candidate,
-            form,
+            parameter,
             columns,
             p,
             worth: drop,
@@ -301,14 +304,14 @@ impl<'a> Search<'a> {
             null: &null,
         };
         let law = Candidate::new(self.rows.sensor, Kind::Effect(law));
-        let best_of = |form| beside_these.law(&law, form);
-        let found = law.forms().into_par_iter().filter_map(best_of);
-        let (form, with) = found.max_by(|a, b| a.1.drop.total_cmp(&b.1.drop))?;
+        let best_of = |parameter| beside_these.law(&law, parameter);
+        let found = law.parameters().into_par_iter().filter_map(best_of);
+        let (parameter, with) = found.max_by(|a, b| a.1.drop.total_cmp(&b.1.drop))?;
         let shadow = Chosen {
             worth: with.drop,
             columns: with.columns,
             candidate: law,
-            form,
+            parameter,
             ..one.clone()
         };
         Some(score(one) - score(&shadow))
@@ -403,13 +406,16 @@ impl<'a> Search<'a> {
 /// costs (Akaike's two, doubled, as for each there are several candidates). Of products that are the same in this recording the
 /// shortest is told.
 fn score(c: &Chosen) -> f64 {
-    let coefficients = c.columns.ncols() as f64 + if c.form > 0.0 { 1.0 } else { 0.0 };
+    let coefficients = c.columns.ncols() as f64 + if c.parameter > 0.0 { 1.0 } else { 0.0 };
     let order = match &c.candidate.kind {
-        Kind::Term(_, monomial) => monomial.0.len() as f64,
+        Kind::Term(_, product) => f64::from(product.order()),
         _ => 0.0,
     };
     c.worth - COEFFICIENT * coefficients - order
 }
+
+/// An effect whose coefficient of the size of a data sheet would not be this many sigmas is not excited.
+pub(super) const EXCITED: f64 = 3.0;
 
 /// What a coefficient costs.
 pub(super) const COEFFICIENT: f64 = 4.0;
@@ -472,7 +478,7 @@ impl Candidate {
     /// How many independent tests it counts for, beside the choices that it is the best of.
     fn tests(&self) -> f64 {
         match self.kind {
-            Kind::Effect(_) if self.form_range().is_some() => 4.0,
+            Kind::Effect(_) if self.parameter().is_some() => 4.0,
             _ => 1.0,
         }
     }

@@ -304,7 +304,7 @@ pub fn opposite_rates(observations: &[Observation]) -> Result<Estimated, Failure
     if rest.is_empty() {
         return Err(Failure::Undetermined {
             parameters: "o (xu (10))".into(),
-            add: "xu's form takes the offset from dwells at rest: add some, or use --method least-squares".into(),
+            add: "the inverse form takes the offset from dwells at rest: add some, or use least squares".into(),
         });
     }
     let span = span(observations);
@@ -320,7 +320,7 @@ pub fn opposite_rates(observations: &[Observation]) -> Result<Estimated, Failure
             .collect();
         return Err(Failure::Undetermined {
             parameters: format!("C, for want of opposite rates about {}", axes.join(", ")),
-            add: "add the opposite of each rate, or use --method least-squares".into(),
+            add: "add the opposite of each rate, or use least squares".into(),
         });
     }
     let reading = DMatrix::from_fn(pairs.len(), 3, |i, j| pairs[i].0.raw[j] - pairs[i].1.raw[j]);
@@ -589,7 +589,7 @@ pub fn six_positions(observations: &[Observation]) -> Result<Estimated, Failure>
             return Err(Failure::Undetermined {
                 parameters: format!("scale factor and bias {} (six-position method)", AXES[axis]),
                 add: format!(
-                    "add dwells with {0} along +{0} and -{0}, or use --method least-squares",
+                    "add dwells with {0} along +{0} and -{0}, or use least squares",
                     AXES[axis]
                 ),
             });

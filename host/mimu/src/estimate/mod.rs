@@ -61,7 +61,7 @@ impl Failure {
     /// As an error about `sensor`.
     pub fn into_error(self, sensor: crate::quantity::Sensor) -> mimu_recording::error::Error {
         match self {
-            Self::Undetermined { parameters, add } => mimu_recording::error::Error::new(
+            Self::Undetermined { parameters, add } => mimu_recording::error::Error::undetermined(
                 sensor,
                 format!("the experiment leaves {parameters} undetermined"),
                 add,

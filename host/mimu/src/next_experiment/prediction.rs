@@ -6,9 +6,10 @@ use super::Setup;
 use super::recipe::Experiment;
 use crate::design::information::{Inverse, Rows};
 use crate::design::lack_of_fit::{ALIASED, extend, outside};
-use crate::diagnose::candidate::{Candidate, Kind};
-use crate::diagnose::effect::{Effect, Moment};
-use crate::diagnose::library;
+use crate::effects;
+use crate::effects::candidate::{Candidate, Kind};
+use crate::effects::effect::{Effect, NonlinearParameter};
+use crate::effects::quantity::Conditions;
 use crate::quantity::Sensor;
 use mimu_recording::Reference;
 
@@ -61,14 +62,14 @@ impl Target {
     /// what tells them apart is the latitude.
     pub fn listed(effect: &'static Effect) -> Self {
         let candidate = Candidate::new(effect.sensor, Kind::Effect(effect));
-        let others = library::all().filter(|e| e.sensor == effect.sensor && e.id != effect.id);
+        let others = effects::all().filter(|e| e.sensor == effect.sensor && e.id != effect.id);
         let rivals = others.map(|e| Candidate::new(e.sensor, Kind::Effect(e)));
         let slow = candidate.is_slow();
         Self {
             sizes: candidate
                 .active
                 .iter()
-                .map(|k| effect.typical[*k])
+                .map(|k| effect.coefficients[*k].typical)
                 .collect(),
             rivals: rivals
                 .filter(|r| effect.is_error() && r.is_error())
@@ -89,8 +90,8 @@ impl Target {
         let count = self.sizes.len();
         let mut sigmas = vec![0.0_f64; count];
         let mut whole = 0.0_f64;
-        for form in quarters(&self.candidate) {
-            let own = Columns::of(setup, experiment, &self.candidate, form);
+        for parameter in quarters(&self.candidate) {
+            let own = Columns::of(setup, experiment, &self.candidate, parameter);
             let alone = if self.each { 1 } else { 0 };
             let beside = self.rivals.iter().map(Some);
             for rival in std::iter::repeat_n(None, alone).chain(beside) {
@@ -131,8 +132,10 @@ impl Target {
 
 /// Values of its nonlinear parameter that an experiment has to be good for: the quarters of its range, in the logarithm.
 fn quarters(candidate: &Candidate) -> [f64; 3] {
-    match candidate.form_range() {
-        Some((from, to)) => [0.25, 0.5, 0.75].map(|share| from * (to / from).powf(share)),
+    match candidate.parameter() {
+        Some(NonlinearParameter { from, to, .. }) => {
+            [0.25, 0.5, 0.75].map(|share| from * (to / from).powf(share))
+        }
         None => [0.0; 3],
     }
 }
@@ -149,8 +152,8 @@ struct Problem {
 
 /// The problems of a sensor. With a known input each axis is one, with its bias and its row of the matrix; where gravity's
 /// magnitude alone is known, the three axes of an accelerometer are one, and a gyro shows its bias at rest.
-fn problems(setup: &Setup, sensor: Sensor, states: &[Moment]) -> Vec<Problem> {
-    let input = |at: &Moment| match sensor {
+fn problems(setup: &Setup, sensor: Sensor, states: &[Conditions]) -> Vec<Problem> {
+    let input = |at: &Conditions| match sensor {
         Sensor::Gyro => at.rate,
         Sensor::Accel => at.force,
     };
@@ -207,13 +210,13 @@ struct InProblem {
 }
 
 impl Columns {
-    fn of(setup: &Setup, experiment: &Experiment, candidate: &Candidate, form: f64) -> Self {
+    fn of(setup: &Setup, experiment: &Experiment, candidate: &Candidate, parameter: f64) -> Self {
         let sensor = candidate.sensor;
-        let states = experiment.states(sensor, candidate.lag_s(form));
+        let states = experiment.states(sensor, candidate.lag_s(parameter));
         let slots = candidate.slots();
         let regressors = states.iter().map(|at| {
             let mut out = vec![0.0; slots.len()];
-            candidate.regressors(at, form, &mut out);
+            candidate.regressors(at, parameter, &mut out);
             out
         });
         let regressors: Vec<Vec<f64>> = regressors.collect();

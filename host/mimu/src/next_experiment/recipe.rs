@@ -6,8 +6,8 @@ use super::Setup;
 use crate::design::model::{GRAVITY, Setting};
 use crate::design::reach::{Carrier, Rates};
 use crate::design::tour::by_lot;
-use crate::diagnose::effect::{Moment, REFERENCE_C, Reading};
-use crate::diagnose::rows::late;
+use crate::effects::quantity::{Conditions, REFERENCE_C, Reading};
+use crate::effects::temperature::lagged;
 use crate::quantity::Sensor;
 use mimu_recording::Reference;
 
@@ -228,7 +228,7 @@ impl Experiment {
 
     /// What `sensor` undergoes on each dwell, as a diagnosis would see it; the temperature that an effect follows late is
     /// behind `lag_s`.
-    pub fn states(&self, sensor: Sensor, lag_s: Option<f64>) -> Vec<Moment> {
+    pub fn states(&self, sensor: Sensor, lag_s: Option<f64>) -> Vec<Conditions> {
         let late = match lag_s {
             Some(lag_s) => behind(&self.board, lag_s),
             None => self.board.clone(),
@@ -244,7 +244,7 @@ impl Experiment {
                     at(track, t_s)
                 }
             };
-            Moment {
+            Conditions {
                 session: 0,
                 reading: Reading::NONE,
                 t_s,
@@ -258,8 +258,8 @@ impl Experiment {
                     Sensor::Gyro => rate,
                     Sensor::Accel => force,
                 },
-                warm_c: of(&self.board),
-                late_c: of(&late),
+                temperature_offset: of(&self.board),
+                lagged_temperature: of(&late),
             }
         })
         .collect()
@@ -293,7 +293,7 @@ fn profile([first, second, third]: [f64; 3], share: f64) -> Vec<(f64, f64)> {
 /// A track behind a first-order lag.
 fn behind(track: &[(f64, f64)], lag_s: f64) -> Vec<(f64, f64)> {
     let times = track.iter().map(|p| p.0);
-    times.zip(late(track, lag_s)).collect()
+    times.zip(lagged(track, lag_s)).collect()
 }
 
 /// Value of a track of straight pieces at a time.

@@ -1,12 +1,14 @@
 //! A design as it is reported: each result is one type, and JSON is that type.
 
+use std::borrow::Cow;
+
 use serde::Serialize;
 
 use super::TOOL;
 use crate::design::Problem;
 use crate::design::budget::{Budget, DwellNoise, Spending};
 use crate::design::judgement::{HALF_95, Judgement};
-use crate::design::model::{Setting, Term, bias_unit};
+use crate::design::model::{Setting, Term};
 use crate::design::plan;
 use crate::design::reach::Carrier;
 use crate::design::schemes::{FANG_FILTERS, Scheme};
@@ -144,12 +146,12 @@ pub struct ParameterSigma {
 }
 
 /// Half of a 95 % interval in the unit of data sheets, which shares of full scale have only beside a full scale.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DataSheet {
     /// In that unit.
     pub half_width_95: f64,
     /// mg, deg/s, ppm, µrad, ppm FS, (deg/s)/g.
-    pub unit: &'static str,
+    pub unit: Cow<'static, str>,
 }
 
 /// Degrees of freedom of a regression that the parameters leave.
@@ -250,7 +252,7 @@ impl Design {
             half_width_95: HALF_95 * p.sigma * p.parameter.si,
             data_sheet: DataSheet {
                 half_width_95: HALF_95 * p.sigma * p.parameter.shown,
-                unit: p.parameter.shown_unit,
+                unit: p.parameter.shown_unit.clone(),
             },
             inflation: p.inflation,
         });
@@ -301,7 +303,7 @@ impl Design {
             dwell_s: conditions.dwell_s,
             dwell_sigma: Quantity {
                 value: sigma,
-                unit: bias_unit(model.sensor).0,
+                unit: model.sensor.unit(),
             },
             noise: conditions.noise,
             order: conditions.order.map_or("published", Order::name),

@@ -6,11 +6,11 @@ use serde::Serialize;
 use super::verify::VerifyResult;
 use super::{Sensors, TOOL};
 use crate::calibration::ConverterTable;
-use crate::diagnose::candidate::Kind;
 use crate::diagnose::decision::{Accepted, Decision, Split};
 use crate::diagnose::picture::Picture;
 use crate::diagnose::rows::Figure as Judged;
 use crate::diagnose::{Diagnosis, SensorDiagnosis, Source, Verdict};
+use crate::effects::candidate::Kind;
 use crate::next_experiment::{Confused, Next};
 use crate::quantity::{AXES, Figure, Sensor};
 use crate::verify::Verification;
@@ -418,7 +418,7 @@ impl AcceptedResult {
     fn of(sensor: Sensor, a: &Accepted) -> Self {
         let candidate = &a.chosen.candidate;
         let typical = |k: &usize| match candidate.kind {
-            Kind::Effect(e) => e.typical.get(*k).copied(),
+            Kind::Effect(e) => e.coefficients.get(*k).map(|c| c.typical),
             _ => None,
         };
         let coefficients = candidate.names().into_iter().zip(&candidate.active);
@@ -458,9 +458,9 @@ impl AcceptedResult {
                 expected_sigmas: s.expected,
                 shows: s.shows(),
             }),
-            form: candidate.form().map(|f| FormResult {
+            form: candidate.parameter().map(|f| FormResult {
                 name: f.name,
-                value: a.chosen.form,
+                value: a.chosen.parameter,
                 from: f.from,
                 to: f.to,
             }),

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::columns::Columns;
 use crate::quantity::{duration, plural};
-use mimu_recording::error::{Error, Result};
+use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{Column, Recording};
 
 /// Fewer have no five octaves up to a quarter of them, which a model needs beside their half.
@@ -101,8 +101,8 @@ impl Stretch {
                         t[i - 1],
                         t[i]
                     ),
-                    "import again without the time column and with --rate-hz, if the rows are in order",
-                ));
+                    "import again without the time column and with the sample rate, if the rows are in order",
+                ).about(Argument::SampleRate));
             }
             if dt * rate_hz > GAP_PERIODS {
                 gaps += 1;
@@ -188,9 +188,10 @@ fn dwell(
     if !recording.columns.step {
         return Err(Error::new(
             place,
-            "--step asks for a dwell, and there is no column step",
-            "choose a stretch with --from and --to",
-        ));
+            "a dwell is asked for by its step, and there is no column step",
+            "choose a stretch by its times",
+        )
+        .about(Argument::Stretch));
     }
     let steps = columns.take(Column::Step)?;
     let rows = longest(steps.len(), |i| steps[i] == f64::from(step));
@@ -214,7 +215,7 @@ fn span(t: &[f64], from_s: Option<f64>, to_s: Option<f64>, place: &str) -> Resul
     let (first, last) = (t.first().copied(), t.last().copied());
     Err(Error::new(
         format!("{place}, t_s"),
-        "there is no sample between --from and --to",
+        "there is no sample in the stretch",
         format!(
             "choose within {} to {} s",
             first.unwrap_or_default(),

@@ -5,7 +5,7 @@ use crate::blocks::quantile;
 use crate::quantity::duration;
 use crate::stillness::{STILL_FACTOR, WINDOW_S};
 use mimu_recording::RAW_COLUMNS;
-use mimu_recording::error::{Error, Result};
+use mimu_recording::error::{Argument, Error, Result};
 
 /// What a channel looked like before it was integrated.
 #[derive(Debug, Clone)]
@@ -91,8 +91,9 @@ pub(super) fn suitability(raw: &[f64], period_s: f64, place: &str) -> Result<Sui
                 raw[run_end],
                 duration(run as f64 * period_s)
             ),
-            "check its wiring, or choose another stretch with --from and --to",
-        ));
+            "check its wiring, or choose another stretch",
+        )
+        .about(Argument::Stretch));
     }
     // A converter coarser than the noise leaves some windows without any: half its step is the least that can be told.
     let least = if step.is_finite() {
@@ -161,7 +162,7 @@ pub(super) fn refuse_motion(
         0 => "record at rest".to_string(),
         // The windows at both ends may hold some of the motion.
         _ => format!(
-            "the longest rest is --from {:.1} --to {:.1}",
+            "the longest rest is from {:.1} to {:.1} s",
             time(rest.start),
             time(rest.end)
         ),

@@ -245,7 +245,7 @@ proptest! {
         let text = format!("t_s,gyro_x,gyro_y,gyro_z\n{text}");
         let whole = read(text.as_bytes(), 1 << 20).map(|(batch, _)| batch.len());
         let cut = read(text.as_bytes(), chunk).map(|(batch, _)| batch.len());
-        prop_assert_eq!(whole.map_err(|e| e.problem), cut.map_err(|e| e.problem));
+        prop_assert_eq!(whole.map_err(|e| e.refused().problem.clone()), cut.map_err(|e| e.refused().problem.clone()));
     }
 
     #[test]

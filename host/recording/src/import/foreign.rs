@@ -5,12 +5,12 @@ use std::path::{Path, PathBuf};
 use super::SkippedLines;
 use super::assignment::{ColumnList, Role, Scale};
 use super::parquet_table::ParquetTable;
-use super::separator::Separator;
 use super::step_labels::StepLabels;
 use super::text_table::{Cells, TextTable};
 use crate::cell::{is_reading, no_reading, no_time};
 use crate::columns::Column;
-use crate::error::{Error, Result};
+use crate::error::{Argument, Error, Result};
+use crate::separator::Separator;
 
 /// How many time steps the sample period is the median of.
 const STEPS_FOR_PERIOD: usize = 100_000;
@@ -88,8 +88,9 @@ impl ForeignFile {
                 Error::new(
                     path.display(),
                     "no column is t_s, so the time between rows is not known",
-                    "name the time column, or give the rate with --rate-hz",
+                    "name the time column, or give the rate",
                 )
+                .about(Argument::SampleRate)
             })
         };
         let clock = match (at(Role::Column(Column::Time)), at(Role::Sample)) {
@@ -236,8 +237,9 @@ pub(super) fn sample_period(path: &Path, how: &HowToRead<'_>) -> Result<f64> {
         return Err(Error::new(
             path.display(),
             "the rate cannot be told from the times of fewer than two rows",
-            "give it with --rate-hz",
-        ));
+            "give it",
+        )
+        .about(Argument::SampleRate));
     }
     let middle = steps.len() / 2;
     let (_, median, _) = steps.select_nth_unstable_by(middle, f64::total_cmp);

@@ -7,7 +7,6 @@ mod inputs;
 mod join;
 mod options;
 mod parquet_table;
-mod separator;
 mod step_labels;
 #[cfg(test)]
 mod tests;
@@ -18,7 +17,6 @@ use std::path::Path;
 
 pub use assignment::{ColumnList, Role, Scale};
 pub use options::ImportOptions;
-pub use separator::Separator;
 
 use foreign::{ForeignFile, HowToRead, Row, sample_period};
 use inputs::Inputs;
@@ -32,7 +30,7 @@ use super::columns::{Column, Columns, Layout};
 use super::digest;
 use super::manifest::{Manifest, Reference, Source};
 use super::writer::Writer;
-use crate::error::{Error, Result};
+use crate::error::{Argument, Error, Result};
 
 /// Rows that are written at a time.
 const BATCH: usize = 1 << 14;
@@ -116,7 +114,7 @@ fn check(options: &ImportOptions, out: &Path) -> Result<()> {
     if lists != 0 && lists != files {
         return refuse(
             format!("there are {files} files and {lists} lists of columns"),
-            "give --columns once for each file, in their order",
+            "give one list of columns for each file, in their order",
         );
     }
     if let Some(rate) = options.rate_hz
@@ -124,7 +122,7 @@ fn check(options: &ImportOptions, out: &Path) -> Result<()> {
     {
         return refuse(
             format!("{rate} is not a sample rate"),
-            "give samples per second with --rate-hz",
+            "give samples per second",
         );
     }
     super::manifest::check_gravity(options.gravity_mps2, "import, gravity")?;
@@ -182,11 +180,8 @@ impl Import {
             (None, Some(period)) => tidy(1.0 / period?),
             (None, None) => {
                 // Opening has refused this already: without a time column the rate is needed.
-                return Err(Error::new(
-                    "import",
-                    "the rate is not known",
-                    "give it with --rate-hz",
-                ));
+                return Err(Error::new("import", "the rate is not known", "give it")
+                    .about(Argument::SampleRate));
             }
         };
         let mut followers = Vec::new();
@@ -237,8 +232,9 @@ impl Import {
             return Err(Error::new(
                 "import, reference",
                 "the reference is to be the table, and there is no ref_ column",
-                "add the ref_ columns or a table of inputs, or say --reference gravity",
-            ));
+                "add the ref_ columns or a table of inputs, or say that the reference is gravity",
+            )
+            .about(Argument::Reference));
         }
         for file in followers
             .iter()

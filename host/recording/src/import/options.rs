@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use super::assignment::{ColumnList, Scale};
 use super::foreign::HowToRead;
-use super::separator::Separator;
 use crate::manifest::{RawUnit, Reference};
+use crate::separator::Separator;
 use crate::writer::SampleFormat;
 
 /// What to import and how.

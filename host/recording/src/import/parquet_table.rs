@@ -9,7 +9,7 @@ use super::text_table::Cells;
 use crate::cell::{is_reading, no_reading};
 use crate::columns::Column;
 use crate::csv_writer::write_number;
-use crate::error::{Error, Result};
+use crate::error::{Argument, Error, Result};
 use crate::in_order::broke_down;
 use crate::parquet_file::{Cursor, Leaf, ParquetFile};
 
@@ -58,12 +58,13 @@ impl ParquetTable {
                     return Err(Error::new(
                         path.display(),
                         format!(
-                            "the file has {} columns and --columns {}",
+                            "the file has {} columns and the list of columns {}",
                             names.len(),
                             items.len()
                         ),
                         "name every column, - for one to skip, or choose by name: gyro_x=wx",
-                    ));
+                    )
+                    .about(Argument::Columns));
                 }
                 let both = items.iter().zip(&names);
                 both.filter_map(|(role, name)| Some(((*role)?, name.clone())))
@@ -111,8 +112,9 @@ impl ParquetTable {
             return Err(Error::new(
                 path.display(),
                 "no column has the name of a recording's column",
-                "say what the columns are, as in --columns gyro_x=wx,gyro_y=wy,gyro_z=wz",
-            ));
+                "say what the columns are, as in gyro_x=wx,gyro_y=wy,gyro_z=wz",
+            )
+            .about(Argument::Columns));
         }
         Ok(ParquetTable {
             path: path.to_owned(),

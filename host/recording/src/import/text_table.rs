@@ -7,11 +7,11 @@ use std::path::{Path, PathBuf};
 use super::SkippedLines;
 use super::assignment::{ColumnList, Role};
 use super::binary::refuse_binary;
-use super::separator::Separator;
 use crate::cell::{self, Refusal, shorten};
 use crate::columns::Column;
 use crate::csv_file::BOM;
-use crate::error::{Error, Result};
+use crate::error::{Argument, Error, Result};
+use crate::separator::Separator;
 
 /// Bytes at the start within which the data must begin.
 const HEAD: u64 = 1 << 18;
@@ -218,7 +218,7 @@ impl TextTable {
         }
         Some(Refusal {
             problem: format!("the row has {cells} cells and {} are expected", self.width),
-            remedy: "correct the row, or add - to --columns for each column to skip",
+            remedy: "correct the row, or list - for each column to skip",
         })
     }
 
@@ -303,8 +303,9 @@ impl TextTable {
                     "no row fits the list of {} columns ({problem}; separator: {})",
                     self.width, self.separator
                 ),
-                "name every column with --columns, - for one to skip",
-            )),
+                "name every column, - for one to skip",
+            )
+            .about(Argument::Columns)),
             None => Err(Error::new(
                 path,
                 "there is no row of data",

@@ -24,6 +24,27 @@ fn a_tumble_shows_the_g_sensitivity_matrix() {
 }
 
 #[test]
+fn g_squared_is_even_in_the_force_and_grows_with_its_square() {
+    let matrix = [[0.05, -0.02, 0.03], [0.0, 0.04, -0.01], [0.02, 0.05, -0.03]];
+    let effect = format!("id = \"gyro_g_squared\"\nmatrix_dps_per_g2 = {matrix:?}");
+    let mut pair = Pair::of(PLAIN, &effect, 1e-2);
+    for axis in 0..3 {
+        for g in [1.0, -1.0, 2.0] {
+            let mut force = [0.0; 3];
+            force[axis] = g * G;
+            let (gyro, accel) = pair.step(&motion(0.0, [0.0; 3], force), 25.0);
+            close(
+                gyro,
+                matrix.map(|row| g * g * DPS * row[axis]),
+                1e-12,
+                "gyro",
+            );
+            close(accel, [0.0; 3], 0.0, "accel");
+        }
+    }
+}
+
+#[test]
 fn gyro_nonlinearities_are_powers_of_the_rate() {
     for (id, at_half, at_minus_half) in [
         ("gyro_scale_quadratic", 0.25, 0.25),

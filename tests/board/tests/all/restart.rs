@@ -81,9 +81,10 @@ fn task(name: &str) -> u64 {
 /// after its end, which none is.
 fn panics() -> u64 {
     const FLASH: u64 = 0x0800_0000;
-    let panic = image().find("panic_const_async_fn_resumed").unwrap();
+    let image = image();
+    let panic = image.find("panic_const_async_fn_resumed").unwrap();
     let bytes = still(Volts::GROUND)
-        .memory(FLASH, (panic - FLASH) as usize)
+        .memory(FLASH, image.sizes().flash as usize)
         .unwrap();
     let half = |at: usize| u32::from(u16::from_le_bytes([bytes[at], bytes[at + 1]]));
     let calls_it = |at: &usize| {

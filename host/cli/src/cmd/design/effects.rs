@@ -6,7 +6,7 @@ use crate::report;
 use mimu::design::budget::DwellNoise;
 use mimu::design::reach::{Carrier, RateList, Rates};
 use mimu::design::tour::Motion;
-use mimu::diagnose::library;
+use mimu::effects;
 use mimu::fit::{Fit, Method, Options, fit};
 use mimu::next_experiment::prediction::Target;
 use mimu::next_experiment::{CHAMBER_C, DWELL_S, RATE_DPS, SLEW, Setup, smallest};
@@ -45,8 +45,8 @@ pub(super) fn chamber(text: &str) -> std::result::Result<[f64; 3], String> {
 fn targets(ids: &[String]) -> Result<Vec<Target>> {
     let mut all: Vec<Target> = Vec::new();
     for id in ids {
-        let Some(effect) = library::by_id(id) else {
-            let known: Vec<&str> = library::all().map(|e| e.id).collect();
+        let Some(effect) = effects::by_id(id) else {
+            let known: Vec<&str> = effects::all().map(|e| e.id).collect();
             return Err(Error::new(
                 format!("--effects {id}"),
                 "there is no effect of this name",

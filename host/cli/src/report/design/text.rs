@@ -4,9 +4,9 @@ use std::fmt::Write as _;
 
 use crate::report::text::{COLUMNS, wrap};
 use mimu::design::judgement::WEAK;
-use mimu::design::model::bias_unit;
 use mimu::design::plan::round;
 use mimu::quantity::{minutes, plural, significant};
+use mimu::readable::{self, Readable};
 use mimu::result::design::{Comparison, Design, Noticed, Spent, Way};
 
 /// Dwells listed: as many as the longest design.
@@ -109,7 +109,7 @@ pub(super) fn wrapped(out: &mut String, name: &str, text: &str) {
 }
 
 fn sigma(report: &Design) -> String {
-    let (_, unit, factor) = bias_unit(report.sensor);
+    let Readable { factor, unit } = readable::parameter(report.dwell_sigma.unit);
     let shown = |v: f64| significant(v * factor);
     let mean = shown(report.dwell_sigma.value);
     match report.noise {

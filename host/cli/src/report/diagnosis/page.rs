@@ -3,7 +3,6 @@
 //! It is XML too, so that any parser reads it. A number in it is a `data` element whose value is that of the JSON.
 
 mod figures;
-mod svg;
 mod tables;
 
 use maud::{Markup, PreEscaped, html};

@@ -1,10 +1,10 @@
 //! Errors by the code: removed by block and by sample, and refused where their converters make no sense.
 
 use mimu::calibration::Calibration;
-use mimu::diagnose::candidate::{Candidate, Kind};
-use mimu::diagnose::library;
-use mimu::diagnose::library::readout::{Converter, first_of};
-use mimu::diagnose::removal::{Removed, remove};
+use mimu::effects;
+use mimu::effects::candidate::{Candidate, Kind};
+use mimu::effects::removal::{Removed, remove};
+use mimu::effects::{converter::Converter, readout::first_of};
 use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
 use mimu_core::compensation::Sample;
@@ -18,7 +18,7 @@ use super::unit::{
 
 /// Converters of the accelerometer, as the recording is made.
 fn converters() -> Removed {
-    let effect = library::by_id("accel_readout_code").unwrap();
+    let effect = effects::by_id("accel_readout_code").unwrap();
     let mut candidate = Candidate::new(Sensor::Accel, Kind::Effect(effect));
     candidate.active.clear();
     let mut values = Vec::new();

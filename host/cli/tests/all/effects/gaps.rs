@@ -2,9 +2,9 @@
 
 use mimu::blocks::Moments;
 use mimu::calibration::Calibration;
-use mimu::diagnose::removal::{Removed, remove};
 use mimu::diagnose::{Recordings, diagnose};
 use mimu::dwell::Fault;
+use mimu::effects::removal::{Removed, remove};
 use mimu::fit::{Method, Options};
 use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
@@ -22,7 +22,7 @@ fn unit(effects: &[(&str, f64, usize)]) -> (Prepared, Calibration) {
         .iter()
         .map(|(id, value, count)| {
             let mut removed: Removed = named(id, &vec![*value; *count]);
-            removed.form = if id.ends_with("lag") { 60.0 } else { 0.0 };
+            removed.parameter = if id.ends_with("lag") { 60.0 } else { 0.0 };
             table(&removed)
         })
         .collect();

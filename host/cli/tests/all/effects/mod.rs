@@ -2,16 +2,19 @@
 
 mod codes;
 mod gaps;
+mod law;
 mod refused;
 mod unit;
 
 use std::process::Command;
 
 use mimu::calibration::{Calibration, EffectTable};
-use mimu::diagnose::candidate::{Candidate, Kind, Monomial, Variable};
-use mimu::diagnose::library;
-use mimu::diagnose::library::readout::Converter;
-use mimu::diagnose::removal::{Removed, remove};
+use mimu::effects;
+use mimu::effects::candidate::{Candidate, Kind};
+use mimu::effects::converter::Converter;
+use mimu::effects::quantity::Quantity;
+use mimu::effects::regressor::Product;
+use mimu::effects::removal::{Removed, remove};
 use mimu::quantity::Sensor;
 use mimu_core::compensation::Sample;
 use mimu_core::effects::{Effects, State};
@@ -22,7 +25,7 @@ use unit::{BIT_0_V, CUBIC, SAG, THERMAL, fitted, named, record, removed, table};
 
 /// All that is known by name, some of it with some of its coefficients only, and three terms; ten times what data sheets say.
 fn every_effect() -> Vec<Removed> {
-    let mut all: Vec<Removed> = library::all()
+    let mut all: Vec<Removed> = effects::all()
         .filter(|effect| effect.is_error())
         .enumerate()
         .map(|(n, effect)| {
@@ -39,20 +42,22 @@ fn every_effect() -> Vec<Removed> {
             let values: Vec<f64> = candidate
                 .active
                 .iter()
-                .map(|k| sign(*k) * effect.typical[*k] * (10.0 + 3.0 * (*k as f64).sqrt()))
+                .map(|k| {
+                    sign(*k) * effect.coefficients[*k].typical * (10.0 + 3.0 * (*k as f64).sqrt())
+                })
                 .collect();
-            let form = effect.form.map_or(0.0, |f| 2.0 * f.from);
+            let form = effect.parameter.map_or(0.0, |p| 2.0 * p.from);
             removed(candidate, form, &values)
         })
         .collect();
-    let term = |sensor, axis, v: &[Variable], value| {
+    let term = |sensor, axis, v: &[Quantity], value| {
         removed(
-            Candidate::new(sensor, Kind::Term(axis, Monomial(v.to_vec()))),
+            Candidate::new(sensor, Kind::Term(axis, Product::term(v).unwrap())),
             0.0,
             &[value],
         )
     };
-    use Variable::{Force, Rate, Temperature, TemperatureRate, Time};
+    use Quantity::{Force, Rate, Temperature, TemperatureRate, Time};
     all.push(term(Sensor::Gyro, 0, &[Rate(0), Force(1), Force(1)], 1e-4));
     all.push(term(Sensor::Gyro, 1, &[TemperatureRate, Time], 1e-4));
     all.push(term(Sensor::Accel, 2, &[Rate(2), Temperature], 1e-3));
@@ -75,7 +80,10 @@ fn every_effect_comes_back_from_the_file_and_the_device_removes_what_the_pc_does
     for (read, written) in calibration.effects().iter().zip(&effects) {
         assert_eq!(read.candidate.id(), written.candidate.id());
         assert_eq!(read.candidate.active, written.candidate.active);
-        assert_eq!((read.form, &read.values), (written.form, &written.values));
+        assert_eq!(
+            (read.parameter, &read.values),
+            (written.parameter, &written.values)
+        );
         assert_eq!(read.candidate.codes, written.candidate.codes);
     }
 

@@ -1,8 +1,8 @@
 //! Effects in a calibration file that cannot be right, or that the device has no room for.
 
 use mimu::calibration::Calibration;
-use mimu::diagnose::candidate::{Candidate, Kind};
-use mimu::diagnose::library;
+use mimu::effects;
+use mimu::effects::candidate::{Candidate, Kind};
 use mimu::quantity::Sensor;
 
 use super::unit::{fitted, named, record, removed, table};
@@ -13,7 +13,7 @@ fn an_effect_that_was_edited_or_that_nobody_knows_is_refused_by_its_name() {
     let path = folder.path().join("recording");
     record(&path, false, true);
     let fit = fitted(&path);
-    let effect = library::by_id("gyro_warm_up").unwrap();
+    let effect = effects::by_id("gyro_warm_up").unwrap();
     let candidate = Candidate::new(Sensor::Gyro, Kind::Effect(effect));
     let warm_up = table(&removed(candidate, 90.0, &[1e-3, 2e-3, 3e-3]));
     let sag = table(&named("gyro_g_sensitivity", &[1e-5; 9]));

@@ -1,10 +1,10 @@
 //! The unit of these tests, a recording of it, and effects to give it.
 
 use mimu::calibration::EffectTable;
-use mimu::diagnose::candidate::{Candidate, Kind};
-use mimu::diagnose::library;
-use mimu::diagnose::library::readout::TYPICAL;
-use mimu::diagnose::removal::Removed;
+use mimu::effects;
+use mimu::effects::candidate::{Candidate, Kind};
+use mimu::effects::readout::TYPICAL;
+use mimu::effects::removal::Removed;
 use mimu::fit::{Fit, Method, Options, fit};
 use mimu::prepared::Prepared;
 use mimu::stillness::STILL_FACTOR;
@@ -161,17 +161,17 @@ pub fn fitted(folder: &Path) -> Fit {
     fit(prepared(folder), options).unwrap()
 }
 
-pub fn removed(candidate: Candidate, form: f64, values: &[f64]) -> Removed {
+pub fn removed(candidate: Candidate, parameter: f64, values: &[f64]) -> Removed {
     let values = values.to_vec();
     Removed {
         candidate,
-        form,
+        parameter,
         values,
     }
 }
 
 pub fn named(id: &str, values: &[f64]) -> Removed {
-    let effect = library::by_id(id).unwrap();
+    let effect = effects::by_id(id).unwrap();
     removed(
         Candidate::new(effect.sensor, Kind::Effect(effect)),
         0.0,

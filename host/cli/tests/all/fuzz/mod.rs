@@ -242,7 +242,8 @@ impl Seeds {
 /// Whether an error is one line with its three parts.
 fn well_formed(error: &Error) -> std::result::Result<(), String> {
     let line = error.to_string();
-    let parts = [&error.place, &error.problem, &error.remedy];
+    let refused = error.refused();
+    let parts = [&refused.place, &refused.problem, &refused.remedy];
     if parts.iter().any(|p| p.trim().is_empty())
         || line.contains(char::is_control)
         || line.lines().count() != 1

@@ -1,17 +1,18 @@
 use super::*;
 use crate::calibration::OnDevice;
-use crate::diagnose::effect::REFERENCE_C;
-use mimu_core::effects;
+use crate::effects::effect::Effect;
+use crate::effects::quantity::{RATE_LAG_S, REFERENCE_C};
+use mimu_core::effects as of_core;
 
 #[test]
 fn every_term_is_found_again_by_its_id() {
     for sensor in Sensor::BOTH {
-        for monomial in Monomial::all() {
+        for term in Product::terms() {
             for axis in 0..3 {
-                let id = Candidate::new(sensor, Kind::Term(axis, monomial.clone())).id();
+                let id = Candidate::new(sensor, Kind::Term(axis, term)).id();
                 let found = candidate(&id).unwrap();
                 assert_eq!((found.id(), found.sensor), (id, sensor));
-                assert!(matches!(&found.kind, Kind::Term(a, m) if *a == axis && *m == monomial));
+                assert!(matches!(&found.kind, Kind::Term(a, m) if *a == axis && *m == term));
             }
         }
     }
@@ -42,14 +43,7 @@ fn what_is_no_id_names_nothing() {
 fn conditions_of_an_effect_are_those_of_its_physics() {
     let depends_on = |id: &str| {
         let candidate = candidate(id).unwrap();
-        let values = vec![1.0; candidate.active.len()];
-        let form = 100.0;
-        let removed = Removed {
-            candidate,
-            form,
-            values,
-        };
-        [Condition::Rate, Condition::Force, Condition::Temperature].map(|c| depends(&removed, c))
+        [Need::Rate, Need::Force, Need::Temperature].map(|need| candidate.needs(need))
     };
     assert_eq!(depends_on("gyro_g_sensitivity"), [false, true, false]);
     assert_eq!(depends_on("gyro_scale_asymmetry"), [true, false, false]);
@@ -66,18 +60,18 @@ fn conditions_of_an_effect_are_those_of_its_physics() {
 
 #[test]
 fn both_sides_count_warmth_from_the_same_temperature_and_filter_its_rate_alike() {
-    assert_eq!(effects::REFERENCE_C, REFERENCE_C);
-    assert_eq!(effects::RATE_LAG_S, crate::diagnose::candidate::RATE_LAG_S);
+    assert_eq!(of_core::REFERENCE_C, REFERENCE_C);
+    assert_eq!(of_core::RATE_LAG_S, RATE_LAG_S);
 }
 
 #[test]
 fn every_effect_that_is_found_can_be_removed_by_the_device() {
-    for effect in library::all().filter(|e| e.is_error()) {
+    for effect in effects::all().filter(|e| e.is_error()) {
         let candidate = Candidate::new(effect.sensor, Kind::Effect(effect));
         let values = vec![1.0; candidate.active.len()];
         let removed = Removed {
             candidate,
-            form: 60.0,
+            parameter: 60.0,
             values,
         };
         for part in OnDevice::<f32>::of(&removed).unwrap() {
@@ -93,10 +87,10 @@ fn an_effect_that_the_device_lacks_is_refused() {
         sensor: Sensor::Gyro,
         about: "an error by the magnetic field",
         coefficients: &[],
-        typical: &[],
-        form: None,
-        regressors: |_, _, _| (),
+        parameter: None,
+        size: "",
         needs: "a compass",
+        taken_for: "",
     };
     for kind in [
         Kind::Effect(&MAGNETIC),
@@ -109,7 +103,7 @@ fn an_effect_that_the_device_lacks_is_refused() {
         let candidate = Candidate::new(Sensor::Gyro, kind);
         let removed = Removed {
             candidate,
-            form: 0.0,
+            parameter: 0.0,
             values: Vec::new(),
         };
         assert!(OnDevice::<f32>::of(&removed).is_err());
@@ -118,13 +112,13 @@ fn an_effect_that_the_device_lacks_is_refused() {
 
 #[test]
 fn an_effect_that_is_found_again_adds_to_what_is_known() {
-    let table = |id: &str, value: f64, form: f64| {
+    let table = |id: &str, value: f64, parameter: f64| {
         let candidate = candidate(id).unwrap();
         let values = vec![value; candidate.active.len()];
         let sigmas = vec![3e-6; values.len()];
         let removed = Removed {
             candidate,
-            form,
+            parameter,
             values,
         };
         EffectTable::new(&removed, &sigmas)
@@ -155,7 +149,7 @@ fn an_effect_that_is_found_again_adds_to_what_is_known() {
         let sigmas = values.clone();
         let removed = Removed {
             candidate,
-            form: 0.0,
+            parameter: 0.0,
             values,
         };
         EffectTable::new(&removed, &sigmas)

@@ -2,12 +2,13 @@
 
 use nalgebra::DMatrix;
 
-use crate::diagnose::rows::{Session, directions};
+use crate::diagnose::rows::Session;
 use crate::diagnose::search::{Chosen, Search};
 use crate::diagnose::spread::{By, Fitted, Spread};
 use crate::quantity::AXES;
 use crate::quantity::Sensor;
 use crate::quantity::significant;
+use crate::triad::directions;
 
 /// A bias that wanders by this many times the noise of a dwell mean is no usual one, and the verdict says so even where nobody has
 /// recorded how far it may: sensors of the usual kind wander by up to three in half an hour. A walk is not all of it: they flicker as

@@ -10,10 +10,10 @@ use nalgebra::DMatrix;
 
 use super::hold_out::{Split, held_out, rms};
 use super::leftover::{FALSE_LEFTOVER, Leftover};
-use crate::diagnose::effect::Moment;
 use crate::diagnose::rows::Rows;
 use crate::diagnose::search::{COEFFICIENT, Chosen, Search, beside, independent_of, unit_columns};
 use crate::diagnose::spread::{By, Fitted};
+use crate::effects::quantity::Conditions;
 use crate::quantity::AXES;
 
 /// Pieces that the range of the readings is divided into.
@@ -34,13 +34,13 @@ pub(super) struct OfReading {
 /// Readings of the dwells without their noise.
 struct Readings<'a> {
     rows: &'a Rows,
-    conditions: Vec<Moment>,
+    conditions: Vec<Conditions>,
     /// Lowest reading and range of each axis, raw.
     range: [(f64, f64); 3],
 }
 
 impl<'a> Readings<'a> {
-    fn new(rows: &'a Rows, conditions: Vec<Moment>) -> Self {
+    fn new(rows: &'a Rows, conditions: Vec<Conditions>) -> Self {
         let range = |axis: usize| {
             let all = conditions.iter().map(|m| m.reading.mean[axis]);
             let (low, high) = all

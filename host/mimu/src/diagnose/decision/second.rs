@@ -3,10 +3,10 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::hold_out::rms;
-use crate::diagnose::removal::Removed;
 use crate::diagnose::rows::Rows;
 use crate::diagnose::search::{Search, basis, beside};
 use crate::diagnose::spread::By;
+use crate::effects::removal::Removed;
 
 /// An effect that should change the residuals of a recording by fewer sigmas than this is neither borne out nor contradicted by it.
 const SHOWS: f64 = 3.0;
@@ -39,7 +39,7 @@ pub(super) fn second(rows: &Rows, effects: &[Removed]) -> Option<Vec<Second>> {
     let search = Search::new(rows, Vec::new());
     let columns: Vec<DMatrix<f64>> = effects
         .iter()
-        .map(|e| e.candidate.columns(rows, e.form))
+        .map(|e| e.candidate.columns(rows, e.parameter))
         .collect();
     let finite = |c: &&DMatrix<f64>| c.iter().all(|v| v.is_finite());
     let all = columns

@@ -3,16 +3,17 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use crate::diagnose::candidate::{Candidate, Kind, Monomial};
-use crate::diagnose::library;
 use crate::diagnose::rows::Rows;
-use crate::diagnose::search::Search;
-
-/// An effect whose coefficient of the size of a data sheet would not be this many sigmas is not excited.
-pub(in crate::diagnose) const EXCITED: f64 = 3.0;
+use crate::diagnose::search::{EXCITED, Search};
+use crate::effects;
+use crate::effects::candidate::{Candidate, Kind};
+use crate::effects::regressor::Product;
 
 /// Share of what a product could be at most below which it is made of rounding.
 const ROUNDING: f64 = 1e-9;
+
+/// Part of a column that the others of its effect have to leave of it.
+const SEPARATE: f64 = 1e-2;
 
 /// Everything that is tried on a sensor, and the effects that its experiment does not show.
 pub(super) fn candidates(
@@ -37,36 +38,40 @@ pub(super) fn candidates(
             if left > 1e-6 * all { left } else { 0.0 }
         })
     };
-    for effect in library::all().filter(|e| e.sensor == sensor) {
+    for effect in effects::all().filter(|e| e.sensor == sensor) {
         let Some(mut candidate) = Candidate::effect_in(effect, rows) else {
             not_excited.push((effect.id.into(), effect.needs.into()));
             continue;
         };
         let mut best = vec![0.0_f64; effect.coefficients.len()];
-        for form in candidate.forms() {
-            let seen = across(&candidate.columns(rows, form));
-            for (best, (seen, typical)) in best.iter_mut().zip(seen.iter().zip(effect.typical)) {
+        for parameter in candidate.parameters() {
+            let seen = across(&candidate.columns(rows, parameter));
+            for (best, (seen, c)) in best.iter_mut().zip(seen.iter().zip(effect.coefficients)) {
                 if seen.is_finite() {
-                    *best = best.max(seen * typical);
+                    *best = best.max(seen * c.typical);
                 }
             }
         }
         candidate.active.retain(|k| best[*k] > EXCITED);
+        if !candidate.reads_code() && candidate.parameter().is_none() {
+            let white = whitener.whiten(&candidate.columns(rows, 0.0));
+            separate(&mut candidate, &(&white - &q * q.tr_mul(&white)));
+        }
         if candidate.active.is_empty() {
             not_excited.push((effect.id.into(), effect.needs.into()));
         } else {
             all.extend(candidate.variants(rows));
         }
     }
-    let terms: Vec<Vec<Candidate>> = Monomial::all()
+    let terms: Vec<Vec<Candidate>> = Product::terms()
         .into_par_iter()
-        .map(|monomial| {
-            let term = |axis| Candidate::new(sensor, Kind::Term(axis, monomial.clone()));
+        .map(|product| {
+            let term = |axis| Candidate::new(sensor, Kind::Term(axis, product));
             let columns = term(0).columns_by_axis(rows, &[0, 1, 2]);
             let seen = across(&columns);
             // A table that turns about one axis at a time has rates about the others of rounding's size: with a coefficient of
             // 5e12 their product passed for an effect.
-            let rounding = ROUNDING * monomial.largest(&rows.moments(term(0).behind(0.0)));
+            let rounding = ROUNDING * product.largest(&rows.conditions(term(0).followed(0.0)), 0);
             let seen = |axis: &usize| {
                 let column = columns.column(*axis);
                 let finite = column.iter().all(|v| v.is_finite());
@@ -81,4 +86,24 @@ pub(super) fn candidates(
         all.extend((0..3).map(|axis| Candidate::new(sensor, jump(axis))));
     }
     (all, not_excited)
+}
+
+/// Keeps those of the active coefficients whose columns, decorrelated beside the affine parameters, are no sums of the ones before: at
+/// rest in gravity the squares of the force along three axes add up to a constant, which is a bias.
+fn separate(candidate: &mut Candidate, columns: &DMatrix<f64>) {
+    let mut spanned: Vec<DVector<f64>> = Vec::new();
+    let mut kept = Vec::new();
+    for (k, column) in candidate.active.iter().zip(columns.column_iter()) {
+        let left = spanned.iter().fold(column.into_owned(), |left, unit| {
+            let share = unit.dot(&left);
+            left - unit * share
+        });
+        if left.norm() > SEPARATE * column.norm() {
+            spanned.push(left.normalize());
+            kept.push(*k);
+        } else {
+            candidate.inseparable.push(*k);
+        }
+    }
+    candidate.active = kept;
 }

@@ -1,8 +1,8 @@
 //! Effects whose physics the rows do not decide.
 
 use super::reading::worse_with_steps;
-use crate::diagnose::library::rivals::rivals;
 use crate::diagnose::search::{Chosen, Search};
+use crate::effects::alternatives::alternatives;
 
 /// An accepted effect that a law on no list explains the rows as well as.
 #[derive(Debug, Clone)]
@@ -27,7 +27,7 @@ pub(super) fn undecided(search: &Search, kept: &[Chosen]) -> Vec<Undecided> {
         let mut rest = kept.to_vec();
         rest.remove(i);
         let id = one.candidate.id();
-        for rival in rivals(&id) {
+        for rival in alternatives(&id) {
             let worse = search.worse_with(&rival.law, one, &rest);
             if let Some(worse) = worse.filter(|w| *w < DECIDED) {
                 all.push(Undecided {

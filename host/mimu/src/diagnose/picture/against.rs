@@ -11,10 +11,10 @@ use serde::Serialize;
 use super::abscissa::{Dependence, abscissa, dependence};
 use super::{Abscissa, Kind, Track};
 use crate::diagnose::decision::Accepted;
-use crate::diagnose::effect::Moment;
 use crate::diagnose::rows::Rows;
 use crate::diagnose::search::Search;
 use crate::diagnose::spread::Fitted;
+use crate::effects::quantity::Conditions;
 use crate::quantity::AXES;
 
 /// Points of a curve.
@@ -85,15 +85,14 @@ struct Group {
 }
 
 /// Coefficients that depend on one quantity and are of one axis belong together: line and bend of a thermal bias.
-fn groups(rows: &Rows, one: &Accepted) -> Vec<Group> {
-    let (candidate, form) = (&one.chosen.candidate, one.chosen.form);
-    let moments = rows.moments(None);
-    let Some(like) = moments.first().filter(|_| !candidate.reads_code()) else {
+fn groups(one: &Accepted) -> Vec<Group> {
+    let candidate = &one.chosen.candidate;
+    if candidate.reads_code() {
         return Vec::new();
-    };
+    }
     let mut groups: Vec<Group> = Vec::new();
     for (slot, (member, axis)) in candidate.slots().into_iter().enumerate() {
-        let on = dependence(candidate, form, slot, like);
+        let on = dependence(candidate, slot);
         let alone = matches!(on, Dependence::Alone(_));
         match groups
             .iter_mut()
@@ -137,7 +136,7 @@ pub(super) fn panels(
         let input = tracks.iter().filter(|t| t.kind == Kind::Input);
         panels.extend(input.filter_map(|t| coded(rows, one, t)));
     }
-    for group in groups(rows, one) {
+    for group in groups(one) {
         let of_axis = tracks
             .iter()
             .filter(|t| t.kind == Kind::Input && t.axis == Some(group.axis));
@@ -212,14 +211,14 @@ fn variable(
     group: &Group,
     track: &Track,
 ) -> Option<Panel> {
-    let (candidate, form) = (&one.chosen.candidate, one.chosen.form);
-    let moments = rows.moments(candidate.behind(form));
+    let (candidate, parameter) = (&one.chosen.candidate, one.chosen.parameter);
+    let conditions = rows.conditions(candidate.followed(parameter));
     let column = |k: usize, r: usize| one.chosen.columns[(r, k)];
     let x: Vec<f64> = track
         .rows
         .iter()
         .map(|r| match &group.on {
-            Dependence::Alone(field) => rows.mean(*r, &moments, |at| field.of(at)),
+            Dependence::Alone(field) => rows.mean(*r, &conditions, |at| field.of(at, group.axis)),
             _ => column(group.members[0], *r),
         })
         .collect();
@@ -227,11 +226,11 @@ fn variable(
     if !(high - low > 1e-9 * high.abs().max(low.abs())) {
         return None;
     }
-    let like = *moments.first()?;
+    let like = *conditions.first()?;
     let values = |x: f64| match &group.on {
         Dependence::Alone(field) => {
             let mut all = vec![0.0; candidate.axes().len()];
-            candidate.regressors(&field.with(like, x), form, &mut all);
+            candidate.regressors(&field.with(like, group.axis, x), parameter, &mut all);
             group.slots.iter().map(|k| all[*k]).collect()
         }
         _ => vec![x],
@@ -253,7 +252,7 @@ fn variable(
     };
     Some(drawn.panel(
         title,
-        abscissa(&group.on, candidate, group.members[0]),
+        abscissa(&group.on, candidate, group.members[0], group.axis),
         values,
     ))
 }
@@ -265,11 +264,11 @@ fn coded(rows: &Rows, one: &Accepted, track: &Track) -> Option<Panel> {
     let slots = candidate.slots();
     let ours = || slots.iter().enumerate().filter(|(_, s)| s.1 == axis);
     let members: Vec<usize> = ours().map(|(_, s)| s.0).collect();
-    let moments = rows.moments(None);
-    let mut like = *moments.first().filter(|_| !members.is_empty())?;
-    let of_rows = |value: &dyn Fn(&Moment) -> f64| -> Vec<f64> {
+    let conditions = rows.conditions(None);
+    let mut like = *conditions.first().filter(|_| !members.is_empty())?;
+    let of_rows = |value: &dyn Fn(&Conditions) -> f64| -> Vec<f64> {
         let rows_of = track.rows.iter();
-        rows_of.map(|r| rows.mean(*r, &moments, value)).collect()
+        rows_of.map(|r| rows.mean(*r, &conditions, value)).collect()
     };
     let sds = of_rows(&|at| at.reading.sd[axis]);
     like.reading.sd[axis] = sds.iter().sum::<f64>() / sds.len() as f64;

@@ -5,11 +5,13 @@ use std::ops::Range;
 use mimu_core::compensation::Affine;
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
-use super::{Figure, Free, Row, Session, Stratum, directions};
-use crate::diagnose::effect::{Moment, Reading, warmth};
+use super::{Figure, Free, Row, Session, Stratum};
+use crate::effects::quantity::{Conditions, Reading};
+use crate::effects::temperature::offsets;
 use crate::noise::wander::{Slow, Span};
 use crate::prepared::Prepared;
 use crate::quantity::Sensor;
+use crate::triad::directions;
 use mimu_recording::Reference;
 
 /// The rows of one recording, not yet beside those of others.
@@ -31,7 +33,7 @@ pub(super) struct Part {
     /// As in [`super::Rows`], of this recording.
     pub step: Option<f64>,
     pub rows: Vec<Row>,
-    pub moments: Vec<Moment>,
+    pub conditions: Vec<Conditions>,
     pub block: Vec<usize>,
     pub warm: Vec<(f64, f64)>,
 }
@@ -44,7 +46,7 @@ pub(super) struct Builder<'a> {
     pub t0_s: f64,
     pub warm: Vec<(f64, f64)>,
     pub rows: Vec<Row>,
-    pub moments: Vec<Moment>,
+    pub conditions: Vec<Conditions>,
     pub block: Vec<usize>,
     pub direction: Matrix3<f64>,
     pub scale: Vector3<f64>,
@@ -60,7 +62,7 @@ pub(super) fn part(session: &Session, sensor: Sensor, free: Free) -> Option<Part
     }
     let (direction, scale, forward) = directions(&inverse)?;
     let blocks = &prepared.condensed.blocks;
-    let warm = warmth(blocks);
+    let warm = offsets(blocks);
     let builder = Builder {
         prepared,
         sensor,
@@ -71,7 +73,7 @@ pub(super) fn part(session: &Session, sensor: Sensor, free: Free) -> Option<Part
         t0_s: blocks.first()?.start_s,
         warm,
         rows: Vec::new(),
-        moments: Vec::new(),
+        conditions: Vec::new(),
         block: Vec::new(),
         direction,
         scale,
@@ -97,19 +99,19 @@ pub(super) fn common_step(steps: &[Option<f64>]) -> Option<f64> {
 }
 
 impl Builder<'_> {
-    pub(super) fn moment(
+    pub(super) fn conditions(
         &self,
         at: usize,
         t_s: f64,
         duration_s: f64,
         rate: Vector3<f64>,
         force: Vector3<f64>,
-    ) -> Moment {
+    ) -> Conditions {
         let input = match self.sensor {
             Sensor::Gyro => rate,
             Sensor::Accel => force,
         };
-        Moment {
+        Conditions {
             session: 0,
             t_s: t_s - self.t0_s,
             on_s: t_s - self.prepared.power_on_s(),
@@ -118,8 +120,8 @@ impl Builder<'_> {
             force,
             angular_acceleration: Vector3::zeros(),
             sensed: self.direction * input,
-            warm_c: self.warm[at].1,
-            late_c: self.warm[at].1,
+            temperature_offset: self.warm[at].1,
+            lagged_temperature: self.warm[at].1,
             reading: Reading::of(
                 &self.prepared.condensed.blocks[at].raw[self.sensor.channels()],
                 &self.scale,
@@ -127,10 +129,10 @@ impl Builder<'_> {
         }
     }
 
-    /// The moments of a dwell, block by block: what is known of the input, or rest under `force`.
+    /// The conditions of a dwell, block by block: what is known of the input, or rest under `force`.
     pub(super) fn dwell(&mut self, index: usize, force: Vector3<f64>) -> Range<usize> {
         let prepared = self.prepared;
-        let first = self.moments.len();
+        let first = self.conditions.len();
         let dwell = &prepared.dwells.list[index];
         for at in dwell.blocks.clone() {
             let block = &prepared.condensed.blocks[at];
@@ -154,25 +156,25 @@ impl Builder<'_> {
             };
             let t_s = 0.5 * (block.start_s + block.last_s);
             let duration_s = f64::from(block.rows) * prepared.condensed.period_s;
-            let moment = self.moment(at, t_s, duration_s, rate, given);
-            self.moments.push(moment);
+            let conditions = self.conditions(at, t_s, duration_s, rate, given);
+            self.conditions.push(conditions);
             self.block.push(at);
         }
-        first..self.moments.len()
+        first..self.conditions.len()
     }
 
     /// Mean over dwell `index` of an error of axis `axis` weighted by `by`.
-    pub(super) fn mean_row(&mut self, index: usize, moments: &Range<usize>, by: Vector3<f64>) {
-        let total: f64 = self.moments[moments.clone()]
+    pub(super) fn mean_row(&mut self, index: usize, conditions: &Range<usize>, by: Vector3<f64>) {
+        let total: f64 = self.conditions[conditions.clone()]
             .iter()
             .map(|m| m.duration_s)
             .sum();
-        let weights = self.moments[moments.clone()]
+        let weights = self.conditions[conditions.clone()]
             .iter()
             .map(|m| by * (m.duration_s / total))
             .collect();
         self.rows.push(Row {
-            moments: moments.clone(),
+            conditions: conditions.clone(),
             weights,
             dwells: [index, index],
         });
@@ -195,7 +197,7 @@ impl Builder<'_> {
             judged: (figure.1, figure.2),
             step: common_step(&self.prepared.condensed.reading_step[self.sensor.channels()]),
             rows: self.rows,
-            moments: self.moments,
+            conditions: self.conditions,
             block: self.block,
             warm: self.warm,
         })

@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use super::build::{Builder, Part};
 use super::{Figure, Row, Stratum};
-use crate::diagnose::effect::Moment;
+use crate::effects::quantity::Conditions;
 use crate::estimate::rotation::sensitivity;
 use crate::prepared::si_covariance;
 use crate::quantity::Sensor;
@@ -26,7 +26,7 @@ impl Builder<'_> {
         let n = observations.len();
         let dwells: Vec<usize> = observations.iter().map(|o| o.dwell).collect();
         let body = self.to_body()?;
-        let moments: Vec<Range<usize>> = observations
+        let conditions: Vec<Range<usize>> = observations
             .iter()
             .map(|o| self.dwell(o.dwell, inverse.apply(&o.raw)))
             .collect();
@@ -37,7 +37,7 @@ impl Builder<'_> {
         for (i, o) in observations.iter().enumerate() {
             let force = inverse.apply(&o.raw);
             let up = force.normalize();
-            self.mean_row(o.dwell, &moments[i], body.tr_mul(&up));
+            self.mean_row(o.dwell, &conditions[i], body.tr_mul(&up));
             y.push(force.norm() - g);
             for (k, (r, c)) in lower.into_iter().enumerate() {
                 nuisance[(i, k)] = up[r] * (o.raw[c] - centre[c]);
@@ -74,7 +74,7 @@ impl Builder<'_> {
         let mut turn_rows: Vec<[f64; 12]> = Vec::new();
         let blocks = &prepared.condensed.blocks;
         for turn in &turns {
-            let first = self.moments.len();
+            let first = self.conditions.len();
             for (k, piece) in turn.increments.iter().enumerate() {
                 let t_s = piece.end_s - 0.5 * piece.duration_s;
                 let at = blocks
@@ -84,20 +84,21 @@ impl Builder<'_> {
                 let rate = inverse.apply(&raw);
                 let reading = Vector3::from_fn(|i, _| blocks[at].raw[3 + i].mean);
                 let force = accel.map_or(Vector3::repeat(f64::NAN), |a| a.apply(&reading));
-                let mut moment = self.moment(at, t_s, piece.duration_s, rate, force);
-                moment.reading.mean = raw;
+                let mut conditions = self.conditions(at, t_s, piece.duration_s, rate, force);
+                conditions.reading.mean = raw;
                 if k > 0 {
-                    let before: &Moment = &self.moments[first + k - 1];
-                    moment.angular_acceleration = (rate - before.rate) / (moment.t_s - before.t_s);
+                    let before: &Conditions = &self.conditions[first + k - 1];
+                    conditions.angular_acceleration =
+                        (rate - before.rate) / (conditions.t_s - before.t_s);
                 }
-                self.moments.push(moment);
+                self.conditions.push(conditions);
                 self.block.push(at);
             }
-            let moments = first..self.moments.len();
+            let conditions = first..self.conditions.len();
             let found = sensitivity(turn, inverse);
             for side in 0..2 {
                 let mut columns = [0.0; 12];
-                let mut weights = Vec::with_capacity(moments.len());
+                let mut weights = Vec::with_capacity(conditions.len());
                 for (by, piece) in found.by.iter().zip(turn.increments) {
                     for i in 0..3 {
                         for j in 0..3 {
@@ -110,7 +111,7 @@ impl Builder<'_> {
                 y.push(found.error[side]);
                 turn_rows.push(columns);
                 self.rows.push(Row {
-                    moments: moments.clone(),
+                    conditions: conditions.clone(),
                     weights,
                     dwells: [turn.from, turn.to],
                 });
@@ -118,7 +119,7 @@ impl Builder<'_> {
         }
         let (m, n) = (y.len(), rest.len());
         let dwells: Vec<usize> = rest.iter().map(|o| o.dwell).collect();
-        let moments: Vec<Range<usize>> = dwells
+        let conditions: Vec<Range<usize>> = dwells
             .iter()
             .map(|d| self.dwell(*d, self.force(*d, accel)))
             .collect();
@@ -152,7 +153,7 @@ impl Builder<'_> {
         for axis in 0..3 {
             for (i, o) in rest.iter().enumerate() {
                 let row = y.len();
-                self.mean_row(o.dwell, &moments[i], body.row(axis).transpose());
+                self.mean_row(o.dwell, &conditions[i], body.row(axis).transpose());
                 y.push(inverse.apply(&o.raw)[axis]);
                 for k in 0..3 {
                     nuisance[(row, 3 * axis + k)] = at_rest[k];

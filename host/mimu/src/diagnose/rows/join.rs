@@ -3,7 +3,8 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::build::{Part, common_step};
-use super::{Row, Rows, elsewhere};
+use super::{Row, Rows};
+use crate::effects::temperature::without_self_heating;
 use crate::quantity::Sensor;
 use mimu_recording::Reference;
 
@@ -75,18 +76,18 @@ pub(super) fn join(sensor: Sensor, parts: Vec<(usize, Part)>, sessions: usize) -
     let steps: Vec<Option<f64>> = parts.iter().map(|p| p.1.step).collect();
     let step = common_step(&steps);
     let mut first = vec![0];
-    let mut moments = Vec::new();
+    let mut conditions = Vec::new();
     let mut block = Vec::new();
     let mut warm = vec![Vec::new(); sessions];
     let mut from_moment = Vec::new();
     for session in 0..sessions {
         let dwells = match parts.iter().find(|p| p.0 == session) {
             Some((_, part)) => {
-                from_moment.push(moments.len());
-                moments.extend(part.moments.iter().map(|m| {
-                    let mut moment = *m;
-                    moment.session = session;
-                    moment
+                from_moment.push(conditions.len());
+                conditions.extend(part.conditions.iter().map(|m| {
+                    let mut conditions = *m;
+                    conditions.session = session;
+                    conditions
                 }));
                 block.extend(part.block.iter().map(|b| (session, *b)));
                 warm[session].clone_from(&part.warm);
@@ -114,7 +115,7 @@ pub(super) fn join(sensor: Sensor, parts: Vec<(usize, Part)>, sessions: usize) -
             let row = &part.rows[r];
             let offset = from_moment[p];
             rows.push(Row {
-                moments: row.moments.start + offset..row.moments.end + offset,
+                conditions: row.conditions.start + offset..row.conditions.end + offset,
                 weights: row.weights.clone(),
                 dwells: row.dwells.map(|d| d + first[*session]),
             });
@@ -135,10 +136,10 @@ pub(super) fn join(sensor: Sensor, parts: Vec<(usize, Part)>, sessions: usize) -
         judged: (judged, together),
         step,
         rows,
-        moments,
+        conditions,
         block,
-        elsewhere: warm.iter().map(|w| elsewhere(w)).collect(),
-        warm,
+        without_self_heating: warm.iter().map(|w| without_self_heating(w)).collect(),
+        temperature: warm,
         first,
     })
 }

@@ -25,7 +25,7 @@ impl Builder<'_> {
         }
         let dwells: Vec<usize> = observations.iter().map(|o| o.dwell).collect();
         let wander = prepared.noise.wander(self.sensor, &prepared.dwells.list);
-        let moments: Vec<Range<usize>> = dwells
+        let conditions: Vec<Range<usize>> = dwells
             .iter()
             .map(|d| self.dwell(*d, self.force(*d, accel)))
             .collect();
@@ -37,7 +37,7 @@ impl Builder<'_> {
             for (i, o) in observations.iter().enumerate() {
                 let row = y.len();
                 let predicted = forward.apply(&o.input)[axis];
-                self.mean_row(o.dwell, &moments[i], Vector3::ith(axis, 1.0));
+                self.mean_row(o.dwell, &conditions[i], Vector3::ith(axis, 1.0));
                 y.push((o.raw[axis] - predicted) / scale[axis]);
                 nuisance[(row, 4 * axis)] = 1.0;
                 for k in 0..3 {

@@ -2,9 +2,11 @@
 
 use nalgebra::DMatrix;
 
-use super::{COEFFICIENT, Search, beside, independent_of, unit_columns};
-use crate::diagnose::candidate::Candidate;
+use super::{COEFFICIENT, EXCITED, Search, beside, independent_of, unit_columns};
 use crate::diagnose::spread::{By, Components, Fitted};
+use crate::effects::candidate::Candidate;
+use crate::effects::effect::NonlinearParameter;
+use crate::effects::readout::TYPICAL;
 
 /// A model with noise of its own that a candidate is put beside.
 pub(super) struct Beside<'a> {
@@ -40,7 +42,7 @@ impl Beside<'_> {
     }
 
     /// With the best value of its nonlinear constant, if it has one: a walk uphill from `first` with ever smaller steps.
-    pub fn form(&self, candidate: &Candidate, first: f64) -> Option<(f64, With)> {
+    pub fn parameter(&self, candidate: &Candidate, first: f64) -> Option<(f64, With)> {
         self.walk(candidate, first, |columns| columns)
     }
 
@@ -55,11 +57,11 @@ impl Beside<'_> {
         first: f64,
         part: impl Fn(DMatrix<f64>) -> DMatrix<f64>,
     ) -> Option<(f64, With)> {
-        let fit = |form: f64, start: &Components| {
-            self.fit(part(candidate.columns(self.search.rows, form)), start)
+        let fit = |parameter: f64, start: &Components| {
+            self.fit(part(candidate.columns(self.search.rows, parameter)), start)
         };
         let mut best = (first, fit(first, &self.null.components)?);
-        let Some((from, to)) = candidate.form_range() else {
+        let Some(NonlinearParameter { from, to, .. }) = candidate.parameter() else {
             return Some(best);
         };
         let mut step: f64 = 1.35;
@@ -84,17 +86,30 @@ impl Beside<'_> {
         Some(best)
     }
 
+    /// Whether each bit of a candidate is determined beside the others and the model: all bits together are nearly what is read, which the
+    /// affine parameters take up, and such coefficients would lead the removal away from the readings.
+    fn determined(fitted: &Fitted, columns: &DMatrix<f64>) -> bool {
+        let first = fitted.coefficients.len() - columns.ncols();
+        columns.column_iter().enumerate().all(|(k, column)| {
+            let variance = fitted.covariance[(first + k, first + k)];
+            variance.sqrt() <= TYPICAL / EXCITED * column.norm()
+        })
+    }
+
     /// With the best choice of bits: one is added or dropped as long as that makes the score better.
-    pub fn bits(&self, from: &Candidate, form: f64) -> Option<(Candidate, With)> {
-        let moments = self.search.freed(&self.model, self.null);
+    pub fn bits(&self, from: &Candidate, parameter: f64) -> Option<(Candidate, With)> {
+        let conditions = self.search.freed(&self.model, self.null);
         let all = from
             .with_all_offered()
-            .columns_at(&self.search.by_dwell, &moments, form);
+            .columns_at(&self.search.by_dwell, &conditions, parameter);
         let columns = |c: &Candidate| c.columns_of(&all);
-        let mut best = (
-            from.clone(),
-            self.fit(columns(from), &self.null.components)?,
-        );
+        let first = columns(from);
+        let both = beside(&self.model, &unit_columns(&first));
+        let at = self.search.spread.fit_at(&both, &self.null.components)?;
+        if !Self::determined(&at, &first) {
+            return None;
+        }
+        let mut best = (from.clone(), self.fit(first, &self.null.components)?);
         loop {
             let toggled = from.offered.iter().filter_map(|&bit| {
                 let mut other = best.0.clone();
@@ -108,10 +123,15 @@ impl Beside<'_> {
                 // By the noise so far: by its own it could only be better.
                 let both = beside(&self.model, &unit_columns(&columns(&other)));
                 let fitted = self.search.spread.fit_at(&both, &best.1.components)?;
+                if !Self::determined(&fitted, &columns(&other)) {
+                    return None;
+                }
                 let score = -fitted.deviance - COEFFICIENT * other.active.len() as f64;
                 Some((other, score))
             });
-            let (other, _) = toggled.max_by(|a, b| a.1.total_cmp(&b.1))?;
+            let Some((other, _)) = toggled.max_by(|a, b| a.1.total_cmp(&b.1)) else {
+                return Some(best);
+            };
             let with = self.fit(columns(&other), &best.1.components)?;
             if with.score() <= best.1.score() {
                 return Some(best);

@@ -4,13 +4,13 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use super::{COEFFICIENT, Chosen, Search, exceeds};
-use crate::diagnose::candidate::Candidate;
 use crate::diagnose::spread::Fitted;
+use crate::effects::candidate::Candidate;
 
 /// A candidate as it looked at first sight.
 pub(super) struct Screened {
     pub index: usize,
-    pub form: f64,
+    pub parameter: f64,
     /// Probability of chance.
     pub p: f64,
     /// Drop of the deviance less what its coefficients cost.
@@ -39,9 +39,13 @@ impl Search<'_> {
         let mut codes: Vec<(&Candidate, f64, DMatrix<f64>)> = Vec::new();
         for c in self.candidates.iter().filter(|c| c.reads_code()) {
             if !codes.last().is_some_and(|last| last.0.is_variant_of(c)) {
-                let form = c.forms()[0];
+                let parameter = c.parameters()[0];
                 let all = c.with_all_offered();
-                codes.push((c, form, all.columns_at(&self.by_dwell, &freed, form)));
+                codes.push((
+                    c,
+                    parameter,
+                    all.columns_at(&self.by_dwell, &freed, parameter),
+                ));
             }
         }
         let mut found: Vec<Screened> = (0..self.candidates.len())
@@ -51,17 +55,18 @@ impl Search<'_> {
                 let candidate = &self.candidates[index];
                 let mut best: Option<Screened> = None;
                 let code = codes.iter().find(|c| c.0.is_variant_of(candidate));
-                let code = code
-                    .map(|(_, form, all)| (*form, self.spread.turn(&candidate.columns_of(all))));
-                for (form, turned) in self.turned[index].iter().chain(&code) {
-                    let (form, white) = (*form, whitener.whiten_turned(turned.clone()));
+                let code = code.map(|(_, parameter, all)| {
+                    (*parameter, self.spread.turn(&candidate.columns_of(all)))
+                });
+                for (parameter, turned) in self.turned[index].iter().chain(&code) {
+                    let (parameter, white) = (*parameter, whitener.whiten_turned(turned.clone()));
                     let Some((p, gain)) = self.explained(&others, &left, total, &white) else {
                         continue;
                     };
                     if best.as_ref().is_none_or(|b| gain > b.gain) {
                         best = Some(Screened {
                             index,
-                            form,
+                            parameter,
                             p,
                             gain,
                         });

@@ -3,7 +3,7 @@
 use mimu::design::budget::DwellNoise;
 use mimu::design::reach::{Carrier, RateList, Rates};
 use mimu::design::tour::Motion;
-use mimu::diagnose::library;
+use mimu::effects;
 use mimu::next_experiment::prediction::{SEEN, Target};
 use mimu::next_experiment::recipe::{Course, Experiment, Inputs, RECIPES};
 use mimu::next_experiment::{Answer, CHAMBER_C, DWELL_S, RATE_DPS, SLEW, Setup, smallest};
@@ -32,7 +32,7 @@ fn setup() -> Setup {
 }
 
 fn target(id: &str) -> Target {
-    Target::listed(library::by_id(id).unwrap())
+    Target::listed(effects::by_id(id).unwrap())
 }
 
 fn answer(setup: &Setup, id: &str) -> Option<Answer> {
@@ -42,7 +42,7 @@ fn answer(setup: &Setup, id: &str) -> Option<Answer> {
 #[test]
 fn every_error_that_is_none_of_a_converter_has_a_recipe_that_shows_it() {
     let setup = setup();
-    for effect in library::all() {
+    for effect in effects::all() {
         let shown = answer(&setup, effect.id);
         if target(effect.id).candidate.reads_code() {
             assert!(shown.is_none(), "{}", effect.id);

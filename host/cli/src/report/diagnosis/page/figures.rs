@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use maud::{Markup, html};
 
-use super::svg::{Frame, power_of_ten, px, range, times_ten};
+use crate::report::svg::{Frame, power_of_ten, px, range, times_ten};
 use mimu::diagnose::picture::{Against, Kind, Panel, Picture, Quantile, Track};
 use mimu::quantity::Figure;
 use mimu::quantity::Sensor;

@@ -2,9 +2,9 @@
 
 use maud::{Markup, PreEscaped, html};
 
-use super::svg::raised;
 use super::{Shown, sentence, spoken};
 use crate::report::diagnosis::text::{by_experiment, by_score, converter, p_value};
+use crate::report::svg::raised;
 use mimu::diagnose::decision::Split;
 use mimu::quantity::{Figure, significant};
 use mimu::readable;

@@ -1,9 +1,34 @@
-//! What temperature does over time: behind a lag, without what the thermometer warms up by itself, and whether it ever comes back.
+//! The temperature that an effect follows: as recorded, behind a lag, and without the thermometer's self-heating.
 
 use nalgebra::{DMatrix, DVector};
 
+use super::quantity::REFERENCE_C;
+use crate::blocks::Block;
+
+/// The temperature that an effect follows, where it is not the one recorded.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Followed {
+    /// Lag, s, if it has one.
+    pub lag_s: Option<f64>,
+    /// Whether the thermometer is on another die, whose self-heating after power-on the sensor does not undergo.
+    pub without_self_heating: bool,
+}
+
+/// Middle of each block, s, and its temperature above [`REFERENCE_C`], °C: where there is none that of the block before, as
+/// the device does it, and not a number before the first.
+pub fn offsets(blocks: &[Block]) -> Vec<(f64, f64)> {
+    let mut held = f64::NAN;
+    let each = blocks.iter().map(|b| {
+        if b.temp_c.mean.is_finite() {
+            held = b.temp_c.mean - REFERENCE_C;
+        }
+        (0.5 * (b.start_s + b.last_s), held)
+    });
+    each.collect()
+}
+
 /// Behind a first-order lag: `(time in s, value)` in, the lagged value out.
-pub fn late(signal: &[(f64, f64)], lag_s: f64) -> Vec<f64> {
+pub fn lagged(signal: &[(f64, f64)], lag_s: f64) -> Vec<f64> {
     let mut state = signal
         .iter()
         .map(|s| s.1)
@@ -24,6 +49,7 @@ pub fn late(signal: &[(f64, f64)], lag_s: f64) -> Vec<f64> {
     }
     out
 }
+
 /// Time after the beginning in which a thermometer warms up by itself, s: dies of such parts take 3 to 10 s.
 const START_S: f64 = 60.0;
 /// Time constants of it that are tried first: the least, s, the ratio of each to that before, and how many.
@@ -35,7 +61,7 @@ const OWN_F: f64 = 50.0;
 
 /// A temperature without what its thermometer warmed up by itself after power-on, which a sensor on another die did not undergo:
 /// an exponential beside a parabola, the slower course of the board, over the first minute. `None` where it shows none.
-pub fn elsewhere(signal: &[(f64, f64)]) -> Option<Vec<(f64, f64)>> {
+pub fn without_self_heating(signal: &[(f64, f64)]) -> Option<Vec<(f64, f64)>> {
     let first = signal.first()?.0;
     let start: Vec<(f64, f64)> = signal
         .iter()
@@ -84,7 +110,7 @@ pub fn elsewhere(signal: &[(f64, f64)]) -> Option<Vec<(f64, f64)>> {
 }
 
 /// Spearman's rank correlation of the values of a signal with time; `None` where fewer than three values are known or all are one.
-pub fn order(signal: &[(f64, f64)]) -> Option<f64> {
+pub fn rank_correlation(signal: &[(f64, f64)]) -> Option<f64> {
     let mut known: Vec<(usize, f64)> = signal
         .iter()
         .map(|s| s.1)
@@ -125,14 +151,14 @@ mod tests {
         let ramp: Vec<(f64, f64)> = (0..4000)
             .map(|i| (f64::from(i), 0.5 * f64::from(i)))
             .collect();
-        let out = late(&ramp, 60.0);
+        let out = lagged(&ramp, 60.0);
         assert!((out[3999] - 0.5 * (3999.0 - 60.0)).abs() < 1e-9);
         let step: Vec<(f64, f64)> = (0..100)
             .map(|i| (f64::from(i), f64::from(u8::from(i > 0))))
             .collect();
         // The step is a ramp of a second: exp(-99/20) (exp(1/20) - 1) 20 is left of it.
         let left = 20.0 * (-99.0_f64 / 20.0).exp() * (0.05_f64.exp() - 1.0);
-        assert!((1.0 - late(&step, 20.0)[99] - left).abs() < 1e-12);
+        assert!((1.0 - lagged(&step, 20.0)[99] - left).abs() < 1e-12);
     }
 
     #[test]
@@ -146,11 +172,11 @@ mod tests {
             };
             (0..300).map(at).collect()
         };
-        let without = elsewhere(&signal(6.0)).unwrap();
+        let without = without_self_heating(&signal(6.0)).unwrap();
         for (t, v) in &without {
             assert!((v - board(t - 100.0)).abs() < 0.1, "{t} {v}");
         }
-        assert!(elsewhere(&signal(0.0)).is_none());
+        assert!(without_self_heating(&signal(0.0)).is_none());
     }
 
     #[test]
@@ -161,12 +187,12 @@ mod tests {
                 .collect()
         };
         let falls = signal(&|t| (-t / 20.0).exp());
-        assert!((order(&falls).unwrap() + 1.0).abs() < 1e-12);
+        assert!((rank_correlation(&falls).unwrap() + 1.0).abs() < 1e-12);
         let returns = signal(&|t| -(t - 50.0).abs());
-        assert!(order(&returns).unwrap().abs() < 1e-12);
+        assert!(rank_correlation(&returns).unwrap().abs() < 1e-12);
         // Ties: ranks 0.5, 0.5, 2.5, 2.5 against 0, 1, 2, 3 correlate by 4/sqrt(5 * 4).
         let steps = [(0.0, 1.0), (1.0, 1.0), (2.0, 5.0), (3.0, 5.0)];
-        assert!((order(&steps).unwrap() - 4.0 / 20f64.sqrt()).abs() < 1e-12);
-        assert_eq!(order(&signal(&|_| 3.0)), None);
+        assert!((rank_correlation(&steps).unwrap() - 4.0 / 20f64.sqrt()).abs() < 1e-12);
+        assert_eq!(rank_correlation(&signal(&|_| 3.0)), None);
     }
 }

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-use super::super::cell::shorten;
+use crate::cell::shorten;
 use crate::error::{Error, Result};
 
 /// What stands between two cells.
@@ -21,7 +21,7 @@ pub enum Separator {
 
 impl Separator {
     /// Finds the separator that cuts most of `lines` alike, into two cells at least.
-    pub(super) fn detect(lines: &[&[u8]]) -> Separator {
+    pub(crate) fn detect(lines: &[&[u8]]) -> Separator {
         // Whitespace last, as blanks may follow any other; comma after semicolon, as numbers with
         // decimal commas stand between semicolons, and are then refused in plain words.
         let candidates = [
@@ -55,7 +55,7 @@ impl Separator {
     }
 
     /// Splits `line` into `cells`; quotes keep a separator inside a cell.
-    pub(super) fn split(self, line: &[u8], cells: &mut csv::ByteRecord) {
+    pub(crate) fn split(self, line: &[u8], cells: &mut csv::ByteRecord) {
         cells.clear();
         let delimiter = match self {
             Separator::Comma => b',',

@@ -4,12 +4,13 @@ use mimu_core::compensation::Affine;
 use nalgebra::{Matrix3, Vector3};
 
 use super::candidate::Candidate;
-use super::effect::{Behind, Moment, Reading, warmth};
-use super::rows::{directions, elsewhere, late};
+use super::quantity::{Conditions, Need, Reading};
+use super::temperature::{Followed, lagged, offsets, without_self_heating};
 use crate::blocks::Block;
 use crate::dwell::Fault;
 use crate::prepared::Prepared;
 use crate::quantity::Sensor;
+use crate::triad::directions;
 use mimu_recording::Reference;
 use mimu_recording::error::{Error, Result};
 
@@ -18,8 +19,8 @@ use mimu_recording::error::{Error, Result};
 pub struct Removed {
     /// Which.
     pub candidate: Candidate,
-    /// Its nonlinear constant, 0 if it has none.
-    pub form: f64,
+    /// Its nonlinear parameter, 0 if it has none.
+    pub parameter: f64,
     /// Coefficients, SI, in the order of the candidate's active ones.
     pub values: Vec<f64>,
 }
@@ -31,74 +32,26 @@ impl Removed {
         Self {
             candidate,
             values,
-            form: self.form,
+            parameter: self.parameter,
         }
     }
 
-    /// Adds its error of the three axes at a moment, SI.
-    fn add(&self, at: &Moment, error: &mut Vector3<f64>) {
-        self.candidate.add_error(at, self.form, &self.values, error);
+    /// Adds its error of the three axes, SI.
+    fn add(&self, at: &Conditions, error: &mut Vector3<f64>) {
+        self.candidate
+            .add_error(at, self.parameter, &self.values, error);
     }
 }
 
-/// Errors of the axes of the sensor at some moments, SI. Of effects with a lag the moments have to come with that lag.
-pub fn errors(effects: &[Removed], moments: &[Moment]) -> Vec<Vector3<f64>> {
-    let mut all = vec![Vector3::zeros(); moments.len()];
+/// Errors of the axes of the sensor under some conditions, SI. Of effects with a lag these have to come with that lag.
+pub fn errors(effects: &[Removed], conditions: &[Conditions]) -> Vec<Vector3<f64>> {
+    let mut all = vec![Vector3::zeros(); conditions.len()];
     for effect in effects {
-        for (error, moment) in all.iter_mut().zip(moments) {
-            effect.add(moment, error);
+        for (error, at) in all.iter_mut().zip(conditions) {
+            effect.add(at, error);
         }
     }
     all
-}
-
-/// A condition that an effect may need, or not.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Condition {
-    Rate,
-    Force,
-    Temperature,
-}
-
-/// Whether the error by an effect depends on a condition: tried, so that no effect has to say it.
-pub(crate) fn depends(effect: &Removed, on: Condition) -> bool {
-    let one = Vector3::repeat(1.0);
-    let mut at = Moment {
-        session: 0,
-        t_s: 1.0,
-        on_s: 1.0,
-        duration_s: 1.0,
-        rate: one,
-        force: one,
-        angular_acceleration: one,
-        sensed: one,
-        warm_c: 1.0,
-        late_c: 1.0,
-        reading: Reading {
-            mean: one,
-            sd: one,
-            scale: one,
-        },
-    };
-    let none = Vector3::repeat(f64::NAN);
-    let own = |sensor| effect.candidate.sensor == sensor;
-    match on {
-        Condition::Rate => {
-            at.rate = none;
-            if own(Sensor::Gyro) {
-                at.sensed = none;
-            }
-        }
-        Condition::Force => {
-            at.force = none;
-            if own(Sensor::Accel) {
-                at.sensed = none;
-            }
-        }
-        Condition::Temperature => (at.warm_c, at.late_c) = (f64::NAN, f64::NAN),
-    }
-    let error = errors(std::slice::from_ref(effect), &[at]);
-    error.iter().any(|e| e.iter().any(|v| v.is_nan()))
 }
 
 /// Refuses a recording that lacks what one of `effects` has to be known by where it is to be taken out: channels, or a temperature.
@@ -123,15 +76,12 @@ pub fn removable(prepared: &Prepared, effects: &[Removed]) -> Result<()> {
         if !prepared.has(sensor) {
             continue;
         }
-        for (other, condition) in [
-            (Sensor::Gyro, Condition::Rate),
-            (Sensor::Accel, Condition::Force),
-        ] {
-            if !prepared.has(other) && depends(effect, condition) {
+        for (other, need) in [(Sensor::Gyro, Need::Rate), (Sensor::Accel, Need::Force)] {
+            if !prepared.has(other) && effect.candidate.needs(need) {
                 return lacks(format!("the recording has no {other} columns"));
             }
         }
-        if let (Some(block), true) = (cold, depends(effect, Condition::Temperature)) {
+        if let (Some(block), true) = (cold, effect.candidate.needs(Need::Temperature)) {
             return lacks(format!("temp_c is missing at {} s", block.start_s));
         }
     }
@@ -164,7 +114,7 @@ pub fn remove(
     Some(out)
 }
 
-/// The moments that readings of a sensor are corrected at.
+/// The conditions that readings of a sensor are corrected under.
 struct Stretches<'a> {
     sensor: Sensor,
     /// Sensitive directions by rows, and how errors along them become errors in the body frame.
@@ -176,8 +126,8 @@ struct Stretches<'a> {
 }
 
 impl Stretches<'_> {
-    /// The moment as it is where the sensor errs by `error`.
-    fn without(&self, at: &Moment, error: &Vector3<f64>) -> Moment {
+    /// The conditions as they are where the sensor errs by `error`.
+    fn without(&self, at: &Conditions, error: &Vector3<f64>) -> Conditions {
         let mut clean = at.read_without(error);
         let input = match self.sensor {
             Sensor::Gyro => &mut clean.rate,
@@ -188,38 +138,38 @@ impl Stretches<'_> {
         clean
     }
 
-    /// Errors of the axes at a moment within block `at`, SI.
-    fn error(&self, moment: &Moment, at: usize) -> Vector3<f64> {
-        let sum = |moment: &Moment, codes: bool| {
+    /// Errors of the axes under conditions within block `at`, SI.
+    fn error(&self, conditions: &Conditions, at: usize) -> Vector3<f64> {
+        let sum = |conditions: &Conditions, codes: bool| {
             let mut error = Vector3::zeros();
             for (effect, late) in self.effects.iter().zip(&self.late) {
                 if effect.candidate.reads_code() != codes {
                     continue;
                 }
-                let now = (moment.warm_c, moment.warm_c);
-                let (warm_c, late_c) = late.as_ref().map_or(now, |l| l[at]);
-                let moment = Moment {
-                    warm_c,
-                    late_c,
-                    ..*moment
+                let now = (conditions.temperature_offset, conditions.temperature_offset);
+                let (temperature_offset, lagged_temperature) = late.as_ref().map_or(now, |l| l[at]);
+                let conditions = Conditions {
+                    temperature_offset,
+                    lagged_temperature,
+                    ..*conditions
                 };
-                effect.add(&moment, &mut error);
+                effect.add(&conditions, &mut error);
             }
             error
         };
         // As the device: where the error is steeper than the input, a second look would lead away. Each axis has a code of its own, and
         // its errors go first, as all else is a function of what would have been read without them.
-        let first = sum(moment, true);
-        let second = sum(&self.without(moment, &first), true);
+        let first = sum(conditions, true);
+        let second = sum(&self.without(conditions, &first), true);
         let codes = first.zip_map(&second, |first, second| {
             match (second - first).powi(2) < first.powi(2) {
                 true => second,
                 false => first,
             }
         });
-        let moment = &self.without(moment, &codes);
-        let first = sum(moment, false);
-        let second = sum(&self.without(moment, &first), false);
+        let conditions = &self.without(conditions, &codes);
+        let first = sum(conditions, false);
+        let second = sum(&self.without(conditions, &first), false);
         match (second - first).norm_squared() < first.norm_squared() {
             true => codes + second,
             false => codes + first,
@@ -239,7 +189,7 @@ fn of_sensor(
     let blocks = &prepared.condensed.blocks;
     let t0_s = blocks.first()?.start_s;
     // Before the first temperature it is that one, as a lag begins there on the device too; without any the reference, as there.
-    let warm = warmth(blocks);
+    let warm = offsets(blocks);
     let first = warm.iter().map(|w| w.1).find(|w| w.is_finite());
     let known = |w: f64| if w.is_nan() { first.unwrap_or(0.0) } else { w };
     let warm: Vec<(f64, f64)> = warm.into_iter().map(|(t, w)| (t, known(w))).collect();
@@ -251,15 +201,15 @@ fn of_sensor(
         late: effects
             .iter()
             .map(|e| {
-                let Behind {
-                    lag_s,
-                    elsewhere: other,
-                } = e.candidate.behind(e.form)?;
-                let other = if other { elsewhere(&warm) } else { None };
+                let followed: Followed = e.candidate.followed(e.parameter)?;
+                let other = match followed.without_self_heating {
+                    true => without_self_heating(&warm),
+                    false => None,
+                };
                 let warm = other.as_ref().unwrap_or(&warm);
                 let now = warm.iter().map(|w| w.1);
-                Some(match lag_s {
-                    Some(lag_s) => now.zip(late(warm, lag_s)).collect(),
+                Some(match followed.lag_s {
+                    Some(lag_s) => now.zip(lagged(warm, lag_s)).collect(),
                     None => now.map(|w| (w, w)).collect(),
                 })
             })
@@ -275,7 +225,7 @@ fn of_sensor(
         mean: raw(at, from),
         ..Reading::of(&blocks[at].raw[from..from + 3], &scale)
     };
-    let moment = |at: usize, t_s: f64, rate: Vector3<f64>, force: Vector3<f64>| Moment {
+    let conditions = |at: usize, t_s: f64, rate: Vector3<f64>, force: Vector3<f64>| Conditions {
         session: 0,
         t_s: t_s - t0_s,
         on_s: t_s - prepared.power_on_s(),
@@ -284,14 +234,14 @@ fn of_sensor(
         force,
         angular_acceleration: Vector3::zeros(),
         sensed: direction * if sensor == Sensor::Gyro { rate } else { force },
-        warm_c: warm[at].1,
-        late_c: warm[at].1,
+        temperature_offset: warm[at].1,
+        lagged_temperature: warm[at].1,
         reading: reading(at),
     };
     let mut of_block = Vec::with_capacity(blocks.len());
     for (at, (t_s, _)) in warm.iter().enumerate() {
         let [rate, force] = [0, 1].map(|s| apply(models[s], raw(at, 3 * s)));
-        of_block.push(all.error(&moment(at, *t_s, rate, force), at));
+        of_block.push(all.error(&conditions(at, *t_s, rate, force), at));
     }
     if sensor == Sensor::Gyro {
         for piece in &mut out.condensed.increments {
@@ -301,10 +251,10 @@ fn of_sensor(
                 .min(blocks.len() - 1);
             let mean = Vector3::from(piece.integral) / piece.duration_s;
             let force = apply(models[1], raw(at, 3));
-            let mut moment = moment(at, t_s, model.apply(&mean), force);
-            moment.reading.mean = mean;
-            moment.duration_s = piece.duration_s;
-            let error = all.error(&moment, at);
+            let mut conditions = conditions(at, t_s, model.apply(&mean), force);
+            conditions.reading.mean = mean;
+            conditions.duration_s = piece.duration_s;
+            let error = all.error(&conditions, at);
             for i in 0..3 {
                 piece.integral[i] -= scale[i] * error[i] * piece.duration_s;
             }
@@ -334,11 +284,11 @@ fn of_sensor(
 
 /// A dwell without a reading of the other triad is none for this one, if an effect goes by that.
 fn leave_out_unknown(sensor: Sensor, effects: &[&Removed], out: &mut Prepared) {
-    let (other, condition) = match sensor {
-        Sensor::Gyro => (Sensor::Accel, Condition::Force),
-        Sensor::Accel => (Sensor::Gyro, Condition::Rate),
+    let (other, need) = match sensor {
+        Sensor::Gyro => (Sensor::Accel, Need::Force),
+        Sensor::Accel => (Sensor::Gyro, Need::Rate),
     };
-    let Some(effect) = effects.iter().find(|e| depends(e, condition)) else {
+    let Some(effect) = effects.iter().find(|e| e.candidate.needs(need)) else {
         return;
     };
     for dwell in &mut out.dwells.list {

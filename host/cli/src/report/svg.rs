@@ -1,5 +1,5 @@
-//! Drawings as inline SVG, straight: plotters writes its colours into every element, and a page that is read in the dark and
-//! printed in the light needs them from a style sheet.
+//! Drawings as SVG whose colours are in a style sheet: a page is read in the dark and printed in the light. Not plotters, which writes its
+//! colours into every element.
 
 use std::fmt::Write as _;
 use std::ops::Range;
@@ -34,32 +34,41 @@ impl Frame {
 
     /// Grid, numbers and a heading; numbers on the left only `with_y`.
     pub fn axes(&self, heading: &str, with_y: bool) -> Markup {
+        let (x, y) = (ticks(&self.x, 5), ticks(&self.y, 5));
+        let zero = self.y.contains(&0.0).then(|| self.at_y(0.0));
+        html! {
+            (self.grid(heading, &x, &y, with_y))
+            @if let Some(y) = zero {
+                path class="zero" d={ "M" (px(self.across.start)) " " (px(y)) "H" (px(self.across.end)) } {}
+            }
+        }
+    }
+
+    /// Grid, numbers and a heading: places on the axes, and what is written there.
+    pub fn grid(
+        &self,
+        heading: &str,
+        x: &[(f64, String)],
+        y: &[(f64, String)],
+        with_y: bool,
+    ) -> Markup {
         let (left, right) = (self.across.start, self.across.end);
         let (top, bottom) = (self.down.start, self.down.end);
-        let x_ticks = Ticks::over(&self.x, 5);
-        let y_ticks = Ticks::over(&self.y, 5);
         html! {
-            path class="grid" d=(y_ticks.at.iter().fold(String::new(), |mut d, y| {
+            path class="grid" d=(y.iter().fold(String::new(), |mut d, (y, _)| {
                 let _ = write!(d, "M{left:.1} {:.1}H{right:.1}", self.at_y(*y));
                 d
             })) {}
-            path class="grid" d=(x_ticks.at.iter().fold(String::new(), |mut d, x| {
+            path class="grid" d=(x.iter().fold(String::new(), |mut d, (x, _)| {
                 let _ = write!(d, "M{:.1} {top:.1}V{bottom:.1}", self.at_x(*x));
                 d
             })) {}
-            @if self.y.contains(&0.0) {
-                path class="zero" d={ "M" (px(left)) " " (px(self.at_y(0.0))) "H" (px(right)) } {}
-            }
-            @for x in &x_ticks.at {
-                text class="tick" x=(px(self.at_x(*x))) y=(px(bottom + 14.0)) text-anchor="middle" {
-                    (x_ticks.label(*x))
-                }
+            @for (x, label) in x {
+                text class="tick" x=(px(self.at_x(*x))) y=(px(bottom + 14.0)) text-anchor="middle" { (label) }
             }
             @if with_y {
-                @for y in &y_ticks.at {
-                    text class="tick" x=(px(left - 6.0)) y=(px(self.at_y(*y) + 3.5)) text-anchor="end" {
-                        (y_ticks.label(*y))
-                    }
+                @for (y, label) in y {
+                    text class="tick" x=(px(left - 6.0)) y=(px(self.at_y(*y) + 3.5)) text-anchor="end" { (label) }
                 }
             }
             text class="heading" x=(px(left)) y=(px(top - 8.0)) { (heading) }
@@ -212,39 +221,29 @@ pub fn raised(text: &str) -> String {
     text.chars().map(one).collect()
 }
 
-/// Round numbers on an axis.
-struct Ticks {
-    at: Vec<f64>,
-    decimals: usize,
-}
-
-impl Ticks {
-    /// About so many in the range.
-    fn over(range: &Range<f64>, about: usize) -> Self {
-        let width = range.end - range.start;
-        let rough = width / about as f64;
-        let decade = 10f64.powf(rough.log10().floor());
-        let step = [1.0, 2.0, 5.0, 10.0]
-            .map(|m| m * decade)
-            .into_iter()
-            .find(|s| *s >= 0.999 * rough)
-            .unwrap_or(10.0 * decade);
-        let from = (range.start / step).ceil() as i64;
-        let to = (range.end / step).floor() as i64;
-        Self {
-            at: (from..=to).map(|k| k as f64 * step).collect(),
-            decimals: (-step.log10()).ceil().clamp(0.0, 9.0) as usize,
-        }
-    }
-
-    fn label(&self, value: f64) -> String {
-        let text = format!("{value:.*}", self.decimals);
+/// About so many round numbers in the range, and how they are written.
+fn ticks(range: &Range<f64>, about: usize) -> Vec<(f64, String)> {
+    let width = range.end - range.start;
+    let rough = width / about as f64;
+    let decade = 10f64.powf(rough.log10().floor());
+    let step = [1.0, 2.0, 5.0, 10.0]
+        .map(|m| m * decade)
+        .into_iter()
+        .find(|s| *s >= 0.999 * rough)
+        .unwrap_or(10.0 * decade);
+    let from = (range.start / step).ceil() as i64;
+    let to = (range.end / step).floor() as i64;
+    let decimals = (-step.log10()).ceil().clamp(0.0, 9.0) as usize;
+    let label = |value: f64| {
+        let text = format!("{value:.decimals$}");
         // Of zero a sum of steps may leave the sign.
         match text.trim_start_matches('-').trim_matches(['0', '.']) {
             "" => text.trim_start_matches('-').into(),
             _ => text.replace('-', "−"),
         }
-    }
+    };
+    let at = (from..=to).map(|k| k as f64 * step);
+    at.map(|value| (value, label(value))).collect()
 }
 
 #[cfg(test)]
@@ -253,8 +252,10 @@ mod tests {
 
     #[test]
     fn ticks_are_round_and_inside() {
-        let ticks = Ticks::over(&(-0.031..0.047), 5);
-        let labels: Vec<String> = ticks.at.iter().map(|t| ticks.label(*t)).collect();
+        let labels: Vec<String> = ticks(&(-0.031..0.047), 5)
+            .into_iter()
+            .map(|(_, label)| label)
+            .collect();
         assert_eq!(labels, ["−0.02", "0.00", "0.02", "0.04"]);
         assert_eq!(power_of_ten(&(-3.1e-5..2e-5)), -6);
         assert_eq!(times_ten(-6), "10⁻⁶ ");

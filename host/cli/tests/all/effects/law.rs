@@ -1,0 +1,90 @@
+//! The device evaluates every effect as its data say, under any conditions.
+
+use mimu::effects;
+use mimu::effects::candidate::{Candidate, Kind};
+use mimu::effects::effect::OnDevice;
+use mimu::effects::quantity::{Conditions, REFERENCE_C, Reading};
+use mimu::effects::temperature::lagged;
+use mimu::quantity::Sensor;
+use mimu_core::compensation::Sample;
+use mimu_core::effects::{Directions, Effect, Effects, State};
+use nalgebra::{Matrix3, Vector3};
+
+/// Uniform between -1 and 1.
+fn random(seed: &mut u64) -> f64 {
+    *seed = seed
+        .wrapping_mul(6_364_136_223_846_793_005)
+        .wrapping_add(1_442_695_040_888_963_407);
+    (*seed >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+}
+
+/// By so much of what data sheets say the inputs are as good as undisturbed: the device evaluates each law without the error of the sample
+/// before.
+const SMALL: f64 = 1e-3;
+
+#[test]
+fn every_effect_is_evaluated_by_the_device_as_its_data_say() {
+    let matrix = Matrix3::new(1.0, 0.03, -0.02, 0.01, 1.0, 0.04, -0.03, 0.02, 1.0);
+    let directions = Directions::<f64>::of(&matrix).unwrap();
+    let seed = &mut 1;
+    for effect in effects::all() {
+        if !matches!(effect.on_device(), OnDevice::EverySample | OnDevice::Folded) {
+            continue;
+        }
+        let parameter = effect.parameter.map(|p| 2.0 * p.from);
+        for _ in 0..20 {
+            let size =
+                |c: &effects::effect::Coefficient, r: f64| SMALL * c.typical * (1.5 + 0.5 * r);
+            let values: Vec<f64> = effect.of_unit().map(|c| size(c, random(seed))).collect();
+            let mut device = Effects::<f64, 8>::of(directions, directions);
+            device
+                .push(Effect::named(effect.id, &values, parameter).unwrap())
+                .unwrap();
+
+            // Two samples, a second apart, at two temperatures.
+            let mut vector = |size: f64| Vector3::from_fn(|_, _| size * random(seed));
+            let samples = [(); 2].map(|()| Sample {
+                gyro: vector(4.0),
+                accel: vector(20.0),
+            });
+            let temp_c = [(); 2].map(|()| 25.0 + 20.0 * random(seed));
+            let [first_s, step_s] = [50.0, 20.0].map(|s| s * (1.5 + random(seed)));
+            let mut state = State::new(1.0);
+            device.slow(&mut state, first_s, temp_c[0]);
+            device.slow(&mut state, step_s, temp_c[1]);
+            device.remove(&mut state, &samples[0]);
+            let clean = device.remove(&mut state, &samples[1]);
+
+            let offsets = temp_c.map(|t| t - REFERENCE_C);
+            let signal = [(0.0, offsets[0]), (step_s, offsets[1])];
+            let [own, of_device] = match effect.sensor {
+                Sensor::Gyro => [samples[1].gyro, samples[1].gyro - clean.gyro],
+                Sensor::Accel => [samples[1].accel, samples[1].accel - clean.accel],
+            };
+            let at = Conditions {
+                session: 0,
+                t_s: first_s + step_s,
+                on_s: first_s + step_s,
+                duration_s: 1.0,
+                rate: samples[1].gyro,
+                force: samples[1].accel,
+                angular_acceleration: samples[1].gyro - samples[0].gyro,
+                sensed: directions.sensed * own,
+                temperature_offset: offsets[1],
+                lagged_temperature: lagged(&signal, parameter.unwrap_or(1.0))[1],
+                reading: Reading::NONE,
+            };
+            let candidate = Candidate::new(effect.sensor, Kind::Effect(effect));
+            let mut error = Vector3::zeros();
+            candidate.add_error(&at, parameter.unwrap_or(0.0), &values, &mut error);
+            let of_host = directions.to_body * error;
+            let off = (of_device - of_host).norm();
+            assert!(of_host.norm() > 1e-9, "{}: {of_host:?}", effect.id);
+            assert!(
+                off < 1e-3 * of_host.norm(),
+                "{}: {of_device:?} {of_host:?}",
+                effect.id
+            );
+        }
+    }
+}

@@ -1,0 +1,359 @@
+//! An effect, a product found from the data or a jump of a bias, with the choice of its coefficients.
+
+use nalgebra::Vector3;
+
+use super::converter::{BITS, Codes, Converter};
+use super::effect::{Coefficient, Effect, NonlinearParameter, Role, Scope};
+use super::quantity::{Conditions, Need, Quantity, RATE_LAG_S};
+use super::readout;
+use super::regressor::{Product, Regressor};
+use super::temperature::Followed;
+use crate::quantity::AXES;
+use crate::quantity::Sensor;
+
+/// What a candidate is.
+#[derive(Debug, Clone)]
+pub enum Kind {
+    /// A named effect.
+    Effect(&'static Effect),
+    /// A term found from the data, of one axis.
+    Term(usize, Product),
+    /// The bias of one axis is another from some time on, s, within one recording.
+    Jump {
+        /// Axis.
+        axis: usize,
+        /// Index of the recording.
+        session: usize,
+        /// Time, s since it began.
+        t_s: f64,
+    },
+}
+
+/// What is tried.
+#[derive(Debug, Clone)]
+pub struct Candidate {
+    /// Sensor.
+    pub sensor: Sensor,
+    /// What it is.
+    pub kind: Kind,
+    /// Which of its coefficients the experiment can tell.
+    pub active: Vec<usize>,
+    /// Of errors by the code: the converter of each axis that has one. Two axes may share one.
+    pub codes: Codes,
+    /// As in [`Followed`].
+    pub without_self_heating: bool,
+    /// Coefficients that the experiment shows, but not beside the active ones and the affine parameters.
+    pub inseparable: Vec<usize>,
+    /// How many choices it is the best of.
+    pub choices: f64,
+    /// Coefficients to choose from, where the choice is part of the search.
+    pub offered: Vec<usize>,
+}
+
+/// Errors of a converter.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OfConverter {
+    /// Axis that it reads; `None`: all of them.
+    pub axis: Option<usize>,
+    /// Its codes.
+    pub converter: Converter,
+    /// Of its bits from the first down, in units of the weight of the first.
+    pub errors: [f64; BITS],
+}
+
+/// Values of a nonlinear parameter that are screened.
+const SCREENED: usize = 9;
+
+impl Candidate {
+    /// Stable name; of a jump what a person reads.
+    pub fn id(&self) -> String {
+        match &self.kind {
+            Kind::Effect(e) => e.id.into(),
+            Kind::Term(axis, m) => format!("term:{}_{}~{}", self.sensor, AXES[*axis], m.name()),
+            Kind::Jump { axis, session, t_s } => {
+                let place = match session {
+                    0 => String::new(),
+                    later => format!(" of recording {}", later + 1),
+                };
+                format!(
+                    "jump of {}_{} at {t_s:.0} s{place}",
+                    self.sensor, AXES[*axis]
+                )
+            }
+        }
+    }
+
+    /// Whether it is an effect of the library.
+    pub fn is_listed(&self) -> bool {
+        matches!(self.kind, Kind::Effect(_))
+    }
+
+    /// Its physics in a line.
+    pub fn about(&self) -> &'static str {
+        match self.kind {
+            Kind::Effect(e) => e.about,
+            Kind::Term(..) => "a product of what was recorded; no effect of this name is known",
+            Kind::Jump { .. } => "the bias is another from here on",
+        }
+    }
+
+    /// Its nonlinear parameter.
+    pub fn parameter(&self) -> Option<NonlinearParameter> {
+        match self.kind {
+            Kind::Effect(e) => e.parameter,
+            _ => None,
+        }
+    }
+
+    /// Values of its nonlinear parameter to be screened; 0 if it has none.
+    pub fn parameters(&self) -> Vec<f64> {
+        let Some(NonlinearParameter { from, to, .. }) = self.parameter() else {
+            return vec![0.0];
+        };
+        let step = (to / from).powf(1.0 / (SCREENED - 1) as f64);
+        (0..SCREENED).map(|k| from * step.powi(k as i32)).collect()
+    }
+
+    /// A candidate with all of its coefficients but those of the recording alone.
+    pub fn new(sensor: Sensor, kind: Kind) -> Self {
+        let active = match &kind {
+            Kind::Effect(e) => {
+                let lasting = |k: &usize| e.coefficients[*k].scope != Scope::Recording;
+                (0..e.coefficients.len()).filter(lasting).collect()
+            }
+            Kind::Term(..) | Kind::Jump { .. } => vec![0],
+        };
+        Self {
+            sensor,
+            kind,
+            active,
+            codes: [None; 3],
+            without_self_heating: false,
+            inseparable: Vec::new(),
+            choices: 1.0,
+            offered: Vec::new(),
+        }
+    }
+
+    /// It with one converter for all axes.
+    pub fn behind_one(mut self, converter: Converter) -> Self {
+        self.active = (0..BITS).collect();
+        self.codes = [Some(converter); 3];
+        self
+    }
+
+    /// Whether its errors are a function of the converter's code.
+    pub fn reads_code(&self) -> bool {
+        matches!(self.kind, Kind::Effect(e) if e.reads_code())
+    }
+
+    /// Coefficients of the recording alone, of the axes that are active.
+    pub(crate) fn of_recording(&self) -> Vec<usize> {
+        let Kind::Effect(e) = &self.kind else {
+            return Vec::new();
+        };
+        let is_active = |axis| self.active.iter().any(|k| e.coefficients[*k].axis == axis);
+        let all = e.coefficients.iter().enumerate();
+        all.filter(|(_, c)| c.scope == Scope::Recording && is_active(c.axis))
+            .map(|(k, _)| k)
+            .collect()
+    }
+
+    /// Regressors of its active coefficients; of a jump none.
+    fn active_regressors(&self) -> Vec<Regressor> {
+        match &self.kind {
+            Kind::Effect(e) => {
+                let each = self.active.iter().map(|k| e.coefficients[*k].regressor);
+                each.collect()
+            }
+            Kind::Term(_, product) => vec![Regressor::Product(*product)],
+            Kind::Jump { .. } => Vec::new(),
+        }
+    }
+
+    /// Regressor of each of its [slots](Self::slots); of a jump none.
+    pub fn slot_regressors(&self) -> Vec<Regressor> {
+        let all = self.active_regressors();
+        let slots = self.slots();
+        let each = slots.iter().filter_map(|(k, _)| all.get(*k).copied());
+        each.collect()
+    }
+
+    /// Whether it is a smooth nonlinearity of an axis: a function of the input along its own direction, and of nothing else.
+    pub fn is_nonlinearity(&self) -> bool {
+        let mut all = self.active_regressors().into_iter().peekable();
+        let any = all.peek().is_some();
+        any && all.all(|r| r.quantities() == [Quantity::Input])
+    }
+
+    /// Whether what it does to the readings cannot be known without `need`.
+    pub(crate) fn needs(&self, need: Need) -> bool {
+        let all = self.active_regressors();
+        all.iter().any(|r| r.needs(need, self.sensor))
+    }
+
+    /// Whether the readings err by it.
+    pub fn is_error(&self) -> bool {
+        match &self.kind {
+            Kind::Effect(e) => e.is_error(),
+            Kind::Term(..) | Kind::Jump { .. } => true,
+        }
+    }
+
+    /// It and the values of its active coefficients without those that are of a recording alone.
+    pub fn lasting(&self, values: &[f64]) -> (Self, Vec<f64>) {
+        let Kind::Effect(e) = &self.kind else {
+            return (self.clone(), values.to_vec());
+        };
+        let lasting = |(k, _): &(usize, f64)| e.coefficients[*k].scope != Scope::Recording;
+        let all = self.active.iter().copied().zip(values.iter().copied());
+        let (active, values) = all.filter(lasting).unzip();
+        let lasting = Self {
+            active,
+            without_self_heating: false,
+            ..self.clone()
+        };
+        (lasting, values)
+    }
+
+    /// Place among the active coefficients, and axis, of each of its regressors.
+    pub fn slots(&self) -> Vec<(usize, usize)> {
+        match &self.kind {
+            Kind::Effect(e) => {
+                let axes = self.active.iter().map(|k| e.coefficients[*k].axis);
+                let slots = axes.enumerate().flat_map(|(at, axis)| match axis {
+                    Some(axis) => vec![(at, axis)],
+                    None => (0..3).map(|axis| (at, axis)).collect(),
+                });
+                slots.collect()
+            }
+            Kind::Term(axis, _) | Kind::Jump { axis, .. } => vec![(0, *axis)],
+        }
+    }
+
+    /// Axis of each of its regressors.
+    pub fn axes(&self) -> Vec<usize> {
+        self.slots().into_iter().map(|s| s.1).collect()
+    }
+
+    /// Adds the errors of the three axes by `values`, coefficients in the order of the active ones; SI.
+    pub fn add_error(
+        &self,
+        at: &Conditions,
+        parameter: f64,
+        values: &[f64],
+        error: &mut Vector3<f64>,
+    ) {
+        let slots = self.slots();
+        let mut regressors = vec![0.0; slots.len()];
+        self.regressors(at, parameter, &mut regressors);
+        for ((coefficient, axis), regressor) in slots.iter().zip(regressors) {
+            error[*axis] += values[*coefficient] * regressor;
+        }
+    }
+
+    /// Of errors by the code, with the values of its active coefficients: what each converter is off by; one of all axes where that is
+    /// all there is to say.
+    pub fn by_converter(&self, values: &[f64]) -> Vec<OfConverter> {
+        let all: Vec<OfConverter> = (0..3)
+            .filter_map(|axis| {
+                let mut errors = [0.0; BITS];
+                for (k, value) in self.active.iter().zip(values) {
+                    let own = k.checked_sub(readout::first_of(axis));
+                    let bit = if *k < errors.len() { Some(*k) } else { own };
+                    if let Some(error) = bit.and_then(|bit| errors.get_mut(bit)) {
+                        *error += value;
+                    }
+                }
+                Some(OfConverter {
+                    axis: Some(axis),
+                    converter: self.codes[axis]?,
+                    errors,
+                })
+            })
+            .collect();
+        let first = all.first().copied();
+        let alike = |one: &OfConverter| {
+            first.is_some_and(|f| (f.converter, f.errors) == (one.converter, one.errors))
+        };
+        match first {
+            Some(one) if all.len() == 3 && all.iter().all(alike) => {
+                vec![OfConverter { axis: None, ..one }]
+            }
+            _ => all,
+        }
+    }
+
+    /// Name and unit of each of its active coefficients.
+    pub fn names(&self) -> Vec<(String, String)> {
+        match &self.kind {
+            Kind::Effect(e) => {
+                let of = |k: &usize| {
+                    let coefficient = &e.coefficients[*k];
+                    (coefficient.name.into(), coefficient.unit(self.sensor))
+                };
+                self.active.iter().map(of).collect()
+            }
+            Kind::Term(axis, product) => vec![(AXES[*axis].into(), product.term_unit(self.sensor))],
+            Kind::Jump { axis, .. } => vec![(AXES[*axis].into(), self.sensor.unit().into())],
+        }
+    }
+
+    /// Writes the regressors of its active coefficients under some conditions, one for each slot.
+    pub fn regressors(&self, at: &Conditions, parameter: f64, out: &mut [f64]) {
+        match &self.kind {
+            Kind::Effect(e) => {
+                let at = match self.reads_code() {
+                    true => &at.in_bits(&self.codes),
+                    false => at,
+                };
+                let mut out = out.iter_mut();
+                for k in &self.active {
+                    let Coefficient {
+                        axis, regressor, ..
+                    } = &e.coefficients[*k];
+                    let axes = axis.map_or(0..3, |axis| axis..axis + 1);
+                    for (axis, out) in axes.zip(&mut out) {
+                        *out = regressor.value(at, parameter, axis);
+                    }
+                }
+            }
+            Kind::Term(axis, product) => out[0] = product.value(at, *axis),
+            Kind::Jump { session, t_s, .. } => {
+                let since = at.session == *session && at.t_s >= *t_s;
+                out[0] = f64::from(u8::from(since));
+            }
+        }
+    }
+
+    /// Whether it moves with temperature or time.
+    pub fn is_slow(&self) -> bool {
+        let jumps = matches!(self.kind, Kind::Jump { .. });
+        jumps || self.active_regressors().iter().any(Regressor::is_slow)
+    }
+
+    /// Whether it follows the temperature.
+    pub fn is_thermal(&self) -> bool {
+        self.needs(Need::Temperature)
+    }
+
+    /// Lag of the temperature that its regressors want, s.
+    pub fn lag_s(&self, parameter: f64) -> Option<f64> {
+        match &self.kind {
+            Kind::Effect(e) if e.parameter.is_some_and(|p| p.role == Role::Lag) => Some(parameter),
+            Kind::Term(_, p) if p.parts().any(|f| f.0 == Quantity::TemperatureRate) => {
+                Some(RATE_LAG_S)
+            }
+            _ => None,
+        }
+    }
+
+    /// The temperature that its regressors follow, where that is not the one recorded.
+    pub fn followed(&self, parameter: f64) -> Option<Followed> {
+        let (lag_s, without_self_heating) = (self.lag_s(parameter), self.without_self_heating);
+        (without_self_heating || lag_s.is_some()).then_some(Followed {
+            lag_s,
+            without_self_heating,
+        })
+    }
+}

@@ -1,0 +1,241 @@
+//! An effect: what the affine model lacks, as a sum of regressors with unknown coefficients.
+
+use super::quantity::Quantity;
+use super::regressor::{Product, Regressor};
+use crate::quantity::Sensor;
+
+/// What the nonlinear parameter of an effect is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Role {
+    /// A time constant, or a scale of another quantity.
+    Scale,
+    /// The lag of [`Quantity::TemperatureLag`].
+    Lag,
+}
+
+/// A parameter that the error is not linear in, searched between two values.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NonlinearParameter {
+    /// Name, with the unit.
+    pub name: &'static str,
+    /// Smallest value that is looked at.
+    pub from: f64,
+    /// Largest.
+    pub to: f64,
+    /// What it is.
+    pub role: Role,
+}
+
+/// One coefficient.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Coefficient {
+    /// Name.
+    pub name: &'static str,
+    /// Axis of the sensor whose reading it is added to; `None`: to all three, each with the regressor of its own.
+    pub axis: Option<usize>,
+    /// What the error is proportional to.
+    pub regressor: Regressor,
+    /// Size in data sheets, in its unit: an experiment that could not see it has not excited the effect.
+    pub typical: f64,
+    /// What it belongs to.
+    pub scope: Scope,
+}
+
+/// What a coefficient belongs to. All are fitted and reported.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Scope {
+    /// The unit: it is an error, written and removed.
+    Unit,
+    /// The first recording: neither written nor removed elsewhere.
+    Recording,
+    /// The place: what the sensor reads is there. The calibration is found without it, and nothing takes it out of readings.
+    Place,
+}
+
+/// One kind of effect. The error of sensor axis i is the sum over the coefficients of i of coefficient times regressor, in the
+/// SI unit of the sensor, and is added to what the sensor should read.
+#[derive(Debug, Clone, Copy)]
+pub struct Effect {
+    /// Public, stable name.
+    pub id: &'static str,
+    /// Triad whose readings err.
+    pub sensor: Sensor,
+    /// Physics in a line.
+    pub about: &'static str,
+    /// Its coefficients; those of a recording alone stand last.
+    pub coefficients: &'static [Coefficient],
+    /// Its nonlinear parameter.
+    pub parameter: Option<NonlinearParameter>,
+    /// Where the typical sizes are from, in words.
+    pub size: &'static str,
+    /// What an experiment has to have for it to be seen.
+    pub needs: &'static str,
+    /// What it may be taken for.
+    pub taken_for: &'static str,
+}
+
+impl Coefficient {
+    /// One of sensor axis `axis`.
+    pub const fn of(axis: usize, name: &'static str, regressor: Regressor, typical: f64) -> Self {
+        Self {
+            name,
+            axis: Some(axis),
+            regressor,
+            typical,
+            scope: Scope::Unit,
+        }
+    }
+
+    /// One of all axes.
+    pub const fn of_all(name: &'static str, regressor: Regressor, typical: f64) -> Self {
+        Self {
+            axis: None,
+            ..Self::of(0, name, regressor, typical)
+        }
+    }
+
+    /// It with another scope.
+    pub const fn scoped(self, scope: Scope) -> Self {
+        Self { scope, ..self }
+    }
+
+    /// SI unit in an error of `sensor`.
+    pub fn unit(&self, sensor: Sensor) -> String {
+        self.regressor.unit(sensor)
+    }
+}
+
+/// One coefficient for each axis, of the same regressor.
+pub(super) const fn each(regressor: Regressor, typical: f64) -> [Coefficient; 3] {
+    [
+        Coefficient::of(0, "x", regressor, typical),
+        Coefficient::of(1, "y", regressor, typical),
+        Coefficient::of(2, "z", regressor, typical),
+    ]
+}
+
+/// A matrix by rows, whose columns have these regressors; rows are the sensor's axes.
+pub(super) const fn matrix(columns: [Regressor; 3], typical: f64) -> [Coefficient; 9] {
+    let [x, y, z] = columns;
+    [
+        Coefficient::of(0, "xx", x, typical),
+        Coefficient::of(0, "xy", y, typical),
+        Coefficient::of(0, "xz", z, typical),
+        Coefficient::of(1, "yx", x, typical),
+        Coefficient::of(1, "yy", y, typical),
+        Coefficient::of(1, "yz", z, typical),
+        Coefficient::of(2, "zx", x, typical),
+        Coefficient::of(2, "zy", y, typical),
+        Coefficient::of(2, "zz", z, typical),
+    ]
+}
+
+/// The same power of the specific force along each body axis.
+pub(super) const fn force(power: u8) -> [Regressor; 3] {
+    [
+        Regressor::power(Quantity::Force(0), power),
+        Regressor::power(Quantity::Force(1), power),
+        Regressor::power(Quantity::Force(2), power),
+    ]
+}
+
+/// Two quantities multiplied.
+pub(super) const fn times(first: Quantity, second: Quantity) -> Regressor {
+    Regressor::Product(Product::of(first, second))
+}
+
+/// How the device removes an effect.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum OnDevice {
+    /// Not at all: it is no error.
+    Never,
+    /// From the raw reading, by its code.
+    ByCode,
+    /// With every sample.
+    EverySample,
+    /// Folded into a bias and a matrix, as temperature and time move.
+    Folded,
+}
+
+impl Effect {
+    /// Whether the readings err by it; else it is something that they should show.
+    pub fn is_error(&self) -> bool {
+        self.coefficients.iter().all(|c| c.scope != Scope::Place)
+    }
+
+    /// Whether its errors are a function of the converter's code.
+    pub fn reads_code(&self) -> bool {
+        let of_code = |c: &Coefficient| matches!(c.regressor, Regressor::Bit(_));
+        self.coefficients.iter().any(of_code)
+    }
+
+    /// The coefficients that are written to a file and removed.
+    pub fn of_unit(&self) -> impl Iterator<Item = &'static Coefficient> {
+        self.coefficients.iter().filter(|c| c.scope == Scope::Unit)
+    }
+
+    /// How the device removes it: what cannot be folded runs with every sample.
+    pub fn on_device(&self) -> OnDevice {
+        match self {
+            e if !e.is_error() => OnDevice::Never,
+            e if e.reads_code() => OnDevice::ByCode,
+            e if e.of_unit().all(|c| c.regressor.folds(e.sensor)) => OnDevice::Folded,
+            _ => OnDevice::EverySample,
+        }
+    }
+
+    /// Its line in the table of docs/effects.md.
+    pub fn table_line(&self) -> String {
+        let mut formulas: Vec<String> = Vec::new();
+        for c in self.coefficients {
+            // Coefficients of each axis with the same law are one formula; those of a matrix are told apart by the other axis.
+            let formula = match c.regressor {
+                Regressor::Bit(_) => "bit set or not, in the mean over the noise".into(),
+                regressor => regressor.formula(None),
+            };
+            let formula = match c.scope {
+                Scope::Recording => {
+                    format!("{formula} (not of the unit: neither written nor removed)")
+                }
+                _ => formula,
+            };
+            if !formulas.contains(&formula) {
+                formulas.push(formula);
+            }
+        }
+        let parameter = self.parameter.map_or(String::new(), |p| {
+            format!("; τ from {} to {} s", p.from, p.to)
+        });
+        let mut units: Vec<String> = Vec::new();
+        for c in self.of_unit() {
+            let unit = c.unit(self.sensor);
+            if !units.contains(&unit) {
+                units.push(unit);
+            }
+        }
+        let of_place = self.coefficients.iter().map(|c| c.unit(self.sensor));
+        let unit = match units[..] {
+            [] => of_place.take(1).collect(),
+            _ => units.join(", "),
+        };
+        let device = match self.on_device() {
+            OnDevice::Never => "never: it is no error",
+            OnDevice::ByCode => "with every sample, by the code",
+            OnDevice::EverySample => "with every sample",
+            OnDevice::Folded => "as temperature and time move",
+        };
+        format!(
+            "| `{}` | {} | {}{parameter} | {} in {unit} | {} | {device} | {} | {} |",
+            self.id,
+            self.about,
+            formulas.join("; "),
+            self.coefficients
+                .iter()
+                .filter(|c| c.scope != Scope::Recording)
+                .count(),
+            self.size,
+            self.needs,
+            self.taken_for
+        )
+    }
+}

@@ -1,0 +1,84 @@
+//! Gyro errors that depend on the motion.
+
+use super::effect::{Coefficient, Effect, Scope, each, force, matrix};
+use super::quantity::Quantity::{Input, Up};
+use super::regressor::Regressor;
+use crate::quantity::Sensor;
+
+/// 1 deg/s, rad/s.
+const DPS: f64 = std::f64::consts::PI / 180.0;
+const G: f64 = 9.80665;
+/// Full scale of an ADXRS300, rad/s: where its nonlinearity is stated.
+const FULL: f64 = 300.0 * DPS;
+
+const EARTH: [Coefficient; 1] = {
+    // 7.292e-5 rad/s at 45 degrees.
+    let vertical = Coefficient::of_all("vertical", Regressor::linear(Up), 5.2e-5);
+    [vertical.scoped(Scope::Place)]
+};
+
+pub(super) const EFFECTS: [Effect; 6] = [
+    // The vertical part alone: about the level one nothing is known where nothing says which way is north.
+    Effect {
+        id: "earth_rate",
+        sensor: Sensor::Gyro,
+        about: "the Earth turns, and a gyro at rest reads it: its rate times the sine of the latitude, about the vertical",
+        coefficients: &EARTH,
+        parameter: None,
+        size: "0.003 deg/s at 45°",
+        needs: "rest with each axis up and down, long enough to see 0.003 deg/s",
+        taken_for: "g-sensitivity alike along all axes",
+    },
+    Effect {
+        id: "gyro_g_sensitivity",
+        sensor: Sensor::Gyro,
+        about: "the proof mass sags under force, and the sag is read as rate",
+        coefficients: &matrix(force(1), 0.2 * DPS / G),
+        parameter: None,
+        size: "0.2 deg/s/g (ADXRS300)",
+        needs: "rest with each axis up and down",
+        taken_for: "magnetic sensitivity, where the heading is always the same; Earth rate",
+    },
+    // At rest in gravity the three squares add up to a constant, which is a bias: of each row the differences are seen, and their sum with
+    // the bias only where the size of the force changes.
+    Effect {
+        id: "gyro_g_squared",
+        sensor: Sensor::Gyro,
+        about: "unequal stiffness rectifies force: error by the squares of the force",
+        coefficients: &matrix(force(2), 0.05 * DPS / (G * G)),
+        parameter: None,
+        size: "0.05 deg/s/g² (assumed)",
+        needs: "rest with each axis up, down and level; a centrifuge or shaker for the sum of each row, which at rest in gravity is bias",
+        taken_for: "bias, in the sum of each row; g-sensitivity, where each axis points one way only",
+    },
+    Effect {
+        id: "gyro_scale_quadratic",
+        sensor: Sensor::Gyro,
+        about: "the response bends: error by the square of the rate along the axis",
+        coefficients: &each(Regressor::power(Input, 2), 1e-3 / FULL),
+        parameter: None,
+        size: "0.1 % of full scale at 300 deg/s, best straight line (ADXRS300)",
+        needs: "three rates and more about each axis, both directions",
+        taken_for: "asymmetry",
+    },
+    Effect {
+        id: "gyro_scale_cubic",
+        sensor: Sensor::Gyro,
+        about: "the response saturates: error by the cube of the rate along the axis",
+        coefficients: &each(Regressor::power(Input, 3), 1e-3 / (FULL * FULL)),
+        parameter: None,
+        size: "0.1 % of full scale at 300 deg/s, best straight line (ADXRS300)",
+        needs: "two sizes of rate and more about each axis, both directions",
+        taken_for: "dead zone",
+    },
+    Effect {
+        id: "gyro_scale_asymmetry",
+        sensor: Sensor::Gyro,
+        about: "the two half-waves of the demodulator differ: another scale factor each way",
+        coefficients: &each(Regressor::Absolute(Input), 1e-3),
+        parameter: None,
+        size: "0.1 % (assumed)",
+        needs: "three rates and more about each axis, both directions",
+        taken_for: "quadratic",
+    },
+];

@@ -1,0 +1,125 @@
+//! Effects: what an affine calibration lacks, by name, as data.
+//!
+//! | module | what |
+//! |---|---|
+//! | [`quantity`] | what an error can be a function of |
+//! | [`converter`] | bits of the code behind a reading |
+//! | [`regressor`] | products of powers, absolute values, decays: what an error is proportional to |
+//! | [`effect`] | coefficients of regressors, with what excites and what removes them |
+//! | `gyro`, `accel`, `drift`, `thermal`, [`readout`] | the effects, one list each |
+//! | [`alternatives`] | laws that are on no list, whose shadow an effect may be |
+//! | [`candidate`] | an effect, a product found from the data or a jump, with the choice of its coefficients |
+//! | [`temperature`] | the temperature that an effect follows |
+//! | [`removal`] | taking effects out of readings |
+//!
+//! An effect is added by one entry in one of the lists, one arm in `core`, which removes it, and one truth in `rig`. What it is a function
+//! of, its units, how the device evaluates it and its line in docs/effects.md follow from the entry. Tests loop over [`all`], so that
+//! what is missing elsewhere is said.
+
+pub mod alternatives;
+pub mod candidate;
+pub mod converter;
+pub mod effect;
+pub mod quantity;
+pub mod readout;
+pub mod regressor;
+pub mod removal;
+pub mod temperature;
+
+mod accel;
+mod drift;
+mod gyro;
+mod thermal;
+
+use effect::Effect;
+
+/// All of them, in the order of docs/effects.md.
+pub fn all() -> impl Iterator<Item = &'static Effect> {
+    static LISTS: [&[Effect]; 5] = [
+        &gyro::EFFECTS,
+        &accel::EFFECTS,
+        &drift::EFFECTS,
+        &thermal::EFFECTS,
+        &readout::EFFECTS,
+    ];
+    LISTS.into_iter().flatten()
+}
+
+/// The effect of this name.
+pub fn by_id(id: &str) -> Option<&'static Effect> {
+    all().find(|e| e.id == id)
+}
+
+#[cfg(test)]
+mod tests {
+    use mimu_core::effects::Effect as OfCore;
+
+    use super::effect::{OnDevice, Scope};
+    use super::*;
+
+    #[test]
+    fn every_effect_is_there_once_and_belongs_to_its_sensor() {
+        let mut ids: Vec<&str> = all().map(|e| e.id).collect();
+        let count = ids.len();
+        ids.sort_unstable();
+        ids.dedup();
+        assert_eq!(ids.len(), count);
+        for effect in all() {
+            assert!(effect.id.starts_with(effect.sensor.name()) || !effect.is_error());
+            // The device takes the coefficients of the unit as a list.
+            let of_unit = effect
+                .coefficients
+                .iter()
+                .map(|c| c.scope != Scope::Recording);
+            assert!(of_unit.is_sorted_by(|a, b| a >= b), "{}", effect.id);
+        }
+    }
+
+    /// What the data say of how often an effect has to be evaluated is what the device does.
+    #[test]
+    fn the_device_folds_what_moves_with_temperature_and_time_only() {
+        for effect in all() {
+            let numbers = vec![1e-3; effect.of_unit().count()];
+            let parameter = effect.parameter.map(|p| p.from);
+            let of_core = OfCore::<f64>::named(effect.id, &numbers, parameter);
+            match effect.on_device() {
+                OnDevice::Never | OnDevice::ByCode => assert!(of_core.is_err(), "{}", effect.id),
+                how => {
+                    let folded = of_core.map(|e| e.is_slow());
+                    assert_eq!(folded, Ok(how == OnDevice::Folded), "{}", effect.id);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn every_effect_that_the_device_removes_has_a_bit_in_its_greeting() {
+        let known = mimu_core::wire::EFFECTS;
+        for effect in all().filter(|e| e.is_error()) {
+            let bit = known.iter().position(|id| *id == effect.id);
+            let bit = bit.unwrap_or_else(|| panic!("{}: append it to wire::EFFECTS", effect.id));
+            let bits = mimu_core::wire::effects_of_this_build();
+            assert!(
+                bits & (1 << bit) != 0,
+                "{}: core does not remove it",
+                effect.id
+            );
+        }
+        assert_eq!(known.len(), all().filter(|e| e.is_error()).count());
+    }
+
+    /// The table of the documentation is made of the data.
+    #[test]
+    fn the_table_of_the_documentation_is_that_of_the_data() {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/effects.md");
+        let text = std::fs::read_to_string(path).expect("docs/effects.md");
+        let head = "| id | physics | regressors | coefficients | size (source) | the device removes it | seen by | taken for |\n\
+                    |---|---|---|---|---|---|---|---|\n";
+        let lines: String = all().map(|e| e.table_line() + "\n").collect();
+        let table = format!("{head}{lines}");
+        assert!(
+            text.contains(&table),
+            "docs/effects.md has to hold this table:\n\n{table}"
+        );
+    }
+}

@@ -1,0 +1,319 @@
+//! What an error can be a function of: the state and the surroundings of a unit.
+
+use nalgebra::Vector3;
+
+use crate::blocks::Moments;
+use crate::quantity::AXES;
+use crate::quantity::Sensor;
+
+/// Temperature from which offsets count, °C.
+pub const REFERENCE_C: f64 = 25.0;
+
+/// Lag of the filter that the rate of change of the temperature is taken by, s: unfiltered it would be noise.
+pub const RATE_LAG_S: f64 = 30.0;
+
+/// What a unit undergoes over a short stretch of time, in the body frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Conditions {
+    /// Index of the recording.
+    pub session: usize,
+    /// Middle of the stretch, s since the recording began.
+    pub t_s: f64,
+    /// The same since power-on, as the device counts it; since the recording began where nobody knows.
+    pub on_s: f64,
+    /// Length of the stretch, s.
+    pub duration_s: f64,
+    /// Rate, rad/s.
+    pub rate: Vector3<f64>,
+    /// Specific force, m/s².
+    pub force: Vector3<f64>,
+    /// Angular acceleration, rad/s²; zero within a dwell.
+    pub angular_acceleration: Vector3<f64>,
+    /// The sensor's own input along its three sensitive directions, rad/s or m/s².
+    pub sensed: Vector3<f64>,
+    /// Temperature above [`REFERENCE_C`], °C; not a number where it was not recorded.
+    pub temperature_offset: f64,
+    /// The same behind a first-order lag: that of the effect, or [`RATE_LAG_S`].
+    pub lagged_temperature: f64,
+    /// What the sensor reads.
+    pub reading: Reading,
+}
+
+impl Conditions {
+    /// One of several at the same input: the first, with the readings of all.
+    pub(crate) fn pooled(all: &[Self]) -> Self {
+        let total: f64 = all.iter().map(|c| c.duration_s).sum();
+        let mean = |of: &dyn Fn(&Self) -> Vector3<f64>| -> Vector3<f64> {
+            all.iter().map(|c| of(c) * (c.duration_s / total)).sum()
+        };
+        let level = mean(&|c| c.reading.mean);
+        let square = |v: Vector3<f64>| v.component_mul(&v);
+        let variance = mean(&|c| square(c.reading.sd) + square(c.reading.mean - level));
+        let mut pooled = all[0];
+        pooled.duration_s = total;
+        pooled.reading.mean = level;
+        pooled.reading.sd = variance.map(f64::sqrt);
+        pooled
+    }
+
+    /// The conditions as the sensor would read them without `error` of its axes, SI.
+    pub fn read_without(&self, error: &Vector3<f64>) -> Self {
+        let mut clean = *self;
+        clean.reading.mean -= self.reading.scale.component_mul(error);
+        clean
+    }
+}
+
+/// Raw readings of the three axes of a sensor over a stretch of time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Reading {
+    /// Their mean, raw.
+    pub mean: Vector3<f64>,
+    /// Standard deviation of a sample, raw.
+    pub sd: Vector3<f64>,
+    /// Scale factors, raw/SI, positive.
+    pub scale: Vector3<f64>,
+}
+
+impl Reading {
+    /// Where nothing was recorded: without noise, in SI.
+    pub const NONE: Self = Self {
+        mean: Vector3::new(0.0, 0.0, 0.0),
+        sd: Vector3::new(0.0, 0.0, 0.0),
+        scale: Vector3::new(1.0, 1.0, 1.0),
+    };
+
+    /// Of statistical `moments` of the three axes.
+    pub fn of(moments: &[Moments], scale: &Vector3<f64>) -> Self {
+        let mean = |i: usize| moments[i].mean;
+        let sd = |i: usize| match moments[i].n {
+            0 | 1 => 0.0,
+            n => (moments[i].m2 / f64::from(n - 1)).sqrt(),
+        };
+        Self {
+            mean: Vector3::from_fn(|i, _| mean(i)),
+            sd: Vector3::from_fn(|i, _| sd(i)),
+            scale: *scale,
+        }
+    }
+}
+
+/// A quantity that regressors are made of. The axis that errs is given with the regressor.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Quantity {
+    /// Rate about a body axis, rad/s.
+    Rate(usize),
+    /// Specific force along a body axis, m/s².
+    Force(usize),
+    /// Temperature above [`REFERENCE_C`], K.
+    Temperature,
+    /// Its rate of change behind a lag of [`RATE_LAG_S`], K/s.
+    TemperatureRate,
+    /// Time since power-on, or since the recording began where nobody knows, s.
+    Time,
+    /// Temperature behind a lag, which is the nonlinear parameter of the effect, minus the temperature, K.
+    TemperatureLag,
+    /// Time since the first recording began, s; infinite in the others.
+    RecordingTime,
+    /// Input of the sensor along the sensitive direction of the axis that errs, rad/s or m/s².
+    Input,
+    /// The same of another axis of the sensor.
+    InputAlong(usize),
+    /// Angular acceleration about a body axis, rad/s².
+    AngularAcceleration(usize),
+    /// Component of the vertical along the body axis of the same name as the axis that errs; the specific force at rest points up.
+    Up,
+    /// Magnitude of the rate, rad/s.
+    RateMagnitude,
+}
+
+/// What an effect needs to be known for its removal.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Need {
+    Rate,
+    Force,
+    Temperature,
+}
+
+impl Quantity {
+    /// Its value in the error of sensor axis `axis`, SI.
+    pub fn of(self, at: &Conditions, axis: usize) -> f64 {
+        match self {
+            Self::Rate(i) => at.rate[i],
+            Self::Force(i) => at.force[i],
+            Self::Temperature => at.temperature_offset,
+            Self::TemperatureRate => (at.temperature_offset - at.lagged_temperature) / RATE_LAG_S,
+            Self::Time => at.on_s,
+            Self::TemperatureLag => at.lagged_temperature - at.temperature_offset,
+            Self::RecordingTime => match at.session {
+                0 => at.t_s,
+                _ => f64::INFINITY,
+            },
+            Self::Input => at.sensed[axis],
+            Self::InputAlong(i) => at.sensed[i],
+            Self::AngularAcceleration(i) => at.angular_acceleration[i],
+            Self::Up => at.force[axis] / at.force.norm(),
+            Self::RateMagnitude => at.rate.norm(),
+        }
+    }
+
+    /// `at` where it has another value; of one that is made of several quantities, as the vertical, unchanged.
+    pub fn with(self, mut at: Conditions, axis: usize, value: f64) -> Conditions {
+        match self {
+            Self::Rate(i) => at.rate[i] = value,
+            Self::Force(i) => at.force[i] = value,
+            Self::Temperature => at.temperature_offset = value,
+            Self::TemperatureRate => {
+                at.lagged_temperature = at.temperature_offset - value * RATE_LAG_S;
+            }
+            Self::Time => at.on_s = value,
+            Self::TemperatureLag => at.lagged_temperature = at.temperature_offset + value,
+            Self::RecordingTime => at.t_s = value,
+            Self::Input => at.sensed[axis] = value,
+            Self::InputAlong(i) => at.sensed[i] = value,
+            Self::AngularAcceleration(i) => at.angular_acceleration[i] = value,
+            Self::Up | Self::RateMagnitude => {}
+        }
+        at
+    }
+
+    /// Name in the id of a term, where terms are made of it.
+    pub fn name(self) -> Option<String> {
+        Some(match self {
+            Self::Rate(i) => format!("rate_{}", AXES[i]),
+            Self::Force(i) => format!("force_{}", AXES[i]),
+            Self::Temperature => "temp".into(),
+            Self::TemperatureRate => "temp_rate".into(),
+            Self::Time => "time".into(),
+            _ => return None,
+        })
+    }
+
+    /// Those that terms are made of.
+    pub const OF_TERMS: [Self; 9] = [
+        Self::Rate(0),
+        Self::Rate(1),
+        Self::Rate(2),
+        Self::Force(0),
+        Self::Force(1),
+        Self::Force(2),
+        Self::Temperature,
+        Self::TemperatureRate,
+        Self::Time,
+    ];
+
+    /// Whether it moves with temperature and time only.
+    pub fn is_slow(self) -> bool {
+        matches!(
+            self,
+            Self::Temperature
+                | Self::TemperatureRate
+                | Self::Time
+                | Self::TemperatureLag
+                | Self::RecordingTime
+        )
+    }
+
+    /// Whether it follows the temperature.
+    pub fn is_thermal(self) -> bool {
+        matches!(
+            self,
+            Self::Temperature | Self::TemperatureRate | Self::TemperatureLag
+        )
+    }
+
+    /// Whether it is the input of `sensor`, or a part of it.
+    pub fn is_input_of(self, sensor: Sensor) -> bool {
+        match self {
+            Self::Input | Self::InputAlong(_) => true,
+            Self::Rate(_) | Self::RateMagnitude => sensor == Sensor::Gyro,
+            Self::Force(_) => sensor == Sensor::Accel,
+            _ => false,
+        }
+    }
+
+    /// Whether it cannot be known without `need`, in an error of `sensor`. The angular acceleration of a recording is taken for zero
+    /// where nobody knows it.
+    pub(crate) fn needs(self, need: Need, sensor: Sensor) -> bool {
+        match (self, need) {
+            (Self::Input | Self::InputAlong(_), Need::Rate) => sensor == Sensor::Gyro,
+            (Self::Input | Self::InputAlong(_), Need::Force) => sensor == Sensor::Accel,
+            (Self::Rate(_) | Self::RateMagnitude, Need::Rate) => true,
+            (Self::Force(_) | Self::Up, Need::Force) => true,
+            (_, Need::Temperature) => self.is_thermal(),
+            _ => false,
+        }
+    }
+
+    /// SI unit, of an effect of `sensor`.
+    pub fn unit(self, sensor: Sensor) -> &'static str {
+        match self {
+            Self::Rate(_) | Self::RateMagnitude => "rad/s",
+            Self::Force(_) => "m/s^2",
+            Self::Input | Self::InputAlong(_) => sensor.unit(),
+            Self::AngularAcceleration(_) => "rad/s^2",
+            Self::Temperature | Self::TemperatureLag => "K",
+            Self::TemperatureRate => "K/s",
+            Self::Time | Self::RecordingTime => "s",
+            Self::Up => "1",
+        }
+    }
+
+    /// Symbol in formulas, in the error of sensor axis `axis`.
+    pub fn symbol(self, axis: Option<usize>) -> String {
+        let own = axis.map_or("i", |axis| AXES[axis]);
+        match self {
+            Self::Rate(i) => format!("ω_{}", AXES[i]),
+            Self::Force(i) => format!("f_{}", AXES[i]),
+            Self::Temperature => "ΔT".into(),
+            Self::TemperatureRate => "dT/dt".into(),
+            Self::Time => "t".into(),
+            Self::TemperatureLag => "(T behind a lag - T)".into(),
+            Self::RecordingTime => "t in the first recording".into(),
+            Self::Input => format!("s_{own}"),
+            Self::InputAlong(i) => format!("s_{}", AXES[i]),
+            Self::AngularAcceleration(i) => format!("α_{}", AXES[i]),
+            Self::Up => format!("up_{own}"),
+            Self::RateMagnitude => "‖ω‖".into(),
+        }
+    }
+
+    /// Name as a person reads it, in the error of axis `axis` of `sensor`.
+    pub fn in_words(self, sensor: Sensor, axis: usize) -> String {
+        let along = |i: usize| match sensor {
+            Sensor::Gyro => format!("rate along gyro {}", AXES[i]),
+            Sensor::Accel => format!("force along accel {}", AXES[i]),
+        };
+        match self {
+            Self::Rate(i) => format!("rate {}", AXES[i]),
+            Self::Force(i) => format!("force {}", AXES[i]),
+            Self::Temperature => "temperature".into(),
+            Self::TemperatureRate => "rate of change of the temperature".into(),
+            Self::Time => "time".into(),
+            Self::TemperatureLag => "lagged temperature minus temperature".into(),
+            Self::RecordingTime => "time in the first recording".into(),
+            Self::Input => along(axis),
+            Self::InputAlong(i) => along(i),
+            Self::AngularAcceleration(i) => format!("angular acceleration {}", AXES[i]),
+            Self::Up => format!("vertical {}", AXES[axis]),
+            Self::RateMagnitude => "magnitude of the rate".into(),
+        }
+    }
+
+    /// Factor from SI to the unit in which a person reads it, and that unit.
+    pub fn readable(self, sensor: Sensor) -> (f64, &'static str) {
+        const DPS: (f64, &str) = (180.0 / std::f64::consts::PI, "deg/s");
+        const IN_G: (f64, &str) = (1.0 / 9.80665, "g");
+        match (self, sensor) {
+            (Self::Time | Self::RecordingTime, _) => (1.0 / 60.0, "min"),
+            (Self::Rate(_) | Self::RateMagnitude, _) => DPS,
+            (Self::Force(_), _) => IN_G,
+            (Self::Input | Self::InputAlong(_), Sensor::Gyro) => DPS,
+            (Self::Input | Self::InputAlong(_), Sensor::Accel) => IN_G,
+            (Self::AngularAcceleration(_), _) => (DPS.0, "deg/s²"),
+            (Self::Temperature | Self::TemperatureLag, _) => (1.0, "K"),
+            (Self::TemperatureRate, _) => (60.0, "K/min"),
+            (Self::Up, _) => (1.0, "1"),
+        }
+    }
+}

@@ -1,0 +1,358 @@
+//! A regressor as data: what an error of one axis is proportional to.
+//!
+//! Its value, unit, formula, what it depends on and how often the device has to evaluate it all follow from the same few numbers, so
+//! that an effect states its law once.
+
+use super::converter::share_set;
+use super::quantity::{Conditions, Need, Quantity};
+use crate::quantity::Sensor;
+
+/// A product of powers of up to three quantities, with a sign.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Product {
+    /// 1 or -1.
+    pub sign: f64,
+    /// In the order of the product; a power of 0 is no factor.
+    pub factors: [(Quantity, u8); 3],
+}
+
+impl Product {
+    /// Of a power of one quantity.
+    pub const fn power(of: Quantity, power: u8) -> Self {
+        let none = (of, 0);
+        Self {
+            sign: 1.0,
+            factors: [(of, power), none, none],
+        }
+    }
+
+    /// Of two quantities.
+    pub const fn of(first: Quantity, second: Quantity) -> Self {
+        Self {
+            sign: 1.0,
+            factors: [(first, 1), (second, 1), (first, 0)],
+        }
+    }
+
+    /// The same with the other sign.
+    pub const fn negative(self) -> Self {
+        Self {
+            sign: -self.sign,
+            ..self
+        }
+    }
+
+    /// Of up to three quantities in ascending order, each as often as it stands there; `None` of none or more.
+    pub fn term(quantities: &[Quantity]) -> Option<Self> {
+        let mut parts: Vec<(Quantity, u8)> = Vec::new();
+        for q in quantities {
+            match parts.last_mut() {
+                Some((last, power)) if last == q => *power += 1,
+                _ => parts.push((*q, 1)),
+            }
+        }
+        let none = (*quantities.first()?, 0);
+        (quantities.len() <= 3 && quantities.is_sorted()).then(|| Self {
+            sign: 1.0,
+            factors: std::array::from_fn(|k| parts.get(k).copied().unwrap_or(none)),
+        })
+    }
+
+    /// All terms up to third order, each once.
+    pub fn terms() -> Vec<Self> {
+        let q = Quantity::OF_TERMS;
+        let mut all = Vec::new();
+        for i in 0..q.len() {
+            all.extend(Self::term(&[q[i]]));
+            for j in i..q.len() {
+                all.extend(Self::term(&[q[i], q[j]]));
+                for k in j..q.len() {
+                    all.extend(Self::term(&[q[i], q[j], q[k]]));
+                }
+            }
+        }
+        all
+    }
+
+    /// Its quantities with their powers.
+    pub fn parts(&self) -> impl Iterator<Item = (Quantity, u8)> + '_ {
+        self.factors.iter().copied().filter(|f| f.1 > 0)
+    }
+
+    /// How many quantities are multiplied, powers counted.
+    pub fn order(&self) -> u8 {
+        self.factors.iter().map(|f| f.1).sum()
+    }
+
+    /// Its value in the error of sensor axis `axis`, SI.
+    pub fn value(&self, at: &Conditions, axis: usize) -> f64 {
+        let powers = self.parts().map(|(q, p)| q.of(at, axis).powi(i32::from(p)));
+        powers.fold(self.sign, |product, v| product * v)
+    }
+
+    /// Largest value that it could have under `conditions`: all of its quantities at their largest together.
+    pub fn largest(&self, conditions: &[Conditions], axis: usize) -> f64 {
+        let most = |(q, p): (Quantity, u8)| {
+            let sizes = conditions.iter().map(|at| q.of(at, axis).abs());
+            let largest = sizes.filter(|s| s.is_finite()).fold(0.0, f64::max);
+            largest.powi(i32::from(p))
+        };
+        self.parts().map(most).product()
+    }
+
+    /// Name of a term: `rate_x*force_y`, `force_z^2`. Empty where terms are made of other quantities.
+    pub fn name(&self) -> String {
+        let written = self.parts().filter_map(|(q, p)| {
+            let name = q.name()?;
+            Some(match p {
+                1 => name,
+                p => format!("{name}^{p}"),
+            })
+        });
+        written.collect::<Vec<_>>().join("*")
+    }
+
+    /// Unit of the coefficient of a term in an error of `sensor`.
+    pub fn term_unit(&self, sensor: Sensor) -> String {
+        let each = self.parts().flat_map(|(q, p)| {
+            let unit = match q {
+                Quantity::Rate(_) | Quantity::Force(_) => format!("({})", q.unit(sensor)),
+                q => q.unit(sensor).into(),
+            };
+            std::iter::repeat_n(unit, usize::from(p))
+        });
+        let units: Vec<String> = each.collect();
+        format!("{}/({})", sensor.unit(), units.join("*"))
+    }
+
+    /// Unit of the coefficient of an effect of `sensor`.
+    ///
+    /// An input of the sensor itself cancels its unit; that of a body axis leaves an angle, as what is misaligned. Radians are none beside
+    /// metres: rate squared times an arm is an acceleration.
+    fn unit(&self, sensor: Sensor) -> String {
+        let count = |of: &dyn Fn(Quantity) -> bool| -> u8 {
+            self.parts().filter(|(q, _)| of(*q)).map(|(_, p)| p).sum()
+        };
+        let own = count(&|q| q.is_input_of(sensor));
+        let rates = count(&|q| q.unit(sensor) == "rad/s");
+        let angular = count(&|q| q.unit(sensor) == "rad/s^2");
+        if sensor == Sensor::Accel && own == 0 && (rates == 2 || angular == 1) {
+            return "m".into();
+        }
+        let kelvins = count(&|q| q.unit(sensor) == "K");
+        let seconds = count(&|q| q.unit(sensor) == "s");
+        let across = self
+            .parts()
+            .any(|(q, _)| matches!(q, Quantity::Rate(_) | Quantity::Force(_)));
+        let (base, first) = match sensor {
+            Sensor::Gyro => ("rad/s", 1),
+            Sensor::Accel => ("m/s^2", 2),
+        };
+        let mut unit = match (own, seconds) {
+            (1, _) if across && kelvins > 0 => "rad".to_string(),
+            (1.., _) => "1".into(),
+            (0, 0) => base.into(),
+            (0, n) => format!("{}^{}", base.split('^').next().unwrap_or(base), first + n),
+        };
+        let mut over = |of: &str, power: u8| match power {
+            0 => {}
+            1 => unit += &format!("/{of}"),
+            p => unit += &format!("/{of}^{p}"),
+        };
+        let other = match sensor {
+            Sensor::Gyro => ("(m/s^2)", count(&|q| q.unit(sensor) == "m/s^2")),
+            Sensor::Accel => ("(rad/s)", rates),
+        };
+        over(other.0, other.1);
+        over(&format!("({base})"), own.saturating_sub(1));
+        over("K", kelvins);
+        unit
+    }
+
+    fn formula(&self, axis: Option<usize>) -> String {
+        let each = self.parts().map(|(q, p)| {
+            let symbol = q.symbol(axis);
+            match p {
+                2 => format!("{symbol}²"),
+                3 => format!("{symbol}³"),
+                4 => format!("{symbol}⁴"),
+                5 => format!("{symbol}⁵"),
+                _ => symbol,
+            }
+        });
+        each.collect::<Vec<_>>().join(" ")
+    }
+}
+
+/// What an error of one axis is proportional to. The *parameter* is the nonlinear parameter of the effect.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Regressor {
+    /// A product.
+    Product(Product),
+    /// The sum of two.
+    Sum(Product, Product),
+    /// The absolute value of a quantity.
+    Absolute(Quantity),
+    /// exp(-quantity / parameter).
+    Decay(Quantity),
+    /// ln(1 + quantity / parameter).
+    Logarithm(Quantity),
+    /// The share of the time that so manieth bit from the first down is set in the code of the reading, over the scale factor. Readings
+    /// are in units of the weight of bit 0, from code 0.
+    Bit(usize),
+}
+
+impl Regressor {
+    /// A quantity itself.
+    pub const fn linear(of: Quantity) -> Self {
+        Self::power(of, 1)
+    }
+
+    /// A power of a quantity.
+    pub const fn power(of: Quantity, power: u8) -> Self {
+        Self::Product(Product::power(of, power))
+    }
+
+    /// Its value in the error of sensor axis `axis`, SI.
+    pub fn value(&self, at: &Conditions, parameter: f64, axis: usize) -> f64 {
+        match self {
+            Self::Product(product) => product.value(at, axis),
+            Self::Sum(a, b) => a.value(at, axis) + b.value(at, axis),
+            Self::Absolute(q) => q.of(at, axis).abs(),
+            Self::Decay(q) => (-q.of(at, axis) / parameter).exp(),
+            Self::Logarithm(q) => (q.of(at, axis) / parameter).ln_1p(),
+            Self::Bit(bit) => {
+                let of_bit = 0.5_f64.powi(*bit as i32);
+                let reading = &at.reading;
+                share_set(reading.mean[axis], reading.sd[axis], of_bit) / reading.scale[axis]
+            }
+        }
+    }
+
+    /// The products that it is made of; those that are no product count as a power of their quantity.
+    fn products(&self) -> [Option<Product>; 2] {
+        match self {
+            Self::Product(product) => [Some(*product), None],
+            Self::Sum(a, b) => [Some(*a), Some(*b)],
+            Self::Absolute(q) | Self::Decay(q) | Self::Logarithm(q) => {
+                [Some(Product::power(*q, 1)), None]
+            }
+            Self::Bit(_) => [None, None],
+        }
+    }
+
+    /// Its quantities, each once, in ascending order.
+    pub fn quantities(&self) -> Vec<Quantity> {
+        let products = self.products();
+        let each = products
+            .iter()
+            .flatten()
+            .flat_map(|p| p.parts().map(|(q, _)| q));
+        let mut all: Vec<Quantity> = each.collect();
+        all.sort_unstable();
+        all.dedup();
+        all
+    }
+
+    /// Whether it moves with temperature or time.
+    pub fn is_slow(&self) -> bool {
+        self.quantities().iter().any(|q| q.is_slow())
+    }
+
+    /// Whether the device can fold it into a bias or a matrix: beside what moves with temperature and time at most one factor, an input
+    /// of the sensor.
+    pub fn folds(&self, sensor: Sensor) -> bool {
+        let fast = |p: &Product| -> Vec<(Quantity, u8)> {
+            p.parts().filter(|(q, _)| !q.is_slow()).collect()
+        };
+        let products = self.products();
+        self.is_slow()
+            && products.iter().flatten().all(|p| match fast(p)[..] {
+                [] => true,
+                [(q, 1)] => q.is_input_of(sensor),
+                _ => false,
+            })
+    }
+
+    /// Whether it cannot be known without `need`, in an error of `sensor`.
+    pub(crate) fn needs(&self, need: Need, sensor: Sensor) -> bool {
+        self.quantities().iter().any(|q| q.needs(need, sensor))
+    }
+
+    /// SI unit of its coefficient in an error of `sensor`.
+    pub fn unit(&self, sensor: Sensor) -> String {
+        match self {
+            Self::Product(product) | Self::Sum(product, _) => product.unit(sensor),
+            Self::Absolute(q) => Product::power(*q, 1).unit(sensor),
+            Self::Decay(_) | Self::Logarithm(_) => sensor.unit().into(),
+            Self::Bit(_) => "1".into(),
+        }
+    }
+
+    /// Formula, in the error of sensor axis `axis`, or of each axis i.
+    pub fn formula(&self, axis: Option<usize>) -> String {
+        match self {
+            Self::Product(product) => product.formula(axis),
+            Self::Sum(a, b) => {
+                let signed = |first: bool, p: &Product| {
+                    let sign = match (first, p.sign < 0.0) {
+                        (true, true) => "-",
+                        (true, false) => "",
+                        (false, true) => " - ",
+                        (false, false) => " + ",
+                    };
+                    format!("{sign}{}", p.formula(axis))
+                };
+                format!("{}{}", signed(true, a), signed(false, b))
+            }
+            Self::Absolute(q) => format!("abs {}", q.symbol(axis)),
+            Self::Decay(q) => format!("exp(-{}/τ)", q.symbol(axis)),
+            Self::Logarithm(q) => format!("ln(1 + {}/τ)", q.symbol(axis)),
+            Self::Bit(bit) => format!("bit -{bit} set"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_term_up_to_third_order_is_there_once() {
+        // Nine quantities: 9 + 45 + 165.
+        let all = Product::terms();
+        let mut names: Vec<String> = all.iter().map(Product::name).collect();
+        names.sort();
+        names.dedup();
+        assert_eq!((all.len(), names.len()), (219, 219));
+        assert!(names.contains(&"rate_x*force_y^2".into()));
+    }
+
+    #[test]
+    fn units_of_coefficients_follow_from_the_quantities() {
+        use Quantity::{AngularAcceleration, Force, Input, Rate, Temperature, Time};
+        let of = |sensor, p: Product| Regressor::Product(p).unit(sensor);
+        let power = Product::power;
+        for (sensor, product, unit) in [
+            (Sensor::Gyro, power(Force(1), 1), "rad/s/(m/s^2)"),
+            (Sensor::Gyro, power(Force(1), 2), "rad/s/(m/s^2)^2"),
+            (Sensor::Gyro, power(Input, 3), "1/(rad/s)^2"),
+            (Sensor::Gyro, power(Time, 1), "rad/s^2"),
+            (Sensor::Accel, power(Time, 1), "m/s^3"),
+            (Sensor::Accel, power(Temperature, 2), "m/s^2/K^2"),
+            (Sensor::Accel, Product::of(Temperature, Input), "1/K"),
+            (Sensor::Gyro, Product::of(Temperature, Rate(1)), "rad/K"),
+            (Sensor::Accel, Product::of(Rate(0), Rate(1)), "m"),
+            (Sensor::Accel, power(AngularAcceleration(2), 1), "m"),
+        ] {
+            assert_eq!(of(sensor, product), unit, "{product:?}");
+        }
+        assert_eq!(Regressor::Absolute(Input).unit(Sensor::Gyro), "1");
+        assert_eq!(Regressor::Decay(Time).unit(Sensor::Accel), "m/s^2");
+        let term = Product::term(&[Rate(0), Force(1), Force(1)]).unwrap();
+        assert_eq!(
+            term.term_unit(Sensor::Gyro),
+            "rad/s/((rad/s)*(m/s^2)*(m/s^2))"
+        );
+    }
+}
