@@ -216,7 +216,10 @@ fn fit_known(
                 continue;
             }
             Err(failure) => {
-                let error = prepared.refused(failure, sensor);
+                let mut error = prepared.refused(failure, sensor);
+                if options.method != Method::LeastSquares {
+                    error = error.about(Argument::Method);
+                }
                 let other = Sensor::BOTH.into_iter().find(|s| *s != sensor && wanted(s));
                 return Err(match other {
                     Some(other) => error

@@ -233,11 +233,11 @@ fn a_complaint_names_the_line_what_is_wrong_and_what_to_do() {
         ),
         (
             "draw_effects = 1000",
-            "2: more effects than there are besides the stated ones; give at most 39",
+            "2: more effects than there are besides the stated ones; give at most 40",
         ),
         (
-            "draw_effects = 39\n[[effect]]\nid = \"gyro_warm_up\"",
-            "2: more effects than there are besides the stated ones; give at most 38",
+            "draw_effects = 40\n[[effect]]\nid = \"gyro_warm_up\"",
+            "2: more effects than there are besides the stated ones; give at most 39",
         ),
         (
             "[[effect]]\nid = \"earth_rate\"\n\n[[effect]]\nid = \"accel_size_effect\"\narms_cm = [[0, 0, 0], [0, 0, 0], [0, 0, 0]]",

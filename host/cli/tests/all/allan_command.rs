@@ -240,7 +240,7 @@ fn what_is_not_at_rest_or_not_alive_is_refused_with_its_place() {
                     row[1] += (k as f64).sin()
                 }
             },
-            &["40.0 s", "gyro_x", "--from 0.0 --to 40.0"],
+            &["40.0 s", "gyro_x", "from 0.0 to 40.0 s (--from, --to)"],
         ),
         (
             "turning slowly",
@@ -361,7 +361,7 @@ fn readings_in_volts_become_si_by_the_calibration_of_the_unit() {
     mimu_rig::record::write(&plan, &truth, 5, &output).unwrap();
     let error = refused(folder.path(), "allan r");
     assert!(
-        error.contains("moves") && error.contains("--from"),
+        error.contains("moves") && error.contains("--from, --to"),
         "{error}"
     );
     done(folder.path(), "fit r -o cal.toml");

@@ -197,9 +197,17 @@ fn refusals_are_one_line_with_status_1_and_wrong_usage_has_status_2() {
         ("-n 20 --table faces --model affine,cubic", 1, "cubic_x"),
         ("-n 8 --sensor gyro --reference gravity", 1, "turns"),
         ("-n 8 --sensor gyro --table two-axis", 1, "three-axis"),
-        ("-n 8 --model affine,g-sensitivity", 1, "--sensor gyro"),
-        ("--scheme xu-rates", 1, "--sensor gyro"),
-        ("--scheme niu-8 --sensor gyro", 1, "--sensor accel"),
+        (
+            "-n 8 --model affine,g-sensitivity",
+            1,
+            "for the gyro (--sensor)",
+        ),
+        ("--scheme xu-rates", 1, "for the gyro (--sensor)"),
+        (
+            "--scheme niu-8 --sensor gyro",
+            1,
+            "for the accel (--sensor)",
+        ),
         ("-n 1", 1, "1 dwell cannot"),
         (
             "-n 17 --model affine,quadratic --table faces --reference gravity",

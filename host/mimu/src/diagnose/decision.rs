@@ -110,8 +110,15 @@ impl Decision {
 
 /// Decides on the rows of one sensor; `dwell_ends` are the times between dwells, where a bias may have jumped: index of the
 /// recording and s. `unseen` are the rows of a second recording, which nothing is found in: what it contradicts is not accepted.
-pub fn decide(rows: &Rows, dwell_ends: &[(usize, f64)], unseen: Option<&Rows>) -> Option<Decision> {
-    let (all, mut not_excited) = candidates(rows, dwell_ends);
+/// `without` are effects that are not tried, each with the reason.
+pub fn decide(
+    rows: &Rows,
+    dwell_ends: &[(usize, f64)],
+    unseen: Option<&Rows>,
+    without: &[(String, String)],
+) -> Option<Decision> {
+    let (mut all, mut not_excited) = candidates(rows, dwell_ends);
+    all.retain(|c| !without.iter().any(|(id, _)| *id == c.id()));
     let search = Search::new(rows, all);
     let null = search.fit(&[])?;
     let known = search.spread.fit_at(&search.basis, &search.spread.none())?;
@@ -119,7 +126,7 @@ pub fn decide(rows: &Rows, dwell_ends: &[(usize, f64)], unseen: Option<&Rows>) -
     let omnibus_p = ChiSquared::new(dof).map_or(1.0, |d| d.sf(known.chi2));
     let (chosen, mut with) = search.run()?;
     let said = |value: f64| rows.figure.said(rows.sensor, value);
-    let mut rejected = Vec::new();
+    let mut rejected = without.to_vec();
     let mut kept: Vec<Chosen> = Vec::new();
     let mut jumps = Vec::new();
     for one in chosen {

@@ -236,6 +236,16 @@ fn session<'a>(prepared: &'a Prepared, models: &[Option<Affine<f64>>; 2]) -> Ses
     }
 }
 
+/// What was accepted, as it is removed.
+fn removed(decision: &Decision) -> Vec<Removed> {
+    let each = decision.accepted.iter().map(|a| Removed {
+        candidate: a.chosen.candidate.clone(),
+        parameter: a.chosen.parameter,
+        values: a.values.iter().copied().collect(),
+    });
+    each.collect()
+}
+
 /// Diagnoses a unit.
 ///
 /// The accelerometer comes first: without a table it is what the gyro is judged by.
@@ -291,8 +301,37 @@ pub fn diagnose(recordings: Recordings, options: Options) -> Result<Diagnosis> {
         let rows = Rows::of(ours, sensor, free).ok_or_else(singular)?;
         let unseen = Rows::of(unseen, sensor, free);
         let all: Vec<&Prepared> = ours.iter().map(|s| s.prepared).collect();
-        let decided = decide(&rows, &dwell_ends(&all), unseen.as_ref());
-        let mut decision = decided.ok_or_else(singular)?;
+        let decide = |without: &[(String, String)]| {
+            decide(&rows, &dwell_ends(&all), unseen.as_ref(), without).ok_or_else(singular)
+        };
+        let clean = |found: &[Removed]| -> Result<(Fit, Vec<Prepared>)> {
+            let lasting: Vec<Removed> = found.iter().map(Removed::lasting).collect();
+            let clean = |(k, s): (usize, &Session)| {
+                let effects = if k == 0 { found } else { &lasting };
+                remove(s.prepared, s.gyro.as_ref(), s.accel.as_ref(), effects).ok_or_else(singular)
+            };
+            let cleaned = sessions.iter().enumerate().map(clean);
+            let mut cleaned: Vec<Prepared> = cleaned.collect::<Result<_>>()?;
+            let first = cleaned.remove(0);
+            Ok((calibrate(first)?, cleaned))
+        };
+        let mut decision = decide(&[])?;
+        let mut found = removed(&decision);
+        let mut after = (!found.is_empty()).then(|| clean(&found));
+        // Bits of a code that are nearly one another's sum can lead the readings away: such a code is no explanation, and no reason to
+        // refuse the recording either.
+        let codes = found.iter().filter(|f| f.candidate.reads_code());
+        let codes: Vec<String> = codes.map(|f| f.candidate.id()).collect();
+        if let Some(Err(error)) = &after
+            && !codes.is_empty()
+        {
+            let problem = &error.refused().problem;
+            let why = format!("readings without it cannot be calibrated: {problem}");
+            let without: Vec<_> = codes.into_iter().map(|id| (id, why.clone())).collect();
+            decision = decide(&without)?;
+            found = removed(&decision);
+            after = (!found.is_empty()).then(|| clean(&found));
+        }
         let noisier = ours.iter().enumerate().flat_map(|(k, s)| {
             let mut all = noisier(s, sensor);
             for one in all.iter_mut().filter(|_| ours.len() > 1) {
@@ -301,27 +340,9 @@ pub fn diagnose(recordings: Recordings, options: Options) -> Result<Diagnosis> {
             all
         });
         decision.leftover.extend(noisier);
-        let found: Vec<Removed> = decision
-            .accepted
-            .iter()
-            .map(|a| Removed {
-                candidate: a.chosen.candidate.clone(),
-                parameter: a.chosen.parameter,
-                values: a.values.iter().copied().collect(),
-            })
-            .collect();
-        if !found.is_empty() {
-            let lasting: Vec<Removed> = found.iter().map(Removed::lasting).collect();
-            let clean = |(k, s): (usize, &Session)| {
-                let effects = if k == 0 { &found } else { &lasting };
-                remove(s.prepared, s.gyro.as_ref(), s.accel.as_ref(), effects).ok_or_else(singular)
-            };
-            let cleaned = sessions.iter().enumerate().map(clean);
-            let mut cleaned: Vec<Prepared> = cleaned.collect::<Result<_>>()?;
-            let first = cleaned.remove(0);
+        if let Some(after) = after {
             effects.extend(found);
-            later = cleaned;
-            now = calibrate(first)?;
+            (now, later) = after?;
         }
         let picture = Picture::of(sensor, &rows, &decision);
         sensors.push(SensorDiagnosis {

@@ -417,6 +417,9 @@ fn score(c: &Chosen) -> f64 {
 /// An effect whose coefficient of the size of a data sheet would not be this many sigmas is not excited.
 pub(super) const EXCITED: f64 = 3.0;
 
+/// Part of a column that the others of its effect have to leave of it.
+pub(super) const SEPARATE: f64 = 1e-2;
+
 /// What a coefficient costs.
 pub(super) const COEFFICIENT: f64 = 4.0;
 

@@ -9,8 +9,9 @@ use crate::design::lack_of_fit::{ALIASED, extend, outside};
 use crate::effects;
 use crate::effects::candidate::{Candidate, Kind};
 use crate::effects::effect::{Effect, NonlinearParameter};
-use crate::effects::quantity::Conditions;
+use crate::effects::quantity::{Conditions, Reading};
 use crate::quantity::Sensor;
+use crate::readable::STANDARD_GRAVITY;
 use mimu_recording::Reference;
 
 /// Sigmas at which a coefficient of its typical size is to be seen. A diagnosis tests from 3 on; at 5 it finds the effect in 98 of
@@ -61,7 +62,7 @@ impl Target {
     /// The rate of the Earth, which is no error, is nobody's rival and has none: at rest it is a g-sensitivity to the last digit, and
     /// what tells them apart is the latitude.
     pub fn listed(effect: &'static Effect) -> Self {
-        let candidate = Candidate::new(effect.sensor, Kind::Effect(effect));
+        let candidate = apart_from_bias(Candidate::new(effect.sensor, Kind::Effect(effect)));
         let others = effects::all().filter(|e| e.sensor == effect.sensor && e.id != effect.id);
         let rivals = others.map(|e| Candidate::new(e.sensor, Kind::Effect(e)));
         let slow = candidate.is_slow();
@@ -129,6 +130,67 @@ impl Target {
         }
     }
 }
+
+/// It without the coefficients that no attitude, rate, temperature or time tells from a bias and from the coefficients before: in gravity
+/// the squares of the force along three axes add up to a constant.
+fn apart_from_bias(mut candidate: Candidate) -> Candidate {
+    if candidate.reads_code() {
+        return candidate;
+    }
+    let parameter = quarters(&candidate)[1];
+    let slots = candidate.slots();
+    let mut values = vec![0.0; slots.len()];
+    let mut columns = vec![DVector::zeros(STATES); slots.len()];
+    for k in 0..STATES {
+        // States spread evenly and independently of each other: multiples of irrational numbers.
+        let even = |by: f64| 2.0 * (k as f64 * by).fract() - 1.0;
+        let (z, turn) = (even(0.618_034), std::f64::consts::PI * even(0.414_214));
+        let across = (1.0 - z * z).sqrt();
+        let force = STANDARD_GRAVITY * Vector3::new(across * turn.cos(), across * turn.sin(), z);
+        let rate = Vector3::new(even(0.732_051), even(0.236_068), even(0.645_751));
+        let time_s = 1000.0 * (1.0 + even(0.302_776));
+        let at = Conditions {
+            session: 0,
+            t_s: time_s,
+            on_s: time_s,
+            duration_s: 1.0,
+            rate,
+            force,
+            angular_acceleration: Vector3::zeros(),
+            sensed: match candidate.sensor {
+                Sensor::Gyro => rate,
+                Sensor::Accel => force,
+            },
+            temperature_offset: 20.0 * even(0.316_625),
+            lagged_temperature: 20.0 * even(0.872_983),
+            reading: Reading::NONE,
+        };
+        candidate.regressors(&at, parameter, &mut values);
+        for (column, value) in columns.iter_mut().zip(&values) {
+            column[k] = *value;
+        }
+    }
+    let bias = DVector::repeat(STATES, 1.0).normalize();
+    let mut spanned: [Vec<DVector<f64>>; 3] = std::array::from_fn(|_| vec![bias.clone()]);
+    let mut kept: Vec<bool> = vec![false; candidate.active.len()];
+    for ((coefficient, axis), column) in slots.into_iter().zip(columns) {
+        let left = spanned[axis].iter().fold(column.clone(), |left, unit| {
+            let share = unit.dot(&left);
+            left - unit * share
+        });
+        // What rounding leaves; a column of zeros needs another state than these, and is not judged here.
+        if left.norm() > 1e-9 * column.norm() || column.norm() == 0.0 {
+            kept[coefficient] = true;
+            spanned[axis].extend(left.try_normalize(0.0));
+        }
+    }
+    let mut keep = kept.into_iter();
+    candidate.active.retain(|_| keep.next().unwrap_or(true));
+    candidate
+}
+
+/// States that coefficients are told apart at: more than any axis has coefficients.
+const STATES: usize = 64;
 
 /// Values of its nonlinear parameter that an experiment has to be good for: the quarters of its range, in the logarithm.
 fn quarters(candidate: &Candidate) -> [f64; 3] {

@@ -167,5 +167,5 @@ pub(super) fn refuse_motion(
             time(rest.end)
         ),
     };
-    Err(Error::new(place, problem, remedy))
+    Err(Error::new(place, problem, remedy).about(Argument::Stretch))
 }

@@ -123,7 +123,8 @@ fn check(options: &ImportOptions, out: &Path) -> Result<()> {
         return refuse(
             format!("{rate} is not a sample rate"),
             "give samples per second",
-        );
+        )
+        .map_err(|e| e.about(Argument::SampleRate));
     }
     super::manifest::check_gravity(options.gravity_mps2, "import, gravity")?;
     // A source inside the recording that is to be replaced would be deleted with it.

@@ -144,7 +144,7 @@ fn time_comes_from_a_column_from_an_index_or_from_the_rate() {
         ("b", "0,1,2,3\n20,1,2,3\n41,1,2,3\n60,1,2,3\n"),
     ]);
     let error = bench.refused(&bench.options(&["a"], &["gyro_x,gyro_y,gyro_z"]));
-    assert!(error.contains("--rate-hz"), "{error}");
+    assert!(error.contains("give the rate"), "{error}");
     let mut options = bench.options(&["b"], &["t_s,gyro_x,gyro_y,gyro_z"]);
     options.scales = vec!["t_s=0.001".parse().unwrap(), "gyro=2".parse().unwrap()];
     let (_, batch, manifest) = bench.import(&options).unwrap();

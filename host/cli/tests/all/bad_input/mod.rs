@@ -102,7 +102,8 @@ fn one_direction_is_enough_for_least_squares_and_refused_where_the_method_needs_
     place.fit(&["--method", "xu"]).refused(&[
         "gyro",
         "opposite rates about x, y, z",
-        "least-squares",
+        "use least squares",
+        "--method",
     ]);
     place
         .fit(&["--method", "six-positions"])
@@ -136,7 +137,7 @@ fn a_sensor_that_is_not_there_cannot_be_fitted_alone() {
     assert!(place.fit(&[]).json()["sensors"]["gyro"].is_null());
     place
         .fit(&["--only", "gyro"])
-        .refused(&["samples.csv", "no gyro", "leave --only out"]);
+        .refused(&["samples.csv", "no gyro", "fit the other one"]);
     let result = Place::with(&on_table()).fit(&["--only", "accel"]).json();
     assert!(result["sensors"]["gyro"].is_null() && distance(&result, "accel") < 2.0);
 }

@@ -209,7 +209,11 @@ fn what_cannot_be_right_is_refused_in_one_line_and_leaves_no_file() {
                 scale(s, "accel", 1.0 / 1640.0 / GRAVITY);
                 scale(s, "gyro", 1.0 / 5000.0);
             },
-            &["raw_unit = \"SI\"", "in g", "--scale accel="],
+            &[
+                "raw_unit = \"SI\"",
+                "in g",
+                "the factor accel=9.80665 (--scale)",
+            ],
         ),
         (
             "known forces in g",

@@ -4,16 +4,13 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use crate::diagnose::rows::Rows;
-use crate::diagnose::search::{EXCITED, Search};
+use crate::diagnose::search::{EXCITED, SEPARATE, Search};
 use crate::effects;
 use crate::effects::candidate::{Candidate, Kind};
 use crate::effects::regressor::Product;
 
 /// Share of what a product could be at most below which it is made of rounding.
 const ROUNDING: f64 = 1e-9;
-
-/// Part of a column that the others of its effect have to leave of it.
-const SEPARATE: f64 = 1e-2;
 
 /// Everything that is tried on a sensor, and the effects that its experiment does not show.
 pub(super) fn candidates(

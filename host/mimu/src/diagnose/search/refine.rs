@@ -2,11 +2,10 @@
 
 use nalgebra::DMatrix;
 
-use super::{COEFFICIENT, EXCITED, Search, beside, independent_of, unit_columns};
+use super::{COEFFICIENT, Search, beside, independent_of, unit_columns};
 use crate::diagnose::spread::{By, Components, Fitted};
 use crate::effects::candidate::Candidate;
 use crate::effects::effect::NonlinearParameter;
-use crate::effects::readout::TYPICAL;
 
 /// A model with noise of its own that a candidate is put beside.
 pub(super) struct Beside<'a> {
@@ -86,16 +85,6 @@ impl Beside<'_> {
         Some(best)
     }
 
-    /// Whether each bit of a candidate is determined beside the others and the model: all bits together are nearly what is read, which the
-    /// affine parameters take up, and such coefficients would lead the removal away from the readings.
-    fn determined(fitted: &Fitted, columns: &DMatrix<f64>) -> bool {
-        let first = fitted.coefficients.len() - columns.ncols();
-        columns.column_iter().enumerate().all(|(k, column)| {
-            let variance = fitted.covariance[(first + k, first + k)];
-            variance.sqrt() <= TYPICAL / EXCITED * column.norm()
-        })
-    }
-
     /// With the best choice of bits: one is added or dropped as long as that makes the score better.
     pub fn bits(&self, from: &Candidate, parameter: f64) -> Option<(Candidate, With)> {
         let conditions = self.search.freed(&self.model, self.null);
@@ -104,11 +93,6 @@ impl Beside<'_> {
             .columns_at(&self.search.by_dwell, &conditions, parameter);
         let columns = |c: &Candidate| c.columns_of(&all);
         let first = columns(from);
-        let both = beside(&self.model, &unit_columns(&first));
-        let at = self.search.spread.fit_at(&both, &self.null.components)?;
-        if !Self::determined(&at, &first) {
-            return None;
-        }
         let mut best = (from.clone(), self.fit(first, &self.null.components)?);
         loop {
             let toggled = from.offered.iter().filter_map(|&bit| {
@@ -123,9 +107,6 @@ impl Beside<'_> {
                 // By the noise so far: by its own it could only be better.
                 let both = beside(&self.model, &unit_columns(&columns(&other)));
                 let fitted = self.search.spread.fit_at(&both, &best.1.components)?;
-                if !Self::determined(&fitted, &columns(&other)) {
-                    return None;
-                }
                 let score = -fitted.deviance - COEFFICIENT * other.active.len() as f64;
                 Some((other, score))
             });
