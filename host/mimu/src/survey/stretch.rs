@@ -221,7 +221,8 @@ fn span(t: &[f64], from_s: Option<f64>, to_s: Option<f64>, place: &str) -> Resul
             first.unwrap_or_default(),
             last.unwrap_or_default()
         ),
-    ))
+    )
+    .about(Argument::Stretch))
 }
 
 /// Temperature over a stretch.
