@@ -10,7 +10,7 @@
 //! | [`prepared`]    | all of these for one recording                                                |
 //! | [`estimate`]    | the estimators                                                                |
 //! | [`triad`]       | calibration of one triad: both directions, covariances, physical quantities   |
-//! | [`fit`]         | both triads, judged on what they have not seen; what cannot be right is refused |
+//! | [`mod@fit`]     | both triads, judged on what they have not seen; what cannot be right is refused |
 //! | [`calibration`], [`verify`] | the file, and judging it by another recording                     |
 //! | [`diagnose`]    | the effect behind a residual: found, added, proved on other data              |
 //! | [`design`]      | experiments: which attitudes and rates, how many, for how long                |
