@@ -174,6 +174,14 @@ pub fn minutes(seconds: f64) -> String {
     }
 }
 
+/// A probability of chance. Nobody's noise is Gaussian farther out than one in a million.
+pub fn p_value(p: f64) -> String {
+    match p {
+        p if p < 1e-6 => "p < 1e-6".into(),
+        p => format!("p = {}", significant(p)),
+    }
+}
+
 /// `1 sample`, `2 samples`.
 pub fn plural(n: u64, noun: &str) -> String {
     if n == 1 {

@@ -18,6 +18,7 @@ use crate::effects::candidate::Kind;
 use crate::effects::quantity::Quantity;
 use crate::effects::regressor::Product;
 use crate::effects::removal::Removed;
+use crate::quantity::p_value;
 use hold_out::leverage;
 use leftover::leftover;
 pub(super) use leftover::noisier;
@@ -299,7 +300,7 @@ pub fn decide(
         );
         let chance = match one.p {
             p if p > 0.5 => "no better than chance".to_string(),
-            p => format!("by chance once in {:.0}", 1.0 / p),
+            p => p_value(p),
         };
         let figures = match (held, now) {
             (Some((sample, held)), (before, Some(out))) => format!(

@@ -417,8 +417,10 @@ fn score(c: &Chosen) -> f64 {
 /// An effect whose coefficient of the size of a data sheet would not be this many sigmas is not excited.
 pub(super) const EXCITED: f64 = 3.0;
 
-/// Part of a column that the others of its effect have to leave of it.
-pub(super) const SEPARATE: f64 = 1e-2;
+/// Part of a column that the others of its effect have to leave of it. At rest in gravity the squares of the force add up to a constant but
+/// for some 1e-4, by which the magnitude of a measured force scatters; at 1e-2 the line and the bend of a thermal bias over a narrow range
+/// of temperatures would be one.
+pub(super) const SEPARATE: f64 = 1e-3;
 
 /// What a coefficient costs.
 pub(super) const COEFFICIENT: f64 = 4.0;

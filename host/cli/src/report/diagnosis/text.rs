@@ -6,7 +6,7 @@ use crate::report::text::{warn, wrap};
 use mimu::calibration::ConverterTable;
 use mimu::diagnose::Verdict;
 use mimu::diagnose::decision::Split;
-use mimu::quantity::{plus_minus, significant};
+use mimu::quantity::{p_value, plus_minus, significant};
 use mimu::readable::{self, Readable};
 use mimu::result::diagnosis::{AcceptedResult, DiagnosisResult, SensorDiagnosisResult};
 
@@ -155,8 +155,8 @@ fn effect(out: &mut String, s: &SensorDiagnosisResult, a: &AcceptedResult) {
     for c in &a.coefficients {
         let Readable { factor, unit } = readable::coefficient(&c.unit);
         // Twice the standard deviation: with dwells by the dozen Student's factor is within a tenth of it.
-        let [value, half] = [c.value, 2.0 * c.sigma].map(|v| significant(v * factor));
-        let _ = writeln!(out, "    {:<12}{value:>12} ± {half} {unit}", c.name);
+        let both = plus_minus(c.value * factor, 2.0 * c.sigma * factor);
+        let _ = writeln!(out, "    {:<12}{both:>19} {unit}", c.name);
     }
     if let Some(form) = &a.form {
         let _ = writeln!(out, "    {:<12}{:>12}", form.name, significant(form.value));
@@ -210,19 +210,11 @@ const FEW: usize = 3;
 /// Alternatives that are listed.
 const SHOWN: usize = 3;
 
-/// A probability of chance. Nobody's noise is Gaussian farther out than one in a million.
-pub(super) fn p_value(p: f64) -> String {
-    match p {
-        p if p < 1e-6 => "p < 1e-6".into(),
-        p => format!("p = {}", significant(p)),
-    }
-}
-
 /// What the recording could not show, and what would.
 fn not_excited(out: &mut String, d: &DiagnosisResult, sensor: &str) {
     for (experiment, ids) in by_experiment(d, |s| s == sensor) {
         wrap(out, "  not excited: ", &ids.join(", "));
-        wrap(out, "    needs ", experiment);
+        wrap(out, "    ", experiment);
     }
 }
 

@@ -3,10 +3,10 @@
 use maud::{Markup, PreEscaped, html};
 
 use super::{Shown, sentence, spoken};
-use crate::report::diagnosis::text::{by_experiment, by_score, converter, p_value};
+use crate::report::diagnosis::text::{by_experiment, by_score, converter};
 use crate::report::svg::raised;
 use mimu::diagnose::decision::Split;
-use mimu::quantity::{Figure, significant};
+use mimu::quantity::{Figure, p_value, significant};
 use mimu::readable;
 use mimu::result::diagnosis::{
     AcceptedResult, DiagnosisResult, LeftoverResult, SecondResult, SensorDiagnosisResult,
