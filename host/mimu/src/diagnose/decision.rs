@@ -2,6 +2,7 @@
 
 mod hold_out;
 mod leftover;
+mod model;
 mod reading;
 mod second;
 mod tried;
@@ -12,7 +13,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::rows::Rows;
 use super::search::{Chosen, Search, beside};
-use super::spread::{By, Fitted};
+use super::spread::Fitted;
 use crate::calibration::EffectTable;
 use crate::effects::candidate::Kind;
 use crate::effects::quantity::Quantity;
@@ -30,6 +31,7 @@ use undecided::undecided;
 pub use hold_out::Split;
 pub(super) use hold_out::{held_out, rms};
 pub use leftover::{FALSE_LEFTOVER, Leftover};
+pub use model::Model;
 pub use second::Second;
 pub use undecided::Undecided;
 
@@ -81,6 +83,8 @@ pub struct Decision {
     pub not_excited: Vec<(String, String)>,
     /// Structure that is left.
     pub leftover: Vec<Leftover>,
+    /// The affine model, and that with the accepted effects.
+    pub models: [Model; 2],
     /// Root mean square of the judged rows before and after, in sample.
     pub rms: [f64; 2],
     /// The same held out; not a number where no block could be.
@@ -240,13 +244,12 @@ pub fn decide(
         rejected.push((candidate.id(), why));
         with = search.fit(&kept)?;
     }
-    let model = search.model(&kept);
-    let last = search
-        .spread
-        .fit(&model, &with.components, By::Restricted)?;
-    let mut accepted = Vec::new();
     let split = common(&kept, &with).1;
-    let values = shares(&search, &kept, &last);
+    let before = Model::of(&search, &[], &null, split)?;
+    let after = Model::of(&search, &kept, &with, split)?;
+    let (model, last) = (&after.columns, &after.fitted);
+    let mut accepted = Vec::new();
+    let values = shares(&search, &kept, last);
     let seconds = elsewhere(&kept, &values);
     let mut from = search.basis.ncols();
     for (i, one) in kept.iter().enumerate() {
@@ -314,28 +317,24 @@ pub fn decide(
         };
         rejected.push((id, chance + &figures));
     }
-    let residuals = |fit: &Fitted, model: &DMatrix<f64>| &rows.y - model * &fit.coefficients;
-    let base = search
-        .spread
-        .fit(&search.basis, &null.components, By::Restricted)?;
-    let of_readings = of_readings(&search, &model, &last, split);
+    let of_readings = of_readings(&search, model, last, split);
     // What scatters beside them.
     let whole = of_readings
         .iter()
         .fold(model.clone(), |m, r| beside(&m, &r.columns));
-    let mut left = leftover(&search, &whole, &last, !kept.is_empty(), &jumps);
+    let mut left = leftover(&search, &whole, last, !kept.is_empty(), &jumps);
     left.extend(of_readings.into_iter().map(|r| r.left));
-    let by =
-        |chosen: &[Chosen], fit: &Fitted, split| held_rms(chosen, fit, split).unwrap_or(f64::NAN);
-    let held = |chosen: &[Chosen], fit: &Fitted| by(chosen, fit, split);
+    let interleaved = held_rms(&kept, last, Split::Interleaved);
+    let models = [before, after];
     let floor: f64 = rows.strata.iter().map(|s| known_in(s, rows.judged.0)).sum();
     Some(Decision {
-        rms: [
-            rms(rows, &residuals(&base, &search.basis)),
-            rms(rows, &residuals(&last, &model)),
-        ],
-        held_out_rms: [held(&[], &null), held(&kept, &last)],
-        interleaved_rms: by(&kept, &last, Split::Interleaved),
+        rms: models.each_ref().map(|m| rms(rows, &m.residuals)),
+        held_out_rms: models.each_ref().map(|m| {
+            let held_out = m.held_out.as_ref();
+            held_out.map_or(f64::NAN, |h| rms(rows, h))
+        }),
+        models,
+        interleaved_rms: interleaved.unwrap_or(f64::NAN),
         split,
         noise_floor: (floor / (rows.judged.0 / rows.judged.1) as f64).sqrt(),
         accepted,

@@ -11,10 +11,9 @@ use statrs::distribution::{Beta, ChiSquared, ContinuousCDF, Normal};
 pub use abscissa::Abscissa;
 pub use against::{Against, At, Curve, Panel};
 
-use super::decision::{Decision, Split, held_out, rms};
+use super::decision::{Decision, Model, Split, rms};
 use super::rows::Rows;
 use super::search::{Chosen, Search};
-use super::spread::{By, Fitted};
 use crate::quantity::Sensor;
 
 /// What residuals are of.
@@ -107,58 +106,22 @@ pub struct Picture {
     pub omnibus: [Omnibus; 2],
 }
 
-/// A model, fitted.
-struct Model<'a> {
-    search: &'a Search<'a>,
-    columns: DMatrix<f64>,
-    /// With the noise that the decision holds out by.
-    judged: Fitted,
-    /// In-sample residuals, by the noise that its coefficients are estimated with.
-    residuals: DVector<f64>,
-    last: Fitted,
-}
-
-impl<'a> Model<'a> {
-    /// With the chosen effects, as the decision fits it.
-    fn new(search: &'a Search<'a>, chosen: &[Chosen]) -> Option<Self> {
-        let columns = search.model(chosen);
-        let tested = search.fit(chosen)?;
-        let last = search
-            .spread
-            .fit(&columns, &tested.components, By::Restricted)?;
-        Some(Self {
-            residuals: &search.rows.y - &columns * &last.coefficients,
-            search,
-            columns,
-            judged: match chosen.is_empty() {
-                true => tested,
-                false => last.clone(),
-            },
-            last,
-        })
-    }
-
-    fn held_out(&self, split: Split) -> Option<DVector<f64>> {
-        held_out(self.search, &self.columns, &self.judged, split)
-    }
-
-    /// Residuals in sigmas of the known noise, their chi-square and its chance.
-    fn by_known_noise(&self) -> Option<(DVector<f64>, Omnibus)> {
-        let (rows, spread) = (self.search.rows, &self.search.spread);
-        let none = spread.none();
-        let fit = spread.fit_at(&self.columns, &none)?;
-        let left = &rows.y - &self.columns * &fit.coefficients;
-        let left = DMatrix::from_column_slice(left.len(), 1, left.as_slice());
-        let white = spread.whitener(&none)?.whiten(&left).column(0).into_owned();
-        let dof = rows.y.len().saturating_sub(self.columns.ncols());
-        let p = ChiSquared::new(dof as f64).map_or(1.0, |d| d.sf(fit.chi2));
-        let omnibus = Omnibus {
-            chi2: fit.chi2,
-            dof,
-            p,
-        };
-        Some((white, omnibus))
-    }
+/// Residuals of a model in sigmas of the known noise, their chi-square and its chance.
+fn by_known_noise(search: &Search, columns: &DMatrix<f64>) -> Option<(DVector<f64>, Omnibus)> {
+    let (rows, spread) = (search.rows, &search.spread);
+    let none = spread.none();
+    let fit = spread.fit_at(columns, &none)?;
+    let left = &rows.y - columns * &fit.coefficients;
+    let left = DMatrix::from_column_slice(left.len(), 1, left.as_slice());
+    let white = spread.whitener(&none)?.whiten(&left).column(0).into_owned();
+    let dof = rows.y.len().saturating_sub(columns.ncols());
+    let p = ChiSquared::new(dof as f64).map_or(1.0, |d| d.sf(fit.chi2));
+    let omnibus = Omnibus {
+        chi2: fit.chi2,
+        dof,
+        p,
+    };
+    Some((white, omnibus))
 }
 
 impl Picture {
@@ -166,40 +129,42 @@ impl Picture {
     pub fn of(sensor: Sensor, rows: &Rows, decision: &Decision) -> Option<Self> {
         let search = Search::new(rows, Vec::new());
         let kept: Vec<Chosen> = decision.accepted.iter().map(|a| a.chosen.clone()).collect();
-        let models: Vec<Model> = (0..=kept.len())
-            .map(|n| Model::new(&search, &kept[..n]))
-            .collect::<Option<_>>()?;
-        let held: Vec<Option<DVector<f64>>> =
-            models.iter().map(|m| m.held_out(decision.split)).collect();
-        let steps = models
-            .iter()
-            .zip(&held)
-            .enumerate()
-            .map(|(n, (m, held))| Step {
-                adds: match n.checked_sub(1) {
-                    None => "affine calibration".into(),
-                    Some(i) => kept[i].candidate.id(),
-                },
-                rms: rms(rows, &m.residuals),
-                held_out_rms: held.as_ref().map_or(f64::NAN, |h| rms(rows, h)),
+        let [first, last] = &decision.models;
+        let step = |adds: String, model: &Model| Step {
+            adds,
+            rms: rms(rows, &model.residuals),
+            held_out_rms: model.held_out.as_ref().map_or(f64::NAN, |h| rms(rows, h)),
+        };
+        let mut steps = vec![step("affine calibration".into(), first)];
+        for n in 1..=kept.len() {
+            let adds = kept[n - 1].candidate.id();
+            steps.push(match n == kept.len() {
+                true => step(adds, last),
+                // The decision is on all of them together; what the first ones do by themselves is fitted for the table.
+                false => {
+                    let tested = search.fit(&kept[..n])?;
+                    step(
+                        adds,
+                        &Model::of(&search, &kept[..n], &tested, decision.split)?,
+                    )
+                }
             });
-        let steps = steps.collect();
-        let (first, last) = (models.first()?, models.last()?);
-        let at = |held: &Option<DVector<f64>>, r: usize| held.as_ref().map_or(f64::NAN, |h| h[r]);
+        }
+        let at = |model: &Model, r: usize| model.held_out.as_ref().map_or(f64::NAN, |h| h[r]);
         let sample = |r: usize, sigma: f64| Sample {
             t_s: middle(rows, r),
             sigma,
             residual: [first.residuals[r], last.residuals[r]],
-            held_out: [at(&held[0], r), at(&held[kept.len()], r)],
+            held_out: [at(first, r), at(last, r)],
         };
         let tracks = tracks(rows, sample);
         let effects = decision
             .accepted
             .iter()
-            .map(|a| against::panels(rows, &search, &last.last, a, &tracks))
+            .map(|a| against::panels(rows, &search, &last.fitted, a, &tracks))
             .collect::<Option<_>>()?;
-        let (before, omnibus_before) = first.by_known_noise()?;
-        let (after, omnibus_after) = last.by_known_noise()?;
+        let (before, omnibus_before) = by_known_noise(&search, &first.columns)?;
+        let (after, omnibus_after) = by_known_noise(&search, &last.columns)?;
         Some(Self {
             sensor,
             blocks_s: match decision.split {

@@ -62,14 +62,8 @@ pub(super) fn errors(sensors: &[Shown]) -> Markup {
                         tr class=[(n == last && last > 0).then_some("total")] {
                             td { @if n == 0 { (spoken(s.name)) (BR) span class="dim" { (s.figures.figure.description()) } } }
                             td { @if n == 0 { (step.adds) } @else { "+ " code { (step.adds) } } }
-                            // The first and the last are those of the decision.
-                            @let (rms, held) = match n {
-                                0 => (s.figures.rms_before, s.figures.held_out_rms_before),
-                                n if n == last => (s.figures.rms_after, s.figures.held_out_rms_after),
-                                _ => (step.rms, step.held_out_rms),
-                            };
-                            td class="n" { (figure_of(s.figures, rms)) }
-                            td class="n" { (figure_of(s.figures, held)) }
+                            td class="n" { (figure_of(s.figures, step.rms)) }
+                            td class="n" { (figure_of(s.figures, step.held_out_rms)) }
                             td class="n" { (figure_of(s.figures, s.figures.noise_floor)) }
                         }
                     }
