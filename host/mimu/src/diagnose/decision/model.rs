@@ -1,0 +1,45 @@
+//! A model of the rows as it was fitted: kept, so that what is drawn is what was decided on.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::hold_out::{Split, held_out};
+use crate::diagnose::search::{Chosen, Search};
+use crate::diagnose::spread::{By, Fitted};
+
+/// Affine parameters and effects, fitted.
+#[derive(Debug, Clone)]
+pub struct Model {
+    /// Columns of the affine parameters, then of the effects; SI, a row for each residual.
+    pub columns: DMatrix<f64>,
+    /// Coefficients with the noise that they are estimated by.
+    pub fitted: Fitted,
+    /// In-sample residuals, SI.
+    pub residuals: DVector<f64>,
+    /// Residuals of rows that the coefficients had not seen; `None` where what is left does not determine them.
+    pub held_out: Option<DVector<f64>>,
+}
+
+impl Model {
+    /// With the chosen effects, of which `tested` is the fit that the search compared by. The affine model alone is held out by the noise of
+    /// `tested`, as it has no effect whose search had to be paid for.
+    pub(in crate::diagnose) fn of(
+        search: &Search,
+        chosen: &[Chosen],
+        tested: &Fitted,
+        split: Split,
+    ) -> Option<Self> {
+        let columns = search.model(chosen);
+        let spread = &search.spread;
+        let fitted = spread.fit(&columns, &tested.components, By::Restricted)?;
+        let judged = match chosen.is_empty() {
+            true => tested,
+            false => &fitted,
+        };
+        Some(Self {
+            residuals: &search.rows.y - &columns * &fitted.coefficients,
+            held_out: held_out(search, &columns, judged, split),
+            columns,
+            fitted,
+        })
+    }
+}
