@@ -38,9 +38,9 @@ const NAMES: [&str; 4] = [
 /// With a table in an order drawn by lot, as listed, as listed with the noise of the unit at rest; and by hand.
 pub fn blocks() -> Vec<Block> {
     let hand = [by_hand(RUNS, false), by_hand(RUNS, true)].concat();
-    let [by_lot, listed, known] = [Dwells::ByLot, Dwells::AsListed, Dwells::AsListedWithNoise]
+    let [randomised, listed, known] = [Dwells::ByLot, Dwells::AsListed, Dwells::AsListedWithNoise]
         .map(|dwells| with_a_table(RUNS, dwells));
-    let all = [by_lot, listed, known, hand];
+    let all = [randomised, listed, known, hand];
     let block = |(name, tallies): (_, &Vec<Tally>)| Block::table(name, &table(tallies));
     NAMES.into_iter().zip(&all).map(block).collect()
 }

@@ -71,7 +71,7 @@ pub fn clean(gyro: AffineFile, accel: AffineFile) -> RigFile {
 /// seed, or as listed.
 ///
 /// Sensors wander, and what neighbouring dwells share of it goes into the parameters that their difference determines.
-/// Drawn by lot, it is noise like any other.
+/// Randomised, it is noise like any other.
 pub fn table_plan(order: Option<u64>) -> String {
     let mut steps = Vec::new();
     for axis in 0..3 {

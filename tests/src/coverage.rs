@@ -122,7 +122,7 @@ fn over(runs: u64, empty: &[Tally], case: impl Fn(u64, &mut [Tally]) + Sync) -> 
 /// How the recordings from a table are made and fitted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Dwells {
-    /// In an order drawn by lot.
+    /// In a randomised order.
     ByLot,
     /// As listed, axis by axis: neighbours share what the bias wanders, and differ along one axis only.
     AsListed,
@@ -177,7 +177,7 @@ pub fn with_a_table(runs: u64, dwells: Dwells) -> Vec<Tally> {
     })
 }
 
-/// Both sensors on recordings by hand, with nothing known but the size of gravity. A gyro that is `quiet` beside
+/// Both sensors on recordings by hand, with nothing known but the magnitude of gravity. A gyro that is `quiet` beside
 /// its accelerometer shows whether the errors that all turns share, those of the accelerometer's calibration, are in its
 /// intervals.
 pub fn by_hand(runs: u64, quiet: bool) -> Vec<Tally> {

@@ -195,7 +195,7 @@ impl Noise {
         Ok(())
     }
 
-    /// Noise of the size of specific force, m/s², as `accel` gives it: what a fit to the size of gravity sees. A unit that
+    /// Noise of the size of specific force, m/s², as `accel` gives it: what a fit to the magnitude of gravity sees. A unit that
     /// creeps on its support tilts, which shows in the channels and not in the size.
     pub fn of_size(dwells: &[Dwell], condensed: &Condensed, accel: &Affine<f64>) -> ChannelNoise {
         let from = Sensor::Accel.channels().start;

@@ -47,7 +47,7 @@ pub enum RawUnit {
 pub enum Reference {
     /// The `ref_` columns hold it.
     Table,
-    /// Only the size of gravity, at rest.
+    /// Only the magnitude of gravity, at rest.
     Gravity,
 }
 

@@ -12,7 +12,7 @@ use mimu::design::budget::{DwellNoise, Session};
 use mimu::design::model::{Model, Setting, Terms};
 use mimu::design::reach::{Carrier, RateList, Rates};
 use mimu::design::schemes::Scheme;
-use mimu::design::tour::{Motion, Order, by_lot};
+use mimu::design::tour::{Motion, Order, randomised};
 use mimu::noise_file::NoiseFile;
 use mimu::quantity::Sensor;
 use mimu::result::design::{Comparison, Conditions, Design};
@@ -67,12 +67,12 @@ pub struct DesignArgs {
     #[arg(long, value_name = "S", conflicts_with = "budget",
           value_parser = |t: &str| number(t, 0.1, 86400.0))]
     dwell: Option<f64>,
-    /// Order of the dwells: lot without it, and published schemes as published
+    /// Order of the dwells: randomised without it, and published schemes as published
     ///
     /// Sensors wander, and what neighbouring dwells share of that goes into the parameters that the difference of their
     /// inputs determines. With 22 dwells and a bias that walks, scale factors and misalignments have 9 times the
-    /// variance that a fit claims in the shortest order, and what it claims by lot. The lot takes longer: what it costs
-    /// is printed.
+    /// variance that a fit claims in the shortest order, and what it claims in a randomised one. That
+    /// takes longer: what it costs is printed.
     #[arg(long, value_enum)]
     order: Option<OrderArg>,
     /// Rates of the table for a gyro, deg/s: `10,100,300`, or `..300` for any up to 300, which it is without it
@@ -123,8 +123,9 @@ enum TableArg {
 enum OrderArg {
     /// Shortest moves found
     Shortest,
-    /// Drawn by lot from the seed
-    Lot,
+    /// Randomised from the seed
+    #[value(alias = "lot")]
+    Randomised,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -236,7 +237,7 @@ impl DesignArgs {
     fn order(&self) -> Option<Order> {
         self.order.map(|order| match order {
             OrderArg::Shortest => Order::Shortest,
-            OrderArg::Lot => Order::Lot,
+            OrderArg::Randomised => Order::Randomised,
         })
     }
 
@@ -290,7 +291,7 @@ impl DesignArgs {
         let settings = match order {
             None => settings.to_vec(),
             Some(Order::Shortest) => shortest,
-            Some(Order::Lot) => by_lot(settings, self.seed),
+            Some(Order::Randomised) => randomised(settings, self.seed),
         };
         let conditions = Conditions {
             title,
@@ -306,7 +307,7 @@ impl DesignArgs {
 
     fn best(&self, problem: &Problem, n: usize, title: String) -> Result<Design> {
         let settings = problem.best(n, self.seed)?;
-        let order = self.order().unwrap_or(Order::Lot);
+        let order = self.order().unwrap_or(Order::Randomised);
         self.report(problem, title, &settings, Some(order))
     }
 
@@ -328,7 +329,7 @@ impl DesignArgs {
     }
 
     fn within(&self, problem: &Problem, minutes: f64) -> Result<Design> {
-        let order = self.order().unwrap_or(Order::Lot);
+        let order = self.order().unwrap_or(Order::Randomised);
         let session = Session {
             time_s: 60.0 * minutes,
             noise: self.noise()?,

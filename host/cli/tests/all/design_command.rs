@@ -142,14 +142,14 @@ fn text_fits_a_hundred_columns() {
 #[test]
 fn a_lot_is_drawn_unless_the_order_is_given_and_says_its_price() {
     let positions = |arguments: &str| json(arguments)["positions"].as_array().unwrap().clone();
-    let by_lot = json("-n 9");
+    let randomised = json("-n 9");
     let shortest = json("-n 9 --order shortest");
     assert_eq!(
-        (&by_lot["order"], &shortest["order"]),
-        (&"lot".into(), &"shortest".into())
+        (&randomised["order"], &shortest["order"]),
+        (&"randomised".into(), &"shortest".into())
     );
-    let longer = by_lot["moves_s"].as_f64().unwrap() - shortest["moves_s"].as_f64().unwrap();
-    assert!(longer > 1.0 && shortest["moves_s"] == by_lot["shortest_moves_s"]);
+    let longer = randomised["moves_s"].as_f64().unwrap() - shortest["moves_s"].as_f64().unwrap();
+    assert!(longer > 1.0 && shortest["moves_s"] == randomised["shortest_moves_s"]);
     let text = String::from_utf8(mimu(Path::new("."), "-n 9").stdout).unwrap();
     assert!(text.contains(&format!("{longer:.1} s longer")), "{text}");
     // The same dwells, in another order for another seed, and in the same for the same.
@@ -261,7 +261,7 @@ fn refusals_are_one_line_with_status_1_and_wrong_usage_has_status_2() {
         ("--scheme six-face --rates 10", 2, "cannot be used with"),
         ("--scheme seven-face", 2, "six-face"),
         ("-n 8 --table four-axis", 2, "two-axis"),
-        ("-n 8 --order random", 2, "lot"),
+        ("-n 8 --order alphabetic", 2, "randomised"),
         ("-n 8 --seed x", 2, "invalid digit"),
         ("-n 8 --seed 18446744073709551616", 2, "too large"),
     ];

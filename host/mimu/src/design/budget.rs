@@ -6,7 +6,7 @@ use serde::Serialize;
 use super::model::Setting;
 use super::problem::Problem;
 use super::refinement::Region as _;
-use super::tour::{Motion, Order, by_lot};
+use super::tour::{Motion, Order, randomised};
 use crate::allan::model::FLOOR;
 use crate::allan::variance::AllanModel;
 use crate::noise_file::NoiseFile;
@@ -229,8 +229,8 @@ impl Session {
         let shortest_moves_s = self.motion.moves_s(&there);
         let settings = match self.order {
             Order::Shortest => there,
-            Order::Lot => (0..passes as u64)
-                .flat_map(|pass| by_lot(shortest, seed.wrapping_add(pass)))
+            Order::Randomised => (0..passes as u64)
+                .flat_map(|pass| randomised(shortest, seed.wrapping_add(pass)))
                 .collect(),
         };
         let moves_s = self.motion.moves_s(&settings);

@@ -204,7 +204,7 @@ fn exchange_weights(rows: &Rows, weights: &mut [f64]) -> Option<Inverse> {
 /// (g - ν)`, ν such that the sum stays 1. `ln det` is self-concordant, so that a step of `δ/(1 + λ)`, `λ² =
 /// δ'Hδ`, never leads down; it ends at the first weight that it brings to nothing. True: settled.
 ///
-/// Pairs find the points and then crawl where these are close together: for the size of gravity on a two-axis table
+/// Pairs find the points and then crawl where these are close together: for the magnitude of gravity on a two-axis table
 /// they were still 8e-5 above the bound after 2000 rounds, and with these steps below 1e-8 after one.
 fn newton_step(rows: &Rows, inverse: &Inverse, weights: &mut [f64]) -> Option<bool> {
     let carrying: Vec<usize> = (0..rows.len()).filter(|i| weights[*i] > 0.0).collect();

@@ -122,7 +122,7 @@ pub struct Parameter {
 pub struct Model {
     /// Sensor.
     pub sensor: Sensor,
-    /// Known input, forward form, fang (19); or the size of gravity only, linearised about a perfect triad.
+    /// Known input, forward form, fang (19); or the magnitude of gravity only, linearised about a perfect triad.
     pub reference: Reference,
     /// Terms beyond the affine ones, ascending.
     pub terms: Vec<Term>,
@@ -157,7 +157,7 @@ impl Model {
     }
 
     /// Number of independent regressions: one for each sensor of the triad with a known input, one for all of
-    /// them where only the size of gravity is known.
+    /// them where only the magnitude of gravity is known.
     pub fn regressions(&self) -> usize {
         match self.reference {
             Reference::Table => 3,

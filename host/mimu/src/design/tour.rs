@@ -7,13 +7,13 @@ use super::reach::Carrier;
 /// Order of the dwells of a design.
 ///
 /// Sensors wander. What neighbouring dwells share of that goes into the parameters that the difference of their
-/// inputs determines, and no residual tells. In an order drawn by lot it is scatter like any other.
+/// inputs determines, and no residual tells. In a randomised order it is scatter like any other.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Order {
     /// The one with the shortest moves found: like beside like.
     Shortest,
-    /// Drawn by lot.
-    Lot,
+    /// Randomised.
+    Randomised,
 }
 
 impl Order {
@@ -21,13 +21,13 @@ impl Order {
     pub fn name(self) -> &'static str {
         match self {
             Self::Shortest => "shortest",
-            Self::Lot => "lot",
+            Self::Randomised => "randomised",
         }
     }
 }
 
-/// The settings in an order drawn by lot (Fisher and Yates), determinate for a `seed`.
-pub fn by_lot(settings: &[Setting], seed: u64) -> Vec<Setting> {
+/// The settings in a randomised order (Fisher and Yates), determinate for a `seed`.
+pub fn randomised(settings: &[Setting], seed: u64) -> Vec<Setting> {
     let mut drawn = settings.to_vec();
     let mut random = SplitMix(seed);
     for k in (1..drawn.len()).rev() {

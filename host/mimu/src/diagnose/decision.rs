@@ -13,7 +13,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::rows::Rows;
 use super::search::{Chosen, Search, beside};
-use super::spread::Fitted;
+use super::variance::Fitted;
 use crate::calibration::EffectTable;
 use crate::effects::candidate::Kind;
 use crate::effects::quantity::Quantity;
@@ -126,7 +126,9 @@ pub fn decide(
     all.retain(|c| !without.iter().any(|(id, _)| *id == c.id()));
     let search = Search::new(rows, all);
     let null = search.fit(&[])?;
-    let known = search.spread.fit_at(&search.basis, &search.spread.none())?;
+    let known = search
+        .variance
+        .fit_at(&search.basis, &search.variance.none())?;
     let dof = rows.y.len() as f64 - search.basis.ncols() as f64;
     let omnibus_p = ChiSquared::new(dof).map_or(1.0, |d| d.sf(known.chi2));
     let (chosen, mut with) = search.run()?;
@@ -144,7 +146,7 @@ pub fn decide(
     if !jumps.is_empty() {
         with = search.fit(&kept)?;
     }
-    // What does not hold out goes, the least worth first.
+    // What does not hold out goes, the one with the smallest drop in deviance first.
     let held_rms = |chosen: &[Chosen], fit: &Fitted, split: Split| {
         held_out(&search, &search.model(chosen), fit, split).map(|r| rms(rows, &r))
     };

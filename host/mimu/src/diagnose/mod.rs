@@ -5,7 +5,7 @@
 //! |---------------|---------------------------------------------------------------------------------|
 //! | `candidate`   | what is tried of the [effects](crate::effects), and its columns                  |
 //! | [`rows`]      | what the affine model leaves of dwells and turns, as one linear problem          |
-//! | [`spread`]    | how that scatters: known noise, more of it, a bias that walks                    |
+//! | [`variance`]    | how that scatters: known noise, more of it, a bias that walks                    |
 //! | [`search`]    | which effects the rows ask for                                                   |
 //! | [`decision`]  | which of them are accepted, and what is left                                     |
 //! | [`picture`]   | what of it can be drawn                                                          |
@@ -15,7 +15,7 @@ pub mod decision;
 pub mod picture;
 pub mod rows;
 pub mod search;
-pub mod spread;
+pub mod variance;
 
 use decision::{Decision, decide, noisier};
 use mimu_core::compensation::Affine;

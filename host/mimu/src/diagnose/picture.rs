@@ -108,12 +108,16 @@ pub struct Picture {
 
 /// Residuals of a model in sigmas of the known noise, their chi-square and its chance.
 fn by_known_noise(search: &Search, columns: &DMatrix<f64>) -> Option<(DVector<f64>, Omnibus)> {
-    let (rows, spread) = (search.rows, &search.spread);
-    let none = spread.none();
-    let fit = spread.fit_at(columns, &none)?;
+    let (rows, variance) = (search.rows, &search.variance);
+    let none = variance.none();
+    let fit = variance.fit_at(columns, &none)?;
     let left = &rows.y - columns * &fit.coefficients;
     let left = DMatrix::from_column_slice(left.len(), 1, left.as_slice());
-    let white = spread.whitener(&none)?.whiten(&left).column(0).into_owned();
+    let white = variance
+        .whitener(&none)?
+        .whiten(&left)
+        .column(0)
+        .into_owned();
     let dof = rows.y.len().saturating_sub(columns.ncols());
     let p = ChiSquared::new(dof as f64).map_or(1.0, |d| d.sf(fit.chi2));
     let omnibus = Omnibus {

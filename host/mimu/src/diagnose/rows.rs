@@ -4,7 +4,7 @@
 //! | reference, sensor | one row is                                                     | unit   |
 //! |-------------------|----------------------------------------------------------------|--------|
 //! | table             | a dwell and sensor axis: reading less prediction, over the scale factor | SI |
-//! | gravity, accel    | a dwell: size of the force less gravity                        | m/s²   |
+//! | gravity, accel    | a dwell: magnitude of the force minus gravity                        | m/s²   |
 //! | gravity, gyro     | a turn and direction across gravity: prediction error of gravity | rad  |
 //! |                   | a dwell and axis: rate at rest                                 | rad/s  |
 //!
@@ -43,7 +43,7 @@ pub struct Stratum {
     /// Known covariance, unit of the rows squared.
     pub known: DMatrix<f64>,
     /// Covariance of a random walk with K = 1 unit/√s between the rows; `None` where rows are no means of dwells.
-    pub walk: Option<DMatrix<f64>>,
+    pub random_walk: Option<DMatrix<f64>>,
     /// Whether the known covariance holds what the bias wanders.
     pub wander_known: bool,
 }
@@ -53,7 +53,7 @@ pub struct Stratum {
 pub enum Figure {
     /// Error of a known input, SI.
     Input,
-    /// Size of the specific force less gravity, m/s².
+    /// Magnitude of the specific force minus gravity, m/s².
     Size,
     /// Direction of gravity predicted by a turn, rad.
     Direction,

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::rows::Rows;
-use super::spread::{By, Fitted, Spread};
+use super::variance::{By, Fitted, VarianceModel};
 use crate::effects::candidate::{Candidate, Kind};
 use crate::effects::effect::Effect;
 use crate::effects::quantity::Conditions;
@@ -40,7 +40,7 @@ pub struct Chosen {
     /// Probability of chance, after the whole search.
     pub p: f64,
     /// By how much the deviance grows without it.
-    pub worth: f64,
+    pub drop: f64,
     /// Others that would do nearly as well in its place, and by how much worse their score is.
     pub alternatives: Vec<(String, f64)>,
 }
@@ -52,12 +52,12 @@ pub struct Search<'a> {
     /// The same by dwells, for functions of the reading.
     by_dwell: Rows,
     /// Their scatter.
-    pub spread: Spread<'a>,
+    pub variance: VarianceModel<'a>,
     /// Basis of what the affine parameters can do.
     pub basis: DMatrix<f64>,
     candidates: Vec<Candidate>,
-    /// Columns of each, turned, for each parameter that is screened; none of those that are another beside other effects.
-    turned: Vec<Vec<(f64, DMatrix<f64>)>>,
+    /// Columns of each, rotated, for each parameter that is screened; none of those that are another beside other effects.
+    rotated: Vec<Vec<(f64, DMatrix<f64>)>>,
     tests: [f64; 2],
 }
 
@@ -122,20 +122,21 @@ impl<'a> Search<'a> {
             });
             ours.map(|(_, c)| c.tests()).sum::<f64>().max(1.0)
         };
-        let spread = Spread::new(rows, false);
+        let variance = VarianceModel::new(rows, false);
         let alike = |a: &Candidate, b: &Candidate| a.is_same_of_another_axis(b);
         let alike: Vec<&[Candidate]> = candidates.chunk_by(alike).collect();
-        let turned = alike
+        let rotated = alike
             .into_par_iter()
             .flat_map_iter(|group| match group {
                 [one] if one.reads_code() => vec![Vec::new()],
                 [one] => {
-                    let at = |parameter| (parameter, spread.turn(&one.columns(rows, parameter)));
+                    let at =
+                        |parameter| (parameter, variance.rotate(&one.columns(rows, parameter)));
                     vec![one.parameters().into_iter().map(at).collect()]
                 }
                 of_axes => {
                     let axes: Vec<usize> = of_axes.iter().flat_map(|c| c.axes()).collect();
-                    let columns = spread.turn(&of_axes[0].columns_by_axis(rows, &axes));
+                    let columns = variance.rotate(&of_axes[0].columns_by_axis(rows, &axes));
                     let of_axis = |k| vec![(0.0, columns.columns(k, 1).into_owned())];
                     (0..axes.len()).map(of_axis).collect()
                 }
@@ -143,11 +144,11 @@ impl<'a> Search<'a> {
             .collect();
         Self {
             rows,
-            turned,
+            rotated,
             basis: basis(&rows.nuisance),
             tests: [count(true), count(false)],
             by_dwell: rows.by_dwell(),
-            spread,
+            variance,
             candidates,
         }
     }
@@ -202,8 +203,8 @@ impl<'a> Search<'a> {
 
     /// The model with the chosen effects, with noise of its own.
     pub fn fit(&self, chosen: &[Chosen]) -> Option<Fitted> {
-        self.spread
-            .fit(&self.model(chosen), &self.spread.none(), By::Likelihood)
+        self.variance
+            .fit(&self.model(chosen), &self.variance.none(), By::Likelihood)
     }
 
     /// Degrees of freedom that a model leaves.
@@ -261,7 +262,7 @@ impl<'a> Search<'a> {
             parameter,
             columns,
             p,
-            worth: drop,
+            drop,
             alternatives: Vec::new(),
         })
     }
@@ -280,7 +281,7 @@ impl<'a> Search<'a> {
             .into_par_iter()
             .filter_map(|s| self.judge(chosen, null, s))
             .collect();
-        judged.sort_by(|a, b| a.p.total_cmp(&b.p).then(b.worth.total_cmp(&a.worth)));
+        judged.sort_by(|a, b| a.p.total_cmp(&b.p).then(b.drop.total_cmp(&a.drop)));
         judged
     }
 
@@ -308,7 +309,7 @@ impl<'a> Search<'a> {
         let found = law.parameters().into_par_iter().filter_map(best_of);
         let (parameter, with) = found.max_by(|a, b| a.1.drop.total_cmp(&b.1.drop))?;
         let shadow = Chosen {
-            worth: with.drop,
+            drop: with.drop,
             columns: with.columns,
             candidate: law,
             parameter,
@@ -376,22 +377,22 @@ impl<'a> Search<'a> {
     fn again(&self, chosen: &mut Vec<Chosen>, now: &mut Fitted) -> Option<()> {
         let mut i = 0;
         while i < chosen.len() && chosen.len() > 1 {
-            let (worth, p, without) = self.worth(chosen, i, now)?;
+            let (drop, p, without) = self.without(chosen, i, now)?;
             let listed = chosen[i].candidate.is_listed();
             if p > if listed { FALSE_LISTED } else { FALSE_FOUND } {
                 chosen.remove(i);
                 *now = without;
                 i = 0;
             } else {
-                (chosen[i].worth, chosen[i].p) = (worth, p);
+                (chosen[i].drop, chosen[i].p) = (drop, p);
                 i += 1;
             }
         }
         Some(())
     }
 
-    /// What chosen effect `k` is worth beside the others: the drop of the deviance, its chance after the whole search, and the fit without it.
-    fn worth(&self, chosen: &[Chosen], k: usize, now: &Fitted) -> Option<(f64, f64, Fitted)> {
+    /// Of chosen effect `k` beside the others: the drop in deviance, its chance after the whole search, and the fit without it.
+    fn without(&self, chosen: &[Chosen], k: usize, now: &Fitted) -> Option<(f64, f64, Fitted)> {
         let mut rest = chosen.to_vec();
         let one = rest.remove(k);
         let without = self.fit(&rest)?;
@@ -411,7 +412,7 @@ fn score(c: &Chosen) -> f64 {
         Kind::Term(_, product) => f64::from(product.order()),
         _ => 0.0,
     };
-    c.worth - COEFFICIENT * coefficients - order
+    c.drop - COEFFICIENT * coefficients - order
 }
 
 /// An effect whose coefficient of the size of a data sheet would not be this many sigmas is not excited.

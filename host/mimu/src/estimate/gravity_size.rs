@@ -1,4 +1,4 @@
-//! Accelerometer calibration from the size of gravity alone, over many poses.
+//! Accelerometer calibration from the magnitude of gravity alone, over many poses.
 //!
 //! At rest `|C u + o| = g` in every pose (references 14 of fang and 19 of xu, among many). A rotation of the whole leaves
 //! every size as it is, so the frame has to be chosen: C is lower triangular with a positive diagonal,
@@ -147,7 +147,8 @@ pub fn estimate(
         .iter()
         .map(|v| (v / (gravity * gravity)).max(floor))
         .collect();
-    let lost = || Failure::NoSolution("the fit to the size of gravity does not converge".into());
+    let lost =
+        || Failure::NoSolution("the fit to the magnitude of gravity does not converge".into());
     let start = DVector::from_vec(vec![1.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]);
     let shape = Observability::of(&evaluate(&start, &vec![1.0; n]).jacobian);
     if !shape.is_complete() {

@@ -3,7 +3,7 @@
 //! | module            | reference | what it is                                               |
 //! |-------------------|-----------|----------------------------------------------------------|
 //! | [`known_input`]   | table     | forward least squares, Kalman bank, xu's inverse form, six positions |
-//! | [`gravity_size`]  | gravity   | accelerometer from the size of gravity over many poses   |
+//! | [`gravity_size`]  | gravity   | accelerometer from the magnitude of gravity over many poses   |
 //! | [`rotation`]      | gravity   | gyro from the turns between dwells                       |
 //! | [`least_squares`] | both      | the algebra under all of them                            |
 
@@ -26,7 +26,7 @@ pub struct Observation {
     pub raw: Vector3<f64>,
     /// Variance of `raw` by the noise within dwells, raw units squared.
     pub variance: Vector3<f64>,
-    /// True input in SI; not a number where only the size of gravity is known.
+    /// True input in SI; not a number where only the magnitude of gravity is known.
     pub input: Vector3<f64>,
 }
 

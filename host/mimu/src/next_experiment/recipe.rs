@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use super::Setup;
 use crate::design::model::{GRAVITY, Setting};
 use crate::design::reach::{Carrier, Rates};
-use crate::design::tour::by_lot;
+use crate::design::tour::randomised;
 use crate::effects::quantity::{Conditions, REFERENCE_C, Reading};
 use crate::effects::temperature::lagged;
 use crate::quantity::Sensor;
@@ -199,7 +199,7 @@ impl Experiment {
             time_s: 0.0,
         };
         'all: for pass in 0..passes {
-            for state in by_lot(&states, setup.seed.wrapping_add(pass)) {
+            for state in randomised(&states, setup.seed.wrapping_add(pass)) {
                 for _ in 0..hold {
                     let last = out.settings.last();
                     let moving = last.map_or(setup.motion.settle_s, |last| {

@@ -361,7 +361,7 @@ impl Design {
     pub fn subject(&self) -> String {
         let reference = match self.reference {
             Reference::Table => "known input",
-            Reference::Gravity => "size of gravity",
+            Reference::Gravity => "magnitude of gravity",
         };
         format!(
             "{}, {}, {reference}, {}",

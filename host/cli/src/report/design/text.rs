@@ -132,7 +132,7 @@ fn sigma(report: &Design) -> String {
 fn order(report: &Design) -> String {
     let name = match report.order {
         "shortest" => return "shortest found; neighbours share drift (see --order)".into(),
-        "lot" => "drawn by lot",
+        "randomised" => "in a randomised order",
         _ => "as published",
     };
     let longer = report.moves_s - report.shortest_moves_s;

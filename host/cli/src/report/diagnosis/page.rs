@@ -271,7 +271,7 @@ fn effect(d: &DiagnosisResult, s: &Shown, one: &AcceptedResult, panels: &[Panel]
                 @if let Some(form) = &one.form { " (for the " code { (form.name) } " found)" }
                 ". Right, what is left, on the same scale. " (keys()) "."
                 @if whole {
-                    " Where a row is a whole turn or the size of gravity, the abscissa is what the fit says that the effect does to "
+                    " Where a row is a whole turn or the magnitude of gravity, the abscissa is what the fit says that the effect does to "
                     "it beside the affine calibration: points on the diagonal are explained."
                 }
             }

@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use crate::diagnose::rows::Rows;
 use crate::diagnose::search::{Search, unit_columns};
-use crate::diagnose::spread::Fitted;
+use crate::diagnose::variance::Fitted;
 
 /// Contiguous blocks that are left out in turn.
 const BLOCKS: usize = 4;
@@ -54,7 +54,7 @@ pub(in crate::diagnose) fn held_out(
         let kept: Vec<usize> = (0..rows.y.len())
             .filter(|r| !parts_of(*r).contains(&block))
             .collect();
-        let parts = search.spread.kept(&at.components, &kept)?;
+        let parts = search.variance.kept(&at.components, &kept)?;
         let white = parts.whiten(&model.select_rows(&kept));
         let y = parts.whiten(&DMatrix::from_fn(kept.len(), 1, |i, _| rows.y[kept[i]]));
         let svd = white.svd(true, true);

@@ -4,14 +4,14 @@ use nalgebra::DMatrix;
 
 use crate::diagnose::rows::Session;
 use crate::diagnose::search::{Chosen, Search};
-use crate::diagnose::spread::{By, Fitted, Spread};
+use crate::diagnose::variance::{By, Fitted, VarianceModel};
 use crate::quantity::AXES;
 use crate::quantity::Sensor;
 use crate::quantity::significant;
 use crate::triad::directions;
 
 /// A bias that wanders by this many times the noise of a dwell mean is no usual one, and the verdict says so even where nobody has
-/// recorded how far it may: sensors of the usual kind wander by up to three in half an hour. A walk is not all of it: they flicker as
+/// recorded how far it may: sensors of the usual kind wander by up to three in half an hour. A random walk is not all of it: they flicker as
 /// well, so that clean units scatter more than their samples do.
 const WANDERS: f64 = 4.0;
 /// Probability that the rows of a clean sensor scatter so much that structure is told of.
@@ -43,25 +43,31 @@ pub(super) fn leftover(
 ) -> Vec<Leftover> {
     let rows = search.rows;
     let mut left = Vec::new();
-    let spread = Spread::new(rows, true);
-    let Some(last) = spread.fit(model, &last.components, By::Likelihood) else {
+    let variance = VarianceModel::new(rows, true);
+    let Some(last) = variance.fit(model, &last.components, By::Likelihood) else {
         return left;
     };
     for (s, stratum) in rows.strata.iter().enumerate() {
-        let (excess, walk) = (last.components.excess[s], last.components.walk[s]);
-        let unit = stratum.walk.as_ref().map_or(0.0, |w| w.diagonal().mean());
-        let strength = (excess + walk * unit).sqrt();
+        let (extra_white, random_walk) = (
+            last.components.extra_white[s],
+            last.components.random_walk[s],
+        );
+        let unit = stratum
+            .random_walk
+            .as_ref()
+            .map_or(0.0, |w| w.diagonal().mean());
+        let strength = (extra_white + random_walk * unit).sqrt();
         let jump = jumps
             .iter()
             .find(|j| j.candidate.axes().first().copied() == stratum.axis);
         // Without the components of this stratum: does the known noise do? A bias wanders, and while nobody has recorded
         // by how much, that it does is no news.
         let mut bare = last.components.clone();
-        bare.excess[s] = 0.0;
+        bare.extra_white[s] = 0.0;
         if stratum.wander_known {
-            bare.walk[s] = 0.0;
+            bare.random_walk[s] = 0.0;
         }
-        let Some(bare) = spread.fit_at(model, &bare) else {
+        let Some(bare) = variance.fit_at(model, &bare) else {
             continue;
         };
         let worse = bare.deviance - last.deviance;
@@ -74,7 +80,7 @@ pub(super) fn leftover(
         }
         let against = match jump {
             Some(jump) => jump.candidate.id(),
-            None if walk * unit > excess => "time: the bias wanders".into(),
+            None if random_walk * unit > extra_white => "time: the bias wanders".into(),
             None => "no quantity recorded: the dwells do not repeat".into(),
         };
         left.push(Leftover {

@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::hold_out::{Split, held_out};
 use crate::diagnose::search::{Chosen, Search};
-use crate::diagnose::spread::{By, Fitted};
+use crate::diagnose::variance::{By, Fitted};
 
 /// Affine parameters and effects, fitted.
 #[derive(Debug, Clone)]
@@ -29,8 +29,8 @@ impl Model {
         split: Split,
     ) -> Option<Self> {
         let columns = search.model(chosen);
-        let spread = &search.spread;
-        let fitted = spread.fit(&columns, &tested.components, By::Restricted)?;
+        let variance = &search.variance;
+        let fitted = variance.fit(&columns, &tested.components, By::Restricted)?;
         let judged = match chosen.is_empty() {
             true => tested,
             false => &fitted,

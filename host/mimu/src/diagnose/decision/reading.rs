@@ -12,7 +12,7 @@ use super::hold_out::{Split, held_out, rms};
 use super::leftover::{FALSE_LEFTOVER, Leftover};
 use crate::diagnose::rows::Rows;
 use crate::diagnose::search::{COEFFICIENT, Chosen, Search, beside, independent_of, unit_columns};
-use crate::diagnose::spread::{By, Fitted};
+use crate::diagnose::variance::{By, Fitted};
 use crate::effects::quantity::Conditions;
 use crate::quantity::AXES;
 
@@ -112,7 +112,7 @@ fn of_axis(
     split: Split,
 ) -> Option<OfReading> {
     let rows = search.rows;
-    let fit = |m: &DMatrix<f64>| search.spread.fit(m, &last.components, By::Likelihood);
+    let fit = |m: &DMatrix<f64>| search.variance.fit(m, &last.components, By::Likelihood);
     let smooth = independent_of(&readings.smooth(axis), model);
     let null = beside(model, &smooth);
     let without = fit(&null)?;
@@ -190,7 +190,7 @@ pub(super) fn worse_with_steps(search: &Search, chosen: &[Chosen], one: usize) -
         .map(|axis| readings.steps(axis, axis, PLACES))
         .collect();
     let steps = all.into_iter().reduce(|a, b| beside(&a, &b))?;
-    let whitener = search.spread.whitener(&null.components)?;
+    let whitener = search.variance.whitener(&null.components)?;
     let y = DMatrix::from_column_slice(search.rows.y.len(), 1, search.rows.y.as_slice());
     let q = whitener.whiten(&model).qr().q();
     let across = |m: DMatrix<f64>| &m - &q * q.tr_mul(&m);
@@ -221,7 +221,9 @@ pub(super) fn worse_with_steps(search: &Search, chosen: &[Chosen], one: usize) -
             &model,
             &unit_columns(&steps.select_columns(&taken[..count])),
         );
-        let fitted = search.spread.fit(&with, &null.components, By::Likelihood)?;
+        let fitted = search
+            .variance
+            .fit(&with, &null.components, By::Likelihood)?;
         Some(null.deviance - fitted.deviance - cost(count))
     });
     let best = scores.max_by(f64::total_cmp)?;

@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use super::hold_out::rms;
 use crate::diagnose::rows::Rows;
 use crate::diagnose::search::{Search, basis, beside};
-use crate::diagnose::spread::By;
+use crate::diagnose::variance::By;
 use crate::effects::removal::Removed;
 
 /// An effect that should change the residuals of a recording by fewer sigmas than this is neither borne out nor contradicted by it.
@@ -46,9 +46,9 @@ pub(super) fn second(rows: &Rows, effects: &[Removed]) -> Option<Vec<Second>> {
         .iter()
         .filter(finite)
         .fold(search.basis.clone(), |m, c| beside(&m, c));
-    let spread = &search.spread;
-    let noise = spread.fit(&basis(&all), &spread.none(), By::Likelihood)?;
-    let whitener = spread.whitener(&noise.components)?;
+    let variance = &search.variance;
+    let noise = variance.fit(&basis(&all), &variance.none(), By::Likelihood)?;
+    let whitener = variance.whitener(&noise.components)?;
     let white = whitener.whiten(&search.basis).svd(true, true);
     let errors: Vec<DVector<f64>> = columns
         .iter()

@@ -22,7 +22,7 @@ pub(super) fn candidates(
     let mut not_excited = Vec::new();
     // Excitation is judged by the known noise.
     let plain = Search::new(rows, Vec::new());
-    let Some(whitener) = plain.spread.whitener(&plain.spread.none()) else {
+    let Some(whitener) = plain.variance.whitener(&plain.variance.none()) else {
         return (all, not_excited);
     };
     let q = whitener.whiten(&plain.basis).qr().q();

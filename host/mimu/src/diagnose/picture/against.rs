@@ -13,7 +13,7 @@ use super::{Abscissa, Kind, Track};
 use crate::diagnose::decision::Accepted;
 use crate::diagnose::rows::Rows;
 use crate::diagnose::search::Search;
-use crate::diagnose::spread::Fitted;
+use crate::diagnose::variance::Fitted;
 use crate::effects::quantity::Conditions;
 use crate::quantity::AXES;
 
@@ -27,7 +27,7 @@ const POINTS_OF_STEPS: usize = 801;
 pub enum Against {
     /// What the effect depends on.
     Variable(Abscissa),
-    /// What the effect does to the row, beside the affine calibration: where a row is a whole turn, or the size of gravity, it is
+    /// What the effect does to the row, beside the affine calibration: where a row is a whole turn, or the magnitude of gravity, it is
     /// no function of one quantity.
     Fitted,
 }
@@ -145,7 +145,7 @@ pub(super) fn panels(
         }
     }
     // Whole rows, beside the affine parameters.
-    let white = search.spread.whitener(&last.components)?;
+    let white = search.variance.whitener(&last.components)?;
     let (basis, columns) = (&search.basis, &one.chosen.columns);
     let share = white
         .whiten(basis)

@@ -217,7 +217,7 @@ impl Builder<'_> {
         (spans, session)
     }
 
-    pub(super) fn walk(&self, dwells: &[usize]) -> DMatrix<f64> {
+    pub(super) fn random_walk(&self, dwells: &[usize]) -> DMatrix<f64> {
         let (spans, session) = self.spans(dwells);
         let unit = Slow {
             instability: 0.0,

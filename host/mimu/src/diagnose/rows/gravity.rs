@@ -48,12 +48,12 @@ impl Builder<'_> {
         }
         let variances = prepared.size_variances(inverse, &observations);
         let strata = vec![Stratum {
-            name: "size of gravity".into(),
+            name: "magnitude of gravity".into(),
             axis: None,
             session: 0,
             rows: 0..n,
             known: DMatrix::from_diagonal(&DVector::from_vec(variances)),
-            walk: Some(self.walk(&dwells)),
+            random_walk: Some(self.random_walk(&dwells)),
             wander_known: prepared.noise.is_stated(Sensor::Accel),
         }];
         self.finish(y, nuisance, vec![6, 7, 8], strata, (Figure::Size, n, 1))
@@ -129,7 +129,7 @@ impl Builder<'_> {
                 nuisance[(row, k)] = *v;
             }
         }
-        let walk = (n > 0).then(|| self.walk(&dwells));
+        let random_walk = (n > 0).then(|| self.random_walk(&dwells));
         let wander = prepared.noise.wander(Sensor::Gyro, &prepared.dwells.list);
         // The reading that rest should have, and not that of each dwell: its noise is what the row is about, and a matrix of
         // zeros would explain it wholly, with `rate_x` of coefficient -1 beside for the turns.
@@ -146,7 +146,7 @@ impl Builder<'_> {
                 session: 0,
                 rows: 0..m,
                 known: DMatrix::from_diagonal(&DVector::from_vec(turn_variances)),
-                walk: None,
+                random_walk: None,
                 wander_known: true,
             });
         }
@@ -174,7 +174,7 @@ impl Builder<'_> {
                 session: 0,
                 rows: m + axis * n..m + (axis + 1) * n,
                 known,
-                walk: walk.clone(),
+                random_walk: random_walk.clone(),
                 wander_known: wander.is_some(),
             });
         }

@@ -29,7 +29,7 @@ impl Builder<'_> {
             .iter()
             .map(|d| self.dwell(*d, self.force(*d, accel)))
             .collect();
-        let walk = self.walk(&dwells);
+        let random_walk = self.random_walk(&dwells);
         let mut y = Vec::new();
         let mut nuisance = DMatrix::zeros(3 * n, 12);
         let mut strata = Vec::new();
@@ -56,7 +56,7 @@ impl Builder<'_> {
                 session: 0,
                 rows: axis * n..(axis + 1) * n,
                 known,
-                walk: Some(walk.clone()),
+                random_walk: Some(random_walk.clone()),
                 wander_known: wander.is_some(),
             });
         }

@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 
 use super::{COEFFICIENT, Search, beside, independent_of, unit_columns};
-use crate::diagnose::spread::{By, Components, Fitted};
+use crate::diagnose::variance::{By, Components, Fitted};
 use crate::effects::candidate::Candidate;
 use crate::effects::effect::NonlinearParameter;
 
@@ -32,7 +32,7 @@ impl With {
 impl Beside<'_> {
     fn fit(&self, columns: DMatrix<f64>, start: &Components) -> Option<With> {
         let both = beside(&self.model, &unit_columns(&columns));
-        let fitted = self.search.spread.fit(&both, start, By::Likelihood)?;
+        let fitted = self.search.variance.fit(&both, start, By::Likelihood)?;
         Some(With {
             drop: (self.null.deviance - fitted.deviance).max(0.0),
             components: fitted.components,
@@ -42,15 +42,15 @@ impl Beside<'_> {
 
     /// With the best value of its nonlinear constant, if it has one: a walk uphill from `first` with ever smaller steps.
     pub fn parameter(&self, candidate: &Candidate, first: f64) -> Option<(f64, With)> {
-        self.walk(candidate, first, |columns| columns)
+        self.climb(candidate, first, |columns| columns)
     }
 
     /// The same of a law that is to do what the model does not yet: what of it is in the model already is no fault of it, and costs nothing.
     pub fn law(&self, law: &Candidate, first: f64) -> Option<(f64, With)> {
-        self.walk(law, first, |columns| independent_of(&columns, &self.model))
+        self.climb(law, first, |columns| independent_of(&columns, &self.model))
     }
 
-    fn walk(
+    fn climb(
         &self,
         candidate: &Candidate,
         first: f64,
@@ -106,7 +106,7 @@ impl Beside<'_> {
                 }
                 // By the noise so far: by its own it could only be better.
                 let both = beside(&self.model, &unit_columns(&columns(&other)));
-                let fitted = self.search.spread.fit_at(&both, &best.1.components)?;
+                let fitted = self.search.variance.fit_at(&both, &best.1.components)?;
                 let score = -fitted.deviance - COEFFICIENT * other.active.len() as f64;
                 Some((other, score))
             });

@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use super::{COEFFICIENT, Chosen, Search, exceeds};
-use crate::diagnose::spread::Fitted;
+use crate::diagnose::variance::Fitted;
 use crate::effects::candidate::Candidate;
 
 /// A candidate as it looked at first sight.
@@ -25,7 +25,7 @@ fn across(others: &DMatrix<f64>, columns: &DMatrix<f64>) -> DMatrix<f64> {
 impl Search<'_> {
     /// Screens all candidates beside the chosen ones; the most promising first. Of the variants of one the best.
     pub(super) fn screen(&self, chosen: &[Chosen], null: &Fitted) -> Vec<Screened> {
-        let Some(whitener) = self.spread.whitener(&null.components) else {
+        let Some(whitener) = self.variance.whitener(&null.components) else {
             return Vec::new();
         };
         let y = DMatrix::from_column_slice(self.rows.y.len(), 1, self.rows.y.as_slice());
@@ -56,10 +56,10 @@ impl Search<'_> {
                 let mut best: Option<Screened> = None;
                 let code = codes.iter().find(|c| c.0.is_variant_of(candidate));
                 let code = code.map(|(_, parameter, all)| {
-                    (*parameter, self.spread.turn(&candidate.columns_of(all)))
+                    (*parameter, self.variance.rotate(&candidate.columns_of(all)))
                 });
-                for (parameter, turned) in self.turned[index].iter().chain(&code) {
-                    let (parameter, white) = (*parameter, whitener.whiten_turned(turned.clone()));
+                for (parameter, rotated) in self.rotated[index].iter().chain(&code) {
+                    let (parameter, white) = (*parameter, whitener.whiten_rotated(rotated.clone()));
                     let Some((p, gain)) = self.explained(&others, &left, total, &white) else {
                         continue;
                     };

@@ -1,25 +1,25 @@
 //! How the rows scatter: known noise, scatter beside it, and a bias that walks, each estimated where it is not known.
 //!
-//! A drift of the bias and a walk of it are told apart by nothing else than that one is a straight line. So where the walk is not
+//! A drift of the bias and a random walk of it are told apart by nothing else than that one is a straight line. So where the random walk is not
 //! known, it is in the null hypothesis.
 
-mod root;
+mod factor;
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::rows::Rows;
-use root::{Axes, Root, Separable};
+use factor::{Axes, Factor, Separable};
 
-pub use root::{Kept, Whitener};
+pub use factor::{Kept, Whitener};
 
 /// Variances of each stratum beside the known ones.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Components {
     /// Of each row by itself, unit of the rows squared.
-    pub excess: Vec<f64>,
-    /// K² of a walk, unit²/s.
-    pub walk: Vec<f64>,
+    pub extra_white: Vec<f64>,
+    /// K² of a random walk, unit²/s.
+    pub random_walk: Vec<f64>,
 }
 
 /// A linear model of the rows at some components.
@@ -56,60 +56,67 @@ struct Share {
 }
 
 /// Rows, with what takes long to find out about them.
-pub struct Spread<'a> {
+pub struct VarianceModel<'a> {
     rows: &'a Rows,
-    /// Axes in which the rows of a stratum are independent whatever its excess, as long as there is no walk: its own where one is
+    /// Axes in which the rows of a stratum are independent whatever its extra white variance, as long as there is no random walk: its own where one is
     /// sought.
     axes: Vec<Option<Axes>>,
-    /// The walk that is sought of each, where it has a root of few terms.
+    /// The random walk that is sought of each, where it has a factor of few terms.
     separable: Vec<Option<Separable>>,
-    /// Typical variance of a row, and of a unit walk, by stratum.
+    /// Typical variance of a row, and of a unit random walk, by stratum.
     typical: Vec<(f64, f64)>,
-    /// Whether a walk is sought where the wander is known as well.
-    all_walk: bool,
+    /// Whether a random walk is sought where the wander is known as well.
+    all_random_walks: bool,
 }
 
-impl<'a> Spread<'a> {
-    /// Of `rows`. Where the wander is known, a walk beside it is only sought if `all_walk`: it would take up every slow effect.
-    pub fn new(rows: &'a Rows, all_walk: bool) -> Self {
+impl<'a> VarianceModel<'a> {
+    /// Of `rows`. Where the wander is known, a random walk beside it is only sought if `all_random_walks`: it would take up every slow effect.
+    pub fn new(rows: &'a Rows, all_random_walks: bool) -> Self {
         let mean = |m: &DMatrix<f64>| m.diagonal().mean().max(1e-30);
-        let mut spread = Self {
+        let mut variance = Self {
             rows,
-            all_walk,
+            all_random_walks,
             axes: Vec::new(),
             separable: Vec::new(),
             typical: rows
                 .strata
                 .iter()
-                .map(|s| (mean(&s.known), s.walk.as_ref().map_or(0.0, mean)))
+                .map(|s| (mean(&s.known), s.random_walk.as_ref().map_or(0.0, mean)))
                 .collect(),
         };
-        spread.axes = (0..rows.strata.len())
+        variance.axes = (0..rows.strata.len())
             .into_par_iter()
-            .map(|s| match spread.walks(s) {
+            .map(|s| match variance.seeks_random_walk(s) {
                 true => Axes::as_they_stand(&rows.strata[s].known),
                 false => Some(Axes::of(&rows.strata[s].known)),
             })
             .collect();
-        spread.separable = (0..rows.strata.len())
-            .map(|s| Separable::of(rows.strata[s].walk.as_ref().filter(|_| spread.walks(s))?))
+        variance.separable = (0..rows.strata.len())
+            .map(|s| {
+                Separable::of(
+                    rows.strata[s]
+                        .random_walk
+                        .as_ref()
+                        .filter(|_| variance.seeks_random_walk(s))?,
+                )
+            })
             .collect();
-        spread
+        variance
     }
 
-    /// Whether a walk of stratum `s` is sought.
-    fn walks(&self, s: usize) -> bool {
+    /// Whether a random walk of stratum `s` is sought.
+    fn seeks_random_walk(&self, s: usize) -> bool {
         let stratum = &self.rows.strata[s];
-        stratum.walk.is_some() && (self.all_walk || !stratum.wander_known)
+        stratum.random_walk.is_some() && (self.all_random_walks || !stratum.wander_known)
     }
 
     /// `matrix`, a row for each of the rows, in the axes in which rows are independent, where there are such.
-    pub fn turn(&self, matrix: &DMatrix<f64>) -> DMatrix<f64> {
+    pub fn rotate(&self, matrix: &DMatrix<f64>) -> DMatrix<f64> {
         let mut out = matrix.clone();
         for (stratum, axes) in self.rows.strata.iter().zip(&self.axes) {
             if let Some(axes) = axes {
                 let (from, count) = (stratum.rows.start, stratum.rows.len());
-                axes.turn(&mut out.rows_mut(from, count));
+                axes.rotate(&mut out.rows_mut(from, count));
             }
         }
         out
@@ -119,8 +126,8 @@ impl<'a> Spread<'a> {
     pub fn none(&self) -> Components {
         let zeros = vec![0.0; self.rows.strata.len()];
         Components {
-            excess: zeros.clone(),
-            walk: zeros,
+            extra_white: zeros.clone(),
+            random_walk: zeros,
         }
     }
 
@@ -129,46 +136,50 @@ impl<'a> Spread<'a> {
         let mut out = DVector::zeros(self.rows.y.len());
         for (s, stratum) in self.rows.strata.iter().enumerate() {
             for (i, row) in stratum.rows.clone().enumerate() {
-                let walk = stratum.walk.as_ref().map_or(0.0, |unit| unit[(i, i)]);
+                let random_walk = stratum
+                    .random_walk
+                    .as_ref()
+                    .map_or(0.0, |unit| unit[(i, i)]);
                 out[row] = stratum.known[(i, i)]
-                    + at.excess[s]
-                    + at.walk[s] * walk
+                    + at.extra_white[s]
+                    + at.random_walk[s] * random_walk
                     + 1e-12 * self.typical[s].0;
             }
         }
         out
     }
 
-    /// Root of the covariance of stratum `s`, for rows that have been turned.
-    fn root(&self, s: usize, excess: f64, walk: f64) -> Option<Root> {
+    /// Factor of the covariance of stratum `s`, for rows that have been rotated.
+    fn factor(&self, s: usize, extra_white: f64, random_walk: f64) -> Option<Factor> {
         let stratum = &self.rows.strata[s];
         let floor = 1e-12 * self.typical[s].0;
         if let Some(axes) = &self.axes[s]
-            && walk == 0.0
+            && random_walk == 0.0
         {
-            return Some(axes.root(excess, floor));
+            return Some(axes.factor(extra_white, floor));
         }
         if let (Some(axes), Some(separable)) = (&self.axes[s], &self.separable[s])
             && let Some(known) = axes.standing()
         {
-            return separable.root(walk, &known.map(|v| v.max(floor) + excess));
+            return separable.factor(random_walk, &known.map(|v| v.max(floor) + extra_white));
         }
         let mut v = stratum.known.clone();
-        if let Some(unit) = &stratum.walk {
-            v += unit * walk;
+        if let Some(unit) = &stratum.random_walk {
+            v += unit * random_walk;
         }
         for i in 0..v.nrows() {
-            v[(i, i)] += excess + floor;
+            v[(i, i)] += extra_white + floor;
         }
-        Cholesky::new(v).map(Root::Full)
+        Cholesky::new(v).map(Factor::Full)
     }
 
     /// What decorrelates all rows.
     pub fn whitener(&self, at: &Components) -> Option<Whitener<'_>> {
-        let roots = (0..self.rows.strata.len()).map(|s| self.root(s, at.excess[s], at.walk[s]));
+        let factors = (0..self.rows.strata.len())
+            .map(|s| self.factor(s, at.extra_white[s], at.random_walk[s]));
         Some(Whitener {
-            spread: self,
-            roots: roots.collect::<Option<_>>()?,
+            variance: self,
+            factors: factors.collect::<Option<_>>()?,
         })
     }
 
@@ -183,11 +194,11 @@ impl<'a> Spread<'a> {
                 .map(|r| r - stratum.rows.start)
                 .collect();
             let mut v = stratum.known.select_rows(&rows).select_columns(&rows);
-            if let Some(unit) = &stratum.walk {
-                v += unit.select_rows(&rows).select_columns(&rows) * at.walk[s];
+            if let Some(unit) = &stratum.random_walk {
+                v += unit.select_rows(&rows).select_columns(&rows) * at.random_walk[s];
             }
             for i in 0..v.nrows() {
-                v[(i, i)] += at.excess[s] + 1e-12 * self.typical[s].0;
+                v[(i, i)] += at.extra_white[s] + 1e-12 * self.typical[s].0;
             }
             if !rows.is_empty() {
                 parts.push((from, Cholesky::new(v)?));
@@ -196,14 +207,20 @@ impl<'a> Spread<'a> {
         Some(Kept { parts })
     }
 
-    fn share(&self, s: usize, excess: f64, walk: f64, both: &DMatrix<f64>) -> Option<Share> {
+    fn share(
+        &self,
+        s: usize,
+        extra_white: f64,
+        random_walk: f64,
+        both: &DMatrix<f64>,
+    ) -> Option<Share> {
         let range = &self.rows.strata[s].rows;
         let mut part = both.rows(range.start, range.len()).into_owned();
-        let root = self.root(s, excess, walk)?;
-        root.whiten(&mut part);
+        let factor = self.factor(s, extra_white, random_walk)?;
+        factor.whiten(&mut part);
         Some(Share {
             normal: part.tr_mul(&part),
-            log_determinant: root.log_determinant(),
+            log_determinant: factor.log_determinant(),
         })
     }
 
@@ -230,12 +247,12 @@ impl<'a> Spread<'a> {
         let scale = DVector::from_fn(p, |i, _| normal[(i, i)].sqrt().max(f64::MIN_POSITIVE));
         let scaled = DMatrix::from_fn(p, p, |i, j| normal[(i, j)] / (scale[i] * scale[j]));
         let right = DVector::from_fn(p, |i, _| normal[(i, p)] / scale[i]);
-        let root = Cholesky::new(scaled)?;
-        let solution = root.solve(&right);
+        let factor = Cholesky::new(scaled)?;
+        let solution = factor.solve(&right);
         let chi2 = (y2 - solution.dot(&right)).max(0.0);
-        let l = root.l_dirty();
+        let l = factor.l_dirty();
         let log: f64 = (0..p).map(|i| 2.0 * (l[(i, i)] * scale[i]).ln()).sum();
-        let mut covariance = root.inverse();
+        let mut covariance = factor.inverse();
         for i in 0..p {
             for j in 0..p {
                 covariance[(i, j)] /= scale[i] * scale[j];
@@ -251,19 +268,19 @@ impl<'a> Spread<'a> {
         })
     }
 
-    /// Columns and residual, turned.
+    /// Columns and residual, rotated.
     fn both(&self, columns: &DMatrix<f64>) -> DMatrix<f64> {
         let p = columns.ncols();
         let mut both = columns.clone().insert_column(p, 0.0);
         both.set_column(p, &self.rows.y);
-        self.turn(&both)
+        self.rotate(&both)
     }
 
     /// The model with `columns` at given components.
     pub fn fit_at(&self, columns: &DMatrix<f64>, at: &Components) -> Option<Fitted> {
         let both = self.both(columns);
         let shares: Option<Vec<Share>> = (0..self.rows.strata.len())
-            .map(|s| self.share(s, at.excess[s], at.walk[s], &both))
+            .map(|s| self.share(s, at.extra_white[s], at.random_walk[s], &both))
             .collect();
         self.solve(&shares?, at)
     }
@@ -277,17 +294,17 @@ impl<'a> Spread<'a> {
         let both = self.both(columns);
         let mut at = start.clone();
         let mut shares: Vec<Share> = (0..self.rows.strata.len())
-            .map(|s| self.share(s, at.excess[s], at.walk[s], &both))
+            .map(|s| self.share(s, at.extra_white[s], at.random_walk[s], &both))
             .collect::<Option<_>>()?;
         let mut best = self.solve(&shares, &at)?;
         for _ in 0..SWEEPS {
             let before = cost(&best);
             for s in 0..shares.len() {
-                let (row, unit_walk) = self.typical[s];
-                for part in 0..if self.walks(s) { 2 } else { 1 } {
+                let (row, unit_random_walk) = self.typical[s];
+                for part in 0..if self.seeks_random_walk(s) { 2 } else { 1 } {
                     let (now, unit) = match part {
-                        0 => (at.excess[s], row),
-                        _ => (at.walk[s], row / unit_walk),
+                        0 => (at.extra_white[s], row),
+                        _ => (at.random_walk[s], row / unit_random_walk),
                     };
                     let mut steps: Vec<f64> = vec![0.0];
                     match now > 0.0 {
@@ -297,24 +314,27 @@ impl<'a> Spread<'a> {
                         }
                     }
                     let with = |value: f64| match part {
-                        0 => (value, at.walk[s]),
-                        _ => (at.excess[s], value),
+                        0 => (value, at.random_walk[s]),
+                        _ => (at.extra_white[s], value),
                     };
                     // Decorrelating a stratum takes nearly all of the time, and one value asks nothing of another.
                     let tried: Vec<((f64, f64), Option<Share>)> = steps
                         .into_par_iter()
                         .map(|value| {
-                            let (excess, walk) = with(value);
-                            ((excess, walk), self.share(s, excess, walk, &both))
+                            let (extra_white, random_walk) = with(value);
+                            (
+                                (extra_white, random_walk),
+                                self.share(s, extra_white, random_walk, &both),
+                            )
                         })
                         .collect();
-                    for ((excess, walk), share) in tried {
+                    for ((extra_white, random_walk), share) in tried {
                         let Some(new) = share else {
                             continue;
                         };
                         let old = std::mem::replace(&mut shares[s], new);
                         let mut there = at.clone();
-                        (there.excess[s], there.walk[s]) = (excess, walk);
+                        (there.extra_white[s], there.random_walk[s]) = (extra_white, random_walk);
                         match self.solve(&shares, &there) {
                             Some(found) if cost(&found) < cost(&best) - 1e-9 => {
                                 best = found;

@@ -1,15 +1,15 @@
-//! Roots of covariances: what decorrelates rows.
+//! Factors of covariances: what decorrelates rows.
 
 use nalgebra::{Cholesky, DMatrix, DMatrixViewMut, DVector, Dyn, Matrix2, SymmetricEigen, Vector2};
 
-use super::Spread;
+use super::VarianceModel;
 
-/// Axes in which rows are independent: the eigenvectors of their known covariance, and those of it and any excess too.
+/// Axes in which rows are independent: the eigenvectors of their known covariance, and those of it and any extra white variance too.
 ///
-/// Found once; each excess that is tried then costs a division for each row, where a Cholesky root costs a third of n³.
+/// Found once; each extra white variance that is tried then costs a division for each row, where a Cholesky factor costs a third of n³.
 pub(super) struct Axes {
     /// Rows times this are independent; `None` where they are as they stand.
-    turn: Option<DMatrix<f64>>,
+    rotate: Option<DMatrix<f64>>,
     /// Their known variances.
     variances: DVector<f64>,
 }
@@ -20,7 +20,7 @@ impl Axes {
         let variances = known.diagonal();
         let independent = (known - DMatrix::from_diagonal(&variances)).amax() == 0.0;
         independent.then_some(Self {
-            turn: None,
+            rotate: None,
             variances,
         })
     }
@@ -30,33 +30,33 @@ impl Axes {
         Self::as_they_stand(known).unwrap_or_else(|| {
             let eigen = SymmetricEigen::new(known.clone());
             Self {
-                turn: Some(eigen.eigenvectors.transpose()),
+                rotate: Some(eigen.eigenvectors.transpose()),
                 variances: eigen.eigenvalues,
             }
         })
     }
 
-    pub(super) fn turn(&self, part: &mut DMatrixViewMut<f64>) {
-        if let Some(turn) = &self.turn {
-            let turned = turn * &*part;
-            part.copy_from(&turned);
+    pub(super) fn rotate(&self, part: &mut DMatrixViewMut<f64>) {
+        if let Some(rotate) = &self.rotate {
+            let rotated = rotate * &*part;
+            part.copy_from(&rotated);
         }
     }
 
-    pub(super) fn root(&self, excess: f64, floor: f64) -> Root {
-        Root::Diagonal(self.variances.map(|v| (v.max(floor) + excess).sqrt()))
+    pub(super) fn factor(&self, extra_white: f64, floor: f64) -> Factor {
+        Factor::Diagonal(self.variances.map(|v| (v.max(floor) + extra_white).sqrt()))
     }
 
     /// The variances of the rows, where they are independent as they stand.
     pub(super) fn standing(&self) -> Option<&DVector<f64>> {
-        self.turn.is_none().then_some(&self.variances)
+        self.rotate.is_none().then_some(&self.variances)
     }
 }
 
-/// A covariance whose element of rows i < j is u_i + v_j, as that of a random walk less its mean is: beside independent noise it has
-/// a root of n terms (Foreman-Mackey et al. 2017, AJ 154:220, with two terms that do not decay).
+/// A covariance whose element of rows i < j is u_i + v_j, as that of a random walk minus its mean is: beside independent noise it has
+/// a factor of n terms (Foreman-Mackey et al. 2017, AJ 154:220, with two terms that do not decay).
 ///
-/// Where a walk is sought its size is not known, and each that is tried took a Cholesky root: six tenths of the time of a diagnosis
+/// Where a random walk is sought its size is not known, and each that is tried took a Cholesky factor: six tenths of the time of a diagnosis
 /// of 150 dwells.
 pub(super) struct Separable {
     /// u and v of each row.
@@ -90,8 +90,8 @@ impl Separable {
         })
     }
 
-    /// Root of it, times `size`, beside independent noise of these variances; `None` if the sum is not positive.
-    pub(super) fn root(&self, size: f64, beside: &DVector<f64>) -> Option<Root> {
+    /// Factor of it, times `size`, beside independent noise of these variances; `None` if the sum is not positive.
+    pub(super) fn factor(&self, size: f64, beside: &DVector<f64>) -> Option<Factor> {
         let mut steps = Vec::with_capacity(self.sums.len());
         let mut s = Matrix2::zeros();
         for ((&[u, v], own), independent) in self.sums.iter().zip(&self.variances).zip(beside) {
@@ -109,11 +109,11 @@ impl Separable {
                 sigma: variance.sqrt(),
             });
         }
-        Some(Root::Steps(steps))
+        Some(Factor::Steps(steps))
     }
 }
 
-/// A row of the root of a [`Separable`] covariance.
+/// A row of the factor of a [`Separable`] covariance.
 pub(super) struct Step {
     /// What of the rows before it is in it.
     later: Vector2<f64>,
@@ -123,17 +123,17 @@ pub(super) struct Step {
     sigma: f64,
 }
 
-/// Root of the covariance of a stratum.
-pub(super) enum Root {
-    /// Of turned rows.
+/// Factor of the covariance of a stratum.
+pub(super) enum Factor {
+    /// Of rotated rows.
     Diagonal(DVector<f64>),
-    /// Of rows that are independent but for a walk, as they are.
+    /// Of rows that are independent but for a random walk, as they are.
     Steps(Vec<Step>),
     /// Of rows as they are.
     Full(Cholesky<f64, Dyn>),
 }
 
-impl Root {
+impl Factor {
     pub(super) fn whiten(&self, part: &mut DMatrix<f64>) {
         match self {
             Self::Diagonal(sigmas) => {
@@ -151,8 +151,8 @@ impl Root {
                     }
                 }
             }
-            Self::Full(root) => {
-                root.l_dirty().solve_lower_triangular_mut(part);
+            Self::Full(factor) => {
+                factor.l_dirty().solve_lower_triangular_mut(part);
             }
         }
     }
@@ -161,32 +161,37 @@ impl Root {
         match self {
             Self::Diagonal(sigmas) => sigmas.iter().map(|s| 2.0 * s.ln()).sum(),
             Self::Steps(steps) => steps.iter().map(|s| 2.0 * s.sigma.ln()).sum(),
-            Self::Full(root) => root.l_dirty().diagonal().iter().map(|s| 2.0 * s.ln()).sum(),
+            Self::Full(factor) => factor
+                .l_dirty()
+                .diagonal()
+                .iter()
+                .map(|s| 2.0 * s.ln())
+                .sum(),
         }
     }
 }
 
 /// Decorrelates rows.
 pub struct Whitener<'a> {
-    pub(super) spread: &'a Spread<'a>,
-    pub(super) roots: Vec<Root>,
+    pub(super) variance: &'a VarianceModel<'a>,
+    pub(super) factors: Vec<Factor>,
 }
 
 impl Whitener<'_> {
     /// `matrix`, a row for each of the rows, decorrelated and in sigmas.
     pub fn whiten(&self, matrix: &DMatrix<f64>) -> DMatrix<f64> {
-        self.whiten_turned(self.spread.turn(matrix))
+        self.whiten_rotated(self.variance.rotate(matrix))
     }
 
-    /// The same of a matrix that [`Spread::turn`] has turned.
-    pub fn whiten_turned(&self, mut turned: DMatrix<f64>) -> DMatrix<f64> {
-        for (stratum, root) in self.spread.rows.strata.iter().zip(&self.roots) {
+    /// The same of a matrix that [`VarianceModel::rotate`] has rotated.
+    pub fn whiten_rotated(&self, mut rotated: DMatrix<f64>) -> DMatrix<f64> {
+        for (stratum, factor) in self.variance.rows.strata.iter().zip(&self.factors) {
             let (from, count) = (stratum.rows.start, stratum.rows.len());
-            let mut part = turned.rows(from, count).into_owned();
-            root.whiten(&mut part);
-            turned.rows_mut(from, count).copy_from(&part);
+            let mut part = rotated.rows(from, count).into_owned();
+            factor.whiten(&mut part);
+            rotated.rows_mut(from, count).copy_from(&part);
         }
-        turned
+        rotated
     }
 }
 
@@ -199,10 +204,10 @@ impl Kept {
     /// `matrix`, a row for each of the chosen rows, decorrelated and in sigmas.
     pub fn whiten(&self, matrix: &DMatrix<f64>) -> DMatrix<f64> {
         let mut out = matrix.clone();
-        for (from, root) in &self.parts {
-            let count = root.l_dirty().nrows();
+        for (from, factor) in &self.parts {
+            let count = factor.l_dirty().nrows();
             let mut part = matrix.rows(*from, count).into_owned();
-            root.l_dirty().solve_lower_triangular_mut(&mut part);
+            factor.l_dirty().solve_lower_triangular_mut(&mut part);
             out.rows_mut(*from, count).copy_from(&part);
         }
         out
@@ -225,23 +230,23 @@ mod tests {
     #[test]
     fn the_root_of_a_walk_is_that_of_its_matrix() {
         let spans = spans(40);
-        let walk = Slow {
+        let random_walk = Slow {
             instability: 0.0,
             walk: 1.0,
         };
-        let walk = walk.covariance(&spans, [0.0, 600.0]);
+        let random_walk = random_walk.covariance(&spans, [0.0, 600.0]);
         let beside = DVector::from_fn(40, |i, _| 1e-3 * (1.0 + (i % 5) as f64));
         let matrix = DMatrix::from_fn(40, 3, |i, j| ((i * (j + 2)) as f64).sin());
         for size in [1e-9, 1e-5, 1e-2, 10.0] {
-            let separable = Separable::of(&walk).unwrap();
-            let root = separable.root(size, &beside).unwrap();
-            let full = &walk * size + DMatrix::from_diagonal(&beside);
-            let full = Root::Full(Cholesky::new(full).unwrap());
+            let separable = Separable::of(&random_walk).unwrap();
+            let factor = separable.factor(size, &beside).unwrap();
+            let full = &random_walk * size + DMatrix::from_diagonal(&beside);
+            let full = Factor::Full(Cholesky::new(full).unwrap());
             let [mut a, mut b] = [matrix.clone(), matrix.clone()];
-            root.whiten(&mut a);
+            factor.whiten(&mut a);
             full.whiten(&mut b);
             assert!((&a - &b).amax() < 1e-8 * b.amax(), "{size}: {}", a - b);
-            assert!((root.log_determinant() - full.log_determinant()).abs() < 1e-6);
+            assert!((factor.log_determinant() - full.log_determinant()).abs() < 1e-6);
         }
     }
 
