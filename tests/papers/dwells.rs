@@ -2,7 +2,7 @@
 
 use mimu::design::Problem;
 use mimu::design::model::{Model, Setting, Terms};
-use mimu::design::reach::Carrier;
+use mimu::design::reach::Fixture;
 use mimu::design::schemes::Scheme;
 use mimu::estimate::Observation;
 use mimu::quantity::Sensor;
@@ -90,7 +90,7 @@ fn study(
     published: Option<&[Setting]>,
 ) -> (Table, Option<[String; 3]>, Chart) {
     let model = Model::accel(reference, &Terms::default());
-    let problem = Problem::accel(model, Carrier::ThreeAxis).expect("determined");
+    let problem = Problem::accel(model, Fixture::ThreeAxis).expect("determined");
     let numbers = NUMBERS.iter().copied().filter(|n| *n >= fewest);
     let ours: Vec<(f64, f64)> = numbers
         .clone()

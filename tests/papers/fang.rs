@@ -2,7 +2,7 @@
 
 use mimu::design::Problem;
 use mimu::design::model::{Model, Setting, Terms};
-use mimu::design::reach::Carrier;
+use mimu::design::reach::Fixture;
 use mimu::design::schemes::{FANG_FILTERS, Scheme};
 use mimu::estimate::known_input::{kalman, least_squares, six_positions};
 use mimu::estimate::{Estimated, Observation};
@@ -48,7 +48,7 @@ fn contenders() -> Vec<Contender> {
     let scheme = |s: Scheme| directions(&s.settings(Sensor::Accel).expect("a scheme of poses"));
     let (six, nine) = (scheme(Scheme::SixFace), scheme(Scheme::FangNine));
     let model = Model::accel(Reference::Table, &Terms::default());
-    let problem = Problem::accel(model, Carrier::ThreeAxis).expect("affine on the whole sphere");
+    let problem = Problem::accel(model, Fixture::ThreeAxis).expect("affine on the whole sphere");
     let ours = directions(&problem.best(9, 1).expect("nine determine four"));
     let new = |name, positions: &Vec<Vector3<f64>>, share, estimator| Contender {
         name,

@@ -3,7 +3,7 @@
 use mimu::design::Problem;
 use mimu::design::judgement::Judgement;
 use mimu::design::model::{Model, Setting, Terms};
-use mimu::design::reach::{Carrier, Rates};
+use mimu::design::reach::{Fixture, Rates};
 use mimu::design::schemes::Scheme;
 use mimu::quantity::Sensor;
 use mimu_recording::Reference;
@@ -64,10 +64,10 @@ fn table(problem: &Problem, sensor: Sensor, sizes: &[usize]) -> Table {
 pub fn blocks() -> Vec<Block> {
     let accel = |reference| {
         let model = Model::accel(reference, &Terms::default());
-        Problem::accel(model, Carrier::ThreeAxis).expect("determined")
+        Problem::accel(model, Fixture::ThreeAxis).expect("determined")
     };
     let gyro = Model::gyro(&Terms::default(), Scheme::XuRates.rate_span());
-    let gyro = Problem::gyro(gyro, Carrier::ThreeAxis, Rates::Any).expect("determined");
+    let gyro = Problem::gyro(gyro, Fixture::ThreeAxis, Rates::Any).expect("determined");
     vec![
         Block::table(
             "schemes, poses known",

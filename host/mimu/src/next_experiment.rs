@@ -17,7 +17,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::design::budget::DwellNoise;
-use crate::design::reach::{Carrier, RateList, Rates};
+use crate::design::reach::{Fixture, RateList, Rates};
 use crate::design::tour::Motion;
 use crate::diagnose::Diagnosis;
 use crate::effects;
@@ -72,7 +72,7 @@ pub struct Setup {
     /// What will be known of the input.
     pub reference: Reference,
     /// What carries the unit.
-    pub carrier: Carrier,
+    pub fixture: Fixture,
     /// Sensors of the unit: each recording has to calibrate them all.
     pub sensors: Vec<Sensor>,
     /// Rates of the table.
@@ -90,23 +90,23 @@ pub struct Setup {
 }
 
 impl Setup {
-    /// The unit of a fitted recording: its noise, sensors and rates; without a `carrier` on what it was recorded on.
-    pub fn of(fit: &Fit, carrier: Option<Carrier>) -> Self {
+    /// The unit of a fitted recording: its noise, sensors and rates; without a `fixture` on what it was recorded on.
+    pub fn of(fit: &Fit, fixture: Option<Fixture>) -> Self {
         let prepared = &fit.prepared;
-        let carrier = carrier.unwrap_or(match prepared.manifest.reference {
-            Reference::Table => Carrier::ThreeAxis,
-            Reference::Gravity => Carrier::Hand,
+        let fixture = fixture.unwrap_or(match prepared.manifest.reference {
+            Reference::Table => Fixture::ThreeAxis,
+            Reference::Gravity => Fixture::Hand,
         });
-        let usual = Motion::of(carrier);
+        let usual = Motion::of(fixture);
         let dwells = &prepared.dwells.list;
         let rates = dwells.iter().flat_map(|d| d.reference[..3].to_vec());
         let largest = rates.fold(0.0, |m: f64, r| m.max(r.abs())).to_degrees();
         Self {
-            reference: match carrier {
-                Carrier::Hand => Reference::Gravity,
+            reference: match fixture {
+                Fixture::Hand => Reference::Gravity,
                 _ => Reference::Table,
             },
-            carrier,
+            fixture,
             sensors: Sensor::BOTH
                 .into_iter()
                 .filter(|s| fit.sensor(*s).is_some())
@@ -121,7 +121,7 @@ impl Setup {
             motion: Motion {
                 slew: usual
                     .slew
-                    .max(if carrier == Carrier::Hand { 0.0 } else { SLEW }),
+                    .max(if fixture == Fixture::Hand { 0.0 } else { SLEW }),
                 ..usual
             },
             seed: 1,
@@ -269,10 +269,10 @@ fn recommended(diagnosis: &Diagnosis, setup: &Setup, target: &Target) -> Option<
     if let Some(answer) = smallest(setup, targets) {
         return Some((answer.words(setup), true));
     }
-    if setup.carrier != Carrier::Hand {
+    if setup.fixture != Fixture::Hand {
         return None;
     }
-    let table = Setup::of(&diagnosis.after, Some(Carrier::ThreeAxis));
+    let table = Setup::of(&diagnosis.after, Some(Fixture::ThreeAxis));
     let answer = smallest(&table, targets)?;
     let words = answer.words(&table);
     Some((format!("This needs a turntable. {words}"), false))

@@ -10,7 +10,7 @@ use clap::{ArgGroup, Args, ValueEnum};
 use mimu::design::Problem;
 use mimu::design::budget::{DwellNoise, Session};
 use mimu::design::model::{Model, Setting, Terms};
-use mimu::design::reach::{Carrier, RateList, Rates};
+use mimu::design::reach::{Fixture, RateList, Rates};
 use mimu::design::schemes::Scheme;
 use mimu::design::tour::{Motion, Order, randomised};
 use mimu::noise_file::NoiseFile;
@@ -180,17 +180,17 @@ impl DesignArgs {
         }
     }
 
-    fn carrier(&self) -> Carrier {
+    fn fixture(&self) -> Fixture {
         match (self.table, self.reference) {
-            (Some(TableArg::ThreeAxis), _) | (None, Reference::Table) => Carrier::ThreeAxis,
-            (Some(TableArg::TwoAxis), _) => Carrier::TwoAxis,
-            (Some(TableArg::Faces), _) => Carrier::Faces,
-            (Some(TableArg::Hand), _) | (None, Reference::Gravity) => Carrier::Hand,
+            (Some(TableArg::ThreeAxis), _) | (None, Reference::Table) => Fixture::ThreeAxis,
+            (Some(TableArg::TwoAxis), _) => Fixture::TwoAxis,
+            (Some(TableArg::Faces), _) => Fixture::Faces,
+            (Some(TableArg::Hand), _) | (None, Reference::Gravity) => Fixture::Hand,
         }
     }
 
     fn motion(&self) -> Motion {
-        let usual = Motion::of(self.carrier());
+        let usual = Motion::of(self.fixture());
         Motion {
             slew: self.slew.map_or(usual.slew, f64::to_radians),
             settle_s: self.settle,
@@ -245,10 +245,10 @@ impl DesignArgs {
     fn problem(&self, span: Vector3<f64>, rates: Rates) -> Result<Problem> {
         match (self.sensor(), self.reference) {
             (Sensor::Accel, reference) => {
-                Problem::accel(Model::accel(reference, &self.model), self.carrier())
+                Problem::accel(Model::accel(reference, &self.model), self.fixture())
             }
             (Sensor::Gyro, Reference::Table) => {
-                Problem::gyro(Model::gyro(&self.model, span), self.carrier(), rates)
+                Problem::gyro(Model::gyro(&self.model, span), self.fixture(), rates)
             }
             (Sensor::Gyro, Reference::Gravity) => Err(Error::new(
                 "gyro, --reference gravity",
@@ -313,12 +313,12 @@ impl DesignArgs {
 
     fn scheme(&self, problem: &Problem, scheme: Scheme) -> Result<Design> {
         let settings = scheme.settings(self.sensor())?;
-        let Some((settings, turned_over)) = self.carrier().holding(&settings) else {
+        let Some((settings, turned_over)) = self.fixture().holding(&settings) else {
             return Err(Error::new(
                 format!("--scheme {}", scheme.name()),
                 format!(
                     "not all of its poses are within reach of --table {}",
-                    self.carrier().name()
+                    self.fixture().name()
                 ),
                 "use --table three-axis",
             ));
@@ -362,7 +362,7 @@ impl DesignArgs {
             };
             let (n, span) = (settings.len(), scheme.rate_span());
             let problem = self.problem(span, Rates::Any)?;
-            if self.carrier().holding(&settings).is_none() {
+            if self.fixture().holding(&settings).is_none() {
                 out_of_reach.push(scheme);
                 continue;
             }

@@ -16,12 +16,12 @@
 //! whose known input are the turns between dwells, is no design of dwells and not treated here.
 //!
 //! ```
-//! use mimu::design::{Problem, model::{Model, Terms}, reach::Carrier, schemes::Scheme};
+//! use mimu::design::{Problem, model::{Model, Terms}, reach::Fixture, schemes::Scheme};
 //! use mimu::quantity::Sensor;
 //! use mimu_recording::Reference;
 //!
 //! let model = Model::accel(Reference::Table, &Terms::default());
-//! let problem = Problem::accel(model, Carrier::ThreeAxis)?;
+//! let problem = Problem::accel(model, Fixture::ThreeAxis)?;
 //! let six = problem.best(6, 1)?;
 //! let ours = problem.judge(&six, 1e-3);
 //! let fang = problem.judge(&Scheme::FangNine.settings(Sensor::Accel)?, 1e-3);

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::model::Setting;
-use super::reach::Carrier;
+use super::reach::Fixture;
 
 /// Sample rate of the recording that the plan asks for, Hz.
 const SAMPLE_RATE_HZ: f64 = 1000.0;
@@ -18,7 +18,7 @@ pub struct Sheet<'a> {
     /// Sample rate, Hz.
     pub sample_rate_hz: f64,
     /// What carries the unit.
-    pub carrier: Carrier,
+    pub fixture: Fixture,
     /// Chamber, s and °C; empty where it does not matter.
     pub chamber_c: &'a [(f64, f64)],
     /// Attitudes and rates, in this order.
@@ -32,12 +32,12 @@ pub struct Sheet<'a> {
 /// Plan `mimu-plan/1` as TOML: `settings` in this order, `dwell_s` seconds each.
 ///
 /// `about` is put in front as a comment, line by line.
-pub fn to_toml(about: &str, carrier: Carrier, settings: &[Setting], dwell_s: f64) -> String {
+pub fn to_toml(about: &str, fixture: Fixture, settings: &[Setting], dwell_s: f64) -> String {
     sheet(&Sheet {
         about,
         device: None,
         sample_rate_hz: SAMPLE_RATE_HZ,
-        carrier,
+        fixture,
         chamber_c: &[],
         settings,
         dwell_s,
@@ -51,8 +51,8 @@ pub fn sheet(sheet: &Sheet) -> String {
     for line in sheet.about.lines() {
         let _ = writeln!(out, "# {line}");
     }
-    let hands = match sheet.carrier {
-        Carrier::Hand => "hands",
+    let hands = match sheet.fixture {
+        Fixture::Hand => "hands",
         _ => "table",
     };
     let _ = writeln!(out, "format = \"mimu-plan/1\"");

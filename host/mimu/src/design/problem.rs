@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::continuous::{Optimum, TOLERANCE};
 use super::information::{Inverse, Rows};
 use super::model::{Model, Setting};
-use super::reach::{Carrier, Rates, Reach};
+use super::reach::{Fixture, Rates, Reach};
 use super::refinement::{Region as _, refine};
 use super::{continuous, exchange, lack_of_fit};
 use crate::estimate::least_squares::Observability;
@@ -39,30 +39,30 @@ const EQUAL: f64 = 1e-6;
 const DIFFERENT: f64 = 0.01;
 
 impl Problem {
-    /// An accelerometer on `carrier`.
-    pub fn accel(model: Model, carrier: Carrier) -> Result<Self> {
+    /// An accelerometer on `fixture`.
+    pub fn accel(model: Model, fixture: Fixture) -> Result<Self> {
         Self::new(Reach {
             model,
-            carrier,
+            fixture,
             rates: Rates::Any,
         })
     }
 
-    /// A gyro triad on `carrier`, turned at `rates`.
-    pub fn gyro(model: Model, carrier: Carrier, rates: Rates) -> Result<Self> {
-        let holds = match carrier {
-            Carrier::ThreeAxis | Carrier::Faces => None,
-            Carrier::TwoAxis => Some("a two-axis table holds a rate about one body axis only"),
-            Carrier::Hand => Some("by hand there is no known rate, only turns between dwells"),
+    /// A gyro triad on `fixture`, turned at `rates`.
+    pub fn gyro(model: Model, fixture: Fixture, rates: Rates) -> Result<Self> {
+        let holds = match fixture {
+            Fixture::ThreeAxis | Fixture::Faces => None,
+            Fixture::TwoAxis => Some("a two-axis table holds a rate about one body axis only"),
+            Fixture::Hand => Some("by hand there is no known rate, only turns between dwells"),
         };
         match holds {
             None => Self::new(Reach {
                 model,
-                carrier,
+                fixture,
                 rates,
             }),
             Some(problem) => Err(Error::new(
-                format!("gyro, {}", carrier.name()),
+                format!("gyro, {}", fixture.name()),
                 problem,
                 "design for a three-axis table, or for one that shows the faces",
             )
@@ -101,7 +101,7 @@ impl Problem {
         let plain = self.reach.plain();
         let faces: Vec<Setting> = plain
             .iter()
-            .filter(|s| Carrier::Faces.reaches(&s.up))
+            .filter(|s| Fixture::Faces.reaches(&s.up))
             .copied()
             .collect();
         let search = |from: &[Setting], rows: &Rows| -> Vec<Vec<Setting>> {
@@ -125,7 +125,7 @@ impl Problem {
         let values: Vec<f64> = all.iter().map(|d| self.log_det(d)).collect();
         let most = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let worth = |settings: &[Setting]| {
-            let held = settings.iter().all(|s| Carrier::Faces.reaches(&s.up));
+            let held = settings.iter().all(|s| Fixture::Faces.reaches(&s.up));
             match held && self.distinct(settings).len() == n {
                 true => f64::INFINITY,
                 false => lack_of_fit::potential(&self.reach.model, settings),
@@ -208,7 +208,7 @@ fn undetermined(reach: &Reach, rows: &Rows) -> Error {
         place,
         format!(
             "{of} on the table {} cannot tell apart {}",
-            reach.carrier.name(),
+            reach.fixture.name(),
             names.join(", ")
         ),
         "leave out the term, or use another table or reference",

@@ -11,7 +11,7 @@ use crate::quantity::Sensor;
 
 /// What carries the unit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Carrier {
+pub enum Fixture {
     /// Three-axis turntable: every attitude, and a rate about the vertical.
     ThreeAxis,
     /// Two-axis turntable as in niu, Table 1: any turn about the body's z, tilted by at most 95 degrees off
@@ -26,7 +26,7 @@ pub enum Carrier {
 /// Largest tilt of the two-axis table, niu Table 1.
 const TILT_DEG: f64 = 95.0;
 
-impl Carrier {
+impl Fixture {
     /// Name as on the command line.
     pub fn name(self) -> &'static str {
         match self {
@@ -46,7 +46,7 @@ impl Carrier {
         }
     }
 
-    /// The settings as this carrier holds them: as they are, or on a two-axis table the unit turned over by a half turn
+    /// The settings as this fixture holds them: as they are, or on a two-axis table the unit turned over by a half turn
     /// about x where only that brings all of them within reach. The flag says whether it was. `None` if neither does.
     pub fn holding(self, settings: &[Setting]) -> Option<(Vec<Setting>, bool)> {
         let reached = |settings: &[Setting]| settings.iter().all(|s| self.reaches(&s.up));
@@ -141,7 +141,7 @@ pub struct Reach {
     /// Model.
     pub model: Model,
     /// What carries the unit.
-    pub carrier: Carrier,
+    pub fixture: Fixture,
     /// Rates, for gyros.
     pub rates: Rates,
 }
@@ -170,13 +170,13 @@ impl Reach {
     /// A grid over the whole reach.
     pub fn candidates(&self) -> Vec<Setting> {
         let mut all = self.plain();
-        if self.carrier != Carrier::Faces {
+        if self.fixture != Fixture::Faces {
             let n = match self.model.sensor {
                 Sensor::Accel => DIRECTIONS,
                 Sensor::Gyro => DIRECTIONS_WITH_RATES,
             };
             all.extend(self.settings((0..n).map(|i| fibonacci(i, n))));
-            if self.carrier == Carrier::TwoAxis {
+            if self.fixture == Fixture::TwoAxis {
                 all.extend(self.settings(lowest_ring().into_iter()));
             }
         }
@@ -185,7 +185,7 @@ impl Reach {
 
     /// All settings with the given upward directions, as far as they are reached.
     fn settings(&self, ups: impl Iterator<Item = Vector3<f64>>) -> Vec<Setting> {
-        let ups = ups.filter(|up| self.carrier.reaches(up));
+        let ups = ups.filter(|up| self.fixture.reaches(up));
         if self.model.sensor == Sensor::Accel {
             return ups.map(Setting::at_rest).collect();
         }
@@ -260,8 +260,8 @@ impl Region for Reach {
         let gyro = self.model.sensor == Sensor::Gyro;
         let share = point.rate / self.largest_rate(&point.up);
         // At rest a gyro's attitude matters only if it feels force.
-        if self.carrier != Carrier::Faces && (!gyro || share != 0.0 || self.model.feels_force()) {
-            for up in self.carrier.around(&point.up, step) {
+        if self.fixture != Fixture::Faces && (!gyro || share != 0.0 || self.model.feels_force()) {
+            for up in self.fixture.around(&point.up, step) {
                 list.push(Setting {
                     up,
                     rate: share * self.largest_rate(&up),

@@ -2,7 +2,7 @@
 
 use super::exchange::SplitMix;
 use super::model::Setting;
-use super::reach::Carrier;
+use super::reach::Fixture;
 
 /// Order of the dwells of a design.
 ///
@@ -50,8 +50,8 @@ pub struct Motion {
 impl Motion {
     /// Of a table: 10 deg/s as in niu, 3.2, a second to settle, rates at 100 deg/s². By hand: a quarter turn
     /// in two seconds.
-    pub fn of(carrier: Carrier) -> Self {
-        let slew_dps: f64 = if carrier == Carrier::Hand { 45.0 } else { 10.0 };
+    pub fn of(fixture: Fixture) -> Self {
+        let slew_dps: f64 = if fixture == Fixture::Hand { 45.0 } else { 10.0 };
         Self {
             slew: slew_dps.to_radians(),
             acceleration: 100f64.to_radians(),

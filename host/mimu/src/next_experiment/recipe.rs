@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 use super::Setup;
 use crate::design::model::{GRAVITY, Setting};
-use crate::design::reach::{Carrier, Rates};
+use crate::design::reach::{Fixture, Rates};
 use crate::design::tour::randomised;
 use crate::effects::quantity::{Conditions, REFERENCE_C, Reading};
 use crate::effects::temperature::lagged;
@@ -90,7 +90,7 @@ impl Inputs {
         if self == Self::Edges {
             ups.extend(&edges);
         }
-        ups.retain(|up| setup.carrier.reaches(up));
+        ups.retain(|up| setup.fixture.reaches(up));
         let mut all: Vec<Setting> = ups.iter().map(|up| Setting::at_rest(*up)).collect();
         // An accelerometer alone needs no rates to be calibrated.
         let useful = self != Self::Faces || setup.sensors.contains(&Sensor::Gyro);
@@ -184,8 +184,8 @@ impl Experiment {
             _ => u64::MAX,
         };
         // By hand a unit lies for minutes between two moves of a session.
-        let hold = match (setup.carrier, length_s.is_finite()) {
-            (Carrier::Hand, true) => (length_s / BY_HAND / setup.dwell_s).ceil().max(1.0) as usize,
+        let hold = match (setup.fixture, length_s.is_finite()) {
+            (Fixture::Hand, true) => (length_s / BY_HAND / setup.dwell_s).ceil().max(1.0) as usize,
             _ => 1,
         };
         let mut out = Self {
@@ -269,7 +269,7 @@ impl Experiment {
 impl Setup {
     /// Whether the fixture holds known rates about the vertical.
     pub fn turns(&self) -> bool {
-        let table = matches!(self.carrier, Carrier::ThreeAxis | Carrier::Faces);
+        let table = matches!(self.fixture, Fixture::ThreeAxis | Fixture::Faces);
         table && self.reference == Reference::Table
     }
 }

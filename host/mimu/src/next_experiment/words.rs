@@ -58,7 +58,7 @@ impl Answer {
             about: &about,
             device,
             sample_rate_hz,
-            carrier: setup.carrier,
+            fixture: setup.fixture,
             chamber_c: &self.experiment.chamber_c,
             settings: &self.experiment.settings,
             dwell_s: self.experiment.dwell_s,

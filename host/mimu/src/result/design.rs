@@ -10,7 +10,7 @@ use crate::design::budget::{Budget, DwellNoise, Spending};
 use crate::design::judgement::{HALF_95, Judgement};
 use crate::design::model::{Setting, Term};
 use crate::design::plan;
-use crate::design::reach::Carrier;
+use crate::design::reach::Fixture;
 use crate::design::schemes::{FANG_FILTERS, Scheme};
 use crate::design::tour::{Motion, Order};
 use crate::quantity::{Sensor, minutes, significant};
@@ -86,7 +86,7 @@ pub struct Design {
     pub noise: Option<DwellNoise>,
     /// `published`, `shortest` or `lot`.
     pub order: &'static str,
-    /// Whether the unit had to be turned over for the table to reach the scheme's poses: see [`Carrier::holding`].
+    /// Whether the unit had to be turned over for the table to reach the scheme's poses: see [`Fixture::holding`].
     pub turned_over: bool,
     /// Time of the moves between the dwells, s.
     pub moves_s: f64,
@@ -107,7 +107,7 @@ pub struct Design {
     #[serde(skip)]
     settings: Vec<Setting>,
     #[serde(skip)]
-    carrier: Carrier,
+    fixture: Fixture,
 }
 
 /// The continuous optimum over the reach.
@@ -278,7 +278,7 @@ impl Design {
             sensor: model.sensor,
             reference: model.reference,
             model: model.to_string(),
-            table: problem.reach.carrier.name(),
+            table: problem.reach.fixture.name(),
             positions: settings.clone().map(|s| s.up.into()).collect(),
             rates_dps: (model.sensor == Sensor::Gyro)
                 .then(|| settings.map(|s| s.rate.to_degrees()).collect()),
@@ -315,7 +315,7 @@ impl Design {
             assumed: None,
             filters: None,
             budget: None,
-            carrier: problem.reach.carrier,
+            fixture: problem.reach.fixture,
             settings: judgement.settings,
         }
     }
@@ -385,7 +385,7 @@ impl Design {
             minutes(self.time_s),
             significant(slew.to_degrees()),
         );
-        plan::to_toml(&about, self.carrier, &self.settings, self.dwell_s)
+        plan::to_toml(&about, self.fixture, &self.settings, self.dwell_s)
     }
 }
 

@@ -119,7 +119,7 @@ impl NextExperiment {
             title: format!("to show {}", ids.join(", ")),
             experiment: answer.words(setup),
             reference: setup.reference,
-            table: setup.carrier.name(),
+            table: setup.fixture.name(),
             effects: effects.collect(),
             positions: settings.clone().map(|s| s.up.into()).collect(),
             rates_dps: settings.map(|s| s.rate.to_degrees()).collect(),

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use crate::report;
 use mimu::design::budget::DwellNoise;
-use mimu::design::reach::{Carrier, RateList, Rates};
+use mimu::design::reach::{Fixture, RateList, Rates};
 use mimu::design::tour::Motion;
 use mimu::effects;
 use mimu::fit::{Fit, Method, Options, fit};
@@ -71,18 +71,18 @@ fn targets(ids: &[String]) -> Result<Vec<Target>> {
 impl DesignArgs {
     /// The unit and its fixture, where no recording says them.
     fn setup(&self) -> Setup {
-        let carrier = self.carrier();
+        let fixture = self.fixture();
         let motion = self.motion();
         let slew = match self.slew {
             None => motion.slew.max(SLEW),
             Some(_) => motion.slew,
         };
         Setup {
-            reference: match carrier {
-                Carrier::Hand => Reference::Gravity,
+            reference: match fixture {
+                Fixture::Hand => Reference::Gravity,
                 _ => self.reference,
             },
-            carrier,
+            fixture,
             sensors: Sensor::BOTH.to_vec(),
             rates: RateList {
                 largest_dps: RATE_DPS,
@@ -161,7 +161,7 @@ pub(super) fn run(args: &DesignArgs, ids: &[String]) -> Result<()> {
         .transpose()?;
     let mut setup = args.setup();
     if let Some(fit) = &recording {
-        let own = Setup::of(fit, args.table.is_some().then(|| args.carrier()));
+        let own = Setup::of(fit, args.table.is_some().then(|| args.fixture()));
         setup = Setup {
             motion: args.slew.map_or(own.motion, |_| args.motion()),
             seed: args.seed,
@@ -191,7 +191,7 @@ pub(super) fn run(args: &DesignArgs, ids: &[String]) -> Result<()> {
             format!("--effects {}", ids.join(",")),
             format!(
                 "no recipe with --table {} and these rates determines every coefficient of it",
-                setup.carrier.name()
+                setup.fixture.name()
             ),
             "use another --table, --reference or --rates, or fewer effects at once",
         ));

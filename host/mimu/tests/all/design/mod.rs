@@ -9,7 +9,7 @@ mod time;
 
 use mimu::design::Problem;
 use mimu::design::model::{Model, Terms};
-use mimu::design::reach::{Carrier, RateList};
+use mimu::design::reach::{Fixture, RateList};
 use mimu_recording::Reference;
 use nalgebra::Vector3;
 
@@ -18,7 +18,7 @@ fn terms(list: &str) -> Terms {
 }
 
 fn accel(reference: Reference, list: &str) -> Problem {
-    Problem::accel(Model::accel(reference, &terms(list)), Carrier::ThreeAxis).unwrap()
+    Problem::accel(Model::accel(reference, &terms(list)), Fixture::ThreeAxis).unwrap()
 }
 
 fn gyro(list: &str, rates: &str) -> Problem {
@@ -26,7 +26,7 @@ fn gyro(list: &str, rates: &str) -> Problem {
     let span = Vector3::repeat(rates.largest_dps.to_radians());
     Problem::gyro(
         Model::gyro(&terms(list), span),
-        Carrier::ThreeAxis,
+        Fixture::ThreeAxis,
         rates.rates,
     )
     .unwrap()

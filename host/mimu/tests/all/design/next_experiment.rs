@@ -1,7 +1,7 @@
 //! Recipes that show effects: what they predict, and that they are no larger than they have to be.
 
 use mimu::design::budget::DwellNoise;
-use mimu::design::reach::{Carrier, RateList, Rates};
+use mimu::design::reach::{Fixture, RateList, Rates};
 use mimu::design::tour::Motion;
 use mimu::effects;
 use mimu::next_experiment::prediction::{SEEN, Target};
@@ -14,7 +14,7 @@ use nalgebra::{DMatrix, DVector};
 fn setup() -> Setup {
     Setup {
         reference: Reference::Table,
-        carrier: Carrier::ThreeAxis,
+        fixture: Fixture::ThreeAxis,
         sensors: Sensor::BOTH.to_vec(),
         rates: RateList {
             largest_dps: RATE_DPS,
@@ -25,7 +25,7 @@ fn setup() -> Setup {
         dwell_s: DWELL_S,
         motion: Motion {
             slew: SLEW,
-            ..Motion::of(Carrier::ThreeAxis)
+            ..Motion::of(Fixture::ThreeAxis)
         },
         seed: 1,
     }
@@ -143,14 +143,14 @@ fn what_a_fixture_cannot_show_has_no_recipe() {
     // By hand a gyro has no known rate; on six faces products of two forces are always nothing.
     let by_hand = Setup {
         reference: Reference::Gravity,
-        carrier: Carrier::Hand,
-        motion: Motion::of(Carrier::Hand),
+        fixture: Fixture::Hand,
+        motion: Motion::of(Fixture::Hand),
         ..setup()
     };
     assert!(answer(&by_hand, "gyro_scale_cubic").is_none());
     assert!(answer(&by_hand, "gyro_g_sensitivity").is_some());
     let faces = Setup {
-        carrier: Carrier::Faces,
+        fixture: Fixture::Faces,
         ..setup()
     };
     assert!(answer(&faces, "accel_cross_axis_product").is_none());

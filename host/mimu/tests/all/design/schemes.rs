@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use mimu::design::judgement::Judgement;
 use mimu::design::model::{GRAVITY, Model, Term, Terms};
-use mimu::design::reach::{Carrier, Rates};
+use mimu::design::reach::{Fixture, Rates};
 use mimu::design::schemes::{FANG_FILTERS, Scheme};
 use mimu::design::{Problem, lack_of_fit};
 use mimu::estimate::{Observation, gravity_size, known_input};
@@ -149,7 +149,7 @@ fn published_schemes_are_worth_what_plain_arithmetic_makes_of_the_printed_tables
     // det(F'F/n) of the positions as printed, by elimination, over that of the optimum, which the tests in `sphere`
     // have in closed form.
     let gyro = Model::gyro(&terms("affine"), Scheme::XuRates.rate_span());
-    let gyro = Problem::gyro(gyro, Carrier::ThreeAxis, Rates::Any).unwrap();
+    let gyro = Problem::gyro(gyro, Fixture::ThreeAxis, Rates::Any).unwrap();
     let known = accel(Reference::Table, "affine");
     let size = accel(Reference::Gravity, "affine");
     for (problem, scheme, determinant, efficiency) in [
@@ -188,7 +188,7 @@ fn a_singular_design_names_what_it_leaves_open() {
 #[test]
 fn products_cannot_be_told_apart_by_the_size_of_gravity() {
     let model = Model::accel(Reference::Gravity, &terms("affine,cross"));
-    let refused = Problem::accel(model, Carrier::ThreeAxis).unwrap_err();
+    let refused = Problem::accel(model, Fixture::ThreeAxis).unwrap_err();
     assert!(
         refused.refused().problem.contains("cross_x_yz"),
         "{refused}"
@@ -291,15 +291,15 @@ fn every_cycle_that_fits_nius_words_holds_the_same_eight_poses() {
 #[test]
 fn on_two_axes_the_unit_stands_the_other_way_up_or_the_scheme_is_out_of_reach() {
     let niu = Scheme::Niu8.settings(Sensor::Accel).unwrap();
-    let (held, turned) = Carrier::TwoAxis.holding(&niu).unwrap();
-    assert!(turned && held.iter().all(|s| Carrier::TwoAxis.reaches(&s.up)));
+    let (held, turned) = Fixture::TwoAxis.holding(&niu).unwrap();
+    assert!(turned && held.iter().all(|s| Fixture::TwoAxis.reaches(&s.up)));
     let model = Model::accel(Reference::Table, &Terms::default());
-    let problem = Problem::accel(model, Carrier::TwoAxis).unwrap();
+    let problem = Problem::accel(model, Fixture::TwoAxis).unwrap();
     let (as_held, published) = (problem.judge(&held, 1.0), problem.judge(&niu, 1.0));
     assert!(close(as_held.determinant, published.determinant, 1e-12));
-    assert!(Carrier::ThreeAxis.holding(&niu) == Some((niu, false)));
+    assert!(Fixture::ThreeAxis.holding(&niu) == Some((niu, false)));
     for scheme in [Scheme::SixFace, Scheme::FangNine, Scheme::Xu33] {
         let settings = scheme.settings(Sensor::Accel).unwrap();
-        assert!(Carrier::TwoAxis.holding(&settings).is_none());
+        assert!(Fixture::TwoAxis.holding(&settings).is_none());
     }
 }

@@ -6,7 +6,7 @@ use mimu::design::Problem;
 use mimu::design::exchange;
 use mimu::design::information::Inverse;
 use mimu::design::model::{Model, Setting};
-use mimu::design::reach::Carrier;
+use mimu::design::reach::Fixture;
 use mimu::design::refinement::Region as _;
 use mimu_recording::Reference;
 use nalgebra::DMatrix;
@@ -148,7 +148,7 @@ fn the_size_of_gravity_is_best_measured_all_over_the_sphere() {
 #[test]
 fn on_a_two_axis_table_every_setting_is_within_its_tilt() {
     let model = Model::accel(Reference::Table, &terms("affine"));
-    let problem = Problem::accel(model, Carrier::TwoAxis).unwrap();
+    let problem = Problem::accel(model, Fixture::TwoAxis).unwrap();
     let best = problem.best(12, 1).unwrap();
     assert!(
         best.iter()
@@ -195,7 +195,7 @@ fn the_size_of_gravity_on_a_two_axis_table_is_best_measured_on_rings() {
     };
     let known = brute_force::best(6, 1.0, of_rings);
     let model = Model::accel(Reference::Gravity, &terms("affine"));
-    let problem = Problem::accel(model, Carrier::TwoAxis).unwrap();
+    let problem = Problem::accel(model, Fixture::TwoAxis).unwrap();
     let found = problem.optimum.log_det.exp();
     assert!(close(found, known, 1e-5), "{found} {known}");
 }
@@ -226,9 +226,9 @@ fn own_squares_are_best_measured_on_six_faces() {
 /// other combinations are in the nightly run.
 #[test]
 fn problems_have_an_optimum_that_designs_approach_or_name_what_they_cannot_tell_apart() {
-    use Carrier::{Faces, ThreeAxis, TwoAxis};
+    use Fixture::{Faces, ThreeAxis, TwoAxis};
     use Reference::{Gravity, Table};
-    for (list, carrier, reference) in [
+    for (list, fixture, reference) in [
         ("affine", TwoAxis, Gravity),
         ("affine,quadratic", ThreeAxis, Gravity),
         ("affine,cubic", TwoAxis, Table),
@@ -239,7 +239,7 @@ fn problems_have_an_optimum_that_designs_approach_or_name_what_they_cannot_tell_
         ("affine,cross", ThreeAxis, Gravity),
         ("affine,quadratic,cubic,cross", ThreeAxis, Table),
     ] {
-        approached_or_refused(list, carrier, reference);
+        approached_or_refused(list, fixture, reference);
     }
 }
 
@@ -255,17 +255,17 @@ fn every_problem_has_an_optimum_that_designs_approach_or_names_what_it_cannot_te
         "affine,quadratic,cubic,cross",
     ];
     for list in lists {
-        for carrier in [Carrier::ThreeAxis, Carrier::TwoAxis, Carrier::Faces] {
+        for fixture in [Fixture::ThreeAxis, Fixture::TwoAxis, Fixture::Faces] {
             for reference in [Reference::Table, Reference::Gravity] {
-                approached_or_refused(list, carrier, reference);
+                approached_or_refused(list, fixture, reference);
             }
         }
     }
 }
 
-fn approached_or_refused(list: &str, carrier: Carrier, reference: Reference) {
-    let what = format!("{list}, {}, {reference:?}", carrier.name());
-    match Problem::accel(Model::accel(reference, &terms(list)), carrier) {
+fn approached_or_refused(list: &str, fixture: Fixture, reference: Reference) {
+    let what = format!("{list}, {}, {reference:?}", fixture.name());
+    match Problem::accel(Model::accel(reference, &terms(list)), fixture) {
         Ok(problem) => {
             assert!(problem.optimum.excess <= 1e-6, "{what}");
             let judged = problem.judge(&problem.best(24, 1).unwrap(), 1.0);
@@ -281,7 +281,7 @@ fn approached_or_refused(list: &str, carrier: Carrier, reference: Reference) {
                 refused.refused().problem.contains("tell apart"),
                 "{what}: {refused}"
             );
-            let known = carrier == Carrier::Faces
+            let known = fixture == Fixture::Faces
                 || (reference == Reference::Gravity && list.contains("cross"));
             assert!(known, "{what}: {refused}");
         }

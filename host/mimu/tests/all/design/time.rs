@@ -2,7 +2,7 @@
 
 use mimu::design::budget::{DwellNoise, Session};
 use mimu::design::model::Setting;
-use mimu::design::reach::Carrier;
+use mimu::design::reach::Fixture;
 use mimu::design::tour::{Motion, Order, randomised};
 use mimu::quantity::Sensor;
 use mimu_recording::Reference;
@@ -13,7 +13,7 @@ use super::{accel, close};
 #[test]
 fn no_order_of_seven_dwells_is_shorter_than_the_one_found_by_more_than_a_tenth() {
     let problem = accel(Reference::Table, "affine");
-    let motion = Motion::of(Carrier::ThreeAxis);
+    let motion = Motion::of(Fixture::ThreeAxis);
     let settings = problem.best(7, 1).unwrap();
     fn shortest(motion: &Motion, done: &mut Vec<Setting>, left: &[Setting]) -> f64 {
         if left.is_empty() {
@@ -45,7 +45,7 @@ fn a_budget_is_kept_and_more_of_it_helps() {
             let session = Session {
                 time_s: 60.0 * minutes,
                 noise: DwellNoise::fang(Sensor::Accel),
-                motion: Motion::of(Carrier::ThreeAxis),
+                motion: Motion::of(Fixture::ThreeAxis),
                 order,
             };
             let budget = session.spend(&problem, 1).unwrap();
@@ -79,7 +79,7 @@ fn random_walk_bounds_the_dwell() {
         let session = Session {
             time_s: 36_000.0,
             noise: DwellNoise { n: 1e-3, b: 0.0, k },
-            motion: Motion::of(Carrier::ThreeAxis),
+            motion: Motion::of(Fixture::ThreeAxis),
             order: Order::Shortest,
         };
         session.spend(&problem, 1).unwrap().best.dwell_s
@@ -115,7 +115,7 @@ fn in_an_order_by_lot_drift_is_scatter_that_a_fit_knows_of_and_in_the_shortest_o
     let problem = accel(Reference::Table, "affine");
     for n in [9, 12, 22] {
         let settings = problem.best(n, 1).unwrap();
-        let shortest = true_over_claimed(&Motion::of(Carrier::ThreeAxis).shortest(&settings));
+        let shortest = true_over_claimed(&Motion::of(Fixture::ThreeAxis).shortest(&settings));
         let lots = (0..2000).map(|seed| true_over_claimed(&randomised(&settings, seed)));
         let randomised = lots.sum::<f64>() / 2000.0;
         println!(
