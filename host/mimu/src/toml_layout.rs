@@ -1,129 +1,80 @@
 //! Result files as TOML that people read: rows of a matrix one below the other, small tables on a line, small numbers with an exponent.
 
 use serde::Serialize;
+use toml_edit::{Array, DocumentMut, InlineTable, Item, Table, Value};
 
 /// Text of `file` below a header of comments. Numbers have all their digits, so that they are read back exactly.
 ///
 /// # Panics
 /// If `file` is no table of values that TOML has: a matter of its type, and not of its numbers.
 pub fn to_toml(header: &str, file: &impl Serialize) -> String {
-    let text = toml::to_string(file).expect("a table of numbers and strings");
-    let mut out = header.to_string();
-    // Name of the array of tables that the line is in, and what is nested in this one of them.
-    let mut array = None;
-    let mut nested: Vec<Nested> = Vec::new();
-    let mut in_string = false;
-    for line in text.lines() {
-        let fences = line.matches("\"\"\"").count() + line.matches("'''").count();
-        let continued = in_string;
-        in_string ^= fences % 2 == 1;
-        let header = line.strip_prefix('[').filter(|_| !continued);
-        if let Some(path) = header.map(|h| h.trim_matches(['[', ']'])) {
-            let many = line.starts_with("[[");
-            match path.split_once('.') {
-                Some((parent, key)) if array == Some(parent) => {
-                    Nested::begin(&mut nested, key, many)
-                }
-                _ => {
-                    Nested::write(&mut nested, &mut out);
-                    out.push('\n');
-                    out.push_str(line);
-                    out.push('\n');
-                    array = many.then_some(path);
-                }
+    let document = toml_edit::ser::to_document(file).expect("a table of numbers and strings");
+    let laid_out = table(inline(document));
+    format!("{header}{}", DocumentMut::from(laid_out))
+}
+
+/// The serializer leaves it open which tables are inline; here all are.
+fn inline(document: DocumentMut) -> InlineTable {
+    document.into_table().into_inline_table()
+}
+
+/// A table with a head of its own, and so are the tables in it; an array of tables has one for each.
+fn table(from: InlineTable) -> Table {
+    let mut out = Table::new();
+    for (key, value) in from {
+        let item = match value {
+            Value::InlineTable(inner) => Item::Table(table(inner)),
+            Value::Array(array) if holds_tables(&array) => {
+                let entries = array.into_iter().filter_map(|v| match v {
+                    Value::InlineTable(inner) => Some(entry(inner)),
+                    _ => None,
+                });
+                Item::ArrayOfTables(entries.collect())
             }
-            continue;
-        }
-        let line = match line.split_once(" = ") {
-            // What has a quote is a string or holds one: digits in it are not numbers.
-            Some((key, value)) if !continued && !line.contains(['"', '\'']) => {
-                format!("{key} = {}", laid_out(value))
-            }
-            _ => line.to_string(),
+            other => Item::Value(laid_out(other)),
         };
-        match nested.last_mut() {
-            Some(table) => table.push(line, continued),
-            None if continued || !line.is_empty() => {
-                out.push_str(&line);
-                out.push('\n');
-            }
-            None => {}
-        }
+        out.insert(&key, item);
     }
-    Nested::write(&mut nested, &mut out);
     out
 }
 
-/// A table in one of an array of tables, or an array of them: written on a line each.
-struct Nested {
-    key: String,
-    many: bool,
-    tables: Vec<Vec<String>>,
+/// An entry of an array of tables: what it holds is on a line each.
+fn entry(from: InlineTable) -> Table {
+    let mut out = Table::new();
+    for (key, value) in from {
+        out.insert(&key, Item::Value(laid_out(value)));
+    }
+    out
 }
 
-impl Nested {
-    fn begin(all: &mut Vec<Self>, key: &str, many: bool) {
-        match all.last_mut().filter(|last| last.key == key) {
-            Some(last) => last.tables.push(Vec::new()),
-            None => all.push(Self {
-                key: key.into(),
-                many,
-                tables: vec![Vec::new()],
-            }),
-        }
-    }
+fn holds_tables(array: &Array) -> bool {
+    !array.is_empty() && array.iter().all(Value::is_inline_table)
+}
 
-    /// Adds a line, or to the string that the last one has begun.
-    fn push(&mut self, line: String, continued: bool) {
-        let Some(table) = self.tables.last_mut() else {
-            return;
-        };
-        match table.last_mut().filter(|_| continued) {
-            Some(last) => {
-                last.push('\n');
-                last.push_str(&line);
-            }
-            None if !line.is_empty() => table.push(line),
-            None => {}
-        }
-    }
-
-    fn write(all: &mut Vec<Self>, out: &mut String) {
-        for Self { key, many, tables } in all.drain(..) {
-            let tables = tables.iter().map(|t| format!("{{ {} }}", t.join(", ")));
-            match many {
-                true => {
-                    let rows: String = tables.map(|t| format!("  {t},\n")).collect();
-                    out.push_str(&format!("{key} = [\n{rows}]\n"));
+/// Rows of a matrix and of an array of tables on a line each, numbers as short as they are read back exactly.
+fn laid_out(value: Value) -> Value {
+    match value {
+        // Display writes 1e-12 as 0.000000000001; Debug does not.
+        Value::Float(x) => format!("{:?}", x.value())
+            .parse()
+            .unwrap_or(Value::Float(x)),
+        Value::Array(array) => {
+            let rows = array.iter().any(Value::is_array) || holds_tables(&array);
+            let mut out: Array = array.into_iter().map(laid_out).collect();
+            if rows {
+                for row in out.iter_mut() {
+                    row.decor_mut().set_prefix("\n  ");
                 }
-                false => tables.for_each(|t| out.push_str(&format!("{key} = {t}\n"))),
+                out.set_trailing("\n");
+                out.set_trailing_comma(true);
             }
+            Value::Array(out)
         }
-    }
-}
-
-/// A number or an array of them.
-fn laid_out(value: &str) -> String {
-    let matrix = value.starts_with("[[");
-    let mut out = String::new();
-    for token in value.split_inclusive([',', '[', ']']) {
-        let (number, end) =
-            token.split_at(token.len() - usize::from(token.ends_with([',', '[', ']'])));
-        let space = if number.starts_with(' ') { " " } else { "" };
-        out.push_str(space);
-        match number.trim().parse::<f64>() {
-            // Display writes 1e-12 as 0.000000000001; Debug does not, and both read back as they were.
-            Ok(x) if number.contains('.') => out.push_str(&format!("{x:?}")),
-            _ => out.push_str(number.trim()),
+        Value::InlineTable(inner) => {
+            let each = inner.into_iter().map(|(key, v)| (key, laid_out(v)));
+            Value::InlineTable(each.collect())
         }
-        out.push_str(end);
-    }
-    match matrix {
-        true => out
-            .replacen("[[", "[\n  [", 1)
-            .replace("], [", "],\n  [")
-            .replacen("]]", "],\n]", 1),
-        false => out,
+        other => other,
     }
 }
 
@@ -214,12 +165,12 @@ empty = []
 x = 0.5
 
 [[list]]
-about = "a"
 one = { x = 1e-9 }
 many = [
   { x = 1.0 },
   { x = 2.0 },
 ]
+about = "a"
 "#;
         assert_eq!(to_toml("", &file), expected);
     }
