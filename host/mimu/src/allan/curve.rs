@@ -13,7 +13,7 @@
 //! (`benches/allan.rs`).
 
 use super::bounds::{self, Estimator};
-use super::deviation::{ALL_TERMS, BLOCK, Integrated, Plan, Samples as _, sums_of_squares};
+use super::deviation::{ALL_TERMS, BLOCK, Integrated, Plan, sums_of_squares};
 use super::power_law::power_law;
 use super::{Kind, Point, Spacing};
 

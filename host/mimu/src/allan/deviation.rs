@@ -13,12 +13,13 @@
 
 mod differences;
 mod integrated;
-mod series;
 mod squares;
 mod window_sums;
 
 pub(super) use differences::{difference, sums};
 pub use integrated::Integrated;
-pub use series::ALL_TERMS;
-pub(super) use series::{BLOCK, Samples, Series};
 pub(super) use squares::{Plan, Squares, sums_of_squares};
+pub(super) use window_sums::BLOCK;
+
+/// Of a series of up to so many rates all differences are used.
+pub const ALL_TERMS: usize = 1 << 20;

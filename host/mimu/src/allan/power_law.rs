@@ -2,7 +2,7 @@
 //! autocorrelation", EFTF 2004, and Howe et al., PTTI 2000, where too few samples are left for it.
 
 use super::Kind;
-use super::deviation::{ALL_TERMS, Samples, Series, Squares, difference, sums};
+use super::deviation::{ALL_TERMS, Squares, difference, sums};
 
 /// Cluster means that the lag 1 autocorrelation needs (Riley and Greenhall 2004).
 const ENOUGH_FOR_LAG_1: usize = 30;
@@ -23,7 +23,7 @@ const ENOUGH_FOR_R: usize = 64;
 ///
 /// With fewer than four cluster means nothing can be told; then -2, for which the bounds are the widest. 0 for a
 /// series that does not vary at all.
-pub fn power_law(x: &Series, kind: Kind, m: usize) -> i32 {
+pub fn power_law(x: &[f64], kind: Kind, m: usize) -> i32 {
     // The reddest noise for which the variance exists.
     let reddest = 2 - 2 * kind.order() as i32;
     let means = x.len().saturating_sub(1) / m;
@@ -42,7 +42,7 @@ pub fn power_law(x: &Series, kind: Kind, m: usize) -> i32 {
 
 /// Riley and Greenhall 2004: differenced d times until it is stationary, fractionally integrated noise has the
 /// lag 1 autocorrelation r = δ/(1-δ), and alpha is -2 (δ + d).
-fn by_lag_1(x: &Series, m: usize, means: usize, most: usize) -> i32 {
+fn by_lag_1(x: &[f64], m: usize, means: usize, most: usize) -> i32 {
     for d in 0..=most {
         let r = match d {
             0 => lag_1::<3>(x, m, means),
@@ -65,11 +65,11 @@ fn by_lag_1(x: &Series, m: usize, means: usize, most: usize) -> i32 {
 ///
 /// Straight from the integral: at m = 1 a copy of the differences would double the memory of the whole analysis.
 /// Of more than [`ENOUGH_PAIRS`] pairs of a long series about so many are taken, evenly over it.
-fn lag_1<const TAPS: usize>(x: &Series, m: usize, n: usize) -> Option<f64> {
+fn lag_1<const TAPS: usize>(x: &[f64], m: usize, n: usize) -> Option<f64> {
     let offsets: [usize; TAPS] = std::array::from_fn(|i| i * m);
     let order = TAPS - 2;
     let lower = |k: usize| -> f64 {
-        let taps: [f64; TAPS] = std::array::from_fn(|i| x.at((k + i.min(order - 1)) * m));
+        let taps: [f64; TAPS] = std::array::from_fn(|i| x[(k + i.min(order - 1)) * m]);
         difference(&taps[..order])
     };
     let mean = (lower(n) - lower(0)) / n as f64;
@@ -94,10 +94,8 @@ fn lag_1<const TAPS: usize>(x: &Series, m: usize, n: usize) -> Option<f64> {
 /// N in B1 is the number of means. Stable32 takes the number of overlapping differences instead, as its outputs
 /// for a caesium clock show (71 of 71 exponents follow with that N, 7 with the means), which moves its limits so
 /// far up that flicker and random walk of 4 to 29 means come out as white, with bounds that are too tight.
-fn by_variance_ratio(x: &Series, kind: Kind, m: usize, means: usize) -> i32 {
-    let y: Vec<f64> = (0..means)
-        .map(|k| x.at((k + 1) * m) - x.at(k * m))
-        .collect();
+fn by_variance_ratio(x: &[f64], kind: Kind, m: usize, means: usize) -> i32 {
+    let y: Vec<f64> = (0..means).map(|k| x[(k + 1) * m] - x[k * m]).collect();
     let alpha = by_b1(&y, if kind == Kind::Hadamard { 2 } else { 1 });
     if alpha > -3 {
         return alpha;
@@ -147,12 +145,12 @@ fn expected_b1(n: f64, mu: i32) -> f64 {
 ///
 /// Taken on every so-many-th sample, for 64 in a cluster: skipping leaves white phase noise white, and a whole
 /// modified variance would cost as much as the curve.
-fn by_modified_variance(x: &Series, m: usize) -> i32 {
+fn by_modified_variance(x: &[f64], m: usize) -> i32 {
     let n = m.min(ENOUGH_FOR_R);
-    let x: Vec<f64> = (0..x.len()).step_by(m / n).map(|i| x.at(i)).collect();
+    let x: Vec<f64> = (0..x.len()).step_by(m / n).map(|i| x[i]).collect();
     let mean = |kind: Kind| {
         let terms = kind.terms(x.len(), n);
-        Squares::new(&x[..], kind).sum(n, 1, 0..terms) / terms as f64
+        Squares::new(&x, kind).sum(n, 1, 0..terms) / terms as f64
     };
     let n = n as f64;
     let ratio = mean(Kind::Modified) / (n * n * mean(Kind::Allan));

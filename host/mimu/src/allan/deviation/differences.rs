@@ -2,8 +2,6 @@
 
 use std::ops::Range;
 
-use super::series::Samples;
-
 /// Independent partial sums in the inner loop: breaks the chain of additions (a latency of 3 to 4 cycles each) and
 /// fills the vector registers.
 const LANES: usize = 8;
@@ -32,7 +30,7 @@ pub fn difference(samples: &[f64]) -> f64 {
 /// # Panics
 /// When the last position plus the largest offset is beyond the end of `x`.
 pub fn sums<const K: usize, const R: usize>(
-    x: &(impl Samples + ?Sized),
+    x: &[f64],
     offsets: [usize; K],
     stride: usize,
     positions: Range<usize>,
@@ -43,8 +41,8 @@ pub fn sums<const K: usize, const R: usize>(
     for from in (0..terms).step_by(BLOCK) {
         let n = BLOCK.min(terms - from);
         let at = offsets.map(|o| positions.start + from * stride + o);
-        let block = match x.slice() {
-            Some(x) if stride == 1 => neighbours(x, at, n, &f),
+        let block = match stride {
+            1 => neighbours(x, at, n, &f),
             _ => strided(x, at, stride, n, &f),
         };
         add(&mut total, block);
@@ -83,7 +81,7 @@ fn neighbours<const K: usize, const R: usize>(
 }
 
 fn strided<const K: usize, const R: usize>(
-    x: &(impl Samples + ?Sized),
+    x: &[f64],
     at: [usize; K],
     stride: usize,
     n: usize,
@@ -94,7 +92,7 @@ fn strided<const K: usize, const R: usize>(
         // Not `at.map`, which stays a call: with it the whole curve takes an eighth longer.
         let mut taps = [0.0; K];
         for k in 0..K {
-            taps[k] = x.at(at[k] + i * stride);
+            taps[k] = x[at[k] + i * stride];
         }
         let values = f(taps);
         for (lane, value) in lanes.iter_mut().zip(values) {

@@ -3,7 +3,6 @@
 use rayon::prelude::*;
 
 use super::super::bounds::Sampling;
-use super::series::{Samples, Series};
 use mimu_recording::error::{Error, Result};
 
 /// Samples that are summed by themselves before they are added to the integral.
@@ -11,7 +10,7 @@ const CHUNK: usize = 4096;
 /// Samples of a longer slice that are taken in at a time.
 const SLICE: usize = 1 << 16;
 
-/// A series integrated over time, ready for differences of any length: 3.4 bytes a sample, for up to 1e6 samples 8.
+/// A series integrated over time, ready for differences of any length.
 ///
 /// A reference is taken off the rates first. Second and third differences do not see it, but a gravity of 9.8 m/s²
 /// under noise of 1e-3 m/s² would fill the digits of the integral with its ramp: 1e9 after 1e8 samples, whose
@@ -19,7 +18,7 @@ const SLICE: usize = 1 << 16;
 #[derive(Debug, Clone)]
 pub struct Integrated {
     /// Integral at the sample borders: one more than there are rates.
-    x: Series,
+    x: Vec<f64>,
     /// Mean of the first slice of rates; it only has to be near theirs.
     reference: Option<f64>,
     end: Sum,
@@ -30,10 +29,8 @@ pub struct Integrated {
 impl Integrated {
     /// Of no rates yet, which will be `dt_s` apart.
     pub fn empty(dt_s: f64) -> Self {
-        let mut x = Series::default();
-        x.append(1, |_| ());
         Self {
-            x,
+            x: vec![0.0],
             reference: None,
             end: Sum::default(),
             dt_s,
@@ -67,18 +64,19 @@ impl Integrated {
         for rates in rates.chunks(SLICE) {
             let sums = chunk_sums(rates, reference);
             let starts: Vec<f64> = sums.into_iter().map(|part| self.end.add(part)).collect();
-            self.x.append(rates.len(), |x| {
-                x.par_chunks_mut(CHUNK)
-                    .zip(rates.par_chunks(CHUNK))
-                    .zip(starts)
-                    .for_each(|((x, rates), start)| {
-                        let mut since_start = 0.0;
-                        for (x, rate) in x.iter_mut().zip(rates) {
-                            since_start += rate - reference;
-                            *x = start + since_start;
-                        }
-                    });
-            });
+            let before = self.x.len();
+            self.x.resize(before + rates.len(), 0.0);
+            self.x[before..]
+                .par_chunks_mut(CHUNK)
+                .zip(rates.par_chunks(CHUNK))
+                .zip(starts)
+                .for_each(|((x, rates), start)| {
+                    let mut since_start = 0.0;
+                    for (x, rate) in x.iter_mut().zip(rates) {
+                        since_start += rate - reference;
+                        *x = start + since_start;
+                    }
+                });
         }
         Ok(())
     }
@@ -89,19 +87,17 @@ impl Integrated {
     /// The first sample that is not a finite number.
     pub fn of_phase(phase: &[f64], dt_s: f64) -> Result<Self> {
         let mut integrated = Self {
-            x: Series::default(),
+            x: Vec::new(),
             sampling: Sampling::Means,
             ..Self::empty(dt_s)
         };
         integrated.refuse_not_finite(phase)?;
-        for part in phase.chunks(SLICE) {
-            integrated.x.append(part.len(), |x| x.copy_from_slice(part));
-        }
+        integrated.x.extend_from_slice(phase);
         Ok(integrated)
     }
 
     /// The integral.
-    pub(in crate::allan) fn x(&self) -> &Series {
+    pub(in crate::allan) fn x(&self) -> &[f64] {
         &self.x
     }
 

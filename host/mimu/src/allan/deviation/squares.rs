@@ -6,7 +6,6 @@ use rayon::prelude::*;
 
 use super::super::Kind;
 use super::differences::{difference, sums};
-use super::series::{Samples, Series};
 use super::window_sums::WindowSums;
 
 /// Positions that all clusters are done at before the next: with what clusters of [`NEAR`] reach beyond, 350 KB of
@@ -36,15 +35,15 @@ impl Plan {
 }
 
 /// Differences of one kind of a series.
-pub struct Squares<'a, X: Samples + ?Sized> {
-    x: &'a X,
+pub struct Squares<'a> {
+    x: &'a [f64],
     kind: Kind,
-    windows: Option<WindowSums<'a, X>>,
+    windows: Option<WindowSums<'a>>,
 }
 
-impl<'a, X: Samples + ?Sized> Squares<'a, X> {
+impl<'a> Squares<'a> {
     /// One pass over the series for [`Kind::Modified`].
-    pub fn new(x: &'a X, kind: Kind) -> Self {
+    pub fn new(x: &'a [f64], kind: Kind) -> Self {
         let windows = (kind == Kind::Modified).then(|| WindowSums::new(x));
         Self { x, kind, windows }
     }
@@ -68,42 +67,23 @@ impl<'a, X: Samples + ?Sized> Squares<'a, X> {
 }
 
 /// For each of `plans`, which have ascending clusters. The order of additions does not depend on the number of threads.
-pub fn sums_of_squares(x: &Series, kind: Kind, plans: &[Plan]) -> Vec<f64> {
-    if let Some(x) = x.slice() {
-        let squares = Squares::new(x, kind);
-        return tiled(plans, |from, _| {
-            let sum = |plan: &Plan| squares.sum(plan.m, plan.stride, plan.within(from));
-            plans.iter().map(sum).collect()
-        });
-    }
+pub fn sums_of_squares(x: &[f64], kind: Kind, plans: &[Plan]) -> Vec<f64> {
+    let squares = Squares::new(x, kind);
     let (near, far) = plans.split_at(plans.partition_point(|plan| plan.m < NEAR));
-    let reach = TILE + near.last().map_or(0, |longest| 3 * longest.m);
-    let mut sums = tiled(near, |from, window| {
-        x.read(from..(from + reach).min(x.len()), window);
-        let squares = Squares::new(&window[..], kind);
-        let sum = |plan: &Plan| {
-            let Range { start, end } = plan.within(from);
-            squares.sum(plan.m, plan.stride, start - from..end - from)
-        };
+    let mut sums = tiled(near, |from| {
+        let sum = |plan: &Plan| squares.sum(plan.m, plan.stride, plan.within(from));
         near.iter().map(sum).collect()
     });
-    if !far.is_empty() {
-        let squares = Squares::new(x, kind);
-        let sum = |plan: &Plan| squares.sum(plan.m, plan.stride, 0..plan.all);
-        sums.par_extend(far.par_iter().map(sum));
-    }
+    let sum = |plan: &Plan| squares.sum(plan.m, plan.stride, 0..plan.all);
+    sums.par_extend(far.par_iter().map(sum));
     sums
 }
 
 /// Sums for all plans, a tile after the other: the series comes from memory once for all clusters, and not once for
-/// each. `part` is handed the start of the tile and a thread's own buffer.
-fn tiled(plans: &[Plan], part: impl Fn(usize, &mut Vec<f64>) -> Vec<f64> + Sync) -> Vec<f64> {
+/// each. `part` is handed the start of the tile.
+fn tiled(plans: &[Plan], part: impl Fn(usize) -> Vec<f64> + Sync + Send) -> Vec<f64> {
     let end = plans.iter().map(|plan| plan.all).max().unwrap_or(0);
-    let tiles: Vec<Vec<f64>> = (0..end)
-        .into_par_iter()
-        .step_by(TILE)
-        .map_init(Vec::new, |buffer, from| part(from, buffer))
-        .collect();
+    let tiles: Vec<Vec<f64>> = (0..end).into_par_iter().step_by(TILE).map(part).collect();
     let mut sums = vec![0.0; plans.len()];
     for tile in tiles {
         for (sum, part) in sums.iter_mut().zip(tile) {

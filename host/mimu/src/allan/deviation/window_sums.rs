@@ -8,30 +8,31 @@
 use std::ops::Range;
 
 use super::differences::difference;
-use super::series::{BLOCK, Samples};
 
+/// Samples from one kept running sum to the next.
+pub const BLOCK: usize = 64;
 /// Runs of terms that are moved on at the same time: one alone waits for its own additions.
 const RUNS: usize = 4;
 /// Terms in a run, after which it begins afresh.
 const RUN: usize = 1024;
 
 /// A series with its running sum at every 64th sample.
-pub struct WindowSums<'a, X: Samples + ?Sized> {
-    x: &'a X,
+pub struct WindowSums<'a> {
+    x: &'a [f64],
     /// Sum of all samples before the k-th kept one, as the unevaluated sum of two numbers. With one, its last
     /// digit is 6e-5 for 1e8 samples of unit white rates (the sum reaches 3e11), and worse for redder ones.
     before: Vec<[f64; 2]>,
 }
 
-impl<'a, X: Samples + ?Sized> WindowSums<'a, X> {
+impl<'a> WindowSums<'a> {
     /// One pass over the integral.
-    pub fn new(x: &'a X) -> Self {
+    pub fn new(x: &'a [f64]) -> Self {
         let blocks = x.len() / BLOCK;
         let mut before = Vec::with_capacity(blocks + 1);
         let [mut high, mut low] = [0.0_f64; 2];
         before.push([high, low]);
         for block in 0..blocks {
-            let part = x.sum_in_block(block * BLOCK, BLOCK);
+            let part = sum(&x[block * BLOCK..][..BLOCK]);
             let next = high + part;
             // Knuth's error-free addition: which of the two is larger changes along the way.
             let back = next - high;
@@ -45,11 +46,11 @@ impl<'a, X: Samples + ?Sized> WindowSums<'a, X> {
     /// Sum of the squares of every `stride`-th term of those that begin in `positions`, from the first, for
     /// clusters of `m`.
     pub fn sum_of_squares(&self, m: usize, stride: usize, positions: Range<usize>) -> f64 {
-        match self.x.slice() {
-            Some(x) if stride == 1 => positions
+        match stride {
+            1 => positions
                 .clone()
                 .step_by(RUN * RUNS)
-                .map(|from| self.consecutive(x, m, from, (RUN * RUNS).min(positions.end - from)))
+                .map(|from| self.consecutive(m, from, (RUN * RUNS).min(positions.end - from)))
                 .sum(),
             _ => positions
                 .step_by(stride)
@@ -64,26 +65,26 @@ impl<'a, X: Samples + ?Sized> WindowSums<'a, X> {
         if m <= BLOCK {
             // No dearer than the windows, whose sums of 64 samples round at 64 times the integral and would show
             // here.
-            let second = |i: usize| difference(&[x.at(i), x.at(i + m), x.at(i + 2 * m)]);
+            let second = |i: usize| difference(&[x[i], x[i + m], x[i + 2 * m]]);
             return (j..j + m).map(second).sum();
         }
         let sums = [0, 1, 2, 3].map(|k| {
             let at = j + k * m;
             let [high, low] = self.before[at / BLOCK];
-            [high, low + x.sum_in_block(at / BLOCK * BLOCK, at % BLOCK)]
+            [high, low + sum(&x[at / BLOCK * BLOCK..at])]
         });
         difference(&sums.map(|[high, _]| high)) + difference(&sums.map(|[_, low]| low))
     }
 
     /// Sum of the squares of `n` consecutive terms.
-    fn consecutive(&self, x: &[f64], m: usize, from: usize, n: usize) -> f64 {
+    fn consecutive(&self, m: usize, from: usize, n: usize) -> f64 {
         let each = n / RUNS;
         let mut total = 0.0;
         if each > 0 {
             let starts: [usize; RUNS] = std::array::from_fn(|r| from + r * each);
             let mut terms = starts.map(|j| self.term(m, j));
             let mut squares = terms.map(|t| t * t);
-            let taps = starts.map(|j| [0, 1, 2, 3].map(|k| &x[j + k * m..][..each - 1]));
+            let taps = starts.map(|j| [0, 1, 2, 3].map(|k| &self.x[j + k * m..][..each - 1]));
             for i in 0..each - 1 {
                 for r in 0..RUNS {
                     let [a, b, c, d] = taps[r];
@@ -98,4 +99,15 @@ impl<'a, X: Samples + ?Sized> WindowSums<'a, X> {
         }
         total
     }
+}
+
+fn sum(samples: &[f64]) -> f64 {
+    let (rows, rest) = samples.as_chunks::<4>();
+    let mut lanes = [0.0; 4];
+    for row in rows {
+        for (lane, v) in lanes.iter_mut().zip(row) {
+            *lane += v;
+        }
+    }
+    lanes.iter().sum::<f64>() + rest.iter().sum::<f64>()
 }
