@@ -1,7 +1,10 @@
 //! `make blind`: units with effects that nobody declares, and what the diagnosis says of them, as tables.
 //!
 //! `blind SEEDS CLEAN [NAME...]`: so many seeds of each effect and pair, so many clean units; names choose among the effects. Every
-//! case is a recording of its own; with names, each is printed.
+//! case is a recording of its own; with names, each is printed. `blind by-hand SEEDS CLEAN [NAME...]`: the same of units in somebody's
+//! hands, so many of each grade.
+
+mod by_hand;
 
 use std::collections::BTreeMap;
 
@@ -92,10 +95,17 @@ impl Tally {
 const HEAD: &str = "| | cases | detected | named right | right and more | named wrong | missed | right, error after at most 1.2 floors | the same, every fourth dwell held out | at most 1.2 times that without the effect |\n|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|";
 
 fn main() {
-    let args: Vec<String> = std::env::args().skip(1).collect();
+    let mut args: Vec<String> = std::env::args().skip(1).collect();
+    let in_hands = args.first().is_some_and(|a| a == "by-hand");
+    if in_hands {
+        args.remove(0);
+    }
     let number = |k: usize, default| args.get(k).and_then(|s| s.parse().ok()).unwrap_or(default);
     let (seeds, clean): (u64, u64) = (number(0, 20), number(1, 200));
     let chosen: Vec<&str> = args.iter().skip(2).map(String::as_str).collect();
+    if in_hands {
+        return by_hand::run(seeds, clean, &chosen);
+    }
     let mut kinds: Vec<Vec<&str>> = specs().map(|s| vec![s.id]).collect();
     kinds.extend(PAIRS.iter().map(|p| p.to_vec()));
     kinds.retain(|ids| chosen.is_empty() || chosen.iter().any(|c| ids.join("+").contains(c)));

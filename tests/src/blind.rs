@@ -72,8 +72,12 @@ pub fn unit(ids: &[&str], seed: u64) -> RigFile {
             parameters: toml::Table::new(),
         })
         .collect();
-    // The sizes that the seed draws, and then another size.
-    let mut drawn = RigTruth::resolve(&file, seed).expect("a rig").file;
+    draw_sizes(&file, seed)
+}
+
+/// `file` with the sizes of its effects drawn evenly in the logarithm over a decade around that of data sheets.
+pub fn draw_sizes(file: &RigFile, seed: u64) -> RigFile {
+    let mut drawn = RigTruth::resolve(file, seed).expect("a rig").file;
     let mut size = Random::new(seed, "size of the effect");
     for effect in &mut drawn.effect {
         let spec = mimu_rig::effects::specs()

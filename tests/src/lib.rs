@@ -3,6 +3,7 @@
 //! | where                  | what                                                              |
 //! |------------------------|-------------------------------------------------------------------|
 //! | [`mod@bench`]          | units with known truth on the virtual bench, read as a user's would be |
+//! | [`blind`], [`by_hand`] | units with undeclared effects, on a table and in the hand         |
 //! | [`coverage`]           | how often intervals hold the truth, over the whole path of a recording |
 //! | [`recordings`]         | recordings by other people                                        |
 //! | `tests/all/`           | agreement of estimators, intervals, diagnosis, published results  |
@@ -12,5 +13,6 @@
 
 pub mod bench;
 pub mod blind;
+pub mod by_hand;
 pub mod coverage;
 pub mod recordings;

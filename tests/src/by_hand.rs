@@ -1,0 +1,248 @@
+//! Units in somebody's hands, of three grades, with effects that nobody told the diagnosis of.
+//!
+//! The truth is made by the bench. What is judged is what a user would be told: which effects, which verdict, and intervals that hold
+//! the truth.
+
+use mimu::diagnose::{Diagnosis, diagnose};
+use mimu::fit::{Fit, Method, Options, fit};
+use mimu::prepared::Prepared;
+use mimu::quantity::Sensor;
+use mimu::stillness::STILL_FACTOR;
+use mimu_rig::random::Random;
+use mimu_rig::rig_file::{AffineFile, EffectFile, Parts, RigFile};
+use nalgebra::SVector;
+
+use crate::bench;
+use crate::blind::{draw_sizes, reported};
+
+/// What hands can show of an unit in some minutes: no steady rate, no temperature that comes and goes.
+pub const SHOWN: [&str; 10] = [
+    "gyro_g_sensitivity",
+    "gyro_scale_quadratic",
+    "gyro_scale_cubic",
+    "gyro_scale_asymmetry",
+    "gyro_bias_drift",
+    "gyro_warm_up",
+    "accel_scale_quadratic",
+    "accel_scale_cubic",
+    "accel_bias_drift",
+    "accel_warm_up",
+];
+
+/// Effects of which a recording of minutes shows the same: a line, and the beginning of an exponential.
+const ALIKE: [[&str; 2]; 2] = [
+    ["gyro_bias_drift", "gyro_warm_up"],
+    ["accel_bias_drift", "accel_warm_up"],
+];
+
+/// Grade of the sensors.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Grade {
+    /// ADXRS300 and MMA7260QT: 0.07 deg/s/√Hz.
+    Analog,
+    /// MPU-6050: 0.0035 deg/s/√Hz.
+    Consumer,
+    /// A tactical gyro and accelerometer: 0.0005 deg/s/√Hz, 20 µg/√Hz.
+    Tactical,
+}
+
+impl Grade {
+    /// All.
+    pub const ALL: [Self; 3] = [Self::Analog, Self::Consumer, Self::Tactical];
+}
+
+/// One unit of the suite.
+#[derive(Debug, Clone)]
+pub struct Case {
+    /// Effects that it has.
+    pub truth: Vec<&'static str>,
+    /// Grade of its sensors.
+    pub grade: Grade,
+    /// Whether the recording has the flaws of a real one.
+    pub flawed: bool,
+    /// Root mean square over the noise that the weakest effect leaves behind the affine fit.
+    pub strength: f64,
+    /// Effects that were accepted.
+    pub found: Vec<String>,
+    /// Verdict, or `refused`.
+    pub verdict: &'static str,
+    /// Parameters of C and o that were within their intervals, and all, of gyro and accelerometer.
+    pub inside: [[u32; 2]; 2],
+    /// What was left, or why it was refused, in words.
+    pub left: Vec<String>,
+}
+
+impl Case {
+    /// Whether `found` is what the unit has, or what this recording cannot tell from it.
+    pub fn is_right(&self, found: &str) -> bool {
+        let alike = |t: &str| ALIKE.iter().any(|a| a.contains(&t) && a.contains(&found));
+        self.truth.iter().any(|t| *t == found || alike(t))
+    }
+
+    /// Whether every effect is named, and nothing else.
+    pub fn is_named_alone(&self) -> bool {
+        self.found.len() == self.truth.len() && self.found.iter().all(|f| self.is_right(f))
+    }
+
+    /// Whether the verdict is that of what the unit has.
+    pub fn has_right_verdict(&self) -> bool {
+        let right = if self.truth.is_empty() {
+            "clean"
+        } else {
+            "explained"
+        };
+        self.verdict == right
+    }
+}
+
+fn counts(model: AffineFile, per_volt: f64) -> AffineFile {
+    AffineFile {
+        matrix: model.matrix.map(|row| row.map(|p| p * per_volt)),
+        bias: model.bias.map(|b| b * 100.0),
+    }
+}
+
+/// A unit of `grade` with `ids`, sizes drawn over a decade around that of data sheets; its affine models are stated.
+fn unit(ids: &[&'static str], grade: Grade, seed: u64) -> RigFile {
+    let mut random = Random::new(seed, "unit");
+    let (gyro, accel) = (bench::gyro(&mut random), bench::accel(&mut random));
+    let mut file = match grade {
+        Grade::Analog => bench::clean(gyro, accel),
+        // 65.5 counts per deg/s for 5 mV, and 16384 per g for 80 mV per m/s².
+        _ => bench::clean(counts(gyro, 13_100.0), counts(accel, 20_900.0)),
+    };
+    if grade != Grade::Analog {
+        file.unit.gyro = Some(Parts::One("MPU6050-gyro".into()));
+        file.unit.accel = Some(Parts::One("MPU6050-accel".into()));
+    }
+    if grade == Grade::Tactical {
+        file.unit.gyro_axes.white_si = Some([0.0005f64.to_radians(); 3]);
+        file.unit.gyro_axes.instability_si = Some([0.0003f64.to_radians(); 3]);
+        file.unit.gyro_axes.walk_si = Some([5e-6f64.to_radians(); 3]);
+        file.unit.accel_axes.white_si = Some([2e-4; 3]);
+        file.unit.accel_axes.instability_si = Some([1e-4; 3]);
+        file.unit.accel_axes.walk_si = Some([1e-6; 3]);
+    }
+    file.earth_rate = Some(true);
+    file.effect = ids
+        .iter()
+        .map(|id| EffectFile {
+            id: (*id).into(),
+            parameters: toml::Table::new(),
+        })
+        .collect();
+    draw_sizes(&file, seed)
+}
+
+/// 26 to 42 poses in 2 to 4 minutes at 100 Hz.
+fn plan(seed: u64) -> String {
+    let poses = 26 + (Random::new(seed, "poses").uniform() * 17.0) as usize;
+    format!(
+        "format = \"mimu-plan/1\"\nsample_rate_hz = 100.0\ncarrier = \"hands\"\nlatitude_deg = 48.0\nlead_in_s = 5.0\n\
+         [[step]]\nposes = {poses}\ndwell_s = 2.5\n"
+    )
+}
+
+fn options() -> Options {
+    Options {
+        method: Method::LeastSquares,
+        holdout_blocks: 0,
+        only: None,
+        still_factor: STILL_FACTOR,
+    }
+}
+
+/// What the affine fit of `with` leaves beyond that of `without`, over the noise, of the sensor that has more.
+fn strength(with: &Prepared, without: &Prepared) -> f64 {
+    let chi = |prepared: &Prepared, sensor: Sensor| {
+        let fit = fit(prepared.clone(), options()).ok()?;
+        let residuals = &fit.sensor(sensor)?.residuals;
+        let squares = residuals
+            .iter()
+            .map(|r| r.value.norm_squared() / (3.0 * r.floor * r.floor));
+        Some(squares.sum::<f64>() / residuals.len() as f64)
+    };
+    let of = |sensor| Some((chi(with, sensor)? - chi(without, sensor)?).max(0.0).sqrt());
+    let both = Sensor::BOTH.map(|s| of(s).unwrap_or(f64::NAN));
+    both[0].max(both[1])
+}
+
+/// How many of the intervals of C and o hold the truth.
+fn inside(fit: &Fit, truths: &[SVector<f64, 12>; 2]) -> [[u32; 2]; 2] {
+    std::array::from_fn(|k| {
+        let Some(found) = fit.sensor(Sensor::BOTH[k]) else {
+            return [0; 2];
+        };
+        // By hand the accelerometer defines the frame.
+        let free: &[usize] = match k {
+            0 => &[0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11],
+            _ => &[0, 3, 4, 6, 7, 8, 9, 10, 11],
+        };
+        let estimates = found.estimated.triad.forward_estimates();
+        let held = free.iter().filter(|i| {
+            let estimate = &estimates[**i];
+            (estimate.value - truths[k][**i]).abs() <= estimate.interval
+        });
+        [held.count() as u32, free.len() as u32]
+    })
+}
+
+/// Records and diagnoses a unit of `grade` with `ids`.
+pub fn case(ids: &[&'static str], grade: Grade, seed: u64, flawed: bool) -> Case {
+    let plan = plan(seed);
+    let file = unit(ids, grade, seed);
+    let with = bench::recorded(&plan, &file, seed);
+    let strengths = (0..ids.len()).map(|k| {
+        let mut less = file.clone();
+        less.effect.remove(k);
+        strength(&with, &bench::recorded(&plan, &less, seed))
+    });
+    let strength = strengths.fold(f64::INFINITY, f64::min);
+    let wander = bench::wander(&plan, &file, seed);
+    let models = [&file.unit.gyro_affine, &file.unit.accel_affine];
+    let truths = std::array::from_fn(|k| {
+        let mut truth = bench::parameters(models[k].as_ref().expect("stated"));
+        for i in 0..3 {
+            truth[9 + i] += wander[k][i];
+        }
+        truth
+    });
+    let case = |found, verdict, inside, left| Case {
+        truth: ids.to_vec(),
+        grade,
+        flawed,
+        strength,
+        found,
+        verdict,
+        inside,
+        left,
+    };
+    let diagnosis: Diagnosis = match diagnose(with.into(), options()) {
+        Ok(diagnosis) => reported(diagnosis),
+        Err(refusal) => {
+            return case(
+                Vec::new(),
+                "refused",
+                [[0; 2]; 2],
+                vec![refusal.to_string()],
+            );
+        }
+    };
+    let left = diagnosis.sensors.iter().flat_map(|s| {
+        let left = s.decision.leftover.iter().map(move |l| {
+            let usual = if l.usual { ", usual" } else { "" };
+            format!(
+                "{}_{}: {} {:.2e}{usual}",
+                s.sensor, l.stratum, l.against, l.strength
+            )
+        });
+        let undecided = s.decision.undecided.iter();
+        left.chain(undecided.map(|u| format!("{}: {} {:.1}", u.id, u.law, u.worse)))
+    });
+    case(
+        diagnosis.effects.iter().map(|e| e.candidate.id()).collect(),
+        diagnosis.verdict.name(),
+        inside(&diagnosis.after, &truths),
+        left.collect(),
+    )
+}
