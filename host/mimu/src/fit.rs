@@ -10,7 +10,7 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use crate::estimate::least_squares::POORLY_DETERMINED;
-use crate::estimate::rotation::{Turn, direction_error};
+use crate::estimate::rotation::{Rest, Turn, direction_error};
 use crate::estimate::{Estimated, Failure, Observation, gravity_size, known_input, rotation};
 use crate::prepared::{Prepared, si_covariance};
 use crate::quantity::{Figure, Sensor};
@@ -492,7 +492,7 @@ fn fit_turns(
     let by_full = &accel.triad.inverse;
     let (turns, refused) = prepared.turns(by_full);
     warnings.extend(refused);
-    let rest = prepared.observations(Sensor::Gyro);
+    let rest = prepared.rest(by_full);
     if turns.is_empty() {
         warnings
             .push("gyro: no turn lies between two usable dwells, so it is not calibrated".into());
@@ -546,14 +546,14 @@ fn fit_turns(
             floor: t.floor(mean_square),
         })
         .collect();
-    let static_rms = |rate: &dyn Fn(&Observation) -> Option<Vector3<f64>>| {
+    let static_rms = |rate: &dyn Fn(&Rest) -> Option<Vector3<f64>>| {
         let all: Vec<_> = rest.iter().filter_map(rate).collect();
         (!all.is_empty()).then(|| rms(Figure::Input, all.into_iter()))
     };
-    let in_sample = static_rms(&|o| Some(gyro.triad.inverse.apply(&o.raw)));
+    let in_sample = static_rms(&|o| Some(gyro.triad.inverse.apply(&o.raw) - o.rate));
     let held = static_rms(&|o| {
         let refit = refits.get(block(o.dwell))?.as_ref().ok()?;
-        Some(refit.triad.inverse.apply(&o.raw))
+        Some(refit.triad.inverse.apply(&o.raw) - o.rate)
     });
     let not_held_out = failures(&refits, Sensor::Gyro);
     let wide = turns

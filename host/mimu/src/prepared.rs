@@ -5,7 +5,8 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::blocks::Condensed;
 use crate::dwell::Dwells;
-use crate::estimate::rotation::{Motion, Turn};
+use crate::estimate::earth::Earth;
+use crate::estimate::rotation::{Motion, Rest, Turn};
 use crate::estimate::{Failure, Observation};
 use crate::noise::Noise;
 use crate::noise_file::NoiseFile;
@@ -114,6 +115,28 @@ impl Prepared {
             .collect()
     }
 
+    /// What is known of the Earth's rate.
+    pub fn earth(&self) -> Earth {
+        Earth::at(self.manifest.latitude_deg)
+    }
+
+    /// Dwells in which the gyro is at rest, with what the Earth turns it by; `accel` says where up is.
+    pub fn rest(&self, accel: &Affine<f64>) -> Vec<Rest> {
+        let earth = self.earth();
+        let rest = |o: Observation| {
+            let up = accel.apply(&self.dwells.list[o.dwell].raw_mean(Sensor::Accel));
+            Rest {
+                dwell: o.dwell,
+                raw: o.raw,
+                variance: o.variance,
+                rate: earth.rate(&up),
+                rate_variance: earth.variance(&up),
+            }
+        };
+        let observations = self.observations(Sensor::Gyro);
+        observations.into_iter().map(rest).collect()
+    }
+
     /// When the power came, on the clock of the recording, s: what the manifest says, or the first sample.
     pub fn power_on_s(&self) -> f64 {
         let first = || self.condensed.blocks.first().map_or(0.0, |b| b.start_s);
@@ -145,6 +168,7 @@ impl Prepared {
                 !dwell.turn && Sensor::BOTH.iter().all(|s| dwell.fault(*s).is_none())
             })
             .collect();
+        let earth = self.earth();
         let (mut turns, mut refused) = (Vec::new(), Vec::new());
         for pair in usable.windows(2) {
             let (a, b) = (&self.dwells.list[pair[0]], &self.dwells.list[pair[1]]);
@@ -197,7 +221,8 @@ impl Prepared {
                 before: accel.apply(&a.raw_mean(Sensor::Accel)),
                 after: accel.apply(&b.raw_mean(Sensor::Accel)),
                 raw: [a, b].map(|d| d.raw_mean(Sensor::Accel)),
-                direction_variance: (variance(a) + variance(b)) / (g * g),
+                direction_variance: (variance(a) + variance(b)) / (g * g)
+                    + earth.of_direction(duration_s),
                 integral_variance: duration_s * duration_s * rate_variance,
                 duration_s,
             });

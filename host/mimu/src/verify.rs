@@ -274,9 +274,9 @@ fn turns(
     let floor: Vec<f64> = by_calibration.iter().map(|t| t.floor(c2)).collect();
     let after = errors(&by_calibration, gyro);
     let rest: Vec<f64> = prepared
-        .observations(Sensor::Gyro)
+        .rest(accel)
         .iter()
-        .flat_map(|o| <[f64; 3]>::from(gyro.apply(&o.raw)))
+        .flat_map(|o| <[f64; 3]>::from(gyro.apply(&o.raw) - o.rate))
         .collect();
     let before = errors(&by_nominal, &nominal(gyro)?);
     let judged = judged(Sensor::Gyro, Figure::Direction, &before, &after, &floor)?;

@@ -5,8 +5,10 @@
 //! | [`known_input`]   | table     | forward least squares, Kalman bank, xu's inverse form, six positions |
 //! | [`gravity_size`]  | gravity   | accelerometer from the magnitude of gravity over many poses   |
 //! | [`rotation`]      | gravity   | gyro from the turns between dwells                       |
+//! | [`earth`]         | gravity   | what the turning Earth adds to it                         |
 //! | [`least_squares`] | both      | the algebra under all of them                            |
 
+pub mod earth;
 pub mod gravity_size;
 pub mod known_input;
 pub mod least_squares;

@@ -10,7 +10,7 @@ use mimu_core::compensation::Affine;
 use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, SVector, Vector3};
 
 use super::least_squares::{Linearized, Observability, Scatter, excess_variance, minimize};
-use super::{Estimated, Failure, Observation};
+use super::{Estimated, Failure};
 use crate::increment::Increment;
 use crate::quantity::AXES;
 use crate::triad::{Covariance, Part, Triad};
@@ -33,7 +33,7 @@ pub struct Turn<'a> {
     pub after: Vector3<f64>,
     /// Mean raw accelerometer readings that `before` and `after` come from.
     pub raw: [Vector3<f64>; 2],
-    /// Variance of the angle between the two directions by the accelerometer's noise, rad² (one component).
+    /// Variance of the angle between the two directions by the accelerometer's noise and by the turning Earth, rad² (one component).
     pub direction_variance: f64,
     /// Variance of the integral of the gyro by its noise, raw²·s², mean of the three axes.
     pub integral_variance: f64,
@@ -52,6 +52,21 @@ impl Turn<'_> {
     pub fn floor(&self, c2: f64) -> f64 {
         (2.0 * self.variance(c2)).sqrt()
     }
+}
+
+/// A dwell, in which nothing but the Earth turns the gyro.
+#[derive(Debug, Clone, Copy)]
+pub struct Rest {
+    /// Index of the dwell.
+    pub dwell: usize,
+    /// Mean reading, raw.
+    pub raw: Vector3<f64>,
+    /// Its variances by noise, raw².
+    pub variance: Vector3<f64>,
+    /// What is known of the rate, rad/s.
+    pub rate: Vector3<f64>,
+    /// Variances of the rest of it, rad²/s².
+    pub rate_variance: Vector3<f64>,
 }
 
 /// Mean force and turn over two neighbouring blocks in motion, for the first guess.
@@ -267,7 +282,7 @@ fn across(w: &Vector3<f64>) -> [Vector3<f64>; 2] {
 /// cases.) `motions` give the first guess unless `start` does; `gravity` in m/s².
 pub fn estimate(
     turns: &[Turn],
-    rest: &[Observation],
+    rest: &[Rest],
     accel: &Triad,
     motions: &[Motion],
     start: Option<&Affine<f64>>,
@@ -339,7 +354,7 @@ pub fn estimate(
         }
         for (s, observation) in rest.iter().enumerate() {
             let u = observation.raw - at_rest;
-            let rate = c * u + o;
+            let rate = c * u + o - observation.rate;
             for i in 0..3 {
                 let row = n_turns + 3 * s + i;
                 r[row] = rate[i];
@@ -357,7 +372,7 @@ pub fn estimate(
         let mean = squared.sum() / 3.0;
         let turns = turns.iter().flat_map(|t| [t.variance(mean); 2]);
         let rest = rest.iter().flat_map(|o| {
-            let v = squared * o.variance;
+            let v = squared * o.variance + o.rate_variance;
             [v.x, v.y, v.z]
         });
         turns.chain(rest).map(|v| v.max(1e-20)).collect()

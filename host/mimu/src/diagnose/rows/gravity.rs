@@ -8,6 +8,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use super::build::{Builder, Part};
 use super::{Figure, Row, Stratum};
 use crate::effects::quantity::Conditions;
+use crate::estimate::earth::poses;
 use crate::estimate::rotation::sensitivity;
 use crate::prepared::si_covariance;
 use crate::quantity::Sensor;
@@ -68,7 +69,18 @@ impl Builder<'_> {
         let prepared = self.prepared;
         let body = self.to_body()?;
         let turns = accel.map_or(Vec::new(), |a| prepared.turns(a).0);
-        let rest = prepared.observations(Sensor::Gyro);
+        // Without an accelerometer, as in one pose, the Earth's rate is a part of the bias.
+        let nowhere = Affine {
+            matrix: Matrix3::zeros(),
+            offset: Vector3::zeros(),
+        };
+        let rest = prepared.rest(accel.unwrap_or(&nowhere));
+        let ups: Vec<Vector3<f64>> = rest.iter().map(|o| self.force(o.dwell, accel)).collect();
+        let poses = match accel {
+            Some(_) => poses(&ups),
+            None => vec![0; rest.len()],
+        };
+        let in_one_pose = poses.iter().all(|p| *p == 0);
         let mean_square = inverse.matrix.norm_squared() / 3.0;
         let mut y = Vec::new();
         let mut turn_rows: Vec<[f64; 12]> = Vec::new();
@@ -154,20 +166,25 @@ impl Builder<'_> {
             for (i, o) in rest.iter().enumerate() {
                 let row = y.len();
                 self.mean_row(o.dwell, &conditions[i], body.row(axis).transpose());
-                y.push(inverse.apply(&o.raw)[axis]);
+                y.push((inverse.apply(&o.raw) - o.rate)[axis]);
                 for k in 0..3 {
                     nuisance[(row, 3 * axis + k)] = at_rest[k];
                 }
                 nuisance[(row, 9 + axis)] = 1.0;
             }
             let c = inverse.matrix.row(axis);
-            let known = DMatrix::from_fn(n, n, |i, j| match (i == j, &wander) {
+            let noise = |i: usize, j: usize| match (i == j, &wander) {
                 (true, _) => si_covariance(&inverse.matrix, &rest[i].variance)[(axis, axis)],
                 (_, Some(w)) => (0..3)
                     .map(|k| c[k] * c[k] * w[k][(dwells[i], dwells[j])])
                     .sum(),
                 _ => 0.0,
-            });
+            };
+            let of_earth = |i: usize, j: usize| match !in_one_pose && poses[i] == poses[j] {
+                true => rest[poses[i]].rate_variance[axis],
+                false => 0.0,
+            };
+            let known = DMatrix::from_fn(n, n, |i, j| noise(i, j) + of_earth(i, j));
             strata.push(Stratum {
                 name: format!("rest {}", crate::quantity::AXES[axis]),
                 axis: Some(axis),
