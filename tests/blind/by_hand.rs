@@ -22,7 +22,7 @@ struct Tally {
 impl Tally {
     fn add(&mut self, case: &Case) {
         self.cases += 1;
-        let named = |t: &&str| case.found.iter().any(|f| f == *t || case.is_right(f));
+        let named = |t: &&str| case.found.iter().any(|f| f.iter().any(|f| f == t));
         self.named += u32::from(case.truth.iter().all(|t| named(&t)));
         self.alone += u32::from(case.is_named_alone());
         self.right_verdict += u32::from(case.has_right_verdict() && case.is_named_alone());

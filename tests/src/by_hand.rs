@@ -29,12 +29,6 @@ pub const SHOWN: [&str; 10] = [
     "accel_warm_up",
 ];
 
-/// Effects of which a recording of minutes shows the same: a line, and the beginning of an exponential.
-const ALIKE: [[&str; 2]; 2] = [
-    ["gyro_bias_drift", "gyro_warm_up"],
-    ["accel_bias_drift", "accel_warm_up"],
-];
-
 /// Grade of the sensors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Grade {
@@ -62,8 +56,8 @@ pub struct Case {
     pub flawed: bool,
     /// Root mean square over the noise that the weakest effect leaves behind the affine fit.
     pub strength: f64,
-    /// Effects that were accepted.
-    pub found: Vec<String>,
+    /// Effects that were accepted, each with those that it says the recording does not tell from it.
+    pub found: Vec<Vec<String>>,
     /// Verdict, or `refused`.
     pub verdict: &'static str,
     /// Parameters of C and o that were within their intervals, and all, of gyro and accelerometer.
@@ -74,9 +68,8 @@ pub struct Case {
 
 impl Case {
     /// Whether `found` is what the unit has, or what this recording cannot tell from it.
-    pub fn is_right(&self, found: &str) -> bool {
-        let alike = |t: &str| ALIKE.iter().any(|a| a.contains(&t) && a.contains(&found));
-        self.truth.iter().any(|t| *t == found || alike(t))
+    pub fn is_right(&self, found: &[String]) -> bool {
+        self.truth.iter().any(|t| found.iter().any(|f| f == t))
     }
 
     /// Whether every effect is named, and nothing else.
@@ -239,8 +232,15 @@ pub fn case(ids: &[&'static str], grade: Grade, seed: u64, flawed: bool) -> Case
         let undecided = s.decision.undecided.iter();
         left.chain(undecided.map(|u| format!("{}: {} {:.1}", u.id, u.law, u.worse)))
     });
+    let accepted = diagnosis.sensors.iter().flat_map(|s| &s.decision.accepted);
+    let found = accepted.map(|a| {
+        let alike = a.chosen.alternatives.iter().map(|(id, _)| id.clone());
+        std::iter::once(a.chosen.candidate.id())
+            .chain(alike)
+            .collect()
+    });
     case(
-        diagnosis.effects.iter().map(|e| e.candidate.id()).collect(),
+        found.collect(),
         diagnosis.verdict.name(),
         inside(&diagnosis.after, &truths),
         left.collect(),

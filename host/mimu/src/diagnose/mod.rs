@@ -8,6 +8,7 @@
 //! | [`variance`]    | how that scatters: known noise, more of it, a bias that walks                    |
 //! | [`search`]    | which effects the rows ask for                                                   |
 //! | [`decision`]  | which of them are accepted, and what is left                                     |
+//! | [`uncertainty`] | what the coefficients of effects leave open of what stands on them               |
 //! | [`picture`]   | what of it can be drawn                                                          |
 
 mod candidate;
@@ -15,13 +16,14 @@ pub mod decision;
 pub mod picture;
 pub mod rows;
 pub mod search;
+pub mod uncertainty;
 pub mod variance;
 
 use decision::{Decision, decide, noisier};
 use mimu_core::compensation::Affine;
 use nalgebra::{Matrix3, Vector3};
 use picture::Picture;
-use rows::{Free, Rows, Session};
+use rows::{ForceErrors, Free, Rows, Session};
 use serde::Serialize;
 
 use crate::calibration::Calibration;
@@ -30,6 +32,7 @@ use crate::fit::session_bias;
 use crate::fit::{Fit, Options, fit, fit_biases};
 use crate::prepared::Prepared;
 use crate::quantity::Sensor;
+use crate::triad::{Part, Triad};
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{RawUnit, Reference};
 
@@ -222,18 +225,24 @@ fn dwell_ends(recordings: &[&Prepared]) -> Vec<(usize, f64)> {
     all
 }
 
-/// A later recording beside the calibration of the first: its matrices, and biases of its own.
-fn session<'a>(prepared: &'a Prepared, models: &[Option<Affine<f64>>; 2]) -> Session<'a> {
-    let [gyro, accel] = [0, 1].map(|i| {
-        let known = models[i]?;
-        let own = session_bias::estimate(prepared, Sensor::BOTH[i], &known);
-        Some(own.map_or(known, |e| e.triad.inverse))
-    });
+/// A recording with the calibrations of gyro and accelerometer.
+fn session(prepared: &Prepared, [gyro, accel]: [Option<Affine<f64>>; 2]) -> Session<'_> {
     Session {
         prepared,
         gyro,
         accel,
+        forces: None,
     }
+}
+
+/// A later recording beside the calibration of the first: its matrices, and biases of its own.
+fn later_session<'a>(prepared: &'a Prepared, models: &[Option<Affine<f64>>; 2]) -> Session<'a> {
+    let own = [0, 1].map(|i| {
+        let known = models[i]?;
+        let own = session_bias::estimate(prepared, Sensor::BOTH[i], &known);
+        Some(own.map_or(known, |e| e.triad.inverse))
+    });
+    session(prepared, own)
 }
 
 /// What was accepted, as it is removed.
@@ -285,17 +294,20 @@ pub fn diagnose(recordings: Recordings, options: Options) -> Result<Diagnosis> {
     let mut now = before.clone();
     let mut effects: Vec<Removed> = Vec::new();
     let mut sensors = Vec::new();
+    let mut forces: Option<ForceErrors> = None;
+    // What the coefficients of effects leave open of the calibration without them.
+    let mut open: Vec<(Sensor, Part)> = Vec::new();
+    let by_gravity = recordings.first.manifest.reference == Reference::Gravity;
     for sensor in [Sensor::Accel, Sensor::Gyro] {
         if now.sensor(sensor).is_none() {
             continue;
         }
         let models = Sensor::BOTH.map(|s| now.sensor(s).map(|f| f.estimated.triad.inverse));
         let head = Session {
-            prepared: &now.prepared,
-            gyro: models[0],
-            accel: models[1],
+            forces: forces.as_ref(),
+            ..session(&now.prepared, models)
         };
-        let others = later.iter().map(|p| session(p, &models));
+        let others = later.iter().map(|p| later_session(p, &models));
         let sessions: Vec<Session> = std::iter::once(head).chain(others).collect();
         let (ours, unseen) = sessions.split_at(found_in);
         let rows = Rows::of(ours, sensor, free).ok_or_else(singular)?;
@@ -344,6 +356,12 @@ pub fn diagnose(recordings: Recordings, options: Options) -> Result<Diagnosis> {
             effects.extend(found);
             (now, later) = after?;
         }
+        open.extend(uncertainty::of_affine(&rows, &decision).map(|part| (sensor, part)));
+        if sensor == Sensor::Accel && free == Free::Affine && by_gravity {
+            let models = Sensor::BOTH.map(|s| now.sensor(s).map(|f| f.estimated.triad.inverse));
+            let head = session(&now.prepared, models);
+            forces = uncertainty::of_forces(&head, &rows, &decision);
+        }
         let picture = Picture::of(sensor, &rows, &decision);
         sensors.push(SensorDiagnosis {
             sensor,
@@ -351,6 +369,14 @@ pub fn diagnose(recordings: Recordings, options: Options) -> Result<Diagnosis> {
             decision,
             picture,
         });
+    }
+    for (sensor, part) in open {
+        let fit = now.sensors.iter_mut().find(|f| f.sensor == sensor);
+        if let Some(triad) = fit.map(|f| &mut f.estimated.triad) {
+            let mut parts = triad.inverse_parts();
+            parts.push(part);
+            *triad = Triad::from_inverse(triad.inverse, parts).ok_or_else(singular)?;
+        }
     }
     sensors.reverse();
     let open = |d: &Decision| d.unexplained().next().is_some() || !d.undecided.is_empty();

@@ -12,6 +12,7 @@
 //! effect must not be made of that.
 
 mod build;
+mod forces;
 mod gravity;
 mod join;
 mod known;
@@ -24,6 +25,8 @@ use nalgebra::{DMatrix, DVector, Vector3};
 
 use crate::effects::quantity::Conditions;
 use crate::effects::temperature::{Followed, lagged, rank_correlation};
+pub use forces::ForceErrors;
+
 use crate::prepared::Prepared;
 use crate::quantity;
 use crate::quantity::Sensor;
@@ -95,6 +98,8 @@ pub struct Session<'a> {
     pub gyro: Option<Affine<f64>>,
     /// Accelerometer, raw to m/s².
     pub accel: Option<Affine<f64>>,
+    /// How its forces may err, where they are what the gyro is judged by.
+    pub forces: Option<&'a ForceErrors>,
 }
 
 impl Session<'_> {
@@ -127,6 +132,8 @@ pub struct Rows {
     pub y: DVector<f64>,
     /// Derivatives by the parameters of the affine model, scaled to columns of one size.
     pub nuisance: DMatrix<f64>,
+    /// What a unit of each of the first of these, which are of the first recording, adds to its inverse affine model: C by rows, then o.
+    pub parameters: DMatrix<f64>,
     /// Strata, which cover the rows in order.
     pub strata: Vec<Stratum>,
     /// What the error figures are about.
@@ -161,6 +168,11 @@ impl Rows {
             .filter_map(|(i, s)| Some((i, build::part(s, sensor, free)?)))
             .collect();
         join::join(sensor, parts, sessions.len())
+    }
+
+    /// Three rows for each pose of a recording: the error of the force that its accelerometer says.
+    pub(super) fn forces(session: &Session) -> Option<Self> {
+        join::join(Sensor::Accel, vec![(0, build::forces(session)?)], 1)
     }
 
     /// Dwells that row `row` is about, counted through all recordings.

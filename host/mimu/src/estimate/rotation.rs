@@ -227,6 +227,8 @@ pub fn direction_error(turn: &Turn, gyro: &Affine<f64>) -> Vector3<f64> {
 /// The direction error of a turn and what it owes to each piece of it.
 #[derive(Debug, Clone)]
 pub struct Sensitivity {
+    /// What each of them owes to the force before and after the turn, rad/(m/s²).
+    pub by_force: [[Vector3<f64>; 2]; 2],
     /// Its two components across the measured direction, rad.
     pub error: [f64; 2],
     /// Derivatives of the two by the rotation vector of each increment, rad/rad, body frame.
@@ -251,9 +253,21 @@ pub fn sensitivity(turn: &Turn, gyro: &Affine<f64>) -> Sensitivity {
     }
     let error = between(&(after * turn.before.normalize()), &measured);
     Sensitivity {
+        by_force: sides.map(|e| by_forces(turn, &after, &e)),
         error: sides.map(|e| e.dot(&error)),
         by,
     }
+}
+
+/// What the component `e` of the direction error of a turn owes to the force before and after it; `rotation` takes a direction from the
+/// body frame before into that after. A direction moves by what of an error of the force lies across it.
+fn by_forces(turn: &Turn, rotation: &Matrix3<f64>, e: &Vector3<f64>) -> [Vector3<f64>; 2] {
+    let side = e.cross(&turn.after.normalize());
+    let ends = [(turn.before, -rotation.tr_mul(&side)), (turn.after, side)];
+    ends.map(|(force, side)| {
+        let up = force.normalize();
+        (side - up * up.dot(&side)) / force.norm()
+    })
 }
 
 /// Rotation vector that turns the unit vector `a` into `b` the shortest way.
@@ -377,8 +391,7 @@ pub fn estimate(
         });
         turns.chain(rest).map(|v| v.max(1e-20)).collect()
     };
-    // Derivatives of the turns' residuals by C and o of the accelerometer. A direction moves by what of an error of the
-    // force lies across it.
+    // Derivatives of the turns' residuals by C and o of the accelerometer.
     let by_accelerometer = |p: &DVector<f64>| {
         let (c, o) = unpack(p);
         let mut by = DMatrix::zeros(n_turns, 12);
@@ -386,14 +399,7 @@ pub fn estimate(
             let (after, _) = integrate(pieces, &c, &o, false);
             let (_, measured) = &directions[t];
             for (k, e) in across(measured).iter().enumerate() {
-                let side = e.cross(measured);
-                let ends = [
-                    (turn.before, turn.raw[0], -(after.transpose() * side)),
-                    (turn.after, turn.raw[1], side),
-                ];
-                for (force, raw, side) in ends {
-                    let up = force.normalize();
-                    let side = (side - up * up.dot(&side)) / force.norm();
+                for (side, raw) in by_forces(turn, &after, e).into_iter().zip(turn.raw) {
                     for i in 0..3 {
                         for j in 0..3 {
                             by[(2 * t + k, 3 * i + j)] += side[i] * raw[j];

@@ -22,6 +22,8 @@ pub(super) struct Part {
     pub y: Vec<f64>,
     /// Derivatives by the affine parameters.
     pub nuisance: DMatrix<f64>,
+    /// What a unit of each adds to the inverse affine model, C by rows and then o.
+    pub parameters: DMatrix<f64>,
     /// Which columns of it are biases.
     pub biases: Vec<usize>,
     /// Strata.
@@ -55,39 +57,26 @@ pub(super) struct Builder<'a> {
 /// The rows of `sensor` in a recording. `None` if there are none, or the calibration is singular.
 pub(super) fn part(session: &Session, sensor: Sensor, free: Free) -> Option<Part> {
     let inverse = session.model(sensor)?;
-    let accel = session.accel;
-    let prepared = session.prepared;
-    if !prepared.has(sensor) {
-        return None;
-    }
-    let (direction, scale, forward) = directions(&inverse)?;
-    let blocks = &prepared.condensed.blocks;
-    let warm = offsets(blocks);
-    let builder = Builder {
-        prepared,
-        sensor,
-        other_measured: match sensor {
-            Sensor::Gyro => session.accel.is_some(),
-            Sensor::Accel => session.gyro.is_some(),
-        },
-        t0_s: blocks.first()?.start_s,
-        warm,
-        rows: Vec::new(),
-        conditions: Vec::new(),
-        block: Vec::new(),
-        direction,
-        scale,
-    };
-    let mut part = match (prepared.manifest.reference, sensor) {
-        (Reference::Table, _) => builder.known(&scale, &forward, accel.as_ref()),
+    let accel = session.accel.as_ref();
+    let builder = Builder::of(session, sensor)?;
+    let reference = session.prepared.manifest.reference;
+    let mut part = match (reference, sensor) {
+        (Reference::Table, _) => builder.known(&inverse, accel),
         (Reference::Gravity, Sensor::Accel) => builder.sizes(&inverse),
-        (Reference::Gravity, Sensor::Gyro) => builder.turns(&inverse, accel.as_ref()),
+        (Reference::Gravity, Sensor::Gyro) => builder.turns(&inverse, accel, session.forces),
     }?;
     if free == Free::Bias {
         part.nuisance = part.nuisance.select_columns(&part.biases);
+        part.parameters = part.parameters.select_columns(&part.biases);
         part.biases = (0..part.biases.len()).collect();
     }
     Some(part)
+}
+
+/// The forces of a recording; see [`Builder::forces`].
+pub(super) fn forces(session: &Session) -> Option<Part> {
+    let inverse = session.model(Sensor::Accel)?;
+    Builder::of(session, Sensor::Accel)?.forces(&inverse)
 }
 
 /// The step of several channels, if they have one in common: their mean, to within what rounding in a text file leaves.
@@ -96,6 +85,33 @@ pub(super) fn common_step(steps: &[Option<f64>]) -> Option<f64> {
     let mean = steps.iter().sum::<f64>() / steps.len() as f64;
     let alike = steps.iter().all(|s| (s / mean - 1.0).abs() < 1e-3);
     alike.then_some(mean)
+}
+
+impl<'a> Builder<'a> {
+    /// `None` if the recording lacks the sensor, or its calibration is singular.
+    fn of(session: &Session<'a>, sensor: Sensor) -> Option<Self> {
+        let prepared = session.prepared;
+        if !prepared.has(sensor) {
+            return None;
+        }
+        let (direction, scale, _) = directions(&session.model(sensor)?)?;
+        let blocks = &prepared.condensed.blocks;
+        Some(Self {
+            prepared,
+            sensor,
+            other_measured: match sensor {
+                Sensor::Gyro => session.accel.is_some(),
+                Sensor::Accel => session.gyro.is_some(),
+            },
+            t0_s: blocks.first()?.start_s,
+            warm: offsets(blocks),
+            rows: Vec::new(),
+            conditions: Vec::new(),
+            block: Vec::new(),
+            direction,
+            scale,
+        })
+    }
 }
 
 impl Builder<'_> {
@@ -182,7 +198,7 @@ impl Builder<'_> {
     pub(super) fn finish(
         self,
         y: Vec<f64>,
-        nuisance: DMatrix<f64>,
+        (nuisance, parameters): (DMatrix<f64>, DMatrix<f64>),
         biases: Vec<usize>,
         strata: Vec<Stratum>,
         figure: (Figure, usize, usize),
@@ -191,6 +207,7 @@ impl Builder<'_> {
             reference: self.prepared.manifest.reference,
             y,
             nuisance,
+            parameters,
             biases,
             strata,
             figure: figure.0,

@@ -6,12 +6,46 @@ use mimu_core::compensation::Affine;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use super::build::{Builder, Part};
-use super::{Figure, Row, Stratum};
+use super::{Figure, ForceErrors, Row, Stratum};
 use crate::effects::quantity::Conditions;
+use crate::estimate::Observation;
 use crate::estimate::earth::poses;
 use crate::estimate::rotation::sensitivity;
 use crate::prepared::si_covariance;
 use crate::quantity::Sensor;
+
+/// What the affine parameters of an accelerometer do to its forces.
+struct Shapes {
+    /// Three rows for each observation.
+    errors: DMatrix<f64>,
+    /// See [`Part::parameters`].
+    parameters: DMatrix<f64>,
+}
+
+/// The nine parameters that gravity's size determines: C lower triangular, about the mean reading, then o.
+fn lower_affine(observations: &[Observation]) -> Shapes {
+    let lower = [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2)];
+    let n = observations.len();
+    let centre = observations.iter().map(|o| o.raw).sum::<Vector3<f64>>() / n.max(1) as f64;
+    let mut errors = DMatrix::zeros(3 * n, 9);
+    for (i, o) in observations.iter().enumerate() {
+        for (k, (r, c)) in lower.into_iter().enumerate() {
+            errors[(3 * i + r, k)] = o.raw[c] - centre[c];
+        }
+        for k in 0..3 {
+            errors[(3 * i + k, 6 + k)] = 1.0;
+        }
+    }
+    let mut parameters = DMatrix::zeros(12, 9);
+    for (k, (r, c)) in lower.into_iter().enumerate() {
+        parameters[(3 * r + c, k)] = 1.0;
+        parameters[(9 + r, k)] = -centre[c];
+    }
+    for k in 0..3 {
+        parameters[(9 + k, 6 + k)] = 1.0;
+    }
+    Shapes { errors, parameters }
+}
 
 impl Builder<'_> {
     /// Errors along the sensors as errors in the body frame: inverse of the sensitive directions.
@@ -31,21 +65,18 @@ impl Builder<'_> {
             .iter()
             .map(|o| self.dwell(o.dwell, inverse.apply(&o.raw)))
             .collect();
+        let shapes = lower_affine(&observations);
         let mut y = Vec::new();
         let mut nuisance = DMatrix::zeros(n, 9);
-        let lower = [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2)];
-        let centre = observations.iter().map(|o| o.raw).sum::<Vector3<f64>>() / n.max(1) as f64;
         for (i, o) in observations.iter().enumerate() {
             let force = inverse.apply(&o.raw);
             let up = force.normalize();
             self.mean_row(o.dwell, &conditions[i], body.tr_mul(&up));
             y.push(force.norm() - g);
-            for (k, (r, c)) in lower.into_iter().enumerate() {
-                nuisance[(i, k)] = up[r] * (o.raw[c] - centre[c]);
-            }
-            for k in 0..3 {
-                nuisance[(i, 6 + k)] = up[k];
-            }
+            let by_force = shapes.errors.rows(3 * i, 3);
+            nuisance
+                .row_mut(i)
+                .copy_from(&by_force.tr_mul(&up).transpose());
         }
         let variances = prepared.size_variances(inverse, &observations);
         let strata = vec![Stratum {
@@ -57,7 +88,40 @@ impl Builder<'_> {
             random_walk: Some(self.random_walk(&dwells)),
             wander_known: prepared.noise.is_stated(Sensor::Accel),
         }];
+        let nuisance = (nuisance, shapes.parameters);
         self.finish(y, nuisance, vec![6, 7, 8], strata, (Figure::Size, n, 1))
+    }
+
+    /// Three rows for each pose: the error of the force, of which [`Self::sizes`] see the part along it. What they cannot see goes into
+    /// the directions that a gyro is judged by.
+    pub(super) fn forces(mut self, inverse: &Affine<f64>) -> Option<Part> {
+        let observations = self.prepared.observations(Sensor::Accel);
+        let n = 3 * observations.len();
+        let body = self.to_body()?;
+        for o in &observations {
+            let conditions = self.dwell(o.dwell, inverse.apply(&o.raw));
+            for k in 0..3 {
+                self.mean_row(o.dwell, &conditions, body.row(k).transpose());
+            }
+        }
+        let shapes = lower_affine(&observations);
+        let strata = vec![Stratum {
+            name: "force".into(),
+            axis: None,
+            session: 0,
+            rows: 0..n,
+            known: DMatrix::identity(n, n),
+            random_walk: None,
+            wander_known: true,
+        }];
+        let nuisance = (shapes.errors, shapes.parameters);
+        self.finish(
+            vec![0.0; n],
+            nuisance,
+            vec![6, 7, 8],
+            strata,
+            (Figure::Size, n, 3),
+        )
     }
 
     /// Two rows for each turn, which `accel` is needed for, and one for each dwell and axis, where the rate is none.
@@ -65,6 +129,7 @@ impl Builder<'_> {
         mut self,
         inverse: &Affine<f64>,
         accel: Option<&Affine<f64>>,
+        forces: Option<&ForceErrors>,
     ) -> Option<Part> {
         let prepared = self.prepared;
         let body = self.to_body()?;
@@ -83,6 +148,7 @@ impl Builder<'_> {
         let in_one_pose = poses.iter().all(|p| *p == 0);
         let mean_square = inverse.matrix.norm_squared() / 3.0;
         let mut y = Vec::new();
+        let mut by_force = Vec::new();
         let mut turn_rows: Vec<[f64; 12]> = Vec::new();
         let blocks = &prepared.condensed.blocks;
         for turn in &turns {
@@ -121,6 +187,7 @@ impl Builder<'_> {
                     weights.push(body.tr_mul(&by[side]) * piece.duration_s);
                 }
                 y.push(found.error[side]);
+                by_force.push((turn, found.by_force[side]));
                 turn_rows.push(columns);
                 self.rows.push(Row {
                     conditions: conditions.clone(),
@@ -157,7 +224,8 @@ impl Builder<'_> {
                 axis: None,
                 session: 0,
                 rows: 0..m,
-                known: DMatrix::from_diagonal(&DVector::from_vec(turn_variances)),
+                known: DMatrix::from_diagonal(&DVector::from_vec(turn_variances))
+                    + forces.map_or_else(|| DMatrix::zeros(m, m), |f| f.of_turns(&by_force)),
                 random_walk: None,
                 wander_known: true,
             });
@@ -199,6 +267,7 @@ impl Builder<'_> {
             0 => (Figure::Rest, 3 * n, 1),
             m => (Figure::Direction, m, 2),
         };
+        let nuisance = (nuisance, DMatrix::identity(12, 12));
         self.finish(y, nuisance, vec![9, 10, 11], strata, figure)
     }
 }

@@ -127,9 +127,17 @@ pub(super) fn join(sensor: Sensor, parts: Vec<(usize, Part)>, sessions: usize) -
         }
         strata.push(stratum);
     }
+    // Those of the first recording stand first.
+    let mut parameters = head.parameters.clone();
+    for (column, place) in head.parameters.column_iter().zip(&places[0]) {
+        let size = nuisance.column(*place).norm();
+        let size = if size > 0.0 { size } else { 1.0 };
+        parameters.set_column(*place, &(column / size));
+    }
     Some(Rows {
         sensor,
         y,
+        parameters,
         nuisance: scaled(nuisance),
         strata,
         figure,

@@ -13,11 +13,11 @@ impl Builder<'_> {
     /// A row for each dwell and sensor axis; `accel` is the calibrated accelerometer, for the forces on a gyro.
     pub(super) fn known(
         mut self,
-        scale: &Vector3<f64>,
-        forward: &Forward,
+        inverse: &Affine<f64>,
         accel: Option<&Affine<f64>>,
     ) -> Option<Part> {
-        let prepared = self.prepared;
+        let forward = Forward::of(inverse)?;
+        let (prepared, scale) = (self.prepared, self.scale);
         let observations = prepared.observations(self.sensor);
         let n = observations.len();
         if n == 0 {
@@ -61,6 +61,26 @@ impl Builder<'_> {
             });
         }
         let figure = (Figure::Input, 3 * n, 1);
-        self.finish(y, nuisance, vec![0, 4, 8], strata, figure)
+        let parameters = by_forward(inverse, &scale);
+        self.finish(y, (nuisance, parameters), vec![0, 4, 8], strata, figure)
     }
+}
+
+/// What a bias and a row of the forward model, in SI along each axis, add to the inverse one: C by rows, then o.
+fn by_forward(inverse: &Affine<f64>, scale: &Vector3<f64>) -> DMatrix<f64> {
+    let (c, o) = (&inverse.matrix, &inverse.offset);
+    let mut out = DMatrix::zeros(12, 12);
+    for axis in 0..3 {
+        let column = c.column(axis) * scale[axis];
+        for i in 0..3 {
+            out[(9 + i, 4 * axis)] = -column[i];
+            for k in 0..3 {
+                for j in 0..3 {
+                    out[(3 * i + j, 4 * axis + 1 + k)] = -column[i] * c[(k, j)];
+                }
+                out[(9 + i, 4 * axis + 1 + k)] = -column[i] * o[k];
+            }
+        }
+    }
+    out
 }
