@@ -53,6 +53,7 @@ fn together(first: Prepared, more: Vec<Prepared>) -> Diagnosis {
         more,
         second: None,
         given: None,
+        accept: Vec::new(),
     };
     diagnose(recordings, OPTIONS).expect("a diagnosis")
 }
@@ -63,6 +64,7 @@ fn judged_by(first: Prepared, second: Prepared) -> Diagnosis {
         more: Vec::new(),
         second: Some(second),
         given: None,
+        accept: Vec::new(),
     };
     diagnose(recordings, OPTIONS).expect("a diagnosis")
 }

@@ -31,6 +31,9 @@ pub struct DiagnoseArgs {
     /// Its effects are taken out first, and go into the new file.
     #[arg(long, value_name = "FILE")]
     calibration: Option<PathBuf>,
+    /// Take this term, though nothing but this recording speaks for it: `term:...`, as the report says
+    #[arg(long, value_name = "ID")]
+    accept: Vec<String>,
     /// Calibration file to write, with the effects
     #[arg(short, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -85,6 +88,7 @@ pub fn run(args: &DiagnoseArgs) -> Result<()> {
             more: all,
             second: second.clone(),
             given: given.as_ref(),
+            accept: args.accept.clone(),
         },
         options,
     )?;

@@ -20,7 +20,7 @@ use crate::effects::quantity::Quantity;
 use crate::effects::regressor::Product;
 use crate::effects::removal::Removed;
 use crate::quantity::p_value;
-use hold_out::leverage;
+use hold_out::{chance_without_a_dwell, leverage, parts_helped};
 use leftover::leftover;
 pub(super) use leftover::noisier;
 use reading::of_readings;
@@ -37,6 +37,9 @@ pub use undecided::Undecided;
 
 /// One dwell that has more than this share in what an effect rests on decides it alone.
 pub const LEVERAGE: f64 = 0.7;
+/// Probability of chance that an effect may have without the dwell that speaks most for it: else one outlier would have made it.
+const SURVIVES: f64 = 0.01;
+
 /// An accepted effect with its coefficients.
 #[derive(Debug, Clone)]
 pub struct Accepted {
@@ -115,12 +118,13 @@ impl Decision {
 
 /// Decides on the rows of one sensor; `dwell_ends` are the times between dwells, where a bias may have jumped: index of the
 /// recording and s. `unseen` are the rows of a second recording, which nothing is found in: what it contradicts is not accepted.
-/// `without` are effects that are not tried, each with the reason.
+/// `without` are effects that are not tried, each with the reason; `accept` are ids of terms that are taken without a second recording.
 pub fn decide(
     rows: &Rows,
     dwell_ends: &[(usize, f64)],
     unseen: Option<&Rows>,
     without: &[(String, String)],
+    accept: &[String],
 ) -> Option<Decision> {
     let (mut all, mut not_excited) = candidates(rows, dwell_ends);
     all.retain(|c| !without.iter().any(|(id, _)| *id == c.id()));
@@ -147,8 +151,11 @@ pub fn decide(
         with = search.fit(&kept)?;
     }
     // What does not hold out goes, the one with the smallest drop in deviance first.
+    let held = |chosen: &[Chosen], fit: &Fitted, split: Split| {
+        held_out(&search, &search.model(chosen), fit, split)
+    };
     let held_rms = |chosen: &[Chosen], fit: &Fitted, split: Split| {
-        held_out(&search, &search.model(chosen), fit, split).map(|r| rms(rows, &r))
+        held(chosen, fit, split).map(|r| rms(rows, &r))
     };
     // All rates in one block of time, and without it there is no calibration.
     let usual = match held_rms(&[], &null, Split::Blocks) {
@@ -197,14 +204,19 @@ pub fn decide(
     loop {
         let seconds = elsewhere(&kept, &shares(&search, &kept, &with));
         let (weights, split) = common(&kept, &with);
-        let held = held_rms(&kept, &with, split);
+        let with_all = held(&kept, &with, split);
         let mut worst: Option<(usize, String, bool)> = None;
         for i in (0..kept.len()).rev() {
             let mut rest = kept.clone();
             rest.remove(i);
             let share = weights[i];
             let without = search.fit(&rest)?;
-            let [a, b] = [held_rms(&rest, &without, split), held];
+            let both = [held(&rest, &without, split), with_all.clone()];
+            let [a, b] = both.each_ref().map(|h| h.as_ref().map(|r| rms(rows, r)));
+            let parts = match &both {
+                [Some(a), Some(b)] => parts_helped(rows, split, [a, b], kept[i].columns.ncols()),
+                _ => [0; 2],
+            };
             let why = match (a, b) {
                 _ if share > LEVERAGE => {
                     format!("it rests to {:.0} % on one dwell", 100.0 * share)
@@ -225,8 +237,21 @@ pub fn decide(
                         said(d)
                     )
                 }
+                (Some(_), Some(_)) if parts[1] >= 2 && parts[1] >= parts[0] => format!(
+                    "the held-out error goes down in {} of the parts, and up in {}",
+                    parts[0], parts[1]
+                ),
                 (_, None) => "what is left when a block is held out does not determine it".into(),
-                _ => continue,
+                _ => {
+                    let models = [&search.model(&rest), &search.model(&kept)];
+                    match chance_without_a_dwell(&search, &kept[i], models, &with) {
+                        Some(p) if p > SURVIVES => format!(
+                            "it does not survive the loss of one dwell: without it, {}",
+                            p_value(p)
+                        ),
+                        _ => continue,
+                    }
+                }
             };
             let too_few_dwells = share > LEVERAGE || b.is_none();
             worst = Some((i, why, too_few_dwells));
@@ -244,6 +269,22 @@ pub fn decide(
             not_excited.push((effect.id.into(), effect.needs.into()));
         }
         rejected.push((candidate.id(), why));
+        with = search.fit(&kept)?;
+    }
+    // A product that no physics asks for is a suggestion.
+    let seconds = elsewhere(&kept, &shares(&search, &kept, &with));
+    let mut suggested = Vec::new();
+    let mut confirmed = seconds.iter().map(|s| s.is_some_and(|s| s.shows()));
+    kept.retain(|one| {
+        let confirmed = confirmed.next().unwrap_or(false);
+        let id = one.candidate.id();
+        let taken = one.candidate.is_listed() || confirmed || accept.contains(&id);
+        if !taken {
+            suggested.push(one.clone());
+        }
+        taken
+    });
+    if !suggested.is_empty() {
         with = search.fit(&kept)?;
     }
     let split = common(&kept, &with).1;
@@ -282,6 +323,15 @@ pub fn decide(
         true => with.clone(),
         false => search.fit(&with_jumps)?,
     };
+    rejected.extend(suggested.iter().map(|one| {
+        let why = format!(
+            "{}, and it lowers the held-out error, but no physics asks for it: a suggestion. A second recording that shows it confirms it \
+             (--verify), or your word (--accept {})",
+            p_value(one.p),
+            one.candidate.id()
+        );
+        (one.candidate.id(), why)
+    }));
     for one in search.others(&with_jumps, &all) {
         let id = one.candidate.id();
         let told = |all: &[(String, String)]| all.iter().any(|r| r.0 == id);
@@ -324,8 +374,15 @@ pub fn decide(
     let whole = of_readings
         .iter()
         .fold(model.clone(), |m, r| beside(&m, &r.columns));
-    let mut left = leftover(&search, &whole, last, !kept.is_empty(), &jumps);
+    let mut left = leftover(&search, &whole, last, &jumps);
     left.extend(of_readings.into_iter().map(|r| r.left));
+    for one in suggested {
+        let mut more = kept.clone();
+        more.push(one.clone());
+        let fitted = search.fit(&more)?;
+        let change = model * &last.coefficients - search.model(&more) * &fitted.coefficients;
+        left.push(Leftover::suggested(&one.candidate, rows, &change));
+    }
     let interleaved = held_rms(&kept, last, Split::Interleaved);
     let models = [before, after];
     let floor: f64 = rows.strata.iter().map(|s| known_in(s, rows.judged.0)).sum();

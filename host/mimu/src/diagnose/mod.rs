@@ -126,6 +126,8 @@ pub struct Recordings<'a> {
     pub second: Option<Prepared>,
     /// The calibration of the unit, where the first recording cannot make one: its matrices are kept, and its effects taken out.
     pub given: Option<&'a Calibration>,
+    /// Ids of terms without known physics that are taken though no second recording confirms them.
+    pub accept: Vec<String>,
 }
 
 impl From<Prepared> for Recordings<'_> {
@@ -135,6 +137,7 @@ impl From<Prepared> for Recordings<'_> {
             more: Vec::new(),
             second: None,
             given: None,
+            accept: Vec::new(),
         }
     }
 }
@@ -314,7 +317,8 @@ pub fn diagnose(recordings: Recordings, options: Options) -> Result<Diagnosis> {
         let unseen = Rows::of(unseen, sensor, free);
         let all: Vec<&Prepared> = ours.iter().map(|s| s.prepared).collect();
         let decide = |without: &[(String, String)]| {
-            decide(&rows, &dwell_ends(&all), unseen.as_ref(), without).ok_or_else(singular)
+            let accept = &recordings.accept;
+            decide(&rows, &dwell_ends(&all), unseen.as_ref(), without, accept).ok_or_else(singular)
         };
         let clean = |found: &[Removed]| -> Result<(Fit, Vec<Prepared>)> {
             let lasting: Vec<Removed> = found.iter().map(Removed::lasting).collect();

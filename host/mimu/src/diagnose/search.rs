@@ -216,7 +216,7 @@ impl<'a> Search<'a> {
     ///
     /// By F: where the size of the noise is found from the rows, `n ln(1 + p F/dof)` is the drop, exactly; where it is known
     /// and F's `dof` is large, it is chi-square.
-    fn chance(&self, drop: f64, p: usize, columns: usize, candidate: &Candidate) -> f64 {
+    pub(super) fn chance(&self, drop: f64, p: usize, columns: usize, candidate: &Candidate) -> f64 {
         let tests = self.tests[usize::from(!candidate.is_listed())] * candidate.choices;
         (self.exceeds_by_chance(drop, p, columns) * tests).min(1.0)
     }

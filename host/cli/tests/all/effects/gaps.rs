@@ -125,6 +125,7 @@ fn a_given_calibration_has_to_fit_the_recording() {
             more: Vec::new(),
             second: None,
             given: Some(given),
+            accept: Vec::new(),
         };
         diagnose(recordings, options()).unwrap_err().to_string()
     };

@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
 use crate::diagnose::rows::Rows;
-use crate::diagnose::search::{Search, unit_columns};
+use crate::diagnose::search::{Chosen, Search, unit_columns};
 use crate::diagnose::variance::Fitted;
 
 /// Contiguous blocks that are left out in turn.
@@ -54,6 +54,10 @@ pub(in crate::diagnose) fn held_out(
         let kept: Vec<usize> = (0..rows.y.len())
             .filter(|r| !parts_of(*r).contains(&block))
             .collect();
+        // One dwell, or as many as there are parameters: there is nothing to hold out.
+        if kept.len() <= model.ncols() {
+            return None;
+        }
         let parts = search.variance.kept(&at.components, &kept)?;
         let white = parts.whiten(&model.select_rows(&kept));
         let y = parts.whiten(&DMatrix::from_fn(kept.len(), 1, |i, _| rows.y[kept[i]]));
@@ -69,6 +73,91 @@ pub(in crate::diagnose) fn held_out(
         }
     }
     Some(out)
+}
+
+/// In how many parts of the judged rows an effect of `coefficients` makes the held-out error less, and in how many it makes it more than
+/// coefficients of nothing would by their noise.
+pub(super) fn parts_helped(
+    rows: &Rows,
+    split: Split,
+    [without, with]: [&DVector<f64>; 2],
+    coefficients: usize,
+) -> [usize; 2] {
+    let mut sums = [[0.0; 2]; BLOCKS];
+    let mut noise = 0.0;
+    for stratum in &rows.strata {
+        for (i, r) in stratum
+            .rows
+            .clone()
+            .enumerate()
+            .filter(|(_, r)| *r < rows.judged.0)
+        {
+            noise += stratum.known[(i, i)] / rows.judged.0 as f64;
+            let part = &mut sums[split.part(rows, rows.dwells(r)[1])];
+            part[0] += without[r] * without[r];
+            part[1] += with[r] * with[r];
+        }
+    }
+    let by_noise = 2.0 * coefficients as f64 * noise;
+    let count = |is: &dyn Fn(&&[f64; 2]) -> bool| sums.iter().filter(is).count();
+    [count(&|s| s[1] < s[0]), count(&|s| s[1] > s[0] + by_noise)]
+}
+
+/// Dwells of which each is left out to see whether an effect survives: those that its drop in deviance owes most to.
+const LEFT_OUT: usize = 3;
+
+/// Largest probability of chance of `one`, after the whole search, when any one dwell is left out with the turns that touch it; `without` and
+/// `with` are the models without it and with it, and how `with` was fitted.
+pub(super) fn chance_without_a_dwell(
+    search: &Search,
+    one: &Chosen,
+    [without, with]: [&DMatrix<f64>; 2],
+    fitted: &Fitted,
+) -> Option<f64> {
+    let rows = search.rows;
+    let variance = &search.variance;
+    let at = &fitted.components;
+    let whitener = variance.whitener(at)?;
+    let left = |model: &DMatrix<f64>| {
+        let found = variance.fit_at(model, at)?;
+        let left = &rows.y - model * found.coefficients;
+        Some(whitener.whiten(&DMatrix::from_column_slice(left.len(), 1, left.as_slice())))
+    };
+    let (a, b) = (left(without)?, left(with)?);
+    let mut owed = vec![0.0; rows.dwell_count()];
+    for r in 0..rows.y.len() {
+        let [from, to] = rows.dwells(r);
+        let gain = a[r].powi(2) - b[r].powi(2);
+        owed[to] += gain;
+        if from != to {
+            owed[from] += gain;
+        }
+    }
+    let mut order: Vec<usize> = (0..owed.len()).collect();
+    order.sort_by(|i, j| owed[*j].total_cmp(&owed[*i]));
+    let chance = |dwell: &usize| {
+        let kept: Vec<usize> = (0..rows.y.len())
+            .filter(|r| !rows.dwells(*r).contains(dwell))
+            .collect();
+        let parts = variance.kept(at, &kept)?;
+        let y = parts.whiten(&DMatrix::from_fn(kept.len(), 1, |i, _| rows.y[kept[i]]));
+        let chi2 = |model: &DMatrix<f64>| {
+            let q = parts
+                .whiten(&unit_columns(model).select_rows(&kept))
+                .qr()
+                .q();
+            (&y - &q * q.tr_mul(&y)).norm_squared()
+        };
+        let [a, b] = [chi2(without), chi2(with)];
+        // Where the noise is known, the one; where it is found from the rows, the other.
+        let drop = (a - b).min(kept.len() as f64 * (a / b).ln());
+        Some(search.chance(drop, one.columns.ncols(), without.ncols(), &one.candidate))
+    };
+    order
+        .iter()
+        .take(LEFT_OUT)
+        .filter_map(chance)
+        .reduce(f64::max)
 }
 
 /// Largest shares of one dwell, and of one block of time, in what the columns of an effect rest on.

@@ -1,10 +1,11 @@
 //! Structure that nothing explains.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
-use crate::diagnose::rows::Session;
+use crate::diagnose::rows::{Rows, Session};
 use crate::diagnose::search::{Chosen, Search};
 use crate::diagnose::variance::{By, Fitted, VarianceModel};
+use crate::effects::candidate::Candidate;
 use crate::quantity::AXES;
 use crate::quantity::Sensor;
 use crate::quantity::significant;
@@ -28,17 +29,33 @@ pub struct Leftover {
     pub against: String,
     /// Root mean square beyond the noise, unit of the rows.
     pub strength: f64,
-    /// Whether the biases of usual sensors do as much by themselves, nobody has recorded what this one does at rest, and no effect was
-    /// found: told, but no verdict rests on it. Beside an effect it may be what the effect does not explain.
+    /// Whether the biases of usual sensors do as much by themselves, and nobody has recorded what this one does at rest: told, but no
+    /// verdict rests on it.
     pub usual: bool,
 }
 
-/// Scatter beyond the known noise, stratum by stratum, and what it goes with; `found` says whether effects are in the model.
+impl Leftover {
+    /// What a term that is not taken would take out of the rows.
+    pub(super) fn suggested(term: &Candidate, rows: &Rows, change: &DVector<f64>) -> Self {
+        let axis = term.axes().first().copied();
+        let ours = rows.strata.iter().find(|s| s.axis == axis);
+        let range = ours.map_or(0..rows.y.len(), |s| s.rows.clone());
+        let mean_square = change.rows(range.start, range.len()).norm_squared() / range.len() as f64;
+        Self {
+            stratum: axis.map_or("", |a| AXES[a]).into(),
+            axis,
+            against: term.id(),
+            strength: mean_square.sqrt(),
+            usual: false,
+        }
+    }
+}
+
+/// Scatter beyond the known noise, stratum by stratum, and what it goes with.
 pub(super) fn leftover(
     search: &Search,
     model: &DMatrix<f64>,
     last: &Fitted,
-    found: bool,
     jumps: &[Chosen],
 ) -> Vec<Leftover> {
     let rows = search.rows;
@@ -88,7 +105,7 @@ pub(super) fn leftover(
             axis: stratum.axis,
             against,
             strength,
-            usual: !stratum.wander_known && !far && jump.is_none() && !found,
+            usual: !stratum.wander_known && !far && jump.is_none(),
         });
     }
     left
