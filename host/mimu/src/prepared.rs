@@ -221,8 +221,8 @@ impl Prepared {
                 before: accel.apply(&a.raw_mean(Sensor::Accel)),
                 after: accel.apply(&b.raw_mean(Sensor::Accel)),
                 raw: [a, b].map(|d| d.raw_mean(Sensor::Accel)),
-                direction_variance: (variance(a) + variance(b)) / (g * g)
-                    + earth.of_direction(duration_s),
+                direction_variance: (variance(a) + variance(b)) / (g * g),
+                earth_variance: earth.of_direction(duration_s),
                 integral_variance: duration_s * duration_s * rate_variance,
                 duration_s,
             });

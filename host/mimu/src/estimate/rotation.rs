@@ -6,6 +6,8 @@
 //! when the model lacks something. The frame is that of the accelerometer, so the full 3x3 matrix holds
 //! the alignment of gyro to accelerometer.
 
+use std::collections::BTreeMap;
+
 use mimu_core::compensation::Affine;
 use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, SVector, Vector3};
 
@@ -33,8 +35,10 @@ pub struct Turn<'a> {
     pub after: Vector3<f64>,
     /// Mean raw accelerometer readings that `before` and `after` come from.
     pub raw: [Vector3<f64>; 2],
-    /// Variance of the angle between the two directions by the accelerometer's noise and by the turning Earth, rad² (one component).
+    /// Variance of the angle between the two directions by the accelerometer's noise, rad² (one component).
     pub direction_variance: f64,
+    /// The same by the Earth's rate across the vertical, where nothing says which way is north.
+    pub earth_variance: f64,
     /// Variance of the integral of the gyro by its noise, raw²·s², mean of the three axes.
     pub integral_variance: f64,
     /// Length, s.
@@ -44,7 +48,7 @@ pub struct Turn<'a> {
 impl Turn<'_> {
     /// Variance of one component of the direction error by noise, rad², for a gyro with a mean square of `c2` per row of
     /// C.
-    fn variance(&self, c2: f64) -> f64 {
+    pub fn variance(&self, c2: f64) -> f64 {
         self.direction_variance + c2 * self.integral_variance
     }
 
@@ -67,6 +71,68 @@ pub struct Rest {
     pub rate: Vector3<f64>,
     /// Variances of the rest of it, rad²/s².
     pub rate_variance: Vector3<f64>,
+}
+
+/// Dwells that turns connect one to the next: in all of them the heading is known but for one angle, and so is the Earth's rate across
+/// the vertical but for two numbers, which are estimated.
+#[derive(Debug, Clone)]
+pub struct Chains {
+    /// Chain that each turn is a link of.
+    pub of_turn: Vec<Option<usize>>,
+    /// Chain of each dwell at rest.
+    pub of_rest: Vec<Option<usize>>,
+    /// How many there are.
+    pub count: usize,
+}
+
+/// Dwells in a chain from which on its two numbers are worth their while; of fewer, the Earth's rate across is noise.
+const CHAIN: usize = 6;
+
+impl Chains {
+    /// Of turns in order of time.
+    pub fn of(turns: &[Turn], rest: &[Rest]) -> Self {
+        let mut out = Self {
+            of_turn: Vec::with_capacity(turns.len()),
+            of_rest: vec![None; rest.len()],
+            count: 0,
+        };
+        for links in turns.chunk_by(|a, b| a.to == b.from) {
+            let long = links.len() + 1 >= CHAIN;
+            out.of_turn
+                .extend(links.iter().map(|_| long.then_some(out.count)));
+            if let (true, [first, .., last]) = (long, links) {
+                for (chain, rest) in out.of_rest.iter_mut().zip(rest) {
+                    if (first.from..=last.to).contains(&rest.dwell) {
+                        *chain = Some(out.count);
+                    }
+                }
+                out.count += 1;
+            }
+        }
+        out
+    }
+
+    /// Two level directions in the body frame of each dwell of a chain, the same ones in the world; `rotations` are those of the turns.
+    pub fn level(
+        &self,
+        turns: &[Turn],
+        rotations: impl Iterator<Item = Matrix3<f64>>,
+    ) -> BTreeMap<usize, [Vector3<f64>; 2]> {
+        let mut level: BTreeMap<usize, [Vector3<f64>; 2]> = BTreeMap::new();
+        for ((turn, rotation), chain) in turns.iter().zip(rotations).zip(&self.of_turn) {
+            if chain.is_none() {
+                continue;
+            }
+            let before = level
+                .entry(turn.from)
+                .or_insert_with(|| across(&turn.before.normalize()));
+            let up = turn.after.normalize();
+            let north = rotation * before[0];
+            let north = (north - up * up.dot(&north)).normalize();
+            level.insert(turn.to, [north, up.cross(&north)]);
+        }
+        level
+    }
 }
 
 /// Mean force and turn over two neighbouring blocks in motion, for the first guess.
@@ -227,6 +293,10 @@ pub fn direction_error(turn: &Turn, gyro: &Affine<f64>) -> Vector3<f64> {
 /// The direction error of a turn and what it owes to each piece of it.
 #[derive(Debug, Clone)]
 pub struct Sensitivity {
+    /// Takes a direction from the body frame before the turn into that after it.
+    pub rotation: Matrix3<f64>,
+    /// Directions of the two, body frame after the turn.
+    pub sides: [Vector3<f64>; 2],
     /// What each of them owes to the force before and after the turn, rad/(m/s²).
     pub by_force: [[Vector3<f64>; 2]; 2],
     /// Its two components across the measured direction, rad.
@@ -253,6 +323,8 @@ pub fn sensitivity(turn: &Turn, gyro: &Affine<f64>) -> Sensitivity {
     }
     let error = between(&(after * turn.before.normalize()), &measured);
     Sensitivity {
+        rotation: after,
+        sides,
         by_force: sides.map(|e| by_forces(turn, &after, &e)),
         error: sides.map(|e| e.dot(&error)),
         by,
@@ -341,19 +413,29 @@ pub fn estimate(
             Vector3::new(p[9], p[10], p[11]),
         )
     };
+    let chains = Chains::of(turns, rest);
+    let all = PARAMETERS + 2 * chains.count;
     let (n_turns, n_rest) = (2 * turns.len(), 3 * rest.len());
     // Unweighted residuals and derivatives: rad, then rad/s.
     let linearize = |p: &DVector<f64>| {
         let (c, o) = unpack(p);
         let mut r = DVector::zeros(n_turns + n_rest);
-        let mut j = DMatrix::zeros(n_turns + n_rest, PARAMETERS);
-        for (t, pieces) in pieces.iter().enumerate() {
-            let (after, by) = integrate(pieces, &c, &o, true);
+        let mut j = DMatrix::zeros(n_turns + n_rest, all);
+        let turned: Vec<_> = pieces.iter().map(|p| integrate(p, &c, &o, true)).collect();
+        let level = chains.level(turns, turned.iter().map(|t| t.0));
+        for (t, (after, by)) in turned.iter().enumerate() {
             let (before, measured) = &directions[t];
             let error = between(&(after * before), measured);
             for (k, e) in across(measured).iter().enumerate() {
                 let row = 2 * t + k;
                 r[row] = e.dot(&error);
+                if let (Some(chain), Some(level)) = (chains.of_turn[t], level.get(&turns[t].to)) {
+                    for (l, level) in level.iter().enumerate() {
+                        let column = PARAMETERS + 2 * chain + l;
+                        j[(row, column)] = -turns[t].duration_s * e.dot(level);
+                        r[row] += j[(row, column)] * p[column];
+                    }
+                }
                 for (column, by) in by.iter().enumerate() {
                     let slope = by.transpose() * e;
                     for i in 0..3 {
@@ -372,6 +454,15 @@ pub fn estimate(
             for i in 0..3 {
                 let row = n_turns + 3 * s + i;
                 r[row] = rate[i];
+                if let (Some(chain), Some(level)) =
+                    (chains.of_rest[s], level.get(&observation.dwell))
+                {
+                    for (l, level) in level.iter().enumerate() {
+                        let column = PARAMETERS + 2 * chain + l;
+                        j[(row, column)] = -level[i];
+                        r[row] -= level[i] * p[column];
+                    }
+                }
                 for k in 0..3 {
                     j[(row, 3 * i + k)] = unit * u[k];
                 }
@@ -384,9 +475,17 @@ pub fn estimate(
         let (c, _) = unpack(p);
         let squared = c.component_mul(&c);
         let mean = squared.sum() / 3.0;
-        let turns = turns.iter().flat_map(|t| [t.variance(mean); 2]);
-        let rest = rest.iter().flat_map(|o| {
-            let v = squared * o.variance + o.rate_variance;
+        let turns = turns.iter().zip(&chains.of_turn).flat_map(|(t, chain)| {
+            let earth = if chain.is_some() {
+                0.0
+            } else {
+                t.earth_variance
+            };
+            [t.variance(mean) + earth; 2]
+        });
+        let rest = rest.iter().zip(&chains.of_rest).flat_map(|(o, chain)| {
+            let earth = o.rate_variance * if chain.is_some() { 0.0 } else { 1.0 };
+            let v = squared * o.variance + earth;
             [v.x, v.y, v.z]
         });
         turns.chain(rest).map(|v| v.max(1e-20)).collect()
@@ -412,7 +511,7 @@ pub fn estimate(
         by
     };
     let accel_covariance = DMatrix::from_fn(12, 12, |i, j| accel.inverse_covariance[(i, j)]);
-    let mut p = DVector::from_fn(PARAMETERS, |k, _| {
+    let mut p = DVector::from_fn(all, |k, _| {
         if k < 9 {
             first[(k / 3, k % 3)] / unit
         } else {
@@ -429,8 +528,8 @@ pub fn estimate(
     groups[0].excess = 0.5f64.to_radians().powi(2);
     groups[1].excess = r.rows(n_turns, n_rest).norm_squared() / n_rest as f64;
     let lost = || Failure::NoSolution("the fit of the gyro to the turns does not converge".into());
-    let mut gain = DMatrix::zeros(PARAMETERS, 12);
-    let mut of_groups = [(); 2].map(|()| DMatrix::zeros(PARAMETERS, PARAMETERS));
+    let mut gain = DMatrix::zeros(all, 12);
+    let mut of_groups = [(); 2].map(|()| DMatrix::zeros(all, all));
     let mut condition = f64::INFINITY;
     for round in 0..30 {
         let variances = known(&p);
@@ -601,6 +700,7 @@ mod tests {
             after: brute_force(rate, 0.0, 1.0).transpose() * before,
             raw: [Vector3::zeros(); 2],
             direction_variance: 0.0,
+            earth_variance: 0.0,
             integral_variance: 0.0,
             duration_s: 1.0,
         };

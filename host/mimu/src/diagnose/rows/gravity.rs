@@ -10,7 +10,7 @@ use super::{Figure, ForceErrors, Row, Stratum};
 use crate::effects::quantity::Conditions;
 use crate::estimate::Observation;
 use crate::estimate::earth::poses;
-use crate::estimate::rotation::sensitivity;
+use crate::estimate::rotation::{Chains, sensitivity};
 use crate::prepared::si_covariance;
 use crate::quantity::Sensor;
 
@@ -148,7 +148,7 @@ impl Builder<'_> {
         let in_one_pose = poses.iter().all(|p| *p == 0);
         let mean_square = inverse.matrix.norm_squared() / 3.0;
         let mut y = Vec::new();
-        let mut by_force = Vec::new();
+        let (mut by_force, mut sides, mut rotations) = (Vec::new(), Vec::new(), Vec::new());
         let mut turn_rows: Vec<[f64; 12]> = Vec::new();
         let blocks = &prepared.condensed.blocks;
         for turn in &turns {
@@ -174,6 +174,7 @@ impl Builder<'_> {
             }
             let conditions = first..self.conditions.len();
             let found = sensitivity(turn, inverse);
+            rotations.push(found.rotation);
             for side in 0..2 {
                 let mut columns = [0.0; 12];
                 let mut weights = Vec::with_capacity(conditions.len());
@@ -188,6 +189,7 @@ impl Builder<'_> {
                 }
                 y.push(found.error[side]);
                 by_force.push((turn, found.by_force[side]));
+                sides.push(found.sides[side]);
                 turn_rows.push(columns);
                 self.rows.push(Row {
                     conditions: conditions.clone(),
@@ -202,10 +204,19 @@ impl Builder<'_> {
             .iter()
             .map(|d| self.dwell(*d, self.force(*d, accel)))
             .collect();
-        let mut nuisance = DMatrix::zeros(m + 3 * n, 12);
+        let chains = Chains::of(&turns, &rest);
+        let level = chains.level(&turns, rotations.into_iter());
+        let mut nuisance = DMatrix::zeros(m + 3 * n, 12 + 2 * chains.count);
         for (row, columns) in turn_rows.iter().enumerate() {
             for (k, v) in columns.iter().enumerate() {
                 nuisance[(row, k)] = *v;
+            }
+            let turn = row / 2;
+            if let (Some(chain), Some(level)) = (chains.of_turn[turn], level.get(&turns[turn].to)) {
+                for (l, level) in level.iter().enumerate() {
+                    let along = sides[row].dot(level);
+                    nuisance[(row, 12 + 2 * chain + l)] = turns[turn].duration_s * along;
+                }
             }
         }
         let random_walk = (n > 0).then(|| self.random_walk(&dwells));
@@ -215,7 +226,15 @@ impl Builder<'_> {
         let at_rest = rest.iter().map(|o| o.raw).sum::<Vector3<f64>>() / n.max(1) as f64;
         let turn_variances: Vec<f64> = turns
             .iter()
-            .flat_map(|t| [0.5 * t.floor(mean_square).powi(2); 2])
+            .zip(&chains.of_turn)
+            .flat_map(|(t, chain)| {
+                let earth = if chain.is_some() {
+                    0.0
+                } else {
+                    t.earth_variance
+                };
+                [t.variance(mean_square) + earth; 2]
+            })
             .collect();
         let mut strata = Vec::new();
         if m > 0 {
@@ -239,6 +258,11 @@ impl Builder<'_> {
                     nuisance[(row, 3 * axis + k)] = at_rest[k];
                 }
                 nuisance[(row, 9 + axis)] = 1.0;
+                if let (Some(chain), Some(level)) = (chains.of_rest[i], level.get(&o.dwell)) {
+                    for (l, level) in level.iter().enumerate() {
+                        nuisance[(row, 12 + 2 * chain + l)] = level[axis];
+                    }
+                }
             }
             let c = inverse.matrix.row(axis);
             let noise = |i: usize, j: usize| match (i == j, &wander) {
@@ -248,7 +272,11 @@ impl Builder<'_> {
                     .sum(),
                 _ => 0.0,
             };
-            let of_earth = |i: usize, j: usize| match !in_one_pose && poses[i] == poses[j] {
+            let noise_of_earth = |i: usize, j: usize| {
+                let known = [i, j].iter().any(|i| chains.of_rest[*i].is_some());
+                !in_one_pose && !known && poses[i] == poses[j]
+            };
+            let of_earth = |i: usize, j: usize| match noise_of_earth(i, j) {
                 true => rest[poses[i]].rate_variance[axis],
                 false => 0.0,
             };
@@ -267,7 +295,9 @@ impl Builder<'_> {
             0 => (Figure::Rest, 3 * n, 1),
             m => (Figure::Direction, m, 2),
         };
-        let nuisance = (nuisance, DMatrix::identity(12, 12));
-        self.finish(y, nuisance, vec![9, 10, 11], strata, figure)
+        // Where the Earth's rate points is of the recording, as the biases are.
+        let own = 9..nuisance.ncols();
+        let nuisance = (nuisance, DMatrix::identity(12, own.end));
+        self.finish(y, nuisance, own.collect(), strata, figure)
     }
 }
