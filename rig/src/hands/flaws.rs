@@ -75,8 +75,7 @@ impl Hands {
         for i in 1..n {
             let [before, turn] = [&self.turns[i - 1], &self.turns[i]];
             let Some(even) = before.even else { continue };
-            let to = turn.from * Rotation::about(turn.axis, turn.angle);
-            let from = turn.from_after(before) * even.turned();
+            let (from, to) = (before.aim() * even.turned(), turn.aim());
             self.turns[i].lead(from, to);
         }
         if truth.settle_mrad > 0.0 {
@@ -104,9 +103,9 @@ impl Turn {
         self.start_s + self.turn_s
     }
 
-    /// The attitude that `before` leads to.
-    fn from_after(&self, before: &Turn) -> Rotation {
-        before.from * Rotation::about(before.axis, before.angle)
+    /// The attitude that it leads to.
+    fn aim(&self) -> Rotation {
+        self.from * Rotation::about(self.axis, self.angle)
     }
 
     /// Leads from one attitude to another, and keeps all else.
