@@ -146,7 +146,7 @@ impl Dwells {
         let mut warnings = Vec::new();
         let longest_run = [0, 1, 2, 3, 4, 5]
             .map(|c| longest_run_by_chance(condensed, c).unwrap_or(f64::INFINITY));
-        let rails = rails::find(condensed, manifest, &longest_run, &mut warnings);
+        let rails = rails::find(condensed, manifest, &mut warnings);
         let (ranges, detection) = if condensed.has_steps {
             (by_step(condensed), None)
         } else {

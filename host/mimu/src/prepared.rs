@@ -205,6 +205,15 @@ impl Prepared {
         (turns, refused)
     }
 
+    /// Whether a sample of the gyro in block `i` lies at a rail.
+    fn gyro_clips(&self, i: usize) -> bool {
+        let block = &self.condensed.blocks[i];
+        let rails = &self.dwells.rails;
+        Sensor::Gyro
+            .channels()
+            .any(|c| rails[c].touched_by(&block.raw[c]))
+    }
+
     /// Pairs of blocks in motion, for the first guess of the gyro.
     pub fn motions(&self, accel: &Affine<f64>) -> Vec<Motion> {
         let mut still = vec![false; self.condensed.blocks.len()];
@@ -220,6 +229,7 @@ impl Prepared {
         };
         (1..still.len())
             .filter(|&i| !still[i] && !self.condensed.blocks[i].after_gap)
+            .filter(|&i| !self.gyro_clips(i - 1) && !self.gyro_clips(i))
             .map(|i| {
                 let [before, after] = [i - 1, i].map(|i| accel.apply(&mean(i, Sensor::Accel)));
                 let centre = |i: usize| {
