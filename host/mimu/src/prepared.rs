@@ -11,6 +11,7 @@ use crate::noise::Noise;
 use crate::noise_file::NoiseFile;
 use crate::quantity::Sensor;
 use crate::rails::refuse_dead_channels;
+use crate::stillness::Finding;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{Batch, Manifest, Recording, Reference};
 
@@ -31,28 +32,32 @@ pub struct Prepared {
 
 impl Prepared {
     /// Reads `recording` and finds its dwells. `progress` is told the share that is read.
-    pub fn read(recording: &Recording, still_factor: f64, progress: impl Fn(f64)) -> Result<Self> {
+    pub fn read(
+        recording: &Recording,
+        finding: impl Into<Finding>,
+        progress: impl Fn(f64),
+    ) -> Result<Self> {
         let manifest = recording.manifest.clone();
         let integrate = manifest.reference == Reference::Gravity;
         let condensed = Condensed::read(recording, integrate, progress)?;
         let place = recording.samples.display().to_string();
-        Self::of_condensed(manifest, condensed, still_factor, place)
+        Self::of_condensed(manifest, condensed, finding.into(), place)
     }
 
-    /// Finds the dwells of `samples` in memory. `still_factor`: see [`crate::stillness::STILL_FACTOR`].
+    /// Finds the dwells of `samples` in memory. `finding`: a factor alone is [`crate::stillness::STILL_FACTOR`] or another.
     ///
     /// Errors: those of a recording on disk; columns of different lengths.
-    pub fn of(manifest: Manifest, samples: &Batch, still_factor: f64) -> Result<Self> {
+    pub fn of(manifest: Manifest, samples: &Batch, finding: impl Into<Finding>) -> Result<Self> {
         let integrate = manifest.reference == Reference::Gravity;
         let condensed = Condensed::of(samples, manifest.sample_rate_hz, integrate)?;
         let place = manifest.device.clone();
-        Self::of_condensed(manifest, condensed, still_factor, place)
+        Self::of_condensed(manifest, condensed, finding.into(), place)
     }
 
     fn of_condensed(
         manifest: Manifest,
         condensed: Condensed,
-        still_factor: f64,
+        finding: Finding,
         place: String,
     ) -> Result<Self> {
         refuse_dead_channels(&condensed, &place)?;
@@ -67,7 +72,7 @@ impl Prepared {
                 "write the t_s at which the power came to recording.toml, or leave the key out";
             return Err(Error::new(place, problem, remedy));
         }
-        let dwells = Dwells::find(&condensed, &manifest, still_factor)
+        let dwells = Dwells::find(&condensed, &manifest, finding)
             .map_err(|e| e.map(|e| e.place = format!("{place}, {}", e.place)))?;
         let noise = Noise::within(&dwells.list, &condensed);
         Ok(Self {

@@ -78,7 +78,7 @@ pub(crate) fn run(args: &FitArgs) -> Result<()> {
     };
     let outputs = [args.output.as_deref(), args.json.file()];
     let inputs = [args.noise.file.as_deref()];
-    let prepared = read(&args.recording, options.still_factor, &outputs, &inputs)?;
+    let prepared = read(&args.recording, args.still.finding(), &outputs, &inputs)?;
     let prepared = args.noise.state(prepared)?;
     if args.method.is_some() && prepared.manifest.reference == Reference::Gravity {
         return Err(Error::new(
