@@ -30,6 +30,8 @@ pub enum Fault {
     NotStill,
     /// The unit turns evenly and does not rest.
     Turning,
+    /// It errs by far more than the others predict.
+    Outlying,
     /// Samples of the channel (0..6) lie at a rail.
     Saturated(usize),
     /// The channel (0..6) repeats one value.
@@ -44,6 +46,7 @@ impl fmt::Display for Fault {
             Self::TooShort => f.write_str("too short"),
             Self::NotStill => f.write_str("not still"),
             Self::Turning => f.write_str("turning"),
+            Self::Outlying => f.write_str("outlying"),
             Self::Saturated(c) => write!(f, "{} saturated", RAW_COLUMNS[c]),
             Self::Stuck(c) => write!(f, "{} stuck", RAW_COLUMNS[c]),
             Self::Missing(c) => write!(f, "{} missing", RAW_COLUMNS[c]),
@@ -129,6 +132,21 @@ impl Dwell {
     }
 }
 
+/// A dwell, or a turn between two, that errs by far more than the others predict.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LeftOut {
+    /// A dwell of the accelerometer, or a turn of the gyro.
+    pub sensor: Sensor,
+    /// Index of the dwell, or of that in which the turn begins.
+    pub from: usize,
+    /// Index of the dwell, or of that in which the turn ends.
+    pub to: usize,
+    /// Its error against the prediction of the others: m/s², or rad.
+    pub error: f64,
+    /// The same in standard deviations.
+    pub sigmas: f64,
+}
+
 /// The dwells of a recording and how they were found.
 #[derive(Debug, Clone)]
 pub struct Dwells {
@@ -140,6 +158,8 @@ pub struct Dwells {
     pub rails: [Rails; 6],
     /// Longest run of equal samples that chance explains, of the six channels; infinite where nothing can be told.
     pub longest_run: [f64; 6],
+    /// What a fit has left out of it.
+    pub left_out: Vec<LeftOut>,
     /// What a person should know.
     pub warnings: Vec<String>,
 }
@@ -217,6 +237,7 @@ impl Dwells {
             detection,
             rails,
             longest_run,
+            left_out: Vec::new(),
             warnings,
         })
     }

@@ -9,7 +9,7 @@ use crate::estimate::rotation::{Motion, Turn};
 use crate::estimate::{Failure, Observation};
 use crate::noise::Noise;
 use crate::noise_file::NoiseFile;
-use crate::quantity::Sensor;
+use crate::quantity::{Sensor, significant};
 use crate::rails::refuse_dead_channels;
 use crate::stillness::Finding;
 use mimu_recording::error::{Error, Result};
@@ -157,7 +157,18 @@ impl Prepared {
             let to = increments.partition_point(|i| i.end_s < b.start_s) + 1;
             let pieces = &increments[from.min(increments.len())..to.min(increments.len())];
             let blocks = &self.condensed.blocks[a.blocks.end..b.blocks.start];
-            let why = if pieces.iter().any(|i| !i.whole) {
+            let outlying = self
+                .dwells
+                .left_out
+                .iter()
+                .find(|l| l.sensor == Sensor::Gyro && [l.from, l.to] == [pair[0], pair[1]]);
+            let why = if let Some(left_out) = outlying {
+                Some(format!(
+                    "it ends {} deg off what the other turns predict, {:.0} sigma",
+                    significant(left_out.error.to_degrees()),
+                    left_out.sigmas
+                ))
+            } else if pieces.iter().any(|i| !i.whole) {
                 Some("samples are missing".to_string())
             } else {
                 Sensor::Gyro.channels().find_map(|c| {
