@@ -166,7 +166,12 @@ pub struct Dwells {
 
 impl Dwells {
     /// The dwells of a recording.
-    pub fn find(condensed: &Condensed, manifest: &Manifest, finding: Finding) -> Result<Self> {
+    pub fn find(
+        condensed: &Condensed,
+        manifest: &Manifest,
+        finding: impl Into<Finding>,
+    ) -> Result<Self> {
+        let finding = finding.into();
         let mut warnings = Vec::new();
         let longest_run = [0, 1, 2, 3, 4, 5]
             .map(|c| longest_run_by_chance(condensed, c).unwrap_or(f64::INFINITY));
