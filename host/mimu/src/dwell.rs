@@ -10,7 +10,7 @@ use std::ops::Range;
 use crate::blocks::{Condensed, Level, Rails, Stretch, pool, quantile};
 use crate::quantity::{Sensor, plural};
 use crate::rails::{self, longest_run_by_chance};
-use crate::rest;
+use crate::rest::{self, Rest};
 use crate::stillness::{self, Detection, Finding, SHORTEST_S, Steps};
 use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{Manifest, RAW_COLUMNS, Reference};
@@ -335,7 +335,12 @@ fn dwell(condensed: &Condensed, step: i32, range: Range<usize>, rails: &[Rails; 
 fn leave_out_turning(list: &mut [Dwell], condensed: &Condensed) {
     let usable = |d: &&Dwell| Sensor::BOTH.iter().all(|s| d.fault(*s).is_none());
     let judged: Vec<&Dwell> = list.iter().filter(usable).collect();
-    let turning = rest::turning(&judged, condensed);
+    let rests = judged.iter().map(|d| Rest {
+        blocks: d.blocks.clone(),
+        mean: d.raw.map(|m| m.mean),
+        duration_s: d.duration_s,
+    });
+    let turning = rest::turning(&rests.collect::<Vec<_>>(), condensed);
     let starts = judged.iter().zip(turning).filter(|(_, turning)| *turning);
     let starts: Vec<u64> = starts.map(|(d, _)| d.first_row).collect();
     for dwell in list.iter_mut().filter(|d| starts.contains(&d.first_row)) {

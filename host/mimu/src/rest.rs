@@ -6,7 +6,6 @@
 use std::ops::Range;
 
 use crate::blocks::{Condensed, Stretch, pool, quantile};
-use crate::dwell::Dwell;
 use crate::quantity::Sensor;
 
 /// Blocks whose mean is compared with that of the middle: noise of a single block would hide a slow turn.
@@ -16,6 +15,8 @@ const GROUP: usize = 3;
 const AT_ENDS: f64 = 5.0;
 /// Deviation of a dwell from its neighbours, at most, over what is usual.
 const AMONG_DWELLS: f64 = 8.0;
+/// Trend beyond the first and the last dwells over that beside them: twice, for a warm-up that slows down within three dwells.
+const BEYOND: f64 = 2.0;
 /// Fewer dwells show nothing usual.
 const FEWEST: usize = 7;
 /// From a median absolute deviation to a standard deviation.
@@ -90,7 +91,7 @@ pub(crate) fn walk_in(stretches: &mut [Stretch], condensed: &Condensed) -> (u64,
     (cut.iter().filter(|c| **c > 0).count() as u64, blocks)
 }
 
-/// What a value is expected to be by its neighbours in time, and how far they differ by a trend. Medians of three on each side, so that
+/// What a value is expected to be by its neighbours in time, and how far a trend may take it from there. Medians of three on each side, so that
 /// one more that strays misleads neither.
 fn expected(values: &[f64], i: usize) -> (f64, f64) {
     let median = |range: Range<usize>| {
@@ -106,18 +107,32 @@ fn expected(values: &[f64], i: usize) -> (f64, f64) {
         }
         (false, _) => {
             let near = median(i + 1..i + 4);
-            (near, (median(i + 4..(i + 7).min(n)) - near).abs())
+            (near, BEYOND * (median(i + 4..(i + 7).min(n)) - near).abs())
         }
         (true, false) => {
             let near = median(i - 3..i);
-            (near, (near - median(i.saturating_sub(6)..i - 3)).abs())
+            (
+                near,
+                BEYOND * (near - median(i.saturating_sub(6)..i - 3)).abs(),
+            )
         }
     }
 }
 
+/// What is judged of a dwell.
+#[derive(Debug, Clone)]
+pub(crate) struct Rest {
+    /// Its blocks.
+    pub blocks: Range<usize>,
+    /// Means of the raw channels.
+    pub mean: [f64; 6],
+    /// Length, s.
+    pub duration_s: f64,
+}
+
 /// Which of `dwells`, usable and in order of time, turn evenly and do not rest: their mean rate is none of the others', or the force
 /// rotates within them.
-pub(crate) fn turning(dwells: &[&Dwell], condensed: &Condensed) -> Vec<bool> {
+pub(crate) fn turning(dwells: &[Rest], condensed: &Condensed) -> Vec<bool> {
     let n = dwells.len();
     let mut turning = vec![false; n];
     if n < FEWEST {
@@ -134,7 +149,7 @@ pub(crate) fn turning(dwells: &[&Dwell], condensed: &Condensed) -> Vec<bool> {
         }
     };
     for c in Sensor::Gyro.channels().filter(|&c| condensed.has_raw[c]) {
-        let means: Vec<f64> = dwells.iter().map(|d| d.raw[c].mean).collect();
+        let means: Vec<f64> = dwells.iter().map(|d| d.mean[c]).collect();
         let by_neighbours: Vec<_> = (0..n).map(|i| expected(&means, i)).collect();
         let off: Vec<f64> = means
             .iter()
@@ -145,7 +160,7 @@ pub(crate) fn turning(dwells: &[&Dwell], condensed: &Condensed) -> Vec<bool> {
         judge(c, &off, &trend);
     }
     for c in Sensor::Accel.channels().filter(|&c| condensed.has_raw[c]) {
-        let moved = |d: &&Dwell| {
+        let moved = |d: &Rest| {
             let third = (d.blocks.len() / 3).max(1);
             mean(condensed, d.blocks.end - third..d.blocks.end, c)
                 - mean(condensed, d.blocks.start..d.blocks.start + third, c)
