@@ -18,6 +18,7 @@ use crate::rotation::{Vector, scale};
 use choice::{Jolt, Turn, between, chosen};
 
 mod choice;
+mod flaws;
 
 /// How the person works. Ranges are lowest and highest, all between equally likely.
 ///
@@ -201,6 +202,7 @@ pub struct Hands {
     lever: Vector,
     tremor: Shake,
     sway: Shake,
+    shake: Shake,
     jolt_s: f64,
     still: Option<(usize, Motion)>,
 }
@@ -213,6 +215,7 @@ impl Hands {
         let random = &mut random;
         let tremor = Shake::new(random, truth.tremor_hz, truth.tremor_mrad, truth.tremor_mm);
         let sway = Shake::new(random, truth.sway_hz, truth.sway_mrad, truth.sway_mm);
+        let shake = sway.clone();
         let mut turns: Vec<Turn> = Vec::new();
         let mut end_s = 0.0;
         for step in &plan.steps {
@@ -242,6 +245,7 @@ impl Hands {
             lever: scale(1e-3, truth.lever_mm),
             tremor,
             sway,
+            shake,
             jolt_s: truth.jolt_s,
             still: None,
         })
@@ -267,7 +271,9 @@ impl Carrier for Hands {
         let jolt = turn
             .jolt
             .filter(|jolt| t_s >= jolt.start_s && t_s < jolt.start_s + self.jolt_s);
-        let lies = !self.held && !turning && jolt.is_none();
+        let settles = |(_, length_s)| t_s < turn.arrived_s() + length_s;
+        let moves = turn.even.is_some() || turn.settling.is_some_and(settles);
+        let lies = !self.held && !turning && !moves && jolt.is_none();
         let motion = match self.still {
             Some((at, still)) if lies && at == self.cursor => Motion { t_s, ..still },
             _ => self.moving(turn, t_s, turning, jolt),
@@ -302,6 +308,27 @@ impl Hands {
         } else if turning {
             shift.add(&self.tremor.at(t_s), detour);
         }
+        if turning && turn.shaken {
+            shift.add(&self.shake.at(t_s), detour);
+        }
+        if let Some((angle, length_s)) = turn.settling {
+            let left = match turning {
+                true => done,
+                false => {
+                    let gone = part(turn.arrived_s(), length_s);
+                    let gone = smooth_step(Jet {
+                        value: gone.value.min(1.0),
+                        ..gone
+                    });
+                    Jet::constant(1.0) + gone.times(-1.0)
+                }
+            };
+            let settling = Shift {
+                angle: angle.map(Jet::constant),
+                ..Shift::default()
+            };
+            shift.add(&settling, left);
+        }
         if let Some(jolt) = jolt {
             let knock = Shift {
                 angle: jolt.angle.map(Jet::constant),
@@ -315,9 +342,13 @@ impl Hands {
                 shift.position[i] + Jet::constant(from[i]) + done.times(to[i] - from[i]);
         }
         shift.position[2] = shift.position[2] + detour.times(turn.lift);
-        Frame::ground(&self.place)
+        let mut frame = Frame::ground(&self.place)
             .fixed(turn.from)
-            .about(turn.axis, done.times(turn.angle))
+            .about(turn.axis, done.times(turn.angle));
+        if let Some((axis, angle)) = turn.even.map(|even| even.at(t_s)) {
+            frame = frame.about(axis, angle);
+        }
+        frame
             .about_own::<0>(detour.times(turn.wander[0]) + shift.angle[0])
             .about_own::<1>(detour.times(turn.wander[1]) + shift.angle[1])
             .about_own::<2>(shift.angle[2])

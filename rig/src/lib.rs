@@ -10,6 +10,7 @@
 //! | [`place`]                      | gravity and the Earth's rotation                                  |
 //! | [`table`], [`axis`]            | a turntable with its flaws                                        |
 //! | [`hands`]                      | a person                                                          |
+//! | [`flaws`]                      | what goes wrong in real recordings                                |
 //! | [`motion`], [`chain`], [`rotation`] | what passes from a carrier to the sensors                    |
 //! | [`record`]                     | recordings of it, in memory or as files                           |
 //!
@@ -28,6 +29,7 @@ pub mod chain;
 pub mod converter;
 pub mod effects;
 pub mod filter;
+pub mod flaws;
 pub mod hands;
 pub mod ideal;
 pub mod located;

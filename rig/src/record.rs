@@ -7,9 +7,10 @@ mod storage;
 use std::path::{Path, PathBuf};
 
 use crate::converter::{Converter, Readings};
+use crate::flaws::Flaws;
 use crate::hands::Hands;
 use crate::motion::{Carrier, Instant};
-use crate::plan::{CarriedBy, Plan, Samples};
+use crate::plan::{CarriedBy, Plan, Samples, Step};
 use crate::rig_file::RigTruth;
 use crate::table::Table;
 use crate::unit::Unit;
@@ -19,6 +20,8 @@ use crate::unit::Unit;
 pub struct Row {
     /// Motion, step, and what the table states.
     pub instant: Instant,
+    /// Time stamp, s.
+    pub stamp_s: f64,
     /// Raw readings.
     pub readings: Readings,
 }
@@ -29,6 +32,7 @@ pub struct Run<'a> {
     carrier: Box<dyn Carrier>,
     unit: Unit,
     converter: Converter,
+    flaws: Flaws,
     next: usize,
     count: usize,
 }
@@ -44,16 +48,21 @@ pub fn samples<'a>(plan: &'a Plan, truth: &RigTruth, seed: u64) -> Result<Run<'a
     }
     let carrier: Box<dyn Carrier> = match plan.carrier {
         CarriedBy::Table => Box::new(Table::new(&at, &truth.table)?),
-        CarriedBy::Hands => Box::new(Hands::new(&at, &truth.hands, seed)?),
+        CarriedBy::Hands => {
+            Box::new(Hands::new(&at, &truth.hands, seed)?.with_flaws(&truth.flaws, seed))
+        }
     };
     plan.check_length(carrier.duration_s())?;
+    let period_s = 1.0 / plan.sample_rate_hz;
+    let dwells = plan.steps.iter().map(Step::dwells).sum();
     Ok(Run {
         plan,
         // All before the end. The ends of dwells are sums: a rounding error beyond a sample is none.
         count: (carrier.duration_s() * plan.sample_rate_hz - 1e-6).ceil() as usize,
         carrier,
-        unit: Unit::new(&truth.unit, seed, 1.0 / plan.sample_rate_hz),
+        unit: Unit::new(&truth.unit, seed, period_s),
         converter: Converter::new(&truth.converter, &truth.unit, seed),
+        flaws: Flaws::new(&truth.flaws, dwells, period_s, seed),
         next: 0,
     })
 }
@@ -67,11 +76,15 @@ impl Iterator for Run<'_> {
         }
         // Not by adding up: the thousandth of a second has no exact sum.
         let t_s = self.next as f64 / self.plan.sample_rate_hz;
+        let stamp_s = self.flaws.stamp(self.next, t_s);
         self.next += 1;
-        let instant = self.carrier.at(t_s);
-        let pins = self.unit.step(&instant.motion, self.plan.chamber_c(t_s));
+        let mut instant = self.carrier.at(t_s);
+        self.flaws.sway(&mut instant);
+        let felt = self.flaws.felt(&instant);
+        let pins = self.unit.step(&felt, self.plan.chamber_c(t_s));
         Some(Row {
             instant,
+            stamp_s,
             readings: self.converter.read(&pins),
         })
     }

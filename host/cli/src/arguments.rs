@@ -6,7 +6,7 @@ use clap::{Args, ValueEnum};
 use mimu::noise_file::NoiseFile;
 use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
-use mimu::stillness::STILL_FACTOR;
+use mimu::stillness::{Finding, STILL_FACTOR, Steps};
 use mimu_recording::error::Result;
 
 #[derive(Args)]
@@ -14,6 +14,31 @@ pub(crate) struct StillArgs {
     /// Without a step column: largest variance of a still window, times that of the quietest
     #[arg(long = "still", value_name = "FACTOR", default_value_t = STILL_FACTOR, value_parser = still)]
     pub(crate) factor: f64,
+    /// Dwells by the step column as they are, or by stillness; without it the step column where there is one
+    #[arg(long = "steps", value_enum, value_name = "WHENCE")]
+    pub(crate) steps: Option<StepsArg>,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+pub(crate) enum StepsArg {
+    /// By the step column, none of them judged not to be still
+    Given,
+    /// By stillness, whatever the step column says
+    Found,
+}
+
+impl StillArgs {
+    pub(crate) fn finding(&self) -> Finding {
+        let steps = match self.steps {
+            None => Steps::AsRecorded,
+            Some(StepsArg::Given) => Steps::Given,
+            Some(StepsArg::Found) => Steps::Found,
+        };
+        Finding {
+            still_factor: self.factor,
+            steps,
+        }
+    }
 }
 
 fn still(text: &str) -> std::result::Result<f64, String> {

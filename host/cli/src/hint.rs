@@ -19,6 +19,7 @@ fn flag(argument: Argument) -> Option<&'static str> {
         Argument::Scale => "--scale",
         Argument::Reference => "--reference",
         Argument::Device => "--device",
+        Argument::Steps => "--steps",
         Argument::StillFactor => "--still",
         Argument::Method => "--method",
         Argument::Only => "--only",

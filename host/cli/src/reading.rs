@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use mimu::prepared::Prepared;
+use mimu::stillness::Finding;
 use mimu_recording::error::Result;
 use mimu_recording::{MANIFEST_FILE, Recording};
 
@@ -11,7 +12,7 @@ use crate::output::{check_outputs, progress};
 /// Opens and reads a recording, after checking that the results can be written and take the place of no input.
 pub(crate) fn read(
     directory: &Path,
-    still_factor: f64,
+    finding: Finding,
     outputs: &[Option<&Path>],
     others: &[Option<&Path>],
 ) -> Result<Prepared> {
@@ -21,7 +22,7 @@ pub(crate) fn read(
     inputs.extend(others.iter().flatten());
     check_outputs(outputs, &inputs)?;
     let bar = progress("reading");
-    let prepared = Prepared::read(&recording, still_factor, |share| {
+    let prepared = Prepared::read(&recording, finding, |share| {
         bar.set_position((share * 1000.0) as u64)
     });
     bar.finish_and_clear();

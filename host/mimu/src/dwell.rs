@@ -10,9 +10,10 @@ use std::ops::Range;
 use crate::blocks::{Condensed, Level, Rails, Stretch, pool, quantile};
 use crate::quantity::{Sensor, plural};
 use crate::rails::{self, longest_run_by_chance};
-use crate::stillness::{self, Detection, SHORTEST_S};
+use crate::rest::{self, Rest};
+use crate::stillness::{self, Detection, Finding, SHORTEST_S, Steps};
 use mimu_recording::error::{Argument, Error, Result};
-use mimu_recording::{Manifest, RAW_COLUMNS};
+use mimu_recording::{Manifest, RAW_COLUMNS, Reference};
 
 /// Variance of a given step over the median of all steps, at most; a fivefold standard deviation.
 const STEP_FACTOR: f64 = 25.0;
@@ -27,6 +28,10 @@ pub enum Fault {
     TooShort,
     /// The variance is far above that of the other dwells.
     NotStill,
+    /// The unit turns evenly and does not rest.
+    Turning,
+    /// It errs by far more than the others predict.
+    Outlying,
     /// Samples of the channel (0..6) lie at a rail.
     Saturated(usize),
     /// The channel (0..6) repeats one value.
@@ -40,6 +45,8 @@ impl fmt::Display for Fault {
         match *self {
             Self::TooShort => f.write_str("too short"),
             Self::NotStill => f.write_str("not still"),
+            Self::Turning => f.write_str("turning"),
+            Self::Outlying => f.write_str("outlying"),
             Self::Saturated(c) => write!(f, "{} saturated", RAW_COLUMNS[c]),
             Self::Stuck(c) => write!(f, "{} stuck", RAW_COLUMNS[c]),
             Self::Missing(c) => write!(f, "{} missing", RAW_COLUMNS[c]),
@@ -125,6 +132,21 @@ impl Dwell {
     }
 }
 
+/// A dwell, or a turn between two, that errs by far more than the others predict.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LeftOut {
+    /// A dwell of the accelerometer, or a turn of the gyro.
+    pub sensor: Sensor,
+    /// Index of the dwell, or of that in which the turn begins.
+    pub from: usize,
+    /// Index of the dwell, or of that in which the turn ends.
+    pub to: usize,
+    /// Its error against the prediction of the others: m/s², or rad.
+    pub error: f64,
+    /// The same in standard deviations.
+    pub sigmas: f64,
+}
+
 /// The dwells of a recording and how they were found.
 #[derive(Debug, Clone)]
 pub struct Dwells {
@@ -136,21 +158,48 @@ pub struct Dwells {
     pub rails: [Rails; 6],
     /// Longest run of equal samples that chance explains, of the six channels; infinite where nothing can be told.
     pub longest_run: [f64; 6],
+    /// What a fit has left out of it.
+    pub left_out: Vec<LeftOut>,
     /// What a person should know.
     pub warnings: Vec<String>,
 }
 
 impl Dwells {
-    /// The dwells of a recording. `still_factor`: see [`stillness::STILL_FACTOR`].
-    pub fn find(condensed: &Condensed, manifest: &Manifest, still_factor: f64) -> Result<Self> {
+    /// The dwells of a recording.
+    pub fn find(
+        condensed: &Condensed,
+        manifest: &Manifest,
+        finding: impl Into<Finding>,
+    ) -> Result<Self> {
+        let finding = finding.into();
         let mut warnings = Vec::new();
         let longest_run = [0, 1, 2, 3, 4, 5]
             .map(|c| longest_run_by_chance(condensed, c).unwrap_or(f64::INFINITY));
-        let rails = rails::find(condensed, manifest, &longest_run, &mut warnings);
-        let (ranges, detection) = if condensed.has_steps {
+        let rails = rails::find(condensed, manifest, &mut warnings);
+        let given = match finding.steps {
+            Steps::Given if !condensed.has_steps => {
+                let problem = "the dwells are to be those of the column step, and there is none";
+                return Err(Error::new("dwells", problem, "have them found").about(Argument::Steps));
+            }
+            Steps::Given | Steps::AsRecorded => condensed.has_steps,
+            Steps::Found => false,
+        };
+        let by_hand = manifest.reference == Reference::Gravity;
+        let (ranges, detection) = if given {
             (by_step(condensed), None)
         } else {
-            let (ranges, detection) = stillness::find(condensed, manifest, still_factor)?;
+            let (mut ranges, detection) =
+                stillness::find(condensed, manifest, finding.still_factor)?;
+            if by_hand {
+                let (cut, blocks) = rest::walk_in(&mut ranges, condensed);
+                if cut > 0 {
+                    warnings.push(format!(
+                        "{} cut at the ends, by {:.1} s in all: the unit was not yet at rest there, or no longer",
+                        plural(cut, "dwell"),
+                        blocks as f64 * detection.block_s
+                    ));
+                }
+            }
             (ranges, Some(detection))
         };
         let mut list: Vec<Dwell> = ranges
@@ -166,7 +215,7 @@ impl Dwells {
             })
             .collect();
         if list.is_empty() {
-            let (problem, remedy) = match condensed.has_steps {
+            let (problem, remedy) = match given {
                 true => (
                     "every row is in transit: its step is empty or -1",
                     "number the dwells in the column step, or leave the column out to have them found",
@@ -177,18 +226,23 @@ impl Dwells {
                 ),
             };
             let error = Error::undetermined("dwells", problem, remedy);
-            return Err(match condensed.has_steps {
+            return Err(match given {
                 true => error,
                 false => error.about(Argument::StillFactor),
             });
         }
-        judge(&mut list, condensed, &longest_run, detection.is_none());
+        let judged = given && finding.steps != Steps::Given;
+        judge(&mut list, condensed, &longest_run, judged);
+        if !given && by_hand {
+            leave_out_turning(&mut list, condensed);
+        }
         warn(&list, manifest, &mut warnings);
         Ok(Self {
             list,
             detection,
             rails,
             longest_run,
+            left_out: Vec::new(),
             warnings,
         })
     }
@@ -277,6 +331,24 @@ fn dwell(condensed: &Condensed, step: i32, range: Range<usize>, rails: &[Rails; 
     }
 }
 
+/// A dwell that turns evenly is none for both sensors.
+fn leave_out_turning(list: &mut [Dwell], condensed: &Condensed) {
+    let usable = |d: &&Dwell| Sensor::BOTH.iter().all(|s| d.fault(*s).is_none());
+    let judged: Vec<&Dwell> = list.iter().filter(usable).collect();
+    let rests = judged.iter().map(|d| Rest {
+        blocks: d.blocks.clone(),
+        mean: d.raw.map(|m| m.mean),
+        duration_s: d.duration_s,
+    });
+    let turning = rest::turning(&rests.collect::<Vec<_>>(), condensed);
+    let starts = judged.iter().zip(turning).filter(|(_, turning)| *turning);
+    let starts: Vec<u64> = starts.map(|(d, _)| d.first_row).collect();
+    for dwell in list.iter_mut().filter(|d| starts.contains(&d.first_row)) {
+        dwell.gyro_fault = Some(Fault::Turning);
+        dwell.accel_fault = Some(Fault::Turning);
+    }
+}
+
 /// Finds out which dwells are no good for which sensor.
 fn judge(list: &mut [Dwell], condensed: &Condensed, longest_run: &[f64; 6], given: bool) {
     for sensor in Sensor::BOTH {
@@ -328,11 +400,12 @@ fn warn(list: &[Dwell], manifest: &Manifest, warnings: &mut Vec<String>) {
             let Some(fault) = dwell.fault(sensor) else {
                 continue;
             };
-            if matches!(fault, Fault::TooShort) && sensor == Sensor::Accel {
+            if matches!(fault, Fault::TooShort | Fault::Turning) && sensor == Sensor::Accel {
                 continue; // said once, for both
             }
             let key = match fault {
                 Fault::TooShort => format!("shorter than {SHORTEST_S} s"),
+                Fault::Turning => "the unit turns evenly and does not rest".into(),
                 Fault::NotStill => format!("not still enough for the {sensor}"),
                 other => other.to_string(),
             };

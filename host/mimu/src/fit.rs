@@ -1,6 +1,7 @@
 //! From a recording to a calibration of both triads, judged on what it was not fitted to.
 
 mod biases;
+mod outlying;
 pub mod plausible;
 mod sensor;
 pub mod session_bias;
@@ -110,7 +111,7 @@ impl Fit {
 }
 
 /// Fits both triads of a recording.
-pub fn fit(prepared: Prepared, options: Options) -> Result<Fit> {
+pub fn fit(mut prepared: Prepared, options: Options) -> Result<Fit> {
     if let Some(only) = options.only
         && !prepared.has(only)
     {
@@ -120,6 +121,9 @@ pub fn fit(prepared: Prepared, options: Options) -> Result<Fit> {
             format!("fit the other one, or add {only}_x, {only}_y, {only}_z"),
         )
         .about(Argument::Only));
+    }
+    if prepared.manifest.reference == Reference::Gravity {
+        outlying::leave_out(&mut prepared);
     }
     let mut warnings = prepared.condensed.warnings.clone();
     warnings.extend(prepared.dwells.warnings.iter().cloned());

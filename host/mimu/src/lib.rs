@@ -4,7 +4,7 @@
 //! |-----------------|-------------------------------------------------------------------------------|
 //! | [`quantity`]    | sensors, axes, SI units, and how numbers are written                         |
 //! | [`blocks`], [`increment`] | one pass over the samples condenses them to 0.1 s blocks and 10 ms integrals |
-//! | [`rails`], [`stillness`], [`dwell`] | which samples and which stretches can be averaged           |
+//! | [`rails`], [`stillness`], [`rest`], [`dwell`] | which samples and which stretches can be averaged           |
 //! | [`reading_step`] | the step that readings are multiples of                                       |
 //! | [`noise`]       | how well a dwell mean is known                                                |
 //! | [`prepared`]    | all of these for one recording                                                |
@@ -78,6 +78,7 @@ pub mod quantity;
 pub mod rails;
 pub mod readable;
 pub mod reading_step;
+pub mod rest;
 pub mod result;
 pub mod stillness;
 pub mod survey;

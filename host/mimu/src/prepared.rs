@@ -10,8 +10,9 @@ use crate::estimate::rotation::{Motion, Rest, Turn};
 use crate::estimate::{Failure, Observation};
 use crate::noise::Noise;
 use crate::noise_file::NoiseFile;
-use crate::quantity::Sensor;
+use crate::quantity::{Sensor, significant};
 use crate::rails::refuse_dead_channels;
+use crate::stillness::Finding;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{Batch, Manifest, Recording, Reference};
 
@@ -32,28 +33,32 @@ pub struct Prepared {
 
 impl Prepared {
     /// Reads `recording` and finds its dwells. `progress` is told the share that is read.
-    pub fn read(recording: &Recording, still_factor: f64, progress: impl Fn(f64)) -> Result<Self> {
+    pub fn read(
+        recording: &Recording,
+        finding: impl Into<Finding>,
+        progress: impl Fn(f64),
+    ) -> Result<Self> {
         let manifest = recording.manifest.clone();
         let integrate = manifest.reference == Reference::Gravity;
         let condensed = Condensed::read(recording, integrate, progress)?;
         let place = recording.samples.display().to_string();
-        Self::of_condensed(manifest, condensed, still_factor, place)
+        Self::of_condensed(manifest, condensed, finding.into(), place)
     }
 
-    /// Finds the dwells of `samples` in memory. `still_factor`: see [`crate::stillness::STILL_FACTOR`].
+    /// Finds the dwells of `samples` in memory. `finding`: a factor alone is [`crate::stillness::STILL_FACTOR`] or another.
     ///
     /// Errors: those of a recording on disk; columns of different lengths.
-    pub fn of(manifest: Manifest, samples: &Batch, still_factor: f64) -> Result<Self> {
+    pub fn of(manifest: Manifest, samples: &Batch, finding: impl Into<Finding>) -> Result<Self> {
         let integrate = manifest.reference == Reference::Gravity;
         let condensed = Condensed::of(samples, manifest.sample_rate_hz, integrate)?;
         let place = manifest.device.clone();
-        Self::of_condensed(manifest, condensed, still_factor, place)
+        Self::of_condensed(manifest, condensed, finding.into(), place)
     }
 
     fn of_condensed(
         manifest: Manifest,
         condensed: Condensed,
-        still_factor: f64,
+        finding: Finding,
         place: String,
     ) -> Result<Self> {
         refuse_dead_channels(&condensed, &place)?;
@@ -68,7 +73,7 @@ impl Prepared {
                 "write the t_s at which the power came to recording.toml, or leave the key out";
             return Err(Error::new(place, problem, remedy));
         }
-        let dwells = Dwells::find(&condensed, &manifest, still_factor)
+        let dwells = Dwells::find(&condensed, &manifest, finding)
             .map_err(|e| e.map(|e| e.place = format!("{place}, {}", e.place)))?;
         let noise = Noise::within(&dwells.list, &condensed);
         Ok(Self {
@@ -176,7 +181,18 @@ impl Prepared {
             let to = increments.partition_point(|i| i.end_s < b.start_s) + 1;
             let pieces = &increments[from.min(increments.len())..to.min(increments.len())];
             let blocks = &self.condensed.blocks[a.blocks.end..b.blocks.start];
-            let why = if pieces.iter().any(|i| !i.whole) {
+            let outlying = self
+                .dwells
+                .left_out
+                .iter()
+                .find(|l| l.sensor == Sensor::Gyro && [l.from, l.to] == [pair[0], pair[1]]);
+            let why = if let Some(left_out) = outlying {
+                Some(format!(
+                    "it ends {} deg off what the other turns predict, {:.0} sigma",
+                    significant(left_out.error.to_degrees()),
+                    left_out.sigmas
+                ))
+            } else if pieces.iter().any(|i| !i.whole) {
                 Some("samples are missing".to_string())
             } else {
                 Sensor::Gyro.channels().find_map(|c| {
@@ -230,6 +246,15 @@ impl Prepared {
         (turns, refused)
     }
 
+    /// Whether a sample of the gyro in block `i` lies at a rail.
+    fn gyro_clips(&self, i: usize) -> bool {
+        let block = &self.condensed.blocks[i];
+        let rails = &self.dwells.rails;
+        Sensor::Gyro
+            .channels()
+            .any(|c| rails[c].touched_by(&block.raw[c]))
+    }
+
     /// Pairs of blocks in motion, for the first guess of the gyro.
     pub fn motions(&self, accel: &Affine<f64>) -> Vec<Motion> {
         let mut still = vec![false; self.condensed.blocks.len()];
@@ -245,6 +270,7 @@ impl Prepared {
         };
         (1..still.len())
             .filter(|&i| !still[i] && !self.condensed.blocks[i].after_gap)
+            .filter(|&i| !self.gyro_clips(i - 1) && !self.gyro_clips(i))
             .map(|i| {
                 let [before, after] = [i - 1, i].map(|i| accel.apply(&mean(i, Sensor::Accel)));
                 let centre = |i: usize| {

@@ -1,6 +1,7 @@
 //! Channels that do not follow their input: at a rail of the converter, stuck, or dead.
 
 use crate::blocks::{Condensed, Moments, Rails, quantile};
+use crate::quantity::plural;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{Manifest, RAW_COLUMNS};
 
@@ -10,16 +11,19 @@ const RUN_LOG_ODDS: f64 = 14.0;
 /// Longest run of equal samples that chance explains in channel `c`, from how often neighbours are
 /// equal where the channel works. `None`: they mostly are, and nothing can be told.
 pub(crate) fn longest_run_by_chance(condensed: &Condensed, c: usize) -> Option<f64> {
-    let mut shares: Vec<f64> = condensed
-        .blocks
-        .iter()
-        .map(|b| b.raw[c])
+    let odds = RUN_LOG_ODDS + (condensed.rows as f64).ln();
+    share_of_repeats(condensed, c).map(|share| (1.0 + odds / -share.ln()).max(5.0))
+}
+
+/// How often neighbours are equal in channel `c`, in the middle one of its blocks. `None`: they mostly are.
+fn share_of_repeats(condensed: &Condensed, c: usize) -> Option<f64> {
+    let blocks = condensed.blocks.iter().map(|b| b.raw[c]);
+    let mut shares: Vec<f64> = blocks
         .filter(|m| m.n > 1)
         .map(|m| f64::from(m.repeats) / f64::from(m.n - 1))
         .collect();
     let share = quantile(&mut shares, 0.5)?.max(1e-3);
-    let odds = RUN_LOG_ODDS + (condensed.rows as f64).ln();
-    (share < 0.8).then(|| (1.0 + odds / -share.ln()).max(5.0))
+    (share < 0.8).then_some(share)
 }
 
 /// Blocks in a row that have to be calm at an extreme.
@@ -71,12 +75,80 @@ fn calm_end(condensed: &Condensed, c: usize, sign: f64, range: [f64; 2]) -> Opti
     (spread < 20.0 * CALM * quiet).then_some(widest)
 }
 
+/// Natural logarithm of the odds against an extreme that is by chance exactly where some converter ends.
+const FULL_SCALE_LOG_ODDS: f64 = 8.0;
+
+/// Natural logarithm of the odds against `value` being an extreme by chance, of readings in multiples of `step`.
+///
+/// Almost all digital parts have 16 bits: a motion that ends at exactly one of their ends, of thousands of codes, was cut off there.
+fn full_scale_log_odds(value: f64, step: Option<f64>) -> f64 {
+    let codes = value / step.unwrap_or(1.0);
+    let whole = codes.round();
+    // A factor of an import rounds in the last places.
+    if (codes - whole).abs() > 1e-6 * whole.abs() {
+        return 0.0;
+    }
+    if [-32768.0, 32767.0, 65535.0].contains(&whole) {
+        return f64::INFINITY;
+    }
+    let is_end = |bits: i32| whole == 2f64.powi(bits) - 1.0 || whole == -(2f64.powi(bits));
+    match (7..=24).any(is_end) {
+        true => FULL_SCALE_LOG_ODDS,
+        false => 0.0,
+    }
+}
+
+/// How often the extreme `value` comes: in all, and in a row.
+fn count(moments: impl Iterator<Item = Moments>, value: f64) -> (u64, f64) {
+    // Blocks are short: a run goes on through those that hold nothing else.
+    let (mut all, mut longest, mut run) = (0, 0.0_f64, 0.0);
+    for m in moments {
+        if m.max == value {
+            all += u64::from(m.at_max);
+        } else if m.min == value {
+            all += u64::from(m.at_min);
+        }
+        if m.min == m.max && m.max == value {
+            run += f64::from(m.n);
+        } else {
+            run = 0.0;
+            if m.run_value == value {
+                longest = longest.max(f64::from(m.run));
+            }
+        }
+        longest = longest.max(run);
+    }
+    (all, longest)
+}
+
+/// Whether the extreme `value` of channel `c` is a rail of the converter: the remark that says so.
+fn converter_rail(condensed: &Condensed, c: usize, value: f64, name: &str) -> Option<String> {
+    let moments = condensed.blocks.iter().map(|b| b.raw[c]);
+    let (all, longest) = count(moments.filter(|m| m.n > 0), value);
+    let full_scale = full_scale_log_odds(value, condensed.reading_step[c]);
+    let channel = RAW_COLUMNS[c];
+    if full_scale > RUN_LOG_ODDS {
+        return Some(format!(
+            "{channel}: {} at {value}, where a converter of 16 bits ends: taken for a rail",
+            plural(all, "sample")
+        ));
+    }
+    // Only the extreme is looked at, and not all runs of a recording, so that its length does not count.
+    let chance = 1.0 + (RUN_LOG_ODDS - full_scale) / -share_of_repeats(condensed, c)?.ln();
+    (longest > chance).then(|| {
+        format!(
+            "{channel}: the {name} value {value} comes {longest} times in a row, chance explains {:.0}: taken for a rail",
+            chance.floor()
+        )
+    })
+}
+
 /// Rails of the six channels: as declared, or where the largest or smallest
-/// value of a whole recording is repeated more often in a row than chance allows, or is as calm as no noise of the sensor is.
+/// value of a whole recording is repeated more often in a row than chance allows, is where a converter ends, or is as calm as no noise
+/// of the sensor is.
 pub(crate) fn find(
     condensed: &Condensed,
     manifest: &Manifest,
-    longest_run: &[f64; 6],
     warnings: &mut Vec<String>,
 ) -> [Rails; 6] {
     let mut rails = [Rails::default(); 6];
@@ -94,56 +166,27 @@ pub(crate) fn find(
             };
             continue;
         }
-        let moments = || {
-            condensed
-                .blocks
-                .iter()
-                .map(move |b| b.raw[c])
-                .filter(|m| m.n > 0)
-        };
-        let high = moments().map(|m| m.max).fold(f64::NEG_INFINITY, f64::max);
-        let low = moments().map(|m| m.min).fold(f64::INFINITY, f64::min);
-        let chance = longest_run[c];
+        let moments = || condensed.blocks.iter().map(|b| &b.raw[c]);
+        let known = || moments().filter(|m| m.n > 0);
+        let high = known().map(|m| m.max).fold(f64::NEG_INFINITY, f64::max);
+        let low = known().map(|m| m.min).fold(f64::INFINITY, f64::min);
         if low == high {
             continue;
         }
-        for (value, name) in [(high, "highest"), (low, "lowest")] {
-            // Blocks are short: a run goes on through those that hold nothing else.
-            let (mut longest, mut run) = (0.0_f64, 0.0);
-            for m in moments() {
-                if m.min == m.max && m.max == value {
-                    run += f64::from(m.n);
-                } else {
-                    run = 0.0;
-                    if m.run_value == value {
-                        longest = longest.max(f64::from(m.run));
-                    }
-                }
-                longest = longest.max(run);
-            }
-            if longest > chance {
-                warnings.push(format!(
-                    "{}: the {name} value {value} comes {longest} times in a row, chance explains {:.0}: taken for a rail",
-                    RAW_COLUMNS[c], chance.floor()
-                ));
-                if value == high {
-                    rail.high = Some(value)
-                } else {
-                    rail.low = Some(value)
-                }
-                continue;
-            }
-            let sign = if value == high { 1.0 } else { -1.0 };
-            if let Some(inner) = calm_end(condensed, c, sign, [low, high]) {
+        let ends = [
+            (high, "highest", 1.0, &mut rail.high),
+            (low, "lowest", -1.0, &mut rail.low),
+        ];
+        for (value, name, sign, end) in ends {
+            if let Some(remark) = converter_rail(condensed, c, value, name) {
+                warnings.push(remark);
+                *end = Some(value);
+            } else if let Some(inner) = calm_end(condensed, c, sign, [low, high]) {
                 warnings.push(format!(
                     "{}: at its {name} values, from {inner} on, the noise is gone: taken for a rail of the sensor",
                     RAW_COLUMNS[c]
                 ));
-                if value == high {
-                    rail.high = Some(inner)
-                } else {
-                    rail.low = Some(inner)
-                }
+                *end = Some(inner);
             }
         }
     }

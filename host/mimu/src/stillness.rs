@@ -26,9 +26,41 @@ pub const STILL_FACTOR: f64 = 10.0;
 /// over its length, and the tremor leaves next to none.
 const GYRO_TREMOR: f64 = 30.0;
 
+/// Where the dwells are taken from.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Steps {
+    /// The `step` column where there is one, and judged; found elsewhere.
+    #[default]
+    AsRecorded,
+    /// The `step` column, as it is: no dwell is judged not to be still.
+    Given,
+    /// Found by stillness, whatever the column says.
+    Found,
+}
+
+/// How the dwells are to be found.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Finding {
+    /// See [`STILL_FACTOR`].
+    pub still_factor: f64,
+    /// Where they are taken from.
+    pub steps: Steps,
+}
+
+impl From<f64> for Finding {
+    fn from(still_factor: f64) -> Self {
+        Self {
+            still_factor,
+            steps: Steps::default(),
+        }
+    }
+}
+
 /// The thresholds that found the dwells.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Detection {
+    /// Length of a block, s: ends of dwells are on this grid.
+    pub block_s: f64,
     /// Window of the variance, s.
     pub window_s: f64,
     /// Left out at both ends, s.
@@ -132,6 +164,7 @@ pub(crate) fn find(
         }
     }
     let detection = Detection {
+        block_s,
         window_s: width as f64 * block_s,
         guard_s: guard as f64 * block_s,
         shortest_s: SHORTEST_S,

@@ -45,6 +45,8 @@ pub enum Argument {
     Reference,
     /// Name of the unit.
     Device,
+    /// Where the dwells are taken from.
+    Steps,
     /// Largest variance of a dwell.
     StillFactor,
     /// The estimator.

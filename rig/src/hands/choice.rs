@@ -1,6 +1,7 @@
 //! What a person makes of a plan: which pose next, how it is met, how long everything takes.
 
 use super::HandsTruth;
+use super::flaws::Even;
 use crate::plan::{Step, attitude};
 use crate::random::Random;
 use crate::rotation::{Rotation, Vector, norm};
@@ -22,6 +23,12 @@ pub(super) struct Turn {
     pub(super) lift: f64,
     pub(super) dwell: [f64; 2],
     pub(super) jolt: Option<Jolt>,
+    /// Whether it is shaken violently on the way.
+    pub(super) shaken: bool,
+    /// Angle from its pose at which it arrives, rad, and the time in which it gets there, s.
+    pub(super) settling: Option<(Vector, f64)>,
+    /// A rest that is none.
+    pub(super) even: Option<Even>,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -94,6 +101,9 @@ impl Turn {
                 start_s: dwell_s + when * (length_s - truth.jolt_s),
                 ..knock
             }),
+            shaken: false,
+            settling: None,
+            even: None,
         }
     }
 }

@@ -41,11 +41,15 @@ fn columns(plan: &Plan) -> impl Iterator<Item = &'static str> {
 
 /// The values of [`columns`], as many as there are of them.
 fn values(row: &Row) -> [f64; 14] {
-    let Row { instant, readings } = row;
+    let Row {
+        instant,
+        stamp_s,
+        readings,
+    } = row;
     let ([gx, gy, gz], [ax, ay, az]) = (readings.gyro, readings.accel);
     let [wx, wy, wz] = instant.stated_rate.unwrap_or_default().map(f64::to_degrees);
     let [fx, fy, fz] = instant.stated_force.unwrap_or_default();
-    let (t_s, temp_c) = (instant.motion.t_s, readings.temp_c);
+    let (t_s, temp_c) = (*stamp_s, readings.temp_c);
     [t_s, temp_c, gx, gy, gz, ax, ay, az, wx, wy, wz, fx, fy, fz]
 }
 

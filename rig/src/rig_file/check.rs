@@ -74,6 +74,7 @@ impl RigFile {
         self.check_numbers()?;
         self.table.check()?;
         self.hands.check()?;
+        self.flaws.check()?;
         let analog = [&gyro, &accel].map(|parts| parts[0].output == RawUnit::V);
         if self.converter.raw_unit == Some(RawUnit::V) && !(analog[0] && analog[1]) {
             return refuse(

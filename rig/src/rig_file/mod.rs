@@ -16,6 +16,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use crate::converter::RawUnit;
+use crate::flaws::FlawsTruth;
 use crate::hands::HandsTruth;
 use crate::located::Source;
 use crate::rotation::Vector;
@@ -65,6 +66,9 @@ pub struct RigFile {
     /// The person, if the plan has one.
     #[serde(default)]
     pub hands: HandsTruth,
+    /// What goes wrong in the recording.
+    #[serde(default)]
+    pub flaws: FlawsTruth,
     /// What the affine model lacks.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub effect: Vec<EffectFile>,
@@ -254,6 +258,7 @@ impl Default for RigFile {
             converter: ConverterFile::default(),
             table: TableTruth::default(),
             hands: HandsTruth::default(),
+            flaws: FlawsTruth::default(),
             effect: Vec::new(),
         }
     }

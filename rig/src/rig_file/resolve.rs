@@ -6,6 +6,7 @@ use super::{AxesFile, EffectFile, RigFile};
 use crate::catalog::{Kind, Sensor};
 use crate::converter::{ConverterTruth, RawUnit};
 use crate::effects::{EffectTruth, draw_ids};
+use crate::flaws::FlawsTruth;
 use crate::hands::HandsTruth;
 use crate::noise::Coefficients;
 use crate::random::Random;
@@ -31,6 +32,8 @@ pub struct RigTruth {
     pub table: TableTruth,
     /// The person.
     pub hands: HandsTruth,
+    /// What goes wrong in the recording.
+    pub flaws: FlawsTruth,
 }
 
 impl RigTruth {
@@ -131,7 +134,7 @@ impl RigTruth {
         }
 
         let thermal = thermal(&mut file, [gyro[0], gyro[1], gyro[2], accel[0]], seed);
-        let (table, hands) = (file.table.clone(), file.hands.clone());
+        let (table, hands, flaws) = (file.table.clone(), file.hands.clone(), file.flaws.clone());
         Ok(Self {
             file,
             earth_rate,
@@ -149,6 +152,7 @@ impl RigTruth {
             converter,
             table,
             hands,
+            flaws,
         })
     }
 }

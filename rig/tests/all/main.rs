@@ -4,6 +4,7 @@
 
 mod effects;
 mod extremes;
+mod flaws;
 mod motion;
 mod noise;
 mod page;

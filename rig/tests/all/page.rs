@@ -5,6 +5,7 @@ use std::fs;
 use std::path::Path;
 
 use mimu_rig::effects::{Draw, Shape, specs};
+use mimu_rig::flaws::FlawsTruth;
 use mimu_rig::hands::HandsTruth;
 use mimu_rig::located::Source;
 use mimu_rig::plan::Plan;
@@ -71,6 +72,7 @@ fn the_page_has_every_key_of_both_files_and_no_other() {
             rig(&format!("[table.settling]\n{unknown}")),
         ),
         ("`[hands]`", rig(&format!("[hands]\n{unknown}"))),
+        ("`[flaws]`", rig(&format!("[flaws]\n{unknown}"))),
     ] {
         let documented: BTreeSet<_> = rows(&page, heading).into_iter().flat_map(|r| r.0).collect();
         assert_eq!(documented, known(&complaint), "{heading}");
@@ -78,7 +80,7 @@ fn the_page_has_every_key_of_both_files_and_no_other() {
 }
 
 #[test]
-fn the_defaults_of_table_and_hands_are_those_of_the_code() {
+fn the_defaults_of_table_hands_and_flaws_are_those_of_the_code() {
     let page = page();
     let settling = toml::Table::try_from(TableTruth::default().settling).unwrap();
     for (heading, defaults) in [
@@ -90,6 +92,10 @@ fn the_defaults_of_table_and_hands_are_those_of_the_code() {
         (
             "`[hands]`",
             toml::Table::try_from(HandsTruth::default()).unwrap(),
+        ),
+        (
+            "`[flaws]`",
+            toml::Table::try_from(FlawsTruth::default()).unwrap(),
         ),
     ] {
         for (keys, cells) in rows(&page, heading) {

@@ -66,7 +66,7 @@ pub fn run(args: &DiagnoseArgs) -> Result<()> {
     ];
     let inputs = [args.noise.file.as_deref(), args.calibration.as_deref()];
     let open = |path: &PathBuf| {
-        let prepared = read(path, args.still.factor, &outputs, &inputs)?;
+        let prepared = read(path, args.still.finding(), &outputs, &inputs)?;
         args.noise.state(prepared)
     };
     let given = match &args.calibration {

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use mimu::calibration::Calibration;
 use mimu::fit::{Method, Options, fit};
-use mimu::result::fit::FitResult;
+use mimu::result::fit::{DwellResult, FitResult};
 use mimu_recording::Reference;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::result_file::stage;
@@ -78,7 +78,7 @@ pub(crate) fn run(args: &FitArgs) -> Result<()> {
     };
     let outputs = [args.output.as_deref(), args.json.file()];
     let inputs = [args.noise.file.as_deref()];
-    let prepared = read(&args.recording, options.still_factor, &outputs, &inputs)?;
+    let prepared = read(&args.recording, args.still.finding(), &outputs, &inputs)?;
     let prepared = args.noise.state(prepared)?;
     if args.method.is_some() && prepared.manifest.reference == Reference::Gravity {
         return Err(Error::new(
@@ -87,7 +87,10 @@ pub(crate) fn run(args: &FitArgs) -> Result<()> {
             "leave --method out, or give the steps their inputs (reference = \"table\")",
         ));
     }
-    let fitted = fit(prepared, options)?;
+    let found = DwellResult::list(&prepared);
+    // Which dwells there are is the first that a person asks for then. The line with the error is the last.
+    let fitted =
+        fit(prepared, options).inspect_err(|_| eprint!("{}", report::dwell_table(&found)))?;
     let result = FitResult::of(&fitted);
     let mut text = report::fit_text(&result);
     if args.dwells {

@@ -33,7 +33,7 @@ pub(crate) fn run(args: &VerifyArgs) -> Result<()> {
     let outputs = [args.json.file()];
     let prepared = read(
         &args.recording,
-        args.still.factor,
+        args.still.finding(),
         &outputs,
         &[Some(&args.calibration), args.noise.file.as_deref()],
     )?;

@@ -8,6 +8,7 @@ use serde::Serialize;
 use super::{Sensors, TOOL};
 use crate::dwell::Dwell;
 use crate::fit::{Fit, Method, SensorFit};
+use crate::prepared::Prepared;
 use crate::quantity::{AXES, Figure, Sensor, inverse_names, raw_unit, scale_unit};
 use crate::stillness;
 use crate::triad::{Angles, Estimate};
@@ -47,6 +48,8 @@ pub struct FitResult {
     pub detection: Option<Detection>,
     /// All dwells, used or not.
     pub dwells: Vec<DwellResult>,
+    /// What errs by far more than the others predict, and was left out.
+    pub left_out: Vec<LeftOutResult>,
     /// What a person should know.
     pub warnings: Vec<String>,
 }
@@ -75,6 +78,23 @@ pub struct Detection {
     pub gyro_still_factor: f64,
     /// Standard deviation of a sample in the quietest twentieth of the recording, raw.
     pub floor_raw: [f64; 6],
+}
+
+/// A dwell, or a turn, that was left out because it errs by far more than the others predict.
+#[derive(Debug, Clone, Serialize)]
+pub struct LeftOutResult {
+    /// Of which sensor.
+    pub sensor: &'static str,
+    /// Step of the dwell, or of that in which the turn begins.
+    pub from_step: i32,
+    /// Step of the dwell, or of that in which the turn ends.
+    pub to_step: i32,
+    /// Its error against the prediction of the others, in [`Self::unit`].
+    pub error: f64,
+    /// SI unit of it.
+    pub unit: &'static str,
+    /// The same in standard deviations.
+    pub sigmas: f64,
 }
 
 /// One dwell.
@@ -217,8 +237,6 @@ impl FitResult {
     pub fn of(fit: &Fit) -> Self {
         let (condensed, manifest) = (&fit.prepared.condensed, &fit.prepared.manifest);
         let of = |sensor: Sensor| Some(SensorFitResult::of(fit, fit.sensor(sensor)?));
-        let labels = &manifest.step_labels;
-        let dwells = fit.prepared.dwells.list.iter();
         let of_sensors = fit.sensors.iter().flat_map(|s| &s.warnings);
         Self {
             format: "mimu-fit/1",
@@ -242,7 +260,8 @@ impl FitResult {
                 accel: of(Sensor::Accel),
             },
             detection: fit.prepared.dwells.detection.map(Detection::of),
-            dwells: dwells.map(|d| DwellResult::of(d, labels)).collect(),
+            dwells: DwellResult::list(&fit.prepared),
+            left_out: LeftOutResult::list(&fit.prepared),
             warnings: fit.warnings.iter().chain(of_sensors).cloned().collect(),
         }
     }
@@ -261,7 +280,32 @@ impl Detection {
     }
 }
 
+impl LeftOutResult {
+    fn list(prepared: &Prepared) -> Vec<Self> {
+        let dwells = &prepared.dwells;
+        let left_out = dwells.left_out.iter().map(|l| Self {
+            sensor: l.sensor.name(),
+            from_step: dwells.list[l.from].step,
+            to_step: dwells.list[l.to].step,
+            error: l.error,
+            unit: match l.sensor {
+                Sensor::Gyro => "rad",
+                Sensor::Accel => "m/s^2",
+            },
+            sigmas: l.sigmas,
+        });
+        left_out.collect()
+    }
+}
+
 impl DwellResult {
+    /// All dwells of a recording, used or not.
+    pub fn list(prepared: &Prepared) -> Vec<Self> {
+        let labels = &prepared.manifest.step_labels;
+        let dwells = prepared.dwells.list.iter();
+        dwells.map(|d| Self::of(d, labels)).collect()
+    }
+
     fn of(dwell: &Dwell, labels: &[String]) -> Self {
         let fault = |sensor| dwell.fault(sensor).map(|f| f.to_string());
         let label = usize::try_from(dwell.step).ok().and_then(|s| labels.get(s));

@@ -1,5 +1,6 @@
 //! People.
 
+use mimu_rig::flaws::FlawsTruth;
 use mimu_rig::hands::{Hands, HandsTruth};
 use mimu_rig::located::Source;
 use mimu_rig::motion::Carrier;
@@ -28,6 +29,26 @@ fn rate_and_angular_acceleration_by_hand_are_derivatives_of_the_attitude() {
         let compared = differentiate(&mut hands, Place::new(30.5, None), f64::INFINITY);
         assert!(compared > 5000, "{compared}");
     }
+}
+
+#[test]
+fn rate_and_angular_acceleration_are_derivatives_of_the_attitude_with_all_flaws_of_a_person() {
+    let truth = FlawsTruth {
+        settle_mrad: 50.0,
+        turning_rests: 8,
+        shake_turns: 2,
+        // The violent one has a jerk that the differences do not bear.
+        shake_mrad: 5.0,
+        ..FlawsTruth::default()
+    };
+    let hands = hands(
+        "[[step]]\nposes = 20\ndwell_s = 1",
+        &HandsTruth::default(),
+        3,
+    );
+    let mut hands = hands.with_flaws(&truth, 3);
+    let compared = differentiate(&mut hands, Place::new(30.5, None), f64::INFINITY);
+    assert!(compared > 5000, "{compared}");
 }
 
 #[test]

@@ -133,7 +133,7 @@ impl DesignArgs {
 /// A recording of the unit, fitted.
 fn after(path: &Path, args: &DesignArgs) -> Result<Fit> {
     let outputs = [args.output.as_deref(), args.json.file()];
-    let prepared = read(path, STILL_FACTOR, &outputs, &[])?;
+    let prepared = read(path, STILL_FACTOR.into(), &outputs, &[])?;
     let prepared = match &args.noise {
         Some(NoiseArg::File(file)) => prepared.with_noise(&NoiseFile::read(file)?)?,
         _ => prepared,

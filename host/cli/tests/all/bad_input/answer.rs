@@ -29,9 +29,14 @@ pub fn mimu<S: AsRef<std::ffi::OsStr>>(arguments: impl IntoIterator<Item = S>) -
 }
 
 impl Run {
-    /// The line of a refusal, after checking that it is one and has its three parts.
+    /// The line of a refusal, after checking that it is one and has its three parts. A fit lists the dwells before it.
     pub fn refusal(&self) -> &str {
-        let line = self.stderr.strip_suffix('\n').unwrap_or(&self.stderr);
+        let text = self.stderr.strip_suffix('\n').unwrap_or(&self.stderr);
+        let (table, line) = text.rsplit_once('\n').unwrap_or(("", text));
+        assert!(
+            table.is_empty() || table.trim_start().starts_with("step first row"),
+            "{text}"
+        );
         assert_eq!(
             self.status,
             Some(1),

@@ -1,0 +1,193 @@
+//! What goes wrong in recordings that people really make, and no tolerance of a data sheet covers.
+//!
+//! Each flaw has a stream of its own and is off by default: switching one on leaves the rest of a recording as it was.
+
+use std::f64::consts::TAU;
+
+use serde::{Deserialize, Serialize};
+
+use crate::motion::{Instant, Motion};
+use crate::random::Random;
+use crate::refusal::{Refusal, within};
+use crate::rotation::{Vector, add, scale};
+
+/// `[flaws]` of a rig file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct FlawsTruth {
+    /// Jitter of the time stamps, standard deviation, s. The samples themselves stay steady.
+    pub stamp_jitter_s: f64,
+    /// So many samples are fetched at once, and stamped at once; 1 is none.
+    pub stamp_burst: u32,
+    /// So many turns by hand have a violent shake in them.
+    pub shake_turns: u32,
+    /// Band of the shake, Hz.
+    pub shake_hz: [f64; 2],
+    /// Shake about each axis, effective value in the middle of the turn.
+    pub shake_mrad: f64,
+    /// Slow settling of a hand after each turn, standard deviation about each axis.
+    pub settle_mrad: f64,
+    /// Length of it, s, or as much of it as there is before the next turn.
+    pub settle_s: f64,
+    /// In so many dwells by hand the unit turns evenly and does not rest.
+    pub turning_rests: u32,
+    /// The rate of that, deg/s, about any axis.
+    pub turning_dps: f64,
+    /// Between so many dwells the biases of the gyros are upset.
+    pub upset_turns: u32,
+    /// By this much, deg/s, along any direction.
+    pub upset_dps: f64,
+    /// Frequency at which the building sways, Hz.
+    pub building_hz: f64,
+    /// Amplitude of its acceleration along both level axes, mg.
+    pub building_mg: f64,
+}
+
+impl Default for FlawsTruth {
+    fn default() -> Self {
+        Self {
+            stamp_jitter_s: 0.0,
+            stamp_burst: 1,
+            shake_turns: 0,
+            shake_hz: [4.0, 6.0],
+            shake_mrad: 250.0,
+            settle_mrad: 0.0,
+            settle_s: 2.0,
+            turning_rests: 0,
+            turning_dps: 5.0,
+            upset_turns: 0,
+            upset_dps: 5.0,
+            building_hz: 0.56,
+            building_mg: 0.0,
+        }
+    }
+}
+
+impl FlawsTruth {
+    /// Refuses what no recording has.
+    pub(crate) fn check(&self) -> Result<(), Refusal> {
+        let size = [0.0, 1000.0];
+        for (key, values, range) in [
+            ("stamp_jitter_s", &[self.stamp_jitter_s][..], [0.0, 1.0]),
+            (
+                "stamp_burst",
+                &[f64::from(self.stamp_burst)],
+                [1.0, 10_000.0],
+            ),
+            ("shake_hz", &self.shake_hz, [0.1, 100.0]),
+            ("shake_mrad", &[self.shake_mrad], [0.0, 3000.0]),
+            ("settle_mrad", &[self.settle_mrad], size),
+            ("settle_s", &[self.settle_s], [0.01, 600.0]),
+            ("turning_dps", &[self.turning_dps], size),
+            ("upset_dps", &[self.upset_dps], size),
+            ("building_hz", &[self.building_hz], [0.0, 100.0]),
+            ("building_mg", &[self.building_mg], size),
+        ] {
+            within(&format!("flaws.{key}"), values, range)?;
+        }
+        Ok(())
+    }
+}
+
+/// Which `count` of `n` things it strikes.
+pub(crate) fn struck(count: u32, n: usize, random: &mut Random) -> Vec<bool> {
+    let mut order: Vec<usize> = (0..n).collect();
+    let mut struck = vec![false; n];
+    for k in 0..n.min(count as usize) {
+        let other = k + (random.uniform() * (n - k) as f64) as usize;
+        order.swap(k, other);
+        struck[order[k]] = true;
+    }
+    struck
+}
+
+/// Any direction, all equally likely.
+pub(crate) fn direction(random: &mut Random) -> Vector {
+    random.attitude().turn([0.0, 0.0, 1.0])
+}
+
+/// Two samples that are fetched together are stamped so far apart, s, or a tenth of a period.
+const FETCH_S: f64 = 1e-4;
+/// No stamp is less behind the one before, s.
+const STAMP_STEP_S: f64 = 1e-6;
+
+/// The flaws that come between the motion and the samples, sample by sample.
+#[derive(Debug, Clone)]
+pub(crate) struct Flaws {
+    truth: FlawsTruth,
+    period_s: f64,
+    jitter: Random,
+    last_stamp_s: f64,
+    /// By the dwell before: what the gyros' biases are upset by, rad/s.
+    upset: Vec<Vector>,
+    last_step: Option<u32>,
+    phase: [f64; 2],
+}
+
+impl Flaws {
+    /// Of a recording with `dwells`, a sample every `period_s`.
+    pub(crate) fn new(truth: &FlawsTruth, dwells: u64, period_s: f64, seed: u64) -> Self {
+        let mut random = Random::new(seed, "upset turns");
+        let turns = (dwells as usize).saturating_sub(1);
+        let struck = struck(truth.upset_turns, turns, &mut random);
+        let size = truth.upset_dps.to_radians();
+        let upset = |s: bool| match s {
+            true => scale(size, direction(&mut random)),
+            false => [0.0; 3],
+        };
+        let upset = struck.into_iter().map(upset).collect();
+        let mut building = Random::new(seed, "building");
+        Self {
+            truth: truth.clone(),
+            period_s,
+            jitter: Random::new(seed, "stamp jitter"),
+            last_stamp_s: f64::NEG_INFINITY,
+            upset,
+            last_step: None,
+            phase: [0; 2].map(|_| TAU * building.uniform()),
+        }
+    }
+
+    /// Adds what the building does to an instant.
+    pub(crate) fn sway(&self, instant: &mut Instant) {
+        if self.truth.building_mg == 0.0 {
+            return;
+        }
+        let motion = &mut instant.motion;
+        let angle = TAU * self.truth.building_hz * motion.t_s;
+        let [east, north] = self
+            .phase
+            .map(|phase| 9.80665e-3 * self.truth.building_mg * (angle + phase).sin());
+        let sway = motion.attitude.inverse().turn([east, north, 0.0]);
+        motion.force = add(motion.force, sway);
+    }
+
+    /// What the sensors take an instant for: an upset gyro shows a rate that is not there.
+    pub(crate) fn felt(&mut self, instant: &Instant) -> Motion {
+        self.last_step = instant.step.or(self.last_step);
+        let before = self.last_step.filter(|_| instant.step.is_none());
+        let upset = before.and_then(|step| self.upset.get(step as usize));
+        Motion {
+            rate: add(instant.motion.rate, upset.copied().unwrap_or_default()),
+            ..instant.motion
+        }
+    }
+
+    /// Time stamp of sample `index`, which was taken at `t_s`. Always later than the one before.
+    pub(crate) fn stamp(&mut self, index: usize, t_s: f64) -> f64 {
+        let mut stamp_s = t_s;
+        let burst = self.truth.stamp_burst as usize;
+        if burst > 1 {
+            let (behind, of_burst) = (index % burst, burst - 1);
+            let fetched_s = t_s + (of_burst - behind) as f64 * self.period_s;
+            let apart_s = FETCH_S.min(0.1 * self.period_s);
+            stamp_s = fetched_s + behind as f64 * apart_s;
+        }
+        if self.truth.stamp_jitter_s > 0.0 {
+            stamp_s += self.truth.stamp_jitter_s * self.jitter.normal();
+            stamp_s = stamp_s.max(self.last_stamp_s + STAMP_STEP_S);
+        }
+        self.last_stamp_s = stamp_s;
+        stamp_s
+    }
+}
