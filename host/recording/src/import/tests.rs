@@ -117,13 +117,10 @@ fn columns_are_chosen_by_position_by_name_or_by_the_names_of_a_recording() {
     for list in [names, "t_s,gyro_x,gyro_y,gyro_z,temp_c"] {
         let (summary, batch, _) = one(text, list).unwrap();
         assert_eq!(summary.skipped.header, 2);
-        assert_eq!((batch.t_s[1], batch.raw[2][1]), (20.0, 6.0));
+        // Ten apart at 100 Hz: milliseconds.
+        assert_eq!((batch.t_s[1], batch.raw[2][1]), (0.02, 6.0));
+        assert_eq!(summary.time[0].unit, Some(Decimal::Millisecond));
         assert!(batch.temp_c[1].is_nan());
-        assert!(
-            summary.warnings[0].contains("--scale t_s"),
-            "{:?}",
-            summary.warnings
-        );
     }
     let bench = Bench::new(&[(
         "a",
@@ -141,7 +138,7 @@ fn time_comes_from_a_column_from_an_index_or_from_the_rate() {
     assert_eq!(batch.t_s, [0.07, 0.09]);
     let bench = Bench::new(&[
         ("a", "1,2,3\n1,2,3\n"),
-        ("b", "0,1,2,3\n20,1,2,3\n41,1,2,3\n60,1,2,3\n"),
+        ("b", "0,1,2,3\n20,1,2,3\n40,1,2,3\n60,1,2,3\n"),
     ]);
     let error = bench.refused(&bench.options(&["a"], &["gyro_x,gyro_y,gyro_z"]));
     assert!(error.contains("give the rate"), "{error}");
@@ -149,7 +146,7 @@ fn time_comes_from_a_column_from_an_index_or_from_the_rate() {
     options.scales = vec!["t_s=0.001".parse().unwrap(), "gyro=2".parse().unwrap()];
     let (_, batch, manifest) = bench.import(&options).unwrap();
     assert_eq!(manifest.sample_rate_hz, 50.0);
-    assert_eq!((batch.t_s[2], batch.raw[2][0]), (0.041, 6.0));
+    assert_eq!((batch.t_s[2], batch.raw[2][0]), (0.04, 6.0));
 }
 
 #[test]
@@ -286,20 +283,77 @@ fn an_interpolation_does_not_bridge_a_long_gap() {
 }
 
 #[test]
-fn a_join_of_unordered_times_is_refused_with_file_and_row() {
-    let good = [0.0, 0.1, 0.2, 0.3];
-    let bad = [0.0, 0.1, 0.1, 0.3];
+fn times_that_go_back_for_good_are_refused_with_file_and_row_and_repeated_rows_are_left_out() {
+    let good = [0.0, 0.1, 0.2, 0.3, 0.4, 0.5];
+    let bad = [10.0, 10.1, 10.2, 0.3, 0.4, 0.5];
     let error = join(&good, &bad).unwrap_err().to_string();
-    assert!(error.contains("g, row 3, column t_s"), "{error}");
-    let error = join(&bad, &good).unwrap_err().to_string();
-    assert!(error.contains("a, row 3, column t_s"), "{error}");
-    let single = one(&timed(&bad), GYR).unwrap().0;
+    assert!(error.contains("g, data row 4, column t_s"), "{error}");
+    let error = one(&timed(&bad), GYR).unwrap_err().to_string();
+    assert!(error.contains("data row 4, column t_s"), "{error}");
+    let twice = [0.0, 0.1, 0.1, 0.2, 0.3, 0.3, 0.4];
+    let (summary, batch, _) = one(&timed(&twice), GYR).unwrap();
+    assert_eq!(summary.time[0].repeated_rows, 2);
+    assert_eq!(batch.t_s, good[..5]);
+    assert_eq!(batch.raw[0], [0.0, 0.2, 0.4, 0.6, 0.8]);
+}
+
+#[test]
+fn a_file_with_nanoseconds_since_1970_has_the_rate_to_all_its_digits() {
+    let row = |i: u64| format!("{},1,2,3\n", 1_403_636_579_763_555_584 + i * 5_000_000);
+    let text: String = (0..2000).map(row).collect();
+    let bench = Bench::new(&[("a", &text)]);
+    let (summary, batch, manifest) = bench.import(&bench.options(&["a"], &[GYR])).unwrap();
+    assert_eq!(manifest.sample_rate_hz, 200.0);
+    assert_eq!(summary.time[0].unit, Some(Decimal::Nanosecond));
+    assert_eq!(summary.time[0].origin_s, 1_403_636_579);
+    assert_eq!(batch.t_s[0], 0.763_555_584);
+    assert!((batch.t_s[1999] - batch.t_s[0] - 9.995).abs() < 1e-12);
+    // The same where somebody has said it, and in seconds with nine decimals.
+    let mut options = bench.options(&["a"], &[GYR]);
+    options.scales = vec!["t_s=1e-9".parse().unwrap()];
+    assert_eq!(bench.import(&options).unwrap().1, batch);
+    let last = batch.t_s[1999];
+    let seconds = |line: &str| format!("{}.{}\n", &line[..10], &line[10..]);
+    let text: String = text.lines().map(seconds).collect();
+    std::fs::write(bench.path("a"), text).unwrap();
+    let (summary, batch, manifest) = bench.import(&bench.options(&["a"], &[GYR])).unwrap();
+    assert_eq!(manifest.sample_rate_hz, 200.0);
+    assert_eq!(summary.time[0].unit, Some(Decimal::Second));
+    assert!((batch.t_s[1999] - last).abs() < 1e-12);
+}
+
+#[test]
+fn two_sensors_with_clocks_of_their_own_are_joined_in_regular_time() {
+    let mut seed = 1_u32;
+    let mut late = || {
+        seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        f64::from(seed >> 8) / f64::from(1 << 24)
+    };
+    // The value is the true time of the sample; the stamps are up to 4 ms late, the rates 100 and 104 Hz.
+    let mut file = |rate: f64| -> String {
+        let row = |i: i32| {
+            let t = f64::from(i) / rate;
+            format!("{:.0} {t} 0 1\n", 1.7e12 + 1e3 * t + 4.0 * late())
+        };
+        (0..2000).map(row).collect()
+    };
+    let bench = Bench::new(&[("a", &file(100.0)), ("g", &file(104.0))]);
+    let (summary, batch, _) = bench
+        .import(&bench.options(&["a", "g"], &[ACC, GYR]))
+        .unwrap();
+    let rates: Vec<f64> = summary.time.iter().map(|time| time.rate_hz).collect();
     assert!(
-        single
-            .warnings
-            .iter()
-            .any(|warning| warning.contains("row 3"))
+        (rates[0] - 100.0).abs() < 2e-3 && (rates[1] - 104.0).abs() < 2e-3,
+        "{rates:?}"
     );
+    assert_eq!(summary.time[0].gaps + summary.time[1].gaps, 0);
+    for (accel, gyro) in batch.raw[3].iter().zip(&batch.raw[0]) {
+        assert!((accel - gyro).abs() < 1e-3, "{accel} {gyro}");
+    }
+    for (i, t) in batch.t_s.iter().enumerate() {
+        let regular = batch.t_s[0] + i as f64 / rates[0];
+        assert!((t - regular).abs() < 1e-6);
+    }
 }
 
 const SESSION: &str = "part,n,x,y,z\nx_a,0,1,0,0\nx_a,1,1,0,0\nx_rot,2,0,0,0\nx_rot,3,0,0,0\n\

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use super::SkippedLines;
 use super::assignment::{ColumnList, Role};
 use super::binary::refuse_binary;
+use super::time::Stamp;
 use crate::cell::{self, Refusal, shorten};
 use crate::columns::Column;
 use crate::csv_file::BOM;
@@ -24,6 +25,8 @@ const LONGEST_LINE: u64 = 1 << 20;
 pub(super) struct Cells {
     /// Numbers in the order of the table's roles; the place of a step holds nothing.
     pub numbers: Vec<f64>,
+    /// Time stamp; its place among the numbers has it rounded.
+    pub stamp: Stamp,
     /// Text of the step.
     pub step: Vec<u8>,
 }
@@ -188,10 +191,14 @@ impl TextTable {
                 cells.numbers.push(f64::NAN);
                 continue;
             }
-            cells.numbers.push(cell::number(cell).map_err(|refusal| {
+            let number = cell::number(cell).map_err(|refusal| {
                 let place = format!("{}, column {}", self.place(line), role.name());
                 Error::new(place, refusal.problem, refusal.remedy)
-            })?);
+            })?;
+            if role == Role::Column(Column::Time) {
+                cells.stamp = Stamp::in_cell(cell, number);
+            }
+            cells.numbers.push(number);
         }
         Ok(())
     }
