@@ -23,9 +23,9 @@ pub(crate) struct ImportArgs {
     ///
     /// Known are t_s, step (numbers or labels), temp_c, gyro_x.., accel_x.., ref_rate_x_dps..,
     /// ref_force_x_mps2.., and sample, an index from which the time follows with --rate-hz.
-    #[arg(long, value_name = "LIST")]
+    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
     columns: Vec<ColumnList>,
-    /// Sample rate, Hz; without it, the inverse of the median time step
+    /// Sample rate, Hz, of files without a time column; of others it is the rate of their time stamps, which this one checks
     #[arg(long)]
     rate_hz: Option<f64>,
     /// Local gravity, m/s²; without it, normal gravity at sea level of --latitude, or 9.80665 and a warning
