@@ -61,6 +61,8 @@ pub enum Argument {
     Sensor,
     /// Serial port.
     Port,
+    /// Topic of a bag.
+    Topic,
 }
 
 /// Result with [`Error`].

@@ -33,7 +33,7 @@ pub use columns::{Column, Columns, RAW_COLUMNS, REFERENCE_COLUMNS};
 pub use growing::Growing;
 pub use import::{
     ColumnList, Decimal, ImportOptions, ImportSummary, Jitter, Role, Scale, SkippedLines,
-    TimeSummary, import,
+    TimeSummary, import, is_bag,
 };
 pub use manifest::read_text;
 pub use manifest::{Format, MANIFEST_FILE, Manifest, Rails, RawUnit, Reference, Source};

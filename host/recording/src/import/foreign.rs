@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use super::SkippedLines;
 use super::assignment::{ColumnList, Role, Scale};
 use super::parquet_table::ParquetTable;
+use super::ros::{ImuTopic, is_bag};
 use super::step_labels::StepLabels;
 use super::text_table::{Cells, TextTable};
 use super::time::{Clock, Stamp, Times};
@@ -43,6 +44,8 @@ pub(super) struct HowToRead<'a> {
     pub list: Option<&'a ColumnList>,
     pub separator: Option<Separator>,
     pub scales: &'a [Scale],
+    /// Topic of a bag.
+    pub topic: Option<&'a str>,
     /// Sample rate, where it was given or is known.
     pub rate_hz: Option<f64>,
 }
@@ -68,6 +71,7 @@ pub(super) struct ForeignFile {
 enum Table {
     Text(TextTable),
     Parquet(ParquetTable),
+    Bag(ImuTopic),
 }
 
 /// Where the time of a row comes from.
@@ -87,13 +91,21 @@ impl ForeignFile {
         let parquet = path
             .extension()
             .is_some_and(|e| e.eq_ignore_ascii_case("parquet"));
+        if is_bag(path) && how.list.is_some() {
+            let problem = "a list of columns is given for a bag, whose messages have their own";
+            return Err(
+                Error::new(path.display(), problem, "leave it out").about(Argument::Columns)
+            );
+        }
         let table = match parquet {
+            _ if is_bag(path) => Table::Bag(ImuTopic::open(path, how.topic)?),
             true => Table::Parquet(ParquetTable::open(path, how.list)?),
             false => Table::Text(TextTable::open(path, how.list, how.separator)?),
         };
         let roles = match &table {
             Table::Text(table) => table.roles(),
             Table::Parquet(table) => table.roles(),
+            Table::Bag(topic) => topic.roles(),
         };
         let at = |role| roles.iter().position(|&other| other == role);
         let needs_rate = || {
@@ -162,7 +174,7 @@ impl ForeignFile {
     pub fn skipped(&self) -> SkippedLines {
         match &self.table {
             Table::Text(table) => table.skipped,
-            Table::Parquet(_) => SkippedLines::default(),
+            Table::Parquet(_) | Table::Bag(_) => SkippedLines::default(),
         }
     }
 
@@ -171,6 +183,7 @@ impl ForeignFile {
         match &self.table {
             Table::Text(table) => &table.warnings,
             Table::Parquet(table) => &table.warnings,
+            Table::Bag(_) => &[],
         }
     }
 
@@ -179,6 +192,7 @@ impl ForeignFile {
         match &self.table {
             Table::Text(table) => table.progress(),
             Table::Parquet(table) => table.progress(),
+            Table::Bag(topic) => topic.progress(),
         }
     }
 
@@ -211,6 +225,7 @@ impl ForeignFile {
         let number = match &mut self.table {
             Table::Text(table) => table.next(&mut self.cells)?,
             Table::Parquet(table) => table.next(&mut self.cells)?,
+            Table::Bag(topic) => topic.next(&mut self.cells),
         };
         let Some(number) = number else {
             return Ok(false);

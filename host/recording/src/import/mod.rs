@@ -7,6 +7,7 @@ mod inputs;
 mod join;
 mod options;
 mod parquet_table;
+mod ros;
 mod step_labels;
 #[cfg(test)]
 mod tests;
@@ -18,6 +19,7 @@ use std::path::Path;
 
 pub use assignment::{ColumnList, Role, Scale};
 pub use options::ImportOptions;
+pub use ros::is_bag;
 pub use time::{Decimal, Jitter, TimeSummary};
 
 use foreign::{ForeignFile, HowToRead, Row};

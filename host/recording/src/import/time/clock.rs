@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use super::super::assignment::Scale;
 use super::super::foreign::{ForeignFile, HowToRead, Row};
+use super::super::ros::is_bag;
 use super::regular::{Gap, Irregular, Jitter, Regular};
 use super::stamp::{Decimal, Stamp, Unit};
 use crate::columns::Column;
@@ -110,7 +111,7 @@ impl Times {
         }
         let problem = |irregular| refused(path, irregular);
         let coarse = Regular::step(&stamps.since_first).ok_or_else(|| problem(Irregular::Short))?;
-        let given = how.time_factor();
+        let given = how.time_factor(path);
         let unit = match given {
             Some(factor) => Unit::of_factor(factor),
             None => Unit::Decimal(Unit::recognise(stamps.first.value, coarse, how.rate_hz)),
@@ -230,7 +231,12 @@ impl Clock {
 
 impl HowToRead<'_> {
     /// Seconds in the unit of the stamps, where somebody has said so or the names are those of a recording.
-    fn time_factor(&self) -> Option<f64> {
-        Scale::given(self.scales, Column::Time).or_else(|| self.list.is_none().then_some(1.0))
+    fn time_factor(&self, path: &Path) -> Option<f64> {
+        let own = match (is_bag(path), self.list) {
+            (true, _) => Some(1e-9),
+            (false, None) => Some(1.0),
+            (false, Some(_)) => None,
+        };
+        Scale::given(self.scales, Column::Time).or(own)
     }
 }
