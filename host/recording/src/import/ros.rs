@@ -17,6 +17,9 @@ use crate::in_order::broke_down;
 /// Bytes that are read at a time.
 const PIECE: usize = 1 << 18;
 
+/// Longest record or chunk of an MCAP file, bytes. A damaged length would be taken from memory first.
+const LONGEST_RECORD: usize = 1 << 30;
+
 /// Whether a file is one of these, by its name.
 pub fn is_bag(path: &Path) -> bool {
     let ending = path
@@ -241,11 +244,12 @@ fn merge(found: &mut Found) {
 
 fn read_mcap(path: &Path) -> Result<Found> {
     use mcap::records::Record;
-    use mcap::sans_io::{LinearReadEvent, LinearReader};
+    use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
     let io = |error: std::io::Error| Error::io(path, &error);
     let damaged = |error: mcap::McapError| damaged(path, &error);
     let mut file = File::open(path).map_err(io)?;
-    let mut reader = LinearReader::new();
+    let options = LinearReaderOptions::default().with_record_length_limit(LONGEST_RECORD);
+    let mut reader = LinearReader::new_with_options(options);
     let mut found = Found::default();
     let mut schemas: BTreeMap<u16, String> = BTreeMap::new();
     while let Some(event) = reader.next_event() {
