@@ -28,6 +28,7 @@ fn flag(argument: Argument) -> Option<&'static str> {
         Argument::Table => "--table",
         Argument::Sensor => "--sensor",
         Argument::Port => "--port",
+        Argument::Topic => "--topic",
         // An argument that this version of the command has no flag for.
         _ => return None,
     })

@@ -20,7 +20,7 @@ pub mod report;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use cmd::{allan, design, device, diagnose, fit, import, record, verify};
+use cmd::{allan, apply, design, device, diagnose, fit, import, record, verify};
 
 /// Calibration of inertial units made of analog MEMS sensors.
 ///
@@ -41,6 +41,8 @@ enum Command {
     Fit(fit::FitArgs),
     /// Judge a calibration by another recording
     Verify(verify::VerifyArgs),
+    /// Write a recording compensated by a calibration
+    Apply(apply::ApplyArgs),
     /// Find the effect behind the residual of a calibrated unit
     Diagnose(diagnose::DiagnoseArgs),
     /// Design the experiment: which attitudes and rates, how many, for how long
@@ -61,6 +63,7 @@ pub fn run() -> ExitCode {
         Command::Import(args) => import::run(args),
         Command::Fit(args) => fit::run(&args),
         Command::Verify(args) => verify::run(&args),
+        Command::Apply(args) => apply::run(&args),
         Command::Diagnose(args) => diagnose::run(&args),
         Command::Design(args) => design::run(&args),
         Command::Allan(args) => allan::run(&args),

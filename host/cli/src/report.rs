@@ -5,6 +5,7 @@
 
 mod allan;
 pub mod allan_plot;
+mod apply;
 mod design;
 mod device;
 mod diagnosis;
@@ -15,6 +16,7 @@ mod text;
 mod verify;
 
 pub use allan::allan_text;
+pub use apply::apply_text;
 pub use design::{comparison_text, design_text, next_text};
 pub use device::{
     check_text, counters_text, download_text, info_text, kalman_text, record_text, self_test_text,

@@ -17,8 +17,12 @@ const BLOCK_S: f64 = 0.1;
 const BLOCK_MIN_ROWS: usize = 4;
 /// A time step this many times the sample period is a gap.
 const GAP_PERIODS: f64 = 1.5;
-/// Gaps in more than this share of all rows are no gaps but another rate.
+/// Odd time steps in more than this share of all rows are no gaps but another rate.
 const GAP_SHARE: f64 = 0.02;
+/// The same of steps of whole periods: so much a radio may lose, of which an import has made the time regular.
+const LOSS_SHARE: f64 = 0.2;
+/// A step this near to a whole number of periods is one.
+const WHOLE: f64 = 0.1;
 /// After this many rows it is looked at whether blocks condense anything at all: what follows could fill the memory.
 const LOOK_AFTER: u64 = 100_000;
 
@@ -308,6 +312,8 @@ struct Steps {
     regular: u64,
     regular_s: f64,
     longer: u64,
+    /// Of `longer`, those of a whole number of periods.
+    whole: u64,
     missing_s: f64,
     shorter: u64,
     first_odd: Option<(u64, f64)>,
@@ -440,6 +446,8 @@ impl Condenser {
         let steps = &mut self.steps;
         if dt > GAP_PERIODS * self.period_s {
             steps.longer += 1;
+            let periods = dt / self.period_s;
+            steps.whole += u64::from((periods - periods.round()).abs() < WHOLE);
             steps.missing_s += dt - self.period_s;
             steps.first_odd.get_or_insert((row, dt));
             return true;
@@ -514,8 +522,10 @@ impl Condenser {
     /// Refuses time steps that mostly or often do not fit the rate.
     fn check_rate(&self) -> Result<()> {
         let steps = &self.steps;
-        let share = (steps.longer + steps.shorter) as f64 / (steps.regular + steps.longer) as f64;
-        if share <= GAP_SHARE {
+        let all = (steps.regular + steps.longer) as f64;
+        let share = (steps.longer + steps.shorter) as f64 / all;
+        let odd = (steps.longer - steps.whole + steps.shorter) as f64 / all;
+        if odd <= GAP_SHARE && share <= LOSS_SHARE {
             return Ok(());
         }
         let (row, dt) = steps.first_odd.unwrap_or((0, f64::NAN));

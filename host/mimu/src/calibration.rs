@@ -304,6 +304,14 @@ impl Calibration {
         on_device::core_effects(self)
     }
 
+    /// The same where a sensor that is not calibrated has a stand-in among `models`.
+    pub(crate) fn effects_of_models<T: RealField + Copy, const N: usize>(
+        &self,
+        models: &[Affine<f64>; 2],
+    ) -> Result<Effects<T, N>> {
+        on_device::effects_of_models(self, models)
+    }
+
     /// The table of `sensor`.
     pub fn table(&self, sensor: Sensor) -> Option<&TriadTable> {
         match sensor {

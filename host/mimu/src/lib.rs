@@ -12,6 +12,7 @@
 //! | [`triad`]       | calibration of one triad: both directions, covariances, physical quantities   |
 //! | [`mod@fit`]     | both triads, judged on what they have not seen; what cannot be right is refused |
 //! | [`calibration`], [`verify`] | the file, and judging it by another recording                     |
+//! | [`mod@apply`]   | the recording that it compensates                                             |
 //! | [`diagnose`]    | the effect behind a residual: found, added, proved on other data              |
 //! | [`design`]      | experiments: which attitudes and rates, how many, for how long                |
 //! | [`next_experiment`] | what to record next, where a diagnosis leaves something open              |
@@ -61,6 +62,7 @@
 //! ```
 
 pub mod allan;
+pub mod apply;
 pub mod blocks;
 pub mod calibration;
 pub mod design;

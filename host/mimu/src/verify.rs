@@ -11,8 +11,8 @@ use crate::prepared::{Prepared, si_covariance};
 use crate::quantity::Figure;
 use crate::quantity::Sensor;
 use crate::triad::Forward;
-use mimu_recording::Reference;
 use mimu_recording::error::{Error, Result};
+use mimu_recording::{Manifest, Reference};
 
 /// What a calibration does to one triad of a recording. Figures as in [`Figure`].
 #[derive(Debug, Clone)]
@@ -52,23 +52,7 @@ pub fn verify(prepared: &Prepared, calibration: &Calibration) -> Result<Verifica
     let manifest = &prepared.manifest;
     let mut warnings = prepared.condensed.warnings.clone();
     warnings.extend(prepared.dwells.warnings.iter().cloned());
-    if calibration.recording.raw_unit != manifest.raw_unit {
-        let problem = format!(
-            "its raw unit is {}, the calibration is for {}",
-            manifest.raw_unit, calibration.recording.raw_unit
-        );
-        return Err(Error::new(
-            &prepared.place,
-            problem,
-            "import it in the other unit, or use the calibration of this unit",
-        ));
-    }
-    if calibration.device != manifest.device {
-        warnings.push(format!(
-            "the calibration is for {:?}, the recording of {:?}",
-            calibration.device, manifest.device
-        ));
-    }
+    warnings.extend(check_unit(calibration, manifest, &prepared.place)?);
     if calibration.recording.sha256 == prepared.condensed.sha256 {
         warnings.push("this is the recording that the calibration was made from: the figures say nothing about new data".into());
     }
@@ -119,6 +103,32 @@ pub fn verify(prepared: &Prepared, calibration: &Calibration) -> Result<Verifica
         ));
     }
     Ok(Verification { sensors, warnings })
+}
+
+/// Refuses a calibration for another raw unit; what to say of one of another device. `place` is the recording.
+pub(crate) fn check_unit(
+    calibration: &Calibration,
+    manifest: &Manifest,
+    place: &str,
+) -> Result<Option<String>> {
+    if calibration.recording.raw_unit != manifest.raw_unit {
+        let problem = format!(
+            "its raw unit is {}, the calibration is for {}",
+            manifest.raw_unit, calibration.recording.raw_unit
+        );
+        return Err(Error::new(
+            place,
+            problem,
+            "import it in the other unit, or use the calibration of this unit",
+        ));
+    }
+    let other = calibration.device != manifest.device;
+    Ok(other.then(|| {
+        format!(
+            "the calibration is for {:?}, the recording of {:?}",
+            calibration.device, manifest.device
+        )
+    }))
 }
 
 /// The recording without the effects of the calibration, if it has any.

@@ -52,11 +52,16 @@ pub(super) fn number(cell: &[u8]) -> Result<f64, Refusal> {
             format!("{} is not a number", shorten(cell)),
             "write decimal points, not commas",
         )),
-        Err(_) => Err(Refusal::new(
-            format!("{} is not a number", shorten(cell)),
-            "correct the cell, or leave it empty where nothing was measured",
-        )),
+        Err(_) => Err(no_number(cell)),
     }
+}
+
+/// What to say about a cell that holds something else.
+pub(super) fn no_number(cell: &[u8]) -> Refusal {
+    Refusal::new(
+        format!("{} is not a number", shorten(cell)),
+        "correct the cell, or leave it empty where nothing was measured",
+    )
 }
 
 /// What to say about a value that is no reading, `shown` as in the file.

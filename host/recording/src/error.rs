@@ -63,6 +63,8 @@ pub enum Argument {
     Sensor,
     /// Serial port.
     Port,
+    /// Topic of a bag.
+    Topic,
 }
 
 /// Result with [`Error`].

@@ -31,7 +31,10 @@ mod writer;
 pub use batch::Batch;
 pub use columns::{Column, Columns, RAW_COLUMNS, REFERENCE_COLUMNS};
 pub use growing::Growing;
-pub use import::{ColumnList, ImportOptions, ImportSummary, Role, Scale, SkippedLines, import};
+pub use import::{
+    ColumnList, Decimal, ImportOptions, ImportSummary, Jitter, Role, Scale, SkippedLines,
+    TimeSummary, import, is_bag,
+};
 pub use manifest::read_text;
 pub use manifest::{Format, MANIFEST_FILE, Manifest, Rails, RawUnit, Reference, Source};
 pub use reader::{ReadSummary, Recording};

@@ -45,6 +45,8 @@ pub(super) struct ParquetFile {
 pub(super) struct Leaf {
     index: usize,
     unsigned: bool,
+    /// INT64 with a sign.
+    long: bool,
     text: bool,
 }
 
@@ -167,6 +169,7 @@ impl ParquetFile {
         Ok(Leaf {
             index,
             unsigned,
+            long: !unsigned && column.physical_type() == Physical::INT64,
             text,
         })
     }
@@ -379,6 +382,33 @@ impl Cursor {
                 })
             }
             _ => Err(ParquetError::General("the column holds no numbers".into())),
+        })
+    }
+
+    /// Appends the next `count` values, and of a column of INT64 that are not unsigned also undiminished, `None` for null.
+    pub fn read_whole(
+        &mut self,
+        count: usize,
+        values: &mut Vec<f64>,
+        wholes: &mut Vec<Option<i64>>,
+    ) -> std::result::Result<(), String> {
+        if !self.leaf.long {
+            return self.read(count, values);
+        }
+        self.advance(count, |reader, levels, count| {
+            let ColumnReader::Int64ColumnReader(reader) = reader else {
+                return Err(ParquetError::General("the column holds no INT64".into()));
+            };
+            let (start, mut stored) = (wholes.len(), Vec::with_capacity(count));
+            let (rows, _, _) = reader.read_records(count, Some(levels), None, &mut stored)?;
+            wholes.extend(stored.into_iter().map(Some));
+            spread(wholes, start, rows, levels, None);
+            values.extend(
+                wholes[start..]
+                    .iter()
+                    .map(|v| v.map_or(f64::NAN, |v| v as f64)),
+            );
+            Ok(rows)
         })
     }
 

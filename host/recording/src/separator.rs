@@ -22,8 +22,8 @@ pub enum Separator {
 impl Separator {
     /// Finds the separator that cuts most of `lines` alike, into two cells at least.
     pub(crate) fn detect(lines: &[&[u8]]) -> Separator {
-        // Whitespace last, as blanks may follow any other; comma after semicolon, as numbers with
-        // decimal commas stand between semicolons, and are then refused in plain words.
+        // Whitespace last, as blanks may follow any other; comma after semicolon, as numbers with decimal commas stand between
+        // semicolons, and not at all where they stand between blanks.
         let candidates = [
             Separator::Tab,
             Separator::Semicolon,
@@ -32,7 +32,11 @@ impl Separator {
         ];
         let mut record = csv::ByteRecord::new();
         let mut best = (0, Separator::Comma);
+        let decimal = lines.iter().filter(|line| has_decimal_commas(line)).count();
         for candidate in candidates {
+            if candidate == Separator::Comma && 2 * decimal > lines.len() {
+                continue;
+            }
             let mut widths: Vec<usize> = lines
                 .iter()
                 .map(|line| {
@@ -86,6 +90,23 @@ impl Separator {
     }
 }
 
+/// Whether a line has words between blanks, each with one comma between digits or none, and one at all.
+fn has_decimal_commas(line: &[u8]) -> bool {
+    let mut words = line
+        .split(u8::is_ascii_whitespace)
+        .filter(|word| !word.is_empty());
+    let decimal = |word: &[u8]| {
+        let mut parts = word.split(|&byte| byte == b',');
+        let ends = [
+            parts.next().and_then(<[u8]>::last),
+            parts.next().and_then(<[u8]>::first),
+        ];
+        let digits = ends.iter().flatten().all(|byte| byte.is_ascii_digit());
+        digits && ends[0].is_some() && parts.next().is_none() && !word.ends_with(b",")
+    };
+    line.contains(&b',') && words.clone().count() > 1 && words.all(decimal)
+}
+
 impl FromStr for Separator {
     type Err = Error;
 
@@ -128,6 +149,8 @@ mod tests {
             ),
             (vec!["1.0, 2.0, 3.0", "1.0, 2.0, 3.0"], Separator::Comma),
             (vec!["1,5;2,5;3", "1,5;2,5;3"], Separator::Semicolon),
+            (vec!["1,5 2,5 -3", "1,5  2,5e1 3"], Separator::Whitespace),
+            (vec!["1, 2,3", "1, 2,5"], Separator::Comma),
             (vec!["1\t2\t3", "1\t\t3"], Separator::Tab),
             (vec!["  1.0e0   2 3", " 4 5 6"], Separator::Whitespace),
         ] {

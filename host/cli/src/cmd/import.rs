@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use mimu::quantity::normal_gravity;
-use mimu_recording::error::Result;
+use mimu_recording::error::{Error, Result};
 use mimu_recording::{
-    ColumnList, ImportOptions, RawUnit, Reference, SampleFormat, Scale, Separator, import,
+    ColumnList, ImportOptions, RawUnit, Reference, SampleFormat, Scale, Separator, import, is_bag,
 };
 
 use crate::arguments::JsonArgs;
@@ -15,7 +15,7 @@ use crate::report;
 
 #[derive(Args)]
 pub(crate) struct ImportArgs {
-    /// Text files (any separator) or Parquet; the later ones are joined onto the times of the first
+    /// Text files (any separator), Parquet, ROS 1 bags or MCAP; the later ones are joined onto the times of the first
     #[arg(required = true)]
     files: Vec<PathBuf>,
     /// Columns of a file from the left (`t_s,accel_x,-`; `-` skips one), or by the names in its header
@@ -23,17 +23,20 @@ pub(crate) struct ImportArgs {
     ///
     /// Known are t_s, step (numbers or labels), temp_c, gyro_x.., accel_x.., ref_rate_x_dps..,
     /// ref_force_x_mps2.., and sample, an index from which the time follows with --rate-hz.
-    #[arg(long, value_name = "LIST")]
+    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
     columns: Vec<ColumnList>,
-    /// Sample rate, Hz; without it, the inverse of the median time step
+    /// Sample rate, Hz, of files without a time column; of others it is the rate of their time stamps, which this one checks
     #[arg(long)]
     rate_hz: Option<f64>,
     /// Local gravity, m/s²; without it, normal gravity at sea level of --latitude, or 9.80665 and a warning
     #[arg(long)]
     gravity: Option<f64>,
-    /// Unit of the raw columns, after --scale: V, count or SI (rad/s and m/s²)
+    /// Unit of the raw columns, after --scale: V, count or SI (rad/s and m/s²); bags have SI without it
     #[arg(long, value_name = "UNIT")]
-    raw_unit: RawUnit,
+    raw_unit: Option<RawUnit>,
+    /// Topic of a bag with sensor_msgs/Imu; without it, the only one
+    #[arg(long)]
+    topic: Option<String>,
     /// What is known of the input: table (ref_ columns or --inputs) or gravity (its size, at rest)
     #[arg(long)]
     reference: Reference,
@@ -47,6 +50,9 @@ pub(crate) struct ImportArgs {
     #[arg(long, allow_negative_numbers = true)]
     latitude: Option<f64>,
     /// CSV with the known input of each step: step, ref_rate_x_dps.., ref_force_x_mps2.., turn_x_deg..
+    ///
+    /// One row for each step of the column step, by its number or label; what is not known stays empty:
+    /// `step,turn_x_deg,ref_force_x_mps2`, then `face_up,,9.81` and `about_x,360,`.
     #[arg(long, value_name = "FILE")]
     inputs: Option<PathBuf>,
     /// Separator of text files: comma, semicolon, tab or space; found out without it
@@ -75,7 +81,16 @@ pub(crate) fn run(args: ImportArgs) -> Result<()> {
         (None, None) if args.reference == Reference::Table => (9.80665, None),
         (None, None) => (9.80665, Some("gravity is taken to be 9.80665 m/s²; it ranges from 9.78 at the equator to 9.83 at the poles, and every scale factor of the accelerometer with it: give --gravity or --latitude".to_string())),
     };
+    let bags = args.files.iter().all(|file| is_bag(file));
+    let raw_unit = args
+        .raw_unit
+        .or(bags.then_some(RawUnit::Si))
+        .ok_or_else(|| {
+            let remedy = "give --raw-unit: V, count or SI (rad/s and m/s²)";
+            Error::new("import", "the unit of the readings is not known", remedy)
+        })?;
     let options = ImportOptions {
+        topic: args.topic,
         columns: args.columns,
         separator: args.separator,
         rate_hz: args.rate_hz,
@@ -85,7 +100,7 @@ pub(crate) fn run(args: ImportArgs) -> Result<()> {
         inputs: args.inputs,
         format: args.format,
         replace: args.replace,
-        ..ImportOptions::new(args.files, gravity, args.raw_unit, args.reference)
+        ..ImportOptions::new(args.files, gravity, raw_unit, args.reference)
     };
     let inputs: Vec<&Path> = options
         .files

@@ -1,6 +1,7 @@
 //! The subcommands, one a file: each a struct of arguments and a `run`.
 
 pub(crate) mod allan;
+pub(crate) mod apply;
 pub(crate) mod design;
 pub(crate) mod device;
 pub(crate) mod diagnose;

@@ -2,8 +2,8 @@
 
 use std::fmt::Write as _;
 
-use mimu::quantity::plural;
-use mimu_recording::ImportSummary;
+use mimu::quantity::{plural, significant};
+use mimu_recording::{ImportSummary, TimeSummary};
 
 use crate::report::text::warn;
 
@@ -17,6 +17,9 @@ pub fn import_text(summary: &ImportSummary) -> String {
         plural(summary.rows, "row"),
         summary.sample_rate_hz
     );
+    for time in &summary.time {
+        let _ = writeln!(out, "  {}: {}", time.file, time_text(time));
+    }
     let skipped = summary.skipped;
     let counts = [
         (skipped.header, "header line", "skipped"),
@@ -45,5 +48,43 @@ pub fn import_text(summary: &ImportSummary) -> String {
         }
     }
     warn(&mut out, summary.warnings.iter());
+    out
+}
+
+/// What the time stamps of a file have shown.
+fn time_text(time: &TimeSummary) -> String {
+    let mut out = match (time.unit, time.recognised) {
+        (Some(unit), true) => format!("times taken for {unit}"),
+        (Some(unit), false) => format!("times in {unit}"),
+        (None, _) => "times scaled".into(),
+    };
+    if time.origin_s != 0 {
+        let _ = write!(out, " counted from {} s", time.origin_s);
+    }
+    let _ = write!(out, ", {} Hz; ", time.rate_hz);
+    if time.stamps_kept {
+        out += "the stamps are kept";
+    } else {
+        let [rms, max] = [time.jitter.rms_s, time.jitter.max_s].map(|s| significant(1e3 * s));
+        let _ = write!(
+            out,
+            "the stamps are off by {rms} ms rms, {max} ms at most, and the time is that of the count of samples"
+        );
+    }
+    if time.gaps > 0 {
+        let _ = write!(
+            out,
+            "; {} in {}",
+            plural(time.missing, "missing sample"),
+            plural(time.gaps, "gap")
+        );
+    }
+    if time.repeated_rows > 0 {
+        let _ = write!(
+            out,
+            "; {} left out as the same as the one before",
+            plural(time.repeated_rows, "row")
+        );
+    }
     out
 }

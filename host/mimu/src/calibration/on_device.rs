@@ -1,6 +1,7 @@
 //! Effects in the words of the device: the bytes that it stores and what the PC compares it with are both made of these.
 
 use mimu_core::RealField;
+use mimu_core::compensation::Affine;
 use mimu_core::effects::{
     Effect as DeviceEffect, Effects, Refused, Sensor as DeviceSensor, Variable as DeviceVariable,
 };
@@ -161,9 +162,17 @@ pub(super) fn core_effects<T: RealField + Copy, const N: usize>(
             Error::new(&place, problem, "calibrate both sensors")
         })
     };
-    let [gyro, accel] = [model(Sensor::Gyro)?, model(Sensor::Accel)?];
+    effects_of_models(calibration, &[model(Sensor::Gyro)?, model(Sensor::Accel)?])
+}
+
+/// The same for a unit with these inverse models.
+pub(super) fn effects_of_models<T: RealField + Copy, const N: usize>(
+    calibration: &Calibration,
+    [gyro, accel]: &[Affine<f64>; 2],
+) -> Result<Effects<T, N>> {
+    let place = format!("calibration of {:?}", calibration.device);
     let singular = || Error::new(&place, "C is singular", "fit the recording again");
-    let mut all = Effects::new(&gyro, &accel).ok_or_else(singular)?;
+    let mut all = Effects::new(gyro, accel).ok_or_else(singular)?;
     for removed in calibration.effects() {
         let refuse = |problem: String, remedy: &str| {
             let id = removed.candidate.id();

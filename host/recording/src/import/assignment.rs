@@ -140,6 +140,12 @@ impl Scale {
         }
     }
 
+    /// Product of the factors for `column`, if there is one.
+    pub(super) fn given(scales: &[Scale], column: Column) -> Option<f64> {
+        let any = scales.iter().any(|scale| scale.applies_to(column));
+        any.then(|| Self::product(scales, column))
+    }
+
     /// Product of the factors that apply to `column`.
     pub(super) fn product(scales: &[Scale], column: Column) -> f64 {
         let applicable = scales.iter().filter(|scale| scale.applies_to(column));

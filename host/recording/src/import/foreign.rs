@@ -5,26 +5,37 @@ use std::path::{Path, PathBuf};
 use super::SkippedLines;
 use super::assignment::{ColumnList, Role, Scale};
 use super::parquet_table::ParquetTable;
+use super::ros::{ImuTopic, is_bag};
 use super::step_labels::StepLabels;
 use super::text_table::{Cells, TextTable};
+use super::time::{Clock, Stamp, Times};
 use crate::cell::{is_reading, no_reading, no_time};
 use crate::columns::Column;
 use crate::error::{Argument, Error, Result};
 use crate::separator::Separator;
-
-/// How many time steps the sample period is the median of.
-const STEPS_FOR_PERIOD: usize = 100_000;
 
 /// One row in the recording's units.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct Row {
     /// Line of a text file, number of the row in a Parquet file; from 1.
     pub number: u64,
+    /// 0 where the rows are still to be looked through for the time that their stamps stand for.
     pub t_s: f64,
+    /// As in the file; not a number where it has none.
+    pub stamp: Stamp,
     /// -1 where the file has no steps.
     pub step: i32,
     /// In the order of [`ForeignFile::columns`].
     pub values: Vec<f64>,
+}
+
+impl Row {
+    /// Whether it says the same as `other` but for its number.
+    pub fn repeats(&self, other: &Row) -> bool {
+        // Empty cells are alike, though not equal.
+        let alike = |(a, b): (&f64, &f64)| a == b || a.is_nan() && b.is_nan();
+        self.step == other.step && self.values.iter().zip(&other.values).all(alike)
+    }
 }
 
 /// How to read a foreign file.
@@ -33,6 +44,8 @@ pub(super) struct HowToRead<'a> {
     pub list: Option<&'a ColumnList>,
     pub separator: Option<Separator>,
     pub scales: &'a [Scale],
+    /// Topic of a bag.
+    pub topic: Option<&'a str>,
     /// Sample rate, where it was given or is known.
     pub rate_hz: Option<f64>,
 }
@@ -43,7 +56,10 @@ pub(super) struct ForeignFile {
     path: PathBuf,
     table: Table,
     cells: Cells,
-    clock: Clock,
+    source: TimeSource,
+    /// The time behind its stamps, once that is known.
+    clock: Option<Clock>,
+    before: Row,
     /// Position among the cells, column and factor.
     values: Vec<(usize, Column, f64)>,
     has_step: bool,
@@ -55,13 +71,14 @@ pub(super) struct ForeignFile {
 enum Table {
     Text(TextTable),
     Parquet(ParquetTable),
+    Bag(ImuTopic),
 }
 
 /// Where the time of a row comes from.
 #[derive(Debug, Clone, Copy)]
-enum Clock {
-    /// Cell, and factor to seconds.
-    Column(usize, f64),
+enum TimeSource {
+    /// A cell with its stamp.
+    Stamp,
     /// Cell with a running number, and the sample rate.
     Sample(usize, f64),
     /// Count of rows, and the sample rate.
@@ -74,13 +91,21 @@ impl ForeignFile {
         let parquet = path
             .extension()
             .is_some_and(|e| e.eq_ignore_ascii_case("parquet"));
+        if is_bag(path) && how.list.is_some() {
+            let problem = "a list of columns is given for a bag, whose messages have their own";
+            return Err(
+                Error::new(path.display(), problem, "leave it out").about(Argument::Columns)
+            );
+        }
         let table = match parquet {
+            _ if is_bag(path) => Table::Bag(ImuTopic::open(path, how.topic)?),
             true => Table::Parquet(ParquetTable::open(path, how.list)?),
             false => Table::Text(TextTable::open(path, how.list, how.separator)?),
         };
         let roles = match &table {
             Table::Text(table) => table.roles(),
             Table::Parquet(table) => table.roles(),
+            Table::Bag(topic) => topic.roles(),
         };
         let at = |role| roles.iter().position(|&other| other == role);
         let needs_rate = || {
@@ -93,10 +118,10 @@ impl ForeignFile {
                 .about(Argument::SampleRate)
             })
         };
-        let clock = match (at(Role::Column(Column::Time)), at(Role::Sample)) {
-            (Some(cell), _) => Clock::Column(cell, Scale::product(how.scales, Column::Time)),
-            (None, Some(cell)) => Clock::Sample(cell, needs_rate()?),
-            (None, None) => Clock::Rows(needs_rate()?),
+        let source = match (at(Role::Column(Column::Time)), at(Role::Sample)) {
+            (Some(_), _) => TimeSource::Stamp,
+            (None, Some(cell)) => TimeSource::Sample(cell, needs_rate()?),
+            (None, None) => TimeSource::Rows(needs_rate()?),
         };
         let numbers = roles
             .iter()
@@ -111,7 +136,9 @@ impl ForeignFile {
             has_step: at(Role::Column(Column::Step)).is_some(),
             table,
             cells: Cells::default(),
-            clock,
+            source,
+            clock: None,
+            before: Row::default(),
             labels: StepLabels::default(),
             rows: 0,
         })
@@ -134,14 +161,20 @@ impl ForeignFile {
 
     /// Whether the file itself tells the time.
     pub fn has_time(&self) -> bool {
-        matches!(self.clock, Clock::Column(..))
+        matches!(self.source, TimeSource::Stamp)
+    }
+
+    /// The file with the time that its stamps stand for; no row of it has been read.
+    pub fn with_times(mut self, times: Times) -> Self {
+        self.clock = Some(Clock::new(times));
+        self
     }
 
     /// Lines that held no row, so far.
     pub fn skipped(&self) -> SkippedLines {
         match &self.table {
             Table::Text(table) => table.skipped,
-            Table::Parquet(_) => SkippedLines::default(),
+            Table::Parquet(_) | Table::Bag(_) => SkippedLines::default(),
         }
     }
 
@@ -150,6 +183,7 @@ impl ForeignFile {
         match &self.table {
             Table::Text(table) => &table.warnings,
             Table::Parquet(table) => &table.warnings,
+            Table::Bag(_) => &[],
         }
     }
 
@@ -158,6 +192,7 @@ impl ForeignFile {
         match &self.table {
             Table::Text(table) => table.progress(),
             Table::Parquet(table) => table.progress(),
+            Table::Bag(topic) => topic.progress(),
         }
     }
 
@@ -168,23 +203,48 @@ impl ForeignFile {
 
     /// Reads the next row; `false` at the end.
     pub fn next(&mut self, row: &mut Row) -> Result<bool> {
+        loop {
+            if !self.read(row)? {
+                return Ok(false);
+            }
+            let Some(clock) = &mut self.clock else {
+                return Ok(true);
+            };
+            if clock.times().drops_repeats {
+                if self.before.stamp == row.stamp && self.before.repeats(row) {
+                    continue;
+                }
+                self.before.clone_from(row);
+            }
+            row.t_s = clock.next(&row.stamp);
+            return Ok(true);
+        }
+    }
+
+    fn read(&mut self, row: &mut Row) -> Result<bool> {
         let number = match &mut self.table {
             Table::Text(table) => table.next(&mut self.cells)?,
             Table::Parquet(table) => table.next(&mut self.cells)?,
+            Table::Bag(topic) => topic.next(&mut self.cells),
         };
         let Some(number) = number else {
             return Ok(false);
         };
         row.number = number;
-        row.t_s = match self.clock {
-            Clock::Column(cell, factor) => self.cells.numbers[cell] * factor,
-            Clock::Sample(cell, rate) => self.cells.numbers[cell] / rate,
-            Clock::Rows(rate) => self.rows as f64 / rate,
+        row.stamp = self.cells.stamp;
+        row.t_s = match self.source {
+            TimeSource::Stamp => 0.0,
+            TimeSource::Sample(cell, rate) => self.cells.numbers[cell] / rate,
+            TimeSource::Rows(rate) => self.rows as f64 / rate,
         };
-        if row.t_s.is_nan() || !is_reading(row.t_s) {
-            let refusal = match row.t_s.is_nan() {
+        let time = match self.source {
+            TimeSource::Stamp => row.stamp.value,
+            _ => row.t_s,
+        };
+        if time.is_nan() || !is_reading(time) {
+            let refusal = match time.is_nan() {
                 true => no_time(),
-                false => no_reading(row.t_s, &format!("a time of {:e} s", row.t_s)),
+                false => no_reading(time, &format!("a time of {time:e}")),
             };
             return Err(Error::new(
                 self.place(number),
@@ -215,33 +275,4 @@ impl ForeignFile {
         self.rows += 1;
         Ok(true)
     }
-}
-
-/// Median time between the rows at the start of a file, in s.
-///
-/// The start only, as all time steps of a long file do not belong into memory; the median, as
-/// gaps and repeated stamps must not count.
-pub(super) fn sample_period(path: &Path, how: &HowToRead<'_>) -> Result<f64> {
-    let mut file = ForeignFile::open(path, how)?;
-    let mut row = Row::default();
-    let mut steps = Vec::new();
-    let mut before = f64::NAN;
-    while steps.len() < STEPS_FOR_PERIOD && file.next(&mut row)? {
-        let step = row.t_s - before;
-        before = row.t_s;
-        if step > 0.0 {
-            steps.push(step);
-        }
-    }
-    if steps.is_empty() {
-        return Err(Error::new(
-            path.display(),
-            "the rate cannot be told from the times of fewer than two rows",
-            "give it",
-        )
-        .about(Argument::SampleRate));
-    }
-    let middle = steps.len() / 2;
-    let (_, median, _) = steps.select_nth_unstable_by(middle, f64::total_cmp);
-    Ok(*median)
 }

@@ -7,22 +7,27 @@ mod inputs;
 mod join;
 mod options;
 mod parquet_table;
+mod ros;
 mod step_labels;
 #[cfg(test)]
 mod tests;
 mod text_table;
+mod time;
 
 use std::collections::{BTreeSet, HashMap};
 use std::path::Path;
 
 pub use assignment::{ColumnList, Role, Scale};
 pub use options::ImportOptions;
+pub use ros::is_bag;
+pub use time::{Decimal, Jitter, TimeSummary};
 
-use foreign::{ForeignFile, HowToRead, Row, sample_period};
+use foreign::{ForeignFile, HowToRead, Row};
 use inputs::Inputs;
 use join::{Follower, Joined, check_order};
 use options::file_name;
 use serde::Serialize;
+use time::Times;
 
 use super::batch::Batch;
 use super::cell::shorten;
@@ -55,8 +60,10 @@ pub struct ImportSummary {
     pub recording: String,
     /// Rows written.
     pub rows: u64,
-    /// Sample rate in Hz, given or found.
+    /// Sample rate in Hz: that of the time stamps, or the one that was given where there are none.
     pub sample_rate_hz: f64,
+    /// What the time stamps have shown, of each file that has them.
+    pub time: Vec<TimeSummary>,
     /// Lines without a row, over all files.
     #[serde(rename = "skipped_lines")]
     pub skipped: SkippedLines,
@@ -100,11 +107,6 @@ pub fn import(
     Ok(import.summary)
 }
 
-/// A rate without the digits that only the rounding of large time stamps has put there.
-fn tidy(rate_hz: f64) -> f64 {
-    format!("{rate_hz:.7e}").parse().unwrap_or(rate_hz)
-}
-
 fn check(options: &ImportOptions, out: &Path) -> Result<()> {
     let refuse = |problem: String, remedy: &str| Err(Error::new("import", problem, remedy));
     let (files, lists) = (options.files.len(), options.columns.len());
@@ -140,6 +142,19 @@ fn check(options: &ImportOptions, out: &Path) -> Result<()> {
     Ok(())
 }
 
+/// What to say where a rate was given and the time stamps have another one.
+fn other_rate(times: &Times, given: f64) -> Option<String> {
+    let summary = &times.summary;
+    let off = given / summary.rate_hz - 1.0;
+    (off.abs() > 1e-3).then(|| {
+        format!(
+            "{}: the rate of the time stamps is {} Hz, and not the {given} Hz that were given: the stamps are believed; to go by \
+             the rate instead, skip the time column",
+            summary.file, summary.rate_hz
+        )
+    })
+}
+
 /// An import under way.
 struct Import {
     first: ForeignFile,
@@ -153,52 +168,51 @@ struct Import {
     step_rows: HashMap<i32, u64>,
     /// Inputs of the steps met so far; `None` where they are not known.
     known: HashMap<i32, Option<[f64; 6]>>,
-    time_steps_back: u64,
     summary: ImportSummary,
 }
 
 impl Import {
     fn open(options: &ImportOptions) -> Result<Import> {
         let mut warnings = Vec::new();
-        let first = ForeignFile::open(&options.files[0], &options.how(0))?;
-        let found = match first.has_time() {
-            true => Some(sample_period(&options.files[0], &options.how(0))),
-            false => None,
-        };
-        let rate_hz = match (options.rate_hz, found) {
-            (Some(rate), found) => {
-                if let Some(Ok(period)) = found
-                    && !(0.99..=1.01).contains(&(period * rate))
-                {
-                    warnings.push(format!(
-                        "{}: the times are {period} s apart, which is not the rate of {rate} Hz that was given; \
-                         if they are not in seconds, scale them (--scale t_s=0.001)",
-                        options.files[0].display()
-                    ));
-                }
-                rate
+        let mut first = ForeignFile::open(&options.files[0], &options.how(0))?;
+        let mut time = Vec::new();
+        let mut origin_s = None;
+        let rate_hz = match first.has_time() {
+            true => {
+                let times = Times::read(&options.files[0], &options.how(0), None)?;
+                let rate_hz = times.summary.rate_hz;
+                warnings.extend(options.rate_hz.and_then(|given| other_rate(&times, given)));
+                origin_s = Some(times.origin_s());
+                time.push(times.summary.clone());
+                first = first.with_times(times);
+                rate_hz
             }
-            (None, Some(period)) => tidy(1.0 / period?),
-            (None, None) => {
-                // Opening has refused this already: without a time column the rate is needed.
-                return Err(Error::new("import", "the rate is not known", "give it")
-                    .about(Argument::SampleRate));
-            }
+            // Opening has refused this already: without a time column the rate is needed.
+            false => options.rate_hz.ok_or_else(|| {
+                Error::new("import", "the rate is not known", "give it").about(Argument::SampleRate)
+            })?,
         };
         let mut followers = Vec::new();
         for (index, path) in options.files.iter().enumerate().skip(1) {
             let how = HowToRead {
-                rate_hz: Some(rate_hz),
+                rate_hz: options.rate_hz.or(Some(rate_hz)),
                 ..options.how(index)
             };
-            let file = ForeignFile::open(path, &how)?;
+            let mut file = ForeignFile::open(path, &how)?;
             if file.has_step() {
                 let problem = "the column step is not in the first file";
                 let remedy = "name the file with the steps first";
                 return Err(Error::new(path.display(), problem, remedy));
             }
-            let period = sample_period(path, &how)?;
-            followers.push(Follower::new(file, period, 1.0 / rate_hz));
+            let mut period_s = 1.0 / rate_hz;
+            if file.has_time() {
+                // A sensor of its own, with a rate and delays of its own; the instants are those of one clock.
+                let times = Times::read(path, &how, origin_s)?;
+                period_s = times.period_s();
+                time.push(times.summary.clone());
+                file = file.with_times(times);
+            }
+            followers.push(Follower::new(file, period_s, 1.0 / rate_hz));
         }
         let order: Vec<Column> = first
             .columns()
@@ -250,12 +264,12 @@ impl Import {
             order,
             step_rows: HashMap::new(),
             known: HashMap::new(),
-            time_steps_back: 0,
             summary: ImportSummary {
                 format: "mimu-import/1",
                 recording: String::new(),
                 rows: 0,
                 sample_rate_hz: rate_hz,
+                time,
                 skipped: SkippedLines::default(),
                 dropped_outside: 0,
                 dropped_in_gaps: 0,
@@ -307,18 +321,7 @@ impl Import {
         let mut batch = Batch::default();
         let mut last_t_s = f64::NEG_INFINITY;
         while self.first.next(&mut row)? {
-            if !self.followers.is_empty() {
-                check_order(&self.first, &row, last_t_s)?;
-            } else if row.t_s <= last_t_s {
-                self.time_steps_back += 1;
-                if self.time_steps_back == 1 {
-                    let place = self.first.place(row.number);
-                    self.summary.warnings.push(format!(
-                        "{place}, column t_s: the time {} s does not lie after {last_t_s} s of the row before",
-                        row.t_s
-                    ));
-                }
-            }
+            check_order(&self.first, &row, last_t_s)?;
             last_t_s = row.t_s;
             values.clear();
             values.extend_from_slice(&row.values);
@@ -407,12 +410,6 @@ impl Import {
                 "{} rows were interpolated between the times of another file, which lowers the white noise of its columns",
                 summary.interpolated
             ));
-        }
-        if self.time_steps_back > 1 {
-            let times = self.time_steps_back;
-            summary
-                .warnings
-                .push(format!("the time does not increase in {times} rows"));
         }
         if let Some(inputs) = &self.inputs {
             let unknown = self.known.iter().filter(|(_, input)| input.is_none());

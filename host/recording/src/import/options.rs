@@ -27,6 +27,8 @@ pub struct ImportOptions {
     pub reference: Reference,
     /// Factors for columns; several for the same column multiply.
     pub scales: Vec<Scale>,
+    /// Topic of bags; without it, the only one with messages of an inertial unit.
+    pub topic: Option<String>,
     /// Name of the unit; without it, the name of the recording.
     pub device: Option<String>,
     /// Latitude in degrees.
@@ -56,6 +58,7 @@ impl ImportOptions {
             raw_unit,
             reference,
             scales: Vec::new(),
+            topic: None,
             device: None,
             latitude_deg: None,
             inputs: None,
@@ -87,6 +90,9 @@ impl ImportOptions {
         for scale in &self.scales {
             option("--scale", scale.to_string());
         }
+        if let Some(topic) = &self.topic {
+            option("--topic", topic.clone());
+        }
         if let Some(device) = &self.device {
             option("--device", device.clone());
         }
@@ -104,6 +110,7 @@ impl ImportOptions {
             list: self.columns.get(file),
             separator: self.separator,
             scales: &self.scales,
+            topic: self.topic.as_deref(),
             rate_hz: self.rate_hz,
         }
     }

@@ -6,6 +6,7 @@ use parquet::data_type::ByteArray;
 
 use super::assignment::{ColumnList, Role};
 use super::text_table::Cells;
+use super::time::Stamp;
 use crate::cell::{is_reading, no_reading};
 use crate::columns::Column;
 use crate::csv_writer::write_number;
@@ -35,6 +36,8 @@ struct Source {
     cursor: Cursor,
     values: Vec<f64>,
     texts: Vec<ByteArray>,
+    /// Time stamps that are whole numbers, which a double may not hold.
+    wholes: Vec<Option<i64>>,
 }
 
 impl std::fmt::Debug for ParquetTable {
@@ -106,6 +109,7 @@ impl ParquetTable {
                 cursor: Cursor::new(&file, leaf),
                 values: Vec::new(),
                 texts: Vec::new(),
+                wholes: Vec::new(),
             });
         }
         if columns.is_empty() {
@@ -161,6 +165,10 @@ impl ParquetTable {
                 let refusal = no_reading(value, &format!("{value:e}"));
                 return Err(Error::new(place, refusal.problem, refusal.remedy));
             }
+            if column.role == Role::Column(Column::Time) {
+                let whole = column.wholes.get(self.at).copied().flatten();
+                cells.stamp = whole.map_or_else(|| Stamp::from(value), Stamp::from);
+            }
             if step {
                 write_number(value, &mut cells.step);
             }
@@ -176,9 +184,14 @@ impl ParquetTable {
         for column in &mut self.columns {
             column.values.clear();
             column.texts.clear();
+            column.wholes.clear();
             // The decoders have panicked on damaged files before; a damaged file is no bug of ours.
             let decode = std::panic::AssertUnwindSafe(|| match column.leaf.is_text() {
                 true => column.cursor.read_text(count, &mut column.texts),
+                false if column.role == Role::Column(Column::Time) => {
+                    let (values, wholes) = (&mut column.values, &mut column.wholes);
+                    column.cursor.read_whole(count, values, wholes)
+                }
                 false => column.cursor.read(count, &mut column.values),
             });
             let decoded = std::panic::catch_unwind(decode)

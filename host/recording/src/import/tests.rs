@@ -7,6 +7,8 @@ use proptest::prelude::*;
 use super::super::{Batch, RawUnit, Recording};
 use super::*;
 
+mod stamps;
+
 /// A folder with foreign files, and the recording that comes of them.
 struct Bench(tempfile::TempDir);
 
@@ -111,19 +113,40 @@ fn every_separator_is_found_out() {
 }
 
 #[test]
+fn decimal_commas_names_behind_a_hash_and_empty_rows_at_the_end_are_read() {
+    for text in [
+        "x;y;z\n1,5;2,25;-3\n4;5,5;6e1\n;;\n;;\n",
+        "# made in 2024\n1,5\t2,25\t-3\n4\t5,5\t6e1\n\t\t\n",
+        "1,5 2,25 -3,0\n4 5,5 6,0e1\n \n",
+    ] {
+        let (_, batch, _) = one(text, "gyro_x,gyro_y,gyro_z").unwrap();
+        let columns = [vec![1.5, 4.0], vec![2.25, 5.5], vec![-3.0, 60.0]];
+        assert_eq!(batch.raw[..3], columns, "{text}");
+    }
+    let error = one_refused("1;2;3\n1;2,x;3\n", "gyro_x,gyro_y,gyro_z");
+    assert!(error.contains("row 2, column gyro_y: \"2,x\""), "{error}");
+    let text = "# by hand\n#wx [rad s^-1],wy,wz\n1,2,3\n4,5,6\n,,\n";
+    let (summary, batch, _) = one(text, "gyro_x=wx [rad s^-1],gyro_y=wy,gyro_z=wz").unwrap();
+    assert_eq!(batch.raw[0], [1.0, 4.0]);
+    let skipped = SkippedLines {
+        header: 1,
+        comment: 1,
+        blank: 1,
+    };
+    assert_eq!(summary.skipped, skipped);
+}
+
+#[test]
 fn columns_are_chosen_by_position_by_name_or_by_the_names_of_a_recording() {
     let text = "time (ms),wx,wy,wz,T\ns,d,d,d,C\n10,1,2,3,20\n20,4,5,6,\n";
     let names = "gyro_z=wz,gyro_x=wx,gyro_y=wy,t_s=time (ms),temp_c=T";
     for list in [names, "t_s,gyro_x,gyro_y,gyro_z,temp_c"] {
         let (summary, batch, _) = one(text, list).unwrap();
         assert_eq!(summary.skipped.header, 2);
-        assert_eq!((batch.t_s[1], batch.raw[2][1]), (20.0, 6.0));
+        // Ten apart at 100 Hz: milliseconds.
+        assert_eq!((batch.t_s[1], batch.raw[2][1]), (0.02, 6.0));
+        assert_eq!(summary.time[0].unit, Some(Decimal::Millisecond));
         assert!(batch.temp_c[1].is_nan());
-        assert!(
-            summary.warnings[0].contains("--scale t_s"),
-            "{:?}",
-            summary.warnings
-        );
     }
     let bench = Bench::new(&[(
         "a",
@@ -141,7 +164,7 @@ fn time_comes_from_a_column_from_an_index_or_from_the_rate() {
     assert_eq!(batch.t_s, [0.07, 0.09]);
     let bench = Bench::new(&[
         ("a", "1,2,3\n1,2,3\n"),
-        ("b", "0,1,2,3\n20,1,2,3\n41,1,2,3\n60,1,2,3\n"),
+        ("b", "0,1,2,3\n20,1,2,3\n40,1,2,3\n60,1,2,3\n"),
     ]);
     let error = bench.refused(&bench.options(&["a"], &["gyro_x,gyro_y,gyro_z"]));
     assert!(error.contains("give the rate"), "{error}");
@@ -149,7 +172,7 @@ fn time_comes_from_a_column_from_an_index_or_from_the_rate() {
     options.scales = vec!["t_s=0.001".parse().unwrap(), "gyro=2".parse().unwrap()];
     let (_, batch, manifest) = bench.import(&options).unwrap();
     assert_eq!(manifest.sample_rate_hz, 50.0);
-    assert_eq!((batch.t_s[2], batch.raw[2][0]), (0.041, 6.0));
+    assert_eq!((batch.t_s[2], batch.raw[2][0]), (0.04, 6.0));
 }
 
 #[test]
@@ -172,11 +195,6 @@ fn bad_rows_are_refused_with_file_row_and_column() {
     // The first row is no header because one of its cells is broken.
     let error = one_refused("1,2,x\n4,5,6\n", "gyro_x,gyro_y,gyro_z");
     assert!(error.contains("row 1, column gyro_z"), "{error}");
-    let error = one_refused("1,5;2,5;3,5\n", "gyro_x,gyro_y,gyro_z");
-    assert!(
-        error.contains("words") || error.contains("points"),
-        "{error}"
-    );
     let long = format!("1,2,3\n{}", "1".repeat(2 << 20));
     assert!(one_refused(&long, "gyro_x,gyro_y,gyro_z").contains("row 2"));
 }
@@ -283,23 +301,6 @@ fn an_interpolation_does_not_bridge_a_long_gap() {
     );
     let (summary, _, _) = join(&first, &with_gap(10..13)).unwrap();
     assert_eq!((summary.dropped_in_gaps, summary.rows), (4, 36));
-}
-
-#[test]
-fn a_join_of_unordered_times_is_refused_with_file_and_row() {
-    let good = [0.0, 0.1, 0.2, 0.3];
-    let bad = [0.0, 0.1, 0.1, 0.3];
-    let error = join(&good, &bad).unwrap_err().to_string();
-    assert!(error.contains("g, row 3, column t_s"), "{error}");
-    let error = join(&bad, &good).unwrap_err().to_string();
-    assert!(error.contains("a, row 3, column t_s"), "{error}");
-    let single = one(&timed(&bad), GYR).unwrap().0;
-    assert!(
-        single
-            .warnings
-            .iter()
-            .any(|warning| warning.contains("row 3"))
-    );
 }
 
 const SESSION: &str = "part,n,x,y,z\nx_a,0,1,0,0\nx_a,1,1,0,0\nx_rot,2,0,0,0\nx_rot,3,0,0,0\n\

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use super::SkippedLines;
 use super::assignment::{ColumnList, Role};
 use super::binary::refuse_binary;
+use super::time::Stamp;
 use crate::cell::{self, Refusal, shorten};
 use crate::columns::Column;
 use crate::csv_file::BOM;
@@ -24,6 +25,8 @@ const LONGEST_LINE: u64 = 1 << 20;
 pub(super) struct Cells {
     /// Numbers in the order of the table's roles; the place of a step holds nothing.
     pub numbers: Vec<f64>,
+    /// Time stamp; its place among the numbers has it rounded.
+    pub stamp: Stamp,
     /// Text of the step.
     pub step: Vec<u8>,
 }
@@ -164,6 +167,11 @@ impl TextTable {
                 Kind::Comment => self.skipped.comment += 1,
                 Kind::Other => {
                     self.separator.split(&self.line, &mut self.record);
+                    // Spreadsheets end with rows of nothing but separators.
+                    if self.record.iter().all(<[u8]>::is_empty) {
+                        self.skipped.blank += 1;
+                        continue;
+                    }
                     if let Some(refusal) = self.misfit(&self.record, ended) {
                         return Err(Error::new(
                             self.place(number),
@@ -178,6 +186,19 @@ impl TextTable {
         }
     }
 
+    /// Number in a cell; where commas do not separate cells, one of them is a decimal point.
+    fn number(&self, cell: &[u8]) -> std::result::Result<f64, Refusal> {
+        if self.separator != Separator::Comma
+            && !cell.contains(&b'.')
+            && let Some(comma) = memchr::memchr(b',', cell)
+        {
+            let mut point = cell.to_vec();
+            point[comma] = b'.';
+            return cell::number(&point).map_err(|_| cell::no_number(cell));
+        }
+        cell::number(cell)
+    }
+
     fn parse(&self, line: u64, cells: &mut Cells) -> Result<()> {
         cells.numbers.clear();
         cells.step.clear();
@@ -188,10 +209,14 @@ impl TextTable {
                 cells.numbers.push(f64::NAN);
                 continue;
             }
-            cells.numbers.push(cell::number(cell).map_err(|refusal| {
+            let number = self.number(cell).map_err(|refusal| {
                 let place = format!("{}, column {}", self.place(line), role.name());
                 Error::new(place, refusal.problem, refusal.remedy)
-            })?);
+            })?;
+            if role == Role::Column(Column::Time) {
+                cells.stamp = Stamp::in_cell(cell, number);
+            }
+            cells.numbers.push(number);
         }
         Ok(())
     }
@@ -242,16 +267,26 @@ impl TextTable {
                     continue;
                 }
                 Kind::Comment => {
-                    self.skipped.comment += 1;
+                    // Many programs write the names of the columns behind a #.
+                    let text = line
+                        .iter()
+                        .position(|b| !matches!(b, b'#' | b'%' | b' ' | b'\t'));
+                    self.separator
+                        .split(&line[text.unwrap_or(line.len())..], &mut record);
+                    let open = self.wanted.is_empty();
+                    if open {
+                        self.take_header(&texts(&record), list, number)?;
+                    }
+                    match open && !self.wanted.is_empty() {
+                        true => self.skipped.header += 1,
+                        false => self.skipped.comment += 1,
+                    }
                     continue;
                 }
                 Kind::Other => self.separator.split(line, &mut record),
             }
             if self.wanted.is_empty() {
-                let here: Vec<String> = record
-                    .iter()
-                    .map(|name| String::from_utf8_lossy(name).trim().to_owned())
-                    .collect();
+                let here = texts(&record);
                 self.take_header(&here, list, number)?;
                 if names.is_empty() || matches(list, &here) > matches(list, &names) {
                     names = here;
@@ -379,7 +414,7 @@ impl TextTable {
             if role == Role::Column(Column::Step) {
                 continue;
             }
-            match cell::number(&record[position]) {
+            match self.number(&record[position]) {
                 Ok(value) => numbers += usize::from(!value.is_nan()),
                 Err(refusal) => {
                     mistakes += 1;
@@ -394,6 +429,12 @@ impl TextTable {
             _ => Look::Words,
         }
     }
+}
+
+/// The cells of a header.
+fn texts(record: &csv::ByteRecord) -> Vec<String> {
+    let text = |cell: &[u8]| String::from_utf8_lossy(cell).trim().to_owned();
+    record.iter().map(text).collect()
 }
 
 /// How many of the columns that are wanted by name are among `names`.

@@ -1,5 +1,6 @@
 //! Effects in a calibration: written, read, removed on the PC and by the device alike, and shown by `mimu verify`.
 
+mod applied;
 mod codes;
 mod gaps;
 mod law;

@@ -1,0 +1,53 @@
+//! `mimu apply`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use mimu::apply::apply;
+use mimu::calibration::Calibration;
+use mimu_recording::error::Result;
+use mimu_recording::{MANIFEST_FILE, Recording, SampleFormat};
+
+use crate::arguments::JsonArgs;
+use crate::output::{check_outputs, print, progress};
+use crate::report;
+
+#[derive(Args)]
+pub(crate) struct ApplyArgs {
+    /// Directory of the recording
+    recording: PathBuf,
+    /// Calibration file
+    #[arg(long, value_name = "FILE")]
+    calibration: PathBuf,
+    /// Format of the samples: parquet or csv
+    #[arg(long, default_value = "parquet")]
+    format: SampleFormat,
+    /// Replace an existing recording
+    #[arg(long)]
+    replace: bool,
+    /// Directory of the compensated recording
+    #[arg(short, value_name = "DIR")]
+    output: PathBuf,
+    #[command(flatten)]
+    json: JsonArgs,
+}
+
+pub(crate) fn run(args: &ApplyArgs) -> Result<()> {
+    let calibration = Calibration::read(&args.calibration)?;
+    let recording = Recording::open(&args.recording)?;
+    let manifest = args.recording.join(MANIFEST_FILE);
+    let inputs = [manifest.as_path(), &recording.samples, &args.calibration];
+    check_outputs(&[args.json.file()], &inputs)?;
+    let bar = progress("compensating");
+    let done = apply(
+        &recording,
+        &calibration,
+        &args.output,
+        args.format,
+        args.replace,
+        |share| bar.set_position((share * 1000.0) as u64),
+    );
+    bar.finish_and_clear();
+    let applied = done?;
+    print(&args.json, &report::apply_text(&applied), &applied, None)
+}

@@ -1,0 +1,332 @@
+//! A recording compensated by a calibration, sample by sample.
+//!
+//! The affine model and the removal of effects are those of `core`, in double precision: what the device streams is what this writes.
+
+use std::path::Path;
+
+use mimu_core::compensation::{Affine, Sample};
+use mimu_core::effects::{Effects, State};
+use nalgebra::{Matrix3, Vector3};
+use serde::Serialize;
+
+use crate::blocks::{Condensed, Rails};
+use crate::calibration::Calibration;
+use crate::effects::quantity::Need;
+use crate::quantity::Sensor;
+use crate::rails::{find, longest_run_by_chance};
+use crate::result::Sensors;
+use crate::verify::check_unit;
+use mimu_recording::error::{Error, Result};
+use mimu_recording::{Batch, Columns, Manifest, RawUnit, Recording, SampleFormat, Source, Writer};
+
+/// Room for effects of a triad; no calibration has as many.
+const ROOM: usize = 32;
+/// A step of so many periods is a gap, as for blocks.
+const GAP_PERIODS: f64 = 1.5;
+
+/// What became of a recording.
+#[derive(Debug, Clone, Serialize)]
+pub struct Applied {
+    /// `mimu-apply/1`.
+    pub format: &'static str,
+    /// Directory of the compensated recording.
+    pub recording: String,
+    /// Rows written: as many as there were.
+    pub rows: u64,
+    /// Sensors that were compensated.
+    pub sensors: Sensors<AppliedSensor>,
+    /// Gaps, which are kept as they are.
+    pub gaps: u64,
+    /// Time missing in them, s.
+    pub missing_s: f64,
+    /// Effects that were removed, by id.
+    pub effects: Vec<String>,
+    /// What a person should know.
+    pub warnings: Vec<String>,
+}
+
+/// Samples of a sensor that are empty in the compensated recording.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+pub struct AppliedSensor {
+    /// An axis has no reading.
+    pub empty: u64,
+    /// An axis is at its rail.
+    pub clipped: u64,
+}
+
+/// Writes `recording`, compensated by `calibration`, to `out`: rad/s and m/s². An input that is known stays beside it.
+///
+/// A sample without a reading of one axis, or with one at its rail, has no input of any: its three cells are empty. Refused is a calibration for
+/// another raw unit, and one with effects that the recording lacks a channel or a temperature for.
+pub fn apply(
+    recording: &Recording,
+    calibration: &Calibration,
+    out: &Path,
+    format: SampleFormat,
+    replace: bool,
+    progress: impl Fn(f64),
+) -> Result<Applied> {
+    let place = recording.samples.display().to_string();
+    let manifest = &recording.manifest;
+    if let (Ok(from), Ok(to)) = (recording.directory.canonicalize(), out.canonicalize())
+        && from.starts_with(&to)
+    {
+        let problem = "this is the recording to compensate, and its raw readings would be lost";
+        return Err(Error::new(out.display(), problem, "choose another name"));
+    }
+    let mut warnings: Vec<String> = check_unit(calibration, manifest, &place)?
+        .into_iter()
+        .collect();
+    let columns = Columns {
+        gyro: recording.columns.gyro && calibration.gyro.is_some(),
+        accel: recording.columns.accel && calibration.accel.is_some(),
+        ..recording.columns
+    };
+    let has = [columns.gyro, columns.accel];
+    if has == [false; 2] {
+        let problem = "it has no sensor that the calibration is for";
+        return Err(Error::new(
+            place,
+            problem,
+            "calibrate the sensor that it has",
+        ));
+    }
+    for sensor in Sensor::BOTH {
+        let recorded = [recording.columns.gyro, recording.columns.accel][sensor as usize];
+        if recorded && !has[sensor as usize] {
+            warnings.push(format!(
+                "the calibration is not for the {sensor}: its columns are left out"
+            ));
+        }
+    }
+    // First pass: rails and the first temperature are only known at the end.
+    let condensed = Condensed::read(recording, false, |share| progress(0.5 * share))?;
+    warnings.extend(condensed.warnings.iter().cloned());
+    let mut compensator = Compensator::new(
+        calibration,
+        &condensed,
+        manifest,
+        has,
+        &place,
+        &mut warnings,
+    )?;
+    let mut writer = Writer::create(out, columns, format, replace)?;
+    recording.for_each_batch(
+        |share| progress(0.5 + 0.5 * share),
+        |batch| writer.write(&compensator.batch(batch)),
+    )?;
+    let rows = writer.rows();
+    let written = writer.finish(&compensated(manifest, recording, &condensed.sha256))?;
+    let counts = compensator.counts;
+    let of = |sensor: Sensor| has[sensor as usize].then_some(counts[sensor as usize]);
+    Ok(Applied {
+        format: "mimu-apply/1",
+        recording: written.display().to_string(),
+        rows,
+        sensors: Sensors {
+            gyro: of(Sensor::Gyro),
+            accel: of(Sensor::Accel),
+        },
+        gaps: condensed.gaps.0,
+        missing_s: condensed.gaps.1,
+        effects: compensator.ids,
+        warnings,
+    })
+}
+
+/// The manifest of the compensated recording: rails are those of raw readings, and go.
+fn compensated(manifest: &Manifest, recording: &Recording, sha256: &str) -> Manifest {
+    let mut out = manifest.clone();
+    out.raw_unit = RawUnit::Si;
+    out.rails = None;
+    out.unfinished = false;
+    out.imported_with = Vec::new();
+    let name = recording.samples.file_name().unwrap_or_default();
+    out.sources = vec![Source {
+        file: name.to_string_lossy().into_owned(),
+        sha256: sha256.to_owned(),
+    }];
+    out
+}
+
+/// A stretch of samples over which temperature and time stand still for the effects.
+struct Slow {
+    first_row: u64,
+    middle_s: f64,
+    temp_c: f64,
+}
+
+/// Compensates batches of samples in their order.
+struct Compensator {
+    models: [Affine<f64>; 2],
+    has: [bool; 2],
+    effects: Effects<f64, ROOM>,
+    ids: Vec<String>,
+    state: State<f64, ROOM>,
+    rails: [Rails; 6],
+    period_s: f64,
+    /// In their order, and those that have been reached.
+    slow: Vec<Slow>,
+    reached: usize,
+    /// When the effects were last told the time; at first, when the power came.
+    told_s: f64,
+    last_s: f64,
+    /// Last whole reading of each triad: what the other one's effects are a function of where it has none.
+    held: [Vector3<f64>; 2],
+    counts: [AppliedSensor; 2],
+}
+
+impl Compensator {
+    fn new(
+        calibration: &Calibration,
+        condensed: &Condensed,
+        manifest: &Manifest,
+        has: [bool; 2],
+        place: &str,
+        warnings: &mut Vec<String>,
+    ) -> Result<Self> {
+        let blocks = &condensed.blocks;
+        let first_temp_c = blocks.iter().map(|b| b.temp_c.mean).find(|t| t.is_finite());
+        for effect in calibration.effects() {
+            let needs = |need| effect.candidate.needs(need);
+            let lacks = match has[effect.candidate.sensor as usize] {
+                false => continue,
+                _ if needs(Need::Rate) && !has[0] => "a calibrated gyro",
+                _ if needs(Need::Force) && !has[1] => "a calibrated accelerometer",
+                _ if needs(Need::Temperature) && first_temp_c.is_none() => "temp_c",
+                _ => continue,
+            };
+            let problem = format!(
+                "{} cannot be removed without {lacks}",
+                effect.candidate.id()
+            );
+            let remedy = "record it, or use a calibration without this effect";
+            return Err(Error::new(place, problem, remedy));
+        }
+        // Before the first temperature it is that one, as for a fit.
+        let mut temp_c = first_temp_c.unwrap_or(f64::NAN);
+        let slow = blocks.iter().map(|block| {
+            if block.temp_c.mean.is_finite() {
+                temp_c = block.temp_c.mean;
+            }
+            Slow {
+                first_row: block.first_row,
+                middle_s: 0.5 * (block.start_s + block.last_s),
+                temp_c,
+            }
+        });
+        let longest_run =
+            std::array::from_fn(|c| longest_run_by_chance(condensed, c).unwrap_or(f64::INFINITY));
+        let first_s = blocks.first().map_or(0.0, |block| block.start_s);
+        let none = Affine {
+            matrix: Matrix3::identity(),
+            offset: Vector3::zeros(),
+        };
+        let models = Sensor::BOTH.map(|s| calibration.inverse(s).unwrap_or(none));
+        let first = |channel: usize| {
+            let means = blocks.iter().map(|block| block.raw[channel]);
+            means
+                .filter(|m| m.n > 0)
+                .map(|m| m.mean)
+                .next()
+                .unwrap_or(0.0)
+        };
+        Ok(Self {
+            models,
+            has,
+            effects: calibration.effects_of_models(&models)?,
+            ids: calibration
+                .effects()
+                .iter()
+                .filter(|e| has[e.candidate.sensor as usize])
+                .map(|e| e.candidate.id())
+                .collect(),
+            state: State::new(1.0 / condensed.period_s),
+            rails: find(condensed, manifest, &longest_run, warnings),
+            period_s: condensed.period_s,
+            slow: slow.collect(),
+            reached: 0,
+            told_s: manifest.power_on_s.unwrap_or(first_s),
+            last_s: first_s,
+            held: [0, 3].map(|from| Vector3::from_fn(|i, _| first(from + i))),
+            counts: Default::default(),
+        })
+    }
+
+    fn batch(&mut self, batch: &Batch) -> Batch {
+        let mut out = batch.clone();
+        for sensor in Sensor::BOTH {
+            if !self.has[sensor as usize] {
+                sensor.channels().for_each(|c| out.raw[c].clear());
+            }
+        }
+        for row in 0..batch.len() {
+            let t_s = batch.t_s[row];
+            self.follow(batch.first_row + row as u64);
+            if t_s - self.last_s > GAP_PERIODS * self.period_s {
+                self.state.gap();
+            }
+            self.last_s = t_s;
+            let whole = Sensor::BOTH.map(|sensor| self.take(sensor, batch, row));
+            let clean = self.clean();
+            if whole.contains(&false) {
+                // What is held for a sample is no reading that a difference could be taken of.
+                self.state.gap();
+            }
+            for (sensor, input) in Sensor::BOTH.into_iter().zip([clean.gyro, clean.accel]) {
+                for (axis, c) in sensor.channels().enumerate() {
+                    if let Some(cell) = out.raw[c].get_mut(row) {
+                        let known = whole[sensor as usize];
+                        *cell = if known { input[axis] } else { f64::NAN };
+                    }
+                }
+            }
+        }
+        out
+    }
+
+    /// Tells the effects time and temperature of the block that `row` is in.
+    fn follow(&mut self, row: u64) {
+        while let Some(slow) = self.slow.get(self.reached).filter(|s| s.first_row <= row) {
+            let dt_s = slow.middle_s - self.told_s;
+            self.effects.slow(&mut self.state, dt_s, slow.temp_c);
+            self.told_s = slow.middle_s;
+            self.reached += 1;
+        }
+    }
+
+    /// Takes in what a triad reads; whether all of it is there.
+    fn take(&mut self, sensor: Sensor, batch: &Batch, row: usize) -> bool {
+        if !self.has[sensor as usize] {
+            return true;
+        }
+        let from = sensor.channels().start;
+        let raw = Vector3::from_fn(|i, _| batch.raw[from + i][row]);
+        let clipped = |i: usize| {
+            let Rails { low, high } = self.rails[from + i];
+            low.is_some_and(|rail| raw[i] <= rail) || high.is_some_and(|rail| raw[i] >= rail)
+        };
+        let clipped = (0..3).any(clipped);
+        let counts = &mut self.counts[sensor as usize];
+        if raw.iter().any(|u| !u.is_finite()) {
+            counts.empty += 1;
+            return false;
+        }
+        if clipped {
+            counts.clipped += 1;
+            return false;
+        }
+        self.held[sensor as usize] = raw;
+        true
+    }
+
+    fn clean(&mut self) -> Sample<f64> {
+        let [gyro, accel] = self.held;
+        let raw = self.effects.without_code_errors(&Sample { gyro, accel });
+        let si = Sample {
+            gyro: self.models[0].apply(&raw.gyro),
+            accel: self.models[1].apply(&raw.accel),
+        };
+        self.effects.remove(&mut self.state, &si)
+    }
+}

@@ -1,0 +1,353 @@
+//! Messages `sensor_msgs/Imu` of ROS bags (version 2.0) and MCAP files.
+//!
+//! Their time is that of the header, which the driver has set, and not that at which they were received.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+
+use super::assignment::Role;
+use super::text_table::Cells;
+use super::time::Stamp;
+use crate::columns::Column;
+use crate::error::{Argument, Error, Result};
+use crate::in_order::broke_down;
+
+/// Bytes that are read at a time.
+const PIECE: usize = 1 << 18;
+
+/// Longest record or chunk of an MCAP file, bytes. A damaged length would be taken from memory first.
+const LONGEST_RECORD: usize = 1 << 30;
+
+/// Whether a file is one of these, by its name.
+pub fn is_bag(path: &Path) -> bool {
+    let ending = path
+        .extension()
+        .and_then(|e| e.to_str())
+        .unwrap_or_default();
+    ["bag", "mcap"]
+        .iter()
+        .any(|e| ending.eq_ignore_ascii_case(e))
+}
+
+/// One message.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Imu {
+    stamp_ns: i64,
+    /// Angular velocity, rad/s; linear acceleration, m/s².
+    values: [f64; 6],
+}
+
+/// The messages of one topic, 56 bytes each, positioned at the next.
+#[derive(Debug)]
+pub(super) struct ImuTopic {
+    messages: Vec<Imu>,
+    next: usize,
+}
+
+/// How a message is laid out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Layout {
+    Ros1,
+    Cdr,
+}
+
+/// A topic of a file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+struct Topic {
+    name: String,
+    kind: String,
+    /// `None` where the messages are others, or are laid out in an unknown way.
+    layout: Option<Layout>,
+}
+
+impl Topic {
+    fn new(name: &str, kind: &str, encoding: &str) -> Self {
+        let imu = ["sensor_msgs/Imu", "sensor_msgs/msg/Imu"].contains(&kind);
+        let layout = match encoding {
+            "ros1" => Some(Layout::Ros1),
+            "cdr" => Some(Layout::Cdr),
+            _ => None,
+        };
+        Self {
+            name: name.to_owned(),
+            kind: kind.to_owned(),
+            layout: layout.filter(|_| imu),
+        }
+    }
+}
+
+/// Messages by topic, as they come.
+#[derive(Default)]
+struct Found {
+    /// By the number that the file gives them.
+    topics: BTreeMap<u32, Topic>,
+    messages: BTreeMap<u32, Vec<Imu>>,
+    broken: Option<String>,
+}
+
+impl Found {
+    fn message(&mut self, topic: u32, data: &[u8]) {
+        let Some(Topic {
+            name,
+            layout: Some(layout),
+            ..
+        }) = self.topics.get(&topic)
+        else {
+            return;
+        };
+        let messages = self.messages.entry(topic).or_default();
+        match parse(data, *layout) {
+            Some(imu) => messages.push(imu),
+            None => {
+                let number = messages.len() + 1;
+                self.broken
+                    .get_or_insert(format!("message {number} of {name}"));
+            }
+        }
+    }
+}
+
+impl ImuTopic {
+    /// Reads the messages of `topic`, which may be left out where there is one only.
+    pub fn open(path: &Path, topic: Option<&str>) -> Result<ImuTopic> {
+        let mcap = path
+            .extension()
+            .is_some_and(|e| e.eq_ignore_ascii_case("mcap"));
+        // The readers panic on some damaged files; a damaged file is no bug of ours.
+        let read = std::panic::catch_unwind(|| match mcap {
+            true => read_mcap(path),
+            false => read_bag(path),
+        });
+        let mut found = read.map_err(|_| broke_down(&path.display().to_string()))??;
+        let number = choose(path, &found.topics, topic)?;
+        if let Some(message) = found.broken {
+            let problem = format!("{message} is cut or is no sensor_msgs/Imu");
+            return Err(Error::new(path.display(), problem, "record it again"));
+        }
+        Ok(ImuTopic {
+            messages: found.messages.remove(&number).unwrap_or_default(),
+            next: 0,
+        })
+    }
+
+    /// Roles in the order of [`Cells::numbers`].
+    pub fn roles(&self) -> Vec<Role> {
+        let raw = (0..6).map(|i| Role::Column(Column::Raw(i)));
+        [Role::Column(Column::Time)]
+            .into_iter()
+            .chain(raw)
+            .collect()
+    }
+
+    /// Share of the messages that has been handed out.
+    pub fn progress(&self) -> f64 {
+        self.next as f64 / self.messages.len().max(1) as f64
+    }
+
+    /// Puts the next message into `cells` and returns its number from 1, or `None` at the end.
+    pub fn next(&mut self, cells: &mut Cells) -> Option<u64> {
+        let imu = self.messages.get(self.next)?;
+        self.next += 1;
+        cells.stamp = Stamp::from(imu.stamp_ns);
+        cells.step.clear();
+        cells.numbers.clear();
+        cells.numbers.push(imu.stamp_ns as f64);
+        cells.numbers.extend(imu.values);
+        Some(self.next as u64)
+    }
+}
+
+/// The number of the topic to read.
+fn choose(path: &Path, topics: &BTreeMap<u32, Topic>, wanted: Option<&str>) -> Result<u32> {
+    let list = |topics: Vec<&Topic>| {
+        let each = topics.iter().map(|t| format!("{} ({})", t.name, t.kind));
+        each.collect::<Vec<_>>().join(", ")
+    };
+    let fits = topics.iter().filter(|(_, topic)| topic.layout.is_some());
+    let chosen: Vec<(&u32, &Topic)> = fits
+        .filter(|(_, topic)| wanted.is_none_or(|name| topic.name == name))
+        .collect();
+    let (problem, remedy) = match chosen.as_slice() {
+        [(number, _)] => return Ok(**number),
+        [] => {
+            let all = list(topics.values().collect());
+            let what = wanted.map_or("no topic".into(), |name| format!("no topic {name}"));
+            (
+                format!("{what} with sensor_msgs/Imu is there; there are: {all}"),
+                "choose another file or topic",
+            )
+        }
+        several => {
+            let all = list(several.iter().map(|(_, topic)| *topic).collect());
+            (
+                format!("several topics have sensor_msgs/Imu: {all}"),
+                "choose one of them",
+            )
+        }
+    };
+    Err(Error::new(path.display(), problem, remedy).about(Argument::Topic))
+}
+
+fn damaged(path: &Path, error: &dyn std::fmt::Display) -> Error {
+    let problem = format!("the file cannot be read as a bag ({error})");
+    Error::new(
+        path.display(),
+        problem,
+        "record it again, or recover it with the tools of ROS",
+    )
+}
+
+fn read_bag(path: &Path) -> Result<Found> {
+    use rosbag::{ChunkRecord, IndexRecord, MessageRecord, RosBag};
+    let damaged = |error: rosbag::Error| damaged(path, &error);
+    File::open(path).map_err(|error| Error::io(path, &error))?;
+    let bag = RosBag::new(path).map_err(|error| self::damaged(path, &error))?;
+    let mut found = Found::default();
+    for record in bag.index_records() {
+        if let IndexRecord::Connection(connection) = record.map_err(damaged)? {
+            let topic = Topic::new(connection.storage_topic, connection.tp, "ros1");
+            found.topics.insert(connection.id, topic);
+        }
+    }
+    for record in bag.chunk_records() {
+        let ChunkRecord::Chunk(chunk) = record.map_err(damaged)? else {
+            continue;
+        };
+        for message in chunk.messages() {
+            if let MessageRecord::MessageData(message) = message.map_err(damaged)? {
+                found.message(message.conn_id, message.data);
+            }
+        }
+    }
+    merge(&mut found);
+    Ok(found)
+}
+
+/// Makes one topic of all connections to it: each node that publishes has one of its own.
+fn merge(found: &mut Found) {
+    let mut first: BTreeMap<String, u32> = BTreeMap::new();
+    let numbers: Vec<u32> = found.topics.keys().copied().collect();
+    for number in numbers {
+        let name = found.topics[&number].name.clone();
+        let to = *first.entry(name).or_insert(number);
+        if to != number {
+            found.topics.remove(&number);
+            let more = found.messages.remove(&number).unwrap_or_default();
+            let all = found.messages.entry(to).or_default();
+            all.extend(more);
+            all.sort_by_key(|imu| imu.stamp_ns);
+        }
+    }
+}
+
+fn read_mcap(path: &Path) -> Result<Found> {
+    use mcap::records::Record;
+    use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
+    let io = |error: std::io::Error| Error::io(path, &error);
+    let damaged = |error: mcap::McapError| damaged(path, &error);
+    let mut file = File::open(path).map_err(io)?;
+    let options = LinearReaderOptions::default().with_record_length_limit(LONGEST_RECORD);
+    let mut reader = LinearReader::new_with_options(options);
+    let mut found = Found::default();
+    let mut schemas: BTreeMap<u16, String> = BTreeMap::new();
+    while let Some(event) = reader.next_event() {
+        match event.map_err(damaged)? {
+            LinearReadEvent::ReadRequest(wanted) => {
+                let piece = reader.insert(wanted.clamp(1, PIECE));
+                let read = file.read(piece).map_err(io)?;
+                reader.notify_read(read);
+            }
+            LinearReadEvent::Record { data, opcode } => {
+                match mcap::parse_record(opcode, data).map_err(damaged)? {
+                    Record::Schema { header, .. } => {
+                        schemas.insert(header.id, header.name);
+                    }
+                    Record::Channel(channel) => {
+                        let kind = schemas.get(&channel.schema_id).map_or("", String::as_str);
+                        let topic = Topic::new(&channel.topic, kind, &channel.message_encoding);
+                        found.topics.insert(u32::from(channel.id), topic);
+                    }
+                    Record::Message { header, data } => {
+                        found.message(u32::from(header.channel_id), &data);
+                    }
+                    _ => {}
+                }
+            }
+        }
+    }
+    merge(&mut found);
+    Ok(found)
+}
+
+/// Takes numbers from the bytes of a message.
+struct Fields<'a> {
+    bytes: &'a [u8],
+    at: usize,
+    big_endian: bool,
+    /// CDR begins each number at a multiple of its size.
+    aligned: bool,
+}
+
+impl Fields<'_> {
+    fn take<const N: usize>(&mut self) -> Option<[u8; N]> {
+        if self.aligned {
+            self.at = self.at.next_multiple_of(N);
+        }
+        let mut taken: [u8; N] = self.bytes.get(self.at..self.at + N)?.try_into().ok()?;
+        self.at += N;
+        if self.big_endian {
+            taken.reverse();
+        }
+        Some(taken)
+    }
+
+    fn u32(&mut self) -> Option<u32> {
+        self.take().map(u32::from_le_bytes)
+    }
+
+    fn f64s<const N: usize>(&mut self) -> Option<[f64; N]> {
+        let mut all = [0.0; N];
+        for value in &mut all {
+            *value = f64::from_le_bytes(self.take()?);
+        }
+        Some(all)
+    }
+}
+
+/// A message; `None` if it is cut.
+fn parse(data: &[u8], layout: Layout) -> Option<Imu> {
+    let mut fields = match layout {
+        Layout::Ros1 => Fields {
+            bytes: data.get(4..)?, // seq
+            at: 0,
+            big_endian: false,
+            aligned: false,
+        },
+        Layout::Cdr => Fields {
+            bytes: data.get(4..)?, // encapsulation
+            at: 0,
+            big_endian: data[1] & 1 == 0,
+            aligned: true,
+        },
+    };
+    let (seconds, nanoseconds) = (fields.u32()?, fields.u32()?);
+    let seconds = match layout {
+        Layout::Ros1 => i64::from(seconds),
+        Layout::Cdr => i64::from(seconds.cast_signed()),
+    };
+    let frame = fields.u32()? as usize;
+    fields.at = fields.at.checked_add(frame)?;
+    fields.f64s::<{ 4 + 9 }>()?;
+    let [rx, ry, rz] = fields.f64s()?;
+    fields.f64s::<9>()?;
+    let [ax, ay, az] = fields.f64s()?;
+    Some(Imu {
+        stamp_ns: seconds * 1_000_000_000 + i64::from(nanoseconds),
+        values: [rx, ry, rz, ax, ay, az],
+    })
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,438 @@
+//! The regular time behind noisy stamps.
+//!
+//! A sensor samples by a crystal of its own, and the stamps are made by whatever reads it: late when that is busy, several at once
+//! when a buffer is handed over. The count of samples is therefore the clock, and the stamps its witnesses: of its rate, of its
+//! beginning, and of samples that never came.
+//!
+//! It is done when foreign files are imported, and not whenever a recording is read. The stamps are the other program's, and what
+//! can be known of them is known there: what their unit is, and whether rows are repeated. A recording says when its samples were taken, so that
+//! whatever reads one agrees on its gaps; and what our own device has recorded has exact stamps, which nothing should touch.
+
+use serde::Serialize;
+
+/// A step that is longer than this many periods may hide missing samples.
+const LONG: f64 = 1.25;
+/// Steps this near to the period, in periods, are those of exact stamps.
+const EXACT: f64 = 0.02;
+/// Low quantile of lateness that two windows are compared by: delays only make stamps late, and single early ones are outvoted.
+const QUANTILE: f64 = 0.25;
+/// Samples in a window, at least and at most.
+const WINDOW: std::ops::RangeInclusive<usize> = 8..=2048;
+/// Samples in a window for each period of jitter.
+const WINDOW_PER_JITTER: f64 = 48.0;
+/// A stall that is caught up within this time is jitter, s.
+const STALL_S: f64 = 5.0;
+/// Share of later samples that may come back to the time before a gap.
+const BACK: f64 = 0.25;
+/// Missing samples that windows show, at least; single ones are told from jitter as long as it varies by less.
+const SMALLEST_GAP: f64 = 0.6;
+/// Standard deviations of the difference of two windows that a gap has to exceed.
+const SIGMAS: f64 = 6.0;
+/// Rounds of rate and gaps; each needs the other.
+const ROUNDS: usize = 6;
+/// Values that a quantile over a long file is taken from.
+const SAMPLED: usize = 20_000;
+/// And from a window.
+const MOST: usize = 512;
+
+/// Samples that never came.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(in super::super) struct Gap {
+    /// Row that comes after them, from 0.
+    pub row: u64,
+    /// How many they are.
+    pub missing: u64,
+}
+
+/// How far stamps are from the regular time, s.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct Jitter {
+    /// Root of the mean square.
+    pub rms_s: f64,
+    /// Largest.
+    pub max_s: f64,
+}
+
+/// Regular times of the rows of a file.
+#[derive(Debug, Clone, PartialEq)]
+pub(in super::super) struct Regular {
+    /// Instant of the first row, s.
+    pub start_s: f64,
+    /// Time between samples, s.
+    pub period_s: f64,
+    /// In the order of their rows.
+    pub gaps: Vec<Gap>,
+    /// Whether the stamps are as good as this, and better kept.
+    pub exact: bool,
+    /// What is left of the stamps.
+    pub jitter: Jitter,
+}
+
+/// What keeps stamps from having a regular time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(in super::super) enum Irregular {
+    /// Fewer than two rows at different times.
+    Short,
+    /// The clock is set back for good before that row.
+    SetBack(usize),
+}
+
+impl Regular {
+    /// The regular time behind `stamps`, s.
+    pub fn find(stamps: &[f64]) -> Result<Regular, Irregular> {
+        let mut period_s = first_period(stamps).ok_or(Irregular::Short)?;
+        if let Some(row) = set_back(stamps, period_s) {
+            return Err(Irregular::SetBack(row));
+        }
+        let mut gaps = Vec::new();
+        let mut start_s = stamps[0];
+        for _ in 0..ROUNDS {
+            let found = find_gaps(stamps, period_s);
+            let numbers = numbers(stamps.len(), &found);
+            let before = period_s;
+            (start_s, period_s) = line(stamps, &numbers, before);
+            let settled = found == gaps && (period_s / before - 1.0).abs() < 1e-9;
+            gaps = found;
+            if settled {
+                break;
+            }
+        }
+        let exact = stamps.windows(2).all(|pair| {
+            let step = (pair[1] - pair[0]) / period_s;
+            (step - 1.0).abs() < EXACT || step > 2.0 - EXACT
+        });
+        if exact {
+            gaps = exact_gaps(stamps, period_s);
+        }
+        let mut regular = Regular {
+            start_s,
+            period_s,
+            gaps,
+            exact,
+            jitter: Jitter::default(),
+        };
+        if !exact {
+            regular.jitter = jitter(stamps, &regular);
+        }
+        Ok(regular)
+    }
+
+    /// The time between stamps to a part in a thousand, in whatever unit they are.
+    pub fn step(stamps: &[f64]) -> Option<f64> {
+        first_period(stamps)
+    }
+
+    /// How many samples are missing.
+    pub fn missing(&self) -> u64 {
+        self.gaps.iter().map(|gap| gap.missing).sum()
+    }
+}
+
+fn jitter(stamps: &[f64], regular: &Regular) -> Jitter {
+    let numbers = numbers(stamps.len(), &regular.gaps);
+    let (mut sum, mut max_s) = (0.0, 0.0_f64);
+    for (&t, n) in stamps.iter().zip(&numbers) {
+        let off = t - (regular.start_s + *n as f64 * regular.period_s);
+        sum += off * off;
+        max_s = max_s.max(off.abs());
+    }
+    Jitter {
+        rms_s: (sum / stamps.len() as f64).sqrt(),
+        max_s,
+    }
+}
+
+/// Numbers of the samples that there are, counted with those that are missing.
+fn numbers(rows: usize, gaps: &[Gap]) -> Vec<u64> {
+    let mut gaps = gaps.iter().peekable();
+    let mut missing = 0;
+    let number = |row: u64| {
+        while let Some(gap) = gaps.next_if(|gap| gap.row <= row) {
+            missing += gap.missing;
+        }
+        row + missing
+    };
+    (0..rows as u64).map(number).collect()
+}
+
+/// The `share` quantile of some values; reorders them.
+fn quantile(values: &mut [f64], share: f64) -> f64 {
+    let at = ((values.len() - 1) as f64 * share) as usize;
+    *values.select_nth_unstable_by(at, f64::total_cmp).1
+}
+
+/// The time between samples by the stamps alone, to a part in a thousand.
+///
+/// The steps of stamps in bursts are anything but the period, and those over many rows have a gap among them. So it is the mean step over as few rows as
+/// agree with each other within a quarter of a period.
+fn first_period(stamps: &[f64]) -> Option<f64> {
+    let mut best: Option<(f64, f64)> = None;
+    let mut lag = 1;
+    while lag < stamps.len() && (lag == 1 || 2 * lag < stamps.len()) {
+        let count = stamps.len() - lag;
+        let stride = count.div_ceil(SAMPLED);
+        let steps = (0..count).step_by(stride);
+        let mut steps: Vec<f64> = steps.map(|i| stamps[i + lag] - stamps[i]).collect();
+        let (low, middle, high) = (
+            quantile(&mut steps, 0.25),
+            quantile(&mut steps, 0.5),
+            quantile(&mut steps, 0.75),
+        );
+        let period = middle / lag as f64;
+        if period > 0.0 {
+            let near = |step: &&f64| (**step - middle).abs() <= 0.5 * period;
+            let (mut sum, mut n) = (0.0, 0.0);
+            for step in steps.iter().filter(near) {
+                sum += step;
+                n += 1.0;
+            }
+            let spread = (high - low) / lag as f64;
+            if best.is_none_or(|(least, _)| spread < least) {
+                best = Some((spread, sum / n / lag as f64));
+            }
+            if high - low < 0.25 * period {
+                break;
+            }
+        }
+        lag *= 4;
+    }
+    let span = stamps.last()? - stamps.first()?;
+    let whole = || (span > 0.0).then(|| span / (stamps.len() - 1) as f64);
+    best.map(|(_, period)| period).or_else(whole)
+}
+
+/// First row from which the clock is behind by more than a second for good.
+fn set_back(stamps: &[f64], period: f64) -> Option<usize> {
+    const AROUND: usize = 16;
+    let behind = (20.0 * period).max(1.0);
+    (1..stamps.len()).find(|&k| {
+        stamps[k] < stamps[k - 1] - behind && {
+            let mut before = stamps[k.saturating_sub(AROUND)..k].to_vec();
+            let mut after = stamps[k..stamps.len().min(k + AROUND)].to_vec();
+            quantile(&mut after, 0.5) < quantile(&mut before, 0.5) - 0.5 * behind
+        }
+    })
+}
+
+/// Gaps of stamps that are exact: each long step.
+fn exact_gaps(stamps: &[f64], period: f64) -> Vec<Gap> {
+    let steps = stamps.windows(2).enumerate();
+    let gap = |(i, pair): (usize, &[f64])| {
+        let missing = ((pair[1] - pair[0]) / period).round() as u64;
+        (missing > 1).then_some(Gap {
+            row: i as u64 + 1,
+            missing: missing - 1,
+        })
+    };
+    steps.filter_map(gap).collect()
+}
+
+/// How late stamps are, in periods, before anything is known of gaps.
+struct Lateness<'a> {
+    stamps: &'a [f64],
+    period: f64,
+}
+
+impl Lateness<'_> {
+    fn at(&self, row: usize) -> f64 {
+        (self.stamps[row] - self.stamps[0]) / self.period - row as f64
+    }
+
+    /// Of `rows`, at most `most` of them evenly spread.
+    fn quantile(&self, rows: std::ops::Range<usize>, most: usize, share: f64) -> f64 {
+        let rows = rows.start..rows.end.min(self.stamps.len());
+        let stride = rows.len().div_ceil(most).max(1);
+        let mut late: Vec<f64> = rows.step_by(stride).map(|row| self.at(row)).collect();
+        quantile(&mut late, share)
+    }
+
+    /// The gap that begins at `row` or soon after it, if one does; `past` is what came before, on top of `level`.
+    fn gap(
+        &self,
+        row: usize,
+        window: usize,
+        stall: usize,
+        least: f64,
+        past: &[f64],
+        level: f64,
+    ) -> Option<Gap> {
+        let mut past = past.to_vec();
+        let was = quantile(&mut past, QUANTILE) + level;
+        let more =
+            |from: usize, rows: usize| self.quantile(from..from + rows, MOST, QUANTILE) - was;
+        let missing = |more: f64| (more >= least).then(|| more.round().max(1.0));
+        let stays = |missing: &f64| {
+            let back = self.quantile(row..row + stall, MOST, BACK) - was;
+            back > 0.5 * missing
+        };
+        let soon = missing(more(row, window))?;
+        // The quantile of a long window sees a gap before it is there, and all of it as late as this.
+        let beyond = row + (QUANTILE * window as f64) as usize;
+        let soon = match window > 2 * WINDOW.start() && beyond < self.stamps.len() {
+            true => missing(more(beyond, window)).unwrap_or(soon),
+            false => soon,
+        };
+        // Of a stall some samples may be lost: then what is left after it counts.
+        let stall = || missing(more(row, stall)).filter(stays);
+        let missing = Some(soon).filter(stays).or_else(stall)?;
+        let centre = quantile(&mut past, 0.5) + level;
+        Some(Gap {
+            row: self.split(row..row + window, centre, missing) as u64,
+            missing: missing as u64,
+        })
+    }
+
+    /// The row from which lateness is `more` than the `centre` that it had before, by the sum of what is off.
+    fn split(&self, rows: std::ops::Range<usize>, centre: f64, more: f64) -> usize {
+        let mut best = (0.0, rows.start);
+        let mut sum = 0.0;
+        for row in rows.start..rows.end.min(self.stamps.len()) {
+            let off = self.at(row) - centre;
+            sum += off.abs() - (off - more).abs();
+            if sum < best.0 {
+                best = (sum, row + 1);
+            }
+        }
+        best.1
+    }
+
+    /// Width of the middle four fifths within short blocks: the lower quartile of all, as there are gaps within the others.
+    fn width(&self) -> f64 {
+        const BLOCK: usize = 32;
+        let blocks = self.stamps.len() / BLOCK;
+        let width = |from: usize| {
+            let block = || from..from + BLOCK;
+            self.quantile(block(), BLOCK, 0.9) - self.quantile(block(), BLOCK, 0.1)
+        };
+        if blocks == 0 {
+            let all = || 0..self.stamps.len();
+            return self.quantile(all(), BLOCK, 0.9) - self.quantile(all(), BLOCK, 0.1);
+        }
+        let stride = blocks.div_ceil(500);
+        let mut widths: Vec<f64> = (0..blocks)
+            .step_by(stride)
+            .map(|i| width(i * BLOCK))
+            .collect();
+        quantile(&mut widths, 0.25)
+    }
+
+    /// Standard deviation by which two windows next to each other differ where nothing is missing.
+    fn noise(&self, window: usize) -> f64 {
+        let places = self.stamps.len() / window;
+        let stride = places.div_ceil(2000).max(1);
+        let differ = |i: usize| {
+            let at = i * window;
+            let [before, after] = [at - window..at, at..at + window]
+                .map(|rows| self.quantile(rows, window, QUANTILE));
+            (after - before).abs()
+        };
+        let mut all: Vec<f64> = (1..places).step_by(stride).map(differ).collect();
+        match all.is_empty() {
+            true => 0.0,
+            false => 1.4826 * quantile(&mut all, 0.5),
+        }
+    }
+}
+
+/// The gaps that stamps show if samples are `period` apart.
+///
+/// A gap begins with a long step, and the stamps after it stay late by whole samples; of jitter they come back. What comes is judged
+/// by a low quantile over as many samples as the jitter asks for, which the next gap does not reach, and then by whether a share
+/// comes back within the longest stall.
+fn find_gaps(stamps: &[f64], period: f64) -> Vec<Gap> {
+    let late = Lateness { stamps, period };
+    let window =
+        ((WINDOW_PER_JITTER * late.width()) as usize).clamp(*WINDOW.start(), *WINDOW.end());
+    let least = SMALLEST_GAP.max(SIGMAS * late.noise(window));
+    let stall = ((STALL_S / period) as usize).clamp(8 * window, 1 << 20);
+    let mut gaps: Vec<Gap> = Vec::new();
+    let mut level = 0_u64;
+    // Levels of the rows that a window may look back to.
+    let mut before: Vec<f64> = vec![0.0; window];
+    let mut ahead: Option<Gap> = None;
+    for row in 1..stamps.len() {
+        before[(row - 1) % window] = late.at(row - 1) - level as f64;
+        let long = stamps[row] - stamps[row - 1] > LONG * period;
+        if ahead.is_none() && long {
+            let past = &before[..row.min(window)];
+            ahead = late.gap(row, window, stall, least, past, level as f64);
+        }
+        if let Some(gap) = ahead.take_if(|gap| gap.row <= row as u64) {
+            level += gap.missing;
+            gaps.push(gap);
+        }
+    }
+    gaps
+}
+
+/// Beginning and period of the straight line through sample numbers and stamps.
+///
+/// Theil's line over the medians of blocks, which no single stamp moves, however late; then that of least squares, which loses less of what
+/// the stamps say, without those that are far off.
+fn line(stamps: &[f64], numbers: &[u64], period: f64) -> (f64, f64) {
+    let blocks = match stamps.len() {
+        rows @ ..128 => rows,
+        _ => 128,
+    };
+    let median = |from: usize, to: usize| {
+        let stride = (to - from).div_ceil(SAMPLED / 16);
+        let mut off: Vec<f64> = (from..to)
+            .step_by(stride)
+            .map(|i| stamps[i] - stamps[0] - numbers[i] as f64 * period)
+            .collect();
+        quantile(&mut off, 0.5)
+    };
+    let points: Vec<(f64, f64)> = (0..blocks)
+        .map(|i| {
+            let (from, to) = (i * stamps.len() / blocks, (i + 1) * stamps.len() / blocks);
+            (
+                0.5 * (numbers[from] + numbers[to - 1]) as f64,
+                median(from, to),
+            )
+        })
+        .collect();
+    let half = blocks / 2;
+    let mut slopes: Vec<f64> = points
+        .iter()
+        .zip(&points[blocks - half..])
+        .map(|(a, b)| (b.1 - a.1) / (b.0 - a.0))
+        .collect();
+    let slope = quantile(&mut slopes, 0.5);
+    let mut starts: Vec<f64> = points.iter().map(|(n, off)| off - slope * n).collect();
+    let start = quantile(&mut starts, 0.5);
+    let (start, slope) = least_squares(stamps, numbers, period + slope, start);
+    (stamps[0] + start, slope)
+}
+
+/// The line of least squares through the stamps that are not far off the line given, which is relative to the first stamp.
+fn least_squares(stamps: &[f64], numbers: &[u64], period: f64, start: f64) -> (f64, f64) {
+    let off = |row: usize| stamps[row] - stamps[0] - numbers[row] as f64 * period - start;
+    let stride = stamps.len().div_ceil(SAMPLED);
+    let mut all: Vec<f64> = (0..stamps.len())
+        .step_by(stride)
+        .map(|row| off(row).abs())
+        .collect();
+    let far = 2.0 * quantile(&mut all, 0.9);
+    let near = || (0..stamps.len()).map(|row| (numbers[row] as f64, off(row)));
+    let near = || near().filter(|(_, off)| off.abs() <= far);
+    let (mut count, mut mean_n, mut mean_off) = (0.0, 0.0, 0.0);
+    for (n, off) in near() {
+        count += 1.0;
+        mean_n += (n - mean_n) / count;
+        mean_off += (off - mean_off) / count;
+    }
+    let (mut of_squares, mut of_both) = (0.0, 0.0);
+    for (n, off) in near() {
+        of_squares += (n - mean_n) * (n - mean_n);
+        of_both += (n - mean_n) * off;
+    }
+    let slope = if of_squares > 0.0 {
+        of_both / of_squares
+    } else {
+        0.0
+    };
+    (start + mean_off - slope * mean_n, period + slope)
+}
+
+#[cfg(test)]
+mod tests;
