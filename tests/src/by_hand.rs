@@ -8,6 +8,7 @@ use mimu::fit::{Fit, Method, Options, fit};
 use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
 use mimu::stillness::STILL_FACTOR;
+use mimu_rig::flaws::FlawsTruth;
 use mimu_rig::random::Random;
 use mimu_rig::rig_file::{AffineFile, EffectFile, Parts, RigFile};
 use nalgebra::SVector;
@@ -129,6 +130,39 @@ fn unit(ids: &[&'static str], grade: Grade, seed: u64) -> RigFile {
     draw_sizes(&file, seed)
 }
 
+/// One flaw of real recordings, another with each seed.
+fn flaw(seed: u64) -> FlawsTruth {
+    let none = FlawsTruth::default();
+    match seed / 2 % 6 {
+        0 => FlawsTruth {
+            shake_turns: 1,
+            ..none
+        },
+        1 => FlawsTruth {
+            settle_mrad: 5.0,
+            ..none
+        },
+        2 => FlawsTruth {
+            turning_rests: 1,
+            ..none
+        },
+        3 => FlawsTruth {
+            upset_turns: 1,
+            ..none
+        },
+        4 => FlawsTruth {
+            building_mg: 1.0,
+            ..none
+        },
+        _ => FlawsTruth {
+            shake_turns: 1,
+            settle_mrad: 5.0,
+            upset_turns: 1,
+            ..none
+        },
+    }
+}
+
 /// 26 to 42 poses in 2 to 4 minutes at 100 Hz.
 fn plan(seed: u64) -> String {
     let poses = 26 + (Random::new(seed, "poses").uniform() * 17.0) as usize;
@@ -185,7 +219,10 @@ fn inside(fit: &Fit, truths: &[SVector<f64, 12>; 2]) -> [[u32; 2]; 2] {
 /// Records and diagnoses a unit of `grade` with `ids`.
 pub fn case(ids: &[&'static str], grade: Grade, seed: u64, flawed: bool) -> Case {
     let plan = plan(seed);
-    let file = unit(ids, grade, seed);
+    let mut file = unit(ids, grade, seed);
+    if flawed {
+        file.flaws = flaw(seed);
+    }
     let with = bench::recorded(&plan, &file, seed);
     let strengths = (0..ids.len()).map(|k| {
         let mut less = file.clone();

@@ -13,7 +13,7 @@ use crate::blocks::{Condensed, Rails};
 use crate::calibration::Calibration;
 use crate::effects::quantity::Need;
 use crate::quantity::Sensor;
-use crate::rails::{find, longest_run_by_chance};
+use crate::rails::find;
 use crate::result::Sensors;
 use crate::verify::check_unit;
 use mimu_recording::error::{Error, Result};
@@ -215,8 +215,6 @@ impl Compensator {
                 temp_c,
             }
         });
-        let longest_run =
-            std::array::from_fn(|c| longest_run_by_chance(condensed, c).unwrap_or(f64::INFINITY));
         let first_s = blocks.first().map_or(0.0, |block| block.start_s);
         let none = Affine {
             matrix: Matrix3::identity(),
@@ -242,7 +240,7 @@ impl Compensator {
                 .map(|e| e.candidate.id())
                 .collect(),
             state: State::new(1.0 / condensed.period_s),
-            rails: find(condensed, manifest, &longest_run, warnings),
+            rails: find(condensed, manifest, warnings),
             period_s: condensed.period_s,
             slow: slow.collect(),
             reached: 0,

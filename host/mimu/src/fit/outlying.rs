@@ -192,7 +192,7 @@ fn outlying_turns(prepared: &Prepared, accel: &Estimated, g: f64) -> Vec<LeftOut
     if turns.len() < ONE_IN {
         return Vec::new();
     }
-    let rest = prepared.observations(Sensor::Gyro);
+    let rest = prepared.rest(&accel.triad.inverse);
     let motions = prepared.motions(model);
     let Ok(gyro) = rotation::estimate(&turns, &rest, &accel.triad, &motions, None, g) else {
         return Vec::new();
@@ -202,18 +202,21 @@ fn outlying_turns(prepared: &Prepared, accel: &Estimated, g: f64) -> Vec<LeftOut
     let turned = |turn: &Turn| Row {
         error: direction_error(turn, &gyro.triad.inverse),
         by: slopes(turn, &gyro.triad.inverse),
-        variance: (0.5 * turn.floor(mean_square).powi(2)).max(1e-18),
+        variance: (turn.variance(mean_square) + turn.earth_variance).max(1e-18),
     };
     let mut rows: Vec<Row> = turns.iter().map(turned).collect();
-    rows.extend(rest.iter().map(|o| Row {
-        error: matrix * o.raw + offset,
-        by: DMatrix::from_fn(3, 12, |i, j| match j {
-            0..9 if j / 3 == i => o.raw[j % 3],
-            9.. if j - 9 == i => 1.0,
-            _ => 0.0,
+    rows.extend(
+        rest.iter().map(|o| Row {
+            error: matrix * o.raw + offset - o.rate,
+            by: DMatrix::from_fn(3, 12, |i, j| match j {
+                0..9 if j / 3 == i => o.raw[j % 3],
+                9.. if j - 9 == i => 1.0,
+                _ => 0.0,
+            }),
+            variance: ((si_covariance(&matrix, &o.variance).trace() + o.rate_variance.sum()) / 3.0)
+                .max(1e-24),
         }),
-        variance: (si_covariance(&matrix, &o.variance).trace() / 3.0).max(1e-24),
-    }));
+    );
     let Some(found) = against_others(&rows, turns.len(), 2.0) else {
         return Vec::new();
     };
