@@ -236,14 +236,7 @@ impl Manifest {
     /// Checks the values; `place` is the file that they are in, or go to.
     pub fn check(&self, place: &str) -> Result<()> {
         let at = |key: &str| format!("{place}, {key}");
-        let rate = self.sample_rate_hz;
-        if !RATE_RANGE.contains(&rate) {
-            return Err(Error::new(
-                at("sample_rate_hz"),
-                format!("{rate:?} is not a sample rate"),
-                "write the samples per second, from 0.01 to 10 million",
-            ));
-        }
+        check_rate(self.sample_rate_hz, &at("sample_rate_hz"))?;
         check_gravity(self.gravity_mps2, &at("gravity_mps2"))?;
         if let Some(latitude) = self.latitude_deg
             && !(-90.0..=90.0).contains(&latitude)
@@ -302,6 +295,18 @@ pub fn read_text(path: &Path) -> Result<String> {
             "save the file as UTF-8",
         )
     })
+}
+
+/// Checks that `rate` (Hz) can be a sample rate; `place` names where it was given.
+pub(super) fn check_rate(rate: f64, place: &str) -> Result<()> {
+    if RATE_RANGE.contains(&rate) {
+        return Ok(());
+    }
+    Err(Error::new(
+        place,
+        format!("{rate:?} is not a sample rate"),
+        "write the samples per second, from 0.01 to 10 million",
+    ))
 }
 
 /// Checks that `gravity` (m/s²) is that of a place on Earth; `place` names where it was given.

@@ -119,14 +119,9 @@ fn check(options: &ImportOptions, out: &Path) -> Result<()> {
             "give one list of columns for each file, in their order",
         );
     }
-    if let Some(rate) = options.rate_hz
-        && !(rate.is_finite() && rate > 0.0)
-    {
-        return refuse(
-            format!("{rate} is not a sample rate"),
-            "give samples per second",
-        )
-        .map_err(|e| e.about(Argument::SampleRate));
+    if let Some(rate) = options.rate_hz {
+        super::manifest::check_rate(rate, "import, sample_rate_hz")
+            .map_err(|e| e.about(Argument::SampleRate))?;
     }
     super::manifest::check_gravity(options.gravity_mps2, "import, gravity")?;
     // A source inside the recording that is to be replaced would be deleted with it.
