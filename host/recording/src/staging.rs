@@ -122,7 +122,7 @@ pub(super) fn check_target(target: &Path, replace: bool) -> Result<()> {
     if !names.is_empty() && !replace {
         return refuse(
             "it exists already",
-            "choose another name, or replace it explicitly",
+            "choose another name, or have it replaced (--replace)",
         );
     }
     match names

@@ -26,10 +26,10 @@ pub(crate) struct ImportArgs {
     #[arg(long, value_name = "LIST")]
     columns: Vec<ColumnList>,
     /// Sample rate, Hz; without it, the inverse of the median time step
-    #[arg(long)]
+    #[arg(long, allow_negative_numbers = true)]
     rate_hz: Option<f64>,
     /// Local gravity, m/s²; without it, normal gravity at sea level of --latitude, or 9.80665 and a warning
-    #[arg(long)]
+    #[arg(long, allow_negative_numbers = true)]
     gravity: Option<f64>,
     /// Unit of the raw columns, after --scale: V, count or SI (rad/s and m/s²)
     #[arg(long, value_name = "UNIT")]
