@@ -41,6 +41,8 @@ pub struct SensorVerification {
 /// What a calibration does to a recording.
 #[derive(Debug, Clone)]
 pub struct Verification {
+    /// Whether it is the recording that the calibration was made from.
+    pub same_recording: bool,
     /// Gyro, then accelerometer, as far as both the calibration and the recording have them.
     pub sensors: Vec<SensorVerification>,
     /// What a person should know.
@@ -69,7 +71,8 @@ pub fn verify(prepared: &Prepared, calibration: &Calibration) -> Result<Verifica
             calibration.device, manifest.device
         ));
     }
-    if calibration.recording.sha256 == prepared.condensed.sha256 {
+    let same_recording = calibration.recording.sha256 == prepared.condensed.sha256;
+    if same_recording {
         warnings.push("this is the recording that the calibration was made from: the figures say nothing about new data".into());
     }
     let cleaned = without_effects(prepared, calibration)?;
@@ -118,7 +121,11 @@ pub fn verify(prepared: &Prepared, calibration: &Calibration) -> Result<Verifica
             s.sensor
         ));
     }
-    Ok(Verification { sensors, warnings })
+    Ok(Verification {
+        same_recording,
+        sensors,
+        warnings,
+    })
 }
 
 /// The recording without the effects of the calibration, if it has any.

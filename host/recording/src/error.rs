@@ -59,6 +59,8 @@ pub enum Argument {
     Table,
     /// Sensor that an experiment is designed for.
     Sensor,
+    /// Whether what exists is replaced.
+    Replace,
     /// Serial port.
     Port,
 }
