@@ -40,7 +40,7 @@ pub struct DiagnoseArgs {
     /// Plan of the next experiment to write: what this recording could not show, and what it could not tell apart
     #[arg(long, value_name = "FILE")]
     plan: Option<PathBuf>,
-    /// Print every effect that was not accepted with its whole reason, in place of the first line
+    /// Print the reason of every effect that was not accepted, however long
     #[arg(long)]
     all: bool,
     #[command(flatten)]

@@ -81,7 +81,7 @@ fn sensor_text(out: &mut String, fit: &FitResult, name: &str, sensor: &SensorFit
         let missing = sensor.not_held_out.len();
         let note = match missing {
             0 if blocks < fit.holdout_blocks => format!(
-                "rms over {blocks} blocks of one dwell each: {} were asked for, and there are no more dwells",
+                "rms over {blocks} blocks of a dwell each; {} asked for",
                 fit.holdout_blocks
             ),
             0 => format!("rms over {blocks} contiguous blocks"),

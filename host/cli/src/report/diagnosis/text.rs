@@ -135,26 +135,24 @@ fn sensor(out: &mut String, d: &DiagnosisResult, name: &str, s: &SensorDiagnosis
     rejected(out, d, name, all);
 }
 
-/// Lines that the reason of an effect that was not accepted may take.
-const LINES: usize = 2;
-
-/// What was not accepted; without `all` only what takes few lines, and how many more there are.
+/// What was not accepted. Without `all`, of those whose reason takes more than a line the ids only.
 fn rejected(out: &mut String, d: &DiagnosisResult, sensor: &str, all: bool) {
-    let mut longer = 0;
+    let mut longer: Vec<&str> = Vec::new();
     for r in d.rejected.iter().filter(|r| r.sensor == sensor) {
         let mut text = String::new();
         wrap(&mut text, &format!("  - {}: ", r.id), &r.reason);
-        match all || text.lines().count() <= LINES {
+        match all || text.lines().count() == 1 {
             true => out.push_str(&text),
-            false => longer += 1,
+            false => longer.push(&r.id),
         }
     }
-    if longer > 0 {
-        let more = plural(longer, "more effect");
-        let _ = writeln!(
-            out,
-            "  - {more} tried and not accepted, with long reasons: --all prints them, and the page has them"
+    if !longer.is_empty() {
+        let count = plural(longer.len() as u64, "effect");
+        let text = format!(
+            "{} (--all prints the reasons, and the page has them)",
+            longer.join(", ")
         );
+        wrap(out, &format!("  - {count} not accepted: "), &text);
     }
 }
 
@@ -319,8 +317,8 @@ pub fn not_in_plan_text(d: &DiagnosisResult) -> String {
     for reason in reasons {
         let of_it = d.not_in_plan.iter().filter(|n| n.reason == reason);
         let ids: Vec<&str> = of_it.map(|n| n.id.as_str()).collect();
-        let text = format!("{}: {reason}", ids.join(", "));
-        wrap(&mut out, "not in this plan: ", &text);
+        let head = format!("not in this plan, as {reason}: ");
+        wrap(&mut out, &head, &ids.join(", "));
     }
     out
 }
