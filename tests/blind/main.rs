@@ -130,7 +130,7 @@ fn main() {
 fn tables(cases: &[(String, u64, Case)]) {
     let mut by_kind: BTreeMap<&str, Tally> = BTreeMap::new();
     let mut by_class = [[Tally::default(); 2]; CLASSES.len()];
-    let mut unlisted: BTreeMap<&str, [u32; 5]> = BTreeMap::new();
+    let mut unlisted: BTreeMap<&str, [u32; 6]> = BTreeMap::new();
     let mut false_alarms = Vec::new();
     let mut clean = 0;
     let without = |seed: u64| cases.iter().find(|c| c.1 == seed && c.2.truth.is_empty());
@@ -149,8 +149,11 @@ fn tables(cases: &[(String, u64, Case)]) {
             count[0] += 1;
             count[1] += u32::from(case.verdict == "unexplained");
             count[2] += u32::from(case.verdict == "clean");
-            count[3] += u32::from(listed && case.verdict == "explained");
-            count[4] += u32::from(case.verdict == "refused");
+            let explained = case.verdict == "explained";
+            let rightly = explained && !listed && case.found.iter().any(right);
+            count[3] += u32::from(rightly);
+            count[4] += u32::from(explained && !rightly);
+            count[5] += u32::from(case.verdict == "refused");
         } else {
             by_kind.entry(name).or_default().add(case, without);
             // A pair is as strong as its weaker part.
@@ -180,9 +183,11 @@ fn tables(cases: &[(String, u64, Case)]) {
         println!("{}", tally.row(&format!("`{name}`")));
     }
     println!(
-        "\neffects on no list\n\n| | cases | unexplained | clean | explained by another effect | refused |\n|---|---:|---:|---:|---:|---:|"
+        "\neffects on no list\n\n| | cases | unexplained | clean | named rightly | explained by another effect | refused |\n|---|---:|---:|---:|---:|---:|---:|"
     );
-    for (name, [cases, unexplained, missed, passed, refused]) in &unlisted {
-        println!("| `{name}` | {cases} | {unexplained} | {missed} | {passed} | {refused} |");
+    for (name, [cases, unexplained, missed, rightly, passed, refused]) in &unlisted {
+        println!(
+            "| `{name}` | {cases} | {unexplained} | {missed} | {rightly} | {passed} | {refused} |"
+        );
     }
 }

@@ -196,7 +196,7 @@ pub fn reported(diagnosis: Diagnosis) -> Diagnosis {
         created: "2026-01-01T00:00:00Z".into(),
     };
     let page = diagnosis_page(&report, &made).expect("a page");
-    let text = diagnosis_text(&report);
+    let text = diagnosis_text(&report, true);
     let json = serde_json::to_string(&report).expect("JSON");
     for effect in &diagnosis.effects {
         let id = effect.candidate.id();

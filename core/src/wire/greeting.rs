@@ -88,7 +88,7 @@ impl Capabilities {
 }
 
 /// Ids of effects by the bits of [`Greeting::effects`]. Append only.
-pub const EFFECTS: [&str; 23] = [
+pub const EFFECTS: &[&str] = &[
     "gyro_g_sensitivity",
     "gyro_scale_quadratic",
     "gyro_scale_cubic",

@@ -44,7 +44,7 @@ impl StillArgs {
 fn still(text: &str) -> std::result::Result<f64, String> {
     match text.parse() {
         Ok(f) if (1.0..=1e9).contains(&f) => Ok(f),
-        _ => Err("write a number of at least 1".into()),
+        _ => Err("write a number from 1 to 1e9".into()),
     }
 }
 
@@ -52,7 +52,8 @@ fn still(text: &str) -> std::result::Result<f64, String> {
 pub(crate) struct NoiseArgs {
     /// Noise of the unit at rest, by `mimu allan -o`; without it, the noise within the dwells
     ///
-    /// It also says how the bias wanders from dwell to dwell, which no dwell can tell.
+    /// It also says how the bias wanders from dwell to dwell, which no dwell can tell. For readings in V or counts it has to be
+    /// of raw readings of the same unit, with or without a calibration.
     #[arg(long = "noise", value_name = "FILE")]
     pub(crate) file: Option<PathBuf>,
 }

@@ -74,12 +74,10 @@ fn worst(
             "record both sensors: Kalibr's file needs both",
         ));
     };
-    if first.unit != sensor.unit() {
-        return Err(Error::new(
-            format!("{place}, channel {}", first.name),
-            format!("it is in {} and not in {}", first.unit, sensor.unit()),
-            "run mimu allan with --calibration",
-        ));
+    if let Err([found, remedy]) = first.model_in(sensor.unit()) {
+        let problem = format!("it is in {found} and not in {}", sensor.unit());
+        let place = format!("{place}, channel {}", first.name);
+        return Err(Error::new(place, problem, remedy));
     }
     let mut largest: Option<(f64, String)> = None;
     let mut missing: Vec<(&NoiseChannel, &str)> = Vec::new();

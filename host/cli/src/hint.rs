@@ -27,6 +27,7 @@ fn flag(argument: Argument) -> Option<&'static str> {
         Argument::Calibration => "--calibration",
         Argument::Table => "--table",
         Argument::Sensor => "--sensor",
+        Argument::Replace => "--replace",
         Argument::Port => "--port",
         Argument::Topic => "--topic",
         // An argument that this version of the command has no flag for.

@@ -22,7 +22,7 @@ pub use device::{
     check_text, counters_text, download_text, info_text, kalman_text, record_text, self_test_text,
     stream_text, upload_text,
 };
-pub use diagnosis::{Made, diagnosis_page, diagnosis_text};
+pub use diagnosis::{Made, diagnosis_page, diagnosis_text, not_in_plan_text};
 pub use fit::{dwell_table, fit_text};
 pub use import::import_text;
 pub use verify::verify_text;

@@ -53,13 +53,15 @@
 //! let accel = fitted.sensor(Sensor::Accel).unwrap();
 //! let scale = accel.estimated.triad.physical(mimu::triad::Angles::Exact).scale[0];
 //! assert!((scale.value - 0.3 / g).abs() < scale.interval); // V/(m/s²), with its 95 % interval
-//! let force = accel.estimated.triad.inverse.apply(&nalgebra::Vector3::new(1.65, 1.65, 1.95));
+//! let force = accel.estimated.triad.inverse.apply(&mimu::nalgebra::Vector3::new(1.65, 1.65, 1.95));
 //! assert!((force.z - g).abs() < 0.01);
 //!
 //! let file = mimu::Calibration::of(&fitted, &[], "2026-01-01T00:00:00Z")?.to_toml();
 //! assert!(file.contains("direction = \"raw to SI\""));
-//! # Ok::<(), mimu_recording::error::Error>(())
+//! # Ok::<(), mimu::Error>(())
 //! ```
+//!
+//! `Cargo.toml` needs this crate alone: `mimu = { path = "mimu/host/mimu" }`. Vectors and matrices are those of [`nalgebra`].
 
 pub mod allan;
 pub mod apply;
@@ -90,6 +92,8 @@ pub mod verify;
 
 pub use calibration::Calibration;
 pub use fit::{Fit, Options, fit};
+pub use mimu_recording::error::Error;
 pub use mimu_recording::{Batch as Samples, Manifest, RawUnit, Recording, Reference};
+pub use nalgebra;
 pub use prepared::Prepared;
 pub use quantity::Sensor;

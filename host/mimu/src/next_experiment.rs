@@ -55,6 +55,20 @@ pub struct Confused {
     pub experiment: String,
 }
 
+/// Something open that a plan for this kind of recording does not show.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct NotInPlan {
+    /// Effect, or two with `or` between them.
+    pub id: String,
+    /// Why not.
+    pub reason: &'static str,
+}
+
+/// It can be shown, but not with what this recording was made with.
+const TURNTABLE: &str = "this needs a turntable";
+/// Nothing of the table of recipes determines it.
+const NO_RECIPE: &str = "no recipe shows it";
+
 /// What to record next.
 #[derive(Debug, Clone, Default)]
 pub struct Next {
@@ -64,6 +78,8 @@ pub struct Next {
     pub confused: Vec<Confused>,
     /// What of it this kind of recording can show, for one experiment together.
     pub targets: Vec<Target>,
+    /// What of it this kind of recording cannot show.
+    pub not_in_plan: Vec<NotInPlan>,
 }
 
 /// A unit, and what an experiment with it can be made with.
@@ -249,18 +265,42 @@ pub fn next(diagnosis: &Diagnosis) -> Next {
         let shown = target
             .as_ref()
             .and_then(|t| recommended(diagnosis, &setup, t));
-        let (words, here) = shown.unwrap_or_else(|| (needs.clone(), false));
-        ((id.clone(), words), target.filter(|_| here))
+        let planned = planned(id, shown.as_ref(), target);
+        let words = shown.map_or_else(|| needs.clone(), |s| s.0);
+        ((id.clone(), words), planned)
     });
-    let (not_excited, targets): (Vec<_>, Vec<_>) = shown.unzip();
+    let (not_excited, listed): (Vec<_>, Vec<_>) = shown.unzip();
     let pairs = pairs(diagnosis);
     let told = pairs.par_iter().map(|p| p.told_apart(diagnosis, &setup));
     let (confused, apart): (Vec<_>, Vec<_>) = told.unzip();
+    let (mut targets, mut not_in_plan) = (Vec::new(), Vec::new());
+    for one in listed.into_iter().chain(apart) {
+        match one {
+            Ok(target) => targets.push(target),
+            Err(left_out) => not_in_plan.push(left_out),
+        }
+    }
     Next {
         not_excited,
         confused,
-        targets: targets.into_iter().chain(apart).flatten().collect(),
+        targets,
+        not_in_plan,
     }
+}
+
+/// `target`, if a recording of the same kind shows it; else that the plan lacks it, and why.
+fn planned(
+    id: &str,
+    shown: Option<&(String, bool)>,
+    target: Option<Target>,
+) -> Result<Target, NotInPlan> {
+    let reason = match (shown, target) {
+        (Some((_, true)), Some(target)) => return Ok(target),
+        (Some((_, false)), _) => TURNTABLE,
+        _ => NO_RECIPE,
+    };
+    let id = id.into();
+    Err(NotInPlan { id, reason })
 }
 
 /// What shows a target, in words, and whether a recording of the same kind does: what cannot be shown by hand may be on a table.
@@ -305,7 +345,11 @@ fn pairs(diagnosis: &Diagnosis) -> Vec<Pair> {
 }
 
 impl Pair {
-    fn told_apart(&self, diagnosis: &Diagnosis, setup: &Setup) -> (Confused, Option<Target>) {
+    fn told_apart(
+        &self,
+        diagnosis: &Diagnosis,
+        setup: &Setup,
+    ) -> (Confused, Result<Target, NotInPlan>) {
         let target = self.other.clone().map(|other| Target {
             candidate: self.found.clone(),
             sizes: self.values.clone(),
@@ -315,21 +359,23 @@ impl Pair {
         let shown = target
             .as_ref()
             .and_then(|t| recommended(diagnosis, setup, t));
-        let (experiment, here) = shown.unwrap_or_else(|| {
+        let ids = [self.found.id(), self.id.clone()];
+        let planned = planned(&ids.join(" or "), shown.as_ref(), target);
+        let experiment = shown.map(|s| s.0).unwrap_or_else(|| {
             // Of the two, what no dwell is planned for.
             let words = match (&self.found.kind, effects::by_id(&self.id)) {
                 (_, Some(effect)) => effect.needs,
                 (Kind::Effect(found), None) if self.other.is_some() => found.needs,
                 _ => "Make the same recording again: a jump does not come back where it was.",
             };
-            (words.to_string(), false)
+            words.to_string()
         });
         let confused = Confused {
-            ids: [self.found.id(), self.id.clone()],
+            ids,
             difference: self.difference,
             experiment,
         };
-        (confused, target.filter(|_| here))
+        (confused, planned)
     }
 }
 

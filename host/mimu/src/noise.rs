@@ -122,7 +122,7 @@ impl Noise {
     /// Takes the noise of `file` in place of that within the dwells; a channel whose dwells are not as noisy as the file says
     /// keeps its own, and is told of.
     ///
-    /// Errors: the file is in another unit than the readings, or lacks a channel.
+    /// Errors: the file has no scale factor to the unit of the readings, or lacks a channel.
     pub fn state(
         &mut self,
         file: &NoiseFile,
@@ -145,19 +145,11 @@ impl Noise {
             };
             let mut nodes = Vec::new();
             for channel in file.channel.iter().filter(|k| k.name == name) {
-                if channel.unit != unit {
-                    return Err(Error::new(
-                        format!("{}, channel {name}", file.place),
-                        format!("it is in {}, and the readings are in {unit}", channel.unit),
-                        match manifest.raw_unit {
-                            RawUnit::Si => "find the noise with the calibration of the unit",
-                            _ => {
-                                "find the noise in a recording in the same unit, without a calibration"
-                            }
-                        },
-                    ));
-                }
-                nodes.push((channel.temp_c.unwrap_or(f64::NAN), channel.model()));
+                let model = channel.model_in(unit).map_err(|[found, remedy]| {
+                    let problem = format!("it is in {found}, and the readings are in {unit}");
+                    Error::new(format!("{}, channel {name}", file.place), problem, remedy)
+                })?;
+                nodes.push((channel.temp_c.unwrap_or(f64::NAN), model));
             }
             if nodes.is_empty() {
                 return Err(Error::new(

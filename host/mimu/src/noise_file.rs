@@ -41,8 +41,14 @@ pub struct NoiseFile {
 pub struct NoiseChannel {
     /// Column: `gyro_x` to `accel_z`.
     pub name: String,
-    /// Unit of its readings.
+    /// Unit of its coefficients and of the deviations that they describe.
     pub unit: String,
+    /// Unit of the readings, where a calibration made [`Self::unit`] of it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub raw_unit: Option<String>,
+    /// Scale factor that did, [`Self::raw_unit`] per [`Self::unit`].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scale_factor: Option<f64>,
     /// Samples that it was computed from.
     pub samples: u64,
     /// Mean temperature, °C, where it was recorded.
@@ -111,11 +117,49 @@ impl NoiseChannel {
     }
 }
 
+impl NoiseChannel {
+    /// [`Self::model`] in `unit` squared, be it the unit of the readings or of what a calibration made of them.
+    ///
+    /// Errors: the unit that it is in, and what to do.
+    pub fn model_in(&self, unit: &str) -> std::result::Result<AllanModel, [String; 2]> {
+        let model = self.model();
+        if unit == self.unit {
+            return Ok(model);
+        }
+        if let (Some(raw), Some(scale)) = (&self.raw_unit, self.scale_factor)
+            && unit == raw
+        {
+            let squared = scale.powi(2);
+            return Ok(AllanModel {
+                white: model.white * squared,
+                flicker: model.flicker * squared,
+                walk: model.walk * squared,
+            });
+        }
+        let is_si = |u: &str| Sensor::BOTH.iter().any(|s| s.unit() == u);
+        let found = match &self.raw_unit {
+            Some(raw) => format!("{}, of readings in {raw}", self.unit),
+            None => self.unit.clone(),
+        };
+        let remedy = match (is_si(&self.unit), &self.raw_unit) {
+            (true, None) if !is_si(unit) => {
+                "run mimu allan again on the raw recording, with --calibration: the file then has the scale factor"
+            }
+            (false, _) if is_si(unit) => {
+                "run mimu allan again with --calibration: one file then serves for raw readings and for SI"
+            }
+            _ => "run mimu allan on a recording of this unit with the same raw unit",
+        };
+        Err([found, remedy.into()])
+    }
+}
+
 /// What a person has to know to use a noise file.
 const HEADER: &str = "\
 # Noise of an inertial unit at rest: sigma^2(tau) = 3 Q^2/tau^2 + N^2/tau + (2 ln 2/pi) B^2 + K^2 tau/3 + R^2 tau^2/2.
 # q quantization, n white noise, b bias instability, k rate random walk, r rate ramp, with a confidence interval each.
 # A coefficient that the record does not show is absent, and its reason is there.
+# scale_factor, where a calibration was given: raw_unit per unit. Times it, a coefficient is that of the raw readings.
 ";
 
 impl NoiseFile {
@@ -157,6 +201,16 @@ impl NoiseFile {
                     format!("{place}, channel {:?}", channel.name),
                     "there is no such channel",
                     format!("it is one of {}", RAW_COLUMNS.join(", ")),
+                ));
+            }
+            let scaled = (&channel.raw_unit, channel.scale_factor);
+            if !matches!(scaled, (None, None) | (Some(_), Some(_)))
+                || scaled.1.is_some_and(|s| !s.is_normal())
+            {
+                return Err(Error::new(
+                    format!("{place}, channel {}, scale_factor", channel.name),
+                    "raw_unit and scale_factor stand together, and a scale factor is a number other than 0",
+                    "run mimu allan again with --calibration",
                 ));
             }
             for term in Term::ALL {

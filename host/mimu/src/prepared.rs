@@ -13,7 +13,7 @@ use crate::noise_file::NoiseFile;
 use crate::quantity::{Sensor, significant};
 use crate::rails::refuse_dead_channels;
 use crate::stillness::Finding;
-use mimu_recording::error::{Error, Result};
+use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{Batch, Manifest, Recording, Reference};
 
 /// A recording, condensed, with its dwells and their noise.
@@ -47,8 +47,13 @@ impl Prepared {
 
     /// Finds the dwells of `samples` in memory. `finding`: a factor alone is [`crate::stillness::STILL_FACTOR`] or another.
     ///
-    /// Errors: those of a recording on disk; columns of different lengths.
+    /// Errors: those of a recording on disk; columns of different lengths; no samples.
     pub fn of(manifest: Manifest, samples: &Batch, finding: impl Into<Finding>) -> Result<Self> {
+        manifest.check("manifest in memory")?;
+        if samples.is_empty() {
+            let remedy = "give each sample its time in t_s and its readings in raw";
+            return Err(Error::new("samples in memory", "there are none", remedy));
+        }
         let integrate = manifest.reference == Reference::Gravity;
         let condensed = Condensed::of(samples, manifest.sample_rate_hz, integrate)?;
         let place = manifest.device.clone();
@@ -61,6 +66,15 @@ impl Prepared {
         finding: Finding,
         place: String,
     ) -> Result<Self> {
+        let still_factor = finding.still_factor;
+        if !(1.0..f64::INFINITY).contains(&still_factor) {
+            return Err(Error::new(
+                "still_factor",
+                format!("{still_factor} is no factor over the quietest variance"),
+                "give a number of at least 1; STILL_FACTOR is the usual one",
+            )
+            .about(Argument::StillFactor));
+        }
         refuse_dead_channels(&condensed, &place)?;
         if let (Some(power), Some(first)) = (manifest.power_on_s, condensed.blocks.first())
             && power > first.start_s
@@ -301,4 +315,41 @@ impl Prepared {
 /// Covariance in SI of independent raw readings with `variance`.
 pub fn si_covariance(matrix: &Matrix3<f64>, variance: &Vector3<f64>) -> Matrix3<f64> {
     matrix * Matrix3::from_diagonal(variance) * matrix.transpose()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stillness::STILL_FACTOR;
+    use mimu_recording::RawUnit;
+
+    #[test]
+    fn what_is_wrong_with_arrays_is_named_where_it_enters() {
+        let one = Batch {
+            t_s: vec![0.0, 0.01],
+            raw: [(); 6].map(|()| vec![0.5, 0.6]),
+            ..Batch::default()
+        };
+        let refused = |rate_hz, gravity, samples: &Batch, still_factor| {
+            let manifest = Manifest::new("u", rate_hz, gravity, RawUnit::Volt, Reference::Gravity);
+            let error = Prepared::of(manifest, samples, still_factor).unwrap_err();
+            error.to_string()
+        };
+        for (rate_hz, gravity, samples, still_factor, says) in [
+            (-100.0, 9.8, &one, STILL_FACTOR, "sample_rate_hz: -100.0"),
+            (100.0, f64::NAN, &one, STILL_FACTOR, "gravity_mps2: NaN"),
+            (
+                100.0,
+                9.8,
+                &Batch::default(),
+                STILL_FACTOR,
+                "there are none",
+            ),
+            (100.0, 9.8, &one, f64::NAN, "still_factor: NaN"),
+            (100.0, 9.8, &one, 0.5, "still_factor: 0.5"),
+        ] {
+            let error = refused(rate_hz, gravity, samples, still_factor);
+            assert!(error.contains(says), "{error}");
+        }
+    }
 }

@@ -184,7 +184,7 @@ fn units(
         let sensor = if i < 3 { Sensor::Gyro } else { Sensor::Accel };
         let Some(calibration) = calibration else {
             return Ok(match raw {
-                RawUnit::Si => Unit::si(sensor, 1.0),
+                RawUnit::Si => Unit::si(sensor),
                 _ => Unit::raw(raw),
             });
         };
@@ -206,7 +206,8 @@ fn units(
                 "give the calibration of this unit",
             ));
         }
-        Ok(Unit::si(sensor, 1.0 / table.physical.scale_factor[i % 3]))
+        let scale_factor = table.physical.scale_factor[i % 3];
+        Ok(Unit::scaled(sensor, raw, scale_factor))
     };
     indices.iter().map(unit).collect()
 }

@@ -41,6 +41,8 @@ pub struct SensorVerification {
 /// What a calibration does to a recording.
 #[derive(Debug, Clone)]
 pub struct Verification {
+    /// Whether it is the recording that the calibration was made from.
+    pub same_recording: bool,
     /// Gyro, then accelerometer, as far as both the calibration and the recording have them.
     pub sensors: Vec<SensorVerification>,
     /// What a person should know.
@@ -53,7 +55,8 @@ pub fn verify(prepared: &Prepared, calibration: &Calibration) -> Result<Verifica
     let mut warnings = prepared.condensed.warnings.clone();
     warnings.extend(prepared.dwells.warnings.iter().cloned());
     warnings.extend(check_unit(calibration, manifest, &prepared.place)?);
-    if calibration.recording.sha256 == prepared.condensed.sha256 {
+    let same_recording = calibration.recording.sha256 == prepared.condensed.sha256;
+    if same_recording {
         warnings.push("this is the recording that the calibration was made from: the figures say nothing about new data".into());
     }
     let cleaned = without_effects(prepared, calibration)?;
@@ -102,7 +105,11 @@ pub fn verify(prepared: &Prepared, calibration: &Calibration) -> Result<Verifica
             s.sensor
         ));
     }
-    Ok(Verification { sensors, warnings })
+    Ok(Verification {
+        same_recording,
+        sensors,
+        warnings,
+    })
 }
 
 /// Refuses a calibration for another raw unit; what to say of one of another device. `place` is the recording.

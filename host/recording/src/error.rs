@@ -61,6 +61,8 @@ pub enum Argument {
     Table,
     /// Sensor that an experiment is designed for.
     Sensor,
+    /// Whether what exists is replaced.
+    Replace,
     /// Serial port.
     Port,
     /// Topic of a bag.
@@ -146,6 +148,7 @@ impl Error {
     /// An error of the operating system on a file or folder.
     pub fn io(path: &Path, error: &std::io::Error) -> Self {
         let remedy = match error.kind() {
+            std::io::ErrorKind::IsADirectory => "name the file in it",
             std::io::ErrorKind::NotFound => "check the path",
             std::io::ErrorKind::PermissionDenied => "check its permissions",
             std::io::ErrorKind::StorageFull => "free some space and run it again",

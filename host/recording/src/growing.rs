@@ -45,7 +45,7 @@ impl Growing {
     pub fn create(directory: &Path, columns: Columns, manifest: &Manifest) -> Result<Self> {
         let place = directory.join(MANIFEST_FILE).display().to_string();
         manifest.check(&place)?;
-        check_target(directory, false)?;
+        check_target(directory, None)?;
         fs::create_dir_all(directory).map_err(|error| Error::io(directory, &error))?;
         let mut csv = CsvWriter::create(&directory.join(SampleFormat::Csv.file_name()), columns)?;
         csv.flush()?;

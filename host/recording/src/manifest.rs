@@ -77,7 +77,7 @@ impl std::str::FromStr for RawUnit {
         match text {
             "V" => Ok(RawUnit::Volt),
             "count" => Ok(RawUnit::Count),
-            "SI" => Ok(RawUnit::Si),
+            "SI" | "si" => Ok(RawUnit::Si),
             _ => Err(Error::new(
                 "raw unit",
                 format!("{} is not known", super::cell::shorten(text.as_bytes())),

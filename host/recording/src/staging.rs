@@ -5,7 +5,7 @@ use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
 use super::manifest::MANIFEST_FILE;
-use crate::error::{Error, Result};
+use crate::error::{Argument, Error, Result};
 
 /// Files that a recording consists of; only these are ever deleted.
 const OWN_FILES: [&str; 3] = [MANIFEST_FILE, "samples.csv", "samples.parquet"];
@@ -22,7 +22,7 @@ pub(super) struct Staging {
 impl Staging {
     /// Creates the temporary directory, after checking that `target` can be written in the end.
     pub fn create(target: &Path, replace: bool) -> Result<Staging> {
-        check_target(target, replace)?;
+        check_target(target, Some(replace))?;
         let path = sibling(target, "new")?;
         Ok(Staging {
             path,
@@ -55,7 +55,7 @@ impl Staging {
     /// Gives the directory its name.
     pub fn publish(self) -> Result<()> {
         // Looked at again: hours may have passed since the start.
-        check_target(&self.target, self.replace)?;
+        check_target(&self.target, Some(self.replace))?;
         sync_directory(&self.path);
         let old = if self.target.exists() {
             // A directory with files in it cannot be renamed over; the old one steps aside first.
@@ -92,7 +92,8 @@ impl Drop for Staging {
     }
 }
 
-pub(super) fn check_target(target: &Path, replace: bool) -> Result<()> {
+/// `replace`: whether what is there is replaced; `None` where the caller offers no such thing.
+pub(super) fn check_target(target: &Path, replace: Option<bool>) -> Result<()> {
     let refuse = |problem: &str, remedy: &str| Err(Error::new(target.display(), problem, remedy));
     let metadata = match fs::symlink_metadata(target) {
         Err(error) if error.kind() == ErrorKind::NotFound => {
@@ -119,11 +120,12 @@ pub(super) fn check_target(target: &Path, replace: bool) -> Result<()> {
         let entry = entry.map_err(|error| Error::io(target, &error))?;
         names.push(entry.file_name().to_string_lossy().into_owned());
     }
-    if !names.is_empty() && !replace {
-        return refuse(
-            "it exists already",
-            "choose another name, or replace it explicitly",
-        );
+    if !names.is_empty() && replace != Some(true) {
+        let refused = |remedy| Error::new(target.display(), "it exists already", remedy);
+        return Err(match replace {
+            None => refused("choose another name"),
+            Some(_) => refused("choose another name, or have it replaced").about(Argument::Replace),
+        });
     }
     match names
         .iter()

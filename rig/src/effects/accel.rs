@@ -5,7 +5,7 @@ use crate::rotation::{add as sum, cross, dot, scale};
 
 const MG: f64 = 1e-3 * G;
 
-pub(super) const SPECS: [Spec; 4] = [
+pub(super) const SPECS: &[Spec] = &[
     // Nonlinearity of the MMA7260QT: 1 % of full scale at most, 15 mg at 1.5 g. A third of it at 1 g.
     Spec {
         id: "accel_scale_quadratic",

@@ -4,7 +4,7 @@ use super::{Active, Build, DPS, G, Spec, axes, form, input};
 
 const MG: f64 = 1e-3 * G;
 
-pub(super) const SPECS: [Spec; 4] = [
+pub(super) const SPECS: &[Spec] = &[
     // Sizes assumed: no datasheet of these parts states an ageing within hours.
     Spec {
         id: "gyro_bias_drift",

@@ -6,7 +6,7 @@ use crate::rotation::dot;
 /// Rate at which the errors of the scale are stated, rad/s: full scale of an ADXRS300.
 const FULL: f64 = 300.0 * DPS;
 
-pub(super) const SPECS: [Spec; 5] = [
+pub(super) const SPECS: &[Spec] = &[
     // The proof mass sags under force and the sense comb reads the sag as rate. ADXRS300: linear acceleration
     // effect 0.2 deg/s/g, any axis.
     Spec {

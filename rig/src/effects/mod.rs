@@ -32,15 +32,15 @@ pub(crate) const G: f64 = 9.80665;
 const REFERENCE_C: f64 = 25.0;
 
 /// All effects.
-const ALL: [&[Spec]; 8] = [
-    &gyro::SPECS,
-    &accel::SPECS,
-    &drift::SPECS,
-    &thermal::SPECS,
-    &readout::SPECS,
-    &supply::SPECS,
-    &unlisted_gyro::SPECS,
-    &unlisted_accel::SPECS,
+const ALL: &[&[Spec]] = &[
+    gyro::SPECS,
+    accel::SPECS,
+    drift::SPECS,
+    thermal::SPECS,
+    readout::SPECS,
+    supply::SPECS,
+    unlisted_gyro::SPECS,
+    unlisted_accel::SPECS,
 ];
 
 /// What effects see at one instant: nothing of it is disturbed.
@@ -297,7 +297,7 @@ impl EffectTruth {
 
 /// Every kind of effect.
 pub fn specs() -> impl Iterator<Item = &'static Spec> {
-    ALL.into_iter().flatten()
+    ALL.iter().copied().flatten()
 }
 
 /// The kind with this id.

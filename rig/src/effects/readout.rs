@@ -24,7 +24,7 @@ const CONVERTERS: [Parameter; 2] = [
     },
 ];
 
-pub(super) const SPECS: [Spec; 9] = [
+pub(super) const SPECS: &[Spec] = &[
     Spec {
         id: "gyro_readout_code",
         about: "each of the six top bits of the code, when set, is worth so much more",

@@ -3,7 +3,7 @@
 use super::{DPS, Spec, read_out, scalar};
 use crate::rotation::norm;
 
-pub(super) const SPECS: [Spec; 1] = [
+pub(super) const SPECS: &[Spec] = &[
     // The slip rings carry the motor's return current past the unit's ground. Size assumed.
     Spec {
         id: "x_supply_coupling",

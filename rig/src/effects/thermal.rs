@@ -43,7 +43,7 @@ const TILT: [Parameter; 1] = [sized("matrix_urad_per_c", Shape::Cross, 20.0)];
 const CURVATURE: Parameter = form("curvature_per_c", 0.001, 0.01);
 const LAG: Parameter = form("lag_s", 20.0, 120.0);
 
-pub(super) const SPECS: [Spec; 8] = [
+pub(super) const SPECS: &[Spec] = &[
     // ADXRS300: the null may move by 0.2 V, 40 deg/s, between the ends of -40 to 85 °C: 0.6 deg/s/K at most.
     // A sixth of that.
     Spec {

@@ -4,7 +4,7 @@ use super::{DPS, G, Spec, axes, form, input};
 
 const MG: f64 = 1e-3 * G;
 
-pub(super) const SPECS: [Spec; 3] = [
+pub(super) const SPECS: &[Spec] = &[
     // The supply of the board sags with rate in one gyro and changes the gain of another chip's amplifier.
     // Size assumed.
     Spec {

@@ -4,7 +4,7 @@ use super::{DPS, G, Spec, axes, form, input, matrix};
 use crate::filter::LowPass;
 use crate::rotation::dot;
 
-pub(super) const SPECS: [Spec; 6] = [
+pub(super) const SPECS: &[Spec] = &[
     // A resonator driven off its axis rectifies vibration. Size assumed: a tenth of the g-sensitivity per g².
     Spec {
         id: "x_gyro_vibration_rectification",

@@ -136,5 +136,15 @@ fn the_page_has_every_effect_with_its_parameters() {
             (spec.id.to_owned(), vec![about, parameters.join("; ")])
         })
         .collect();
-    assert_eq!(documented, expected);
+    for (id, cells) in &expected {
+        let line = format!("| `{id}` | {} |", cells.join(" | ")).replace('¦', "\\|");
+        let shown = documented.get(id);
+        assert_eq!(shown, Some(cells), "write to docs/bench.md:\n{line}\n");
+    }
+    for id in documented.keys() {
+        assert!(
+            expected.contains_key(id),
+            "docs/bench.md has {id}, which is no effect of the bench"
+        );
+    }
 }

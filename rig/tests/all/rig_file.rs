@@ -2,6 +2,7 @@
 
 use mimu_rig::catalog::sensors;
 use mimu_rig::converter::Converter;
+use mimu_rig::effects::specs;
 use mimu_rig::ideal::{Angles, Fang, Ideal, XU_TABLE_1, XU_TABLE_2};
 use mimu_rig::located::Source;
 use mimu_rig::motion::Motion;
@@ -232,14 +233,6 @@ fn a_complaint_names_the_line_what_is_wrong_and_what_to_do() {
             "5: a digital part gives no volts; write \"count\"",
         ),
         (
-            "draw_effects = 1000",
-            "2: more effects than there are besides the stated ones; give at most 40",
-        ),
-        (
-            "draw_effects = 40\n[[effect]]\nid = \"gyro_warm_up\"",
-            "2: more effects than there are besides the stated ones; give at most 39",
-        ),
-        (
             "[[effect]]\nid = \"earth_rate\"\n\n[[effect]]\nid = \"accel_size_effect\"\narms_cm = [[0, 0, 0], [0, 0, 0], [0, 0, 0]]",
             "3: the Earth's rate is no effect here but the truth; write `earth_rate = true` or false at the top",
         ),
@@ -294,6 +287,12 @@ fn a_complaint_names_the_line_what_is_wrong_and_what_to_do() {
         ),
     ] {
         assert_eq!(parse(text).unwrap_err(), format!("RIG.toml:{complaint}"));
+    }
+    let all = specs().count();
+    let one_stated = format!("draw_effects = {all}\n[[effect]]\nid = \"gyro_warm_up\"");
+    for (text, most) in [("draw_effects = 1000", all), (one_stated.as_str(), all - 1)] {
+        let says = "2: more effects than there are besides the stated ones; give at most";
+        assert_eq!(parse(text).unwrap_err(), format!("RIG.toml:{says} {most}"));
     }
     let unknown = parse("[[effect]]\nid = \"gyro_g\"").unwrap_err();
     assert!(

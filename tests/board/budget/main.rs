@@ -27,7 +27,7 @@ fn effects() -> impl Iterator<Item = &'static str> {
         let of = |count: usize| Effect::<f32>::named(id, &[1e-4; 9][..count], None);
         of(9).or(of(3)).is_ok_and(|effect| !effect.is_slow())
     };
-    EFFECTS.into_iter().filter(runs).chain(["term"])
+    EFFECTS.iter().copied().filter(runs).chain(["term"])
 }
 
 fn main() -> ExitCode {

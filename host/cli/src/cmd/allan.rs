@@ -39,13 +39,15 @@ pub struct AllanArgs {
     /// Probability of the intervals
     #[arg(long, value_name = "P", default_value_t = 0.95, value_parser = confidence)]
     confidence: f64,
-    /// Calibration of the unit: readings in V or counts are divided by its scale factors
+    /// Calibration of the unit: readings in V or counts are divided by its scale factors, which go into the noise file
     #[arg(long, value_name = "FILE")]
     calibration: Option<PathBuf>,
     /// Plot to write
     #[arg(long, value_name = "FILE.svg")]
     plot: Option<PathBuf>,
-    /// Noise file to write, for `mimu export`
+    /// Noise file to write, for `mimu fit`, `verify`, `diagnose`, `design` and `export`
+    ///
+    /// Of readings in V or counts `design` and `export` take it only with --calibration; the others take it either way.
     #[arg(short, value_name = "FILE")]
     output: Option<PathBuf>,
     #[command(flatten)]

@@ -37,7 +37,7 @@ pub struct DesignArgs {
     #[arg(long, value_name = "LIST", default_value = "affine")]
     model: Terms,
     /// Find the best design of N dwells
-    #[arg(short, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=200))]
+    #[arg(short, value_name = "N", value_parser = dwells, allow_negative_numbers = true)]
     n: Option<u16>,
     /// Find how many dwells and how long are best within so many minutes, moves included
     #[arg(long, value_name = "MINUTES", value_parser = |t: &str| number(t, 0.1, 2880.0))]
@@ -142,6 +142,13 @@ enum SchemeArg {
     /// Eight dwells on a two-axis table (niu, 3.2)
     #[value(name = "niu-8")]
     Niu8,
+}
+
+fn dwells(text: &str) -> std::result::Result<u16, String> {
+    match text.parse() {
+        Ok(n) if (1..=200).contains(&n) => Ok(n),
+        _ => Err("write a whole number, 1 to 200".into()),
+    }
 }
 
 pub fn number(text: &str, lowest: f64, highest: f64) -> std::result::Result<f64, String> {

@@ -43,6 +43,9 @@ pub struct DiagnoseArgs {
     /// Plan of the next experiment to write: what this recording could not show, and what it could not tell apart
     #[arg(long, value_name = "FILE")]
     plan: Option<PathBuf>,
+    /// Print the reason of every effect that was not accepted, however long
+    #[arg(long)]
+    all: bool,
     #[command(flatten)]
     still: StillArgs,
     #[command(flatten)]
@@ -135,20 +138,25 @@ pub fn run(args: &DiagnoseArgs) -> Result<()> {
         files.push(stage(path, made.to_toml())?);
     }
     let next = next_experiment::next(&diagnosis);
+    let judged = judged.as_ref().map(|(name, both)| (name.as_str(), both));
+    let found = DiagnosisResult::of(&diagnosis, &next, judged);
     let mut said = String::new();
     if let Some(path) = &args.plan {
         said = match next_experiment::together(&diagnosis, &next) {
             Some((setup, answer)) => {
                 let manifest = &diagnosis.before.prepared.manifest;
-                let text = answer.plan(&setup, Some(&manifest.device), manifest.sample_rate_hz);
+                let left_out = report::not_in_plan_text(&found);
+                let about: String = left_out.lines().map(|l| format!("# {l}\n")).collect();
+                let text = about + &answer.plan(&setup, Some(&manifest.device), manifest.sample_rate_hz);
                 files.push(stage(path, text)?);
-                format!("\nplan of the next experiment: {}\n", path.display())
+                format!(
+                    "\nplan of the next experiment: {}\n{left_out}",
+                    path.display()
+                )
             }
             None => "\nplan of the next experiment: none written, as there is nothing that one of this kind would settle\n".into(),
         };
     }
-    let judged = judged.as_ref().map(|(name, both)| (name.as_str(), both));
-    let found = DiagnosisResult::of(&diagnosis, &next, judged);
     let named: Vec<String> = args
         .recordings
         .iter()
@@ -162,9 +170,14 @@ pub fn run(args: &DiagnoseArgs) -> Result<()> {
         };
         files.push(stage(path, report::diagnosis_page(&found, &made)?)?);
     }
+    for (what, path) in [("calibration", &args.output), ("page", &args.page)] {
+        if let Some(path) = path {
+            said += &format!("\n{what}: {}\n", path.display());
+        }
+    }
     print(
         &args.json,
-        &(report::diagnosis_text(&found) + &said),
+        &(report::diagnosis_text(&found, args.all) + &said),
         &found,
         files,
     )

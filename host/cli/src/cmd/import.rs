@@ -26,10 +26,10 @@ pub(crate) struct ImportArgs {
     #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
     columns: Vec<ColumnList>,
     /// Sample rate, Hz, of files without a time column; of others it is the rate of their time stamps, which this one checks
-    #[arg(long)]
+    #[arg(long, allow_negative_numbers = true)]
     rate_hz: Option<f64>,
     /// Local gravity, m/s²; without it, normal gravity at sea level of --latitude, or 9.80665 and a warning
-    #[arg(long)]
+    #[arg(long, allow_negative_numbers = true)]
     gravity: Option<f64>,
     /// Unit of the raw columns, after --scale: V, count or SI (rad/s and m/s²); bags have SI without it
     #[arg(long, value_name = "UNIT")]

@@ -4,4 +4,4 @@ mod page;
 mod text;
 
 pub use page::{Made, diagnosis_page};
-pub use text::diagnosis_text;
+pub use text::{diagnosis_text, not_in_plan_text};

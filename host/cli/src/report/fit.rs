@@ -80,6 +80,10 @@ fn sensor_text(out: &mut String, fit: &FitResult, name: &str, sensor: &SensorFit
     if blocks > 0 {
         let missing = sensor.not_held_out.len();
         let note = match missing {
+            0 if blocks < fit.holdout_blocks => format!(
+                "rms over {blocks} blocks of a dwell each; {} asked for",
+                fit.holdout_blocks
+            ),
             0 => format!("rms over {blocks} contiguous blocks"),
             m if m == blocks => "no block can be left out, see the warnings".into(),
             m => format!("rms over {} of {blocks} contiguous blocks", blocks - m),

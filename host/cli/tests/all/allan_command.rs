@@ -382,6 +382,35 @@ fn readings_in_volts_become_si_by_the_calibration_of_the_unit() {
         }
     }
     assert!(outside <= 1, "{outside} of six");
+    one_noise_file_serves_all(folder.path());
     let error = refused(folder.path(), "export --kalibr imu.yaml --noise cal.toml");
     assert!(error.contains("cal.toml, line"), "{error}");
+}
+
+/// With a calibration the file serves those who read volts as that without one does, and those who need SI as well.
+fn one_noise_file_serves_all(folder: &Path) {
+    done(folder, "allan r --step 2 -o raw.toml");
+    done(
+        folder,
+        "allan r --step 2 --calibration cal.toml -o both.toml",
+    );
+    for command in ["fit r", "verify r --calibration cal.toml", "diagnose r"] {
+        let [raw, both] = ["raw", "both"].map(|n| {
+            let text = done(folder, &format!("{command} --noise {n}.toml"));
+            text.replace(&format!("{n}.toml"), "the file")
+        });
+        assert_eq!(raw, both, "{command}");
+        assert_ne!(raw, done(folder, command), "{command}: the noise is used");
+    }
+    let kalibr = "export --kalibr imu.yaml --gyro-walk 1e-6 --accel-walk 1e-6";
+    let design = "design -n 12 --sensor accel";
+    for command in [kalibr, design] {
+        done(folder, &format!("{command} --noise both.toml"));
+        let error = refused(folder, &format!("{command} --noise raw.toml"));
+        let says = "it is in V and not in";
+        assert!(
+            error.contains(says) && error.contains("--calibration"),
+            "{error}"
+        );
+    }
 }

@@ -1,4 +1,4 @@
-//! What the README shows is what the command prints.
+//! What the README and the pages of the documentation show is what the command prints.
 
 use std::path::Path;
 use std::process::Command;
@@ -24,4 +24,29 @@ fn the_fit_in_the_readme_is_that_of_the_demo() {
         printed.contains(shown),
         "the README shows\n{shown}\nand the demo prints\n{printed}"
     );
+}
+
+/// A block below `<!-- mimu ARGUMENTS -->` is part of what that command prints; a first line with the command itself is left out.
+#[test]
+fn what_the_page_of_designs_shows_is_what_the_command_prints() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let page = std::fs::read_to_string(root.join("docs/design.md")).unwrap();
+    let mut checked = 0;
+    for part in page.split("<!-- mimu ").skip(1) {
+        let (arguments, rest) = part.split_once(" -->\n```\n").unwrap();
+        let shown = rest.split("\n```").next().unwrap();
+        let shown = match shown.strip_prefix("$ ") {
+            Some(typed) => typed.split_once('\n').unwrap().1,
+            None => shown,
+        };
+        let mut command = Command::new(env!("CARGO_BIN_EXE_mimu"));
+        let printed = command.args(arguments.split(' ')).output().unwrap().stdout;
+        let printed = String::from_utf8(printed).unwrap();
+        assert!(
+            printed.contains(shown),
+            "docs/design.md shows for `mimu {arguments}`\n{shown}\nand it prints\n{printed}"
+        );
+        checked += 1;
+    }
+    assert!(checked >= 2, "{checked} blocks");
 }

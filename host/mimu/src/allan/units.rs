@@ -12,14 +12,26 @@ pub struct Unit {
     pub name: &'static str,
     /// Factor from a raw reading to it.
     pub per_raw: f64,
+    /// Unit of the raw readings, where a scale factor made [`Self::name`] of it.
+    pub scaled_from: Option<&'static str>,
 }
 
 impl Unit {
-    /// SI unit of `sensor`, `per_raw` of which are one raw reading.
-    pub fn si(sensor: Sensor, per_raw: f64) -> Self {
+    /// SI unit of `sensor`, for readings in it.
+    pub fn si(sensor: Sensor) -> Self {
         Self {
             name: sensor.unit(),
-            per_raw,
+            per_raw: 1.0,
+            scaled_from: None,
+        }
+    }
+
+    /// SI unit of `sensor`, for readings in `raw` that a calibration with `scale_factor`, raw per SI unit, is given for.
+    pub fn scaled(sensor: Sensor, raw: RawUnit, scale_factor: f64) -> Self {
+        Self {
+            name: sensor.unit(),
+            per_raw: 1.0 / scale_factor,
+            scaled_from: (raw != RawUnit::Si).then(|| Self::raw(raw).name),
         }
     }
 
@@ -30,7 +42,11 @@ impl Unit {
             RawUnit::Count => "count",
             RawUnit::Si => "SI",
         };
-        Self { name, per_raw: 1.0 }
+        Self {
+            name,
+            per_raw: 1.0,
+            scaled_from: None,
+        }
     }
 
     /// Unit of the coefficient of `term` in JSON and files.

@@ -11,7 +11,7 @@ use crate::allan::model::FLOOR;
 use crate::allan::variance::AllanModel;
 use crate::noise_file::NoiseFile;
 use crate::quantity::Sensor;
-use mimu_recording::error::{Argument, Error, Result};
+use mimu_recording::error::{Error, Result};
 
 /// Noise of a sensor as density and floor, from which the sigma of a dwell mean follows.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -48,7 +48,7 @@ impl DwellNoise {
 
     /// Of the worst axis of `sensor` in a noise file: of each coefficient the largest, over all temperatures.
     ///
-    /// Errors: the file lacks the sensor, or is not in SI.
+    /// Errors: the file lacks the sensor, or is of raw readings without a scale factor.
     pub fn stated(file: &NoiseFile, sensor: Sensor) -> Result<Self> {
         let mut worst = Self {
             n: 0.0,
@@ -64,19 +64,19 @@ impl DwellNoise {
             ));
         }
         for channel in channels {
-            if channel.unit != sensor.unit() {
-                return Err(Error::new(
+            let model = channel.model_in(sensor.unit()).map_err(|[found, remedy]| {
+                let problem = format!("it is in {found} and not in {}", sensor.unit());
+                Error::new(
                     format!("{}, channel {}", file.place, channel.name),
-                    format!("it is in {} and not in {}", channel.unit, sensor.unit()),
-                    "convert the readings by a calibration before their noise is found",
+                    problem,
+                    remedy,
                 )
-                .about(Argument::Calibration));
-            }
+            })?;
             let AllanModel {
                 white,
                 flicker,
                 walk,
-            } = channel.model();
+            } = model;
             worst.n = worst.n.max(white.sqrt());
             worst.b = worst.b.max((flicker / FLOOR).sqrt());
             worst.k = worst.k.max((3.0 * walk).sqrt());

@@ -59,7 +59,7 @@ const ARMS: [Coefficient; 9] = {
     ]
 };
 
-pub(super) const EFFECTS: [Effect; 4] = [
+pub(super) const EFFECTS: &[Effect] = &[
     Effect {
         id: "accel_scale_quadratic",
         sensor: Sensor::Accel,

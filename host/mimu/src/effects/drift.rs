@@ -23,7 +23,7 @@ const SETTLED: Regressor = Regressor::Decay(Time);
 const DRIFTS: &str = "the same inputs again half an hour later";
 const SETTLES: &str = "a cold start: switch on and record at once, for half an hour";
 
-pub(super) const EFFECTS: [Effect; 4] = [
+pub(super) const EFFECTS: &[Effect] = &[
     Effect {
         id: "gyro_bias_drift",
         sensor: Sensor::Gyro,

@@ -17,7 +17,7 @@ const EARTH: [Coefficient; 1] = {
     [vertical.scoped(Scope::Place)]
 };
 
-pub(super) const EFFECTS: [Effect; 6] = [
+pub(super) const EFFECTS: &[Effect] = &[
     // The vertical part alone: about the level one nothing is known where nothing says which way is north.
     Effect {
         id: "earth_rate",

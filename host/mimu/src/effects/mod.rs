@@ -35,14 +35,14 @@ use effect::Effect;
 
 /// All of them, in the order of docs/effects.md.
 pub fn all() -> impl Iterator<Item = &'static Effect> {
-    static LISTS: [&[Effect]; 5] = [
-        &gyro::EFFECTS,
-        &accel::EFFECTS,
-        &drift::EFFECTS,
-        &thermal::EFFECTS,
-        &readout::EFFECTS,
+    static LISTS: &[&[Effect]] = &[
+        gyro::EFFECTS,
+        accel::EFFECTS,
+        drift::EFFECTS,
+        thermal::EFFECTS,
+        readout::EFFECTS,
     ];
-    LISTS.into_iter().flatten()
+    LISTS.iter().copied().flatten()
 }
 
 /// The effect of this name.
@@ -97,7 +97,12 @@ mod tests {
         let known = mimu_core::wire::EFFECTS;
         for effect in all().filter(|e| e.is_error()) {
             let bit = known.iter().position(|id| *id == effect.id);
-            let bit = bit.unwrap_or_else(|| panic!("{}: append it to wire::EFFECTS", effect.id));
+            let bit = bit.unwrap_or_else(|| {
+                panic!(
+                    "append it to EFFECTS in core/src/wire/greeting.rs:\n    \"{}\",",
+                    effect.id
+                )
+            });
             let bits = mimu_core::wire::effects_of_this_build();
             assert!(
                 bits & (1 << bit) != 0,
@@ -115,11 +120,21 @@ mod tests {
         let text = std::fs::read_to_string(path).expect("docs/effects.md");
         let head = "| id | physics | regressors | coefficients | size (source) | the device removes it | seen by | taken for |\n\
                     |---|---|---|---|---|---|---|---|\n";
-        let lines: String = all().map(|e| e.table_line() + "\n").collect();
-        let table = format!("{head}{lines}");
+        let lines: Vec<String> = all().map(Effect::table_line).collect();
+        let missing: Vec<&str> = lines
+            .iter()
+            .map(String::as_str)
+            .filter(|line| !text.lines().any(|l| l == *line))
+            .collect();
+        assert!(
+            missing.is_empty(),
+            "docs/effects.md lacks of its table, in the order of the lists of effects:\n\n{}\n",
+            missing.join("\n")
+        );
+        let table = format!("{head}{}\n", lines.join("\n"));
         assert!(
             text.contains(&table),
-            "docs/effects.md has to hold this table:\n\n{table}"
+            "docs/effects.md: all lines are there, but not one below the other in the order of the lists of effects, or with one too many"
         );
     }
 }

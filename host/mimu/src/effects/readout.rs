@@ -57,7 +57,7 @@ const ABOUT: &str = "bits of the converter are worth more or less than they say,
 const SIZE: &str = "2e-4 of the weight of bit 0 (STM32H743: 4 to 12 codes of 65536)";
 const TAKEN_FOR: &str = "scale nonlinearity, a bias beyond a limit";
 
-pub(super) const EFFECTS: [Effect; 2] = [
+pub(super) const EFFECTS: &[Effect] = &[
     Effect {
         id: "gyro_readout_code",
         sensor: Sensor::Gyro,

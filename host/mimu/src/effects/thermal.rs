@@ -65,7 +65,7 @@ const SWEEP: &str = "temp_c, and the dwells at temperatures 20 °C apart";
 const RAMP: &str = "temp_c, and a ramp up and down at some °C a minute";
 const ONE_WAY: &str = "drift, on a one-way sweep";
 
-pub(super) const EFFECTS: [Effect; 8] = [
+pub(super) const EFFECTS: &[Effect] = &[
     Effect {
         id: "gyro_thermal_bias",
         sensor: Sensor::Gyro,

@@ -157,6 +157,8 @@ pub struct Experiment {
     pub begin_s: Vec<f64>,
     /// Length of a dwell, s.
     pub dwell_s: f64,
+    /// Dwells in a row in each state before the next one.
+    pub hold: usize,
     /// Temperature of the chamber, s and °C; empty where it does not matter.
     pub chamber_c: Vec<(f64, f64)>,
     /// Temperature of the board, s and °C above [`REFERENCE_C`].
@@ -194,6 +196,7 @@ impl Experiment {
             settings: Vec::new(),
             begin_s: Vec::new(),
             dwell_s: setup.dwell_s,
+            hold,
             chamber_c,
             board: Vec::new(),
             time_s: 0.0,

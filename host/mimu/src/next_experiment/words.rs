@@ -12,8 +12,13 @@ impl Answer {
         let minutes = (done.time_s / 60.0).ceil();
         let states = done.recipe.inputs.settings(setup).len();
         let dwell_s = shown(done.dwell_s);
+        // By hand a unit is left where it lies for several dwells, which are one step of the plan.
+        let each = match done.hold {
+            1 => format!("{dwell_s} s a dwell"),
+            n => format!("left for {n} dwells of {dwell_s} s in each before it is turned by hand"),
+        };
         let go = format!(
-            "for {minutes:.0} min go through {states} states again and again in a randomised order, {dwell_s} s a dwell"
+            "for {minutes:.0} min go through {states} states again and again in a randomised order, {each}"
         );
         let how = match done.recipe.course {
             Course::Dwells => format!(
@@ -26,7 +31,7 @@ impl Answer {
             ),
             Course::Chamber => format!(
                 "Put the unit into a chamber, switch it on and start to record at once; {go}, while the chamber goes from {} °C \
-                 at 2 °C a minute, staying {} min at each",
+                 at 2 °C a minute, staying {} min at each; record temp_c as well, the temperature of the unit and not of the chamber",
                 course_of(done),
                 shown(SOAK_S / 60.0)
             ),

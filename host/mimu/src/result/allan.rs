@@ -67,6 +67,12 @@ pub struct ChannelResult {
     pub temp_c: Option<f64>,
     /// rad/s, m/s^2, or the raw unit.
     pub unit: &'static str,
+    /// Unit of the readings, where a calibration made [`Self::unit`] of it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub raw_unit: Option<&'static str>,
+    /// Scale factor that did, [`Self::raw_unit`] per [`Self::unit`].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub scale_factor: Option<f64>,
     /// Samples that it was computed from.
     pub samples: usize,
     /// Averaging times, s.
@@ -223,6 +229,8 @@ impl ChannelResult {
             recording: survey.recording.clone(),
             temp_c: survey.temp_c,
             unit: channel.unit.name,
+            raw_unit: channel.unit.scaled_from,
+            scale_factor: channel.unit.scaled_from.map(|_| 1.0 / channel.unit.per_raw),
             samples: channel.samples,
             tau_s: column(|p| p.tau_s),
             adev: column(|p| p.deviation),
@@ -270,6 +278,8 @@ impl ChannelResult {
         NoiseChannel {
             name: self.name.into(),
             unit: self.unit.into(),
+            raw_unit: self.raw_unit.map(String::from),
+            scale_factor: self.scale_factor,
             samples: self.samples as u64,
             // To a thousandth: more is the thermometer's noise.
             temp_c: self.temp_c.map(|t| (1e3 * t).round() / 1e3),

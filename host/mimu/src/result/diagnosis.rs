@@ -11,7 +11,7 @@ use crate::diagnose::picture::Picture;
 use crate::diagnose::rows::Figure as Judged;
 use crate::diagnose::{Diagnosis, SensorDiagnosis, Source, Verdict};
 use crate::effects::candidate::Kind;
-use crate::next_experiment::{Confused, Next};
+use crate::next_experiment::{Confused, Next, NotInPlan};
 use crate::quantity::{AXES, Figure, Sensor};
 use crate::verify::Verification;
 
@@ -40,6 +40,8 @@ pub struct DiagnosisResult {
     pub not_excited: Vec<NotExcitedResult>,
     /// Candidates that the recordings do not tell apart.
     pub confused: Vec<Confused>,
+    /// What of `not_excited` and `confused` the plan of the next experiment (`--plan`) does not show.
+    pub not_in_plan: Vec<NotInPlan>,
     /// Error figures.
     pub sensors: Sensors<SensorDiagnosisResult>,
     /// Accepted effects whose physics the recordings do not decide.
@@ -220,6 +222,8 @@ pub struct LeftOutResult {
 pub struct SecondResult {
     /// Its name.
     pub recording: String,
+    /// Whether it is the recording that the calibration was fitted to, so that its figures prove nothing.
+    pub fitted_to: bool,
     /// By the calibration without the effects.
     pub before: VerifyResult,
     /// By the calibration with them.
@@ -304,6 +308,7 @@ impl DiagnosisResult {
             rejected: Vec::new(),
             not_excited: Vec::new(),
             confused: next.confused.clone(),
+            not_in_plan: next.not_in_plan.clone(),
             sensors: Sensors {
                 gyro: of_sensor(Sensor::Gyro),
                 accel: of_sensor(Sensor::Accel),
@@ -320,6 +325,7 @@ impl DiagnosisResult {
             warnings,
             second: second.map(|(name, [before, after])| SecondResult {
                 recording: name.into(),
+                fitted_to: before.same_recording,
                 before: VerifyResult::of(before),
                 after: VerifyResult::of(after),
             }),

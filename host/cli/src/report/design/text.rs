@@ -262,7 +262,7 @@ fn spent(out: &mut String, by_noise: bool, budget: &Spent) {
             out,
             "limited by",
             &format!(
-                "{limit} would help; variance of a dwell mean: white noise {white:.0} %, \
+                "{limit} would help. Shares in the variance of a dwell mean: white noise {white:.0} %, \
                  bias instability {floor:.0} %, random walk {walk:.0} %; moves take {:.0} % of the time",
                 100.0 * moving
             ),

@@ -77,7 +77,11 @@ pub fn diagnosis_page(d: &DiagnosisResult, made: &Made) -> Result<String> {
                 (tables::errors(&sensors))
                 @if let Some(second) = &d.second {
                     h2 { "A second recording" }
-                    p { "Of " code { (second.recording) } " nothing was used to find or to fit the effects." }
+                    p { @if second.fitted_to {
+                        code { (second.recording) } " is the recording that was fitted to, and proves nothing."
+                    } @else {
+                        "Of " code { (second.recording) } " nothing was used to find or to fit the effects."
+                    } }
                     (tables::second(second))
                 }
                 @if !d.leftover.is_empty() {

@@ -6,12 +6,16 @@ use crate::report::text::{warn, wrap};
 use mimu::calibration::ConverterTable;
 use mimu::diagnose::Verdict;
 use mimu::diagnose::decision::Split;
-use mimu::quantity::{p_value, plus_minus, significant};
+use mimu::quantity::{p_value, plural, plus_minus, significant};
 use mimu::readable::{self, Readable};
 use mimu::result::diagnosis::{AcceptedResult, DiagnosisResult, SensorDiagnosisResult};
 
-/// Result of `mimu diagnose`.
-pub fn diagnosis_text(d: &DiagnosisResult) -> String {
+/// Why its figures are not those of `mimu fit`.
+const FIGURES: &str = "The figures before are not quite those of `mimu fit`: residuals are weighted here by the variance components of \
+                       this diagnosis.";
+
+/// Result of `mimu diagnose`. `all`: with the whole reason of each effect that was not accepted.
+pub fn diagnosis_text(d: &DiagnosisResult, all: bool) -> String {
     let mut out = String::new();
     let verdict = match d.verdict {
         Verdict::Clean => "clean: noise explains what the affine calibration leaves",
@@ -26,15 +30,23 @@ pub fn diagnosis_text(d: &DiagnosisResult) -> String {
     let _ = writeln!(out, "{}: {verdict}", d.device);
     for (name, s) in d.sensors.named() {
         let _ = writeln!(out);
-        sensor(&mut out, d, name, s);
-        not_excited(&mut out, d, name);
+        sensor(&mut out, d, name, s, all);
     }
+    not_excited(&mut out, d);
     confused(&mut out, d);
     if let Some(second) = &d.second {
         let _ = writeln!(
             out,
-            "\non {}, which nothing was fitted to\n  {:<8}{:>16}{:>16}{:>16}",
-            second.recording, "", "before", "after", "noise floor"
+            "\non {}{}\n  {:<8}{:>16}{:>16}{:>16}",
+            second.recording,
+            match second.fitted_to {
+                true => ", which is the recording that was fitted to",
+                false => ", which nothing was fitted to",
+            },
+            "",
+            "before",
+            "after",
+            "noise floor"
         );
         let both = second
             .before
@@ -47,6 +59,8 @@ pub fn diagnosis_text(d: &DiagnosisResult) -> String {
             let _ = writeln!(out, "  {name:<8}{x:>16}{y:>16}{z:>16}");
         }
     }
+    let _ = writeln!(out);
+    wrap(&mut out, "", FIGURES);
     if !d.warnings.is_empty() {
         let _ = writeln!(out);
         warn(&mut out, d.warnings.iter());
@@ -62,7 +76,7 @@ fn shown(s: &SensorDiagnosisResult, value: f64) -> String {
     }
 }
 
-fn sensor(out: &mut String, d: &DiagnosisResult, name: &str, s: &SensorDiagnosisResult) {
+fn sensor(out: &mut String, d: &DiagnosisResult, name: &str, s: &SensorDiagnosisResult, all: bool) {
     let _ = writeln!(
         out,
         "{name} ({}, rms)\n  {:<12}{:>16}{:>16}{:>16}",
@@ -118,8 +132,27 @@ fn sensor(out: &mut String, d: &DiagnosisResult, name: &str, s: &SensorDiagnosis
     if leftover().any(|l| l.usual) {
         wrap(out, "    ", USUAL);
     }
-    for r in d.rejected.iter().filter(|r| r.sensor == name) {
-        wrap(out, &format!("  - {}: ", r.id), &r.reason);
+    rejected(out, d, name, all);
+}
+
+/// What was not accepted. Without `all`, of those whose reason takes more than a line the ids only.
+fn rejected(out: &mut String, d: &DiagnosisResult, sensor: &str, all: bool) {
+    let mut longer: Vec<&str> = Vec::new();
+    for r in d.rejected.iter().filter(|r| r.sensor == sensor) {
+        let mut text = String::new();
+        wrap(&mut text, &format!("  - {}: ", r.id), &r.reason);
+        match all || text.lines().count() == 1 {
+            true => out.push_str(&text),
+            false => longer.push(&r.id),
+        }
+    }
+    if !longer.is_empty() {
+        let count = plural(longer.len() as u64, "effect");
+        let text = format!(
+            "{} (--all prints the reasons, and the page has them)",
+            longer.join(", ")
+        );
+        wrap(out, &format!("  - {count} not accepted: "), &text);
     }
 }
 
@@ -210,12 +243,38 @@ const FEW: usize = 3;
 /// Alternatives that are listed.
 const SHOWN: usize = 3;
 
-/// What the recording could not show, and what would.
-fn not_excited(out: &mut String, d: &DiagnosisResult, sensor: &str) {
-    for (experiment, ids) in by_experiment(d, |s| s == sensor) {
-        wrap(out, "  not excited: ", &ids.join(", "));
-        wrap(out, "    ", experiment);
+/// What the recordings could not show, and what would. Recipes that differ in their size only are one: the largest shows them all.
+fn not_excited(out: &mut String, d: &DiagnosisResult) {
+    let mut alike: Vec<(&str, Vec<&str>)> = Vec::new();
+    for (experiment, ids) in by_experiment(d, |_| true) {
+        let same = |e: &str| without_numbers(e) == without_numbers(experiment);
+        match alike.iter_mut().find(|(e, _)| same(e)) {
+            Some((largest, all)) => {
+                all.extend(ids);
+                if first_number(experiment) > first_number(largest) {
+                    *largest = experiment;
+                }
+            }
+            None => alike.push((experiment, ids)),
+        }
     }
+    if !alike.is_empty() {
+        let _ = writeln!(out);
+    }
+    for (experiment, ids) in alike {
+        wrap(out, "not excited: ", &ids.join(", "));
+        wrap(out, "  ", experiment);
+    }
+}
+
+fn without_numbers(text: &str) -> String {
+    text.chars().filter(|c| !c.is_ascii_digit()).collect()
+}
+
+/// Of a recipe: its dwells, or its minutes.
+fn first_number(text: &str) -> u32 {
+    let digits = text.split(|c: char| !c.is_ascii_digit());
+    digits.filter_map(|d| d.parse().ok()).next().unwrap_or(0)
 }
 
 /// Effects that were not excited, of the sensors that `of` takes, by the experiment that would show them.
@@ -247,4 +306,19 @@ fn confused(out: &mut String, d: &DiagnosisResult) {
         );
         wrap(out, "  told apart by ", &c.experiment);
     }
+}
+
+/// What the plan of the next experiment does not show, by the reason.
+pub fn not_in_plan_text(d: &DiagnosisResult) -> String {
+    let mut out = String::new();
+    let mut reasons: Vec<&str> = d.not_in_plan.iter().map(|n| n.reason).collect();
+    reasons.sort_unstable();
+    reasons.dedup();
+    for reason in reasons {
+        let of_it = d.not_in_plan.iter().filter(|n| n.reason == reason);
+        let ids: Vec<&str> = of_it.map(|n| n.id.as_str()).collect();
+        let head = format!("not in this plan, as {reason}: ");
+        wrap(&mut out, &head, &ids.join(", "));
+    }
+    out
 }

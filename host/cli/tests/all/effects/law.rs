@@ -10,6 +10,12 @@ use mimu_core::compensation::Sample;
 use mimu_core::effects::{Directions, Effect, Effects, State};
 use nalgebra::{Matrix3, Vector3};
 
+/// Effects smaller than this drown in the rounding of the readings, rad/s or m/s².
+const ROUNDING: f64 = 1e-9;
+
+/// Random inputs of each effect.
+const DRAWS: usize = 20;
+
 /// Uniform between -1 and 1.
 fn random(seed: &mut u64) -> f64 {
     *seed = seed
@@ -32,7 +38,8 @@ fn every_effect_is_evaluated_by_the_device_as_its_data_say() {
             continue;
         }
         let parameter = effect.parameter.map(|p| 2.0 * p.from);
-        for _ in 0..20 {
+        let mut compared = 0;
+        for _ in 0..DRAWS {
             let size =
                 |c: &effects::effect::Coefficient, r: f64| SMALL * c.typical * (1.5 + 0.5 * r);
             let values: Vec<f64> = effect.of_unit().map(|c| size(c, random(seed))).collect();
@@ -79,12 +86,21 @@ fn every_effect_is_evaluated_by_the_device_as_its_data_say() {
             candidate.add_error(&at, parameter.unwrap_or(0.0), &values, &mut error);
             let of_host = directions.to_body * error;
             let off = (of_device - of_host).norm();
-            assert!(of_host.norm() > 1e-9, "{}: {of_host:?}", effect.id);
+            // A high power is next to nothing for some inputs.
+            if of_host.norm() < ROUNDING {
+                continue;
+            }
+            compared += 1;
             assert!(
                 off < 1e-3 * of_host.norm(),
-                "{}: {of_device:?} {of_host:?}",
+                "{}: the device removes {of_device:?}, and its data say {of_host:?}: the row in core/src/effects/law.rs is another law",
                 effect.id
             );
         }
+        assert!(
+            2 * compared > DRAWS,
+            "{}: only {compared} of {DRAWS} random inputs, up to 4 rad/s and 20 m/s², give an error above {ROUNDING}: is the typical size too small?",
+            effect.id
+        );
     }
 }

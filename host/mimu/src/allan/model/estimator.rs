@@ -144,7 +144,7 @@ impl Estimator {
             let why = match instead.is_empty() {
                 true => format!("not seen: {bound}"),
                 false => format!(
-                    "or {}, the record does not tell which: {bound}",
+                    "not told apart from {} by this record: {bound}",
                     instead.join(" or ")
                 ),
             };
