@@ -18,6 +18,7 @@ use crate::rotation::{Vector, scale};
 use choice::{Jolt, Turn, between, chosen};
 
 mod choice;
+mod even;
 mod flaws;
 
 /// How the person works. Ranges are lowest and highest, all between equally likely.

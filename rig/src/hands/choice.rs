@@ -1,7 +1,7 @@
 //! What a person makes of a plan: which pose next, how it is met, how long everything takes.
 
 use super::HandsTruth;
-use super::flaws::Even;
+use super::even::Even;
 use crate::plan::{Step, attitude};
 use crate::random::Random;
 use crate::rotation::{Rotation, Vector, norm};

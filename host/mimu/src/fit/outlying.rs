@@ -105,7 +105,14 @@ fn outlying(found: &[(f64, f64)], most: usize) -> Vec<usize> {
 /// Marks what is outlying in a recording with gravity as its only reference, dwells first. They keep their places in the list of
 /// dwells, and whoever asks for observations or turns afterwards gets neither.
 pub(super) fn leave_out(prepared: &mut Prepared) {
+    if !prepared.has(Sensor::Accel) {
+        return;
+    }
     let poses = prepared.observations(Sensor::Accel);
+    // Of fewer, none may be left out.
+    if poses.len() < ONE_IN {
+        return;
+    }
     let g = prepared.manifest.gravity_mps2;
     let Some(accel) = fit_poses(prepared, &poses, g) else {
         return;
@@ -150,9 +157,6 @@ fn outlying_poses(
     accel: &Affine<f64>,
 ) -> Vec<(usize, (f64, f64))> {
     let g = prepared.manifest.gravity_mps2;
-    if poses.len() < ONE_IN {
-        return Vec::new();
-    }
     let variances = prepared.size_variances(accel, poses);
     let up: Vec<Vector3<f64>> = poses.iter().map(|o| accel.apply(&o.raw)).collect();
     let rows = poses.iter().enumerate().map(|(k, o)| {

@@ -178,13 +178,25 @@ fn what_can_be_left_out_is_named_and_the_result_is_right() {
             &["1 dwell (7) is not used: not still enough for the accel"],
         ),
         (
-            "one absurd sample in a turn",
+            "one absurd sample in a turn, where a converter ends",
             by_hand,
             |s| {
                 let turn = s.turn(2).start + 70;
                 s.edit("gyro_x", turn..turn + 1, |_| 32767.0);
             },
-            &["gyro: 1 outlier (turn to dwell 3)"],
+            &[
+                "gyro_x: 1 sample at 32767",
+                "the turn from dwell 2 to 3 is not used: gyro_x is at its rail",
+            ],
+        ),
+        (
+            "one absurd sample in a turn",
+            by_hand,
+            |s| {
+                let turn = s.turn(2).start + 70;
+                s.edit("gyro_x", turn..turn + 1, |_| 32000.0);
+            },
+            &["the turn from dwell 2 to 3 is not used: it ends"],
         ),
     ];
     for (name, base, damage, words) in cases {
