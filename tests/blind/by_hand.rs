@@ -23,7 +23,7 @@ impl Tally {
     fn add(&mut self, case: &Case) {
         self.cases += 1;
         let named = |t: &&str| case.found.iter().any(|f| f.iter().any(|f| f == t));
-        self.named += u32::from(case.truth.iter().all(|t| named(t)));
+        self.named += u32::from(case.truth.iter().all(named));
         self.alone += u32::from(case.is_named_alone());
         self.right_verdict += u32::from(case.has_right_verdict() && case.is_named_alone());
         self.not_there += u32::from(case.found.iter().any(|f| !case.is_right(f)));
