@@ -409,7 +409,9 @@ pub fn decide(
 
 fn known_in(stratum: &super::rows::Stratum, judged: usize) -> f64 {
     let rows = stratum.rows.clone().take_while(|r| *r < judged).count();
-    stratum.known.diagonal().rows(0, rows).sum()
+    let by_reference = stratum.by_reference.as_ref();
+    let by_reference = by_reference.map_or(0.0, |v| v.rows(0, rows).sum());
+    stratum.known.diagonal().rows(0, rows).sum() - by_reference
 }
 
 /// Coefficients of each of the chosen.

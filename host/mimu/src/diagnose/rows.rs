@@ -45,6 +45,8 @@ pub struct Stratum {
     pub rows: Range<usize>,
     /// Known covariance, unit of the rows squared.
     pub known: DMatrix<f64>,
+    /// What of the variance of each row is no noise of it, but an error that the reference may have; `None`: nothing.
+    pub by_reference: Option<DVector<f64>>,
     /// Covariance of a random walk with K = 1 unit/√s between the rows; `None` where rows are no means of dwells.
     pub random_walk: Option<DMatrix<f64>>,
     /// Whether the known covariance holds what the bias wanders.

@@ -85,6 +85,7 @@ impl Builder<'_> {
             session: 0,
             rows: 0..n,
             known: DMatrix::from_diagonal(&DVector::from_vec(variances)),
+            by_reference: None,
             random_walk: Some(self.random_walk(&dwells)),
             wander_known: prepared.noise.is_stated(Sensor::Accel),
         }];
@@ -111,6 +112,7 @@ impl Builder<'_> {
             session: 0,
             rows: 0..n,
             known: DMatrix::identity(n, n),
+            by_reference: None,
             random_walk: None,
             wander_known: true,
         }];
@@ -238,13 +240,17 @@ impl Builder<'_> {
             .collect();
         let mut strata = Vec::new();
         if m > 0 {
+            let by_reference = forces.map(|f| f.of_turns(&by_force));
             strata.push(Stratum {
                 name: "turns".into(),
                 axis: None,
                 session: 0,
                 rows: 0..m,
                 known: DMatrix::from_diagonal(&DVector::from_vec(turn_variances))
-                    + forces.map_or_else(|| DMatrix::zeros(m, m), |f| f.of_turns(&by_force)),
+                    + by_reference
+                        .as_ref()
+                        .map_or_else(|| DMatrix::zeros(m, m), DMatrix::clone),
+                by_reference: by_reference.map(|v| v.diagonal()),
                 random_walk: None,
                 wander_known: true,
             });
@@ -287,6 +293,7 @@ impl Builder<'_> {
                 session: 0,
                 rows: m + axis * n..m + (axis + 1) * n,
                 known,
+                by_reference: None,
                 random_walk: random_walk.clone(),
                 wander_known: wander.is_some(),
             });

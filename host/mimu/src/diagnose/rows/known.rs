@@ -56,6 +56,7 @@ impl Builder<'_> {
                 session: 0,
                 rows: axis * n..(axis + 1) * n,
                 known,
+                by_reference: None,
                 random_walk: Some(random_walk.clone()),
                 wander_known: wander.is_some(),
             });
