@@ -257,7 +257,7 @@ fn fit_known(
                 .filter(|&i| block_of(i, n, options.holdout_blocks.min(n)) != block)
                 .map(|i| observations[i])
                 .collect();
-            estimate(&kept)
+            determined(estimate(&kept)?, &estimated)
         });
         let mut not_held_out = Vec::new();
         for (block, refit) in refits.into_iter().enumerate() {
@@ -297,6 +297,23 @@ fn refit<T: Send>(
     estimate: impl Fn(usize) -> std::result::Result<T, Failure> + Sync + Send,
 ) -> Vec<std::result::Result<T, Failure>> {
     (0..blocks).into_par_iter().map(estimate).collect()
+}
+
+/// How much worse than the whole recording what is left without a block may determine the parameters.
+const WORSE: f64 = 10.0;
+
+/// A fit without a block, unless what is left determines it so poorly that its error is that of the cut: one block held all slanted poses
+/// of a recording, and the held-out error was 2451 mm/s².
+fn determined(refit: Estimated, full: &Estimated) -> std::result::Result<Estimated, Failure> {
+    let condition = refit.condition;
+    if condition > POORLY_DETERMINED && condition > WORSE * full.condition {
+        let problem = format!(
+            "the rest determines some parameters poorly (condition {condition:.0}, and {:.0} with it)",
+            full.condition
+        );
+        return Err(Failure::NoSolution(problem));
+    }
+    Ok(refit)
 }
 
 /// Fewer degrees of freedom than this show no error of the model.
@@ -430,7 +447,7 @@ fn fit_gravity(
             .zip(&by_sphere)
             .filter(|(o, _)| block(o.dwell) != b);
         let (kept, variances): (Vec<_>, Vec<_>) = kept.map(|(o, v)| (*o, *v)).unzip();
-        gravity_size::estimate(&kept, &variances, g)
+        determined(gravity_size::estimate(&kept, &variances, g)?, &accel)
     });
     let size_error = |triad: &Triad, o: &Observation| {
         Vector3::new(triad.inverse.apply(&o.raw).norm() - g, 0.0, 0.0)
@@ -518,7 +535,8 @@ fn fit_turns(
             .copied()
             .collect();
         let start = Some(&gyro.triad.inverse);
-        rotation::estimate(&kept, &rest, &accel.triad, &[], start, g)
+        let refit = rotation::estimate(&kept, &rest, &accel.triad, &[], start, g)?;
+        determined(refit, &gyro)
     });
     let held_out = |t: &Turn| {
         let b = block(t.to);

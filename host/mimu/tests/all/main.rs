@@ -3,4 +3,5 @@
 mod allan_model;
 mod allan_vectors;
 mod design;
+mod held_out;
 mod written_files;
