@@ -2,6 +2,7 @@
 
 mod assignment;
 mod binary;
+mod first_pass;
 mod foreign;
 mod inputs;
 mod join;
@@ -174,7 +175,7 @@ impl Import {
         let mut origin_s = None;
         let rate_hz = match first.has_time() {
             true => {
-                let times = Times::read(&options.files[0], &options.how(0), None)?;
+                let times = first_pass::times(&options.files[0], &options.how(0), None)?;
                 let rate_hz = times.summary.rate_hz;
                 warnings.extend(options.rate_hz.and_then(|given| other_rate(&times, given)));
                 origin_s = Some(times.origin_s());
@@ -202,7 +203,7 @@ impl Import {
             let mut period_s = 1.0 / rate_hz;
             if file.has_time() {
                 // A sensor of its own, with a rate and delays of its own; the instants are those of one clock.
-                let times = Times::read(path, &how, origin_s)?;
+                let times = first_pass::times(path, &how, origin_s)?;
                 period_s = times.period_s();
                 time.push(times.summary.clone());
                 file = file.with_times(times);

@@ -147,3 +147,24 @@ fn a_given_calibration_has_to_fit_the_recording() {
         "{said}"
     );
 }
+
+#[test]
+fn a_single_dwell_beside_a_given_calibration_leaves_nothing_to_find() {
+    let (from, calibration) = unit(&[("gyro_bias_drift", 1e-6, 3)]);
+    let mut one = from;
+    one.dwells.list.truncate(1);
+    let recordings = Recordings {
+        given: Some(&calibration),
+        ..Recordings::from(one)
+    };
+    let options = Options {
+        method: Method::LeastSquares,
+        holdout_blocks: 0,
+        only: None,
+        still_factor: STILL_FACTOR,
+    };
+    match diagnose(recordings, options) {
+        Ok(found) => assert!(found.effects.is_empty()),
+        Err(refusal) => assert!(refusal.to_string().contains("dwell"), "{refusal}"),
+    }
+}

@@ -1,15 +1,11 @@
-//! A first pass over the stamps of a file, and the time of each of its rows that follows.
+//! What the stamps of a file say, and the time of each of its rows that follows.
 
 use std::path::Path;
 
 use serde::Serialize;
 
-use super::super::assignment::Scale;
-use super::super::foreign::{ForeignFile, HowToRead, Row};
-use super::super::ros::is_bag;
 use super::regular::{Gap, Irregular, Jitter, Regular};
 use super::stamp::{Decimal, Stamp, Unit};
-use crate::columns::Column;
 use crate::error::{Argument, Error, Result};
 
 /// From so many seconds on, stamps count from the first whole second: later ones lose digits of the steps between samples.
@@ -53,47 +49,25 @@ pub(in super::super) struct Times {
 
 /// Stamps of a file, relative to the first, in its unit.
 #[derive(Default)]
-struct Stamps {
-    first: Stamp,
-    since_first: Vec<f64>,
+pub(in super::super) struct Stamps {
+    pub first: Stamp,
+    pub since_first: Vec<f64>,
     /// Places in `since_first` of rows that repeat the one before.
-    repeats: Vec<usize>,
+    pub repeats: Vec<usize>,
     /// Rows with the stamp of the row before, and other values.
-    shared: u64,
-}
-
-impl Stamps {
-    fn read(path: &Path, how: &HowToRead<'_>) -> Result<Stamps> {
-        let mut file = ForeignFile::open(path, how)?;
-        let (mut row, mut before) = (Row::default(), Row::default());
-        let mut stamps = Stamps::default();
-        while file.next(&mut row)? {
-            if stamps.since_first.is_empty() {
-                stamps.first = row.stamp;
-            } else if row.stamp == before.stamp {
-                match row.repeats(&before) {
-                    true => stamps.repeats.push(stamps.since_first.len()),
-                    false => stamps.shared += 1,
-                }
-            }
-            let since = match stamps.first.whole() {
-                0 => row.stamp.value - stamps.first.value,
-                whole => row.stamp.since(whole) - stamps.first.since(whole),
-            };
-            stamps.since_first.push(since);
-            std::mem::swap(&mut row, &mut before);
-        }
-        Ok(stamps)
-    }
+    pub shared: u64,
 }
 
 impl Times {
-    /// Reads the stamps of `path` once. `origin_s` is that of the file that it is joined to.
-    ///
-    /// The stamps are held, 8 bytes a row: 115 MB for four hours at 1 kHz. Whether a sample is missing or late is only seen by what
-    /// comes later, and the rate only at the end.
-    pub fn read(path: &Path, how: &HowToRead<'_>, origin_s: Option<i64>) -> Result<Times> {
-        let mut stamps = Stamps::read(path, how)?;
+    /// Of the stamps of `path`, which are in units of `given` seconds if that is known; `rate_hz` helps to find out where it is not.
+    /// `origin_s` is that of the file that it is joined to.
+    pub fn of(
+        path: &Path,
+        mut stamps: Stamps,
+        given: Option<f64>,
+        rate_hz: Option<f64>,
+        origin_s: Option<i64>,
+    ) -> Result<Times> {
         // A logger that is faster than its sensor writes readings twice. Bursts of a sensor at rest may look like it, but have equal stamps
         // with other readings as well.
         let drops_repeats = stamps.shared == 0 && !stamps.repeats.is_empty();
@@ -111,10 +85,9 @@ impl Times {
         }
         let problem = |irregular| refused(path, irregular);
         let coarse = Regular::step(&stamps.since_first).ok_or_else(|| problem(Irregular::Short))?;
-        let given = how.time_factor(path);
         let unit = match given {
             Some(factor) => Unit::of_factor(factor),
-            None => Unit::Decimal(Unit::recognise(stamps.first.value, coarse, how.rate_hz)),
+            None => Unit::Decimal(Unit::recognise(stamps.first.value, coarse, rate_hz)),
         };
         let far = || {
             let first = unit.seconds(stamps.first.value);
@@ -128,7 +101,11 @@ impl Times {
         let mut regular = Regular::find(&stamps.since_first).map_err(problem)?;
         regular.start_s += first_s;
         let summary = TimeSummary {
-            file: super::super::options::file_name(path),
+            file: path
+                .file_name()
+                .unwrap_or(path.as_os_str())
+                .to_string_lossy()
+                .into_owned(),
             unit: match unit {
                 Unit::Decimal(unit) => Some(unit),
                 Unit::Other(_) => None,
@@ -226,17 +203,5 @@ impl Clock {
             self.next_gap += 1;
         }
         regular.start_s + (row + self.missing) as f64 * regular.period_s
-    }
-}
-
-impl HowToRead<'_> {
-    /// Seconds in the unit of the stamps, where somebody has said so or the names are those of a recording.
-    fn time_factor(&self, path: &Path) -> Option<f64> {
-        let own = match (is_bag(path), self.list) {
-            (true, _) => Some(1e-9),
-            (false, None) => Some(1.0),
-            (false, Some(_)) => None,
-        };
-        Scale::given(self.scales, Column::Time).or(own)
     }
 }

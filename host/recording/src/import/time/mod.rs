@@ -8,5 +8,5 @@ pub use clock::TimeSummary;
 pub use regular::Jitter;
 pub use stamp::Decimal;
 
-pub(super) use clock::{Clock, Times};
+pub(super) use clock::{Clock, Stamps, Times};
 pub(super) use stamp::Stamp;
