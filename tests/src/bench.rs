@@ -111,15 +111,20 @@ pub fn hand_plan(poses: usize) -> String {
     )
 }
 
-/// The recording of a plan.
-pub fn recorded(plan: &str, file: &RigFile, seed: u64) -> Prepared {
+/// The recording of a plan in `recording`, a folder of a temporary one.
+pub fn written(plan: &str, file: &RigFile, seed: u64) -> tempfile::TempDir {
     let plan = Plan::parse(Source::new("plan", plan)).expect("a plan");
     let truth = RigTruth::resolve(file, seed).expect("a rig");
     let folder = tempfile::tempdir().expect("a folder");
-    let path = folder.path().join("recording");
-    let output = Output::new(&path, &plan).expect("a name");
+    let output = Output::new(&folder.path().join("recording"), &plan).expect("a name");
     write(&plan, &truth, seed, &output).expect("written");
-    let recording = Recording::open(&path).expect("a recording");
+    folder
+}
+
+/// The recording of a plan.
+pub fn recorded(plan: &str, file: &RigFile, seed: u64) -> Prepared {
+    let folder = written(plan, file, seed);
+    let recording = Recording::open(&folder.path().join("recording")).expect("a recording");
     Prepared::read(&recording, STILL_FACTOR, |_| ()).expect("readable")
 }
 

@@ -2,20 +2,28 @@
 
 use mimu::dwell::{Dwell, Fault};
 use mimu::fit::{Fit, Options, fit};
+use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
+use mimu::stillness::STILL_FACTOR;
+use mimu_recording::{ImportOptions, RawUnit, Recording, Reference, import};
 use mimu_rig::located::Source;
 use mimu_rig::random::Random;
 use mimu_rig::rig_file::RigFile;
 use mimu_tests::bench;
 
-/// A fit of 38 poses by hand with parts of 16 bits, whose scale factors of the gyros are 3600 counts per rad/s.
-fn by_hand(rest_of_rig: &str) -> Fit {
+/// A rig of 16 bits, whose scale factors of the gyros are 3600 counts per rad/s.
+fn rig(rest_of_rig: &str) -> RigFile {
     let rig = format!(
         "format = \"mimu-rig/1\"\nearth_rate = false\n{rest_of_rig}\n[unit]\ngyro = \"MPU6050-gyro\"\naccel = \"MPU6050-accel\"\n\
          [unit.gyro_affine]\nmatrix = [[3600.0, 0.0, 0.0], [0.0, 3600.0, 0.0], [0.0, 0.0, 3600.0]]\nbias = [30.0, -20.0, 10.0]\n\
          [unit.accel_affine]\nmatrix = [[1670.0, 0.0, 0.0], [0.0, 1670.0, 0.0], [0.0, 0.0, 1670.0]]\nbias = [100.0, 50.0, -80.0]\n"
     );
-    let file = RigFile::parse(&Source::new("RIG.toml", rig)).expect("a rig");
+    RigFile::parse(&Source::new("RIG.toml", rig)).expect("a rig")
+}
+
+/// A fit of 38 poses by hand.
+fn by_hand(rest_of_rig: &str) -> Fit {
+    let file = rig(rest_of_rig);
     let prepared = bench::recorded(&bench::hand_plan(38), &file, 7);
     fit(prepared, Options::default()).expect("it can be fitted")
 }
@@ -112,5 +120,30 @@ fn a_real_effect_is_no_outlier() {
         );
         let turning = |d: &Dwell| d.gyro_fault == Some(Fault::Turning);
         assert!(!fit.prepared.dwells.list.iter().any(turning), "{effect}");
+    }
+}
+
+#[test]
+fn jittering_stamps_that_are_imported_lose_no_turn() {
+    for flaw in ["stamp_jitter_s = 0.003", "stamp_burst = 4"] {
+        let file = rig(&format!("[flaws]\n{flaw}\n"));
+        let folder = bench::written(&bench::hand_plan(38), &file, 7);
+        let written = Recording::open(&folder.path().join("recording")).expect("a recording");
+        let options = ImportOptions::new(
+            vec![written.samples],
+            9.80665,
+            RawUnit::Count,
+            Reference::Gravity,
+        );
+        let path = folder.path().join("imported");
+        let summary = import(&options, &path, |_| ()).expect("importable");
+        assert_eq!(summary.time[0].gaps, 0, "{flaw}: {:?}", summary.time);
+        assert!((summary.sample_rate_hz - 100.0).abs() < 0.01, "{flaw}");
+        let recording = Recording::open(&path).expect("a recording");
+        let prepared = Prepared::read(&recording, STILL_FACTOR, |_| ()).expect("readable");
+        let fit = fit(prepared, Options::default()).expect("it can be fitted");
+        assert!(scale_error(&fit) < FINE, "{flaw}: {}", scale_error(&fit));
+        let turns = fit.warnings.iter().any(|w| w.contains("the turn from"));
+        assert!(!turns, "{flaw}: {:?}", fit.warnings);
     }
 }
