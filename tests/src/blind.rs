@@ -64,7 +64,12 @@ pub fn plan(seed: u64) -> String {
 pub fn unit(ids: &[&str], seed: u64) -> RigFile {
     let mut random = Random::new(seed, "unit");
     let (gyro, accel) = (bench::gyro(&mut random), bench::accel(&mut random));
-    let mut file = bench::clean(gyro, accel);
+    let file = bench::clean(gyro, accel);
+    with_effects(file, ids, seed)
+}
+
+/// `file` with `ids`, the size of each drawn evenly in the logarithm over a decade around that of data sheets.
+pub fn with_effects(mut file: RigFile, ids: &[&str], seed: u64) -> RigFile {
     file.effect = ids
         .iter()
         .map(|id| EffectFile {
@@ -72,12 +77,7 @@ pub fn unit(ids: &[&str], seed: u64) -> RigFile {
             parameters: toml::Table::new(),
         })
         .collect();
-    draw_sizes(&file, seed)
-}
-
-/// `file` with the sizes of its effects drawn evenly in the logarithm over a decade around that of data sheets.
-pub fn draw_sizes(file: &RigFile, seed: u64) -> RigFile {
-    let mut drawn = RigTruth::resolve(file, seed).expect("a rig").file;
+    let mut drawn = RigTruth::resolve(&file, seed).expect("a rig").file;
     let mut size = Random::new(seed, "size of the effect");
     for effect in &mut drawn.effect {
         let spec = mimu_rig::effects::specs()
@@ -140,7 +140,8 @@ pub struct Case {
     pub left: Vec<String>,
 }
 
-fn options() -> Options {
+/// How a unit of the suites is diagnosed.
+pub(crate) fn options() -> Options {
     Options {
         method: Method::LeastSquares,
         holdout_blocks: 0,

@@ -4,17 +4,16 @@
 //! the truth.
 
 use mimu::diagnose::{Diagnosis, diagnose};
-use mimu::fit::{Fit, Method, Options, fit};
+use mimu::fit::{Fit, fit};
 use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
-use mimu::stillness::STILL_FACTOR;
 use mimu_rig::flaws::FlawsTruth;
 use mimu_rig::random::Random;
-use mimu_rig::rig_file::{AffineFile, EffectFile, Parts, RigFile};
+use mimu_rig::rig_file::{AffineFile, Parts, RigFile};
 use nalgebra::SVector;
 
 use crate::bench;
-use crate::blind::{draw_sizes, reported};
+use crate::blind::{options, reported, with_effects};
 
 /// What hands can show of an unit in some minutes: no steady rate, no temperature that comes and goes.
 pub const SHOWN: [&str; 10] = [
@@ -120,14 +119,7 @@ fn unit(ids: &[&'static str], grade: Grade, seed: u64) -> RigFile {
         file.unit.accel_axes.walk_si = Some([1e-5; 3]);
     }
     file.earth_rate = Some(true);
-    file.effect = ids
-        .iter()
-        .map(|id| EffectFile {
-            id: (*id).into(),
-            parameters: toml::Table::new(),
-        })
-        .collect();
-    draw_sizes(&file, seed)
+    with_effects(file, ids, seed)
 }
 
 /// One flaw of real recordings, another with each seed.
@@ -170,15 +162,6 @@ fn plan(seed: u64) -> String {
         "format = \"mimu-plan/1\"\nsample_rate_hz = 100.0\ncarrier = \"hands\"\nlatitude_deg = 48.0\nlead_in_s = 5.0\n\
          [[step]]\nposes = {poses}\ndwell_s = 2.5\n"
     )
-}
-
-fn options() -> Options {
-    Options {
-        method: Method::LeastSquares,
-        holdout_blocks: 0,
-        only: None,
-        still_factor: STILL_FACTOR,
-    }
 }
 
 /// What the affine fit of `with` leaves beyond that of `without`, over the noise, of the sensor that has more.
