@@ -1,6 +1,7 @@
 //! From a recording to a calibration of both triads, judged on what it was not fitted to.
 
 mod biases;
+mod hold_out;
 mod outlying;
 pub mod plausible;
 mod sensor;
@@ -8,21 +9,22 @@ pub mod session_bias;
 
 use mimu_core::compensation::Affine;
 use nalgebra::Vector3;
-use rayon::prelude::*;
 
 use crate::estimate::least_squares::POORLY_DETERMINED;
-use crate::estimate::rotation::{Rest, Turn, direction_error};
+use crate::estimate::turn::{Rest, Turn, direction_error, sensitivity};
 use crate::estimate::{Estimated, Failure, Observation, gravity_size, known_input, rotation};
 use crate::prepared::{Prepared, si_covariance};
 use crate::quantity::{Figure, Sensor};
 use crate::stillness::STILL_FACTOR;
-use crate::triad::Triad;
+use crate::triad::{Triad, slope};
 use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{RawUnit, Reference};
 
-use sensor::rms;
+use hold_out::{HeldOut, determined};
+use sensor::{rms, typical};
 
 pub use biases::fit_biases;
+pub use hold_out::{HoldOut, Split};
 pub use sensor::{Residual, SensorFit};
 
 /// How a triad with known input is estimated.
@@ -43,7 +45,7 @@ pub enum Method {
 pub struct Options {
     /// Estimator where the input is known.
     pub method: Method,
-    /// Number of contiguous blocks that are left out in turn; 0: none.
+    /// Number of parts that are left out in turn, contiguous blocks where that leaves the rest determined; 0: none.
     pub holdout_blocks: usize,
     /// See [`crate::stillness::STILL_FACTOR`].
     pub still_factor: f64,
@@ -164,21 +166,6 @@ fn warn_of_temperature(prepared: &Prepared, warnings: &mut Vec<String>) {
     }
 }
 
-/// The one of `blocks` contiguous blocks that item `i` of `n` falls into, in order of time: sizes differ by one
-/// at most, the larger blocks first (as k-fold cross-validation is commonly cut, so that figures compare).
-fn block_of(i: usize, n: usize, blocks: usize) -> usize {
-    if blocks == 0 {
-        return 0;
-    }
-    let (small, larger) = (n / blocks, n % blocks);
-    let in_larger = larger * (small + 1);
-    if i < in_larger {
-        i / (small + 1)
-    } else {
-        larger + (i - in_larger) / small.max(1)
-    }
-}
-
 fn fit_known(
     prepared: &Prepared,
     options: Options,
@@ -252,23 +239,22 @@ fn fit_known(
             })
             .collect();
         let n = observations.len();
-        let refits = refit(options.holdout_blocks.min(n), |block| {
-            let kept: Vec<_> = (0..n)
-                .filter(|&i| block_of(i, n, options.holdout_blocks.min(n)) != block)
-                .map(|i| observations[i])
-                .collect();
-            determined(estimate(&kept)?, &estimated)
+        let parts = options.holdout_blocks.min(n);
+        let typical = typical(Figure::Input, &residuals);
+        let held_out = HeldOut::of(parts, |split, part| {
+            let of_part = |i: &usize| split.part(*i, n, parts) == part;
+            let kept = (0..n).filter(|i| !of_part(i)).map(|i| observations[i]);
+            let refit = estimate(&kept.collect::<Vec<_>>())?;
+            let open = (0..n).filter(of_part).map(|i| {
+                let axis = |k: usize| slope(&Vector3::ith(k, 1.0), &observations[i].raw);
+                (0..3).map(|k| refit.triad.variance(&axis(k))).sum::<f64>() / 3.0
+            });
+            determined(open, typical, (Figure::Input, sensor))?;
+            Ok(refit)
         });
-        let mut not_held_out = Vec::new();
-        for (block, refit) in refits.into_iter().enumerate() {
-            let members =
-                (0..n).filter(|&i| block_of(i, n, options.holdout_blocks.min(n)) == block);
-            match refit {
-                Ok(refit) => members.for_each(|i| {
-                    residuals[i].held_out = Some(error(&refit.triad, &observations[i]))
-                }),
-                Err(failure) => not_held_out.push(cannot_hold_out(block, failure, sensor)),
-            }
+        for (i, residual) in residuals.iter_mut().enumerate() {
+            let refit = held_out.without(held_out.split.part(i, n, parts));
+            residual.held_out = refit.map(|refit| error(&refit.triad, &observations[i]));
         }
         sensors.push(finish(
             sensor,
@@ -277,7 +263,7 @@ fn fit_known(
             residuals,
             n,
             None,
-            not_held_out,
+            held_out.into(),
         ));
     }
     if sensors.is_empty() {
@@ -291,42 +277,8 @@ fn fit_known(
     Ok(sensors)
 }
 
-/// Runs `estimate` for each block that is left out, side by side.
-fn refit<T: Send>(
-    blocks: usize,
-    estimate: impl Fn(usize) -> std::result::Result<T, Failure> + Sync + Send,
-) -> Vec<std::result::Result<T, Failure>> {
-    (0..blocks).into_par_iter().map(estimate).collect()
-}
-
-/// How much worse than the whole recording what is left without a block may determine the parameters.
-const WORSE: f64 = 10.0;
-
-/// A fit without a block, unless what is left determines it so poorly that its error is that of the cut: one block held all slanted poses
-/// of a recording, and the held-out error was 2451 mm/s².
-fn determined(refit: Estimated, full: &Estimated) -> std::result::Result<Estimated, Failure> {
-    let condition = refit.condition;
-    if condition > POORLY_DETERMINED && condition > WORSE * full.condition {
-        let problem = format!(
-            "the rest determines some parameters poorly (condition {condition:.0}, and {:.0} with it)",
-            full.condition
-        );
-        return Err(Failure::NoSolution(problem));
-    }
-    Ok(refit)
-}
-
 /// Fewer degrees of freedom than this show no error of the model.
 const FEW_DOF: f64 = 3.0;
-
-fn cannot_hold_out(block: usize, failure: Failure, sensor: Sensor) -> String {
-    let error = failure.into_error(sensor);
-    let problem = &error.refused().problem;
-    format!(
-        "block {} cannot be held out: without it {problem}",
-        block + 1
-    )
-}
 
 fn finish(
     sensor: Sensor,
@@ -335,7 +287,7 @@ fn finish(
     residuals: Vec<Residual>,
     dwells: usize,
     static_rms: Option<(f64, Option<f64>)>,
-    not_held_out: Vec<String>,
+    held_out: HoldOut,
 ) -> SensorFit {
     let mut warnings = Vec::new();
     warnings.extend(
@@ -353,7 +305,7 @@ fn finish(
     if estimated.triad.inverse.matrix.determinant() < 0.0 {
         warnings.push(format!("{sensor}: the axes come out left-handed: one of them, of gyro or accelerometer, points the other way than its column says"));
     }
-    for reason in &not_held_out {
+    for reason in &held_out.reasons {
         warnings.push(format!("{sensor}: {reason}"));
     }
     SensorFit {
@@ -363,7 +315,7 @@ fn finish(
         residuals,
         dwells,
         static_rms,
-        not_held_out,
+        held_out,
         warnings,
     }
 }
@@ -438,45 +390,47 @@ fn fit_gravity(
     let accel = gravity_size::estimate(&poses, &by_sphere, g)
         .map_err(|f| prepared.refused(f, Sensor::Accel))?;
     let floors = variances(&accel.triad.inverse);
-    let all_dwells = prepared.dwells.list.len();
-    let blocks = options.holdout_blocks.min(poses.len());
-    let block = |dwell: usize| block_of(dwell, all_dwells, blocks);
-    let accel_refits = refit(blocks, |b| {
-        let kept = poses
-            .iter()
-            .zip(&by_sphere)
-            .filter(|(o, _)| block(o.dwell) != b);
-        let (kept, variances): (Vec<_>, Vec<_>) = kept.map(|(o, v)| (*o, *v)).unzip();
-        determined(gravity_size::estimate(&kept, &variances, g)?, &accel)
-    });
+    let parts = options.holdout_blocks.min(poses.len());
+    let part_of = |split: Split, dwell: usize| split.part(dwell, prepared.dwells.list.len(), parts);
     let size_error = |triad: &Triad, o: &Observation| {
         Vector3::new(triad.inverse.apply(&o.raw).norm() - g, 0.0, 0.0)
     };
-    let residuals = poses
+    let mut residuals: Vec<Residual> = poses
         .iter()
         .zip(&floors)
-        .map(|(o, floor)| {
-            let refit = accel_refits
-                .get(block(o.dwell))
-                .and_then(|r| r.as_ref().ok());
-            Residual {
-                dwell: o.dwell,
-                value: size_error(&accel.triad, o),
-                held_out: refit.map(|r| size_error(&r.triad, o)),
-                floor: floor.sqrt(),
-            }
+        .map(|(o, floor)| Residual {
+            dwell: o.dwell,
+            value: size_error(&accel.triad, o),
+            held_out: None,
+            floor: floor.sqrt(),
         })
         .collect();
-    let not_held_out = failures(&accel_refits, Sensor::Accel);
+    let typical = typical(Figure::GravitySize, &residuals);
+    let without = |split: Split, part: usize| {
+        let of_part = |o: &Observation| part_of(split, o.dwell) == part;
+        let kept = poses.iter().zip(&by_sphere).filter(|(o, _)| !of_part(o));
+        let (kept, variances): (Vec<_>, Vec<_>) = kept.map(|(o, v)| (*o, *v)).unzip();
+        let refit = gravity_size::estimate(&kept, &variances, g)?;
+        let open = poses.iter().filter(|o| of_part(o)).map(|o| {
+            let up = accel.triad.inverse.apply(&o.raw).normalize();
+            refit.triad.variance(&slope(&up, &o.raw))
+        });
+        determined(open, typical, (Figure::GravitySize, Sensor::Accel))?;
+        Ok(refit)
+    };
+    let held_out = HeldOut::of(parts, without);
+    for (residual, o) in residuals.iter_mut().zip(&poses) {
+        let refit = held_out.without(part_of(held_out.split, o.dwell));
+        residual.held_out = refit.map(|refit| size_error(&refit.triad, o));
+    }
     let mut sensors = Vec::new();
     if prepared.has(Sensor::Gyro) && options.wants(Sensor::Gyro) {
-        sensors.extend(fit_turns(
-            prepared,
-            &accel,
-            &accel_refits,
-            &block,
-            warnings,
-        )?);
+        let parts = Parts {
+            count: parts,
+            of: &part_of,
+            accel_without: &without,
+        };
+        sensors.extend(fit_turns(prepared, &accel, &parts, warnings)?);
     }
     sensors.push(finish(
         Sensor::Accel,
@@ -485,28 +439,24 @@ fn fit_gravity(
         residuals,
         poses.len(),
         None,
-        not_held_out,
+        held_out.into(),
     ));
     Ok(sensors)
 }
 
-fn failures(refits: &[std::result::Result<Estimated, Failure>], sensor: Sensor) -> Vec<String> {
-    let failed = refits
-        .iter()
-        .enumerate()
-        .filter_map(|(b, r)| r.as_ref().err().map(|f| (b, f)));
-    failed
-        .map(|(b, f)| cannot_hold_out(b, f.clone(), sensor))
-        .collect()
+/// How a recording is cut into parts, and what its accelerometer is without one.
+struct Parts<'a> {
+    count: usize,
+    of: &'a (dyn Fn(Split, usize) -> usize + Sync),
+    accel_without: &'a (dyn Fn(Split, usize) -> std::result::Result<Estimated, Failure> + Sync),
 }
 
-/// The gyro from the turns. A turn belongs to the block of the dwell that it ends in, and no turn that touches
-/// a dwell of a block is used while the block is left out.
+/// The gyro from the turns. A turn belongs to the part of the dwell that it ends in, and no turn that touches
+/// a dwell of a part is used while the part is left out.
 fn fit_turns(
     prepared: &Prepared,
     accel: &Estimated,
-    accel_refits: &[std::result::Result<Estimated, Failure>],
-    block: &(impl Fn(usize) -> usize + Sync),
+    parts: &Parts,
     warnings: &mut Vec<String>,
 ) -> Result<Option<SensorFit>> {
     let g = prepared.manifest.gravity_mps2;
@@ -522,62 +472,63 @@ fn fit_turns(
     let motions = prepared.motions(by_full);
     let gyro = rotation::estimate(&turns, &rest, &accel.triad, &motions, None, g)
         .map_err(|f| prepared.refused(f, Sensor::Gyro))?;
-    let refits = refit(accel_refits.len(), |b| {
-        let accel = accel_refits[b].as_ref().map_err(Clone::clone)?;
-        let (turns, _) = prepared.turns(&accel.triad.inverse);
-        let kept: Vec<_> = turns
-            .into_iter()
-            .filter(|t| block(t.from) != b && block(t.to) != b)
-            .collect();
-        let rest: Vec<_> = rest
-            .iter()
-            .filter(|o| block(o.dwell) != b)
-            .copied()
-            .collect();
-        let start = Some(&gyro.triad.inverse);
-        let refit = rotation::estimate(&kept, &rest, &accel.triad, &[], start, g)?;
-        determined(refit, &gyro)
-    });
-    let held_out = |t: &Turn| {
-        let b = block(t.to);
-        let (gyro, accel) = (
-            refits.get(b)?.as_ref().ok()?,
-            accel_refits[b].as_ref().ok()?,
-        );
-        let direction = |d: usize| {
-            accel
-                .triad
-                .inverse
-                .apply(&prepared.dwells.list[d].raw_mean(Sensor::Accel))
-        };
-        let turn = Turn {
-            before: direction(t.from),
-            after: direction(t.to),
-            ..*t
-        };
-        Some(direction_error(&turn, &gyro.triad.inverse))
-    };
     let c = gyro.triad.inverse.matrix;
     let mean_square = c.norm_squared() / 3.0;
-    let residuals = turns
+    let mut residuals: Vec<Residual> = turns
         .iter()
         .map(|t| Residual {
             dwell: t.to,
             value: direction_error(t, &gyro.triad.inverse),
-            held_out: held_out(t),
+            held_out: None,
             floor: t.floor(mean_square),
         })
         .collect();
+    let typical = typical(Figure::Direction, &residuals);
+    let held = HeldOut::of(parts.count, |split, part| {
+        let accel = (parts.accel_without)(split, part).map_err(|failure| {
+            let problem = failure.problem();
+            Failure::NoSolution(format!("the accelerometer is not determined: {problem}"))
+        })?;
+        let of_part = |dwell: usize| (parts.of)(split, dwell) == part;
+        let kept: Vec<_> = prepared.turns(&accel.triad.inverse).0;
+        let kept: Vec<_> = kept
+            .into_iter()
+            .filter(|t| !of_part(t.from) && !of_part(t.to))
+            .collect();
+        let rest: Vec<_> = rest.iter().filter(|o| !of_part(o.dwell)).copied().collect();
+        let start = Some(&gyro.triad.inverse);
+        let refit = rotation::estimate(&kept, &rest, &accel.triad, &[], start, g)?;
+        let open = turns.iter().filter(|t| of_part(t.to)).map(|t| {
+            let columns = sensitivity(t, &gyro.triad.inverse).by_parameters(t);
+            columns.iter().map(|by| refit.triad.variance(by)).sum()
+        });
+        determined(open, typical, (Figure::Direction, Sensor::Gyro))?;
+        Ok((refit, accel))
+    });
+    let without = |dwell: usize| held.without((parts.of)(held.split, dwell));
+    for (residual, turn) in residuals.iter_mut().zip(&turns) {
+        residual.held_out = without(turn.to).map(|(gyro, accel)| {
+            let force = |dwell: usize| {
+                let raw = prepared.dwells.list[dwell].raw_mean(Sensor::Accel);
+                accel.triad.inverse.apply(&raw)
+            };
+            let turn = Turn {
+                before: force(turn.from),
+                after: force(turn.to),
+                ..*turn
+            };
+            direction_error(&turn, &gyro.triad.inverse)
+        });
+    }
     let static_rms = |rate: &dyn Fn(&Rest) -> Option<Vector3<f64>>| {
         let all: Vec<_> = rest.iter().filter_map(rate).collect();
         (!all.is_empty()).then(|| rms(Figure::Input, all.into_iter()))
     };
     let in_sample = static_rms(&|o| Some(gyro.triad.inverse.apply(&o.raw) - o.rate));
-    let held = static_rms(&|o| {
-        let refit = refits.get(block(o.dwell))?.as_ref().ok()?;
+    let at_rest = static_rms(&|o| {
+        let (refit, _) = without(o.dwell)?;
         Some(refit.triad.inverse.apply(&o.raw) - o.rate)
     });
-    let not_held_out = failures(&refits, Sensor::Gyro);
     let wide = turns
         .iter()
         .map(|t| direction_error(t, &gyro.triad.inverse).norm())
@@ -588,8 +539,8 @@ fn fit_turns(
         Figure::Direction,
         residuals,
         rest.len(),
-        in_sample.map(|r| (r, held)),
-        not_held_out,
+        in_sample.map(|r| (r, at_rest)),
+        held.into(),
     );
     if wide > 20f64.to_radians() {
         fit.warnings.push(format!("gyro: after one turn gravity is {:.0} degrees from where it is predicted; samples are missing or clipped, or the gyro's columns are not the gyro's", wide.to_degrees()));

@@ -6,7 +6,7 @@ use nalgebra::{Matrix3, Vector3};
 use crate::blocks::Condensed;
 use crate::dwell::Dwells;
 use crate::estimate::earth::Earth;
-use crate::estimate::rotation::{Motion, Rest, Turn};
+use crate::estimate::turn::{Motion, Rest, Turn};
 use crate::estimate::{Failure, Observation};
 use crate::noise::Noise;
 use crate::noise_file::NoiseFile;

@@ -157,7 +157,20 @@ pub struct Triad {
     forward_parts: Vec<Part>,
 }
 
+/// Derivatives of `along · (C u + o)` by C (rows first) and o: `along` itself, and its products with the raw reading `u`.
+pub fn slope(along: &Vector3<f64>, u: &Vector3<f64>) -> SVector<f64, 12> {
+    SVector::from_fn(|k, _| match k {
+        0..9 => along[k / 3] * u[k % 3],
+        _ => along[k - 9],
+    })
+}
+
 impl Triad {
+    /// Variance by the error of the inverse model, of what has the derivatives `by` its twelve parameters.
+    pub fn variance(&self, by: &SVector<f64, 12>) -> f64 {
+        by.dot(&(self.inverse_covariance * by)).max(0.0)
+    }
+
     /// From the inverse model and the parts of its covariance. `None` if C is singular.
     pub fn from_inverse(inverse: Affine<f64>, parts: Vec<Part>) -> Option<Self> {
         let forward = Forward::of(&inverse)?;

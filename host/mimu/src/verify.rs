@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::calibration::Calibration;
 use crate::effects::removal::{removable, remove};
-use crate::estimate::rotation::{Turn, direction_error};
+use crate::estimate::turn::{Turn, direction_error};
 use crate::fit::refuse_wrong_gravity;
 use crate::prepared::{Prepared, si_covariance};
 use crate::quantity::Figure;

@@ -5,3 +5,52 @@ mod text;
 
 pub use page::{Made, diagnosis_page};
 pub use text::{diagnosis_text, not_in_plan_text};
+
+use mimu::diagnose::Verdict;
+use mimu::fit::Split;
+use mimu::quantity::significant;
+use mimu::readable;
+use mimu::result::diagnosis::{DiagnosisResult, SensorDiagnosisResult};
+
+/// What the verdict means, as a sentence fragment.
+fn meaning(d: &DiagnosisResult) -> &'static str {
+    let open = |s: &SensorDiagnosisResult| s.reference_rms > s.noise_floor;
+    match d.verdict {
+        Verdict::Clean if d.sensors.named().any(|(_, s)| open(s)) => {
+            "noise, and what the poses leave open of the accelerometer, explain what the affine calibration leaves"
+        }
+        Verdict::Clean => "noise explains what the affine calibration leaves",
+        Verdict::Explained => "with the effects below, noise explains what is left",
+        Verdict::Unexplained if d.unexplained().next().is_some() => {
+            "something is left that nothing here explains"
+        }
+        Verdict::Unexplained => "an unlisted alternative model does as well as what was found",
+    }
+}
+
+/// What a person should know of the error figures of a sensor, as sentence fragments.
+fn remarks(s: &SensorDiagnosisResult) -> Vec<String> {
+    let mut all = Vec::new();
+    if !s.held_out_rms_after.is_finite() {
+        all.push(
+            "nothing is held out: without any part of it the rest determines too little".into(),
+        );
+    } else if s.held_out == Split::Interleaved {
+        all.push(
+            "held out every fourth dwell: one block of time alone shows what is needed".into(),
+        );
+    }
+    if s.reference_rms > s.noise_floor {
+        all.push(format!(
+            "the poses leave the accelerometer so open that its directions of gravity add up to {} rms to the noise floor",
+            readable::error(s.unit).write(s.reference_rms)
+        ));
+    }
+    if let Some(share) = s.explained {
+        all.push(format!(
+            "{} % of the held-out mean square beyond the noise is explained",
+            significant(100.0 * share)
+        ));
+    }
+    all
+}

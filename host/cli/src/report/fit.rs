@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use mimu::fit::Split;
 use mimu::quantity::{plural, plus_minus, significant};
 use mimu::readable;
 use mimu::result::fit::{DwellResult, FitResult, Parameter, SensorFitResult};
@@ -78,15 +79,20 @@ fn sensor_text(out: &mut String, fit: &FitResult, name: &str, sensor: &SensorFit
     };
     let blocks = fit.holdout_blocks.min(sensor.dwells);
     if blocks > 0 {
-        let missing = sensor.not_held_out.len();
-        let note = match missing {
-            0 if blocks < fit.holdout_blocks => format!(
+        let note = match (sensor.held_out, sensor.held_out_parts) {
+            (Split::Interleaved, held) if held < blocks => {
+                format!("rms over {held} of {blocks} parts, one dwell in {blocks} each")
+            }
+            (Split::Interleaved, _) => format!("rms, one dwell in {blocks} held out in turn"),
+            (_, 0) => "no block can be left out, see the warnings".into(),
+            (_, held) if held < blocks => {
+                format!("rms over {held} of {blocks} contiguous blocks")
+            }
+            _ if blocks < fit.holdout_blocks => format!(
                 "rms over {blocks} blocks of a dwell each; {} asked for",
                 fit.holdout_blocks
             ),
-            0 => format!("rms over {blocks} contiguous blocks"),
-            m if m == blocks => "no block can be left out, see the warnings".into(),
-            m => format!("rms over {} of {blocks} contiguous blocks", blocks - m),
+            _ => format!("rms over {blocks} contiguous blocks"),
         };
         line("held out", sensor.held_out_rms, &note);
     } else {

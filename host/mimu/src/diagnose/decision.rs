@@ -19,6 +19,7 @@ use crate::effects::candidate::Kind;
 use crate::effects::quantity::Quantity;
 use crate::effects::regressor::Product;
 use crate::effects::removal::Removed;
+use crate::fit::Split;
 use crate::quantity::p_value;
 use hold_out::{chance_without_a_dwell, leverage, parts_helped};
 use leftover::leftover;
@@ -28,8 +29,7 @@ use second::second;
 use tried::candidates;
 use undecided::undecided;
 
-pub use hold_out::Split;
-pub(super) use hold_out::{held_out, rms};
+pub(super) use hold_out::{held_out, part, rms};
 pub use leftover::{FALSE_LEFTOVER, Leftover};
 pub use model::Model;
 pub use second::Second;
@@ -99,6 +99,8 @@ pub struct Decision {
     pub interleaved_rms: f64,
     /// What noise alone would leave.
     pub noise_floor: f64,
+    /// What errors of the reference may add to it: of the accelerometer, whose directions the turns are judged by.
+    pub reference_rms: f64,
     /// Accepted effects whose physics the rows do not decide.
     pub undecided: Vec<Undecided>,
     /// What a person should know of the accepted effects.
@@ -110,6 +112,15 @@ pub struct Decision {
 }
 
 impl Decision {
+    /// Share of the held-out mean square beyond noise and errors of the reference that the accepted effects take out. `None` without
+    /// effects, or where nothing is beyond.
+    pub fn explained(&self) -> Option<f64> {
+        let known = self.noise_floor.powi(2) + self.reference_rms.powi(2);
+        let [before, after] = self.held_out_rms.map(|rms| rms * rms - known);
+        (!self.accepted.is_empty() && before > 0.0 && after.is_finite())
+            .then(|| 1.0 - after.max(0.0) / before)
+    }
+
     /// What is left that no usual sensor does.
     pub fn unexplained(&self) -> impl Iterator<Item = &Leftover> {
         self.leftover.iter().filter(|l| !l.usual)
@@ -246,7 +257,7 @@ pub fn decide(
                     let models = [&search.model(&rest), &search.model(&kept)];
                     match chance_without_a_dwell(&search, &kept[i], models, &with) {
                         Some(p) if p > SURVIVES => format!(
-                            "it does not survive the loss of one dwell: without it, {}",
+                            "it does not survive the loss of one dwell and of those in its pose: without them, {}",
                             p_value(p)
                         ),
                         _ => continue,
@@ -385,7 +396,10 @@ pub fn decide(
     }
     let interleaved = held_rms(&kept, last, Split::Interleaved);
     let models = [before, after];
-    let floor: f64 = rows.strata.iter().map(|s| known_in(s, rows.judged.0)).sum();
+    let [floor, reference] = known_in(rows).map(|sum| {
+        let items = rows.judged.0 / rows.judged.1;
+        (sum / items as f64).sqrt()
+    });
     Some(Decision {
         rms: models.each_ref().map(|m| rms(rows, &m.residuals)),
         held_out_rms: models.each_ref().map(|m| {
@@ -395,7 +409,8 @@ pub fn decide(
         models,
         interleaved_rms: interleaved.unwrap_or(f64::NAN),
         split,
-        noise_floor: (floor / (rows.judged.0 / rows.judged.1) as f64).sqrt(),
+        noise_floor: floor,
+        reference_rms: reference,
         accepted,
         rejected,
         not_excited,
@@ -407,11 +422,18 @@ pub fn decide(
     })
 }
 
-fn known_in(stratum: &super::rows::Stratum, judged: usize) -> f64 {
-    let rows = stratum.rows.clone().take_while(|r| *r < judged).count();
-    let by_reference = stratum.by_reference.as_ref();
-    let by_reference = by_reference.map_or(0.0, |v| v.rows(0, rows).sum());
-    stratum.known.diagonal().rows(0, rows).sum() - by_reference
+/// Known variances of the judged rows, summed: by noise, and by errors of the reference.
+fn known_in(rows: &Rows) -> [f64; 2] {
+    let mut sums = [0.0; 2];
+    for stratum in &rows.strata {
+        let judged = stratum.rows.clone().take_while(|r| *r < rows.judged.0);
+        let count = judged.count();
+        let by_reference = stratum.by_reference.as_ref();
+        let by_reference = by_reference.map_or(0.0, |v| v.rows(0, count).sum());
+        sums[0] += stratum.known.diagonal().rows(0, count).sum() - by_reference;
+        sums[1] += by_reference;
+    }
+    sums
 }
 
 /// Coefficients of each of the chosen.

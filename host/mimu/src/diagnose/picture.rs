@@ -11,9 +11,10 @@ use statrs::distribution::{Beta, ChiSquared, ContinuousCDF, Normal};
 pub use abscissa::Abscissa;
 pub use against::{Against, At, Curve, Panel};
 
-use super::decision::{Decision, Model, Split, rms};
+use super::decision::{Decision, Model, part, rms};
 use super::rows::Rows;
 use super::search::{Chosen, Search};
+use crate::fit::Split;
 use crate::quantity::Sensor;
 
 /// What residuals are of.
@@ -233,7 +234,7 @@ fn blocks(rows: &Rows) -> Vec<f64> {
     }
     let mut ends: Vec<(usize, f64)> = (0..rows.y.len())
         .map(|r| {
-            let block = Split::Blocks.part(rows, rows.dwells(r)[1]);
+            let block = part(Split::Blocks, rows, rows.dwells(r)[1]);
             (block, middle(rows, r))
         })
         .collect();

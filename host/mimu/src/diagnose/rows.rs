@@ -25,6 +25,7 @@ use nalgebra::{DMatrix, DVector, Vector3};
 
 use crate::effects::quantity::Conditions;
 use crate::effects::temperature::{Followed, lagged, rank_correlation};
+use crate::estimate::earth::poses;
 pub use forces::ForceErrors;
 
 use crate::prepared::Prepared;
@@ -180,6 +181,42 @@ impl Rows {
     /// Dwells that row `row` is about, counted through all recordings.
     pub fn dwells(&self, row: usize) -> [usize; 2] {
         self.rows[row].dwells
+    }
+
+    /// For each dwell the first that is in the same pose of the same recording, by the direction of gravity: all of these err alike if the unit
+    /// stood badly, and are one witness. On a table, whose input is known, and where there is one pose only, each dwell is its own.
+    pub fn witnesses(&self) -> Vec<usize> {
+        if self.figure == Figure::Input {
+            return (0..self.dwell_count()).collect();
+        }
+        let mut ups = vec![Vector3::repeat(f64::NAN); self.dwell_count()];
+        for row in self.rows.iter().filter(|r| r.dwells[0] == r.dwells[1]) {
+            ups[row.dwells[0]] = self.conditions[row.conditions.start].force;
+        }
+        let sessions = self.first.windows(2).flat_map(|ends| {
+            let found = poses(&ups[ends[0]..ends[1]]).into_iter();
+            found.map(|pose| ends[0] + pose)
+        });
+        let witnesses: Vec<usize> = sessions.collect();
+        match witnesses.iter().all(|w| *w == 0) {
+            true => (0..witnesses.len()).collect(),
+            false => witnesses,
+        }
+    }
+
+    /// Whether stratum `s` is of turns.
+    pub fn is_turn(&self, s: usize) -> bool {
+        self.figure == Figure::Direction && self.strata[s].axis.is_none()
+    }
+
+    /// Mean square of the times that the rows in `range` are integrated over, s².
+    pub fn mean_square_duration(&self, range: Range<usize>) -> f64 {
+        let square = |row: &Row| {
+            let conditions = &self.conditions[row.conditions.clone()];
+            conditions.iter().map(|c| c.duration_s).sum::<f64>().powi(2)
+        };
+        let count = range.len().max(1) as f64;
+        self.rows[range].iter().map(square).sum::<f64>() / count
     }
 
     /// Number of dwells.

@@ -5,14 +5,18 @@
 //! | [`known_input`]   | table     | forward least squares, Kalman bank, xu's inverse form, six positions |
 //! | [`gravity_size`]  | gravity   | accelerometer from the magnitude of gravity over many poses   |
 //! | [`rotation`]      | gravity   | gyro from the turns between dwells                       |
+//! | [`turn`]          | gravity   | one turn, and where a calibration carries gravity in it   |
+//! | [`chains`]        | gravity   | dwells that turns connect one to the next                 |
 //! | [`earth`]         | gravity   | what the turning Earth adds to it                         |
 //! | [`least_squares`] | both      | the algebra under all of them                            |
 
+pub mod chains;
 pub mod earth;
 pub mod gravity_size;
 pub mod known_input;
 pub mod least_squares;
 pub mod rotation;
+pub mod turn;
 
 use nalgebra::Vector3;
 
@@ -60,17 +64,26 @@ pub enum Failure {
 }
 
 impl Failure {
+    /// What is wrong, as a sentence fragment.
+    pub fn problem(&self) -> String {
+        match self {
+            Self::Undetermined { parameters, .. } => {
+                format!("the experiment leaves {parameters} undetermined")
+            }
+            Self::NoSolution(seen) => seen.clone(),
+        }
+    }
+
     /// As an error about `sensor`.
     pub fn into_error(self, sensor: crate::quantity::Sensor) -> mimu_recording::error::Error {
+        let problem = self.problem();
         match self {
-            Self::Undetermined { parameters, add } => mimu_recording::error::Error::undetermined(
+            Self::Undetermined { add, .. } => {
+                mimu_recording::error::Error::undetermined(sensor, problem, add)
+            }
+            Self::NoSolution(_) => mimu_recording::error::Error::new(
                 sensor,
-                format!("the experiment leaves {parameters} undetermined"),
-                add,
-            ),
-            Self::NoSolution(seen) => mimu_recording::error::Error::new(
-                sensor,
-                seen,
+                problem,
                 "look at the recording: wrong columns, wrong reference, or motion within dwells",
             ),
         }

@@ -3,6 +3,7 @@
 use mimu_core::compensation::Affine;
 use nalgebra::Vector3;
 
+use super::hold_out::HoldOut;
 use super::sensor::Residual;
 use super::{Fit, Options, finish, plausible, refuse_wrong_gravity, session_bias};
 use crate::prepared::{Prepared, si_covariance};
@@ -72,7 +73,7 @@ pub fn fit_biases(
             residuals,
             n,
             None,
-            Vec::new(),
+            HoldOut::none(),
         ));
     }
     if sensors.is_empty() {

@@ -9,7 +9,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use crate::blocks::quantile;
 use crate::dwell::{Fault, LeftOut};
-use crate::estimate::rotation::{Turn, direction_error};
+use crate::estimate::turn::{Turn, direction_error};
 use crate::estimate::{Estimated, Observation, gravity_size, rotation};
 use crate::prepared::{Prepared, si_covariance};
 use crate::quantity::{Sensor, significant};

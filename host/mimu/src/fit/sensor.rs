@@ -2,6 +2,7 @@
 
 use nalgebra::Vector3;
 
+use super::hold_out::HoldOut;
 use crate::estimate::Estimated;
 use crate::quantity::{Figure, Sensor};
 
@@ -33,8 +34,8 @@ pub struct SensorFit {
     pub dwells: usize,
     /// Compensated gyro dwell means without a table, root mean square in sample and held out, rad/s.
     pub static_rms: Option<(f64, Option<f64>)>,
-    /// Why blocks could not be held out.
-    pub not_held_out: Vec<String>,
+    /// How its residuals were held out.
+    pub held_out: HoldOut,
     /// What a person should know.
     pub warnings: Vec<String>,
 }
@@ -60,6 +61,13 @@ impl SensorFit {
                 .map(|r| Vector3::new(r.floor, 0.0, 0.0)),
         )
     }
+}
+
+/// What is left in sample, or what noise alone would leave where that is more: few residuals of many parameters say little.
+pub(super) fn typical(figure: Figure, residuals: &[Residual]) -> f64 {
+    let floor = |r: &Residual| Vector3::new(r.floor, 0.0, 0.0);
+    let in_sample = rms(figure, residuals.iter().map(|r| r.value));
+    in_sample.max(rms(Figure::GravitySize, residuals.iter().map(floor)))
 }
 
 /// Root mean square: over axes where the input is known, of angle or size elsewhere.

@@ -6,11 +6,12 @@ use serde::Serialize;
 use super::verify::VerifyResult;
 use super::{Sensors, TOOL};
 use crate::calibration::ConverterTable;
-use crate::diagnose::decision::{Accepted, Decision, Split};
+use crate::diagnose::decision::{Accepted, Decision};
 use crate::diagnose::picture::Picture;
 use crate::diagnose::rows::Figure as Judged;
 use crate::diagnose::{Diagnosis, SensorDiagnosis, Source, Verdict};
 use crate::effects::candidate::Kind;
+use crate::fit::Split;
 use crate::next_experiment::{Confused, Next, NotInPlan};
 use crate::quantity::{AXES, Figure, Sensor};
 use crate::verify::Verification;
@@ -251,6 +252,10 @@ pub struct SensorDiagnosisResult {
     pub interleaved_rms_after: f64,
     /// What noise alone would leave.
     pub noise_floor: f64,
+    /// What errors of the accelerometer, whose directions of gravity the turns are judged by, may add to that.
+    pub reference_rms: f64,
+    /// Share of the held-out mean square beyond these two that the effects take out; null without effects, or where nothing is beyond.
+    pub explained: Option<f64>,
     /// What a person should know of the accepted effects.
     pub notes: Vec<String>,
     /// Residuals that the model is fitted to.
@@ -408,6 +413,8 @@ fn figures(d: &Diagnosis, found: &SensorDiagnosis) -> SensorDiagnosisResult {
         held_out: decision.split,
         interleaved_rms_after: decision.interleaved_rms,
         noise_floor: decision.noise_floor,
+        reference_rms: decision.reference_rms,
+        explained: decision.explained(),
         notes: decision.notes.clone(),
         rows: decision.rows[0],
         affine_parameters: decision.rows[1],

@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::{Sensors, TOOL};
 use crate::dwell::Dwell;
-use crate::fit::{Fit, Method, SensorFit};
+use crate::fit::{Fit, Method, SensorFit, Split};
 use crate::prepared::Prepared;
 use crate::quantity::{AXES, Figure, Sensor, inverse_names, raw_unit, scale_unit};
 use crate::stillness;
@@ -153,7 +153,11 @@ pub struct SensorFitResult {
     pub small_angle: SmallAngle,
     /// By group of observations, whether noise explains their residuals.
     pub scatter: BTreeMap<String, ScatterResult>,
-    /// Why blocks could not be held out.
+    /// How the dwells were held out: contiguous `blocks`, or `interleaved` where one of these leaves the rest undetermined.
+    pub held_out: Split,
+    /// Parts that were held out in turn.
+    pub held_out_parts: usize,
+    /// Why not in blocks, or why some parts were not held out.
     pub not_held_out: Vec<String>,
     /// One for every dwell or turn that was used.
     pub residuals: Vec<ResidualResult>,
@@ -362,7 +366,9 @@ impl SensorFitResult {
                 non_orthogonality_yz_zy_zx_rad: Triple::of(&small.non_orthogonality),
             },
             scatter: scatter.collect(),
-            not_held_out: found.not_held_out.clone(),
+            held_out: found.held_out.split,
+            held_out_parts: found.held_out.count,
+            not_held_out: found.held_out.reasons.clone(),
             residuals: residuals.collect(),
             static_rms: found.static_rms.map(|(rms, _)| rms),
             static_held_out_rms: found.static_rms.map(|(_, held_out)| held_out),

@@ -1,5 +1,6 @@
-//! Blocks that leave a fit undetermined are named, and no error of theirs is averaged in.
+//! Parts of a recording that nothing else determines are held out otherwise, or named, and no error of theirs is averaged in.
 
+use mimu::fit::Split;
 use mimu::quantity::Sensor;
 use mimu::{Manifest, Options, Prepared, RawUnit, Reference, Samples, fit};
 
@@ -24,16 +25,20 @@ fn recorded(ups: &[[f64; 3]]) -> Prepared {
     Prepared::of(manifest, &samples, mimu::stillness::STILL_FACTOR).expect("readable")
 }
 
-#[test]
-fn a_block_that_holds_all_slanted_poses_is_named_and_not_averaged_in() {
-    let mut ups = Vec::new();
-    // Nearly along the axes: 3e-4 of a misalignment's slope is all that they show.
-    for k in 0..18 {
-        let sign = if k % 2 == 0 { 1.0 } else { -1.0 };
+/// Eighteen poses nearly along the axes: 3e-4 of a misalignment's slope is all that they show.
+fn along_the_axes() -> Vec<[f64; 3]> {
+    let pose = |k: usize| {
+        let sign = if k.is_multiple_of(2) { 1.0 } else { -1.0 };
         let mut up = [3e-4 * sign, -3e-4, 3e-4];
         up[k / 2 % 3] = if k / 6 % 2 == 0 { 1.0 } else { -1.0 };
-        ups.push(up);
-    }
+        up
+    };
+    (0..18).map(pose).collect()
+}
+
+#[test]
+fn where_a_block_holds_all_slanted_poses_one_dwell_in_four_is_held_out_instead() {
+    let mut ups = along_the_axes();
     ups.extend([
         [1.0, 1.0, 0.0],
         [-1.0, 1.0, 0.0],
@@ -44,13 +49,38 @@ fn a_block_that_holds_all_slanted_poses_is_named_and_not_averaged_in() {
     ]);
     let fitted = fit(recorded(&ups), Options::default()).expect("it is determined");
     let accel = fitted.sensor(Sensor::Accel).expect("an accelerometer");
-    let [reason] = &accel.not_held_out[..] else {
-        panic!("{:?}", accel.not_held_out);
+    assert_eq!(
+        (accel.held_out.split, accel.held_out.count),
+        (Split::Interleaved, 4)
+    );
+    let [reason] = &accel.held_out.reasons[..] else {
+        panic!("{:?}", accel.held_out.reasons);
     };
-    assert!(reason.starts_with("block 4 cannot be held out"), "{reason}");
+    assert!(reason.contains("block 4 cannot be held out"), "{reason}");
+    let worst = accel
+        .residuals
+        .iter()
+        .map(|r| r.held_out.expect("each is held out").x.abs());
+    assert!(worst.fold(0.0, f64::max) < 1e-3);
+}
+
+#[test]
+fn a_block_that_cannot_be_cut_otherwise_is_named_and_not_averaged_in() {
+    let mut ups = along_the_axes();
+    // Each shows one angle that no other pose shows.
+    ups.extend([[1.0, 1.0, 0.0], [0.0, 1.0, 1.0], [1.0, 0.0, 1.0]]);
+    let fitted = fit(recorded(&ups), Options::default()).expect("it is determined");
+    let accel = fitted.sensor(Sensor::Accel).expect("an accelerometer");
+    assert_eq!(accel.held_out.split, Split::Blocks);
+    let reason = accel.held_out.reasons.last().expect("a reason");
+    assert!(reason.contains("4 cannot be held out: without"), "{reason}");
+    assert!(
+        reason.contains("the rest leaves its errors open by"),
+        "{reason}"
+    );
+    assert!(accel.residuals[16..].iter().all(|r| r.held_out.is_none()));
     for residual in &accel.residuals {
         let held_out = residual.held_out.map(|h| h.x.abs());
-        assert_eq!(held_out.is_none(), residual.dwell >= 18);
         assert!(held_out.is_none_or(|h| h < 1e-3), "{held_out:?}");
     }
 }

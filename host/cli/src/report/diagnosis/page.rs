@@ -7,8 +7,8 @@ mod tables;
 
 use maud::{Markup, PreEscaped, html};
 
+use super::meaning;
 use super::text::{USUAL, by};
-use mimu::diagnose::Verdict;
 use mimu::diagnose::decision::{FALSE_LEFTOVER, LEVERAGE};
 use mimu::diagnose::picture::{Against, Omnibus, Panel, Picture};
 use mimu::diagnose::search::{FALSE_FOUND, FALSE_LISTED};
@@ -153,21 +153,13 @@ fn head(d: &DiagnosisResult, made: &Made) -> Markup {
 
 fn verdict(d: &DiagnosisResult) -> Markup {
     let unexplained = d.unexplained().next().is_some();
-    let meaning = match d.verdict {
-        Verdict::Clean => "noise explains what the affine calibration leaves.",
-        Verdict::Explained => "with the effects found, noise explains what is left.",
-        Verdict::Unexplained if unexplained => "something is left that nothing tried explains:",
-        Verdict::Unexplained => {
-            "what was found is explained as well by an unlisted alternative model."
-        }
-    };
     let left = || {
         d.sensors
             .named()
             .filter(|(name, _)| d.unexplained().any(|l| l.sensor == *name))
     };
     html! {
-        strong { (d.verdict.name()) } ": " (meaning)
+        strong { (d.verdict.name()) } ": " (meaning(d)) (if unexplained { ": " } else { "." })
         @for (n, (name, _)) in left().enumerate() { @if n > 0 { ";" } " " (tables::leftover_words(d, name)) }
         @if unexplained { "." }
         @for (name, s) in d.sensors.named() {

@@ -2,10 +2,9 @@
 
 use std::fmt::Write as _;
 
+use super::{meaning, remarks};
 use crate::report::text::{warn, wrap};
 use mimu::calibration::ConverterTable;
-use mimu::diagnose::Verdict;
-use mimu::diagnose::decision::Split;
 use mimu::quantity::{p_value, plural, plus_minus, significant};
 use mimu::readable::{self, Readable};
 use mimu::result::diagnosis::{AcceptedResult, DiagnosisResult, SensorDiagnosisResult};
@@ -17,17 +16,7 @@ const FIGURES: &str = "The figures before are not quite those of `mimu fit`: res
 /// Result of `mimu diagnose`. `all`: with the whole reason of each effect that was not accepted.
 pub fn diagnosis_text(d: &DiagnosisResult, all: bool) -> String {
     let mut out = String::new();
-    let verdict = match d.verdict {
-        Verdict::Clean => "clean: noise explains what the affine calibration leaves",
-        Verdict::Explained => "explained: with the effects below, noise explains what is left",
-        Verdict::Unexplained if d.unexplained().next().is_some() => {
-            "unexplained: something is left that nothing here explains"
-        }
-        Verdict::Unexplained => {
-            "unexplained: an unlisted alternative model does as well as what was found"
-        }
-    };
-    let _ = writeln!(out, "{}: {verdict}", d.device);
+    let _ = writeln!(out, "{}: {}: {}", d.device, d.verdict.name(), meaning(d));
     for (name, s) in d.sensors.named() {
         let _ = writeln!(out);
         sensor(&mut out, d, name, s, all);
@@ -95,11 +84,8 @@ fn sensor(out: &mut String, d: &DiagnosisResult, name: &str, s: &SensorDiagnosis
         let (before, after) = (shown(s, before), shown(s, after));
         let _ = writeln!(out, "  {label:<12}{before:>16}{after:>16}{floor:>16}");
     }
-    if s.held_out == Split::Interleaved {
-        let _ = writeln!(
-            out,
-            "  held out every fourth dwell: one block of time alone shows what is needed"
-        );
+    for remark in remarks(s) {
+        wrap(out, "  ", &remark);
     }
     if s.rows < s.affine_parameters + FEW {
         let _ = writeln!(

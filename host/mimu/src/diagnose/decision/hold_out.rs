@@ -1,11 +1,11 @@
 //! Holding dwells out, and what an effect rests on.
 
 use nalgebra::{DMatrix, DVector};
-use serde::Serialize;
 
 use crate::diagnose::rows::Rows;
 use crate::diagnose::search::{Chosen, Search, unit_columns};
 use crate::diagnose::variance::Fitted;
+use crate::fit::Split;
 
 /// Contiguous blocks that are left out in turn.
 const BLOCKS: usize = 4;
@@ -16,26 +16,14 @@ pub(in crate::diagnose) fn rms(rows: &Rows, residuals: &DVector<f64>) -> f64 {
     (residuals.rows(0, count).norm_squared() / (count / together) as f64).sqrt()
 }
 
-/// How dwells are held out.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Split {
-    /// Contiguous blocks of time.
-    Blocks,
-    /// Every so manieth dwell: for what is seen in one block only, like a warm-up, which nothing else determines.
-    Interleaved,
+/// Part that a dwell is in; of several recordings each block is a stretch of every one.
+pub(in crate::diagnose) fn part(split: Split, rows: &Rows, dwell: usize) -> usize {
+    let (place, of) = rows.place(dwell);
+    split.part(place, of, BLOCKS)
 }
 
-impl Split {
-    /// Part that a dwell is in; of several recordings each block is a stretch of every one.
-    pub(in crate::diagnose) fn part(self, rows: &Rows, dwell: usize) -> usize {
-        let (place, of) = rows.place(dwell);
-        match self {
-            Self::Blocks => place * BLOCKS / of.max(1),
-            Self::Interleaved => place % BLOCKS,
-        }
-    }
-}
+/// By how many times its own variance what the rest leaves open may be: a row is then not held out, but extrapolated to.
+const OPEN: f64 = 100.0;
 
 /// Held-out residuals of the judged rows: each by a model that has not seen its block. `None` where what is left of the
 /// experiment does not determine the model.
@@ -46,10 +34,11 @@ pub(in crate::diagnose) fn held_out(
     split: Split,
 ) -> Option<DVector<f64>> {
     let rows = search.rows;
-    let parts_of = |r: usize| rows.dwells(r).map(|d| split.part(rows, d));
+    let parts_of = |r: usize| rows.dwells(r).map(|d| part(split, rows, d));
     let mut out = DVector::zeros(rows.y.len());
     // Columns of one size: a temperature far from the reference, squared, is no reason to be taken for undetermined.
     let model = unit_columns(model);
+    let variances = search.variance.variances(&at.components);
     for block in 0..BLOCKS {
         let kept: Vec<usize> = (0..rows.y.len())
             .filter(|r| !parts_of(*r).contains(&block))
@@ -67,9 +56,19 @@ pub(in crate::diagnose) fn held_out(
             return None;
         }
         let solution = svd.solve(&y, 0.0).ok()?;
+        let by_parameters = svd.v_t.as_ref()?.transpose()
+            * DMatrix::from_diagonal(&svd.singular_values.map(|s| 1.0 / s));
+        let (mut open, mut own) = (0.0, 0.0);
         // A turn into the block is of it; one out of it is of the next, and is judged there.
         for r in (0..rows.y.len()).filter(|r| parts_of(*r)[1] == block) {
             out[r] = rows.y[r] - (model.row(r) * &solution)[(0, 0)];
+            if r < rows.judged.0 {
+                open += (model.row(r) * &by_parameters).norm_squared();
+                own += variances[r];
+            }
+        }
+        if open > OPEN * own {
+            return None;
         }
     }
     Some(out)
@@ -93,7 +92,7 @@ pub(super) fn parts_helped(
             .filter(|(_, r)| *r < rows.judged.0)
         {
             noise += stratum.known[(i, i)] / rows.judged.0 as f64;
-            let part = &mut sums[split.part(rows, rows.dwells(r)[1])];
+            let part = &mut sums[part(split, rows, rows.dwells(r)[1])];
             part[0] += without[r] * without[r];
             part[1] += with[r] * with[r];
         }
@@ -106,8 +105,8 @@ pub(super) fn parts_helped(
 /// Dwells of which each is left out to see whether an effect survives: those that its drop in deviance owes most to.
 const LEFT_OUT: usize = 3;
 
-/// Largest probability of chance of `one`, after the whole search, when any one dwell is left out with the turns that touch it; `without` and
-/// `with` are the models without it and with it, and how `with` was fitted.
+/// Largest probability of chance of `one`, after the whole search, when any one dwell is left out, with all others in its pose and the turns
+/// that touch them; `without` and `with` are the models without it and with it, and how `with` was fitted.
 pub(super) fn chance_without_a_dwell(
     search: &Search,
     one: &Chosen,
@@ -124,9 +123,11 @@ pub(super) fn chance_without_a_dwell(
         Some(whitener.whiten(&DMatrix::from_column_slice(left.len(), 1, left.as_slice())))
     };
     let (a, b) = (left(without)?, left(with)?);
+    let witnesses = rows.witnesses();
+    let of_row = |r: usize| rows.dwells(r).map(|d| witnesses[d]);
     let mut owed = vec![0.0; rows.dwell_count()];
     for r in 0..rows.y.len() {
-        let [from, to] = rows.dwells(r);
+        let [from, to] = of_row(r);
         let gain = a[r].powi(2) - b[r].powi(2);
         owed[to] += gain;
         if from != to {
@@ -137,8 +138,11 @@ pub(super) fn chance_without_a_dwell(
     order.sort_by(|i, j| owed[*j].total_cmp(&owed[*i]));
     let chance = |dwell: &usize| {
         let kept: Vec<usize> = (0..rows.y.len())
-            .filter(|r| !rows.dwells(*r).contains(dwell))
+            .filter(|r| !of_row(*r).contains(dwell))
             .collect();
+        if kept.len() <= with.ncols() {
+            return None;
+        }
         let parts = variance.kept(at, &kept)?;
         let y = parts.whiten(&DMatrix::from_fn(kept.len(), 1, |i, _| rows.y[kept[i]]));
         let chi2 = |model: &DMatrix<f64>| {
@@ -171,7 +175,7 @@ pub(super) fn leverage(rows: &Rows, others: &DMatrix<f64>, columns: &DMatrix<f64
         for (r, v) in column.iter().enumerate() {
             let dwell = rows.dwells(r)[1];
             by[0][dwell] += v * v;
-            by[1][Split::Blocks.part(rows, dwell)] += v * v;
+            by[1][part(Split::Blocks, rows, dwell)] += v * v;
         }
         for (worst, by) in worst.iter_mut().zip(by) {
             let total: f64 = by.iter().sum();

@@ -2,9 +2,10 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::hold_out::{Split, held_out};
+use super::hold_out::held_out;
 use crate::diagnose::search::{Chosen, Search};
 use crate::diagnose::variance::{By, Fitted};
+use crate::fit::Split;
 
 /// Affine parameters and effects, fitted.
 #[derive(Debug, Clone)]

@@ -8,12 +8,13 @@
 
 use nalgebra::DMatrix;
 
-use super::hold_out::{Split, held_out, rms};
+use super::hold_out::{held_out, rms};
 use super::leftover::{FALSE_LEFTOVER, Leftover};
 use crate::diagnose::rows::Rows;
 use crate::diagnose::search::{COEFFICIENT, Chosen, Search, beside, independent_of, unit_columns};
 use crate::diagnose::variance::{By, Fitted};
 use crate::effects::quantity::Conditions;
+use crate::fit::Split;
 use crate::quantity::AXES;
 
 /// Pieces that the range of the readings is divided into.

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, Vector3};
 
-use crate::estimate::rotation::Turn;
+use crate::estimate::turn::Turn;
 
 /// Errors of the forces of an accelerometer that are common to all of its poses, or to several.
 #[derive(Debug, Clone)]

@@ -3,14 +3,15 @@
 use std::ops::Range;
 
 use mimu_core::compensation::Affine;
-use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, SVector, Vector3};
 
 use super::build::{Builder, Part};
 use super::{Figure, ForceErrors, Row, Stratum};
 use crate::effects::quantity::Conditions;
 use crate::estimate::Observation;
+use crate::estimate::chains::Chains;
 use crate::estimate::earth::poses;
-use crate::estimate::rotation::{Chains, sensitivity};
+use crate::estimate::turn::sensitivity;
 use crate::prepared::si_covariance;
 use crate::quantity::Sensor;
 
@@ -151,7 +152,7 @@ impl Builder<'_> {
         let mean_square = inverse.matrix.norm_squared() / 3.0;
         let mut y = Vec::new();
         let (mut by_force, mut sides, mut rotations) = (Vec::new(), Vec::new(), Vec::new());
-        let mut turn_rows: Vec<[f64; 12]> = Vec::new();
+        let mut turn_rows: Vec<SVector<f64, 12>> = Vec::new();
         let blocks = &prepared.condensed.blocks;
         for turn in &turns {
             let first = self.conditions.len();
@@ -177,18 +178,11 @@ impl Builder<'_> {
             let conditions = first..self.conditions.len();
             let found = sensitivity(turn, inverse);
             rotations.push(found.rotation);
-            for side in 0..2 {
-                let mut columns = [0.0; 12];
-                let mut weights = Vec::with_capacity(conditions.len());
-                for (by, piece) in found.by.iter().zip(turn.increments) {
-                    for i in 0..3 {
-                        for j in 0..3 {
-                            columns[3 * i + j] += by[side][i] * piece.integral[j];
-                        }
-                        columns[9 + i] += by[side][i] * piece.duration_s;
-                    }
-                    weights.push(body.tr_mul(&by[side]) * piece.duration_s);
-                }
+            for (side, columns) in found.by_parameters(turn).into_iter().enumerate() {
+                let pieces = found.by.iter().zip(turn.increments);
+                let weights = pieces
+                    .map(|(by, piece)| body.tr_mul(&by[side]) * piece.duration_s)
+                    .collect();
                 y.push(found.error[side]);
                 by_force.push((turn, found.by_force[side]));
                 sides.push(found.sides[side]);

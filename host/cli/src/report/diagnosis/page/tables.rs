@@ -3,9 +3,9 @@
 use maud::{Markup, PreEscaped, html};
 
 use super::{Shown, sentence, spoken};
+use crate::report::diagnosis::remarks;
 use crate::report::diagnosis::text::{by_experiment, by_score, converter};
 use crate::report::svg::raised;
-use mimu::diagnose::decision::Split;
 use mimu::quantity::{Figure, p_value, significant};
 use mimu::readable;
 use mimu::result::diagnosis::{
@@ -70,8 +70,8 @@ pub(super) fn errors(sensors: &[Shown]) -> Markup {
                 }
             }
         } }
-        @for s in sensors.iter().filter(|s| s.figures.held_out == Split::Interleaved) {
-            p class="dim" { (spoken(s.name)) ": every fourth dwell is held out in turn, as one block of time alone shows what the model needs." }
+        @for s in sensors {
+            @for remark in remarks(s.figures) { p class="dim" { (spoken(s.name)) ": " (remark) "." } }
         }
     }
 }
