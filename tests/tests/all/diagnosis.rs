@@ -171,6 +171,36 @@ fn a_step_at_a_reading_is_left_over_against_the_reading_or_named_an_error_by_the
     assert!(by_reading > 0);
 }
 
+/// The table turns about axes that point up and never down, so that the square of a force looks like a little scale factor and
+/// misalignment: an affine model that does not know of it bends, and with it the directions that its products are made with.
+#[test]
+fn a_quadratic_of_five_per_cent_on_a_table_comes_alone_and_at_its_size() {
+    let seed = 1;
+    let mut file = unit(&["accel_scale_quadratic"], seed);
+    file.effect[0].parameters = toml::from_str("mg_per_g2 = [50.0, -40.0, 30.0]").unwrap();
+    let recorded = bench::recorded(&plan(seed), &file, seed);
+    let noise = bench::noise_file(&file, seed, recorded.condensed.period_s);
+    let found = diagnose(recorded.with_noise(&noise).unwrap().into(), options()).unwrap();
+    let ids: Vec<String> = found.effects.iter().map(|e| e.candidate.id()).collect();
+    assert_eq!(ids, ["accel_scale_quadratic"]);
+    let accepted = found.sensors.iter().flat_map(|s| &s.decision.accepted);
+    let one = accepted.last().unwrap();
+    for (axis, mg_per_g2) in [50.0, -40.0, 30.0].into_iter().enumerate() {
+        // 1 mg/g² is 1e-3/9.80665 of 1/(m/s²).
+        let (truth, sigma) = (
+            mg_per_g2 * 1e-3 / 9.806_65,
+            one.covariance[(axis, axis)].sqrt(),
+        );
+        let error = one.values[axis] - truth;
+        println!(
+            "{axis}: {:.2} sigma, {:.2} %",
+            error / sigma,
+            100.0 * error / truth
+        );
+        assert!(error.abs() < 4.0 * sigma && error.abs() < 4e-3 * truth.abs());
+    }
+}
+
 fn diagnosed(fit: mimu::fit::Fit) -> Diagnosis {
     diagnose(fit.prepared.into(), fit.options).unwrap()
 }

@@ -12,9 +12,12 @@ use mimu::quantity::significant;
 use mimu::readable;
 use mimu::result::diagnosis::{DiagnosisResult, SensorDiagnosisResult};
 
+/// Errors of the reference over the noise floor from which on they, and not the noise, are what a clean unit is judged by.
+const OPEN: f64 = 3.0;
+
 /// What the verdict means, as a sentence fragment.
 fn meaning(d: &DiagnosisResult) -> &'static str {
-    let open = |s: &SensorDiagnosisResult| s.reference_rms > s.noise_floor;
+    let open = |s: &SensorDiagnosisResult| s.reference_rms > OPEN * s.noise_floor;
     match d.verdict {
         Verdict::Clean if d.sensors.named().any(|(_, s)| open(s)) => {
             "noise, and what the poses leave open of the accelerometer, explain what the affine calibration leaves"
@@ -42,13 +45,13 @@ fn remarks(s: &SensorDiagnosisResult) -> Vec<String> {
     }
     if s.reference_rms > s.noise_floor {
         all.push(format!(
-            "the poses leave the accelerometer so open that its directions of gravity add up to {} rms to the noise floor",
+            "errors of the accelerometer, whose directions of gravity the turns are judged by, may add {} rms to the noise floor",
             readable::error(s.unit).write(s.reference_rms)
         ));
     }
     if let Some(share) = s.explained {
         all.push(format!(
-            "{} % of the held-out mean square beyond the noise is explained",
+            "{} % of the held-out mean square beyond noise and errors of the reference is explained",
             significant(100.0 * share)
         ));
     }
