@@ -58,16 +58,19 @@ impl Candidate {
 
     /// Its columns in `rows`.
     pub fn columns(&self, rows: &Rows, parameter: f64) -> DMatrix<f64> {
+        if let Some(columns) = self.columns_by_axis(rows, &self.axes()) {
+            return columns;
+        }
         self.columns_at(rows, &rows.conditions(self.followed(parameter)), parameter)
     }
 
-    /// Columns of the one regressor of a term or a jump as an error of each of `axes`: it takes longer to find than to weigh.
-    pub fn columns_by_axis(&self, rows: &Rows, axes: &[usize]) -> DMatrix<f64> {
-        let conditions = rows.conditions(self.followed(0.0));
-        rows.columns(&conditions, axes, |at, out| {
-            self.regressors(at, 0.0, &mut out[..1]);
-            out.fill(out[0]);
-        })
+    /// Columns of a term or a jump as an error of each of `axes`; `None` of an effect.
+    pub fn columns_by_axis(&self, rows: &Rows, axes: &[usize]) -> Option<DMatrix<f64>> {
+        match &self.kind {
+            Kind::Term(_, product) => Some(rows.term(product, axes)),
+            Kind::Jump { session, t_s, .. } => Some(rows.jump(*session, *t_s, axes)),
+            Kind::Effect(_) => None,
+        }
     }
 
     /// It with all of the coefficients that its search chooses from.
@@ -95,17 +98,44 @@ impl Candidate {
         conditions: &[Conditions],
         parameter: f64,
     ) -> DMatrix<f64> {
-        let slots = self.slots();
         let all = rows.columns(conditions, &self.axes(), |at, out| {
             self.regressors(at, parameter, out)
         });
-        if slots.len() == self.active.len() {
-            return all;
+        self.by_coefficient(all)
+    }
+
+    /// Columns of a code in `rows` [by dwell](Rows::by_dwell) at the conditions of [`Rows::conditions_without`]; `slots` are its
+    /// [columns by slot](Self::columns_by_slot) there. How often a bit is set takes an error function for each of the conditions, of which the
+    /// turns have many thousands, and they stay.
+    pub fn columns_without(
+        &self,
+        rows: &Rows,
+        slots: &DMatrix<f64>,
+        conditions: &[Conditions],
+    ) -> DMatrix<f64> {
+        let all = rows.columns_without(slots.clone(), conditions, &self.axes(), |at, out| {
+            self.regressors(at, 0.0, out)
+        });
+        self.by_coefficient(all)
+    }
+
+    /// Columns of each of its [slots](Self::slots) in `rows`.
+    pub fn columns_by_slot(&self, rows: &Rows) -> DMatrix<f64> {
+        rows.columns(&rows.conditions(None), &self.axes(), |at, out| {
+            self.regressors(at, 0.0, out)
+        })
+    }
+
+    /// Columns of its active coefficients out of those of its slots.
+    fn by_coefficient(&self, slots: DMatrix<f64>) -> DMatrix<f64> {
+        let of = self.slots();
+        if of.len() == self.active.len() {
+            return slots;
         }
-        let mut columns = DMatrix::zeros(all.nrows(), self.active.len());
-        for (slot, (coefficient, _)) in slots.iter().enumerate() {
+        let mut columns = DMatrix::zeros(slots.nrows(), self.active.len());
+        for (slot, (coefficient, _)) in of.iter().enumerate() {
             let mut sum = columns.column_mut(*coefficient);
-            sum += all.column(slot);
+            sum += slots.column(slot);
         }
         columns
     }

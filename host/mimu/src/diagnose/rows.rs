@@ -16,9 +16,11 @@ mod forces;
 mod gravity;
 mod join;
 mod known;
+mod terms;
 
 use std::borrow::Cow;
 use std::ops::Range;
+use std::sync::OnceLock;
 
 use mimu_core::compensation::Affine;
 use nalgebra::{DMatrix, DVector, Vector3};
@@ -27,6 +29,7 @@ use crate::effects::quantity::Conditions;
 use crate::effects::temperature::{Followed, lagged, rank_correlation};
 use crate::estimate::earth::poses;
 pub use forces::ForceErrors;
+use terms::Quantities;
 
 use crate::prepared::Prepared;
 use crate::quantity;
@@ -155,6 +158,8 @@ pub struct Rows {
     without_self_heating: Vec<Option<Vec<(f64, f64)>>>,
     /// Number of the first dwell of each recording, and that of all dwells.
     first: Vec<usize>,
+    /// What its terms are made of, once a column of one was asked for.
+    quantities: OnceLock<Quantities>,
 }
 
 /// Rank correlation from which on temperature and time are one. A ramp up and half of the way back has 0.5.
@@ -246,6 +251,7 @@ impl Rows {
     /// The same rows with one conditions for each dwell, whose reading scatters as its samples do: for what depends on the reading alone.
     pub fn by_dwell(&self) -> Self {
         let mut out = self.clone();
+        out.quantities = OnceLock::new();
         out.conditions.clear();
         out.block.clear();
         let mut merged: Vec<(Range<usize>, usize)> = Vec::new();
@@ -365,6 +371,26 @@ impl Rows {
                         columns[(r, k)] += w * at[p * m + k];
                     }
                 }
+            }
+        }
+        columns
+    }
+
+    /// `columns` of some regressors at other conditions: those of [Self::conditions_without], which differ where a row has one only.
+    pub fn columns_without(
+        &self,
+        mut columns: DMatrix<f64>,
+        conditions: &[Conditions],
+        axes: &[usize],
+        values: impl Fn(&Conditions, &mut [f64]),
+    ) -> DMatrix<f64> {
+        let mut at = vec![0.0; axes.len()];
+        for (r, row) in self.rows.iter().enumerate() {
+            let [weight] = &row.weights[..] else { continue };
+            values(&conditions[row.conditions.start], &mut at);
+            for (k, axis) in axes.iter().enumerate() {
+                let w = weight[*axis];
+                columns[(r, k)] = if w == 0.0 { 0.0 } else { w * at[k] };
             }
         }
         columns

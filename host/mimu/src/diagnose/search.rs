@@ -45,6 +45,14 @@ pub struct Chosen {
     pub alternatives: Vec<(String, f64)>,
 }
 
+/// Columns of a candidate at a value of its nonlinear parameter.
+struct Columns {
+    parameter: f64,
+    plain: DMatrix<f64>,
+    /// See [`VarianceModel::rotate`].
+    rotated: DMatrix<f64>,
+}
+
 /// The search over the rows of one sensor.
 pub struct Search<'a> {
     /// Rows.
@@ -56,8 +64,10 @@ pub struct Search<'a> {
     /// Basis of what the affine parameters can do.
     pub basis: DMatrix<f64>,
     candidates: Vec<Candidate>,
-    /// Columns of each, rotated, for each parameter that is screened; none of those that are another beside other effects.
-    rotated: Vec<Vec<(f64, DMatrix<f64>)>>,
+    /// Columns of each for each parameter that is screened; none of those that are another beside other effects.
+    screened: Vec<Vec<Columns>>,
+    /// Codes with all of their bits, and their columns by slot in the rows by dwells.
+    codes: Vec<(Candidate, DMatrix<f64>)>,
     tests: [f64; 2],
 }
 
@@ -125,29 +135,55 @@ impl<'a> Search<'a> {
         let variance = VarianceModel::new(rows, false);
         let alike = |a: &Candidate, b: &Candidate| a.is_same_of_another_axis(b);
         let alike: Vec<&[Candidate]> = candidates.chunk_by(alike).collect();
-        let rotated = alike
+        let screened = alike
             .into_par_iter()
-            .flat_map_iter(|group| match group {
-                [one] if one.reads_code() => vec![Vec::new()],
-                [one] => {
-                    let at =
-                        |parameter| (parameter, variance.rotate(&one.columns(rows, parameter)));
-                    vec![one.parameters().into_iter().map(at).collect()]
-                }
-                of_axes => {
-                    let axes: Vec<usize> = of_axes.iter().flat_map(|c| c.axes()).collect();
-                    let columns = variance.rotate(&of_axes[0].columns_by_axis(rows, &axes));
-                    let of_axis = |k| vec![(0.0, columns.columns(k, 1).into_owned())];
-                    (0..axes.len()).map(of_axis).collect()
+            .flat_map_iter(|group| {
+                let axes: Vec<usize> = group.iter().flat_map(|c| c.axes()).collect();
+                match (&group[0], group[0].columns_by_axis(rows, &axes)) {
+                    (_, Some(plain)) => {
+                        let rotated = variance.rotate(&plain);
+                        let of_axis = |k| {
+                            vec![Columns {
+                                parameter: 0.0,
+                                plain: plain.columns(k, 1).into_owned(),
+                                rotated: rotated.columns(k, 1).into_owned(),
+                            }]
+                        };
+                        (0..axes.len()).map(of_axis).collect()
+                    }
+                    (one, None) if one.reads_code() => vec![Vec::new()],
+                    (one, None) => {
+                        let at = |parameter| {
+                            let plain = one.columns(rows, parameter);
+                            let rotated = variance.rotate(&plain);
+                            Columns {
+                                parameter,
+                                plain,
+                                rotated,
+                            }
+                        };
+                        vec![one.parameters().into_iter().map(at).collect()]
+                    }
                 }
             })
             .collect();
+        let by_dwell = rows.by_dwell();
+        let of_code = candidates.iter().filter(|c| c.reads_code());
+        let mut codes: Vec<(Candidate, DMatrix<f64>)> = Vec::new();
+        for code in of_code {
+            if !codes.last().is_some_and(|last| last.0.is_variant_of(code)) {
+                let all = code.with_all_offered();
+                let slots = all.columns_by_slot(&by_dwell);
+                codes.push((all, slots));
+            }
+        }
         Self {
             rows,
-            rotated,
+            screened,
+            codes,
             basis: basis(&rows.nuisance),
             tests: [count(true), count(false)],
-            by_dwell: rows.by_dwell(),
+            by_dwell,
             variance,
             candidates,
         }
@@ -164,6 +200,12 @@ impl<'a> Search<'a> {
         self.by_dwell.conditions_without(&left)
     }
 
+    /// Columns of all bits that are offered of a code, at the conditions of [`Rows::conditions_without`]; `None` of what is no code.
+    pub(super) fn bits(&self, code: &Candidate, conditions: &[Conditions]) -> Option<DMatrix<f64>> {
+        let (all, slots) = self.codes.iter().find(|(c, _)| c.is_variant_of(code))?;
+        Some(all.columns_without(&self.by_dwell, slots, conditions))
+    }
+
     /// Takes the bits of a code again from the readings without the errors of what has been added since: those move the readings too.
     fn read_again(&self, chosen: &mut [Chosen], now: &mut Fitted) {
         for k in 0..chosen.len() {
@@ -171,10 +213,11 @@ impl<'a> Search<'a> {
                 continue;
             }
             let conditions = self.conditions_beside(chosen, k, now);
-            let one = &chosen[k];
-            let columns = one
-                .candidate
-                .columns_at(&self.by_dwell, &conditions, one.parameter);
+            let one = &chosen[k].candidate;
+            let Some(all) = self.bits(one, &conditions) else {
+                continue;
+            };
+            let columns = one.columns_of(&all);
             let before = std::mem::replace(&mut chosen[k].columns, columns);
             match self.fit(chosen) {
                 Some(fit) => *now = fit,
@@ -242,11 +285,13 @@ impl<'a> Search<'a> {
         };
         let (candidate, parameter, fitted) = match candidate.reads_code() {
             true => {
-                let (candidate, fitted) = beside_these.bits(candidate, screened.parameter)?;
+                let (candidate, fitted) = beside_these.bits(candidate)?;
                 (candidate, screened.parameter, fitted)
             }
             false => {
-                let (parameter, fitted) = beside_these.parameter(candidate, screened.parameter)?;
+                let at = |c: &&Columns| c.parameter == screened.parameter;
+                let first = self.screened[screened.index].iter().find(at)?;
+                let (parameter, fitted) = beside_these.parameter(candidate, first)?;
                 (candidate.clone(), parameter, fitted)
             }
         };

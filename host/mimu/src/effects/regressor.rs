@@ -90,16 +90,6 @@ impl Product {
         powers.fold(self.sign, |product, v| product * v)
     }
 
-    /// Largest value that it could have under `conditions`: all of its quantities at their largest together.
-    pub fn largest(&self, conditions: &[Conditions], axis: usize) -> f64 {
-        let most = |(q, p): (Quantity, u8)| {
-            let sizes = conditions.iter().map(|at| q.of(at, axis).abs());
-            let largest = sizes.filter(|s| s.is_finite()).fold(0.0, f64::max);
-            largest.powi(i32::from(p))
-        };
-        self.parts().map(most).product()
-    }
-
     /// Name of a term: `rate_x*force_y`, `force_z^2`. Empty where terms are made of other quantities.
     pub fn name(&self) -> String {
         let written = self.parts().filter_map(|(q, p)| {

@@ -64,11 +64,11 @@ pub(super) fn candidates(
         .into_par_iter()
         .map(|product| {
             let term = |axis| Candidate::new(sensor, Kind::Term(axis, product));
-            let columns = term(0).columns_by_axis(rows, &[0, 1, 2]);
+            let columns = rows.term(&product, &[0, 1, 2]);
             let seen = across(&columns);
             // A table that turns about one axis at a time has rates about the others of rounding's size: with a coefficient of
             // 5e12 their product passed for an effect.
-            let rounding = ROUNDING * product.largest(&rows.conditions(term(0).followed(0.0)), 0);
+            let rounding = ROUNDING * rows.largest(&product);
             let seen = |axis: &usize| {
                 let column = columns.column(*axis);
                 let finite = column.iter().all(|v| v.is_finite());

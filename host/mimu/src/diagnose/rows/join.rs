@@ -149,5 +149,6 @@ pub(super) fn join(sensor: Sensor, parts: Vec<(usize, Part)>, sessions: usize) -
         without_self_heating: warm.iter().map(|w| without_self_heating(w)).collect(),
         temperature: warm,
         first,
+        quantities: std::sync::OnceLock::new(),
     })
 }

@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use super::{COEFFICIENT, Search, beside, independent_of, unit_columns};
+use super::{COEFFICIENT, Columns, Search, beside, independent_of, unit_columns};
 use crate::diagnose::variance::{By, Components, Fitted};
 use crate::effects::candidate::Candidate;
 use crate::effects::effect::NonlinearParameter;
@@ -40,26 +40,30 @@ impl Beside<'_> {
         })
     }
 
-    /// With the best value of its nonlinear constant, if it has one: a walk uphill from `first` with ever smaller steps.
-    pub fn parameter(&self, candidate: &Candidate, first: f64) -> Option<(f64, With)> {
-        self.climb(candidate, first, |columns| columns)
+    /// With the best value of its nonlinear constant, if it has one: a walk uphill from its columns at the `first` with ever smaller
+    /// steps.
+    pub fn parameter(&self, candidate: &Candidate, first: &Columns) -> Option<(f64, With)> {
+        let at_first = self.fit(first.plain.clone(), &self.null.components)?;
+        self.climb(candidate, (first.parameter, at_first), |columns| columns)
     }
 
     /// The same of a law that is to do what the model does not yet: what of it is in the model already is no fault of it, and costs nothing.
     pub fn law(&self, law: &Candidate, first: f64) -> Option<(f64, With)> {
-        self.climb(law, first, |columns| independent_of(&columns, &self.model))
+        let part = |columns: DMatrix<f64>| independent_of(&columns, &self.model);
+        let columns = part(law.columns(self.search.rows, first));
+        let at_first = self.fit(columns, &self.null.components)?;
+        self.climb(law, (first, at_first), part)
     }
 
     fn climb(
         &self,
         candidate: &Candidate,
-        first: f64,
+        mut best: (f64, With),
         part: impl Fn(DMatrix<f64>) -> DMatrix<f64>,
     ) -> Option<(f64, With)> {
         let fit = |parameter: f64, start: &Components| {
             self.fit(part(candidate.columns(self.search.rows, parameter)), start)
         };
-        let mut best = (first, fit(first, &self.null.components)?);
         let Some(NonlinearParameter { from, to, .. }) = candidate.parameter() else {
             return Some(best);
         };
@@ -86,11 +90,9 @@ impl Beside<'_> {
     }
 
     /// With the best choice of bits: one is added or dropped as long as that makes the score better.
-    pub fn bits(&self, from: &Candidate, parameter: f64) -> Option<(Candidate, With)> {
+    pub fn bits(&self, from: &Candidate) -> Option<(Candidate, With)> {
         let conditions = self.search.freed(&self.model, self.null);
-        let all = from
-            .with_all_offered()
-            .columns_at(&self.search.by_dwell, &conditions, parameter);
+        let all = self.search.bits(from, &conditions)?;
         let columns = |c: &Candidate| c.columns_of(&all);
         let first = columns(from);
         let mut best = (from.clone(), self.fit(first, &self.null.components)?);

@@ -35,19 +35,9 @@ impl Search<'_> {
         let total = left.norm_squared();
         let freed = self.freed(&self.model(chosen), null);
         let taken = |c: &Candidate| chosen.iter().any(|k| k.candidate.is_variant_of(c));
-        // Of each code once for all of its variants, which follow each other.
-        let mut codes: Vec<(&Candidate, f64, DMatrix<f64>)> = Vec::new();
-        for c in self.candidates.iter().filter(|c| c.reads_code()) {
-            if !codes.last().is_some_and(|last| last.0.is_variant_of(c)) {
-                let parameter = c.parameters()[0];
-                let all = c.with_all_offered();
-                codes.push((
-                    c,
-                    parameter,
-                    all.columns_at(&self.by_dwell, &freed, parameter),
-                ));
-            }
-        }
+        // Of each code once for all of its variants.
+        let of_code = |c: &'_ (Candidate, _)| Some((c.0.clone(), self.bits(&c.0, &freed)?));
+        let codes: Vec<(Candidate, DMatrix<f64>)> = self.codes.iter().filter_map(of_code).collect();
         let mut found: Vec<Screened> = (0..self.candidates.len())
             .into_par_iter()
             .filter(|i| !taken(&self.candidates[*i]))
@@ -55,11 +45,13 @@ impl Search<'_> {
                 let candidate = &self.candidates[index];
                 let mut best: Option<Screened> = None;
                 let code = codes.iter().find(|c| c.0.is_variant_of(candidate));
-                let code = code.map(|(_, parameter, all)| {
-                    (*parameter, self.variance.rotate(&candidate.columns_of(all)))
-                });
-                for (parameter, rotated) in self.rotated[index].iter().chain(&code) {
-                    let (parameter, white) = (*parameter, whitener.whiten_rotated(rotated.clone()));
+                let code =
+                    code.map(|(_, all)| (0.0, self.variance.rotate(&candidate.columns_of(all))));
+                let known = self.screened[index]
+                    .iter()
+                    .map(|c| (c.parameter, c.rotated.clone()));
+                for (parameter, rotated) in known.chain(code) {
+                    let white = whitener.whiten_rotated(rotated);
                     let Some((p, gain)) = self.explained(&others, &left, total, &white) else {
                         continue;
                     };

@@ -1,0 +1,98 @@
+//! Columns of terms and jumps. All terms are products of the same nine quantities, which are laid out one after the other here: made from the
+//! conditions one by one they took a third of the time of a diagnosis by hand, whose turns are of some ten thousand pieces.
+
+use nalgebra::DMatrix;
+
+use super::Rows;
+use crate::effects::quantity::{Quantity, RATE_LAG_S};
+use crate::effects::regressor::Product;
+use crate::effects::temperature::Followed;
+
+/// The quantities of terms under all conditions.
+#[derive(Debug, Clone)]
+pub(super) struct Quantities {
+    /// Of each of [`Quantity::OF_TERMS`].
+    values: [Vec<f64>; 9],
+    /// Largest size of each that is a number.
+    largest: [f64; 9],
+    /// Time of each of the conditions, s since its recording began.
+    t_s: Vec<f64>,
+}
+
+impl Quantities {
+    fn of(rows: &Rows) -> Self {
+        let behind = Followed {
+            lag_s: Some(RATE_LAG_S),
+            without_self_heating: false,
+        };
+        let conditions = rows.conditions(Some(behind));
+        // No quantity of terms is another on another axis.
+        let of = |q: Quantity| conditions.iter().map(|at| q.of(at, 0)).collect();
+        let values: [Vec<f64>; 9] = Quantity::OF_TERMS.map(of);
+        let largest = values.each_ref().map(|all| {
+            let sizes = all.iter().map(|v| v.abs()).filter(|v| v.is_finite());
+            sizes.fold(0.0, f64::max)
+        });
+        Self {
+            values,
+            largest,
+            t_s: conditions.iter().map(|at| at.t_s).collect(),
+        }
+    }
+}
+
+/// Place of a quantity among those of terms, and its power, for each part of a product.
+fn parts(product: &Product) -> impl Iterator<Item = (usize, i32)> + '_ {
+    product.parts().filter_map(|(q, power)| {
+        let place = Quantity::OF_TERMS.iter().position(|t| *t == q)?;
+        Some((place, i32::from(power)))
+    })
+}
+
+impl Rows {
+    fn quantities(&self) -> &Quantities {
+        self.quantities.get_or_init(|| Quantities::of(self))
+    }
+
+    /// The term `product` as an error of each of `axes`: a column for each.
+    pub fn term(&self, product: &Product, axes: &[usize]) -> DMatrix<f64> {
+        let mut values = vec![product.sign; self.conditions.len()];
+        for (place, power) in parts(product) {
+            for (value, factor) in values.iter_mut().zip(&self.quantities().values[place]) {
+                *value *= factor.powi(power);
+            }
+        }
+        self.weighted(axes, &values)
+    }
+
+    /// Largest value that the term could have: all of its quantities at their largest together.
+    pub fn largest(&self, product: &Product) -> f64 {
+        let largest = &self.quantities().largest;
+        parts(product)
+            .map(|(place, power)| largest[place].powi(power))
+            .product()
+    }
+
+    /// A jump at `t_s` of recording `session` as an error of each of `axes`.
+    pub fn jump(&self, session: usize, t_s: f64, axes: &[usize]) -> DMatrix<f64> {
+        let times = self.quantities().t_s.iter().zip(&self.block);
+        let since = times.map(|(t, (of, _))| f64::from(u8::from(*of == session && *t >= t_s)));
+        self.weighted(axes, &since.collect::<Vec<_>>())
+    }
+
+    /// What an error of `values`, one for each of the conditions, of each of `axes` does to the rows.
+    fn weighted(&self, axes: &[usize], values: &[f64]) -> DMatrix<f64> {
+        let mut columns = DMatrix::zeros(self.rows.len(), axes.len());
+        for (r, row) in self.rows.iter().enumerate() {
+            for (value, weight) in values[row.conditions.clone()].iter().zip(&row.weights) {
+                for (k, axis) in axes.iter().enumerate() {
+                    // What is not known may be weighted by nothing.
+                    if weight[*axis] != 0.0 {
+                        columns[(r, k)] += weight[*axis] * value;
+                    }
+                }
+            }
+        }
+        columns
+    }
+}
