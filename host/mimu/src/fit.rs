@@ -1,6 +1,7 @@
 //! From a recording to a calibration of both triads, judged on what it was not fitted to.
 
 mod biases;
+mod of_temperature;
 mod outlying;
 pub mod plausible;
 mod sensor;

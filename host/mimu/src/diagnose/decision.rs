@@ -3,6 +3,7 @@
 mod hold_out;
 mod leftover;
 mod model;
+mod nonlinear;
 mod reading;
 mod second;
 mod tried;
@@ -32,6 +33,7 @@ pub use hold_out::Split;
 pub(super) use hold_out::{held_out, rms};
 pub use leftover::{FALSE_LEFTOVER, Leftover};
 pub use model::Model;
+pub use nonlinear::{Interval, Nonlinear};
 pub use second::Second;
 pub use undecided::Undecided;
 
@@ -47,8 +49,13 @@ pub struct Accepted {
     pub chosen: Chosen,
     /// Coefficients, SI, in the order of the candidate's active ones.
     pub values: DVector<f64>,
-    /// Their covariance.
+    /// Their covariance, whatever its nonlinear parameter is.
     pub covariance: DMatrix<f64>,
+    /// The same for the nonlinear parameter found: coefficient and parameter err together, and this is what a curve drawn for one value
+    /// of the parameter is uncertain by.
+    pub conditional: DMatrix<f64>,
+    /// 95 % interval of its nonlinear parameter, if it has one.
+    pub parameter: Option<Interval>,
     /// Held-out root mean square without it and with it, beside the others.
     pub held_out: [f64; 2],
     /// How it was held out.
@@ -88,6 +95,8 @@ pub struct Decision {
     pub leftover: Vec<Leftover>,
     /// The affine model, and that with the accepted effects.
     pub models: [Model; 2],
+    /// What the nonlinear parameters of the accepted effects leave open.
+    pub nonlinear: Nonlinear,
     /// Root mean square of the judged rows before and after, in sample.
     pub rms: [f64; 2],
     /// The same held out; not a number where no block could be.
@@ -287,14 +296,16 @@ pub fn decide(
     if !suggested.is_empty() {
         with = search.fit(&kept)?;
     }
+    nonlinear::refine(&search, &mut kept, &mut with);
     let split = common(&kept, &with).1;
     let before = Model::of(&search, &[], &null, split)?;
     let after = Model::of(&search, &kept, &with, split)?;
+    let nonlinear = Nonlinear::of(&search, &kept, &after);
     let (model, last) = (&after.columns, &after.fitted);
     let mut accepted = Vec::new();
     let values = shares(&search, &kept, last);
     let seconds = elsewhere(&kept, &values);
-    let mut from = search.basis.ncols();
+    let (first, mut from) = (search.basis.ncols(), 0);
     for (i, one) in kept.iter().enumerate() {
         let count = one.columns.ncols();
         let mut rest = kept.clone();
@@ -309,10 +320,15 @@ pub fn decide(
             split,
             values: values[i].clone(),
             second: seconds[i],
-            covariance: last
+            covariance: nonlinear
                 .covariance
                 .view((from, from), (count, count))
                 .into_owned(),
+            conditional: last
+                .covariance
+                .view((first + from, first + from), (count, count))
+                .into_owned(),
+            parameter: nonlinear.intervals[i],
             held_out: held.map(|h| h.unwrap_or(f64::NAN)),
         });
         from += count;
@@ -393,6 +409,7 @@ pub fn decide(
             held_out.map_or(f64::NAN, |h| rms(rows, h))
         }),
         models,
+        nonlinear,
         interleaved_rms: interleaved.unwrap_or(f64::NAN),
         split,
         noise_floor: (floor / (rows.judged.0 / rows.judged.1) as f64).sqrt(),

@@ -21,7 +21,7 @@ use std::borrow::Cow;
 use std::ops::Range;
 
 use mimu_core::compensation::Affine;
-use nalgebra::{DMatrix, DVector, Vector3};
+use nalgebra::{DMatrix, DVector, SMatrix, Vector3};
 
 use crate::effects::quantity::Conditions;
 use crate::effects::temperature::{Followed, lagged, rank_correlation};
@@ -31,6 +31,7 @@ use crate::prepared::Prepared;
 use crate::quantity;
 use crate::quantity::Sensor;
 use crate::quantity::significant;
+use crate::triad::Covariance;
 
 /// Rows that share their noise.
 #[derive(Debug, Clone)]
@@ -45,7 +46,7 @@ pub struct Stratum {
     pub rows: Range<usize>,
     /// Known covariance, unit of the rows squared.
     pub known: DMatrix<f64>,
-    /// What of the variance of each row is no noise of it, but an error that the reference may have; `None`: nothing.
+    /// What of the variance of each row is no noise of it, but an error that the reference or a given matrix may have; `None`: nothing.
     pub by_reference: Option<DVector<f64>>,
     /// Covariance of a random walk with K = 1 unit/√s between the rows; `None` where rows are no means of dwells.
     pub random_walk: Option<DMatrix<f64>>,
@@ -83,12 +84,13 @@ impl Figure {
 }
 
 /// Which affine parameters the recordings have to determine themselves.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Free {
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Free<'a> {
     /// Matrix and biases.
     Affine,
-    /// The biases; the matrix is known.
-    Bias,
+    /// The biases. The matrix is known, to within the covariance of its inverse affine model: C by rows, then o, of which the latter is
+    /// not looked at.
+    Bias(Option<&'a Covariance>),
 }
 
 /// A recording with the calibration that its residuals are of.
@@ -136,6 +138,8 @@ pub struct Rows {
     pub nuisance: DMatrix<f64>,
     /// What a unit of each of the first of these, which are of the first recording, adds to its inverse affine model: C by rows, then o.
     pub parameters: DMatrix<f64>,
+    /// What an error of C, by rows, does to each row beside the biases.
+    by_matrix: DMatrix<f64>,
     /// Strata, which cover the rows in order.
     pub strata: Vec<Stratum>,
     /// What the error figures are about.
@@ -169,7 +173,33 @@ impl Rows {
             .enumerate()
             .filter_map(|(i, s)| Some((i, build::part(s, sensor, free)?)))
             .collect();
-        join::join(sensor, parts, sessions.len())
+        let mut rows = join::join(sensor, parts, sessions.len())?;
+        if let Free::Bias(Some(covariance)) = free {
+            rows.leave_open(&covariance.fixed_view::<9, 9>(0, 0).into_owned());
+        }
+        Some(rows)
+    }
+
+    /// Adds what a given matrix leaves open, the covariance of C by rows, to the known covariance of the rows: its errors are common to
+    /// all of them, and no noise.
+    ///
+    /// What several recordings have in common is not in the covariance, which is that of each stratum by itself. An error that shows alike
+    /// in n of them is therefore given n times its variance, which their mean has 1/n of.
+    fn leave_open(&mut self, covariance: &SMatrix<f64, 9, 9>) {
+        let mut sessions: Vec<usize> = self.strata.iter().map(|s| s.session).collect();
+        sessions.sort_unstable();
+        sessions.dedup();
+        let times = sessions.len() as f64;
+        for stratum in &mut self.strata {
+            let by = self.by_matrix.rows_range(stratum.rows.clone());
+            let open = times * (&by * covariance * by.transpose());
+            let share = open.diagonal();
+            stratum.by_reference = Some(match stratum.by_reference.take() {
+                Some(other) => other + share,
+                None => share,
+            });
+            stratum.known += open;
+        }
     }
 
     /// Three rows for each pose of a recording: the error of the force that its accelerometer says.

@@ -12,7 +12,7 @@ use crate::diagnose::rows::Figure as Judged;
 use crate::diagnose::{Diagnosis, SensorDiagnosis, Source, Verdict};
 use crate::effects::candidate::Kind;
 use crate::next_experiment::{Confused, Next, NotInPlan};
-use crate::quantity::{AXES, Figure, Sensor};
+use crate::quantity::{AXES, Figure, Sensor, significant};
 use crate::verify::Verification;
 
 /// Result of a diagnosis.
@@ -96,7 +96,7 @@ pub struct CoefficientResult {
     pub name: String,
     /// Value, in [`Self::unit`].
     pub value: f64,
-    /// Standard deviation.
+    /// Standard deviation, whatever the nonlinear parameter is.
     pub sigma: f64,
     /// SI unit.
     pub unit: String,
@@ -137,6 +137,10 @@ pub struct FormResult {
     pub name: &'static str,
     /// Value.
     pub value: f64,
+    /// Lower end of its 95 % interval; `None` where the smallest value that was tried is within.
+    pub lower: Option<f64>,
+    /// Upper end; `None` where the largest is within.
+    pub upper: Option<f64>,
     /// Smallest value that was tried.
     pub from: f64,
     /// Largest.
@@ -420,6 +424,18 @@ fn figures(d: &Diagnosis, found: &SensorDiagnosis) -> SensorDiagnosisResult {
     }
 }
 
+impl FormResult {
+    /// Its 95 % interval for people: `55.2 to 66.1`, `at most 12`.
+    pub fn interval(&self) -> String {
+        match [self.lower, self.upper].map(|end| end.map(significant)) {
+            [Some(lower), Some(upper)] => format!("{lower} to {upper}"),
+            [None, Some(upper)] => format!("at most {upper}"),
+            [Some(lower), None] => format!("at least {lower}"),
+            [None, None] => "any that was tried".into(),
+        }
+    }
+}
+
 impl AcceptedResult {
     fn of(sensor: Sensor, a: &Accepted) -> Self {
         let candidate = &a.chosen.candidate;
@@ -467,6 +483,8 @@ impl AcceptedResult {
             form: candidate.parameter().map(|f| FormResult {
                 name: f.name,
                 value: a.chosen.parameter,
+                lower: a.parameter.and_then(|p| p.lower),
+                upper: a.parameter.and_then(|p| p.upper),
                 from: f.from,
                 to: f.to,
             }),
