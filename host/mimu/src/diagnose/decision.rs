@@ -6,6 +6,7 @@ mod model;
 mod nonlinear;
 mod reading;
 mod second;
+mod together;
 mod tried;
 mod undecided;
 
@@ -26,6 +27,7 @@ use leftover::leftover;
 pub(super) use leftover::noisier;
 use reading::of_readings;
 use second::second;
+use together::together;
 use tried::candidates;
 use undecided::undecided;
 
@@ -62,6 +64,9 @@ pub struct Accepted {
     pub split: Split,
     /// What it does to the second recording, if there is one that can be judged by.
     pub second: Option<Second>,
+    /// Whether it is an error of the unit, which a calibration holds: what goes by the time since power-on is one of the recording alone
+    /// where nobody knows when that was.
+    pub of_unit: bool,
 }
 
 impl From<&Accepted> for EffectTable {
@@ -119,6 +124,24 @@ pub struct Decision {
 }
 
 impl Decision {
+    /// Takes the effects that go by the time since power-on for those of the recording alone, whose device had started otherwise: by `start`.
+    pub(super) fn without_power_on(&mut self, start: &str) {
+        let by_time = |a: &&mut Accepted| a.chosen.candidate.goes_by_time();
+        let mut ids = Vec::new();
+        for accepted in self.accepted.iter_mut().filter(by_time) {
+            accepted.of_unit = false;
+            ids.push(accepted.chosen.candidate.id());
+        }
+        if !ids.is_empty() {
+            self.notes.push(format!(
+                "{}: the device had not been switched on but had started anew ({start}), so that the time since power-on is unknown; the \
+                 coefficients count from the start of the recording, are of this recording alone, and are in no calibration; switch it off \
+                 and on, and record at once",
+                ids.join(", ")
+            ));
+        }
+    }
+
     /// What is left that no usual sensor does.
     pub fn unexplained(&self) -> impl Iterator<Item = &Leftover> {
         self.leftover.iter().filter(|l| !l.usual)
@@ -297,6 +320,7 @@ pub fn decide(
         with = search.fit(&kept)?;
     }
     nonlinear::refine(&search, &mut kept, &mut with);
+    let one_at_these_inputs = together(&search, &mut kept, &with);
     let split = common(&kept, &with).1;
     let before = Model::of(&search, &[], &null, split)?;
     let after = Model::of(&search, &kept, &with, split)?;
@@ -330,6 +354,7 @@ pub fn decide(
                 .into_owned(),
             parameter: nonlinear.intervals[i],
             held_out: held.map(|h| h.unwrap_or(f64::NAN)),
+            of_unit: one.candidate.is_error(),
         });
         from += count;
     }
@@ -418,7 +443,7 @@ pub fn decide(
         not_excited,
         leftover: left,
         undecided: undecided(&search, &kept),
-        notes: notes(rows, &kept),
+        notes: [notes(rows, &kept), one_at_these_inputs].concat(),
         rows: [rows.y.len(), search.basis.ncols()],
         omnibus_p,
     })

@@ -361,6 +361,10 @@ pub fn diagnose(recordings: Recordings, options: Options) -> Result<Diagnosis> {
             all
         });
         decision.leftover.extend(noisier);
+        let mut starts = all.iter().map(|p| p.manifest.start_without_power_on());
+        if let Some(start) = starts.find_map(|s| s) {
+            decision.without_power_on(start);
+        }
         if let Some(after) = after {
             effects.extend(found);
             (now, later) = after?;

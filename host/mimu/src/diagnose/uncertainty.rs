@@ -88,7 +88,10 @@ pub fn of_forces(session: &Session, sizes: &Rows, decision: &Decision) -> Option
     }
     for slope in slopes.iter().filter(|s| s.iter().all(|v| v.is_finite())) {
         precision.push(0.0);
-        columns = beside(&columns, &DMatrix::from_column_slice(slope.len(), 1, slope.as_slice()));
+        columns = beside(
+            &columns,
+            &DMatrix::from_column_slice(slope.len(), 1, slope.as_slice()),
+        );
     }
     let accel = session.accel?;
     let list = &session.prepared.dwells.list;

@@ -13,8 +13,7 @@ use mimu_recording::Reference;
 use mimu_recording::error::{Error, Result};
 
 /// What a person should know of a fit to a matrix whose covariance is known.
-const GIVEN: &str =
-    "the matrix is given, with its intervals; the biases are this recording's, and the intervals hold both";
+const GIVEN: &str = "the matrix is given, with its intervals; the biases are this recording's, and the intervals hold both";
 
 /// What the covariance of a given C, by rows, is of a model whose biases were found beside it: where the readings are on average, the error
 /// of the matrix is in the bias.

@@ -6,12 +6,16 @@
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
 use super::sensor::Residual;
+use crate::effects::temperature::lagged;
 use crate::estimate::Observation;
 use crate::prepared::Prepared;
 use crate::quantity::Sensor;
 
-/// Temperature of a bias and of a matrix: constant, input, T, T², T times input.
-const COLUMNS: usize = 9;
+/// Constant, input, T, T² and T behind a lag: what a bias does. A scale factor that moves by 300 ppm/K moves by 3 % of the inputs in 100 K,
+/// and a plan that has all of its rates at one temperature does not show it.
+const COLUMNS: usize = 7;
+/// Lag of the die behind the thermometer, s: of some tens of seconds to some minutes one is much like another on a ramp.
+const LAG_S: f64 = 60.0;
 /// As many dwells as there are columns again have to be left: with fewer, temperature would explain what it has no part in.
 const LEAST: usize = 2 * COLUMNS;
 
@@ -45,10 +49,15 @@ pub(super) fn with_temperature(
     }
     let temperatures = || used.iter().map(|u| u.1);
     let mean_c = temperatures().sum::<f64>() / n as f64;
-    let widest = temperatures().map(|t| (t - mean_c).abs()).fold(0.0, f64::max);
+    let widest = temperatures()
+        .map(|t| (t - mean_c).abs())
+        .fold(0.0, f64::max);
     if widest < 0.5 * super::ISOTHERMAL_C {
         return None;
     }
+    let dwell = |o: &Observation| &prepared.dwells.list[o.dwell];
+    let signal: Vec<(f64, f64)> = used.iter().map(|u| (dwell(u.0).start_s, u.1)).collect();
+    let late = lagged(&signal, LAG_S);
     let size = used.iter().map(|u| u.0.input.norm()).fold(0.0, f64::max);
     let design = DMatrix::from_fn(n, COLUMNS, |i, k| {
         let (input, t) = (used[i].0.input / size, (used[i].1 - mean_c) / widest);
@@ -57,7 +66,7 @@ pub(super) fn with_temperature(
             1..=3 => input[k - 1],
             4 => t,
             5 => t * t,
-            k => t * input[k - 6],
+            _ => (late[i] - used[i].1) / widest,
         }
     });
     let raw = DMatrix::from_fn(n, 3, |i, axis| used[i].0.raw[axis]);

@@ -101,7 +101,10 @@ fn refuse_unrelated(prepared: &Prepared, fit: &SensorFit) -> Result<Option<Strin
         false => " at all".to_string(),
     };
     let with = match with {
-        Some(with) => format!(", {} with temperature in the model", percent(with.rms / spread)),
+        Some(with) => format!(
+            ", {} with temperature in the model",
+            percent(with.rms / spread)
+        ),
         None => String::new(),
     };
     let worst = match worst_first(fit).first() {

@@ -66,6 +66,9 @@ pub struct AcceptedResult {
     pub sensor: &'static str,
     /// Physics in a line.
     pub about: &'static str,
+    /// Whether it is an error of the unit, which the calibration holds; else something that it should read, or an error whose time since
+    /// power-on is unknown.
+    pub of_unit: bool,
     /// Its coefficients.
     pub coefficients: Vec<CoefficientResult>,
     /// Held-out root mean square without it, beside the other effects; unit of the sensor's figures.
@@ -458,6 +461,7 @@ impl AcceptedResult {
             id: candidate.id(),
             sensor: sensor.name(),
             about: candidate.about(),
+            of_unit: a.of_unit,
             coefficients: coefficients.collect(),
             held_out_rms_before: a.held_out[0],
             held_out_rms_after: a.held_out[1],

@@ -155,7 +155,10 @@ impl Nonlinear {
             };
         };
         let size = effects + which.len();
-        let mut covariance = joint.covariance.view((first, first), (size, size)).into_owned();
+        let mut covariance = joint
+            .covariance
+            .view((first, first), (size, size))
+            .into_owned();
         for (i, k) in which.iter().enumerate() {
             // No value outside of what is looked at: the variance of a uniform distribution over it is the most that a parameter can have,
             // where it is nearly determined by nothing.

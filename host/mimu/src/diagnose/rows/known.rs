@@ -74,7 +74,13 @@ impl Builder<'_> {
         }
         let figure = (Figure::Input, 3 * n, 1);
         let parameters = by_forward(inverse, &scale);
-        self.finish(y, (nuisance, parameters, by_matrix), vec![0, 4, 8], strata, figure)
+        self.finish(
+            y,
+            (nuisance, parameters, by_matrix),
+            vec![0, 4, 8],
+            strata,
+            figure,
+        )
     }
 }
 
