@@ -7,9 +7,12 @@ use mimu::calibration::Calibration;
 use mimu::diagnose::decision::Accepted;
 use mimu::diagnose::{Diagnosis, Recordings, diagnose};
 use mimu::fit::{Method, Options, fit};
+use mimu::next_experiment::next;
 use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
+use mimu::result::diagnosis::DiagnosisResult;
 use mimu::stillness::STILL_FACTOR;
+use mimu_cli::report::{Made, diagnosis_page, diagnosis_text};
 use mimu_recording::Recorded;
 use mimu_rig::random::Random;
 use mimu_rig::rig_file::{EffectFile, RigFile, RigTruth};
@@ -75,6 +78,12 @@ fn unit(effects: &[&str], seed: u64) -> RigFile {
     RigTruth::resolve(&file, seed).expect("a rig").file
 }
 
+/// `file` with a parameter of its first effect.
+fn with(mut file: RigFile, key: &str, value: impl Into<toml::Value>) -> RigFile {
+    file.effect[0].parameters.insert(key.into(), value.into());
+    file
+}
+
 fn recorded(plan: &str, file: &RigFile, seed: u64) -> Prepared {
     let prepared = bench::recorded(plan, file, seed);
     let noise = bench::noise_file(file, seed, prepared.condensed.period_s);
@@ -108,10 +117,15 @@ fn chamber(seed: u64) -> Prepared {
     }
     for axis in 0..3 {
         let up: [f64; 3] = std::array::from_fn(|i| f64::from(u8::from(i == axis)));
-        steps.extend([(up, 50.0), (up, -50.0)]);
+        steps.extend([(up, 20.0), (up, -20.0)]);
     }
     let plan = plan(&steps, 5.0, &[[0.0, -20.0], [300.0, 60.0], [600.0, -20.0]]);
-    recorded(&plan, &unit(&["gyro_thermal_bias"], seed), seed)
+    let file = unit(&["gyro_thermal_bias"], seed);
+    recorded(
+        &plan,
+        &with(file, "dps_per_c", vec![0.1, -0.12, 0.08]),
+        seed,
+    )
 }
 
 #[test]
@@ -185,15 +199,24 @@ fn count(into: &mut [u32; 2], held: bool) {
     into[1] += 1;
 }
 
+/// A unit that lags by 20 to 110 s, on a table while the chamber warms by 20 °C and cools again.
+fn lagging(seed: u64) -> (RigFile, Prepared) {
+    let file = unit(&["gyro_thermal_lag"], seed);
+    let file = with(file, "dps_per_c", vec![0.15, -0.1, 0.12]);
+    let file = with(file, "lag_s", 20.0 + 10.0 * (seed % 10) as f64);
+    let steps = randomised(
+        [faces(&[-100.0, 100.0]), faces(&[-200.0, 200.0])].concat(),
+        seed,
+    );
+    let ramp = [[0.0, 20.0], [60.0, 20.0], [160.0, 40.0], [260.0, 20.0]];
+    let prepared = recorded(&plan(&steps, 6.0, &ramp), &file, seed);
+    (file, prepared)
+}
+
 fn lags(seeds: u64) -> Held {
     let each = (0..seeds).into_par_iter().map(|seed| {
-        let file = unit(&["gyro_thermal_lag"], seed);
-        let steps = randomised(
-            [faces(&[-100.0, 100.0]), faces(&[-200.0, 200.0])].concat(),
-            seed,
-        );
-        let ramp = [[0.0, 20.0], [60.0, 20.0], [160.0, 30.0], [260.0, 20.0]];
-        let found = diagnosed(recorded(&plan(&steps, 6.0, &ramp), &file, seed), None);
+        let (file, prepared) = lagging(seed);
+        let found = diagnosed(prepared, None);
         let mut lag = accepted(&found).filter(|a| a.chosen.candidate.id() == "gyro_thermal_lag");
         (lag.next().cloned(), file.effect[0].parameters.clone())
     });
@@ -262,6 +285,29 @@ fn of_more_units_intervals_of_a_lag_hold_the_truth_in_93_to_97_of_100() {
     }
     // By the covariance for the lag found they do not.
     assert!(share(held.conditional) < 0.9, "{held:?}");
+}
+
+#[test]
+fn the_interval_of_a_lag_is_in_the_json_the_text_and_the_page() {
+    let found = diagnosed(lagging(3).1, None);
+    let result = DiagnosisResult::of(&found, &next(&found), None);
+    let lag = result.effects.iter().find(|e| e.id == "gyro_thermal_lag");
+    let form = lag.and_then(|l| l.form.as_ref()).expect("a lag");
+    let json = serde_json::to_value(form).expect("JSON");
+    let [lower, upper] = ["lower", "upper"].map(|k| json[k].as_f64().expect("an end"));
+    assert!(lower < form.value && form.value < upper, "{json}");
+    let made = Made {
+        recording: "lagging".into(),
+        command: "mimu diagnose lagging".into(),
+        created: "2026-01-01T00:00:00Z".into(),
+    };
+    let interval = form.interval();
+    assert!(diagnosis_text(&result, false).contains(&format!("(95 %: {interval})")));
+    assert!(
+        diagnosis_page(&result, &made)
+            .expect("a page")
+            .contains(&interval)
+    );
 }
 
 /// A calibration of `file` by a short recording at one temperature.

@@ -21,7 +21,7 @@ use std::borrow::Cow;
 use std::ops::Range;
 
 use mimu_core::compensation::Affine;
-use nalgebra::{DMatrix, DVector, SMatrix, Vector3};
+use nalgebra::{DMatrix, DVector, SMatrix, SymmetricEigen, Vector3};
 
 use crate::effects::quantity::Conditions;
 use crate::effects::temperature::{Followed, lagged, rank_correlation};
@@ -46,8 +46,11 @@ pub struct Stratum {
     pub rows: Range<usize>,
     /// Known covariance, unit of the rows squared.
     pub known: DMatrix<f64>,
-    /// What of the variance of each row is no noise of it, but an error that the reference or a given matrix may have; `None`: nothing.
+    /// What of the variance of each row is no noise of it, but an error that the reference may have; `None`: nothing.
     pub by_reference: Option<DVector<f64>>,
+    /// What a given matrix leaves open, which is no noise and common to all rows: this times its transpose is their covariance beside the
+    /// known one, unit of the rows squared. `None`: nothing.
+    pub open: Option<DMatrix<f64>>,
     /// Covariance of a random walk with K = 1 unit/√s between the rows; `None` where rows are no means of dwells.
     pub random_walk: Option<DMatrix<f64>>,
     /// Whether the known covariance holds what the bias wanders.
@@ -163,6 +166,9 @@ pub struct Rows {
 /// Rank correlation from which on temperature and time are one. A ramp up and half of the way back has 0.5.
 const ONE_WAY: f64 = 0.95;
 
+/// Share of the variance by noise below which it does not matter what a given matrix leaves open.
+const NEGLIGIBLE: f64 = 1e-4;
+
 impl Rows {
     /// The rows of `sensor` in all of `sessions`, whose calibrations share one matrix.
     ///
@@ -175,30 +181,31 @@ impl Rows {
             .collect();
         let mut rows = join::join(sensor, parts, sessions.len())?;
         if let Free::Bias(Some(covariance)) = free {
-            rows.leave_open(&covariance.fixed_view::<9, 9>(0, 0).into_owned());
+            rows.leave_open(covariance.fixed_view::<9, 9>(0, 0).into_owned());
         }
         Some(rows)
     }
 
-    /// Adds what a given matrix leaves open, the covariance of C by rows, to the known covariance of the rows: its errors are common to
-    /// all of them, and no noise.
+    /// Takes a given matrix for known to within the `covariance` of C by rows only.
     ///
     /// What several recordings have in common is not in the covariance, which is that of each stratum by itself. An error that shows alike
     /// in n of them is therefore given n times its variance, which their mean has 1/n of.
-    fn leave_open(&mut self, covariance: &SMatrix<f64, 9, 9>) {
+    fn leave_open(&mut self, covariance: SMatrix<f64, 9, 9>) {
         let mut sessions: Vec<usize> = self.strata.iter().map(|s| s.session).collect();
         sessions.sort_unstable();
         sessions.dedup();
-        let times = sessions.len() as f64;
+        let eigen = SymmetricEigen::new(covariance * sessions.len() as f64);
+        let sigmas = eigen.eigenvalues.map(|v| v.max(0.0).sqrt());
+        let factor = eigen.eigenvectors * SMatrix::from_diagonal(&sigmas);
+        let factor = DMatrix::from_fn(9, 9, |i, j| factor[(i, j)]);
         for stratum in &mut self.strata {
-            let by = self.by_matrix.rows_range(stratum.rows.clone());
-            let open = times * (&by * covariance * by.transpose());
-            let share = open.diagonal();
-            stratum.by_reference = Some(match stratum.by_reference.take() {
-                Some(other) => other + share,
-                None => share,
-            });
-            stratum.known += open;
+            let open = self.by_matrix.rows_range(stratum.rows.clone()) * &factor;
+            let most = open
+                .row_iter()
+                .map(|r| r.norm_squared())
+                .fold(0.0, f64::max);
+            // At one input an error of the matrix is a bias.
+            stratum.open = (most > NEGLIGIBLE * stratum.known.diagonal().min()).then_some(open);
         }
     }
 

@@ -101,6 +101,7 @@ impl Builder<'_> {
             rows: 0..n,
             known: DMatrix::from_diagonal(&DVector::from_vec(variances)),
             by_reference: None,
+            open: None,
             random_walk: Some(self.random_walk(&dwells)),
             wander_known: prepared.noise.is_stated(Sensor::Accel),
         }];
@@ -128,6 +129,7 @@ impl Builder<'_> {
             rows: 0..n,
             known: DMatrix::identity(n, n),
             by_reference: None,
+            open: None,
             random_walk: None,
             wander_known: true,
         }];
@@ -266,6 +268,7 @@ impl Builder<'_> {
                         .as_ref()
                         .map_or_else(|| DMatrix::zeros(m, m), DMatrix::clone),
                 by_reference: by_reference.map(|v| v.diagonal()),
+                open: None,
                 random_walk: None,
                 wander_known: true,
             });
@@ -309,6 +312,7 @@ impl Builder<'_> {
                 rows: m + axis * n..m + (axis + 1) * n,
                 known,
                 by_reference: None,
+                open: None,
                 random_walk: random_walk.clone(),
                 wander_known: wander.is_some(),
             });

@@ -68,6 +68,7 @@ impl Builder<'_> {
                 rows: axis * n..(axis + 1) * n,
                 known,
                 by_reference: None,
+                open: None,
                 random_walk: Some(random_walk.clone()),
                 wander_known: wander.is_some(),
             });
