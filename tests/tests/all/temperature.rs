@@ -120,7 +120,8 @@ fn chamber(seed: u64) -> Prepared {
         steps.extend([(up, 20.0), (up, -20.0)]);
     }
     let plan = plan(&steps, 5.0, &[[0.0, -20.0], [300.0, 60.0], [600.0, -20.0]]);
-    let file = unit(&["gyro_thermal_bias"], seed);
+    let mut file = unit(&["gyro_thermal_bias"], seed);
+    file.thermal.board_lag_s = Some(20.0);
     recorded(
         &plan,
         &with(file, "dps_per_c", vec![0.1, -0.12, 0.08]),
@@ -261,19 +262,19 @@ fn share([held, of]: [u32; 2]) -> f64 {
 
 #[test]
 fn intervals_of_a_lag_and_of_its_coefficients_hold_the_truth() {
-    let held = lags(10);
+    let held = lags(8);
     assert!(held.unknown <= 1, "{held:?}");
-    // Of ten four may be missed once in a thousand times, and of thirty six.
+    // Of eight three are missed once in two hundred times, and of twenty-four five.
     assert!(
-        share(held.lags) >= 0.7 && share(held.coefficients) >= 0.8,
+        share(held.lags) >= 0.75 && share(held.coefficients) >= 0.8,
         "{held:?}"
     );
 }
 
 #[test]
 #[ignore = "nightly: more seeds"]
-fn of_more_units_intervals_of_a_lag_hold_the_truth_in_93_to_97_of_100() {
-    let held = lags(100);
+fn of_more_units_intervals_of_a_lag_hold_the_truth_in_93_to_97_of_a_hundred() {
+    let held = lags(300);
     assert!(held.unknown <= 2, "{held:?}");
     for of in [held.lags, held.coefficients] {
         let margin = |p: f64| 3.0 * (p * (1.0 - p) / f64::from(of[1])).sqrt();

@@ -122,3 +122,26 @@ pub fn fit_biases(
         warnings,
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn at_the_mean_reading_an_error_of_a_given_matrix_is_one_of_the_bias_and_does_nothing() {
+        let given = Covariance::from_fn(|i, j| if i == j { 1.0 } else { 0.3 });
+        let mean = Vector3::new(2.5, -1.0, 0.5);
+        let part = with_biases(&given, &mean);
+        let variance = |raw: Vector3<f64>| {
+            let mut by = nalgebra::SVector::<f64, 12>::zeros();
+            for k in 0..3 {
+                by[3 + k] = raw[k];
+            }
+            by[10] = 1.0;
+            (by.transpose() * part.covariance * by)[0]
+        };
+        assert!(variance(mean).abs() < 1e-12);
+        // A unit away along one axis it is the variance of one element.
+        assert!((variance(mean + Vector3::x()) - 1.0).abs() < 1e-12);
+    }
+}

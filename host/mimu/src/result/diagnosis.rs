@@ -496,3 +496,27 @@ impl AcceptedResult {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_interval_that_reaches_the_end_of_what_was_searched_is_open_there() {
+        let interval = |lower, upper| {
+            let form = FormResult {
+                name: "lag_s",
+                value: 60.0,
+                lower,
+                upper,
+                from: 5.0,
+                to: 600.0,
+            };
+            form.interval()
+        };
+        assert_eq!(interval(Some(55.0), Some(66.0)), "55.0 to 66.0");
+        assert_eq!(interval(None, Some(66.0)), "at most 66.0");
+        assert_eq!(interval(Some(55.0), None), "at least 55.0");
+        assert_eq!(interval(None, None), "any that was tried");
+    }
+}
