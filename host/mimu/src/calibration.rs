@@ -18,7 +18,7 @@ use serde::{Deserialize, Serialize};
 use crate::effects::removal::Removed;
 use crate::quantity::Sensor;
 use crate::toml_layout;
-use crate::triad::Forward;
+use crate::triad::{Covariance, Forward};
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{RawUnit, Reference, read_text};
 
@@ -318,6 +318,12 @@ impl Calibration {
             Sensor::Gyro => self.gyro.as_ref(),
             Sensor::Accel => self.accel.as_ref(),
         }
+    }
+
+    /// Covariance of the inverse model of `sensor`: C by rows, then o.
+    pub fn covariance(&self, sensor: Sensor) -> Option<Covariance> {
+        let table = self.table(sensor)?;
+        Some(Covariance::from_fn(|i, j| table.covariance[i][j]))
     }
 
     /// The inverse model of `sensor`.

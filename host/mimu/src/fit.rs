@@ -2,6 +2,7 @@
 
 mod biases;
 mod hold_out;
+mod of_temperature;
 mod outlying;
 pub mod plausible;
 mod sensor;

@@ -172,6 +172,13 @@ pub struct Manifest {
 }
 
 impl Manifest {
+    /// Why the device had started, where it says that it was no power-on and nobody has said when the power came: no time since power-on is
+    /// known then, not even that it was the first sample's.
+    pub fn start_without_power_on(&self) -> Option<&str> {
+        let start = self.recorded.as_ref()?.start.as_deref()?;
+        self.power_on_s.is_none().then_some(start)
+    }
+
     /// Manifest with the keys that have no default; the others empty.
     pub fn new(
         device: impl Into<String>,
@@ -366,6 +373,7 @@ reference = "table"
         manifest.unfinished = true;
         manifest.recorded = Some(Recorded {
             tool: "mimu 0".into(),
+            start: Some("reset pin".into()),
             missing: 3,
             restarts: vec![super::super::recorded::Restart {
                 t_s: 12.5,

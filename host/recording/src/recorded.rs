@@ -14,6 +14,9 @@ pub struct Recorded {
     pub board: String,
     /// The microcontroller's own number, hexadecimal.
     pub unit_id: String,
+    /// Why the device had started, where that was no power-on: its clock began then, and nobody knows when the power came.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub start: Option<String>,
     /// Samples that are missing between the first and the last, restarts left out: every gap is a step of `t_s`.
     #[serde(default)]
     pub missing: u64,

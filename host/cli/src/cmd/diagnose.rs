@@ -104,7 +104,7 @@ pub fn run(args: &DiagnoseArgs) -> Result<()> {
         .sensors
         .iter()
         .flat_map(|s| &s.decision.accepted)
-        .filter(|a| a.chosen.candidate.is_error())
+        .filter(|a| a.of_unit)
         .map(EffectTable::from);
     let mut effects = known.clone();
     for table in found {

@@ -144,13 +144,16 @@ pub fn record(
         Reference::Gravity,
     );
     manifest.latitude_deg = options.latitude_deg;
-    // Its clock starts with it. After a reset without a power failure the device counts from zero as well.
-    manifest.power_on_s = Some(0.0);
+    // Its clock starts with it, but after a reset without a power failure the device counts from zero as well: the die is warm then, and a
+    // warm-up counted from there would be another with every reset.
+    let by_power = who.start == Started::PowerOn;
+    manifest.power_on_s = by_power.then_some(0.0);
     manifest.recorded = Some(Recorded {
         tool: TOOL.into(),
         firmware: who.firmware.clone(),
         board: who.board.clone(),
         unit_id: who.unit_id.clone(),
+        start: (!by_power).then(|| who.start.to_string()),
         ..Recorded::default()
     });
     let columns = Columns {

@@ -1,12 +1,15 @@
 //! What is tried in the rows of a sensor, and its columns there.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 use super::rows::Rows;
 use crate::effects::candidate::{Candidate, Kind};
 use crate::effects::converter::{self, Converter};
 use crate::effects::effect::Effect;
 use crate::effects::quantity::Conditions;
+
+/// Step of the logarithm of a parameter for a central difference, whose error is a millionth of the derivative: far above rounding.
+const STEP: f64 = 1e-3;
 
 impl Candidate {
     /// An effect in `rows`; `None` where it goes by codes that the steps of the readings would have to say, and they have none.
@@ -62,6 +65,14 @@ impl Candidate {
             return columns;
         }
         self.columns_at(rows, &rows.conditions(self.followed(parameter)), parameter)
+    }
+
+    /// Derivative of what it adds to `rows` with coefficients of `values` by the natural logarithm of its nonlinear parameter, unit of the
+    /// rows.
+    pub fn slope(&self, rows: &Rows, parameter: f64, values: &DVector<f64>) -> DVector<f64> {
+        let step = STEP.exp();
+        let [up, down] = [parameter * step, parameter / step].map(|p| self.columns(rows, p));
+        (up - down) * values / (2.0 * STEP)
     }
 
     /// Columns of a term or a jump as an error of each of `axes`; `None` of an effect.

@@ -3,8 +3,10 @@
 mod hold_out;
 mod leftover;
 mod model;
+mod nonlinear;
 mod reading;
 mod second;
+mod together;
 mod tried;
 mod undecided;
 
@@ -26,12 +28,14 @@ use leftover::leftover;
 pub(super) use leftover::noisier;
 use reading::of_readings;
 use second::second;
+use together::together;
 use tried::candidates;
 use undecided::undecided;
 
 pub(super) use hold_out::{held_out, part, rms};
 pub use leftover::{FALSE_LEFTOVER, Leftover};
 pub use model::Model;
+pub use nonlinear::{Interval, Nonlinear};
 pub use second::Second;
 pub use undecided::Undecided;
 
@@ -47,14 +51,22 @@ pub struct Accepted {
     pub chosen: Chosen,
     /// Coefficients, SI, in the order of the candidate's active ones.
     pub values: DVector<f64>,
-    /// Their covariance.
+    /// Their covariance, whatever its nonlinear parameter is.
     pub covariance: DMatrix<f64>,
+    /// The same for the nonlinear parameter found: coefficient and parameter err together, and this is what a curve drawn for one value
+    /// of the parameter is uncertain by.
+    pub conditional: DMatrix<f64>,
+    /// 95 % interval of its nonlinear parameter, if it has one.
+    pub parameter: Option<Interval>,
     /// Held-out root mean square without it and with it, beside the others.
     pub held_out: [f64; 2],
     /// How it was held out.
     pub split: Split,
     /// What it does to the second recording, if there is one that can be judged by.
     pub second: Option<Second>,
+    /// Whether it is an error of the unit, which a calibration holds: what goes by the time since power-on is one of the recording alone
+    /// where nobody knows when that was.
+    pub of_unit: bool,
 }
 
 impl From<&Accepted> for EffectTable {
@@ -88,6 +100,8 @@ pub struct Decision {
     pub leftover: Vec<Leftover>,
     /// The affine model, and that with the accepted effects.
     pub models: [Model; 2],
+    /// What the nonlinear parameters of the accepted effects leave open.
+    pub nonlinear: Nonlinear,
     /// Root mean square of the judged rows before and after, in sample.
     pub rms: [f64; 2],
     /// The same held out; not a number where no block could be.
@@ -119,6 +133,24 @@ impl Decision {
         let [before, after] = self.held_out_rms.map(|rms| rms * rms - known);
         (!self.accepted.is_empty() && before > 0.0 && after.is_finite())
             .then(|| 1.0 - after.max(0.0) / before)
+    }
+
+    /// Takes the effects that go by the time since power-on for those of the recording alone, whose device had started otherwise: by `start`.
+    pub(super) fn without_power_on(&mut self, start: &str) {
+        let by_time = |a: &&mut Accepted| a.chosen.candidate.goes_by_time();
+        let mut ids = Vec::new();
+        for accepted in self.accepted.iter_mut().filter(by_time) {
+            accepted.of_unit = false;
+            ids.push(accepted.chosen.candidate.id());
+        }
+        if !ids.is_empty() {
+            self.notes.push(format!(
+                "{}: the device had not been switched on but had started anew ({start}), so that the time since power-on is unknown; the \
+                 coefficients count from the start of the recording, are of this recording alone, and are in no calibration; switch it off \
+                 and on, and record at once",
+                ids.join(", ")
+            ));
+        }
     }
 
     /// What is left that no usual sensor does.
@@ -298,14 +330,17 @@ pub fn decide(
     if !suggested.is_empty() {
         with = search.fit(&kept)?;
     }
+    nonlinear::refine(&search, &mut kept, &mut with);
+    let one_at_these_inputs = together(&search, &mut kept, &with);
     let split = common(&kept, &with).1;
     let before = Model::of(&search, &[], &null, split)?;
     let after = Model::of(&search, &kept, &with, split)?;
+    let nonlinear = Nonlinear::of(&search, &kept, &after);
     let (model, last) = (&after.columns, &after.fitted);
     let mut accepted = Vec::new();
     let values = shares(&search, &kept, last);
     let seconds = elsewhere(&kept, &values);
-    let mut from = search.basis.ncols();
+    let (first, mut from) = (search.basis.ncols(), 0);
     for (i, one) in kept.iter().enumerate() {
         let count = one.columns.ncols();
         let mut rest = kept.clone();
@@ -320,11 +355,17 @@ pub fn decide(
             split,
             values: values[i].clone(),
             second: seconds[i],
-            covariance: last
+            covariance: nonlinear
                 .covariance
                 .view((from, from), (count, count))
                 .into_owned(),
+            conditional: last
+                .covariance
+                .view((first + from, first + from), (count, count))
+                .into_owned(),
+            parameter: nonlinear.intervals[i],
             held_out: held.map(|h| h.unwrap_or(f64::NAN)),
+            of_unit: one.candidate.is_error(),
         });
         from += count;
     }
@@ -407,6 +448,7 @@ pub fn decide(
             held_out.map_or(f64::NAN, |h| rms(rows, h))
         }),
         models,
+        nonlinear,
         interleaved_rms: interleaved.unwrap_or(f64::NAN),
         split,
         noise_floor: floor,
@@ -416,7 +458,7 @@ pub fn decide(
         not_excited,
         leftover: left,
         undecided: undecided(&search, &kept),
-        notes: notes(rows, &kept),
+        notes: [notes(rows, &kept), one_at_these_inputs].concat(),
         rows: [rows.y.len(), search.basis.ncols()],
         omnibus_p,
     })

@@ -291,12 +291,17 @@ pub fn diagnose(recordings: Recordings, options: Options) -> Result<Diagnosis> {
         )
     };
     let held = matrices(&recordings);
-    let free = match held {
-        Some(_) => Free::Bias,
-        None => Free::Affine,
+    // Of readings in SI that were never turned nobody knows how well their matrix is known.
+    let covariances = Sensor::BOTH.map(|s| recordings.given.and_then(|c| c.covariance(s)));
+    let free = |sensor: Sensor| match (held, &covariances) {
+        (Some(_), [gyro, accel]) => Free::Bias(match sensor {
+            Sensor::Gyro => gyro.as_ref(),
+            Sensor::Accel => accel.as_ref(),
+        }),
+        (None, _) => Free::Affine,
     };
     let calibrate = |prepared: Prepared| match held {
-        Some(matrices) => fit_biases(prepared, options, matrices),
+        Some(matrices) => fit_biases(prepared, options, matrices, &covariances),
         None => fit(prepared, options),
     };
     let without = |prepared: &Prepared| match (recordings.given, held) {
@@ -334,8 +339,8 @@ pub fn diagnose(recordings: Recordings, options: Options) -> Result<Diagnosis> {
             let others = later.iter().map(|p| later_session(p, &models));
             let sessions: Vec<Session> = std::iter::once(head).chain(others).collect();
             let (ours, unseen) = sessions.split_at(found_in);
-            let rows = Rows::of(ours, sensor, free).ok_or_else(singular)?;
-            let unseen = Rows::of(unseen, sensor, free);
+            let rows = Rows::of(ours, sensor, free(sensor)).ok_or_else(singular)?;
+            let unseen = Rows::of(unseen, sensor, free(sensor));
             let all: Vec<&Prepared> = ours.iter().map(|s| s.prepared).collect();
             let decide = |without: &[(String, String)]| {
                 let accept = &recordings.accept;
@@ -392,6 +397,10 @@ pub fn diagnose(recordings: Recordings, options: Options) -> Result<Diagnosis> {
                 all
             });
             decision.leftover.extend(noisier);
+            let mut starts = all.iter().map(|p| p.manifest.start_without_power_on());
+            if let Some(start) = starts.find_map(|s| s) {
+                decision.without_power_on(start);
+            }
             break (rows, decision, found, after);
         };
         if let Some(after) = after {
@@ -399,10 +408,16 @@ pub fn diagnose(recordings: Recordings, options: Options) -> Result<Diagnosis> {
             (now, later) = after?;
         }
         open.extend(uncertainty::of_affine(&rows, &decision).map(|part| (sensor, part)));
-        if sensor == Sensor::Accel && free == Free::Affine && by_gravity {
+        if sensor == Sensor::Accel && by_gravity {
             let models = Sensor::BOTH.map(|s| now.sensor(s).map(|f| f.estimated.triad.inverse));
             let head = session(&now.prepared, models);
-            forces = uncertainty::of_forces(&head, &rows, &decision);
+            forces = match held {
+                None => uncertainty::of_forces(&head, &rows, &decision),
+                Some(_) => now.sensor(sensor).map(|f| {
+                    let covariance = &f.estimated.triad.inverse_covariance;
+                    uncertainty::of_given_forces(&now.prepared, covariance)
+                }),
+            };
         }
         let picture = Picture::of(sensor, &rows, &decision);
         sensors.push(SensorDiagnosis {

@@ -23,7 +23,7 @@ use std::ops::Range;
 use std::sync::OnceLock;
 
 use mimu_core::compensation::Affine;
-use nalgebra::{DMatrix, DVector, Vector3};
+use nalgebra::{DMatrix, DVector, SMatrix, SymmetricEigen, Vector3};
 
 use crate::effects::quantity::Conditions;
 use crate::effects::temperature::{Followed, lagged, rank_correlation};
@@ -35,6 +35,7 @@ use crate::prepared::Prepared;
 use crate::quantity;
 use crate::quantity::Sensor;
 use crate::quantity::significant;
+use crate::triad::Covariance;
 
 /// Rows that share their noise.
 #[derive(Debug, Clone)]
@@ -51,6 +52,9 @@ pub struct Stratum {
     pub known: DMatrix<f64>,
     /// What of the variance of each row is no noise of it, but an error that the reference may have; `None`: nothing.
     pub by_reference: Option<DVector<f64>>,
+    /// What a given matrix leaves open, which is no noise and common to all rows: this times its transpose is their covariance beside the
+    /// known one, unit of the rows squared. `None`: nothing.
+    pub open: Option<DMatrix<f64>>,
     /// Covariance of a random walk with K = 1 unit/√s between the rows; `None` where rows are no means of dwells.
     pub random_walk: Option<DMatrix<f64>>,
     /// Whether the known covariance holds what the bias wanders.
@@ -87,12 +91,13 @@ impl Figure {
 }
 
 /// Which affine parameters the recordings have to determine themselves.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Free {
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Free<'a> {
     /// Matrix and biases.
     Affine,
-    /// The biases; the matrix is known.
-    Bias,
+    /// The biases. The matrix is known, to within the covariance of its inverse affine model: C by rows, then o, of which the latter is
+    /// not looked at.
+    Bias(Option<&'a Covariance>),
 }
 
 /// A recording with the calibration that its residuals are of.
@@ -140,6 +145,8 @@ pub struct Rows {
     pub nuisance: DMatrix<f64>,
     /// What a unit of each of the first of these, which are of the first recording, adds to its inverse affine model: C by rows, then o.
     pub parameters: DMatrix<f64>,
+    /// What an error of C, by rows, does to each row beside the biases.
+    by_matrix: DMatrix<f64>,
     /// Strata, which cover the rows in order.
     pub strata: Vec<Stratum>,
     /// What the error figures are about.
@@ -165,6 +172,9 @@ pub struct Rows {
 /// Rank correlation from which on temperature and time are one. A ramp up and half of the way back has 0.5.
 const ONE_WAY: f64 = 0.95;
 
+/// Share of the variance by noise below which it does not matter what a given matrix leaves open.
+const NEGLIGIBLE: f64 = 1e-4;
+
 impl Rows {
     /// The rows of `sensor` in all of `sessions`, whose calibrations share one matrix.
     ///
@@ -175,7 +185,34 @@ impl Rows {
             .enumerate()
             .filter_map(|(i, s)| Some((i, build::part(s, sensor, free)?)))
             .collect();
-        join::join(sensor, parts, sessions.len())
+        let mut rows = join::join(sensor, parts, sessions.len())?;
+        if let Free::Bias(Some(covariance)) = free {
+            rows.leave_open(covariance.fixed_view::<9, 9>(0, 0).into_owned());
+        }
+        Some(rows)
+    }
+
+    /// Takes a given matrix for known to within the `covariance` of C by rows only.
+    ///
+    /// What several recordings have in common is not in the covariance, which is that of each stratum by itself. An error that shows alike
+    /// in n of them is therefore given n times its variance, which their mean has 1/n of.
+    fn leave_open(&mut self, covariance: SMatrix<f64, 9, 9>) {
+        let mut sessions: Vec<usize> = self.strata.iter().map(|s| s.session).collect();
+        sessions.sort_unstable();
+        sessions.dedup();
+        let eigen = SymmetricEigen::new(covariance * sessions.len() as f64);
+        let sigmas = eigen.eigenvalues.map(|v| v.max(0.0).sqrt());
+        let factor = eigen.eigenvectors * SMatrix::from_diagonal(&sigmas);
+        let factor = DMatrix::from_fn(9, 9, |i, j| factor[(i, j)]);
+        for stratum in &mut self.strata {
+            let open = self.by_matrix.rows_range(stratum.rows.clone()) * &factor;
+            let most = open
+                .row_iter()
+                .map(|r| r.norm_squared())
+                .fold(0.0, f64::max);
+            // At one input an error of the matrix is a bias.
+            stratum.open = (most > NEGLIGIBLE * stratum.known.diagonal().min()).then_some(open);
+        }
     }
 
     /// Three rows for each pose of a recording: the error of the force that its accelerometer says.

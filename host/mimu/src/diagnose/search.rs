@@ -474,7 +474,7 @@ pub(super) const COEFFICIENT: f64 = 4.0;
 /// Score by which a term found from the data has to be better than an effect with a name.
 const PREFERENCE: f64 = 12.0;
 /// Score within which two candidates are told to be confused: odds of one to four hundred.
-const CONFUSED: f64 = 12.0;
+pub(super) const CONFUSED: f64 = 12.0;
 
 /// Columns of size 1.
 pub fn unit_columns(columns: &DMatrix<f64>) -> DMatrix<f64> {

@@ -11,6 +11,7 @@ use crate::effects;
 use crate::effects::candidate::{Candidate, Kind};
 use crate::effects::effect::Effect;
 use crate::effects::quantity::Quantity;
+use crate::prepared::Prepared;
 use crate::quantity::Sensor;
 use crate::triad::{Covariance, Part};
 
@@ -31,15 +32,12 @@ pub fn of_affine(rows: &Rows, decision: &Decision) -> Option<Part> {
     let variance = VarianceModel::new(rows, false);
     let whitener = variance.whitener(&model.fitted.components)?;
     let svd = whitener.whiten(&rows.nuisance).svd(true, true);
-    let columns = whitener.whiten(&model.columns.columns(first, effects).into_owned());
+    let columns = model.columns.columns(first, effects).into_owned();
+    let columns = whitener.whiten(&beside(&columns, &decision.nonlinear.slopes));
     let by_effects = svd.solve(&columns, RANK * svd.singular_values.max()).ok()?;
     let of_first = by_effects.rows(0, rows.parameters.ncols());
     let into = &rows.parameters * of_first;
-    let covariance = model
-        .fitted
-        .covariance
-        .view((first, first), (effects, effects));
-    let added = &into * covariance * into.transpose();
+    let added = &into * &decision.nonlinear.covariance * into.transpose();
     Some(Part {
         covariance: Covariance::from_fn(|i, j| added[(i, j)]),
         dof: f64::INFINITY,
@@ -73,6 +71,11 @@ pub fn of_forces(session: &Session, sizes: &Rows, decision: &Decision) -> Option
         }
     };
     let accepted: Vec<_> = decision.accepted.iter().map(|a| &a.chosen).collect();
+    let mut slopes = Vec::new();
+    for a in decision.accepted.iter().filter(|a| a.parameter.is_some()) {
+        let one = &a.chosen;
+        slopes.push(one.candidate.slope(&rows, one.parameter, &a.values));
+    }
     for one in accepted.iter().filter(|c| !c.candidate.reads_code()) {
         add(&one.candidate, one.parameter, &|_| 0.0);
     }
@@ -82,6 +85,13 @@ pub fn of_forces(session: &Session, sizes: &Rows, decision: &Decision) -> Option
             let typical = |k: usize| effect.coefficients[k].typical.powi(-2);
             add(&candidate, 0.0, &typical);
         }
+    }
+    for slope in slopes.iter().filter(|s| s.iter().all(|v| v.is_finite())) {
+        precision.push(0.0);
+        columns = beside(
+            &columns,
+            &DMatrix::from_column_slice(slope.len(), 1, slope.as_slice()),
+        );
     }
     let accel = session.accel?;
     let list = &session.prepared.dwells.list;
@@ -104,6 +114,25 @@ pub fn of_forces(session: &Session, sizes: &Rows, decision: &Decision) -> Option
         dwells,
         covariance: &columns * parameters * columns.transpose(),
     })
+}
+
+/// How the forces of an accelerometer may err whose inverse model is known to within `covariance`, C by rows and then o: its matrix is
+/// given, and its biases are those of the recording.
+pub fn of_given_forces(prepared: &Prepared, covariance: &Covariance) -> ForceErrors {
+    let poses = prepared.observations(Sensor::Accel);
+    let mut by = DMatrix::zeros(3 * poses.len(), 12);
+    for (i, o) in poses.iter().enumerate() {
+        for k in 0..3 {
+            for c in 0..3 {
+                by[(3 * i + k, 3 * k + c)] = o.raw[c];
+            }
+            by[(3 * i + k, 9 + k)] = 1.0;
+        }
+    }
+    ForceErrors {
+        dwells: poses.iter().map(|o| o.dwell).collect(),
+        covariance: &by * covariance * by.transpose(),
+    }
 }
 
 /// Whether an effect is an error of an accelerometer that goes by the force alone.

@@ -61,6 +61,8 @@ pub struct VarianceModel<'a> {
     /// Axes in which the rows of a stratum are independent whatever its extra white variance, as long as there is no random walk: its own where one is
     /// sought.
     axes: Vec<Option<Axes>>,
+    /// What a given matrix leaves open of each, in these axes.
+    open: Vec<Option<DMatrix<f64>>>,
     /// The random walk that is sought of each, where it has a factor of few terms.
     separable: Vec<Option<Separable>>,
     /// Typical variance of a row, and of a unit random walk, by stratum.
@@ -77,6 +79,7 @@ impl<'a> VarianceModel<'a> {
             rows,
             all_random_walks,
             axes: Vec::new(),
+            open: Vec::new(),
             separable: Vec::new(),
             typical: rows
                 .strata
@@ -89,6 +92,16 @@ impl<'a> VarianceModel<'a> {
             .map(|s| match variance.seeks_random_walk(s) {
                 true => Axes::as_they_stand(&rows.strata[s].known),
                 false => Some(Axes::of(&rows.strata[s].known)),
+            })
+            .collect();
+        variance.open = (0..rows.strata.len())
+            .map(|s| {
+                let mut open = rows.strata[s].open.clone()?;
+                let count = open.nrows();
+                if let Some(axes) = &variance.axes[s] {
+                    axes.rotate(&mut open.rows_mut(0, count));
+                }
+                Some(open)
             })
             .collect();
         variance.separable = (0..rows.strata.len())
@@ -140,7 +153,9 @@ impl<'a> VarianceModel<'a> {
                     .random_walk
                     .as_ref()
                     .map_or(0.0, |unit| unit[(i, i)]);
+                let open = stratum.open.as_ref();
                 out[row] = stratum.known[(i, i)]
+                    + open.map_or(0.0, |o| o.row(i).norm_squared())
                     + at.extra_white[s]
                     + at.random_walk[s] * random_walk
                     + 1e-12 * self.typical[s].0;
@@ -151,6 +166,15 @@ impl<'a> VarianceModel<'a> {
 
     /// Factor of the covariance of stratum `s`, for rows that have been rotated.
     fn factor(&self, s: usize, extra_white: f64, random_walk: f64) -> Option<Factor> {
+        let noise = self.factor_of_noise(s, extra_white, random_walk)?;
+        match &self.open[s] {
+            Some(open) => noise.beside(open),
+            None => Some(noise),
+        }
+    }
+
+    /// The same without what a given matrix leaves open.
+    fn factor_of_noise(&self, s: usize, extra_white: f64, random_walk: f64) -> Option<Factor> {
         let stratum = &self.rows.strata[s];
         let floor = 1e-12 * self.typical[s].0;
         if let Some(axes) = &self.axes[s]
@@ -196,6 +220,10 @@ impl<'a> VarianceModel<'a> {
             let mut v = stratum.known.select_rows(&rows).select_columns(&rows);
             if let Some(unit) = &stratum.random_walk {
                 v += unit.select_rows(&rows).select_columns(&rows) * at.random_walk[s];
+            }
+            if let Some(open) = &stratum.open {
+                let open = open.select_rows(&rows);
+                v += &open * open.transpose();
             }
             for i in 0..v.nrows() {
                 v[(i, i)] += at.extra_white[s] + 1e-12 * self.typical[s].0;

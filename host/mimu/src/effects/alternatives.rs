@@ -131,6 +131,22 @@ static ALTERNATIVES: [Alternative; 5] = [
     },
 ];
 
+/// Effects of the list that are one where the input along an axis is always the same, as in one pose: what the temperature does to a bias
+/// and to a scale factor.
+const ONE_AT_A_CONSTANT_INPUT: [[&str; 2]; 2] = [
+    ["gyro_thermal_bias", "gyro_thermal_scale"],
+    ["accel_thermal_bias", "accel_thermal_scale"],
+];
+
+/// The effect that `id` is the same as while its input is constant, if there is such a one.
+pub fn one_at_a_constant_input(id: &str) -> Option<&'static str> {
+    ONE_AT_A_CONSTANT_INPUT.iter().find_map(|[a, b]| match id {
+        _ if id == *a => Some(*b),
+        _ if id == *b => Some(*a),
+        _ => None,
+    })
+}
+
 /// Alternatives to the effect `id`.
 pub fn alternatives(id: &str) -> impl Iterator<Item = &'static Alternative> {
     ALTERNATIVES.iter().filter(move |r| r.of.contains(&id))

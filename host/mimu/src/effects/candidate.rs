@@ -332,6 +332,12 @@ impl Candidate {
         jumps || self.active_regressors().iter().any(Regressor::is_slow)
     }
 
+    /// Whether it goes by the time since power-on.
+    pub fn goes_by_time(&self) -> bool {
+        let mut all = self.active_regressors().into_iter();
+        all.any(|r| r.quantities().contains(&Quantity::Time))
+    }
+
     /// Whether it follows the temperature.
     pub fn is_thermal(&self) -> bool {
         self.needs(Need::Temperature)

@@ -9,19 +9,40 @@ use super::{Fit, Options, finish, plausible, refuse_wrong_gravity, session_bias}
 use crate::prepared::{Prepared, si_covariance};
 use crate::quantity::Figure;
 use crate::quantity::Sensor;
+use crate::triad::{Covariance, Part, Triad};
 use mimu_recording::Reference;
 use mimu_recording::error::{Error, Result};
 
-/// Fits the biases of `prepared` to matrices that are `given`: gyro, accelerometer, raw to SI.
+/// What a person should know of a fit to a matrix whose covariance is known.
+const GIVEN: &str = "the matrix is given, with its intervals; the biases are this recording's, and the intervals hold both";
+
+/// What the covariance of a given C, by rows, is of a model whose biases were found beside it: where the readings are on average, the error
+/// of the matrix is in the bias.
+fn with_biases(covariance: &Covariance, mean: &Vector3<f64>) -> Part {
+    let mut by = Covariance::zeros();
+    for i in 0..9 {
+        by[(i, i)] = 1.0;
+        by[(9 + i / 3, i)] = -mean[i % 3];
+    }
+    Part {
+        covariance: by * covariance * by.transpose(),
+        dof: f64::INFINITY,
+    }
+}
+
+/// Fits the biases of `prepared` to matrices that are `given`: gyro, accelerometer, raw to SI; `covariances` are those of C by rows, then o,
+/// where they are known.
 pub fn fit_biases(
     prepared: Prepared,
     options: Options,
     given: [Option<Affine<f64>>; 2],
+    covariances: &[Option<Covariance>; 2],
 ) -> Result<Fit> {
     let mut warnings = prepared.condensed.warnings.clone();
     warnings.extend(prepared.dwells.warnings.iter().cloned());
     let mut sensors = Vec::new();
-    for (sensor, known) in Sensor::BOTH.into_iter().zip(given) {
+    let given = Sensor::BOTH.into_iter().zip(given).zip(covariances);
+    for ((sensor, known), covariance) in given {
         let Some(known) = known.filter(|_| prepared.has(sensor)) else {
             continue;
         };
@@ -32,8 +53,17 @@ pub fn fit_biases(
             continue;
         }
         refuse_wrong_gravity(&prepared, sensor, &observations)?;
-        let estimated = session_bias::estimate(&prepared, sensor, &known)
+        let mut estimated = session_bias::estimate(&prepared, sensor, &known)
             .map_err(|f| prepared.refused(f, sensor))?;
+        if let Some(covariance) = covariance {
+            let raw: Vector3<f64> = observations.iter().map(|o| o.raw).sum();
+            let mut parts = estimated.triad.inverse_parts();
+            parts.push(with_biases(covariance, &(raw / observations.len() as f64)));
+            if let Some(triad) = Triad::from_inverse(estimated.triad.inverse, parts) {
+                estimated.triad = triad;
+            }
+            estimated.notes = vec![GIVEN.into()];
+        }
         let inverse = estimated.triad.inverse;
         let reference = prepared.manifest.reference;
         let by_size = reference == Reference::Gravity && sensor == Sensor::Accel;
@@ -92,4 +122,27 @@ pub fn fit_biases(
         sensors,
         warnings,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn at_the_mean_reading_an_error_of_a_given_matrix_is_one_of_the_bias_and_does_nothing() {
+        let given = Covariance::from_fn(|i, j| if i == j { 1.0 } else { 0.3 });
+        let mean = Vector3::new(2.5, -1.0, 0.5);
+        let part = with_biases(&given, &mean);
+        let variance = |raw: Vector3<f64>| {
+            let mut by = nalgebra::SVector::<f64, 12>::zeros();
+            for k in 0..3 {
+                by[3 + k] = raw[k];
+            }
+            by[10] = 1.0;
+            (by.transpose() * part.covariance * by)[0]
+        };
+        assert!(variance(mean).abs() < 1e-12);
+        // A unit away along one axis it is the variance of one element.
+        assert!((variance(mean + Vector3::x()) - 1.0).abs() < 1e-12);
+    }
 }

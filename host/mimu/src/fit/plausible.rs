@@ -3,6 +3,7 @@
 //! Swapped columns, a wrong unit, one dwell with the wrong input: each leaves a trace, and each would otherwise end in a
 //! calibration file. What cannot be right is refused; what may be meant is a warning.
 
+use super::of_temperature::with_temperature;
 use super::sensor::{Residual, SensorFit};
 use crate::estimate::Failure;
 use crate::prepared::Prepared;
@@ -26,8 +27,8 @@ const TURNED_DEG: f64 = 20.0;
 /// Refuses or adds warnings to the fit of one sensor.
 pub fn check(prepared: &Prepared, fit: &mut SensorFit) -> Result<()> {
     check_numbers(fit)?;
-    refuse_unrelated(prepared, fit)?;
     let found = [
+        refuse_unrelated(prepared, fit)?,
         outliers(prepared, fit),
         unit(prepared, fit),
         turned(prepared, fit),
@@ -68,10 +69,27 @@ fn spread(prepared: &Prepared, fit: &SensorFit) -> f64 {
     }
 }
 
-fn refuse_unrelated(prepared: &Prepared, fit: &SensorFit) -> Result<()> {
-    let share = fit.rms() / spread(prepared, fit);
+/// Refuses readings that do not follow their inputs. Those that do beside the temperature are fitted, with a warning.
+fn refuse_unrelated(prepared: &Prepared, fit: &SensorFit) -> Result<Option<String>> {
+    let spread = spread(prepared, fit);
+    let share = fit.rms() / spread;
     if share <= FOLLOWS_NOTHING {
-        return Ok(());
+        return Ok(None);
+    }
+    let percent = |share: f64| format!("{} %", significant(100.0 * share));
+    let with = match fit.figure {
+        Figure::Input => with_temperature(prepared, fit.sensor, &fit.residuals),
+        Figure::GravitySize | Figure::Direction => None,
+    };
+    if let Some(with) = with.filter(|w| w.rms / spread <= FOLLOWS_NOTHING) {
+        return Ok(Some(format!(
+            "{}: {} of the known inputs is left over by a model without temperature, and {} by one with it: the parameters are those at about {:.1} °C, \
+             the mean of the dwells, and their intervals hold what the temperature does; `mimu diagnose` finds what follows it",
+            fit.sensor,
+            percent(share),
+            percent(with.rms / spread),
+            with.mean_c
+        )));
     }
     let against = match fit.figure {
         Figure::Input => "the known inputs",
@@ -82,13 +100,20 @@ fn refuse_unrelated(prepared: &Prepared, fit: &SensorFit) -> Result<()> {
         true => format!(": {:.0} % is left over", 100.0 * share),
         false => " at all".to_string(),
     };
+    let with = match with {
+        Some(with) => format!(
+            ", {} with temperature in the model",
+            percent(with.rms / spread)
+        ),
+        None => String::new(),
+    };
     let worst = match worst_first(fit).first() {
         Some(worst) => format!(", dwell {} the least", name(prepared, worst)),
         None => String::new(),
     };
     Err(Error::new(
         format!("{}, {}", prepared.place, fit.sensor),
-        format!("the readings do not follow {against}{how}{worst}"),
+        format!("the readings do not follow {against}{how}{with}{worst}"),
         "check that no columns are swapped and that every step has its own input",
     ))
 }

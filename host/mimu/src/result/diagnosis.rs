@@ -13,7 +13,7 @@ use crate::diagnose::{Diagnosis, SensorDiagnosis, Source, Verdict};
 use crate::effects::candidate::Kind;
 use crate::fit::Split;
 use crate::next_experiment::{Confused, Next, NotInPlan};
-use crate::quantity::{AXES, Figure, Sensor};
+use crate::quantity::{AXES, Figure, Sensor, significant};
 use crate::verify::Verification;
 
 /// Result of a diagnosis.
@@ -67,6 +67,9 @@ pub struct AcceptedResult {
     pub sensor: &'static str,
     /// Physics in a line.
     pub about: &'static str,
+    /// Whether it is an error of the unit, which the calibration holds; else something that it should read, or an error whose time since
+    /// power-on is unknown.
+    pub of_unit: bool,
     /// Its coefficients.
     pub coefficients: Vec<CoefficientResult>,
     /// Held-out root mean square without it, beside the other effects; unit of the sensor's figures.
@@ -97,7 +100,7 @@ pub struct CoefficientResult {
     pub name: String,
     /// Value, in [`Self::unit`].
     pub value: f64,
-    /// Standard deviation.
+    /// Standard deviation, whatever the nonlinear parameter is.
     pub sigma: f64,
     /// SI unit.
     pub unit: String,
@@ -138,6 +141,10 @@ pub struct FormResult {
     pub name: &'static str,
     /// Value.
     pub value: f64,
+    /// Lower end of its 95 % interval; `None` where the smallest value that was tried is within.
+    pub lower: Option<f64>,
+    /// Upper end; `None` where the largest is within.
+    pub upper: Option<f64>,
     /// Smallest value that was tried.
     pub from: f64,
     /// Largest.
@@ -427,6 +434,18 @@ fn figures(d: &Diagnosis, found: &SensorDiagnosis) -> SensorDiagnosisResult {
     }
 }
 
+impl FormResult {
+    /// Its 95 % interval for people: `55.2 to 66.1`, `at most 12`.
+    pub fn interval(&self) -> String {
+        match [self.lower, self.upper].map(|end| end.map(significant)) {
+            [Some(lower), Some(upper)] => format!("{lower} to {upper}"),
+            [None, Some(upper)] => format!("at most {upper}"),
+            [Some(lower), None] => format!("at least {lower}"),
+            [None, None] => "any that was tried".into(),
+        }
+    }
+}
+
 impl AcceptedResult {
     fn of(sensor: Sensor, a: &Accepted) -> Self {
         let candidate = &a.chosen.candidate;
@@ -449,6 +468,7 @@ impl AcceptedResult {
             id: candidate.id(),
             sensor: sensor.name(),
             about: candidate.about(),
+            of_unit: a.of_unit,
             coefficients: coefficients.collect(),
             held_out_rms_before: a.held_out[0],
             held_out_rms_after: a.held_out[1],
@@ -474,10 +494,36 @@ impl AcceptedResult {
             form: candidate.parameter().map(|f| FormResult {
                 name: f.name,
                 value: a.chosen.parameter,
+                lower: a.parameter.and_then(|p| p.lower),
+                upper: a.parameter.and_then(|p| p.upper),
                 from: f.from,
                 to: f.to,
             }),
             converters: ConverterTable::of(&candidate.codes),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_interval_that_reaches_the_end_of_what_was_searched_is_open_there() {
+        let interval = |lower, upper| {
+            let form = FormResult {
+                name: "lag_s",
+                value: 60.0,
+                lower,
+                upper,
+                from: 5.0,
+                to: 600.0,
+            };
+            form.interval()
+        };
+        assert_eq!(interval(Some(55.0), Some(66.0)), "55.0 to 66.0");
+        assert_eq!(interval(None, Some(66.0)), "at most 66.0");
+        assert_eq!(interval(Some(55.0), None), "at least 55.0");
+        assert_eq!(interval(None, None), "any that was tried");
     }
 }

@@ -178,7 +178,8 @@ fn effect(out: &mut String, s: &SensorDiagnosisResult, a: &AcceptedResult) {
         let _ = writeln!(out, "    {:<12}{both:>19} {unit}", c.name);
     }
     if let Some(form) = &a.form {
-        let _ = writeln!(out, "    {:<12}{:>12}", form.name, significant(form.value));
+        let (value, interval) = (significant(form.value), form.interval());
+        let _ = writeln!(out, "    {:<12}{value:>12} (95 %: {interval})", form.name);
     }
     for c in &a.converters {
         let _ = writeln!(out, "    {}", converter(c));

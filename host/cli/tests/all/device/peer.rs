@@ -11,8 +11,8 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use mimu_core::wire::{
-    Decoder, MAGIC, MAX_FRAME, Message, PROTOCOL, Refusal, Reply, Version, effects_of_this_build,
-    encode,
+    Decoder, MAGIC, MAX_FRAME, Message, PROTOCOL, Refusal, Reply, Start, Version,
+    effects_of_this_build, encode,
 };
 
 use super::terminal::Terminal;
@@ -77,6 +77,8 @@ pub struct Script {
     /// Added to the compensated gyro x, rad/s: a device that computes wrongly.
     pub bent: f32,
     pub self_test_passed: u8,
+    /// Why it started.
+    pub start: Start<'static>,
 }
 
 impl Default for Script {
@@ -94,6 +96,10 @@ impl Default for Script {
             speed: 1.0,
             bent: 0.0,
             self_test_passed: 0b1111,
+            start: Start::Panic {
+                file: "src/x.rs",
+                line: 7,
+            },
         }
     }
 }

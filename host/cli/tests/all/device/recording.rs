@@ -4,6 +4,7 @@ use std::io::Write as _;
 use std::process::Stdio;
 use std::time::{Duration, Instant};
 
+use mimu_core::wire::Start;
 use mimu_recording::{Batch, Recording};
 
 use super::peer::{ACCEL_VOLTS, Act, GYRO_VOLTS, Peer, Script, TEMP_C, sums};
@@ -231,6 +232,29 @@ fn a_recording_goes_on_over_a_restart_and_tells_it() {
     assert!((after / 1000.0 - t_s).abs() < 1e-9);
     assert!(before < 6_000.0 && rows.t_s.windows(2).all(|p| p[1] > p[0]));
     assert_eq!(recording.manifest.recorded.unwrap().restarts.len(), 1);
+}
+
+#[test]
+fn the_clock_of_a_device_counts_from_power_on_only_if_that_is_why_it_started() {
+    let recorded = |start| {
+        let place = Place::new();
+        let peer = Peer::new(Script {
+            speed: 4.0,
+            start,
+            ..Script::default()
+        });
+        let arguments = [
+            "record", "--port", &peer.path, "-o", "rec", "--for", "1s", "--json", "-",
+        ];
+        mimu(&place, &arguments).json();
+        rows(&place, "rec").0.manifest
+    };
+    let by_power = recorded(Start::PowerOn);
+    assert_eq!(by_power.power_on_s, Some(0.0));
+    assert_eq!(by_power.start_without_power_on(), None);
+    let by_button = recorded(Start::ResetPin);
+    assert_eq!(by_button.power_on_s, None);
+    assert_eq!(by_button.start_without_power_on(), Some("reset pin"));
 }
 
 #[test]

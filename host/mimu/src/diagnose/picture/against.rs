@@ -56,7 +56,7 @@ pub struct Curve {
     pub x: f64,
     /// Its value.
     pub value: f64,
-    /// Half of its 95 % interval, by the covariance of the coefficients.
+    /// Half of its 95 % interval, by the covariance of the coefficients for the nonlinear parameter found.
     pub half: f64,
 }
 
@@ -169,7 +169,7 @@ fn whole(one: &Accepted, across: &DMatrix<f64>, track: &Track) -> Panel {
             Curve {
                 x: fitted[*r],
                 value: fitted[*r],
-                half: 2.0 * by.dot(&(&one.covariance * &by)).max(0.0).sqrt(),
+                half: 2.0 * by.dot(&(&one.conditional * &by)).max(0.0).sqrt(),
             }
         })
         .collect();
@@ -328,7 +328,7 @@ impl Drawn<'_> {
         let value = |k: &usize| self.one.values[*k];
         let count = self.members.len();
         let covariance = DMatrix::from_fn(count, count, |i, j| {
-            self.one.covariance[(self.members[i], self.members[j])]
+            self.one.conditional[(self.members[i], self.members[j])]
         });
         let (low, high) = ends(&self.x);
         let curve = (0..self.points).map(|i| {

@@ -24,7 +24,9 @@ pub(super) struct Part {
     pub nuisance: DMatrix<f64>,
     /// What a unit of each adds to the inverse affine model, C by rows and then o.
     pub parameters: DMatrix<f64>,
-    /// Which columns of it are biases.
+    /// As in [`super::Rows`].
+    pub by_matrix: DMatrix<f64>,
+    /// Which columns of the derivatives are biases.
     pub biases: Vec<usize>,
     /// Strata.
     pub strata: Vec<Stratum>,
@@ -65,7 +67,7 @@ pub(super) fn part(session: &Session, sensor: Sensor, free: Free) -> Option<Part
         (Reference::Gravity, Sensor::Accel) => builder.sizes(&inverse),
         (Reference::Gravity, Sensor::Gyro) => builder.turns(&inverse, accel, session.forces),
     }?;
-    if free == Free::Bias {
+    if let Free::Bias(_) = free {
         part.nuisance = part.nuisance.select_columns(&part.biases);
         part.parameters = part.parameters.select_columns(&part.biases);
         part.biases = (0..part.biases.len()).collect();
@@ -198,7 +200,7 @@ impl Builder<'_> {
     pub(super) fn finish(
         self,
         y: Vec<f64>,
-        (nuisance, parameters): (DMatrix<f64>, DMatrix<f64>),
+        (nuisance, parameters, by_matrix): (DMatrix<f64>, DMatrix<f64>, DMatrix<f64>),
         biases: Vec<usize>,
         strata: Vec<Stratum>,
         figure: (Figure, usize, usize),
@@ -208,6 +210,7 @@ impl Builder<'_> {
             y,
             nuisance,
             parameters,
+            by_matrix,
             biases,
             strata,
             figure: figure.0,

@@ -21,6 +21,8 @@ struct Shapes {
     errors: DMatrix<f64>,
     /// See [`Part::parameters`].
     parameters: DMatrix<f64>,
+    /// By all nine elements of C, about the mean reading.
+    by_matrix: DMatrix<f64>,
 }
 
 /// The nine parameters that gravity's size determines: C lower triangular, about the mean reading, then o.
@@ -29,12 +31,16 @@ fn lower_affine(observations: &[Observation]) -> Shapes {
     let n = observations.len();
     let centre = observations.iter().map(|o| o.raw).sum::<Vector3<f64>>() / n.max(1) as f64;
     let mut errors = DMatrix::zeros(3 * n, 9);
+    let mut by_matrix = DMatrix::zeros(3 * n, 9);
     for (i, o) in observations.iter().enumerate() {
         for (k, (r, c)) in lower.into_iter().enumerate() {
             errors[(3 * i + r, k)] = o.raw[c] - centre[c];
         }
         for k in 0..3 {
             errors[(3 * i + k, 6 + k)] = 1.0;
+            for c in 0..3 {
+                by_matrix[(3 * i + k, 3 * k + c)] = o.raw[c] - centre[c];
+            }
         }
     }
     let mut parameters = DMatrix::zeros(12, 9);
@@ -45,7 +51,11 @@ fn lower_affine(observations: &[Observation]) -> Shapes {
     for k in 0..3 {
         parameters[(9 + k, 6 + k)] = 1.0;
     }
-    Shapes { errors, parameters }
+    Shapes {
+        errors,
+        parameters,
+        by_matrix,
+    }
 }
 
 impl Builder<'_> {
@@ -69,6 +79,7 @@ impl Builder<'_> {
         let shapes = lower_affine(&observations);
         let mut y = Vec::new();
         let mut nuisance = DMatrix::zeros(n, 9);
+        let mut by_matrix = DMatrix::zeros(n, 9);
         for (i, o) in observations.iter().enumerate() {
             let force = inverse.apply(&o.raw);
             let up = force.normalize();
@@ -76,6 +87,10 @@ impl Builder<'_> {
             y.push(force.norm() - g);
             let by_force = shapes.errors.rows(3 * i, 3);
             nuisance
+                .row_mut(i)
+                .copy_from(&by_force.tr_mul(&up).transpose());
+            let by_force = shapes.by_matrix.rows(3 * i, 3);
+            by_matrix
                 .row_mut(i)
                 .copy_from(&by_force.tr_mul(&up).transpose());
         }
@@ -87,10 +102,11 @@ impl Builder<'_> {
             rows: 0..n,
             known: DMatrix::from_diagonal(&DVector::from_vec(variances)),
             by_reference: None,
+            open: None,
             random_walk: Some(self.random_walk(&dwells)),
             wander_known: prepared.noise.is_stated(Sensor::Accel),
         }];
-        let nuisance = (nuisance, shapes.parameters);
+        let nuisance = (nuisance, shapes.parameters, by_matrix);
         self.finish(y, nuisance, vec![6, 7, 8], strata, (Figure::Size, n, 1))
     }
 
@@ -114,10 +130,11 @@ impl Builder<'_> {
             rows: 0..n,
             known: DMatrix::identity(n, n),
             by_reference: None,
+            open: None,
             random_walk: None,
             wander_known: true,
         }];
-        let nuisance = (shapes.errors, shapes.parameters);
+        let nuisance = (shapes.errors, shapes.parameters, shapes.by_matrix);
         self.finish(
             vec![0.0; n],
             nuisance,
@@ -245,6 +262,7 @@ impl Builder<'_> {
                         .as_ref()
                         .map_or_else(|| DMatrix::zeros(m, m), DMatrix::clone),
                 by_reference: by_reference.map(|v| v.diagonal()),
+                open: None,
                 random_walk: None,
                 wander_known: true,
             });
@@ -288,6 +306,7 @@ impl Builder<'_> {
                 rows: m + axis * n..m + (axis + 1) * n,
                 known,
                 by_reference: None,
+                open: None,
                 random_walk: random_walk.clone(),
                 wander_known: wander.is_some(),
             });
@@ -296,9 +315,14 @@ impl Builder<'_> {
             0 => (Figure::Rest, 3 * n, 1),
             m => (Figure::Direction, m, 2),
         };
+        // What is constant of an error of C is a bias.
+        let mut by_matrix = nuisance.columns(0, 9).into_owned();
+        for (k, mut column) in by_matrix.column_iter_mut().enumerate() {
+            column -= nuisance.column(9 + k / 3) * at_rest[k % 3];
+        }
         // Where the Earth's rate points is of the recording, as the biases are.
         let own = 9..nuisance.ncols();
-        let nuisance = (nuisance, DMatrix::identity(12, own.end));
+        let nuisance = (nuisance, DMatrix::identity(12, own.end), by_matrix);
         self.finish(y, nuisance, own.collect(), strata, figure)
     }
 }

@@ -101,6 +101,7 @@ pub(super) fn join(sensor: Sensor, parts: Vec<(usize, Part)>, sessions: usize) -
 
     let mut y = DVector::zeros(total);
     let mut nuisance = DMatrix::zeros(total, columns);
+    let mut by_matrix = DMatrix::zeros(total, 9);
     let mut strata = Vec::new();
     let mut rows = Vec::with_capacity(total);
     for (p, s) in order {
@@ -112,6 +113,7 @@ pub(super) fn join(sensor: Sensor, parts: Vec<(usize, Part)>, sessions: usize) -
             for (k, place) in places[p].iter().enumerate() {
                 nuisance[(rows.len(), *place)] = part.nuisance[(r, k)];
             }
+            by_matrix.set_row(rows.len(), &part.by_matrix.row(r));
             let row = &part.rows[r];
             let offset = from_moment[p];
             rows.push(Row {
@@ -138,6 +140,7 @@ pub(super) fn join(sensor: Sensor, parts: Vec<(usize, Part)>, sessions: usize) -
         sensor,
         y,
         parameters,
+        by_matrix,
         nuisance: scaled(nuisance),
         strata,
         figure,

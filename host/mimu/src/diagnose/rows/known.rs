@@ -32,16 +32,27 @@ impl Builder<'_> {
         let random_walk = self.random_walk(&dwells);
         let mut y = Vec::new();
         let mut nuisance = DMatrix::zeros(3 * n, 12);
+        let mut by_matrix = DMatrix::zeros(3 * n, 9);
+        let readings: Vec<Vector3<f64>> = observations
+            .iter()
+            .map(|o| forward.apply(&o.input))
+            .collect();
+        let centre = readings.iter().sum::<Vector3<f64>>() / n as f64;
         let mut strata = Vec::new();
         for axis in 0..3 {
             for (i, o) in observations.iter().enumerate() {
                 let row = y.len();
-                let predicted = forward.apply(&o.input)[axis];
+                let predicted = readings[i][axis];
                 self.mean_row(o.dwell, &conditions[i], Vector3::ith(axis, 1.0));
                 y.push((o.raw[axis] - predicted) / scale[axis]);
                 nuisance[(row, 4 * axis)] = 1.0;
                 for k in 0..3 {
                     nuisance[(row, 4 * axis + 1 + k)] = o.input[k];
+                }
+                // Of u = P x + b the derivative by C is -P dC (u - b), and what is constant of it a bias.
+                for (r, c) in (0..3).flat_map(|r| (0..3).map(move |c| (r, c))) {
+                    by_matrix[(row, 3 * r + c)] =
+                        forward.matrix[(axis, r)] * (readings[i] - centre)[c] / scale[axis];
                 }
             }
             let s2 = scale[axis] * scale[axis];
@@ -57,13 +68,20 @@ impl Builder<'_> {
                 rows: axis * n..(axis + 1) * n,
                 known,
                 by_reference: None,
+                open: None,
                 random_walk: Some(random_walk.clone()),
                 wander_known: wander.is_some(),
             });
         }
         let figure = (Figure::Input, 3 * n, 1);
         let parameters = by_forward(inverse, &scale);
-        self.finish(y, (nuisance, parameters), vec![0, 4, 8], strata, figure)
+        self.finish(
+            y,
+            (nuisance, parameters, by_matrix),
+            vec![0, 4, 8],
+            strata,
+            figure,
+        )
     }
 }
 

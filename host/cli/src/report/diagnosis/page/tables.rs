@@ -101,7 +101,7 @@ pub fn coefficients(one: &AcceptedResult) -> Markup {
                     tr {
                         td { (form.name) }
                         td class="n" { (number(form.value, 1.0, "")) }
-                        td class="n" { "–" } td { }
+                        td class="n" { (form.interval()) } td { }
                         td class="n" { (number(form.from, 1.0, "")) " to " (number(form.to, 1.0, "")) " sought" }
                         td { } td { }
                     }

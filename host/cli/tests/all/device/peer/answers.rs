@@ -6,7 +6,7 @@ use mimu_core::kalman::Bank;
 use mimu_core::stored::{self, ROOM};
 use mimu_core::wire::{
     Call, Capabilities, Counters, Greeting, KalmanAxis, KalmanState, Message, Prior, Refusal,
-    Reply, Request, SelfTest, Slot, Start, StoredInfo,
+    Reply, Request, SelfTest, Slot, StoredInfo,
 };
 use nalgebra::Vector3;
 
@@ -46,10 +46,7 @@ impl Device {
             sample_rate_hz: 1000,
             channels: "gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z",
             raw_unit: "V",
-            start: Start::Panic {
-                file: "src/x.rs",
-                line: 7,
-            },
+            start: self.script.start,
             starts: 3,
             stored,
             slots: [first, Slot::Empty],

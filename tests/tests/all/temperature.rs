@@ -1,0 +1,407 @@
+//! Temperature in fit and diagnosis: sweeps that no affine model follows, intervals of lags, matrices that are given, one pose, and the
+//! time since power-on. The truth is the bench's.
+
+use std::fmt::Write as _;
+
+use mimu::calibration::Calibration;
+use mimu::diagnose::decision::Accepted;
+use mimu::diagnose::{Diagnosis, Recordings, diagnose};
+use mimu::fit::{Method, Options, fit};
+use mimu::next_experiment::next;
+use mimu::prepared::Prepared;
+use mimu::quantity::Sensor;
+use mimu::result::diagnosis::DiagnosisResult;
+use mimu::stillness::STILL_FACTOR;
+use mimu_cli::report::{Made, diagnosis_page, diagnosis_text};
+use mimu_recording::Recorded;
+use mimu_rig::random::Random;
+use mimu_rig::rig_file::{EffectFile, RigFile, RigTruth};
+use mimu_tests::bench;
+use rayon::prelude::*;
+
+const OPTIONS: Options = Options {
+    method: Method::LeastSquares,
+    holdout_blocks: 0,
+    still_factor: STILL_FACTOR,
+    only: None,
+};
+
+type Step = ([f64; 3], f64);
+
+/// A plan of `steps`, body axis up and rate in deg/s, of `dwell_s` at 50 Hz, while the chamber goes through `chamber_c`.
+fn plan(steps: &[Step], dwell_s: f64, chamber_c: &[[f64; 2]]) -> String {
+    let mut plan = format!(
+        "format = \"mimu-plan/1\"\nsample_rate_hz = 50.0\ncarrier = \"table\"\nlead_in_s = 5.0\nchamber_c = {chamber_c:?}\n"
+    );
+    for (up, rate_dps) in steps {
+        let _ = writeln!(
+            plan,
+            "[[step]]\nup = {up:?}\nrate_dps = {rate_dps:?}\ndwell_s = {dwell_s:?}"
+        );
+    }
+    plan
+}
+
+/// Faces at rest, and each axis up at these rates.
+fn faces(rates_dps: &[f64]) -> Vec<Step> {
+    let mut steps = Vec::new();
+    for axis in 0..3 {
+        let up: [f64; 3] = std::array::from_fn(|i| f64::from(u8::from(i == axis)));
+        steps.extend([(up, 0.0), (up.map(|u| -u), 0.0)]);
+        steps.extend(rates_dps.iter().map(|r| (up, *r)));
+    }
+    steps
+}
+
+/// In an order drawn by the seed.
+fn randomised(mut steps: Vec<Step>, seed: u64) -> Vec<Step> {
+    let mut random = Random::new(seed, "order of the steps");
+    for k in (1..steps.len()).rev() {
+        steps.swap(k, (random.uniform() * (k + 1) as f64) as usize);
+    }
+    steps
+}
+
+/// A unit whose thermometer is on its dies, warmed up and without heat of its own: what it lags by is the effect's.
+fn unit(effects: &[&str], seed: u64) -> RigFile {
+    let mut random = Random::new(seed, "unit");
+    let (gyro, accel) = (bench::gyro(&mut random), bench::accel(&mut random));
+    let mut file = bench::clean(gyro, accel);
+    file.thermal.on_before_s = Some(f64::INFINITY);
+    file.thermal.die_lag_s = Some([1.0; 4]);
+    file.thermal.die_heating_c = Some([0.0; 4]);
+    let effect = |id: &&str| EffectFile {
+        id: (*id).into(),
+        parameters: Default::default(),
+    };
+    file.effect = effects.iter().map(effect).collect();
+    RigTruth::resolve(&file, seed).expect("a rig").file
+}
+
+/// `file` with a parameter of its first effect.
+fn with(mut file: RigFile, key: &str, value: impl Into<toml::Value>) -> RigFile {
+    file.effect[0].parameters.insert(key.into(), value.into());
+    file
+}
+
+fn recorded(plan: &str, file: &RigFile, seed: u64) -> Prepared {
+    let prepared = bench::recorded(plan, file, seed);
+    let noise = bench::noise_file(file, seed, prepared.condensed.period_s);
+    prepared.with_noise(&noise).expect("its noise")
+}
+
+fn diagnosed(first: Prepared, given: Option<&Calibration>) -> Diagnosis {
+    let recordings = Recordings {
+        given,
+        ..first.into()
+    };
+    diagnose(recordings, OPTIONS).expect("a diagnosis")
+}
+
+fn accepted(diagnosis: &Diagnosis) -> impl Iterator<Item = &Accepted> {
+    let sensors = diagnosis.sensors.iter();
+    sensors.flat_map(|s| &s.decision.accepted)
+}
+
+fn ids(diagnosis: &Diagnosis) -> Vec<String> {
+    accepted(diagnosis)
+        .map(|a| a.chosen.candidate.id())
+        .collect()
+}
+
+/// 80 °C up and back while poses at rest go on, and six rates at the end: the bias moves by as much as the rates.
+fn chamber(seed: u64) -> Prepared {
+    let mut steps: Vec<Step> = Vec::new();
+    for _ in 0..10 {
+        steps.extend(faces(&[]));
+    }
+    for axis in 0..3 {
+        let up: [f64; 3] = std::array::from_fn(|i| f64::from(u8::from(i == axis)));
+        steps.extend([(up, 20.0), (up, -20.0)]);
+    }
+    let plan = plan(&steps, 5.0, &[[0.0, -20.0], [300.0, 60.0], [600.0, -20.0]]);
+    let mut file = unit(&["gyro_thermal_bias"], seed);
+    file.thermal.board_lag_s = Some(20.0);
+    recorded(
+        &plan,
+        &with(file, "dps_per_c", vec![0.1, -0.12, 0.08]),
+        seed,
+    )
+}
+
+#[test]
+fn a_sweep_that_moves_the_bias_by_more_than_the_rates_is_fitted_and_its_effect_is_named() {
+    let prepared = chamber(1);
+    let fitted = fit(prepared.clone(), OPTIONS).expect("a fit");
+    let gyro = fitted.sensor(Sensor::Gyro).expect("recorded");
+    // More than the share of the inputs from which on readings follow nothing.
+    let said = gyro.warnings.join("\n");
+    assert!(said.contains("by a model without temperature"), "{said}");
+    let found = diagnosed(prepared, None);
+    assert!(
+        ids(&found).contains(&"gyro_thermal_bias".into()),
+        "{:?}",
+        ids(&found)
+    );
+    let after = found.after.sensor(Sensor::Gyro).expect("recorded");
+    assert!(
+        after.rms() < 0.02 * gyro.rms(),
+        "{} {}",
+        after.rms(),
+        gyro.rms()
+    );
+}
+
+#[test]
+fn a_sweep_whose_readings_follow_no_input_is_refused_though_they_follow_the_temperature() {
+    // Rates that were written to the wrong dwells, and a gyro that reads nothing but its temperature.
+    let mut shuffled = chamber(2);
+    let inputs: Vec<[f64; 6]> = shuffled.dwells.list.iter().map(|d| d.reference).collect();
+    let n = inputs.len();
+    for (i, dwell) in shuffled.dwells.list.iter_mut().enumerate() {
+        dwell.reference = inputs[(i * 7 + 3) % n];
+    }
+    let mut dead = chamber(2);
+    let still = dead.dwells.list.len() - 6;
+    for i in still..dead.dwells.list.len() {
+        let before: Vec<f64> = (0..3)
+            .map(|k| dead.dwells.list[still - 1].raw[k].mean)
+            .collect();
+        for (k, mean) in before.into_iter().enumerate() {
+            dead.dwells.list[i].raw[k].mean = mean;
+        }
+    }
+    for recording in [shuffled, dead] {
+        let only = Options {
+            only: Some(Sensor::Gyro),
+            ..OPTIONS
+        };
+        let refused = fit(recording, only)
+            .expect_err("no calibration")
+            .to_string();
+        assert!(
+            refused.contains("do not follow the known inputs"),
+            "{refused}"
+        );
+    }
+}
+
+/// How often intervals held the truth: lags, coefficients, and coefficients by the covariance for the lag found.
+#[derive(Debug, Default)]
+struct Held {
+    lags: [u32; 2],
+    coefficients: [u32; 2],
+    conditional: [u32; 2],
+    unknown: u32,
+}
+
+fn count(into: &mut [u32; 2], held: bool) {
+    into[0] += u32::from(held);
+    into[1] += 1;
+}
+
+/// A unit that lags by 20 to 110 s, on a table while the chamber warms by 20 °C and cools again.
+fn lagging(seed: u64) -> (RigFile, Prepared) {
+    let file = unit(&["gyro_thermal_lag"], seed);
+    let file = with(file, "dps_per_c", vec![0.15, -0.1, 0.12]);
+    let file = with(file, "lag_s", 20.0 + 10.0 * (seed % 10) as f64);
+    let steps = randomised(
+        [faces(&[-100.0, 100.0]), faces(&[-200.0, 200.0])].concat(),
+        seed,
+    );
+    let ramp = [[0.0, 20.0], [60.0, 20.0], [160.0, 40.0], [260.0, 20.0]];
+    let prepared = recorded(&plan(&steps, 6.0, &ramp), &file, seed);
+    (file, prepared)
+}
+
+fn lags(seeds: u64) -> Held {
+    let each = (0..seeds).into_par_iter().map(|seed| {
+        let (file, prepared) = lagging(seed);
+        let found = diagnosed(prepared, None);
+        let mut lag = accepted(&found).filter(|a| a.chosen.candidate.id() == "gyro_thermal_lag");
+        (lag.next().cloned(), file.effect[0].parameters.clone())
+    });
+    let mut held = Held::default();
+    for (lag, truth) in each.collect::<Vec<_>>() {
+        let Some(lag) = lag else {
+            held.unknown += 1;
+            continue;
+        };
+        let true_lag = truth["lag_s"].as_float().expect("a number");
+        let interval = lag.parameter.expect("an interval");
+        let above = interval.lower.is_none_or(|l| l <= true_lag);
+        count(
+            &mut held.lags,
+            above && interval.upper.is_none_or(|u| true_lag <= u),
+        );
+        for (i, k) in lag
+            .chosen
+            .candidate
+            .active
+            .iter()
+            .enumerate()
+            .filter(|(_, k)| **k < 3)
+        {
+            let size = truth["dps_per_c"].as_array().expect("a list")[*k].as_float();
+            let error = (lag.values[i] - size.expect("a number").to_radians()).abs();
+            for (covariance, into) in [
+                (&lag.covariance, &mut held.coefficients),
+                (&lag.conditional, &mut held.conditional),
+            ] {
+                count(into, error <= 1.96 * covariance[(i, i)].sqrt());
+            }
+        }
+    }
+    println!("{held:?}");
+    held
+}
+
+fn share([held, of]: [u32; 2]) -> f64 {
+    f64::from(held) / f64::from(of)
+}
+
+#[test]
+fn intervals_of_a_lag_and_of_its_coefficients_hold_the_truth() {
+    let held = lags(8);
+    assert!(held.unknown <= 1, "{held:?}");
+    // Of eight three are missed once in two hundred times, and of twenty-four five.
+    assert!(
+        share(held.lags) >= 0.75 && share(held.coefficients) >= 0.8,
+        "{held:?}"
+    );
+}
+
+#[test]
+#[ignore = "nightly: more seeds"]
+fn of_more_units_intervals_of_a_lag_hold_the_truth_in_93_to_97_of_a_hundred() {
+    let held = lags(300);
+    assert!(held.unknown <= 2, "{held:?}");
+    for of in [held.lags, held.coefficients] {
+        let margin = |p: f64| 3.0 * (p * (1.0 - p) / f64::from(of[1])).sqrt();
+        let share = share(of);
+        assert!(
+            (0.93 - margin(0.93)..0.97 + margin(0.97)).contains(&share),
+            "{held:?}"
+        );
+    }
+    // By the covariance for the lag found they do not.
+    assert!(share(held.conditional) < 0.9, "{held:?}");
+}
+
+#[test]
+fn the_interval_of_a_lag_is_in_the_json_the_text_and_the_page() {
+    let found = diagnosed(lagging(3).1, None);
+    let result = DiagnosisResult::of(&found, &next(&found), None);
+    let lag = result.effects.iter().find(|e| e.id == "gyro_thermal_lag");
+    let form = lag.and_then(|l| l.form.as_ref()).expect("a lag");
+    let json = serde_json::to_value(form).expect("JSON");
+    let [lower, upper] = ["lower", "upper"].map(|k| json[k].as_f64().expect("an end"));
+    assert!(lower < form.value && form.value < upper, "{json}");
+    let made = Made {
+        recording: "lagging".into(),
+        command: "mimu diagnose lagging".into(),
+        created: "2026-01-01T00:00:00Z".into(),
+    };
+    let interval = form.interval();
+    assert!(diagnosis_text(&result, false).contains(&format!("(95 %: {interval})")));
+    assert!(
+        diagnosis_page(&result, &made)
+            .expect("a page")
+            .contains(&interval)
+    );
+}
+
+/// A calibration of `file` by a short recording at one temperature.
+fn short(file: &RigFile, seed: u64) -> Calibration {
+    let plan = plan(&faces(&[-60.0, 60.0]), 1.5, &[[0.0, 25.0]]);
+    let fitted = fit(recorded(&plan, file, seed), OPTIONS).expect("a fit");
+    Calibration::of(&fitted, &[], "2026-01-01T00:00:00Z").expect("a calibration")
+}
+
+#[test]
+fn nothing_is_found_in_what_a_given_matrix_leaves_open() {
+    for seed in 0..2 {
+        let file = unit(&[], seed);
+        let given = short(&file, seed);
+        let rates = [-280.0, -200.0, -100.0, 100.0, 200.0, 280.0];
+        let steps = randomised([faces(&rates), faces(&rates)].concat(), seed);
+        let chamber = [[0.0, 20.0], [150.0, 30.0], [300.0, 20.0]];
+        let long = recorded(&plan(&steps, 6.0, &chamber), &file, 100 + seed);
+        let found = diagnosed(long, Some(&given));
+        assert_eq!(ids(&found), [""; 0], "seed {seed}");
+    }
+}
+
+#[test]
+fn what_the_temperature_does_to_bias_and_scale_in_one_pose_is_named_together() {
+    for (id, other) in [
+        ("accel_thermal_scale", "accel_thermal_bias"),
+        ("accel_thermal_bias", "accel_thermal_scale"),
+    ] {
+        let file = unit(&[id], 4);
+        let steps = vec![([0.0, 0.0, 1.0], 0.0); 40];
+        let chamber = [[0.0, 20.0], [150.0, 40.0], [300.0, 20.0]];
+        let one_pose = recorded(&plan(&steps, 6.0, &chamber), &file, 4);
+        let found = diagnosed(one_pose, Some(&short(&unit(&[], 4), 5)));
+        let effect = accepted(&found).find(|a| a.chosen.candidate.sensor == Sensor::Accel);
+        let effect = effect.expect("an effect");
+        let mut named: Vec<String> = vec![effect.chosen.candidate.id()];
+        named.push(effect.chosen.alternatives[0].0.clone());
+        named.sort_unstable();
+        let mut both = [id, other];
+        both.sort_unstable();
+        assert_eq!(named, both, "{id}");
+        let notes = &found.sensors.iter().find(|s| s.sensor == Sensor::Accel);
+        let notes = notes.expect("recorded").decision.notes.join("\n");
+        assert!(
+            notes.contains("does as well, as the input along the axis"),
+            "{notes}"
+        );
+    }
+}
+
+#[test]
+fn at_many_poses_what_the_temperature_does_to_bias_and_scale_is_told_apart() {
+    let file = unit(&["accel_thermal_scale"], 4);
+    let steps = randomised(
+        [faces(&[-100.0, 100.0]), faces(&[-200.0, 200.0])].concat(),
+        4,
+    );
+    let chamber = [[0.0, 20.0], [150.0, 40.0], [300.0, 20.0]];
+    let found = diagnosed(recorded(&plan(&steps, 6.0, &chamber), &file, 4), None);
+    let scale = accepted(&found).find(|a| a.chosen.candidate.id() == "accel_thermal_scale");
+    let others = &scale.expect("found").chosen.alternatives;
+    assert!(
+        others.iter().all(|o| o.0 != "accel_thermal_bias"),
+        "{others:?}"
+    );
+}
+
+#[test]
+fn a_warm_up_after_a_start_that_was_no_power_on_is_of_the_recording_alone() {
+    let mut file = unit(&["gyro_warm_up"], 6);
+    file.thermal.on_before_s = Some(0.0);
+    let steps = randomised(
+        [faces(&[-100.0, 100.0]), faces(&[-200.0, 200.0])].concat(),
+        6,
+    );
+    let by_power = recorded(&plan(&steps, 12.0, &[[0.0, 25.0]]), &file, 6);
+    let mut by_button = by_power.clone();
+    by_button.manifest.power_on_s = None;
+    by_button.manifest.recorded = Some(Recorded {
+        start: Some("reset pin".into()),
+        ..Recorded::default()
+    });
+    for (recording, of_unit) in [(by_power, true), (by_button, false)] {
+        let found = diagnosed(recording, None);
+        let warm_up = accepted(&found).find(|a| a.chosen.candidate.id() == "gyro_warm_up");
+        assert_eq!(warm_up.expect("found").of_unit, of_unit);
+        let gyro = found.sensors.iter().find(|s| s.sensor == Sensor::Gyro);
+        let notes = gyro.expect("recorded").decision.notes.join("\n");
+        assert_eq!(
+            notes.contains("time since power-on is unknown"),
+            !of_unit,
+            "{notes}"
+        );
+    }
+}
