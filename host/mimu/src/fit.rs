@@ -12,9 +12,11 @@ use rayon::prelude::*;
 
 use crate::estimate::least_squares::POORLY_DETERMINED;
 use crate::estimate::rotation::{Rest, Turn, direction_error};
-use crate::estimate::{Estimated, Failure, Observation, gravity_size, known_input, rotation};
+use crate::estimate::{
+    Estimated, Failure, Observation, gravity_size, known_input, moving_input, rotation,
+};
 use crate::prepared::{Prepared, si_covariance};
-use crate::quantity::{Figure, Sensor};
+use crate::quantity::{Figure, Sensor, plural};
 use crate::stillness::STILL_FACTOR;
 use crate::triad::Triad;
 use mimu_recording::error::{Argument, Error, Result};
@@ -199,20 +201,25 @@ fn fit_known(
         refuse_wrong_gravity(prepared, sensor, &observations)?;
         let wander = prepared.noise.wander(sensor, &prepared.dwells.list);
         let wander = wander.as_ref();
-        let estimate = |o: &[Observation]| match (options.method, sensor) {
+        let within = prepared.within_dwells(sensor);
+        let estimate = |o: &[Observation], within: &[Observation]| match (options.method, sensor) {
+            (Method::LeastSquares, _) if !within.is_empty() => {
+                moving_input::least_squares(o, within, wander)
+            }
             (Method::LeastSquares, _) => known_input::least_squares(o, wander),
             (Method::Kalman, _) => known_input::kalman(o, wander),
             (Method::InverseForm, Sensor::Gyro) => known_input::opposite_rates(o),
             (Method::InverseForm, Sensor::Accel) => known_input::inverse_form(o),
             (Method::SixPositions, _) => known_input::six_positions(o),
         };
-        let estimated = match estimate(&observations) {
+        let estimated = match estimate(&observations, &within) {
             Ok(estimated) => estimated,
             // A level cube tells nothing of the gyro, and a rate table not much of the accelerometer.
             Err(_)
-                if observations
-                    .iter()
-                    .all(|o| o.input == observations[0].input) =>
+                if within.is_empty()
+                    && observations
+                        .iter()
+                        .all(|o| o.input == observations[0].input) =>
             {
                 missing.push(format!(
                     "{sensor}: all dwells have the same input, so it is not calibrated"
@@ -240,32 +247,53 @@ fn fit_known(
         {
             warnings.push("gyro: the turns are taken to be of exactly the given angle about exactly the given axis; what hands and table miss of that is in no interval".into());
         }
-        let error = |triad: &Triad, o: &Observation| triad.inverse.apply(&o.raw) - o.input;
+        if !within.is_empty() && options.method != Method::LeastSquares {
+            warnings.push(format!(
+                "{sensor}: {} {} an input that moves, of which {} uses the mean alone: least squares uses how the readings follow it",
+                plural(count_dwells(&within), "dwell"),
+                if count_dwells(&within) == 1 { "has" } else { "have" },
+                options.method.name()
+            ));
+        }
+        let means = observations.iter().map(|o| (o, 1.0));
+        let within_used = match options.method {
+            Method::LeastSquares => &within[..],
+            _ => &[],
+        };
+        let all: Vec<(&Observation, f64)> =
+            means.chain(within_used.iter().map(|o| (o, 0.0))).collect();
         let matrix = estimated.triad.inverse.matrix;
-        let mut residuals: Vec<Residual> = observations
+        let mut residuals: Vec<Residual> = all
             .iter()
-            .map(|o| Residual {
+            .map(|(o, bias)| Residual {
                 dwell: o.dwell,
-                value: error(&estimated.triad, o),
+                within: *bias == 0.0,
+                value: estimated.error(o, *bias),
                 held_out: None,
                 floor: (si_covariance(&matrix, &o.variance).trace() / 3.0).sqrt(),
             })
             .collect();
         let n = observations.len();
-        let refits = refit(options.holdout_blocks.min(n), |block| {
-            let kept: Vec<_> = (0..n)
-                .filter(|&i| block_of(i, n, options.holdout_blocks.min(n)) != block)
-                .map(|i| observations[i])
-                .collect();
-            determined(estimate(&kept)?, &estimated)
+        let blocks = options.holdout_blocks.min(n);
+        // What a dwell shows within itself is held out with its mean.
+        let block_of_dwell = |dwell: usize| {
+            let at = observations.partition_point(|o| o.dwell < dwell);
+            block_of(at.min(n - 1), n, blocks)
+        };
+        let refits = refit(blocks, |block| {
+            let kept = |all: &[Observation]| -> Vec<Observation> {
+                let others = all.iter().filter(|o| block_of_dwell(o.dwell) != block);
+                others.copied().collect()
+            };
+            determined(estimate(&kept(&observations), &kept(&within))?, &estimated)
         });
         let mut not_held_out = Vec::new();
         for (block, refit) in refits.into_iter().enumerate() {
-            let members =
-                (0..n).filter(|&i| block_of(i, n, options.holdout_blocks.min(n)) == block);
+            let members = (0..all.len()).filter(|&i| block_of_dwell(all[i].0.dwell) == block);
             match refit {
                 Ok(refit) => members.for_each(|i| {
-                    residuals[i].held_out = Some(error(&refit.triad, &observations[i]))
+                    let (o, bias) = all[i];
+                    residuals[i].held_out = Some(refit.error(o, bias))
                 }),
                 Err(failure) => not_held_out.push(cannot_hold_out(block, failure, sensor)),
             }
@@ -289,6 +317,13 @@ fn fit_known(
     }
     warnings.extend(missing);
     Ok(sensors)
+}
+
+/// Dwells that `observations` are of, which stand in order.
+fn count_dwells(observations: &[Observation]) -> u64 {
+    let mut dwells: Vec<usize> = observations.iter().map(|o| o.dwell).collect();
+    dwells.dedup();
+    dwells.len() as u64
 }
 
 /// Runs `estimate` for each block that is left out, side by side.
@@ -344,7 +379,15 @@ fn finish(
             .iter()
             .map(|note| format!("{sensor}: {note}")),
     );
-    if estimated.scatter.iter().any(|(_, s)| s.dof < FEW_DOF) {
+    // Groups of one axis have its name before them.
+    let dof = |name: &str| {
+        let of_axis = estimated.scatter.iter().filter(|s| {
+            let rest = s.0.strip_prefix(name);
+            rest.is_some_and(|r| r.is_empty() || r.starts_with(" within"))
+        });
+        of_axis.map(|s| s.1.dof).sum::<f64>()
+    };
+    if estimated.scatter.iter().any(|(name, _)| dof(name.trim_end_matches(" within dwells")) < FEW_DOF) {
         warnings.push(format!("{sensor}: hardly more dwells than parameters: nothing can contradict the model, and the intervals rest on the noise within dwells alone"));
     }
     if estimated.condition > POORLY_DETERMINED {
@@ -376,9 +419,13 @@ pub(crate) fn refuse_wrong_gravity(
 ) -> Result<()> {
     let g = prepared.manifest.gravity_mps2;
     if sensor == Sensor::Accel && prepared.manifest.reference == Reference::Table {
-        let mut sizes: Vec<f64> = observations.iter().map(|o| o.input.norm()).collect();
+        // Of a force that turns the mean has another size.
+        let stand = observations
+            .iter()
+            .filter(|o| !prepared.dwells.list[o.dwell].moves(sensor));
+        let mut sizes: Vec<f64> = stand.map(|o| o.input.norm()).collect();
         sizes.sort_by(f64::total_cmp);
-        let typical = sizes[sizes.len() / 2];
+        let typical = sizes.get(sizes.len() / 2).copied().unwrap_or(g);
         if (0.8..1.2).contains(&typical) {
             let problem = format!("the known forces have a size of {typical:.3}, so they are in g");
             return Err(Error::new(
@@ -461,6 +508,7 @@ fn fit_gravity(
                 .and_then(|r| r.as_ref().ok());
             Residual {
                 dwell: o.dwell,
+                within: false,
                 value: size_error(&accel.triad, o),
                 held_out: refit.map(|r| size_error(&r.triad, o)),
                 floor: floor.sqrt(),
@@ -563,6 +611,7 @@ fn fit_turns(
         .iter()
         .map(|t| Residual {
             dwell: t.to,
+            within: false,
             value: direction_error(t, &gyro.triad.inverse),
             held_out: held_out(t),
             floor: t.floor(mean_square),

@@ -57,6 +57,7 @@ fn on_a_table(unit: &Ideal, random: &mut Random) -> Vec<Observation> {
             raw: unit.read(input.into(), 1000, random).into(),
             variance: Vector3::from(unit.sigma).map(|s| s * s / 1000.0),
             input,
+            change: Vector3::zeros(),
         })
         .collect()
 }

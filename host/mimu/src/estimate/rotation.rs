@@ -645,6 +645,7 @@ pub fn estimate(
         triad,
         scatter,
         condition,
+        delays: None,
         notes: Vec::new(),
     })
 }

@@ -88,6 +88,7 @@ impl Builder<'_> {
             by_reference: None,
             random_walk: Some(self.random_walk(&dwells)),
             wander_known: prepared.noise.is_stated(Sensor::Accel),
+            within: false,
         }];
         let nuisance = (nuisance, shapes.parameters);
         self.finish(y, nuisance, vec![6, 7, 8], strata, (Figure::Size, n, 1))
@@ -115,6 +116,7 @@ impl Builder<'_> {
             by_reference: None,
             random_walk: None,
             wander_known: true,
+            within: false,
         }];
         let nuisance = (shapes.errors, shapes.parameters);
         self.finish(
@@ -197,6 +199,7 @@ impl Builder<'_> {
                     conditions: conditions.clone(),
                     weights,
                     dwells: [turn.from, turn.to],
+                    moving: false,
                 });
             }
         }
@@ -253,6 +256,7 @@ impl Builder<'_> {
                 by_reference: by_reference.map(|v| v.diagonal()),
                 random_walk: None,
                 wander_known: true,
+                within: false,
             });
         }
         for axis in 0..3 {
@@ -296,6 +300,7 @@ impl Builder<'_> {
                 by_reference: None,
                 random_walk: random_walk.clone(),
                 wander_known: wander.is_some(),
+                within: false,
             });
         }
         let figure = match m {
