@@ -40,7 +40,8 @@ fn functions(course: &Course) -> Vec<DVector<f64>> {
     let n = course.blocks.len();
     let series = |kind: usize| {
         let of = course.of.iter().flatten();
-        let each = of.flat_map(move |s| (0..3).map(move |k| DVector::from_fn(n, |i, _| s[kind][i][k])));
+        let each =
+            of.flat_map(move |s| (0..3).map(move |k| DVector::from_fn(n, |i, _| s[kind][i][k])));
         each.collect::<Vec<_>>()
     };
     let inputs = series(0);
@@ -54,7 +55,12 @@ fn functions(course: &Course) -> Vec<DVector<f64>> {
 }
 
 /// The contrasts of `dwell`, the one of index `index`, in order of what they say; none where the input stands.
-pub(crate) fn contrasts(condensed: &Condensed, course: &Course, dwell: &Dwell, index: usize) -> Vec<Contrast> {
+pub(crate) fn contrasts(
+    condensed: &Condensed,
+    course: &Course,
+    dwell: &Dwell,
+    index: usize,
+) -> Vec<Contrast> {
     if !Sensor::BOTH.iter().any(|s| dwell.moves(*s)) {
         return Vec::new();
     }
@@ -88,15 +94,21 @@ pub(crate) fn contrasts(condensed: &Condensed, course: &Course, dwell: &Dwell, i
             weights[i - dwell.blocks.start] = *w;
         }
         let sum = |series: &Vec<Vector3<f64>>| -> Vector3<f64> {
-            series.iter().zip(by_block.iter()).map(|(x, w)| x * *w).sum()
+            series
+                .iter()
+                .zip(by_block.iter())
+                .map(|(x, w)| x * *w)
+                .sum()
         };
-        let known = course.of.each_ref().map(|of| of.as_ref().map(|s| s.each_ref().map(sum)));
+        let known = course
+            .of
+            .each_ref()
+            .map(|of| of.as_ref().map(|s| s.each_ref().map(sum)));
         let changes = unit.as_slice().windows(2).filter(|w| w[0] * w[1] < 0.0);
         let blocks = &condensed.blocks[dwell.blocks.clone()];
         Contrast {
             dwell: index,
-            half_period_s: dwell.duration_s
-                / (1 + changes.count()).clamp(2, blocks.len()) as f64,
+            half_period_s: dwell.duration_s / (1 + changes.count()).clamp(2, blocks.len()) as f64,
             weights,
             known,
         }

@@ -16,9 +16,9 @@ const FEWEST_BLOCKS: usize = 12;
 /// Blocks that a rate of change is taken from: a polynomial of fourth order. Of a turn by 30 degrees a block it errs by 0.4 %, where a
 /// central difference errs by 5 %, and what a delay does to the reading goes by it.
 const OF_SLOPE: usize = 5;
-/// Share of its range in the dwell that an input may move by within a block: half is that of a turn by 60 degrees, of which the mean of
-/// a square is 9 % less than the effect of it is taken to be, and the rate of change 4 %.
-const WITHIN_BLOCK: f64 = 0.5;
+/// Share of its range in the dwell that an input may move by within a block: that of a turn by 50 degrees, where the rate of change of the
+/// block means errs by 2 %, and the mean of a square, which is taken for the square of the mean, by 6 %.
+const WITHIN_BLOCK: f64 = 0.4;
 /// A gap of this many block lengths has no rate of change.
 const GAP_BLOCKS: f64 = 3.0;
 
@@ -107,8 +107,7 @@ impl Course {
                 Sensor::Gyro => 1f64.to_radians(),
                 Sensor::Accel => 1.0,
             };
-            let level =
-                |i: usize, k: usize| unit * condensed.blocks[i].reference[from + k].mean;
+            let level = |i: usize, k: usize| unit * condensed.blocks[i].reference[from + k].mean;
             let x: Vec<Vector3<f64>> = blocks
                 .iter()
                 .map(|i| Vector3::from_fn(|k, _| level(*i, k)))

@@ -498,7 +498,9 @@ fn warn(list: &[Dwell], manifest: &Manifest, warnings: &mut Vec<String>) {
                 Fault::Turning => "the unit turns evenly and does not rest".into(),
                 Fault::NotStill => format!("not still enough for the {sensor}"),
                 Fault::TooFast => {
-                    format!("the input of the {sensor} moves by half of its range within a tenth of a second")
+                    format!(
+                        "the input of the {sensor} moves too far within a tenth of a second, by two fifths of its range"
+                    )
                 }
                 other => other.to_string(),
             };

@@ -387,7 +387,11 @@ fn finish(
         });
         of_axis.map(|s| s.1.dof).sum::<f64>()
     };
-    if estimated.scatter.iter().any(|(name, _)| dof(name.trim_end_matches(" within dwells")) < FEW_DOF) {
+    if estimated
+        .scatter
+        .iter()
+        .any(|(name, _)| dof(name.trim_end_matches(" within dwells")) < FEW_DOF)
+    {
         warnings.push(format!("{sensor}: hardly more dwells than parameters: nothing can contradict the model, and the intervals rest on the noise within dwells alone"));
     }
     if estimated.condition > POORLY_DETERMINED {

@@ -103,7 +103,14 @@ impl Noise {
                         let of_sensor = dwells.iter().filter(|d| d.fault(sensor).is_none());
                         of_sensor.filter(|d| !d.turn)
                     };
-                    let stand = || usable().filter(|d| !d.moves(sensor));
+                    // What another input does to the reading is no noise either, but a fit does not know it.
+                    let none_moves = usable().any(|d| d.moves == [false; 2]);
+                    let stand = || {
+                        usable().filter(|d| match none_moves {
+                            true => d.moves == [false; 2],
+                            false => !d.moves(sensor),
+                        })
+                    };
                     channels[c] = match stand().next() {
                         Some(_) => within(stand(), condensed, |b| {
                             (b.raw[c].n > 0).then_some(b.raw[c].mean)

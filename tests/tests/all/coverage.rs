@@ -15,7 +15,7 @@ use mimu_recording::{
 use mimu_rig::ideal::Ideal;
 use mimu_rig::random::Random;
 use mimu_tests::bench;
-use mimu_tests::coverage::{Dwells, Tally, by_hand, with_a_table};
+use mimu_tests::coverage::{Dwells, Tally, by_hand, with_a_table, with_turning_inputs};
 use nalgebra::Vector3;
 
 /// Every parameter within 93 to 97 %, and what so many runs scatter by: 4 sigmas, as up to 60 parameters are looked at.
@@ -71,6 +71,36 @@ const MANY: u64 = 400;
 #[test]
 fn intervals_hold_the_truth_where_the_input_is_known() {
     with_a_table(FEW, Dwells::ByLot).iter().for_each(judge);
+}
+
+/// Parameters, and delays of the filters of the bench.
+fn turning_inputs(runs: u64) {
+    let (tallies, delays) = with_turning_inputs(runs);
+    tallies.iter().for_each(judge);
+    for (errors, sensor) in delays.iter().zip(Sensor::BOTH) {
+        let n = errors.len() as f64;
+        let inside = errors.iter().filter(|e| e.abs() < 1.96).count() as f64 / n;
+        let rms = (errors.iter().map(|e| e * e).sum::<f64>() / n).sqrt();
+        println!(
+            "delays of the {sensor}: {n} of them, 95 % intervals hold {:.1} %, rms error {rms:.3} sigma",
+            100.0 * inside
+        );
+        assert!(
+            (0.8..1.25).contains(&rms),
+            "{sensor}: rms error of {rms} sigma"
+        );
+    }
+}
+
+#[test]
+fn intervals_hold_the_truth_where_inputs_move_within_dwells() {
+    turning_inputs(24);
+}
+
+#[test]
+#[ignore = "nightly: more recordings"]
+fn intervals_of_many_hold_the_truth_where_inputs_move_within_dwells() {
+    turning_inputs(200);
 }
 
 #[test]

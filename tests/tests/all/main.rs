@@ -13,3 +13,4 @@ mod real_mikoff;
 mod real_xsens;
 mod several_recordings;
 mod stated_noise;
+mod turning;

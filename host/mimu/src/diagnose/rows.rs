@@ -189,7 +189,10 @@ impl Rows {
 
     /// Rows among the judged that are not of a whole dwell, but of how the reading follows an input that moves within it.
     pub fn judged_within(&self) -> usize {
-        let within = self.strata.iter().filter(|s| s.within && s.rows.end <= self.judged.0);
+        let within = self
+            .strata
+            .iter()
+            .filter(|s| s.within && s.rows.end <= self.judged.0);
         within.map(|s| s.rows.len()).sum()
     }
 

@@ -239,11 +239,7 @@ pub(super) struct OfAxis {
 }
 
 /// Puts `[b, P1, P2, P3]` of the three sensors (inputs in units of `span`) together.
-pub(super) fn forward(
-    axes: &[OfAxis],
-    span: f64,
-    condition: f64,
-) -> Result<Estimated, Failure> {
+pub(super) fn forward(axes: &[OfAxis], span: f64, condition: f64) -> Result<Estimated, Failure> {
     let mut model = Forward {
         matrix: Matrix3::zeros(),
         bias: Vector3::zeros(),

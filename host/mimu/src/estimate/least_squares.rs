@@ -175,7 +175,10 @@ struct ByRows {
 
 fn by_qr(white: &DMatrix<f64>) -> Option<ByRows> {
     let columns = white.ncols() - 1;
-    let (mut a, y) = (white.columns(0, columns).into_owned(), white.column(columns));
+    let (mut a, y) = (
+        white.columns(0, columns).into_owned(),
+        white.column(columns),
+    );
     // Columns of very different units: scaled for QR, scaled back after.
     let scale = DVector::from_iterator(
         a.ncols(),
@@ -246,9 +249,10 @@ pub fn solve_groups(groups: &[Group]) -> Option<(Solution, Vec<Scatter>)> {
             residuals.extend(left.iter().copied());
             from += n;
         }
-        let settled = next.iter().enumerate().all(|(g, s)| {
-            (s.excess - excess(g)).abs() <= 1e-6 * s.excess.max(excess(g))
-        });
+        let settled = next
+            .iter()
+            .enumerate()
+            .all(|(g, s)| (s.excess - excess(g)).abs() <= 1e-6 * s.excess.max(excess(g)));
         scatter = Some(next);
         if settled {
             let solution = Solution {

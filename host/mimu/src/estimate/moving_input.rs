@@ -108,8 +108,9 @@ pub fn least_squares(
             let mut delay = 0.0;
             for _ in 0..STEPS {
                 let by = all.forward(&solution);
-                (solution, scatter) =
-                    all.solve(axis, &errors, delay, Some(by)).ok_or_else(singular)?;
+                (solution, scatter) = all
+                    .solve(axis, &errors, delay, Some(by))
+                    .ok_or_else(singular)?;
                 let step = solution.parameters[4];
                 delay += step;
                 if step.abs() < SETTLED * solution.covariance[(4, 4)].sqrt() {
