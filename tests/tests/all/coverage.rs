@@ -299,7 +299,7 @@ fn noise_of_a_dwell_mean_is_that_of_correlated_noise() {
     let recording = Recording::open(&path).unwrap();
     let condensed = Condensed::read(&recording, false, |_| ()).unwrap();
     let found = mimu::dwell::Dwells::find(&condensed, &recording.manifest, STILL_FACTOR).unwrap();
-    let noise = mimu::noise::Noise::within(&found.list, &condensed);
+    let noise = mimu::noise::Noise::within(&found.list, &condensed, &found.rails);
     let claimed = noise.of_mean(Sensor::Gyro, &found.list[0]).mean().sqrt();
     let means = found
         .list
