@@ -2,14 +2,14 @@
 //!
 //! `blind SEEDS CLEAN [NAME...]`: so many seeds of each effect and pair, so many clean units; names choose among the effects. Every
 //! case is a recording of its own; with names, each is printed. `blind by-hand SEEDS CLEAN [NAME...]`: the same of units in somebody's
-//! hands, so many of each grade.
+//! hands, so many of each grade. `blind turning SEEDS CLEAN [NAME...]`: the first on a plan that also turns gravity through the unit.
 
 mod by_hand;
 
 use std::collections::BTreeMap;
 
 use mimu_rig::effects::specs;
-use mimu_tests::blind::{Case, case, is_listed, is_right};
+use mimu_tests::blind::{Case, case_on, is_listed, is_right, plan, turning_plan};
 use rayon::prelude::*;
 
 /// Pairs of effects, of one sensor and of both.
@@ -97,7 +97,8 @@ const HEAD: &str = "| | cases | detected | named right | right and more | named 
 fn main() {
     let mut args: Vec<String> = std::env::args().skip(1).collect();
     let in_hands = args.first().is_some_and(|a| a == "by-hand");
-    if in_hands {
+    let turning = args.first().is_some_and(|a| a == "turning");
+    if in_hands || turning {
         args.remove(0);
     }
     let number = |k: usize, default| args.get(k).and_then(|s| s.parse().ok()).unwrap_or(default);
@@ -117,7 +118,12 @@ fn main() {
         .into_par_iter()
         .map(|(ids, seed)| {
             let name = ids.join(" + ");
-            let case = case(&ids, seed);
+            let plan = if turning {
+                turning_plan(seed)
+            } else {
+                plan(seed)
+            };
+            let case = case_on(&plan, &ids, seed);
             if !chosen.is_empty() {
                 println!("{name}, seed {seed}: {case:?}");
             }

@@ -90,6 +90,7 @@ impl Contender {
             raw: truth.read((*up).into(), n, random).into(),
             variance: Vector3::repeat(SIGMA * SIGMA / f64::from(n)),
             input: *up,
+            change: Vector3::zeros(),
         };
         self.positions.iter().enumerate().map(dwell).collect()
     }

@@ -117,6 +117,7 @@ impl Experiment {
             raw: truth.read((*input).into(), 1, random).into(),
             variance: Vector3::from(sigma).map(|s| s * s),
             input: *input,
+            change: Vector3::zeros(),
         };
         self.inputs.iter().enumerate().map(read).collect()
     }

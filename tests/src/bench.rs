@@ -104,6 +104,40 @@ pub fn table_plan(order: Option<u64>) -> String {
     plan
 }
 
+/// Plan of the faces, of rates about each axis upright, and of turns about the body's z axis, level and slanted, with a rate about the
+/// vertical besides or without one: gravity turns through the accelerometer, and the rate through the gyro; in an order drawn by the seed.
+pub fn turning_plan(seed: u64) -> String {
+    let mut steps: Vec<([f64; 3], f64, f64)> = Vec::new();
+    for axis in 0..3 {
+        let up: [f64; 3] = std::array::from_fn(|i| f64::from(u8::from(i == axis)));
+        steps.push((up, 0.0, 0.0));
+        steps.push((up.map(|u| -u), 0.0, 0.0));
+        steps.extend([-200.0, 200.0].map(|rate| (up, rate, 0.0)));
+    }
+    for up in [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]] {
+        steps.extend([-180.0, -60.0, 60.0, 180.0].map(|spin| (up, 0.0, spin)));
+    }
+    for up in [[1.0, 0.0, 1.0], [1.0, 0.0, -1.0]] {
+        steps.extend([-90.0, 90.0].map(|spin| (up, 0.0, spin)));
+    }
+    for (rate, spin) in [(60.0, 45.0), (-60.0, 45.0), (120.0, -90.0), (-120.0, 90.0)] {
+        steps.push(([0.0, 1.0, 0.0], rate, spin));
+    }
+    let mut random = Random::new(seed, "order of the steps");
+    for k in (1..steps.len()).rev() {
+        steps.swap(k, (random.uniform() * (k + 1) as f64) as usize);
+    }
+    let mut plan =
+        String::from("format = \"mimu-plan/1\"\nsample_rate_hz = 100.0\ncarrier = \"table\"\n");
+    for (up, rate_dps, spin_dps) in steps {
+        let _ = writeln!(
+            plan,
+            "[[step]]\nup = {up:?}\nrate_dps = {rate_dps:?}\nspin_dps = {spin_dps:?}\ndwell_s = 6.0"
+        );
+    }
+    plan
+}
+
 /// Plan of so many poses by hand, 3 s each at 100 Hz.
 pub fn hand_plan(poses: usize) -> String {
     format!(

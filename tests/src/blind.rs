@@ -26,19 +26,42 @@ use crate::bench;
 /// Plan of half an hour on a table in a chamber: faces, edges, corners and eight rates about each axis, all twice, in an order drawn
 /// by the seed, while the chamber warms by 15 °C and cools again.
 pub fn plan(seed: u64) -> String {
-    let mut steps: Vec<([f64; 3], f64)> = Vec::new();
+    written_plan(seed, false)
+}
+
+/// The same with rates about the edges, and with turns about the body's z axis, level and slanted, with a rate about the vertical besides or
+/// without one.
+pub fn turning_plan(seed: u64) -> String {
+    written_plan(seed, true)
+}
+
+fn written_plan(seed: u64, turning: bool) -> String {
+    let mut steps: Vec<([f64; 3], f64, f64)> = Vec::new();
     for x in [-1.0, 0.0, 1.0] {
         for y in [-1.0, 0.0, 1.0] {
             for z in [-1.0, 0.0, 1.0] {
                 if (x, y, z) != (0.0, 0.0, 0.0) {
-                    steps.push(([x, y, z], 0.0));
+                    steps.push(([x, y, z], 0.0, 0.0));
                 }
             }
         }
     }
     for axis in 0..3 {
         let up: [f64; 3] = std::array::from_fn(|i| f64::from(u8::from(i == axis)));
-        steps.extend([-280.0, -200.0, -100.0, -30.0, 30.0, 100.0, 200.0, 280.0].map(|r| (up, r)));
+        steps.extend(
+            [-280.0, -200.0, -100.0, -30.0, 30.0, 100.0, 200.0, 280.0].map(|r| (up, r, 0.0)),
+        );
+    }
+    if turning {
+        for up in [[1.0, 1.0, 0.0], [0.0, 1.0, 1.0], [1.0, 0.0, 1.0]] {
+            steps.extend([-200.0, 200.0].map(|rate| (up, rate, 0.0)));
+        }
+        for up in [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 0.0, 1.0]] {
+            steps.extend([-180.0, -60.0, 60.0, 180.0].map(|spin| (up, 0.0, spin)));
+        }
+        for (rate, spin) in [(60.0, 45.0), (-60.0, 45.0), (120.0, -90.0), (-120.0, 90.0)] {
+            steps.push(([0.0, 1.0, 0.0], rate, spin));
+        }
     }
     let mut random = Random::new(seed, "order of the steps");
     let mut plan = String::from(
@@ -49,11 +72,11 @@ pub fn plan(seed: u64) -> String {
         for k in (1..steps.len()).rev() {
             steps.swap(k, (random.uniform() * (k + 1) as f64) as usize);
         }
-        for (up, rate_dps) in &steps {
+        for (up, rate_dps, spin_dps) in &steps {
             let heading = random.within(180.0);
             let _ = writeln!(
                 plan,
-                "[[step]]\nup = {up:?}\nheading_deg = {heading:?}\nrate_dps = {rate_dps:?}\ndwell_s = 10.0"
+                "[[step]]\nup = {up:?}\nheading_deg = {heading:?}\nrate_dps = {rate_dps:?}\nspin_dps = {spin_dps:?}\ndwell_s = 10.0"
             );
         }
     }
@@ -160,9 +183,20 @@ fn strength(with: &Prepared, without: &Prepared) -> (Sensor, f64) {
             let same = |b: &&Observation| step(without, b) == step(with, &a);
             Some((a, *all.iter().find(same)?))
         });
-        let (a, b): (Vec<Observation>, Vec<Observation>) = pairs.unzip();
+        let (mut a, mut b): (Vec<Observation>, Vec<Observation>) = pairs.unzip();
+        let means = a.len();
+        // How the readings follow inputs that move; the inputs are the same.
+        let within = [with, without].map(|p| p.within_dwells(sensor));
+        if within[0].len() == within[1].len() {
+            let [of_with, of_without] = within;
+            a.extend(of_with);
+            b.extend(of_without);
+        }
         let n = a.len();
-        let design = DMatrix::from_fn(n, 4, |i, j| if j == 0 { 1.0 } else { a[i].input[j - 1] });
+        let design = DMatrix::from_fn(n, 4, |i, j| match j {
+            0 => f64::from(u8::from(i < means)),
+            _ => a[i].input[j - 1],
+        });
         let q = design.qr().q();
         let mut sum = 0.0;
         let mut noise = 0.0;
@@ -179,13 +213,16 @@ fn strength(with: &Prepared, without: &Prepared) -> (Sensor, f64) {
 
 /// Recording of the unit of a seed without any effect, which every effect of that seed is measured against.
 fn clean(plan: &str, file: &RigFile, seed: u64) -> Arc<Prepared> {
-    static RECORDED: Mutex<BTreeMap<u64, Arc<Prepared>>> = Mutex::new(BTreeMap::new());
+    // Of one seed there is one plan of each kind, and they differ in length.
+    type Recorded = BTreeMap<(u64, usize), Arc<Prepared>>;
+    static RECORDED: Mutex<Recorded> = Mutex::new(BTreeMap::new());
     let known = || RECORDED.lock().expect("nobody panics with it");
-    if let Some(recorded) = known().get(&seed) {
+    let key = (seed, plan.lines().count());
+    if let Some(recorded) = known().get(&key) {
         return recorded.clone();
     }
     let recorded = Arc::new(bench::recorded(plan, file, seed));
-    known().entry(seed).or_insert(recorded).clone()
+    known().entry(key).or_insert(recorded).clone()
 }
 
 /// A diagnosis that everything was said and drawn of: none may fail for what was found.
@@ -211,17 +248,21 @@ pub fn reported(diagnosis: Diagnosis) -> Diagnosis {
 
 /// Records and diagnoses a unit with `ids`.
 pub fn case(ids: &[&str], seed: u64) -> Case {
-    let plan = plan(seed);
+    case_on(&plan(seed), ids, seed)
+}
+
+/// The same on a plan of another kind.
+pub fn case_on(plan: &str, ids: &[&str], seed: u64) -> Case {
     let file = unit(ids, seed);
-    let with = bench::recorded(&plan, &file, seed);
+    let with = bench::recorded(plan, &file, seed);
     let mut strengths = Vec::new();
     let mut sensors = Vec::new();
     for k in 0..ids.len() {
         let mut less = file.clone();
         less.effect.remove(k);
         let less = match less.effect.is_empty() {
-            true => clean(&plan, &less, seed),
-            false => Arc::new(bench::recorded(&plan, &less, seed)),
+            true => clean(plan, &less, seed),
+            false => Arc::new(bench::recorded(plan, &less, seed)),
         };
         let (sensor, s) = strength(&with, &less);
         strengths.push(s);

@@ -1,11 +1,13 @@
 //! Whether 95 % intervals hold the truth in 95 % of the cases, parameter by parameter, over the whole path of a recording.
 
+use std::sync::Mutex;
+
 use mimu::fit::{Fit, Method, Options, fit};
 use mimu::quantity::Sensor;
 use mimu::stillness::STILL_FACTOR;
 use mimu::triad::Triad;
 use mimu_rig::random::Random;
-use mimu_rig::rig_file::RigFile;
+use mimu_rig::rig_file::{RigFile, RigTruth};
 use nalgebra::SVector;
 use rayon::prelude::*;
 
@@ -175,6 +177,43 @@ pub fn with_a_table(runs: u64, dwells: Dwells) -> Vec<Tally> {
             }
         }
     })
+}
+
+/// Least squares of both sensors on recordings from a table that turns gravity through the accelerometer; with the errors of the delays
+/// in sigmas, gyro and accelerometer. A first-order filter delays a slow input by its time constant.
+pub fn with_turning_inputs(runs: u64) -> (Vec<Tally>, [Vec<f64>; 2]) {
+    let all: Vec<usize> = (0..12).collect();
+    let empty = Sensor::BOTH.map(|s| Tally::new(format!("inputs that turn, {s}"), &all));
+    let delays = Mutex::new([Vec::new(), Vec::new()]);
+    let tallies = over(runs, &empty, |seed, tallies| {
+        let plan = bench::turning_plan(seed);
+        let mut random = Random::new(seed, "unit");
+        let (gyro, accel) = (bench::gyro(&mut random), bench::accel(&mut random));
+        let file = bench::clean(gyro, accel);
+        let truths = of_the_session(&plan, &file, seed);
+        let unit = RigTruth::resolve(&file, seed).expect("a rig").unit;
+        let fitted = fit(
+            bench::recorded(&plan, &file, seed),
+            options(Method::LeastSquares),
+        )
+        .unwrap_or_else(|e| panic!("inputs that turn, seed {seed}: {e}"));
+        for (k, sensor) in Sensor::BOTH.into_iter().enumerate() {
+            tallies[k].add(triad(&fitted, sensor), &truths[k]);
+            let found = fitted.sensor(sensor).expect("recorded").estimated.delays;
+            let found = found.expect("inputs move");
+            let axes = [&unit.gyro, &unit.accel][k].axes.iter();
+            let errors = axes.enumerate().map(|(i, axis)| {
+                let filters = [axis.bandwidth_hz, axis.rc_hz];
+                let known: f64 = filters
+                    .map(|hz| 1.0 / (std::f64::consts::TAU * hz))
+                    .iter()
+                    .sum();
+                (found.value[i] - known) / found.sigma[i]
+            });
+            delays.lock().expect("nobody panics with it")[k].extend(errors);
+        }
+    });
+    (tallies, delays.into_inner().expect("nobody panics with it"))
 }
 
 /// Both sensors on recordings by hand, with nothing known but the magnitude of gravity. A gyro that is `quiet` beside

@@ -8,15 +8,19 @@ use std::fmt;
 use std::ops::Range;
 
 use crate::blocks::{Condensed, Level, Rails, Stretch, pool, quantile};
+use crate::course::{Course, Motion, motion};
 use crate::quantity::{Sensor, plural};
 use crate::rails::{self, longest_run_by_chance};
 use crate::rest::{self, Rest};
-use crate::stillness::{self, Detection, Finding, SHORTEST_S, Steps};
+use crate::stillness::{self, Detection, Finding, SHORTEST_S, Steps, reference_spans};
 use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{Manifest, RAW_COLUMNS, Reference};
 
 /// Variance of a given step over the median of all steps, at most; a fivefold standard deviation.
 const STEP_FACTOR: f64 = 25.0;
+/// Part of the variance of block means that the known input of a dwell may leave: errors of a tenth of the input are a diagnosis's to
+/// find; a reference of another dwell leaves all of it.
+const UNFOLLOWED: f64 = 0.02;
 /// Share of clipped samples from which on a mean is refused: below, it moves by less than a tenth
 /// of a standard deviation of one sample.
 const CLIPPED_SHARE: f64 = 0.01;
@@ -26,8 +30,10 @@ const CLIPPED_SHARE: f64 = 0.01;
 pub enum Fault {
     /// Shorter than [`SHORTEST_S`].
     TooShort,
-    /// The variance is far above that of the other dwells.
+    /// The variance is far above that of the other dwells, and no known input explains it.
     NotStill,
+    /// The known input moves too fast for the blocks that samples are condensed to.
+    TooFast,
     /// The unit turns evenly and does not rest.
     Turning,
     /// It errs by far more than the others predict.
@@ -45,6 +51,7 @@ impl fmt::Display for Fault {
         match *self {
             Self::TooShort => f.write_str("too short"),
             Self::NotStill => f.write_str("not still"),
+            Self::TooFast => f.write_str("moved too fast"),
             Self::Turning => f.write_str("turning"),
             Self::Outlying => f.write_str("outlying"),
             Self::Saturated(c) => write!(f, "{} saturated", RAW_COLUMNS[c]),
@@ -92,6 +99,8 @@ pub struct Dwell {
     pub temp_c: f64,
     /// Whether it is a turn of known angle, of which only the mean rate is known.
     pub turn: bool,
+    /// Whether the known input of gyro and accelerometer moves within it.
+    pub moves: [bool; 2],
     /// Why it is not used for the gyro, if so.
     pub gyro_fault: Option<Fault>,
     /// Why it is not used for the accelerometer, if so.
@@ -105,6 +114,11 @@ impl Dwell {
             Sensor::Gyro => self.gyro_fault,
             Sensor::Accel => self.accel_fault,
         }
+    }
+
+    /// Whether the known input of `sensor` moves within it: then its mean is not all that it shows.
+    pub fn moves(&self, sensor: Sensor) -> bool {
+        self.moves[sensor as usize]
     }
 
     /// Time over which the channels of `sensor` are averaged, s: masked samples are gone, and the mean is that of a shorter
@@ -232,7 +246,20 @@ impl Dwells {
             });
         }
         let judged = given && finding.steps != Steps::Given;
-        judge(&mut list, condensed, &longest_run, judged);
+        let too_fast = match manifest.reference {
+            Reference::Table => find_moving(&mut list, condensed),
+            Reference::Gravity => vec![[false; 2]; list.len()],
+        };
+        let unfollowed = |dwell: &Dwell, sensor| unfollowed(dwell, sensor, condensed, &rails);
+        judge(&mut list, condensed, &longest_run, judged, &unfollowed);
+        for (dwell, too_fast) in list.iter_mut().zip(too_fast) {
+            let faults = [&mut dwell.gyro_fault, &mut dwell.accel_fault];
+            for (fault, too_fast) in faults.into_iter().zip(too_fast) {
+                if too_fast && *fault == Some(Fault::NotStill) {
+                    *fault = Some(Fault::TooFast);
+                }
+            }
+        }
         if !given && by_hand {
             leave_out_turning(&mut list, condensed);
         }
@@ -326,6 +353,7 @@ fn dwell(condensed: &Condensed, step: i32, range: Range<usize>, rails: &[Rails; 
         reference,
         temp_c: average(|b, _| b.temp_c, 0),
         turn: false,
+        moves: [false; 2],
         gyro_fault: None,
         accel_fault: None,
     }
@@ -349,19 +377,77 @@ fn leave_out_turning(list: &mut [Dwell], condensed: &Condensed) {
     }
 }
 
-/// Finds out which dwells are no good for which sensor.
-fn judge(list: &mut [Dwell], condensed: &Condensed, longest_run: &[f64; 6], given: bool) {
+/// Finds the dwells whose known inputs move, and those where one moves too fast.
+fn find_moving(list: &mut [Dwell], condensed: &Condensed) -> Vec<[bool; 2]> {
+    let spans = reference_spans(condensed);
+    let each = list.iter_mut().map(|dwell| {
+        // Of a turn of known angle only the mean rate is known.
+        if dwell.turn {
+            return [false; 2];
+        }
+        let blocks = &condensed.blocks[dwell.blocks.clone()];
+        let found = Sensor::BOTH.map(|s| motion(blocks, s, &spans));
+        dwell.moves = found.map(|m| m == Motion::Moves);
+        found.map(|m| m == Motion::TooFast)
+    });
+    each.collect()
+}
+
+/// Variance of the block means of each channel of `sensor` over `dwell`, raw units squared, and what of it its known input leaves; `None`
+/// where that does not move.
+fn unfollowed(
+    dwell: &Dwell,
+    sensor: Sensor,
+    condensed: &Condensed,
+    rails: &[Rails; 6],
+) -> Option<[[f64; 2]; 3]> {
+    if !dwell.moves(sensor) {
+        return None;
+    }
+    let course = Course::of(condensed, dwell.blocks.clone(), rails)?;
+    let from = sensor.channels().start;
+    let mut out = [[0.0; 2]; 3];
+    for (k, out) in out.iter_mut().enumerate() {
+        let blocks = course.blocks.iter();
+        let means: Vec<f64> = blocks
+            .map(|i| condensed.blocks[*i].raw[from + k].mean)
+            .collect();
+        let n = means.len() as f64;
+        let centre = means.iter().sum::<f64>() / n;
+        let left = course.unfollowed(sensor, &means)?;
+        *out = [
+            means.iter().map(|m| (m - centre).powi(2)).sum::<f64>() / n,
+            left.iter().map(|r| r * r).sum::<f64>() / n,
+        ];
+    }
+    Some(out)
+}
+
+/// Finds out which dwells are no good for which sensor; `unfollowed` is of a dwell what the function of that name says.
+fn judge(
+    list: &mut [Dwell],
+    condensed: &Condensed,
+    longest_run: &[f64; 6],
+    given: bool,
+    unfollowed: &dyn Fn(&Dwell, Sensor) -> Option<[[f64; 2]; 3]>,
+) {
     for sensor in Sensor::BOTH {
         let channels = || sensor.channels().filter(|&c| condensed.has_raw[c]);
+        let any_stands = list.iter().any(|d| !d.moves(sensor));
         let typical: Vec<f64> = channels()
             .map(|c| {
-                let mut all: Vec<f64> = list.iter().map(|d| d.raw[c].variance).collect();
+                let usual = list.iter().filter(|d| !any_stands || !d.moves(sensor));
+                let mut all: Vec<f64> = usual.map(|d| d.raw[c].variance).collect();
                 quantile(&mut all, 0.5).unwrap_or(0.0)
             })
             .collect();
         for dwell in list.iter_mut() {
             // A turn of known angle has a known mean rate, and is anything but still.
             let turn = dwell.turn;
+            let followed = match given && channels().next().is_some() {
+                true => unfollowed(dwell, sensor),
+                false => None,
+            };
             let mut fault = None;
             for (k, c) in channels().enumerate() {
                 let mean = dwell.raw[c];
@@ -376,6 +462,10 @@ fn judge(list: &mut [Dwell], condensed: &Condensed, longest_run: &[f64; 6], give
                     && !turn
                     && mean.variance > STEP_FACTOR * typical[k]
                     && typical[k] > 0.0
+                    && !followed.is_some_and(|f| {
+                        let [all, left] = f[c - sensor.channels().start];
+                        left <= STEP_FACTOR * typical[k] + UNFOLLOWED * all
+                    })
                 {
                     Some(Fault::NotStill)
                 } else {
@@ -407,6 +497,11 @@ fn warn(list: &[Dwell], manifest: &Manifest, warnings: &mut Vec<String>) {
                 Fault::TooShort => format!("shorter than {SHORTEST_S} s"),
                 Fault::Turning => "the unit turns evenly and does not rest".into(),
                 Fault::NotStill => format!("not still enough for the {sensor}"),
+                Fault::TooFast => {
+                    format!(
+                        "the input of the {sensor} moves too far within a tenth of a second, by two fifths of its range"
+                    )
+                }
                 other => other.to_string(),
             };
             let name = manifest

@@ -13,9 +13,11 @@ use nalgebra::Vector3;
 
 use crate::estimate::least_squares::POORLY_DETERMINED;
 use crate::estimate::turn::{Rest, Turn, direction_error, sensitivity};
-use crate::estimate::{Estimated, Failure, Observation, gravity_size, known_input, rotation};
+use crate::estimate::{
+    Estimated, Failure, Observation, gravity_size, known_input, moving_input, rotation,
+};
 use crate::prepared::{Prepared, si_covariance};
-use crate::quantity::{Figure, Sensor};
+use crate::quantity::{Figure, Sensor, plural};
 use crate::stillness::STILL_FACTOR;
 use crate::triad::{Triad, slope};
 use mimu_recording::error::{Argument, Error, Result};
@@ -187,20 +189,25 @@ fn fit_known(
         refuse_wrong_gravity(prepared, sensor, &observations)?;
         let wander = prepared.noise.wander(sensor, &prepared.dwells.list);
         let wander = wander.as_ref();
-        let estimate = |o: &[Observation]| match (options.method, sensor) {
+        let within = prepared.within_dwells(sensor);
+        let estimate = |o: &[Observation], within: &[Observation]| match (options.method, sensor) {
+            (Method::LeastSquares, _) if !within.is_empty() => {
+                moving_input::least_squares(o, within, wander)
+            }
             (Method::LeastSquares, _) => known_input::least_squares(o, wander),
             (Method::Kalman, _) => known_input::kalman(o, wander),
             (Method::InverseForm, Sensor::Gyro) => known_input::opposite_rates(o),
             (Method::InverseForm, Sensor::Accel) => known_input::inverse_form(o),
             (Method::SixPositions, _) => known_input::six_positions(o),
         };
-        let estimated = match estimate(&observations) {
+        let estimated = match estimate(&observations, &within) {
             Ok(estimated) => estimated,
             // A level cube tells nothing of the gyro, and a rate table not much of the accelerometer.
             Err(_)
-                if observations
-                    .iter()
-                    .all(|o| o.input == observations[0].input) =>
+                if within.is_empty()
+                    && observations
+                        .iter()
+                        .all(|o| o.input == observations[0].input) =>
             {
                 missing.push(format!(
                     "{sensor}: all dwells have the same input, so it is not calibrated"
@@ -228,34 +235,60 @@ fn fit_known(
         {
             warnings.push("gyro: the turns are taken to be of exactly the given angle about exactly the given axis; what hands and table miss of that is in no interval".into());
         }
-        let error = |triad: &Triad, o: &Observation| triad.inverse.apply(&o.raw) - o.input;
+        if !within.is_empty() && options.method != Method::LeastSquares {
+            warnings.push(format!(
+                "{sensor}: {} {} an input that moves, of which {} uses the mean alone: least squares uses how the readings follow it",
+                plural(count_dwells(&within), "dwell"),
+                if count_dwells(&within) == 1 { "has" } else { "have" },
+                options.method.name()
+            ));
+        }
+        let means = observations.iter().map(|o| (o, 1.0));
+        let within_used = match options.method {
+            Method::LeastSquares => &within[..],
+            _ => &[],
+        };
+        let all: Vec<(&Observation, f64)> =
+            means.chain(within_used.iter().map(|o| (o, 0.0))).collect();
         let matrix = estimated.triad.inverse.matrix;
-        let mut residuals: Vec<Residual> = observations
+        let mut residuals: Vec<Residual> = all
             .iter()
-            .map(|o| Residual {
+            .map(|(o, bias)| Residual {
                 dwell: o.dwell,
-                value: error(&estimated.triad, o),
+                within: *bias == 0.0,
+                value: estimated.error(o, *bias),
                 held_out: None,
                 floor: (si_covariance(&matrix, &o.variance).trace() / 3.0).sqrt(),
             })
             .collect();
         let n = observations.len();
         let parts = options.holdout_blocks.min(n);
+        // What a dwell shows within itself is held out with its mean.
+        let part_of = |split: Split, dwell: usize| {
+            let at = observations.partition_point(|o| o.dwell < dwell);
+            split.part(at.min(n - 1), n, parts)
+        };
         let typical = typical(Figure::Input, &residuals);
         let held_out = HeldOut::of(parts, |split, part| {
-            let of_part = |i: &usize| split.part(*i, n, parts) == part;
-            let kept = (0..n).filter(|i| !of_part(i)).map(|i| observations[i]);
-            let refit = estimate(&kept.collect::<Vec<_>>())?;
-            let open = (0..n).filter(of_part).map(|i| {
-                let axis = |k: usize| slope(&Vector3::ith(k, 1.0), &observations[i].raw);
+            let of_part = |o: &Observation| part_of(split, o.dwell) == part;
+            let kept = |all: &[Observation]| -> Vec<Observation> {
+                all.iter().filter(|o| !of_part(o)).copied().collect()
+            };
+            let refit = estimate(&kept(&observations), &kept(&within))?;
+            let open = all.iter().filter(|(o, _)| of_part(o)).map(|(o, bias)| {
+                let axis = |k: usize| {
+                    let mut by = slope(&Vector3::ith(k, 1.0), &o.raw);
+                    by.rows_mut(9, 3).scale_mut(*bias);
+                    by
+                };
                 (0..3).map(|k| refit.triad.variance(&axis(k))).sum::<f64>() / 3.0
             });
             determined(open, typical, (Figure::Input, sensor))?;
             Ok(refit)
         });
-        for (i, residual) in residuals.iter_mut().enumerate() {
-            let refit = held_out.without(held_out.split.part(i, n, parts));
-            residual.held_out = refit.map(|refit| error(&refit.triad, &observations[i]));
+        for (residual, (o, bias)) in residuals.iter_mut().zip(&all) {
+            let refit = held_out.without(part_of(held_out.split, o.dwell));
+            residual.held_out = refit.map(|refit| refit.error(o, *bias));
         }
         sensors.push(finish(
             sensor,
@@ -278,6 +311,13 @@ fn fit_known(
     Ok(sensors)
 }
 
+/// Dwells that `observations` are of, which stand in order.
+fn count_dwells(observations: &[Observation]) -> u64 {
+    let mut dwells: Vec<usize> = observations.iter().map(|o| o.dwell).collect();
+    dwells.dedup();
+    dwells.len() as u64
+}
+
 /// Fewer degrees of freedom than this show no error of the model.
 const FEW_DOF: f64 = 3.0;
 
@@ -297,7 +337,19 @@ fn finish(
             .iter()
             .map(|note| format!("{sensor}: {note}")),
     );
-    if estimated.scatter.iter().any(|(_, s)| s.dof < FEW_DOF) {
+    // Groups of one axis have its name before them.
+    let dof = |name: &str| {
+        let of_axis = estimated.scatter.iter().filter(|s| {
+            let rest = s.0.strip_prefix(name);
+            rest.is_some_and(|r| r.is_empty() || r.starts_with(" within"))
+        });
+        of_axis.map(|s| s.1.dof).sum::<f64>()
+    };
+    if estimated
+        .scatter
+        .iter()
+        .any(|(name, _)| dof(name.trim_end_matches(" within dwells")) < FEW_DOF)
+    {
         warnings.push(format!("{sensor}: hardly more dwells than parameters: nothing can contradict the model, and the intervals rest on the noise within dwells alone"));
     }
     if estimated.condition > POORLY_DETERMINED {
@@ -329,9 +381,13 @@ pub(crate) fn refuse_wrong_gravity(
 ) -> Result<()> {
     let g = prepared.manifest.gravity_mps2;
     if sensor == Sensor::Accel && prepared.manifest.reference == Reference::Table {
-        let mut sizes: Vec<f64> = observations.iter().map(|o| o.input.norm()).collect();
+        // Of a force that turns the mean has another size.
+        let stand = observations
+            .iter()
+            .filter(|o| !prepared.dwells.list[o.dwell].moves(sensor));
+        let mut sizes: Vec<f64> = stand.map(|o| o.input.norm()).collect();
         sizes.sort_by(f64::total_cmp);
-        let typical = sizes[sizes.len() / 2];
+        let typical = sizes.get(sizes.len() / 2).copied().unwrap_or(g);
         if (0.8..1.2).contains(&typical) {
             let problem = format!("the known forces have a size of {typical:.3}, so they are in g");
             return Err(Error::new(
@@ -401,6 +457,7 @@ fn fit_gravity(
         .zip(&floors)
         .map(|(o, floor)| Residual {
             dwell: o.dwell,
+            within: false,
             value: size_error(&accel.triad, o),
             held_out: None,
             floor: floor.sqrt(),
@@ -479,6 +536,7 @@ fn fit_turns(
         .iter()
         .map(|t| Residual {
             dwell: t.to,
+            within: false,
             value: direction_error(t, &gyro.triad.inverse),
             held_out: None,
             floor: t.floor(mean_square),

@@ -5,6 +5,7 @@
 //! | [`quantity`]    | sensors, axes, SI units, and how numbers are written                         |
 //! | [`blocks`], [`increment`] | one pass over the samples condenses them to 0.1 s blocks and 10 ms integrals |
 //! | [`rails`], [`stillness`], [`rest`], [`dwell`] | which samples and which stretches can be averaged           |
+//! | `course`, `contrast` | a known input that moves within a dwell, and what the dwell then shows beside its mean |
 //! | [`reading_step`] | the step that readings are multiples of                                       |
 //! | [`noise`]       | how well a dwell mean is known                                                |
 //! | [`prepared`]    | all of these for one recording                                                |
@@ -67,6 +68,8 @@ pub mod allan;
 pub mod apply;
 pub mod blocks;
 pub mod calibration;
+mod contrast;
+mod course;
 pub mod design;
 pub mod diagnose;
 pub mod dwell;

@@ -12,7 +12,8 @@ use mimu_core::compensation::Affine;
 
 use self::wander::{Slow, Span};
 use crate::allan::variance::AllanModel;
-use crate::blocks::{Block, Condensed};
+use crate::blocks::{Block, Condensed, Rails};
+use crate::course::Course;
 use crate::dwell::Dwell;
 use crate::noise_file::NoiseFile;
 use crate::quantity::Sensor;
@@ -92,18 +93,39 @@ const ANOTHER_NOISE: f64 = 2.0;
 
 impl Noise {
     /// Pools the overlapping Allan variance within all usable dwells at rest or at a constant rate, and fits the
-    /// model to it.
-    pub fn within(dwells: &[Dwell], condensed: &Condensed) -> Self {
+    /// model to it. Where no input stands, of what the readings do not follow of theirs; `rails` are those of the channels.
+    pub fn within(dwells: &[Dwell], condensed: &Condensed, rails: &[Rails; 6]) -> Self {
         let mut channels: [ChannelNoise; 6] = Default::default();
         for sensor in Sensor::BOTH {
             for c in sensor.channels() {
                 if condensed.has_raw[c] {
-                    let usable = dwells
-                        .iter()
-                        .filter(|d| d.fault(sensor).is_none() && !d.turn);
-                    channels[c] = within(usable, condensed, |b| {
-                        (b.raw[c].n > 0).then_some(b.raw[c].mean)
-                    });
+                    let usable = || {
+                        let of_sensor = dwells.iter().filter(|d| d.fault(sensor).is_none());
+                        of_sensor.filter(|d| !d.turn)
+                    };
+                    // What another input does to the reading is no noise either, but a fit does not know it.
+                    let none_moves = usable().any(|d| d.moves == [false; 2]);
+                    let stand = || {
+                        usable().filter(|d| match none_moves {
+                            true => d.moves == [false; 2],
+                            false => !d.moves(sensor),
+                        })
+                    };
+                    channels[c] = match stand().next() {
+                        Some(_) => within(stand(), condensed, |b| {
+                            (b.raw[c].n > 0).then_some(b.raw[c].mean)
+                        }),
+                        None => {
+                            let left = usable().filter_map(|d| {
+                                let course = Course::of(condensed, d.blocks.clone(), rails)?;
+                                let blocks = course.blocks.iter();
+                                let means: Vec<f64> =
+                                    blocks.map(|i| condensed.blocks[*i].raw[c].mean).collect();
+                                course.unfollowed(sensor, &means)
+                            });
+                            pooled(left, block_s(condensed).1)
+                        }
+                    };
                 }
             }
         }
@@ -278,17 +300,26 @@ fn within<'a>(
     condensed: &Condensed,
     value: impl Fn(&Block) -> Option<f64>,
 ) -> ChannelNoise {
+    let (rows, block_s) = block_s(condensed);
+    let series = dwells.map(|dwell| {
+        let blocks = condensed.blocks[dwell.blocks.clone()].iter();
+        let whole = blocks.filter(|b| b.rows == rows);
+        whole.filter_map(&value).collect()
+    });
+    pooled(series, block_s)
+}
+
+/// Samples of a full block, and its length, s.
+fn block_s(condensed: &Condensed) -> (u32, f64) {
     let rows = condensed.blocks.iter().map(|b| b.rows).max().unwrap_or(1);
-    let block_s = f64::from(rows) * condensed.period_s;
+    (rows, f64::from(rows) * condensed.period_s)
+}
+
+/// Noise of series of means over `block_s`, pooled.
+fn pooled(series: impl Iterator<Item = Vec<f64>>, block_s: f64) -> ChannelNoise {
     // Sum of squared differences and their number, by octave of block length.
     let mut octaves: Vec<(f64, f64, f64)> = Vec::new();
-    for dwell in dwells {
-        let blocks = &condensed.blocks[dwell.blocks.clone()];
-        let means: Vec<f64> = blocks
-            .iter()
-            .filter(|b| b.rows == rows)
-            .filter_map(&value)
-            .collect();
+    for means in series {
         let mut sums = Vec::with_capacity(means.len() + 1);
         sums.push(0.0);
         for m in &means {

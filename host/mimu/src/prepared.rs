@@ -4,7 +4,9 @@ use mimu_core::compensation::Affine;
 use nalgebra::{Matrix3, Vector3};
 
 use crate::blocks::Condensed;
-use crate::dwell::Dwells;
+use crate::contrast::{Contrast, contrasts};
+use crate::course::Course;
+use crate::dwell::{Dwell, Dwells};
 use crate::estimate::earth::Earth;
 use crate::estimate::turn::{Motion, Rest, Turn};
 use crate::estimate::{Failure, Observation};
@@ -89,7 +91,7 @@ impl Prepared {
         }
         let dwells = Dwells::find(&condensed, &manifest, finding)
             .map_err(|e| e.map(|e| e.place = format!("{place}, {}", e.place)))?;
-        let noise = Noise::within(&dwells.list, &condensed);
+        let noise = Noise::within(&dwells.list, &condensed, &dwells.rails);
         Ok(Self {
             manifest,
             condensed,
@@ -129,9 +131,71 @@ impl Prepared {
                     raw: d.raw_mean(sensor),
                     variance: self.noise.of_mean(sensor, d),
                     input: input.unwrap_or_else(|| Vector3::repeat(f64::NAN)),
+                    change: self.mean_change(sensor, d),
                 })
             })
             .collect()
+    }
+
+    /// Course of the known inputs through a dwell.
+    pub(crate) fn course(&self, dwell: &Dwell) -> Option<Course> {
+        Course::of(&self.condensed, dwell.blocks.clone(), &self.dwells.rails)
+    }
+
+    /// Mean rate of change of the known input of `sensor` over `dwell`, SI/s.
+    fn mean_change(&self, sensor: Sensor, dwell: &Dwell) -> Vector3<f64> {
+        let course = dwell.moves(sensor).then(|| self.course(dwell)).flatten();
+        course.map_or_else(Vector3::zeros, |course| {
+            let change = course.of[sensor as usize].iter().flat_map(|[_, c]| c);
+            change.zip(&course.share).map(|(c, share)| c * *share).sum()
+        })
+    }
+
+    /// The contrasts of all dwells in which a known input moves.
+    pub(crate) fn contrasts(&self) -> Vec<Contrast> {
+        let moving = self.dwells.list.iter().enumerate();
+        let each = moving.filter(|(_, d)| Sensor::BOTH.iter().any(|s| d.moves(*s)));
+        each.filter_map(|(i, d)| Some(contrasts(&self.condensed, &self.course(d)?, d, i)))
+            .flatten()
+            .collect()
+    }
+
+    /// What `sensor` reads in `contrast`; `None` if the dwell is not used for it or its input is not known.
+    pub(crate) fn observation(&self, sensor: Sensor, contrast: &Contrast) -> Option<Observation> {
+        let dwell = &self.dwells.list[contrast.dwell];
+        let [input, change] = contrast.known[sensor as usize]?;
+        if dwell.fault(sensor).is_some() || !self.has(sensor) {
+            return None;
+        }
+        let from = sensor.channels().start;
+        let blocks = &self.condensed.blocks[dwell.blocks.clone()];
+        let raw = Vector3::from_fn(|k, _| {
+            let weighted = blocks.iter().zip(&contrast.weights);
+            let used = weighted.filter(|(_, w)| **w != 0.0);
+            used.map(|(b, w)| w * b.raw[from + k].mean).sum()
+        });
+        // White noise has the variance of the mean, as the weights have a mean square of one; what is slower than the weights is not in it.
+        let tau_s = contrast.half_period_s;
+        let variance = Vector3::from_fn(|k, _| {
+            let of_half = self.noise.variance(from + k, tau_s, dwell.temp_c);
+            of_half * tau_s / dwell.averaged_s(sensor)
+        });
+        Some(Observation {
+            dwell: contrast.dwell,
+            raw,
+            variance,
+            input,
+            change,
+        })
+    }
+
+    /// What the dwells in which the known input of `sensor` moves show of it beside their means.
+    pub fn within_dwells(&self, sensor: Sensor) -> Vec<Observation> {
+        let contrasts = self.contrasts();
+        let moving = contrasts
+            .iter()
+            .filter(|c| self.dwells.list[c.dwell].moves(sensor));
+        moving.filter_map(|c| self.observation(sensor, c)).collect()
     }
 
     /// What is known of the Earth's rate.

@@ -218,7 +218,7 @@ fn rate_at_rest(at_rest: &[&Window], c: usize, margin: f64) -> std::ops::RangeIn
 }
 
 /// Largest less smallest value of each reference channel in the recording, by sensor.
-fn reference_spans(condensed: &Condensed) -> [f64; 6] {
+pub(crate) fn reference_spans(condensed: &Condensed) -> [f64; 6] {
     let mut spans = [0.0; 6];
     for sensor in Sensor::BOTH {
         let mut span: f64 = 0.0;
@@ -246,7 +246,8 @@ const CONSTANT_SHARE: f64 = 2e-3;
 /// And always while it moves by less than this, deg/s or m/s²: where nothing moves, the span is that of the jitter.
 const CONSTANT: [f64; 2] = [0.01, 1e-3];
 
-fn tolerance(c: usize, spans: &[f64; 6]) -> f64 {
+/// By how much reference channel `c` may move and stand, deg/s or m/s²; `spans` are those of [`reference_spans`].
+pub(crate) fn tolerance(c: usize, spans: &[f64; 6]) -> f64 {
     (CONSTANT_SHARE * spans[c]).max(CONSTANT[c / 3])
 }
 

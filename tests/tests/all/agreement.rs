@@ -52,6 +52,7 @@ fn on_a_table(unit: &Ideal, n: u32, random: &mut Random) -> Vec<Observation> {
             raw: unit.read(input.into(), n, random).into(),
             variance,
             input,
+            change: Vector3::zeros(),
         })
         .collect()
 }

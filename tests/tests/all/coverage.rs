@@ -15,7 +15,7 @@ use mimu_recording::{
 use mimu_rig::ideal::Ideal;
 use mimu_rig::random::Random;
 use mimu_tests::bench;
-use mimu_tests::coverage::{Dwells, Tally, by_hand, with_a_table};
+use mimu_tests::coverage::{Dwells, Tally, by_hand, with_a_table, with_turning_inputs};
 use nalgebra::Vector3;
 
 /// Every parameter within 93 to 97 %, and what so many runs scatter by: 4 sigmas, as up to 60 parameters are looked at.
@@ -57,6 +57,7 @@ fn on_a_table(unit: &Ideal, random: &mut Random) -> Vec<Observation> {
             raw: unit.read(input.into(), 1000, random).into(),
             variance: Vector3::from(unit.sigma).map(|s| s * s / 1000.0),
             input,
+            change: Vector3::zeros(),
         })
         .collect()
 }
@@ -70,6 +71,36 @@ const MANY: u64 = 400;
 #[test]
 fn intervals_hold_the_truth_where_the_input_is_known() {
     with_a_table(FEW, Dwells::ByLot).iter().for_each(judge);
+}
+
+/// Parameters, and delays of the filters of the bench.
+fn turning_inputs(runs: u64) {
+    let (tallies, delays) = with_turning_inputs(runs);
+    tallies.iter().for_each(judge);
+    for (errors, sensor) in delays.iter().zip(Sensor::BOTH) {
+        let n = errors.len() as f64;
+        let inside = errors.iter().filter(|e| e.abs() < 1.96).count() as f64 / n;
+        let rms = (errors.iter().map(|e| e * e).sum::<f64>() / n).sqrt();
+        println!(
+            "delays of the {sensor}: {n} of them, 95 % intervals hold {:.1} %, rms error {rms:.3} sigma",
+            100.0 * inside
+        );
+        assert!(
+            (0.8..1.25).contains(&rms),
+            "{sensor}: rms error of {rms} sigma"
+        );
+    }
+}
+
+#[test]
+fn intervals_hold_the_truth_where_inputs_move_within_dwells() {
+    turning_inputs(24);
+}
+
+#[test]
+#[ignore = "nightly: more recordings"]
+fn intervals_of_many_hold_the_truth_where_inputs_move_within_dwells() {
+    turning_inputs(200);
 }
 
 #[test]
@@ -268,7 +299,7 @@ fn noise_of_a_dwell_mean_is_that_of_correlated_noise() {
     let recording = Recording::open(&path).unwrap();
     let condensed = Condensed::read(&recording, false, |_| ()).unwrap();
     let found = mimu::dwell::Dwells::find(&condensed, &recording.manifest, STILL_FACTOR).unwrap();
-    let noise = mimu::noise::Noise::within(&found.list, &condensed);
+    let noise = mimu::noise::Noise::within(&found.list, &condensed, &found.rails);
     let claimed = noise.of_mean(Sensor::Gyro, &found.list[0]).mean().sqrt();
     let means = found
         .list

@@ -14,3 +14,4 @@ mod real_xsens;
 mod several_recordings;
 mod stated_noise;
 mod temperature;
+mod turning;

@@ -56,6 +56,9 @@ pub fn fit_text(fit: &FitResult) -> String {
     out
 }
 
+/// Half of a 95 % interval in sigmas.
+const INTERVAL: f64 = 1.96;
+
 fn sensor_text(out: &mut String, fit: &FitResult, name: &str, sensor: &SensorFitResult) {
     let dwells = plural(sensor.dwells as u64, "dwell");
     let used = match sensor.unit {
@@ -107,6 +110,16 @@ fn sensor_text(out: &mut String, fit: &FitResult, name: &str, sensor: &SensorFit
             let _ = writeln!(out, "    {:<12}{:>16}", "held out", rate.write(held));
         }
         let _ = writeln!(out, "    {:<12}{:>16}", "in sample", rate.write(rms));
+    }
+    if let Some(delay) = &sensor.delay_s {
+        let of = |k: usize| plus_minus(1e3 * delay.value[k], 1e3 * INTERVAL * delay.sigma[k]);
+        let _ = writeln!(
+            out,
+            "  behind the reference, taken out: x {}, y {}, z {} ms",
+            of(0),
+            of(1),
+            of(2)
+        );
     }
     for (group, scatter) in &sensor.scatter {
         if scatter.significant {

@@ -4,6 +4,7 @@
 //! | reference, sensor | one row is                                                     | unit   |
 //! |-------------------|----------------------------------------------------------------|--------|
 //! | table             | a dwell and sensor axis: reading less prediction, over the scale factor | SI |
+//! |                   | where an input moves within a dwell: its [contrasts](crate::prepared::Prepared::within_dwells) | SI |
 //! | gravity, accel    | a dwell: magnitude of the force minus gravity                        | m/s²   |
 //! | gravity, gyro     | a turn and direction across gravity: prediction error of gravity | rad  |
 //! |                   | a dwell and axis: rate at rest                                 | rad/s  |
@@ -59,6 +60,8 @@ pub struct Stratum {
     pub random_walk: Option<DMatrix<f64>>,
     /// Whether the known covariance holds what the bias wanders.
     pub wander_known: bool,
+    /// Whether its rows are no means of dwells, but of how the reading follows an input that moves within them.
+    pub within: bool,
 }
 
 /// What the error figures of some rows are about.
@@ -132,6 +135,8 @@ struct Row {
     weights: Vec<Vector3<f64>>,
     /// Index of the dwell, or of the dwells that a turn begins and ends in; counted through all recordings.
     dwells: [usize; 2],
+    /// Whether the input moves from one of its conditions to the next, so that none stands for all.
+    moving: bool,
 }
 
 /// The rows of one sensor.
@@ -261,6 +266,15 @@ impl Rows {
         self.rows[range].iter().map(square).sum::<f64>() / count
     }
 
+    /// Rows among the judged that are not of a whole dwell, but of how the reading follows an input that moves within it.
+    pub fn judged_within(&self) -> usize {
+        let within = self
+            .strata
+            .iter()
+            .filter(|s| s.within && s.rows.end <= self.judged.0);
+        within.map(|s| s.rows.len()).sum()
+    }
+
     /// Number of dwells.
     pub fn dwell_count(&self) -> usize {
         self.first.last().copied().unwrap_or(0)
@@ -285,7 +299,7 @@ impl Rows {
         of_row.iter().map(|m| value(m) * m.duration_s / total).sum()
     }
 
-    /// The same rows with one conditions for each dwell, whose reading scatters as its samples do: for what depends on the reading alone.
+    /// The same rows with one conditions for each dwell whose input stands, whose reading scatters as its samples do: for what depends on the reading alone.
     pub fn by_dwell(&self) -> Self {
         let mut out = self.clone();
         out.quantities = OnceLock::new();
@@ -295,14 +309,18 @@ impl Rows {
         for row in &mut out.rows {
             let range = row.conditions.clone();
             let at = out.conditions.len();
-            if row.dwells[0] != row.dwells[1] {
-                out.conditions
-                    .extend_from_slice(&self.conditions[range.clone()]);
-                out.block.extend_from_slice(&self.block[range]);
-                row.conditions = at..out.conditions.len();
+            let known = merged.iter().rev().find(|m| m.0 == range).map(|m| m.1);
+            if row.dwells[0] != row.dwells[1] || row.moving {
+                let at = known.unwrap_or_else(|| {
+                    let ours = &self.conditions[range.clone()];
+                    out.conditions.extend_from_slice(ours);
+                    out.block.extend_from_slice(&self.block[range.clone()]);
+                    merged.push((range.clone(), at));
+                    at
+                });
+                row.conditions = at..at + range.len();
                 continue;
             }
-            let known = merged.iter().rev().find(|m| m.0 == range).map(|m| m.1);
             let at = known.unwrap_or_else(|| {
                 out.conditions
                     .push(Conditions::pooled(&self.conditions[range.clone()]));

@@ -235,6 +235,7 @@ pub fn estimate(
         triad,
         scatter: vec![("magnitude of specific force".into(), scatter)],
         condition: shape.condition,
+        delays: None,
         notes: Vec::new(),
     })
 }

@@ -19,9 +19,9 @@ const REST_SHARE: f64 = 1e-3;
 const ALONG_SHARE: f64 = 0.02;
 
 /// Size of the largest input; the unit in which designs are judged.
-fn span(observations: &[Observation]) -> f64 {
+pub(super) fn span<'a>(observations: impl IntoIterator<Item = &'a Observation>) -> f64 {
     observations
-        .iter()
+        .into_iter()
         .map(|o| o.input.norm())
         .fold(0.0, f64::max)
         .max(f64::MIN_POSITIVE)
@@ -38,6 +38,11 @@ fn design(observations: &[Observation], span: f64) -> DMatrix<f64> {
 /// Whether the inputs determine `[b, P1, P2, P3]`, fang (29), (30). The same for all three sensors.
 pub fn observability(observations: &[Observation]) -> Result<Observability, Failure> {
     let found = Observability::of(&design(observations, span(observations)));
+    complete(found, observations.len())
+}
+
+/// What was found of a design `[b, P1, P2, P3]` of so many dwells, or what it leaves undetermined.
+pub(super) fn complete(found: Observability, dwells: usize) -> Result<Observability, Failure> {
     if found.is_complete() {
         return Ok(found);
     }
@@ -56,10 +61,9 @@ pub fn observability(observations: &[Observation]) -> Result<Observability, Fail
         parameters.insert(0, "the biases".into());
     }
     let axes = inputs.join(", ");
-    let add = if observations.len() < 4 {
+    let add = if dwells < 4 {
         format!(
-            "only {} dwells can be used, and 4 parameters a sensor need at least 4 different inputs",
-            observations.len()
+            "only {dwells} dwells can be used, and 4 parameters a sensor need at least 4 different inputs"
         )
     } else if bias {
         format!(
@@ -76,7 +80,11 @@ pub fn observability(observations: &[Observation]) -> Result<Observability, Fail
 
 /// What is known of the errors of the readings of sensor `axis`. `wander` is what the means of all dwells share, axis by axis
 /// ([`crate::noise::Noise::wander`]), and part of their variances.
-fn errors(observations: &[Observation], axis: usize, wander: Option<&[DMatrix<f64>; 3]>) -> Errors {
+pub(super) fn errors(
+    observations: &[Observation],
+    axis: usize,
+    wander: Option<&[DMatrix<f64>; 3]>,
+) -> Errors {
     let n = observations.len();
     let variances = positive(DVector::from_fn(n, |i, _| observations[i].variance[axis]));
     let Some(wander) = wander else {
@@ -105,7 +113,11 @@ pub fn least_squares(
         let errors = errors(observations, axis, wander);
         let (solution, scatter) = solve_with_excess(&design, &raw, &errors)
             .ok_or_else(|| Failure::NoSolution("the design is singular".into()))?;
-        axes.push((solution.parameters, solution.covariance, scatter));
+        axes.push(OfAxis {
+            parameters: solution.parameters,
+            covariance: solution.covariance,
+            scatter: vec![(AXES[axis].to_string(), scatter)],
+        });
     }
     forward(&axes, span, observability.condition)
 }
@@ -204,7 +216,11 @@ pub fn kalman(
             round += 1;
             if settled || round == 30 {
                 let covariance = DMatrix::from_column_slice(4, 4, filter.covariance().as_slice());
-                return Ok((mean, covariance, scatter));
+                return Ok(OfAxis {
+                    parameters: mean,
+                    covariance,
+                    scatter: vec![(AXES[axis].to_string(), scatter)],
+                });
             }
         }
     };
@@ -212,18 +228,26 @@ pub fn kalman(
     forward(&axes, span, observability.condition)
 }
 
+/// What was found of one sensor.
+pub(super) struct OfAxis {
+    /// `[b, P1, P2, P3]`, inputs in units of the span.
+    pub parameters: DVector<f64>,
+    /// Their covariance.
+    pub covariance: DMatrix<f64>,
+    /// By group of observations; the variance of the parameters comes from all.
+    pub scatter: Vec<(String, Scatter)>,
+}
+
 /// Puts `[b, P1, P2, P3]` of the three sensors (inputs in units of `span`) together.
-fn forward(
-    axes: &[(DVector<f64>, DMatrix<f64>, Scatter)],
-    span: f64,
-    condition: f64,
-) -> Result<Estimated, Failure> {
+pub(super) fn forward(axes: &[OfAxis], span: f64, condition: f64) -> Result<Estimated, Failure> {
     let mut model = Forward {
         matrix: Matrix3::zeros(),
         bias: Vector3::zeros(),
     };
     let mut parts = Vec::new();
-    for (axis, (parameters, of_axis, scatter)) in axes.iter().enumerate() {
+    for (axis, found) in axes.iter().enumerate() {
+        let (parameters, of_axis) = (&found.parameters, &found.covariance);
+        let dof = found.scatter.iter().map(|s| s.1.variance_dof());
         let mut covariance = Covariance::zeros();
         // Where b, P1, P2, P3 of this sensor stand among the twelve.
         let places = [9 + axis, 3 * axis, 3 * axis + 1, 3 * axis + 2];
@@ -239,14 +263,10 @@ fn forward(
         }
         parts.push(Part {
             covariance,
-            dof: scatter.variance_dof(),
+            dof: dof.fold(f64::INFINITY, f64::min),
         });
     }
-    let scatter: Vec<_> = axes
-        .iter()
-        .zip(AXES)
-        .map(|(a, name)| (name.to_string(), a.2))
-        .collect();
+    let scatter: Vec<_> = axes.iter().flat_map(|a| a.scatter.clone()).collect();
     let triad = Triad::from_forward(model, parts).ok_or_else(|| {
         Failure::NoSolution(
             "the three sensors measure one plane only (singular scale-factor matrix)".into(),
@@ -256,12 +276,13 @@ fn forward(
         triad,
         scatter,
         condition,
+        delays: None,
         notes: Vec::new(),
     })
 }
 
 /// Variances, with a floor where a noiseless recording has none: 1e-12 of the largest, or of one.
-fn positive(variances: DVector<f64>) -> DVector<f64> {
+pub(super) fn positive(variances: DVector<f64>) -> DVector<f64> {
     let floor = 1e-12 * variances.max();
     variances.map(|v| {
         if v > floor {
@@ -433,6 +454,7 @@ pub fn opposite_rates(observations: &[Observation]) -> Result<Estimated, Failure
         triad,
         scatter,
         condition: observability.condition,
+        delays: None,
         notes,
     })
 }
@@ -556,6 +578,7 @@ pub fn inverse_form(observations: &[Observation]) -> Result<Estimated, Failure> 
         triad,
         scatter,
         condition: observability.condition,
+        delays: None,
         notes: Vec::new(),
     })
 }
@@ -629,6 +652,7 @@ pub fn six_positions(observations: &[Observation]) -> Result<Estimated, Failure>
         triad,
         scatter,
         condition: 1.0,
+        delays: None,
         notes: Vec::new(),
     })
 }

@@ -148,11 +148,37 @@ pub fn solve(
     errors: &Errors,
     excess: f64,
 ) -> Option<Solution> {
+    let found = by_qr(&errors.whitened(excess, &beside(design, observations))?)?;
+    let residuals = observations - design * &found.parameters;
+    Some(Solution {
+        parameters: found.parameters,
+        covariance: found.covariance,
+        residuals,
+    })
+}
+
+/// `design` with the observations behind it.
+fn beside(design: &DMatrix<f64>, observations: &DVector<f64>) -> DMatrix<f64> {
     let columns = design.ncols();
     let mut both = design.clone().insert_column(columns, 0.0);
     both.set_column(columns, observations);
-    let both = errors.whitened(excess, &both)?;
-    let (mut a, y) = (both.columns(0, columns).into_owned(), both.column(columns));
+    both
+}
+
+/// What decorrelated rows, the observations in the last column, say of the parameters.
+struct ByRows {
+    parameters: DVector<f64>,
+    covariance: DMatrix<f64>,
+    /// Of each row, the share of its own noise that its prediction has.
+    leverage: DVector<f64>,
+}
+
+fn by_qr(white: &DMatrix<f64>) -> Option<ByRows> {
+    let columns = white.ncols() - 1;
+    let (mut a, y) = (
+        white.columns(0, columns).into_owned(),
+        white.column(columns),
+    );
     // Columns of very different units: scaled for QR, scaled back after.
     let scale = DVector::from_iterator(
         a.ncols(),
@@ -163,19 +189,82 @@ pub fn solve(
     }
     let qr = a.qr();
     let r_inverse = qr.r().try_inverse()?;
-    let parameters = (&r_inverse * qr.q().transpose() * y).component_div(&scale);
+    let q = qr.q();
+    let parameters = (&r_inverse * q.transpose() * y).component_div(&scale);
     let mut covariance = &r_inverse * r_inverse.transpose();
     for i in 0..scale.len() {
         for j in 0..scale.len() {
             covariance[(i, j)] /= scale[i] * scale[j];
         }
     }
-    let residuals = observations - design * &parameters;
-    Some(Solution {
+    let rows = q.row_iter().map(|r| r.norm_squared());
+    Some(ByRows {
+        leverage: DVector::from_iterator(q.nrows(), rows),
         parameters,
         covariance,
-        residuals,
     })
+}
+
+/// Observations that share what they scatter by beside their known errors.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Group {
+    /// Design, a row for each.
+    pub design: DMatrix<f64>,
+    /// Observations.
+    pub observations: DVector<f64>,
+    /// Known errors.
+    pub errors: Errors,
+}
+
+/// Solves a linear problem of several groups of observations that are independent of each other, adding to each the excess variance that
+/// its own residual shows. A group has as many degrees of freedom as observations, minus what the parameters take up of them.
+pub fn solve_groups(groups: &[Group]) -> Option<(Solution, Vec<Scatter>)> {
+    let mut last: Option<(Solution, Vec<Scatter>)> = None;
+    // A chi-square at the edge of doubt may come and go with the excess of another group: either answer is as good.
+    for _ in 0..30 {
+        let excess = |g: usize| last.as_ref().map_or(0.0, |l| l.1[g].excess);
+        let white = groups.iter().enumerate().map(|(g, group)| {
+            let both = beside(&group.design, &group.observations);
+            group.errors.whitened(excess(g), &both)
+        });
+        let white = white.collect::<Option<Vec<DMatrix<f64>>>>()?;
+        let count: usize = white.iter().map(DMatrix::nrows).sum();
+        let mut all = DMatrix::zeros(count, white.first()?.ncols());
+        let mut from = 0;
+        for part in &white {
+            all.rows_mut(from, part.nrows()).copy_from(part);
+            from += part.nrows();
+        }
+        let found = by_qr(&all)?;
+        let (mut scatter, mut residuals) = (Vec::new(), Vec::new());
+        let mut from = 0;
+        for (g, group) in groups.iter().enumerate() {
+            let n = group.observations.len();
+            let left = &group.observations - &group.design * &found.parameters;
+            let dof = n as f64 - found.leverage.rows(from, n).sum();
+            let mut one = excess_of(&left, &group.errors, dof);
+            if let Some((_, before)) = &last {
+                one.chi2 = before[g].chi2;
+            }
+            scatter.push(one);
+            residuals.extend(left.iter().copied());
+            from += n;
+        }
+        let settled = scatter
+            .iter()
+            .enumerate()
+            .all(|(g, s)| (s.excess - excess(g)).abs() <= 1e-6 * s.excess.max(excess(g)));
+        let solution = Solution {
+            parameters: found.parameters,
+            covariance: found.covariance,
+            residuals: DVector::from_vec(residuals),
+        };
+        last = Some((solution, scatter));
+        if settled {
+            break;
+        }
+    }
+    last
 }
 
 /// What scatter has, beside the noise that was known beforehand.

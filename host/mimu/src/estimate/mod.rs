@@ -3,6 +3,7 @@
 //! | module            | reference | what it is                                               |
 //! |-------------------|-----------|----------------------------------------------------------|
 //! | [`known_input`]   | table     | forward least squares, Kalman bank, xu's inverse form, six positions |
+//! | [`moving_input`]  | table     | the same least squares where inputs move within dwells     |
 //! | [`gravity_size`]  | gravity   | accelerometer from the magnitude of gravity over many poses   |
 //! | [`rotation`]      | gravity   | gyro from the turns between dwells                       |
 //! | [`turn`]          | gravity   | one turn, and where a calibration carries gravity in it   |
@@ -15,6 +16,7 @@ pub mod earth;
 pub mod gravity_size;
 pub mod known_input;
 pub mod least_squares;
+pub mod moving_input;
 pub mod rotation;
 pub mod turn;
 
@@ -23,17 +25,30 @@ use nalgebra::Vector3;
 use crate::triad::Triad;
 use least_squares::Scatter;
 
-/// One dwell as an estimator sees it.
+/// The mean of a dwell as an estimator sees it; or, where its input moves, another sum over the dwell, with weights that add to zero.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Observation {
     /// Index of the dwell it comes from.
     pub dwell: usize,
-    /// Mean raw reading.
+    /// Mean raw reading, or the sum of the raw readings.
     pub raw: Vector3<f64>,
     /// Variance of `raw` by the noise within dwells, raw units squared.
     pub variance: Vector3<f64>,
-    /// True input in SI; not a number where only the magnitude of gravity is known.
+    /// The same of the true input in SI; not a number where only the magnitude of gravity is known.
     pub input: Vector3<f64>,
+    /// The same of the rate of change of the true input, SI/s; zero where it stands.
+    pub change: Vector3<f64>,
+}
+
+/// By how much the readings of three axes are behind the reference, s.
+///
+/// Filters of the sensor and the clocks of table and converter: both are a shift in time to first order.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Delays {
+    /// Estimates.
+    pub value: Vector3<f64>,
+    /// Standard deviations.
+    pub sigma: Vector3<f64>,
 }
 
 /// What an estimator found for one triad.
@@ -45,8 +60,25 @@ pub struct Estimated {
     pub scatter: Vec<(String, Scatter)>,
     /// Condition number of the scaled design.
     pub condition: f64,
+    /// Delays of the readings, where moving inputs show them.
+    pub delays: Option<Delays>,
     /// What a person should know.
     pub notes: Vec<String>,
+}
+
+impl Estimated {
+    /// Error of an observation whose input is known, SI: what it is by the calibration, its delay taken out, minus its input. `bias` is the
+    /// sum of its weights: 1 of a mean, 0 of the other sums.
+    pub fn error(&self, o: &Observation, bias: f64) -> Vector3<f64> {
+        let behind = match &self.delays {
+            Some(delays) => delays
+                .value
+                .component_mul(&(self.triad.forward.matrix * o.change)),
+            None => Vector3::zeros(),
+        };
+        let inverse = &self.triad.inverse;
+        inverse.matrix * (o.raw + behind) + inverse.offset * bias - o.input
+    }
 }
 
 /// Why there is no estimate.

@@ -338,6 +338,7 @@ pub fn estimate(
         triad,
         scatter,
         condition,
+        delays: None,
         notes: Vec::new(),
     })
 }

@@ -85,6 +85,7 @@ pub fn fit_biases(
             };
             Residual {
                 dwell: o.dwell,
+                within: false,
                 value,
                 held_out: None,
                 floor: floor.sqrt(),

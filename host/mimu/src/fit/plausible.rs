@@ -60,11 +60,14 @@ fn spread(prepared: &Prepared, fit: &SensorFit) -> f64 {
         Figure::GravitySize => prepared.manifest.gravity_mps2,
         Figure::Input => {
             let dwell = |r: &Residual| prepared.dwells.list[r.dwell].input(fit.sensor);
-            let inputs: Vec<_> = fit.residuals.iter().filter_map(dwell).collect();
+            let means = fit.residuals.iter().filter(|r| !r.within);
+            let inputs: Vec<_> = means.filter_map(dwell).collect();
             let n = inputs.len() as f64;
             let mean = inputs.iter().sum::<nalgebra::Vector3<f64>>() / n;
             let squares = inputs.iter().map(|x| (x - mean).norm_squared());
-            (squares.sum::<f64>() / (3.0 * n)).sqrt()
+            let within = prepared.within_dwells(fit.sensor);
+            let moved: f64 = within.iter().map(|o| o.input.norm_squared()).sum();
+            ((squares.sum::<f64>() + moved) / (3.0 * n)).sqrt()
         }
     }
 }

@@ -11,6 +11,8 @@ use crate::quantity::{Figure, Sensor};
 pub struct Residual {
     /// Dwell, or the dwell that a turn ends in.
     pub dwell: usize,
+    /// Whether it is not of the mean of the dwell, but of how the reading follows an input that moves within it.
+    pub within: bool,
     /// Vector residual: input error, direction error; for a size, the error stands first.
     pub value: Vector3<f64>,
     /// The same by a calibration that has not seen it. `None`: could not be held out.
@@ -28,7 +30,7 @@ pub struct SensorFit {
     pub estimated: Estimated,
     /// What the error figures are about.
     pub figure: Figure,
-    /// One for every dwell or turn that was used.
+    /// One for every dwell or turn that was used, and of dwells whose input moves those within them.
     pub residuals: Vec<Residual>,
     /// Number of dwells used.
     pub dwells: usize,

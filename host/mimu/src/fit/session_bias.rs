@@ -96,6 +96,7 @@ pub fn estimate(
         triad,
         scatter,
         condition: 1.0,
+        delays: None,
         notes: vec![
             "the matrix is given, and no interval holds its error; the biases are this recording's"
                 .into(),

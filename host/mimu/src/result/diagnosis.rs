@@ -426,7 +426,7 @@ fn figures(d: &Diagnosis, found: &SensorDiagnosis) -> SensorDiagnosisResult {
         rows: decision.rows[0],
         affine_parameters: decision.rows[1],
         omnibus_chance: decision.omnibus_p,
-        judged: count / of_one,
+        judged: (count - found.rows.judged_within()) / of_one,
         dwells_used: fit.map_or(0, |f| f.dwells),
         dwells: dwells.list.len(),
         not_used: dwells.unused(found.sensor),

@@ -149,6 +149,9 @@ pub struct SensorFitResult {
     pub dwells: usize,
     /// Condition of the experiment.
     pub condition: f64,
+    /// By how much the readings of x, y, z are behind the reference, s, taken out of the fit; absent where no input moves within a dwell.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub delay_s: Option<Triple>,
     /// The physical quantities to first order in the angles, fang (14): for comparison with what others publish.
     pub small_angle: SmallAngle,
     /// By group of observations, whether noise explains their residuals.
@@ -159,7 +162,7 @@ pub struct SensorFitResult {
     pub held_out_parts: usize,
     /// Why not in blocks, or why some parts were not held out.
     pub not_held_out: Vec<String>,
-    /// One for every dwell or turn that was used.
+    /// One for every dwell or turn that was used, and those within the dwells whose input moves.
     pub residuals: Vec<ResidualResult>,
     /// Compensated gyro dwell means without a table, rad/s; absent with one.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -228,6 +231,9 @@ pub struct ScatterResult {
 pub struct ResidualResult {
     /// Dwell, or that which the turn ends in.
     pub step: i32,
+    /// Whether it is not of the mean of the dwell, but of how the reading follows an input that moves within it; absent where not.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub within: bool,
     /// Residual, SI; of a magnitude the first.
     pub value: [f64; 3],
     /// The same by a fit that has not seen it; null where there is none.
@@ -344,6 +350,7 @@ impl SensorFitResult {
         });
         let residuals = found.residuals.iter().map(|r| ResidualResult {
             step: fit.prepared.dwells.list[r.dwell].step,
+            within: r.within,
             value: r.value.into(),
             held_out: r.held_out.map(Into::into),
             floor: r.floor,
@@ -359,6 +366,10 @@ impl SensorFitResult {
             figure: found.figure,
             dwells: found.dwells,
             condition: found.estimated.condition,
+            delay_s: found.estimated.delays.map(|d| Triple {
+                value: d.value.into(),
+                sigma: d.sigma.into(),
+            }),
             small_angle: SmallAngle {
                 scale: Triple::of(&small.scale),
                 bias: Triple::of(&small.bias),

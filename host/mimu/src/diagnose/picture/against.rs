@@ -154,7 +154,11 @@ pub(super) fn panels(
         .ok()?;
     let across = columns - basis * share;
     for track in tracks.iter().filter(|t| t.axis.is_none()) {
-        panels.push(whole(one, &across, track));
+        // Rows of another axis are no points of a line.
+        let mut ours = track.rows.iter();
+        if ours.any(|r| columns.row(*r).amax() > 0.0) {
+            panels.push(whole(one, &across, track));
+        }
     }
     Some(panels)
 }

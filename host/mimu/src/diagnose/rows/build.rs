@@ -195,6 +195,7 @@ impl Builder<'_> {
             conditions: conditions.clone(),
             weights,
             dwells: [index, index],
+            moving: self.prepared.dwells.list[index].moves.contains(&true),
         });
     }
     pub(super) fn finish(

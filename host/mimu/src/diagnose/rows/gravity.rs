@@ -105,6 +105,7 @@ impl Builder<'_> {
             open: None,
             random_walk: Some(self.random_walk(&dwells)),
             wander_known: prepared.noise.is_stated(Sensor::Accel),
+            within: false,
         }];
         let nuisance = (nuisance, shapes.parameters, by_matrix);
         self.finish(y, nuisance, vec![6, 7, 8], strata, (Figure::Size, n, 1))
@@ -133,6 +134,7 @@ impl Builder<'_> {
             open: None,
             random_walk: None,
             wander_known: true,
+            within: false,
         }];
         let nuisance = (shapes.errors, shapes.parameters, shapes.by_matrix);
         self.finish(
@@ -208,6 +210,7 @@ impl Builder<'_> {
                     conditions: conditions.clone(),
                     weights,
                     dwells: [turn.from, turn.to],
+                    moving: false,
                 });
             }
         }
@@ -265,6 +268,7 @@ impl Builder<'_> {
                 open: None,
                 random_walk: None,
                 wander_known: true,
+                within: false,
             });
         }
         for axis in 0..3 {
@@ -309,6 +313,7 @@ impl Builder<'_> {
                 open: None,
                 random_walk: random_walk.clone(),
                 wander_known: wander.is_some(),
+                within: false,
             });
         }
         let figure = match m {

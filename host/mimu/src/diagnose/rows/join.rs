@@ -120,6 +120,7 @@ pub(super) fn join(sensor: Sensor, parts: Vec<(usize, Part)>, sessions: usize) -
                 conditions: row.conditions.start + offset..row.conditions.end + offset,
                 weights: row.weights.clone(),
                 dwells: row.dwells.map(|d| d + first[*session]),
+                moving: row.moving,
             });
         }
         stratum.rows = from..rows.len();

@@ -3,14 +3,20 @@
 use std::ops::Range;
 
 use mimu_core::compensation::Affine;
-use nalgebra::{DMatrix, Vector3};
+use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::build::{Builder, Part};
-use super::{Figure, Stratum};
+use super::{Figure, Row, Stratum};
+use crate::contrast::Contrast;
+use crate::estimate::Observation;
+use crate::quantity::{AXES, Sensor};
 use crate::triad::Forward;
 
+/// Derivatives by the parameters: bias and matrix row of each axis, then the delay of each where an input moves.
+const DELAYS: usize = 12;
+
 impl Builder<'_> {
-    /// A row for each dwell and sensor axis; `accel` is the calibrated accelerometer, for the forces on a gyro.
+    /// A row for each dwell and sensor axis, and one for each contrast; `accel` is the calibrated accelerometer, for the forces on a gyro.
     pub(super) fn known(
         mut self,
         inverse: &Affine<f64>,
@@ -29,31 +35,51 @@ impl Builder<'_> {
             .iter()
             .map(|d| self.dwell(*d, self.force(*d, accel)))
             .collect();
+        for (dwell, range) in dwells.iter().zip(&conditions) {
+            self.follow(*dwell, range, &forward);
+        }
+        let contrasts = prepared.contrasts();
+        let within: Vec<(&Contrast, Observation)> = contrasts
+            .iter()
+            .filter_map(|c| Some((c, prepared.observation(self.sensor, c)?)))
+            .collect();
+        let list = &prepared.dwells.list;
+        let moves = dwells.iter().any(|d| list[*d].moves(self.sensor)) && !within.is_empty();
+        let columns = if moves { DELAYS + 3 } else { DELAYS };
+        let count = 3 * (n + within.len());
         let random_walk = self.random_walk(&dwells);
         let mut y = Vec::new();
-        let mut nuisance = DMatrix::zeros(3 * n, 12);
-        let mut by_matrix = DMatrix::zeros(3 * n, 9);
+        let mut nuisance = DMatrix::zeros(count, columns);
+        let mut by_matrix = DMatrix::zeros(count, 9);
         let readings: Vec<Vector3<f64>> = observations
             .iter()
             .map(|o| forward.apply(&o.input))
             .collect();
         let centre = readings.iter().sum::<Vector3<f64>>() / n as f64;
         let mut strata = Vec::new();
-        for axis in 0..3 {
-            for (i, o) in observations.iter().enumerate() {
-                let row = y.len();
-                let predicted = readings[i][axis];
-                self.mean_row(o.dwell, &conditions[i], Vector3::ith(axis, 1.0));
-                y.push((o.raw[axis] - predicted) / scale[axis]);
-                nuisance[(row, 4 * axis)] = 1.0;
+        // Rows of the nuisance: what an observation owes to the parameters of `axis`.
+        let mut owes =
+            |row: usize, o: &Observation, axis: usize, bias: f64, reading: Vector3<f64>| {
+                nuisance[(row, 4 * axis)] = bias;
                 for k in 0..3 {
                     nuisance[(row, 4 * axis + 1 + k)] = o.input[k];
                 }
                 // Of u = P x + b the derivative by C is -P dC (u - b), and what is constant of it a bias.
                 for (r, c) in (0..3).flat_map(|r| (0..3).map(move |c| (r, c))) {
                     by_matrix[(row, 3 * r + c)] =
-                        forward.matrix[(axis, r)] * (readings[i] - centre)[c] / scale[axis];
+                        forward.matrix[(axis, r)] * reading[c] / scale[axis];
                 }
+                if moves {
+                    let change = (forward.matrix.row(axis) * o.change)[(0, 0)];
+                    nuisance[(row, DELAYS + axis)] = -change / scale[axis];
+                }
+            };
+        for axis in 0..3 {
+            for (i, o) in observations.iter().enumerate() {
+                owes(y.len(), o, axis, 1.0, readings[i] - centre);
+                let predicted = readings[i][axis];
+                self.mean_row(o.dwell, &conditions[i], Vector3::ith(axis, 1.0));
+                y.push((o.raw[axis] - predicted) / scale[axis]);
             }
             let s2 = scale[axis] * scale[axis];
             let known = DMatrix::from_fn(n, n, |i, j| match (i == j, &wander) {
@@ -62,7 +88,7 @@ impl Builder<'_> {
                 _ => 0.0,
             });
             strata.push(Stratum {
-                name: crate::quantity::AXES[axis].into(),
+                name: AXES[axis].into(),
                 axis: Some(axis),
                 session: 0,
                 rows: axis * n..(axis + 1) * n,
@@ -71,17 +97,75 @@ impl Builder<'_> {
                 open: None,
                 random_walk: Some(random_walk.clone()),
                 wander_known: wander.is_some(),
+                within: false,
             });
         }
-        let figure = (Figure::Input, 3 * n, 1);
-        let parameters = by_forward(inverse, &scale);
-        self.finish(
-            y,
-            (nuisance, parameters, by_matrix),
-            vec![0, 4, 8],
-            strata,
-            figure,
-        )
+        // A bias that wanders as fast as the input is in the known variance, and slower it is in no contrast: nothing is shared with the means.
+        for axis in 0..if within.is_empty() { 0 } else { 3 } {
+            let from = y.len();
+            for (contrast, o) in &within {
+                owes(y.len(), o, axis, 0.0, forward.matrix * o.input);
+                let place = dwells.partition_point(|d| *d < contrast.dwell);
+                self.contrast_row(contrast, &conditions[place], axis);
+                let predicted = (forward.matrix.row(axis) * o.input)[(0, 0)];
+                y.push((o.raw[axis] - predicted) / scale[axis]);
+            }
+            let s2 = scale[axis] * scale[axis];
+            let variances = within.iter().map(|(_, o)| o.variance[axis] / s2);
+            let known = DVector::from_iterator(within.len(), variances);
+            strata.push(Stratum {
+                name: format!("{} within dwells", AXES[axis]),
+                // A row is no function of one quantity, and is not drawn as one.
+                axis: None,
+                session: 0,
+                rows: from..y.len(),
+                known: DMatrix::from_diagonal(&known),
+                by_reference: None,
+                open: None,
+                random_walk: None,
+                wander_known: true,
+                within: true,
+            });
+        }
+        let figure = (Figure::Input, count, 1);
+        let parameters = by_forward(inverse, &scale).resize_horizontally(columns, 0.0);
+        // A delay is the session's own, as a bias is: the clocks are.
+        let biases = [0, 4, 8].into_iter().chain(DELAYS..columns).collect();
+        self.finish(y, (nuisance, parameters, by_matrix), biases, strata, figure)
+    }
+
+    /// Gives the conditions of a dwell whose input moves what the reference says of them: the angular acceleration, and the reading, of which the
+    /// measured one has noise that is in the row as well.
+    fn follow(&mut self, dwell: usize, conditions: &Range<usize>, forward: &Forward) {
+        let prepared = self.prepared;
+        let Some(course) = prepared.course(&prepared.dwells.list[dwell]) else {
+            return;
+        };
+        let list = &prepared.dwells.list[dwell];
+        for (k, block) in course.blocks.iter().enumerate() {
+            let at = &mut self.conditions[conditions.start + block - list.blocks.start];
+            if let (true, Some([_, change])) =
+                (list.moves(Sensor::Gyro), &course.of[Sensor::Gyro as usize])
+            {
+                at.angular_acceleration = change[k];
+            }
+            if let (true, Some([input, _])) =
+                (list.moves(self.sensor), &course.of[self.sensor as usize])
+            {
+                at.reading.mean = forward.apply(&input[k]);
+            }
+        }
+    }
+
+    /// The sum over a dwell that `contrast` is, of an error of `axis`.
+    fn contrast_row(&mut self, contrast: &Contrast, conditions: &Range<usize>, axis: usize) {
+        let weights = contrast.weights.iter();
+        self.rows.push(Row {
+            conditions: conditions.clone(),
+            weights: weights.map(|w| Vector3::ith(axis, *w)).collect(),
+            dwells: [contrast.dwell; 2],
+            moving: true,
+        });
     }
 }
 

@@ -94,6 +94,7 @@ fn the_estimators_claim_the_sigmas_that_the_design_promised() {
             raw: s.up * GRAVITY,
             variance: Vector3::repeat(sigma * sigma),
             input: s.up * GRAVITY,
+            change: Vector3::zeros(),
         })
         .collect();
     // Columns of C or P by rows, then o or b: known_input gives P, b; gravity_size C, o.

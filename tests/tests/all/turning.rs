@@ -1,0 +1,103 @@
+//! Diagnosis of units on a table that turns gravity through them within dwells.
+
+use mimu::calibration::EffectTable;
+use mimu::diagnose::{Diagnosis, diagnose};
+use mimu::fit::Options;
+use mimu::quantity::Sensor;
+use mimu_rig::random::Random;
+use mimu_rig::rig_file::EffectFile;
+use mimu_tests::bench;
+use rayon::prelude::*;
+
+const G: f64 = 9.80665;
+/// deg/s per g: rows are axes that err.
+const SENSITIVITY: [[f64; 3]; 3] = [[0.2, 0.1, 0.05], [0.02, -0.15, 0.0], [0.1, 0.0, 0.1]];
+/// The board beside the point where the table's axes meet, mm.
+const BESIDE_MM: [f64; 3] = [2.0, -3.0, 5.0];
+
+/// A unit with a g-sensitivity, beside the centre of a table without other flaws.
+fn found(seed: u64) -> Diagnosis {
+    let mut random = Random::new(seed, "unit");
+    let (gyro, accel) = (bench::gyro(&mut random), bench::accel(&mut random));
+    let mut file = bench::clean(gyro, accel);
+    file.table.offset_mm = BESIDE_MM;
+    let rows = SENSITIVITY.map(|row| toml::Value::Array(row.map(toml::Value::Float).to_vec()));
+    let matrix = toml::Value::Array(rows.to_vec());
+    file.effect = vec![EffectFile {
+        id: "gyro_g_sensitivity".into(),
+        parameters: toml::Table::from_iter([("matrix_dps_per_g".to_string(), matrix)]),
+    }];
+    let recorded = bench::recorded(&bench::turning_plan(seed), &file, seed);
+    let options = Options {
+        holdout_blocks: 0,
+        ..Options::default()
+    };
+    diagnose(recorded.into(), options).expect("diagnosed")
+}
+
+/// Effects that were found.
+fn ids(found: &Diagnosis) -> Vec<String> {
+    let mut ids: Vec<String> = found.effects.iter().map(|e| e.candidate.id()).collect();
+    ids.sort();
+    ids
+}
+
+/// Errors of the coefficients in sigmas, gyro and accelerometer.
+fn errors(found: &Diagnosis) -> [Vec<f64>; 2] {
+    Sensor::BOTH.map(|sensor| {
+        let of = found.sensors.iter().find(|s| s.sensor == sensor);
+        let accepted = &of.expect("recorded").decision.accepted;
+        let tables = accepted.iter().map(EffectTable::from);
+        let coefficients = tables.flat_map(|t| t.coefficients);
+        coefficients
+            .map(|c| {
+                let at = |k: usize| "xyz".find(&c.name[k..=k]).expect("an axis");
+                let truth = match sensor {
+                    Sensor::Gyro => SENSITIVITY[at(0)][at(1)].to_radians() / G,
+                    Sensor::Accel => 1e-3 * BESIDE_MM[at(1)],
+                };
+                (c.value - truth) / c.sigma
+            })
+            .collect()
+    })
+}
+
+#[test]
+fn g_sensitivity_and_a_lever_arm_are_named_where_gravity_turns_through_the_unit() {
+    let found = found(1);
+    assert_eq!(ids(&found), ["accel_size_effect", "gyro_g_sensitivity"]);
+    for errors in errors(&found) {
+        assert!(errors.len() >= 7, "{errors:?}");
+        assert!(errors.iter().all(|e| e.abs() < 4.5), "{errors:?}");
+    }
+}
+
+#[test]
+#[ignore = "nightly: more recordings"]
+fn intervals_of_coefficients_hold_the_truth_where_gravity_turns_through_the_unit() {
+    let all: Vec<Diagnosis> = (0..40).into_par_iter().map(found).collect();
+    let named = all
+        .iter()
+        .filter(|d| ids(d) == ["accel_size_effect", "gyro_g_sensitivity"]);
+    let named: Vec<&Diagnosis> = named.collect();
+    println!(
+        "{} of {} have both effects and no other",
+        named.len(),
+        all.len()
+    );
+    assert!(named.len() >= 38);
+    for k in 0..2 {
+        let errors: Vec<f64> = named.iter().flat_map(|d| errors(d)[k].clone()).collect();
+        let n = errors.len() as f64;
+        let inside = errors.iter().filter(|e| e.abs() < 1.96).count() as f64 / n;
+        let rms = (errors.iter().map(|e| e * e).sum::<f64>() / n).sqrt();
+        println!(
+            "{}: {n} coefficients, 95 % intervals hold {:.1} %, rms error {rms:.3} sigma",
+            Sensor::BOTH[k],
+            100.0 * inside
+        );
+        // Four sigmas of so many, as if they were independent.
+        let margin = 4.0 * (0.07 * 0.93 / n).sqrt();
+        assert!((0.93 - margin..0.97 + margin).contains(&inside), "{inside}");
+    }
+}
