@@ -162,6 +162,12 @@ pub fn survey(
             };
             channel.analyse(&integrated, &rates, estimator.map(|(_, e)| e), &options)?;
             channel.judge_drift(&integrated, heat, &options, &mut warnings);
+            if channel.spectrum.remains {
+                warnings.push(format!(
+                    "{}: lines that are not steady were set aside, and something still stands above the floor of the spectrum: the coefficients have some of it",
+                    channel.name
+                ));
+            }
             channels.push(channel);
             progress(0.1 + 0.9 * (done + 1) as f64 / indices.len() as f64);
         }
@@ -324,8 +330,10 @@ impl Channel {
     /// N from the spectrum, where the Allan curve is bent at its short end and the model does not show it, or not as it is.
     fn read_white_band(&mut self, rates: &[f64], dt_s: f64, confidence: f64) {
         let Some(model) = &mut self.model else { return };
+        // Of a bump its slopes are left, which are below twice the floor each and move the whole curve.
+        let bump = self.spectrum.lines.iter().any(|l| l.width_hz.is_some());
         let shortened = model.range_s[0] > 1.5 * dt_s;
-        if model.get(Term::N).is_ok() && model.excess.is_none() && !shortened {
+        if model.get(Term::N).is_ok() && model.excess.is_none() && !shortened && !bump {
             return;
         }
         let Some(white) = white_band(rates, dt_s, &self.spectrum.lines, confidence) else {
@@ -345,7 +353,10 @@ impl Channel {
             }
             // Neither shows it: the curve's bound may come from where a filter has bent it.
             (None, Err(unseen)) => {
-                unseen.raise(white.interval[1], self.unit.write(Term::N, white.interval[1]));
+                unseen.raise(
+                    white.interval[1],
+                    self.unit.write(Term::N, white.interval[1]),
+                );
             }
             (None, Ok(_)) => {}
         }

@@ -60,7 +60,11 @@ impl Floor {
                 Some(above) => {
                     let slope = (above.1 - below.1) / (above.0 - below.0);
                     let between = below.1 + slope * (x - below.0);
-                    (between, between.max(below.1).max(above.1), below.2.min(above.2))
+                    (
+                        between,
+                        between.max(below.1).max(above.1),
+                        below.2.min(above.2),
+                    )
                 }
                 None => (below.1, below.1, below.2),
             };

@@ -102,7 +102,10 @@ fn means(welch: &Welch, dt_s: f64, out: &[[f64; 2]]) -> Vec<Mean> {
             break;
         }
         let hz = |k: usize| k as f64 * welch.df_hz;
-        let counts = |k: &usize| !out.iter().any(|[low, high]| (*low..=*high).contains(&hz(*k)));
+        let counts = |k: &usize| {
+            !out.iter()
+                .any(|[low, high]| (*low..=*high).contains(&hz(*k)))
+        };
         let bins: Vec<usize> = (from..=to).filter(counts).collect();
         let first = from;
         from = to + 1;
@@ -122,7 +125,12 @@ fn means(welch: &Welch, dt_s: f64, out: &[[f64; 2]]) -> Vec<Mean> {
             density: bins.iter().map(|k| welch.power[*k]).sum::<f64>() / n,
             // Segments that overlap by half share 1/6 of the variance of a band; the bins of one, less at the ends of a band.
             dof: welch.dof * n / (BIN_OVERLAP * (1.0 - 0.5 / n) + 2.0 / 6.0),
-            basis: [1.0, mean(&|f| 1.0 / f), mean(&|f| 1.0 / (f * f)), mean(&bend)],
+            basis: [
+                1.0,
+                mean(&|f| 1.0 / f),
+                mean(&|f| 1.0 / (f * f)),
+                mean(&bend),
+            ],
         });
     }
     means
@@ -147,9 +155,8 @@ fn fit(means: &[Mean], shortened: bool, z: f64) -> Option<White> {
     if -best.a[BEND] * top.basis[BEND] > BENT * best.a[0] {
         return None;
     }
-    let plausible = |m: &&Fitted| {
-        cost(m) <= cost(best) + PLAUSIBLE && m.deviance <= best.deviance + PLAUSIBLE
-    };
+    let plausible =
+        |m: &&Fitted| cost(m) <= cost(best) + PLAUSIBLE && m.deviance <= best.deviance + PLAUSIBLE;
     let (mut lower, mut upper) = (f64::INFINITY, 0.0f64);
     for model in models.iter().filter(plausible) {
         let sigma = model.variance.sqrt();
@@ -162,9 +169,8 @@ fn fit(means: &[Mean], shortened: bool, z: f64) -> Option<White> {
         other < best.a[0]
     };
     let white: Vec<&Mean> = means.iter().filter(is_white).collect();
-    let seen = lower > 0.0
-        && best.a[0] > SEEN * best.variance.sqrt()
-        && white.len() >= FEWEST_WHITE;
+    let seen =
+        lower > 0.0 && best.a[0] > SEEN * best.variance.sqrt() && white.len() >= FEWEST_WHITE;
     let value = best.a[0].max(0.0).sqrt();
     Some(White {
         value,
@@ -188,9 +194,8 @@ fn solve(means: &[Mean], terms: &[usize]) -> Option<Fitted> {
             return None;
         }
         let weight = |i: usize| (0.5 * means[i].dof).sqrt() / mu[i];
-        let mut matrix = DMatrix::from_fn(n, terms.len(), |i, k| {
-            means[i].basis[terms[k]] * weight(i)
-        });
+        let mut matrix =
+            DMatrix::from_fn(n, terms.len(), |i, k| means[i].basis[terms[k]] * weight(i));
         let scale: Vec<f64> = matrix.column_iter().map(|c| c.norm()).collect();
         for (mut column, s) in matrix.column_iter_mut().zip(&scale) {
             column /= *s;

@@ -4,4 +4,5 @@ mod allan_model;
 mod allan_vectors;
 mod design;
 mod held_out;
+mod spectrum;
 mod written_files;
