@@ -185,10 +185,12 @@ fn curve_text(out: &mut String, channels: &[&ChannelResult]) {
         if let Some(time_s) = points.iter().flatten().next().map(|p| p[0]) {
             let label = format!("  {} s", significant(time_s));
             rows.push((label, points.into_iter().map(cell).collect()));
+            // Only where it is another number.
             let without = channels.iter().map(|c| {
                 let quiet = c.adev_without_lines.as_ref()?;
                 let (i, _) = c.tau_s.iter().enumerate().find(|(_, t)| **t == time_s)?;
-                Some(significant(quiet[i] * unit.factor))
+                let [quiet, all] = [quiet[i], c.adev[i]].map(|d| significant(d * unit.factor));
+                (quiet != all).then_some(quiet)
             });
             let without: Vec<Option<String>> = without.collect();
             if without.iter().any(Option::is_some) {

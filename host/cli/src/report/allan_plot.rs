@@ -123,6 +123,8 @@ fn panel(result: &AllanResult, sensor: Sensor, channels: &[&ChannelResult]) -> M
 
 /// Averaging time at which a sinusoid of frequency 1 bends an Allan deviation most: where `sin²(π τ)/(π τ)` is greatest.
 const BENT_AT: f64 = 0.371;
+/// Width and height that the label of a frequency takes, pixels.
+const LABEL: (f64, f64) = (54.0, 14.0);
 
 /// Where a line bends the curves: a wedge that points at the highest of them, and the frequency above; lines that several
 /// channels have are one.
@@ -145,15 +147,29 @@ fn line_marks(frame: &Frame, channels: &[&ChannelResult], by: f64) -> Markup {
             }
         }
     }
-    let places = marks.iter().filter_map(|(f, deviation)| {
+    // Along the falling curve, the highest frequency first.
+    marks.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let mut labels: Vec<(f64, f64)> = Vec::new();
+    let mut place = |(f, deviation): &(f64, f64)| {
         let (x, y) = ((BENT_AT / f).log10(), deviation.log10());
         let inside = frame.x.contains(&x) && frame.y.contains(&y);
-        inside.then(|| (*f, frame.at_x(x), frame.at_y(y) - 6.0))
-    });
+        inside.then(|| {
+            let (x, y) = (frame.at_x(x), frame.at_y(y) - 5.0);
+            let (left, mut bottom) = (x + 6.0, y - 4.0);
+            for (other, above) in &labels {
+                if (left - other).abs() < LABEL.0 && (bottom - above).abs() < LABEL.1 {
+                    bottom = above + LABEL.1;
+                }
+            }
+            labels.push((left, bottom));
+            (*f, [x, y], [left, bottom])
+        })
+    };
+    let places: Vec<_> = marks.iter().filter_map(&mut place).collect();
     html! {
-        @for (f, x, y) in places {
+        @for (f, [x, y], [left, bottom]) in places {
             path class="line" d={ "M" (px(x - 4.0)) " " (px(y - 7.0)) "L" (px(x)) " " (px(y)) "L" (px(x + 4.0)) " " (px(y - 7.0)) } {}
-            text class="tick" x=(px(x)) y=(px(y - 11.0)) text-anchor="middle" { (significant(f)) " Hz" }
+            text class="tick" x=(px(left)) y=(px(bottom)) { (significant(f)) " Hz" }
         }
     }
 }

@@ -11,8 +11,10 @@ use super::welch::BIN_OVERLAP;
 const ROUNDS: usize = 4;
 /// Part of a band's power that a sinusoid has to hold to be taken off as one.
 const STEADY: f64 = 0.3;
-/// Part of its power from which on a line is steady and nothing else.
-const ALL_OF_IT: f64 = 0.9;
+/// A sinusoid of more power than this part of the band's is none that was seen there.
+const MUCH: f64 = 2.0;
+/// Part of its power that a line may have beside a sinusoid and still is steady, or twice what the noise makes of the power.
+const BESIDE_IT: f64 = 0.1;
 /// Standard deviations of its amplitude by which a sinusoid exceeds what the noise has.
 const CERTAIN: f64 = 4.0;
 
@@ -104,12 +106,14 @@ fn remove(
     // White noise of density S puts the variance 2 S/T into each of both amplitudes.
     let noise = 2.0 * floor / length_s;
     let holds = |s: &Sinusoid| {
-        s.power() > STEADY * excess.power && (2.0 * s.power()).sqrt() > CERTAIN * noise.sqrt()
+        let share = s.power() / excess.power;
+        (STEADY..MUCH).contains(&share) && (2.0 * s.power()).sqrt() > CERTAIN * noise.sqrt()
     };
     match sinusoid.filter(holds) {
         Some(sinusoid) => {
             sinusoid.subtract(rates, dt_s);
-            if sinusoid.power() > ALL_OF_IT * excess.power {
+            let by_noise = 2.0 * (4.0 / (line.above_floor * welch.dof)).sqrt();
+            if sinusoid.power() > (1.0 - by_noise.max(BESIDE_IT)) * excess.power {
                 line.frequency_hz = sinusoid.frequency_hz;
                 line.width_hz = None;
                 line.rms = (sinusoid.power() - noise).max(0.0).sqrt();

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix5, Vector5};
 
 /// Blocks that the series is condensed to within the band of a line, for each bin of that band.
 const BLOCKS: f64 = 16.0;
@@ -56,7 +56,8 @@ impl Sinusoid {
         let middle = middle(rates.len());
         let half = middle.max(1.0);
         let mut phasor = Phasor::new(TAU * self.frequency_hz * dt_s);
-        let (mut normal, mut right) = (Matrix3::<f64>::zeros(), Vector3::<f64>::zeros());
+        let (mut normal, mut right) = (Matrix5::<f64>::zeros(), Vector5::<f64>::zeros());
+        let reference = rates.first().copied().unwrap_or(0.0);
         for (i, rate) in rates.iter().enumerate() {
             let (sin, cos) = phasor.at(i, middle);
             let along = (i as f64 - middle) / half;
@@ -64,16 +65,17 @@ impl Sinusoid {
                 true => along * (self.sin * cos - self.cos * sin),
                 false => 0.0,
             };
-            let row = [cos, sin, slope];
-            let left = rate - self.cos * cos - self.sin * sin;
-            for j in 0..3 {
+            // The bias and its drift beside it: a mean of a thousand amplitudes is not orthogonal to a broken number of periods.
+            let row = [cos, sin, slope, 1.0, along];
+            let left = rate - reference - self.cos * cos - self.sin * sin;
+            for j in 0..5 {
                 right[j] += row[j] * left;
-                for k in j..3 {
+                for k in j..5 {
                     normal[(j, k)] += row[j] * row[k];
                 }
             }
         }
-        for j in 0..3 {
+        for j in 0..5 {
             for k in 0..j {
                 normal[(j, k)] = normal[(k, j)];
             }
