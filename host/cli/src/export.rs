@@ -24,7 +24,11 @@ pub struct KalibrOptions {
 /// has N = density, and its bias walks by `random_walk √dt` a sample, which has K = random_walk (Kalibr wiki, "IMU noise
 /// model"). The worst axis of each sensor is stated, as the file has one number for three.
 ///
-/// Errors: a sensor is missing or not in SI; a coefficient that the record does not show on any axis and without a fallback.
+/// A random walk that the record does not show on some axis is the one given by hand or, without one, the upper end of its
+/// interval there: an estimator that takes a bias for steadier than it is will not follow it, one that takes it for less steady
+/// only follows it less smoothly.
+///
+/// Errors: a sensor is missing or not in SI; N is missing on an axis; K is, and nothing bounds it.
 pub fn kalibr(file: &NoiseFile, options: &KalibrOptions) -> Result<String> {
     let mut out = format!(
         "# {}: noise from {:.0} s at rest, by mimu {}.\n\
@@ -81,16 +85,25 @@ fn worst(
     }
     let mut largest: Option<(f64, String)> = None;
     let mut missing: Vec<(&NoiseChannel, &str)> = Vec::new();
+    let mut take = |value: f64, said: String| {
+        if largest.as_ref().is_none_or(|(v, _)| value > *v) {
+            largest = Some((value, said));
+        }
+    };
     for channel in channels {
-        match channel.get(term) {
-            Ok(c) if largest.as_ref().is_none_or(|(v, _)| c.value > *v) => {
-                largest = Some((
-                    c.value,
-                    format!("{}: {:.2e} to {:.2e}", channel.name, c.lower, c.upper),
-                ));
+        let (name, bound) = (&channel.name, channel.k_at_most);
+        match (channel.get(term), bound) {
+            (Ok(c), _) => take(
+                c.value,
+                format!("{name}: {:.2e} to {:.2e}", c.lower, c.upper),
+            ),
+            (Err(_), Some(bound)) if term == Term::K && fallback.is_none() => {
+                take(
+                    bound,
+                    format!("{name}: not seen, the upper end of its interval"),
+                );
             }
-            Ok(_) => {}
-            Err(why) => missing.push((channel, why)),
+            (Err(why), _) => missing.push((channel, why)),
         }
     }
     if let (Some((value, said)), true) = (&largest, missing.is_empty()) {

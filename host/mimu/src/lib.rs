@@ -18,6 +18,7 @@
 //! | [`design`]      | experiments: which attitudes and rates, how many, for how long                |
 //! | [`next_experiment`] | what to record next, where a diagnosis leaves something open              |
 //! | [`allan`], [`survey`] | Allan deviation and noise model of a series; of the channels of a recording at rest |
+//! | [`spectrum`]    | lines that are no noise of the sensor, and the band in which it is white     |
 //! | [`noise_file`]  | its result for the other commands                                             |
 //! | [`result`]      | what a fit, a verification and a survey found: one type each, which JSON is    |
 //! | [`readable`]    | from SI to the units of data sheets                                           |
@@ -87,6 +88,7 @@ pub mod readable;
 pub mod reading_step;
 pub mod rest;
 pub mod result;
+pub mod spectrum;
 pub mod stillness;
 pub mod survey;
 mod toml_layout;

@@ -73,6 +73,9 @@ pub struct NoiseChannel {
     pub k_reason: Option<String>,
     /// Why there is no rate ramp.
     pub r_reason: Option<String>,
+    /// Upper end of the interval of a rate random walk that is not there: what a program that has to have one can take.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub k_at_most: Option<f64>,
 }
 
 /// A coefficient of a noise file.
@@ -226,6 +229,16 @@ impl NoiseFile {
                         "run mimu allan again",
                     ));
                 }
+            }
+            if channel
+                .k_at_most
+                .is_some_and(|k| !(k.is_finite() && k >= 0.0))
+            {
+                return Err(Error::new(
+                    format!("{place}, channel {}, k_at_most", channel.name),
+                    "it is no upper end of a noise",
+                    "run mimu allan again",
+                ));
             }
             if channel.model().variance(1.0) == 0.0 {
                 let why = channel.get(Term::N).err().unwrap_or_default();

@@ -15,11 +15,14 @@ pub use self::stretch::Part;
 use self::stretch::{FEWEST, Stretch, temperature};
 use self::suitability::{Suitability, suitability};
 use crate::allan::deviation::Integrated;
-use crate::allan::model::{Estimator, NoiseModel, Term, allan_factors, hadamard_factors};
+use crate::allan::model::{
+    Coefficient, Estimator, NoiseModel, Term, allan_factors, hadamard_factors,
+};
 use crate::allan::units::Unit;
 use crate::allan::{Kind, Point, Spacing};
 use crate::calibration::Calibration;
 use crate::quantity::{Sensor, duration, significant};
+use crate::spectrum::{SetAside, set_aside, white_band};
 use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{Column, RAW_COLUMNS, RawUnit, Recording};
 
@@ -51,8 +54,14 @@ pub struct Channel {
     pub curve: Vec<Point>,
     /// Hadamard deviation, where a drift asks for it.
     pub hadamard: Option<Vec<Point>>,
+    /// Lines of its spectrum, which the model is without.
+    pub spectrum: SetAside,
+    /// [`Channel::curve`] without them, where there are any.
+    pub without_lines: Option<Vec<Point>>,
     /// The noise model; `None` where the record has too few octaves for one.
     pub model: Option<NoiseModel>,
+    /// Band of the spectrum that N was read from, Hz, where the Allan curve does not show it.
+    pub n_band_hz: Option<[f64; 2]>,
 }
 
 /// Noise of a recording.
@@ -136,6 +145,9 @@ pub fn survey(
                 .as_ref()
                 .and_then(|t| t.against(&values.suitability.levels));
             judged.push((i, values.suitability));
+            let mut rates = values.rates;
+            let mut integrated = Integrated::empty(stretch.period_s);
+            integrated.push(&rates)?;
             let mut channel = Channel {
                 name: RAW_COLUMNS[i],
                 sensor: if i < 3 { Sensor::Gyro } else { Sensor::Accel },
@@ -143,11 +155,19 @@ pub fn survey(
                 samples,
                 curve: Vec::new(),
                 hadamard: None,
+                spectrum: set_aside(&mut rates, stretch.period_s, options.confidence),
+                without_lines: None,
                 model: None,
+                n_band_hz: None,
             };
-            let integrated = Integrated::new(values.rates, stretch.period_s)?;
-            channel.analyse(&integrated, estimator.map(|(_, e)| e), &options);
+            channel.analyse(&integrated, &rates, estimator.map(|(_, e)| e), &options)?;
             channel.judge_drift(&integrated, heat, &options, &mut warnings);
+            if channel.spectrum.remains {
+                warnings.push(format!(
+                    "{}: lines that are not steady were set aside, and something still stands above the floor of the spectrum: the coefficients have some of it",
+                    channel.name
+                ));
+            }
             channels.push(channel);
             progress(0.1 + 0.9 * (done + 1) as f64 / indices.len() as f64);
         }
@@ -270,27 +290,76 @@ impl Values {
 }
 
 impl Channel {
+    /// Curve of the channel as it is, and model of it without its lines: `rates` are without them.
     fn analyse(
         &mut self,
         integrated: &Integrated,
+        rates: &[f64],
         estimator: Option<&Estimator>,
         options: &Options,
-    ) {
+    ) -> Result<()> {
         let step = 1.0 / options.per_decade as f64;
         let mut shown: Vec<usize> = (0..)
             .map(|k| 10f64.powf(f64::from(k) * step).round() as usize)
             .take_while(|m| 2 * m <= self.samples)
             .collect();
         shown.dedup();
-        let curve = |kind, times: &[usize]| {
-            integrated.curve(kind, &Spacing::Samples(times.into()), options.confidence)
+        let curve = |of: &Integrated, kind, times: &[usize]| {
+            of.curve(kind, &Spacing::Samples(times.into()), options.confidence)
         };
-        let allan = curve(Kind::Allan, &allan_factors(self.samples));
-        let hadamard = curve(Kind::Hadamard, &hadamard_factors(self.samples));
+        self.curve = curve(integrated, options.kind, &shown);
+        let without_lines = match self.spectrum.lines.is_empty() {
+            true => None,
+            false => {
+                let mut of = Integrated::empty(integrated.dt_s());
+                of.push(rates)?;
+                self.without_lines = Some(curve(&of, options.kind, &shown));
+                Some(of)
+            }
+        };
+        let of = without_lines.as_ref().unwrap_or(integrated);
+        let allan = curve(of, Kind::Allan, &allan_factors(self.samples));
+        let hadamard = curve(of, Kind::Hadamard, &hadamard_factors(self.samples));
         let unit = self.unit;
         let words = |term: Term, value: f64| unit.write(term, value);
         self.model = estimator.and_then(|e| e.fit(&allan, &hadamard, words));
-        self.curve = curve(options.kind, &shown);
+        self.read_white_band(rates, integrated.dt_s(), options.confidence);
+        Ok(())
+    }
+
+    /// N from the spectrum, where the Allan curve is bent at its short end and the model does not show it, or not as it is.
+    fn read_white_band(&mut self, rates: &[f64], dt_s: f64, confidence: f64) {
+        let Some(model) = &mut self.model else { return };
+        // Of a bump its slopes are left, which are below twice the floor each and move the whole curve.
+        let bump = self.spectrum.lines.iter().any(|l| l.width_hz.is_some());
+        let shortened = model.range_s[0] > 1.5 * dt_s;
+        if model.get(Term::N).is_ok() && model.excess.is_none() && !shortened && !bump {
+            return;
+        }
+        let Some(white) = white_band(rates, dt_s, &self.spectrum.lines, confidence) else {
+            return;
+        };
+        let n = &mut model.coefficients[Term::N as usize];
+        match (white.band_hz, n) {
+            (Some(band), n) => {
+                let [lower, upper] = white.interval;
+                *n = Ok(Coefficient {
+                    value: white.value,
+                    sigma: white.sigma,
+                    lower,
+                    upper,
+                });
+                self.n_band_hz = Some(band);
+            }
+            // Neither shows it: the curve's bound may come from where a filter has bent it.
+            (None, Err(unseen)) => {
+                unseen.raise(
+                    white.interval[1],
+                    self.unit.write(Term::N, white.interval[1]),
+                );
+            }
+            (None, Ok(_)) => {}
+        }
     }
 
     /// Warns where the long end is a drift's, and adds what the Hadamard deviation shows without it.

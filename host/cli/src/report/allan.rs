@@ -52,7 +52,7 @@ fn write_rows(out: &mut String, rows: &Rows) {
     let cells = rows.iter().flat_map(|(_, cells)| cells);
     let width = 2 + cells.map(|c| c.chars().count()).max().unwrap_or(0);
     for (label, cells) in rows {
-        let _ = write!(out, "  {label:<15}");
+        let _ = write!(out, "  {label:<17}");
         for cell in cells {
             let _ = write!(out, "{cell:>width$}");
         }
@@ -101,7 +101,46 @@ fn sensor_text(
     ));
     write_rows(out, &rows);
     curve_text(out, channels);
+    lines_text(out, channels);
     reasons(out, channels);
+}
+
+/// What was set aside, and where N is from.
+fn lines_text(out: &mut String, channels: &[&ChannelResult]) {
+    for channel in channels {
+        let unit = &readable::noise(channel.unit)[0];
+        for line in &channel.lines {
+            let [lower, upper] = line.rms_interval;
+            let width = match line.width_hz {
+                Some(width) => format!("{} Hz wide", significant(width)),
+                None => "steady".into(),
+            };
+            let _ = writeln!(
+                out,
+                "  {}: set aside: {} Hz, {width}, rms {} {}, {:.0} dB above the floor",
+                channel.name,
+                frequency(line.frequency_hz, line.resolution_hz),
+                interval(line.rms, lower, upper, unit),
+                unit.unit,
+                10.0 * line.above_floor.log10()
+            );
+        }
+        if let Some([from, to]) = channel.n_band_hz {
+            let _ = writeln!(
+                out,
+                "  {}: N by the spectrum, which is white from {} to {} Hz",
+                channel.name,
+                significant(from),
+                significant(to)
+            );
+        }
+    }
+}
+
+/// To a tenth of the resolution.
+fn frequency(hz: f64, resolution_hz: f64) -> String {
+    let places = (1.0 - resolution_hz.log10().floor()).clamp(0.0, 6.0);
+    format!("{hz:.*}", places as usize)
 }
 
 /// One point of a curve: averaging time, deviation, ends of its interval, sigma of independent clusters.
@@ -143,9 +182,21 @@ fn curve_text(out: &mut String, channels: &[&ChannelResult]) {
             near(decade, columns.map(Vec::as_slice))
         });
         let points: Vec<Option<Point>> = points.collect();
-        if let Some(first) = points.iter().flatten().next() {
-            let label = format!("  {} s", significant(first[0]));
+        if let Some(time_s) = points.iter().flatten().next().map(|p| p[0]) {
+            let label = format!("  {} s", significant(time_s));
             rows.push((label, points.into_iter().map(cell).collect()));
+            // Only where it is another number.
+            let without = channels.iter().map(|c| {
+                let quiet = c.adev_without_lines.as_ref()?;
+                let (i, _) = c.tau_s.iter().enumerate().find(|(_, t)| **t == time_s)?;
+                let [quiet, all] = [quiet[i], c.adev[i]].map(|d| significant(d * unit.factor));
+                (quiet != all).then_some(quiet)
+            });
+            let without: Vec<Option<String>> = without.collect();
+            if without.iter().any(Option::is_some) {
+                let cells = without.into_iter().map(|c| c.unwrap_or_else(|| "-".into()));
+                rows.push(("    without lines".into(), cells.collect()));
+            }
             let beside = channels.iter().map(|c| {
                 let h = c.hadamard.as_ref()?;
                 let columns = [&h.tau_s, &h.hdev, &h.lower, &h.upper, &h.sigma_independent];

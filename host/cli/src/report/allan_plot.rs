@@ -6,7 +6,7 @@ use maud::{Markup, html};
 
 use super::svg::{Frame, px};
 use mimu::allan::model::{FLOOR, Term};
-use mimu::quantity::Sensor;
+use mimu::quantity::{Sensor, significant};
 use mimu::readable;
 use mimu::result::allan::{AllanResult, ChannelResult, ModelResult};
 
@@ -18,7 +18,7 @@ const STYLE: &str = "text{font:14px sans-serif;fill:#000}.tick{font-size:13px}.n
 path{fill:none;stroke-width:2}.grid{stroke:#e1e1e1;stroke-width:1}.axis{stroke:#000;stroke-width:1}\
 .x{stroke:#e69f00}.y{stroke:#0072b2}.z{stroke:#009e73}\
 .band{stroke:none;opacity:.2}.x.band{fill:#e69f00}.y.band{fill:#0072b2}.z.band{fill:#009e73}\
-.hadamard{stroke-dasharray:7 4}.model{stroke:#000;stroke-width:1;stroke-dasharray:2 3}\
+.hadamard{stroke-dasharray:7 4}.quiet{stroke-width:1.5;stroke-dasharray:3 3}.line{stroke:#000;stroke-width:1}.model{stroke:#000;stroke-width:1;stroke-dasharray:2 3}\
 circle{fill:#fff;stroke-width:2}.key{fill:#fff;opacity:.85;stroke:#c8c8c8}";
 
 /// Classes of the channels in [`STYLE`].
@@ -84,6 +84,11 @@ fn panel(result: &AllanResult, sensor: Sensor, channels: &[&ChannelResult]) -> M
     for (class, channel) in CLASSES.iter().zip(channels) {
         curves.push(line(class, curve(&channel.tau_s, &channel.adev)));
         key.push(((*class).into(), channel.name.into()));
+        if let Some(quiet) = &channel.adev_without_lines {
+            let class = format!("{class} quiet");
+            curves.push(line(&class, curve(&channel.tau_s, quiet)));
+            key.push((class, format!("{}, lines set aside", channel.name)));
+        }
         if let Some(hadamard) = &channel.hadamard {
             let class = format!("{class} hadamard");
             curves.push(line(&class, curve(&hadamard.tau_s, &hadamard.hdev)));
@@ -111,7 +116,61 @@ fn panel(result: &AllanResult, sensor: Sensor, channels: &[&ChannelResult]) -> M
         }
         @for curve in &curves { (curve) }
         @for term in [Term::N, Term::B, Term::K] { (marks(&frame, channels, term, by)) }
+        (line_marks(&frame, channels, by))
         (legend(&frame, &key))
+    }
+}
+
+/// Averaging time at which a sinusoid of frequency 1 bends an Allan deviation most: where `sin²(π τ)/(π τ)` is greatest.
+const BENT_AT: f64 = 0.371;
+/// Width and height that the label of a frequency takes, pixels.
+const LABEL: (f64, f64) = (54.0, 14.0);
+
+/// Where a line bends the curves: a wedge that points at the highest of them, and the frequency above; lines that several
+/// channels have are one.
+fn line_marks(frame: &Frame, channels: &[&ChannelResult], by: f64) -> Markup {
+    let mut marks: Vec<(f64, f64)> = Vec::new();
+    for channel in channels {
+        for line in &channel.lines {
+            let t = BENT_AT / line.frequency_hz;
+            let near = |(a, b): (&f64, &f64)| ((a / t).ln().abs(), b * by);
+            let each = channel.tau_s.iter().zip(&channel.adev).map(near);
+            let Some((_, deviation)) = each.min_by(|a, b| a.0.total_cmp(&b.0)) else {
+                continue;
+            };
+            match marks
+                .iter_mut()
+                .find(|(f, _)| (f / line.frequency_hz).ln().abs() < 0.05)
+            {
+                Some((_, high)) => *high = high.max(deviation),
+                None => marks.push((line.frequency_hz, deviation)),
+            }
+        }
+    }
+    // Along the falling curve, the highest frequency first.
+    marks.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let mut labels: Vec<(f64, f64)> = Vec::new();
+    let mut place = |(f, deviation): &(f64, f64)| {
+        let (x, y) = ((BENT_AT / f).log10(), deviation.log10());
+        let inside = frame.x.contains(&x) && frame.y.contains(&y);
+        inside.then(|| {
+            let (x, y) = (frame.at_x(x), frame.at_y(y) - 5.0);
+            let (left, mut bottom) = (x + 6.0, y - 4.0);
+            for (other, above) in &labels {
+                if (left - other).abs() < LABEL.0 && (bottom - above).abs() < LABEL.1 {
+                    bottom = above + LABEL.1;
+                }
+            }
+            labels.push((left, bottom));
+            (*f, [x, y], [left, bottom])
+        })
+    };
+    let places: Vec<_> = marks.iter().filter_map(&mut place).collect();
+    html! {
+        @for (f, [x, y], [left, bottom]) in places {
+            path class="line" d={ "M" (px(x - 4.0)) " " (px(y - 7.0)) "L" (px(x)) " " (px(y)) "L" (px(x + 4.0)) " " (px(y - 7.0)) } {}
+            text class="tick" x=(px(left)) y=(px(bottom)) { (significant(f)) " Hz" }
+        }
     }
 }
 

@@ -5,6 +5,7 @@ use std::path::Path;
 use std::process::{Command, Output};
 
 use mimu::noise_file::NoiseFile;
+use mimu_rig::located::Source;
 use mimu_rig::noise::{Coefficients, Noise};
 use mimu_rig::plan::Plan;
 use mimu_rig::rig_file::{RigFile, RigTruth};
@@ -175,18 +176,23 @@ fn recordings_at_several_temperatures_stand_in_one_file_with_theirs() {
 }
 
 #[test]
-fn kalibr_gets_the_worst_axis_and_no_coefficient_that_was_not_seen() {
+fn kalibr_gets_the_worst_axis_and_for_a_walk_that_was_not_seen_its_bound_or_what_is_given() {
     let folder = tempfile::tempdir().unwrap();
     write(folder.path(), &at_rest(60_000));
     done(folder.path(), "allan r -o noise.toml --json a.json");
-    let error = refused(folder.path(), "export --kalibr imu.yaml --noise noise.toml");
+    let file = NoiseFile::read(&folder.path().join("noise.toml")).unwrap();
+    let bounds = file.channel[..3].iter().map(|c| c.k_at_most.unwrap());
+    let bound = bounds.fold(0.0, f64::max);
+    done(folder.path(), "export --kalibr imu.yaml --noise noise.toml");
+    let yaml = std::fs::read_to_string(folder.path().join("imu.yaml")).unwrap();
+    let walk = yaml
+        .lines()
+        .find(|l| l.starts_with("gyroscope_random_walk"));
+    let walk = walk.unwrap();
     assert!(
-        error.contains("gyro_x")
-            && error.contains("record at least")
-            && error.contains("--gyro-walk"),
-        "{error}"
+        walk.contains(&format!("{bound:.6e}")) && walk.contains("not seen, the upper end"),
+        "{yaml}"
     );
-    assert!(!folder.path().join("imu.yaml").exists());
     done(
         folder.path(),
         "export --kalibr imu.yaml --noise noise.toml --gyro-walk 1e-6 --rostopic /a",
@@ -349,6 +355,90 @@ fn drift_at_the_long_end_is_told_and_hadamard_shown_beside_it() {
     let hadamard = &json["channels"][0]["hadamard"];
     assert!(last(&hadamard["hdev"]) < 0.3 * last(&json["channels"][0]["adev"]));
     assert!(json["channels"][1]["hadamard"].is_null());
+}
+
+#[test]
+fn a_swaying_building_is_set_aside_and_the_noise_beneath_is_exported() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut rows = at_rest(60_000);
+    for row in &mut rows {
+        // 2 mg, as some tower blocks in the wind.
+        row[4] += 0.02 * (std::f64::consts::TAU * 0.56 * row[0]).sin();
+    }
+    write(folder.path(), &rows);
+    let text = done(
+        folder.path(),
+        "allan r -o noise.toml --json a.json --plot a.svg",
+    );
+    let says = [
+        "accel_x: set aside: 0.560",
+        "Hz, steady, rms 1.4",
+        "dB above",
+        "without lines",
+    ];
+    assert!(says.iter().all(|s| text.contains(s)), "{text}");
+    let json = std::fs::read(folder.path().join("a.json")).unwrap();
+    let json: serde_json::Value = serde_json::from_slice(&json).unwrap();
+    for (i, channel) in json["channels"].as_array().unwrap().iter().enumerate() {
+        let lines = channel["lines"].as_array().unwrap();
+        assert_eq!(lines.len(), usize::from(i == 3), "{lines:?}");
+        let without = channel["adev_without_lines"].as_array();
+        assert_eq!(without.is_some(), i == 3);
+        let n = ["lower", "upper"].map(|e| channel["n"][e].as_f64().unwrap());
+        // 99.9 % of six: a tenth of the width of an interval of 95 % either way.
+        assert!(n[0] < 1.005 * N && n[1] > 0.995 * N, "{i}: {n:?}");
+    }
+    let line = &json["channels"][3]["lines"][0];
+    let ends = [0, 1].map(|k| line["rms_interval"][k].as_f64().unwrap());
+    assert!(
+        ends[0] < 0.02 / 2f64.sqrt() && 0.02 / 2f64.sqrt() < ends[1],
+        "{line}"
+    );
+    assert!(
+        (line["frequency_hz"].as_f64().unwrap() - 0.56).abs() < 1e-4,
+        "{line}"
+    );
+    let svg = std::fs::read_to_string(folder.path().join("a.svg")).unwrap();
+    assert!(svg.contains("accel_x, lines set aside") && svg.contains("0.560 Hz"));
+    done(folder.path(), "export --kalibr imu.yaml --noise noise.toml");
+}
+
+#[test]
+fn the_sway_of_the_bench_is_found_in_both_level_axes_with_its_size() {
+    let folder = tempfile::tempdir().unwrap();
+    let plan = "format = \"mimu-plan/1\"\nsample_rate_hz = 200.0\ncarrier = \"table\"\nlead_in_s = 1.0\n\
+                [[step]]\nup = [0.0, 0.0, 1.0]\ndwell_s = 300.0\n";
+    let plan = Plan::parse(Source::new("PLAN.toml", plan)).unwrap();
+    let record = |name: &str, mg: f64| {
+        let rig = format!("format = \"mimu-rig/1\"\n[flaws]\nbuilding_mg = {mg:?}\n");
+        let rig = RigFile::parse(&Source::new("RIG.toml", rig)).unwrap();
+        let truth = RigTruth::resolve(&rig, 3).unwrap();
+        let output = mimu_rig::record::Output::new(&folder.path().join(name), &plan).unwrap();
+        mimu_rig::record::write(&plan, &truth, 3, &output).unwrap();
+        let json = done(folder.path(), &format!("allan {name} --from 2 --json -"));
+        let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+        (truth, json)
+    };
+    let (truth, swaying) = record("swaying", 2.0);
+    let (_, quiet) = record("quiet", 0.0);
+    let mut squares = 0.0;
+    for i in 0..6 {
+        let [with, without] = [&swaying, &quiet].map(|json| &json["channels"][i]);
+        let lines = with["lines"].as_array().unwrap();
+        assert_eq!(lines.len(), usize::from(i == 3 || i == 4), "{i}: {lines:?}");
+        assert!(without["lines"].as_array().unwrap().is_empty());
+        if let Some(line) = lines.first() {
+            let volts = line["rms"].as_f64().unwrap();
+            squares += (volts / truth.unit.accel.axes[i - 3].sensitivity).powi(2);
+            assert!((line["frequency_hz"].as_f64().unwrap() - 0.56).abs() < 1e-4);
+        }
+        // The noise is the same to the last sample: so are the coefficients but for what a few frequencies are of all.
+        let [a, b] = [with, without].map(|c| c["n"]["value"].as_f64().unwrap());
+        assert!((a / b - 1.0).abs() < 0.01, "{i}: {a} {b}");
+    }
+    // Sinusoids along two level axes.
+    let known = 2.0 * 9.80665e-3;
+    assert!((squares.sqrt() / known - 1.0).abs() < 0.02, "{squares}");
 }
 
 #[test]

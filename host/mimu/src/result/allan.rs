@@ -9,6 +9,7 @@ use crate::allan::Point;
 use crate::allan::model::{NoiseModel, Term};
 use crate::noise_file::{FileCoefficient, NOISE_FORMAT, NoiseChannel, NoiseFile};
 use crate::quantity::Sensor;
+use crate::spectrum::Line;
 use crate::survey::{Channel, Survey};
 
 /// Why a channel has no coefficients at all.
@@ -107,9 +108,37 @@ pub struct ChannelResult {
     pub reasons: BTreeMap<String, String>,
     /// By its letter, the upper end of the interval of one that is not there; null where nothing tells it.
     pub at_most: BTreeMap<String, Option<f64>>,
+    /// Lowest and highest frequency that was searched for lines, Hz; null for a record too short for a spectrum.
+    pub searched_hz: Option<[f64; 2]>,
+    /// Lines and bumps of the spectrum, by frequency: the coefficients are of the noise without them.
+    pub lines: Vec<LineResult>,
+    /// Deviations without them, at [`Self::tau_s`]; absent where there are none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub adev_without_lines: Option<Vec<f64>>,
+    /// Band in which the spectrum is white, Hz, where N was read from it and not from the curve; null elsewhere.
+    pub n_band_hz: Option<[f64; 2]>,
     /// Hadamard deviation, where a drift asks for it; absent elsewhere.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub hadamard: Option<HadamardResult>,
+}
+
+/// What stands above the floor of a spectrum and is no noise of the sensor: the building, a fan, the mains.
+#[derive(Debug, Clone, Serialize)]
+pub struct LineResult {
+    /// Frequency, Hz.
+    pub frequency_hz: f64,
+    /// Band that holds the middle half of its power, Hz; null for a steady sinusoid, narrower than the record can tell.
+    pub width_hz: Option<f64>,
+    /// Effective value, [`ChannelResult::unit`]; of a bump, within [`Self::band_hz`].
+    pub rms: f64,
+    /// Ends of the interval of it.
+    pub rms_interval: [f64; 2],
+    /// Its highest density over that of the floor.
+    pub above_floor: f64,
+    /// Noise bandwidth of the spectrum in which it stands so high, Hz.
+    pub resolution_hz: f64,
+    /// Band within which it was set aside, Hz.
+    pub band_hz: [f64; 2],
 }
 
 /// A noise model over the averaging times of its channel.
@@ -204,6 +233,7 @@ impl ChannelResult {
     fn of(survey: &Survey, channel: &Channel) -> Self {
         let column = |of: fn(&Point) -> f64| column(&channel.curve, of);
         let model = channel.model.as_ref();
+        let without_lines = channel.without_lines.as_deref();
         let (mut reasons, mut at_most) = (BTreeMap::new(), BTreeMap::new());
         let [q, n, b, k, r] = Term::ALL.map(|term| {
             let why = match model.map(|m| m.get(term)) {
@@ -248,6 +278,10 @@ impl ChannelResult {
             r,
             reasons,
             at_most,
+            searched_hz: channel.spectrum.searched_hz,
+            lines: channel.spectrum.lines.iter().map(LineResult::of).collect(),
+            adev_without_lines: without_lines.map(|curve| self::column(curve, |p| p.deviation)),
+            n_band_hz: channel.n_band_hz,
             hadamard: channel.hadamard.as_deref().map(HadamardResult::of),
         }
     }
@@ -293,6 +327,21 @@ impl ChannelResult {
             b_reason: reason(Term::B),
             k_reason: reason(Term::K),
             r_reason: reason(Term::R),
+            k_at_most: self.at_most.get("k").copied().flatten(),
+        }
+    }
+}
+
+impl LineResult {
+    fn of(line: &Line) -> Self {
+        Self {
+            frequency_hz: line.frequency_hz,
+            width_hz: line.width_hz,
+            rms: line.rms,
+            rms_interval: line.interval,
+            above_floor: line.above_floor,
+            resolution_hz: line.resolution_hz,
+            band_hz: line.band_hz,
         }
     }
 }

@@ -5,4 +5,5 @@ mod allan_vectors;
 mod design;
 mod held_out;
 mod moving_input;
+mod spectrum;
 mod written_files;

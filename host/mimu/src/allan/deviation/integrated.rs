@@ -102,7 +102,7 @@ impl Integrated {
     }
 
     /// Sample period, s.
-    pub(in crate::allan) fn dt_s(&self) -> f64 {
+    pub fn dt_s(&self) -> f64 {
         self.dt_s
     }
 

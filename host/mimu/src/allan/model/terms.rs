@@ -42,6 +42,16 @@ pub enum Term {
     R,
 }
 
+impl Unseen {
+    /// Raises a bound that is below `at_most`, which is written as `words`.
+    pub fn raise(&mut self, at_most: f64, words: String) {
+        if self.at_most.is_none_or(|bound| bound < at_most) {
+            self.at_most = Some(at_most);
+            self.why = format!("not seen, in the spectrum neither: at most {words}");
+        }
+    }
+}
+
 impl Term {
     /// All of them, by powers of τ.
     pub const ALL: [Self; TERMS] = [Self::Q, Self::N, Self::B, Self::K, Self::R];

@@ -1,0 +1,25 @@
+//! Spectrum of a channel at rest: lines and bumps that are no noise of the sensor, and the band in which it is white.
+//!
+//! An Allan variance is the spectrum seen through a filter an octave wide: a building that sways at 0.56 Hz bends it over a decade of
+//! averaging times, and what bends it cannot be told there. In the spectrum it is a few frequencies of ten thousand.
+//!
+//! | module       | what                                                              |
+//! |--------------|-------------------------------------------------------------------|
+//! | `welch`      | averaged periodograms, two-sided densities                        |
+//! | `floor`      | local floor of one, from the medians beside each frequency        |
+//! | `search`     | which frequencies stand above it, by more than chance             |
+//! | `sinusoid`   | amplitude, phase and frequency of a steady line                   |
+//! | `flatten`    | a band brought down to the floor                                  |
+//! | `set_aside`  | all of these: a series without its lines, and the lines           |
+//! | `white`      | N from the band in which the spectrum is flat                     |
+
+mod flatten;
+mod floor;
+mod search;
+mod set_aside;
+mod sinusoid;
+mod welch;
+mod white;
+
+pub use self::set_aside::{Line, SetAside, set_aside};
+pub use self::white::{White, white_band};
