@@ -250,8 +250,7 @@ impl Dwells {
             Reference::Table => find_moving(&mut list, condensed),
             Reference::Gravity => vec![[false; 2]; list.len()],
         };
-        let unfollowed = |dwell: &Dwell, sensor| unfollowed(dwell, sensor, condensed, &rails);
-        judge(&mut list, condensed, &longest_run, judged, &unfollowed);
+        judge(&mut list, condensed, (&longest_run, &rails), judged);
         for (dwell, too_fast) in list.iter_mut().zip(too_fast) {
             let faults = [&mut dwell.gyro_fault, &mut dwell.accel_fault];
             for (fault, too_fast) in faults.into_iter().zip(too_fast) {
@@ -423,13 +422,12 @@ fn unfollowed(
     Some(out)
 }
 
-/// Finds out which dwells are no good for which sensor; `unfollowed` is of a dwell what the function of that name says.
+/// Finds out which dwells are no good for which sensor, by the longest run of equal samples and the rails of each channel.
 fn judge(
     list: &mut [Dwell],
     condensed: &Condensed,
-    longest_run: &[f64; 6],
+    (longest_run, rails): (&[f64; 6], &[Rails; 6]),
     given: bool,
-    unfollowed: &dyn Fn(&Dwell, Sensor) -> Option<[[f64; 2]; 3]>,
 ) {
     for sensor in Sensor::BOTH {
         let channels = || sensor.channels().filter(|&c| condensed.has_raw[c]);
@@ -445,7 +443,7 @@ fn judge(
             // A turn of known angle has a known mean rate, and is anything but still.
             let turn = dwell.turn;
             let followed = match given && channels().next().is_some() {
-                true => unfollowed(dwell, sensor),
+                true => unfollowed(dwell, sensor, condensed, rails),
                 false => None,
             };
             let mut fault = None;

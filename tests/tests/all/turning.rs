@@ -7,6 +7,7 @@ use mimu::quantity::Sensor;
 use mimu_rig::random::Random;
 use mimu_rig::rig_file::EffectFile;
 use mimu_tests::bench;
+use mimu_tests::blind::{case_on, turning_plan};
 use rayon::prelude::*;
 
 const G: f64 = 9.80665;
@@ -69,6 +70,29 @@ fn g_sensitivity_and_a_lever_arm_are_named_where_gravity_turns_through_the_unit(
     for errors in errors(&found) {
         assert!(errors.len() >= 7, "{errors:?}");
         assert!(errors.iter().all(|e| e.abs() < 4.5), "{errors:?}");
+    }
+}
+
+#[test]
+fn noise_of_blocks_makes_no_effect_of_a_clean_unit_whose_inputs_turn() {
+    // Read by their own noisy block means, the bits of a gyro's code passed for an effect here.
+    let case = case_on(&turning_plan(0), &[], 0);
+    assert_eq!(case.verdict, "clean", "{case:?}");
+}
+
+#[test]
+#[ignore = "nightly: a plan of half an hour; mimu has a short one"]
+fn a_force_that_is_read_with_the_rate_across_it_is_suggested_for_every_axis() {
+    let case = case_on(&turning_plan(1), &["x_accel_rotation_coupling"], 1);
+    assert_eq!(case.verdict, "unexplained", "{case:?}");
+    for (error, one, other) in [("x", "y", "z"), ("y", "z", "x"), ("z", "x", "y")] {
+        // Of a rate along the force the product is the same either way.
+        let either = [(one, other), (other, one)]
+            .map(|(rate, force)| format!("term:accel_{error}~rate_{rate}*force_{force}: "));
+        let suggested = |r: &String| {
+            r.contains("a suggestion") && either.iter().any(|e| r.starts_with(e.as_str()))
+        };
+        assert!(case.rejected.iter().any(suggested), "{error}: {case:?}");
     }
 }
 
