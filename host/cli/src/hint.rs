@@ -30,6 +30,7 @@ fn flag(argument: Argument) -> Option<&'static str> {
         Argument::Replace => "--replace",
         Argument::Port => "--port",
         Argument::Topic => "--topic",
+        Argument::Preset => "--preset",
         // An argument that this version of the command has no flag for.
         _ => return None,
     })

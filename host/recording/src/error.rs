@@ -67,6 +67,8 @@ pub enum Argument {
     Port,
     /// Topic of a bag.
     Topic,
+    /// Whose layout a foreign file has.
+    Preset,
 }
 
 /// Result with [`Error`].

@@ -17,6 +17,17 @@ pub fn import_text(summary: &ImportSummary) -> String {
         plural(summary.rows, "row"),
         summary.sample_rate_hz
     );
+    if let Some(preset) = &summary.preset {
+        let whence = match preset.recognised {
+            true => "recognised by the header",
+            false => "as given",
+        };
+        let _ = writeln!(
+            out,
+            "  read by the preset {}, {whence}: {}",
+            preset.name, preset.title
+        );
+    }
     for time in &summary.time {
         let _ = writeln!(out, "  {}: {}", time.file, time_text(time));
     }

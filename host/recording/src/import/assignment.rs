@@ -140,6 +140,23 @@ impl Scale {
         }
     }
 
+    /// Those of `scales` that are of columns of which `by_hand` has none; of three axes of which it has some, the others.
+    pub(super) fn beside(scales: &[Scale], by_hand: &[Scale]) -> Vec<Scale> {
+        let free = |column: &Column| Self::given(by_hand, *column).is_none();
+        let mut beside = Vec::new();
+        for scale in scales {
+            let columns: Vec<Column> = Column::all().filter(|c| scale.applies_to(*c)).collect();
+            match columns.iter().all(free) {
+                true => beside.push(scale.clone()),
+                false => beside.extend(columns.into_iter().filter(free).map(|column| Scale {
+                    target: column.name().to_owned(),
+                    factor: scale.factor,
+                })),
+            }
+        }
+        beside
+    }
+
     /// Product of the factors for `column`, if there is one.
     pub(super) fn given(scales: &[Scale], column: Column) -> Option<f64> {
         let any = scales.iter().any(|scale| scale.applies_to(column));

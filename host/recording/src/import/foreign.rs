@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::SkippedLines;
 use super::assignment::{ColumnList, Role, Scale};
+use super::counter::Counter;
 use super::parquet_table::ParquetTable;
 use super::ros::{ImuTopic, is_bag};
 use super::step_labels::StepLabels;
@@ -57,6 +58,7 @@ pub(super) struct ForeignFile {
     table: Table,
     cells: Cells,
     source: TimeSource,
+    counter: Counter,
     /// The time behind its stamps, once that is known.
     clock: Option<Clock>,
     before: Row,
@@ -137,6 +139,7 @@ impl ForeignFile {
             table,
             cells: Cells::default(),
             source,
+            counter: Counter::default(),
             clock: None,
             before: Row::default(),
             labels: StepLabels::default(),
@@ -187,6 +190,11 @@ impl ForeignFile {
         }
     }
 
+    /// How often its running number has begun again at 0, so far.
+    pub fn wraps(&self) -> u64 {
+        self.counter.wraps
+    }
+
     /// Share of the file that has been read.
     pub fn progress(&self) -> f64 {
         match &self.table {
@@ -234,7 +242,7 @@ impl ForeignFile {
         row.stamp = self.cells.stamp;
         row.t_s = match self.source {
             TimeSource::Stamp => 0.0,
-            TimeSource::Sample(cell, rate) => self.cells.numbers[cell] / rate,
+            TimeSource::Sample(cell, rate) => self.counter.next(self.cells.numbers[cell]) / rate,
             TimeSource::Rows(rate) => self.rows as f64 / rate,
         };
         let time = match self.source {

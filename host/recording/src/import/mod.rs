@@ -2,12 +2,14 @@
 
 mod assignment;
 mod binary;
+mod counter;
 mod first_pass;
 mod foreign;
 mod inputs;
 mod join;
 mod options;
 mod parquet_table;
+mod preset;
 mod ros;
 mod step_labels;
 #[cfg(test)]
@@ -20,6 +22,7 @@ use std::path::Path;
 
 pub use assignment::{ColumnList, Role, Scale};
 pub use options::ImportOptions;
+pub use preset::{Chosen, Preset, PresetUse};
 pub use ros::is_bag;
 pub use time::{Decimal, Jitter, TimeSummary};
 
@@ -61,6 +64,8 @@ pub struct ImportSummary {
     pub recording: String,
     /// Rows written.
     pub rows: u64,
+    /// The maker's layout that the files were read by, if any.
+    pub preset: Option<PresetUse>,
     /// Sample rate in Hz: that of the time stamps, or the one that was given where there are none.
     pub sample_rate_hz: f64,
     /// What the time stamps have shown, of each file that has them.
@@ -169,7 +174,7 @@ struct Import {
 
 impl Import {
     fn open(options: &ImportOptions) -> Result<Import> {
-        let mut warnings = Vec::new();
+        let mut warnings = options.preset_warnings.clone();
         let mut first = ForeignFile::open(&options.files[0], &options.how(0))?;
         let mut time = Vec::new();
         let mut origin_s = None;
@@ -264,6 +269,7 @@ impl Import {
                 format: "mimu-import/1",
                 recording: String::new(),
                 rows: 0,
+                preset: options.preset.clone(),
                 sample_rate_hz: rate_hz,
                 time,
                 skipped: SkippedLines::default(),
@@ -400,6 +406,13 @@ impl Import {
             summary.skipped.header += skipped.header;
             summary.skipped.comment += skipped.comment;
             summary.skipped.blank += skipped.blank;
+            if file.wraps() > 0 {
+                summary.warnings.push(format!(
+                    "{}: the column sample began again at 0 {} times, as counters of 16 and 32 bits do, and was counted on",
+                    file.path().display(),
+                    file.wraps()
+                ));
+            }
         }
         if summary.interpolated > 0 {
             summary.warnings.push(format!(

@@ -7,6 +7,7 @@ use proptest::prelude::*;
 use super::super::{Batch, RawUnit, Recording};
 use super::*;
 
+mod presets;
 mod stamps;
 
 /// A folder with foreign files, and the recording that comes of them.
