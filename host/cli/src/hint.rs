@@ -31,6 +31,7 @@ fn flag(argument: Argument) -> Option<&'static str> {
         Argument::Port => "--port",
         Argument::Topic => "--topic",
         Argument::Preset => "--preset",
+        Argument::Means => "--means",
         // An argument that this version of the command has no flag for.
         _ => return None,
     })

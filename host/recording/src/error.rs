@@ -69,6 +69,8 @@ pub enum Argument {
     Topic,
     /// Whose layout a foreign file has.
     Preset,
+    /// Whether rows are means, and no samples.
+    Means,
 }
 
 /// Result with [`Error`].

@@ -31,6 +31,10 @@ pub(crate) struct ImportArgs {
     /// Whose files they are, which says columns, units and signs where they are not given; without it, by the header
     #[arg(long, value_name = "NAME", value_parser = presets())]
     preset: Option<Preset>,
+    /// The rows are means over a pose or a rate each, and no samples: mean readings, and as far as known standard deviations of a
+    /// sample (`accel_x_sd`), numbers of samples (`averaged`, `accel_x_averaged`), inputs (ref_ columns) and names (`step`)
+    #[arg(long)]
+    means: bool,
     /// Sample rate, Hz, of files without a time column; of others it is the rate of their time stamps, which this one checks
     #[arg(long, allow_negative_numbers = true)]
     rate_hz: Option<f64>,
@@ -116,6 +120,7 @@ pub(crate) fn run(args: ImportArgs) -> Result<()> {
         device: args.device,
         latitude_deg: args.latitude,
         inputs: args.inputs,
+        means: args.means,
         format: args.format,
         replace: args.replace,
         ..ImportOptions::new(args.files, gravity, raw_unit, args.reference)

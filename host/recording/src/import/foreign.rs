@@ -109,6 +109,18 @@ impl ForeignFile {
             Table::Parquet(table) => table.roles(),
             Table::Bag(topic) => topic.roles(),
         };
+        let of_means = |role: &&Role| matches!(role, Role::Deviation(_) | Role::Averaged(_));
+        if let Some(role) = roles.iter().find(of_means) {
+            return Err(Error::new(
+                path.display(),
+                format!(
+                    "the column {} is of a table of means, and samples are asked for",
+                    role.name()
+                ),
+                "skip the column, or import the table as one of means",
+            )
+            .about(Argument::Means));
+        }
         let at = |role| roles.iter().position(|&other| other == role);
         let needs_rate = || {
             how.rate_hz.ok_or_else(|| {
@@ -129,7 +141,8 @@ impl ForeignFile {
             .iter()
             .enumerate()
             .filter_map(|(cell, role)| match role {
-                Role::Sample | Role::Column(Column::Time | Column::Step) => None,
+                Role::Sample | Role::Deviation(_) | Role::Averaged(_) => None,
+                Role::Column(Column::Time | Column::Step) => None,
                 Role::Column(column) => Some((cell, *column, Scale::product(how.scales, *column))),
             });
         Ok(ForeignFile {

@@ -9,6 +9,7 @@ mod inputs;
 mod join;
 mod options;
 mod parquet_table;
+mod pose_means;
 mod preset;
 mod ros;
 mod step_labels;
@@ -22,6 +23,7 @@ use std::path::Path;
 
 pub use assignment::{ColumnList, Role, Scale};
 pub use options::ImportOptions;
+pub use pose_means::{PoseMean, PoseMeans};
 pub use preset::{Chosen, Preset, PresetUse};
 pub use ros::is_bag;
 pub use time::{Decimal, Jitter, TimeSummary};
@@ -64,9 +66,11 @@ pub struct ImportSummary {
     pub recording: String,
     /// Rows written.
     pub rows: u64,
+    /// Whether the rows are means over a pose each, and no samples.
+    pub means: bool,
     /// The maker's layout that the files were read by, if any.
     pub preset: Option<PresetUse>,
-    /// Sample rate in Hz: that of the time stamps, or the one that was given where there are none.
+    /// Sample rate in Hz: that of the time stamps, or the one that was given where there are none; null of means without one.
     pub sample_rate_hz: f64,
     /// What the time stamps have shown, of each file that has them.
     pub time: Vec<TimeSummary>,
@@ -93,6 +97,9 @@ pub fn import(
     progress: impl Fn(f64),
 ) -> Result<ImportSummary> {
     check(options, out)?;
+    if options.means {
+        return pose_means::import_means(options, out);
+    }
     let mut import = Import::open(options)?;
     let mut manifest = import.manifest(options, out);
     manifest.check("import")?;
@@ -269,6 +276,7 @@ impl Import {
                 format: "mimu-import/1",
                 recording: String::new(),
                 rows: 0,
+                means: false,
                 preset: options.preset.clone(),
                 sample_rate_hz: rate_hz,
                 time,

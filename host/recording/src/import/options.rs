@@ -36,6 +36,8 @@ pub struct ImportOptions {
     pub latitude_deg: Option<f64>,
     /// Table of the known input of each step.
     pub inputs: Option<PathBuf>,
+    /// Whether the rows are means over a pose or a step each, and no samples.
+    pub means: bool,
     /// What a preset has said of the files; see [`ImportOptions::with_preset`].
     pub preset: Option<PresetUse>,
     /// What it has to warn of.
@@ -67,6 +69,7 @@ impl ImportOptions {
             device: None,
             latitude_deg: None,
             inputs: None,
+            means: false,
             preset: None,
             preset_warnings: Vec::new(),
             format: SampleFormat::default(),
@@ -92,6 +95,9 @@ impl ImportOptions {
     /// files were on somebody's machine helps nobody and may not be meant to be passed on.
     pub(super) fn arguments(&self) -> Vec<String> {
         let mut arguments: Vec<String> = self.files.iter().map(|file| file_name(file)).collect();
+        if self.means {
+            arguments.push("--means".to_owned());
+        }
         let mut option = |name: &str, value: String| {
             arguments.push(name.to_owned());
             arguments.push(value);

@@ -7,6 +7,7 @@ use proptest::prelude::*;
 use super::super::{Batch, RawUnit, Recording};
 use super::*;
 
+mod means;
 mod presets;
 mod stamps;
 
