@@ -131,7 +131,7 @@ fn a_table_of_means_is_fitted_and_everything_that_needs_samples_refuses_it() {
         let json: serde_json::Value = serde_json::from_str(&json).unwrap();
         assert_eq!(json["means"], true);
         assert_eq!(json["dwells"][3]["label"], "p3");
-        let parameters = json["accel"]["parameters"].as_array().unwrap();
+        let parameters = json["sensors"]["accel"]["parameters"].as_array().unwrap();
         let value = |name: &str, axis: &str| {
             let is = |p: &&serde_json::Value| p["name"] == format!("{name}_{axis}");
             parameters.iter().find(is).unwrap()["value"]
