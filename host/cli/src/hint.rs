@@ -30,6 +30,8 @@ fn flag(argument: Argument) -> Option<&'static str> {
         Argument::Replace => "--replace",
         Argument::Port => "--port",
         Argument::Topic => "--topic",
+        Argument::Preset => "--preset",
+        Argument::Means => "--means",
         // An argument that this version of the command has no flag for.
         _ => return None,
     })

@@ -5,9 +5,26 @@ use std::path::Path;
 use mimu::prepared::Prepared;
 use mimu::stillness::Finding;
 use mimu_recording::error::Result;
-use mimu_recording::{MANIFEST_FILE, Recording};
+use mimu_recording::{MANIFEST_FILE, PoseMeans, Recording};
 
 use crate::output::{check_outputs, progress};
+
+/// A recording of samples or of means; see [`read`].
+pub(crate) fn read_for_fit(
+    directory: &Path,
+    finding: Finding,
+    outputs: &[Option<&Path>],
+    others: &[Option<&Path>],
+) -> Result<Prepared> {
+    let Some(means) = PoseMeans::file(directory) else {
+        return read(directory, finding, outputs, others);
+    };
+    let manifest = directory.join(MANIFEST_FILE);
+    let mut inputs: Vec<&Path> = vec![&manifest, &means];
+    inputs.extend(others.iter().flatten());
+    check_outputs(outputs, &inputs)?;
+    Prepared::of_means(&PoseMeans::open(directory)?)
+}
 
 /// Opens and reads a recording, after checking that the results can be written and take the place of no input.
 pub(crate) fn read(

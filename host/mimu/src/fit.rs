@@ -127,6 +127,17 @@ pub fn fit(mut prepared: Prepared, options: Options) -> Result<Fit> {
         )
         .about(Argument::Only));
     }
+    if prepared.manifest.means
+        && prepared.manifest.reference == Reference::Gravity
+        && options.only == Some(Sensor::Gyro)
+    {
+        return Err(Error::undetermined(
+            &prepared.place,
+            "the gyro is calibrated by turns, which need samples, and this is a table of means",
+            "give it steps of known rate (ref_rate_ columns, reference = \"table\"), or record samples",
+        )
+        .about(Argument::Only));
+    }
     if prepared.manifest.reference == Reference::Gravity {
         outlying::leave_out(&mut prepared);
     }
@@ -482,7 +493,8 @@ fn fit_gravity(
         residual.held_out = refit.map(|refit| size_error(&refit.triad, o));
     }
     let mut sensors = Vec::new();
-    if prepared.has(Sensor::Gyro) && options.wants(Sensor::Gyro) {
+    // The turns of a table of means are not known, which its warnings say.
+    if prepared.has(Sensor::Gyro) && options.wants(Sensor::Gyro) && !prepared.manifest.means {
         let parts = Parts {
             count: parts,
             of: &part_of,

@@ -9,6 +9,7 @@
 //! | [`reading_step`] | the step that readings are multiples of                                       |
 //! | [`noise`]       | how well a dwell mean is known                                                |
 //! | [`prepared`]    | all of these for one recording                                                |
+//! | [`pose_means`]  | the same of a table of means, without samples                                 |
 //! | [`estimate`]    | the estimators                                                                |
 //! | [`triad`]       | calibration of one triad: both directions, covariances, physical quantities   |
 //! | [`mod@fit`]     | both triads, judged on what they have not seen; what cannot be right is refused |
@@ -81,6 +82,7 @@ pub mod increment;
 pub mod next_experiment;
 pub mod noise;
 pub mod noise_file;
+pub mod pose_means;
 pub mod prepared;
 pub mod quantity;
 pub mod rails;

@@ -86,6 +86,8 @@ pub struct Noise {
     other: [Option<[f64; 2]>; 6],
     /// From the first dwell to the end of the last, s.
     session: Span,
+    /// Whether the standard deviations of a table of means are all that is known.
+    of_table: bool,
 }
 
 /// A noise file whose variance of a mean over 1 s is off by this factor, up or down, is not that of this recording.
@@ -138,7 +140,21 @@ impl Noise {
                 dwells.first().map_or(0.0, |d| d.start_s),
                 dwells.last().map_or(0.0, end),
             ],
+            of_table: false,
         }
+    }
+
+    /// That of the means of a table: white, by the standard deviation and the number of samples of each.
+    pub fn of_table() -> Self {
+        Self {
+            of_table: true,
+            ..Self::default()
+        }
+    }
+
+    /// Whether the variances of the means are known as they are, and not by that of their size.
+    pub fn is_by_channel(&self, sensor: Sensor) -> bool {
+        self.of_table || self.is_stated(sensor)
     }
 
     /// Takes the noise of `file` in place of that within the dwells; a channel whose dwells are not as noisy as the file says
@@ -246,6 +262,12 @@ impl Noise {
     /// of the mean less that of the session.
     pub fn of_mean(&self, sensor: Sensor, dwell: &Dwell) -> Vector3<f64> {
         let from = sensor.channels().start;
+        if self.of_table {
+            return Vector3::from_fn(|i, _| {
+                let mean = dwell.raw[from + i];
+                mean.variance / mean.n.max(1) as f64
+            });
+        }
         let averaged_s = dwell.averaged_s(sensor);
         Vector3::from_fn(|i, _| match &self.stated[from + i] {
             None => self.channels[from + i].variance(averaged_s),

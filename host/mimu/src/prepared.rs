@@ -103,6 +103,10 @@ impl Prepared {
 
     /// With the noise that a record at rest has shown in place of that within the dwells. Errors: see [`Noise::state`].
     pub fn with_noise(mut self, file: &NoiseFile) -> Result<Self> {
+        if self.manifest.means {
+            let problem = "a noise file says how a mean over some seconds errs, and these means have no lengths";
+            return Err(Error::new(&self.place, problem, "leave it out"));
+        }
         let Dwells { list, warnings, .. } = &mut self.dwells;
         self.noise.state(file, &self.manifest, list, warnings)?;
         Ok(self)
@@ -228,7 +232,7 @@ impl Prepared {
 
     /// Variances of the size of specific force over each of `poses` by noise, (m/s²)².
     pub fn size_variances(&self, accel: &Affine<f64>, poses: &[Observation]) -> Vec<f64> {
-        if self.noise.is_stated(Sensor::Accel) {
+        if self.noise.is_by_channel(Sensor::Accel) {
             let size = |o: &Observation| {
                 let by = accel.matrix.tr_mul(&accel.apply(&o.raw).normalize());
                 by.component_mul(&by).dot(&o.variance)

@@ -67,6 +67,10 @@ pub enum Argument {
     Port,
     /// Topic of a bag.
     Topic,
+    /// Whose layout a foreign file has.
+    Preset,
+    /// Whether rows are means, and no samples.
+    Means,
 }
 
 /// Result with [`Error`].

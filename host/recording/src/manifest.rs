@@ -133,7 +133,8 @@ pub struct Manifest {
     pub format: Format,
     /// Unit that was recorded.
     pub device: String,
-    /// Nominal sample rate in Hz.
+    /// Nominal sample rate in Hz; may be absent, not a number, of means alone.
+    #[serde(default = "unknown", skip_serializing_if = "is_unknown")]
     pub sample_rate_hz: f64,
     /// Local gravity in m/s².
     pub gravity_mps2: f64,
@@ -151,6 +152,9 @@ pub struct Manifest {
     /// It was not ended: what records it was killed, or is still at it. Its last row may be cut, and is left out then.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub unfinished: bool,
+    /// Instead of samples there are means, one row for each pose: only a fit can use them.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub means: bool,
     /// Text label of step i, where the source named its steps.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub step_labels: Vec<String>,
@@ -169,6 +173,14 @@ pub struct Manifest {
     /// Files that it was imported from.
     #[serde(default, rename = "source", skip_serializing_if = "Vec::is_empty")]
     pub sources: Vec<Source>,
+}
+
+fn unknown() -> f64 {
+    f64::NAN
+}
+
+fn is_unknown(number: &f64) -> bool {
+    number.is_nan()
 }
 
 impl Manifest {
@@ -197,6 +209,7 @@ impl Manifest {
             reference,
             power_on_s: None,
             unfinished: false,
+            means: false,
             step_labels: Vec::new(),
             turn_steps: Vec::new(),
             imported_with: Vec::new(),
@@ -243,7 +256,14 @@ impl Manifest {
     /// Checks the values; `place` is the file that they are in, or go to.
     pub fn check(&self, place: &str) -> Result<()> {
         let at = |key: &str| format!("{place}, {key}");
-        check_rate(self.sample_rate_hz, &at("sample_rate_hz"))?;
+        match (self.sample_rate_hz.is_nan(), self.means) {
+            (true, true) => {}
+            (true, false) if place.ends_with(MANIFEST_FILE) => {
+                let problem = "missing field `sample_rate_hz`";
+                return Err(Error::new(place, problem, "add the key"));
+            }
+            _ => check_rate(self.sample_rate_hz, &at("sample_rate_hz"))?,
+        }
         check_gravity(self.gravity_mps2, &at("gravity_mps2"))?;
         if let Some(latitude) = self.latitude_deg
             && !(-90.0..=90.0).contains(&latitude)

@@ -65,6 +65,13 @@ impl Recording {
             return Err(Error::new(directory.display(), problem, remedy));
         }
         let manifest = Manifest::read(&manifest)?;
+        if manifest.means {
+            return Err(Error::new(
+                directory.display(),
+                "it holds the means of poses, which only a fit can use: everything else needs samples",
+                "run mimu fit, or import a recording of samples",
+            ));
+        }
         let csv = directory.join("samples.csv");
         let parquet = directory.join("samples.parquet");
         let mut warnings = Vec::new();

@@ -8,7 +8,7 @@ use super::manifest::MANIFEST_FILE;
 use crate::error::{Argument, Error, Result};
 
 /// Files that a recording consists of; only these are ever deleted.
-const OWN_FILES: [&str; 3] = [MANIFEST_FILE, "samples.csv", "samples.parquet"];
+const OWN_FILES: [&str; 4] = [MANIFEST_FILE, "samples.csv", "samples.parquet", "means.csv"];
 
 /// A directory under a temporary name beside the target, on the same file system, so that one
 /// rename makes it appear. It is removed when dropped.

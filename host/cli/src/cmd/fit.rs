@@ -12,12 +12,12 @@ use mimu_recording::result_file::stage;
 
 use crate::arguments::{JsonArgs, NoiseArgs, SensorArg, StillArgs};
 use crate::output::print;
-use crate::reading::read;
+use crate::reading::read_for_fit;
 use crate::report;
 
 #[derive(Args)]
 pub(crate) struct FitArgs {
-    /// Directory of the recording
+    /// Directory of the recording, of samples or of means
     recording: PathBuf,
     /// Refit without each of N contiguous blocks of time and report the error on it
     #[arg(long, value_name = "blocks=N", default_value = "blocks=4", value_parser = holdout)]
@@ -78,7 +78,7 @@ pub(crate) fn run(args: &FitArgs) -> Result<()> {
     };
     let outputs = [args.output.as_deref(), args.json.file()];
     let inputs = [args.noise.file.as_deref()];
-    let prepared = read(&args.recording, args.still.finding(), &outputs, &inputs)?;
+    let prepared = read_for_fit(&args.recording, args.still.finding(), &outputs, &inputs)?;
     let prepared = args.noise.state(prepared)?;
     if args.method.is_some() && prepared.manifest.reference == Reference::Gravity {
         return Err(Error::new(

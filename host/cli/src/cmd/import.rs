@@ -3,10 +3,12 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use mimu::quantity::normal_gravity;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{
-    ColumnList, ImportOptions, RawUnit, Reference, SampleFormat, Scale, Separator, import, is_bag,
+    ColumnList, ImportOptions, Preset, RawUnit, Reference, SampleFormat, Scale, Separator, import,
+    is_bag,
 };
 
 use crate::arguments::JsonArgs;
@@ -15,7 +17,8 @@ use crate::report;
 
 #[derive(Args)]
 pub(crate) struct ImportArgs {
-    /// Text files (any separator), Parquet, ROS 1 bags or MCAP; the later ones are joined onto the times of the first
+    /// Text files (any separator), Parquet, ROS 1 bags or MCAP, or the folder of a preset; the later ones are joined onto the
+    /// times of the first
     #[arg(required = true)]
     files: Vec<PathBuf>,
     /// Columns of a file from the left (`t_s,accel_x,-`; `-` skips one), or by the names in its header
@@ -25,13 +28,20 @@ pub(crate) struct ImportArgs {
     /// ref_force_x_mps2.., and sample, an index from which the time follows with --rate-hz.
     #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
     columns: Vec<ColumnList>,
+    /// Whose files they are, which says columns, units and signs where they are not given; without it, by the header
+    #[arg(long, value_name = "NAME", value_parser = presets())]
+    preset: Option<Preset>,
+    /// The rows are means over a pose or a rate each, and no samples: mean readings, and as far as known standard deviations of a
+    /// sample (`accel_x_sd`), numbers of samples (`averaged`, `accel_x_averaged`), inputs (ref_ columns) and names (`step`)
+    #[arg(long)]
+    means: bool,
     /// Sample rate, Hz, of files without a time column; of others it is the rate of their time stamps, which this one checks
     #[arg(long, allow_negative_numbers = true)]
     rate_hz: Option<f64>,
     /// Local gravity, m/s²; without it, normal gravity at sea level of --latitude, or 9.80665 and a warning
     #[arg(long, allow_negative_numbers = true)]
     gravity: Option<f64>,
-    /// Unit of the raw columns, after --scale: V, count or SI (rad/s and m/s²); bags have SI without it
+    /// Unit of the raw columns, after --scale: V, count or SI (rad/s and m/s²); bags and most presets have SI without it
     #[arg(long, value_name = "UNIT")]
     raw_unit: Option<RawUnit>,
     /// Topic of a bag with sensor_msgs/Imu; without it, the only one
@@ -71,6 +81,13 @@ pub(crate) struct ImportArgs {
     json: JsonArgs,
 }
 
+fn presets() -> impl TypedValueParser<Value = Preset> {
+    let names = Preset::all()
+        .iter()
+        .map(|preset| PossibleValue::new(preset.name).help(preset.title));
+    PossibleValuesParser::new(names).try_map(|name| name.parse::<Preset>())
+}
+
 /// Sample rates below this are more likely a wrong unit of time.
 const SLOW_HZ: f64 = 5.0;
 
@@ -81,9 +98,14 @@ pub(crate) fn run(args: ImportArgs) -> Result<()> {
         (None, None) if args.reference == Reference::Table => (9.80665, None),
         (None, None) => (9.80665, Some("gravity is taken to be 9.80665 m/s²; it ranges from 9.78 at the equator to 9.83 at the poles, and every scale factor of the accelerometer with it: give --gravity or --latitude".to_string())),
     };
+    let chosen = match (&args.preset, args.columns.is_empty()) {
+        (None, false) => None,
+        (named, _) => Preset::choose(*named, &args.files, args.separator)?,
+    };
     let bags = args.files.iter().all(|file| is_bag(file));
     let raw_unit = args
         .raw_unit
+        .or(chosen.as_ref().and_then(|chosen| chosen.raw_unit))
         .or(bags.then_some(RawUnit::Si))
         .ok_or_else(|| {
             let remedy = "give --raw-unit: V, count or SI (rad/s and m/s²)";
@@ -98,9 +120,14 @@ pub(crate) fn run(args: ImportArgs) -> Result<()> {
         device: args.device,
         latitude_deg: args.latitude,
         inputs: args.inputs,
+        means: args.means,
         format: args.format,
         replace: args.replace,
         ..ImportOptions::new(args.files, gravity, raw_unit, args.reference)
+    };
+    let options = match chosen {
+        Some(chosen) => options.with_preset(chosen),
+        None => options,
     };
     let inputs: Vec<&Path> = options
         .files

@@ -13,6 +13,30 @@ use crate::report::text::warn;
 /// Result of `mimu fit`.
 pub fn fit_text(fit: &FitResult) -> String {
     let mut out = String::new();
+    if fit.means {
+        let _ = writeln!(
+            out,
+            "{}: means of {}, gravity {} m/s²",
+            fit.device,
+            plural(fit.rows, "pose"),
+            fit.gravity_mps2
+        );
+    } else {
+        recorded(&mut out, fit);
+    }
+    for (name, sensor) in fit.sensors.named() {
+        let _ = writeln!(out);
+        sensor_text(&mut out, fit, name, sensor);
+    }
+    if !fit.warnings.is_empty() {
+        let _ = writeln!(out);
+        warn(&mut out, fit.warnings.iter());
+    }
+    out
+}
+
+/// How long the recording is, and what its dwells are.
+fn recorded(out: &mut String, fit: &FitResult) {
     let _ = writeln!(
         out,
         "{}: {} samples, {:.1} s at {:.2} Hz, gravity {} m/s²",
@@ -45,15 +69,6 @@ pub fn fit_text(fit: &FitResult) -> String {
             );
         }
     }
-    for (name, sensor) in fit.sensors.named() {
-        let _ = writeln!(out);
-        sensor_text(&mut out, fit, name, sensor);
-    }
-    if !fit.warnings.is_empty() {
-        let _ = writeln!(out);
-        warn(&mut out, fit.warnings.iter());
-    }
-    out
 }
 
 /// Half of a 95 % interval in sigmas.
@@ -195,10 +210,10 @@ pub fn dwell_table(dwells: &[DwellResult]) -> String {
         let name = d.label.clone().unwrap_or_else(|| d.step.to_string());
         let _ = write!(
             out,
-            "{name:>10} {:>9} {:>9.2} {:>8.2}",
+            "{name:>10} {:>9} {:>9} {:>8}",
             d.first_row + 1,
-            d.start_s,
-            d.duration_s
+            known(d.start_s),
+            known(d.duration_s)
         );
         for (mean, n) in d.raw_mean.iter().zip(d.averaged) {
             let shown = if n > 0 { six(*mean) } else { "-".into() };
@@ -213,6 +228,14 @@ pub fn dwell_table(dwells: &[DwellResult]) -> String {
         let _ = writeln!(out, "  {}", faults.join(", "));
     }
     out
+}
+
+/// Seconds, where they are known.
+fn known(seconds: f64) -> String {
+    match seconds.is_nan() {
+        true => "-".into(),
+        false => format!("{seconds:.2}"),
+    }
 }
 
 /// Six significant digits.

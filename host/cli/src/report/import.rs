@@ -10,13 +10,32 @@ use crate::report::text::warn;
 /// Result of `mimu import`.
 pub fn import_text(summary: &ImportSummary) -> String {
     let mut out = String::new();
-    let _ = writeln!(
-        out,
-        "{}: {} at {} Hz",
-        summary.recording,
-        plural(summary.rows, "row"),
-        summary.sample_rate_hz
-    );
+    let _ = match summary.means {
+        true => writeln!(
+            out,
+            "{}: means of {}",
+            summary.recording,
+            plural(summary.rows, "pose")
+        ),
+        false => writeln!(
+            out,
+            "{}: {} at {} Hz",
+            summary.recording,
+            plural(summary.rows, "row"),
+            summary.sample_rate_hz
+        ),
+    };
+    if let Some(preset) = &summary.preset {
+        let whence = match preset.recognised {
+            true => "recognised by the header",
+            false => "as given",
+        };
+        let _ = writeln!(
+            out,
+            "  read by the preset {}, {whence}: {}",
+            preset.name, preset.title
+        );
+    }
     for time in &summary.time {
         let _ = writeln!(out, "  {}: {}", time.file, time_text(time));
     }

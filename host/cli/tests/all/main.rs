@@ -7,5 +7,6 @@ mod device;
 mod diagnosis_page;
 mod effects;
 mod fuzz;
+mod import_command;
 mod pocket_calculator;
 mod readme;

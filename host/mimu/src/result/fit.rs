@@ -32,7 +32,9 @@ pub struct FitResult {
     pub gravity_mps2: f64,
     /// Estimator where the input is known.
     pub method: &'static str,
-    /// Samples.
+    /// Whether it was a table of means, one row for each pose, and no samples.
+    pub means: bool,
+    /// Samples, or rows of the table of means.
     pub rows: u64,
     /// Time between samples, s.
     pub period_s: f64,
@@ -257,6 +259,7 @@ impl FitResult {
             raw_unit: manifest.raw_unit,
             gravity_mps2: manifest.gravity_mps2,
             method: fit.options.method.name(),
+            means: manifest.means,
             rows: condensed.rows,
             period_s: condensed.period_s,
             gaps: Gaps {

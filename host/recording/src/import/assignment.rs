@@ -14,12 +14,38 @@ pub enum Role {
     Column(Column),
     /// A running number, from which the time follows with the sample rate.
     Sample,
+    /// In a table of means: standard deviation of one sample of a raw column, index into [`RAW_COLUMNS`](crate::RAW_COLUMNS).
+    Deviation(usize),
+    /// In a table of means: how many samples were averaged, of one raw column or of all.
+    Averaged(Option<usize>),
 }
+
+const DEVIATION_COLUMNS: [&str; 6] = [
+    "gyro_x_sd",
+    "gyro_y_sd",
+    "gyro_z_sd",
+    "accel_x_sd",
+    "accel_y_sd",
+    "accel_z_sd",
+];
+
+const AVERAGED_COLUMNS: [&str; 6] = [
+    "gyro_x_averaged",
+    "gyro_y_averaged",
+    "gyro_z_averaged",
+    "accel_x_averaged",
+    "accel_y_averaged",
+    "accel_z_averaged",
+];
 
 impl Role {
     /// Every role there is.
     pub fn all() -> impl Iterator<Item = Role> {
-        Column::all().map(Role::Column).chain([Role::Sample])
+        Column::all()
+            .map(Role::Column)
+            .chain([Role::Sample, Role::Averaged(None)])
+            .chain((0..6).map(Role::Deviation))
+            .chain((0..6).map(|c| Role::Averaged(Some(c))))
     }
 
     /// Name on the command line.
@@ -27,6 +53,9 @@ impl Role {
         match self {
             Role::Column(column) => column.name(),
             Role::Sample => "sample",
+            Role::Deviation(c) => DEVIATION_COLUMNS[c],
+            Role::Averaged(None) => "averaged",
+            Role::Averaged(Some(c)) => AVERAGED_COLUMNS[c],
         }
     }
 
@@ -138,6 +167,23 @@ impl Scale {
             }
             target => name == target,
         }
+    }
+
+    /// Those of `scales` that are of columns of which `by_hand` has none; of three axes of which it has some, the others.
+    pub(super) fn beside(scales: &[Scale], by_hand: &[Scale]) -> Vec<Scale> {
+        let free = |column: &Column| Self::given(by_hand, *column).is_none();
+        let mut beside = Vec::new();
+        for scale in scales {
+            let columns: Vec<Column> = Column::all().filter(|c| scale.applies_to(*c)).collect();
+            match columns.iter().all(free) {
+                true => beside.push(scale.clone()),
+                false => beside.extend(columns.into_iter().filter(free).map(|column| Scale {
+                    target: column.name().to_owned(),
+                    factor: scale.factor,
+                })),
+            }
+        }
+        beside
     }
 
     /// Product of the factors for `column`, if there is one.

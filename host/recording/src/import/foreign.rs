@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::SkippedLines;
 use super::assignment::{ColumnList, Role, Scale};
+use super::counter::Counter;
 use super::parquet_table::ParquetTable;
 use super::ros::{ImuTopic, is_bag};
 use super::step_labels::StepLabels;
@@ -57,6 +58,7 @@ pub(super) struct ForeignFile {
     table: Table,
     cells: Cells,
     source: TimeSource,
+    counter: Counter,
     /// The time behind its stamps, once that is known.
     clock: Option<Clock>,
     before: Row,
@@ -107,6 +109,18 @@ impl ForeignFile {
             Table::Parquet(table) => table.roles(),
             Table::Bag(topic) => topic.roles(),
         };
+        let of_means = |role: &&Role| matches!(role, Role::Deviation(_) | Role::Averaged(_));
+        if let Some(role) = roles.iter().find(of_means) {
+            return Err(Error::new(
+                path.display(),
+                format!(
+                    "the column {} is of a table of means, and samples are asked for",
+                    role.name()
+                ),
+                "skip the column, or import the table as one of means",
+            )
+            .about(Argument::Means));
+        }
         let at = |role| roles.iter().position(|&other| other == role);
         let needs_rate = || {
             how.rate_hz.ok_or_else(|| {
@@ -127,7 +141,8 @@ impl ForeignFile {
             .iter()
             .enumerate()
             .filter_map(|(cell, role)| match role {
-                Role::Sample | Role::Column(Column::Time | Column::Step) => None,
+                Role::Sample | Role::Deviation(_) | Role::Averaged(_) => None,
+                Role::Column(Column::Time | Column::Step) => None,
                 Role::Column(column) => Some((cell, *column, Scale::product(how.scales, *column))),
             });
         Ok(ForeignFile {
@@ -137,6 +152,7 @@ impl ForeignFile {
             table,
             cells: Cells::default(),
             source,
+            counter: Counter::default(),
             clock: None,
             before: Row::default(),
             labels: StepLabels::default(),
@@ -187,6 +203,11 @@ impl ForeignFile {
         }
     }
 
+    /// How often its running number has begun again at 0, so far.
+    pub fn wraps(&self) -> u64 {
+        self.counter.wraps
+    }
+
     /// Share of the file that has been read.
     pub fn progress(&self) -> f64 {
         match &self.table {
@@ -234,7 +255,7 @@ impl ForeignFile {
         row.stamp = self.cells.stamp;
         row.t_s = match self.source {
             TimeSource::Stamp => 0.0,
-            TimeSource::Sample(cell, rate) => self.cells.numbers[cell] / rate,
+            TimeSource::Sample(cell, rate) => self.counter.next(self.cells.numbers[cell]) / rate,
             TimeSource::Rows(rate) => self.rows as f64 / rate,
         };
         let time = match self.source {

@@ -2,12 +2,15 @@
 
 mod assignment;
 mod binary;
+mod counter;
 mod first_pass;
 mod foreign;
 mod inputs;
 mod join;
 mod options;
 mod parquet_table;
+mod pose_means;
+mod preset;
 mod ros;
 mod step_labels;
 #[cfg(test)]
@@ -20,6 +23,8 @@ use std::path::Path;
 
 pub use assignment::{ColumnList, Role, Scale};
 pub use options::ImportOptions;
+pub use pose_means::{PoseMean, PoseMeans};
+pub use preset::{Chosen, Preset, PresetUse};
 pub use ros::is_bag;
 pub use time::{Decimal, Jitter, TimeSummary};
 
@@ -61,7 +66,11 @@ pub struct ImportSummary {
     pub recording: String,
     /// Rows written.
     pub rows: u64,
-    /// Sample rate in Hz: that of the time stamps, or the one that was given where there are none.
+    /// Whether the rows are means over a pose each, and no samples.
+    pub means: bool,
+    /// The maker's layout that the files were read by, if any.
+    pub preset: Option<PresetUse>,
+    /// Sample rate in Hz: that of the time stamps, or the one that was given where there are none; null of means without one.
     pub sample_rate_hz: f64,
     /// What the time stamps have shown, of each file that has them.
     pub time: Vec<TimeSummary>,
@@ -88,6 +97,9 @@ pub fn import(
     progress: impl Fn(f64),
 ) -> Result<ImportSummary> {
     check(options, out)?;
+    if options.means {
+        return pose_means::import_means(options, out);
+    }
     let mut import = Import::open(options)?;
     let mut manifest = import.manifest(options, out);
     manifest.check("import")?;
@@ -169,7 +181,7 @@ struct Import {
 
 impl Import {
     fn open(options: &ImportOptions) -> Result<Import> {
-        let mut warnings = Vec::new();
+        let mut warnings = options.preset_warnings.clone();
         let mut first = ForeignFile::open(&options.files[0], &options.how(0))?;
         let mut time = Vec::new();
         let mut origin_s = None;
@@ -264,6 +276,8 @@ impl Import {
                 format: "mimu-import/1",
                 recording: String::new(),
                 rows: 0,
+                means: false,
+                preset: options.preset.clone(),
                 sample_rate_hz: rate_hz,
                 time,
                 skipped: SkippedLines::default(),
@@ -400,6 +414,13 @@ impl Import {
             summary.skipped.header += skipped.header;
             summary.skipped.comment += skipped.comment;
             summary.skipped.blank += skipped.blank;
+            if file.wraps() > 0 {
+                summary.warnings.push(format!(
+                    "{}: the column sample began again at 0 {} times, as counters of 16 and 32 bits do, and was counted on",
+                    file.path().display(),
+                    file.wraps()
+                ));
+            }
         }
         if summary.interpolated > 0 {
             summary.warnings.push(format!(

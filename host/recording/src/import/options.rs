@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::assignment::{ColumnList, Scale};
 use super::foreign::HowToRead;
+use super::preset::{Chosen, PresetUse};
 use crate::manifest::{RawUnit, Reference};
 use crate::separator::Separator;
 use crate::writer::SampleFormat;
@@ -35,6 +36,12 @@ pub struct ImportOptions {
     pub latitude_deg: Option<f64>,
     /// Table of the known input of each step.
     pub inputs: Option<PathBuf>,
+    /// Whether the rows are means over a pose or a step each, and no samples.
+    pub means: bool,
+    /// What a preset has said of the files; see [`ImportOptions::with_preset`].
+    pub preset: Option<PresetUse>,
+    /// What it has to warn of.
+    pub preset_warnings: Vec<String>,
     /// Format of the samples.
     pub format: SampleFormat,
     /// Whether an existing recording is replaced.
@@ -62,19 +69,42 @@ impl ImportOptions {
             device: None,
             latitude_deg: None,
             inputs: None,
+            means: false,
+            preset: None,
+            preset_warnings: Vec::new(),
             format: SampleFormat::default(),
             replace: false,
         }
+    }
+
+    /// With what a preset says of the files where nothing was given by hand. The unit of the readings stays, as it has no default.
+    pub fn with_preset(mut self, chosen: Chosen) -> Self {
+        self.files = chosen.files;
+        if self.columns.is_empty() {
+            self.columns = chosen.columns;
+        }
+        let scales = Scale::beside(&chosen.scales, &self.scales);
+        self.scales.extend(scales);
+        self.rate_hz = self.rate_hz.or(chosen.rate_hz);
+        self.preset = Some(chosen.used);
+        self.preset_warnings = chosen.warnings;
+        self
     }
 
     /// The options as arguments of `mimu import`, for the manifest. File names only: where the
     /// files were on somebody's machine helps nobody and may not be meant to be passed on.
     pub(super) fn arguments(&self) -> Vec<String> {
         let mut arguments: Vec<String> = self.files.iter().map(|file| file_name(file)).collect();
+        if self.means {
+            arguments.push("--means".to_owned());
+        }
         let mut option = |name: &str, value: String| {
             arguments.push(name.to_owned());
             arguments.push(value);
         };
+        if let Some(preset) = &self.preset {
+            option("--preset", preset.name.to_owned());
+        }
         for list in &self.columns {
             option("--columns", list.to_string());
         }

@@ -7,6 +7,8 @@ use proptest::prelude::*;
 use super::super::{Batch, RawUnit, Recording};
 use super::*;
 
+mod means;
+mod presets;
 mod stamps;
 
 /// A folder with foreign files, and the recording that comes of them.

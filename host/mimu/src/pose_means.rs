@@ -1,0 +1,173 @@
+//! Tables of means made ready for a fit, without any samples behind them.
+//!
+//! A mean is what a dwell comes to, so a row is a dwell: its noise is what the table says of it, and nothing is judged that only samples
+//! show (stillness, rails, stuck channels). What goes by time is not known: turns, drifts, and how a bias wanders.
+
+use crate::blocks::{Block, Condensed, Level, Moments};
+use crate::dwell::{Dwell, Dwells, Fault, Mean};
+use crate::noise::Noise;
+use crate::prepared::Prepared;
+use crate::quantity::Sensor;
+use mimu_recording::error::Result;
+use mimu_recording::{Column, PoseMean, PoseMeans, Reference};
+
+impl Prepared {
+    /// The dwells of a table of means, ready for [`fit`](fn@crate::fit::fit) and for nothing else.
+    ///
+    /// The variance of a mean is that of its samples over their number, as of white noise; zero where the table does not say, and then
+    /// the scatter about the fit is the only noise there is.
+    ///
+    /// Errors: those of the manifest.
+    pub fn of_means(means: &PoseMeans) -> Result<Self> {
+        let manifest = means.manifest.clone();
+        manifest.check(&means.place)?;
+        let period_s = 1.0 / manifest.sample_rate_hz;
+        let has_raw = [0, 1, 2, 3, 4, 5].map(|c| means.columns.has(Column::Raw(c)));
+        let poses = means.poses.iter().enumerate();
+        let (blocks, list): (Vec<Block>, Vec<Dwell>) = poses
+            .map(|(i, pose)| {
+                let dwell = dwell(i, pose, period_s, &has_raw);
+                (block(&dwell, pose), dwell)
+            })
+            .unzip();
+        let condensed = Condensed {
+            blocks,
+            increments: Vec::new(),
+            rows: means.poses.len() as u64,
+            reading_step: [None; 6],
+            has_raw,
+            has_reference: means.columns.reference,
+            has_steps: true,
+            period_s,
+            gaps: (0, 0.0),
+            duplicates: 0,
+            missing: [0; 6],
+            sha256: means.sha256.clone(),
+            warnings: Vec::new(),
+        };
+        let dwells = Dwells {
+            warnings: warnings(&list, means, &has_raw),
+            list,
+            detection: None,
+            rails: Default::default(),
+            longest_run: [f64::INFINITY; 6],
+            left_out: Vec::new(),
+        };
+        Ok(Self {
+            manifest,
+            condensed,
+            dwells,
+            noise: Noise::of_table(),
+            place: means.place.clone(),
+        })
+    }
+}
+
+fn dwell(i: usize, pose: &PoseMean, period_s: f64, has_raw: &[bool; 6]) -> Dwell {
+    let raw = [0, 1, 2, 3, 4, 5].map(|c| match pose.raw[c] {
+        mean if mean.is_nan() => Mean::default(),
+        mean => Mean {
+            n: pose.averaged[c].unwrap_or(1),
+            mean,
+            variance: match pose.deviation[c] {
+                unknown if unknown.is_nan() => 0.0,
+                deviation => deviation * deviation,
+            },
+            clipped: 0,
+        },
+    });
+    let fault = |sensor: Sensor| {
+        let mut own = sensor.channels().filter(|&c| has_raw[c]);
+        own.find(|&c| raw[c].n == 0).map(Fault::Missing)
+    };
+    let rows = raw.iter().map(|mean| mean.n).max().unwrap_or(0);
+    let mut reference = pose.reference;
+    for rate in &mut reference[Sensor::Gyro.channels()] {
+        *rate = rate.to_radians();
+    }
+    Dwell {
+        // A table has fewer rows than that by far.
+        step: i as i32,
+        first_row: i as u64,
+        rows,
+        start_s: f64::NAN,
+        last_s: f64::NAN,
+        duration_s: match pose.averaged.iter().any(Option::is_some) {
+            true => rows as f64 * period_s,
+            false => f64::NAN,
+        },
+        blocks: i..i + 1,
+        gyro_fault: fault(Sensor::Gyro),
+        accel_fault: fault(Sensor::Accel),
+        raw,
+        reference,
+        temp_c: pose.temp_c,
+        turn: false,
+        moves: [false; 2],
+    }
+}
+
+/// The one block of a dwell.
+fn block(dwell: &Dwell, pose: &PoseMean) -> Block {
+    let level = |value: f64| Level {
+        mean: value,
+        min: value,
+        max: value,
+    };
+    Block {
+        first_row: dwell.first_row,
+        rows: 1,
+        start_s: f64::NAN,
+        last_s: f64::NAN,
+        step: dwell.step,
+        after_gap: true,
+        raw: dwell.raw.map(|mean| Moments {
+            n: u32::from(mean.n > 0),
+            mean: mean.mean,
+            min: mean.mean,
+            max: mean.mean,
+            ..Moments::default()
+        }),
+        reference: pose.reference.map(level),
+        temp_c: level(pose.temp_c),
+    }
+}
+
+/// What a person should know of the table.
+fn warnings(list: &[Dwell], means: &PoseMeans, has_raw: &[bool; 6]) -> Vec<String> {
+    let mut warnings = Vec::new();
+    for sensor in Sensor::BOTH {
+        let channels = || sensor.channels().filter(|&c| has_raw[c]);
+        if channels().next().is_none() {
+            continue;
+        }
+        let unknown = |pose: &PoseMean| {
+            let mut own = channels().filter(|&c| !pose.raw[c].is_nan());
+            own.any(|c| pose.deviation[c].is_nan())
+        };
+        warnings.push(match means.poses.iter().any(unknown) {
+            true => format!(
+                "{sensor}: the table has no standard deviations: the scatter about the fit is the only noise, and what noise alone would leave is not known"
+            ),
+            false => format!(
+                "{sensor}: the noise of a mean is taken to be white, its standard deviation over the root of the number of samples; what else is in the means shows in the scatter about the fit"
+            ),
+        });
+        let without = list.iter().filter(|d| d.fault(sensor).is_some()).count();
+        if without > 0 {
+            warnings.push(format!(
+                "{sensor}: {without} of {} rows have no mean of one axis at least, and are not used for it",
+                list.len()
+            ));
+        }
+        if sensor == Sensor::Gyro && means.manifest.reference == Reference::Gravity {
+            warnings.push(
+                "gyro: turns need samples, and this is a table of means: it is not calibrated; give it steps of known rate (ref_rate_ columns, reference = \"table\"), or record samples".into(),
+            );
+        }
+    }
+    warnings
+}
+
+#[cfg(test)]
+mod tests;

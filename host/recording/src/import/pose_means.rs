@@ -1,0 +1,355 @@
+//! Tables of means: one row for each pose or rate, in place of its samples.
+
+use std::path::{Path, PathBuf};
+
+use super::assignment::{ColumnList, Role, Scale};
+use super::options::{ImportOptions, file_name};
+use super::ros::is_bag;
+use super::text_table::{Cells, TextTable};
+use super::{ImportSummary, SkippedLines};
+use crate::cell::is_reading;
+use crate::columns::{Column, Columns, Layout};
+use crate::digest;
+use crate::error::{Argument, Error, Result};
+use crate::manifest::{MANIFEST_FILE, Manifest, Reference, Source};
+use crate::separator::Separator;
+use crate::staging::Staging;
+
+/// File of the means in a recording's directory, beside its manifest.
+pub const MEANS_FILE: &str = "means.csv";
+
+/// More samples are averaged by nobody; a double counts to here without a gap.
+const MOST_AVERAGED: f64 = 1e15;
+
+/// The means of one pose, or of one step of a rate table.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PoseMean {
+    /// What the table calls it; empty where it has no names.
+    pub label: String,
+    /// Mean readings: gyro x, y, z, accelerometer x, y, z, in the raw unit. Not a number where there is none.
+    pub raw: [f64; 6],
+    /// Standard deviations of one sample, raw units; not a number where unknown.
+    pub deviation: [f64; 6],
+    /// Samples averaged; `None` where unknown.
+    pub averaged: [Option<u64>; 6],
+    /// Known input: rates (deg/s), specific forces (m/s²). Not a number where unknown.
+    pub reference: [f64; 6],
+    /// Temperature, °C, or not a number.
+    pub temp_c: f64,
+}
+
+/// A table of means with its manifest.
+#[derive(Debug, Clone)]
+pub struct PoseMeans {
+    /// What is known beside the means; the sample rate is not a number where it is not known.
+    pub manifest: Manifest,
+    /// Where it is, for messages.
+    pub place: String,
+    /// SHA-256 of the file of the means, hexadecimal.
+    pub sha256: String,
+    /// In the order of the table.
+    pub poses: Vec<PoseMean>,
+    /// Which readings and inputs it has.
+    pub columns: Columns,
+}
+
+impl PoseMeans {
+    /// The file of the means of `directory`, where it is a recording of means.
+    pub fn file(directory: &Path) -> Option<PathBuf> {
+        let path = directory.join(MEANS_FILE);
+        path.is_file().then_some(path)
+    }
+
+    /// Reads the recording of means at `directory`.
+    pub fn open(directory: &Path) -> Result<PoseMeans> {
+        let mut manifest = Manifest::read(&directory.join(MANIFEST_FILE))?;
+        if !manifest.means {
+            return Err(Error::new(
+                directory.join(MANIFEST_FILE).display(),
+                format!("there is {MEANS_FILE}, and the key means is not true"),
+                "import the table again",
+            ));
+        }
+        let path = directory.join(MEANS_FILE);
+        let table = Table::read(&path, None, Some(Separator::Comma), &[])?;
+        if table.poses.iter().any(|pose| !pose.label.is_empty()) {
+            manifest.step_labels = table.poses.iter().map(|p| p.label.clone()).collect();
+        }
+        Ok(PoseMeans {
+            manifest,
+            place: path.display().to_string(),
+            sha256: digest::sha256(&path)?,
+            poses: table.poses,
+            columns: table.columns,
+        })
+    }
+}
+
+/// What was read of a table.
+struct Table {
+    poses: Vec<PoseMean>,
+    columns: Columns,
+    skipped: SkippedLines,
+    warnings: Vec<String>,
+}
+
+impl Table {
+    fn read(
+        path: &Path,
+        list: Option<&ColumnList>,
+        separator: Option<Separator>,
+        scales: &[Scale],
+    ) -> Result<Table> {
+        let refuse = |problem: String, remedy: &str| {
+            Err(Error::new(path.display(), problem, remedy).about(Argument::Columns))
+        };
+        let mut table = TextTable::open(path, list, separator)?;
+        let roles = table.roles();
+        let has = |role: Role| roles.contains(&role);
+        let timed = [Role::Column(Column::Time), Role::Sample];
+        if let Some(role) = timed.into_iter().find(|role| has(*role)) {
+            return refuse(
+                format!(
+                    "there is the column {}, and means have no time",
+                    role.name()
+                ),
+                "skip the column, or import the rows as the samples that they are",
+            );
+        }
+        for c in 0..6 {
+            let counted = has(Role::Averaged(None)) || has(Role::Averaged(Some(c)));
+            if has(Role::Deviation(c)) && !counted {
+                return refuse(
+                    format!(
+                        "there is the column {}, and not of how many samples",
+                        Role::Deviation(c).name()
+                    ),
+                    "add the column averaged; it is 1 where the deviations are those of the means themselves",
+                );
+            }
+        }
+        // The same rules as for a recording's header, but for the time.
+        let names = roles.iter().filter_map(|role| match role {
+            Role::Column(column) => Some(column.name()),
+            _ => None,
+        });
+        let names: Vec<&str> = [Column::Time.name()].into_iter().chain(names).collect();
+        let columns = Layout::from_names(&names, &path.display().to_string())?.columns;
+        let mut cells = Cells::default();
+        let mut poses = Vec::new();
+        while let Some(row) = table.next(&mut cells)? {
+            let place = table.place(row);
+            poses.push(pose(&roles, &cells, scales, &columns, &place)?);
+        }
+        Ok(Table {
+            poses,
+            columns,
+            skipped: table.skipped,
+            warnings: std::mem::take(&mut table.warnings),
+        })
+    }
+}
+
+fn pose(
+    roles: &[Role],
+    cells: &Cells,
+    scales: &[Scale],
+    columns: &Columns,
+    place: &str,
+) -> Result<PoseMean> {
+    let mut pose = PoseMean {
+        label: String::from_utf8_lossy(&cells.step).trim().to_owned(),
+        raw: [f64::NAN; 6],
+        deviation: [f64::NAN; 6],
+        averaged: [None; 6],
+        reference: [f64::NAN; 6],
+        temp_c: f64::NAN,
+    };
+    let refuse = |role: Role, problem: String, remedy: &str| {
+        let place = format!("{place}, column {}", role.name());
+        Err(Error::new(place, problem, remedy))
+    };
+    for (&role, &number) in roles.iter().zip(&cells.numbers) {
+        let scaled = |column| number * Scale::product(scales, column);
+        match role {
+            Role::Column(Column::Raw(c)) => pose.raw[c] = scaled(Column::Raw(c)),
+            Role::Column(Column::Reference(c)) => {
+                pose.reference[c] = scaled(Column::Reference(c));
+            }
+            Role::Column(Column::Temperature) => pose.temp_c = scaled(Column::Temperature),
+            Role::Deviation(c) => {
+                if number < 0.0 {
+                    let remedy = "a standard deviation is 0 or more; correct the cell";
+                    return refuse(role, format!("{number} is negative"), remedy);
+                }
+                pose.deviation[c] = (scaled(Column::Raw(c))).abs();
+            }
+            Role::Averaged(which) => {
+                if number.is_nan() {
+                    continue;
+                }
+                if number.fract() != 0.0 || !(1.0..=MOST_AVERAGED).contains(&number) {
+                    let problem = format!("{number} is no number of samples");
+                    return refuse(role, problem, "write a whole number from 1");
+                }
+                // Whole and in range, by the lines above.
+                let count = Some(number as u64);
+                match which {
+                    Some(c) => pose.averaged[c] = count,
+                    None => {
+                        for (c, averaged) in pose.averaged.iter_mut().enumerate() {
+                            // A count of the channel's own goes before that of the row.
+                            if !roles.contains(&Role::Averaged(Some(c))) {
+                                *averaged = count;
+                            }
+                        }
+                    }
+                }
+            }
+            Role::Column(Column::Time | Column::Step) | Role::Sample => {}
+        }
+    }
+    let numbers = pose
+        .raw
+        .iter()
+        .chain(&pose.deviation)
+        .chain(&pose.reference);
+    if !numbers.into_iter().all(|number| is_reading(*number)) {
+        let remedy = "correct the cell or the factor";
+        return Err(Error::new(
+            place,
+            "a number is too large for a reading",
+            remedy,
+        ));
+    }
+    for c in (0..6).filter(|&c| columns.has(Column::Raw(c)) && !pose.raw[c].is_nan()) {
+        let counts = [Role::Averaged(Some(c)), Role::Averaged(None)];
+        let counted = counts.into_iter().find(|role| roles.contains(role));
+        let missing = match (roles.contains(&Role::Deviation(c)), counted) {
+            (true, _) if pose.deviation[c].is_nan() => Some(Role::Deviation(c)),
+            (_, Some(role)) if pose.averaged[c].is_none() => Some(role),
+            _ => None,
+        };
+        if let Some(role) = missing {
+            let problem = format!("it is empty, and {} is not", Column::Raw(c).name());
+            return refuse(role, problem, "fill it in, or skip the column");
+        }
+    }
+    Ok(pose)
+}
+
+/// Imports a table of means as a recording of means at `out`.
+pub(super) fn import_means(options: &ImportOptions, out: &Path) -> Result<ImportSummary> {
+    let path = &options.files[0];
+    let refuse = |problem: &str, remedy: &str| Err(Error::new(path.display(), problem, remedy));
+    if options.files.len() > 1 {
+        return refuse(
+            "there are several files of means",
+            "put them into one table",
+        );
+    }
+    if options.inputs.is_some() {
+        let remedy = "write the known inputs into the table: ref_rate_x_dps, ref_force_x_mps2 and the others";
+        return refuse("a table of inputs is given beside a table of means", remedy);
+    }
+    if is_bag(path)
+        || path
+            .extension()
+            .is_some_and(|e| e.eq_ignore_ascii_case("parquet"))
+    {
+        return refuse("a table of means is read from text", "write it as CSV");
+    }
+    let list = options.columns.first();
+    let table = Table::read(path, list, options.separator, &options.scales)?;
+    if options.reference == Reference::Table && table.columns.reference == [false; 6] {
+        return Err(Error::new(
+            path.display(),
+            "the reference is to be the table, and there is no ref_ column",
+            "add the ref_ columns, or say that the reference is gravity",
+        )
+        .about(Argument::Reference));
+    }
+    let device = options.device.clone().unwrap_or_else(|| file_name(out));
+    let mut manifest = Manifest::new(
+        device,
+        options.rate_hz.unwrap_or(f64::NAN),
+        options.gravity_mps2,
+        options.raw_unit,
+        options.reference,
+    );
+    manifest.means = true;
+    manifest.latitude_deg = options.latitude_deg;
+    manifest.imported_with = options.arguments();
+    manifest.sources.push(Source {
+        file: file_name(path),
+        sha256: digest::sha256(path)?,
+    });
+    manifest.check("import")?;
+    let staging = Staging::create(out, options.replace)?;
+    staging.write_file(MEANS_FILE, &to_csv(&table))?;
+    staging.write_file(MANIFEST_FILE, manifest.to_toml()?.as_bytes())?;
+    staging.publish()?;
+    let raw = (0..6).filter(|&c| table.columns.has(Column::Raw(c)));
+    let empty = |c: usize| table.poses.iter().filter(move |pose| pose.raw[c].is_nan());
+    let mut warnings = options.preset_warnings.clone();
+    warnings.extend(table.warnings);
+    Ok(ImportSummary {
+        format: "mimu-import/1",
+        recording: out.display().to_string(),
+        rows: table.poses.len() as u64,
+        means: true,
+        preset: options.preset.clone(),
+        sample_rate_hz: manifest.sample_rate_hz,
+        time: Vec::new(),
+        skipped: table.skipped,
+        dropped_outside: 0,
+        dropped_in_gaps: 0,
+        interpolated: 0,
+        empty_cells: raw.map(|c| empty(c).count() as u64).sum(),
+        warnings,
+    })
+}
+
+/// The table in the units of the recording, by the names of its columns. Labels stand last, as a line that begins with # is a comment.
+fn to_csv(table: &Table) -> Vec<u8> {
+    let poses = &table.poses;
+    let columns = &table.columns;
+    let number = |value: f64| match value.is_nan() {
+        true => String::new(),
+        false => format!("{value:?}"),
+    };
+    let mut written: Vec<(String, Vec<String>)> = Vec::new();
+    let mut add = |role: Role, cell: &dyn Fn(&PoseMean) -> String| {
+        written.push((role.name().to_owned(), poses.iter().map(cell).collect()));
+    };
+    for column in columns
+        .present()
+        .filter(|c| !matches!(c, Column::Time | Column::Step))
+    {
+        add(Role::Column(column), &|pose| match column {
+            Column::Raw(c) => number(pose.raw[c]),
+            Column::Reference(c) => number(pose.reference[c]),
+            _ => number(pose.temp_c),
+        });
+        let Column::Raw(c) = column else { continue };
+        if poses.iter().any(|pose| !pose.deviation[c].is_nan()) {
+            add(Role::Deviation(c), &|pose| number(pose.deviation[c]));
+        }
+        if poses.iter().any(|pose| pose.averaged[c].is_some()) {
+            let count = |n: u64| n.to_string();
+            add(Role::Averaged(Some(c)), &|pose| {
+                pose.averaged[c].map_or_else(String::new, count)
+            });
+        }
+    }
+    if columns.step {
+        add(Role::Column(Column::Step), &|pose| pose.label.clone());
+    }
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    // Writing into memory cannot fail.
+    let _ = writer.write_record(written.iter().map(|(name, _)| name));
+    for row in 0..poses.len() {
+        let _ = writer.write_record(written.iter().map(|(_, cells)| &cells[row]));
+    }
+    writer.into_inner().unwrap_or_default()
+}

@@ -1,0 +1,376 @@
+//! Recordings of well-known makers: whether files are theirs, and what their columns mean.
+//!
+//! A preset is data; what it says goes the way that the same would go by hand, as lists of columns and factors.
+
+mod layout;
+mod table;
+
+use std::io::Read;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+use serde::Serialize;
+
+use super::assignment::{ColumnList, Scale};
+use super::ros::is_bag;
+use super::text_table::{Cells, TextTable};
+use crate::cell::shorten;
+use crate::error::{Argument, Error, Result};
+use crate::manifest::RawUnit;
+use crate::separator::Separator;
+use layout::Layout;
+pub use layout::Preset;
+use table::PRESETS;
+
+/// Bytes at the start of a file among which its header and the lines above it stand.
+const HEAD: u64 = 1 << 16;
+
+/// What a preset has said of the files of an import.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PresetUse {
+    /// Name of the preset.
+    pub name: &'static str,
+    /// What it reads.
+    pub title: &'static str,
+    /// Whether it was found out by the headers, and not given.
+    pub recognised: bool,
+}
+
+/// A preset with the files that it fits.
+#[derive(Debug, Clone)]
+pub struct Chosen {
+    /// Which one.
+    pub used: PresetUse,
+    /// Unit of the readings, where the maker has only one.
+    pub raw_unit: Option<RawUnit>,
+    /// The files; of a folder, those in it.
+    pub files: Vec<PathBuf>,
+    /// What their columns mean.
+    pub columns: Vec<ColumnList>,
+    /// Factors, signs included.
+    pub scales: Vec<Scale>,
+    /// Sample rate in Hz, where a line above the data says it.
+    pub rate_hz: Option<f64>,
+    /// What a person should know.
+    pub warnings: Vec<String>,
+}
+
+/// Why files are not of a preset.
+enum Unfit {
+    /// They are another maker's, or are not whole.
+    Other(Error),
+    /// They are its maker's, and of no use.
+    Useless(Error),
+}
+
+impl Unfit {
+    fn into_error(self) -> Error {
+        match self {
+            Unfit::Other(error) | Unfit::Useless(error) => error,
+        }
+    }
+}
+
+impl From<Error> for Unfit {
+    fn from(error: Error) -> Self {
+        Unfit::Other(error)
+    }
+}
+
+impl FromStr for Preset {
+    type Err = Error;
+
+    fn from_str(name: &str) -> Result<Self> {
+        let known = Preset::all().iter().find(|preset| preset.name == name);
+        known.copied().ok_or_else(|| {
+            let names: Vec<&str> = Preset::all().iter().map(|preset| preset.name).collect();
+            Error::new(
+                "preset",
+                format!("{} is not known", shorten(name.as_bytes())),
+                format!("write one of {}", names.join(", ")),
+            )
+        })
+    }
+}
+
+impl Preset {
+    /// All of them.
+    pub fn all() -> &'static [Preset] {
+        &PRESETS
+    }
+
+    /// What `named` says of `paths`, files or folders; without it what the only preset says that their headers are of, and `None` if
+    /// they are of none.
+    ///
+    /// Errors: the files are not of the preset that is named, are of several, or are of no use.
+    pub fn choose(
+        named: Option<Preset>,
+        paths: &[PathBuf],
+        separator: Option<Separator>,
+    ) -> Result<Option<Chosen>> {
+        if let Some(preset) = named {
+            let chosen = preset.of(paths, separator, false);
+            return chosen.map(Some).map_err(Unfit::into_error);
+        }
+        let mut fitting = Vec::new();
+        let mut useless = None;
+        for preset in Preset::all() {
+            match preset.of(paths, separator, true) {
+                Ok(chosen) => fitting.push(chosen),
+                Err(Unfit::Useless(error)) => {
+                    useless.get_or_insert(error);
+                }
+                Err(Unfit::Other(_)) => {}
+            }
+        }
+        if fitting.len() > 1 {
+            let names: Vec<&str> = fitting.iter().map(|chosen| chosen.used.name).collect();
+            return Err(Error::new(
+                paths[0].display(),
+                format!("it has the header of {}", names.join(" and of ")),
+                "say which of them it is",
+            )
+            .about(Argument::Preset));
+        }
+        match (fitting.pop(), useless) {
+            (None, Some(error)) => Err(error),
+            (chosen, _) => Ok(chosen),
+        }
+    }
+
+    /// What it says of `paths`. `recognise`: whether files that have no header are none of its own.
+    fn of(
+        &self,
+        paths: &[PathBuf],
+        separator: Option<Separator>,
+        recognise: bool,
+    ) -> std::result::Result<Chosen, Unfit> {
+        let mut files = Vec::new();
+        for path in paths {
+            match path.is_dir() {
+                true => files.extend(self.files_in(path)?),
+                false => files.push(path.clone()),
+            }
+        }
+        let mut chosen = Chosen {
+            used: PresetUse {
+                name: self.name,
+                title: self.title,
+                recognised: recognise,
+            },
+            raw_unit: self.raw_unit,
+            files: Vec::new(),
+            columns: Vec::new(),
+            scales: Vec::new(),
+            rate_hz: None,
+            warnings: Vec::new(),
+        };
+        for file in &files {
+            let (layout, list, rate_hz) = self.layout(file, separator, recognise)?;
+            for text in layout.scales {
+                let scale: Scale = text.parse()?;
+                if !chosen.scales.contains(&scale) {
+                    chosen.scales.push(scale);
+                }
+            }
+            chosen.columns.push(list);
+            chosen.rate_hz = chosen.rate_hz.or(rate_hz);
+            if self.contradicted_beside(file) {
+                let metadata = self.beside.map_or("", |beside| beside.file);
+                let problem = format!(
+                    "{} beside {} says that it is not of the preset {}, but of another one with the same header",
+                    metadata,
+                    file.display(),
+                    self.name
+                );
+                if recognise {
+                    return Err(Unfit::Other(Error::new(file.display(), problem, "")));
+                }
+                chosen.warnings.push(problem);
+            }
+        }
+        chosen.files = files;
+        Ok(chosen)
+    }
+
+    /// The first of its sets of files that `folder` has.
+    fn files_in(&self, folder: &Path) -> Result<Vec<PathBuf>> {
+        let sets = self.in_folder.iter();
+        let mut sets = sets.map(|set| set.iter().map(|file| folder.join(file)).collect());
+        sets.find(|set: &Vec<PathBuf>| set.iter().all(|file| file.is_file()))
+            .ok_or_else(|| {
+                let sets: Vec<String> = self.in_folder.iter().map(|s| s.join(" and ")).collect();
+                let problem = match sets.is_empty() {
+                    true => format!("this is a folder, and the preset {} has none", self.name),
+                    false => format!(
+                        "there are no files of the preset {} in this folder: {}",
+                        self.name,
+                        sets.join(", or ")
+                    ),
+                };
+                Error::new(folder.display(), problem, "name the files")
+            })
+    }
+
+    /// The layout of `path`, its columns and the sample rate that it says.
+    fn layout(
+        &self,
+        path: &Path,
+        separator: Option<Separator>,
+        recognise: bool,
+    ) -> std::result::Result<(&'static Layout, ColumnList, Option<f64>), Unfit> {
+        let refused = |problem: String, remedy: &str| {
+            let error = Error::new(path.display(), problem, remedy);
+            Err(Unfit::Other(error.about(Argument::Columns)))
+        };
+        if is_bag(path) {
+            let problem = "a preset is given for a bag, whose messages have their own columns";
+            return Err(Error::new(path.display(), problem, "leave it out").into());
+        }
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        let head = head(path)?;
+        let mut nearest: Option<(Vec<String>, Error)> = None;
+        for layout in self.layouts.iter().filter(|l| l.file.fits(&name)) {
+            let list: ColumnList = layout.columns.parse()?;
+            if recognise && matches!(list, ColumnList::ByPosition(_)) {
+                continue;
+            }
+            let rate_hz = layout.rate_after.map(|words| rate_after(&head, words));
+            let outcome = match (rate_hz, layout.rate_after) {
+                (Some(None), Some(words)) => Err(Error::new(
+                    path.display(),
+                    format!("no line above the data has {words:?} and the sample rate"),
+                    "export it with its header, or say what the columns are",
+                )),
+                _ => layout.read(path, list, separator),
+            };
+            match (outcome, layout.unfit) {
+                (Ok(_), Some([problem, remedy])) => {
+                    return Err(Unfit::Useless(Error::new(path.display(), problem, remedy)));
+                }
+                (Ok(list), None) => return Ok((layout, list, rate_hz.flatten())),
+                (Err(error), _) => {
+                    let missing = layout.missing(&head);
+                    if nearest
+                        .as_ref()
+                        .is_none_or(|(m, _)| missing.len() < m.len())
+                    {
+                        nearest = Some((missing, error));
+                    }
+                }
+            }
+        }
+        match nearest {
+            None => refused(
+                format!(
+                    "its name is not one of the files of the preset {}",
+                    self.name
+                ),
+                "name it as its maker does, or say what the columns are",
+            ),
+            // The names are there, and something else is wrong.
+            Some((missing, error)) if missing.is_empty() => Err(error.into()),
+            Some((missing, _)) => refused(
+                format!(
+                    "it is not of the preset {}: there is no column {}",
+                    self.name,
+                    missing.join(", ")
+                ),
+                "give the file as its maker wrote it, or say what the columns are",
+            ),
+        }
+    }
+
+    /// Whether the file beside `path` says that it is of another preset.
+    fn contradicted_beside(&self, path: &Path) -> bool {
+        let Some(beside) = &self.beside else {
+            return false;
+        };
+        let Ok(text) = std::fs::read_to_string(path.with_file_name(beside.file)) else {
+            return false;
+        };
+        let mut rows = text.lines().map(|line| {
+            let mut cells = csv::ByteRecord::new();
+            Separator::Comma.split(line.as_bytes(), &mut cells);
+            let text = |cell: &[u8]| String::from_utf8_lossy(cell).to_lowercase();
+            cells.iter().map(text).collect::<Vec<String>>()
+        });
+        let (names, row) = (
+            rows.next().unwrap_or_default(),
+            rows.next().unwrap_or_default(),
+        );
+        let is = |(column, value): &(&str, &str)| {
+            let mut cells = names.iter().zip(&row);
+            cells.any(|(name, cell)| name == column && cell == value)
+        };
+        beside.values.iter().any(is) != beside.one_is_there
+    }
+}
+
+impl Layout {
+    /// Its columns in `path`, with those that it may have; the first row must have a time if any row should.
+    fn read(
+        &self,
+        path: &Path,
+        list: ColumnList,
+        separator: Option<Separator>,
+    ) -> Result<ColumnList> {
+        let more = format!("{},{}", self.columns, self.optional);
+        if !self.optional.is_empty()
+            && let Ok(more) = more.parse()
+            && TextTable::open(path, Some(&more), separator).is_ok()
+        {
+            return self.timed(path, more, separator);
+        }
+        self.timed(path, list, separator)
+    }
+
+    fn timed(
+        &self,
+        path: &Path,
+        list: ColumnList,
+        separator: Option<Separator>,
+    ) -> Result<ColumnList> {
+        let mut table = TextTable::open(path, Some(&list), separator)?;
+        let mut cells = Cells::default();
+        let row = table.next(&mut cells)?;
+        if row.is_some() && self.columns.contains("t_s") && cells.stamp.value.is_nan() {
+            let problem = "the column of the time is there, and empty";
+            let remedy = "say what the columns are without it, and the rate";
+            return Err(Error::new(path.display(), problem, remedy)
+                .about(Argument::Columns)
+                .about(Argument::SampleRate));
+        }
+        Ok(list)
+    }
+
+    /// The names in the header that are not in `head`.
+    fn missing(&self, head: &str) -> Vec<String> {
+        let list: Result<ColumnList> = self.columns.parse();
+        match list {
+            Ok(ColumnList::ByName(names)) => {
+                let names = names.into_iter().map(|(_, name)| name);
+                names.filter(|name| !head.contains(name)).collect()
+            }
+            _ => Vec::new(),
+        }
+    }
+}
+
+/// The beginning of a file as text.
+fn head(path: &Path) -> Result<String> {
+    let io = |error: std::io::Error| Error::io(path, &error);
+    let file = std::fs::File::open(path).map_err(io)?;
+    let mut head = Vec::new();
+    file.take(HEAD).read_to_end(&mut head).map_err(io)?;
+    Ok(String::from_utf8_lossy(&head).into_owned())
+}
+
+/// The number behind `words` in one of the first lines.
+fn rate_after(head: &str, words: &str) -> Option<f64> {
+    let behind = head.lines().find_map(|line| line.split_once(words))?.1;
+    let digits = behind.trim_start();
+    let end = digits.find(|c: char| !c.is_ascii_digit() && c != '.');
+    let rate: f64 = digits[..end.unwrap_or(digits.len())].parse().ok()?;
+    (rate > 0.0).then_some(rate)
+}

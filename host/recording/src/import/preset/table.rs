@@ -1,0 +1,188 @@
+//! The presets. Another maker is another entry here, and a line in the table of `docs/import.md`.
+
+use super::layout::{Beside, FileName, Layout, Preset};
+use crate::manifest::RawUnit;
+
+/// A file of Sensor Logger: the name says which sensor, as all have the same header.
+const fn sensor_logger(file: &'static str, columns: &'static str) -> Layout {
+    Layout {
+        file: FileName::Is(file),
+        scales: &["t_s=1e-9"],
+        ..Layout::of(columns)
+    }
+}
+
+const LOGGED_GYRO: &str = "t_s=time,gyro_x=x,gyro_y=y,gyro_z=z";
+const LOGGED_ACCEL: &str = "t_s=time,accel_x=x,accel_y=y,accel_z=z";
+
+/// Its acceleration that is no reading of a sensor.
+const fn without_gravity(file: &'static str) -> Layout {
+    Layout {
+        unfit: Some([
+            "it has the acceleration without gravity, or gravity without the acceleration: what the phone makes of its sensors, and no reading",
+            "record and give AccelerometerUncalibrated.csv, or TotalAcceleration.csv",
+        ]),
+        ..sensor_logger(file, LOGGED_ACCEL)
+    }
+}
+
+/// The switch "Standardise Units & Frames" makes an iPhone write as Android does; without it signs and units are Apple's.
+const AS_ANDROID: [(&str, &str); 2] = [("platform", "android"), ("standardisation", "true")];
+
+const LOGGED_FOLDER: [&[&str]; 6] = [
+    &["GyroscopeUncalibrated.csv", "AccelerometerUncalibrated.csv"],
+    &["GyroscopeUncalibrated.csv", "TotalAcceleration.csv"],
+    &["Gyroscope.csv", "AccelerometerUncalibrated.csv"],
+    &["Gyroscope.csv", "TotalAcceleration.csv"],
+    &["AccelerometerUncalibrated.csv"],
+    &["TotalAcceleration.csv"],
+];
+
+/// Calibrated readings of the packets, and the temperature where it was exported.
+const XSENS: Layout = Layout {
+    optional: "temp_c=Temperature",
+    rate_after: Some("Update Rate:"),
+    ..Layout::of("")
+};
+
+/// All of them.
+pub(super) const PRESETS: [Preset; 6] = [
+    // The header of every imu0/data.csv of the EuRoC sequences and of those laid out like them (TUM VI, MRPT, OpenVINS);
+    // Burri et al., The EuRoC micro aerial vehicle datasets, IJRR 2016. Stamps since 1970; sensor.yaml beside it says nothing of units.
+    Preset {
+        name: "euroc",
+        title: "EuRoC/ASL: imu0/data.csv",
+        raw_unit: Some(RawUnit::Si),
+        layouts: &[Layout {
+            scales: &["t_s=1e-9"],
+            ..Layout::of(
+                "t_s=timestamp [ns],gyro_x=w_RS_S_x [rad s^-1],gyro_y=w_RS_S_y [rad s^-1],gyro_z=w_RS_S_z [rad s^-1],\
+                 accel_x=a_RS_S_x [m s^-2],accel_y=a_RS_S_y [m s^-2],accel_z=a_RS_S_z [m s^-2]",
+            )
+        }],
+        in_folder: &[&["data.csv"], &["imu0/data.csv"], &["mav0/imu0/data.csv"]],
+        beside: None,
+    },
+    // github.com/tszheichoi/awesome-sensor-logger at b10f5c5: README.md (Metadata.csv), UNITS.md, COORDINATES.md, CROSSPLATFORM.md.
+    // The columns stand as z, y, x, and go by their names. Uncalibrated is preferred, as Android subtracts its own estimate of the
+    // gyro's bias from the other one.
+    Preset {
+        name: "sensor-logger",
+        title: "Sensor Logger on Android, or on iOS with standardised units and frames",
+        raw_unit: Some(RawUnit::Si),
+        layouts: &[
+            sensor_logger("GyroscopeUncalibrated.csv", LOGGED_GYRO),
+            sensor_logger("Gyroscope.csv", LOGGED_GYRO),
+            sensor_logger("AccelerometerUncalibrated.csv", LOGGED_ACCEL),
+            sensor_logger("TotalAcceleration.csv", LOGGED_ACCEL),
+            without_gravity("Accelerometer.csv"),
+            without_gravity("Gravity.csv"),
+        ],
+        in_folder: &LOGGED_FOLDER,
+        beside: Some(Beside {
+            file: "Metadata.csv",
+            values: &AS_ANDROID,
+            one_is_there: true,
+        }),
+    },
+    // The same sources: on iOS uncalibrated acceleration is in g (of 9.80665 m/s²), and all three axes have the other sign: on its
+    // back a phone reads -1 on z, where its specific force is +g. Rates of rotation have the same sign on both.
+    Preset {
+        name: "sensor-logger-ios",
+        title: "Sensor Logger on iOS, as it is without standardised units and frames",
+        raw_unit: Some(RawUnit::Si),
+        layouts: &[
+            sensor_logger("GyroscopeUncalibrated.csv", LOGGED_GYRO),
+            sensor_logger("Gyroscope.csv", LOGGED_GYRO),
+            Layout {
+                scales: &["t_s=1e-9", "accel=-9.80665"],
+                ..sensor_logger("AccelerometerUncalibrated.csv", LOGGED_ACCEL)
+            },
+            without_gravity("Accelerometer.csv"),
+            without_gravity("Gravity.csv"),
+        ],
+        in_folder: &LOGGED_FOLDER,
+        beside: Some(Beside {
+            file: "Metadata.csv",
+            values: &AS_ANDROID,
+            one_is_there: false,
+        }),
+    },
+    // github.com/phyphox/phyphox-experiments at 972923d: <export> of accelerometer, gyroscope and linear_accelerometer; files and
+    // separators by DataExport.java of phyphox-android. Both signs are those of specific force and rate, on both systems.
+    Preset {
+        name: "phyphox",
+        title: "phyphox: \"Acceleration (with g)\" and \"Gyroscope\", any separator",
+        raw_unit: Some(RawUnit::Si),
+        layouts: &[
+            Layout::of(
+                "t_s=Time (s),gyro_x=Gyroscope x (rad/s),gyro_y=Gyroscope y (rad/s),gyro_z=Gyroscope z (rad/s),\
+                 accel_x=Acceleration x (m/s^2),accel_y=Acceleration y (m/s^2),accel_z=Acceleration z (m/s^2)",
+            ),
+            Layout::of(
+                "t_s=Time (s),accel_x=Acceleration x (m/s^2),accel_y=Acceleration y (m/s^2),accel_z=Acceleration z (m/s^2)",
+            ),
+            // Some experiments write the square as a sign.
+            Layout::of(
+                "t_s=Time (s),accel_x=Acceleration x (m/s²),accel_y=Acceleration y (m/s²),accel_z=Acceleration z (m/s²)",
+            ),
+            Layout::of(
+                "t_s=Time (s),gyro_x=Gyroscope x (rad/s),gyro_y=Gyroscope y (rad/s),gyro_z=Gyroscope z (rad/s)",
+            ),
+            Layout {
+                unfit: Some([
+                    "it has the acceleration without gravity, which is no reading of a sensor",
+                    "record the experiment \"Acceleration (with g)\"",
+                ]),
+                ..Layout::of(
+                    "t_s=Time (s),accel_x=Linear Acceleration x (m/s^2),accel_y=Linear Acceleration y (m/s^2),accel_z=Linear Acceleration z (m/s^2)",
+                )
+            },
+        ],
+        in_folder: &[
+            &["Gyroscope.csv", "Accelerometer.csv"],
+            &["Raw Data.csv"],
+            &["Accelerometer.csv"],
+        ],
+        beside: None,
+    },
+    // Text exports of MT Manager: lines with // above the names, one of which has the rate. Units by the MTw user manual (table of
+    // exported data): m/s², rad/s, °C, a counter that wraps at 65535. SampleTimeFine counts 10 kHz (MTi Family Reference Manual,
+    // XDI_SampleTimeFine); of a wireless unit it is there and empty. Xsens DOT has the same names in other units, and no such line.
+    Preset {
+        name: "xsens",
+        title: "Xsens MT Manager, export as text",
+        raw_unit: Some(RawUnit::Si),
+        layouts: &[
+            Layout {
+                columns: "t_s=SampleTimeFine,accel_x=Acc_X,accel_y=Acc_Y,accel_z=Acc_Z,gyro_x=Gyr_X,gyro_y=Gyr_Y,gyro_z=Gyr_Z",
+                scales: &["t_s=1e-4"],
+                ..XSENS
+            },
+            Layout {
+                columns: "sample=PacketCounter,accel_x=Acc_X,accel_y=Acc_Y,accel_z=Acc_Z,gyro_x=Gyr_X,gyro_y=Gyr_Y,gyro_z=Gyr_Z",
+                ..XSENS
+            },
+        ],
+        in_folder: &[],
+        beside: None,
+    },
+    // github.com/Kyle-ak/imu_tk at 7780270: bin/test_data and importAsciiData in src/io_utils.cpp. Raw counts or SI, as one likes.
+    Preset {
+        name: "imu_tk",
+        title: "imu_tk: one file each, time x y z, named with acc and gyr",
+        raw_unit: None,
+        layouts: &[
+            Layout {
+                file: FileName::Has("acc"),
+                ..Layout::of("t_s,accel_x,accel_y,accel_z")
+            },
+            Layout {
+                file: FileName::Has("gyr"),
+                ..Layout::of("t_s,gyro_x,gyro_y,gyro_z")
+            },
+        ],
+        in_folder: &[],
+        beside: None,
+    },
+];
