@@ -1,0 +1,206 @@
+//! Both triads with gravity as the only reference: the accelerometer by its magnitude, the gyro by the turns between dwells.
+
+use mimu_core::compensation::Affine;
+use nalgebra::Vector3;
+
+use super::hold_out::{HeldOut, Split, determined};
+use super::sensor::{Residual, SensorFit, rms, typical};
+use super::{Options, finish, refuse_wrong_gravity};
+use crate::estimate::turn::{Rest, Turn, direction_error, sensitivity};
+use crate::estimate::{Estimated, Failure, Observation, gravity_size, rotation};
+use crate::prepared::Prepared;
+use crate::quantity::{Figure, Sensor};
+use crate::triad::{Triad, slope};
+use mimu_recording::error::{Error, Result};
+
+pub(super) fn fit_gravity(
+    prepared: &Prepared,
+    options: Options,
+    warnings: &mut Vec<String>,
+) -> Result<Vec<SensorFit>> {
+    let g = prepared.manifest.gravity_mps2;
+    if !prepared.has(Sensor::Accel) {
+        return Err(Error::new(
+            &prepared.place,
+            "there is no accelerometer, and gravity is the only reference",
+            "add accel_x, accel_y, accel_z, or give the gyro its rates in ref_rate_ columns (reference = \"table\")",
+        ));
+    }
+    let poses = prepared.observations(Sensor::Accel);
+    if poses.is_empty() {
+        return Err(Error::new(
+            &prepared.place,
+            format!(
+                "no dwell can be used for the accelerometer{}",
+                prepared.dwells.unused(Sensor::Accel)
+            ),
+            "hold the unit still for some seconds in every pose, within the sensor's range",
+        ));
+    }
+    refuse_wrong_gravity(prepared, Sensor::Accel, &poses)?;
+    let variances = |accel: &Affine<f64>| prepared.size_variances(accel, &poses);
+    let by_sphere = gravity_size::first_guess(&poses, g)
+        .map_or_else(|| vec![0.0; poses.len()], |a| variances(&a));
+    let accel = gravity_size::estimate(&poses, &by_sphere, g)
+        .map_err(|f| prepared.refused(f, Sensor::Accel))?;
+    let floors = variances(&accel.triad.inverse);
+    let parts = options.holdout_blocks.min(poses.len());
+    let part_of = |split: Split, dwell: usize| split.part(dwell, prepared.dwells.list.len(), parts);
+    let size_error = |triad: &Triad, o: &Observation| {
+        Vector3::new(triad.inverse.apply(&o.raw).norm() - g, 0.0, 0.0)
+    };
+    let mut residuals: Vec<Residual> = poses
+        .iter()
+        .zip(&floors)
+        .map(|(o, floor)| Residual {
+            dwell: o.dwell,
+            within: false,
+            value: size_error(&accel.triad, o),
+            held_out: None,
+            floor: floor.sqrt(),
+        })
+        .collect();
+    let typical = typical(Figure::GravitySize, &residuals);
+    let without = |split: Split, part: usize| {
+        let of_part = |o: &Observation| part_of(split, o.dwell) == part;
+        let kept = poses.iter().zip(&by_sphere).filter(|(o, _)| !of_part(o));
+        let (kept, variances): (Vec<_>, Vec<_>) = kept.map(|(o, v)| (*o, *v)).unzip();
+        let refit = gravity_size::estimate(&kept, &variances, g)?;
+        let open = poses.iter().filter(|o| of_part(o)).map(|o| {
+            let up = accel.triad.inverse.apply(&o.raw).normalize();
+            refit.triad.variance(&slope(&up, &o.raw))
+        });
+        determined(open, typical, (Figure::GravitySize, Sensor::Accel))?;
+        Ok(refit)
+    };
+    let held_out = HeldOut::of(parts, without);
+    for (residual, o) in residuals.iter_mut().zip(&poses) {
+        let refit = held_out.without(part_of(held_out.split, o.dwell));
+        residual.held_out = refit.map(|refit| size_error(&refit.triad, o));
+    }
+    let mut sensors = Vec::new();
+    // The turns of a table of means are not known, which its warnings say.
+    if prepared.has(Sensor::Gyro) && options.wants(Sensor::Gyro) && !prepared.manifest.means {
+        let parts = Parts {
+            count: parts,
+            of: &part_of,
+            accel_without: &without,
+        };
+        sensors.extend(fit_turns(prepared, &accel, &parts, warnings)?);
+    }
+    sensors.push(finish(
+        Sensor::Accel,
+        accel,
+        Figure::GravitySize,
+        residuals,
+        poses.len(),
+        None,
+        held_out.into(),
+    ));
+    Ok(sensors)
+}
+
+/// How a recording is cut into parts, and what its accelerometer is without one.
+struct Parts<'a> {
+    count: usize,
+    of: &'a (dyn Fn(Split, usize) -> usize + Sync),
+    accel_without: &'a (dyn Fn(Split, usize) -> std::result::Result<Estimated, Failure> + Sync),
+}
+
+/// The gyro from the turns. A turn belongs to the part of the dwell that it ends in, and no turn that touches
+/// a dwell of a part is used while the part is left out.
+fn fit_turns(
+    prepared: &Prepared,
+    accel: &Estimated,
+    parts: &Parts,
+    warnings: &mut Vec<String>,
+) -> Result<Option<SensorFit>> {
+    let g = prepared.manifest.gravity_mps2;
+    let by_full = &accel.triad.inverse;
+    let (turns, refused) = prepared.turns(by_full);
+    warnings.extend(refused);
+    let rest = prepared.rest(by_full);
+    if turns.is_empty() {
+        warnings
+            .push("gyro: no turn lies between two usable dwells, so it is not calibrated".into());
+        return Ok(None);
+    }
+    let motions = prepared.motions(by_full);
+    let gyro = rotation::estimate(&turns, &rest, &accel.triad, &motions, None, g)
+        .map_err(|f| prepared.refused(f, Sensor::Gyro))?;
+    let c = gyro.triad.inverse.matrix;
+    let mean_square = c.norm_squared() / 3.0;
+    let mut residuals: Vec<Residual> = turns
+        .iter()
+        .map(|t| Residual {
+            dwell: t.to,
+            within: false,
+            value: direction_error(t, &gyro.triad.inverse),
+            held_out: None,
+            floor: t.floor(mean_square),
+        })
+        .collect();
+    let typical = typical(Figure::Direction, &residuals);
+    let held = HeldOut::of(parts.count, |split, part| {
+        let accel = (parts.accel_without)(split, part).map_err(|failure| {
+            let problem = failure.problem();
+            Failure::NoSolution(format!("the accelerometer is not determined: {problem}"))
+        })?;
+        let of_part = |dwell: usize| (parts.of)(split, dwell) == part;
+        let kept: Vec<_> = prepared.turns(&accel.triad.inverse).0;
+        let kept: Vec<_> = kept
+            .into_iter()
+            .filter(|t| !of_part(t.from) && !of_part(t.to))
+            .collect();
+        let rest: Vec<_> = rest.iter().filter(|o| !of_part(o.dwell)).copied().collect();
+        let start = Some(&gyro.triad.inverse);
+        let refit = rotation::estimate(&kept, &rest, &accel.triad, &[], start, g)?;
+        let open = turns.iter().filter(|t| of_part(t.to)).map(|t| {
+            let columns = sensitivity(t, &gyro.triad.inverse).by_parameters(t);
+            columns.iter().map(|by| refit.triad.variance(by)).sum()
+        });
+        determined(open, typical, (Figure::Direction, Sensor::Gyro))?;
+        Ok((refit, accel))
+    });
+    let without = |dwell: usize| held.without((parts.of)(held.split, dwell));
+    for (residual, turn) in residuals.iter_mut().zip(&turns) {
+        residual.held_out = without(turn.to).map(|(gyro, accel)| {
+            let force = |dwell: usize| {
+                let raw = prepared.dwells.list[dwell].raw_mean(Sensor::Accel);
+                accel.triad.inverse.apply(&raw)
+            };
+            let turn = Turn {
+                before: force(turn.from),
+                after: force(turn.to),
+                ..*turn
+            };
+            direction_error(&turn, &gyro.triad.inverse)
+        });
+    }
+    let static_rms = |rate: &dyn Fn(&Rest) -> Option<Vector3<f64>>| {
+        let all: Vec<_> = rest.iter().filter_map(rate).collect();
+        (!all.is_empty()).then(|| rms(Figure::Input, all.into_iter()))
+    };
+    let in_sample = static_rms(&|o| Some(gyro.triad.inverse.apply(&o.raw) - o.rate));
+    let at_rest = static_rms(&|o| {
+        let (refit, _) = without(o.dwell)?;
+        Some(refit.triad.inverse.apply(&o.raw) - o.rate)
+    });
+    let wide = turns
+        .iter()
+        .map(|t| direction_error(t, &gyro.triad.inverse).norm())
+        .fold(0.0, f64::max);
+    let mut fit = finish(
+        Sensor::Gyro,
+        gyro,
+        Figure::Direction,
+        residuals,
+        rest.len(),
+        in_sample.map(|r| (r, at_rest)),
+        held.into(),
+    );
+    if wide > 20f64.to_radians() {
+        fit.warnings.push(format!("gyro: after one turn gravity is {:.0} degrees from where it is predicted; samples are missing or clipped, or the gyro's columns are not the gyro's", wide.to_degrees()));
+    }
+    Ok(Some(fit))
+}

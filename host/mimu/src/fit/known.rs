@@ -1,0 +1,161 @@
+//! Both triads under a known input: on a table, or in steps of known rate and force.
+
+use nalgebra::Vector3;
+
+use super::hold_out::{HeldOut, Split, determined};
+use super::sensor::{Residual, SensorFit, typical};
+use super::{Method, Options, finish, refuse_wrong_gravity};
+use crate::estimate::{Observation, known_input, moving_input};
+use crate::prepared::{Prepared, si_covariance};
+use crate::quantity::{Figure, Sensor, plural};
+use crate::triad::slope;
+use mimu_recording::error::{Argument, Error, Result};
+
+pub(super) fn fit_known(
+    prepared: &Prepared,
+    options: Options,
+    warnings: &mut Vec<String>,
+) -> Result<Vec<SensorFit>> {
+    let mut sensors = Vec::new();
+    let mut missing = Vec::new();
+    let wanted = |s: &Sensor| prepared.has(*s) && options.wants(*s);
+    for sensor in Sensor::BOTH.into_iter().filter(wanted) {
+        let observations = prepared.observations(sensor);
+        if observations.is_empty() {
+            let unused = prepared.dwells.unused(sensor);
+            missing.push(format!(
+                "{sensor}: no usable dwell has a known input{unused}, so it is not calibrated"
+            ));
+            continue;
+        }
+        refuse_wrong_gravity(prepared, sensor, &observations)?;
+        let wander = prepared.noise.wander(sensor, &prepared.dwells.list);
+        let wander = wander.as_ref();
+        let within = prepared.within_dwells(sensor);
+        let estimate = |o: &[Observation], within: &[Observation]| match (options.method, sensor) {
+            (Method::LeastSquares, _) if !within.is_empty() => {
+                moving_input::least_squares(o, within, wander)
+            }
+            (Method::LeastSquares, _) => known_input::least_squares(o, wander),
+            (Method::Kalman, _) => known_input::kalman(o, wander),
+            (Method::InverseForm, Sensor::Gyro) => known_input::opposite_rates(o),
+            (Method::InverseForm, Sensor::Accel) => known_input::inverse_form(o),
+            (Method::SixPositions, _) => known_input::six_positions(o),
+        };
+        let estimated = match estimate(&observations, &within) {
+            Ok(estimated) => estimated,
+            // A level cube tells nothing of the gyro, and a rate table not much of the accelerometer.
+            Err(_)
+                if within.is_empty()
+                    && observations
+                        .iter()
+                        .all(|o| o.input == observations[0].input) =>
+            {
+                missing.push(format!(
+                    "{sensor}: all dwells have the same input, so it is not calibrated"
+                ));
+                continue;
+            }
+            Err(failure) => {
+                let mut error = prepared.refused(failure, sensor);
+                if options.method != Method::LeastSquares {
+                    error = error.about(Argument::Method);
+                }
+                let other = Sensor::BOTH.into_iter().find(|s| *s != sensor && wanted(s));
+                return Err(match other {
+                    Some(other) => error
+                        .map(|e| e.remedy += &format!("; or fit the {other} alone"))
+                        .about(Argument::Only),
+                    None => error,
+                });
+            }
+        };
+        if observations
+            .iter()
+            .any(|o| prepared.dwells.list[o.dwell].turn)
+            && sensor == Sensor::Gyro
+        {
+            warnings.push("gyro: the turns are taken to be of exactly the given angle about exactly the given axis; what hands and table miss of that is in no interval".into());
+        }
+        if !within.is_empty() && options.method != Method::LeastSquares {
+            warnings.push(format!(
+                "{sensor}: {} {} an input that moves, of which {} uses the mean alone: least squares uses how the readings follow it",
+                plural(count_dwells(&within), "dwell"),
+                if count_dwells(&within) == 1 { "has" } else { "have" },
+                options.method.name()
+            ));
+        }
+        let means = observations.iter().map(|o| (o, 1.0));
+        let within_used = match options.method {
+            Method::LeastSquares => &within[..],
+            _ => &[],
+        };
+        let all: Vec<(&Observation, f64)> =
+            means.chain(within_used.iter().map(|o| (o, 0.0))).collect();
+        let matrix = estimated.triad.inverse.matrix;
+        let mut residuals: Vec<Residual> = all
+            .iter()
+            .map(|(o, bias)| Residual {
+                dwell: o.dwell,
+                within: *bias == 0.0,
+                value: estimated.error(o, *bias),
+                held_out: None,
+                floor: (si_covariance(&matrix, &o.variance).trace() / 3.0).sqrt(),
+            })
+            .collect();
+        let n = observations.len();
+        let parts = options.holdout_blocks.min(n);
+        // What a dwell shows within itself is held out with its mean.
+        let part_of = |split: Split, dwell: usize| {
+            let at = observations.partition_point(|o| o.dwell < dwell);
+            split.part(at.min(n - 1), n, parts)
+        };
+        let typical = typical(Figure::Input, &residuals);
+        let held_out = HeldOut::of(parts, |split, part| {
+            let of_part = |o: &Observation| part_of(split, o.dwell) == part;
+            let kept = |all: &[Observation]| -> Vec<Observation> {
+                all.iter().filter(|o| !of_part(o)).copied().collect()
+            };
+            let refit = estimate(&kept(&observations), &kept(&within))?;
+            let open = all.iter().filter(|(o, _)| of_part(o)).map(|(o, bias)| {
+                let axis = |k: usize| {
+                    let mut by = slope(&Vector3::ith(k, 1.0), &o.raw);
+                    by.rows_mut(9, 3).scale_mut(*bias);
+                    by
+                };
+                (0..3).map(|k| refit.triad.variance(&axis(k))).sum::<f64>() / 3.0
+            });
+            determined(open, typical, (Figure::Input, sensor))?;
+            Ok(refit)
+        });
+        for (residual, (o, bias)) in residuals.iter_mut().zip(&all) {
+            let refit = held_out.without(part_of(held_out.split, o.dwell));
+            residual.held_out = refit.map(|refit| refit.error(o, *bias));
+        }
+        sensors.push(finish(
+            sensor,
+            estimated,
+            Figure::Input,
+            residuals,
+            n,
+            None,
+            held_out.into(),
+        ));
+    }
+    if sensors.is_empty() {
+        return Err(Error::new(
+            &prepared.place,
+            missing.join(", "),
+            "give dwells of a second and more their inputs in the ref_ columns, or set reference = \"gravity\" where there is no table",
+        ));
+    }
+    warnings.extend(missing);
+    Ok(sensors)
+}
+
+/// Dwells that `observations` are of, which stand in order.
+fn count_dwells(observations: &[Observation]) -> u64 {
+    let mut dwells: Vec<usize> = observations.iter().map(|o| o.dwell).collect();
+    dwells.dedup();
+    dwells.len() as u64
+}
