@@ -166,7 +166,7 @@ fn a_unit_that_swings_about_level_axes_is_calibrated_by_the_reference_of_every_i
         }
     }
     // 240 errors: an rms of one is known to 5 %.
-    let rms = (sum / count as f64).sqrt();
+    let rms = (sum / count).sqrt();
     assert!((0.8..1.2).contains(&rms), "rms error of {rms} sigma");
 }
 
