@@ -8,27 +8,29 @@
 //! | [`variance`]    | how that scatters: known noise, more of it, a bias that walks                    |
 //! | [`search`]    | which effects the rows ask for                                                   |
 //! | [`decision`]  | which of them are accepted, and what is left                                     |
+//! | `passes`      | all of this again with the affine model that strong effects leave                |
 //! | [`uncertainty`] | what the coefficients of effects leave open of what stands on them               |
 //! | [`picture`]   | what of it can be drawn                                                          |
 
 mod candidate;
 pub mod decision;
+mod passes;
 pub mod picture;
 pub mod rows;
 pub mod search;
 pub mod uncertainty;
 pub mod variance;
 
-use decision::{Decision, decide, noisier};
+use decision::Decision;
 use mimu_core::compensation::Affine;
 use nalgebra::{Matrix3, Vector3};
+use passes::{Pass, Passes, session};
 use picture::Picture;
-use rows::{ForceErrors, Free, Rows, Session};
+use rows::{ForceErrors, Free, Rows};
 use serde::Serialize;
 
 use crate::calibration::Calibration;
 use crate::effects::removal::{Removed, removable, remove};
-use crate::fit::session_bias;
 use crate::fit::{Fit, Options, fit, fit_biases};
 use crate::prepared::Prepared;
 use crate::quantity::Sensor;
@@ -217,66 +219,6 @@ fn matrices(recordings: &Recordings) -> Option<[Option<Affine<f64>>; 2]> {
     (first.manifest.raw_unit == RawUnit::Si && never_turned).then_some([Some(unit); 2])
 }
 
-/// Times between the dwells, s since the recording began, and which recording.
-fn dwell_ends(recordings: &[&Prepared]) -> Vec<(usize, f64)> {
-    let mut all = Vec::new();
-    for (session, prepared) in recordings.iter().enumerate() {
-        let t0_s = prepared.condensed.blocks.first().map_or(0.0, |b| b.start_s);
-        let ends = prepared.dwells.list.windows(2);
-        all.extend(ends.map(|d| (session, 0.5 * (d[0].last_s + d[1].start_s) - t0_s)));
-    }
-    all
-}
-
-/// A recording with the calibrations of gyro and accelerometer.
-fn session(prepared: &Prepared, [gyro, accel]: [Option<Affine<f64>>; 2]) -> Session<'_> {
-    Session {
-        prepared,
-        gyro,
-        accel,
-        forces: None,
-    }
-}
-
-/// A later recording beside the calibration of the first: its matrices, and biases of its own.
-fn later_session<'a>(prepared: &'a Prepared, models: &[Option<Affine<f64>>; 2]) -> Session<'a> {
-    let own = [0, 1].map(|i| {
-        let known = models[i]?;
-        let own = session_bias::estimate(prepared, Sensor::BOTH[i], &known);
-        Some(own.map_or(known, |e| e.triad.inverse))
-    });
-    session(prepared, own)
-}
-
-/// What was accepted, as it is removed.
-fn removed(decision: &Decision) -> Vec<Removed> {
-    let each = decision.accepted.iter().map(|a| Removed {
-        candidate: a.chosen.candidate.clone(),
-        parameter: a.chosen.parameter,
-        values: a.values.iter().copied().collect(),
-    });
-    each.collect()
-}
-
-/// How often the rows of a sensor are made at most, each time with the affine model beside the effects found before.
-const PASSES: usize = 3;
-/// Error of an effect's columns by the affine model, over the noise, from which on they are made again. With an accelerometer quadratic of 5 % at
-/// 1 g on a table that shows some attitudes more often than their opposites, the affine model alone errs by 1 % of scale and 0.3 degrees, and
-/// the quadratic came out 1 % small with `accel_cross_axis_product` beside it.
-const BENT: f64 = 0.1;
-
-/// By what share one affine model differs from another in scale and direction.
-fn bent(was: &Affine<f64>, is: &Affine<f64>) -> f64 {
-    let inverse = was.matrix.try_inverse().unwrap_or_else(Matrix3::zeros);
-    (is.matrix * inverse - Matrix3::identity()).amax()
-}
-
-/// What the effects take out of the rows, in sample, unit of the rows.
-fn explained_rms(decision: &Decision) -> f64 {
-    let [before, after] = decision.rms.map(|rms| rms * rms);
-    (before - after).max(0.0).sqrt()
-}
-
 /// Diagnoses a unit.
 ///
 /// The accelerometer comes first: without a table it is what the gyro is judged by.
@@ -329,80 +271,23 @@ pub fn diagnose(recordings: Recordings, options: Options) -> Result<Diagnosis> {
         if now.sensor(sensor).is_none() {
             continue;
         }
-        let mut models = Sensor::BOTH.map(|s| now.sensor(s).map(|f| f.estimated.triad.inverse));
-        let mut passes = 1;
-        let (rows, decision, found, after) = loop {
-            let head = Session {
-                forces: forces.as_ref(),
-                ..session(&now.prepared, models)
-            };
-            let others = later.iter().map(|p| later_session(p, &models));
-            let sessions: Vec<Session> = std::iter::once(head).chain(others).collect();
-            let (ours, unseen) = sessions.split_at(found_in);
-            let rows = Rows::of(ours, sensor, free(sensor)).ok_or_else(singular)?;
-            let unseen = Rows::of(unseen, sensor, free(sensor));
-            let all: Vec<&Prepared> = ours.iter().map(|s| s.prepared).collect();
-            let decide = |without: &[(String, String)]| {
-                let accept = &recordings.accept;
-                decide(&rows, &dwell_ends(&all), unseen.as_ref(), without, accept)
-                    .ok_or_else(singular)
-            };
-            let clean = |found: &[Removed]| -> Result<(Fit, Vec<Prepared>)> {
-                let lasting: Vec<Removed> = found.iter().map(Removed::lasting).collect();
-                let clean = |(k, s): (usize, &Session)| {
-                    let effects = if k == 0 { found } else { &lasting };
-                    remove(s.prepared, s.gyro.as_ref(), s.accel.as_ref(), effects)
-                        .ok_or_else(singular)
-                };
-                let cleaned = sessions.iter().enumerate().map(clean);
-                let mut cleaned: Vec<Prepared> = cleaned.collect::<Result<_>>()?;
-                let first = cleaned.remove(0);
-                Ok((calibrate(first)?, cleaned))
-            };
-            let mut decision = decide(&[])?;
-            let mut found = removed(&decision);
-            let mut after = (!found.is_empty()).then(|| clean(&found));
-            // Bits of a code that are nearly one another's sum can lead the readings away: such a code is no explanation, and no reason to
-            // refuse the recording either.
-            let codes = found.iter().filter(|f| f.candidate.reads_code());
-            let codes: Vec<String> = codes.map(|f| f.candidate.id()).collect();
-            if let Some(Err(error)) = &after
-                && !codes.is_empty()
-            {
-                let problem = &error.refused().problem;
-                let why = format!("readings without it cannot be calibrated: {problem}");
-                let without: Vec<_> = codes.into_iter().map(|id| (id, why.clone())).collect();
-                decision = decide(&without)?;
-                found = removed(&decision);
-                after = (!found.is_empty()).then(|| clean(&found));
-            }
-            // A strong effect bends the affine model that its own columns are made with.
-            let better = after
-                .as_ref()
-                .and_then(|a| a.as_ref().ok()?.0.sensor(sensor));
-            let better = better.map(|f| f.estimated.triad.inverse);
-            if let (Some(was), Some(is)) = (&mut models[sensor as usize], better)
-                && passes < PASSES
-                && bent(was, &is) * explained_rms(&decision) > BENT * decision.noise_floor
-            {
-                *was = is;
-                passes += 1;
-                continue;
-            }
-            let noisier = ours.iter().enumerate().flat_map(|(k, s)| {
-                let mut all = noisier(s, sensor);
-                for one in all.iter_mut().filter(|_| ours.len() > 1) {
-                    one.stratum = format!("{} of recording {}", one.stratum, k + 1);
-                }
-                all
-            });
-            decision.leftover.extend(noisier);
-            let mut starts = all.iter().map(|p| p.manifest.start_without_power_on());
-            if let Some(start) = starts.find_map(|s| s) {
-                decision.without_power_on(start);
-            }
-            break (rows, decision, found, after);
+        let passes = Passes {
+            sensor,
+            now: &now,
+            later: &later,
+            found_in,
+            forces: forces.as_ref(),
+            free: free(sensor),
+            accept: &recordings.accept,
+            calibrate: &calibrate,
+            place: &place,
         };
+        let Pass {
+            rows,
+            decision,
+            found,
+            after,
+        } = passes.best()?;
         if let Some(after) = after {
             effects.extend(found);
             (now, later) = after?;
