@@ -399,7 +399,7 @@ impl<'a> Search<'a> {
             best.alternatives = finalists
                 .iter()
                 .filter(|c| c.candidate.id() != best.candidate.id())
-                .filter(|c| score(&best) - score(c) < CONFUSED && c.p < LIKELY)
+                .filter(|c| score(&best) - score(c) < CONFUSED && significant(c))
                 .map(|c| (c.candidate.id(), score(&best) - score(c)))
                 .collect();
             chosen.push(best);
@@ -473,9 +473,6 @@ pub(super) const COEFFICIENT: f64 = 4.0;
 
 /// Score by which a term found from the data has to be better than an effect with a name.
 const PREFERENCE: f64 = 12.0;
-/// Probability of chance, after the search, up to which a candidate is listed beside the one that was taken. Of effects that are weak the one
-/// that the unit has need not be significant by itself: of 60 drifts by hand of about the noise, five were named a warm-up alone.
-const LIKELY: f64 = 0.05;
 /// Score within which two candidates are told to be confused: odds of one to four hundred.
 pub(super) const CONFUSED: f64 = 12.0;
 
