@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::time::{Duration, Instant};
 
 use clap::{Parser, Subcommand};
 use mimu_board::front::Front;
@@ -75,23 +76,8 @@ fn main() -> ExitCode {
     }
 }
 
-/// Longest virtual time that a firmware may take until it says something, ms.
-const START_MS: u32 = 2000;
-
-/// Runs a board until its firmware has said something, as one does that was plugged in before its port is opened. Executing
-/// this takes seconds on a busy machine, which whoever opens the port would otherwise spend waiting for an answer.
-fn start(board: &mut Board) -> Result<(), String> {
-    let mut spoken = false;
-    for _ in 0..START_MS {
-        board.run_for(1_000_000)?;
-        let quiet = board.receive().is_empty();
-        if spoken && quiet {
-            break;
-        }
-        spoken |= !quiet;
-    }
-    Ok(())
-}
+/// Time between two warnings of lost bytes, of which a second loses a thousand chunks.
+const BETWEEN_WARNINGS: Duration = Duration::from_secs(1);
 
 /// The unit at rest with z up, in a room.
 const AT_REST: &str = include_str!("../../plans/rest.toml");
@@ -108,23 +94,23 @@ impl Serve {
         };
         let truth = RigTruth::resolve(&rig, self.seed)?;
         let image = Image::read(&self.image.unwrap_or_else(release_image))?;
-        let mut board = Board::new(&image, Front::bench(&plan, &truth, self.seed)?)?;
-        start(&mut board)?;
+        let board = Board::new(&image, Front::bench(&plan, &truth, self.seed)?)?;
         let pace = match self.pace {
             Pace::Wall => serve::Pace::Wall,
             Pace::Fast => serve::Pace::Fast,
         };
         let mut served = Served::new(board, pace, self.flash.as_deref())?;
+        served.start()?;
         println!("{}", served.path().display());
-        let mut told = served.traffic().lost;
+        let mut told = (served.traffic().lost, Instant::now());
         loop {
             served.step()?;
             let lost = served.traffic().lost;
-            if lost != told {
+            if lost != told.0 && told.1.elapsed() >= BETWEEN_WARNINGS {
                 eprintln!(
                     "mimu-board: {lost} bytes lost: whoever has the port open does not read them"
                 );
-                told = lost;
+                told = (lost, Instant::now());
             }
         }
     }

@@ -19,6 +19,9 @@ pub enum Pace {
     Fast,
 }
 
+/// Longest virtual time that a firmware may take until it says something, ms.
+const START_MS: u32 = 2000;
+
 /// Virtual time between two looks at the terminal, ns. A request waits so long at most.
 const SLICE_NS: u64 = 1_000_000;
 
@@ -55,8 +58,8 @@ pub struct Served {
 }
 
 impl Served {
-    /// Puts a board behind a terminal. What it stores in flash is kept in a file, if one is
-    /// given: read if it is there, made if it is not.
+    /// Puts a board that has not run yet behind a terminal. What it stores in flash is kept in a file, if one is
+    /// given: read if it is there, made if it is not. The firmware reads it once, when it starts.
     ///
     /// Errors: no terminal to be had; the file cannot be read or made, or is not one of these.
     pub fn new(mut board: Board, pace: Pace, store: Option<&Path>) -> Result<Self, String> {
@@ -80,6 +83,25 @@ impl Served {
             began: Instant::now(),
             first_ns,
         })
+    }
+
+    /// Runs the board until its firmware has said something, as one does that was plugged in before its port is opened. Executing
+    /// this takes seconds on a busy machine, which whoever opens the port would otherwise spend waiting for an answer.
+    ///
+    /// Errors: the emulator gave up.
+    pub fn start(&mut self) -> Result<(), String> {
+        let mut spoken = false;
+        for _ in 0..START_MS {
+            self.board.run_for(SLICE_NS)?;
+            let quiet = self.board.receive().is_empty();
+            if spoken && quiet {
+                break;
+            }
+            spoken |= !quiet;
+        }
+        self.began = Instant::now();
+        self.first_ns = self.board.standing().ns;
+        Ok(())
     }
 
     /// What to open.

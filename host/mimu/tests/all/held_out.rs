@@ -30,7 +30,7 @@ fn along_the_axes() -> Vec<[f64; 3]> {
     let pose = |k: usize| {
         let sign = if k.is_multiple_of(2) { 1.0 } else { -1.0 };
         let mut up = [3e-4 * sign, -3e-4, 3e-4];
-        up[k / 2 % 3] = if k / 6 % 2 == 0 { 1.0 } else { -1.0 };
+        up[k / 2 % 3] = if (k / 6).is_multiple_of(2) { 1.0 } else { -1.0 };
         up
     };
     (0..18).map(pose).collect()

@@ -5,12 +5,13 @@ use std::path::Path;
 use mimu_board::flash::Change;
 use mimu_board::running::STORE;
 use mimu_board::schematic::Volts;
+use mimu_board::serve::{Pace, Served};
 use mimu_board_tests::conversation::{Answer, Conversation};
 use mimu_board_tests::{MS, still};
 use mimu_core::compensation::{Affine, Compensation};
 use mimu_core::stored;
 use mimu_core::table::Node;
-use mimu_core::wire::Request;
+use mimu_core::wire::{Call, Decoder, MAX_FRAME, Message, Request, encode};
 use nalgebra::{Matrix3, Vector3};
 use plotters::prelude::*;
 
@@ -114,6 +115,39 @@ fn after(device: &mut Conversation, store: Vec<u8>, seed: u64) -> (Option<u64>, 
         panic!("no greeting");
     };
     (hash, device.download())
+}
+
+#[test]
+fn a_served_board_starts_with_the_calibration_that_its_file_holds() {
+    let bytes = calibration(7, 3.5);
+    let mut device = with_old(&bytes);
+    let Answer::Greeting { hash, .. } = device.greeting() else {
+        panic!("no greeting");
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("unit.flash");
+    std::fs::write(&path, device.board.store().unwrap()).unwrap();
+
+    let mut served = Served::new(still(Volts::GROUND), Pace::Fast, Some(&path)).unwrap();
+    served.start().unwrap();
+    let mut frame = [0; MAX_FRAME];
+    let request = Request::Hello;
+    let length = encode(&Call { id: 7, request }, &mut frame).unwrap();
+    let board = served.board();
+    board.send(&frame[..length]);
+    let mut decoder = Decoder::new();
+    let stored = (0..1000).find_map(|_| {
+        board.run_for(MS).unwrap();
+        board.receive().into_iter().find_map(|(_, byte)| {
+            match decoder.push(byte).and_then(|frame| frame.message()) {
+                Some(Message::Greeting { id: 7, greeting }) => {
+                    Some(greeting.stored.map(|stored| stored.hash))
+                }
+                _ => None,
+            }
+        })
+    });
+    assert_eq!(stored, Some(hash));
 }
 
 /// Starting the device after each takes seconds, since it polls while its converter calibrates.
