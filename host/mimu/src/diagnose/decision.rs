@@ -1,6 +1,7 @@
 //! From the rows of one sensor to a verdict: what is tried, what is accepted, what is left.
 
 mod hold_out;
+mod in_time;
 mod leftover;
 mod model;
 mod nonlinear;
@@ -24,6 +25,7 @@ use crate::effects::removal::Removed;
 use crate::fit::Split;
 use crate::quantity::p_value;
 use hold_out::{chance_without_a_dwell, leverage, parts_helped};
+use in_time::others_in_time;
 use leftover::leftover;
 pub(super) use leftover::noisier;
 use reading::of_readings;
@@ -331,6 +333,7 @@ pub fn decide(
         with = search.fit(&kept)?;
     }
     nonlinear::refine(&search, &mut kept, &mut with);
+    others_in_time(&search, &mut kept, &with);
     let one_at_these_inputs = together(&search, &mut kept, &with);
     let split = common(&kept, &with).1;
     let before = Model::of(&search, &[], &null, split)?;

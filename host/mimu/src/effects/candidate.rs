@@ -326,6 +326,15 @@ impl Candidate {
         }
     }
 
+    /// Whether it moves a bias with temperature or time, and nothing else.
+    pub fn is_slow_bias(&self) -> bool {
+        let all = self.active_regressors();
+        let slow = |r: &Regressor| {
+            !r.quantities().is_empty() && r.quantities().iter().all(|q| q.is_slow())
+        };
+        !all.is_empty() && all.iter().all(slow)
+    }
+
     /// Whether it moves with temperature or time.
     pub fn is_slow(&self) -> bool {
         let jumps = matches!(self.kind, Kind::Jump { .. });

@@ -121,7 +121,7 @@ fn after(device: &mut Conversation, store: Vec<u8>, seed: u64) -> (Option<u64>, 
 fn a_served_board_starts_with_the_calibration_that_its_file_holds() {
     let bytes = calibration(7, 3.5);
     let mut device = with_old(&bytes);
-    let Answer::Greeting { hash, .. } = device.greeting() else {
+    let Answer::Greeting { hash, .. } = device.ask(Request::Hello) else {
         panic!("no greeting");
     };
     let folder = tempfile::tempdir().unwrap();

@@ -15,7 +15,7 @@ use crate::quantity::AXES;
 
 /// A coefficient of this many times the size of data sheets is no explanation: at rest a gyro reads the Earth's rate, and the scale factor
 /// that would do to that what 0.1 deg/s/K do to the bias is a million times too large.
-const PLAUSIBLE: f64 = 10.0;
+pub(super) const PLAUSIBLE: f64 = 10.0;
 
 /// A part of an accepted effect that the rows do not tell from another effect.
 struct Part {

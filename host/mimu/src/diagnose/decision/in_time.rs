@@ -1,0 +1,82 @@
+//! Effects of time and temperature that do as well as an accepted one.
+//!
+//! The search lists with an effect the finalists that would have done nearly as well. A drift of the size of data sheets is not seen in three
+//! minutes, and is then no candidate; one of twice that size is, and an exponential warm-up describes it: of sixty units by hand with a drift of
+//! about the noise five were reported to warm up, and to do nothing else.
+
+use nalgebra::DMatrix;
+
+use super::together::PLAUSIBLE;
+use crate::diagnose::search::{COEFFICIENT, CONFUSED, Chosen, Search, beside};
+use crate::diagnose::variance::Fitted;
+use crate::effects;
+use crate::effects::candidate::{Candidate, Kind};
+use crate::effects::effect::Effect;
+
+/// Adds to the alternatives of each of the kept effects that move a bias with time or temperature the others that do so and whose score is
+/// nearly as good. `with` is the fit of all.
+pub(super) fn others_in_time(search: &Search, kept: &mut [Chosen], with: &Fitted) {
+    for i in 0..kept.len() {
+        if !kept[i].candidate.is_slow_bias() {
+            continue;
+        }
+        let ids: Vec<String> = kept.iter().map(|k| k.candidate.id()).collect();
+        let listed = |e: &Effect| {
+            let known = kept[i].alternatives.iter().any(|a| a.0 == e.id);
+            known || ids.iter().any(|id| id == e.id)
+        };
+        let rivals = effects::all().filter(|e| e.sensor == search.rows.sensor && !listed(e));
+        let found: Vec<(String, f64)> = rivals
+            .filter_map(|rival| Some((rival.id.into(), worse_with(search, kept, i, rival, with)?)))
+            .filter(|(_, worse)| *worse < CONFUSED)
+            .collect();
+        let all = &mut kept[i].alternatives;
+        all.extend(found);
+        all.sort_by(|a, b| a.1.total_cmp(&b.1));
+    }
+}
+
+/// By how much the score is less with `rival`, on the same axes, in the place of kept effect `i`; `None` where it is of another kind, is not
+/// determined, or would have to be far beyond data sheets.
+fn worse_with(
+    search: &Search,
+    kept: &[Chosen],
+    i: usize,
+    rival: &'static Effect,
+    with: &Fitted,
+) -> Option<f64> {
+    let axes = kept[i].candidate.axes();
+    let mut candidate = Candidate::new(search.rows.sensor, Kind::Effect(rival));
+    candidate.without_self_heating = kept[i].candidate.without_self_heating;
+    let of_axes = |k: &usize| {
+        rival.coefficients[*k]
+            .axis
+            .is_none_or(|a| axes.contains(&a))
+    };
+    candidate.active.retain(of_axes);
+    if !candidate.is_slow_bias() || candidate.active.is_empty() {
+        return None;
+    }
+    let mut rest = kept.to_vec();
+    let one = rest.remove(i);
+    let bare = search.model(&rest);
+    let cost =
+        |columns: usize, nonlinear: bool| COEFFICIENT * (columns + usize::from(nonlinear)) as f64;
+    let fit = |model: &DMatrix<f64>| search.variance.fit_at(model, &with.components);
+    let whole = fit(&beside(&bare, &one.columns))?.chi2;
+    let whole = whole + cost(one.columns.ncols(), one.parameter > 0.0);
+    let tried = candidate.parameters().into_iter().filter_map(|parameter| {
+        let columns = candidate.columns(search.rows, parameter);
+        if !columns.iter().all(|v| v.is_finite()) {
+            return None;
+        }
+        let fitted = fit(&beside(&bare, &columns))?;
+        let values = fitted.coefficients.rows(bare.ncols(), columns.ncols());
+        let plausible = values
+            .iter()
+            .zip(&candidate.active)
+            .all(|(value, k)| value.abs() < PLAUSIBLE * rival.coefficients[*k].typical);
+        plausible.then(|| fitted.chi2 + cost(columns.ncols(), parameter > 0.0))
+    });
+    Some(tried.reduce(f64::min)? - whole)
+}
