@@ -6,9 +6,9 @@ use mimu::quantity::Sensor;
 use mimu::stillness::STILL_FACTOR;
 use mimu_rig::located::Source;
 use mimu_rig::plan::Plan;
-use mimu_tests::bench;
 use mimu_tests::blind::{Case, case, is_right, plan, reported, unit};
 use mimu_tests::recordings::{mikoff, xsens};
+use mimu_tests::{bench, by_hand};
 use rayon::prelude::*;
 
 fn options() -> Options {
@@ -198,6 +198,16 @@ fn a_quadratic_of_five_per_cent_on_a_table_comes_alone_and_at_its_size() {
             100.0 * error / truth
         );
         assert!(error.abs() < 4.0 * sigma && error.abs() < 4e-3 * truth.abs());
+    }
+}
+
+/// A drift of data sheets would not be seen in three minutes, and is no candidate; these two units drift by a little more.
+#[test]
+fn what_describes_a_weak_drift_by_hand_is_named_with_the_drift() {
+    for (id, seed) in [("accel_bias_drift", 18), ("gyro_bias_drift", 10)] {
+        let case = by_hand::case(&[id], by_hand::Grade::Analog, seed, false);
+        assert_eq!(case.found.len(), 1, "{case:?}");
+        assert!(case.is_named_alone(), "{case:?}");
     }
 }
 
