@@ -251,21 +251,6 @@ impl Rows {
         }
     }
 
-    /// Whether stratum `s` is of turns.
-    pub fn is_turn(&self, s: usize) -> bool {
-        self.figure == Figure::Direction && self.strata[s].axis.is_none()
-    }
-
-    /// Mean square of the times that the rows in `range` are integrated over, s².
-    pub fn mean_square_duration(&self, range: Range<usize>) -> f64 {
-        let square = |row: &Row| {
-            let conditions = &self.conditions[row.conditions.clone()];
-            conditions.iter().map(|c| c.duration_s).sum::<f64>().powi(2)
-        };
-        let count = range.len().max(1) as f64;
-        self.rows[range].iter().map(square).sum::<f64>() / count
-    }
-
     /// Rows among the judged that are not of a whole dwell, but of how the reading follows an input that moves within it.
     pub fn judged_within(&self) -> usize {
         let within = self

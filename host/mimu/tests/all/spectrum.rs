@@ -134,7 +134,8 @@ fn behind_filter(corner_hz: f64, runs: u64) -> usize {
         // The edge of the filter's band is no bump.
         assert!(set_aside(&mut rates.clone(), DT_S, 0.95).lines.is_empty());
         let white = white_band(&rates, DT_S, &[], 0.95).unwrap();
-        let inside = |[_, to]: [f64; 2]| (0.1 * corner_hz..corner_hz).contains(&to);
+        // It may end early, where a misfit by chance leaves its end out: N is then less well known, and the interval says so.
+        let inside = |[_, to]: [f64; 2]| to < corner_hz;
         assert!(white.band_hz.is_none_or(inside), "{white:?}");
         white.interval[0] <= 1.0 && 1.0 <= white.interval[1]
     };

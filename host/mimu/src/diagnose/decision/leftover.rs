@@ -64,7 +64,6 @@ pub(super) fn leftover(
     let Some(last) = variance.fit(model, &last.components, By::Likelihood) else {
         return left;
     };
-    let by_wander = by_wander(rows, &last);
     for (s, stratum) in rows.strata.iter().enumerate() {
         let (extra_white, random_walk) = (
             last.components.extra_white[s],
@@ -96,16 +95,8 @@ pub(super) fn leftover(
         if p > FALSE_LEFTOVER && jump.is_none() && (stratum.wander_known || !far) {
             continue;
         }
-        let in_turns = by_wander.filter(|_| rows.is_turn(s));
-        let by_wander = in_turns.filter(|wander| {
-            let mut with = last.components.clone();
-            with.extra_white[s] = extra_white.min(*wander);
-            let fitted = variance.fit_at(model, &with);
-            fitted.is_some_and(|f| (-0.5 * (f.deviance - last.deviance)).exp() > FALSE_LEFTOVER)
-        });
         let against = match jump {
             Some(jump) => jump.candidate.id(),
-            None if by_wander.is_some() => "time: the bias wanders, by as much as at rest".into(),
             None if random_walk * unit > extra_white => "time: the bias wanders".into(),
             None => "no quantity recorded: the dwells do not repeat".into(),
         };
@@ -114,32 +105,10 @@ pub(super) fn leftover(
             axis: stratum.axis,
             against,
             strength,
-            usual: (!stratum.wander_known && !far || by_wander.is_some()) && jump.is_none(),
+            usual: !stratum.wander_known && !far && jump.is_none(),
         });
     }
     left
-}
-
-/// Variance that the wander of the biases adds to the turns, rad²: what the dwells at rest scatter by beyond their noise, over the time
-/// of a turn. `None` where that is no usual wander, or a noise file has it.
-fn by_wander(rows: &Rows, last: &Fitted) -> Option<f64> {
-    let turns = (0..rows.strata.len()).find(|s| rows.is_turn(*s))?;
-    let duration2 = rows.mean_square_duration(rows.strata[turns].rows.clone());
-    let at_rest = (0..rows.strata.len()).filter(|s| !rows.is_turn(*s));
-    let mut rate_variances = Vec::new();
-    for s in at_rest {
-        let stratum = &rows.strata[s];
-        let unit = stratum.random_walk.as_ref();
-        let unit = unit.map_or(0.0, |w| w.diagonal().mean());
-        let found = last.components.extra_white[s] + last.components.random_walk[s] * unit;
-        let floor2 = stratum.known.diagonal().mean();
-        if stratum.wander_known || found > WANDERS * WANDERS * floor2 {
-            return None;
-        }
-        rate_variances.push(found);
-    }
-    let count = rate_variances.len() as f64;
-    (count > 0.0).then(|| duration2 * rate_variances.iter().sum::<f64>() / count)
 }
 
 /// Noise beyond what a record at rest said of a channel: what has made it is in no model, and hides whatever is smaller.
