@@ -6,6 +6,7 @@
 //! | `arguments` | arguments that several share |
 //! | `reading`, `output` | the recording in; text, JSON and files out |
 //! | [`report`] | results as JSON, text and page |
+//! | `views` | how a session of the wizard is shown while it runs |
 //! | `hint` | flags of the command beside what an error says to set otherwise |
 //! | `export` | noise coefficients for other programs |
 
@@ -16,11 +17,12 @@ mod hint;
 mod output;
 mod reading;
 pub mod report;
+mod views;
 
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use cmd::{allan, apply, design, device, diagnose, fit, import, record, verify};
+use cmd::{allan, apply, design, device, diagnose, fit, import, record, verify, wizard};
 
 /// Calibration of inertial units made of analog MEMS sensors.
 ///
@@ -35,6 +37,8 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
+    /// From an uncalibrated board to a verified one: says what to do, watches, fits, stores and verifies
+    Wizard(wizard::WizardArgs),
     /// Make a recording of foreign files
     Import(import::ImportArgs),
     /// Calibrate the gyro and the accelerometer of a recording
@@ -60,6 +64,7 @@ enum Command {
 /// Parses the arguments of the process and runs the subcommand; prints an error in one line.
 pub fn run() -> ExitCode {
     let done = match Cli::parse().command {
+        Command::Wizard(args) => wizard::run(&args),
         Command::Import(args) => import::run(args),
         Command::Fit(args) => fit::run(&args),
         Command::Verify(args) => verify::run(&args),

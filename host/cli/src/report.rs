@@ -14,6 +14,7 @@ mod import;
 mod svg;
 mod text;
 mod verify;
+mod wizard;
 
 pub use allan::allan_text;
 pub use apply::apply_text;
@@ -26,3 +27,4 @@ pub use diagnosis::{Made, diagnosis_page, diagnosis_text, not_in_plan_text};
 pub use fit::{dwell_table, fit_text};
 pub use import::import_text;
 pub use verify::verify_text;
+pub(crate) use wizard::{wizard_lines, wizard_question, wizard_text};

@@ -88,6 +88,24 @@ impl std::fmt::Debug for Port {
     }
 }
 
+/// Both ends of a serial port that anything but a mimu device is at: to read from and to write to. A read waits at most `poll`.
+pub fn serial_pair(name: &str, baud: u32, poll: Duration) -> Result<SerialPair> {
+    let write = serialport::new(name, baud)
+        .timeout(poll)
+        .open()
+        .map_err(|error| not_opened(name, &error))?;
+    let read = write
+        .try_clone()
+        .map_err(|error| not_opened(name, &error))?;
+    Ok((Box::new(read), Box::new(write)))
+}
+
+/// See [`serial_pair`].
+pub type SerialPair = (
+    Box<dyn std::io::Read + Send>,
+    Box<dyn std::io::Write + Send>,
+);
+
 /// Ports of this computer that a board can be at: those on USB, or all of them if none says that it is.
 pub fn ports() -> Vec<String> {
     // A system that cannot list its ports has none to offer; one that is named still opens.

@@ -34,6 +34,24 @@ impl CsvWriter {
         })
     }
 
+    /// Goes on behind the first `bytes` bytes of a file that [`Self::create`] began.
+    pub fn append(path: &Path, columns: Columns, bytes: u64) -> Result<CsvWriter> {
+        let io = |error: std::io::Error| Error::io(path, &error);
+        let file = File::options().append(true).open(path).map_err(io)?;
+        let length = file.metadata().map_err(io)?.len();
+        if length < bytes {
+            let problem = format!("it has {length} bytes, and had {bytes}");
+            return Err(Error::new(path.display(), problem, "begin a new recording"));
+        }
+        file.set_len(bytes).map_err(io)?;
+        Ok(CsvWriter {
+            path: path.to_owned(),
+            file,
+            text: Vec::with_capacity(2 * BUFFER),
+            columns: columns.present().collect(),
+        })
+    }
+
     pub fn write(&mut self, batch: &Batch) -> Result<()> {
         let columns: Vec<Option<&[f64]>> = self.columns.iter().map(|&c| batch.values(c)).collect();
         for row in 0..batch.len() {

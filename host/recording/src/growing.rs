@@ -65,6 +65,33 @@ impl Growing {
         Ok(growing)
     }
 
+    /// Goes on with a recording that was not ended, behind its first `rows` rows, which take `bytes` bytes: what is behind them is
+    /// cut off.
+    pub fn resume(directory: &Path, columns: Columns, rows: u64, bytes: u64) -> Result<Self> {
+        let path = directory.join(SampleFormat::Csv.file_name());
+        let csv = CsvWriter::append(&path, columns, bytes)?;
+        let disk = Disk::new(csv.file()?).map_err(|error| Error::io(directory, &error))?;
+        Ok(Self {
+            directory: directory.to_owned(),
+            csv: Some(csv),
+            columns,
+            rows,
+            disk: Some(disk),
+        })
+    }
+
+    /// Waits until the disk has what was written; bytes of the samples.
+    pub fn sync(&self) -> Result<u64> {
+        let Some(csv) = &self.csv else {
+            return Ok(0);
+        };
+        let file = csv.file()?;
+        let synced = file.sync_data().and_then(|()| file.metadata());
+        synced
+            .map(|m| m.len())
+            .map_err(|error| Error::io(&self.directory, &error))
+    }
+
     /// Appends rows, which have the announced columns and nothing that a reader would refuse.
     pub fn write(&mut self, batch: &Batch) -> Result<()> {
         if let Some(column) = batch.ragged(&self.columns) {

@@ -202,7 +202,7 @@ fn known(given: Option<&Calibration>, diagnosis: &mut Diagnosis) -> Vec<EffectTa
 }
 
 /// The command as it was typed, without the path of the program.
-fn command_line() -> String {
+pub(crate) fn command_line() -> String {
     let arguments = std::env::args_os().skip(1);
     let shown = arguments.map(|a| match a.to_string_lossy() {
         a if a.contains([' ', '\'', '"']) => format!("{a:?}"),

@@ -10,3 +10,4 @@ pub(crate) mod fit;
 pub(crate) mod import;
 pub(crate) mod record;
 pub(crate) mod verify;
+pub(crate) mod wizard;

@@ -1,0 +1,228 @@
+//! `mimu wizard`: arguments and what follows from them.
+
+use std::io::IsTerminal as _;
+use std::path::{Path, PathBuf};
+
+use clap::{Args, ValueEnum};
+use mimu::quantity::normal_gravity;
+use mimu::result::diagnosis::DiagnosisResult;
+use mimu_recording::error::{Error, Result};
+use mimu_wizard::device::DeviceSource;
+use mimu_wizard::drive::{Driver, Person, TextDriver};
+use mimu_wizard::procedure::{Asked, Fixture, Targets, first_steps, verification};
+use mimu_wizard::session::{Wanted, run as carry_out};
+use mimu_wizard::source::{Opener, Source};
+
+use crate::arguments::JsonArgs;
+use crate::cmd::design::number;
+use crate::cmd::device::interruption;
+use crate::output::{check_outputs, print};
+use crate::report::{self, Made};
+use crate::views::answers::{Beforehand, Typed};
+use crate::views::lines::Lines;
+
+#[derive(Args)]
+pub(crate) struct WizardArgs {
+    /// Folder of the session; one that was begun goes on
+    #[arg(short, value_name = "DIR")]
+    output: PathBuf,
+    /// Serial port; without it, the only one at which a device greets. Several: boards on one fixture
+    #[arg(long = "port", value_name = "PATH")]
+    ports: Vec<String>,
+    /// What carries the unit
+    #[arg(long, value_enum, default_value = "hands")]
+    fixture: FixtureArg,
+    /// Driver file of a turntable; without it a person is told what to do
+    #[arg(long, value_name = "FILE")]
+    driver: Option<PathBuf>,
+    /// Local gravity, m/s²; without it, normal gravity at sea level of --latitude
+    #[arg(long, required_unless_present = "latitude")]
+    gravity: Option<f64>,
+    /// Latitude, degrees
+    #[arg(long, allow_negative_numbers = true)]
+    latitude: Option<f64>,
+    /// Length of a dwell, s
+    #[arg(long, value_name = "S", default_value_t = 4.0, value_parser = |t: &str| number(t, 1.0, 600.0))]
+    dwell: f64,
+    /// Largest rate of the table, deg/s
+    #[arg(long, value_name = "DPS", default_value_t = 100.0, value_parser = |t: &str| number(t, 1.0, 10000.0))]
+    rate: f64,
+    /// Largest change of temperature of a unit that has warmed up, °C/min; 0: it is not waited for
+    #[arg(long, value_name = "C_PER_MIN", default_value_t = 0.5, value_parser = |t: &str| number(t, 0.0, 100.0))]
+    warm_up: f64,
+    /// Largest change of temperature from the first dwell on, °C
+    #[arg(long, value_name = "C", default_value_t = 5.0, value_parser = |t: &str| number(t, 0.1, 200.0))]
+    drift: f64,
+    /// Half-width of a 95 % interval that is wanted: gyro-bias=0.05 (deg/s), gyro-scale=2000 (ppm), gyro-angle=2000 (µrad), accel-bias=1 (mg), accel-scale=1000, accel-angle=1000; may be repeated
+    #[arg(long = "target", value_name = "NAME=VALUE")]
+    targets: Vec<String>,
+    /// All planned dwells and no more, whatever the targets say
+    #[arg(long)]
+    as_planned: bool,
+    /// Most dwells of the calibration
+    #[arg(long, value_name = "N", default_value_t = 60)]
+    most: usize,
+    /// Order of the planned dwells
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Answer all questions beforehand: effects that are found are stored, and a failed self-test ends the session
+    #[arg(long)]
+    yes: bool,
+    /// Write what happens as JSON lines (`-`: to standard output)
+    #[arg(long, value_name = "FILE")]
+    events: Option<PathBuf>,
+    #[command(flatten)]
+    json: JsonArgs,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum FixtureArg {
+    /// A turntable: attitudes and rates are known
+    Table,
+    /// A box with six faces, also held by its edges
+    Cube,
+    /// Hands: any attitude
+    Hands,
+}
+
+impl FixtureArg {
+    fn fixture(self) -> Fixture {
+        match self {
+            Self::Table => Fixture::Table,
+            Self::Cube => Fixture::Cube,
+            Self::Hands => Fixture::Hands,
+        }
+    }
+}
+
+impl WizardArgs {
+    fn targets(&self) -> Result<Targets> {
+        let mut targets = Targets::default();
+        for text in &self.targets {
+            let wrong = |problem: &str| {
+                let remedy = "write one of gyro-bias, gyro-scale, gyro-angle, accel-bias, accel-scale, accel-angle, =, and a number above 0";
+                Error::new(format!("--target {text}"), problem, remedy)
+            };
+            let (name, value) = text.split_once('=').ok_or_else(|| wrong("there is no ="))?;
+            let value: f64 = value.parse().map_err(|_| wrong("this is no number"))?;
+            if !(value > 0.0) {
+                return Err(wrong("it is not above 0"));
+            }
+            let target = match name {
+                "gyro-bias" => &mut targets.gyro_bias_dps,
+                "gyro-scale" => &mut targets.gyro_scale_ppm,
+                "gyro-angle" => &mut targets.gyro_angle_urad,
+                "accel-bias" => &mut targets.accel_bias_mg,
+                "accel-scale" => &mut targets.accel_scale_ppm,
+                "accel-angle" => &mut targets.accel_angle_urad,
+                _ => return Err(wrong("there is no such parameter")),
+            };
+            *target = value;
+        }
+        Ok(targets)
+    }
+
+    fn asked(&self) -> Result<Asked> {
+        let fixture = self.fixture.fixture();
+        let steps = first_steps(fixture, self.dwell, self.rate, self.seed);
+        let gravity = self.gravity.or(self.latitude.map(normal_gravity));
+        Ok(Asked {
+            fixture,
+            gravity_mps2: gravity.unwrap_or(mimu::readable::STANDARD_GRAVITY),
+            latitude_deg: self.latitude,
+            dwell_s: self.dwell,
+            largest_rate_dps: self.rate,
+            verification: verification(fixture, &steps, self.dwell, self.rate),
+            steps,
+            by_targets: !self.as_planned,
+            most_dwells: self.most,
+            warm_c_per_min: (self.warm_up > 0.0).then_some(self.warm_up),
+            most_drift_c: self.drift,
+            targets: self.targets()?,
+        })
+    }
+
+    /// The units: each with its port and its folder.
+    fn wanted(&self) -> Vec<Wanted> {
+        let opener = |port: Option<String>| -> Opener {
+            Box::new(move |next| {
+                let source = DeviceSource::open(port.as_deref(), next)?;
+                Ok(Box::new(source) as Box<dyn Source>)
+            })
+        };
+        match self.ports.as_slice() {
+            [] => vec![Wanted {
+                opener: opener(None),
+                folder: self.output.clone(),
+            }],
+            [port] => vec![Wanted {
+                opener: opener(Some(port.clone())),
+                folder: self.output.clone(),
+            }],
+            ports => {
+                let each = (1..).zip(ports);
+                each.map(|(k, port)| Wanted {
+                    opener: opener(Some(port.clone())),
+                    folder: self.output.join(format!("board-{k}")),
+                })
+                .collect()
+            }
+        }
+    }
+}
+
+pub(crate) fn run(args: &WizardArgs) -> Result<()> {
+    check_outputs(&[args.json.file()], &[])?;
+    let asked = args.asked()?;
+    let driver: Box<dyn Driver> = match &args.driver {
+        Some(path) => Box::new(TextDriver::open(path)?),
+        None => Box::new(Person),
+    };
+    let beforehand = match args.yes {
+        true => Beforehand {
+            store_effects: Some(true),
+            go_on: Some(false),
+            power_cycle: Some(false),
+        },
+        false => Beforehand::default(),
+    };
+    let mut lines = Lines::new(Typed::new(interruption()?)?, beforehand);
+    lines.sketches = driver.is_person() && std::io::stdout().is_terminal();
+    match &args.events {
+        Some(path) if path == Path::new("-") => {
+            lines.events = Some(Box::new(std::io::stdout()));
+            lines.text = Some(Box::new(std::io::stderr()));
+        }
+        Some(path) => {
+            let file = std::fs::File::create(path).map_err(|e| Error::io(path, &e))?;
+            lines.events = Some(Box::new(file));
+        }
+        None => {}
+    }
+    if lines.text.is_none() && !args.json.is_standard_output() {
+        lines.text = Some(Box::new(std::io::stdout()));
+    }
+    let page = |found: &DiagnosisResult, folder: &Path| {
+        let made = Made {
+            recording: folder.join("calibration").display().to_string(),
+            command: crate::cmd::diagnose::command_line(),
+            created: jiff::Timestamp::now()
+                .round(jiff::Unit::Second)
+                .unwrap_or_default()
+                .to_string(),
+        };
+        report::diagnosis_page(found, &made)
+    };
+    let outcome = carry_out(asked, args.wanted(), driver, &mut lines, &page)?;
+    print(&args.json, &report::wizard_text(&outcome), &outcome, None)?;
+    let unstored = outcome.units.iter().filter(|u| u.stored.is_none());
+    let failed: Vec<String> = unstored.flat_map(|u| u.notes.clone()).collect();
+    match failed.is_empty() || outcome.cancelled {
+        true => Ok(()),
+        false => Err(Error::new(
+            args.output.display(),
+            failed.join(", "),
+            "look at the page, mend the setup, and begin anew in another folder",
+        )),
+    }
+}

@@ -1,0 +1,197 @@
+//! Events and outcome of a session of the wizard, in words.
+
+use std::fmt::Write as _;
+
+use mimu::quantity::{Figure, minutes, plural, significant};
+use mimu_wizard::event::{Event, Question};
+use mimu_wizard::folder::Part;
+use mimu_wizard::refit::Progress;
+use mimu_wizard::session::{Outcome, UnitOutcome};
+use mimu_wizard::verdict::{Judged, SensorJudged};
+
+/// An event as lines of text; none for what only a program wants.
+pub(crate) fn wizard_lines(event: &Event) -> Vec<String> {
+    match event {
+        Event::Greeted { told, unit } => {
+            let mut lines: Vec<String> = told.clone();
+            if lines.is_empty() {
+                lines.push(unit.clone());
+            }
+            lines
+        }
+        Event::Resumed { dwells } => vec![format!(
+            "the session goes on behind {}",
+            plural(*dwells as u64, "dwell")
+        )],
+        Event::SelfTested { words, passed, .. } => vec![match passed {
+            true => format!("self-test: {words}"),
+            false => format!("self-test FAILED: {words}"),
+        }],
+        Event::Phase { phase, words } => vec![String::new(), format!("{phase}: {words}")],
+        Event::Step {
+            done,
+            planned,
+            words,
+            ..
+        } => vec![format!("[{}/{planned}] {words}", done + 1)],
+        Event::Waiting { why, .. } => vec![format!("    waiting: {why}")],
+        Event::Dwell { part, number, .. } => match part {
+            Part::Calibration => Vec::new(),
+            _ => vec![format!("    dwell {number} done")],
+        },
+        Event::Thrown { why, .. } => vec![format!("    thrown away, once more: {why}")],
+        Event::Redo { number } => vec![format!("    dwell {number} is to be had again")],
+        Event::Progress { progress, .. } => vec![format!("    {}", progress_line(progress))],
+        Event::Interrupted { why, .. } => vec![format!("    {why}")],
+        Event::Verified { judged, .. } => judged_lines(judged),
+        Event::Stored { hash, words, .. } => vec![format!("{hash}: {words}")],
+        Event::Diagnosed {
+            verdict,
+            effects,
+            page,
+            ..
+        } => {
+            let found = match effects.is_empty() {
+                true => "no effect was found".to_string(),
+                false => format!("found: {}", effects.join(", ")),
+            };
+            vec![
+                format!("verdict: {verdict}; {found}"),
+                format!("page: {page}"),
+            ]
+        }
+        Event::Note { words } => vec![format!("    {words}")],
+    }
+}
+
+/// The half-widths of a calibration beside their targets, in one line.
+pub(crate) fn progress_line(progress: &Progress) -> String {
+    if progress.sensors.is_empty() {
+        return "done; not determined yet".into();
+    }
+    let mut text = String::from("done;");
+    for sensor in &progress.sensors {
+        let _ = write!(text, " {}", sensor.sensor);
+        for aim in &sensor.aims {
+            let mark = if aim.half_width <= aim.target {
+                ""
+            } else {
+                "!"
+            };
+            let _ = write!(
+                text,
+                " {} ±{}{mark}",
+                aim.parameter,
+                significant(aim.half_width)
+            );
+        }
+        text.push(';');
+    }
+    text.pop();
+    text
+}
+
+/// A question as a sentence.
+pub(crate) fn wizard_question(question: &Question) -> String {
+    match question {
+        Question::PowerCycled => {
+            "unplug the board, plug it in again, and say yes; no leaves that out".into()
+        }
+        Question::StoreEffects(effects) => {
+            format!("verify and store the calibration with {effects}?")
+        }
+        Question::GoOn(why) => format!("{why}; go on all the same?"),
+    }
+}
+
+fn judged_lines(judged: &Judged) -> Vec<String> {
+    let mut lines: Vec<String> = judged.sensors.iter().map(judged_line).collect();
+    lines.extend(
+        judged
+            .broken
+            .iter()
+            .map(|b| format!("FAILED, nothing is stored: {b}")),
+    );
+    lines
+}
+
+fn judged_line(of: &SensorJudged) -> String {
+    let (factor, unit) = figure(of).readable(of.sensor);
+    let shown = |si: f64| significant(si * factor);
+    let mut text = format!(
+        "{:5} error of {} in poses that were not used: ",
+        of.sensor.name(),
+        of.figure
+    );
+    let _ = write!(text, "data sheet {}, ", shown(of.before));
+    if of.affine != of.after {
+        let _ = write!(
+            text,
+            "calibrated {}, with effects {}",
+            shown(of.affine),
+            shown(of.after)
+        );
+    } else {
+        let _ = write!(text, "calibrated {}", shown(of.after));
+    }
+    let _ = write!(
+        text,
+        " {unit}; noise alone {} ({:.2} times the noise)",
+        shown(of.floor),
+        of.after / of.floor
+    );
+    text
+}
+
+fn figure(of: &SensorJudged) -> Figure {
+    let all = [Figure::Input, Figure::GravitySize, Figure::Direction];
+    let found = all.into_iter().find(|f| f.description() == of.figure);
+    found.unwrap_or(Figure::Input)
+}
+
+/// What a session has come to.
+pub(crate) fn wizard_text(outcome: &Outcome) -> String {
+    let mut text = String::new();
+    if outcome.cancelled {
+        text.push_str("\nended; the same command goes on from here\n");
+        return text;
+    }
+    for unit in &outcome.units {
+        unit_text(unit, &mut text);
+    }
+    text
+}
+
+fn unit_text(unit: &UnitOutcome, text: &mut String) {
+    let _ = writeln!(
+        text,
+        "\n{}: {} in {}, {} thrown away",
+        unit.unit,
+        plural(unit.dwells as u64, "dwell"),
+        minutes(unit.recorded_s),
+        unit.thrown
+    );
+    let judged = unit.confirmed.as_ref().or(unit.verified.as_ref());
+    for line in judged.into_iter().flat_map(judged_lines) {
+        let _ = writeln!(text, "{line}");
+    }
+    if let Some(verdict) = unit.verdict {
+        let effects = match unit.effects.as_slice() {
+            [] => "no effect".into(),
+            effects => effects.join(", "),
+        };
+        let _ = writeln!(text, "diagnosis: {verdict}, {effects}");
+    }
+    match &unit.stored {
+        Some(file) => {
+            let _ = writeln!(text, "in use: {file}");
+        }
+        None => text.push_str("nothing was stored\n"),
+    }
+    for note in &unit.notes {
+        let _ = writeln!(text, "note: {note}");
+    }
+    if let Some(page) = &unit.page {
+        let _ = writeln!(text, "page: {page}");
+    }
+}

@@ -1,0 +1,103 @@
+//! What a person types while a session runs, and what was answered beforehand on the command line.
+
+use std::io::BufRead as _;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, channel};
+
+use mimu_recording::error::{Error, Result};
+use mimu_wizard::event::{Question, Wish};
+
+/// What was answered beforehand: then nobody is asked.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Beforehand {
+    /// Effects that are found are stored, or not.
+    pub store_effects: Option<bool>,
+    /// A failed self-test is gone on from, or not.
+    pub go_on: Option<bool>,
+    /// The supply is turned off and on by hand, or not.
+    pub power_cycle: Option<bool>,
+}
+
+impl Beforehand {
+    /// The answer, if there is one.
+    pub(crate) fn answer(&self, question: &Question) -> Option<bool> {
+        match question {
+            Question::PowerCycled => self.power_cycle,
+            Question::StoreEffects(_) => self.store_effects,
+            Question::GoOn(_) => self.go_on,
+        }
+    }
+}
+
+/// Lines from standard input, and Ctrl-C.
+pub(crate) struct Typed {
+    lines: Receiver<String>,
+    stop: Arc<AtomicBool>,
+    /// A line that was looked at as a wish and is an answer.
+    answer: Option<bool>,
+    ended: bool,
+}
+
+impl Typed {
+    pub(crate) fn new(stop: Arc<AtomicBool>) -> Result<Self> {
+        let (tell, lines) = channel();
+        let read = move || {
+            let input = std::io::stdin().lock();
+            for line in input.lines().map_while(std::io::Result::ok) {
+                if tell.send(line).is_err() {
+                    return;
+                }
+            }
+        };
+        std::thread::Builder::new()
+            .name("keyboard".into())
+            .spawn(read)
+            .map_err(|error| Error::new("keyboard", error, "run it again"))?;
+        Ok(Self {
+            lines,
+            stop,
+            answer: None,
+            ended: false,
+        })
+    }
+
+    /// What is wanted, if anything.
+    pub(crate) fn wish(&mut self) -> Option<Wish> {
+        if self.stop.load(Ordering::Relaxed) {
+            return Some(Wish::Cancel);
+        }
+        let line = match self.lines.try_recv() {
+            Ok(line) => line,
+            Err(std::sync::mpsc::TryRecvError::Disconnected) => {
+                self.ended = true;
+                return None;
+            }
+            Err(_) => return None,
+        };
+        let mut words = line.split_whitespace();
+        match (words.next()?, words.next()) {
+            ("q" | "quit" | "cancel", None) => Some(Wish::Cancel),
+            ("s" | "skip", None) => Some(Wish::Skip),
+            ("r" | "redo", None) => Some(Wish::RedoLast),
+            ("r" | "redo", Some(number)) => number.parse().ok().map(Wish::Redo),
+            ("y" | "yes", None) => {
+                self.answer = Some(true);
+                None
+            }
+            ("n" | "no", None) => {
+                self.answer = Some(false);
+                None
+            }
+            _ => {
+                eprintln!("type redo, redo N, skip, quit, yes or no");
+                None
+            }
+        }
+    }
+
+    /// The answer to a question, once it is there. Where nobody can type any more it is no.
+    pub(crate) fn answer(&mut self) -> Option<bool> {
+        self.answer.take().or(self.ended.then_some(false))
+    }
+}

@@ -1,0 +1,86 @@
+//! A session as lines of text: what happens, once each. For pipes, logs and small terminals.
+
+use std::io::Write;
+
+use mimu_wizard::event::{Event, Question, Standing, View, Wish};
+use mimu_wizard::step::sketch;
+
+use super::answers::{Beforehand, Typed};
+use crate::report;
+
+/// Lines of text on one side, JSON lines on the other, either of them or both.
+pub(crate) struct Lines {
+    /// Where the text goes, if anywhere.
+    pub text: Option<Box<dyn Write>>,
+    /// Where the events go, if anywhere.
+    pub events: Option<Box<dyn Write>>,
+    /// Whether a person turns the unit: then each step has a sketch.
+    pub sketches: bool,
+    pub typed: Typed,
+    pub beforehand: Beforehand,
+    asked: Option<Question>,
+}
+
+impl Lines {
+    pub(crate) fn new(typed: Typed, beforehand: Beforehand) -> Self {
+        Self {
+            text: None,
+            events: None,
+            sketches: false,
+            typed,
+            beforehand,
+            asked: None,
+        }
+    }
+
+    fn say(&mut self, text: &str) {
+        if let Some(out) = &mut self.text {
+            // Whoever has closed the pipe does not want to hear more.
+            let _ = writeln!(out, "{text}").and_then(|()| out.flush());
+        }
+    }
+}
+
+impl View for Lines {
+    fn tell(&mut self, event: &Event) {
+        if let Some(out) = &mut self.events
+            && let Ok(line) = serde_json::to_string(event)
+        {
+            let _ = writeln!(out, "{line}").and_then(|()| out.flush());
+        }
+        for line in report::wizard_lines(event) {
+            self.say(&line);
+        }
+        if let Event::Step { step, .. } = event
+            && self.sketches
+        {
+            for line in sketch(&step.up()) {
+                self.say(&line);
+            }
+        }
+    }
+
+    fn show(&mut self, _: &Standing) {}
+
+    fn wish(&mut self) -> Option<Wish> {
+        self.typed.wish()
+    }
+
+    fn ask(&mut self, question: &Question) -> Option<bool> {
+        if let Some(answer) = self.beforehand.answer(question) {
+            return Some(answer);
+        }
+        if self.asked.as_ref() != Some(question) {
+            self.asked = Some(question.clone());
+            self.say(&format!(
+                "{} (yes or no)",
+                report::wizard_question(question)
+            ));
+        }
+        let answer = self.typed.answer();
+        if answer.is_some() {
+            self.asked = None;
+        }
+        answer
+    }
+}

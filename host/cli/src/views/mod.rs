@@ -1,0 +1,4 @@
+//! How a session of the wizard is shown: as lines of text, as JSON lines, or on a full screen.
+
+pub(crate) mod answers;
+pub(crate) mod lines;

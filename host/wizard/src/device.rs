@@ -1,0 +1,157 @@
+//! A mimu device as a source of samples.
+
+use std::time::{Duration, Instant};
+
+use mimu_core::compensation::Affine;
+use mimu_core::wire::{Request, flags};
+use mimu_device::{Event, Samples, Session, Started};
+use mimu_recording::RawUnit;
+use mimu_recording::error::{Error, Result};
+use nalgebra::{Matrix3, Vector3};
+
+use crate::source::{Chunk, Heard, Source, Unit};
+
+/// Silence after which the device is asked whether it is still there.
+const SILENCE: Duration = Duration::from_secs(2);
+
+/// What the sensors' data sheets say: ADXRS300, 2.5 V and 5 mV per deg/s; MMA7260QT at 1.5 g, 1.65 V and 800 mV/g.
+fn nominal() -> [Affine<f64>; 2] {
+    let triad = |null: f64, raw_per_si: f64| Affine {
+        matrix: Matrix3::identity() / raw_per_si,
+        offset: Vector3::repeat(-null / raw_per_si),
+    };
+    [
+        triad(2.5, 0.005 * 1f64.to_degrees()),
+        triad(1.65, 0.8 / mimu::readable::STANDARD_GRAVITY),
+    ]
+}
+
+/// The raw stream of a device.
+#[derive(Debug)]
+pub struct DeviceSource {
+    session: Session,
+    unit: Unit,
+    streaming: bool,
+    heard: Instant,
+    /// Tick of the sample that is numbered 0, and the tick that comes next.
+    zero: i64,
+    next: u64,
+    /// Whether what comes next begins a new count.
+    anew: bool,
+}
+
+const RAW: Request<'_> = Request::Stream {
+    raw: true,
+    compensated: false,
+};
+
+impl DeviceSource {
+    /// Opens the port, or the only one at which a device greets. `next`: the first tick that it may use.
+    pub fn open(port: Option<&str>, next: u64) -> Result<Self> {
+        Ok(Self::of(Session::open(port)?, next))
+    }
+
+    /// Of an open session.
+    pub fn of(session: Session, next: u64) -> Self {
+        let who = session.who();
+        let mut told = vec![format!(
+            "{}, firmware {}, unit {}",
+            who.board, who.firmware, who.unit_id
+        )];
+        told.push(match &who.stored {
+            None => "it holds no calibration".into(),
+            Some(held) => format!("it holds the calibration {}", held.hash),
+        });
+        told.push(format!("it started by: {}", who.start));
+        told.extend(who.warnings.iter().cloned());
+        let unit = Unit {
+            id: who.unit_id.clone(),
+            name: format!("mimu-{}", who.unit_id),
+            raw_unit: RawUnit::Volt,
+            rate_hz: f64::from(who.sample_rate_hz),
+            nominal: Some(nominal()),
+            told,
+            is_device: true,
+            start: (who.start != Started::PowerOn).then(|| who.start.to_string()),
+        };
+        Self {
+            session,
+            unit,
+            streaming: false,
+            heard: Instant::now(),
+            zero: 0,
+            next,
+            anew: true,
+        }
+    }
+
+    fn take(&mut self, samples: &Samples) -> Result<Heard> {
+        self.heard = Instant::now();
+        let number = i64::from(samples.head.first);
+        // A count that begins anew says nothing of the time that has passed: that it was more than nothing is all that is claimed.
+        let back = self.zero + number < self.next as i64;
+        if self.anew || back {
+            self.zero = self.next as i64 + 1 - number;
+            self.anew = false;
+        }
+        let tick = (self.zero + number) as u64;
+        let mut values = Vec::with_capacity(samples.values.len());
+        for sample in &samples.values {
+            let mut row = [0.0; 6];
+            for (to, from) in row.iter_mut().zip(sample.gyro.iter().chain(&sample.accel)) {
+                *to = f64::from(*from);
+            }
+            if row.iter().any(|v| !v.is_finite()) {
+                return Err(Error::device(
+                    self.session.port(),
+                    "the device sent a reading that is not a number",
+                    "reset the board, and report this",
+                ));
+            }
+            values.push(row);
+        }
+        self.next = tick + values.len() as u64;
+        Ok(Heard::Samples(Chunk {
+            tick,
+            values,
+            temp_c: f64::from(samples.head.temp_c),
+            saturated: samples.head.flags & flags::SATURATED != 0,
+            self_test: samples.head.flags & flags::SELF_TEST != 0,
+        }))
+    }
+}
+
+impl Source for DeviceSource {
+    fn unit(&self) -> &Unit {
+        &self.unit
+    }
+
+    fn next(&mut self) -> Result<Heard> {
+        if !self.streaming {
+            self.session.begin_stream(RAW)?;
+            (self.streaming, self.heard) = (true, Instant::now());
+        }
+        match self.session.event()? {
+            Some(Event::Raw(samples)) => self.take(&samples),
+            Some(Event::Started(who)) => {
+                self.anew = true;
+                self.unit.start = (who.start != Started::PowerOn).then(|| who.start.to_string());
+                self.streaming = false;
+                Ok(Heard::Restarted(who.start.to_string()))
+            }
+            Some(_) => Ok(Heard::Nothing),
+            None if self.heard.elapsed() > SILENCE => {
+                // It may have restarted, and its greeting been lost.
+                self.session.hello()?;
+                self.streaming = false;
+                Ok(Heard::Nothing)
+            }
+            None => Ok(Heard::Nothing),
+        }
+    }
+
+    fn device(&mut self) -> Option<&mut Session> {
+        self.streaming = false;
+        Some(&mut self.session)
+    }
+}

@@ -1,0 +1,219 @@
+//! What a session says: events that count, once each, and how it stands, many times a second. Both are plain data, so that a full
+//! screen, lines of text and JSON lines are views of the same.
+
+use serde::Serialize;
+
+use crate::folder::Part;
+use crate::refit::Progress;
+use crate::step::Step;
+use crate::verdict::Judged;
+
+/// Something that has happened.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(tag = "event", rename_all = "kebab-case")]
+pub enum Event {
+    /// A unit greets.
+    Greeted {
+        /// Which.
+        unit: String,
+        /// What it says of itself.
+        told: Vec<String>,
+    },
+    /// A session goes on where it was.
+    Resumed {
+        /// Dwells that there are already.
+        dwells: usize,
+    },
+    /// The sensors were deflected electrically.
+    SelfTested {
+        /// Which unit.
+        unit: String,
+        /// Whether all answered as their data sheets state.
+        passed: bool,
+        /// Which did not, and what moved.
+        words: String,
+    },
+    /// A phase begins.
+    Phase {
+        /// `warm-up`, `calibration`, `verification`, `store`, `diagnosis`.
+        phase: &'static str,
+        /// In a sentence.
+        words: String,
+    },
+    /// What to do next.
+    Step {
+        /// Which recording.
+        part: Part,
+        /// Dwells so far.
+        done: usize,
+        /// Dwells as planned; more or fewer may come.
+        planned: usize,
+        /// What to do.
+        step: Step,
+        /// In words.
+        words: String,
+    },
+    /// Why it waits now.
+    Waiting {
+        /// Which unit.
+        unit: String,
+        /// Why.
+        why: String,
+    },
+    /// A dwell was had.
+    Dwell {
+        /// Which unit.
+        unit: String,
+        /// Which recording.
+        part: Part,
+        /// Its number.
+        number: i32,
+        /// What it was.
+        step: Step,
+        /// In words.
+        words: String,
+    },
+    /// A dwell was thrown away.
+    Thrown {
+        /// Which unit.
+        unit: String,
+        /// Why.
+        why: String,
+    },
+    /// A dwell is to be had again.
+    Redo {
+        /// Its number.
+        number: i32,
+    },
+    /// How the calibration stands after a dwell.
+    Progress {
+        /// Which unit.
+        unit: String,
+        /// Beside the targets.
+        progress: Progress,
+    },
+    /// The line was lost or found, the device has restarted, another unit is there.
+    Interrupted {
+        /// Which unit.
+        unit: String,
+        /// What happened.
+        why: String,
+    },
+    /// The calibration, judged by the verification.
+    Verified {
+        /// Which unit.
+        unit: String,
+        /// The figures.
+        judged: Judged,
+    },
+    /// A calibration was stored, read back and compared.
+    Stored {
+        /// Which unit.
+        unit: String,
+        /// Its hash.
+        hash: String,
+        /// What was checked.
+        words: String,
+    },
+    /// What still errs.
+    Diagnosed {
+        /// Which unit.
+        unit: String,
+        /// `clean`, `explained` or `unexplained`.
+        verdict: &'static str,
+        /// The effects, each with its strength.
+        effects: Vec<String>,
+        /// The page.
+        page: String,
+    },
+    /// Something that a person should know.
+    Note {
+        /// What.
+        words: String,
+    },
+}
+
+/// How a unit stands.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct UnitStanding {
+    /// Which.
+    pub unit: String,
+    /// Motion of gyro and accelerometer over what still counts as still.
+    pub motion: Option<[f64; 2]>,
+    /// Angle between up and the direction that is wanted up, degrees.
+    pub tilt_deg: Option<f64>,
+    /// What is allowed of it.
+    pub tilt_limit_deg: f64,
+    /// Rate about the vertical, deg/s.
+    pub rate_dps: Option<f64>,
+    /// °C.
+    pub temp_c: Option<f64>,
+    /// °C/min.
+    pub trend_c_per_min: Option<f64>,
+    /// Samples received, and lost since the beginning.
+    pub samples: u64,
+    /// Samples that are missing.
+    pub lost: u64,
+    /// Why it waits; `None` while a dwell runs.
+    pub waiting: Option<String>,
+    /// Seconds of the dwell that are left.
+    pub left_s: Option<f64>,
+}
+
+/// How the session stands.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct Standing {
+    /// What is done now.
+    pub phase: &'static str,
+    /// The step.
+    pub step: Option<Step>,
+    /// Dwells so far, and as planned.
+    pub dwells: [usize; 2],
+    /// Thrown away.
+    pub thrown: usize,
+    /// Time since the beginning, s, by the units' clock.
+    pub elapsed_s: f64,
+    /// Each unit.
+    pub units: Vec<UnitStanding>,
+    /// The calibration of each, as far as it is known.
+    pub progress: Vec<Progress>,
+}
+
+/// What a person wants, since the last time that was asked.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Wish {
+    /// End it; what there is stays, and the session can go on.
+    Cancel,
+    /// Have the last dwell again.
+    RedoLast,
+    /// Have the dwell of this number again.
+    Redo(i32),
+    /// Another step first: this one comes later.
+    Skip,
+}
+
+/// A question that has to be answered by yes or no.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Question {
+    /// Turn the supply off and on, then yes.
+    PowerCycled,
+    /// Store the calibration with the effects that were found.
+    StoreEffects(String),
+    /// A self-test failed: go on all the same.
+    GoOn(String),
+}
+
+/// Shows a session to somebody, and hears what they want.
+pub trait View {
+    /// Something has happened.
+    fn tell(&mut self, event: &Event);
+
+    /// How it stands; called many times a second.
+    fn show(&mut self, standing: &Standing);
+
+    /// What is wanted.
+    fn wish(&mut self) -> Option<Wish>;
+
+    /// Asks; `None` while there is no answer yet.
+    fn ask(&mut self, question: &Question) -> Option<bool>;
+}

@@ -1,0 +1,391 @@
+//! The folder of a session: what was asked, a journal, and the recordings. Killed at any instant, a session goes on from its last dwell.
+//!
+//! | file | what |
+//! |---|---|
+//! | `session.json` | what was asked, and of which unit |
+//! | `journal.jsonl` | a line for everything that was done and counts |
+//! | `calibration/`, `verification/`, `confirmation/` | the recordings, which the other commands read |
+//! | `calibration.toml` | the calibration |
+//! | `held-before.bin` | the calibration that the device held before, as it stores it |
+//! | `diagnosis.html`, `with-effects.toml` | what still errs, and the calibration with it |
+//!
+//! The samples of a dwell are handed to the disk before its line in the journal is written. A line that is cut, and samples behind the
+//! last line, do not count.
+
+use std::fs::{self, File, OpenOptions};
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+use mimu_recording::error::{Error, Result};
+use mimu_recording::{Batch, Columns, Growing, Manifest, Recording, SampleFormat, Writer};
+use serde::{Deserialize, Serialize};
+
+use crate::procedure::Asked;
+use crate::step::Step;
+
+/// Which recording.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Part {
+    /// What the calibration is made from.
+    Calibration,
+    /// What it is judged by.
+    Verification,
+    /// What the calibration with effects is judged by.
+    Confirmation,
+}
+
+impl Part {
+    /// Name of its directory.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Calibration => "calibration",
+            Self::Verification => "verification",
+            Self::Confirmation => "confirmation",
+        }
+    }
+}
+
+/// A line of the journal.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "entry", rename_all = "kebab-case")]
+pub enum Entry {
+    /// A dwell was had.
+    Dwell {
+        /// Of which recording.
+        part: Part,
+        /// Number in it.
+        number: i32,
+        /// What it was.
+        step: Step,
+        /// Time of its first sample, s.
+        from_s: f64,
+        /// Rows of the recording after it.
+        rows: u64,
+        /// Bytes of its samples after it.
+        bytes: u64,
+        /// Mean temperature, °C, if known.
+        temp_c: Option<f64>,
+    },
+    /// A dwell was thrown away while it lasted.
+    Thrown {
+        /// What it was to be.
+        step: Step,
+        /// Why.
+        why: String,
+    },
+    /// A dwell is to be had again: the old one does not count.
+    Redo {
+        /// Of which recording.
+        part: Part,
+        /// Number.
+        number: i32,
+    },
+    /// The device restarted, or the line was lost and found.
+    Interrupted {
+        /// What happened.
+        why: String,
+    },
+    /// The calibration was made, and verified.
+    Verified {
+        /// Whether it passed.
+        passed: bool,
+    },
+    /// A calibration was stored on the device.
+    Stored {
+        /// Its hash.
+        hash: String,
+        /// Whether it has effects.
+        effects: Vec<String>,
+    },
+    /// All is done.
+    Done,
+}
+
+/// What a session is.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Begun {
+    /// `mimu-wizard-session/1`.
+    pub format: String,
+    /// Of the unit.
+    pub unit_id: String,
+    /// What was asked.
+    pub asked: Asked,
+}
+
+/// The folder of a session.
+#[derive(Debug)]
+pub struct Folder {
+    /// Where it is.
+    pub path: PathBuf,
+    journal: File,
+    entries: Vec<Entry>,
+}
+
+const SESSION: &str = "session.json";
+const JOURNAL: &str = "journal.jsonl";
+
+impl Folder {
+    /// What the session in this folder is, if there is one.
+    pub fn begun(path: &Path) -> Result<Option<Begun>> {
+        let file = path.join(SESSION);
+        if !file.is_file() {
+            return Ok(None);
+        }
+        let text = mimu_recording::read_text(&file)?;
+        let begun: Begun = serde_json::from_str(&text).map_err(|e| {
+            let remedy = "give another folder with -o, or remove this one";
+            Error::new(file.display(), e, remedy)
+        })?;
+        Ok(Some(begun))
+    }
+
+    /// Begins a session in a new folder.
+    pub fn create(path: &Path, begun: &Begun) -> Result<Self> {
+        if path.exists() && fs::read_dir(path).is_ok_and(|mut d| d.next().is_some()) {
+            let problem = "the folder is not empty, and holds no session";
+            return Err(Error::new(
+                path.display(),
+                problem,
+                "give another folder with -o",
+            ));
+        }
+        fs::create_dir_all(path).map_err(|e| Error::io(path, &e))?;
+        let text = serde_json::to_string_pretty(begun)
+            .map_err(|e| Error::new(path.display(), e, "report this"))?;
+        mimu_recording::result_file::stage(&path.join(SESSION), text + "\n")?.publish()?;
+        Self::open(path)
+    }
+
+    /// Opens the folder of a session that was begun.
+    pub fn open(path: &Path) -> Result<Self> {
+        let file = path.join(JOURNAL);
+        let io = |e: std::io::Error| Error::io(&file, &e);
+        let text = match fs::read_to_string(&file) {
+            Ok(text) => text,
+            Err(e) if e.kind() == std::io::ErrorKind::NotFound => String::new(),
+            Err(e) => return Err(io(e)),
+        };
+        let whole = text.rfind('\n').map_or(0, |at| at + 1);
+        let mut entries = Vec::new();
+        for (k, line) in (1..).zip(text[..whole].lines()) {
+            let entry = serde_json::from_str(line).map_err(|e| {
+                let place = format!("{}, line {k}", file.display());
+                Error::new(place, e, "begin anew in another folder")
+            })?;
+            entries.push(entry);
+        }
+        let journal = OpenOptions::new()
+            .create(true)
+            .write(true)
+            .truncate(false)
+            .open(&file)
+            .map_err(io)?;
+        // A line that was cut never happened.
+        journal.set_len(whole as u64).map_err(io)?;
+        drop(journal);
+        let journal = OpenOptions::new().append(true).open(&file).map_err(io)?;
+        Ok(Self {
+            path: path.to_owned(),
+            journal,
+            entries,
+        })
+    }
+
+    /// Adds a line, and waits for the disk.
+    pub fn add(&mut self, entry: Entry) -> Result<()> {
+        let file = self.path.join(JOURNAL);
+        let mut line = serde_json::to_string(&entry)
+            .map_err(|e| Error::new(file.display(), e, "report this"))?;
+        line.push('\n');
+        let written = self.journal.write_all(line.as_bytes());
+        written
+            .and_then(|()| self.journal.sync_data())
+            .map_err(|e| Error::io(&file, &e))?;
+        self.entries.push(entry);
+        Ok(())
+    }
+
+    /// What was done so far.
+    pub fn entries(&self) -> &[Entry] {
+        &self.entries
+    }
+
+    /// The dwells of a recording that count, with their numbers.
+    pub fn dwells(&self, of: Part) -> Vec<(i32, Step)> {
+        let mut all: Vec<(i32, Step)> = Vec::new();
+        for entry in &self.entries {
+            match entry {
+                Entry::Dwell {
+                    part, number, step, ..
+                } if *part == of => all.push((*number, *step)),
+                Entry::Redo { part, number } if *part == of => all.retain(|d| d.0 != *number),
+                _ => {}
+            }
+        }
+        all
+    }
+
+    /// Numbers of the dwells that do not count.
+    fn dropped(&self, of: Part) -> Vec<i32> {
+        let redone = self.entries.iter().filter_map(|entry| match entry {
+            Entry::Redo { part, number } if *part == of => Some(*number),
+            _ => None,
+        });
+        redone.collect()
+    }
+
+    /// Dwells that were thrown away while they lasted.
+    pub fn thrown(&self) -> usize {
+        let thrown = |e: &&Entry| matches!(e, Entry::Thrown { .. });
+        self.entries.iter().filter(thrown).count()
+    }
+
+    /// Temperatures of the first dwell and of the last, °C.
+    pub fn temperatures(&self) -> Option<[f64; 2]> {
+        let mut all = self.entries.iter().filter_map(|entry| match entry {
+            Entry::Dwell { temp_c, .. } => *temp_c,
+            _ => None,
+        });
+        let first = all.next()?;
+        Some([first, all.next_back().unwrap_or(first)])
+    }
+
+    /// Path of a file or a recording in it.
+    pub fn file(&self, name: &str) -> PathBuf {
+        self.path.join(name)
+    }
+}
+
+/// A recording of the session while it grows: on the disk, and in memory for the fits in between.
+#[derive(Debug)]
+pub struct Taking {
+    part: Part,
+    growing: Growing,
+    manifest: Manifest,
+    columns: Columns,
+    /// All rows so far; those of dwells that do not count are in transit.
+    pub samples: Batch,
+}
+
+impl Taking {
+    /// Begins a recording, or goes on after the last dwell of the journal.
+    pub fn begin(
+        folder: &Folder,
+        part: Part,
+        columns: Columns,
+        manifest: &Manifest,
+    ) -> Result<Self> {
+        let directory = folder.file(part.name());
+        let last = folder.entries().iter().rev().find_map(|entry| match entry {
+            Entry::Dwell {
+                part: of,
+                rows,
+                bytes,
+                ..
+            } if *of == part => Some((*rows, *bytes)),
+            _ => None,
+        });
+        let mut samples = Batch::default();
+        let growing = match last {
+            None => {
+                // What was there before the first dwell was ended is nothing.
+                if directory.exists() {
+                    fs::remove_dir_all(&directory).map_err(|e| Error::io(&directory, &e))?;
+                }
+                Growing::create(&directory, columns, manifest)?
+            }
+            Some((rows, bytes)) => {
+                let growing = Growing::resume(&directory, columns, rows, bytes)?;
+                Recording::open(&directory)?.for_each_batch(
+                    |_| {},
+                    |batch| {
+                        append(&mut samples, batch);
+                        Ok(())
+                    },
+                )?;
+                if samples.len() as u64 != rows {
+                    let problem = format!(
+                        "it holds {} rows, and the journal says {rows}",
+                        samples.len()
+                    );
+                    let remedy = "begin anew in another folder";
+                    return Err(Error::new(directory.display(), problem, remedy));
+                }
+                growing
+            }
+        };
+        let mut taking = Self {
+            part,
+            growing,
+            manifest: manifest.clone(),
+            columns,
+            samples,
+        };
+        for number in folder.dropped(part) {
+            taking.drop_dwell(number);
+        }
+        Ok(taking)
+    }
+
+    /// Takes rows in.
+    pub fn write(&mut self, rows: &Batch) -> Result<()> {
+        self.growing.write(rows)?;
+        append(&mut self.samples, rows);
+        Ok(())
+    }
+
+    /// Rows and bytes that the disk holds, for certain.
+    pub fn settled(&self) -> Result<(u64, u64)> {
+        Ok((self.growing.rows(), self.growing.sync()?))
+    }
+
+    /// The dwell of this number does not count any more.
+    pub fn drop_dwell(&mut self, number: i32) {
+        let samples = &mut self.samples;
+        for (row, step) in samples.step.iter_mut().enumerate() {
+            if *step == number {
+                *step = -1;
+                for reference in &mut samples.reference {
+                    if let Some(value) = reference.get_mut(row) {
+                        *value = f64::NAN;
+                    }
+                }
+            }
+        }
+    }
+
+    /// The manifest.
+    pub fn manifest(&self) -> &Manifest {
+        &self.manifest
+    }
+
+    /// Time of the last row, s.
+    pub fn last_s(&self) -> Option<f64> {
+        self.samples.t_s.last().copied()
+    }
+
+    /// Ends it: what does not count is in transit on the disk as well.
+    pub fn finish(self, folder: &Folder) -> Result<PathBuf> {
+        let directory = folder.file(self.part.name());
+        self.growing
+            .finish(&self.manifest, SampleFormat::Csv, |_| {})?;
+        if !folder.dropped(self.part).is_empty() {
+            let mut writer = Writer::create(&directory, self.columns, SampleFormat::Csv, true)?;
+            writer.write(&self.samples)?;
+            writer.finish(&self.manifest)?;
+        }
+        Ok(directory)
+    }
+}
+
+/// Puts rows behind others.
+pub fn append(to: &mut Batch, rows: &Batch) {
+    to.t_s.extend(&rows.t_s);
+    to.step.extend(&rows.step);
+    to.temp_c.extend(&rows.temp_c);
+    for c in 0..6 {
+        to.raw[c].extend(&rows.raw[c]);
+        to.reference[c].extend(&rows.reference[c]);
+    }
+}

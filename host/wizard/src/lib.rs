@@ -1,0 +1,35 @@
+//! The wizard: from an uncalibrated board to a verified one. It says what to do, watches whether that was done, fits after every dwell,
+//! and stores only what kept its promise in poses that were not used.
+//!
+//! | module | what it is |
+//! |---|---|
+//! | [`step`] | a dwell that is wanted: which way is up, how fast it turns, how long |
+//! | [`procedure`] | what is asked of a session; the steps to begin with, the next best one, those that verify |
+//! | [`source`], [`device`] | where samples come from |
+//! | [`station`] | a port with a thread of its own, opened again when it was gone |
+//! | [`watch`] | is the unit still, which way is up, how fast does it turn |
+//! | [`refit`] | the calibration so far, every parameter beside its target |
+//! | [`folder`] | the journal and the recordings, from which a killed session goes on |
+//! | [`one`] | one of the units: its dwells, had or thrown away |
+//! | [`drive`] | what turns the unit: a person, or a turntable that takes text commands |
+//! | [`event`] | what a session says and asks; views show it |
+//! | [`wizard`] | which step comes next, and who has had it |
+//! | [`store`] | into the device, back, and over a loss of the supply |
+//! | [`verdict`] | whether a calibration keeps what it promises |
+//! | [`session`] | all of it, in order |
+
+pub mod device;
+pub mod drive;
+pub mod event;
+pub mod folder;
+pub mod one;
+pub mod procedure;
+pub mod refit;
+pub mod session;
+pub mod source;
+pub mod station;
+pub mod step;
+pub mod store;
+pub mod verdict;
+pub mod watch;
+pub mod wizard;

@@ -1,0 +1,393 @@
+//! What is asked of a session, and which steps it takes: those to begin with, the next one by the information it brings, and those
+//! that verify.
+
+use mimu::design::information::Inverse;
+use mimu::design::model::{Model, Setting, Terms};
+use mimu::design::reach::{Fixture as Reached, Rates, Reach};
+use mimu::design::refinement::Region as _;
+use mimu::design::tour::randomised;
+use mimu_recording::Reference;
+use nalgebra::{Matrix3, Vector3};
+use serde::{Deserialize, Serialize};
+
+use crate::step::Step;
+
+/// What carries the unit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Fixture {
+    /// A turntable: attitudes and rates are known.
+    Table,
+    /// A box with six faces, also held by its edges: only the size of gravity is known, and the turns between the poses.
+    Cube,
+    /// Hands: the same, in any attitude.
+    Hands,
+}
+
+impl Fixture {
+    /// Whether attitudes and rates are known.
+    pub fn reference(self) -> Reference {
+        match self {
+            Self::Table => Reference::Table,
+            Self::Cube | Self::Hands => Reference::Gravity,
+        }
+    }
+
+    /// How far from a direction a pose may be and still be it, degrees. Without a calibration the null of an accelerometer may be off by
+    /// a tenth of g and its axes by some degrees more; faces, edges and corners are 35 degrees apart at least.
+    pub fn tolerance_deg(self) -> f64 {
+        match self {
+            Self::Table | Self::Cube => 12.0,
+            Self::Hands => 25.0,
+        }
+    }
+}
+
+/// What is asked of a session; kept with it, so that it goes on as it was begun.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Asked {
+    /// What carries the unit.
+    pub fixture: Fixture,
+    /// Local gravity, m/s².
+    pub gravity_mps2: f64,
+    /// Degrees.
+    pub latitude_deg: Option<f64>,
+    /// Length of a dwell, s.
+    pub dwell_s: f64,
+    /// Largest rate of the table, deg/s.
+    pub largest_rate_dps: f64,
+    /// Steps to begin with.
+    pub steps: Vec<Step>,
+    /// Whether to go on beyond these while targets are not met, and to end before their end once they are.
+    pub by_targets: bool,
+    /// Most dwells.
+    pub most_dwells: usize,
+    /// Steps that verify.
+    pub verification: Vec<Step>,
+    /// Largest change of temperature of a unit that has warmed up, °C/min; `None`: it is not waited for.
+    pub warm_c_per_min: Option<f64>,
+    /// Largest change of temperature from the first dwell on, °C.
+    pub most_drift_c: f64,
+    /// Half-widths of the 95 % intervals that are wanted.
+    pub targets: Targets,
+}
+
+/// Half-widths of 95 % intervals that are wanted.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Targets {
+    /// Of gyro biases, deg/s.
+    pub gyro_bias_dps: f64,
+    /// Of gyro scale factors, ppm.
+    pub gyro_scale_ppm: f64,
+    /// Of the angles of gyro axes, µrad.
+    pub gyro_angle_urad: f64,
+    /// Of accelerometer biases, mg.
+    pub accel_bias_mg: f64,
+    /// Of accelerometer scale factors, ppm.
+    pub accel_scale_ppm: f64,
+    /// Of the angles of accelerometer axes, µrad.
+    pub accel_angle_urad: f64,
+}
+
+impl Default for Targets {
+    /// What a quarter of an hour with analog MEMS sensors comes to.
+    fn default() -> Self {
+        Self {
+            gyro_bias_dps: 0.05,
+            gyro_scale_ppm: 2000.0,
+            gyro_angle_urad: 2000.0,
+            accel_bias_mg: 1.0,
+            accel_scale_ppm: 1000.0,
+            accel_angle_urad: 1000.0,
+        }
+    }
+}
+
+/// Faces, edges and corners of a cube, in this order.
+fn directions() -> [Vec<Vector3<f64>>; 3] {
+    let steps = [1.0, -1.0, 0.0];
+    let mut all = [const { Vec::new() }; 3];
+    for x in steps {
+        for y in steps {
+            for z in steps {
+                let up: Vector3<f64> = Vector3::new(x, y, z);
+                if up != Vector3::zeros() {
+                    all[up.norm_squared() as usize - 1].push(up.normalize());
+                }
+            }
+        }
+    }
+    all
+}
+
+/// Steps to begin with, in an order in which like does not follow like.
+pub fn first_steps(fixture: Fixture, dwell_s: f64, largest_rate_dps: f64, seed: u64) -> Vec<Step> {
+    let [faces, edges, corners] = directions();
+    let settings = match fixture {
+        // Full rates both ways on all faces determine the gyro; half of them on edges show what is not linear, and corners at rest what
+        // the accelerometer makes of two or three axes at once.
+        Fixture::Table => {
+            let rate = largest_rate_dps.to_radians();
+            let turning = |up: &Vector3<f64>, rate: f64| Setting { up: *up, rate };
+            let both = |up: &Vector3<f64>| [turning(up, rate), turning(up, -rate)];
+            let mut all: Vec<Setting> = faces.iter().flat_map(both).collect();
+            let some = edges.iter().step_by(2).enumerate();
+            all.extend(some.map(|(k, up)| {
+                let sign = if k % 2 == 0 { 0.5 } else { -0.5 };
+                turning(up, sign * rate)
+            }));
+            all.extend(corners.iter().map(|up| turning(up, 0.0)));
+            randomised(&all, seed)
+        }
+        Fixture::Cube => chained(&[faces, edges.into_iter().step_by(2).collect()].concat()),
+        Fixture::Hands => chained(&[faces, corners].concat()),
+    };
+    let step = |s: Setting| Step {
+        up: s.up.into(),
+        // Radians and back leave traces.
+        rate_dps: (1e9 * s.rate.to_degrees()).round() / 1e9,
+        dwell_s,
+    };
+    settings.into_iter().map(step).collect()
+}
+
+/// By hand the gyro lives on the turns between poses: each turn is to be a quarter and more, about axes that take their turns.
+fn chained(ups: &[Vector3<f64>]) -> Vec<Setting> {
+    let mut left = ups.to_vec();
+    let mut turned = Turned::default();
+    let mut chain = vec![left.remove(left.iter().position(|u| u.z > 0.99).unwrap_or(0))];
+    while !left.is_empty() {
+        let from = chain[chain.len() - 1];
+        let best = (0..left.len()).max_by(|&a, &b| {
+            let gain = |k: usize| turned.gain(&from, &left[k]);
+            gain(a).total_cmp(&gain(b))
+        });
+        let next = left.remove(best.unwrap_or(0));
+        turned.take(&from, &next);
+        chain.push(next);
+    }
+    chain.into_iter().map(Setting::at_rest).collect()
+}
+
+/// What turns have told of a gyro.
+#[derive(Debug, Clone)]
+struct Turned(Matrix3<f64>);
+
+impl Default for Turned {
+    fn default() -> Self {
+        Self(Matrix3::identity() * 0.1)
+    }
+}
+
+impl Turned {
+    fn vector(from: &Vector3<f64>, to: &Vector3<f64>) -> Vector3<f64> {
+        let axis = from.cross(to);
+        match axis.norm() {
+            // A half turn goes about any axis across: nothing that can be counted on.
+            size if size < 0.1 => Vector3::zeros(),
+            size => axis / size * from.angle(to),
+        }
+    }
+
+    fn gain(&self, from: &Vector3<f64>, to: &Vector3<f64>) -> f64 {
+        let v = Self::vector(from, to);
+        let inverse = self.0.try_inverse().unwrap_or_else(Matrix3::zeros);
+        (1.0 + (inverse * v).dot(&v)).ln()
+    }
+
+    fn take(&mut self, from: &Vector3<f64>, to: &Vector3<f64>) {
+        let v = Self::vector(from, to);
+        self.0 += v * v.transpose();
+    }
+}
+
+/// Which sensors still miss a target: gyro, accelerometer.
+pub type Missed = [bool; 2];
+
+/// The step that brings most information beside `done`, for the sensors that need it.
+pub fn next_step(asked: &Asked, done: &[Step], missed: Missed) -> Step {
+    let candidates = match asked.fixture {
+        Fixture::Table => first_steps(
+            Fixture::Table,
+            asked.dwell_s,
+            asked.largest_rate_dps,
+            done.len() as u64,
+        ),
+        fixture => {
+            let [faces, edges, corners] = directions();
+            let ups = match fixture {
+                Fixture::Cube => [faces, edges].concat(),
+                _ => [faces, edges, corners].concat(),
+            };
+            let step = |up: Vector3<f64>| Step::at_rest(up, asked.dwell_s);
+            ups.into_iter().map(step).collect()
+        }
+    };
+    let reference = asked.fixture.reference();
+    let terms = Terms::default();
+    let mut models = Vec::new();
+    if missed[1] || missed == [false; 2] {
+        models.push(Model::accel(reference, &terms));
+    }
+    if missed[0] && reference == Reference::Table {
+        let span = Vector3::repeat(asked.largest_rate_dps.to_radians());
+        models.push(Model::gyro(&terms, span));
+    }
+    let reaches = models.into_iter().map(|model| Reach {
+        model,
+        fixture: Reached::Hand,
+        rates: Rates::Any,
+    });
+    let reaches: Vec<Reach> = reaches.collect();
+    let setting = |s: &Step| Setting {
+        up: s.up(),
+        rate: s.rate_dps.to_radians(),
+    };
+    let had: Vec<Setting> = done.iter().map(setting).collect();
+    let mut turned = Turned::default();
+    for pair in had.windows(2) {
+        turned.take(&pair[0].up, &pair[1].up);
+    }
+    let last = had.last().map(|s| s.up);
+    let gain = |candidate: &Step| {
+        let with = [had.as_slice(), &[setting(candidate)]].concat();
+        let of = |reach: &Reach| {
+            let rows = reach.rows(&with);
+            // A whisper of everything, so that what is not determined yet can be compared too.
+            let all = (0..rows.len()).map(|i| (i, 1.0));
+            Inverse::of(&rows, all).map_or(-1e3, |i| i.log_det())
+        };
+        let mut gain: f64 = reaches.iter().map(of).sum();
+        if let Some(last) = last.filter(|_| reference == Reference::Gravity) {
+            gain += turned.gain(&last, &candidate.up()) * if missed[0] { 3.0 } else { 1.0 };
+            // The same pose again is no turn, and no other pose either.
+            let near = last.angle(&candidate.up()).to_degrees() < 2.0 * SAME_POSE_DEG;
+            gain -= if near { 100.0 } else { 0.0 };
+        }
+        gain
+    };
+    let best = candidates
+        .iter()
+        .map(|c| (gain(c), c))
+        .reduce(|a, b| if b.0 > a.0 { b } else { a });
+    best.map_or(Step::at_rest(Vector3::z(), asked.dwell_s), |b| *b.1)
+}
+
+/// Nearer than this two poses by hand are one, degrees.
+pub const SAME_POSE_DEG: f64 = 12.0;
+
+/// Steps that verify: as far from all `used` directions as can be, and on a table at other rates.
+pub fn verification(
+    asked_of: Fixture,
+    used: &[Step],
+    dwell_s: f64,
+    largest_rate_dps: f64,
+) -> Vec<Step> {
+    // A spiral over the sphere: directions that nobody plans.
+    let count = 200;
+    let spiral = (0..count).map(|k| {
+        let z = 1.0 - (2 * k + 1) as f64 / count as f64;
+        let turn = k as f64 * 2.399_963;
+        let across = (1.0 - z * z).sqrt();
+        Vector3::new(across * turn.cos(), across * turn.sin(), z)
+    });
+    let [_, edges, _] = directions();
+    let candidates: Vec<Vector3<f64>> = match asked_of {
+        Fixture::Cube => edges,
+        _ => spiral.collect(),
+    };
+    let mut taken: Vec<Vector3<f64>> = used.iter().map(Step::up).collect();
+    let wanted = if asked_of == Fixture::Table { 8 } else { 6 };
+    let mut chosen = Vec::new();
+    for k in 0..wanted {
+        let distance = |up: &Vector3<f64>| {
+            let nearest = taken.iter().map(|t| t.angle(up));
+            nearest.fold(f64::INFINITY, f64::min)
+        };
+        let Some(up) = candidates
+            .iter()
+            .copied()
+            .map(|up| (distance(&up), up))
+            .reduce(|a, b| if b.0 > a.0 { b } else { a })
+        else {
+            break;
+        };
+        taken.push(up.1);
+        let rate_dps = match (asked_of, k % 2) {
+            (Fixture::Table, 0) => {
+                let share = [0.7, -0.7, 0.3, -0.3][k / 2 % 4];
+                (10.0 * share * largest_rate_dps).round() / 10.0
+            }
+            _ => 0.0,
+        };
+        chosen.push(Step {
+            up: up.1.into(),
+            rate_dps,
+            dwell_s,
+        });
+    }
+    match asked_of {
+        Fixture::Table => chosen,
+        // By hand turns of a quarter and more.
+        _ => {
+            let ups: Vec<Vector3<f64>> = chosen.iter().map(Step::up).collect();
+            let order = chained(&ups);
+            order
+                .into_iter()
+                .map(|s| Step::at_rest(s.up, dwell_s))
+                .collect()
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn neighbouring_poses_by_hand_are_a_quarter_turn_apart_and_more() {
+        for fixture in [Fixture::Hands, Fixture::Cube] {
+            let steps = first_steps(fixture, 3.0, 0.0, 1);
+            let apart = steps
+                .windows(2)
+                .map(|p| p[0].up().angle(&p[1].up()).to_degrees());
+            let least = apart.fold(f64::INFINITY, f64::min);
+            assert!(least > 50.0, "{fixture:?}: {least}");
+        }
+    }
+
+    #[test]
+    fn verification_uses_no_direction_of_the_calibration() {
+        for fixture in [Fixture::Table, Fixture::Hands] {
+            let used = first_steps(fixture, 3.0, 100.0, 1);
+            for step in verification(fixture, &used, 3.0, 100.0) {
+                let nearest = used.iter().map(|u| u.up().angle(&step.up()).to_degrees());
+                let nearest = nearest.fold(f64::INFINITY, f64::min);
+                assert!(nearest > SAME_POSE_DEG, "{fixture:?}: {nearest}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_direction_that_was_missed_is_the_next() {
+        let mut done = first_steps(Fixture::Hands, 3.0, 0.0, 1);
+        // Nothing has ever shown the side of -x.
+        done.retain(|s| s.up[0] > -0.3);
+        let asked = Asked {
+            fixture: Fixture::Hands,
+            gravity_mps2: 9.8,
+            latitude_deg: None,
+            dwell_s: 3.0,
+            largest_rate_dps: 0.0,
+            steps: Vec::new(),
+            by_targets: true,
+            most_dwells: 40,
+            verification: Vec::new(),
+            warm_c_per_min: None,
+            most_drift_c: 5.0,
+            targets: Targets::default(),
+        };
+        let next = next_step(&asked, &done, [false, true]);
+        assert!(next.up[0] < -0.5, "{next:?}");
+    }
+}

@@ -1,0 +1,145 @@
+//! The calibration so far, and how far each parameter is from its target.
+
+use mimu::fit::{Fit, Options, SensorFit, fit};
+use mimu::prepared::Prepared;
+use mimu::quantity::{AXES, Sensor};
+use mimu::readable::STANDARD_GRAVITY;
+use mimu::stillness::STILL_FACTOR;
+use mimu::triad::{Angles, Estimate};
+use mimu_recording::error::Result;
+use mimu_recording::{Batch, Manifest};
+use serde::Serialize;
+
+use crate::procedure::{Missed, Targets};
+
+/// A parameter beside its target.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Aim {
+    /// `scale`, `bias` or `angles`, the worst of three.
+    pub parameter: &'static str,
+    /// Axis of the worst.
+    pub axis: &'static str,
+    /// Half of its 95 % interval.
+    pub half_width: f64,
+    /// What is wanted.
+    pub target: f64,
+    /// Of both.
+    pub unit: &'static str,
+}
+
+/// The parameters of a sensor beside their targets.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Aims {
+    /// Which.
+    pub sensor: Sensor,
+    /// Biases, scale factors, angles.
+    pub aims: Vec<Aim>,
+}
+
+impl Aims {
+    /// Whether all targets are met.
+    pub fn met(&self) -> bool {
+        self.aims.iter().all(|a| a.half_width <= a.target)
+    }
+}
+
+/// How the calibration stands after a dwell.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct Progress {
+    /// By sensor, as far as they are determined.
+    pub sensors: Vec<Aims>,
+    /// Why there is no calibration yet.
+    pub not_yet: Option<String>,
+}
+
+impl Progress {
+    /// Which sensors still miss a target.
+    pub fn missed(&self) -> Missed {
+        Sensor::BOTH.map(|sensor| {
+            let found = self.sensors.iter().find(|s| s.sensor == sensor);
+            found.is_none_or(|s| !s.met())
+        })
+    }
+}
+
+/// The calibration from the dwells so far. `holdout_blocks` as in [`Options`].
+pub fn calibrate(manifest: &Manifest, samples: &Batch, holdout_blocks: usize) -> Result<Fit> {
+    let options = Options {
+        holdout_blocks,
+        ..Options::default()
+    };
+    fit(
+        Prepared::of(manifest.clone(), samples, STILL_FACTOR)?,
+        options,
+    )
+}
+
+/// How far each parameter is from its target.
+pub fn progress(fitted: &Result<Fit>, targets: &Targets) -> Progress {
+    match fitted {
+        Ok(fitted) => Progress {
+            sensors: fitted.sensors.iter().map(|s| aims(s, targets)).collect(),
+            not_yet: None,
+        },
+        Err(error) => Progress {
+            sensors: Vec::new(),
+            not_yet: Some(error.to_string()),
+        },
+    }
+}
+
+fn aims(fitted: &SensorFit, targets: &Targets) -> Aims {
+    let physical = fitted.estimated.triad.physical(Angles::Exact);
+    let worst = |widths: [f64; 3]| {
+        let all = widths.into_iter().zip(AXES);
+        all.fold((0.0, AXES[0]), |a, b| {
+            if b.0 > a.0 || b.0.is_nan() { b } else { a }
+        })
+    };
+    let each =
+        |of: [Estimate; 3], by: [f64; 3]| worst([0, 1, 2].map(|i| of[i].interval / by[i].abs()));
+    let scale = physical.scale.map(|s| s.value);
+    let (bias_unit, bias, angle, ratio) = match fitted.sensor {
+        Sensor::Gyro => (
+            ("deg/s", 1f64.to_degrees()),
+            targets.gyro_bias_dps,
+            targets.gyro_angle_urad,
+            targets.gyro_scale_ppm,
+        ),
+        Sensor::Accel => (
+            ("mg", 1e3 / STANDARD_GRAVITY),
+            targets.accel_bias_mg,
+            targets.accel_angle_urad,
+            targets.accel_scale_ppm,
+        ),
+    };
+    let aim = |parameter, (half_width, axis): (f64, &'static str), factor: f64, target, unit| Aim {
+        parameter,
+        axis,
+        half_width: factor * half_width,
+        target,
+        unit,
+    };
+    let angles = [physical.misalignment, physical.non_orthogonality];
+    let angles = angles.map(|a| each(a, [1.0; 3]));
+    // Seen from the body only turns tell the misalignment of a triad that nothing but gravity is known of: it has none by definition.
+    let angles = if angles[1].0 > angles[0].0 {
+        angles[1]
+    } else {
+        angles[0]
+    };
+    Aims {
+        sensor: fitted.sensor,
+        aims: vec![
+            aim(
+                "bias",
+                each(physical.bias, scale),
+                bias_unit.1,
+                bias,
+                bias_unit.0,
+            ),
+            aim("scale", each(physical.scale, scale), 1e6, ratio, "ppm"),
+            aim("angles", angles, 1e6, angle, "µrad"),
+        ],
+    }
+}

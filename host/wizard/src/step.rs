@@ -1,0 +1,159 @@
+//! One thing to do: a direction that is to point up, a rate about it, and how long.
+
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+
+/// A dwell that is wanted, or was had.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Step {
+    /// Direction in the body frame that points up, of length 1.
+    pub up: [f64; 3],
+    /// Rate about the upward vertical, deg/s, right-hand rule.
+    #[serde(default)]
+    pub rate_dps: f64,
+    /// Length of the dwell, s.
+    pub dwell_s: f64,
+}
+
+impl Step {
+    /// At rest.
+    pub fn at_rest(up: Vector3<f64>, dwell_s: f64) -> Self {
+        Self {
+            up: up.normalize().into(),
+            rate_dps: 0.0,
+            dwell_s,
+        }
+    }
+
+    /// Direction that points up.
+    pub fn up(&self) -> Vector3<f64> {
+        Vector3::from(self.up)
+    }
+
+    /// Rate, rad/s in the body frame.
+    pub fn rate(&self) -> Vector3<f64> {
+        self.up() * self.rate_dps.to_radians()
+    }
+
+    /// In a few words.
+    pub fn words(&self) -> String {
+        let pose = words(&self.up());
+        match self.rate_dps {
+            0.0 => pose,
+            rate => format!("{pose}, turning at {rate:+} deg/s about the vertical"),
+        }
+    }
+}
+
+/// Axes with their signs, the largest first, of those that are within a factor of three of the largest.
+fn parts(up: &Vector3<f64>) -> Vec<(usize, f64)> {
+    let largest = up.amax();
+    let mut parts: Vec<(usize, f64)> = (0..3)
+        .map(|i| (i, up[i]))
+        .filter(|p| p.1.abs() > largest / 3.0)
+        .collect();
+    parts.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()));
+    parts
+}
+
+/// `+z face up`, `edge between +x and -y up`, `corner of +x, +y and -z up`; others by their angles to the nearest of these.
+pub fn words(up: &Vector3<f64>) -> String {
+    let name = |p: &(usize, f64)| {
+        let sign = if p.1 < 0.0 { '-' } else { '+' };
+        format!("{sign}{}", mimu::quantity::AXES[p.0])
+    };
+    let all = parts(up);
+    let exact: Vector3<f64> = all
+        .iter()
+        .map(|p| Vector3::ith(p.0, p.1.signum()))
+        .sum::<Vector3<f64>>()
+        .normalize();
+    let text = match all.as_slice() {
+        [a] => format!("{} face up", name(a)),
+        [a, b] => format!("edge between {} and {} up", name(a), name(b)),
+        [a, b, c] => format!("corner of {}, {} and {} up", name(a), name(b), name(c)),
+        _ => String::new(),
+    };
+    match exact.angle(up).to_degrees() {
+        off if off < 1.0 => text,
+        off => format!("{text}, {off:.0} degrees off"),
+    }
+}
+
+/// A box seen from the front left above, its faces named as they lie with `up` upwards: what is on top, in front and to the right.
+///
+/// Only faces can be drawn so; an edge or a corner is drawn on its nearest face, with an arrow to the side that is lifted.
+pub fn sketch(up: &Vector3<f64>) -> [String; 7] {
+    let all = parts(up);
+    let name = |axis: usize, sign: f64| {
+        format!(
+            "{}{}",
+            if sign < 0.0 { '-' } else { '+' },
+            mimu::quantity::AXES[axis]
+        )
+    };
+    let (top, sign) = all
+        .first()
+        .copied()
+        .map_or((2, 1.0), |p| (p.0, p.1.signum()));
+    // A right-handed box: front x right = top.
+    let (front, right) = ((top + 1) % 3, (top + 2) % 3);
+    let [t, f, r] = [name(top, sign), name(front, 1.0), name(right, sign)];
+    let lifted = all[1.min(all.len())..].iter();
+    let lifted: Vec<String> = lifted.map(|p| name(p.0, p.1)).collect();
+    let note = match lifted.is_empty() {
+        true => String::new(),
+        false => format!("  and lift the side of {}", lifted.join(" and ")),
+    };
+    [
+        "      ________".into(),
+        format!("     /   {t}  /|"),
+        "    /_______/ |".into(),
+        "   |        | |".into(),
+        format!("   |   {f}   |{r}"),
+        "   |________|/ ".into(),
+        note,
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn poses_are_named_as_a_person_holds_them() {
+        for (up, says) in [
+            ([0.0, 0.0, 1.0], "+z face up"),
+            ([0.0, -1.0, 0.02], "-y face up, 1 degrees off"),
+            ([1.0, 0.0, -1.0], "edge between +x and -z up"),
+            ([1.0, -1.0, 1.0], "corner of +x, -y and +z up"),
+        ] {
+            let up = Vector3::from(up).normalize();
+            assert_eq!(words(&up), says);
+        }
+    }
+
+    #[test]
+    fn front_times_right_of_the_sketch_is_up() {
+        for axis in 0..3 {
+            for sign in [1.0, -1.0] {
+                let up = Vector3::ith(axis, sign);
+                let lines = sketch(&up).join("\n");
+                let at = |s: &str| {
+                    let k = mimu::quantity::AXES
+                        .iter()
+                        .position(|a| s.ends_with(a))
+                        .unwrap();
+                    Vector3::ith(k, if s.starts_with('-') { -1.0 } else { 1.0 })
+                };
+                let names: Vec<&str> = lines
+                    .split(|c: char| !(c == '+' || c == '-' || c.is_alphabetic()))
+                    .filter(|w| w.len() == 2)
+                    .collect();
+                let [top, front, right] = [names[0], names[1], names[2]].map(at);
+                assert_eq!(front.cross(&right), top, "{lines}");
+                assert_eq!(top, up);
+            }
+        }
+    }
+}

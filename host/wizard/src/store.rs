@@ -1,0 +1,147 @@
+//! A calibration into the device: stored, read back, kept over a loss of the supply, and computed with as the PC does.
+
+use std::time::{Duration, Instant};
+
+use mimu::calibration::Calibration;
+use mimu_device::{Image, check, download, self_test, upload};
+use mimu_recording::error::{Error, Result};
+
+use crate::event::{Event, Question};
+use crate::folder::Entry;
+use crate::wizard::{Ended, Wizard};
+
+/// Longest wait for a device to come back with its supply.
+const BACK: Duration = Duration::from_secs(60);
+/// Length of the comparison of the device's compensation with the PC's.
+const COMPARED: Duration = Duration::from_secs(1);
+
+impl Wizard<'_> {
+    /// Has the sensors deflected electrically, and keeps a copy of what the device holds.
+    pub fn look_at_devices(&mut self) -> Result<Ended> {
+        for k in 0..self.units.len() {
+            let unit = &self.units[k];
+            let name = unit.name();
+            if !unit.station.unit.is_device {
+                continue;
+            }
+            let copy = unit.folder.file("held-before.bin");
+            if !copy.exists() {
+                let held = unit.station.with(|session| {
+                    let holds = session.hello()?.stored.is_some();
+                    holds.then(|| download(session)).transpose()
+                })?;
+                if let Some(bytes) = held {
+                    mimu_recording::result_file::stage(&copy, bytes.as_slice())?.publish()?;
+                }
+            }
+            let tested = unit.station.with(self_test)?;
+            let failed = tested.passed.sensors().into_iter().filter(|s| !s.1);
+            let failed: Vec<&str> = failed.map(|s| s.0).collect();
+            let words = match (failed.is_empty(), &tested.moved) {
+                (true, _) => "all sensors answer as their data sheets state".to_string(),
+                (false, None) => format!("not as the data sheets state: {}", failed.join(", ")),
+                (false, Some(moved)) => {
+                    format!("{} failed, and the unit moved: {moved}", failed.join(", "))
+                }
+            };
+            let passed = failed.is_empty();
+            let question = Question::GoOn(format!("{name}: the self-test failed, {words}"));
+            self.tell(Event::SelfTested {
+                unit: name.clone(),
+                passed,
+                words: words.clone(),
+            });
+            if !passed {
+                match self.ask(&question)? {
+                    Some(true) => {}
+                    Some(false) => {
+                        let remedy = "check the wiring of the sensors, keep the unit still, and run the same command";
+                        return Err(Error::device(
+                            name,
+                            format!("the self-test failed: {words}"),
+                            remedy,
+                        ));
+                    }
+                    None => return Ok(Ended::Cancelled),
+                }
+            }
+        }
+        Ok(Ended::Done)
+    }
+
+    /// Stores a calibration on unit `k`, reads it back, turns the supply off and on, and compares what the device makes of its readings with
+    /// what the PC makes of the same. `place` is the file.
+    pub fn store(&mut self, k: usize, calibration: &Calibration, place: &str) -> Result<Ended> {
+        let unit = &self.units[k];
+        let name = unit.name();
+        if !unit.station.unit.is_device {
+            return Ok(Ended::Done);
+        }
+        let (given, file) = (calibration.clone(), place.to_owned());
+        let (hash, effects) = unit.station.with(move |session| {
+            let image = Image::new(&given, &file)?;
+            image.check_device(&given, session.who(), &file)?;
+            let done = upload(session, &image, |_| {})?;
+            Ok((done.hash.0, done.effects))
+        })?;
+        let shown = format!("{hash:016x}");
+        self.units[k].folder.add(Entry::Stored {
+            hash: shown.clone(),
+            effects,
+        })?;
+        let cycled = match self.driver.power_cycle()? {
+            true => Some(true),
+            false => self.ask(&Question::PowerCycled)?,
+        };
+        let Some(cycled) = cycled else {
+            return Ok(Ended::Cancelled);
+        };
+        self.wait_for(k, hash)?;
+        let (given, file) = (calibration.clone(), place.to_owned());
+        let unit = &self.units[k];
+        let checked = unit
+            .station
+            .with(move |session| check(session, &given, &file, COMPARED, |_| {}))?;
+        if !checked.holds && checked.not_judged_for.is_empty() {
+            let problem = "the device compensates otherwise than the PC, by more than rounding";
+            let remedy = "update device and program to the same version";
+            return Err(Error::device(name, problem, remedy));
+        }
+        let kept = match cycled {
+            true => "kept over a loss of the supply",
+            false => "not tried with the supply off",
+        };
+        self.tell(Event::Stored {
+            unit: name,
+            hash: shown,
+            words: format!("stored, read back, {kept}, and computed with as the PC does"),
+        });
+        Ok(Ended::Done)
+    }
+
+    /// Waits until unit `k` greets with this calibration.
+    fn wait_for(&mut self, k: usize, hash: u64) -> Result<()> {
+        let since = Instant::now();
+        loop {
+            let held = self.units[k].station.with(|session| {
+                let stored = session.hello()?.stored;
+                Ok(stored.map(|s| s.hash.0))
+            });
+            match held {
+                Ok(Some(found)) if found == hash => return Ok(()),
+                Ok(_) => {
+                    let name = self.units[k].name();
+                    let problem =
+                        "the device has not kept the calibration over the loss of its supply";
+                    return Err(Error::device(
+                        name,
+                        problem,
+                        "store it again; if it stays so, its flash is worn out",
+                    ));
+                }
+                Err(error) if since.elapsed() > BACK => return Err(error),
+                Err(_) => std::thread::sleep(Duration::from_millis(200)),
+            }
+        }
+    }
+}

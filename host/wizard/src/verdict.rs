@@ -1,0 +1,133 @@
+//! Whether a calibration keeps what it promises, judged by dwells that it was not made from.
+
+use mimu::calibration::Calibration;
+use mimu::fit::Fit;
+use mimu::prepared::Prepared;
+use mimu::quantity::Sensor;
+use mimu::stillness::STILL_FACTOR;
+use mimu::verify::{SensorVerification, verify};
+use mimu_recording::Recording;
+use mimu_recording::error::Result;
+use serde::Serialize;
+use std::path::Path;
+
+/// Errors beyond this many noise floors are worth a look.
+pub const CLEAN: f64 = 1.3;
+/// What was held out promises; twice of it and of the noise is no chance any more with six dwells and more.
+const BROKEN: f64 = 2.0;
+
+/// The figures of one sensor.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SensorJudged {
+    /// Which.
+    pub sensor: Sensor,
+    /// What they are about.
+    pub figure: &'static str,
+    /// Of all of them.
+    pub unit: &'static str,
+    /// What a data sheet would leave: one scale factor and one bias for all axes.
+    pub before: f64,
+    /// With the calibration, without its effects.
+    pub affine: f64,
+    /// With the calibration.
+    pub after: f64,
+    /// What noise alone would leave.
+    pub floor: f64,
+    /// What was promised: held out of the dwells that it was made from.
+    pub promised: Option<f64>,
+    /// Dwells or turns.
+    pub count: usize,
+}
+
+impl SensorJudged {
+    fn of(found: &SensorVerification, promised: Option<f64>) -> Self {
+        Self {
+            sensor: found.sensor,
+            figure: found.figure.description(),
+            unit: found.figure.unit(found.sensor),
+            before: found.rms_raw,
+            affine: found.rms_affine.unwrap_or(found.rms),
+            after: found.rms,
+            floor: found.noise_floor,
+            promised,
+            count: found.count,
+        }
+    }
+
+    /// Why it must not be stored.
+    pub fn broken(&self) -> Option<String> {
+        let promised = self.promised.unwrap_or(0.0).hypot(self.floor);
+        if !(self.after < self.before) {
+            return Some(format!(
+                "{}: {} errs by {} {} with the calibration and by {} without",
+                self.sensor,
+                self.figure,
+                mimu::quantity::significant(self.after),
+                self.unit,
+                mimu::quantity::significant(self.before)
+            ));
+        }
+        (self.after > BROKEN * promised).then(|| {
+            format!(
+                "{}: {} errs by {} {} in poses that were not used, and {} were promised",
+                self.sensor,
+                self.figure,
+                mimu::quantity::significant(self.after),
+                self.unit,
+                mimu::quantity::significant(promised)
+            )
+        })
+    }
+}
+
+/// A calibration judged by the verification.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Judged {
+    /// By sensor.
+    pub sensors: Vec<SensorJudged>,
+    /// Why it must not be stored.
+    pub broken: Vec<String>,
+    /// What a person should know.
+    pub warnings: Vec<String>,
+}
+
+impl Judged {
+    /// Whether it may be stored.
+    pub fn passed(&self) -> bool {
+        self.broken.is_empty() && !self.sensors.is_empty()
+    }
+
+    /// Whether noise explains what is left.
+    pub fn clean(&self) -> bool {
+        self.sensors.iter().all(|s| s.after <= CLEAN * s.floor)
+    }
+}
+
+/// The recording of a directory, ready.
+pub fn prepared(directory: &Path) -> Result<Prepared> {
+    Prepared::read(&Recording::open(directory)?, STILL_FACTOR, |_| {})
+}
+
+/// Judges a calibration by the recording of the verification; `promised` is the fit that it was made by.
+pub fn judge(by: &Prepared, calibration: &Calibration, promised: Option<&Fit>) -> Result<Judged> {
+    let found = verify(by, calibration)?;
+    let of = |s: &SensorVerification| {
+        let fitted = promised.and_then(|f| f.sensor(s.sensor));
+        SensorJudged::of(s, fitted.and_then(|f| f.held_out_rms()))
+    };
+    let sensors: Vec<SensorJudged> = found.sensors.iter().map(of).collect();
+    let mut broken: Vec<String> = sensors.iter().filter_map(SensorJudged::broken).collect();
+    for sensor in Sensor::BOTH {
+        let judged = sensors.iter().any(|s| s.sensor == sensor);
+        if calibration.inverse(sensor).is_some() && !judged {
+            broken.push(format!(
+                "{sensor}: the verification has nothing to judge it by"
+            ));
+        }
+    }
+    Ok(Judged {
+        sensors,
+        broken,
+        warnings: found.warnings,
+    })
+}

@@ -1,0 +1,310 @@
+//! The samples as they come, looked at a tenth of a second at a time: is the unit still, which way is up, how fast does it turn.
+
+use std::collections::VecDeque;
+
+use mimu::quantity::Sensor;
+use mimu::stillness::{STILL_FACTOR, WINDOW_S};
+use mimu_core::compensation::Affine;
+use nalgebra::{Matrix3, Vector3};
+
+use crate::source::Chunk;
+
+/// Length of a block, s.
+const BLOCK_S: f64 = 0.1;
+/// Over how long the change of temperature is taken, s: with a noise of 0.05 °C the slope is then good to 0.05 °C/min.
+const TREND_S: f64 = 60.0;
+/// Least of that, s, to say anything.
+const TREND_LEAST_S: f64 = 15.0;
+/// What the gyro is allowed beyond a still accelerometer by hand: see the stillness of recordings, where hands tremble in angle.
+const GYRO_TREMOR: f64 = 30.0;
+
+/// Moments of the six channels.
+#[derive(Debug, Clone, Copy, Default)]
+struct Moments {
+    count: f64,
+    mean: [f64; 6],
+    squares: [f64; 6],
+}
+
+impl Moments {
+    fn add(&mut self, row: &[f64; 6]) {
+        self.count += 1.0;
+        for c in 0..6 {
+            let off = row[c] - self.mean[c];
+            self.mean[c] += off / self.count;
+            self.squares[c] += off * (row[c] - self.mean[c]);
+        }
+    }
+
+    fn join(&mut self, other: &Self) {
+        let count = self.count + other.count;
+        if count == 0.0 {
+            return;
+        }
+        for c in 0..6 {
+            let off = other.mean[c] - self.mean[c];
+            self.squares[c] += other.squares[c] + off * off * self.count * other.count / count;
+            self.mean[c] += off * other.count / count;
+        }
+        self.count = count;
+    }
+}
+
+/// A tenth of a second.
+#[derive(Debug, Clone, Copy, Default)]
+struct Block {
+    moments: Moments,
+    saturated: bool,
+    missing: u64,
+}
+
+/// What the last second was like.
+#[derive(Debug, Clone, Copy)]
+pub struct Seen {
+    /// Tick after it.
+    pub tick: u64,
+    /// Means, raw.
+    pub mean: [f64; 6],
+    /// Standard deviation of gyro and accelerometer over the most that counts as still; the worst axis.
+    pub motion: [f64; 2],
+    /// Whether a reading may stand at the end of its range.
+    pub saturated: bool,
+    /// Samples that are missing in it.
+    pub missing: u64,
+    /// °C.
+    pub temp_c: f64,
+    /// °C/min over the last minute, once there is enough of it.
+    pub trend: Option<f64>,
+    /// The first channel that has one value only.
+    pub stuck: Option<usize>,
+}
+
+/// The samples of one unit, condensed as they come.
+#[derive(Debug)]
+pub struct Watch {
+    rate_hz: f64,
+    by_hand: bool,
+    block_rows: f64,
+    open: Block,
+    window: VecDeque<Block>,
+    next: Option<u64>,
+    /// Variance of one sample in the quietest second so far, raw.
+    floor: Option<[f64; 6]>,
+    /// Mean reading of the gyro in that second.
+    rest: [f64; 3],
+    temperatures: VecDeque<(u64, f64)>,
+}
+
+impl Watch {
+    /// Of a unit; `by_hand` allows the gyro the tremor of hands.
+    pub fn new(rate_hz: f64, by_hand: bool) -> Self {
+        Self {
+            rate_hz,
+            by_hand,
+            block_rows: (BLOCK_S * rate_hz).round().max(4.0),
+            open: Block::default(),
+            window: VecDeque::new(),
+            next: None,
+            floor: None,
+            rest: [0.0; 3],
+            temperatures: VecDeque::new(),
+        }
+    }
+
+    /// Takes samples in; what the last second was like, if one is whole.
+    pub fn take(&mut self, chunk: &Chunk) -> Option<Seen> {
+        let missing = chunk.tick.saturating_sub(self.next.unwrap_or(chunk.tick));
+        self.next = Some(chunk.tick + chunk.values.len() as u64);
+        // After more than a tenth of a second without samples it is another second.
+        if missing as f64 > self.block_rows {
+            (self.open, self.window) = (Block::default(), VecDeque::new());
+        }
+        self.open.missing += missing;
+        let mut seen = None;
+        for (k, row) in (1..).zip(&chunk.values) {
+            self.open.moments.add(row);
+            self.open.saturated |= chunk.saturated;
+            if self.open.moments.count >= self.block_rows {
+                self.window.push_back(std::mem::take(&mut self.open));
+                let whole = (WINDOW_S / BLOCK_S).round() as usize;
+                if self.window.len() > whole {
+                    self.window.pop_front();
+                }
+                self.follow(chunk.tick + k, chunk.temp_c);
+                if self.window.len() == whole && !chunk.self_test {
+                    seen = Some(self.see(chunk.tick + k, chunk.temp_c));
+                }
+            }
+        }
+        seen
+    }
+
+    /// Forgets what it has seen of the last second: what comes next has nothing to do with it.
+    pub fn interrupted(&mut self) {
+        (self.open, self.window) = (Block::default(), VecDeque::new());
+        self.temperatures.clear();
+    }
+
+    /// Whether it knows yet how quiet the unit can be.
+    pub fn knows_rest(&self) -> bool {
+        self.floor.is_some()
+    }
+
+    fn follow(&mut self, tick: u64, temp_c: f64) {
+        if temp_c.is_finite() {
+            self.temperatures.push_back((tick, temp_c));
+        }
+        let from = tick.saturating_sub((TREND_S * self.rate_hz) as u64);
+        while self.temperatures.front().is_some_and(|(t, _)| *t < from) {
+            self.temperatures.pop_front();
+        }
+    }
+
+    /// °C/min by a straight line.
+    fn trend(&self) -> Option<f64> {
+        let (first, last) = (self.temperatures.front()?, self.temperatures.back()?);
+        if ((last.0 - first.0) as f64) < TREND_LEAST_S * self.rate_hz {
+            return None;
+        }
+        let n = self.temperatures.len() as f64;
+        let minutes = |t: u64| (t - first.0) as f64 / self.rate_hz / 60.0;
+        let (t, c) = self
+            .temperatures
+            .iter()
+            .fold((0.0, 0.0), |(t, c), x| (t + minutes(x.0) / n, c + x.1 / n));
+        let products = self.temperatures.iter().map(|x| {
+            let off = minutes(x.0) - t;
+            (off * (x.1 - c), off * off)
+        });
+        let (tc, tt) = products.fold((0.0, 0.0), |s, p| (s.0 + p.0, s.1 + p.1));
+        Some(tc / tt)
+    }
+
+    fn see(&mut self, tick: u64, temp_c: f64) -> Seen {
+        let mut all = Moments::default();
+        let (mut saturated, mut missing) = (false, 0);
+        for block in &self.window {
+            all.join(&block.moments);
+            saturated |= block.saturated;
+            missing += block.missing;
+        }
+        let variance = all.squares.map(|s| s / (all.count - 1.0));
+        let stuck = (0..6).find(|c| variance[*c] == 0.0);
+        let sum = |v: &[f64; 6]| v[..3].iter().sum::<f64>();
+        if stuck.is_none() && !saturated {
+            let floor = self.floor.get_or_insert(variance);
+            // The quietest second is where the rate is that of rest.
+            if sum(&variance) <= sum(floor) {
+                self.rest = [0, 1, 2].map(|c| all.mean[c]);
+            }
+            for c in 0..6 {
+                floor[c] = floor[c].min(variance[c]);
+            }
+        }
+        let floor = self.floor.unwrap_or(variance);
+        let motion = Sensor::BOTH.map(|sensor| {
+            let allowed = match sensor {
+                Sensor::Gyro if self.by_hand => GYRO_TREMOR * STILL_FACTOR,
+                _ => STILL_FACTOR,
+            };
+            let ratio = |c: usize| (variance[c] / (allowed * floor[c])).sqrt();
+            sensor.channels().map(ratio).fold(0.0, f64::max)
+        });
+        Seen {
+            tick,
+            mean: all.mean,
+            motion,
+            saturated,
+            missing,
+            temp_c,
+            trend: self.trend(),
+            stuck,
+        }
+    }
+
+    /// Rate of a second against that of rest, rad/s, by `gyro`, raw to SI.
+    pub fn rate(&self, seen: &Seen, gyro: &Affine<f64>) -> Vector3<f64> {
+        gyro.matrix * Vector3::from_fn(|c, _| seen.mean[c] - self.rest[c])
+    }
+
+    /// Standard deviation of one sample of the gyro at rest, by `gyro`, rad/s; the noisiest axis.
+    pub fn gyro_noise(&self, gyro: &Affine<f64>) -> f64 {
+        let floor = self.floor.unwrap_or_default();
+        let of = |i: usize| gyro.matrix.row(i).norm() * floor[i].sqrt();
+        (0..3).map(of).fold(0.0, f64::max)
+    }
+}
+
+/// Specific force by `accel`, raw to SI.
+pub fn force(seen: &Seen, accel: &Affine<f64>) -> Vector3<f64> {
+    accel.apply(&Vector3::from_fn(|c, _| seen.mean[3 + c]))
+}
+
+/// What a board must be of which no data sheet is known: at rest its accelerometer reads gravity, by the size of `seen`; its gyro is
+/// taken to be in units of a thousandth of that which makes 1 rad/s, so that only directions mean anything.
+pub fn guessed(seen: &Seen, gravity_mps2: f64) -> [Affine<f64>; 2] {
+    let size = Vector3::from_fn(|c, _| seen.mean[3 + c]).norm();
+    let plain = |factor: f64| Affine {
+        matrix: Matrix3::identity() * factor,
+        offset: Vector3::zeros(),
+    };
+    [
+        plain(1.0),
+        plain(gravity_mps2 / size.max(f64::MIN_POSITIVE)),
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn chunk(tick: u64, rows: usize, offset: f64, spread: f64) -> Chunk {
+        let row = |k: usize| {
+            let noise = ((tick as usize + k) as f64 * 0.618_034).fract() - 0.5;
+            [0, 1, 2, 3, 4, 5].map(|c| offset + spread * noise * (1.0 + 0.1 * c as f64))
+        };
+        Chunk {
+            tick,
+            values: (0..rows).map(row).collect(),
+            temp_c: 20.0 + tick as f64 / 60e3,
+            saturated: false,
+            self_test: false,
+        }
+    }
+
+    #[test]
+    fn what_is_five_times_as_noisy_as_the_quietest_second_is_no_rest() {
+        let mut watch = Watch::new(1000.0, false);
+        let mut last = None;
+        for k in 0..100 {
+            last = watch.take(&chunk(20 * k, 20, 1.0, 0.01)).or(last);
+        }
+        assert!(last.unwrap().motion.iter().all(|m| *m < 0.5), "{last:?}");
+        for k in 100..150 {
+            last = watch.take(&chunk(20 * k, 20, 1.0, 0.05)).or(last);
+        }
+        assert!(last.unwrap().motion.iter().all(|m| *m > 1.0), "{last:?}");
+    }
+
+    #[test]
+    fn the_trend_of_the_temperature_is_in_degrees_a_minute() {
+        let mut watch = Watch::new(1000.0, false);
+        let mut last = None;
+        for k in 0..2000 {
+            last = watch.take(&chunk(20 * k, 20, 1.0, 0.01)).or(last);
+        }
+        assert!(
+            (last.unwrap().trend.unwrap() - 1.0).abs() < 1e-6,
+            "{last:?}"
+        );
+    }
+
+    #[test]
+    fn a_gap_begins_another_second() {
+        let mut watch = Watch::new(1000.0, false);
+        for k in 0..60 {
+            watch.take(&chunk(20 * k, 20, 1.0, 0.01));
+        }
+        assert!(watch.take(&chunk(5000, 100, 1.0, 0.01)).is_none());
+    }
+}

@@ -1,0 +1,366 @@
+//! A session from the greeting to the last dwell: which step comes next, and who has had it.
+
+use std::time::{Duration, Instant};
+
+use mimu_recording::error::{Error, Result};
+
+use crate::drive::Driver;
+use crate::event::{Event, Question, Standing, View, Wish};
+use crate::folder::{Entry, Part};
+use crate::one::One;
+use crate::procedure::{Asked, Fixture, next_step};
+use crate::step::Step;
+
+/// How often the standing is shown.
+const SHOWN: Duration = Duration::from_millis(100);
+/// Nothing has come: so long nothing is looked at.
+const IDLE: Duration = Duration::from_millis(4);
+/// Without a person, what does not come about in this time never will: ten times the longest move and dwell.
+const STUCK: Duration = Duration::from_secs(120);
+/// Longest wait for a unit to say anything, or for a table's interlock.
+const SILENT: Duration = Duration::from_secs(30);
+
+/// How a phase ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Ended {
+    /// As it was to.
+    Done,
+    /// By the person: the session can go on later.
+    Cancelled,
+}
+
+/// A session.
+pub struct Wizard<'a> {
+    /// What is asked.
+    pub asked: Asked,
+    /// The units, all on one fixture.
+    pub units: Vec<One>,
+    /// What turns them.
+    pub driver: Box<dyn Driver + 'a>,
+    /// Who is told.
+    pub view: &'a mut dyn View,
+    /// The phase, for the standing.
+    pub phase: &'static str,
+    shown: Instant,
+    queue: Vec<Step>,
+    planned: usize,
+    current: Option<Step>,
+    zero_s: Option<u64>,
+}
+
+/// How a step ended.
+enum Stepped {
+    Had,
+    Cancelled,
+    Skipped,
+    Redo(Step),
+}
+
+impl<'a> Wizard<'a> {
+    /// Of these units.
+    pub fn new(
+        asked: Asked,
+        units: Vec<One>,
+        driver: Box<dyn Driver + 'a>,
+        view: &'a mut dyn View,
+    ) -> Self {
+        Self {
+            asked,
+            units,
+            driver,
+            view,
+            phase: "start",
+            shown: Instant::now(),
+            queue: Vec::new(),
+            planned: 0,
+            current: None,
+            zero_s: None,
+        }
+    }
+
+    /// Tells of an event.
+    pub fn tell(&mut self, event: Event) {
+        self.view.tell(&event);
+    }
+
+    /// Begins a phase.
+    pub fn begin_phase(&mut self, phase: &'static str, words: String) {
+        self.phase = phase;
+        self.tell(Event::Phase { phase, words });
+    }
+
+    /// Listens to all units once, and shows how they stand. Whether a wish came.
+    fn round(&mut self, step: Option<&Step>, busy: bool) -> Result<Option<Wish>> {
+        let mut tell = Vec::new();
+        let any_order = self.driver.is_person();
+        let mut some = false;
+        for unit in &mut self.units {
+            some |= unit.listen(&self.asked, step, &self.queue, busy, any_order, &mut tell)?;
+        }
+        for event in tell {
+            self.view.tell(&event);
+        }
+        if self.shown.elapsed() > SHOWN {
+            self.shown = Instant::now();
+            let samples = self.units.first().map_or(0, |u| u.standing.samples);
+            let zero = *self.zero_s.get_or_insert(samples);
+            let rate_hz = self.units.first().map_or(1.0, |u| u.station.unit.rate_hz);
+            let standing = Standing {
+                phase: self.phase,
+                step: self.current,
+                dwells: [self.units.first().map_or(0, |u| self.had(u)), self.planned],
+                thrown: self.units.iter().map(|u| u.folder.thrown()).sum(),
+                elapsed_s: (samples - zero.min(samples)) as f64 / rate_hz,
+                units: self.units.iter().map(|u| u.standing.clone()).collect(),
+                progress: self.units.iter().map(|u| u.progress.clone()).collect(),
+            };
+            self.view.show(&standing);
+        }
+        let wish = self.view.wish();
+        if !some && wish.is_none() {
+            std::thread::sleep(IDLE);
+        }
+        Ok(wish)
+    }
+
+    fn had(&self, unit: &One) -> usize {
+        let part = match self.phase {
+            "verification" => Part::Verification,
+            "confirmation" => Part::Confirmation,
+            _ => Part::Calibration,
+        };
+        unit.folder.dwells(part).len()
+    }
+
+    /// Waits until all units are heard and, where that is asked, warm.
+    pub fn warm_up(&mut self) -> Result<Ended> {
+        let mut since = Instant::now();
+        self.current = None;
+        loop {
+            if self.round(None, false)? == Some(Wish::Cancel) {
+                return Ok(Ended::Cancelled);
+            }
+            let heard = self.units.iter().all(One::is_heard);
+            if !heard {
+                if since.elapsed() > SILENT {
+                    let silent = self.units.iter().find(|u| !u.is_heard());
+                    let name = silent.map_or_else(String::new, One::name);
+                    let problem = "no samples come";
+                    return Err(Error::device(
+                        name,
+                        problem,
+                        "reset the board and run it again",
+                    ));
+                }
+                continue;
+            }
+            let Some(limit) = self.asked.warm_c_per_min else {
+                return Ok(Ended::Done);
+            };
+            let warm = |u: &One| u.trend().is_some_and(|t| t.abs() <= limit);
+            for unit in &mut self.units {
+                let waiting = match unit.trend() {
+                    None => Some("its temperature is watched".to_string()),
+                    Some(t) if t.abs() > limit => {
+                        Some(format!("warming up: {t:+.2} °C/min, {limit} is the limit"))
+                    }
+                    Some(_) => None,
+                };
+                unit.standing.waiting = waiting;
+            }
+            if self.units.iter().all(warm) {
+                return Ok(Ended::Done);
+            }
+            since = Instant::now();
+        }
+    }
+
+    /// Has the dwells of a recording: those planned that are not there yet and, for a calibration that goes by targets, more or fewer.
+    pub fn dwells(&mut self, part: Part, steps: &[Step]) -> Result<Ended> {
+        for unit in &mut self.units {
+            let asked = self.asked.clone();
+            unit.begin(part, &asked)?;
+            if part == Part::Calibration {
+                unit.refit(&asked);
+            }
+        }
+        self.planned = steps.len();
+        self.queue = self.left(part, steps);
+        loop {
+            let Some(step) = self.choose(part) else {
+                self.driver.stop()?;
+                self.current = None;
+                return Ok(Ended::Done);
+            };
+            self.current = Some(step);
+            let done = self
+                .units
+                .first()
+                .map_or(0, |u| u.folder.dwells(part).len());
+            let planned = self.planned.max(done + 1);
+            self.tell(Event::Step {
+                part,
+                done,
+                planned,
+                step,
+                words: step.words(),
+            });
+            match self.step(&step)? {
+                // A person may have had another pose than was asked for: that one is off the list then, and this one is not.
+                Stepped::Had if self.driver.is_person() => self.queue = self.left(part, steps),
+                Stepped::Had => {}
+                Stepped::Cancelled => {
+                    self.driver.stop()?;
+                    return Ok(Ended::Cancelled);
+                }
+                Stepped::Skipped => self.queue.push(step),
+                Stepped::Redo(other) => {
+                    self.queue.insert(0, step);
+                    self.queue.insert(0, other);
+                }
+            }
+        }
+    }
+
+    /// The planned steps that no dwell of the journal is.
+    fn left(&self, part: Part, steps: &[Step]) -> Vec<Step> {
+        // Units that were not interrupted at the same dwell go on from the one that has fewest: the others have one more then.
+        let had = self.units.iter().map(|u| u.folder.dwells(part));
+        let had = had.min_by_key(Vec::len).unwrap_or_default();
+        let mut left = steps.to_vec();
+        let limit = self.asked.fixture.tolerance_deg();
+        for (_, dwell) in had {
+            let is = |s: &Step| {
+                s.rate_dps == dwell.rate_dps && s.up().angle(&dwell.up()).to_degrees() <= limit
+            };
+            if let Some(at) = left.iter().position(is) {
+                left.remove(at);
+            }
+        }
+        left
+    }
+
+    /// The next step; `None` if there is none left to do.
+    fn choose(&mut self, part: Part) -> Option<Step> {
+        let going_by_targets = part == Part::Calibration && self.asked.by_targets;
+        if !going_by_targets {
+            return (!self.queue.is_empty()).then(|| self.queue.remove(0));
+        }
+        let met = self.units.iter().all(|u| u.progress.missed() == [false; 2]);
+        let done = self
+            .units
+            .first()
+            .map_or(0, |u| u.folder.dwells(part).len());
+        // What is held out has to leave the rest determined: half as much again as what determines it.
+        if met && done >= least(self.asked.fixture) || done >= self.asked.most_dwells {
+            return None;
+        }
+        if !self.queue.is_empty() {
+            return Some(self.queue.remove(0));
+        }
+        let worst = self
+            .units
+            .iter()
+            .find(|u| u.progress.missed() != [false; 2])?;
+        let had: Vec<Step> = worst.folder.dwells(part).into_iter().map(|d| d.1).collect();
+        Some(next_step(&self.asked, &had, worst.progress.missed()))
+    }
+
+    fn step(&mut self, step: &Step) -> Result<Stepped> {
+        for unit in &mut self.units {
+            (unit.done, unit.standing.waiting) = (false, None);
+        }
+        let mut since = Instant::now();
+        let mut told = false;
+        while let Some(why) = self.driver.held()? {
+            if !told {
+                self.tell(Event::Note { words: why.clone() });
+                told = true;
+            }
+            if self.round(None, false)? == Some(Wish::Cancel) {
+                return Ok(Stepped::Cancelled);
+            }
+            if since.elapsed() > SILENT && !self.driver.is_person() {
+                return Err(Error::device(
+                    "table",
+                    why,
+                    "close it and run the same command",
+                ));
+            }
+        }
+        self.driver.go(step)?;
+        since = Instant::now();
+        loop {
+            let busy = self.driver.busy()?;
+            match self.round(Some(step), busy)? {
+                Some(Wish::Cancel) => return Ok(Stepped::Cancelled),
+                Some(Wish::Skip) => return Ok(Stepped::Skipped),
+                Some(Wish::RedoLast) => {
+                    let last = self.units.iter().filter_map(One::last_number).max();
+                    if let Some(step) = last.map(|n| self.redo(n)).transpose()?.flatten() {
+                        return Ok(Stepped::Redo(step));
+                    }
+                }
+                Some(Wish::Redo(number)) => {
+                    if let Some(step) = self.redo(number)? {
+                        return Ok(Stepped::Redo(step));
+                    }
+                }
+                None => {}
+            }
+            if self.units.iter().all(|u| u.done) {
+                return Ok(Stepped::Had);
+            }
+            if since.elapsed() > STUCK && !self.driver.is_person() {
+                let why = self.units.iter().filter(|u| !u.done);
+                let why = why.filter_map(|u| u.standing.waiting.clone()).next();
+                let problem = format!(
+                    "the step {:?} does not come about: {}",
+                    step.words(),
+                    why.unwrap_or_else(|| "the dwell is broken off again and again".into())
+                );
+                let remedy = "mend it and run the same command: the session goes on";
+                return Err(Error::device("session", problem, remedy));
+            }
+        }
+    }
+
+    fn redo(&mut self, number: i32) -> Result<Option<Step>> {
+        let mut step = None;
+        for unit in &mut self.units {
+            step = unit.redo(number)?.or(step);
+        }
+        if step.is_some() {
+            self.tell(Event::Redo { number });
+        }
+        Ok(step)
+    }
+
+    /// Asks, and listens to the units meanwhile. `None`: it was cancelled.
+    pub fn ask(&mut self, question: &Question) -> Result<Option<bool>> {
+        loop {
+            if let Some(answer) = self.view.ask(question) {
+                return Ok(Some(answer));
+            }
+            if self.round(None, false)? == Some(Wish::Cancel) {
+                return Ok(None);
+            }
+        }
+    }
+
+    /// Adds a line to the journal of each unit.
+    pub fn journal(&mut self, entry: &Entry) -> Result<()> {
+        for unit in &mut self.units {
+            unit.folder.add(entry.clone())?;
+        }
+        Ok(())
+    }
+}
+
+/// Fewest dwells of a calibration.
+fn least(fixture: Fixture) -> usize {
+    match fixture {
+        Fixture::Table => 18,
+        Fixture::Cube | Fixture::Hands => 14,
+    }
+}
