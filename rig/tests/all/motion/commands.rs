@@ -303,7 +303,10 @@ fn a_person_who_is_told_begins_like_one_with_a_plan_and_misses_every_pose_by_as_
 #[test]
 fn no_command_makes_a_hand_jump_whenever_it_comes() {
     let truth = HandsTruth {
+        // Long and large knocks, so that some commands fall into one.
         jolt_probability: 1.0,
+        jolt_s: 1.0,
+        jolt_mrad: 30.0,
         ..HandsTruth::default()
     };
     for seed in 0..4 {
@@ -320,7 +323,7 @@ fn no_command_makes_a_hand_jump_whenever_it_comes() {
                 course.tell(Command::Stop);
             }
         }
-        // A turn of 180 degrees within a second; knocks of 50 ms have some 10 rad/s².
+        // A turn of 180 degrees within a second has 18 rad/s² and its detour as much.
         course.is_continuous(60.0);
     }
 }
