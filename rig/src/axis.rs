@@ -125,6 +125,24 @@ impl Axis {
         self.end_s = self.end_s.max(end_s);
     }
 
+    /// Forgets what was to come after `t_s`, which is not before the time that [`Axis::advance`] went to, and goes on
+    /// as it is at that instant: angle and rate do not jump, nor does the swing of the load.
+    pub(crate) fn cut(&mut self, t_s: f64) {
+        // The first piece begins at 0.
+        while self.segments.len() > 1 && self.segments[self.segments.len() - 1].start_s > t_s {
+            self.segments.pop();
+        }
+        self.end_s = t_s;
+        self.push(self.end().0, self.end().1, 0.0);
+    }
+
+    /// Commanded angle at any time, rad.
+    pub(crate) fn angle(&self, t_s: f64) -> f64 {
+        let after = self.segments.partition_point(|s| s.start_s <= t_s);
+        let here = &self.segments[after.saturating_sub(1)];
+        commanded(here, t_s - here.start_s).value
+    }
+
     fn accelerate(&mut self, duration_s: f64, acceleration: f64) {
         let (angle, rate) = self.end();
         self.push(angle, rate, acceleration);

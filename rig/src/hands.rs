@@ -16,8 +16,10 @@ use crate::refusal::{Refusal, within};
 use crate::rotation::{Vector, scale};
 
 use choice::{Jolt, Turn, between, chosen};
+use commanded::Told;
 
 mod choice;
+mod commanded;
 mod even;
 mod flaws;
 
@@ -192,20 +194,21 @@ impl Shake {
     }
 }
 
-/// A person who carries out a plan.
+/// A person who carries out a plan, or commands.
 #[derive(Debug, Clone)]
 pub struct Hands {
     place: Place,
     turns: Vec<Turn>,
     cursor: usize,
     duration_s: f64,
-    held: bool,
     lever: Vector,
     tremor: Shake,
     sway: Shake,
     shake: Shake,
     jolt_s: f64,
     still: Option<(usize, Motion)>,
+    /// What is to be done besides, where there is no plan.
+    told: Option<Told>,
 }
 
 impl Hands {
@@ -213,10 +216,8 @@ impl Hands {
     pub fn new(plan: &Plan, truth: &HandsTruth, seed: u64) -> Result<Self, String> {
         truth.check()?;
         let mut random = Random::new(seed, "hands");
+        let mut hands = Self::of(plan, truth, &mut random);
         let random = &mut random;
-        let tremor = Shake::new(random, truth.tremor_hz, truth.tremor_mrad, truth.tremor_mm);
-        let sway = Shake::new(random, truth.sway_hz, truth.sway_mrad, truth.sway_mm);
-        let shake = sway.clone();
         let mut turns: Vec<Turn> = Vec::new();
         let mut end_s = 0.0;
         for step in &plan.steps {
@@ -237,19 +238,27 @@ impl Hands {
                 }
             }
         }
-        Ok(Self {
+        (hands.turns, hands.duration_s) = (turns, end_s);
+        Ok(hands)
+    }
+
+    /// The person, without anything to do.
+    fn of(plan: &Plan, truth: &HandsTruth, random: &mut Random) -> Self {
+        let tremor = Shake::new(random, truth.tremor_hz, truth.tremor_mrad, truth.tremor_mm);
+        let sway = Shake::new(random, truth.sway_hz, truth.sway_mrad, truth.sway_mm);
+        Self {
             place: plan.place,
-            turns,
+            turns: Vec::new(),
             cursor: 0,
-            duration_s: end_s,
-            held: truth.held,
+            duration_s: 0.0,
             lever: scale(1e-3, truth.lever_mm),
             tremor,
+            shake: sway.clone(),
             sway,
-            shake,
             jolt_s: truth.jolt_s,
             still: None,
-        })
+            told: None,
+        }
     }
 }
 
@@ -267,14 +276,15 @@ impl Carrier for Hands {
             self.cursor += 1;
         }
         let turn = &self.turns[self.cursor];
-        let step = (t_s >= turn.dwell[0] && t_s < turn.dwell[1]).then_some(self.cursor as u32);
+        let dwells = t_s >= turn.dwell[0] && t_s < turn.dwell[1] && self.told.is_none();
+        let step = dwells.then_some(self.cursor as u32);
         let turning = t_s < turn.start_s + turn.turn_s;
         let jolt = turn
             .jolt
             .filter(|jolt| t_s >= jolt.start_s && t_s < jolt.start_s + self.jolt_s);
         let settles = |(_, length_s)| t_s < turn.arrived_s() + length_s;
         let moves = turn.even.is_some() || turn.settling.is_some_and(settles);
-        let lies = !self.held && !turning && !moves && jolt.is_none();
+        let lies = !turn.held[1] && !turning && !moves && jolt.is_none();
         let motion = match self.still {
             Some((at, still)) if lies && at == self.cursor => Motion { t_s, ..still },
             _ => self.moving(turn, t_s, turning, jolt),
@@ -303,10 +313,18 @@ impl Hands {
             (Jet::constant(1.0), Jet::default())
         };
         let mut shift = Shift::default();
-        if self.held {
-            shift.add(&self.tremor.at(t_s), Jet::constant(1.0));
-            shift.add(&self.sway.at(t_s), Jet::constant(1.0));
-        } else if turning {
+        // How much of it is held: a hand lets go, or takes hold, as the turn goes.
+        let held = match turn.held {
+            [false, false] => None,
+            [true, true] => Some(Jet::constant(1.0)),
+            [true, false] => Some(Jet::constant(1.0) + done.times(-1.0)),
+            [false, true] => Some(done),
+        };
+        if let Some(held) = held {
+            shift.add(&self.tremor.at(t_s), held);
+            shift.add(&self.sway.at(t_s), held);
+        }
+        if turning && turn.held != [true, true] {
             shift.add(&self.tremor.at(t_s), detour);
         }
         if turning && turn.shaken {

@@ -11,6 +11,7 @@
 //! | [`table`], [`axis`]            | a turntable with its flaws                                        |
 //! | [`hands`]                      | a person                                                          |
 //! | [`flaws`]                      | what goes wrong in real recordings                                |
+//! | [`command`]                    | what a table and a person are told in place of a plan             |
 //! | [`motion`], [`chain`], [`rotation`] | what passes from a carrier to the sensors                    |
 //! | [`record`]                     | recordings of it, in memory or as files                           |
 //!
@@ -26,6 +27,7 @@
 pub mod axis;
 pub mod catalog;
 pub mod chain;
+pub mod command;
 pub mod converter;
 pub mod effects;
 pub mod filter;

@@ -75,6 +75,19 @@ pub struct Step {
 }
 
 impl Step {
+    /// One that stands in no file: a pose, at rest.
+    pub(crate) fn commanded(up: Vector, heading: Option<f64>, dwell_s: f64) -> Self {
+        Self {
+            pose: Pose::Up(up),
+            heading,
+            rate: 0.0,
+            spin: 0.0,
+            dwell_s,
+            repeat: 1,
+            at: Places::default(),
+        }
+    }
+
     /// Dwells in it.
     pub fn dwells(&self) -> u64 {
         let poses = match self.pose {
@@ -95,7 +108,7 @@ pub enum Pose {
 }
 
 /// Where in the file the values of a step stand.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 struct Places {
     pose: Range<usize>,
     heading: Range<usize>,
@@ -147,57 +160,92 @@ impl Plan {
     /// Refuses what a table cannot do, in one line that names the step's line and the limit.
     pub fn check(&self, limits: &Limits) -> Result<(), String> {
         for step in &self.steps {
-            if let Pose::Up(up) = step.pose {
-                let (middle, _) = tilt(up);
-                if !limits.reaches(middle) && !limits.reaches(-middle) {
-                    return Err(self.source.error(
-                        &step.at.pose,
-                        format_args!(
-                            "`up` needs the middle axis at {:.1} degrees, and the table has {:.1} to {:.1}",
-                            middle.to_degrees(),
-                            limits.middle[0].to_degrees(),
-                            limits.middle[1].to_degrees()
-                        ),
-                        "take a pose within reach, or remount the unit",
-                    ));
-                }
-                if !limits.outer {
-                    let upright = up[0].hypot(up[1]) < UPRIGHT;
-                    let remedy = "use `spin_dps`, or turn the inner axis upright (`up` along z)";
-                    if step.rate != 0.0 && !upright {
-                        let problem = "`rate_dps` is about the vertical, where the table has no axis in this pose";
-                        return Err(self.source.error(&step.at.rate, problem, remedy));
-                    }
-                    if step.heading.is_some_and(|h| h != 0.0) && !upright {
-                        let problem = "`heading_deg` needs an outer axis, and the table has none";
-                        return Err(self.source.error(&step.at.heading, problem, "leave it out"));
-                    }
-                }
-            } else if !limits.outer && step.rate != 0.0 {
-                let problem =
-                    "`rate_dps` is about the vertical, where the table has no axis in most poses";
-                return Err(self.source.error(&step.at.rate, problem, "use `spin_dps`"));
+            limits.check(step).map_err(|beyond| self.beyond(&beyond))?;
+        }
+        Ok(())
+    }
+
+    /// One line of what is beyond a table's limits.
+    pub(crate) fn beyond(
+        &self,
+        Beyond {
+            at,
+            problem,
+            remedy,
+        }: &Beyond,
+    ) -> String {
+        self.source.error(at, problem, remedy)
+    }
+}
+
+/// What a table cannot do of a step.
+#[derive(Debug, Clone)]
+pub(crate) struct Beyond {
+    at: Range<usize>,
+    pub(crate) problem: String,
+    pub(crate) remedy: &'static str,
+}
+
+impl Limits {
+    /// Refuses a step that a table of these limits cannot carry out.
+    pub(crate) fn check(&self, step: &Step) -> Result<(), Beyond> {
+        let refused = |at: &Range<usize>, problem: String, remedy| {
+            Err(Beyond {
+                at: at.clone(),
+                problem,
+                remedy,
+            })
+        };
+        if let Pose::Up(up) = step.pose {
+            let (middle, _) = tilt(up);
+            if !self.reaches(middle) && !self.reaches(-middle) {
+                return refused(
+                    &step.at.pose,
+                    format!(
+                        "`up` needs the middle axis at {:.1} degrees, and the table has {:.1} to {:.1}",
+                        middle.to_degrees(),
+                        self.middle[0].to_degrees(),
+                        self.middle[1].to_degrees()
+                    ),
+                    "take a pose within reach, or remount the unit",
+                );
             }
-            let (outer, inner) = if limits.outer {
-                (step.rate, step.spin)
-            } else {
-                (0.0, step.rate.abs() + step.spin.abs())
-            };
-            for (rate, limit, at, key) in [
-                (outer, limits.rate[0], &step.at.rate, "rate_dps"),
-                (inner, limits.rate[1], &step.at.spin, "spin_dps"),
-            ] {
-                if rate.abs() > limit * (1.0 + 1e-12) {
-                    return Err(self.source.error(
-                        at,
-                        format_args!(
-                            "`{key}`: {} is more than the table's {}",
-                            shown(rate.abs()),
-                            shown(limit)
-                        ),
-                        "slow down",
-                    ));
+            if !self.outer {
+                let upright = up[0].hypot(up[1]) < UPRIGHT;
+                let remedy = "use `spin_dps`, or turn the inner axis upright (`up` along z)";
+                if step.rate != 0.0 && !upright {
+                    let problem = "`rate_dps` is about the vertical, where the table has no axis in this pose";
+                    return refused(&step.at.rate, problem.into(), remedy);
                 }
+                if step.heading.is_some_and(|h| h != 0.0) && !upright {
+                    let problem = "`heading_deg` needs an outer axis, and the table has none";
+                    return refused(&step.at.heading, problem.into(), "leave it out");
+                }
+            }
+        } else if !self.outer && step.rate != 0.0 {
+            let problem =
+                "`rate_dps` is about the vertical, where the table has no axis in most poses";
+            return refused(&step.at.rate, problem.into(), "use `spin_dps`");
+        }
+        let (outer, inner) = if self.outer {
+            (step.rate, step.spin)
+        } else {
+            (0.0, step.rate.abs() + step.spin.abs())
+        };
+        for (rate, limit, at, key) in [
+            (outer, self.rate[0], &step.at.rate, "rate_dps"),
+            (inner, self.rate[1], &step.at.spin, "spin_dps"),
+        ] {
+            if rate.abs() > limit * (1.0 + 1e-12) {
+                return refused(
+                    at,
+                    format!(
+                        "`{key}`: {} is more than the table's {}",
+                        shown(rate.abs()),
+                        shown(limit)
+                    ),
+                    "slow down",
+                );
             }
         }
         Ok(())

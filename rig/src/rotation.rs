@@ -29,6 +29,17 @@ pub fn scale(s: f64, a: Vector) -> Vector {
     a.map(|x| s * x)
 }
 
+/// Unit vector along `v`. `None` if it has no length or is not finite.
+pub fn direction(v: Vector) -> Option<Vector> {
+    let largest = v.iter().fold(0.0, |a: f64, x| a.max(x.abs()));
+    if largest == 0.0 || !v.iter().all(|x| x.is_finite()) {
+        return None;
+    }
+    // First by the largest: squares of 1e200 are infinite.
+    let v = v.map(|x| x / largest);
+    Some(scale(1.0 / norm(v), v))
+}
+
 /// Length.
 pub fn norm(a: Vector) -> f64 {
     dot(a, a).sqrt()

@@ -7,12 +7,12 @@
 //!
 //! Left out: axes that do not meet in a point, play, and noise of the controller's own.
 
+mod commanded;
 mod controller;
 mod truth;
 
-use controller::{Controller, Dwell, INNER, MIDDLE, OUTER};
+use controller::{Controller, INNER, MIDDLE, OUTER};
 
-use crate::axis::Axis;
 use crate::chain::{Frame, Jet};
 use crate::motion::{Carrier, Instant};
 use crate::place::Place;
@@ -21,12 +21,11 @@ use crate::rotation::{Rotation, Vector, scale};
 
 pub use truth::TableTruth;
 
-/// A table that carries out a plan.
+/// A table that carries out a plan, or commands.
 #[derive(Debug, Clone)]
 pub struct Table {
     place: Place,
-    axes: [Axis; 3],
-    dwells: Vec<Dwell>,
+    controller: Controller,
     cursor: usize,
     duration_s: f64,
     base: Frame,
@@ -45,14 +44,18 @@ impl Table {
     pub fn new(plan: &Plan, truth: &TableTruth) -> Result<Self, String> {
         truth.check()?;
         plan.check(&truth.limits())?;
-        let Controller { axes, dwells, .. } = Controller::carry_out(plan, truth);
+        let controller = Controller::carry_out(plan, truth);
+        let duration_s = controller.dwells.last().map_or(0.0, |dwell| dwell.end_s);
+        Ok(Self::driven(controller, duration_s, plan, truth))
+    }
+
+    fn driven(controller: Controller, duration_s: f64, plan: &Plan, truth: &TableTruth) -> Self {
         let arcsec = |x: f64| (x / 3600.0).to_radians();
         let [east, north] = truth.level_arcsec.map(arcsec);
-        Ok(Self {
+        Self {
             place: plan.place,
-            duration_s: dwells.last().map_or(0.0, |dwell| dwell.end_s),
-            axes,
-            dwells,
+            duration_s,
+            controller,
             cursor: 0,
             base: Frame::ground(&plan.place).fixed(Rotation::by([east, north, 0.0])),
             mounting: Rotation::by(truth.mounting_arcsec.map(arcsec)),
@@ -62,7 +65,7 @@ impl Table {
             stated: truth.rate_scale_ppm.map(|ppm| 1.0 / (1.0 + 1e-6 * ppm)),
             offset: scale(1e-3, truth.offset_mm),
             still: None,
-        })
+        }
     }
 }
 
@@ -72,23 +75,20 @@ impl Carrier for Table {
     }
 
     fn at(&mut self, t_s: f64) -> Instant {
-        while self
-            .dwells
+        let dwells = &self.controller.dwells;
+        while dwells
             .get(self.cursor)
             .is_some_and(|dwell| dwell.end_s <= t_s)
         {
             self.cursor += 1;
         }
-        let dwell = self
-            .dwells
-            .get(self.cursor)
-            .filter(|dwell| dwell.start_s <= t_s);
+        let dwell = dwells.get(self.cursor).filter(|dwell| dwell.start_s <= t_s);
         let step = dwell.map(|_| self.cursor as u32);
         let mut resting = true;
-        for axis in &mut self.axes {
+        for axis in &mut self.controller.axes {
             resting &= axis.advance(t_s);
         }
-        let segments = [0, 1, 2].map(|i| self.axes[i].cursor());
+        let segments = [0, 1, 2].map(|i| self.controller.axes[i].cursor());
         if let Some((of, mut still)) = self.still
             && resting
             && of == segments
@@ -110,7 +110,7 @@ impl Table {
         let mut rate = [0.0; 3];
         let (mut sine, mut cosine) = ([0.0; 3], [0.0; 3]);
         for i in 0..3 {
-            let (commanded, lag) = self.axes[i].at(t_s);
+            let (commanded, lag) = self.controller.axes[i].at(t_s);
             let (s, c) = commanded.value.sin_cos();
             angle[i] = commanded + commanded.through([s, c, -s]).times(self.encoder[i]) + lag;
             tilt[i] = commanded.through([c, -s, -c]).times(self.wobble[i]);

@@ -2,9 +2,10 @@
 
 use std::fmt;
 
+use mimu_rig::command::{Command, Commanded, Position};
 use mimu_rig::filter::LowPass;
 use mimu_rig::hands::Hands;
-use mimu_rig::motion::Carrier;
+use mimu_rig::motion::{Carrier, Instant, Motion};
 use mimu_rig::pins::Pins;
 use mimu_rig::plan::{CarriedBy, Plan};
 use mimu_rig::random::Random;
@@ -33,7 +34,7 @@ const RANGES: [f64; 4] = [1.0, 0.75, 0.375, 0.25];
 pub enum Front {
     /// Voltages that a test sets, without noise.
     Still(Volts),
-    /// A unit that is carried through a plan.
+    /// A unit that is carried through a plan, or as it is told.
     Bench(Box<Bench>),
 }
 
@@ -43,6 +44,43 @@ impl Front {
     ///
     /// Errors: the plan asks for what the table cannot do, or a sensor is not analog.
     pub fn bench(plan: &Plan, truth: &RigTruth, seed: u64) -> Result<Self, String> {
+        Self::carried(
+            plan,
+            truth,
+            |at| {
+                Ok(Carried::Plan(match at.carrier {
+                    CarriedBy::Table => Box::new(Table::new(at, &truth.table)?),
+                    CarriedBy::Hands => Box::new(Hands::new(at, &truth.hands, seed)?),
+                }))
+            },
+            seed,
+        )
+    }
+
+    /// A unit of known truth that is moved by [`Front::command`]. Of the plan it has carrier, place, lead-in, chamber and
+    /// the first pose, in which it stands; the steps are not carried out.
+    ///
+    /// Errors: the first pose is out of the table's reach, or a sensor is not analog.
+    pub fn commanded(plan: &Plan, truth: &RigTruth, seed: u64) -> Result<Self, String> {
+        Self::carried(
+            plan,
+            truth,
+            |at| {
+                Ok(Carried::Commands(match at.carrier {
+                    CarriedBy::Table => Box::new(Table::commanded(at, &truth.table)?),
+                    CarriedBy::Hands => Box::new(Hands::commanded(at, &truth.hands, seed)?),
+                }))
+            },
+            seed,
+        )
+    }
+
+    fn carried(
+        plan: &Plan,
+        truth: &RigTruth,
+        carrier: impl FnOnce(&Plan) -> Result<Carried, String>,
+        seed: u64,
+    ) -> Result<Self, String> {
         for (kind, triad) in [("gyro", &truth.unit.gyro), ("accel", &truth.unit.accel)] {
             if !triad.analog {
                 return Err(format!(
@@ -55,18 +93,17 @@ impl Front {
         if !truth.earth_rate {
             at.place.rotation = 0.0;
         }
-        let mut carrier: Box<dyn Carrier + Send> = match plan.carrier {
-            CarriedBy::Table => Box::new(Table::new(&at, &truth.table)?),
-            CarriedBy::Hands => Box::new(Hands::new(&at, &truth.hands, seed)?),
-        };
+        let mut carrier = carrier(&at)?;
         let dt_s = 1.0 / STEPS_PER_S as f64;
         let mut unit = Unit::new(&truth.unit, seed, dt_s);
         let mut filters = Filters::new(dt_s);
-        let pins = unit.step(&carrier.at(0.0).motion, plan.chamber_c(0.0));
+        let motion = carrier.at(0.0).motion;
+        let pins = unit.step(&motion, plan.chamber_c(0.0));
         let first = filters.step(&pins);
         Ok(Self::Bench(Box::new(Bench {
             plan: at,
             carrier,
+            motion,
             unit,
             filters,
             before: first,
@@ -98,6 +135,108 @@ impl Front {
         }
     }
 
+    /// What carries the unit, if there is one.
+    pub fn carried_by(&self) -> Option<CarriedBy> {
+        match self {
+            Self::Still(_) => None,
+            Self::Bench(bench) => Some(bench.plan.carrier),
+        }
+    }
+
+    /// Tells what carries the unit what to do from an instant on, ns.
+    ///
+    /// Errors: it cannot do that, or carries out a plan, in one line that says what instead.
+    pub fn command(&mut self, ns: u64, command: Command) -> Result<(), String> {
+        let t_s = self.advanced(ns);
+        self.taking_commands()?.command(t_s, command)
+    }
+
+    /// Whether it still moves as it was told, at an instant, ns.
+    ///
+    /// Errors: it carries out a plan.
+    pub fn busy(&mut self, ns: u64) -> Result<bool, String> {
+        let t_s = self.advanced(ns);
+        Ok(self.taking_commands()?.busy(t_s))
+    }
+
+    /// Where it was told to be, at an instant, ns.
+    ///
+    /// Errors: it carries out a plan.
+    pub fn position(&mut self, ns: u64) -> Result<Position, String> {
+        let t_s = self.advanced(ns);
+        Ok(self.taking_commands()?.position(t_s))
+    }
+
+    /// Brings the chamber to a temperature (°C) from an instant (ns) on: at a steady rate (K/s), or at once.
+    ///
+    /// Errors: there is no chamber.
+    pub fn set_chamber(&mut self, ns: u64, to_c: f64, rate: Option<f64>) -> Result<(), String> {
+        let t_s = self.advanced(ns);
+        let Self::Bench(bench) = self else {
+            return Err(NO_UNIT.into());
+        };
+        let from_c = bench.plan.chamber_c(t_s);
+        let ramp_s = rate.map_or(0.0, |rate| (to_c - from_c).abs() / rate);
+        bench.plan.chamber = match ramp_s > 0.0 {
+            true => vec![[t_s, from_c], [t_s + ramp_s, to_c]],
+            false => vec![[t_s, to_c]],
+        };
+        Ok(())
+    }
+
+    /// Temperature of the chamber's air at an instant, ns, °C.
+    ///
+    /// Errors: there is no chamber.
+    pub fn chamber_c(&mut self, ns: u64) -> Result<f64, String> {
+        let t_s = self.advanced(ns);
+        match self {
+            Self::Still(_) => Err(NO_UNIT.into()),
+            Self::Bench(bench) => Ok(bench.plan.chamber_c(t_s)),
+        }
+    }
+
+    /// The true motion of the unit at an instant, ns, or up to 50 µs after it.
+    ///
+    /// Errors: there is no unit.
+    pub fn motion(&mut self, ns: u64) -> Result<Motion, String> {
+        self.advanced(ns);
+        match self {
+            Self::Still(_) => Err(NO_UNIT.into()),
+            Self::Bench(bench) => Ok(bench.motion),
+        }
+    }
+
+    /// Moves the unit on to an instant, ns, where nobody asks for voltages.
+    pub fn advance(&mut self, ns: u64) {
+        self.advanced(ns);
+    }
+
+    /// Steps up to an instant, ns, and returns the time of the last step, s since the plan or the lead-in began: what
+    /// was computed cannot be changed any more.
+    fn advanced(&mut self, ns: u64) -> f64 {
+        match self {
+            Self::Still(_) => 0.0,
+            Self::Bench(bench) => {
+                bench.advance(ns.saturating_sub(bench.began_ns));
+                bench.t_s()
+            }
+        }
+    }
+
+    fn taking_commands(&mut self) -> Result<&mut (dyn Commanded + Send + 'static), String> {
+        match self {
+            Self::Still(_) => Err(NO_UNIT.into()),
+            Self::Bench(bench) => match &mut bench.carrier {
+                Carried::Plan(_) => Err(
+                    "the unit is carried through a plan; serve it with a control from the \
+                                         start"
+                        .into(),
+                ),
+                Carried::Commands(carrier) => Ok(&mut **carrier),
+            },
+        }
+    }
+
     /// Voltages at an instant, ns. Instants do not go back.
     pub fn at(&mut self, ns: u64) -> Volts {
         match self {
@@ -116,10 +255,30 @@ impl fmt::Debug for Front {
     }
 }
 
-/// A plan being carried out in front of the pins.
+/// What is said where voltages stand in the place of a unit.
+const NO_UNIT: &str = "no unit is at the pins of the board; serve one";
+
+/// What carries the unit, and by what.
+enum Carried {
+    Plan(Box<dyn Carrier + Send>),
+    Commands(Box<dyn Commanded + Send>),
+}
+
+impl Carried {
+    fn at(&mut self, t_s: f64) -> Instant {
+        match self {
+            Self::Plan(carrier) => carrier.at(t_s.min(carrier.duration_s())),
+            Self::Commands(carrier) => carrier.at(t_s),
+        }
+    }
+}
+
+/// A unit on the move in front of the pins.
 pub struct Bench {
     plan: Plan,
-    carrier: Box<dyn Carrier + Send>,
+    carrier: Carried,
+    /// At the step `steps`.
+    motion: Motion,
     unit: Unit,
     filters: Filters,
     /// At the steps `steps - 1` and `steps`.
@@ -156,16 +315,26 @@ impl Bench {
         }
     }
 
-    fn at(&mut self, ns: u64) -> Volts {
-        let ns = ns.saturating_sub(self.began_ns);
+    /// Time of the last step, s.
+    fn t_s(&self) -> f64 {
+        self.steps as f64 / STEPS_PER_S as f64
+    }
+
+    /// Steps until the last one is behind an instant, ns since it began.
+    fn advance(&mut self, ns: u64) {
         while self.steps * STEP_NS <= ns {
             self.steps += 1;
-            let t_s = self.steps as f64 / STEPS_PER_S as f64;
-            let motion = self.carrier.at(t_s.min(self.carrier.duration_s())).motion;
-            let mut pins = self.unit.step(&motion, self.plan.chamber_c(t_s));
+            let t_s = self.t_s();
+            self.motion = self.carrier.at(t_s).motion;
+            let mut pins = self.unit.step(&self.motion, self.plan.chamber_c(t_s));
             self.deflect(&mut pins);
             self.before = std::mem::replace(&mut self.after, self.filters.step(&pins));
         }
+    }
+
+    fn at(&mut self, ns: u64) -> Volts {
+        let ns = ns.saturating_sub(self.began_ns);
+        self.advance(ns);
         let since = ns - (self.steps - 1) * STEP_NS;
         let mut volts = self
             .before

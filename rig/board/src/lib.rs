@@ -15,17 +15,21 @@
 //! | [`fault`]     | an instruction that is not what the image says                                |
 //! | [`findings`]  | what the emulator found out about the firmware                                |
 //! | [`running`]   | a board that runs: time, bytes, supply, reset, counters                       |
-//! | [`serve`], [`terminal`] | the same behind a pseudo-terminal                                  |
+//! | [`serve`], [`terminal`], `port` | the same behind a pseudo-terminal                            |
+//! | `control`, `interference` | commands over TCP; garbled bytes                                  |
 
+mod control;
 mod driver;
 pub mod fault;
 pub mod findings;
 pub mod flash;
 pub mod front;
 pub mod image;
+mod interference;
 mod line;
 mod memory;
 mod part;
+mod port;
 pub mod running;
 pub mod sampler;
 pub mod schematic;

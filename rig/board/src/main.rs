@@ -10,7 +10,7 @@ use mimu_board::image::{Image, release_image};
 use mimu_board::running::Board;
 use mimu_board::serve::{self, Served};
 use mimu_rig::located::Source;
-use mimu_rig::plan::Plan;
+use mimu_rig::plan::{CarriedBy, Plan};
 use mimu_rig::rig_file::{RigFile, RigTruth};
 
 /// The emulated board: the firmware's image on an emulated NUCLEO-H743ZI2 with a virtual unit at its pins.
@@ -33,7 +33,8 @@ enum Command {
 /// Run the firmware on an emulated board and print the path of its serial port.
 ///
 /// The port is a pseudo-terminal in raw mode; its speed does not matter. The unit is carried through the plan from
-/// the moment that the board is switched on, and stays where the plan ends. Runs until it is interrupted.
+/// the moment that the board is switched on, and stays where the plan ends; or it is moved by commands, with --control.
+/// Runs until it is interrupted.
 #[derive(clap::Args)]
 #[command(after_help = KEYS)]
 struct Serve {
@@ -46,6 +47,18 @@ struct Serve {
     /// What is done to the unit [default: it lies still]
     #[arg(long, value_name = "PLAN.toml")]
     plan: Option<PathBuf>,
+    /// TCP address for commands that move the unit and disturb the line, as 127.0.0.1:0 for any free port.
+    ///
+    /// It is printed behind the port. Of the plan the unit has carrier, place, lead-in, chamber and the first pose, in which
+    /// it stands; the steps are not carried out. Whoever reaches the address may command.
+    #[arg(long, value_name = "ADDRESS")]
+    control: Option<String>,
+    /// What carries the unit under --control where no plan says it [default: table]
+    #[arg(long, requires = "control", conflicts_with = "plan")]
+    carrier: Option<Carrier>,
+    /// Symbolic link to the port, which is kept current when the line is unplugged and plugged in again.
+    #[arg(long, value_name = "PATH")]
+    link: Option<PathBuf>,
     /// Another seed is another unit, another person, and other noise.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
@@ -63,6 +76,14 @@ enum Pace {
     Wall,
     /// As fast as the machine can and as whoever has the port open reads; it waits for them.
     Fast,
+}
+
+#[derive(Clone, Copy, clap::ValueEnum)]
+enum Carrier {
+    /// A turntable.
+    Table,
+    /// A person.
+    Hands,
 }
 
 fn main() -> ExitCode {
@@ -84,24 +105,50 @@ const AT_REST: &str = include_str!("../../plans/rest.toml");
 
 impl Serve {
     fn run(self) -> Result<(), String> {
-        let plan = match &self.plan {
+        let mut plan = match &self.plan {
             Some(path) => Plan::read(path)?,
             None => Plan::parse(Source::new("rest.toml", AT_REST))?,
         };
+        if let Some(carrier) = self.carrier {
+            plan.carrier = match carrier {
+                Carrier::Table => CarriedBy::Table,
+                Carrier::Hands => CarriedBy::Hands,
+            };
+        }
         let rig = match &self.unit {
             Some(path) => RigFile::read(path)?,
             None => RigFile::default(),
         };
         let truth = RigTruth::resolve(&rig, self.seed)?;
         let image = Image::read(&self.image.unwrap_or_else(release_image))?;
-        let board = Board::new(&image, Front::bench(&plan, &truth, self.seed)?)?;
+        let front = match self.control {
+            Some(_) => Front::commanded(&plan, &truth, self.seed)?,
+            None => Front::bench(&plan, &truth, self.seed)?,
+        };
+        let board = Board::new(&image, front)?;
         let pace = match self.pace {
             Pace::Wall => serve::Pace::Wall,
             Pace::Fast => serve::Pace::Fast,
         };
         let mut served = Served::new(board, pace, self.flash.as_deref())?;
+        if let Some(link) = &self.link {
+            served.link(link)?;
+        }
+        let control = match &self.control {
+            Some(address) => Some(served.listen(address, self.seed)?),
+            None => None,
+        };
         served.start()?;
         println!("{}", served.path().display());
+        if let Some(address) = control {
+            println!("control: {address}");
+            if let Some(plan) = &self.plan {
+                eprintln!(
+                    "mimu-board: {}: its steps are not carried out; the commands of the control move the unit",
+                    plan.display()
+                );
+            }
+        }
         let mut told = (served.traffic().lost, Instant::now());
         loop {
             served.step()?;

@@ -1,13 +1,22 @@
 //! A board behind a pseudo-terminal, for whatever opens serial ports.
 
+use std::fmt;
 use std::fs::{File, OpenOptions};
 use std::io::{self, ErrorKind, Read, Seek, SeekFrom, Write};
+use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
+use crate::control::Control;
 use crate::flash::BANK;
+use crate::interference::Interference;
+use crate::port::Port;
 use crate::running::{Board, STORE};
-use crate::terminal::Terminal;
+
+mod orders;
+
+pub use orders::COMMANDS;
+use orders::Desk;
 
 /// How fast virtual time goes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -40,13 +49,37 @@ pub struct Traffic {
     pub lost: u64,
     /// To the device.
     pub sent: u64,
+    /// To the device while its supply was off.
+    pub unpowered: u64,
+    /// From the device, and made others by the bench.
+    pub garbled: u64,
+}
+
+impl fmt::Display for Traffic {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            delivered,
+            unheard,
+            lost,
+            sent,
+            unpowered,
+            garbled,
+        } = self;
+        write!(
+            f,
+            "{delivered} {unheard} {lost} {sent} {unpowered} {garbled}"
+        )
+    }
 }
 
 /// A board with its terminal.
 #[derive(Debug)]
 pub struct Served {
     board: Board,
-    terminal: Terminal,
+    port: Port,
+    control: Option<Control>,
+    desk: Desk,
+    interference: Interference,
     store: Option<StoreFile>,
     pace: Pace,
     traffic: Traffic,
@@ -72,10 +105,12 @@ impl Served {
             None => None,
         };
         let first_ns = board.standing().ns;
-        let terminal = Terminal::open().map_err(|e| format!("a pseudo-terminal: {e}"))?;
         Ok(Self {
             board,
-            terminal,
+            port: Port::new()?,
+            control: None,
+            desk: Desk::new(0),
+            interference: Interference::new(0),
             store,
             pace,
             traffic: Traffic::default(),
@@ -104,9 +139,31 @@ impl Served {
         Ok(())
     }
 
-    /// What to open.
+    /// Takes commands at a TCP address of this machine, as `127.0.0.1:0`, where port 0 is any that is free. They are
+    /// answered while the board steps or waits. The seed is what it says of itself, and decides what faults strike.
+    ///
+    /// Returns where it listens.
+    ///
+    /// Errors: not an address, or it is taken.
+    pub fn listen(&mut self, address: &str, seed: u64) -> Result<SocketAddr, String> {
+        let control = Control::bind(address)?;
+        let address = control.address();
+        self.control = Some(control);
+        self.desk = Desk::new(seed);
+        self.interference = Interference::new(seed);
+        Ok(address)
+    }
+
+    /// Makes a symbolic link to the terminal, which points to the new one after the line was unplugged.
+    ///
+    /// Errors: something else has that name.
+    pub fn link(&mut self, link: &Path) -> Result<(), String> {
+        self.port.link(link)
+    }
+
+    /// What to open: the link, if there is one.
     pub fn path(&self) -> &Path {
-        self.terminal.path()
+        self.port.path()
     }
 
     /// What became of the bytes so far.
@@ -119,31 +176,36 @@ impl Served {
         &mut self.board
     }
 
-    /// Runs a millisecond of virtual time, or waits.
+    /// Answers the commands that have come, then runs a millisecond of virtual time, or waits.
     ///
     /// Errors: the emulator, the terminal or the file gave up.
     pub fn step(&mut self) -> Result<(), String> {
-        let broken = |e: io::Error| format!("the pseudo-terminal: {e}");
-        if self.pace == Pace::Fast && !(self.terminal.is_open() && self.waiting.is_empty()) {
-            if !self.terminal.is_open() {
+        if let Some(mut control) = self.control.take() {
+            let answered = control.poll(&mut |line| self.answer(line));
+            self.control = Some(control);
+            answered?;
+        }
+        if self.pace == Pace::Fast && !(self.port.is_open() && self.waiting.is_empty()) {
+            if !self.port.is_open() {
                 // Poll returns at once for a terminal that nobody has open.
                 std::thread::sleep(Duration::from_millis(1));
             }
-            self.terminal.wait_for_room(10);
-            return self.deliver().map_err(broken);
+            self.port.wait_for_room(10);
+            return self.deliver();
         }
-        self.collect().map_err(broken)?;
+        self.collect()?;
         let standing = self.board.run_for(SLICE_NS)?;
         let bytes = self.board.receive();
-        self.waiting.extend(bytes.iter().map(|&(_, byte)| byte));
-        self.deliver().map_err(broken)?;
-        if let Some(store) = &mut self.store {
-            for (first, length) in self.board.changed()? {
-                if first >= STORE {
-                    let bytes = self.board.memory(first, length as usize)?;
-                    store.write(first - STORE, &bytes)?;
-                }
-            }
+        let mut bytes: Vec<u8> = bytes.iter().map(|&(_, byte)| byte).collect();
+        if self.port.is_open() {
+            self.traffic.garbled += self.interference.pass(&mut bytes);
+        }
+        self.waiting.extend(bytes);
+        self.deliver()?;
+        self.keep()?;
+        if self.desk.is_off() {
+            // Nothing is converted, and the unit is moved all the same: without this all of it at once at the end.
+            self.board.front(|front, ns| front.advance(ns))?;
         }
         if self.pace == Pace::Wall {
             let due = self.began + Duration::from_nanos(standing.ns - self.first_ns);
@@ -152,25 +214,49 @@ impl Served {
         Ok(())
     }
 
+    /// Writes what has changed in the flash to the file.
+    fn keep(&mut self) -> Result<(), String> {
+        if self.store.is_none() {
+            return Ok(());
+        }
+        let changed = self.board.changed()?;
+        self.keep_spans(&changed)
+    }
+
+    /// Writes stretches of the flash (first address, bytes) to the file.
+    fn keep_spans(&mut self, spans: &[(u64, u64)]) -> Result<(), String> {
+        if let Some(store) = &mut self.store {
+            for &(first, length) in spans.iter().filter(|(first, _)| *first >= STORE) {
+                let bytes = self.board.memory(first, length as usize)?;
+                store.write(first - STORE, &bytes)?;
+            }
+        }
+        Ok(())
+    }
+
     /// From the terminal to the line.
-    fn collect(&mut self) -> io::Result<()> {
+    fn collect(&mut self) -> Result<(), String> {
         let mut some = [0; WAITING];
+        if self.desk.is_off() {
+            self.traffic.unpowered += self.port.read(&mut some)? as u64;
+            return Ok(());
+        }
         let room = WAITING.saturating_sub(self.board.unsent());
-        let count = self.terminal.read(&mut some[..room])?;
+        let count = self.port.read(&mut some[..room])?;
         self.board.send(&some[..count]);
         self.traffic.sent += count as u64;
         Ok(())
     }
 
     /// From the line to the terminal.
-    fn deliver(&mut self) -> io::Result<()> {
-        if !self.terminal.is_open() {
+    fn deliver(&mut self) -> Result<(), String> {
+        if !self.port.is_open() {
             self.traffic.unheard += self.waiting.len() as u64;
             self.waiting.clear();
             return Ok(());
         }
         while !self.waiting.is_empty() {
-            let count = self.terminal.write(&self.waiting)?;
+            let count = self.port.write(&self.waiting)?;
             if count == 0 {
                 break;
             }

@@ -10,6 +10,11 @@ use crate::rotation::{Rotation, Vector, norm};
 #[derive(Debug, Clone)]
 pub(super) struct Turn {
     pub(super) start_s: f64,
+    /// Where it was to lead: what was to be upright (unit, body axes), and the heading, rad.
+    pub(super) up: Vector,
+    pub(super) heading: Option<f64>,
+    /// Whether the board is in the hand before and after.
+    pub(super) held: [bool; 2],
     /// Length of the turn, s; 0 where the recording begins.
     pub(super) turn_s: f64,
     pub(super) from: Rotation,
@@ -89,6 +94,9 @@ impl Turn {
         let (axis, angle) = (from.inverse() * to).axis_angle();
         Turn {
             start_s: if last.is_some() { at_s } else { 0.0 },
+            up,
+            heading: step.heading,
+            held: [last.map_or(truth.held, |last| last.held[1]), truth.held],
             turn_s,
             from,
             axis,

@@ -59,7 +59,7 @@ impl Turn {
     }
 
     /// The attitude that it leads to.
-    fn aim(&self) -> Rotation {
+    pub(super) fn aim(&self) -> Rotation {
         self.from * Rotation::about(self.axis, self.angle)
     }
 

@@ -9,7 +9,7 @@ use toml::Spanned;
 use super::{CarriedBy, Places, Plan, Pose, Samples, Step};
 use crate::located::{Source, written};
 use crate::place::Place;
-use crate::rotation::{Vector, norm, scale};
+use crate::rotation::{Vector, direction};
 
 /// Longest recording, s: a plan that asks for more has a wrong unit in it.
 const LONGEST_S: f64 = 48.0 * 3600.0;
@@ -226,17 +226,14 @@ impl Reader<'_> {
         let (pose, pose_at) = match (&raw.up, &raw.poses) {
             (Some(up), None) => {
                 let v = *up.get_ref();
-                let largest = v.iter().fold(0.0, |a: f64, x| a.max(x.abs()));
                 if !v.iter().all(|x| x.is_finite()) {
                     return refuse(&up.span(), &"`up` is not finite", "give three numbers");
                 }
-                if largest == 0.0 {
+                let Some(v) = direction(v) else {
                     let remedy = "give the body direction that points up, as [0.0, 0.0, 1.0]";
                     return refuse(&up.span(), &"`up` has no length", remedy);
-                }
-                // First by the largest: squares of 1e200 are infinite.
-                let v = v.map(|x| x / largest);
-                (Pose::Up(scale(1.0 / norm(v), v)), up.span())
+                };
+                (Pose::Up(v), up.span())
             }
             (None, Some(poses)) => {
                 if *poses.get_ref() == 0 {

@@ -4,8 +4,8 @@ use std::f64::consts::{PI, TAU};
 
 use super::truth::TableTruth;
 use crate::axis::{Axis, nearest_turn};
-use crate::plan::{Limits, Plan, Pose, Step, UPRIGHT, tilt};
-use crate::rotation::Vector;
+use crate::plan::{Beyond, Limits, Plan, Pose, Step, UPRIGHT, attitude, tilt};
+use crate::rotation::{Rotation, Vector};
 
 pub(super) const OUTER: usize = 0;
 pub(super) const MIDDLE: usize = 1;
@@ -19,17 +19,25 @@ pub(super) struct Dwell {
 }
 
 /// Carries out steps by appending to the axes' commands.
-pub(super) struct Controller<'a> {
-    truth: &'a TableTruth,
-    limits: Limits,
+#[derive(Debug, Clone)]
+pub(super) struct Controller {
+    truth: TableTruth,
+    pub(super) limits: Limits,
     lead_in_s: f64,
     pub(super) axes: [Axis; 3],
     pub(super) dwells: Vec<Dwell>,
+    /// Under command: rates about the vertical and about the inner axis that it was told last, rad/s.
+    pub(super) rates: [f64; 2],
+    /// When the move that it was told last is over, s, and when the load has come to rest behind it.
+    pose_s: f64,
+    settled_s: f64,
+    /// When it is done with all that it was told, s.
+    pub(super) busy_s: f64,
 }
 
-impl<'a> Controller<'a> {
+impl Controller {
     /// All of a plan that is within the table's limits.
-    pub(super) fn carry_out(plan: &Plan, truth: &'a TableTruth) -> Self {
+    pub(super) fn carry_out(plan: &Plan, truth: &TableTruth) -> Self {
         let mut controller = Self::new(plan, truth);
         for step in &plan.steps {
             match step.pose {
@@ -44,51 +52,57 @@ impl<'a> Controller<'a> {
         controller
     }
 
-    fn new(plan: &Plan, truth: &'a TableTruth) -> Self {
+    /// At rest in the first pose of a plan, within the table's limits, about to be told what to do.
+    pub(super) fn standing(plan: &Plan, truth: &TableTruth) -> Result<Self, Beyond> {
+        let mut controller = Self::new(plan, truth);
+        if let Some(first) = plan.steps.first() {
+            let mut at_rest = first.clone();
+            (at_rest.rate, at_rest.spin) = (0.0, 0.0);
+            controller.limits.check(&at_rest)?;
+            let up = match first.pose {
+                Pose::Up(up) => Some(up),
+                Pose::Many(count) => spread(count, &controller.limits).next(),
+            };
+            if let Some(up) = up {
+                controller.stand(up, first.heading);
+            }
+        }
+        Ok(controller)
+    }
+
+    fn new(plan: &Plan, truth: &TableTruth) -> Self {
         Self {
-            truth,
+            truth: truth.clone(),
             limits: truth.limits(),
             lead_in_s: plan.lead_in_s,
             axes: [0, 1, 2].map(|_| Axis::new(0.0, truth.settling)),
             dwells: Vec::new(),
+            rates: [0.0; 2],
+            pose_s: 0.0,
+            settled_s: 0.0,
+            busy_s: 0.0,
         }
+    }
+
+    /// Stands at a pose from the beginning.
+    fn stand(&mut self, up: Vector, heading: Option<f64>) {
+        let target = self.angles(up, heading.unwrap_or(0.0));
+        self.axes = target.map(|angle| Axis::new(angle, self.truth.settling));
     }
 
     /// Pose, rates up, dwells, rates down. Between the dwells of one pose nothing stops.
     fn step(&mut self, step: &Step, up: Vector) {
-        let target = self.angles(up, step.heading.unwrap_or(0.0));
-        let per_axis = |dps: Vector| dps.map(f64::to_radians);
-        let (slew, acceleration) = (
-            per_axis(self.truth.slew_dps),
-            per_axis(self.truth.max_acceleration_dps2),
-        );
         let first = self.dwells.is_empty();
         let before = if first { self.lead_in_s } else { self.now() };
         if first {
             // The table stands at the first pose when the recording begins.
-            self.axes = target.map(|angle| Axis::new(angle, self.truth.settling));
+            self.stand(up, step.heading);
             self.hold(self.lead_in_s);
         } else {
-            for i in 0..3 {
-                self.axes[i].move_to(target[i], slew[i], acceleration[i]);
-            }
+            self.slew(up, step.heading);
         }
         self.hold(0.0);
-        let rates = if self.limits.outer {
-            [step.rate, 0.0, step.spin]
-        } else {
-            // The check lets a rate about the vertical pass where the inner axis is upright, either way up.
-            [0.0, 0.0, step.spin + step.rate * up[2].signum()]
-        };
-        let run = |axes: &mut [Axis; 3], rates: Vector| {
-            for i in 0..3 {
-                axes[i].run_up(
-                    rates[i] * (1.0 + 1e-6 * self.truth.rate_scale_ppm[i]),
-                    acceleration[i],
-                );
-            }
-        };
-        run(&mut self.axes, rates);
+        self.run(self.axis_rates([step.rate, step.spin], up));
         self.hold(0.0);
         if self.now() > before {
             self.hold(self.truth.settle_s);
@@ -101,8 +115,97 @@ impl<'a> Controller<'a> {
                 end_s: self.now(),
             });
         }
-        run(&mut self.axes, [0.0; 3]);
+        self.run([0.0; 3]);
         self.hold(0.0);
+    }
+
+    /// From rest to a pose at rest.
+    fn slew(&mut self, up: Vector, heading: Option<f64>) {
+        let target = self.angles(up, heading.unwrap_or(0.0));
+        let slew = self.truth.slew_dps.map(f64::to_radians);
+        let acceleration = self.truth.max_acceleration_dps2.map(f64::to_radians);
+        for i in 0..3 {
+            self.axes[i].move_to(target[i], slew[i], acceleration[i]);
+        }
+    }
+
+    /// Every axis to a rate, rad/s.
+    fn run(&mut self, rates: Vector) {
+        for i in 0..3 {
+            self.axes[i].run_up(
+                rates[i] * (1.0 + 1e-6 * self.truth.rate_scale_ppm[i]),
+                self.truth.max_acceleration_dps2[i].to_radians(),
+            );
+        }
+    }
+
+    /// Which axis turns at which rate, for rates about the vertical and about the inner axis.
+    fn axis_rates(&self, [rate, spin]: [f64; 2], up: Vector) -> Vector {
+        if self.limits.outer {
+            [rate, 0.0, spin]
+        } else {
+            // The check lets a rate about the vertical pass where the inner axis is upright, either way up.
+            [0.0, 0.0, spin + rate * up[2].signum()]
+        }
+    }
+
+    /// Leaves whatever it does at `t_s` for a pose at rest, as between the steps of a plan: the rates down first.
+    pub(super) fn go(&mut self, t_s: f64, up: Vector, heading: Option<f64>) {
+        let from_s = t_s.max(self.lead_in_s);
+        self.halt(from_s);
+        self.slew(up, heading);
+        self.hold(0.0);
+        self.posed(from_s);
+    }
+
+    /// To rest where it is at `t_s`.
+    pub(super) fn halt(&mut self, t_s: f64) {
+        for axis in &mut self.axes {
+            axis.cut(t_s);
+        }
+        self.run([0.0; 3]);
+        self.hold(0.0);
+        self.rates = [0.0; 2];
+        self.posed(t_s);
+    }
+
+    /// Takes note of when it is done with what it was told at `from_s`.
+    fn posed(&mut self, from_s: f64) {
+        self.pose_s = self.now();
+        self.settled_s = self.settled_s(from_s);
+        self.busy_s = self.settled_s;
+    }
+
+    /// When the load has come to rest behind the axes, as before a dwell, if anything moves after `from_s`.
+    fn settled_s(&self, from_s: f64) -> f64 {
+        let moved = self.now() > from_s;
+        self.now() + if moved { self.truth.settle_s } else { 0.0 }
+    }
+
+    /// To rates about the vertical and about the inner axis, rad/s, from `t_s` on, or from the end of the move that
+    /// it is in.
+    pub(super) fn turn(&mut self, t_s: f64, rates: [f64; 2]) {
+        let from_s = t_s.max(self.lead_in_s).max(self.pose_s);
+        for axis in &mut self.axes {
+            axis.cut(from_s);
+        }
+        self.rates = rates;
+        self.run(self.axis_rates(rates, self.position(from_s).0));
+        self.hold(0.0);
+        self.busy_s = self.settled_s.max(self.settled_s(from_s));
+    }
+
+    /// Where its axes have been turned to at a time, or will be when the move that it is in is over: up in body
+    /// axes, and heading (rad).
+    pub(super) fn position(&self, t_s: f64) -> (Vector, f64) {
+        let t_s = t_s.max(self.pose_s);
+        let [outer, middle, inner] = [0, 1, 2].map(|i| self.axes[i].angle(t_s));
+        let (x, z) = ([1.0, 0.0, 0.0], [0.0, 0.0, 1.0]);
+        let turned =
+            Rotation::about(z, outer) * Rotation::about(x, middle) * Rotation::about(z, inner);
+        let up = turned.inverse().turn(z);
+        let (axis, angle) = (turned * attitude(up, 0.0).inverse()).axis_angle();
+        (up, angle * axis[2].signum())
     }
 
     /// When the last axis is done, s.

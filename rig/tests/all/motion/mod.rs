@@ -1,6 +1,7 @@
 //! Motions against closed forms of kinematics, and against numeric differentiation of attitude and position.
 
 mod closed_forms;
+mod commands;
 mod flaws;
 mod hands;
 mod table;

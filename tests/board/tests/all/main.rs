@@ -2,6 +2,7 @@
 
 mod board;
 mod budget;
+mod control;
 mod power;
 mod restart;
 mod serial;

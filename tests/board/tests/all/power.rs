@@ -16,7 +16,7 @@ use nalgebra::{Matrix3, Vector3};
 use plotters::prelude::*;
 
 /// A calibration of so many temperature nodes that no other number gives.
-fn calibration(nodes: u32, scale: f32) -> Vec<u8> {
+pub fn calibration(nodes: u32, scale: f32) -> Vec<u8> {
     let affine = |k: u32| Affine {
         matrix: Matrix3::from_diagonal_element(scale + k as f32 * 0.001),
         offset: Vector3::repeat(-2.5 * scale),

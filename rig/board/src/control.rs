@@ -1,0 +1,154 @@
+//! Lines of text over TCP, each answered by a line. It never waits for anybody.
+
+use std::io::{self, ErrorKind, Read, Write};
+use std::net::{SocketAddr, TcpListener, TcpStream};
+
+/// Longest line, bytes. The longest command takes a tenth of it.
+const LONGEST: usize = 1000;
+
+/// Most clients at a time.
+const MOST: usize = 16;
+
+/// Bytes of answers that a client may leave unread, after which it is dropped.
+const UNREAD: usize = 1 << 16;
+
+/// Where commands come in.
+#[derive(Debug)]
+pub(crate) struct Control {
+    listener: TcpListener,
+    address: SocketAddr,
+    clients: Vec<Client>,
+}
+
+/// Somebody who sends commands.
+#[derive(Debug)]
+struct Client {
+    stream: TcpStream,
+    received: Vec<u8>,
+    unsent: Vec<u8>,
+    /// Nothing more comes: it is dropped once it has its answers.
+    ended: bool,
+}
+
+impl Control {
+    /// Listens at an address, as `127.0.0.1:0`; port 0 is any that is free.
+    ///
+    /// Errors: not an address, or it is taken.
+    pub(crate) fn bind(address: &str) -> Result<Self, String> {
+        let refused = |e: io::Error| {
+            format!(
+                "{address}: {e}; give the control an address of this machine and a free port, as 127.0.0.1:0"
+            )
+        };
+        let listener = TcpListener::bind(address).map_err(refused)?;
+        listener.set_nonblocking(true).map_err(refused)?;
+        let address = listener.local_addr().map_err(refused)?;
+        Ok(Self {
+            listener,
+            address,
+            clients: Vec::new(),
+        })
+    }
+
+    /// Where it listens.
+    pub(crate) fn address(&self) -> SocketAddr {
+        self.address
+    }
+
+    /// Answers every line that has come.
+    ///
+    /// Errors: those of `answer`, for which there is no line to give back.
+    pub(crate) fn poll(
+        &mut self,
+        answer: &mut dyn FnMut(&str) -> Result<String, String>,
+    ) -> Result<(), String> {
+        // Whoever gives up before being accepted is no matter.
+        while let Ok((stream, _)) = self.listener.accept() {
+            // A client beyond the most finds its connection closed.
+            if self.clients.len() < MOST && stream.set_nonblocking(true).is_ok() {
+                // Without it an answer may wait for 40 ms.
+                let _ = stream.set_nodelay(true);
+                self.clients.push(Client {
+                    stream,
+                    received: Vec::new(),
+                    unsent: Vec::new(),
+                    ended: false,
+                });
+            }
+        }
+        for client in &mut self.clients {
+            client.listen();
+            while let Some(line) = client.line() {
+                let answer = match line {
+                    Some(line) => answer(&line)?,
+                    None => {
+                        client.ended = true;
+                        "ERR the line is too long; send one command on each".into()
+                    }
+                };
+                client.unsent.extend(answer.bytes().chain([b'\n']));
+            }
+            client.speak();
+        }
+        let wanted = |c: &Client| c.unsent.len() < UNREAD && !(c.ended && c.unsent.is_empty());
+        self.clients.retain(wanted);
+        Ok(())
+    }
+}
+
+impl Client {
+    /// Takes in what has come, as much as one look is for.
+    fn listen(&mut self) {
+        let mut some = [0; LONGEST];
+        if self.ended {
+            return;
+        }
+        match self.stream.read(&mut some) {
+            Ok(0) => {
+                self.ended = true;
+                // A last line without its end is one as well.
+                if !self.received.is_empty() {
+                    self.received.push(b'\n');
+                }
+            }
+            Ok(count) => self.received.extend(&some[..count]),
+            Err(e) if matches!(e.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) => {}
+            Err(_) => {
+                self.ended = true;
+                self.received.clear();
+                self.unsent.clear();
+            }
+        }
+    }
+
+    /// The next line without its end; within, `None` for one that is too long.
+    fn line(&mut self) -> Option<Option<String>> {
+        match self.received.iter().position(|&byte| byte == b'\n') {
+            Some(end) => {
+                let line: Vec<u8> = self.received.drain(..=end).collect();
+                Some(Some(String::from_utf8_lossy(&line).trim().to_owned()))
+            }
+            None if self.received.len() > LONGEST => {
+                self.received.clear();
+                Some(None)
+            }
+            None => None,
+        }
+    }
+
+    fn speak(&mut self) {
+        while !self.unsent.is_empty() {
+            match self.stream.write(&self.unsent) {
+                Ok(0) => break,
+                Ok(count) => drop(self.unsent.drain(..count)),
+                Err(e) if matches!(e.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) => {
+                    break;
+                }
+                Err(_) => {
+                    self.ended = true;
+                    self.unsent.clear();
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,49 @@
+//! A carrier that is told where to go while it goes, in place of a plan.
+
+use crate::motion::Carrier;
+use crate::rotation::Vector;
+
+/// What a carrier can be told.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Command {
+    /// To a pose at rest.
+    Move {
+        /// Body direction that is to point up, unit vector.
+        up: Vector,
+        /// Turn about the vertical from the body's nominal heading, rad. Left out, a table takes 0 and a person any.
+        heading: Option<f64>,
+    },
+    /// Rate about the vertical by the outer axis, rad/s, kept until it is told another one or to move.
+    Rate(f64),
+    /// Rate about the body's z axis by the inner axis, rad/s, kept likewise.
+    Spin(f64),
+    /// To rest where it is.
+    Stop,
+    /// In every so many-th pose from now on a hand moves once, some seconds after it has come to rest; 0 is never.
+    Fidget(u32),
+    /// Whether a hand keeps hold of the board in the poses from now on.
+    Hold(bool),
+}
+
+/// Where a carrier was told to go, and nothing of how well it got there.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Position {
+    /// Body direction that points up, unit vector.
+    pub up: Vector,
+    /// Turn about the vertical, rad, from -π to π. `None`: a person was not told any.
+    pub heading: Option<f64>,
+}
+
+/// A carrier under command. It stands at the first pose of a plan and has no end.
+pub trait Commanded: Carrier {
+    /// Does as it is told from `t_s` on, which must not be before the last instant that it was asked for: attitude
+    /// and rate go on from there without a jump.
+    ///
+    /// Errors: it cannot do that, in one line that says what instead.
+    fn command(&mut self, t_s: f64, command: Command) -> Result<(), String>;
+    /// Whether it still moves, runs up or settles as it was told, at an instant.
+    fn busy(&self, t_s: f64) -> bool;
+    /// Where it was told to be: the pose that it is on its way to or, once it is there, where its axes have been
+    /// turned to at the instant.
+    fn position(&self, t_s: f64) -> Position;
+}
