@@ -31,6 +31,9 @@ const RATE_DPS: f64 = 2.0;
 /// So much of what has come is kept between two dwells, s: a turn takes seconds.
 const KEPT_S: f64 = 120.0;
 
+/// From this many targets on a half-width tells nothing of where up is: 20 mrad.
+const KNOWN: f64 = 20.0;
+
 /// A dwell that runs.
 #[derive(Debug, Clone, Copy)]
 struct Dwell {
@@ -519,7 +522,17 @@ impl One {
         let taking = self.taking.as_ref()?;
         let fitted = calibrate(taking.manifest(), &taking.samples, 0);
         self.progress = progress(&fitted, &asked.targets);
-        fitted.ok()
+        let fitted = fitted.ok()?;
+        // A calibration that is open by degrees tells up no better than a data sheet.
+        let known = self
+            .progress
+            .sensors
+            .iter()
+            .all(|s| s.aims.iter().all(|a| a.half_width < KNOWN * a.target));
+        if let (true, [Some(gyro), Some(accel)]) = (known, Sensor::BOTH.map(|s| fitted.sensor(s))) {
+            self.nominal = Some([gyro, accel].map(|s| s.estimated.triad.inverse));
+        }
+        Some(fitted)
     }
 
     /// The dwell of this number does not count any more; what it was.
