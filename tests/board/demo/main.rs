@@ -1,0 +1,221 @@
+//! `make demo`: a unit with an effect that nobody declares, on the emulated board, and the wizard that calibrates it.
+//!
+//! `demo SEED FOLDER`: another seed is another unit and another effect. The image, the serial line, the turntable and the command are the
+//! real ones; only silicon and steel are computed. The folder is left for whoever wants to look.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, ExitCode, Stdio};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+use mimu_board::front::Front;
+use mimu_board::running::Board;
+use mimu_board::serve::{Pace, Served};
+use mimu_rig::located::Source;
+use mimu_rig::plan::Plan;
+use mimu_rig::rig_file::RigTruth;
+use mimu_tests::blind::{is_listed, unit};
+use serde_json::Value;
+
+/// What may be wrong with a unit: effects that a table at one temperature can show, and two that the diagnosis has never heard of.
+const EFFECTS: [&str; 9] = [
+    "gyro_g_sensitivity",
+    "accel_scale_quadratic",
+    "gyro_scale_quadratic",
+    "accel_size_effect",
+    "gyro_scale_asymmetry",
+    "x_gyro_g_squared",
+    "accel_scale_cubic",
+    "gyro_scale_cubic",
+    "x_gyro_dead_zone",
+];
+
+/// Where the unit is, and which way is up before it is told otherwise.
+const PLACE: &str = "format = \"mimu-plan/1\"\ndevice = \"unit-007\"\nsample_rate_hz = 1000.0\ncarrier = \"table\"\n\
+     latitude_deg = 30.5\ngravity_mps2 = 9.793\nlead_in_s = 1.0\n[[step]]\nup = [0.0, 0.0, 1.0]\ndwell_s = 1.0\n";
+
+fn main() -> ExitCode {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let seed = arguments.first().map_or(Ok(1), |a| a.parse());
+    let done = match (seed, arguments.get(1)) {
+        (Ok(seed), Some(folder)) => demo(seed, Path::new(folder)),
+        _ => Err("usage: demo SEED FOLDER".into()),
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(problem) => {
+            eprintln!("demo: {problem}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// A board that runs while the port is open.
+struct Running {
+    end: Arc<AtomicBool>,
+    thread: Option<std::thread::JoinHandle<Result<f64, String>>>,
+    port: PathBuf,
+    control: String,
+}
+
+impl Running {
+    fn start(truth: &RigTruth, seed: u64, folder: &Path) -> Result<Self, String> {
+        let plan = Plan::parse(Source::new("place", PLACE))?;
+        let image = mimu_board_tests::image();
+        let board = Board::new(&image, Front::commanded(&plan, truth, seed)?)?;
+        let mut served = Served::new(board, Pace::Fast, Some(&folder.join("flash.bin")))?;
+        let control = served.listen("127.0.0.1:0", seed)?.to_string();
+        served.start()?;
+        let port = served.path().to_owned();
+        let end = Arc::new(AtomicBool::new(false));
+        let ended = end.clone();
+        let thread = std::thread::spawn(move || {
+            while !ended.load(Ordering::Relaxed) {
+                served.step()?;
+            }
+            Ok(served.board().standing().ns as f64 * 1e-9)
+        });
+        Ok(Self {
+            end,
+            thread: Some(thread),
+            port,
+            control,
+        })
+    }
+
+    /// Switches it off; how long it ran by its own clock, s.
+    fn stop(mut self) -> Result<f64, String> {
+        self.end.store(true, Ordering::Relaxed);
+        match self.thread.take().map(std::thread::JoinHandle::join) {
+            Some(Ok(ran)) => ran,
+            _ => Err("the board's thread broke down".into()),
+        }
+    }
+}
+
+fn demo(seed: u64, folder: &Path) -> Result<(), String> {
+    let began = Instant::now();
+    let wrong = |what: &str| move |e: std::io::Error| format!("{what}: {e}");
+    std::fs::create_dir_all(folder).map_err(wrong("the folder"))?;
+    let effect = EFFECTS[(seed as usize + EFFECTS.len() - 1) % EFFECTS.len()];
+    let truth = RigTruth::resolve(&unit(&[effect], seed), seed)?;
+    println!(
+        "A unit with unknown errors (seed {seed}) is on a turntable; the firmware's image runs on an emulated board."
+    );
+    let board = Running::start(&truth, seed, folder)?;
+    let driver = folder.join("turntable.toml");
+    let text = include_str!("turntable.toml").replace("HOST:PORT", &board.control);
+    std::fs::write(&driver, text).map_err(wrong("the driver file"))?;
+    let outcome = wizard(&board.port, &driver, folder);
+    let ran_s = board.stop()?;
+    let outcome = outcome?;
+    let unit = &outcome["units"][0];
+    let number = |v: &Value| v.as_f64().unwrap_or(f64::NAN);
+    println!(
+        "The wizard made {} dwells, and once more in poses that it had not used; {:.0} s of the board's time.",
+        unit["dwells"], ran_s
+    );
+    for sensor in unit["verified"]["sensors"].as_array().into_iter().flatten() {
+        println!(
+            "  {:5} errs by {} as the data sheet has it, and by {} calibrated; noise alone would be {}.",
+            sensor["sensor"].as_str().unwrap_or_default(),
+            shown(sensor, "before"),
+            shown(sensor, "affine"),
+            shown(sensor, "floor")
+        );
+    }
+    println!(
+        "The calibration was stored, read back, and was still there after the supply had been off."
+    );
+    let found: Vec<&str> = unit["effects"]
+        .as_array()
+        .into_iter()
+        .flatten()
+        .filter_map(Value::as_str)
+        .collect();
+    let verdict = unit["verdict"].as_str().unwrap_or("none");
+    match found.is_empty() {
+        true => {
+            println!("Diagnosis: {verdict}; nothing that it knows was found, so nothing was added.")
+        }
+        false => println!(
+            "Diagnosis: {verdict}; found {}, which was added and stored.",
+            found.join(", ")
+        ),
+    }
+    for sensor in unit["confirmed"]["sensors"]
+        .as_array()
+        .into_iter()
+        .flatten()
+    {
+        println!(
+            "  {:5} in a new run: before {}, after {}; noise alone {} ({:.2} times).",
+            sensor["sensor"].as_str().unwrap_or_default(),
+            shown(sensor, "affine"),
+            shown(sensor, "after"),
+            shown(sensor, "floor"),
+            number(&sensor["after"]) / number(&sensor["floor"])
+        );
+    }
+    for note in unit["notes"].as_array().into_iter().flatten() {
+        println!("Note: {}", note.as_str().unwrap_or_default());
+    }
+    let listed = match is_listed(effect) {
+        true => "which mimu knows",
+        false => "which is on no list of mimu's",
+    };
+    println!("What was wrong with the unit, which nobody had said: {effect}, {listed}.");
+    println!(
+        "Page: {}  ({:.0} s)",
+        unit["page"].as_str().unwrap_or_default(),
+        began.elapsed().as_secs_f64()
+    );
+    Ok(())
+}
+
+/// A figure in the unit of data sheets.
+fn shown(sensor: &Value, key: &str) -> String {
+    let value = sensor[key].as_f64().unwrap_or(f64::NAN);
+    match sensor["sensor"].as_str() {
+        Some("gyro") => format!("{:.4} deg/s", value.to_degrees()),
+        _ => format!("{:.3} mg", value * 1e3 / 9.80665),
+    }
+}
+
+/// Runs the command beside this program.
+fn wizard(port: &Path, driver: &Path, folder: &Path) -> Result<Value, String> {
+    let here = std::env::current_exe().map_err(|e| format!("this program: {e}"))?;
+    let mimu = here.with_file_name("mimu");
+    let json = folder.join("outcome.json");
+    let log = std::fs::File::create(folder.join("wizard.txt")).map_err(|e| e.to_string())?;
+    let ran = Command::new(&mimu)
+        .arg("wizard")
+        .args([
+            "--fixture",
+            "table",
+            "--rate",
+            "250",
+            "--dwell",
+            "3",
+            "--as-planned",
+        ])
+        .args(["--gravity", "9.793", "--warm-up", "0", "--yes"])
+        .arg("--port")
+        .arg(port)
+        .arg("--driver")
+        .arg(driver)
+        .arg("--json")
+        .arg(&json)
+        .arg("-o")
+        .arg(folder.join("session"))
+        .stdin(Stdio::null())
+        .stdout(log)
+        .output()
+        .map_err(|e| format!("{}: {e}", mimu.display()))?;
+    if !ran.status.success() && !json.exists() {
+        return Err(String::from_utf8_lossy(&ran.stderr).trim().to_owned());
+    }
+    let text = std::fs::read_to_string(&json).map_err(|e| format!("{}: {e}", json.display()))?;
+    serde_json::from_str(&text).map_err(|e| format!("{}: {e}", json.display()))
+}
