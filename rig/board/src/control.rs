@@ -86,7 +86,7 @@ impl Control {
                         "ERR the line is too long; send one command on each".into()
                     }
                 };
-                client.unsent.extend(answer.bytes().chain([b'\n']));
+                client.unsent.extend(answer.bytes().chain(*b"\n"));
             }
             client.speak();
         }

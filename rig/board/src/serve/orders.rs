@@ -251,7 +251,7 @@ impl Served {
             }
             "BURST" => self.interference.burst(u64::from(line.count(u32::MAX)?)),
             "LINK" => match line.switch()? {
-                true => self.port.plug()?,
+                true => self.port.plug().map_err(Problem::Refused)?,
                 false => {
                     self.port.unplug();
                     self.traffic.unheard += self.waiting.len() as u64;
