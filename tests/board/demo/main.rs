@@ -96,8 +96,7 @@ impl Running {
 
 fn demo(seed: u64, folder: &Path) -> Result<(), String> {
     let began = Instant::now();
-    let wrong = |what: &str| move |e: std::io::Error| format!("{what}: {e}");
-    std::fs::create_dir_all(folder).map_err(wrong("the folder"))?;
+    std::fs::create_dir_all(folder).map_err(|e| format!("the folder: {e}"))?;
     let effect = EFFECTS[(seed as usize + EFFECTS.len() - 1) % EFFECTS.len()];
     let truth = RigTruth::resolve(&unit(&[effect], seed), seed)?;
     println!(
@@ -106,7 +105,7 @@ fn demo(seed: u64, folder: &Path) -> Result<(), String> {
     let board = Running::start(&truth, seed, folder)?;
     let driver = folder.join("turntable.toml");
     let text = include_str!("turntable.toml").replace("HOST:PORT", &board.control);
-    std::fs::write(&driver, text).map_err(wrong("the driver file"))?;
+    std::fs::write(&driver, text).map_err(|e| format!("the driver file: {e}"))?;
     let outcome = wizard(&board.port, &driver, folder);
     let ran_s = board.stop()?;
     let outcome = outcome?;
