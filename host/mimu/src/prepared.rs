@@ -64,10 +64,15 @@ impl Prepared {
 
     fn of_condensed(
         manifest: Manifest,
-        condensed: Condensed,
+        mut condensed: Condensed,
         finding: Finding,
         place: String,
     ) -> Result<Self> {
+        for block in &mut condensed.blocks {
+            if manifest.dropped_steps.contains(&block.step) {
+                block.step = -1;
+            }
+        }
         let still_factor = finding.still_factor;
         if !(1.0..f64::INFINITY).contains(&still_factor) {
             return Err(Error::new(

@@ -161,6 +161,9 @@ pub struct Manifest {
     /// Steps that are turns of a known angle: only the mean of their rate is known, and they are anything but still.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub turn_steps: Vec<i32>,
+    /// Steps that do not count, as they were had again: they are in transit like what is between the dwells.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub dropped_steps: Vec<i32>,
     /// Arguments of the import that made the recording, with file names instead of paths.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub imported_with: Vec<String>,
@@ -212,6 +215,7 @@ impl Manifest {
             means: false,
             step_labels: Vec::new(),
             turn_steps: Vec::new(),
+            dropped_steps: Vec::new(),
             imported_with: Vec::new(),
             recorded: None,
             rails: None,

@@ -17,7 +17,7 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use mimu_recording::error::{Error, Result};
-use mimu_recording::{Batch, Columns, Growing, Manifest, Recording, SampleFormat, Writer};
+use mimu_recording::{Batch, Columns, Growing, Manifest, Recording, SampleFormat};
 use serde::{Deserialize, Serialize};
 
 use crate::procedure::Asked;
@@ -263,8 +263,7 @@ pub struct Taking {
     part: Part,
     growing: Growing,
     manifest: Manifest,
-    columns: Columns,
-    /// All rows so far; those of dwells that do not count are in transit.
+    /// All rows so far.
     pub samples: Batch,
 }
 
@@ -319,12 +318,9 @@ impl Taking {
             part,
             growing,
             manifest: manifest.clone(),
-            columns,
             samples,
         };
-        for number in folder.dropped(part) {
-            taking.drop_dwell(number);
-        }
+        taking.manifest.dropped_steps = folder.dropped(part);
         Ok(taking)
     }
 
@@ -342,17 +338,7 @@ impl Taking {
 
     /// The dwell of this number does not count any more.
     pub fn drop_dwell(&mut self, number: i32) {
-        let samples = &mut self.samples;
-        for (row, step) in samples.step.iter_mut().enumerate() {
-            if *step == number {
-                *step = -1;
-                for reference in &mut samples.reference {
-                    if let Some(value) = reference.get_mut(row) {
-                        *value = f64::NAN;
-                    }
-                }
-            }
-        }
+        self.manifest.dropped_steps.push(number);
     }
 
     /// The manifest.
@@ -365,17 +351,11 @@ impl Taking {
         self.samples.t_s.last().copied()
     }
 
-    /// Ends it: what does not count is in transit on the disk as well.
+    /// Ends it, so that the other commands read it.
     pub fn finish(self, folder: &Folder) -> Result<PathBuf> {
-        let directory = folder.file(self.part.name());
-        self.growing
-            .finish(&self.manifest, SampleFormat::Csv, |_| {})?;
-        if !folder.dropped(self.part).is_empty() {
-            let mut writer = Writer::create(&directory, self.columns, SampleFormat::Csv, true)?;
-            writer.write(&self.samples)?;
-            writer.finish(&self.manifest)?;
-        }
-        Ok(directory)
+        let format = SampleFormat::Csv;
+        self.growing.finish(&self.manifest, format, |_| {})?;
+        Ok(folder.file(self.part.name()))
     }
 }
 

@@ -135,6 +135,8 @@ impl One {
             _ => None,
         });
         self.number = redone.max().unwrap_or(0).max(self.number);
+        // What waits is of the time before.
+        while self.station.next()?.is_some() {}
         (self.pending, self.dwell, self.next) = (Batch::default(), None, None);
         self.watch.interrupted();
         Ok(())
@@ -387,7 +389,10 @@ impl One {
             false => *s,
         };
         let had = self.folder.dwells(self.part);
-        let again = by_hand && had.iter().any(|d| off(&d.1) < SAME_POSE_DEG);
+        let near = |d: &Step| off(d) < SAME_POSE_DEG;
+        // The last pose is no turn; one before it may be asked for again.
+        let same = by_hand && had.last().is_some_and(|d| near(&d.1));
+        let again = same || by_hand && off(step) > limit && had.iter().any(|d| near(&d.1));
         if off(step) <= limit && !again {
             return Ok(as_it_is(step));
         }

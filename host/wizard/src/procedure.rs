@@ -263,6 +263,11 @@ pub fn next_step(asked: &Asked, done: &[Step], missed: Missed) -> Step {
             // The same pose again is no turn, and no other pose either.
             let near = last.angle(&candidate.up()).to_degrees() < 2.0 * SAME_POSE_DEG;
             gain -= if near { 100.0 } else { 0.0 };
+            // Another pose shows besides what the model lacks.
+            let new = done
+                .iter()
+                .all(|d| d.up().angle(&candidate.up()).to_degrees() > SAME_POSE_DEG);
+            gain += if new { NEW_POSE } else { 0.0 };
         }
         gain
     };
@@ -272,6 +277,9 @@ pub fn next_step(asked: &Asked, done: &[Step], missed: Missed) -> Step {
         .reduce(|a, b| if b.0 > a.0 { b } else { a });
     best.map_or(Step::at_rest(Vector3::z(), asked.dwell_s), |b| *b.1)
 }
+
+/// What a pose that was not had yet is worth beside its information, in logarithms of a determinant: as much as one more of ten dwells.
+const NEW_POSE: f64 = 1.0;
 
 /// Nearer than this two poses by hand are one, degrees.
 pub const SAME_POSE_DEG: f64 = 12.0;

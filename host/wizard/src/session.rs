@@ -174,7 +174,7 @@ impl Whole<'_> {
         let steps = wizard.asked.steps.clone();
         wizard.begin_phase("calibration", format!("{} dwells are planned", steps.len()));
         or_cancelled!(wizard.dwells(Part::Calibration, &steps));
-        self.finish(Part::Calibration)?;
+        self.finish()?;
         let mut fits = Vec::new();
         for unit in &self.wizard.units {
             let directory = unit.folder.file(Part::Calibration.name());
@@ -185,7 +185,7 @@ impl Whole<'_> {
         let words = format!("{} poses that were not used", steps.len());
         wizard.begin_phase("verification", words);
         or_cancelled!(wizard.dwells(Part::Verification, &steps));
-        self.finish(Part::Verification)?;
+        self.finish()?;
         self.wizard
             .begin_phase("store", "what was verified is stored".into());
         let mut judging = Vec::new();
@@ -223,7 +223,7 @@ impl Whole<'_> {
         Ok(path.display().to_string())
     }
 
-    fn finish(&mut self, _part: Part) -> Result<()> {
+    fn finish(&mut self) -> Result<()> {
         for unit in &mut self.wizard.units {
             if let Some(taking) = unit.taking.take() {
                 taking.finish(&unit.folder)?;
@@ -346,7 +346,7 @@ impl Whole<'_> {
         );
         self.wizard.begin_phase("confirmation", words);
         or_cancelled!(self.wizard.dwells(Part::Confirmation, &steps));
-        self.finish(Part::Confirmation)?;
+        self.finish()?;
         for (k, found) in found.into_iter().enumerate() {
             let Some(found) = found else { continue };
             let by = prepared(&self.file(k, Part::Confirmation.name()))?;
