@@ -31,7 +31,14 @@ fn calibration(nodes: u32, scale: f32) -> Vec<u8> {
     let nodes: Vec<_> = (0..nodes).map(node).collect();
     let found_with = Matrix3::identity();
     let mut bytes = vec![0; stored::MAX_LENGTH];
-    let length = stored::encode([&found_with, &found_with], &nodes, &[], &mut bytes).unwrap();
+    let length = stored::encode(
+        &stored::Origin::UNKNOWN,
+        [&found_with, &found_with],
+        &nodes,
+        &[],
+        &mut bytes,
+    )
+    .unwrap();
     bytes.truncate(length);
     bytes
 }

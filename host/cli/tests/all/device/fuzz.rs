@@ -186,7 +186,14 @@ fn image() -> Vec<u8> {
     ];
     let mut bytes = vec![0; 1024];
     let matrices = [&affine.matrix, &affine.matrix];
-    let length = stored::encode(matrices, &nodes, &records, &mut bytes).unwrap();
+    let length = stored::encode(
+        &stored::Origin::UNKNOWN,
+        matrices,
+        &nodes,
+        &records,
+        &mut bytes,
+    )
+    .unwrap();
     bytes.truncate(length);
     bytes
 }
@@ -207,7 +214,7 @@ fn damage_that_the_crc_does_not_see_makes_no_reader_of_a_stored_calibration_fail
             // Half of them where the counts and the effects are, which is little among so many numbers.
             let at = match random.below(4) {
                 0 => random.below(12),
-                1 => 284 + random.below(bytes.len().saturating_sub(284).max(1)),
+                1 => 336 + random.below(bytes.len().saturating_sub(336).max(1)),
                 _ => random.below(bytes.len().max(1)),
             };
             match (random.below(8), bytes.get_mut(at)) {
