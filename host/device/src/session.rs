@@ -6,6 +6,7 @@ use mimu_core::wire::{Refusal, Request};
 
 use super::heard::{Answer, Event, LineCount};
 use super::line::{ATTEMPTS, Line};
+use super::origin;
 use super::port::{Port, listed, ports};
 use super::who::{Who, unusable};
 use mimu_recording::error::{Argument, Error, Result};
@@ -260,6 +261,18 @@ pub fn refused(port: &str, purpose: &str, refusal: &Refusal) -> Error {
             "it is busy with something else".into(),
             "wait a few seconds and run it again",
         ),
+        Refusal::OtherUnit { unit_id } => (
+            format!("it is of the unit {}", origin::digits(unit_id)),
+            "upload the calibration of this unit, or insist",
+        ),
+        Refusal::NotKnown => (
+            "for a reason that this program does not know".into(),
+            "update mimu on this computer",
+        ),
     };
-    Error::device(port, format!("the device refuses {purpose}: {why}"), remedy)
+    let error = Error::device(port, format!("the device refuses {purpose}: {why}"), remedy);
+    match refusal {
+        Refusal::OtherUnit { .. } => error.about(Argument::OtherUnit),
+        _ => error,
+    }
 }

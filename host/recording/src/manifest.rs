@@ -191,6 +191,12 @@ impl Manifest {
         self.power_on_s.is_none().then_some(start)
     }
 
+    /// Number of the unit, if it was recorded from one that gives it.
+    pub fn unit_id(&self) -> Option<&str> {
+        let recorded = self.recorded.as_ref()?;
+        Some(recorded.unit_id.as_str()).filter(|id| !id.is_empty())
+    }
+
     /// Manifest with the keys that have no default; the others empty.
     pub fn new(
         device: impl Into<String>,

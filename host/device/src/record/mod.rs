@@ -18,7 +18,7 @@ pub use steps::Steps;
 use crate::heard::{Event, LineCount, Samples};
 use crate::result::TOOL;
 use crate::session::Session;
-use crate::who::Started;
+use crate::who::{Started, unit_name};
 use clock::Clock;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{
@@ -137,7 +137,7 @@ pub fn record(
     }
     let device = options.device.clone();
     let mut manifest = Manifest::new(
-        device.unwrap_or_else(|| format!("mimu-{}", who.unit_id)),
+        device.unwrap_or_else(|| unit_name(&who.unit_id)),
         f64::from(who.sample_rate_hz),
         options.gravity_mps2,
         RawUnit::Volt,

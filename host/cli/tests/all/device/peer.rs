@@ -140,6 +140,7 @@ impl Peer {
             streams: (false, false),
             streamed_from: None,
             upload: None,
+            insists: false,
             answers: 0,
             lost: 0,
             dropped: 0,
@@ -182,6 +183,8 @@ struct Device {
     /// First sample of the stream.
     streamed_from: Option<u32>,
     upload: Option<(usize, u64, Vec<u8>)>,
+    /// It may be of another unit.
+    insists: bool,
     answers: u32,
     lost: u32,
     dropped: u32,
