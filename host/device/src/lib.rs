@@ -40,7 +40,7 @@ pub use contents::{
 pub use heard::{Answer, Ear, Event, Heard, LineCount, Samples};
 pub use image::{Image, remembers};
 pub use kalman::{Applied, AxisEstimate, Converging, KalmanPlan, KalmanRun, SHORTEST, kalman};
-pub use port::{BAUD, Port, ports};
+pub use port::{BAUD, Port, Ports, ports};
 pub use result::{Counted, DeviceResult};
 pub use self_test::{Passed, SelfTested, self_test};
 pub use session::{Session, refused};

@@ -414,6 +414,13 @@ pub fn record_text(summary: &RecordSummary) -> String {
         .iter()
         .map(|r| format!("the device restarted before {:.3} s: {}", r.t_s, r.start))
         .collect();
+    warnings.extend(s.warnings.iter().cloned());
+    if s.reconnected > 0 {
+        warnings.push(format!(
+            "the port vanished and came back {} times: the time in between is missing",
+            s.reconnected
+        ));
+    }
     for (count, what) in [
         (
             s.saturated,

@@ -307,7 +307,7 @@ fn killed(bench: &Bench, place: &Place) {
     );
     let samples = place.path("cut/samples.csv");
     let until = Instant::now() + Duration::from_secs(120);
-    while std::fs::metadata(&samples).map_or(0, |m| m.len()) < 150_000 {
+    while std::fs::metadata(&samples).map_or(0, |m| m.len()) < 75_000 {
         assert!(Instant::now() < until, "nothing is recorded");
         std::thread::sleep(Duration::from_millis(2));
     }
