@@ -14,6 +14,7 @@ struct Greeted {
     /// `Start::Panic` and `Start::Fault` with their places.
     start: String,
     starts: u32,
+    firmware: String,
 }
 
 /// The greeting that the device sends by itself after a start.
@@ -31,11 +32,32 @@ fn greeting(board: &mut Board) -> Greeted {
                     other => format!("{other:?}"),
                 };
                 let starts = greeting.starts;
-                return Greeted { start, starts };
+                let firmware = greeting.firmware.to_owned();
+                return Greeted {
+                    start,
+                    starts,
+                    firmware,
+                };
             }
         }
     }
     panic!("no greeting in a second");
+}
+
+#[test]
+fn the_firmware_names_the_commit_that_it_was_built_from() {
+    let firmware = greeting(&mut still(Volts::GROUND)).firmware;
+    let (version, commit) = match firmware.split_once('-') {
+        Some((version, commit)) => (version, Some(commit)),
+        // Of sources in no repository.
+        None => (firmware.as_str(), None),
+    };
+    assert_eq!(version, env!("CARGO_PKG_VERSION"));
+    if let Some(commit) = commit {
+        let hash = commit.strip_suffix("-dirty").unwrap_or(commit);
+        let digits = hash.bytes().all(|b| b.is_ascii_hexdigit());
+        assert!(hash.len() >= 8 && digits, "{firmware}");
+    }
 }
 
 /// A board that samples, after its first greeting.
