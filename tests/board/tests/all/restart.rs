@@ -6,7 +6,7 @@ use mimu_board::fault::Fault;
 use mimu_board::running::Board;
 use mimu_board::schematic::Volts;
 use mimu_board_tests::{MS, STARTED, image, still};
-use mimu_core::wire::{Decoder, Message, Start};
+use mimu_core::wire::{Decoder, Greeting, Message, Start};
 
 /// What a greeting says of the start.
 #[derive(Debug, PartialEq)]
@@ -14,11 +14,10 @@ struct Greeted {
     /// `Start::Panic` and `Start::Fault` with their places.
     start: String,
     starts: u32,
-    firmware: String,
 }
 
-/// The greeting that the device sends by itself after a start.
-fn greeting(board: &mut Board) -> Greeted {
+/// Has `look` see the greeting that the device sends by itself after a start.
+fn greeted<T>(board: &mut Board, look: impl Fn(&Greeting<'_>) -> T) -> T {
     let mut decoder = Decoder::new();
     for _ in 0..1000 {
         board.run_for(MS).unwrap();
@@ -26,27 +25,28 @@ fn greeting(board: &mut Board) -> Greeted {
             let frame = decoder.push(byte);
             let message = frame.map(|frame| frame.message().expect("a whole message"));
             if let Some(Message::Greeting { greeting, .. }) = message {
-                let start = match greeting.start {
-                    Start::Panic { file, line } => format!("panic {file}:{line}"),
-                    Start::Fault { pc, cfsr } => format!("fault {pc:#x} {cfsr:#x}"),
-                    other => format!("{other:?}"),
-                };
-                let starts = greeting.starts;
-                let firmware = greeting.firmware.to_owned();
-                return Greeted {
-                    start,
-                    starts,
-                    firmware,
-                };
+                return look(&greeting);
             }
         }
     }
     panic!("no greeting in a second");
 }
 
+/// What that greeting says of the start.
+fn greeting(board: &mut Board) -> Greeted {
+    greeted(board, |greeting| Greeted {
+        start: match greeting.start {
+            Start::Panic { file, line } => format!("panic {file}:{line}"),
+            Start::Fault { pc, cfsr } => format!("fault {pc:#x} {cfsr:#x}"),
+            other => format!("{other:?}"),
+        },
+        starts: greeting.starts,
+    })
+}
+
 #[test]
 fn the_firmware_names_the_commit_that_it_was_built_from() {
-    let firmware = greeting(&mut still(Volts::GROUND)).firmware;
+    let firmware = greeted(&mut still(Volts::GROUND), |g| g.firmware.to_owned());
     let (version, commit) = match firmware.split_once('-') {
         Some((version, commit)) => (version, Some(commit)),
         // Of sources in no repository.
