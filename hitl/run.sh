@@ -44,7 +44,7 @@ ask() {
 
 if [ -z "${MIMU_NO_PROBE:-}" ]; then
   step "build, flash and start"
-  cargo build --locked --release -p mimu
+  cargo build --locked --release --bin mimu
   cargo build --locked --release -p mimu-firmware --target thumbv7em-none-eabihf
   probe-rs download --chip "$chip" --verify "$image"
   probe-rs reset --chip "$chip"
@@ -75,8 +75,11 @@ json "$work/kalman.json" "r['largest_distance_sigma'] < 0.1 and r['rejected'] ==
 if [ -n "$calibration" ]; then
   step "a calibration up and down"
   ask upload device upload "$calibration"
-  ask download device download -o "$work/held.bin"
+  ask download device download -o "$work/held.toml"
   json "$work/download.json" "r['hash'] == json.load(open('$work/upload.json'))['hash']"
+  # What is fetched is what is stored: sent again, there is nothing to write.
+  ask again device upload "$work/held.toml"
+  json "$work/again.json" "r['was_there']"
 
   step "compensated on the device as on the PC"
   ask check device check --calibration "$calibration" --for 10s

@@ -9,6 +9,7 @@
 //! | 2     | length of everything                                                                              |
 //! | 1, 1  | number of nodes (1 to [`NODES`]), of effects                                                      |
 //! | 2     | zero                                                                                              |
+//! | 52    | [`Origin`], zero where it is unknown: number of the unit, 12; when it was made, UTC seconds since 1970, 8; SHA-256 of the samples that it was made from, 32 |
 //! | 144   | [`Directions`] of the gyro, D and R, then of the accelerometer: those of C that the effects were found with |
 //! | 100   | each node: temperature, °C; C and o (rad/s) of the gyro; C and o (m/s²) of the accelerometer      |
 //! | ...   | each effect, see below                                                                            |
@@ -20,10 +21,13 @@
 //! A code: 2; triad; axis (0 to 2, or 3 for all); weight of the converter's first bit, V; reading of code 0, V; errors of nine bits in
 //! units of the weight; `f32` each.
 //!
+//! Version 3 has no origin: it is read as a calibration of no known unit.
+//!
 //! Raw is volts at the sensor, as in [`RawBatch`](crate::wire::RawBatch). The noise of biases and the sigmas of the parameters are not
 //! here: the device has no use for them.
 
 mod bytes;
+mod origin;
 
 use crc::{CRC_32_ISO_HDLC, CRC_64_XZ, Crc, NoTable};
 use heapless::Vec;
@@ -36,14 +40,17 @@ use crate::table::{self, Node, Table};
 use bytes::{Reader, Writer};
 
 pub use bytes::TooLong;
+pub use origin::Origin;
 
-/// Version of the layout.
-pub const VERSION: u16 = 3;
+/// Version of the layout that is written.
+pub const VERSION: u16 = 4;
+/// The oldest that is read.
+pub const OLDEST: u16 = 3;
 /// Most temperature nodes.
 pub const NODES: usize = 16;
 /// Most effects of a triad that run with every sample, and as many that do not.
 pub const ROOM: usize = 8;
-/// Most bytes of a calibration: all nodes and effects at their longest come to 4.0 kB.
+/// Most bytes of a calibration: all nodes and effects at their longest come to 4.1 kB.
 pub const MAX_LENGTH: usize = 4096;
 
 const MAGIC: [u8; 4] = *b"mimc";
@@ -74,6 +81,8 @@ pub fn hash(bytes: &[u8]) -> u64 {
 /// A calibration in use.
 #[derive(Debug, Clone)]
 pub struct Stored {
+    /// Where it comes from.
+    pub origin: Origin,
     /// Compensation over temperature.
     pub table: Table<f32, NODES>,
     /// What the affine model lacks; `None` if there are none, so that no sample pays for it.
@@ -161,6 +170,7 @@ pub enum Refused {
 /// Writes a calibration to the beginning of `out`; returns its length. `found_with`: C of the gyro and of the accelerometer that the
 /// effects were found with. What is written is not judged; [`decode`] does that.
 pub fn encode(
+    origin: &Origin,
     found_with: [&Matrix3<f32>; 2],
     nodes: &[Node<f32>],
     effects: &[Record<'_>],
@@ -172,6 +182,7 @@ pub fn encode(
     to.u16(VERSION)?;
     to.u16(0)?;
     to.bytes(&[count(nodes.len())?, count(effects.len())?, 0, 0])?;
+    origin.write(&mut to)?;
     for matrix in found_with {
         // The device inverts nothing, so a singular matrix is marked by what is no number.
         let nothing = Matrix3::repeat(f32::NAN);
@@ -275,7 +286,7 @@ pub fn read(
         return Err(Refused::NotACalibration);
     }
     let version = from.u16().ok_or(Refused::Length)?;
-    if version != VERSION {
+    if !(OLDEST..=VERSION).contains(&version) {
         return Err(Refused::Version { found: version });
     }
     let length = from.u16().ok_or(Refused::Length)?;
@@ -288,7 +299,12 @@ pub fn read(
     }
     let mut from = Reader(body.get(LENGTH_AT + 2..).ok_or(Refused::Length)?);
     let [nodes, effects, ..] = from.bytes::<4>().ok_or(Refused::Length)?;
-    contents(&mut from, nodes, effects, node, record)
+    let origin = match version {
+        OLDEST => Origin::UNKNOWN,
+        _ => Origin::read(&mut from).ok_or(Refused::Length)?,
+    };
+    let contents = contents(&mut from, nodes, effects, node, record)?;
+    Ok(Stored { origin, ..contents })
 }
 
 fn contents(
@@ -336,6 +352,7 @@ fn contents(
     }
     match from.0.is_empty() {
         true => Ok(Stored {
+            origin: Origin::UNKNOWN,
             table,
             effects: (effects > 0).then_some(all),
             effect_count: effects,

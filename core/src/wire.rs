@@ -11,8 +11,11 @@
 //! * COBS takes every zero out, so that a zero is the end of a frame and nothing else: whatever was lost or garbled, reading
 //!   resumes at the next zero. The zero in front costs a byte and saves the first frame after noise. Empty frames mean nothing.
 //!
-//! The order of variants and fields is the protocol. A minor version appends variants; a major one may do anything but change
-//! [`Message::Greeting`] and [`Request::Hello`], by which both sides find out whom they talk to.
+//! The order of variants and fields is the protocol. A minor version appends variants of requests, messages and refusals, and fields
+//! behind the last of [`Greeting`], [`Counters`] and [`SelfTest`], which are read whatever their length: what the sender lacks is zero, and
+//! what the reader does not know is passed over. [`Start`] and [`Slot`] have their length in front, so that one that the reader does not
+//! know hides nothing behind it. A major version may do anything but change the beginning of [`Message::Greeting`], up to
+//! [`Greeting::protocol`], and [`Request::Hello`], by which both sides find out whom they talk to.
 //!
 //! | longest, by a test                | bytes a frame | frames a second | kB/s |
 //! |-----------------------------------|---------------|-----------------|------|
@@ -20,6 +23,7 @@
 //! | compensated, 20 samples a frame   | 512           | 50              | 25.6 |
 
 mod batch;
+mod extensible;
 mod frame;
 mod greeting;
 mod message;

@@ -3,7 +3,7 @@
 use mimu_core::compensation::{Affine, Compensation, Sample};
 use mimu_core::effects::{Sensor, Variable};
 use mimu_core::single;
-use mimu_core::stored::{NODES, ROOM, Record, Refused, decode, encode, hash};
+use mimu_core::stored::{NODES, Origin, ROOM, Record, Refused, decode, encode, hash};
 use mimu_core::table::{self, Node, Place, Table};
 use nalgebra::{Matrix3, Vector3};
 use proptest::prelude::*;
@@ -48,7 +48,14 @@ fn regular() -> [f32; 24] {
 fn bytes(nodes: &[Node<f32>], effects: &[Record<'_>]) -> Vec<u8> {
     let mut out = [0; 4096];
     let matrix = Matrix3::from_diagonal_element(3.5);
-    let length = encode([&matrix, &matrix], nodes, effects, &mut out).unwrap();
+    let length = encode(
+        &Origin::UNKNOWN,
+        [&matrix, &matrix],
+        nodes,
+        effects,
+        &mut out,
+    )
+    .unwrap();
     out[..length].to_vec()
 }
 
@@ -102,11 +109,20 @@ fn the_layout_is_that_of_the_table_in_the_documentation() {
     let gyro = Matrix3::new(0.0, -2.0, 0.0, 4.0, 0.0, 0.0, 0.0, 0.0, 0.5);
     let mut all = [0; 4096];
     let one = [node(25.0, &regular())];
-    let length = encode([&gyro, &accel], &one, &effects, &mut all).unwrap();
+    let origin = Origin {
+        unit_id: Some([1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12]),
+        // 2026-01-01, in seconds since 1970.
+        created_s: Some(0x6955_b900),
+        samples_sha256: Some([0xab; 32]),
+    };
+    let length = encode(&origin, [&gyro, &accel], &one, &effects, &mut all).unwrap();
     let all = &all[..length];
-    let mut expected = b"mimc\x03\x00".to_vec();
+    let mut expected = b"mimc\x04\x00".to_vec();
     expected.extend((all.len() as u16).to_le_bytes());
     expected.extend([1, 4, 0, 0]);
+    expected.extend([1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12]);
+    expected.extend([0x00, 0xb9, 0x55, 0x69, 0, 0, 0, 0]);
+    expected.extend([0xab; 32]);
     // D by rows, and R: of right angles the one is the other transposed.
     for rows in [
         [[0, 1, 0], [-1, 0, 0], [0, 0, 1]],
@@ -147,6 +163,7 @@ fn the_layout_is_that_of_the_table_in_the_documentation() {
     assert_eq!(all, &expected[..]);
     let stored = decode(all).unwrap();
     assert_eq!((stored.table.len(), stored.effect_count), (1, 4));
+    assert_eq!(stored.origin, origin);
     // 384 of 256 codes to 1.65 V are bits 0 and -1, and 255 are bits -1 to -8; half a code more, so that no error turns any.
     let right = Vector3::new(384.5, 0.5, 255.5) * (1.65 / 256.0);
     let read = Sample {
@@ -163,6 +180,39 @@ fn the_layout_is_that_of_the_table_in_the_documentation() {
     };
     let clean = single::without_code_errors(stored.effects.as_ref().unwrap(), &set);
     assert_eq!(clean.accel, Vector3::new(2.475, 0.0, 0.004));
+}
+
+/// The same as version 3 has it: no origin, and its own number.
+fn of_version_3(bytes: &[u8]) -> Vec<u8> {
+    let mut older = [&bytes[..12], &bytes[64..]].concat();
+    older[4] = 3;
+    let length = older.len() as u16;
+    older[6..8].copy_from_slice(&length.to_le_bytes());
+    resealed(older)
+}
+
+#[test]
+fn a_calibration_of_version_3_is_read_as_one_of_no_unit() {
+    let nodes = [node(0.0, &regular()), node(50.0, &regular())];
+    let effects = [Record::Named {
+        id: "gyro_warm_up",
+        coefficients: &[1.0, 2.0, 3.0],
+        nonlinear: Some(60.0),
+    }];
+    let older = decode(&of_version_3(&bytes(&nodes, &effects))).unwrap();
+    assert_eq!(older.origin, Origin::UNKNOWN);
+    assert_eq!((older.table.len(), older.effect_count), (2, 1));
+    let mut oldest = of_version_3(&bytes(&nodes, &effects));
+    oldest[4] = 2;
+    let refused = decode(&resealed(oldest)).err();
+    assert_eq!(refused, Some(Refused::Version { found: 2 }));
+}
+
+#[test]
+fn what_is_not_known_of_an_origin_is_zero() {
+    let unknown = bytes(&[node(25.0, &regular())], &[]);
+    assert_eq!(unknown[12..64], [0; 52]);
+    assert_eq!(decode(&unknown).unwrap().origin, Origin::UNKNOWN);
 }
 
 #[test]
@@ -258,7 +308,14 @@ fn every_refusal_has_its_name() {
     assert_eq!(nodes(&many), Some(Refused::Node { at: 17 }));
     let flat = Matrix3::zeros();
     let mut out = [0; 4096];
-    let length = encode([&flat, &flat], &[node(0.0, &regular())], &[], &mut out).unwrap();
+    let length = encode(
+        &Origin::UNKNOWN,
+        [&flat, &flat],
+        &[node(0.0, &regular())],
+        &[],
+        &mut out,
+    )
+    .unwrap();
     assert_eq!(refused(&out[..length]), Some(Refused::Singular));
 
     let named = |id, coefficients| Record::Named {

@@ -50,6 +50,8 @@ pub fn info(length: u32, hash: u64, stored: &Stored) -> StoredInfo {
         hash,
         nodes: stored.table.len() as u8,
         effects: stored.effect_count,
+        unit_id: stored.origin.unit_id.unwrap_or_default(),
+        created_s: stored.origin.created_s.unwrap_or_default(),
     }
 }
 
@@ -141,7 +143,11 @@ impl Commands<'_> {
                 Ok(())
             })?,
             Request::Stop => pipeline.lock(|p| p.borrow_mut().stream(Streams::default())),
-            Request::UploadBegin { length, hash } => self.upload.begin(length, hash)?,
+            Request::UploadBegin {
+                length,
+                hash,
+                other_unit,
+            } => self.upload.begin(length, hash, other_unit)?,
             Request::UploadChunk { offset, bytes } => self.upload.chunk(offset, bytes)?,
             Request::KalmanStart {
                 triad,
@@ -179,7 +185,7 @@ impl Commands<'_> {
     }
 
     async fn commit(&mut self) -> Result<(), Refusal> {
-        self.upload.check()?;
+        self.upload.check(&uid())?;
         let bytes = self.upload.bytes();
         let storing = |on| {
             let set = |p: &RefCell<Pipeline>| p.borrow_mut().flag(flags::STORING, on);
@@ -233,7 +239,7 @@ impl Commands<'_> {
         let greeting = Greeting {
             magic: MAGIC,
             protocol: PROTOCOL,
-            firmware: env!("CARGO_PKG_VERSION"),
+            firmware: env!("MIMU_FIRMWARE_VERSION"),
             board: board::NAME,
             unit_id: uid(),
             capabilities: Capabilities::TEMPERATURE_NODES

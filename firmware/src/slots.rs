@@ -134,8 +134,11 @@ impl<F: NorFlash> Slots<F> {
     }
 
     /// Stores a calibration. When this returns, or the supply fails on the way, either it is the one in use, whole, or the one before
-    /// is.
+    /// is. The one in use is not written again: a sector lives for 10 000 erases.
     pub async fn store(&mut self, bytes: &[u8]) -> Result<(), Failed> {
+        if self.holds(bytes).await {
+            return Ok(());
+        }
         let slot = match self.in_use {
             Some(InUse { slot: 0, .. }) => 1,
             _ => 0,
@@ -163,6 +166,24 @@ impl<F: NorFlash> Slots<F> {
         self.state[slot] = Slot::Whole { generation };
         self.in_use = Some(InUse { slot, front });
         Ok(())
+    }
+
+    /// Whether the calibration in use is this one, byte by byte in the flash.
+    async fn holds(&mut self, bytes: &[u8]) -> bool {
+        let Some(InUse { slot, front }) = self.in_use else {
+            return false;
+        };
+        if front.length as usize != bytes.len() || front.hash != hash(bytes) {
+            return false;
+        }
+        for (k, part) in bytes.chunks(WORD).enumerate() {
+            let mut word = [0; WORD];
+            let kept = &mut word[..part.len()];
+            if !self.read(slot, WORD * (k + 1), kept).await || kept != part {
+                return false;
+            }
+        }
+        true
     }
 
     /// Writes a word and reads it back.

@@ -9,6 +9,7 @@ use mimu_core::wire::{CHUNK, Refusal};
 struct Announced {
     length: usize,
     hash: u64,
+    other_unit: bool,
 }
 
 /// A calibration as far as it has been received.
@@ -26,8 +27,8 @@ impl<'a> Upload<'a> {
         }
     }
 
-    /// Announces one; another before it is forgotten.
-    pub fn begin(&mut self, length: u32, hash: u64) -> Result<(), Refusal> {
+    /// Announces one, and whether it may be of another unit; another before it is forgotten.
+    pub fn begin(&mut self, length: u32, hash: u64, other_unit: bool) -> Result<(), Refusal> {
         let room = MAX_LENGTH as u32;
         if length > room {
             return Err(Refusal::TooLong { room });
@@ -36,6 +37,7 @@ impl<'a> Upload<'a> {
         self.announced = Some(Announced {
             length: length as usize,
             hash,
+            other_unit,
         });
         Ok(())
     }
@@ -63,9 +65,10 @@ impl<'a> Upload<'a> {
         self.received.extend_from_slice(new).map_err(|_| too_long)
     }
 
-    /// Whether all of it is there, has the hash that was announced, and can be used.
+    /// Whether all of it is there, has the hash that was announced, can be used, and is of the unit of this number: wrong by up to a
+    /// tenth in scale, a calibration of another one looks like one to everything else.
     #[inline(never)]
-    pub fn check(&self) -> Result<(), Refusal> {
+    pub fn check(&self, unit_id: &[u8; 12]) -> Result<(), Refusal> {
         let announced = self.announced.ok_or(Refusal::NoUpload)?;
         if self.received.len() < announced.length {
             return Err(Refusal::Incomplete {
@@ -77,9 +80,13 @@ impl<'a> Upload<'a> {
         if found != announced.hash {
             return Err(Refusal::WrongHash { found });
         }
-        stored::decode(bytes)
-            .map(|_| ())
-            .map_err(Refusal::NotUsable)
+        let stored = stored::decode(bytes).map_err(Refusal::NotUsable)?;
+        match stored.origin.unit_id {
+            Some(other) if other != *unit_id && !announced.other_unit => {
+                Err(Refusal::OtherUnit { unit_id: other })
+            }
+            _ => Ok(()),
+        }
     }
 
     /// What has been received.
@@ -96,6 +103,53 @@ impl<'a> Upload<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use mimu_core::compensation::{Affine, Compensation};
+    use mimu_core::stored::Origin;
+    use mimu_core::table::Node;
+    use nalgebra::{Matrix3, Vector3};
+
+    const UNIT: [u8; 12] = *b"unit-number1";
+    const OTHER: [u8; 12] = *b"unit-number2";
+
+    #[test]
+    fn a_calibration_of_another_unit_is_refused_unless_the_upload_insists() {
+        let affine = Affine {
+            matrix: Matrix3::identity(),
+            offset: Vector3::zeros(),
+        };
+        let model = Compensation {
+            gyro: affine,
+            accel: affine,
+        };
+        let node = Node {
+            temp_c: 25.0,
+            model,
+        };
+        let refused = Err(Refusal::OtherUnit { unit_id: OTHER });
+        for (unit_id, other_unit, expected) in [
+            (None, false, Ok(())),
+            (Some(UNIT), false, Ok(())),
+            (Some(OTHER), false, refused),
+            (Some(OTHER), true, Ok(())),
+        ] {
+            let origin = Origin {
+                unit_id,
+                ..Origin::UNKNOWN
+            };
+            let mut bytes = [0; MAX_LENGTH];
+            let matrices = [&affine.matrix, &affine.matrix];
+            let length = stored::encode(&origin, matrices, &[node], &[], &mut bytes).unwrap();
+            let bytes = &bytes[..length];
+            let mut received = Vec::new();
+            let mut upload = Upload::new(&mut received);
+            let begun = upload.begin(length as u32, hash(bytes), other_unit);
+            assert_eq!(begun, Ok(()));
+            for (k, part) in bytes.chunks(CHUNK).enumerate() {
+                upload.chunk((k * CHUNK) as u32, part).unwrap();
+            }
+            assert_eq!(upload.check(&UNIT), expected);
+        }
+    }
 
     #[test]
     fn parts_have_to_come_in_order_and_may_be_repeated() {
@@ -103,14 +157,14 @@ mod tests {
         let mut upload = Upload::new(&mut received);
         assert_eq!(upload.chunk(0, &[1]), Err(Refusal::NoUpload));
         let room = MAX_LENGTH as u32;
-        assert_eq!(upload.begin(4097, 0), Err(Refusal::TooLong { room }));
+        assert_eq!(upload.begin(4097, 0, false), Err(Refusal::TooLong { room }));
         // CRC-64/XZ of "123456789", by the catalogue of CRC algorithms.
-        upload.begin(9, 0x995d_c9bb_df19_39fa).unwrap();
+        upload.begin(9, 0x995d_c9bb_df19_39fa, false).unwrap();
         upload.chunk(0, b"12345").unwrap();
         let gap = upload.chunk(6, b"7");
         assert_eq!(gap, Err(Refusal::WrongOffset { expected: 5 }));
         assert_eq!(
-            upload.check().err(),
+            upload.check(&UNIT).err(),
             Some(Refusal::Incomplete { received: 5 })
         );
         upload.chunk(3, b"45678").unwrap();
@@ -119,10 +173,13 @@ mod tests {
         upload.chunk(8, b"9").unwrap();
         // The hash holds; it is no calibration.
         let foreign = Refusal::NotUsable(stored::Refused::NotACalibration);
-        assert_eq!(upload.check().err(), Some(foreign));
+        assert_eq!(upload.check(&UNIT).err(), Some(foreign));
         upload.chunk(0, b"0").unwrap();
-        assert!(matches!(upload.check(), Err(Refusal::WrongHash { .. })));
+        assert!(matches!(
+            upload.check(&UNIT),
+            Err(Refusal::WrongHash { .. })
+        ));
         upload.end();
-        assert_eq!(upload.check().err(), Some(Refusal::NoUpload));
+        assert_eq!(upload.check(&UNIT).err(), Some(Refusal::NoUpload));
     }
 }

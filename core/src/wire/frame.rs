@@ -5,7 +5,9 @@ use crc::{CRC_32_ISO_HDLC, Crc};
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
-use super::message::{Call, Message};
+use super::extensible::Tolerant;
+use super::greeting::MAGIC;
+use super::message::{Call, Message, Refusal, Reply};
 
 /// Most bytes of a message. The longest is a compensated batch, some ten shorter.
 pub const MAX_PAYLOAD: usize = 512;
@@ -57,12 +59,26 @@ pub fn encode<T: Serialize>(message: &T, out: &mut [u8; MAX_FRAME]) -> Result<us
 pub struct Frame<'a>(pub &'a [u8]);
 
 impl<'a> Frame<'a> {
-    /// The message in it: all of it, or `None`. A [greeting](Message::Greeting) may be followed by what later versions have
-    /// appended to it.
+    /// The message in it: all of it, or `None`. A [greeting](Message::Greeting), [counters](Reply::Counters) and the results of a
+    /// [self-test](Reply::SelfTest) may be followed by what later versions have appended, and may lack what this one has; then it is zero.
+    /// A refusal for a reason that this build does not know is [`Refusal::NotKnown`].
     pub fn message(&self) -> Option<Message<'a>> {
-        let (message, rest) = postcard::take_from_bytes(self.0).ok()?;
-        let greeting = matches!(message, Message::Greeting { .. });
-        (rest.is_empty() || greeting).then_some(message)
+        let Ok((message, tolerant)) = Tolerant::read::<Message<'a>>(self.0) else {
+            let Ok((Beginning::Refused { id }, _)) = postcard::take_from_bytes(self.0) else {
+                return None;
+            };
+            let refusal = Refusal::NotKnown;
+            return Some(Message::Refused { id, refusal });
+        };
+        let any_length = match &message {
+            // What begins otherwise is somebody else's, and only what is whole is one of those.
+            Message::Greeting { greeting, .. } => !tolerant.is_cut() || greeting.magic == MAGIC,
+            Message::Reply { reply, .. } => {
+                matches!(reply, Reply::Counters(_) | Reply::SelfTest(_))
+            }
+            _ => false,
+        };
+        (any_length || tolerant.is_exact()).then_some(message)
     }
 
     /// The call in it: all of it, or `None`.
@@ -80,6 +96,14 @@ impl<'a> Frame<'a> {
         let (message, rest) = postcard::take_from_bytes(self.0).ok()?;
         rest.is_empty().then_some(message)
     }
+}
+
+/// As much of a [`Message`] as tells a refusal.
+#[derive(Deserialize)]
+enum Beginning {
+    Greeting,
+    Reply,
+    Refused { id: u16 },
 }
 
 /// Finds frames in a stream of bytes.

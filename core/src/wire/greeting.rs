@@ -1,7 +1,9 @@
-//! Who the device is. The layout of this is that of version 1 for ever; later versions append fields.
+//! Who the device is. The layout of this is that of version 2 for ever. Later versions append fields: one that a device does not send
+//! yet is read as zero, which is none or unknown, and one that this build does not know yet is not looked at.
 
 use serde::{Deserialize, Serialize};
 
+use super::extensible;
 use crate::effects::{Effect, Refused};
 use crate::stored;
 
@@ -9,10 +11,10 @@ use crate::stored;
 pub const MAGIC: [u8; 4] = *b"mimu";
 
 /// The protocol of this build.
-pub const PROTOCOL: Version = Version { major: 1, minor: 0 };
+pub const PROTOCOL: Version = Version { major: 2, minor: 0 };
 
 /// Version of a protocol.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize)]
 pub struct Version {
     /// Another one cannot be talked to.
     pub major: u8,
@@ -21,13 +23,13 @@ pub struct Version {
 }
 
 /// Who the device is, what it can do, and what it holds.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Greeting<'a> {
     /// [`MAGIC`].
     pub magic: [u8; 4],
     /// What it speaks.
     pub protocol: Version,
-    /// Version of the firmware.
+    /// Version of the firmware, and the commit that it was built from: `0.1.0-1a2b3c4`, with `-dirty` behind it if it was changed.
     pub firmware: &'a str,
     /// Name of the board.
     pub board: &'a str,
@@ -50,18 +52,19 @@ pub struct Greeting<'a> {
     /// Unit of a raw reading.
     pub raw_unit: &'a str,
     /// Why it started.
-    #[serde(borrow)]
+    #[serde(borrow, with = "extensible")]
     pub start: Start<'a>,
     /// Starts without a power failure in between, this one counted.
     pub starts: u32,
     /// The calibration in use.
     pub stored: Option<StoredInfo>,
     /// What is in the two places for a calibration.
+    #[serde(with = "extensible::pair")]
     pub slots: [Slot; 2],
 }
 
 /// Bits of [`Greeting::capabilities`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Capabilities(pub u32);
 
 impl Capabilities {
@@ -126,7 +129,7 @@ pub fn effects_of_this_build() -> u32 {
 }
 
 /// Why the device started.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum Start<'a> {
     /// Power came, or was too low in between.
     PowerOn,
@@ -152,6 +155,10 @@ pub enum Start<'a> {
     },
     /// None of these.
     Other,
+    /// A reason that this build does not know, or none was given; never sent.
+    #[default]
+    #[serde(skip)]
+    NotKnown,
 }
 
 /// A stored calibration.
@@ -165,10 +172,14 @@ pub struct StoredInfo {
     pub nodes: u8,
     /// Effects.
     pub effects: u8,
+    /// Number of the unit that it is of; zero if that is not known.
+    pub unit_id: [u8; 12],
+    /// When it was made, UTC seconds since 1970; zero if that is not known.
+    pub created_s: u64,
 }
 
 /// What is in one of the two places for a calibration.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum Slot {
     /// Nothing.
     Empty,
@@ -183,6 +194,10 @@ pub enum Slot {
     Damaged,
     /// A whole calibration that this version of the firmware cannot use.
     NotUsable(stored::Refused),
+    /// Something that this build does not know; never sent.
+    #[default]
+    #[serde(skip)]
+    NotKnown,
 }
 
 /// How a device compares with this build.

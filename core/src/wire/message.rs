@@ -46,6 +46,8 @@ pub enum Request<'a> {
         length: u32,
         /// [`stored::hash`](crate::stored::hash) over all of them.
         hash: u64,
+        /// Whether it is also stored if it is of another unit. One of no known unit always is.
+        other_unit: bool,
     },
     /// Part of it, in order of the offset and without gaps; a part that was received already may be repeated. → [`Reply::Done`]
     UploadChunk {
@@ -190,6 +192,14 @@ pub enum Refusal {
     BadNumber,
     /// The device does something that does not go together with it; try again later.
     Busy,
+    /// What was received is of another unit, and the upload does not insist.
+    OtherUnit {
+        /// Which.
+        unit_id: [u8; 12],
+    },
+    /// A reason that this build does not know; never sent.
+    #[serde(skip)]
+    NotKnown,
 }
 
 /// Three sensors.
@@ -244,8 +254,8 @@ pub struct KalmanAxis {
     pub covariance: [f32; 10],
 }
 
-/// How the sensors answered to their self-test inputs.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+/// How the sensors answered to their self-test inputs. Later versions append fields, as to [`Greeting`].
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct SelfTest {
     /// Change of the gyros' outputs by ST1, V at the gyro.
     pub gyro_st1_v: [f32; 3],
@@ -259,7 +269,7 @@ pub struct SelfTest {
     pub passed: u8,
 }
 
-/// What the device has counted since its start, or since [`Request::ResetCounters`].
+/// What the device has counted since its start, or since [`Request::ResetCounters`]. Later versions append fields, as to [`Greeting`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Counters {
     /// Since the start, ms. Not reset.

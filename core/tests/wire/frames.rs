@@ -4,7 +4,7 @@ use mimu_core::effects::Effect;
 use mimu_core::wire::{
     BATCH, BatchHead, COMPENSATED_BYTES, Call, Compatibility, CompensatedBatch, Decoder, EFFECTS,
     Event, Greeting, MAGIC, MAX_FRAME, MAX_PAYLOAD, Message, PROTOCOL, RAW_BYTES, RawBatch,
-    Request, Slot, Start, Version, compatibility, effects_of_this_build, encode,
+    Request, Version, compatibility, effects_of_this_build, encode,
 };
 use proptest::prelude::*;
 
@@ -116,21 +116,7 @@ fn older_newer_and_foreign_devices_are_told_apart() {
         compatibility(&Greeting {
             magic,
             protocol: Version { major, minor },
-            firmware: "",
-            board: "",
-            unit_id: [0; 12],
-            capabilities: mimu_core::wire::Capabilities(0),
-            effects: 0,
-            effects_room: 0,
-            nodes_room: 0,
-            stored_room: 0,
-            sample_rate_hz: 1,
-            channels: "",
-            raw_unit: "",
-            start: Start::Other,
-            starts: 1,
-            stored: None,
-            slots: [Slot::Empty; 2],
+            ..Greeting::default()
         })
     };
     let Version { major, minor } = PROTOCOL;

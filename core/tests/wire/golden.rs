@@ -53,7 +53,14 @@ fn requests() {
     request(Request::ResetCounters, "04");
     request(Request::SelfTest, "05");
     let (length, hash) = (1000, 128);
-    request(Request::UploadBegin { length, hash }, "06 e807 8001");
+    for (other_unit, bytes) in [(false, "00"), (true, "01")] {
+        let begin = Request::UploadBegin {
+            length,
+            hash,
+            other_unit,
+        };
+        request(begin, &format!("06 e807 8001 {bytes}"));
+    }
     let (offset, bytes) = (256, &[7, 0, 255][..]);
     request(Request::UploadChunk { offset, bytes }, "07 8002 03 0700ff");
     request(Request::UploadCommit, "08");
@@ -107,7 +114,7 @@ fn greeting<'a>(start: Start<'a>, stored: Option<StoredInfo>, slots: [Slot; 2]) 
         id: 1,
         greeting: Greeting {
             magic: MAGIC,
-            protocol: Version { major: 1, minor: 2 },
+            protocol: Version { major: 2, minor: 1 },
             firmware: "0.1.0",
             board: "B",
             unit_id: [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12],
@@ -128,28 +135,28 @@ fn greeting<'a>(start: Start<'a>, stored: Option<StoredInfo>, slots: [Slot; 2]) 
 }
 
 /// A greeting as far as `start`. 0xfffff in sevens is 7f 7f 3f; 4096 is 32 * 128.
-const BEFORE: &str = "00 01 6d696d75 01 02 05 302e312e30 01 42 0102030405060708090a0b0c \
+const BEFORE: &str = "00 01 6d696d75 02 01 05 302e312e30 01 42 0102030405060708090a0b0c \
                       1f ffff3f 08 10 8020 e807 03 782c79 01 56";
 
 #[test]
 fn greetings() {
     let none = [Slot::Empty; 2];
     for (start, bytes) in [
-        (Start::PowerOn, "00"),
-        (Start::ResetPin, "01"),
-        (Start::Watchdog, "02"),
-        (Start::Software, "03"),
+        (Start::PowerOn, "01 00"),
+        (Start::ResetPin, "01 01"),
+        (Start::Watchdog, "01 02"),
+        (Start::Software, "01 03"),
         (
             Start::Panic {
                 file: "a.rs",
                 line: 300,
             },
-            "04 04 612e7273 ac02",
+            "08 04 04 612e7273 ac02",
         ),
-        (Start::Fault { pc: 128, cfsr: 1 }, "05 8001 01"),
-        (Start::Other, "06"),
+        (Start::Fault { pc: 128, cfsr: 1 }, "04 05 8001 01"),
+        (Start::Other, "01 06"),
     ] {
-        let bytes = hex(&format!("{BEFORE} {bytes} 03 00 00 00"));
+        let bytes = hex(&format!("{BEFORE} {bytes} 03 00 0100 0100"));
         frozen(greeting(start, None, none), &bytes);
     }
     let stored = StoredInfo {
@@ -157,32 +164,25 @@ fn greetings() {
         hash: u64::MAX,
         nodes: 5,
         effects: 2,
+        unit_id: [0xab; 12],
+        created_s: 300,
     };
     for (slot, bytes) in [
-        (Slot::Empty, "00"),
-        (Slot::Whole { generation: 128 }, "01 8001"),
-        (Slot::Unfinished, "02"),
-        (Slot::Damaged, "03"),
-        (Slot::NotUsable(stored::Refused::Check), "04 03"),
+        (Slot::Empty, "01 00"),
+        (Slot::Whole { generation: 128 }, "03 01 8001"),
+        (Slot::Unfinished, "01 02"),
+        (Slot::Damaged, "01 03"),
+        (Slot::NotUsable(stored::Refused::Check), "02 04 03"),
     ] {
         let bytes = hex(&format!(
-            "{BEFORE} 00 03 01 ac02 ffffffffffffffffff01 05 02 {bytes} 00"
+            "{BEFORE} 01 00 03 01 ac02 ffffffffffffffffff01 05 02 {} ac02 {bytes} 01 00",
+            "ab".repeat(12)
         ));
         frozen(
             greeting(Start::PowerOn, Some(stored), [slot, Slot::Empty]),
             &bytes,
         );
     }
-}
-
-#[test]
-fn a_greeting_that_a_later_version_has_added_to_is_read() {
-    let bytes = hex(&format!("{BEFORE} 00 03 00 00 00 aabbcc"));
-    let message = mimu_core::wire::Frame(&bytes).message();
-    assert_eq!(
-        message,
-        Some(greeting(Start::PowerOn, None, [Slot::Empty; 2]))
-    );
 }
 
 #[test]
@@ -304,6 +304,12 @@ fn refusals() {
         (Refusal::NoBank, "09"),
         (Refusal::BadNumber, "0a"),
         (Refusal::Busy, "0b"),
+        (
+            Refusal::OtherUnit {
+                unit_id: [0xab; 12],
+            },
+            "0c abababababababababababab",
+        ),
     ] {
         let bytes = hex(&format!("02 03 {bytes}"));
         frozen(Message::Refused { id: 3, refusal }, &bytes);

@@ -83,7 +83,14 @@ fn calibration(effects: &[Record<'_>]) -> Stored {
     let mut bytes = [0; stored::MAX_LENGTH];
     let one = Matrix3::identity();
     let nodes = [node(-10.0, 2.0), node(60.0, 4.0)];
-    let length = stored::encode([&one, &one], &nodes, effects, &mut bytes).unwrap();
+    let length = stored::encode(
+        &stored::Origin::UNKNOWN,
+        [&one, &one],
+        &nodes,
+        effects,
+        &mut bytes,
+    )
+    .unwrap();
     stored::decode(&bytes[..length]).unwrap()
 }
 

@@ -42,6 +42,8 @@ struct Memory {
     cells: Vec<Cell>,
     /// Operations until the supply fails.
     left: usize,
+    /// Operations so far.
+    done: usize,
     /// What a word reads like that was torn: 0 nothing at all, 1 as erased, 2 as written, 3 as half of both.
     tear: u8,
 }
@@ -55,6 +57,7 @@ impl Memory {
         Self {
             cells: vec![Cell::Erased; 2 * USED],
             left: usize::MAX,
+            done: 0,
             tear: 0,
         }
     }
@@ -68,6 +71,7 @@ impl Memory {
     /// Whether the supply holds for one more operation.
     fn step(&mut self) -> bool {
         self.left = self.left.saturating_sub(1);
+        self.done += 1;
         self.left > 0
     }
 }
@@ -159,7 +163,14 @@ fn calibration(k: u8, nodes: usize) -> Vec<u8> {
         .collect();
     let mut bytes = vec![0; MAX_LENGTH];
     let found_with = [&affine.matrix, &affine.matrix];
-    let length = stored::encode(found_with, &nodes, &[], &mut bytes).unwrap();
+    let length = stored::encode(
+        &stored::Origin::UNKNOWN,
+        found_with,
+        &nodes,
+        &[],
+        &mut bytes,
+    )
+    .unwrap();
     bytes.truncate(length);
     bytes
 }
@@ -206,14 +217,45 @@ fn an_empty_memory_holds_none_and_then_the_last_that_was_stored() {
 }
 
 #[test]
+fn the_calibration_in_use_is_not_written_again_unless_it_is_damaged() {
+    let (one, other) = (calibration(1, 3), calibration(2, 3));
+    let mut memory = Memory::new();
+    assert!(store(&mut memory, &one, usize::MAX, 0));
+    let (done, before) = (memory.done, memory.cells.clone());
+    assert!(store(&mut memory, &one, usize::MAX, 0));
+    assert_eq!((memory.done, &memory.cells), (done, &before));
+    // Also not when it is the older one, which is not in use.
+    assert!(store(&mut memory, &other, usize::MAX, 0));
+    let done = memory.done;
+    assert!(store(&mut memory, &one, usize::MAX, 0));
+    assert!(memory.done > done);
+    assert_eq!(found(&memory).0.as_ref(), Some(&one));
+
+    // A bit that flips after the start: what is in use is not what is asked for any more.
+    let mut buffer = heapless::Vec::new();
+    let mut slots = block_on(Slots::open(memory, &mut buffer));
+    let InUse { slot, .. } = slots.in_use.unwrap();
+    let Cell::Written(word) = &mut slots.flash.cells[slot * USED + 2] else {
+        panic!()
+    };
+    word[5] ^= 1;
+    let done = slots.flash.done;
+    assert_eq!(block_on(slots.store(&one)), Ok(()));
+    assert!(slots.flash.done > done);
+    assert_eq!(found(&slots.flash).0.as_ref(), Some(&one));
+}
+
+#[test]
 fn wherever_the_supply_fails_the_old_or_the_new_one_is_whole() {
     let (old, new, third) = (calibration(1, 3), calibration(2, 5), calibration(3, 4));
     // Erase, the words, and the word in front.
     let operations = 1 + new.len().div_ceil(WORD) + 1;
     for older in 0..=2 {
         let mut before = Memory::new();
-        for _ in 0..older {
-            assert!(store(&mut before, &old, usize::MAX, 0));
+        for k in (0..older).rev() {
+            // The last one is `old`, and no two in a row are the same.
+            let bytes = if k == 0 { &old } else { &third };
+            assert!(store(&mut before, bytes, usize::MAX, 0));
         }
         let old = (older > 0).then(|| old.clone());
         for tear in 0..4 {

@@ -29,6 +29,7 @@ fn flag(argument: Argument) -> Option<&'static str> {
         Argument::Sensor => "--sensor",
         Argument::Replace => "--replace",
         Argument::Port => "--port",
+        Argument::OtherUnit => "--other-unit",
         Argument::Topic => "--topic",
         Argument::Preset => "--preset",
         Argument::Means => "--means",

@@ -81,7 +81,7 @@ pub fn check(
     mut progress: impl FnMut(f64),
 ) -> Result<Checked> {
     let image = Image::new(calibration, place)?;
-    let held = session.hello()?.stored.map(|s| s.hash);
+    let held = session.hello()?.stored.as_ref().map(|s| s.hash);
     if held != Some(image.hash) {
         let problem = match held {
             None => "the device holds no calibration".to_string(),

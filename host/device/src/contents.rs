@@ -1,25 +1,34 @@
-//! What stands in a stored calibration, for people: nodes and effects as [`mimu_core::stored`] reads them.
-
-use std::path::Path;
+//! What stands in a stored calibration: nodes and effects as [`mimu_core::stored`] reads them, for people, and as a calibration file.
 
 use mimu_core::compensation::Affine;
 use mimu_core::effects::{Sensor, Variable};
-use mimu_core::stored::{self, Record, Refused};
+use mimu_core::stored::{self, Record};
 use mimu_core::table::Node;
 use serde::Serialize;
 
+use super::origin;
 use super::who::Hash;
+use mimu::calibration::{Calibration, Kept, OnDevice, What};
 use mimu::quantity::{self, AXES};
+use mimu_recording::error::{Error, Result};
 
 /// A stored calibration, number by number: the result of `mimu device download`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Contents {
-    /// File that the bytes are written to.
-    pub file: String,
-    /// Their number.
+    /// Calibration file that it is written to, if it is.
+    pub file: Option<String>,
+    /// File that the bytes are written to as the device stores them, if they are.
+    pub bytes_file: Option<String>,
+    /// Number of the bytes.
     pub bytes: usize,
     /// What the calibration is told apart by.
     pub hash: Hash,
+    /// Number of the unit that it is of, if it says so.
+    pub unit_id: Option<String>,
+    /// When it was made, RFC 3339, if it says so.
+    pub created: Option<String>,
+    /// SHA-256 of the samples that it was made from, if it says so.
+    pub samples_sha256: Option<String>,
     /// `x = C u + o`.
     pub formula: &'static str,
     /// `raw to SI`.
@@ -81,18 +90,23 @@ pub struct ConverterContents {
     pub reading_of_code_0_v: f32,
 }
 
-/// What stands in `bytes`, which go to `file`. Refused where the device would refuse it.
-pub fn contents(bytes: &[u8], file: &Path) -> Result<Contents, Refused> {
+/// What stands in `bytes`. Refused where the device would refuse it.
+pub fn contents(bytes: &[u8]) -> std::result::Result<Contents, stored::Refused> {
     let (mut nodes, mut effects) = (Vec::new(), Vec::new());
-    stored::read(
+    let stored = stored::read(
         bytes,
         |stored| nodes.push(node(stored)),
         |record| effects.push(effect(record)),
     )?;
+    let origin = stored.origin;
     Ok(Contents {
-        file: file.display().to_string(),
+        file: None,
+        bytes_file: None,
         bytes: bytes.len(),
         hash: Hash(stored::hash(bytes)),
+        unit_id: origin.unit_id.as_ref().map(origin::digits),
+        created: origin.created_s.and_then(origin::date),
+        samples_sha256: origin.samples_sha256.as_ref().map(origin::digits),
         formula: "x = C u + o",
         direction: "raw to SI",
         raw_unit: "V",
@@ -100,6 +114,92 @@ pub fn contents(bytes: &[u8], file: &Path) -> Result<Contents, Refused> {
         nodes,
         effects,
     })
+}
+
+/// The calibration file of `bytes` that [`contents`] has read, of the unit of this name; `place` is where they come from.
+///
+/// # Errors
+/// Several temperature nodes, which no calibration file has.
+pub fn calibration(bytes: &[u8], device: &str, place: &str) -> Result<Calibration> {
+    let (mut nodes, mut effects) = (Vec::new(), Vec::new());
+    let stored = stored::read(
+        bytes,
+        |node| nodes.push(*node),
+        |record| effects.push(on_device(record)),
+    );
+    let (Ok(stored), [node]) = (stored, nodes.as_slice()) else {
+        let problem = format!(
+            "it keeps {} temperature nodes, and a calibration file is of one temperature",
+            nodes.len()
+        );
+        return Err(Error::device(
+            place,
+            problem,
+            "fetch the bytes: --bytes FILE",
+        ));
+    };
+    let origin = stored.origin;
+    let kept = Kept {
+        device: device.to_owned(),
+        unit_id: origin.unit_id.as_ref().map(origin::digits),
+        created: origin.created_s.and_then(origin::date),
+        sha256: origin.samples_sha256.as_ref().map(origin::digits),
+        temp_c: node.temp_c,
+        models: [node.model.gyro, node.model.accel],
+        effects,
+    };
+    Calibration::kept(&kept, place)
+}
+
+/// An effect in the words that it was uploaded with.
+fn on_device(record: &Record<'_>) -> OnDevice<f32> {
+    match *record {
+        Record::Named {
+            id,
+            coefficients,
+            nonlinear,
+        } => OnDevice {
+            id: id.to_owned(),
+            sensor: match id.starts_with("gyro") {
+                true => Sensor::Gyro,
+                false => Sensor::Accel,
+            },
+            what: What::Named {
+                coefficients: coefficients.to_vec(),
+                form: nonlinear,
+            },
+        },
+        Record::Term {
+            sensor,
+            axis,
+            coefficient,
+            variables,
+        } => OnDevice {
+            id: effect(record).id,
+            sensor,
+            what: What::Term {
+                axis: usize::from(axis),
+                coefficient,
+                variables: variables.to_vec(),
+            },
+        },
+        Record::Code {
+            sensor,
+            axis,
+            weight,
+            zero,
+            errors,
+        } => OnDevice {
+            id: effect(record).id,
+            sensor,
+            what: What::Code {
+                axis: axis.map(usize::from),
+                errors: *errors,
+                weight,
+                zero,
+            },
+        },
+    }
 }
 
 fn node(node: &Node<f32>) -> NodeContents {

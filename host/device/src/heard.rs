@@ -82,6 +82,16 @@ pub struct LineCount {
 }
 
 impl LineCount {
+    /// Both together.
+    pub fn and(&self, other: &Self) -> Self {
+        Self {
+            bytes: self.bytes + other.bytes,
+            frames: self.frames + other.frames,
+            garbled: self.garbled + other.garbled,
+            not_understood: self.not_understood + other.not_understood,
+        }
+    }
+
     /// What has been heard since `before`.
     pub fn since(&self, before: &Self) -> Self {
         Self {

@@ -2,16 +2,17 @@
 
 use mimu_core::compensation::{Affine, Compensation};
 use mimu_core::effects::{REFERENCE_C, Sensor as DeviceSensor};
-use mimu_core::stored::{self, MAX_LENGTH, NODES, ROOM, Record, Stored};
+use mimu_core::stored::{self, MAX_LENGTH, NODES, Origin, ROOM, Record, Stored};
 use mimu_core::table::Node;
 use mimu_core::wire::Capabilities;
 use nalgebra::{Matrix3, Vector3};
 
+use super::origin;
 use super::who::{Hash, Who, unusable};
 use mimu::calibration::{Calibration, NO_SENSE, OnDevice, What};
 use mimu::quantity::Sensor;
 use mimu_recording::RawUnit;
-use mimu_recording::error::{Error, Result};
+use mimu_recording::error::{Argument, Error, Result};
 
 /// A calibration as the device stores it.
 #[derive(Debug, Clone, PartialEq)]
@@ -20,6 +21,8 @@ pub struct Image {
     pub bytes: Vec<u8>,
     /// What it is told apart by.
     pub hash: Hash,
+    /// Unit, time and recording that it is of.
+    pub origin: Origin,
     /// Temperatures of its nodes, °C. A single one is for all temperatures.
     pub node_temp_c: Vec<f32>,
     /// Ids of its effects.
@@ -45,6 +48,7 @@ impl Image {
             ));
             REFERENCE_C
         });
+        let origin = origin::of(calibration, place, &mut warnings);
         let effects = on_device(calibration, place)?;
         let records: Vec<Record<'_>> = effects.iter().map(record).collect();
         let node = Node {
@@ -53,7 +57,8 @@ impl Image {
         };
         let mut bytes = vec![0; MAX_LENGTH];
         let found_with = [&model.gyro.matrix, &model.accel.matrix];
-        let length = stored::encode(found_with, &[node], &records, &mut bytes).map_err(|_| {
+        let length = stored::encode(&origin, found_with, &[node], &records, &mut bytes);
+        let length = length.map_err(|_| {
             let problem = format!("it is longer than the {MAX_LENGTH} bytes that a device stores");
             Error::new(place, problem, "use fewer effects")
         })?;
@@ -67,6 +72,7 @@ impl Image {
         Ok(Self {
             hash: Hash(stored::hash(&bytes)),
             bytes,
+            origin,
             node_temp_c: vec![node.temp_c],
             effects: calibration
                 .effects()
@@ -75,6 +81,23 @@ impl Image {
                 .collect(),
             warnings,
         })
+    }
+
+    /// Refuses a calibration of another unit than that of this greeting.
+    pub fn check_unit(&self, who: &Who, place: &str) -> Result<()> {
+        let of = self.origin.unit_id.as_ref().map(origin::digits);
+        match of.filter(|of| *of != who.unit_id) {
+            None => Ok(()),
+            Some(of) => Err(Error::new(
+                place,
+                format!(
+                    "it is of the unit {of}, and the device is the unit {}",
+                    who.unit_id
+                ),
+                "upload the calibration of this unit, or insist",
+            )
+            .about(Argument::OtherUnit)),
+        }
     }
 
     /// Refuses what the device of this greeting could not use, by the name of the effect: before anything is sent.

@@ -7,6 +7,7 @@
 //! | `line`, `session` | calls, each repeated until it is answered or refused                              |
 //! | `who`        | the greeting: what is there, and whether it can be talked to                           |
 //! | `image`      | a calibration file as the bytes that the device stores                                 |
+//! | `origin`     | of which unit, from when and of what recording a calibration is                        |
 //! | `upload`     | sending them and fetching them back                                                    |
 //! | `contents`   | what stands in them                                                                    |
 //! | `self_test`  | the self-test, and whether the unit stood still for it                                 |
@@ -22,6 +23,7 @@ mod heard;
 mod image;
 mod kalman;
 mod line;
+mod origin;
 mod port;
 pub mod record;
 mod result;
@@ -32,14 +34,16 @@ mod upload;
 mod who;
 
 pub use check::{Checked, Difference, check, rounding, ulps};
-pub use contents::{Contents, ConverterContents, EffectContents, Inverse, NodeContents, contents};
+pub use contents::{
+    Contents, ConverterContents, EffectContents, Inverse, NodeContents, calibration, contents,
+};
 pub use heard::{Answer, Ear, Event, Heard, LineCount, Samples};
 pub use image::{Image, remembers};
 pub use kalman::{Applied, AxisEstimate, Converging, KalmanPlan, KalmanRun, SHORTEST, kalman};
-pub use port::{BAUD, Port, SerialPair, ports, serial_pair};
+pub use port::{BAUD, Port, Ports, SerialPair, ports, serial_pair};
 pub use result::{Counted, DeviceResult};
 pub use self_test::{Passed, SelfTested, self_test};
 pub use session::{Session, refused};
 pub use stream::{Moments, Stream, Streamed, stream};
 pub use upload::{Uploaded, download, upload};
-pub use who::{Hash, Held, Room, Started, Who, unusable};
+pub use who::{Hash, Held, Room, Started, Who, unit_name, unusable};

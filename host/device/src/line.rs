@@ -89,11 +89,11 @@ impl Line {
         match stranger {
             Some((magic, version)) => {
                 check(self.port.name(), magic, version)?;
-                // Of this protocol, and with something in its greeting that is not known here.
+                // Of this protocol, whose greeting is read whatever its length.
                 Err(Error::device(
                     self.port.name(),
-                    "the device is newer than this program: its greeting says what is not known here",
-                    "update mimu on this computer",
+                    "the device greets in this program's protocol, and its greeting cannot be read",
+                    "flash the firmware that belongs to this program (README, flashing)",
                 ))
             }
             None => Ok(answer),

@@ -3,7 +3,7 @@
 use std::io::{ErrorKind as Io, Read as _, Write as _};
 use std::time::Duration;
 
-use serialport::{ClearBuffer, ErrorKind, SerialPort, SerialPortType};
+use serialport::{ClearBuffer, ErrorKind, SerialPort, SerialPortInfo, SerialPortType};
 
 use mimu_recording::error::{Error, Result};
 
@@ -17,6 +17,7 @@ const POLL: Duration = Duration::from_millis(20);
 pub struct Port {
     name: String,
     serial: Box<dyn SerialPort>,
+    lost: bool,
 }
 
 impl Port {
@@ -31,6 +32,7 @@ impl Port {
         Ok(Self {
             name: name.to_owned(),
             serial,
+            lost: false,
         })
     }
 
@@ -73,7 +75,13 @@ impl Port {
         Ok(())
     }
 
-    fn gone(&self) -> Error {
+    /// Whether it has vanished.
+    pub fn is_lost(&self) -> bool {
+        self.lost
+    }
+
+    fn gone(&mut self) -> Error {
+        self.lost = true;
         Error::device(
             &self.name,
             "the port has vanished",
@@ -106,34 +114,83 @@ pub type SerialPair = (
     Box<dyn std::io::Write + Send>,
 );
 
-/// Ports of this computer that a board can be at: those on USB, or all of them if none says that it is.
-pub fn ports() -> Vec<String> {
-    // A system that cannot list its ports has none to offer; one that is named still opens.
-    let all = serialport::available_ports().unwrap_or_default();
-    let on_usb =
-        |p: &&serialport::SerialPortInfo| matches!(p.port_type, SerialPortType::UsbPort(_));
-    let some = all.iter().any(|p| on_usb(&p));
-    let mut names: Vec<String> = all
-        .iter()
-        .filter(|p| !some || on_usb(p))
-        .map(|p| p.port_name.clone())
-        .collect();
-    names.sort();
-    names
+/// Vendor of the debuggers on ST's boards, and the products of them that have a serial port: ST-LINK/V2-1, with and without a drive, and
+/// STLINK-V3E, -V3S, -V3 with two ports, -V3E without a drive, -V3PWR (OpenOCD's list, `stlink_usb.c`).
+const ST_LINK: (u16, &[u16]) = (
+    0x0483,
+    &[0x374b, 0x3752, 0x374e, 0x374f, 0x3753, 0x3754, 0x3757],
+);
+/// The firmware's own USB: `USB_VENDOR` and `USB_PRODUCT` of its design parameters.
+const OWN: (u16, &[u16]) = (0x1209, &[0x0001]);
+
+/// The serial ports of this computer.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Ports {
+    /// Those that a board can be at: a debugger of ST, or the firmware's own USB.
+    pub of_boards: Vec<String>,
+    /// The others, each with what it is: nothing is sent to one that nobody names, since what listens there is not ours to disturb.
+    pub others: Vec<String>,
 }
 
-/// The ports as a remedy: what there is to choose from.
-pub(super) fn listed(names: &[String]) -> String {
-    match names {
-        [] => "no serial port is there: plug the board in".into(),
-        names => format!("name one of {}", names.join(", ")),
+/// The serial ports of this computer.
+pub fn ports() -> Ports {
+    // A system that cannot list its ports has none to offer; one that is named still opens.
+    sorted(serialport::available_ports().unwrap_or_default())
+}
+
+fn sorted(mut all: Vec<SerialPortInfo>) -> Ports {
+    all.sort_by(|a, b| a.port_name.cmp(&b.port_name));
+    let mut ports = Ports::default();
+    for SerialPortInfo {
+        port_name,
+        port_type,
+    } in all
+    {
+        match port_type {
+            SerialPortType::UsbPort(usb) => {
+                let is = |(vendor, products): (u16, &[u16])| {
+                    usb.vid == vendor && products.contains(&usb.pid)
+                };
+                if is(ST_LINK) || is(OWN) {
+                    ports.of_boards.push(port_name);
+                    continue;
+                }
+                let named = usb.product.map(|product| format!(", {product}"));
+                ports.others.push(format!(
+                    "{port_name} ({:04x}:{:04x}{})",
+                    usb.vid,
+                    usb.pid,
+                    named.unwrap_or_default()
+                ));
+            }
+            _ => ports.others.push(format!("{port_name} (not USB)")),
+        }
+    }
+    ports
+}
+
+impl Ports {
+    /// What there is to choose from, as a remedy.
+    pub(super) fn listed(&self) -> String {
+        match [&self.of_boards[..], &self.others].concat().as_slice() {
+            [] => "no serial port is there: plug the board in".into(),
+            names => format!("name one of {}", names.join(", ")),
+        }
+    }
+
+    /// What was not tried, as a part of a sentence; empty if there is nothing.
+    pub(super) fn left_alone(&self) -> String {
+        match self.others.as_slice() {
+            [] => String::new(),
+            others => format!(", left alone as no board of ours: {}", others.join(", ")),
+        }
     }
 }
 
 fn not_opened(name: &str, error: &serialport::Error) -> Error {
     // A pseudo-terminal or a board that was just pulled out can fail in ways of its own: the system's words then.
     let (problem, remedy) = match error.kind() {
-        ErrorKind::Io(Io::NotFound) => ("there is no such port".into(), listed(&ports())),
+        ErrorKind::Io(Io::NotFound) => ("there is no such port".into(), ports().listed()),
         ErrorKind::Io(Io::PermissionDenied) => (
             "no permission to open the port".into(),
             "join the group that owns it (`sudo usermod -aG dialout $USER` on Debian) and log in again"
@@ -145,10 +202,10 @@ fn not_opened(name: &str, error: &serialport::Error) -> Error {
             "close that program (a terminal, a recording), or wait until it is done".into(),
         ),
         _ => match std::fs::metadata(name).is_ok_and(|m| m.is_file() || m.is_dir()) {
-            true => ("this is not a serial port".into(), listed(&ports())),
+            true => ("this is not a serial port".into(), ports().listed()),
             false => (
                 format!("it cannot be opened as a serial port: {}", error.description),
-                listed(&ports()),
+                ports().listed(),
             ),
         },
     };
@@ -158,6 +215,42 @@ fn not_opened(name: &str, error: &serialport::Error) -> Error {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn only_ports_of_boards_are_tried_and_the_others_are_named() {
+        let port = |name: &str, usb: Option<(u16, u16, &str)>| SerialPortInfo {
+            port_name: name.into(),
+            port_type: match usb {
+                None => SerialPortType::Unknown,
+                Some((vid, pid, product)) => SerialPortType::UsbPort(serialport::UsbPortInfo {
+                    vid,
+                    pid,
+                    serial_number: None,
+                    manufacturer: None,
+                    product: Some(product.into()),
+                }),
+            },
+        };
+        // A GPS receiver, an Arduino, a multimeter at a serial port of the mainboard.
+        let ports = sorted(vec![
+            port("ttyUSB0", Some((0x067b, 0x2303, "PL2303"))),
+            port("ttyACM1", Some((0x0483, 0x374e, "STLINK-V3"))),
+            port("ttyS0", None),
+            port("ttyACM2", Some((0x2341, 0x0043, "Uno"))),
+            port("ttyACM0", Some((0x1209, 0x0001, "mimu"))),
+            // Of the same maker, and no debugger: somebody's own device.
+            port("ttyACM3", Some((0x0483, 0x5740, "VCP"))),
+        ]);
+        assert_eq!(ports.of_boards, ["ttyACM0", "ttyACM1"]);
+        let others = [
+            "ttyACM2 (2341:0043, Uno)",
+            "ttyACM3 (0483:5740, VCP)",
+            "ttyS0 (not USB)",
+            "ttyUSB0 (067b:2303, PL2303)",
+        ];
+        assert_eq!(ports.others, others);
+        assert!(ports.left_alone().contains("ttyACM2 (2341:0043, Uno)"));
+    }
 
     #[test]
     fn every_reason_why_a_port_does_not_open_is_told_apart() {

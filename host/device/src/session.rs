@@ -6,7 +6,8 @@ use mimu_core::wire::{Refusal, Request};
 
 use super::heard::{Answer, Event, LineCount};
 use super::line::{ATTEMPTS, Line};
-use super::port::{Port, listed, ports};
+use super::origin;
+use super::port::{Port, ports};
 use super::who::{Who, unusable};
 use mimu_recording::error::{Argument, Error, Result};
 
@@ -22,15 +23,15 @@ pub struct Session {
 }
 
 impl Session {
-    /// Opens the port and greets. Without a name, tries all ports: exactly one has to greet.
+    /// Opens the port and greets. Without a name, tries those that a board of ours can be at: exactly one has to greet.
     pub fn open(port: Option<&str>) -> Result<Self> {
         if let Some(name) = port {
             return Self::greet(Port::open(name)?);
         }
-        let names = ports();
+        let ports = ports();
         let mut found: Vec<Self> = Vec::new();
         let mut reasons = Vec::new();
-        for name in &names {
+        for name in &ports.of_boards {
             match Port::open(name).and_then(Self::greet) {
                 Ok(session) => found.push(session),
                 Err(error) => {
@@ -39,26 +40,30 @@ impl Session {
                 }
             }
         }
+        let refuse = |problem: String, remedy: String| {
+            Err(Error::device("ports", problem, remedy).about(Argument::Port))
+        };
         match (found.pop(), found.as_slice()) {
             (Some(only), []) => Ok(only),
-            (Some(_), _) => {
-                Err(
-                    Error::device("ports", "more than one device greets", listed(&names))
-                        .about(Argument::Port),
-                )
-            }
+            (Some(_), _) => refuse("more than one device greets".into(), ports.listed()),
             (None, _) => {
                 let problem = match reasons.is_empty() {
-                    true => "no serial port is there".to_string(),
+                    true => "no serial port of a board is there (ST-LINK, or the board's own USB)"
+                        .to_string(),
                     false => format!(
                         "no device greets ({})",
                         reasons.join("; ").replace(';', ",")
                     ),
                 };
                 let remedy = "plug the board in, or name its port";
-                Err(Error::device("ports", problem, remedy).about(Argument::Port))
+                refuse(problem + &ports.left_alone(), remedy.into())
             }
         }
+    }
+
+    /// Whether the port has vanished: the board was unplugged, or is without power.
+    pub fn is_lost(&self) -> bool {
+        self.line.port.is_lost()
     }
 
     fn greet(port: Port) -> Result<Self> {
@@ -260,6 +265,18 @@ pub fn refused(port: &str, purpose: &str, refusal: &Refusal) -> Error {
             "it is busy with something else".into(),
             "wait a few seconds and run it again",
         ),
+        Refusal::OtherUnit { unit_id } => (
+            format!("it is of the unit {}", origin::digits(unit_id)),
+            "upload the calibration of this unit, or insist",
+        ),
+        Refusal::NotKnown => (
+            "for a reason that this program does not know".into(),
+            "update mimu on this computer",
+        ),
     };
-    Error::device(port, format!("the device refuses {purpose}: {why}"), remedy)
+    let error = Error::device(port, format!("the device refuses {purpose}: {why}"), remedy);
+    match refusal {
+        Refusal::OtherUnit { .. } => error.about(Argument::OtherUnit),
+        _ => error,
+    }
 }

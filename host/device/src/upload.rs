@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use super::heard::Answer;
 use super::image::Image;
+use super::origin;
 use super::session::{PATIENCE, Session, refused};
 use super::who::Hash;
 use mimu_recording::error::{Error, Result};
@@ -26,12 +27,14 @@ pub struct Uploaded {
     pub bytes: usize,
     /// Hash of the calibration before, if there was one.
     pub before: Option<Hash>,
-    /// The device held it already, and nothing was written.
+    /// The device held it already, byte by byte, and nothing was written.
     pub was_there: bool,
     /// Messages that had to be sent again.
     pub repeated: u32,
     /// Times that the device restarted and the upload began anew.
     pub restarts: u32,
+    /// Number of the unit that the calibration is of, if it says so.
+    pub unit_id: Option<String>,
     /// Temperatures of its nodes, °C.
     pub node_temp_c: Vec<f32>,
     /// Ids of its effects.
@@ -42,15 +45,24 @@ pub struct Uploaded {
 
 /// Sends a calibration, has it stored, and reads it back byte by byte. `progress` hears the share that is done, up to 1.
 ///
+/// `other_unit`: also if it is of another unit; refused by the device else.
+///
 /// Whatever fails, and whenever: the device holds the old calibration or the new one, whole. The error says which, if the device still
 /// says it.
-pub fn upload(session: &mut Session, image: &Image, progress: impl Fn(f64)) -> Result<Uploaded> {
-    let before = session.hello()?.stored.map(|s| s.hash);
+pub fn upload(
+    session: &mut Session,
+    image: &Image,
+    other_unit: bool,
+    progress: impl Fn(f64),
+) -> Result<Uploaded> {
+    let before = session.hello()?.stored.as_ref().map(|s| s.hash);
     let repeated = session.repeated();
     let was_there = before == Some(image.hash);
     let mut restarts = 0;
     if !was_there {
-        while !send(session, image, &progress).map_err(|error| told(session, image, error))? {
+        while !send(session, image, other_unit, &progress)
+            .map_err(|error| told(session, image, error))?
+        {
             restarts += 1;
             if restarts == BEGINNINGS {
                 let problem = format!("the device restarted in each of {BEGINNINGS} uploads");
@@ -76,6 +88,7 @@ pub fn upload(session: &mut Session, image: &Image, progress: impl Fn(f64)) -> R
         was_there,
         repeated: session.repeated() - repeated,
         restarts,
+        unit_id: image.origin.unit_id.as_ref().map(origin::digits),
         node_temp_c: image.node_temp_c.clone(),
         effects: image.effects.clone(),
         warnings: image.warnings.clone(),
@@ -83,11 +96,17 @@ pub fn upload(session: &mut Session, image: &Image, progress: impl Fn(f64)) -> R
 }
 
 /// Sends it once; `false` if the device has forgotten the beginning.
-fn send(session: &mut Session, image: &Image, progress: &impl Fn(f64)) -> Result<bool> {
+fn send(
+    session: &mut Session,
+    image: &Image,
+    other_unit: bool,
+    progress: &impl Fn(f64),
+) -> Result<bool> {
     let (length, hash) = (image.bytes.len() as u32, image.hash);
     let begin = Request::UploadBegin {
         length,
         hash: hash.0,
+        other_unit,
     };
     session.done(begin, "to take a calibration")?;
     let mut offset = 0;
@@ -115,12 +134,21 @@ fn send(session: &mut Session, image: &Image, progress: &impl Fn(f64)) -> Result
         Answer::Done => {}
         // Either it restarted in between, or it has stored it and the answer was lost: the greeting tells the two apart.
         Answer::Refused(Refusal::NoUpload) => {
-            return Ok(session.hello()?.stored.is_some_and(|s| s.hash == hash));
+            return Ok(session
+                .hello()?
+                .stored
+                .as_ref()
+                .is_some_and(|s| s.hash == hash));
         }
         Answer::Refused(refusal) => return Err(refused(session.port(), purpose, &refusal)),
         _ => return Err(session.unexpected(purpose)),
     }
-    if session.hello()?.stored.is_none_or(|s| s.hash != hash) {
+    if session
+        .hello()?
+        .stored
+        .as_ref()
+        .is_none_or(|s| s.hash != hash)
+    {
         return Err(Error::device(
             session.port(),
             "it says that the calibration is stored, and greets with another",
@@ -133,7 +161,7 @@ fn send(session: &mut Session, image: &Image, progress: &impl Fn(f64)) -> Result
 /// `error`, with what the device holds now.
 fn told(session: &mut Session, image: &Image, error: Error) -> Error {
     let holds = match session.hello() {
-        Ok(who) => match who.stored {
+        Ok(who) => match &who.stored {
             None => "the device holds no calibration, as before".to_string(),
             Some(s) if s.hash == image.hash => "the device holds the new calibration".to_string(),
             Some(s) => format!("the device keeps the calibration {}", s.hash),
@@ -145,7 +173,7 @@ fn told(session: &mut Session, image: &Image, error: Error) -> Error {
 
 /// The calibration in use, as the device stores it: read in parts, its hash compared with that of the greeting.
 pub fn download(session: &mut Session) -> Result<Vec<u8>> {
-    let Some(info) = session.hello()?.stored else {
+    let Some(info) = session.hello()?.stored.clone() else {
         let [a, b] = &session.who().slots;
         return Err(Error::device(
             session.port(),

@@ -4,12 +4,13 @@ use std::fmt;
 
 use serde::{Serialize, Serializer};
 
-use mimu_core::stored::{Refused, VERSION};
+use mimu_core::stored::{OLDEST, Refused, VERSION};
 use mimu_core::wire::{
     Capabilities, Compatibility, EFFECTS, Greeting, MAGIC, PROTOCOL, Slot, Start, Version,
     compatibility,
 };
 
+use super::origin;
 use mimu_recording::error::{Error, Result};
 
 /// A [`Greeting`], kept: the result of `mimu device info`.
@@ -60,7 +61,7 @@ pub struct Room {
 }
 
 /// The calibration that a device uses, as it greets with it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Held {
     /// What it is told apart by.
     pub hash: Hash,
@@ -70,6 +71,10 @@ pub struct Held {
     pub nodes: u8,
     /// Effects.
     pub effects: u8,
+    /// Number of the unit that it is of, if it says so.
+    pub unit_id: Option<String>,
+    /// When it was made, RFC 3339, if it says so.
+    pub created: Option<String>,
 }
 
 /// What a calibration is told apart by. In JSON 16 hexadecimal digits: many programs read numbers of 53 bits.
@@ -116,6 +121,8 @@ pub enum Started {
     },
     /// None of these.
     Other,
+    /// A reason that this program does not know.
+    NotKnown,
 }
 
 impl fmt::Display for Started {
@@ -128,6 +135,7 @@ impl fmt::Display for Started {
             Self::Panic { file, line } => write!(f, "panic in {file}, line {line}"),
             Self::Fault { pc, cfsr } => write!(f, "fault at {pc:#010x}, CFSR {cfsr:#010x}"),
             Self::Other => f.write_str("unknown"),
+            Self::NotKnown => f.write_str("a reason that this program does not know"),
         }
     }
 }
@@ -145,6 +153,7 @@ impl From<Start<'_>> for Started {
             },
             Start::Fault { pc, cfsr } => Self::Fault { pc, cfsr },
             Start::Other => Self::Other,
+            Start::NotKnown => Self::NotKnown,
         }
     }
 }
@@ -155,11 +164,7 @@ impl From<&Greeting<'_>> for Who {
             protocol: greeting.protocol,
             firmware: greeting.firmware.into(),
             board: greeting.board.into(),
-            unit_id: greeting
-                .unit_id
-                .iter()
-                .map(|b| format!("{b:02x}"))
-                .collect(),
+            unit_id: origin::digits(&greeting.unit_id),
             capabilities: greeting.capabilities,
             effects: EFFECTS
                 .iter()
@@ -182,6 +187,12 @@ impl From<&Greeting<'_>> for Who {
                 bytes: held.length,
                 nodes: held.nodes,
                 effects: held.effects,
+                unit_id: Some(held.unit_id)
+                    .filter(|id| *id != [0; 12])
+                    .map(|id| origin::digits(&id)),
+                created: Some(held.created_s)
+                    .filter(|s| *s != 0)
+                    .and_then(origin::date),
             }),
             slots: greeting.slots.each_ref().map(slot),
             warnings: version_warning(greeting.protocol).into_iter().collect(),
@@ -255,21 +266,7 @@ pub(super) fn check(port: &str, magic: [u8; 4], protocol: Version) -> Result<()>
     let stub = Greeting {
         magic,
         protocol,
-        firmware: "",
-        board: "",
-        unit_id: [0; 12],
-        capabilities: Capabilities(0),
-        effects: 0,
-        effects_room: 0,
-        nodes_room: 0,
-        stored_room: 0,
-        sample_rate_hz: 0,
-        channels: "",
-        raw_unit: "",
-        start: Start::Other,
-        starts: 0,
-        stored: None,
-        slots: [Slot::Empty; 2],
+        ..Greeting::default()
     };
     let versions = versions(protocol);
     match compatibility(&stub) {
@@ -303,13 +300,20 @@ fn versions(device: Version) -> String {
     )
 }
 
+/// Name of a unit that was given none: by its number.
+pub fn unit_name(unit_id: &str) -> String {
+    format!("mimu-{unit_id}")
+}
+
 /// Why bytes are not a calibration, in words.
 pub fn unusable(refused: &Refused) -> String {
     match refused {
         Refused::NotACalibration => "they do not begin as a calibration does".into(),
         Refused::Length => "their length is not the one that they state".into(),
         Refused::Version { found } => {
-            format!("their layout is of version {found}, and this program's of version {VERSION}")
+            format!(
+                "their layout is of version {found}, and this program reads {OLDEST} to {VERSION}"
+            )
         }
         Refused::Check => "their CRC does not hold".into(),
         Refused::Node { at } => format!(
@@ -329,6 +333,7 @@ fn slot(slot: &Slot) -> String {
         Slot::Whole { generation } => format!("whole, number {generation}"),
         Slot::Unfinished => "unfinished: its writing, or its erasing, was cut off".into(),
         Slot::Damaged => "damaged: it was whole once".into(),
+        Slot::NotKnown => "something that this program does not know".into(),
         Slot::NotUsable(refused) => format!("whole, and not usable: {}", unusable(refused)),
     }
 }

@@ -1,10 +1,12 @@
 //! The calibration file: TOML that a program reads and a person can apply with a pocket calculator.
 
 mod effect;
+mod kept;
 mod of_fit;
 mod on_device;
 
 pub use effect::{CoefficientTable, ConverterTable, EffectTable, FormTable};
+pub use kept::Kept;
 pub use on_device::{NO_SENSE, OnDevice, What};
 
 use std::path::Path;
@@ -20,7 +22,7 @@ use crate::quantity::Sensor;
 use crate::toml_layout;
 use crate::triad::{Covariance, Forward};
 use mimu_recording::error::{Error, Result};
-use mimu_recording::{RawUnit, Reference, read_text};
+use mimu_recording::{Manifest, RawUnit, Reference, read_text};
 
 /// Version of the layout.
 const FORMAT: &str = "mimu-calibration/1";
@@ -42,6 +44,11 @@ const HEADER_OF_KEYS: &str = "\
 # non-orthogonalities yz, zy, zx. sha256 is that of the samples file, temp_c the mean of its dwells in degrees Celsius.
 ";
 
+const HEADER_OF_KEPT: &str = "\
+# Fetched from a device, which keeps no standard deviations, no covariance and no error figures: how well it is known is not in here.
+# Numbers are of single precision. temp_c is the temperature that the device lists it at, in degrees Celsius.
+";
+
 /// A calibration as a file holds it.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -50,8 +57,12 @@ pub struct Calibration {
     pub format: String,
     /// Unit that it is for.
     pub device: String,
-    /// When it was made, RFC 3339.
-    pub created: String,
+    /// The unit's own number, where it was recorded by `mimu record`: 24 hexadecimal digits.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub unit_id: Option<String>,
+    /// When it was made, RFC 3339; unknown of one that a device did not keep it of.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub created: Option<String>,
     /// Program and version that made it.
     pub tool: String,
     /// What it was made from.
@@ -75,19 +86,23 @@ pub struct Calibration {
 #[serde(deny_unknown_fields)]
 pub struct Origin {
     /// SHA-256 of its samples file.
-    pub sha256: String,
-    /// What was known of its input.
-    pub reference: Reference,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sha256: Option<String>,
+    /// What was known of its input; a device does not keep it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reference: Option<Reference>,
     /// Unit of its raw columns.
     pub raw_unit: RawUnit,
-    /// Local gravity, m/s².
-    pub gravity_mps2: f64,
+    /// Local gravity, m/s²; a device does not keep it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gravity_mps2: Option<f64>,
     /// Mean temperature of the dwells, °C, if known.
     #[serde(default)]
     pub temp_c: Option<f64>,
 }
 
-/// One triad in a calibration file.
+/// One triad in a calibration file. Standard deviations, intervals, covariance and error figures are there all together, or not at all, as
+/// in a calibration that was fetched from a device, which keeps none.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[allow(non_snake_case)] // C, P: the letters of the formulas, in the file as in the papers
@@ -107,19 +122,26 @@ pub struct TriadTable {
     /// SI.
     pub o: [f64; 3],
     /// Standard deviations of C.
-    pub sigma_C: [[f64; 3]; 3],
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sigma_C: Option<[[f64; 3]; 3]>,
     /// Standard deviations of o.
-    pub sigma_o: [f64; 3],
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sigma_o: Option<[f64; 3]>,
     /// Halves of the 95 % intervals of C.
-    pub interval_C: [[f64; 3]; 3],
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub interval_C: Option<[[f64; 3]; 3]>,
     /// Halves of the 95 % intervals of o.
-    pub interval_o: [f64; 3],
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub interval_o: Option<[f64; 3]>,
     /// Order of the covariance.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub parameters: Vec<String>,
     /// 12x12.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub covariance: Vec<Vec<f64>>,
     /// How well it did.
-    pub judged: Judged,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub judged: Option<Judged>,
     /// The same calibration the other way.
     pub forward: ForwardTable,
     /// And as physical quantities.
@@ -173,19 +195,23 @@ pub struct PhysicalTable {
     /// Raw per SI.
     pub scale_factor: [f64; 3],
     /// Standard deviations.
-    pub sigma_scale_factor: [f64; 3],
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sigma_scale_factor: Option<[f64; 3]>,
     /// Raw.
     pub bias: [f64; 3],
     /// Standard deviations.
-    pub sigma_bias: [f64; 3],
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sigma_bias: Option<[f64; 3]>,
     /// θx, θy, θz, degrees.
     pub misalignment_deg: [f64; 3],
     /// Standard deviations.
-    pub sigma_misalignment_deg: [f64; 3],
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sigma_misalignment_deg: Option<[f64; 3]>,
     /// βyz, βzy, βzx, degrees.
     pub non_orthogonality_deg: [f64; 3],
     /// Standard deviations.
-    pub sigma_non_orthogonality_deg: [f64; 3],
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sigma_non_orthogonality_deg: Option<[f64; 3]>,
 }
 
 impl Calibration {
@@ -220,7 +246,11 @@ impl Calibration {
             true => "",
             false => HEADER_OF_EFFECTS,
         };
-        toml_layout::to_toml(&format!("{HEADER}{effects}{HEADER_OF_KEYS}"), self)
+        let keys = match self.is_uncertain() {
+            true => HEADER_OF_KEYS,
+            false => HEADER_OF_KEPT,
+        };
+        toml_layout::to_toml(&format!("{HEADER}{effects}{keys}"), self)
     }
 
     /// What can be applied, with its effects as they are removed.
@@ -265,7 +295,17 @@ impl Calibration {
                     "use the version of mimu that wrote it",
                 ));
             }
-            if table.covariance.len() != 12 || table.covariance.iter().any(|r| r.len() != 12) {
+            if let Some((there, missing)) = table.half_uncertain() {
+                return Err(Error::new(
+                    place,
+                    format!("{there} is there and {missing} is not: the file is cut or was edited"),
+                    "copy it again, or fit the recording again",
+                ));
+            }
+            let known = table.sigma_C.is_some();
+            if known && table.covariance.len() != 12
+                || table.covariance.iter().any(|r| r.len() != 12)
+            {
                 return Err(Error::new(
                     place,
                     "covariance is not 12 by 12",
@@ -281,6 +321,14 @@ impl Calibration {
                 ));
             };
             check_both_ways(table, &forward, &place)?;
+        }
+        let digits = |id: &str| id.len() == 24 && id.bytes().all(|b| b.is_ascii_hexdigit());
+        if let Some(id) = self.unit_id.as_ref().filter(|id| !digits(id)) {
+            return Err(Error::new(
+                format!("{place}, unit_id"),
+                format!("{id:?} is no number of a unit"),
+                "write 24 hexadecimal digits, as `mimu device info` gives them, or leave the key out",
+            ));
         }
         if self.gyro.is_none() && self.accel.is_none() {
             return Err(Error::new(
@@ -320,9 +368,30 @@ impl Calibration {
         }
     }
 
-    /// Covariance of the inverse model of `sensor`: C by rows, then o.
+    /// Whether it says how well it is known. One that was fetched from a device does not.
+    pub fn is_uncertain(&self) -> bool {
+        let mut tables = [&self.gyro, &self.accel].into_iter().flatten();
+        tables.all(|table| table.sigma_C.is_some())
+    }
+
+    /// Whether it is of the unit that was recorded: by its number where both have one, else by its name. If not, how they differ.
+    pub fn other_unit(&self, manifest: &Manifest) -> Option<String> {
+        match (&self.unit_id, manifest.unit_id()) {
+            (Some(ours), Some(theirs)) => (!ours.eq_ignore_ascii_case(theirs)).then(|| {
+                format!("the calibration is of the unit {ours}, the recording of the unit {theirs}")
+            }),
+            _ => (self.device != manifest.device).then(|| {
+                format!(
+                    "the calibration is for {:?}, the recording of {:?}",
+                    self.device, manifest.device
+                )
+            }),
+        }
+    }
+
+    /// Covariance of the inverse model of `sensor`: C by rows, then o. None where [it is not known](Self::is_uncertain).
     pub fn covariance(&self, sensor: Sensor) -> Option<Covariance> {
-        let table = self.table(sensor)?;
+        let table = self.table(sensor).filter(|t| !t.covariance.is_empty())?;
         Some(Covariance::from_fn(|i, j| table.covariance[i][j]))
     }
 
@@ -333,6 +402,23 @@ impl Calibration {
             matrix: Matrix3::from_fn(|i, j| table.C[i][j]),
             offset: Vector3::from(table.o),
         })
+    }
+}
+
+impl TriadTable {
+    /// Of what belongs together, something that is there and something that is not.
+    fn half_uncertain(&self) -> Option<(&'static str, &'static str)> {
+        let all = [
+            ("sigma_C", self.sigma_C.is_some()),
+            ("sigma_o", self.sigma_o.is_some()),
+            ("interval_C", self.interval_C.is_some()),
+            ("interval_o", self.interval_o.is_some()),
+            ("covariance", !self.covariance.is_empty()),
+            ("[judged]", self.judged.is_some()),
+        ];
+        let there = all.iter().find(|(_, there)| *there)?;
+        let missing = all.iter().find(|(_, there)| !*there)?;
+        Some((there.0, missing.0))
     }
 }
 

@@ -55,7 +55,7 @@ pub fn verify(prepared: &Prepared, calibration: &Calibration) -> Result<Verifica
     let mut warnings = prepared.condensed.warnings.clone();
     warnings.extend(prepared.dwells.warnings.iter().cloned());
     warnings.extend(check_unit(calibration, manifest, &prepared.place)?);
-    let same_recording = calibration.recording.sha256 == prepared.condensed.sha256;
+    let same_recording = calibration.recording.sha256.as_ref() == Some(&prepared.condensed.sha256);
     if same_recording {
         warnings.push("this is the recording that the calibration was made from: the figures say nothing about new data".into());
     }
@@ -129,13 +129,7 @@ pub(crate) fn check_unit(
             "import it in the other unit, or use the calibration of this unit",
         ));
     }
-    let other = calibration.device != manifest.device;
-    Ok(other.then(|| {
-        format!(
-            "the calibration is for {:?}, the recording of {:?}",
-            calibration.device, manifest.device
-        )
-    }))
+    Ok(calibration.other_unit(manifest))
 }
 
 /// The recording without the effects of the calibration, if it has any.

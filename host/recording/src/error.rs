@@ -65,6 +65,8 @@ pub enum Argument {
     Replace,
     /// Serial port.
     Port,
+    /// Whether a calibration of another unit is stored.
+    OtherUnit,
     /// Topic of a bag.
     Topic,
     /// Whose layout a foreign file has.

@@ -121,12 +121,13 @@ impl Growing {
         self.rows
     }
 
-    /// Ends it: `manifest` takes the place of the one of the beginning, the samples become Parquet if that is wanted. Without a row
-    /// nothing is left.
+    /// Ends it: `manifest` takes the place of the one of the beginning, the samples become Parquet if that is wanted. `complete` writes
+    /// into the rows what was not known before the end. Without a row nothing is left.
     pub fn finish(
         mut self,
         manifest: &Manifest,
         format: SampleFormat,
+        mut complete: Option<&mut dyn FnMut(&mut Batch)>,
         progress: impl Fn(f64),
     ) -> Result<()> {
         self.settle()?;
@@ -142,15 +143,20 @@ impl Growing {
             unfinished: false,
             ..manifest.clone()
         };
-        match format {
-            SampleFormat::Csv => self.state(&manifest),
-            SampleFormat::Parquet => {
-                let recording = Recording::open(&self.directory)?;
-                let mut writer = Writer::create(&self.directory, self.columns, format, true)?;
-                recording.for_each_batch(progress, |batch| writer.write(batch))?;
-                writer.finish(&manifest).map(drop)
-            }
+        if format == SampleFormat::Csv && complete.is_none() {
+            return self.state(&manifest);
         }
+        let recording = Recording::open(&self.directory)?;
+        let mut writer = Writer::create(&self.directory, self.columns, format, true)?;
+        recording.for_each_batch(progress, |batch| match &mut complete {
+            None => writer.write(batch),
+            Some(complete) => {
+                let mut batch = batch.clone();
+                complete(&mut batch);
+                writer.write(&batch)
+            }
+        })?;
+        writer.finish(&manifest).map(drop)
     }
 
     /// Puts a manifest in the place of the one that is there.

@@ -194,6 +194,12 @@ impl Manifest {
         self.power_on_s.is_none().then_some(start)
     }
 
+    /// Number of the unit, if it was recorded from one that has any: that of an emulated one is zero.
+    pub fn unit_id(&self) -> Option<&str> {
+        let recorded = self.recorded.as_ref()?;
+        Some(recorded.unit_id.as_str()).filter(|id| id.bytes().any(|digit| digit != b'0'))
+    }
+
     /// Manifest with the keys that have no default; the others empty.
     pub fn new(
         device: impl Into<String>,

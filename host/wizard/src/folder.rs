@@ -354,7 +354,7 @@ impl Taking {
     /// Ends it, so that the other commands read it.
     pub fn finish(self, folder: &Folder) -> Result<PathBuf> {
         let format = SampleFormat::Csv;
-        self.growing.finish(&self.manifest, format, |_| {})?;
+        self.growing.finish(&self.manifest, format, None, |_| {})?;
         Ok(folder.file(self.part.name()))
     }
 }

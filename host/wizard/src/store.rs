@@ -81,7 +81,7 @@ impl Wizard<'_> {
         let (hash, effects) = unit.station.with(move |session| {
             let image = Image::new(&given, &file)?;
             image.check_device(&given, session.who(), &file)?;
-            let done = upload(session, &image, |_| {})?;
+            let done = upload(session, &image, false, |_| {})?;
             Ok((done.hash.0, done.effects))
         })?;
         let shown = format!("{hash:016x}");
@@ -124,7 +124,7 @@ impl Wizard<'_> {
         let since = Instant::now();
         loop {
             let held = self.units[k].station.with(|session| {
-                let stored = session.hello()?.stored;
+                let stored = session.hello()?.stored.as_ref();
                 Ok(stored.map(|s| s.hash.0))
             });
             match held {

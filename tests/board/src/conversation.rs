@@ -170,6 +170,7 @@ impl Conversation {
         let begin = Request::UploadBegin {
             length: bytes.len() as u32,
             hash: mimu_core::stored::hash(bytes),
+            other_unit: false,
         };
         assert_eq!(self.ask(begin), Answer::Done);
         for (k, part) in bytes.chunks(CHUNK).enumerate() {

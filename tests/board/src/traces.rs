@@ -145,7 +145,14 @@ fn stored(temps: &[f64], records: &[Record<'_>]) -> Vec<u8> {
     let found_with = model(0.0);
     let mut bytes = vec![0; stored::MAX_LENGTH];
     let matrices = [&found_with.gyro.matrix, &found_with.accel.matrix];
-    let length = stored::encode(matrices, &nodes, records, &mut bytes).expect("there is room");
+    let length = stored::encode(
+        &stored::Origin::UNKNOWN,
+        matrices,
+        &nodes,
+        records,
+        &mut bytes,
+    )
+    .expect("there is room");
     bytes.truncate(length);
     bytes
 }

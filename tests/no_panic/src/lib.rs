@@ -9,7 +9,7 @@ use mimu_core::compensation::{Affine, Compensation, Sample};
 use mimu_core::effects::{Directions, Effect, Effects, Refused, Sensor, State, Variable};
 use mimu_core::kalman::{Bank, Filter, Innovation, Rejected};
 use mimu_core::single;
-use mimu_core::stored::{self, Record, Stored, TooLong};
+use mimu_core::stored::{self, Origin, Record, Stored, TooLong};
 use mimu_core::table::{self, Node, Table};
 use mimu_core::wire::{
     Call, CompensatedBatch, Decoder, EncodeError, MAX_FRAME, Message, RawBatch, Sums,
@@ -167,12 +167,13 @@ pub fn table_follow(table: &Table<f32, 16>, temp_c: f32) -> table::State<f32> {
 /// [`stored::encode`].
 #[inline(never)]
 pub fn stored_encode(
+    origin: &Origin,
     found_with: [&Matrix3<f32>; 2],
     nodes: &[Node<f32>],
     effects: &[Record<'_>],
     out: &mut [u8],
 ) -> Result<usize, TooLong> {
-    stored::encode(found_with, nodes, effects, out)
+    stored::encode(origin, found_with, nodes, effects, out)
 }
 
 /// [`stored::decode`] and [`stored::hash`].

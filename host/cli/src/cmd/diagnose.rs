@@ -134,7 +134,10 @@ pub fn run(args: &DiagnoseArgs) -> Result<()> {
     }
     let mut files = Vec::new();
     if let Some(path) = &args.output {
-        let made = Calibration::of(&diagnosis.after, &effects, &now)?;
+        let mut made = Calibration::of(&diagnosis.after, &effects, &now)?;
+        // An imported recording does not know the unit's number; that it is of the same unit was checked.
+        let number = given.as_ref().and_then(|given| given.unit_id.clone());
+        made.unit_id = made.unit_id.or(number);
         files.push(stage(path, made.to_toml())?);
     }
     let next = next_experiment::next(&diagnosis);

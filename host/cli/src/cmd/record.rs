@@ -1,7 +1,7 @@
 //! `mimu record`: arguments and what follows from them.
 
 use std::io::{BufRead as _, IsTerminal as _};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::Duration;
@@ -10,9 +10,9 @@ use crate::report;
 use clap::Args;
 use indicatif::ProgressBar;
 use mimu_device::Session;
-use mimu_device::record::{RecordOptions, Standing, Steps, Wish, record};
-use mimu_recording::SampleFormat;
+use mimu_device::record::{Known, Plan, RecordOptions, Standing, Steps, Wish, record};
 use mimu_recording::error::{Error, Result};
+use mimu_recording::{Inputs, SampleFormat};
 
 use crate::arguments::JsonArgs;
 use crate::cmd::device::{PortArgs, duration, interruption};
@@ -30,16 +30,31 @@ pub struct RecordArgs {
     #[arg(long = "for", value_name = "TIME", value_parser = duration)]
     duration: Option<Duration>,
     /// Mark the dwells: each line on standard input (Enter) begins one, or ends the one that runs
-    #[arg(long, conflicts_with = "step_every")]
+    #[arg(long, conflicts_with_all = ["step_every", "transit"])]
     steps: bool,
     /// Mark the dwells by time: so long a dwell, so long in transit, again and again (`10s,5s`)
     #[arg(long, value_name = "DWELL,TRANSIT", value_parser = every)]
     step_every: Option<(Duration, Duration)>,
-    /// Name of the unit; without it, the number of its microcontroller
+    /// Plan of the experiment (`mimu design -o`): its dwells with their inputs, marked by hand (--steps) or by time (--transit); the
+    /// recording ends with the last of them
+    #[arg(long, value_name = "PLAN", conflicts_with_all = ["step_every", "inputs"])]
+    plan: Option<PathBuf>,
+    /// With --plan: so long in transit between two dwells
+    #[arg(long, value_name = "TIME", value_parser = duration, requires = "plan")]
+    transit: Option<Duration>,
+    /// CSV with the known input of each dwell, as `mimu import` takes it: step, ref_rate_x_dps.., ref_force_x_mps2.., turn_x_deg..
+    ///
+    /// One row for each dwell, by its number from 0; if the rows have labels in place of numbers, in the order of the rows.
+    #[arg(long, value_name = "FILE")]
+    inputs: Option<PathBuf>,
+    /// How long to wait for a port that has vanished, as when the cable was pulled; 0 ends the recording
+    #[arg(long, value_name = "TIME", default_value = "30s", value_parser = patience)]
+    reconnect: Duration,
+    /// Name of the unit; without it, that of the plan, or the number of its microcontroller
     #[arg(long)]
     device: Option<String>,
-    /// Local gravity, m/s²; without it, normal gravity at sea level of --latitude, or 9.80665 and a warning
-    #[arg(long)]
+    /// Local gravity, m/s²; without it, that of the plan, normal gravity at sea level of --latitude, or 9.80665 and a warning
+    #[arg(long, allow_negative_numbers = true)]
     gravity: Option<f64>,
     /// Latitude, degrees
     #[arg(long, allow_negative_numbers = true)]
@@ -51,14 +66,30 @@ pub struct RecordArgs {
     json: JsonArgs,
 }
 
+fn patience(text: &str) -> std::result::Result<Duration, String> {
+    match text {
+        "0" => Ok(Duration::ZERO),
+        text => duration(text),
+    }
+}
+
 fn every(text: &str) -> std::result::Result<(Duration, Duration), String> {
     let (dwell, transit) = text.split_once(',').ok_or("write two times, like 10s,5s")?;
     Ok((duration(dwell)?, duration(transit)?))
 }
 
 pub fn run(args: &RecordArgs) -> Result<()> {
-    check_outputs(&[args.json.file()], &[])?;
-    let gravity_mps2 = match (args.gravity, args.latitude) {
+    let inputs = [args.plan.as_deref(), args.inputs.as_deref()];
+    let inputs: Vec<&Path> = inputs.into_iter().flatten().collect();
+    check_outputs(&[args.json.file()], &inputs)?;
+    let plan = args.plan.as_deref().map(Plan::read).transpose()?;
+    let of_plan = |key: fn(&Plan) -> Option<f64>| plan.as_ref().and_then(key);
+    let latitude_deg = args.latitude.or(of_plan(|plan| plan.latitude_deg));
+    let given = args.gravity.or(match args.latitude {
+        None => of_plan(|plan| plan.gravity_mps2),
+        Some(_) => None,
+    });
+    let gravity_mps2 = match (given, latitude_deg) {
         (Some(gravity), _) => gravity,
         (None, Some(latitude)) => normal_gravity(latitude),
         (None, None) => {
@@ -68,19 +99,52 @@ pub fn run(args: &RecordArgs) -> Result<()> {
             9.80665
         }
     };
+    let (known, table) = match (&plan, &args.plan, &args.inputs) {
+        (Some(plan), Some(path), _) => {
+            let dwells = plan.dwells(gravity_mps2, &path.display().to_string())?;
+            (Some(Known::of_plan(dwells)), plan.is_of_table())
+        }
+        (_, _, Some(path)) => (Some(Known::of_table(Inputs::read(path)?)), true),
+        _ => (None, false),
+    };
+    let steps = match (args.steps, args.step_every, args.transit, &plan) {
+        (true, ..) => match known.as_ref().and_then(Known::planned) {
+            Some(dwells) => Steps::marks_for(dwells),
+            None => Steps::marks(),
+        },
+        (_, Some((dwell, transit)), ..) => Steps::Every(dwell, transit),
+        (_, _, Some(transit), Some(plan)) => {
+            let lengths = known.as_ref().map(Known::lengths).unwrap_or_default();
+            Steps::planned(plan.lead_in(), &lengths, transit)
+        }
+        _ if known.is_some() => {
+            let (place, remedy) = match &args.plan {
+                Some(_) => (
+                    "--plan",
+                    "give --steps and press Enter at each, or the time in between: --transit 5s",
+                ),
+                None => (
+                    "--inputs",
+                    "give --steps and press Enter at each, or --step-every",
+                ),
+            };
+            let problem = "nothing says when a dwell begins and ends";
+            return Err(Error::new(place, problem, remedy));
+        }
+        _ => Steps::Detected,
+    };
     let options = RecordOptions {
         directory: args.output.clone(),
         duration: args.duration,
-        steps: match (args.steps, args.step_every) {
-            (true, _) => Steps::marks(),
-            (_, Some((dwell, transit))) => Steps::Every(dwell, transit),
-            _ => Steps::Detected,
-        },
-        device: args.device.clone(),
+        steps,
+        reconnect: args.reconnect,
+        table,
+        device: (args.device.clone()).or(plan.as_ref().and_then(|plan| plan.device.clone())),
         gravity_mps2,
-        latitude_deg: args.latitude,
+        latitude_deg,
         format: args.format,
     };
+    let titles = known.as_ref().map(titles).unwrap_or_default();
     let mut session = Session::open(args.port.path.as_deref())?;
     for warning in &session.who().warnings {
         eprintln!("warning: {warning}");
@@ -89,7 +153,7 @@ pub fn run(args: &RecordArgs) -> Result<()> {
     let marks = args.steps.then(keyboard).transpose()?;
     let spinner = ProgressBar::new_spinner();
     let look = |standing: &Standing| {
-        spinner.set_message(told(standing, args.steps));
+        spinner.set_message(told(standing, args.steps, &titles));
         spinner.tick();
         Wish {
             end: stop.load(Ordering::Relaxed),
@@ -97,7 +161,7 @@ pub fn run(args: &RecordArgs) -> Result<()> {
         }
     };
     let bar = progress("writing parquet");
-    let summary = record(&mut session, &options, look, |share| {
+    let summary = record(&mut session, &options, known, look, |share| {
         bar.set_position((share * 1000.0) as u64)
     })?;
     spinner.finish_and_clear();
@@ -106,13 +170,29 @@ pub fn run(args: &RecordArgs) -> Result<()> {
     summary.broken_off.map_or(Ok(()), Err)
 }
 
+/// What is to be done in each dwell, as far as that is known.
+fn titles(known: &Known) -> Vec<String> {
+    let all = (0..).map_while(|step| known.title(step));
+    all.map(str::to_owned).collect()
+}
+
 /// The line that a terminal shows.
-fn told(standing: &Standing, steps: bool) -> String {
+fn told(standing: &Standing, steps: bool, titles: &[String]) -> String {
+    if standing.waiting {
+        return "the port has vanished, and is waited for; Ctrl-C ends the recording".into();
+    }
+    let title = |dwell: usize| {
+        let title = titles.get(dwell).map(|title| format!(" ({title})"));
+        title.unwrap_or_default()
+    };
+    let next = standing.dwells as usize;
     let length = standing.last_s.unwrap_or_default() - standing.first_s.unwrap_or_default();
     let dwell = match (steps, standing.step) {
-        (false, _) => String::new(),
-        (true, Some(step)) => format!(", dwell {step}: Enter ends it"),
-        (true, None) => format!(", {} dwells: Enter begins one", standing.dwells),
+        (false, Some(step)) => format!(", dwell {step}{}", title(step as usize)),
+        (false, None) if titles.is_empty() => String::new(),
+        (false, None) => format!(", next is dwell {next}{}", title(next)),
+        (true, Some(step)) => format!(", dwell {step}{}: Enter ends it", title(step as usize)),
+        (true, None) => format!(", {next} dwells: Enter begins one{}", title(next)),
     };
     format!(
         "{length:.1} s, {} samples, {} lost, {:.1} °C{dwell}; Ctrl-C ends the recording",

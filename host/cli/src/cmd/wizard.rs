@@ -5,13 +5,16 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use mimu::quantity::normal_gravity;
+use mimu::readable::STANDARD_GRAVITY;
 use mimu::result::diagnosis::DiagnosisResult;
+use mimu_device::record::Plan;
 use mimu_recording::error::{Error, Result};
 use mimu_wizard::device::DeviceSource;
 use mimu_wizard::drive::{Driver, Person, TextDriver};
 use mimu_wizard::procedure::{Asked, Fixture, Targets, first_steps, verification};
 use mimu_wizard::session::{Wanted, run as carry_out};
 use mimu_wizard::source::{Opener, Source};
+use mimu_wizard::step::Step;
 
 use crate::arguments::JsonArgs;
 use crate::cmd::design::number;
@@ -36,7 +39,7 @@ pub(crate) struct WizardArgs {
     #[arg(long, value_name = "FILE")]
     driver: Option<PathBuf>,
     /// Local gravity, m/s²; without it, normal gravity at sea level of --latitude
-    #[arg(long, required_unless_present = "latitude")]
+    #[arg(long)]
     gravity: Option<f64>,
     /// Latitude, degrees
     #[arg(long, allow_negative_numbers = true)]
@@ -56,6 +59,9 @@ pub(crate) struct WizardArgs {
     /// Half-width of a 95 % interval that is wanted: gyro-bias=0.05 (deg/s), gyro-scale=2000 (ppm), gyro-angle=2000 (µrad), accel-bias=1 (mg), accel-scale=1000, accel-angle=1000; may be repeated
     #[arg(long = "target", value_name = "NAME=VALUE")]
     targets: Vec<String>,
+    /// Plan of `mimu design` to begin with; without it one is made
+    #[arg(long, value_name = "PLAN")]
+    plan: Option<PathBuf>,
     /// All planned dwells and no more, whatever the targets say
     #[arg(long)]
     as_planned: bool,
@@ -124,12 +130,29 @@ impl WizardArgs {
 
     fn asked(&self) -> Result<Asked> {
         let fixture = self.fixture.fixture();
-        let steps = first_steps(fixture, self.dwell, self.rate, self.seed);
-        let gravity = self.gravity.or(self.latitude.map(normal_gravity));
+        let mut gravity = self.gravity.or(self.latitude.map(normal_gravity));
+        let mut latitude_deg = self.latitude;
+        let steps = match &self.plan {
+            None => first_steps(fixture, self.dwell, self.rate, self.seed),
+            Some(path) => {
+                let plan = Plan::read(path)?;
+                gravity = gravity.or(plan.gravity_mps2);
+                latitude_deg = latitude_deg.or(plan.latitude_deg);
+                planned(&plan, fixture, gravity.unwrap_or(STANDARD_GRAVITY), path)?
+            }
+        };
+        let Some(gravity_mps2) = gravity else {
+            let problem = "local gravity is not known, and every scale factor of the accelerometer goes by it";
+            return Err(Error::new(
+                "wizard",
+                problem,
+                "give --gravity, or --latitude",
+            ));
+        };
         Ok(Asked {
             fixture,
-            gravity_mps2: gravity.unwrap_or(mimu::readable::STANDARD_GRAVITY),
-            latitude_deg: self.latitude,
+            gravity_mps2,
+            latitude_deg,
             dwell_s: self.dwell,
             largest_rate_dps: self.rate,
             verification: verification(fixture, &steps, self.dwell, self.rate),
@@ -169,6 +192,38 @@ impl WizardArgs {
             }
         }
     }
+}
+
+/// The steps of a plan.
+fn planned(plan: &Plan, fixture: Fixture, gravity_mps2: f64, path: &Path) -> Result<Vec<Step>> {
+    let place = path.display().to_string();
+    let mut steps = Vec::new();
+    for (k, dwell) in (1..).zip(plan.dwells(gravity_mps2, &place)?) {
+        let Some(up) = dwell.up else {
+            let at = format!("{place}, dwell {k}");
+            let problem = "the plan leaves the pose to the bench, and a person has to be told one";
+            return Err(Error::new(
+                at,
+                problem,
+                "write up = [x, y, z], or leave --plan out",
+            ));
+        };
+        if dwell.rate_dps != 0.0 && fixture != Fixture::Table {
+            let at = format!("{place}, dwell {k}");
+            let problem = "it turns, and nothing but a table holds a rate";
+            return Err(Error::new(
+                at,
+                problem,
+                "use --fixture table, or another plan",
+            ));
+        }
+        steps.push(Step {
+            up,
+            rate_dps: dwell.rate_dps,
+            dwell_s: dwell.length.as_secs_f64(),
+        });
+    }
+    Ok(steps)
 }
 
 pub(crate) fn run(args: &WizardArgs) -> Result<()> {

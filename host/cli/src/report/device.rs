@@ -41,7 +41,7 @@ pub fn info_text(result: &DeviceResult<&Who>) -> String {
         who.channels.join(", "),
         who.raw_unit
     );
-    match who.stored {
+    match &who.stored {
         None => {
             line!(out, "calibration   none");
         }
@@ -53,6 +53,15 @@ pub fn info_text(result: &DeviceResult<&Who>) -> String {
                 s.bytes,
                 s.nodes,
                 s.effects
+            );
+            line!(
+                out,
+                "              {}",
+                origin(
+                    s.unit_id.as_deref(),
+                    Some(&who.unit_id),
+                    s.created.as_deref()
+                )
             );
         }
     }
@@ -87,7 +96,7 @@ pub fn upload_text(result: &DeviceResult<Uploaded>) -> String {
     if done.was_there {
         line!(
             out,
-            "{port}: holds {hash} already ({bytes} bytes, read back)"
+            "{port}: already stored: {hash} ({bytes} bytes, read back)"
         );
     } else {
         let before = done.before.map_or("none".into(), |hash| hash.to_string());
@@ -120,6 +129,11 @@ pub fn download_text(result: &DeviceResult<Contents>) -> String {
         "{port}: calibration {}, {} bytes",
         found.hash,
         found.bytes
+    );
+    line!(
+        out,
+        "{}",
+        origin(found.unit_id.as_deref(), None, found.created.as_deref())
     );
     line!(
         out,
@@ -164,8 +178,28 @@ pub fn download_text(result: &DeviceResult<Contents>) -> String {
             );
         }
     }
-    line!(out, "\nimage: {}", found.file);
+    if let Some(file) = &found.file {
+        line!(
+            out,
+            "\ncalibration: {file} (without standard deviations and covariance, which the device does not keep)"
+        );
+    }
+    if let Some(file) = &found.bytes_file {
+        line!(out, "\nbytes: {file}");
+    }
     out
+}
+
+/// Of which unit a calibration is, beside the one that holds it, and from when.
+fn origin(of: Option<&str>, held_by: Option<&str>, created: Option<&str>) -> String {
+    let unit = match (of, held_by) {
+        (None, _) => "of no known unit".to_string(),
+        (Some(of), Some(unit)) if of == unit => "of this unit".to_string(),
+        (Some(of), Some(_)) => format!("of ANOTHER unit, {of}"),
+        (Some(of), None) => format!("of the unit {of}"),
+    };
+    let made = created.map_or("unknown when".to_string(), |at| format!("made {at}"));
+    format!("{unit}, {made}")
 }
 
 /// Result of `mimu device self-test`.
@@ -380,6 +414,13 @@ pub fn record_text(summary: &RecordSummary) -> String {
         .iter()
         .map(|r| format!("the device restarted before {:.3} s: {}", r.t_s, r.start))
         .collect();
+    warnings.extend(s.warnings.iter().cloned());
+    if s.reconnected > 0 {
+        warnings.push(format!(
+            "the port vanished and came back {} times: the time in between is missing",
+            s.reconnected
+        ));
+    }
     for (count, what) in [
         (
             s.saturated,

@@ -12,7 +12,14 @@ pub(super) struct Clock {
     /// Tick and number of the sample that comes next if none is lost.
     next: Option<(u64, u32)>,
     restarted: Option<Option<Started>>,
+    /// The line was lost and is there again; why the device had started, as it says.
+    reconnected: Option<Started>,
 }
+
+/// Silence that may pass before the first batch after the line is there again, beside the time that it was away, s.
+const DELAY_S: f64 = 1.0;
+/// Share by which the clocks of device and PC differ at most.
+const DRIFT: f64 = 0.01;
 
 /// Where a batch has arrived.
 #[derive(Debug, PartialEq)]
@@ -31,6 +38,7 @@ impl Clock {
             rate_hz: f64::from(rate_hz),
             next: None,
             restarted: None,
+            reconnected: None,
         }
     }
 
@@ -40,6 +48,19 @@ impl Clock {
         if self.next.is_some() {
             self.restarted = Some(start);
         }
+    }
+
+    /// The line is there again, and the device has not said whether it went on meanwhile: its next number tells.
+    pub fn reconnected(&mut self, start: Started) {
+        self.reconnected = Some(start);
+    }
+
+    /// Whether a device that begins a batch with this number has begun to count while the line was away, and did not go on. One that
+    /// goes on is ahead by the time that has passed here; one that began anew has no larger number than that time.
+    fn began_anew(&self, number: u32, ahead: u32, silence: Duration) -> bool {
+        let away = silence.as_secs_f64() * self.rate_hz;
+        let room = DRIFT * away + DELAY_S * self.rate_hz;
+        f64::from(number) <= away + room && (f64::from(ahead) - away).abs() > room
     }
 
     /// A batch that begins with this number has arrived, so long after the one before.
@@ -55,8 +76,10 @@ impl Clock {
         };
         let ahead = number.wrapping_sub(expected);
         let back = ahead > u32::MAX / 2;
+        let reconnected = self.reconnected.take();
+        let anew = reconnected.is_some() && self.began_anew(number, ahead, silence);
         let restart = match self.restarted.take() {
-            None if back => Some(None),
+            None if back || anew => Some(reconnected),
             told => told,
         };
         let (tick, missing) = match restart {
@@ -129,6 +152,26 @@ mod tests {
         clock.passed(20);
         let arrival = clock.arrive(10, AT_ONCE);
         assert_eq!((arrival.tick, arrival.missing), ((1 << 32) + 10, 0));
+    }
+
+    #[test]
+    fn after_a_lost_line_the_device_s_own_clock_counts_unless_it_began_anew() {
+        let away = Duration::from_secs(20);
+        let arrival = |recorded: u32, number: u32| {
+            let mut clock = Clock::new(1000);
+            clock.arrive(0, AT_ONCE);
+            clock.passed(recorded as usize);
+            clock.reconnected(Started::PowerOn);
+            let arrival = clock.arrive(number, away);
+            (arrival.tick, arrival.missing, arrival.restart.is_some())
+        };
+        // It went on for 20 s, by its clock 20.1.
+        assert_eq!(arrival(5_000, 25_100), (25_100, 20_100, false));
+        // It was without power, and is on for 15 s: ahead of where it was, and yet another count.
+        assert_eq!(arrival(5_000, 15_000), (25_000, 0, true));
+        assert_eq!(arrival(60_000, 300), (80_000, 0, true));
+        // Time stood still for the device, as for an emulated one that nobody listens to.
+        assert_eq!(arrival(60_000, 60_040), (60_040, 40, false));
     }
 
     #[test]

@@ -1,9 +1,12 @@
 //! Recording a device: its raw stream into a directory that can be read at any time.
 //!
 //! Times are the device's own: sample n of its 1 kHz is at n/1000 s since it began to sample, so that a sample that is missing is a
-//! gap in `t_s` and never moves the ones after it.
+//! gap in `t_s` and never moves the ones after it. So is the time without a line, after a cable was pulled and is back.
 
 mod clock;
+mod known;
+mod line;
+mod plan;
 mod steps;
 
 use std::path::{Path, PathBuf};
@@ -13,12 +16,14 @@ use mimu_core::wire::{Request, flags};
 
 use serde::{Serialize, Serializer};
 
+pub use known::Known;
+pub use plan::{Plan, Planned};
 pub use steps::Steps;
 
 use crate::heard::{Event, LineCount, Samples};
 use crate::result::TOOL;
 use crate::session::Session;
-use crate::who::Started;
+use crate::who::{Started, unit_name};
 use clock::Clock;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{
@@ -37,6 +42,10 @@ pub struct RecordOptions {
     pub duration: Option<Duration>,
     /// Where dwells begin and end.
     pub steps: Steps,
+    /// How long to wait for a port that has vanished; with zero the recording ends.
+    pub reconnect: Duration,
+    /// Whether every dwell has an input that is known: the reference is a table then.
+    pub table: bool,
     /// Name of the unit; without it, the number of its microcontroller.
     pub device: Option<String>,
     /// Local gravity, m/s².
@@ -78,6 +87,11 @@ pub struct Standing {
     pub restarts: Vec<Restart>,
     /// Times that a device which was still there had to be told to stream again.
     pub resumed: u32,
+    /// Times that the port vanished and came back.
+    pub reconnected: u32,
+    /// The port has vanished, and is waited for.
+    #[serde(skip)]
+    pub waiting: bool,
     /// °C, the last.
     pub temp_c: f64,
     /// Samples in batches with a reading at the end of the converter's range.
@@ -88,6 +102,8 @@ pub struct Standing {
     pub self_test: u64,
     /// What was heard on the line.
     pub line: LineCount,
+    /// What a person should know beside all that.
+    pub warnings: Vec<String>,
 }
 
 /// A recording that was ended: the result of `mimu record`.
@@ -113,13 +129,14 @@ fn as_words<S: Serializer>(of: &Option<Error>, to: S) -> std::result::Result<S::
     of.as_ref().map(Error::to_string).serialize(to)
 }
 
-/// Records. `look` is shown how it stands, some times a second, and says what is wanted; `finishing` hears the share that is done of
+/// Records; the inputs of the dwells are those of `known`, if they are. `look` is shown how it stands, some times a second, and says what is wanted; `finishing` hears the share that is done of
 /// turning the samples into Parquet.
 ///
 /// An error means that there is no recording. One that was broken off is a [`RecordSummary`], with its reason.
 pub fn record(
     session: &mut Session,
     options: &RecordOptions,
+    known: Option<Known>,
     mut look: impl FnMut(&Standing) -> Wish,
     finishing: impl Fn(f64),
 ) -> Result<RecordSummary> {
@@ -137,13 +154,19 @@ pub fn record(
     }
     let device = options.device.clone();
     let mut manifest = Manifest::new(
-        device.unwrap_or_else(|| format!("mimu-{}", who.unit_id)),
+        device.unwrap_or_else(|| unit_name(&who.unit_id)),
         f64::from(who.sample_rate_hz),
         options.gravity_mps2,
         RawUnit::Volt,
-        Reference::Gravity,
+        match options.table {
+            true => Reference::Table,
+            false => Reference::Gravity,
+        },
     );
     manifest.latitude_deg = options.latitude_deg;
+    if let Some(known) = &known {
+        manifest.step_labels = known.labels().to_vec();
+    }
     // Its clock starts with it, but after a reset without a power failure the device counts from zero as well: the die is warm then, and a
     // warm-up counted from there would be another with every reset.
     let by_power = who.start == Started::PowerOn;
@@ -161,32 +184,47 @@ pub fn record(
         temp_c: true,
         gyro: true,
         accel: true,
-        reference: [false; 6],
+        reference: known.as_ref().map_or([false; 6], Known::columns),
     };
     let growing = Growing::create(&options.directory, columns, &manifest)?;
     let mut run = Run {
         growing,
         clock: Clock::new(who.sample_rate_hz),
         steps: options.steps.clone(),
+        known,
         standing: Standing::default(),
         begun: None,
         heard: Instant::now(),
         unit_id: who.unit_id,
+        starts: who.starts,
         // A program that was killed may have left half a frame.
-        before: session.count(),
+        line: line::Heard::from(session.count()),
     };
     let ended = run.receive(session, options, &mut look);
     let mut standing = run.standing;
-    standing.line = session.count().since(&run.before);
+    standing.line = run.line.total(session.count());
+    standing.waiting = false;
     if let Some(recorded) = &mut manifest.recorded {
         recorded.missing = standing.missing;
         recorded.restarts = standing.restarts.clone();
     }
+    let rate_hz = manifest.sample_rate_hz;
+    let mut known = run.known;
+    if let Some(known) = &known {
+        manifest.turn_steps = known.turns();
+        standing.warnings.extend(known.unused());
+    }
+    let mut complete = known
+        .as_mut()
+        .filter(|known| known.has_turns())
+        .map(|known| |batch: &mut Batch| known.complete(batch, rate_hz));
+    let complete = complete.as_mut().map(|c| c as &mut dyn FnMut(&mut Batch));
     // A device that is gone needs not be told.
     let _ = ended
         .is_ok()
         .then(|| session.done(Request::Stop, "to stop streaming"));
-    run.growing.finish(&manifest, options.format, finishing)?;
+    run.growing
+        .finish(&manifest, options.format, complete, finishing)?;
     match ended {
         Ok(()) if standing.samples == 0 => Err(Error::new(
             session.port(),
@@ -217,14 +255,22 @@ struct Run {
     growing: Growing,
     clock: Clock,
     steps: Steps,
+    known: Option<Known>,
     standing: Standing,
     /// Tick of the first sample.
     begun: Option<u64>,
     heard: Instant,
     unit_id: String,
-    /// What had been heard on the line before it began.
-    before: LineCount,
+    /// Starts of the device since it has power.
+    starts: u32,
+    line: line::Heard,
 }
+
+/// What the device is asked for.
+const RAW: Request<'_> = Request::Stream {
+    raw: true,
+    compensated: false,
+};
 
 impl Run {
     fn receive(
@@ -233,55 +279,98 @@ impl Run {
         options: &RecordOptions,
         look: &mut impl FnMut(&Standing) -> Wish,
     ) -> Result<()> {
-        let raw = Request::Stream {
-            raw: true,
-            compensated: false,
-        };
-        session.begin_stream(raw)?;
+        session.begin_stream(RAW)?;
         let rate_hz = f64::from(session.who().sample_rate_hz);
-        let wanted = options
-            .duration
-            .map(|d| (d.as_secs_f64() * rate_hz).round() as u64);
+        let end = self.steps.end().into_iter().chain(options.duration).min();
+        let wanted = end.map(|d| (d.as_secs_f64() * rate_hz).round() as u64);
         loop {
-            match session.event()? {
-                Some(Event::Raw(batch)) => {
-                    self.take(session.port(), &batch, wanted)?;
-                    if self.is_done(wanted) {
+            match self.hear(session, wanted) {
+                Ok(true) => return Ok(()),
+                Ok(false) => {}
+                Err(lost) if session.is_lost() => {
+                    if !self.reconnect(session, options.reconnect, &lost, look)? {
                         return Ok(());
                     }
                 }
-                Some(Event::Started(who)) => {
-                    if who.unit_id != self.unit_id {
-                        let problem =
-                            format!("another device is at the port now ({})", who.unit_id);
-                        return Err(Error::new(
-                            session.port(),
-                            problem,
-                            "record each for itself",
-                        ));
-                    }
-                    self.clock.restarted(Some(who.start.clone()));
-                    session.done(raw, "to stream")?;
-                }
-                Some(_) => {}
-                None if self.heard.elapsed() > SILENCE => {
-                    // It may have restarted, and its greeting been lost.
-                    session.hello()?;
-                    session.done(raw, "to stream")?;
-                    self.standing.resumed += 1;
-                    self.heard = Instant::now();
-                }
-                None => {}
+                Err(error) => return Err(error),
             }
-            self.standing.line = session.count().since(&self.before);
-            let wish = look(&self.standing);
-            for _ in 0..wish.marks {
-                self.steps.mark();
-            }
-            if wish.end {
+            self.standing.line = self.line.total(session.count());
+            if self.asks_to_end(look) || self.steps.is_done() {
                 return Ok(());
             }
         }
+    }
+
+    /// Shows how it stands, and takes the marks.
+    fn asks_to_end(&mut self, look: &mut impl FnMut(&Standing) -> Wish) -> bool {
+        let wish = look(&self.standing);
+        for _ in 0..wish.marks {
+            self.steps.mark();
+        }
+        wish.end
+    }
+
+    /// Takes in what comes next; whether it was the last that was wanted.
+    fn hear(&mut self, session: &mut Session, wanted: Option<u64>) -> Result<bool> {
+        match session.event()? {
+            Some(Event::Raw(batch)) => {
+                self.take(session.port(), &batch, wanted)?;
+                return Ok(self.is_done(wanted));
+            }
+            Some(Event::Started(who)) => {
+                if who.unit_id != self.unit_id {
+                    let problem = format!("another device is at the port now ({})", who.unit_id);
+                    return Err(Error::new(
+                        session.port(),
+                        problem,
+                        "record each for itself",
+                    ));
+                }
+                self.starts = who.starts;
+                self.clock.restarted(Some(who.start.clone()));
+                session.done(RAW, "to stream")?;
+            }
+            Some(_) => {}
+            None if self.heard.elapsed() > SILENCE => {
+                // It may have restarted, and its greeting been lost.
+                session.hello()?;
+                session.done(RAW, "to stream")?;
+                self.standing.resumed += 1;
+                self.heard = Instant::now();
+            }
+            None => {}
+        }
+        Ok(false)
+    }
+
+    /// Waits until the unit is there again; whether it is, or the person has had enough.
+    fn reconnect(
+        &mut self,
+        session: &mut Session,
+        patience: Duration,
+        lost: &Error,
+        look: &mut impl FnMut(&Standing) -> Wish,
+    ) -> Result<bool> {
+        self.standing.waiting = true;
+        let (port, unit_id) = (session.port().to_owned(), self.unit_id.clone());
+        let go_on = || !self.asks_to_end(look);
+        let Some(again) = line::wait_for(&port, &unit_id, patience, lost, go_on)? else {
+            return Ok(false);
+        };
+        self.standing.waiting = false;
+        self.standing.reconnected += 1;
+        self.line.lost(session.count(), again.count());
+        *session = again;
+        let who = session.who();
+        let start = who.start.clone();
+        if who.starts != self.starts {
+            self.clock.restarted(Some(start));
+            self.starts = who.starts;
+        } else {
+            self.clock.reconnected(start);
+        }
+        session.begin_stream(RAW)?;
+        Ok(true)
     }
 
     fn is_done(&self, wanted: Option<u64>) -> bool {
@@ -318,10 +407,18 @@ impl Run {
             batch.t_s.push(self.clock.seconds(tick));
             if let Some(step) = self.steps.at(self.clock.length(tick - begun)) {
                 batch.step.push(step);
+                if let Some(known) = &mut self.known {
+                    let input = known.next(step);
+                    for ((column, value), there) in
+                        batch.reference.iter_mut().zip(input).zip(known.columns())
+                    {
+                        column.extend(there.then_some(value));
+                    }
+                }
                 self.standing.step = (step >= 0).then_some(step);
                 self.standing.dwells = self.standing.dwells.max((step + 1) as u32);
             }
-            batch.temp_c.push(f64::from(samples.head.temp_c));
+            batch.temp_c.push(shortest(samples.head.temp_c));
             let values = sample.gyro.iter().chain(sample.accel.iter());
             for (column, value) in batch.raw.iter_mut().zip(values) {
                 if !value.is_finite() {
@@ -332,7 +429,7 @@ impl Run {
                         "reset the board, and report this",
                     ));
                 }
-                column.push(f64::from(*value));
+                column.push(shortest(*value));
             }
         }
         self.clock.passed(samples.values.len());
@@ -342,7 +439,7 @@ impl Run {
         self.growing.write(&batch)?;
         let standing = &mut self.standing;
         standing.samples += count as u64;
-        standing.temp_c = f64::from(samples.head.temp_c);
+        standing.temp_c = shortest(samples.head.temp_c);
         for (flag, counter) in [
             (flags::SATURATED, &mut standing.saturated),
             (flags::NO_REFERENCE, &mut standing.without_reference),
@@ -355,5 +452,30 @@ impl Run {
         standing.first_s.get_or_insert(self.clock.seconds(first));
         standing.last_s = Some(self.clock.seconds(first + count as u64 - 1));
         Ok(())
+    }
+}
+
+/// The shortest decimal number that is this one in single precision: as `f32` it is what the device has sent, and it is off by less than
+/// half of the last place of that, where all the digits of the same `f32` in double precision take twice the room.
+fn shortest(value: f32) -> f64 {
+    // What the standard library writes of an `f32` is the shortest that reads back as it.
+    value.to_string().parse().unwrap_or(f64::from(value))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_reading_keeps_all_bits_of_single_precision_in_its_shortest_form() {
+        let mut readings: Vec<f32> = (59_000..70_000).map(|n| n as f32 * 4.2e-5).collect();
+        readings.extend([0.0, -0.0, 1e-30, f32::MAX, f32::MIN_POSITIVE, 16_777_217.0]);
+        for reading in readings {
+            let kept = shortest(reading);
+            assert_eq!((kept as f32).to_bits(), reading.to_bits());
+            assert_eq!(kept.to_string(), reading.to_string());
+        }
+        assert_eq!(shortest(2.478), 2.478);
+        assert_ne!(f64::from(2.478_f32), 2.478);
     }
 }

@@ -11,6 +11,8 @@ pub enum Steps {
     Every(Duration, Duration),
     /// By marks: each begins a dwell, or ends the one that runs.
     Marks(Marks),
+    /// By a plan: when each dwell begins and ends, from the first sample on; no two overlap.
+    Planned(Vec<[Duration; 2]>),
 }
 
 /// Marks so far.
@@ -18,12 +20,46 @@ pub enum Steps {
 pub struct Marks {
     begun: i32,
     dwells: bool,
+    /// There are to be so many.
+    most: Option<i32>,
 }
 
 impl Steps {
     /// By marks, in transit before the first.
     pub fn marks() -> Self {
         Self::Marks(Marks::default())
+    }
+
+    /// The same, so many dwells.
+    pub fn marks_for(dwells: usize) -> Self {
+        Self::Marks(Marks {
+            most: i32::try_from(dwells).ok(),
+            ..Marks::default()
+        })
+    }
+
+    /// Dwells of these lengths, so long in transit in between.
+    pub fn planned(lead_in: Duration, lengths: &[Duration], transit: Duration) -> Self {
+        let mut begin = lead_in;
+        let each = lengths.iter().map(|length| {
+            let dwell = [begin, begin + *length];
+            begin = dwell[1] + transit;
+            dwell
+        });
+        Self::Planned(each.collect())
+    }
+
+    /// When the last dwell ends, if that is planned.
+    pub(super) fn end(&self) -> Option<Duration> {
+        match self {
+            Self::Planned(dwells) => dwells.last().map(|d| d[1]),
+            _ => None,
+        }
+    }
+
+    /// Whether the last of the dwells has ended, of marks whose number is known.
+    pub(super) fn is_done(&self) -> bool {
+        matches!(self, Self::Marks(marks) if !marks.dwells && marks.most == Some(marks.begun))
     }
 
     /// Begins a dwell, or ends it.
@@ -44,6 +80,11 @@ impl Steps {
                 let (step, within) = (since.as_nanos() / cycle, since.as_nanos() % cycle);
                 let step = i32::try_from(step).unwrap_or(i32::MAX);
                 Some(if within < dwell.as_nanos() { step } else { -1 })
+            }
+            Self::Planned(dwells) => {
+                let step = dwells.partition_point(|d| d[0] <= since).checked_sub(1);
+                let running = step.filter(|step| since < dwells[*step][1]);
+                Some(running.and_then(|s| i32::try_from(s).ok()).unwrap_or(-1))
             }
             Self::Marks(marks) if marks.dwells => Some(marks.begun - 1),
             Self::Marks(_) => Some(-1),
@@ -66,6 +107,30 @@ mod tests {
         );
         // 0.9 / 0.3 is below 3 in floating point.
         assert_eq!([at(899), at(900)], [-1, 3]);
+    }
+
+    #[test]
+    fn the_dwells_of_a_plan_follow_each_other_by_time() {
+        let ms = Duration::from_millis;
+        let steps = Steps::planned(ms(100), &[ms(200), ms(50)], ms(300));
+        let at = |t| steps.at(ms(t)).unwrap();
+        assert_eq!([at(0), at(99), at(100), at(299)], [-1, -1, 0, 0]);
+        assert_eq!(
+            [at(300), at(599), at(600), at(649), at(650)],
+            [-1, -1, 1, 1, -1]
+        );
+        assert_eq!(steps.end(), Some(ms(650)));
+    }
+
+    #[test]
+    fn marks_of_a_plan_are_done_with_its_last_dwell() {
+        let mut steps = Steps::marks_for(2);
+        let mut done = Vec::new();
+        for _ in 0..4 {
+            steps.mark();
+            done.push(steps.is_done());
+        }
+        assert_eq!(done, [false, false, false, true]);
     }
 
     #[test]

@@ -15,8 +15,8 @@ use crate::quantity::Sensor;
 use mimu_recording::error::{Error, Result};
 
 /// How the coefficients of an effect are applied: e is the error of the three sensors, S the norms of the rows of P.
-const FORMULA: &str = "x = C (u - S e) + o, e_i = sum of coefficient * regressor";
-const DIRECTION: &str = "raw to SI";
+pub(super) const FORMULA: &str = "x = C (u - S e) + o, e_i = sum of coefficient * regressor";
+pub(super) const DIRECTION: &str = "raw to SI";
 
 /// An effect in a calibration file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -148,8 +148,9 @@ pub struct CoefficientTable {
     pub name: String,
     /// Value.
     pub value: f64,
-    /// Standard deviation.
-    pub sigma: f64,
+    /// Standard deviation; a device keeps none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sigma: Option<f64>,
     /// Unit of both.
     pub unit: String,
 }
@@ -184,7 +185,7 @@ impl EffectTable {
                 .map(|((name, unit), (value, sigma))| CoefficientTable {
                     name,
                     value: *value,
-                    sigma,
+                    sigma: Some(sigma),
                     unit,
                 })
                 .collect(),
@@ -211,7 +212,7 @@ impl EffectTable {
             match known.coefficients.iter_mut().find(|c| c.name == more.name) {
                 Some(c) => {
                     c.value += more.value;
-                    c.sigma = c.sigma.hypot(more.sigma);
+                    c.sigma = c.sigma.zip(more.sigma).map(|(a, b)| a.hypot(b));
                 }
                 None => known.coefficients.push(more),
             }
@@ -276,7 +277,8 @@ impl EffectTable {
                 let problem = format!("unit of {:?} is {:?}, not {unit:?}", c.name, c.unit);
                 return Err((problem, EDITED));
             }
-            if !c.value.is_finite() || !(c.sigma >= 0.0) || !c.sigma.is_finite() {
+            let sigma = c.sigma.unwrap_or_default();
+            if !c.value.is_finite() || !(sigma >= 0.0) || !sigma.is_finite() {
                 let problem = format!("value or sigma of {:?} is not a number", c.name);
                 return Err((problem, EDITED));
             }
@@ -316,7 +318,7 @@ impl EffectTable {
 }
 
 /// The candidate of an id, with all of its coefficients.
-fn candidate(id: &str) -> Option<Candidate> {
+pub(super) fn candidate(id: &str) -> Option<Candidate> {
     let Some(term) = id.strip_prefix("term:") else {
         let effect = effects::by_id(id).filter(|e| e.is_error())?;
         return Some(Candidate::new(effect.sensor, Kind::Effect(effect)));

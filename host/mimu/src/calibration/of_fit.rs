@@ -8,7 +8,7 @@ use super::{
 };
 use crate::fit::{Fit, SensorFit};
 use crate::quantity::{Sensor, inverse_names, rounded};
-use crate::triad::{Angles, Estimate};
+use crate::triad::{Angles, Estimate, Forward, Physical};
 use mimu_recording::Reference;
 use mimu_recording::error::Result;
 
@@ -30,13 +30,14 @@ impl Calibration {
         let calibration = Self {
             format: FORMAT.into(),
             device: manifest.device.clone(),
-            created: created.into(),
+            unit_id: manifest.unit_id().map(str::to_owned),
+            created: Some(created.into()),
             tool: concat!("mimu ", env!("CARGO_PKG_VERSION")).into(),
             recording: Origin {
-                sha256: fit.prepared.condensed.sha256.clone(),
-                reference: manifest.reference,
+                sha256: Some(fit.prepared.condensed.sha256.clone()),
+                reference: Some(manifest.reference),
                 raw_unit: manifest.raw_unit,
-                gravity_mps2: manifest.gravity_mps2,
+                gravity_mps2: Some(manifest.gravity_mps2),
                 temp_c: mean.is_finite().then_some(mean),
             },
             gyro: triad(Sensor::Gyro),
@@ -52,7 +53,7 @@ impl Calibration {
 fn readable(mut effect: EffectTable) -> EffectTable {
     for c in &mut effect.coefficients {
         c.value += 0.0;
-        c.sigma = rounded(c.sigma, SIGMA_DIGITS);
+        c.sigma = c.sigma.map(|sigma| rounded(sigma, SIGMA_DIGITS));
     }
     effect
 }
@@ -82,15 +83,15 @@ fn table(fit: &Fit, found: &SensorFit) -> TriadTable {
         frame: frame.into(),
         C: by_rows(&triad.inverse.matrix),
         o: plain(&triad.inverse.offset),
-        sigma_C: [0, 3, 6].map(|i| [i, i + 1, i + 2].map(sigmas)),
-        sigma_o: [9, 10, 11].map(sigmas),
-        interval_C: [0, 3, 6].map(|i| [i, i + 1, i + 2].map(intervals)),
-        interval_o: [9, 10, 11].map(intervals),
+        sigma_C: Some([0, 3, 6].map(|i| [i, i + 1, i + 2].map(sigmas))),
+        sigma_o: Some([9, 10, 11].map(sigmas)),
+        interval_C: Some([0, 3, 6].map(|i| [i, i + 1, i + 2].map(intervals))),
+        interval_o: Some([9, 10, 11].map(intervals)),
         parameters: inverse_names().into(),
         covariance: (0..12)
             .map(|i| (0..12).map(|j| covariance[(i, j)] + 0.0).collect())
             .collect(),
-        judged: Judged {
+        judged: Some(Judged {
             estimator: fit.estimator(found.sensor).into(),
             figure: found.figure.description().into(),
             unit: found.figure.unit(found.sensor).into(),
@@ -99,25 +100,42 @@ fn table(fit: &Fit, found: &SensorFit) -> TriadTable {
             noise_floor: rounded(found.noise_floor(), FIGURE_DIGITS),
             dwells: found.dwells,
             condition: rounded(found.estimated.condition, SIGMA_DIGITS + 1),
-        },
-        forward: ForwardTable {
-            formula: "u = P x + b".into(),
-            direction: "SI to raw".into(),
-            P: by_rows(&triad.forward.matrix),
-            b: plain(&triad.forward.bias),
-        },
+        }),
+        forward: forward_table(&triad.forward),
         physical: PhysicalTable {
-            formula: "P = K Mo Mp, Mp = Rz Ry Rx by the misalignments, rows of Mo of unit length"
-                .into(),
-            scale_factor: values(&physical.scale, 1.0),
-            sigma_scale_factor: sigmas_of(&physical.scale, 1.0),
-            bias: values(&physical.bias, 1.0),
-            sigma_bias: sigmas_of(&physical.bias, 1.0),
-            misalignment_deg: values(&physical.misalignment, degrees),
-            sigma_misalignment_deg: sigmas_of(&physical.misalignment, degrees),
-            non_orthogonality_deg: values(&physical.non_orthogonality, degrees),
-            sigma_non_orthogonality_deg: sigmas_of(&physical.non_orthogonality, degrees),
+            sigma_scale_factor: Some(sigmas_of(&physical.scale, 1.0)),
+            sigma_bias: Some(sigmas_of(&physical.bias, 1.0)),
+            sigma_misalignment_deg: Some(sigmas_of(&physical.misalignment, degrees)),
+            sigma_non_orthogonality_deg: Some(sigmas_of(&physical.non_orthogonality, degrees)),
+            ..physical_table(&physical)
         },
+    }
+}
+
+/// The forward model.
+pub(super) fn forward_table(forward: &Forward) -> ForwardTable {
+    ForwardTable {
+        formula: "u = P x + b".into(),
+        direction: "SI to raw".into(),
+        P: by_rows(&forward.matrix),
+        b: plain(&forward.bias),
+    }
+}
+
+/// Physical quantities without their sigmas.
+pub(super) fn physical_table(physical: &Physical) -> PhysicalTable {
+    let degrees = 1f64.to_degrees();
+    PhysicalTable {
+        formula: "P = K Mo Mp, Mp = Rz Ry Rx by the misalignments, rows of Mo of unit length"
+            .into(),
+        scale_factor: values(&physical.scale, 1.0),
+        sigma_scale_factor: None,
+        bias: values(&physical.bias, 1.0),
+        sigma_bias: None,
+        misalignment_deg: values(&physical.misalignment, degrees),
+        sigma_misalignment_deg: None,
+        non_orthogonality_deg: values(&physical.non_orthogonality, degrees),
+        sigma_non_orthogonality_deg: None,
     }
 }
 

@@ -182,11 +182,17 @@ impl Recordings<'_> {
                 removable(recording, given.effects())?;
             }
         }
-        let given = self.given.map(|c| (c.device.as_str(), "the calibration"));
-        let recordings = self
+        if let Some(problem) = self.given.and_then(|c| c.other_unit(&self.first.manifest)) {
+            return Err(Error::new(
+                &self.first.place,
+                problem,
+                "effects are a unit's own: give the calibration of this unit; if it is, write the same name as device in both files",
+            ));
+        }
+        let mut recordings = self
             .later()
             .map(|r| (r.manifest.device.as_str(), r.place.as_str()));
-        if let Some((device, place)) = recordings.chain(given).find(|(d, _)| d != unit) {
+        if let Some((device, place)) = recordings.find(|(d, _)| d != unit) {
             return Err(Error::new(
                 place,
                 format!("device is {device:?}, and that of the first recording {unit:?}"),
@@ -218,6 +224,9 @@ fn matrices(recordings: &Recordings) -> Option<[Option<Affine<f64>>; 2]> {
     };
     (first.manifest.raw_unit == RawUnit::Si && never_turned).then_some([Some(unit); 2])
 }
+
+/// What a calibration that was fetched from a device leaves open.
+const UNCERTAIN: &str = "the calibration does not say how well it is known, as one that a device kept: its matrix is taken as exact, so that what it is off by may be found as an effect, and the intervals of a new calibration lack it";
 
 /// Diagnoses a unit.
 ///
@@ -319,6 +328,9 @@ pub fn diagnose(recordings: Recordings, options: Options) -> Result<Diagnosis> {
             parts.push(part);
             *triad = Triad::from_inverse(triad.inverse, parts).ok_or_else(singular)?;
         }
+    }
+    if recordings.given.is_some_and(|given| !given.is_uncertain()) {
+        now.warnings.push(UNCERTAIN.into());
     }
     sensors.reverse();
     let open = |d: &Decision| d.unexplained().next().is_some() || !d.undecided.is_empty();

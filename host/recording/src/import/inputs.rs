@@ -20,7 +20,7 @@ const LONGEST: u64 = 64 << 20;
 /// recording, and `turn_x_deg` and so on: the angle that was turned in all, from which the mean
 /// rate follows with the duration of the step.
 #[derive(Debug)]
-pub(super) struct Inputs {
+pub struct Inputs {
     path: PathBuf,
     /// Which of the `ref_` columns it fills.
     pub columns: [bool; 6],
@@ -40,7 +40,7 @@ struct Step {
 }
 
 impl Inputs {
-    /// Reads the table.
+    /// Reads the table at `path`.
     pub fn read(path: &Path) -> Result<Inputs> {
         let io = |error: std::io::Error| Error::io(path, &error);
         if std::fs::metadata(path).map_err(io)?.len() > LONGEST {
@@ -189,13 +189,38 @@ impl Inputs {
         Ok(())
     }
 
+    /// Labels of its rows from the first on: those of the steps 0, 1 and so on where the samples have none. Empty if they are numbers.
+    pub fn labels(&self) -> Vec<String> {
+        let mut rows: Vec<(u64, &String)> = self.steps.iter().map(|(l, s)| (s.row, l)).collect();
+        rows.sort_unstable();
+        let labels = rows.into_iter().map(|(_, label)| label.clone());
+        match self.steps.keys().all(|label| label.parse::<i32>().is_ok()) {
+            true => Vec::new(),
+            false => labels.collect(),
+        }
+    }
+
     /// Input during step `number`, which lasts `duration_s`, in deg/s and m/s²; `None` where the
     /// table does not have it.
-    pub fn input(&mut self, number: i32, labels: &StepLabels, duration_s: f64) -> Option<[f64; 6]> {
-        let label = labels.label(number).map(str::to_owned);
+    pub(super) fn input(
+        &mut self,
+        number: i32,
+        labels: &StepLabels,
+        duration_s: f64,
+    ) -> Option<[f64; 6]> {
+        self.of_step(number, labels.label(number), duration_s)
+    }
+
+    /// The same of a step that has this label, or none.
+    pub fn of_step(
+        &mut self,
+        number: i32,
+        label: Option<&str>,
+        duration_s: f64,
+    ) -> Option<[f64; 6]> {
         let key = label
-            .filter(|label| self.steps.contains_key(label))
-            .unwrap_or_else(|| number.to_string());
+            .filter(|label| self.steps.contains_key(*label))
+            .map_or_else(|| number.to_string(), str::to_owned);
         let step = self.steps.get_mut(&key)?;
         step.used = true;
         if step.turn_deg.iter().any(|turn| !turn.is_nan()) {

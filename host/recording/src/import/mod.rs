@@ -22,6 +22,7 @@ use std::collections::{BTreeSet, HashMap};
 use std::path::Path;
 
 pub use assignment::{ColumnList, Role, Scale};
+pub use inputs::Inputs;
 pub use options::ImportOptions;
 pub use pose_means::{PoseMean, PoseMeans};
 pub use preset::{Chosen, Preset, PresetUse};
@@ -29,7 +30,6 @@ pub use ros::is_bag;
 pub use time::{Decimal, Jitter, TimeSummary};
 
 use foreign::{ForeignFile, HowToRead, Row};
-use inputs::Inputs;
 use join::{Follower, Joined, check_order};
 use options::file_name;
 use serde::Serialize;

@@ -11,12 +11,17 @@ use mimu_board_tests::{MS, still};
 use mimu_core::compensation::{Affine, Compensation};
 use mimu_core::stored;
 use mimu_core::table::Node;
-use mimu_core::wire::{Call, Decoder, MAX_FRAME, Message, Request, encode};
+use mimu_core::wire::{CHUNK, Call, Decoder, MAX_FRAME, Message, Refusal, Request, encode};
 use nalgebra::{Matrix3, Vector3};
 use plotters::prelude::*;
 
 /// A calibration of so many temperature nodes that no other number gives.
 pub fn calibration(nodes: u32, scale: f32) -> Vec<u8> {
+    calibration_of(&stored::Origin::UNKNOWN, nodes, scale)
+}
+
+/// The same of a certain unit.
+fn calibration_of(origin: &stored::Origin, nodes: u32, scale: f32) -> Vec<u8> {
     let affine = |k: u32| Affine {
         matrix: Matrix3::from_diagonal_element(scale + k as f32 * 0.001),
         offset: Vector3::repeat(-2.5 * scale),
@@ -31,7 +36,8 @@ pub fn calibration(nodes: u32, scale: f32) -> Vec<u8> {
     let nodes: Vec<_> = (0..nodes).map(node).collect();
     let found_with = Matrix3::identity();
     let mut bytes = vec![0; stored::MAX_LENGTH];
-    let length = stored::encode([&found_with, &found_with], &nodes, &[], &mut bytes).unwrap();
+    let length =
+        stored::encode(origin, [&found_with, &found_with], &nodes, &[], &mut bytes).unwrap();
     bytes.truncate(length);
     bytes
 }
@@ -337,6 +343,44 @@ fn plot(course: &Course, outcomes: &[(u64, bool)], path: &Path) {
         (course.done - course.committed) as f64 / 1e9,
         path.display()
     );
+}
+
+#[test]
+fn a_calibration_of_another_unit_is_refused_and_nothing_is_erased_for_the_one_in_use() {
+    let old = calibration(7, 3.5);
+    let mut device = with_old(&old);
+    // The emulated part has the number 0, which is nobody's.
+    let origin = stored::Origin {
+        unit_id: Some(*b"another-unit"),
+        ..stored::Origin::UNKNOWN
+    };
+    let other = calibration_of(&origin, 7, 3.5);
+    device.upload(&other);
+    let unit_id = *b"another-unit";
+    let refused = Answer::Refused(Refusal::OtherUnit { unit_id });
+    assert_eq!(device.ask(Request::UploadCommit), refused);
+    assert_eq!(device.download().as_ref(), Some(&old));
+
+    // It is there already: an erase alone would take a second.
+    device.upload(&old);
+    let began = device.board.standing().ns;
+    assert_eq!(device.ask(Request::UploadCommit), Answer::Done);
+    let took = device.board.standing().ns - began;
+    assert!(took < 50 * MS, "{took} ns");
+
+    let insists = Request::UploadBegin {
+        length: other.len() as u32,
+        hash: stored::hash(&other),
+        other_unit: true,
+    };
+    assert_eq!(device.ask(insists), Answer::Done);
+    for (k, bytes) in other.chunks(CHUNK).enumerate() {
+        let offset = (k * CHUNK) as u32;
+        let chunk = Request::UploadChunk { offset, bytes };
+        assert_eq!(device.ask(chunk), Answer::Done);
+    }
+    assert_eq!(device.ask(Request::UploadCommit), Answer::Done);
+    assert_eq!(device.download(), Some(other));
 }
 
 #[test]

@@ -6,7 +6,7 @@ use mimu_board::fault::Fault;
 use mimu_board::running::Board;
 use mimu_board::schematic::Volts;
 use mimu_board_tests::{MS, STARTED, image, still};
-use mimu_core::wire::{Decoder, Message, Start};
+use mimu_core::wire::{Decoder, Greeting, Message, Start};
 
 /// What a greeting says of the start.
 #[derive(Debug, PartialEq)]
@@ -16,8 +16,8 @@ struct Greeted {
     starts: u32,
 }
 
-/// The greeting that the device sends by itself after a start.
-fn greeting(board: &mut Board) -> Greeted {
+/// Has `look` see the greeting that the device sends by itself after a start.
+fn greeted<T>(board: &mut Board, look: impl Fn(&Greeting<'_>) -> T) -> T {
     let mut decoder = Decoder::new();
     for _ in 0..1000 {
         board.run_for(MS).unwrap();
@@ -25,17 +25,39 @@ fn greeting(board: &mut Board) -> Greeted {
             let frame = decoder.push(byte);
             let message = frame.map(|frame| frame.message().expect("a whole message"));
             if let Some(Message::Greeting { greeting, .. }) = message {
-                let start = match greeting.start {
-                    Start::Panic { file, line } => format!("panic {file}:{line}"),
-                    Start::Fault { pc, cfsr } => format!("fault {pc:#x} {cfsr:#x}"),
-                    other => format!("{other:?}"),
-                };
-                let starts = greeting.starts;
-                return Greeted { start, starts };
+                return look(&greeting);
             }
         }
     }
     panic!("no greeting in a second");
+}
+
+/// What that greeting says of the start.
+fn greeting(board: &mut Board) -> Greeted {
+    greeted(board, |greeting| Greeted {
+        start: match greeting.start {
+            Start::Panic { file, line } => format!("panic {file}:{line}"),
+            Start::Fault { pc, cfsr } => format!("fault {pc:#x} {cfsr:#x}"),
+            other => format!("{other:?}"),
+        },
+        starts: greeting.starts,
+    })
+}
+
+#[test]
+fn the_firmware_names_the_commit_that_it_was_built_from() {
+    let firmware = greeted(&mut still(Volts::GROUND), |g| g.firmware.to_owned());
+    let (version, commit) = match firmware.split_once('-') {
+        Some((version, commit)) => (version, Some(commit)),
+        // Of sources in no repository.
+        None => (firmware.as_str(), None),
+    };
+    assert_eq!(version, env!("CARGO_PKG_VERSION"));
+    if let Some(commit) = commit {
+        let hash = commit.strip_suffix("-dirty").unwrap_or(commit);
+        let digits = hash.bytes().all(|b| b.is_ascii_hexdigit());
+        assert!(hash.len() >= 8 && digits, "{firmware}");
+    }
 }
 
 /// A board that samples, after its first greeting.

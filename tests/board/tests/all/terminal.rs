@@ -2,6 +2,7 @@
 
 use std::fs::File;
 use std::io::{Read, Write};
+use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
@@ -11,6 +12,8 @@ use mimu_board::schematic::Volts;
 use mimu_board::serve::{Pace, Served};
 use mimu_board_tests::{MS, STARTED, image, still};
 use mimu_core::wire::{Call, Decoder, MAX_FRAME, Message, Request, encode};
+use mimu_rig::plan::Plan;
+use mimu_rig::rig_file::{RigFile, RigTruth};
 
 /// A device that never answers fails the test and does not hang it.
 const PATIENCE: Duration = Duration::from_secs(300);
@@ -94,4 +97,23 @@ fn at_the_pace_of_the_wall_a_second_takes_no_less_than_a_second() {
         served.step().unwrap();
     }
     assert!(began.elapsed() >= Duration::from_millis(500));
+}
+
+#[test]
+fn the_command_that_the_page_of_the_bench_shows_is_served() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let page = std::fs::read_to_string(root.join("docs/bench.md")).unwrap();
+    let mut commands = page.lines().filter(|l| l.contains("mimu-board -- serve"));
+    let words: Vec<&str> = commands.next().unwrap().split_whitespace().collect();
+    assert_eq!(commands.next(), None);
+    let option = |name: &str| {
+        let at = words.iter().position(|w| *w == name).unwrap();
+        words[at + 1]
+    };
+    let seed: u64 = option("--seed").parse().unwrap();
+    let rig = RigFile::read(&root.join(option("--unit"))).unwrap();
+    let truth = RigTruth::resolve(&rig, seed).unwrap();
+    let plan = Plan::read(&root.join(option("--plan"))).unwrap();
+    // A digital part has no voltage for the board's pins, and is refused here.
+    Front::bench(&plan, &truth, seed).unwrap();
 }

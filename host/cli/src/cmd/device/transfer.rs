@@ -5,8 +5,10 @@ use std::path::PathBuf;
 use crate::report;
 use clap::Args;
 use mimu::calibration::Calibration;
-use mimu_core::stored::{Refused, VERSION};
-use mimu_device::{DeviceResult, Image, contents, download, unusable, upload};
+use mimu_core::stored::{OLDEST, Refused};
+use mimu_device::{
+    DeviceResult, Image, calibration, contents, download, unit_name, unusable, upload,
+};
 use mimu_recording::error::{Error, Result};
 use mimu_recording::result_file::stage;
 
@@ -18,6 +20,9 @@ use crate::output::{check_outputs, print, progress};
 pub struct UploadArgs {
     /// Calibration file
     calibration: PathBuf,
+    /// Also if the calibration is of another unit
+    #[arg(long)]
+    other_unit: bool,
     #[command(flatten)]
     port: PortArgs,
     #[command(flatten)]
@@ -25,10 +30,17 @@ pub struct UploadArgs {
 }
 
 #[derive(Args)]
+#[command(group(clap::ArgGroup::new("to").required(true).multiple(true).args(["output", "bytes"])))]
 pub struct DownloadArgs {
-    /// File to write the bytes to, as the device stores them
+    /// Calibration file to write. What the device does not keep is not in it: how well the numbers are known
     #[arg(short, value_name = "FILE")]
-    output: PathBuf,
+    output: Option<PathBuf>,
+    /// File to write the bytes to, as the device stores them
+    #[arg(long, value_name = "FILE")]
+    bytes: Option<PathBuf>,
+    /// Name of the unit in the calibration file; without it, as `mimu record` names it: by its number
+    #[arg(long)]
+    device: Option<String>,
     #[command(flatten)]
     port: PortArgs,
     #[command(flatten)]
@@ -41,9 +53,12 @@ pub fn run_upload(args: &UploadArgs) -> Result<()> {
     let calibration = Calibration::read(&args.calibration)?;
     let image = Image::new(&calibration, &place)?;
     let mut session = open(&args.port)?;
+    if !args.other_unit {
+        image.check_unit(session.who(), &place)?;
+    }
     image.check_device(&calibration, session.who(), &place)?;
     let bar = progress("uploading");
-    let done = upload(&mut session, &image, |share| {
+    let done = upload(&mut session, &image, args.other_unit, |share| {
         bar.set_position((share * 1000.0) as u64)
     })?;
     bar.finish_and_clear();
@@ -52,17 +67,22 @@ pub fn run_upload(args: &UploadArgs) -> Result<()> {
 }
 
 pub fn run_download(args: &DownloadArgs) -> Result<()> {
-    check_outputs(&[Some(&args.output), args.json.file()], &[])?;
+    let outputs = [
+        args.output.as_deref(),
+        args.bytes.as_deref(),
+        args.json.file(),
+    ];
+    check_outputs(&outputs, &[])?;
     let mut session = open(&args.port)?;
     let bytes = download(&mut session)?;
     let port = session.port();
-    let contents = contents(&bytes, &args.output).map_err(|refused| {
+    let mut contents = contents(&bytes).map_err(|refused| {
         let problem = format!(
             "this program cannot read what it stores: {}",
             unusable(&refused)
         );
         let remedy = match refused {
-            Refused::Version { found } if found < VERSION => {
+            Refused::Version { found } if found < OLDEST => {
                 "upload the calibration file again: the device keeps the numbers in an older layout"
             }
             Refused::Version { .. } => "update mimu on this computer",
@@ -70,8 +90,19 @@ pub fn run_download(args: &DownloadArgs) -> Result<()> {
         };
         Error::new(port, problem, remedy)
     })?;
-    let file = stage(&args.output, bytes.as_slice())?;
+    let shown = |path: &PathBuf| path.display().to_string();
+    contents.file = args.output.as_ref().map(shown);
+    contents.bytes_file = args.bytes.as_ref().map(shown);
+    let mut files = Vec::new();
+    if let Some(path) = &args.output {
+        let unit = contents.unit_id.as_ref().unwrap_or(&session.who().unit_id);
+        let device = args.device.clone().unwrap_or_else(|| unit_name(unit));
+        let file = calibration(&bytes, &device, port)?;
+        files.push(stage(path, file.to_toml())?);
+    }
+    if let Some(path) = &args.bytes {
+        files.push(stage(path, bytes.as_slice())?);
+    }
     let result = DeviceResult::new("download", port, contents);
-    let text = report::download_text(&result);
-    print(&args.json, &text, &result, Some(file))
+    print(&args.json, &report::download_text(&result), &result, files)
 }

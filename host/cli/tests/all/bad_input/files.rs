@@ -295,7 +295,7 @@ fn a_damaged_calibration_file_is_refused_with_its_place() {
         ),
         (
             good[..cut].to_string(),
-            &["cal.toml, line", "judged", "cut"],
+            &["cal.toml, line", "forward", "cut"],
         ),
         (good[..good.len() - 9].to_string(), &["cal.toml, line"]),
         (String::new(), &["cal.toml", "missing field"]),

@@ -47,20 +47,20 @@ fn a_calibration_arrives_whole_over_a_line_that_loses_and_garbles() {
     let held = peer.seen.lock().unwrap().stored.clone().unwrap();
     assert_eq!(result["hash"], format!("{:016x}", stored::hash(&held)));
 
-    // What arrived is the file's numbers: C by rows from the inverse of the hand-written P, little end first behind 156 bytes.
+    // What arrived is the file's numbers: C by rows from the inverse of the hand-written P, little end first behind 208 bytes.
     let [(p, b), _] = forward();
     let c = p.try_inverse().unwrap();
     let float = |at: usize| f32::from_le_bytes(held[at..at + 4].try_into().unwrap());
-    assert_eq!(float(156), 26.5, "temperature of the node");
+    assert_eq!(float(208), 26.5, "temperature of the node");
     for i in 0..3 {
         for j in 0..3 {
-            assert_eq!(float(160 + 4 * (3 * i + j)), c[(i, j)] as f32);
+            assert_eq!(float(212 + 4 * (3 * i + j)), c[(i, j)] as f32);
         }
-        assert_eq!(float(196 + 4 * i), -(c * b)[i] as f32);
+        assert_eq!(float(248 + 4 * i), -(c * b)[i] as f32);
     }
 
     let download = [
-        "device", "download", "-o", "back.bin", "--port", &peer.path, "--json", "-",
+        "device", "download", "--bytes", "back.bin", "--port", &peer.path, "--json", "-",
     ];
     let back = mimu(&place, &download).json();
     assert_eq!(std::fs::read(place.path("back.bin")).unwrap(), held);
@@ -151,10 +151,10 @@ fn a_refused_upload_says_what_the_device_holds() {
     let empty = Peer::new(Script::default());
     mimu(
         &place,
-        &["device", "download", "-o", "x.bin", "--port", &empty.path],
+        &["device", "download", "-o", "x.toml", "--port", &empty.path],
     )
     .refused(&["holds no calibration"]);
-    assert!(!place.path("x.bin").exists());
+    assert!(!place.path("x.toml").exists());
 }
 
 #[test]

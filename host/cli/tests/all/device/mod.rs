@@ -6,6 +6,7 @@ mod board;
 mod calibration;
 mod conversation;
 mod fuzz;
+mod kept;
 mod peer;
 mod ports;
 mod recording;

@@ -5,6 +5,7 @@
 mod answers;
 mod samples;
 
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
@@ -43,6 +44,9 @@ pub enum Act {
     Restart,
     /// The port is gone.
     Vanish,
+    /// The cable is pulled, and so long after it is back: the port, of the same name, is another. The device goes on meanwhile, or if it
+    /// has no power but from there it starts with it.
+    Unplug { away_ms: u64, powered: bool },
 }
 
 /// What answers at the port.
@@ -79,6 +83,8 @@ pub struct Script {
     pub self_test_passed: u8,
     /// Why it started.
     pub start: Start<'static>,
+    /// Name of the port in place of that of the terminal: one that stays as the terminal goes and another comes.
+    pub link: Option<PathBuf>,
 }
 
 impl Default for Script {
@@ -100,6 +106,7 @@ impl Default for Script {
                 file: "src/x.rs",
                 line: 7,
             },
+            link: None,
         }
     }
 }
@@ -124,7 +131,7 @@ pub struct Peer {
 
 impl Peer {
     pub fn new(script: Script) -> Self {
-        let (port, path) = Terminal::open();
+        let (port, path) = open(script.link.as_deref());
         let seen = Arc::new(Mutex::new(Seen {
             stored: script.stored.clone(),
             ..Seen::default()
@@ -132,6 +139,7 @@ impl Peer {
         let stop = Arc::new(AtomicBool::new(false));
         let device = Device {
             port: Some(port),
+            back: None,
             seen: seen.clone(),
             stop: stop.clone(),
             script,
@@ -140,6 +148,7 @@ impl Peer {
             streams: (false, false),
             streamed_from: None,
             upload: None,
+            insists: false,
             answers: 0,
             lost: 0,
             dropped: 0,
@@ -170,8 +179,21 @@ impl Drop for Peer {
     }
 }
 
+/// A terminal, and the name that it is opened by.
+fn open(link: Option<&Path>) -> (Terminal, String) {
+    let (port, path) = Terminal::open();
+    let Some(link) = link else {
+        return (port, path);
+    };
+    let _ = std::fs::remove_file(link);
+    std::os::unix::fs::symlink(path, link).unwrap();
+    (port, link.display().to_string())
+}
+
 struct Device {
     port: Option<Terminal>,
+    /// When the port is back, and whether the device had power meanwhile.
+    back: Option<(Instant, bool)>,
     seen: Arc<Mutex<Seen>>,
     stop: Arc<AtomicBool>,
     script: Script,
@@ -182,6 +204,8 @@ struct Device {
     /// First sample of the stream.
     streamed_from: Option<u32>,
     upload: Option<(usize, u64, Vec<u8>)>,
+    /// It may be of another unit.
+    insists: bool,
     answers: u32,
     lost: u32,
     dropped: u32,
@@ -194,6 +218,12 @@ impl Device {
         let mut decoder = Decoder::new();
         let mut bytes = [0; 4096];
         while !self.stop.load(Ordering::Relaxed) {
+            if let Some((_, powered)) = self.back.take_if(|back| back.0 <= Instant::now()) {
+                self.port = Some(open(self.script.link.as_deref()).0);
+                if !powered {
+                    self.restart();
+                }
+            }
             let count = match &mut self.port {
                 Some(port) => port.read(&mut bytes),
                 None => {

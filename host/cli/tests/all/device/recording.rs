@@ -10,6 +10,22 @@ use mimu_recording::{Batch, Recording};
 use super::peer::{ACCEL_VOLTS, Act, GYRO_VOLTS, Peer, Script, TEMP_C, sums};
 use super::{Place, command, mimu, start};
 
+/// The same, with its inputs.
+fn all_rows(place: &Place, name: &str) -> (Recording, Batch) {
+    let (recording, mut all) = rows(place, name);
+    let read = recording.for_each_batch(
+        |_| {},
+        |batch| {
+            for (all, more) in all.reference.iter_mut().zip(&batch.reference) {
+                all.extend_from_slice(more);
+            }
+            Ok(())
+        },
+    );
+    read.unwrap();
+    (recording, all)
+}
+
 /// All rows of a recording.
 pub fn rows(place: &Place, name: &str) -> (Recording, Batch) {
     let recording = Recording::open(&place.path(name)).unwrap();
@@ -39,9 +55,10 @@ fn check_rows(rows: &Batch) {
         let sums = sums(n as u32);
         for axis in 0..6 {
             let step = if axis < 3 { GYRO_VOLTS } else { ACCEL_VOLTS };
+            // To the last bit of what the device has sent, which is of single precision.
             assert_eq!(
-                rows.raw[axis][i],
-                f64::from(sums[axis] as f32 * step),
+                rows.raw[axis][i] as f32,
+                sums[axis] as f32 * step,
                 "sample {n}"
             );
         }
@@ -170,7 +187,7 @@ fn a_killed_recording_is_there_up_to_the_last_second() {
     // The moment does not matter: the rows are there when it is killed, or the file would not be as long.
     let until = Instant::now() + Duration::from_secs(60);
     let samples = place.path("rec/samples.csv");
-    while std::fs::metadata(&samples).map_or(0, |m| m.len()) < 300_000 {
+    while std::fs::metadata(&samples).map_or(0, |m| m.len()) < 150_000 {
         assert!(Instant::now() < until, "nothing is recorded");
         std::thread::sleep(Duration::from_millis(5));
     }
@@ -265,8 +282,21 @@ fn a_port_that_vanishes_ends_the_recording_with_what_there_is() {
         speed: 2.0,
         ..Script::default()
     });
-    let run = mimu(&place, &["record", "--port", &peer.path, "-o", "rec"]);
-    run.refused(&[&peer.path, "vanished", "samples are kept in rec"]);
+    let arguments = [
+        "record",
+        "--port",
+        &peer.path,
+        "-o",
+        "rec",
+        "--reconnect",
+        "300ms",
+    ];
+    let run = mimu(&place, &arguments);
+    run.refused(&[
+        &peer.path,
+        "vanished, and has not come back within 0.3 s",
+        "samples are kept in rec",
+    ]);
     let (recording, rows) = rows(&place, "rec");
     assert!(!recording.manifest.unfinished);
     check_rows(&rows);
@@ -293,4 +323,173 @@ fn ctrl_c_ends_a_recording_and_does_not_cut_it() {
     assert!(!recording.manifest.unfinished);
     check_rows(&rows);
     assert_eq!(peer.count("Stop"), 1);
+}
+
+/// Records over a pulled cable.
+fn unplugged(powered: bool) -> (Place, Peer, serde_json::Value) {
+    let place = Place::new();
+    let away_ms = 700;
+    let peer = Peer::new(Script {
+        acts: vec![(1_000, Act::Unplug { away_ms, powered })],
+        link: Some(place.path("port")),
+        start: Start::PowerOn,
+        ..Script::default()
+    });
+    let arguments = [
+        "record", "--port", &peer.path, "-o", "rec", "--for", "3s", "--json", "-",
+    ];
+    let result = mimu(&place, &arguments).json();
+    (place, peer, result)
+}
+
+#[test]
+fn a_recording_goes_on_after_the_cable_was_pulled_and_the_device_s_clock_measures_the_gap() {
+    let (place, _peer, result) = unplugged(true);
+    assert_eq!(result["reconnected"], 1);
+    assert_eq!(result["restarts"], serde_json::json!([]));
+    let (recording, rows) = rows(&place, "rec");
+    // Every row is the sample of its time, also behind the gap.
+    check_rows(&rows);
+    let [(before, after)] = gaps(&rows)[..] else {
+        panic!("one gap: {:?}", gaps(&rows));
+    };
+    assert!(
+        before < 1_000.0 && after - before > 700.0,
+        "{before} {after}"
+    );
+    let missing = recording.manifest.recorded.unwrap().missing;
+    assert_eq!(result["missing"], missing);
+    assert_eq!(missing as f64, after - before - 1.0);
+    let length = rows.t_s.last().unwrap() - rows.t_s[0];
+    assert!((length - 2.999).abs() < 1e-9, "{length}");
+}
+
+#[test]
+fn a_device_that_was_without_power_meanwhile_has_restarted() {
+    let (place, _peer, result) = unplugged(false);
+    assert_eq!(result["reconnected"], 1);
+    assert_eq!(result["restarts"][0]["start"], "power-on");
+    let (recording, rows) = rows(&place, "rec");
+    assert_eq!(gaps(&rows).len(), 1);
+    assert_eq!(recording.manifest.recorded.unwrap().restarts.len(), 1);
+}
+
+#[test]
+fn a_row_takes_no_more_bytes_than_its_numbers_have_digits() {
+    let place = Place::new();
+    let peer = Peer::new(Script {
+        speed: 4.0,
+        ..Script::default()
+    });
+    let arguments = [
+        "record", "--port", &peer.path, "-o", "rec", "--for", "2s", "--json", "-",
+    ];
+    mimu(&place, &arguments).json();
+    let bytes = std::fs::metadata(place.path("rec/samples.csv"))
+        .unwrap()
+        .len();
+    let each = bytes as f64 / 2000.0;
+    println!("{each:.1} bytes a row");
+    // A time of 5 digits, a temperature of 5, six readings of up to 9 digits and a point, and what separates them.
+    assert!(each < 80.0, "{each}");
+}
+
+#[test]
+fn a_plan_by_time_gives_every_sample_of_a_dwell_its_input() {
+    let place = Place::new();
+    let plan = "format = \"mimu-plan/1\"\ndevice = \"unit-9\"\nsample_rate_hz = 1000.0\ncarrier = \"table\"\n\
+                gravity_mps2 = 9.793\nlead_in_s = 0.25\n\
+                [[step]]\nup = [0.0, 0.0, 1.0]\ndwell_s = 0.5\n\
+                [[step]]\nup = [0.0, -2.0, 0.0]\nrate_dps = 50.0\ndwell_s = 0.25\nrepeat = 2\n";
+    std::fs::write(place.path("plan.toml"), plan).unwrap();
+    let peer = Peer::new(Script {
+        speed: 4.0,
+        ..Script::default()
+    });
+    let record = [
+        "record",
+        "--port",
+        &peer.path,
+        "-o",
+        "rec",
+        "--plan",
+        "plan.toml",
+    ];
+    let nothing = mimu(&place, &record);
+    nothing.refused(&["--plan", "begins and ends", "--transit"]);
+    let by_time = [&record[..], &["--transit", "250ms", "--json", "-"]].concat();
+    let result = mimu(&place, &by_time).json();
+    assert_eq!(
+        (&result["dwells"], &result["samples"]),
+        (&3.into(), &1750.into())
+    );
+    let (recording, rows) = all_rows(&place, "rec");
+    let manifest = &recording.manifest;
+    assert_eq!(manifest.reference, mimu_recording::Reference::Table);
+    assert_eq!(
+        (manifest.device.as_str(), manifest.gravity_mps2),
+        ("unit-9", 9.793)
+    );
+    let none = [None; 6];
+    let up = [0.0, 0.0, 0.0, 0.0, 0.0, 9.793].map(Some);
+    let turning = [0.0, -50.0, 0.0, 0.0, -9.793, 0.0].map(Some);
+    let spans = [
+        (250, -1, none),
+        (500, 0, up),
+        (250, -1, none),
+        (250, 1, turning),
+        (250, -1, none),
+        (250, 2, turning),
+    ];
+    let mut row = 0;
+    for (length, step, input) in spans {
+        for _ in 0..length {
+            assert_eq!(rows.step[row], step, "row {row}");
+            let found: [Option<f64>; 6] =
+                std::array::from_fn(|i| Some(rows.reference[i][row]).filter(|v| !v.is_nan()));
+            assert_eq!(found, input, "row {row}");
+            row += 1;
+        }
+    }
+    assert_eq!(row, 1750);
+}
+
+#[test]
+fn a_table_of_inputs_is_taken_by_the_labels_of_its_rows_and_turns_at_the_end() {
+    let place = Place::new();
+    let inputs = "step,turn_x_deg,ref_force_z_mps2\nface_up,,9.81\nabout_x,90,\nface_down,,-9.81\n";
+    std::fs::write(place.path("inputs.csv"), inputs).unwrap();
+    let peer = Peer::new(Script {
+        speed: 4.0,
+        ..Script::default()
+    });
+    let arguments = [
+        "record",
+        "--port",
+        &peer.path,
+        "-o",
+        "rec",
+        "--inputs",
+        "inputs.csv",
+        "--step-every",
+        "500ms,100ms",
+        "--for",
+        "1100ms",
+        "--gravity",
+        "9.81",
+        "--json",
+        "-",
+    ];
+    let result = mimu(&place, &arguments).json();
+    // Of the last one nothing was recorded, which is told.
+    let warning = result["warnings"][0].as_str().unwrap();
+    assert!(warning.contains("face_down"), "{warning}");
+    let (recording, rows) = all_rows(&place, "rec");
+    let manifest = &recording.manifest;
+    assert_eq!(manifest.step_labels, ["face_up", "about_x", "face_down"]);
+    assert_eq!(manifest.turn_steps, [1]);
+    assert_eq!(rows.reference[5][10], 9.81);
+    assert!(rows.reference[0][10].is_nan() && rows.reference[5][550].is_nan());
+    // 90 degrees in half a second.
+    assert_eq!((rows.step[700], rows.reference[0][700]), (1, 180.0));
 }

@@ -3,6 +3,7 @@
 mod applied;
 mod codes;
 mod gaps;
+mod kept;
 mod law;
 mod refused;
 mod unit;

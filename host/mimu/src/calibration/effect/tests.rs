@@ -131,7 +131,7 @@ fn an_effect_that_is_found_again_adds_to_what_is_known() {
     assert_eq!(all.len(), 1);
     let of = |name: &str| {
         let found = all[0].coefficients.iter().find(|c| c.name == name);
-        found.map(|c| (c.value, c.sigma)).unwrap()
+        found.map(|c| (c.value, c.sigma.unwrap())).unwrap()
     };
     assert_eq!(of("xx"), (2e-5, 3e-6));
     let (value, sigma) = of("zy");

@@ -23,6 +23,8 @@ impl Device {
                 hash: stored::hash(bytes),
                 nodes: decoded.table.len() as u8,
                 effects: decoded.effect_count,
+                unit_id: decoded.origin.unit_id.unwrap_or_default(),
+                created_s: decoded.origin.created_s.unwrap_or_default(),
             }
         });
         let first = match stored {
@@ -135,7 +137,12 @@ impl Device {
                     passed: self.script.self_test_passed,
                 }));
             }
-            Request::UploadBegin { length, hash } => {
+            Request::UploadBegin {
+                length,
+                hash,
+                other_unit,
+            } => {
+                self.insists = other_unit;
                 self.upload = Some((length as usize, hash, Vec::new()));
             }
             Request::UploadChunk { offset, bytes } => {
@@ -164,7 +171,11 @@ impl Device {
                 if found != hash {
                     return Err(Refusal::WrongHash { found });
                 }
-                stored::decode(&received).map_err(Refusal::NotUsable)?;
+                let stored = stored::decode(&received).map_err(Refusal::NotUsable)?;
+                let other = stored.origin.unit_id.filter(|id| *id != UNIT_ID);
+                if let (Some(unit_id), false) = (other, self.insists) {
+                    return Err(Refusal::OtherUnit { unit_id });
+                }
                 self.upload = None;
                 self.calibrated = None;
                 self.seen.lock().unwrap().stored = Some(received);

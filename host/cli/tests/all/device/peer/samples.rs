@@ -1,6 +1,7 @@
 //! Samples, batch by batch, and what is made of them.
 
 use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
 
 use mimu_core::effects;
 use mimu_core::kalman::Bank;
@@ -46,6 +47,14 @@ impl Device {
             match act {
                 Some(Act::Restart) => return self.restart(),
                 Some(Act::Vanish) => self.port = None,
+                Some(Act::Unplug { away_ms, powered }) => {
+                    if let Some(link) = &self.script.link {
+                        std::fs::remove_file(link).unwrap();
+                    }
+                    self.port = None;
+                    let back = Instant::now() + Duration::from_millis(away_ms);
+                    self.back = Some((back, powered));
+                }
                 Some(Act::Drop) => self.dropped += 1,
                 _ => {}
             }

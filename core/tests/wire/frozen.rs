@@ -1,0 +1,242 @@
+//! Frames of version 2.0, byte by byte as a device sends them, made by a program of its own from the specifications of postcard, COBS
+//! and CRC-32. They never change: a device in the field is met with programs older and newer than its firmware.
+
+// What is not written out is of a later version.
+#![allow(clippy::needless_update)]
+
+use mimu_core::wire::{
+    Capabilities, Compatibility, Counters, Decoder, EFFECTS, Greeting, MAGIC, Message, Refusal,
+    Reply, SelfTest, Slot, Start, StoredInfo, Version, compatibility,
+};
+
+/// As the device sends it.
+const GREETING: &str = "000107076d696d7502650d302e312e302d316132623363340e4e55434c454f2d483734335a49320102030405060708090a0b0c0fffffff \
+     0308108020e8072c6779726f5f782c6779726f5f792c6779726f5f7a2c616363656c5f782c616363656c5f792c616363656c5f7a015601 \
+     250301b802ef9bafcdf8acd1910101020102030405060708090a0b0c80f2d6ca0602010501059a3c25b400";
+/// The same of a device that does not send its slots, the last field, yet.
+const GREETING_SHORTER: &str = "000107076d696d7502650d302e312e302d316132623363340e4e55434c454f2d483734335a49320102030405060708090a0b0c0fffffff \
+     0308108020e8072c6779726f5f782c6779726f5f792c6779726f5f7a2c616363656c5f782c616363656c5f792c616363656c5f7a015601 \
+     250301b802ef9bafcdf8acd1910101020102030405060708090a0b0c80f2d6ca066b8fe73f00";
+/// The same with more behind it.
+const GREETING_LONGER: &str = "000107076d696d7502650d302e312e302d316132623363340e4e55434c454f2d483734335a49320102030405060708090a0b0c0fffffff \
+     0308108020e8072c6779726f5f782c6779726f5f792c6779726f5f7a2c616363656c5f782c616363656c5f792c616363656c5f7a015601 \
+     250301b802ef9bafcdf8acd1910101020102030405060708090a0b0c80f2d6ca0602010501010a05746578746a3f7aee00";
+/// The same with a reason to start of a later version, number 19, with five bytes.
+const UNKNOWN_START: &str = "000107076d696d7502900d302e312e302d316132623363340e4e55434c454f2d483734335a49320102030405060708090a0b0c0fffffff \
+     0308108020e8072c6779726f5f782c6779726f5f792c6779726f5f7a2c616363656c5f782c616363656c5f792c616363656c5f7a015607 \
+     130568656c6c6f0301b802ef9bafcdf8acd1910101020102030405060708090a0b0c80f2d6ca0602010501050e29b3db00";
+const COUNTERS: &str = "001d010701bbd024fccf24fbcf240102030405060708090a9c036be31a2d00";
+/// Without the last.
+const COUNTERS_SHORTER: &str = "001b010701bbd024fccf24fbcf240102030405060708090a24e942de00";
+/// With two more.
+const COUNTERS_LONGER: &str =
+    "0020010701bbd024fccf24fbcf240102030405060708090a9c030580019dcebd7900";
+const SELF_TEST: &str = "0039010702713d8abe713d8abe713d8abe713d8a3e713d8a3e713d8a3e3333d33f3333d33fcdcc1c403333d33f3333d33fcdccec3f0f3a \
+     e20e1f00";
+/// Without the accelerometer's coarse range and the verdict.
+const SELF_TEST_SHORTER: &str =
+    "002c010702713d8abe713d8abe713d8abe713d8a3e713d8a3e713d8a3e3333d33f3333d33fcdcc1c400bcd240100";
+/// With one more.
+const SELF_TEST_LONGER: &str = "0035010702713d8abe713d8abe713d8abe713d8a3e713d8a3e713d8a3e3333d33f3333d33fcdcc1c403333d33f3333d33fcdccec3f0f01 \
+     0101056ce33f0700";
+/// For a reason of a later version, number 99, with three bytes.
+const UNKNOWN_REFUSAL: &str = "000b0207630102035add44cd00";
+
+fn bytes(hex: &str) -> Vec<u8> {
+    let digits: Vec<u8> = hex
+        .chars()
+        .filter_map(|c| Some(c.to_digit(16)? as u8))
+        .collect();
+    digits.chunks(2).map(|d| d[0] << 4 | d[1]).collect()
+}
+
+/// Has `look` see the message in the frame.
+fn read<T>(hex: &str, look: impl Fn(&Message<'_>) -> T) -> T {
+    let mut decoder = Decoder::new();
+    let frame = bytes(hex);
+    let (last, before) = frame.split_last().unwrap();
+    for byte in before {
+        assert_eq!(decoder.push(*byte), None);
+    }
+    let frame = decoder.push(*last).expect("a whole frame");
+    look(&frame.message().expect("a message"))
+}
+
+fn greeting() -> Greeting<'static> {
+    Greeting {
+        magic: MAGIC,
+        protocol: Version { major: 2, minor: 0 },
+        firmware: "0.1.0-1a2b3c4",
+        board: "NUCLEO-H743ZI2",
+        unit_id: [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12],
+        capabilities: Capabilities::TEMPERATURE_NODES
+            .and(Capabilities::TERMS)
+            .and(Capabilities::KALMAN)
+            .and(Capabilities::SELF_TEST),
+        effects: 0x007f_ffff,
+        effects_room: 8,
+        nodes_room: 16,
+        stored_room: 4096,
+        sample_rate_hz: 1000,
+        channels: "gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z",
+        raw_unit: "V",
+        start: Start::PowerOn,
+        starts: 3,
+        stored: Some(StoredInfo {
+            length: 312,
+            hash: 0x0123_4567_89ab_cdef,
+            nodes: 1,
+            effects: 2,
+            unit_id: [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12],
+            // 2026-01-01.
+            created_s: 1_767_225_600,
+        }),
+        slots: [Slot::Whole { generation: 5 }, Slot::Empty],
+        ..Greeting::default()
+    }
+}
+
+#[track_caller]
+fn greets(hex: &str, expected: &Greeting<'_>) {
+    read(hex, |message| {
+        let Message::Greeting { id: 7, greeting } = message else {
+            panic!("{message:?}");
+        };
+        assert_eq!(greeting, expected);
+        let major = compatibility(greeting);
+        assert_eq!(
+            major,
+            Compatibility::Same,
+            "not one that asks for an update"
+        );
+    });
+}
+
+#[test]
+fn a_greeting_of_2_0_is_read_for_ever() {
+    greets(GREETING, &greeting());
+    // What is sent today begins as it did then.
+    let message = Message::Greeting {
+        id: 7,
+        greeting: greeting(),
+    };
+    let mut room = [0; 512];
+    let sent = postcard::to_slice(&message, &mut room).unwrap();
+    let mut decoder = Decoder::new();
+    let frame = bytes(GREETING);
+    let payload = frame
+        .iter()
+        .find_map(|b| Some(decoder.push(*b)?.0.to_vec()));
+    assert!(sent.starts_with(&payload.unwrap()));
+    assert_eq!(EFFECTS[22], "gyro_g_squared", "the last bit of it");
+}
+
+#[test]
+fn what_a_greeting_lacks_is_unknown() {
+    let slots = [Slot::NotKnown; 2];
+    let expected = Greeting {
+        slots,
+        ..greeting()
+    };
+    greets(GREETING_SHORTER, &expected);
+}
+
+#[test]
+fn what_a_greeting_has_beyond_is_not_looked_at() {
+    greets(GREETING_LONGER, &greeting());
+}
+
+#[test]
+fn a_reason_to_start_that_is_not_known_hides_nothing_behind_it() {
+    let start = Start::NotKnown;
+    let expected = Greeting {
+        start,
+        ..greeting()
+    };
+    greets(UNKNOWN_START, &expected);
+}
+
+#[test]
+fn counters_of_2_0_are_read_for_ever_and_whatever_their_length() {
+    let whole = Counters {
+        uptime_ms: 600_123,
+        samples: 600_060,
+        last: 600_059,
+        late: 1,
+        converter_overruns: 2,
+        stalls: 3,
+        queue_overruns: 4,
+        batches_dropped: 5,
+        frames_garbled: 6,
+        receiver_overruns: 7,
+        refused: 8,
+        flash_corrected: 9,
+        flash_uncorrectable: 10,
+        longest_us: 412,
+        ..Counters::default()
+    };
+    let shorter = Counters {
+        longest_us: 0,
+        ..whole
+    };
+    for (hex, expected) in [(COUNTERS, whole), (COUNTERS_SHORTER, shorter)] {
+        let id = 7;
+        let reply = Reply::Counters(expected);
+        read(hex, |message| {
+            assert_eq!(*message, Message::Reply { id, reply })
+        });
+    }
+    read(COUNTERS_LONGER, |message| {
+        let Message::Reply {
+            id: 7,
+            reply: Reply::Counters(found),
+        } = message
+        else {
+            panic!("{message:?}");
+        };
+        assert_eq!((found.uptime_ms, found.longest_us), (600_123, 412));
+    });
+}
+
+#[test]
+fn a_self_test_of_2_0_is_read_for_ever_and_whatever_its_length() {
+    let whole = SelfTest {
+        gyro_st1_v: [-0.27; 3],
+        gyro_st2_v: [0.27; 3],
+        accel_fine_v: [1.65, 1.65, 2.45],
+        accel_coarse_v: [1.65, 1.65, 1.85],
+        passed: 15,
+        ..SelfTest::default()
+    };
+    let shorter = SelfTest {
+        accel_coarse_v: [0.0; 3],
+        passed: 0,
+        ..whole
+    };
+    for (hex, expected) in [
+        (SELF_TEST, whole),
+        (SELF_TEST_LONGER, whole),
+        (SELF_TEST_SHORTER, shorter),
+    ] {
+        let id = 7;
+        let reply = Reply::SelfTest(expected);
+        read(hex, |message| {
+            assert_eq!(*message, Message::Reply { id, reply })
+        });
+    }
+}
+
+#[test]
+fn a_refusal_for_an_unknown_reason_is_a_refusal() {
+    let refusal = Refusal::NotKnown;
+    let expected = Message::Refused { id: 7, refusal };
+    read(UNKNOWN_REFUSAL, |message| assert_eq!(*message, expected));
+}
+
+#[test]
+fn a_message_of_another_kind_is_whole_or_none() {
+    // Done of call 7, with a byte behind it, and half of it.
+    for payload in [&[1, 7, 0, 9][..], &[1, 7], &[0], &[0, 7, b'n']] {
+        assert_eq!(mimu_core::wire::Frame(payload).message(), None);
+    }
+}

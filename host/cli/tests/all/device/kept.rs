@@ -1,0 +1,149 @@
+//! Of which unit a calibration is, and the file that is fetched back from the device that keeps it.
+
+use super::calibration::{EFFECTS, text};
+use super::peer::{Peer, Script, UNIT_ID};
+use super::{Place, Ran, mimu};
+
+const OTHER: &str = "ffeeddccbbaa998877665544";
+
+/// Number of the peer.
+fn unit() -> String {
+    UNIT_ID.iter().map(|b| format!("{b:02x}")).collect()
+}
+
+/// A calibration file of the unit of this number.
+fn of_unit(place: &Place, unit_id: &str) -> String {
+    let path = place.path("of-unit.toml");
+    let id = format!("unit_id = \"{unit_id}\"\ncreated");
+    let sha = format!("sha256 = \"{}\"", "c0ffee12".repeat(8));
+    let text = text("V", EFFECTS).replace("created", &id);
+    std::fs::write(&path, text.replace("sha256 = \"00\"", &sha)).unwrap();
+    path.display().to_string()
+}
+
+fn device(place: &Place, peer: &Peer, arguments: &[&str]) -> Ran {
+    let all = [&["device"], arguments, &["--port", &peer.path]].concat();
+    mimu(place, &all)
+}
+
+#[test]
+fn a_calibration_of_another_unit_is_refused_unless_somebody_insists() {
+    let place = Place::new();
+    let peer = Peer::new(Script::default());
+    let other = of_unit(&place, OTHER);
+    let refused = device(&place, &peer, &["upload", &other]);
+    refused.refused(&["of-unit.toml", OTHER, &unit(), "(--other-unit)"]);
+    assert_eq!(peer.count("UploadBegin"), 0, "before anything is sent");
+
+    let insisted = ["upload", &other, "--other-unit", "--json", "-"];
+    let stored = device(&place, &peer, &insisted).json();
+    assert_eq!(stored["unit_id"], OTHER);
+    let shown = device(&place, &peer, &["info"]).stdout;
+    let words = format!("of ANOTHER unit, {OTHER}, made 2026-01-01T00:00:00Z");
+    assert!(shown.contains(&words), "{shown}");
+
+    let own = of_unit(&place, &unit());
+    let stored = device(&place, &peer, &["upload", &own, "--json", "-"]).json();
+    assert_eq!(stored["warnings"], serde_json::json!([]));
+    let shown = device(&place, &peer, &["info"]).stdout;
+    assert!(shown.contains("of this unit, made 2026"), "{shown}");
+}
+
+#[test]
+fn a_calibration_of_no_known_unit_is_stored_with_a_warning() {
+    let place = Place::new();
+    let peer = Peer::new(Script::default());
+    let unknown = place.calibration("V", "");
+    let stored = device(&place, &peer, &["upload", &unknown, "--json", "-"]).json();
+    let warning = stored["warnings"][0].as_str().unwrap();
+    assert!(warning.contains("of which unit"), "{warning}");
+    assert!(stored["unit_id"].is_null());
+    let shown = device(&place, &peer, &["info"]).stdout;
+    assert!(shown.contains("of no known unit, made 2026"), "{shown}");
+}
+
+#[test]
+fn what_is_fetched_and_stored_again_is_the_same_to_the_last_byte() {
+    let place = Place::new();
+    let peer = Peer::new(Script::default());
+    let file = of_unit(&place, &unit());
+    let sent = device(&place, &peer, &["upload", &file, "--json", "-"]).json();
+    let held = peer.seen.lock().unwrap().stored.clone();
+    let fetched = ["download", "-o", "back.toml", "--json", "-"];
+    let fetched = device(&place, &peer, &fetched).json();
+    assert_eq!(fetched["samples_sha256"], "c0ffee12".repeat(8));
+    assert_eq!(fetched["created"], "2026-01-01T00:00:00Z");
+    let back = std::fs::read_to_string(place.path("back.toml")).unwrap();
+    assert!(
+        back.contains(&format!("device = \"mimu-{}\"", unit())),
+        "{back}"
+    );
+    assert!(!back.contains("sigma") && !back.contains("covariance ="));
+
+    // The device holds it: nothing is sent.
+    let again = ["upload", "back.toml", "--json", "-"];
+    assert_eq!(device(&place, &peer, &again).json()["was_there"], true);
+    assert_eq!(peer.count("UploadBegin"), 1);
+    let said = device(&place, &peer, &["upload", "back.toml"]).stdout;
+    assert!(said.contains("already stored"), "{said}");
+    // And another one, which does not, is sent the same.
+    let empty = Peer::new(Script::default());
+    let twin = device(&place, &empty, &again).json();
+    assert_eq!(
+        (&twin["was_there"], &twin["hash"]),
+        (&false.into(), &sent["hash"])
+    );
+    assert_eq!(empty.seen.lock().unwrap().stored, held);
+}
+
+#[test]
+fn a_file_with_half_of_its_uncertainty_is_refused() {
+    let place = Place::new();
+    let peer = Peer::new(Script::default());
+    let file = place.path("cal.toml");
+    let whole = text("V", "");
+    let lines = whole.lines().filter(|l| !l.starts_with("sigma_o"));
+    std::fs::write(&file, lines.collect::<Vec<_>>().join("\n")).unwrap();
+    let refused = device(&place, &peer, &["upload", "cal.toml"]);
+    refused.refused(&["[gyro]", "sigma_C is there and sigma_o is not", "cut"]);
+    std::fs::write(
+        &file,
+        whole.replacen("device", "unit_id = \"12\"\ndevice", 1),
+    )
+    .unwrap();
+    let refused = device(&place, &peer, &["upload", "cal.toml"]);
+    refused.refused(&["unit_id", "\"12\" is no number of a unit", "24 hexadecimal"]);
+}
+
+#[test]
+fn several_temperature_nodes_are_fetched_as_bytes_only() {
+    use mimu_core::compensation::{Affine, Compensation};
+    use mimu_core::stored::{self, Origin};
+    use mimu_core::table::Node;
+    use nalgebra::{Matrix3, Vector3};
+
+    let affine = Affine {
+        matrix: Matrix3::identity(),
+        offset: Vector3::zeros(),
+    };
+    let model = Compensation {
+        gyro: affine,
+        accel: affine,
+    };
+    let nodes = [10.0, 30.0].map(|temp_c| Node { temp_c, model });
+    let mut bytes = vec![0; stored::MAX_LENGTH];
+    let matrices = [&affine.matrix, &affine.matrix];
+    let length = stored::encode(&Origin::UNKNOWN, matrices, &nodes, &[], &mut bytes).unwrap();
+    bytes.truncate(length);
+    let place = Place::new();
+    let peer = Peer::new(Script {
+        stored: Some(bytes.clone()),
+        ..Script::default()
+    });
+    let file = ["download", "-o", "cal.toml", "--bytes", "cal.bin"];
+    device(&place, &peer, &file).refused(&["2 temperature nodes", "--bytes FILE"]);
+    assert!(!place.path("cal.bin").exists() && !place.path("cal.toml").exists());
+    let only_bytes = device(&place, &peer, &["download", "--bytes", "cal.bin"]);
+    assert_eq!(only_bytes.status, Some(0), "{}", only_bytes.stderr);
+    assert_eq!(std::fs::read(place.path("cal.bin")).unwrap(), bytes);
+}

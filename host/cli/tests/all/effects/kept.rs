@@ -1,0 +1,109 @@
+//! The calibration that a device keeps, fetched: what every command makes of it.
+
+use mimu::calibration::Calibration;
+use mimu::effects::candidate::{Candidate, Kind};
+use mimu::effects::converter::Converter;
+use mimu::effects::readout::first_of;
+use mimu::quantity::Sensor;
+use mimu_device::{Image, calibration, contents};
+
+use super::unit::{BIT_0_V, CUBIC, SAG, fitted, named, record, removed, table};
+use super::{every_effect, mimu};
+
+const CREATED: &str = "2026-01-01T00:00:00Z";
+
+/// The file that is fetched from the device that holds this one.
+fn fetched(calibration_file: &Calibration) -> (Image, Calibration) {
+    let image = Image::new(calibration_file, "cal.toml").unwrap();
+    let kept = calibration(&image.bytes, &calibration_file.device, "port").unwrap();
+    let text = kept.to_toml();
+    (image, Calibration::parse(&text, "kept.toml").unwrap())
+}
+
+#[test]
+fn every_effect_is_fetched_as_it_was_sent() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("recording");
+    record(&path, false, true);
+    let fit = fitted(&path);
+    // Converters of their own of two axes of the accelerometer, in place of one of all.
+    let effect = mimu::effects::by_id("accel_readout_code").unwrap();
+    let mut own = Candidate::new(Sensor::Accel, Kind::Effect(effect));
+    own.active = vec![first_of(0), first_of(2) + 3];
+    own.codes = [
+        Some(Converter::of(BIT_0_V, 0.123)),
+        None,
+        Some(Converter::of(BIT_0_V, -0.321)),
+    ];
+    let own = removed(own, 0.0, &[1e-3, -2e-3]);
+    let mut others = every_effect();
+    others.retain(|e| e.candidate.id() != "accel_readout_code");
+    others.insert(2, own);
+    for effects in [every_effect(), others] {
+        let tables: Vec<_> = effects.iter().map(table).collect();
+        let made = Calibration::of(&fit, &tables, CREATED).unwrap();
+        let (sent, kept) = fetched(&made);
+        let again = Image::new(&kept, "kept.toml").unwrap();
+        let shown = contents(&sent.bytes).unwrap();
+        println!("{} effects, {} bytes", shown.effects.len(), shown.bytes);
+        assert!(again.bytes == sent.bytes, "to the last bit");
+        let ids = |c: &Calibration| -> Vec<String> {
+            c.effects().iter().map(|e| e.candidate.id()).collect()
+        };
+        assert_eq!(ids(&kept), ids(&made));
+        assert_eq!(kept.recording.sha256, made.recording.sha256);
+        assert_eq!(kept.created.as_deref(), Some(CREATED));
+    }
+}
+
+#[test]
+fn the_other_commands_take_what_was_fetched_and_say_what_they_lack() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let text = |name: &str| path(name).display().to_string();
+    record(&path("clean"), false, true);
+    record(&path("flawed"), true, true);
+    let effects = [
+        named(
+            "gyro_g_sensitivity",
+            &[0.0, 0.0, SAG, SAG, 0.0, 0.0, 0.0, 0.0, 0.0],
+        ),
+        named("accel_scale_cubic", &[CUBIC; 3]),
+    ];
+    let made = Calibration::of(
+        &fitted(&path("clean")),
+        &effects.each_ref().map(table),
+        CREATED,
+    );
+    let made = made.unwrap();
+    let (_, kept) = fetched(&made);
+    assert!(made.is_uncertain() && !kept.is_uncertain());
+    std::fs::write(path("made.toml"), made.to_toml()).unwrap();
+    std::fs::write(path("kept.toml"), kept.to_toml()).unwrap();
+    let run = |command: &[&str], file: &str| {
+        let calibration = text(file);
+        let all = [command, &["--calibration", &calibration, "--json", "-"]].concat();
+        let (done, said) = mimu(&all);
+        assert!(done, "{all:?}: {said}");
+        serde_json::from_str::<serde_json::Value>(&said).unwrap()
+    };
+    let flawed = text("flawed");
+    for sensor in ["gyro", "accel"] {
+        let [before, after] = ["made.toml", "kept.toml"].map(|file| {
+            let judged = run(&["verify", &flawed], file);
+            judged["sensors"][sensor]["rms"].as_f64().unwrap()
+        });
+        // Single precision is 6e-8 of some volts.
+        assert!((before - after).abs() < 1e-4 * before, "{before} {after}");
+    }
+    let out = text("compensated");
+    let applied = run(&["apply", &flawed, "-o", &out], "kept.toml");
+    assert_eq!(applied["effects"].as_array().unwrap().len(), 2);
+
+    let lacks = |found: &serde_json::Value| {
+        let warnings = found["warnings"].to_string();
+        warnings.contains("does not say how well it is known")
+    };
+    assert!(lacks(&run(&["diagnose", &flawed], "kept.toml")));
+    assert!(!lacks(&run(&["diagnose", &flawed], "made.toml")));
+}

@@ -1,0 +1,153 @@
+//! Inputs that are known while a recording is made: of a table beside it, or of the plan that it follows.
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use mimu_recording::{Batch, Inputs};
+
+use super::plan::Planned;
+
+/// What is known of each dwell.
+#[derive(Debug)]
+pub struct Known {
+    source: Source,
+    labels: Vec<String>,
+    /// Samples of each dwell so far.
+    samples: BTreeMap<i32, u64>,
+}
+
+#[derive(Debug)]
+enum Source {
+    Table(Inputs),
+    Plan(Vec<Planned>),
+}
+
+impl Known {
+    /// Of a table as `mimu import --inputs` takes it: by the number of the dwell, or by its place in the table where rows have labels.
+    pub fn of_table(inputs: Inputs) -> Self {
+        let labels = inputs.labels();
+        Self::of(Source::Table(inputs), labels)
+    }
+
+    /// Of the dwells of a plan.
+    pub fn of_plan(dwells: Vec<Planned>) -> Self {
+        Self::of(Source::Plan(dwells), Vec::new())
+    }
+
+    fn of(source: Source, labels: Vec<String>) -> Self {
+        Self {
+            source,
+            labels,
+            samples: BTreeMap::new(),
+        }
+    }
+
+    /// Which of the `ref_` columns it fills; none by hand.
+    pub fn columns(&self) -> [bool; 6] {
+        match &self.source {
+            Source::Table(inputs) => inputs.columns,
+            Source::Plan(dwells) => {
+                std::array::from_fn(|i| dwells.iter().any(|d| !d.input[i].is_nan()))
+            }
+        }
+    }
+
+    /// Labels of the dwells, if they have any.
+    pub fn labels(&self) -> &[String] {
+        &self.labels
+    }
+
+    /// How many dwells there are to be, where that is planned.
+    pub fn planned(&self) -> Option<usize> {
+        match &self.source {
+            Source::Table(_) => None,
+            Source::Plan(dwells) => Some(dwells.len()),
+        }
+    }
+
+    /// What is to be done in a dwell, if that is known.
+    pub fn title(&self, step: i32) -> Option<&str> {
+        let at = usize::try_from(step).ok()?;
+        match &self.source {
+            Source::Table(_) => self.labels.get(at).map(String::as_str),
+            Source::Plan(dwells) => dwells.get(at).map(|d| d.title.as_str()),
+        }
+    }
+
+    /// Input of a sample of a dwell, deg/s and m/s², not a number where it is unknown; counts the sample. The mean rate of a turn is
+    /// known at the end only.
+    pub(super) fn next(&mut self, step: i32) -> [f64; 6] {
+        *self.samples.entry(step).or_default() += 1;
+        self.input(step, f64::NAN)
+    }
+
+    /// Input of a dwell of this length.
+    fn input(&mut self, step: i32, duration_s: f64) -> [f64; 6] {
+        const UNKNOWN: [f64; 6] = [f64::NAN; 6];
+        let Ok(at) = usize::try_from(step) else {
+            return UNKNOWN;
+        };
+        let known = match &mut self.source {
+            Source::Plan(dwells) => dwells.get(at).map(|d| d.input),
+            Source::Table(inputs) => {
+                let label = self.labels.get(at).map(String::as_str);
+                inputs.of_step(step, label, duration_s)
+            }
+        };
+        known.unwrap_or(UNKNOWN)
+    }
+
+    /// Whether a rate was not known before the end of its dwell.
+    pub(super) fn has_turns(&self) -> bool {
+        matches!(&self.source, Source::Table(inputs) if inputs.has_turns)
+    }
+
+    /// Writes the inputs of whole dwells into rows, at the rate of the samples: n samples span n periods.
+    pub(super) fn complete(&mut self, batch: &mut Batch, rate_hz: f64) {
+        let columns = self.columns();
+        let mut inputs: BTreeMap<i32, [f64; 6]> = BTreeMap::new();
+        for (row, step) in batch.step.iter().enumerate() {
+            let input = *inputs.entry(*step).or_insert_with(|| {
+                let samples = self.samples.get(step).copied().unwrap_or_default();
+                self.input(*step, samples as f64 / rate_hz)
+            });
+            for (i, column) in batch.reference.iter_mut().enumerate() {
+                if columns[i] {
+                    column[row] = input[i];
+                }
+            }
+        }
+    }
+
+    /// The dwells that are turns.
+    pub(super) fn turns(&self) -> Vec<i32> {
+        match &self.source {
+            Source::Table(inputs) => inputs.turns.iter().copied().collect(),
+            Source::Plan(_) => Vec::new(),
+        }
+    }
+
+    /// One sentence for what no sample belongs to, if there is any.
+    pub(super) fn unused(&self) -> Option<String> {
+        match &self.source {
+            Source::Table(inputs) => inputs.unused(),
+            Source::Plan(dwells) => {
+                let done = self.samples.keys().filter(|step| **step >= 0).count();
+                (done < dwells.len()).then(|| {
+                    format!(
+                        "{done} of the {} dwells of the plan were recorded",
+                        dwells.len()
+                    )
+                })
+            }
+        }
+    }
+
+    /// Lengths of the planned dwells.
+    pub fn lengths(&self) -> Vec<Duration> {
+        match &self.source {
+            Source::Table(_) => Vec::new(),
+            Source::Plan(dwells) => dwells.iter().map(|d| d.length).collect(),
+        }
+    }
+}
