@@ -62,6 +62,8 @@ pub struct Asked {
     pub by_targets: bool,
     /// Most dwells.
     pub most_dwells: usize,
+    /// Without a person: so long a step may take to come about, s.
+    pub patience_s: f64,
     /// Steps that verify.
     pub verification: Vec<Step>,
     /// Largest change of temperature of a unit that has warmed up, °C/min; `None`: it is not waited for.
@@ -390,6 +392,7 @@ mod tests {
             steps: Vec::new(),
             by_targets: true,
             most_dwells: 40,
+            patience_s: 60.0,
             verification: Vec::new(),
             warm_c_per_min: None,
             most_drift_c: 5.0,

@@ -15,8 +15,6 @@ use crate::step::Step;
 const SHOWN: Duration = Duration::from_millis(100);
 /// Nothing has come: so long nothing is looked at.
 const IDLE: Duration = Duration::from_millis(4);
-/// Without a person, what does not come about in this time never will: ten times the longest move and dwell.
-const STUCK: Duration = Duration::from_secs(120);
 /// Longest wait for a unit to say anything, or for a table's interlock.
 const SILENT: Duration = Duration::from_secs(30);
 
@@ -311,7 +309,7 @@ impl<'a> Wizard<'a> {
             if self.units.iter().all(|u| u.done) {
                 return Ok(Stepped::Had);
             }
-            if since.elapsed() > STUCK && !self.driver.is_person() {
+            if since.elapsed().as_secs_f64() > self.asked.patience_s && !self.driver.is_person() {
                 let why = self.units.iter().filter(|u| !u.done);
                 let why = why.filter_map(|u| u.standing.waiting.clone()).next();
                 let problem = format!(

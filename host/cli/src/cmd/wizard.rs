@@ -68,6 +68,9 @@ pub(crate) struct WizardArgs {
     /// Most dwells of the calibration
     #[arg(long, value_name = "N", default_value_t = 60)]
     most: usize,
+    /// Without a person: so long a step may take to come about, s
+    #[arg(long, value_name = "S", default_value_t = 120.0, value_parser = |t: &str| number(t, 1.0, 1e5))]
+    patience: f64,
     /// Order of the planned dwells
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -159,6 +162,7 @@ impl WizardArgs {
             steps,
             by_targets: !self.as_planned,
             most_dwells: self.most,
+            patience_s: self.patience,
             warm_c_per_min: (self.warm_up > 0.0).then_some(self.warm_up),
             most_drift_c: self.drift,
             targets: self.targets()?,
