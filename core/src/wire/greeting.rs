@@ -9,7 +9,7 @@ use crate::stored;
 pub const MAGIC: [u8; 4] = *b"mimu";
 
 /// The protocol of this build.
-pub const PROTOCOL: Version = Version { major: 1, minor: 0 };
+pub const PROTOCOL: Version = Version { major: 2, minor: 0 };
 
 /// Version of a protocol.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -58,6 +58,8 @@ pub struct Greeting<'a> {
     pub stored: Option<StoredInfo>,
     /// What is in the two places for a calibration.
     pub slots: [Slot; 2],
+    /// Time since power-on at the start of sampling, ms; `None` if it is not known.
+    pub powered_for_ms: Option<u32>,
 }
 
 /// Bits of [`Greeting::capabilities`].
