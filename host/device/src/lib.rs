@@ -10,6 +10,7 @@
 //! | `upload`     | sending them and fetching them back                                                    |
 //! | `contents`   | what stands in them                                                                    |
 //! | `self_test`  | the self-test, and whether the unit stood still for it                                 |
+//! | `flagged`    | samples that carry a flag, counted                                                     |
 //! | `stream`     | samples as they come                                                                   |
 //! | `check`      | the device's compensation against the PC's, sample by sample                           |
 //! | [`record`]   | recording its raw stream                                                               |
@@ -18,6 +19,7 @@
 
 mod check;
 mod contents;
+mod flagged;
 mod heard;
 mod image;
 mod kalman;
@@ -33,6 +35,7 @@ mod who;
 
 pub use check::{Checked, Difference, check, rounding, ulps};
 pub use contents::{Contents, ConverterContents, EffectContents, Inverse, NodeContents, contents};
+pub use flagged::Flagged;
 pub use heard::{Answer, Ear, Event, Heard, LineCount, Samples};
 pub use image::{Image, remembers};
 pub use kalman::{Applied, AxisEstimate, Converging, KalmanPlan, KalmanRun, SHORTEST, kalman};

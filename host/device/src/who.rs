@@ -44,6 +44,8 @@ pub struct Who {
     pub stored: Option<Held>,
     /// What is in the two places for a calibration, in words.
     pub slots: [String; 2],
+    /// Time since power-on at the start of sampling, ms; `None` if the device does not know it.
+    pub powered_for_ms: Option<u32>,
     /// One sentence if the device is older or newer and can be talked to all the same.
     pub warnings: Vec<String>,
 }
@@ -184,6 +186,7 @@ impl From<&Greeting<'_>> for Who {
                 effects: held.effects,
             }),
             slots: greeting.slots.each_ref().map(slot),
+            powered_for_ms: greeting.powered_for_ms,
             warnings: version_warning(greeting.protocol).into_iter().collect(),
         }
     }
@@ -270,6 +273,7 @@ pub(super) fn check(port: &str, magic: [u8; 4], protocol: Version) -> Result<()>
         starts: 0,
         stored: None,
         slots: [Slot::Empty; 2],
+        powered_for_ms: None,
     };
     let versions = versions(protocol);
     match compatibility(&stub) {

@@ -11,7 +11,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use mimu_core::wire::{
-    Decoder, MAGIC, MAX_FRAME, Message, PROTOCOL, Refusal, Reply, Start, Version,
+    Decoder, MAGIC, MAX_FRAME, Message, PROTOCOL, Refusal, Reply, Start, Version, checks,
     effects_of_this_build, encode,
 };
 
@@ -76,9 +76,13 @@ pub struct Script {
     pub speed: f64,
     /// Added to the compensated gyro x, rad/s: a device that computes wrongly.
     pub bent: f32,
-    pub self_test_passed: u8,
+    pub self_test_passed: u16,
     /// Why it started.
     pub start: Start<'static>,
+    /// Time since power-on when it began to sample.
+    pub powered_for_ms: Option<u32>,
+    /// Carried by all its batches.
+    pub flags: u16,
 }
 
 impl Default for Script {
@@ -95,7 +99,9 @@ impl Default for Script {
             acts: Vec::new(),
             speed: 1.0,
             bent: 0.0,
-            self_test_passed: 0b1111,
+            self_test_passed: checks::ALL,
+            powered_for_ms: Some(0),
+            flags: 0,
             start: Start::Panic {
                 file: "src/x.rs",
                 line: 7,
