@@ -34,6 +34,11 @@ pub fn info_text(result: &DeviceResult<&Who>) -> String {
         who.start,
         starts(who.starts)
     );
+    let powered = match who.powered_for_ms {
+        Some(ms) => format!("{:.1} s before sampling began", f64::from(ms) / 1000.0),
+        None => "not known: a reset has lost it".into(),
+    };
+    line!(out, "power-on      {powered}");
     line!(
         out,
         "samples       {} Hz, {} in {}",
