@@ -66,7 +66,7 @@ ask zero device counters --reset
 step "$seconds s of samples, none missing"
 ask record record -o "$work/rest" --for "${seconds}s" --gravity 9.81
 json "$work/record.json" "r['missing'] == 0 and r['gaps'] == 0 and not r['restarts'] and not r['broken_off']"
-json "$work/record.json" "r['samples'] == round($seconds * 1000) and r['saturated'] == 0 and r['without_reference'] == 0"
+json "$work/record.json" "r['samples'] == round($seconds * 1000) and r['saturated'] == 0 and r['without_reference'] == 0 and not any(r['temperature_left_out'])"
 
 step "the Kalman bank on the device and on the PC, on the same samples"
 ask kalman device kalman --force-mps2 0,0,9.81 --for 5s </dev/null

@@ -78,6 +78,8 @@ pub struct State<T: RealField, const N: usize> {
     /// Time since power-on, s, and what rounding has added to it.
     time: T,
     lost: T,
+    /// What decays after power-on is gone.
+    settled: bool,
     /// The last temperature above the reference that was a number, °C.
     temperature_offset: Option<T>,
     /// The temperature lagged by [`RATE_LAG_S`], minus itself, °C.
@@ -102,10 +104,20 @@ impl<T: RealField + Copy, const N: usize> State<T, N> {
             },
             time: T::zero(),
             lost: T::zero(),
+            settled: false,
             temperature_offset: None,
             rate_lag: T::zero(),
             gyro: Memory::none(),
             accel: Memory::none(),
+        }
+    }
+
+    /// Of a stream whose power-on is not known: what decays after it is taken for long past, and what grows with time counts from the
+    /// beginning of the stream. To count a warm-up from there instead would put an error of its whole size in.
+    pub fn long_after_power_on(self) -> Self {
+        Self {
+            settled: true,
+            ..self
         }
     }
 
@@ -177,8 +189,9 @@ impl<T: RealField + Copy, const N: usize> Effects<T, N> {
         *rate = -state.rate_lag / rate_lag;
         *since = time;
 
-        self.gyro.slow(&mut state.gyro, dt, risen, &state.at);
-        self.accel.slow(&mut state.accel, dt, risen, &state.at);
+        let (at, settled) = (&state.at, state.settled);
+        self.gyro.slow(&mut state.gyro, dt, risen, settled, at);
+        self.accel.slow(&mut state.accel, dt, risen, settled, at);
     }
 
     /// Raw readings without the errors of the converters' codes: to be compensated in place of those that were read.

@@ -21,6 +21,7 @@ use crate::restart::Before;
 use crate::sampling::Tally;
 use crate::self_test;
 use crate::slots::Slots;
+use crate::supply::Supply;
 use crate::upload::Upload;
 
 /// Everything that a call can concern.
@@ -37,8 +38,12 @@ pub struct Commands<'a> {
     pub stored: Option<StoredInfo>,
     /// Inputs of the sensors.
     pub self_test: SelfTestPins,
+    /// What the self-test measures the supply with.
+    pub supply: Supply,
     /// Why the device started.
     pub before: &'a Before,
+    /// Time since power-on at the start of sampling, ms, if it is known.
+    pub powered_for_ms: Option<u32>,
     /// Where answers go.
     pub replies: FrameSender,
 }
@@ -111,7 +116,8 @@ impl Commands<'_> {
             Request::Download { offset, length } => self.download(offset, length, &mut part).await,
             Request::UploadCommit => self.commit().await.map(|()| Reply::Done),
             Request::SelfTest => {
-                let result = self_test::run(&mut self.self_test, self.pipeline).await;
+                let pins = &mut self.self_test;
+                let result = self_test::run(pins, &mut self.supply, self.pipeline).await;
                 Ok(Reply::SelfTest(result))
             }
             Request::Counters => Ok(Reply::Counters(self.counters(heard))),
@@ -258,6 +264,7 @@ impl Commands<'_> {
             starts: self.before.starts(),
             stored: self.stored,
             slots: self.slots.state(),
+            powered_for_ms: self.powered_for_ms,
         };
         send(&mut self.replies, &Message::Greeting { id, greeting }).await;
     }

@@ -9,11 +9,14 @@
 //! drift of 1 % would look like 5 deg/s. The 2.5 V reference of gyro x is converted along with the rest through an equal divider:
 //! a ratio to it is free of the supply and of the dividers. The accelerometer follows that supply itself, as its codes do.
 
+use mimu_core::wire::flags;
+
 use crate::board::{REFERENCE_V, SCANS};
 use crate::design_parameters::{
     DIVIDER_RATIO, GYRO_REFERENCE_V, GYRO_TEMPERATURE_NULL_C, GYRO_TEMPERATURE_NULL_V,
     GYRO_TEMPERATURE_V_PER_C, REFERENCE_TOLERANCE, SAMPLE_HZ, SLOW_S,
 };
+use crate::temperature::that_count;
 
 /// The code at the converter's reference voltage. A full scale of 2^16 - 1 and not 2^16 (RM0433 25.4.35).
 pub const FULL_SCALE: u32 = u16::MAX as u32;
@@ -28,76 +31,142 @@ pub const ACCEL_VOLTS: f32 = REFERENCE_V / SUM_FULL_SCALE as f32;
 pub const NOMINAL_REFERENCE: f32 =
     GYRO_REFERENCE_V * DIVIDER_RATIO / REFERENCE_V * SUM_FULL_SCALE as f32;
 
-/// What moves slowly and is filtered: the gyros' reference and their temperature.
-///
 /// A mean over the first [`SLOW_S`], and from then on a first-order lag of that length: with the lag alone the first reading would
 /// weigh on the first seconds with all of its noise.
-///
-/// Both are kept as differences, to the nominal reference and to equal voltages, where a step of the filter is not lost in the
-/// last digit of a large number.
 #[derive(Clone, Copy, Debug)]
-pub struct Slow {
-    /// Sum of the reference less [`NOMINAL_REFERENCE`].
-    reference: f32,
-    /// Mean of the three temperature sums less the sum of the reference.
-    temperature: f32,
+struct Lag {
+    value: f32,
     /// Samples so far, as far as the mean goes.
     samples: f32,
+}
+
+impl Lag {
+    const NEW: Self = Self {
+        value: 0.0,
+        samples: 0.0,
+    };
+
+    /// Takes in the mean of `count` samples.
+    fn take(&mut self, mean: f32, count: f32) {
+        self.samples = (self.samples + count).min(SLOW_S * SAMPLE_HZ as f32);
+        self.value += count / self.samples * (mean - self.value);
+    }
+}
+
+/// What moves slowly and is filtered: the gyros' reference and their temperatures.
+///
+/// Whether a pin can be believed is asked of each batch by itself: the filter would hide one that has just come off, and let it bend
+/// what it filters for as long.
+#[derive(Clone, Copy, Debug)]
+pub struct Slow {
+    /// Sum of the reference minus [`NOMINAL_REFERENCE`]: as a difference, so that a step of the filter is not lost in the last digit of
+    /// a large number.
+    reference: Lag,
+    /// The last one, unfiltered.
+    reference_sum: f32,
+    /// By the TEMP pins of gyro x, y, z, °C.
+    pins_c: [Lag; 3],
+    /// Which of them count.
+    count: [bool; 3],
+    /// Mean of those that count, °C.
+    temp_c: Lag,
 }
 
 impl Slow {
     /// Before the first sample.
     pub const NEW: Self = Self {
-        reference: 0.0,
-        temperature: 0.0,
-        samples: 0.0,
+        reference: Lag::NEW,
+        reference_sum: 0.0,
+        pins_c: [Lag::NEW; 3],
+        count: [false; 3],
+        temp_c: Lag::NEW,
     };
 
-    /// Takes in `count` samples: totals of the reference's sums, and of those of the three temperatures together.
-    pub fn update(&mut self, reference: u32, temperatures: u32, count: u32) {
+    /// Takes in `count` samples: totals of the sums of the reference and of the three temperatures.
+    pub fn update(&mut self, reference: u32, temperatures: [u32; 3], count: u32) {
         if count == 0 {
             return;
         }
         let count = count as f32;
-        let reference = reference as f32 / count;
-        let temperature = temperatures as f32 / (3.0 * count);
-        self.samples = (self.samples + count).min(SLOW_S * SAMPLE_HZ as f32);
-        let weight = count / self.samples;
-        self.reference += weight * (reference - NOMINAL_REFERENCE - self.reference);
-        self.temperature += weight * (temperature - reference - self.temperature);
+        self.reference_sum = reference as f32 / count;
+        if self.has_reference() {
+            let off = self.reference_sum - NOMINAL_REFERENCE;
+            self.reference.take(off, count);
+        }
+        let volts = self.gyro_volts();
+        let pins_c = temperatures.map(|total| celsius(total as f32 / count * volts));
+        for (pin, read) in self.pins_c.iter_mut().zip(pins_c) {
+            pin.take(read, count);
+        }
+        self.count = that_count(pins_c);
+        let counted = || pins_c.iter().zip(self.count).filter(|(_, counts)| *counts);
+        let how_many = counted().count() as f32;
+        if how_many > 0.0 {
+            let sum: f32 = counted().map(|(read, _)| read).sum();
+            self.temp_c.take(sum / how_many, count);
+        }
     }
 
     /// Whether the reference is where it can be; otherwise its pin is open, and the nominal one counts.
     pub fn has_reference(&self) -> bool {
-        self.reference.abs() <= REFERENCE_TOLERANCE * NOMINAL_REFERENCE
+        (self.reference_sum - NOMINAL_REFERENCE).abs() <= REFERENCE_TOLERANCE * NOMINAL_REFERENCE
     }
 
     /// Whether any sample was taken in.
     pub fn begun(&self) -> bool {
-        self.samples > 0.0
-    }
-
-    fn reference(&self) -> f32 {
-        match self.has_reference() {
-            true => NOMINAL_REFERENCE + self.reference,
-            false => NOMINAL_REFERENCE,
-        }
+        self.pins_c[0].samples > 0.0
     }
 
     /// Volts at a gyro for a step of its sum, about 42 µV.
     pub fn gyro_volts(&self) -> f32 {
-        GYRO_REFERENCE_V / self.reference()
+        let reference = match self.has_reference() {
+            true => NOMINAL_REFERENCE + self.reference.value,
+            false => NOMINAL_REFERENCE,
+        };
+        GYRO_REFERENCE_V / reference
     }
 
-    /// Mean temperature of the gyros, °C. TEMP is made from the gyro's reference as well: that, too, is a ratio.
-    pub fn temp_c(&self) -> f32 {
-        let above_null = match self.has_reference() {
-            true => self.temperature,
-            false => self.temperature + self.reference,
-        } * self.gyro_volts();
-        let null = GYRO_REFERENCE_V - GYRO_TEMPERATURE_NULL_V;
-        GYRO_TEMPERATURE_NULL_C + (above_null + null) / GYRO_TEMPERATURE_V_PER_C
+    /// The gyros' reference as it was read last, as a share of the converter's.
+    pub fn reference_share(&self) -> f32 {
+        self.reference_sum / SUM_FULL_SCALE as f32 / DIVIDER_RATIO
     }
+
+    /// Mean temperature of the gyros whose pins count, °C; while none does the last one, and before there was one 25 °C.
+    pub fn temp_c(&self) -> f32 {
+        match self.temp_c.samples > 0.0 {
+            true => self.temp_c.value,
+            false => GYRO_TEMPERATURE_NULL_C,
+        }
+    }
+
+    /// Temperatures by the TEMP pins of gyro x, y, z, °C, also of those that do not count.
+    pub fn gyro_temps_c(&self) -> [f32; 3] {
+        self.pins_c.map(|pin| pin.value)
+    }
+
+    /// Which of them count.
+    pub fn temperatures_that_count(&self) -> [bool; 3] {
+        self.count
+    }
+
+    /// What of it cannot be believed, as [`flags`].
+    pub fn flags(&self) -> u16 {
+        let left_out = flags::TEMPERATURE_LEFT_OUT.iter().zip(self.count);
+        let left_out = left_out.filter(|(_, counts)| !counts);
+        let mut all = left_out.fold(0, |all, (flag, _)| all | flag);
+        if !self.has_reference() {
+            all |= flags::NO_REFERENCE;
+        }
+        if self.count == [false; 3] {
+            all |= flags::NO_TEMPERATURE;
+        }
+        all
+    }
+}
+
+/// Temperature of a gyro, °C, by the voltage of its TEMP pin, which is made from the gyro's reference and so is a ratio as well.
+fn celsius(temp_v: f32) -> f32 {
+    GYRO_TEMPERATURE_NULL_C + (temp_v - GYRO_TEMPERATURE_NULL_V) / GYRO_TEMPERATURE_V_PER_C
 }
 
 #[cfg(test)]
@@ -114,9 +183,64 @@ mod tests {
         let mut slow = Slow::NEW;
         for _ in 0..seconds * 50 {
             let reference = 20 * sum(reference_v * 0.6, vref_v);
-            slow.update(reference, 3 * 20 * sum(temp_v * 0.6, vref_v), 20);
+            slow.update(reference, [20 * sum(temp_v * 0.6, vref_v); 3], 20);
         }
         slow
+    }
+
+    const REFERENCE: u32 = NOMINAL_REFERENCE as u32;
+
+    /// Sums of twenty samples of TEMP pins, V.
+    fn pins(volts: [f64; 3]) -> [u32; 3] {
+        volts.map(|v| 20 * sum(v * 0.6, 3.3))
+    }
+
+    #[test]
+    fn an_open_temperature_pin_moves_the_mean_by_nothing_and_is_flagged_at_once() {
+        for wrong_v in [0.0, 5.0] {
+            for pin in 0..3 {
+                let mut slow = settled(2.5, 2.5, 3.3, 5);
+                let mut volts = [2.5; 3];
+                volts[pin] = wrong_v;
+                for _ in 0..100 {
+                    slow.update(20 * REFERENCE, pins(volts), 20);
+                    assert_eq!(slow.flags(), flags::TEMPERATURE_LEFT_OUT[pin]);
+                    assert!((slow.temp_c() - 25.0).abs() < 0.02, "{}", slow.temp_c());
+                }
+                // As read it is told all the same.
+                let read = slow.gyro_temps_c()[pin];
+                assert!(!(-150.0..150.0).contains(&read), "{read}");
+                // And is back as soon as it is.
+                slow.update(20 * REFERENCE, pins([2.5; 3]), 20);
+                assert_eq!(slow.flags(), 0);
+            }
+        }
+    }
+
+    #[test]
+    fn without_any_temperature_the_last_good_one_holds_and_without_that_25_degrees() {
+        let mut slow = settled(2.5, 2.5 + 0.0084 * 15.0, 3.3, 5);
+        for _ in 0..500 {
+            slow.update(20 * REFERENCE, pins([0.0; 3]), 20);
+        }
+        assert!((slow.temp_c() - 40.0).abs() < 0.02, "{}", slow.temp_c());
+        let all = flags::TEMPERATURE_LEFT_OUT.iter().sum::<u16>() | flags::NO_TEMPERATURE;
+        assert_eq!(slow.flags(), all);
+        let mut slow = Slow::NEW;
+        slow.update(20 * REFERENCE, pins([0.0; 3]), 20);
+        assert_eq!((slow.temp_c(), slow.flags()), (25.0, all));
+    }
+
+    #[test]
+    fn a_reference_that_comes_off_moves_neither_a_rate_nor_a_temperature() {
+        let mut slow = settled(2.5, 2.5, 3.3, 5);
+        for _ in 0..50 {
+            slow.update(0, pins([2.5; 3]), 20);
+            assert_eq!(slow.flags(), flags::NO_REFERENCE);
+            let read = sum(1.5, 3.3) as f32 * slow.gyro_volts();
+            assert!((read - 2.5).abs() < 1e-3, "{read}");
+            assert!((slow.temp_c() - 25.0).abs() < 0.1, "{}", slow.temp_c());
+        }
     }
 
     #[test]
@@ -148,15 +272,15 @@ mod tests {
         let nominal = NOMINAL_REFERENCE.round() as u32;
         for k in 0..500 {
             let sign = [-20, 20][k % 2];
-            slow.update(nominal.saturating_add_signed(sign), 3 * nominal, 1);
+            slow.update(nominal.saturating_add_signed(sign), [nominal; 3], 1);
         }
-        assert!((slow.reference + NOMINAL_REFERENCE - nominal as f32).abs() < 0.1);
+        assert!((slow.reference.value + NOMINAL_REFERENCE - nominal as f32).abs() < 0.1);
         // A step of the reference: when the second is full the mean is halfway, and after three time constants more e⁻³ of that
         // half is left.
         for _ in 0..500 + 3000 {
-            slow.update(nominal + 200, 3 * nominal, 1);
+            slow.update(nominal + 200, [nominal; 3], 1);
         }
-        let left = f64::from(nominal as f32 + 200.0 - (slow.reference + NOMINAL_REFERENCE));
+        let left = f64::from(nominal as f32 + 200.0 - (slow.reference.value + NOMINAL_REFERENCE));
         assert!((left - 100.0 * (-3.0_f64).exp()).abs() < 0.1, "{left}");
     }
 

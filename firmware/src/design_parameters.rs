@@ -27,6 +27,28 @@ pub const GYRO_TEMPERATURE_NULL_C: f32 = 25.0;
 /// Slope of TEMP, V/°C: 2.5 V / 298 K.
 pub const GYRO_TEMPERATURE_V_PER_C: f32 = 0.0084;
 
+/// Temperatures that a working TEMP pin can stand for, °C. The part works from -40 to 85 °C. TEMP is a share of its gyro's own
+/// reference and is divided by that of gyro x, each 2.45 to 2.55 V: 6 °C each. A pin that is open or shorted to ground reads -270 °C,
+/// one at 5 V 320 °C.
+pub const GYRO_TEMPERATURE_RANGE_C: [f32; 2] = [-55.0, 100.0];
+
+/// Most that two TEMP pins differ by while both work, °C: 12 by the two gyros' references, and half a dozen by what the gyros warm
+/// themselves (5 °C, by 30 mW) and by where they sit on the board.
+pub const GYRO_TEMPERATURE_SPREAD_C: f32 = 20.0;
+
+/// The gyros' reference as the data sheet of the ADXRS300 allows, V: 2.45 to 2.55. By as much again it may be off where it is measured: by
+/// the dividers (0.8 % with 1 % resistors), and by the converter's supply, which the internal reference tells within 1 %.
+pub const GYRO_REFERENCE_TOLERANCE_V: f32 = 0.1;
+
+/// Where the output of an ADXRS300 ends, V: it reaches at least 0.25 V and 0.25 V below its supply of 5 V, 450 deg/s either way, and not
+/// the ends of the converter's range, which are 5.5 V apart behind the divider. (Data sheet, output voltage swing; recalled, as in the
+/// catalogue of the bench.)
+pub const GYRO_STOPS_V: [f32; 2] = [0.25, 4.75];
+
+/// So near to a stop a gyro counts as saturated, V: 1 % resistors in two dividers, its own and that of the reference, make 1.6 % of
+/// 4.75 V, 0.08 V; noise 0.01 V. The specified 300 deg/s end at 4.0 V, or 4.3 V with the largest sensitivity and null.
+pub const GYRO_STOP_MARGIN_V: f32 = 0.1;
+
 /// Null voltage of an MMA7260QT accelerometer, V: half its 3.3 V supply. Ratiometric, and its
 /// supply is the converter's reference, so its codes do not change with that voltage.
 pub const ACCEL_NULL_V: f32 = 1.65;
@@ -35,6 +57,14 @@ pub const ACCEL_NULL_V: f32 = 1.65;
 /// calibration on a turntable never leaves 1 g by much; 1.5 g is 0.45 to 2.85 V, within the
 /// reference.
 pub const ACCEL_SENSITIVITY_V_PER_G: f32 = 0.8;
+
+/// Where the output of an MMA7260QT ends at 3.3 V, V: 0.25 V from either rail (data sheet, full scale output range; recalled). Not the
+/// 0.45 and 2.85 V of 1.5 g: with a null of 1.815 V, which is allowed, 2.85 V are 1.3 g and read rightly.
+pub const ACCEL_STOPS_V: [f32; 2] = [0.25, 3.05];
+
+/// So near to a stop the accelerometer counts as saturated, V: ten times its noise. There is no divider, and it follows the converter's
+/// reference.
+pub const ACCEL_STOP_MARGIN_V: f32 = 0.05;
 
 // ---- Between sensor and pin --------------------------------------------------------------------
 
@@ -61,21 +91,29 @@ pub const DIVIDER_RATIO: f32 =
 
 // ---- Self-test ---------------------------------------------------------------------------------
 
-/// Change of an ADXRS300's output by ST1, V, typically: it deflects the sensor by some -50 deg/s.
-pub const SELF_TEST_ST1_V: f32 = -0.27;
+/// Change of an ADXRS300's output by ST1 or ST2 as its data sheet states it, V: 0.15 to 0.45, typically 0.27, which is some 50 deg/s.
+/// ST1 lowers the output, ST2 raises it. The means that it is compared with have 0.2 mV of noise; to allow more than the data sheet does
+/// would pass a sensor that has lost half of its sensitivity.
+pub const SELF_TEST_GYRO_V: [f32; 2] = [0.15, 0.45];
 
-/// The same by ST2.
-pub const SELF_TEST_ST2_V: f32 = 0.27;
+/// Sensitivity of the accelerometer at its 6 g range (both g-Selects high) over that at 1.5 g: 200 of 800 mV/g. It has no input that moves
+/// its mass; but what it senses must shrink to this.
+pub const SELF_TEST_ACCEL_RATIO: f32 = 0.25;
 
-/// Largest departure from that: the datasheet states 0.15 to 0.45 V.
-pub const SELF_TEST_TOLERANCE_V: f32 = 0.18;
+/// Farthest that the null of an axis, `(fine * ratio - coarse) / (ratio - 1)`, may be from [`ACCEL_NULL_V`], V. The data sheet allows 0.165
+/// (1.485 to 1.815 V). The sensitivities of both ranges may be 7.5 % off, which under 1 g is 0.04 V of it.
+pub const SELF_TEST_ACCEL_NULL_V: f32 = 0.22;
 
-/// The accelerometer has no input that moves its mass; but its 6 g range (both g-Selects high) is four times coarser, so that
-/// gravity's share of the output must shrink from 0.8 to 0.2 V. This is the change of its length, V.
+/// Change of all three axes together from the finest range to the coarsest under 1 g, V: 0.8 - 0.2.
 pub const SELF_TEST_ACCEL_V: f32 = 0.6;
 
-/// Largest departure from that. Its nulls differ from 1.65 V by up to 0.165 V, and not by the same in both ranges.
-pub const SELF_TEST_ACCEL_TOLERANCE_V: f32 = 0.35;
+/// Largest departure from that: 0.075 V, since both sensitivities may be 7.5 % off, and as much for nulls that differ between the ranges, of
+/// which the data sheet says nothing. An axis that ought to see two thirds of gravity and sees none is missed by 0.153 V.
+pub const SELF_TEST_ACCEL_TOLERANCE_V: f32 = 0.15;
+
+/// Farthest that the supply of converter and accelerometer may be from [`REFERENCE_V`](crate::board::REFERENCE_V), part of it: the
+/// regulator is within 2 %, and the internal reference within 1 % of its own calibration, 3 % without one.
+pub const SUPPLY_TOLERANCE: f32 = 0.05;
 
 /// Time that every state of the self-test lasts before it is measured, ms. The slowest part of the chain is the gyro's 40 Hz filter,
 /// 4 ms: 25 time constants.
@@ -103,8 +141,9 @@ pub const RECEIVED: usize = 1024;
 /// thought of.
 pub const QUEUE: usize = 64;
 
-/// Time in which the program has to come round, or the watchdog restarts it, µs. It comes round every [`WATCHDOG_FEED_MS`]; the
-/// watchdog's own clock is 32 kHz within 10 %.
+/// Time in which a sample has to be taken, or the watchdog restarts the program, µs. It is fed every [`WATCHDOG_FEED_MS`] while samples
+/// come; the watchdog's own clock is 32 kHz within 10 %. Until the clocks run it has its reset value, 512 ms: the oscillator takes 2 ms, a
+/// PLL less.
 pub const WATCHDOG_US: u32 = 2_000_000;
 
 /// How often the watchdog is fed, ms.

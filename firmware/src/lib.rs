@@ -6,6 +6,7 @@
 //! | [`design_parameters`] | sensors, front end and timing, each constant with its reason     |
 //! | [`channels`]          | the channels of a sample, and their order in a scan              |
 //! | [`convert`]           | sums of converter codes, and what they stand for                 |
+//! | [`temperature`]       | which of the gyros' TEMP pins count                              |
 //! | [`pipeline`]          | what happens to a sample: compensation, batches, Kalman banks    |
 //! | [`bank`]              | a Kalman bank that is given its input and fed from the stream     |
 //! | [`upload`]            | a calibration on its way to the device                           |
@@ -15,7 +16,8 @@
 //! | `sampling`            | the task that takes samples, above all others                    |
 //! | `link`                | the line to the host: serial, or USB                             |
 //! | `commands`            | what the host asks, and what it is answered                      |
-//! | `self_test`           | deflects the sensors by their inputs                             |
+//! | [`self_test`]         | what the sensors make of their test inputs, against their data sheets |
+//! | `supply`              | the supply, by the part's internal reference                     |
 //! | `restart`             | why the device started, and the record that a panic leaves       |
 //!
 //! Those with links compile for the PC as well and are tested there.
@@ -39,7 +41,9 @@ pub mod pipeline;
 pub mod restart;
 #[cfg(target_os = "none")]
 pub mod sampling;
-#[cfg(target_os = "none")]
 pub mod self_test;
 pub mod slots;
+#[cfg(target_os = "none")]
+pub mod supply;
+pub mod temperature;
 pub mod upload;

@@ -17,7 +17,6 @@ use core::sync::atomic::{AtomicU32, Ordering};
 use cortex_m_rt::{ExceptionFrame, exception};
 use defmt_rtt as _;
 use embassy_executor::Spawner;
-use embassy_stm32::Peri;
 use embassy_stm32::peripherals::IWDG1;
 use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_sync::blocking_mutex::Mutex;
@@ -39,6 +38,7 @@ use mimu_firmware::pipeline::{Pipeline, Shared};
 use mimu_firmware::restart::{self, Before};
 use mimu_firmware::sampling::{self, QUEUE, TALLY};
 use mimu_firmware::slots::Slots;
+use mimu_firmware::supply::Supply;
 use mimu_firmware::upload::Upload;
 use static_cell::{ConstStaticCell, StaticCell};
 
@@ -53,7 +53,11 @@ async fn main(spawner: Spawner) {
     let board = Board::start();
     let stored = STORED.take();
     let slots = Slots::open(Flash::new(), stored).await;
-    let (pipeline, in_use) = pipeline(slots.in_use(), stored);
+    let supply = Supply::new(board.supply);
+    let converter = Converter::new(board.sensors, SCANS.take());
+    // Sampling begins within some milliseconds.
+    let powered_for_ms = powered_for_ms(before);
+    let (pipeline, in_use) = pipeline(slots.in_use(), stored, powered_for_ms);
     let (events, events_out) = queue_of_events();
     let (replies, replies_out) = queue_of_replies();
     #[cfg(not(feature = "usb"))]
@@ -78,15 +82,17 @@ async fn main(spawner: Spawner) {
         upload: Upload::new(stored),
         stored: in_use,
         self_test: board.self_test,
+        supply,
         before,
+        powered_for_ms,
         replies,
     };
 
-    sampling::start(Converter::new(board.sensors, SCANS.take()));
+    sampling::start(converter);
     spawner.spawn(process(pipeline, events).unwrap());
     spawner.spawn(output(to_host, replies_out, events_out).unwrap());
     spawner.spawn(commands(everything, from_host).unwrap());
-    watch(board.watchdog, pipeline).await
+    watch(board.watchdog, pipeline, before).await
 }
 
 /// Takes samples from the queue through the pipeline.
@@ -122,20 +128,31 @@ async fn usb(mut usb: link::Usb) {
     usb.run().await
 }
 
-/// Feeds the watchdog as long as samples come and are processed, and logs.
-async fn watch(watchdog: Peri<'static, IWDG1>, pipeline: &Shared) -> ! {
-    let mut watchdog = IndependentWatchdog::new(watchdog, design::WATCHDOG_US);
-    watchdog.unleash();
+/// Time since power-on now, ms, if it is known.
+fn powered_for_ms(before: &Before) -> Option<u32> {
+    let uptime_ms = u32::try_from(Instant::now().as_millis()).unwrap_or(u32::MAX);
+    let so_far = before.powered_for_ms()?;
+    Some(so_far.saturating_add(uptime_ms))
+}
+
+/// Feeds the watchdog as long as samples come and are processed, keeps the time since power-on, and logs.
+async fn watch(
+    mut watchdog: IndependentWatchdog<'static, IWDG1>,
+    pipeline: &Shared,
+    before: &Before,
+) -> ! {
     let mut due = Ticker::every(Duration::from_millis(design::WATCHDOG_FEED_MS));
-    let (mut before, mut rounds) = (TALLY.progress(), 0);
+    let (mut last, mut rounds) = (0, 0);
     loop {
         due.next().await;
-        let now = TALLY.progress();
-        // A queue that is full is one that nobody empties.
-        if now != before && !QUEUE.is_full() {
+        // Nothing but samples: a converter that gives none is started anew again and again, which is no progress. A queue that is full
+        // is one that nobody empties.
+        let samples = TALLY.samples.load(Ordering::Relaxed);
+        if samples != last && !QUEUE.is_full() {
             watchdog.pet();
+            restart::keep_powered(powered_for_ms(before));
         }
-        before = now;
+        last = samples;
         rounds += 1;
         if rounds % (1000 / design::WATCHDOG_FEED_MS) == 0 {
             let losses = pipeline.lock(|p| p.borrow().losses());
@@ -155,9 +172,14 @@ async fn watch(watchdog: Peri<'static, IWDG1>, pipeline: &Shared) -> ! {
 
 /// The path of the samples, with the calibration in use. Not in `main`, whose future would keep room for both.
 #[inline(never)]
-fn pipeline(in_use: Option<(u32, u64)>, bytes: &[u8]) -> (&'static Shared, Option<StoredInfo>) {
+fn pipeline(
+    in_use: Option<(u32, u64)>,
+    bytes: &[u8],
+    powered_for_ms: Option<u32>,
+) -> (&'static Shared, Option<StoredInfo>) {
     static PIPELINE: StaticCell<Shared> = StaticCell::new();
     let pipeline = PIPELINE.init_with(|| Mutex::new(RefCell::new(Pipeline::new())));
+    pipeline.lock(|p| p.borrow_mut().powered_for(powered_for_ms));
     let info = in_use.and_then(|(length, hash)| {
         let stored = stored::decode(bytes).ok()?;
         let info = info(length, hash, &stored);
@@ -188,16 +210,17 @@ fn queue_of_replies() -> (FrameSender, FrameReceiver) {
 #[panic_handler]
 fn panic(panic: &PanicInfo<'_>) -> ! {
     cortex_m::interrupt::disable();
-    if let Some(at) = panic.location() {
-        defmt::error!("panic at {=str}:{=u32}", at.file(), at.line());
-    }
-    restart::after_panic(panic)
+    restart::after_panic(panic, || {
+        if let Some(at) = panic.location() {
+            defmt::error!("panic at {=str}:{=u32}", at.file(), at.line());
+        }
+    })
 }
 
 // SAFETY: it never returns, and all that it uses is the record of `restart`.
 #[allow(unsafe_code)]
 #[exception]
 unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
-    defmt::error!("fault at {=u32:#x}", frame.pc());
-    restart::after_fault(frame.pc())
+    let pc = frame.pc();
+    restart::after_fault(pc, || defmt::error!("fault at {=u32:#x}", pc))
 }

@@ -21,8 +21,10 @@ use nalgebra::Vector3;
 
 use crate::bank::Bank;
 use crate::channels::Channels;
-use crate::convert::{ACCEL_VOLTS, SUM_FULL_SCALE, Slow};
-use crate::design_parameters::SAMPLE_HZ;
+use crate::convert::{ACCEL_VOLTS, Slow};
+use crate::design_parameters::{
+    ACCEL_STOP_MARGIN_V, ACCEL_STOPS_V, GYRO_STOP_MARGIN_V, GYRO_STOPS_V, SAMPLE_HZ,
+};
 
 /// The path of the samples, between tasks of one executor: none of them holds it while it waits.
 pub type Shared = Mutex<NoopRawMutex, RefCell<Pipeline>>;
@@ -68,11 +70,12 @@ struct Batch {
     streams: Streams,
     head: BatchHead,
     gyro_volts: f32,
+    gyro_temps_c: [f32; 3],
     raw: Vec<[u8; RAW_BYTES], BATCH>,
     compensated: Vec<[u8; COMPENSATED_BYTES], BATCH>,
     /// Totals for [`Slow::update`].
     reference: u32,
-    temperatures: u32,
+    temperatures: [u32; 3],
 }
 
 /// The path of the samples.
@@ -85,7 +88,9 @@ pub struct Pipeline {
     /// Streams from the next batch on.
     streams: Streams,
     /// Flags that others set, see [`flags`].
-    held_flags: u8,
+    held_flags: u16,
+    /// Time since power-on at sample 0, ms, if it is known.
+    powered_for_ms: Option<u32>,
     losses: Losses,
     measurement: Option<Measurement>,
     /// Banks of the gyros and of the accelerometers.
@@ -117,10 +122,11 @@ impl Pipeline {
                     flags: 0,
                 },
                 gyro_volts: 0.0,
+                gyro_temps_c: [0.0; 3],
                 raw: Vec::new(),
                 compensated: Vec::new(),
                 reference: 0,
-                temperatures: 0,
+                temperatures: [0; 3],
             },
             expected: None,
             streams: Streams {
@@ -128,6 +134,7 @@ impl Pipeline {
                 compensated: false,
             },
             held_flags: 0,
+            powered_for_ms: Some(0),
             losses: Losses {
                 samples: 0,
                 batches: 0,
@@ -137,15 +144,32 @@ impl Pipeline {
         }
     }
 
+    /// How long the device had its power at sample 0, ms: 0 unless it is told, `None` if nobody knows. To be called before
+    /// [`Self::calibrate`].
+    pub fn powered_for(&mut self, ms: Option<u32>) {
+        self.powered_for_ms = ms;
+        self.flag(flags::POWER_ON_UNKNOWN, ms.is_none());
+    }
+
     /// Compensates by this from the next batch on.
     pub fn calibrate(&mut self, stored: Stored) {
+        let effects = effects::State::new(SAMPLE_HZ as f32);
+        let (effects, powered_for_ms) = match self.powered_for_ms {
+            Some(ms) => (effects, ms),
+            None => (effects.long_after_power_on(), 0),
+        };
         self.calibrated = Some(Calibrated {
             model: stored.table.state(),
-            effects: effects::State::new(SAMPLE_HZ as f32),
-            // So that time since power-on goes on.
-            followed: 0,
+            effects,
+            // A number is a millisecond. Time since power-on goes on, whenever the calibration comes.
+            followed: 0_u32.wrapping_sub(powered_for_ms),
             stored,
         });
+    }
+
+    /// What moves slowly.
+    pub fn slow(&self) -> &Slow {
+        &self.slow
     }
 
     /// Whether there is a calibration.
@@ -159,7 +183,7 @@ impl Pipeline {
     }
 
     /// Sets or clears some of [`flags`] for the samples to come.
-    pub fn flag(&mut self, flag: u8, on: bool) {
+    pub fn flag(&mut self, flag: u16, on: bool) {
         match on {
             true => self.held_flags |= flag,
             false => self.held_flags &= !flag,
@@ -228,13 +252,14 @@ impl Pipeline {
         };
         let batch = &mut self.batch;
         batch.reference += channels.reference;
-        batch.temperatures += channels.temperature.iter().sum::<u32>();
-        let mut all = sums.gyro.iter().chain(&sums.accel);
-        if all.any(|sum| *sum == 0 || *sum == SUM_FULL_SCALE) {
+        for (total, sum) in batch.temperatures.iter_mut().zip(channels.temperature) {
+            *total += sum;
+        }
+        let raw = volts(&sums, batch.gyro_volts, ACCEL_VOLTS);
+        if is_saturated(&raw) {
             batch.head.flags |= flags::SATURATED;
         }
         batch.head.flags |= self.held_flags;
-        let raw = volts(&sums, batch.gyro_volts, ACCEL_VOLTS);
         // There is room: a full batch ends below.
         let _ = batch.raw.push(RawBatch::pack(&sums));
         // Also while nobody listens: the effects have to see every sample, and the load is then the same at all times.
@@ -278,26 +303,24 @@ impl Pipeline {
 
     fn begin_batch(&mut self, number: u32, channels: &Channels<u32>) {
         if !self.slow.begun() {
-            let temperatures = channels.temperature.iter().sum();
-            self.slow.update(channels.reference, temperatures, 1);
+            self.slow
+                .update(channels.reference, channels.temperature, 1);
         }
         let temp_c = self.slow.temp_c();
         let batch = &mut self.batch;
         batch.streams = self.streams;
         batch.compensated.clear();
         batch.gyro_volts = self.slow.gyro_volts();
+        batch.gyro_temps_c = self.slow.gyro_temps_c();
         batch.reference = 0;
-        batch.temperatures = 0;
+        batch.temperatures = [0; 3];
         batch.head = BatchHead {
             first: number,
             samples_lost: self.losses.samples,
             batches_dropped: self.losses.batches,
             temp_c,
-            flags: 0,
+            flags: self.slow.flags(),
         };
-        if !self.slow.has_reference() {
-            batch.head.flags |= flags::NO_REFERENCE;
-        }
         if let Some(calibrated) = &mut self.calibrated {
             if calibrated.follow(number, temp_c) != Place::Inside {
                 batch.head.flags |= flags::OUTSIDE_NODES;
@@ -322,6 +345,7 @@ impl Pipeline {
                 head,
                 gyro_volts: batch.gyro_volts,
                 accel_volts: ACCEL_VOLTS,
+                gyro_temps_c: batch.gyro_temps_c,
                 samples: batch.raw.as_flattened(),
             });
             dropped += u32::from(!send(&Message::Event(event)));
@@ -362,6 +386,15 @@ impl Calibrated {
             None => single::compensate(model, raw),
         }
     }
+}
+
+/// Whether a sensor's output is at one of its stops.
+fn is_saturated(raw: &Sample<f32>) -> bool {
+    let at_a_stop = |volts: &Vector3<f32>, [low, high]: [f32; 2], margin: f32| {
+        volts.min() <= low + margin || volts.max() >= high - margin
+    };
+    at_a_stop(&raw.gyro, GYRO_STOPS_V, GYRO_STOP_MARGIN_V)
+        || at_a_stop(&raw.accel, ACCEL_STOPS_V, ACCEL_STOP_MARGIN_V)
 }
 
 #[cfg(test)]

@@ -62,15 +62,6 @@ impl Tally {
             longest_us: AtomicU32::new(0),
         }
     }
-
-    /// Samples and faults, so that it moves as long as sampling does not stand still.
-    pub fn progress(&self) -> u32 {
-        let of = |counter: &AtomicU32| counter.load(Ordering::Relaxed);
-        of(&self.samples)
-            .wrapping_add(of(&self.late))
-            .wrapping_add(of(&self.converter_overruns))
-            .wrapping_add(of(&self.stalls))
-    }
 }
 
 /// Runs the task, from an interrupt.

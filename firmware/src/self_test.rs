@@ -1,62 +1,158 @@
-//! The self-test: deflects the sensors by their inputs, and measures what comes of it.
+//! The self-test: what the sensors make of their test inputs, and what they are supplied with, against their data sheets.
+//!
+//! # What one pose cannot show
+//!
+//! The accelerometer has no input that moves its mass, so that gravity is all there is to sense. An axis that lies across it reads its null
+//! in every range, and so does one that is stuck there: only in a pose that turns it up does it show which. An axis that is stuck anywhere
+//! else fails in all poses, because what it reads above its null does not shrink with the range. Of the gyros it shows that they
+//! answer, and not their scale factor within better than half. Their 5 V supply is at no pin.
 
-use embassy_stm32::gpio::Output;
-use embassy_time::Timer;
-use mimu_core::compensation::Sample;
-use mimu_core::wire::{self, flags};
 use nalgebra::Vector3;
 
-use crate::board::SelfTestPins;
+use mimu_core::wire::checks;
+
+use crate::board::REFERENCE_V;
 use crate::design_parameters::{
-    ACCEL_NULL_V, SELF_TEST_ACCEL_TOLERANCE_V, SELF_TEST_ACCEL_V, SELF_TEST_SAMPLES,
-    SELF_TEST_SETTLE_MS, SELF_TEST_ST1_V, SELF_TEST_ST2_V, SELF_TEST_TOLERANCE_V,
+    ACCEL_NULL_V, GYRO_REFERENCE_TOLERANCE_V, GYRO_REFERENCE_V, SELF_TEST_ACCEL_NULL_V,
+    SELF_TEST_ACCEL_RATIO, SELF_TEST_ACCEL_TOLERANCE_V, SELF_TEST_ACCEL_V, SELF_TEST_GYRO_V,
+    SUPPLY_TOLERANCE,
 };
-use crate::pipeline::Shared;
 
-/// Takes about a second. The inputs are as before afterwards.
-pub async fn run(pins: &mut SelfTestPins, pipeline: &Shared) -> wire::SelfTest {
-    pipeline.lock(|p| p.borrow_mut().flag(flags::SELF_TEST, true));
-    let rest = mean(pipeline).await;
-    pins.st1.set_high();
-    let st1 = mean(pipeline).await.gyro - rest.gyro;
-    pins.st1.set_low();
-    pins.st2.set_high();
-    let st2 = mean(pipeline).await.gyro - rest.gyro;
-    pins.st2.set_low();
-    pins.range.iter_mut().for_each(Output::set_high);
-    let coarse = mean(pipeline).await.accel;
-    pins.range.iter_mut().for_each(Output::set_low);
-    // The sensors have to be back before the flag goes.
-    Timer::after_millis(SELF_TEST_SETTLE_MS).await;
-    pipeline.lock(|p| p.borrow_mut().flag(flags::SELF_TEST, false));
+#[cfg(target_os = "none")]
+mod deflect;
+#[cfg(target_os = "none")]
+pub use deflect::run;
 
-    let within = |value: f32, wanted: f32, by: f32| (value - wanted).abs() <= by;
-    let mut passed = 0;
-    for axis in 0..3 {
-        let moved = within(st1[axis], SELF_TEST_ST1_V, SELF_TEST_TOLERANCE_V)
-            && within(st2[axis], SELF_TEST_ST2_V, SELF_TEST_TOLERANCE_V);
-        passed |= u8::from(moved) << axis;
-    }
-    let length = |v: &Vector3<f32>| v.add_scalar(-ACCEL_NULL_V).norm();
-    let shrunk = length(&rest.accel) - length(&coarse);
-    let moved = within(shrunk, SELF_TEST_ACCEL_V, SELF_TEST_ACCEL_TOLERANCE_V);
-    wire::SelfTest {
-        gyro_st1_v: st1.into(),
-        gyro_st2_v: st2.into(),
-        accel_fine_v: rest.accel.into(),
-        accel_coarse_v: coarse.into(),
-        passed: passed | u8::from(moved) << 3,
-    }
+/// What a self-test has measured.
+#[derive(Clone, Copy, Debug)]
+pub struct Measured {
+    /// Change of the gyros' outputs by ST1, V.
+    pub gyro_st1_v: [f32; 3],
+    /// The same by ST2.
+    pub gyro_st2_v: [f32; 3],
+    /// Outputs of the accelerometer at its finest range, V.
+    pub accel_fine_v: [f32; 3],
+    /// The same at its coarsest.
+    pub accel_coarse_v: [f32; 3],
+    /// Whether the TEMP pins count ([`that_count`](crate::temperature::that_count)).
+    pub temperatures_count: [bool; 3],
+    /// Reference of the gyros, V.
+    pub reference_v: f32,
+    /// Supply of converter and accelerometer, V.
+    pub supply_v: f32,
 }
 
-/// Mean of some samples, V, once the sensors have settled.
-async fn mean(pipeline: &Shared) -> Sample<f32> {
-    Timer::after_millis(SELF_TEST_SETTLE_MS).await;
-    pipeline.lock(|p| p.borrow_mut().measure(SELF_TEST_SAMPLES));
-    loop {
-        Timer::after_millis(u64::from(SELF_TEST_SAMPLES) / 4).await;
-        if let Some(mean) = pipeline.lock(|p| p.borrow().measured()) {
-            return mean;
+/// Which [`checks`] it passes.
+pub fn judge(of: &Measured) -> u16 {
+    let within = |value: f32, wanted: f32, by: f32| (value - wanted).abs() <= by;
+    let mut passed = 0;
+    let mut pass = |check: u16, on: bool| passed |= if on { check } else { 0 };
+    let [least, most] = SELF_TEST_GYRO_V;
+    for axis in 0..3 {
+        let (st1, st2) = (of.gyro_st1_v[axis], of.gyro_st2_v[axis]);
+        let moved = (least..=most).contains(&-st1) && (least..=most).contains(&st2);
+        pass(checks::GYRO[axis], moved);
+        // Both ranges have the null in common.
+        let (fine, coarse) = (of.accel_fine_v[axis], of.accel_coarse_v[axis]);
+        let null = (fine * SELF_TEST_ACCEL_RATIO - coarse) / (SELF_TEST_ACCEL_RATIO - 1.0);
+        pass(
+            checks::ACCEL[axis],
+            within(null, ACCEL_NULL_V, SELF_TEST_ACCEL_NULL_V),
+        );
+        pass(checks::TEMPERATURE[axis], of.temperatures_count[axis]);
+    }
+    // The length of the change and not the change of the length: nulls are not in it.
+    let change = Vector3::from(of.accel_fine_v) - Vector3::from(of.accel_coarse_v);
+    let gravity = within(
+        change.norm(),
+        SELF_TEST_ACCEL_V,
+        SELF_TEST_ACCEL_TOLERANCE_V,
+    );
+    pass(checks::GRAVITY, gravity);
+    pass(
+        checks::REFERENCE,
+        within(of.reference_v, GYRO_REFERENCE_V, GYRO_REFERENCE_TOLERANCE_V),
+    );
+    pass(
+        checks::SUPPLY,
+        within(of.supply_v, REFERENCE_V, SUPPLY_TOLERANCE * REFERENCE_V),
+    );
+    passed
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A unit as the data sheets have it, with this specific force, g, and nulls of the accelerometer, V.
+    fn unit(force_g: [f32; 3], nulls: [f32; 3]) -> Measured {
+        let at = |v_per_g: f32| core::array::from_fn(|i| nulls[i] + v_per_g * force_g[i]);
+        Measured {
+            gyro_st1_v: [-0.27; 3],
+            gyro_st2_v: [0.27; 3],
+            accel_fine_v: at(0.8),
+            accel_coarse_v: at(0.2),
+            temperatures_count: [true; 3],
+            reference_v: 2.5,
+            supply_v: 3.3,
         }
+    }
+
+    const NULLS: [f32; 3] = [1.485, 1.815, 1.65];
+    const SLANTED: [f32; 3] = [0.6, -0.64, 0.48];
+
+    #[test]
+    fn a_unit_within_its_data_sheets_passes_in_any_pose() {
+        for force in [[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], SLANTED] {
+            assert_eq!(judge(&unit(force, NULLS)), checks::ALL);
+        }
+        let mut unit = unit(SLANTED, NULLS);
+        unit.gyro_st1_v = [-0.16, -0.27, -0.44];
+        unit.gyro_st2_v = [0.44, 0.16, 0.27];
+        assert_eq!(judge(&unit), checks::ALL);
+    }
+
+    #[test]
+    fn a_gyro_that_answers_less_or_more_than_its_data_sheet_allows_fails() {
+        for wrong in [0.0, 0.09, 0.14, 0.46, -0.27] {
+            let mut one = unit(SLANTED, NULLS);
+            one.gyro_st1_v[1] = -wrong;
+            assert_eq!(judge(&one), checks::ALL & !checks::GYRO[1], "{wrong}");
+            let mut one = unit(SLANTED, NULLS);
+            one.gyro_st2_v[2] = wrong;
+            assert_eq!(judge(&one), checks::ALL & !checks::GYRO[2], "{wrong}");
+        }
+    }
+
+    #[test]
+    fn an_axis_that_is_stuck_off_its_null_fails_also_across_gravity() {
+        for stuck_v in [0.0, 0.69, 1.2, 2.2, 3.3] {
+            let mut one = unit([0.0, 0.0, 1.0], NULLS);
+            (one.accel_fine_v[0], one.accel_coarse_v[0]) = (stuck_v, stuck_v);
+            assert_eq!(judge(&one), checks::ALL & !checks::ACCEL[0], "{stuck_v}");
+        }
+    }
+
+    #[test]
+    fn an_axis_that_ought_to_see_gravity_and_stays_at_its_null_fails() {
+        // At 45 degrees the other alone has 0.7 of the length.
+        let mut one = unit([0.0, 0.71, 0.71], [1.65; 3]);
+        (one.accel_fine_v[1], one.accel_coarse_v[1]) = (1.65, 1.65);
+        assert_eq!(judge(&one), checks::ALL & !checks::GRAVITY);
+    }
+
+    #[test]
+    fn temperature_reference_and_supply_fail_by_name() {
+        let mut one = unit(SLANTED, NULLS);
+        one.temperatures_count[2] = false;
+        assert_eq!(judge(&one), checks::ALL & !checks::TEMPERATURE[2]);
+        let mut one = unit(SLANTED, NULLS);
+        one.reference_v = 2.3;
+        assert_eq!(judge(&one), checks::ALL & !checks::REFERENCE);
+        let mut one = unit(SLANTED, NULLS);
+        one.supply_v = 3.0;
+        assert_eq!(judge(&one), checks::ALL & !checks::SUPPLY);
+        one.supply_v = f32::NAN;
+        assert_eq!(judge(&one), checks::ALL & !checks::SUPPLY);
     }
 }

@@ -52,6 +52,8 @@ pub(super) enum Slowly<T: RealField> {
 pub(super) struct Ambient<T> {
     /// Time since power-on, s.
     pub time: T,
+    /// What decays after power-on is gone, whatever the time.
+    pub settled: bool,
     /// Temperature above the reference, °C.
     pub temperature_offset: T,
     /// Lagged temperature minus the temperature, °C.
@@ -127,7 +129,9 @@ impl<T: RealField + Copy> Law<T> {
             |c, time_constant, at, e| {
                 // Not `exp`, which nothing else here uses and which would be in the image for this.
                 let left = (-at.time / time_constant).exp_m1() + T::one();
-                e.bias += each(c) * left;
+                if !at.settled {
+                    e.bias += each(c) * left;
+                }
             },
         ),
         Self::slow("thermal_bias", 6, Nonlinear::None, |c, _, at, e| {

@@ -100,7 +100,14 @@ impl<T: RealField + Copy, const N: usize> Triad<T, N> {
     }
 
     /// Folds the slow effects; the slow variables of the conditions are set.
-    pub fn slow(&self, memory: &mut Memory<T, N>, dt: T, risen: T, at: &Conditions<T>) {
+    pub fn slow(
+        &self,
+        memory: &mut Memory<T, N>,
+        dt: T,
+        risen: T,
+        settled: bool,
+        at: &Conditions<T>,
+    ) {
         let [.., temperature_offset, _, time] = at.values;
         let mut total = Slow {
             bias: Vector3::zeros(),
@@ -124,6 +131,7 @@ impl<T: RealField + Copy, const N: usize> Triad<T, N> {
                         *nonlinear,
                         &Ambient {
                             time,
+                            settled,
                             temperature_offset,
                             lag,
                         },

@@ -7,7 +7,7 @@ use crate::compensation::Sample;
 
 /// Most samples of a batch. Fewer come where a sample is missing, since those of a batch are consecutive.
 ///
-/// Twenty: 20 ms of delay, and 33 bytes of everything else are 8 % of a raw frame.
+/// Twenty: 20 ms of delay, and 46 bytes of everything else are 11 % of a raw frame.
 pub const BATCH: usize = 20;
 
 /// Bytes of a raw sample: six sums of three bytes.
@@ -19,15 +19,22 @@ pub const COMPENSATED_BYTES: usize = 24;
 /// Bits of [`BatchHead::flags`].
 pub mod flags {
     /// The temperature is outside the nodes of the calibration: that of the nearest node is used.
-    pub const OUTSIDE_NODES: u8 = 1;
+    pub const OUTSIDE_NODES: u16 = 1;
     /// The self-test deflects the sensors.
-    pub const SELF_TEST: u8 = 1 << 1;
+    pub const SELF_TEST: u16 = 1 << 1;
     /// A calibration is being written.
-    pub const STORING: u8 = 1 << 2;
-    /// A sample of the batch stands at the end of the converter's range.
-    pub const SATURATED: u8 = 1 << 3;
+    pub const STORING: u16 = 1 << 2;
+    /// A sample of the batch stands where a sensor's output can go no further: its input is larger than it tells.
+    pub const SATURATED: u16 = 1 << 3;
     /// The gyros' reference is not where it can be: its pin is open, and its nominal voltage is used.
-    pub const NO_REFERENCE: u8 = 1 << 4;
+    pub const NO_REFERENCE: u16 = 1 << 4;
+    /// The TEMP pins of gyro x, y, z: one that reads what no working gyro has, or that disagrees with the others, is left out of
+    /// [`BatchHead::temp_c`](super::BatchHead::temp_c).
+    pub const TEMPERATURE_LEFT_OUT: [u16; 3] = [1 << 5, 1 << 6, 1 << 7];
+    /// No TEMP pin is left, and the last good temperature is used; before there was one, 25 °C.
+    pub const NO_TEMPERATURE: u16 = 1 << 8;
+    /// When the power came is not known: what passes after it is taken for long past.
+    pub const POWER_ON_UNKNOWN: u16 = 1 << 9;
 }
 
 /// Sums of the converter's codes over the scans of a sample, so that averaging loses nothing.
@@ -49,10 +56,10 @@ pub struct BatchHead {
     pub samples_lost: u32,
     /// Batches that were lost so far because the line was behind.
     pub batches_dropped: u32,
-    /// Temperature of the gyros, filtered, °C: the mean of the three, and what compensation goes by.
+    /// Temperature of the gyros, filtered, °C: the mean of those TEMP pins that are not left out, and what compensation goes by.
     pub temp_c: f32,
     /// [`flags`].
-    pub flags: u8,
+    pub flags: u16,
 }
 
 /// Raw readings.
@@ -65,6 +72,8 @@ pub struct RawBatch<'a> {
     pub gyro_volts: f32,
     /// Volts at the accelerometer for one step of its sum.
     pub accel_volts: f32,
+    /// Temperatures by the TEMP pins of gyro x, y, z, filtered, °C, also of a pin that is left out.
+    pub gyro_temps_c: [f32; 3],
     /// [`Sums`]: gyro x, y, z, accel x, y, z, each three bytes, little end first; sample after sample.
     pub samples: &'a [u8],
 }

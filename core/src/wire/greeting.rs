@@ -61,6 +61,8 @@ pub struct Greeting<'a> {
     /// What is in the two places for a calibration.
     #[serde(with = "extensible::pair")]
     pub slots: [Slot; 2],
+    /// Time since power-on at the start of sampling, ms; `None` if it is not known.
+    pub powered_for_ms: Option<u32>,
 }
 
 /// Bits of [`Greeting::capabilities`].

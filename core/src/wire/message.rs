@@ -254,7 +254,7 @@ pub struct KalmanAxis {
     pub covariance: [f32; 10],
 }
 
-/// How the sensors answered to their self-test inputs. Later versions append fields, as to [`Greeting`].
+/// How the sensors answered to their self-test inputs, and what they are supplied with. Later versions append fields, as to [`Greeting`].
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct SelfTest {
     /// Change of the gyros' outputs by ST1, V at the gyro.
@@ -265,8 +265,32 @@ pub struct SelfTest {
     pub accel_fine_v: [f32; 3],
     /// The same at its coarsest.
     pub accel_coarse_v: [f32; 3],
-    /// Bits 0 to 2: gyro x, y, z answered as their datasheet states; bit 3: the accelerometer.
-    pub passed: u8,
+    /// Temperatures by the TEMP pins of gyro x, y, z, °C.
+    pub gyro_temps_c: [f32; 3],
+    /// Reference of the gyros, V at the gyro.
+    pub reference_v: f32,
+    /// Supply of the converter and of the accelerometer, V, by the microcontroller's internal reference.
+    pub supply_v: f32,
+    /// Bits of [`checks`].
+    pub passed: u16,
+}
+
+/// Bits of [`SelfTest::passed`].
+pub mod checks {
+    /// Gyro x, y, z answered to both inputs as its data sheet states.
+    pub const GYRO: [u16; 3] = [1, 1 << 1, 1 << 2];
+    /// Accelerometer x, y, z followed its range about a null that its data sheet allows.
+    pub const ACCEL: [u16; 3] = [1 << 3, 1 << 4, 1 << 5];
+    /// The three axes of the accelerometer together see gravity.
+    pub const GRAVITY: u16 = 1 << 6;
+    /// The TEMP pin of gyro x, y, z is in its range and agrees with the others.
+    pub const TEMPERATURE: [u16; 3] = [1 << 7, 1 << 8, 1 << 9];
+    /// The gyros' reference is where its data sheet allows.
+    pub const REFERENCE: u16 = 1 << 10;
+    /// The supply of the converter is where its regulator holds it.
+    pub const SUPPLY: u16 = 1 << 11;
+    /// All of them.
+    pub const ALL: u16 = (1 << 12) - 1;
 }
 
 /// What the device has counted since its start, or since [`Request::ResetCounters`]. Later versions append fields, as to [`Greeting`].

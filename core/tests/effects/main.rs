@@ -340,6 +340,19 @@ fn a_warm_up_is_half_as_large_after_each_half_life() {
 }
 
 #[test]
+fn long_after_power_on_a_warm_up_is_over_and_a_drift_counts_from_the_beginning() {
+    let warm_up = Effect::named("accel_warm_up", &[0.04, 0.0, -0.08], Some(100.0)).unwrap();
+    let drift = Effect::named("accel_bias_drift", &[1e-5, 0.0, 2e-5], None).unwrap();
+    let effects = with(&[warm_up, drift], &si());
+    let mut state = State::new(1000.0).long_after_power_on();
+    effects.slow(&mut state, 0.0, f64::NAN);
+    assert_eq!(bias(&effects, &mut state), Vector3::zeros());
+    effects.slow(&mut state, 600.0, f64::NAN);
+    let expected = Vector3::new(6e-3, 0.0, 12e-3);
+    assert!((bias(&effects, &mut state) - expected).norm() < 1e-14);
+}
+
+#[test]
 fn thermal_errors_are_those_of_a_sensor_at_that_temperature() {
     let unit = Mounted::crooked();
     let effects = with(

@@ -52,7 +52,7 @@ fn head() -> BatchHead {
         samples_lost: u32::MAX,
         batches_dropped: u32::MAX,
         temp_c: 25.0,
-        flags: 255,
+        flags: u16::MAX,
     }
 }
 
@@ -64,6 +64,7 @@ fn full_batches_fit() {
         head: head(),
         gyro_volts: 1.0,
         accel_volts: 1.0,
+        gyro_temps_c: [1.0; 3],
         samples: &raw,
     })));
     let compensated = [255; BATCH * COMPENSATED_BYTES];

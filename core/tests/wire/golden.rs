@@ -5,7 +5,7 @@ use mimu_core::stored;
 use mimu_core::wire::{
     BatchHead, Call, Capabilities, CompensatedBatch, Counters, Event, Greeting, KalmanAxis,
     KalmanState, MAGIC, Message, Prior, RawBatch, Refusal, Reply, Request, SelfTest, Slot, Start,
-    StoredInfo, Sums, Triad, Version,
+    StoredInfo, Sums, Triad, Version, checks, flags,
 };
 use serde::{Deserialize, Serialize};
 
@@ -130,6 +130,7 @@ fn greeting<'a>(start: Start<'a>, stored: Option<StoredInfo>, slots: [Slot; 2]) 
             starts: 3,
             stored,
             slots,
+            powered_for_ms: Some(300),
         },
     }
 }
@@ -156,7 +157,7 @@ fn greetings() {
         (Start::Fault { pc: 128, cfsr: 1 }, "04 05 8001 01"),
         (Start::Other, "01 06"),
     ] {
-        let bytes = hex(&format!("{BEFORE} {bytes} 03 00 0100 0100"));
+        let bytes = hex(&format!("{BEFORE} {bytes} 03 00 0100 0100 01 ac02"));
         frozen(greeting(start, None, none), &bytes);
     }
     let stored = StoredInfo {
@@ -175,7 +176,7 @@ fn greetings() {
         (Slot::NotUsable(stored::Refused::Check), "02 04 03"),
     ] {
         let bytes = hex(&format!(
-            "{BEFORE} 01 00 03 01 ac02 ffffffffffffffffff01 05 02 {} ac02 {bytes} 01 00",
+            "{BEFORE} 01 00 03 01 ac02 ffffffffffffffffff01 05 02 {} ac02 {bytes} 01 00 01 ac02",
             "ab".repeat(12)
         ));
         frozen(
@@ -214,13 +215,16 @@ fn replies() {
         gyro_st2_v: [-2.0; 3],
         accel_fine_v: [0.5; 3],
         accel_coarse_v: [0.0; 3],
-        passed: 15,
+        gyro_temps_c: [1.0; 3],
+        reference_v: -2.0,
+        supply_v: 0.5,
+        passed: checks::GRAVITY | checks::SUPPLY,
     };
     let [one, minus, half] = ["0000803f", "000000c0", "0000003f"].map(|f| f.repeat(3));
     frozen(
         reply(Reply::SelfTest(self_test)),
         &hex(&format!(
-            "01 02 02 {one} {minus} {half} {} 0f",
+            "01 02 02 {one} {minus} {half} {} {one} 000000c0 0000003f c010",
             "00".repeat(12)
         )),
     );
@@ -323,7 +327,7 @@ fn events() {
         samples_lost: 1,
         batches_dropped: 128,
         temp_c: 0.5,
-        flags: 3,
+        flags: flags::SELF_TEST | flags::POWER_ON_UNKNOWN,
     };
     let samples = &[1, 2, 3][..];
     frozen(
@@ -331,13 +335,16 @@ fn events() {
             head,
             gyro_volts: 1.0,
             accel_volts: -2.0,
+            gyro_temps_c: [0.5, 1.0, -2.0],
             samples,
         })),
-        &hex("03 00 ac02 01 8001 0000003f 03 0000803f 000000c0 03 010203"),
+        &hex(
+            "03 00 ac02 01 8001 0000003f 8204 0000803f 000000c0 0000003f 0000803f 000000c0 03 010203",
+        ),
     );
     frozen(
         Message::Event(Event::Compensated(CompensatedBatch { head, samples })),
-        &hex("03 01 ac02 01 8001 0000003f 03 03 010203"),
+        &hex("03 01 ac02 01 8001 0000003f 8204 03 010203"),
     );
     frozen(
         Message::Event(Event::Kalman(kalman())),
@@ -372,6 +379,7 @@ fn samples_of_a_batch() {
         },
         gyro_volts: 0.25,
         accel_volts: 0.5,
+        gyro_temps_c: [25.0; 3],
         samples: &two,
     };
     assert!(batch.is_whole());

@@ -113,18 +113,21 @@ pub use parts::{Board, Irqs, SelfTestPins, Sensors};
 mod parts {
     use embassy_stm32::adc::{AdcChannel, AnyAdcChannel};
     use embassy_stm32::gpio::{AnyPin, Level, Output, Speed};
-    use embassy_stm32::peripherals::{self, ADC1, DMA1_CH0, IWDG1};
+    use embassy_stm32::pac::iwdg::vals::Key;
+    use embassy_stm32::peripherals::{self, ADC1, ADC3, DMA1_CH0, IWDG1};
     use embassy_stm32::rcc::{
         AHBPrescaler, APBPrescaler, Hse, HseMode, LsConfig, Pll, PllDiv, PllMul, PllPreDiv,
         PllSource, Sysclk, VoltageScale, mux,
     };
     use embassy_stm32::time::Hertz;
+    use embassy_stm32::wdg::IndependentWatchdog;
     use embassy_stm32::{Config, Peri, bind_interrupts, dma, pac};
     #[cfg(not(feature = "usb"))]
     use embassy_stm32::{mode::Async, usart};
 
     use super::*;
     use crate::channels::Channels;
+    use crate::design_parameters::WATCHDOG_US;
 
     bind_interrupts!(
         /// Who answers which interrupt.
@@ -192,20 +195,34 @@ mod parts {
         pub sensors: Sensors,
         /// The sensors' inputs.
         pub self_test: SelfTestPins,
+        /// The converter that can read the internal reference.
+        pub supply: Peri<'static, ADC3>,
         /// To the host: USART3, which the debugger's bridge is on, at [`BAUD`], 8 data bits, no parity, 1 stop bit.
         #[cfg(not(feature = "usb"))]
         pub line: usart::Uart<'static, Async>,
         /// To the host.
         #[cfg(feature = "usb")]
         pub line: UsbPins,
-        /// Restarts the program when it stands still.
-        pub watchdog: Peri<'static, IWDG1>,
+        /// Restarts the program when it stands still; runs already.
+        pub watchdog: IndependentWatchdog<'static, IWDG1>,
     }
 
     impl Board {
-        /// Starts the clocks and takes the board. To be called once, first.
+        /// Starts the watchdog and the clocks, and takes the board. To be called once, first.
         pub fn start() -> Self {
+            // By itself, with its reset value of 512 ms: `init` waits for the oscillator for ever, and one that does not start is given
+            // the next chance by a reset. The watchdog's own clock comes with it.
+            pac::IWDG1.kr().write(|w| w.set_key(Key::START));
+            if let Some(mut core) = cortex_m::Peripherals::take() {
+                // Without it each instruction that is not in the prefetch buffer waits for the flash. The data cache stays off: all
+                // memory here is AXI RAM, which DMA reads and writes behind it, and every buffer would have to be invalidated.
+                core.SCB.enable_icache();
+            }
             let p = embassy_stm32::init(clocks());
+            let mut watchdog = IndependentWatchdog::new(p.IWDG1, WATCHDOG_US);
+            watchdog.unleash();
+            // Its counter still holds what is left of the 512 ms.
+            watchdog.pet();
             // Was on for `clocks` only.
             pac::RCC.cr().modify(|w| w.set_pllon(2, false));
             let low = |pin: Peri<'static, AnyPin>| Output::new(pin, Level::Low, Speed::Low);
@@ -252,7 +269,8 @@ mod parts {
                     dp: p.PA12,
                     dm: p.PA11,
                 },
-                watchdog: p.IWDG1,
+                supply: p.ADC3,
+                watchdog,
             }
         }
     }

@@ -235,8 +235,29 @@ fn errors_of_the_code_are_taken_out_of_the_reading_before_its_temperature_matter
     assert_eq!(seen, [true; 4]);
 }
 
+/// Heads of all batches of a stream in which `change` has its way with each sample.
+fn heads(
+    pipeline: &mut Pipeline,
+    numbers: core::ops::Range<u32>,
+    mut change: impl FnMut(u32, &mut Channels<u32>),
+) -> Vec<BatchHead> {
+    let mut heads = Vec::new();
+    for number in numbers {
+        let mut sums = sums(number);
+        change(number, &mut sums);
+        pipeline.take(number, &sums, &mut |message| {
+            match keep(message) {
+                Sent::Raw(head, ..) | Sent::Compensated(head, _) => heads.push(head),
+                Sent::Kalman(_) => {}
+            }
+            true
+        });
+    }
+    heads
+}
+
 #[test]
-fn saturation_and_flags_of_others_are_in_the_batch_that_has_them() {
+fn flags_of_others_are_in_the_batch_that_has_them() {
     let mut pipeline = Pipeline::new();
     pipeline.stream(Streams {
         raw: true,
@@ -244,19 +265,101 @@ fn saturation_and_flags_of_others_are_in_the_batch_that_has_them() {
     });
     let mut flags_of = Vec::new();
     for number in 0..60 {
-        let mut sums = sums(number);
-        if number == 25 {
-            sums.accel[0] = SUM_FULL_SCALE;
-        }
         pipeline.flag(flags::SELF_TEST, (45..50).contains(&number));
-        pipeline.take(number, &sums, &mut |message| {
-            if let Sent::Raw(head, ..) = keep(message) {
-                flags_of.push(head.flags);
-            }
-            true
-        });
+        let of = heads(&mut pipeline, number..number + 1, |_, _| ());
+        flags_of.extend(of.iter().map(|head| head.flags));
     }
-    assert_eq!(flags_of, [0, flags::SATURATED, flags::SELF_TEST]);
+    assert_eq!(flags_of, [0, 0, flags::SELF_TEST]);
+}
+
+/// The outputs end 0.25 V from the sensors' own supplies, 5 and 3.3 V, which the converter reads as anything but its ends.
+#[test]
+fn a_sensor_at_its_own_stop_saturates_both_streams() {
+    // 24 and 36 kilohms in front of two conversions of 65535 steps of 3.3 V.
+    let gyro = |v: f64| (v * 0.6 / 3.3 * 131_070.0).round() as u32;
+    let accel = |v: f64| (v / 3.3 * 131_070.0).round() as u32;
+    for (gyro_v, accel_v, saturates) in [
+        (4.75, 1.65, true),
+        (0.25, 1.65, true),
+        // With one-percent resistors in both dividers.
+        (4.75 * 0.985, 1.65, true),
+        (2.5, 0.25, true),
+        (2.5, 3.05, true),
+        // The largest rate and force that the parts are made for: 300 deg/s of 5.4 mV at a null of 2.7 V, 1.5 g at 1.65 V.
+        (4.32, 2.85, false),
+        (0.68, 0.45, false),
+    ] {
+        for axis in 0..3 {
+            let mut pipeline = Pipeline::new();
+            pipeline.calibrate(calibration(&[]));
+            pipeline.stream(both());
+            let heads = heads(&mut pipeline, 0..60, |number, sums| {
+                if number == 25 {
+                    sums.gyro[axis] = gyro(gyro_v);
+                    sums.accel[axis] = accel(accel_v);
+                }
+            });
+            let flags_of: Vec<u16> = heads.iter().map(|head| head.flags).collect();
+            let flag = if saturates { flags::SATURATED } else { 0 };
+            assert_eq!(flags_of, [0, 0, flag, flag, 0, 0], "{gyro_v} {accel_v}");
+        }
+    }
+}
+
+#[test]
+fn an_open_temperature_pin_is_flagged_and_compensation_goes_by_the_two_others() {
+    let mut pipeline = Pipeline::new();
+    pipeline.calibrate(calibration(&[]));
+    pipeline.stream(both());
+    let heads = heads(&mut pipeline, 0..200, |number, sums| {
+        if number >= 40 {
+            sums.temperature[1] = 0;
+        }
+    });
+    for head in heads {
+        // The batch after the first that has it open.
+        let flag = match head.first {
+            0..=40 => 0,
+            _ => flags::TEMPERATURE_LEFT_OUT[1],
+        };
+        assert_eq!(head.flags, flag, "{}", head.first);
+        assert!((head.temp_c - 25.0).abs() < 0.01, "{}", head.temp_c);
+    }
+}
+
+#[test]
+fn a_warm_up_goes_by_the_time_since_power_on_and_is_over_where_that_is_unknown() {
+    let coefficients = [0.5, -0.3, 0.2];
+    let warm_up = Record::Named {
+        id: "gyro_warm_up",
+        coefficients: &coefficients,
+        nonlinear: Some(100.0),
+    };
+    // What is left of it in the first sample.
+    let left = |powered_for_ms| {
+        let mut of = [None, Some(&warm_up)].map(|warm_up: Option<&Record<'_>>| {
+            let mut pipeline = Pipeline::new();
+            pipeline.powered_for(powered_for_ms);
+            pipeline.calibrate(calibration(warm_up.map_or(&[], core::slice::from_ref)));
+            pipeline.stream(Streams {
+                raw: false,
+                compensated: true,
+            });
+            let sent = run(&mut pipeline, 0..20);
+            let [Sent::Compensated(head, samples)] = &sent[..] else {
+                panic!("{sent:?}")
+            };
+            (head.flags, samples[0].1.gyro.x)
+        });
+        of[1].1 = of[0].1 - of[1].1;
+        of[1]
+    };
+    for (ms, share) in [(0, 1.0), (69_315, 0.5), (138_629, 0.25)] {
+        let (flags, gone) = left(Some(ms));
+        assert_eq!(flags, 0);
+        assert!((gone - 0.5 * share).abs() < 1e-3, "{ms}: {gone}");
+    }
+    assert_eq!(left(None), (flags::POWER_ON_UNKNOWN, 0.0));
 }
 
 #[test]

@@ -81,7 +81,9 @@ pub fn check(
     mut progress: impl FnMut(f64),
 ) -> Result<Checked> {
     let image = Image::new(calibration, place)?;
-    let held = session.hello()?.stored.as_ref().map(|s| s.hash);
+    let who = session.hello()?;
+    let held = who.stored.as_ref().map(|s| s.hash);
+    let powered_for_ms = who.powered_for_ms;
     if held != Some(image.hash) {
         let problem = match held {
             None => "the device holds no calibration".to_string(),
@@ -93,7 +95,8 @@ pub fn check(
         let remedy = format!("upload it first: `mimu device upload {place}`");
         return Err(Error::device(session.port(), problem, remedy));
     }
-    let mut twin = Twin::new(calibration, &image, session.who().sample_rate_hz, place)?;
+    let rate_hz = session.who().sample_rate_hz;
+    let mut twin = Twin::new(calibration, &image, rate_hz, powered_for_ms, place)?;
     let wanted = (duration.as_secs_f64() * f64::from(session.who().sample_rate_hz)) as u64;
     let mut found = Checked {
         samples: 0,
@@ -164,22 +167,36 @@ pub fn check(
 }
 
 impl Twin {
-    fn new(calibration: &Calibration, image: &Image, rate_hz: u32, place: &str) -> Result<Self> {
+    fn new(
+        calibration: &Calibration,
+        image: &Image,
+        rate_hz: u32,
+        powered_for_ms: Option<u32>,
+        place: &str,
+    ) -> Result<Self> {
         let unusable = |_| Error::device(place, "the device could not use it", "fit it again");
         let stored = image.stored().map_err(unusable)?;
         let model = |sensor| {
             let missing = || Error::device(place, "a sensor is missing", "calibrate both sensors");
             calibration.inverse(sensor).ok_or_else(missing)
         };
+        let (mut single, mut double) = (
+            effects::State::new(rate_hz as f32),
+            effects::State::new(f64::from(rate_hz)),
+        );
+        if powered_for_ms.is_none() {
+            (single, double) = (single.long_after_power_on(), double.long_after_power_on());
+        }
+        let before = u64::from(powered_for_ms.unwrap_or_default()) * u64::from(rate_hz) / 1000;
         Ok(Self {
             rate_hz,
             model: stored.table.state(),
-            single: effects::State::new(rate_hz as f32),
+            single,
             stored,
             affine: [model(Sensor::Gyro)?, model(Sensor::Accel)?],
             effects: calibration.core_effects()?,
-            double: effects::State::new(f64::from(rate_hz)),
-            followed: 0,
+            double,
+            followed: 0_u32.wrapping_sub(before as u32),
             next: None,
         })
     }

@@ -40,6 +40,8 @@ pub enum Answer {
 pub struct Samples {
     /// What holds for all of them.
     pub head: BatchHead,
+    /// Temperatures by the TEMP pins of gyro x, y, z, °C; of raw readings only.
+    pub gyro_temps_c: Option<[f32; 3]>,
     /// One after the other, the first of the number [`BatchHead::first`].
     pub values: Vec<Sample<f32>>,
 }
@@ -155,12 +157,14 @@ fn understood(frame: &Frame<'_>) -> Option<Heard> {
         Message::Event(WireEvent::Raw(batch)) if batch.is_whole() => {
             Heard::Event(Event::Raw(Samples {
                 head: batch.head,
+                gyro_temps_c: Some(batch.gyro_temps_c),
                 values: batch.volts().map(|(_, sample)| sample).collect(),
             }))
         }
         Message::Event(WireEvent::Compensated(batch)) if batch.is_whole() => {
             Heard::Event(Event::Compensated(Samples {
                 head: batch.head,
+                gyro_temps_c: None,
                 values: batch.values().map(|(_, sample)| sample).collect(),
             }))
         }

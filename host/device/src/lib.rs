@@ -11,6 +11,7 @@
 //! | `upload`     | sending them and fetching them back                                                    |
 //! | `contents`   | what stands in them                                                                    |
 //! | `self_test`  | the self-test, and whether the unit stood still for it                                 |
+//! | `flagged`    | samples that carry a flag, counted                                                     |
 //! | `stream`     | samples as they come                                                                   |
 //! | `check`      | the device's compensation against the PC's, sample by sample                           |
 //! | [`record`]   | recording its raw stream                                                               |
@@ -19,6 +20,7 @@
 
 mod check;
 mod contents;
+mod flagged;
 mod heard;
 mod image;
 mod kalman;
@@ -37,6 +39,7 @@ pub use check::{Checked, Difference, check, rounding, ulps};
 pub use contents::{
     Contents, ConverterContents, EffectContents, Inverse, NodeContents, calibration, contents,
 };
+pub use flagged::Flagged;
 pub use heard::{Answer, Ear, Event, Heard, LineCount, Samples};
 pub use image::{Image, remembers};
 pub use kalman::{Applied, AxisEstimate, Converging, KalmanPlan, KalmanRun, SHORTEST, kalman};

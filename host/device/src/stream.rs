@@ -6,6 +6,7 @@ use mimu_core::compensation::Sample;
 use mimu_core::wire::{BatchHead, Request};
 use serde::Serialize;
 
+use super::flagged::Flagged;
 use super::heard::{Event, LineCount};
 use super::session::Session;
 use mimu_recording::error::{Error, Result};
@@ -36,6 +37,11 @@ pub struct Streamed {
     pub first: Option<u32>,
     /// °C, the last.
     pub temp_c: f64,
+    /// By the TEMP pins of gyro x, y, z, °C, the last; of the raw stream only.
+    pub gyro_temps_c: Option<[f32; 3]>,
+    /// What the device says is wrong with them.
+    #[serde(flatten)]
+    pub flagged: Flagged,
     /// Gyro.
     pub gyro: Moments,
     /// Accelerometer.
@@ -72,6 +78,8 @@ impl Streamed {
             missing: 0,
             first: None,
             temp_c: 0.0,
+            gyro_temps_c: None,
+            flagged: Flagged::default(),
             gyro,
             accel,
             line: LineCount::default(),
@@ -123,6 +131,7 @@ pub fn stream(
         };
         heard = Instant::now();
         found.temp_c = f64::from(batch.head.temp_c);
+        found.gyro_temps_c = batch.gyro_temps_c;
         for (k, sample) in (0..).zip(&batch.values) {
             let number = batch.head.first.wrapping_add(k);
             let lost = number.wrapping_sub(expected.unwrap_or(number));
@@ -133,6 +142,7 @@ pub fn stream(
             }
             expected = Some(number.wrapping_add(1));
             found.samples += 1;
+            found.flagged.count(batch.head.flags, 1);
             // Welford: of a bias of volts and a noise of microvolts the plain sums lose the noise. The deviations are sums of
             // squares until the end.
             let triads = [

@@ -45,6 +45,8 @@ pub struct Who {
     pub stored: Option<Held>,
     /// What is in the two places for a calibration, in words.
     pub slots: [String; 2],
+    /// Time since power-on at the start of sampling, ms; `None` if the device does not know it.
+    pub powered_for_ms: Option<u32>,
     /// One sentence if the device is older or newer and can be talked to all the same.
     pub warnings: Vec<String>,
 }
@@ -195,6 +197,7 @@ impl From<&Greeting<'_>> for Who {
                     .and_then(origin::date),
             }),
             slots: greeting.slots.each_ref().map(slot),
+            powered_for_ms: greeting.powered_for_ms,
             warnings: version_warning(greeting.protocol).into_iter().collect(),
         }
     }

@@ -38,6 +38,8 @@ pub struct DeviceSource {
     next: u64,
     /// Whether what comes next begins a new count.
     anew: bool,
+    /// For how long it had its power when it began to sample, s.
+    powered_for_s: Option<f64>,
 }
 
 const RAW: Request<'_> = Request::Stream {
@@ -74,7 +76,9 @@ impl DeviceSource {
             is_device: true,
             start: (who.start != Started::PowerOn).then(|| who.start.to_string()),
         };
+        let powered_for_s = who.powered_for_ms.map(|ms| f64::from(ms) / 1000.0);
         Self {
+            powered_for_s,
             session,
             unit,
             streaming: false,
@@ -117,6 +121,9 @@ impl DeviceSource {
             temp_c: f64::from(samples.head.temp_c),
             saturated: samples.head.flags & flags::SATURATED != 0,
             self_test: samples.head.flags & flags::SELF_TEST != 0,
+            power_on_s: self
+                .powered_for_s
+                .map(|s| self.zero as f64 / self.unit.rate_hz - s),
         }))
     }
 }
@@ -135,6 +142,7 @@ impl Source for DeviceSource {
             Some(Event::Raw(samples)) => self.take(&samples),
             Some(Event::Started(who)) => {
                 self.anew = true;
+                self.powered_for_s = who.powered_for_ms.map(|ms| f64::from(ms) / 1000.0);
                 self.unit.start = (who.start != Started::PowerOn).then(|| who.start.to_string());
                 self.streaming = false;
                 Ok(Heard::Restarted(who.start.to_string()))

@@ -60,6 +60,8 @@ pub struct One {
     nominal: Option<[Affine<f64>; 2]>,
     pending: Batch,
     next: Option<u64>,
+    /// When the power came, on the clock of the recordings, s.
+    power_on_s: Option<f64>,
     dwell: Option<Dwell>,
     seen: Option<Seen>,
     part: Part,
@@ -85,6 +87,7 @@ impl One {
             done: false,
             pending: Batch::default(),
             next: None,
+            power_on_s: None,
             dwell: None,
             seen: None,
             part: Part::Calibration,
@@ -111,11 +114,12 @@ impl One {
             asked.fixture.reference(),
         );
         manifest.latitude_deg = asked.latitude_deg;
+        manifest.power_on_s = self.power_on_s;
         if unit.is_device {
             manifest.recorded = Some(Recorded {
                 tool: concat!("mimu ", env!("CARGO_PKG_VERSION")).into(),
                 unit_id: unit.id.clone(),
-                start: unit.start.clone(),
+                start: unit.start.clone().filter(|_| self.power_on_s.is_none()),
                 ..Recorded::default()
             });
         }
@@ -213,6 +217,7 @@ impl One {
     fn keep(&mut self, chunk: &Chunk) {
         let missing = chunk.tick.saturating_sub(self.next.unwrap_or(chunk.tick));
         self.next = Some(chunk.tick + chunk.values.len() as u64);
+        self.power_on_s = chunk.power_on_s;
         self.standing.lost += missing;
         self.standing.samples += chunk.values.len() as u64;
         let rate_hz = self.station.unit.rate_hz;

@@ -39,6 +39,8 @@ pub struct Chunk {
     pub saturated: bool,
     /// Whether a self-test deflected the sensors.
     pub self_test: bool,
+    /// When the power came, on the clock of the ticks, s; `None` where nobody knows.
+    pub power_on_s: Option<f64>,
 }
 
 /// What a source has to say.

@@ -44,7 +44,7 @@ impl Wizard<'_> {
                 continue;
             }
             let tested = unit.station.with(self_test)?;
-            let failed = tested.passed.sensors().into_iter().filter(|s| !s.1);
+            let failed = tested.passed.all().into_iter().filter(|s| !s.1);
             let failed: Vec<&str> = failed.map(|s| s.0).collect();
             let words = match (failed.is_empty(), &tested.moved) {
                 (true, _) => "all sensors answer as their data sheets state".to_string(),

@@ -134,6 +134,9 @@ impl Mcu for Part {
         }
         let drives = self.drives();
         self.sampler.front.drive(drives);
+        // All converters have one VREF+, and this one the part's own reference, in mV.
+        let [.., adc3] = &mut self.mcu.adc;
+        adc3.set_reference(self.sampler.rail_mv);
     }
 
     fn split(&mut self, slot: usize) -> (&mut Bus, Option<&mut dyn ErasedDevice>) {

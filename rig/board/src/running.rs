@@ -199,6 +199,24 @@ impl Board {
         self.with(move |s| read(s.host, address, length))?
     }
 
+    /// Writes memory, as a debugger would, or a reset that comes in the middle of a write.
+    ///
+    /// Errors: besides, an address where no memory is.
+    pub fn set_memory(&mut self, address: u64, bytes: Vec<u8>) -> Result<(), String> {
+        self.with(move |s| {
+            (address..).zip(bytes).try_for_each(|(at, byte)| {
+                s.host
+                    .write(at, Width::W8, u64::from(byte))
+                    .map_err(|e| e.to_string())
+            })
+        })?
+    }
+
+    /// Stops the converter ADC1 for good: what it is asked to convert never ends.
+    pub fn stop_converter(&mut self) -> Result<(), String> {
+        self.with(|s| s.session.board_mut().part.sampler.stopped = true)
+    }
+
     /// Reads a register of a peripheral without the firmware noticing.
     ///
     /// Errors: besides, an address where no register is.

@@ -50,6 +50,10 @@ impl Conversions {
 pub(crate) struct Sampler {
     adc: Adc,
     pub(crate) front: Front,
+    /// No conversion ends.
+    pub(crate) stopped: bool,
+    /// VREF+ at the last conversion, mV.
+    pub(crate) rail_mv: u32,
     conversions: Conversions,
 }
 
@@ -59,6 +63,8 @@ impl Sampler {
             // Without a clock until the firmware starts one.
             adc: Adc::new(Converter::Adc1, 0),
             front,
+            stopped: false,
+            rail_mv: 3300,
             conversions: Conversions::NONE,
         }
     }
@@ -71,6 +77,7 @@ impl Sampler {
         // The model takes millivolts and uses nothing but the ratio. In those its own step, 50 µV, would be lost.
         let microvolts = |v: f64| (v * 1e6).round() as u32;
         self.adc.set_reference(microvolts(volts.rail));
+        self.rail_mv = (volts.rail * 1e3).round() as u32;
         for (number, &v) in (0..INPUTS as u8).zip(&volts.input) {
             let channel = Channel::new(number).expect("an input of the converter");
             self.adc.set_input(channel, microvolts(v));
@@ -110,6 +117,9 @@ impl Device for Sampler {
         registers: &mut RegisterFile,
         context: &mut DeviceContext<'_>,
     ) {
+        if self.stopped {
+            return;
+        }
         let now = context.now().0;
         let volts = self.front.at(now);
         self.show(&volts);

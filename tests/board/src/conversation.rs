@@ -2,7 +2,8 @@
 
 use mimu_board::running::Board;
 use mimu_core::wire::{
-    CHUNK, Call, Decoder, Event, MAX_FRAME, Message, Refusal, Reply, Request, Sums, encode,
+    BatchHead, CHUNK, Call, Decoder, Event, MAX_FRAME, Message, Refusal, Reply, Request, SelfTest,
+    Sums, encode,
 };
 
 use crate::MS;
@@ -26,6 +27,8 @@ pub enum Answer {
         /// Why the device started.
         start: String,
     },
+    /// How the sensors answered.
+    SelfTest(SelfTest),
     /// Any other reply, as text.
     Other(String),
 }
@@ -50,6 +53,8 @@ pub struct Conversation {
     pub samples: Vec<Sample>,
     /// Samples and batches that the device says it has lost, by the last batch.
     pub lost: (u32, u32),
+    /// Head of the last raw batch, and the temperatures by the TEMP pins in it, °C.
+    pub last: Option<(BatchHead, [f32; 3])>,
     /// Every byte that comes, where one has put a list here to keep them.
     pub kept: Option<Vec<u8>>,
 }
@@ -64,6 +69,7 @@ impl Conversation {
             answers: Vec::new(),
             samples: Vec::new(),
             lost: (0, 0),
+            last: None,
             kept: None,
         }
     }
@@ -101,6 +107,7 @@ impl Conversation {
                         Reply::Stored { length, bytes, .. } => {
                             Answer::Stored(length, bytes.to_vec())
                         }
+                        Reply::SelfTest(result) => Answer::SelfTest(result),
                         other => Answer::Other(format!("{other:?}")),
                     };
                     self.answers.push((id, answer));
@@ -110,6 +117,7 @@ impl Conversation {
                 }
                 Message::Event(Event::Raw(batch)) => {
                     self.lost = (batch.head.samples_lost, batch.head.batches_dropped);
+                    self.last = Some((batch.head, batch.gyro_temps_c));
                     let sample = |(number, sums)| Sample { number, sums };
                     self.samples.extend(batch.sums().map(sample));
                 }

@@ -273,6 +273,8 @@ impl Step {
         device.greeting();
         device.run_for(STARTED);
         device.kept = Some(Vec::new());
+        // For how long it has had its power, from which the effects count.
+        device.ask(Request::Hello);
         let stream = Request::Stream {
             raw: true,
             compensated: !self.banks,

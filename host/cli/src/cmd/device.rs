@@ -213,7 +213,7 @@ fn run_self_test(args: &PlainArgs) -> Result<()> {
     let port = session.port();
     let result = DeviceResult::new("self-test", port, found);
     print(&args.json, &report::self_test_text(&result), &result, None)?;
-    let sensors = result.found.passed.sensors().into_iter();
+    let sensors = result.found.passed.all().into_iter();
     let failed: Vec<&str> = sensors.filter(|s| !s.1).map(|s| s.0).collect();
     let failed = failed.join(", ");
     match &result.found.moved {
@@ -226,7 +226,7 @@ fn run_self_test(args: &PlainArgs) -> Result<()> {
         None => Err(Error::new(
             port,
             format!("the self-test failed: {failed}"),
-            "check the wiring of the self-test pins and of these sensors",
+            "check the wiring of these, and of the self-test pins",
         )),
     }
 }

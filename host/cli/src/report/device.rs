@@ -34,6 +34,11 @@ pub fn info_text(result: &DeviceResult<&Who>) -> String {
         who.start,
         starts(who.starts)
     );
+    let powered = match who.powered_for_ms {
+        Some(ms) => format!("{:.1} s before sampling began", f64::from(ms) / 1000.0),
+        None => "not known: a reset has lost it".into(),
+    };
+    line!(out, "power-on      {powered}");
     line!(
         out,
         "samples       {} Hz, {} in {}",
@@ -208,17 +213,30 @@ pub fn self_test_text(result: &DeviceResult<SelfTested>) -> String {
     let mut out = String::new();
     line!(out, "{}: self-test", result.port);
     let word = |ok: bool| if ok { "passed" } else { "FAILED" };
-    let volts = |v: &[f32; 3]| format!("{:.3}, {:.3}, {:.3} V", v[0], v[1], v[2]);
-    for (i, (sensor, passed)) in found.passed.sensors().into_iter().enumerate() {
-        let detail = match (found.gyro_st1_v.get(i), found.gyro_st2_v.get(i)) {
-            (Some(st1), Some(st2)) => format!("ST1 {st1:+.3} V, ST2 {st2:+.3} V"),
-            _ => format!(
-                "finest range {}, coarsest {}",
-                volts(&found.accel_fine_v),
-                volts(&found.accel_coarse_v)
+    for (k, (name, passed)) in found.passed.all().into_iter().enumerate() {
+        let i = k % 3;
+        let detail = match k {
+            0..3 => format!(
+                "ST1 {:+.3} V, ST2 {:+.3} V",
+                found.gyro_st1_v[i], found.gyro_st2_v[i]
             ),
+            3..6 => format!(
+                "finest range {:.3} V, coarsest {:.3} V",
+                found.accel_fine_v[i], found.accel_coarse_v[i]
+            ),
+            6 => "seen by the three of them together".into(),
+            7..10 => format!("{:.2} °C", found.gyro_temps_c[(k - 7) % 3]),
+            10 => format!("{:.3} V", found.reference_v),
+            _ => format!("{:.3} V", found.supply_v),
         };
-        line!(out, "{sensor:<6}   {}   {detail}", word(passed));
+        line!(out, "{name:<13}   {}   {detail}", word(passed));
+    }
+    if !found.accel_not_shown.is_empty() {
+        line!(
+            out,
+            "not shown in this pose: accel {}, across gravity, where one that is stuck reads the same; test again with it up",
+            found.accel_not_shown.join(", ")
+        );
     }
     if let Some(moved) = &found.moved {
         line!(out, "the unit did not stand still: {moved}");
@@ -298,7 +316,11 @@ pub fn stream_text(result: &DeviceResult<Streamed>) -> String {
             );
         }
     }
+    if let Some([x, y, z]) = found.gyro_temps_c {
+        line!(out, "gyros x, y, z at {x:.2}, {y:.2}, {z:.2} °C");
+    }
     line_text(&mut out, &found.line);
+    warn(&mut out, found.flagged.warnings().iter());
     out
 }
 
@@ -421,21 +443,7 @@ pub fn record_text(summary: &RecordSummary) -> String {
             s.reconnected
         ));
     }
-    for (count, what) in [
-        (
-            s.saturated,
-            "in batches with a reading at the end of the converter's range",
-        ),
-        (
-            s.without_reference,
-            "without the gyros' reference: their drift with the supply is in them",
-        ),
-        (s.self_test, "while the self-test deflected the sensors"),
-    ] {
-        if count > 0 {
-            warnings.push(format!("{count} samples {what}"));
-        }
-    }
+    warnings.extend(s.flagged.warnings());
     warn(&mut out, warnings.iter());
     line!(out, "recording: {}", summary.recording);
     out

@@ -12,7 +12,7 @@ mod steps;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use mimu_core::wire::{Request, flags};
+use mimu_core::wire::Request;
 
 use serde::{Serialize, Serializer};
 
@@ -20,6 +20,7 @@ pub use known::Known;
 pub use plan::{Plan, Planned};
 pub use steps::Steps;
 
+use crate::flagged::Flagged;
 use crate::heard::{Event, LineCount, Samples};
 use crate::result::TOOL;
 use crate::session::Session;
@@ -94,12 +95,9 @@ pub struct Standing {
     pub waiting: bool,
     /// °C, the last.
     pub temp_c: f64,
-    /// Samples in batches with a reading at the end of the converter's range.
-    pub saturated: u64,
-    /// Samples in batches without the gyros' reference.
-    pub without_reference: u64,
-    /// Samples while a self-test deflected the sensors.
-    pub self_test: u64,
+    /// What the device says is wrong with them.
+    #[serde(flatten)]
+    pub flagged: Flagged,
     /// What was heard on the line.
     pub line: LineCount,
     /// What a person should know beside all that.
@@ -167,10 +165,10 @@ pub fn record(
     if let Some(known) = &known {
         manifest.step_labels = known.labels().to_vec();
     }
-    // Its clock starts with it, but after a reset without a power failure the device counts from zero as well: the die is warm then, and a
-    // warm-up counted from there would be another with every reset.
+    // Its clock begins with every start, after a reset too: the die is warm then, and a warm-up counted from there would be another with
+    // every reset. The device knows for how long it has had its power, unless it has lost that in the reset.
     let by_power = who.start == Started::PowerOn;
-    manifest.power_on_s = by_power.then_some(0.0);
+    manifest.power_on_s = who.powered_for_ms.map(|ms| -f64::from(ms) / 1000.0);
     manifest.recorded = Some(Recorded {
         tool: TOOL.into(),
         firmware: who.firmware.clone(),
@@ -440,15 +438,7 @@ impl Run {
         let standing = &mut self.standing;
         standing.samples += count as u64;
         standing.temp_c = shortest(samples.head.temp_c);
-        for (flag, counter) in [
-            (flags::SATURATED, &mut standing.saturated),
-            (flags::NO_REFERENCE, &mut standing.without_reference),
-            (flags::SELF_TEST, &mut standing.self_test),
-        ] {
-            if samples.head.flags & flag != 0 {
-                *counter += count as u64;
-            }
-        }
+        standing.flagged.count(samples.head.flags, count as u64);
         standing.first_s.get_or_insert(self.clock.seconds(first));
         standing.last_s = Some(self.clock.seconds(first + count as u64 - 1));
         Ok(())

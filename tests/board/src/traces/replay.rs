@@ -34,6 +34,7 @@ pub fn replay(trace: &Trace) -> Result<Replayed, String> {
         model: stored.table.state(),
         effects: effects::State::new(1000.0),
         slow_at: None,
+        powered_for_ms: 0,
         next: None,
         stored,
     };
@@ -71,6 +72,10 @@ pub fn replay(trace: &Trace) -> Result<Replayed, String> {
                 // The samples that it took in last come with the batch behind it.
                 reports.push(state);
             }
+            Message::Greeting { greeting, .. } => {
+                let unknown = "the device does not know for how long it has had its power";
+                twin.powered_for_ms = greeting.powered_for_ms.ok_or(unknown)?;
+            }
             _ => {}
         }
     }
@@ -101,6 +106,8 @@ struct Twin {
     effects: effects::State<f32, ROOM>,
     /// Number of the sample at which the slow effects were followed last.
     slow_at: Option<u32>,
+    /// At sample 0.
+    powered_for_ms: u32,
     next: Option<u32>,
 }
 
@@ -149,7 +156,9 @@ impl Twin {
         };
         let mut at = self.slow_at.map_or(0, |last| last + BATCH as u32);
         loop {
-            let passed = at - self.slow_at.unwrap_or(0);
+            let passed = self
+                .slow_at
+                .map_or(self.powered_for_ms, |before| at - before);
             all.slow(&mut self.effects, passed as f32 / 1000.0, head.temp_c);
             self.slow_at = Some(at);
             if at >= head.first {

@@ -1,8 +1,9 @@
 //! The release image on the emulated board, whatever it sends: when it samples, what it samples, and what the
 //! emulator says of how it uses the part.
 
+use mimu_board::running::Board;
 use mimu_board::schematic::{Volts, WIRING};
-use mimu_board_tests::{MS, STARTED, still};
+use mimu_board_tests::{MS, STARTED, image, still};
 
 /// Registers of DMA1's first stream (RM0433 15.5): what is left of the round, and where it writes.
 const LEFT: u64 = 0x4002_0014;
@@ -42,6 +43,37 @@ fn each_place_of_the_ring_holds_the_code_of_its_own_pin() {
             "{net:?} at {pin}: {code}, not {exact}"
         );
     }
+}
+
+/// Instructions of the image that set this bit of the configuration and control register, behind which stands a store, as the crate
+/// cortex-m writes them: `cpsid i`, a load, `orr.w` with the bit (ARMv7-M A7.7.92, A5.3.2).
+fn that_set(board: &mut Board, bit: u32) -> Vec<u64> {
+    const FLASH: u64 = 0x0800_0000;
+    let size = image().sizes().flash as usize;
+    let bytes = board.memory(FLASH, size).unwrap();
+    let half = |at: usize| u32::from(u16::from_le_bytes([bytes[at], bytes[at + 1]]));
+    // 1 << bit is 0x80 turned right by 39 - bit: its uppermost bit is `i`, then three, and the last stands before the 0x80.
+    let turned = 39 - bit;
+    let upper = 0xf040 | (turned >> 4) << 10;
+    let lower = (turned >> 1 & 7) << 12 | (turned & 1) << 7;
+    let sets = |at: &usize| {
+        half(*at) == 0xb672 && half(at + 4) & !0xf == upper && half(at + 6) & !0xf00 == lower
+    };
+    let found = (0..size - 8).step_by(2).filter(sets);
+    found.map(|at| FLASH + at as u64).collect()
+}
+
+/// Bits IC and DC (ARMv7-M B3.2.8).
+#[test]
+fn instructions_are_cached_and_data_which_the_controllers_write_are_not() {
+    let mut board = still(Volts::GROUND);
+    assert_eq!(that_set(&mut board, 16), []);
+    let [sets] = that_set(&mut board, 17)[..] else {
+        panic!("nothing in the image sets the bit, or several do");
+    };
+    board.watch(sets).unwrap();
+    board.run_to(MS).unwrap();
+    assert_eq!(board.arrivals().unwrap().len(), 1);
 }
 
 #[test]

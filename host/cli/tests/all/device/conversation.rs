@@ -1,7 +1,7 @@
 //! Calibrations up and down, tests and comparisons.
 
 use mimu_core::stored;
-use mimu_core::wire::{EFFECTS, Refusal};
+use mimu_core::wire::{EFFECTS, Refusal, checks, flags};
 
 use super::calibration::{EFFECTS as ALL_EFFECTS, forward};
 use super::peer::{Peer, Script};
@@ -169,12 +169,127 @@ fn counters_and_self_test_are_told() {
     let test = ["device", "self-test", "--port", &peer.path, "--json", "-"];
     assert_eq!(mimu(&place, &test).json()["passed"]["gyro_z"], true);
     let failing = Peer::new(Script {
-        self_test_passed: 0b1011,
+        self_test_passed: checks::ALL & !checks::GYRO[2],
         ..Script::default()
     });
     mimu(&place, &["device", "self-test", "--port", &failing.path])
         .refused(&["self-test failed", "gyro z"]);
 }
+
+#[test]
+fn a_self_test_names_what_failed_and_what_the_pose_did_not_show() {
+    let place = Place::new();
+    let peer = Peer::new(Script {
+        self_test_passed: checks::ALL & !(checks::TEMPERATURE[1] | checks::SUPPLY),
+        ..Script::default()
+    });
+    let run = mimu(&place, &["device", "self-test", "--port", &peer.path]);
+    for line in [
+        "gyro z          passed   ST1 -0.270 V, ST2 +0.270 V",
+        "accel z         passed   finest range 2.450 V, coarsest 1.850 V",
+        "gravity         passed",
+        "temperature y   FAILED   26.00 °C",
+        "supply          FAILED   3.300 V",
+        "not shown in this pose: accel x, y",
+    ] {
+        assert!(run.stdout.contains(line), "{line}: {}", run.stdout);
+    }
+    run.refused(&["self-test failed: temperature y, supply"]);
+}
+
+#[test]
+fn when_the_power_came_is_told_or_that_it_is_not_known() {
+    let place = Place::new();
+    let told = |powered_for_ms| {
+        let peer = Peer::new(Script {
+            powered_for_ms,
+            ..Script::default()
+        });
+        mimu(&place, &["device", "info", "--port", &peer.path]).stdout
+    };
+    let known = told(Some(90_500));
+    assert!(known.contains("90.5 s before sampling began"), "{known}");
+    let lost = told(None);
+    assert!(lost.contains("power-on      not known"), "{lost}");
+}
+
+#[test]
+fn samples_that_carry_a_flag_are_counted_and_told() {
+    let place = Place::new();
+    let script = || Script {
+        flags: flags::TEMPERATURE_LEFT_OUT[1] | flags::POWER_ON_UNKNOWN,
+        speed: 4.0,
+        ..Script::default()
+    };
+    let peer = Peer::new(script());
+    let stream = [
+        "device", "stream", "raw", "--for", "500ms", "--port", &peer.path,
+    ];
+    let told = mimu(&place, &[&stream[..], &["--json", "-"]].concat()).json();
+    assert_eq!(told["temperature_left_out"], serde_json::json!([0, 500, 0]));
+    assert_eq!(told["power_on_unknown"], 500);
+    assert_eq!(
+        told["gyro_temps_c"],
+        serde_json::json!([31.25, 31.25, 31.25])
+    );
+    drop(peer);
+    let peer = Peer::new(script());
+    let record = [
+        "record", "--port", &peer.path, "-o", "rec", "--for", "500ms",
+    ];
+    let text = mimu(&place, &record);
+    let all = text.stdout + &text.stderr;
+    assert!(
+        all.contains("500 samples whose temperature leaves gyro y out"),
+        "{all}"
+    );
+    assert!(
+        all.contains("500 samples of a device that does not know"),
+        "{all}"
+    );
+}
+
+#[test]
+fn a_warm_up_is_compared_by_the_time_since_power_on_that_the_device_tells() {
+    let place = Place::new();
+    let calibration = place.calibration("V", WARM_UP);
+    let held = uploaded(&place, &calibration);
+    for powered_for_ms in [Some(0), Some(250_000), None] {
+        let peer = Peer::new(Script {
+            stored: Some(held.clone()),
+            powered_for_ms,
+            speed: 4.0,
+            ..Script::default()
+        });
+        let arguments = [
+            "device",
+            "check",
+            "--calibration",
+            &calibration,
+            "--for",
+            "500ms",
+            "--port",
+            &peer.path,
+            "--json",
+            "-",
+        ];
+        let result = mimu(&place, &arguments).json();
+        assert_eq!(result["gyro"]["ulps"], 0, "{powered_for_ms:?}: {result}");
+        assert_eq!(result["holds"], true, "{powered_for_ms:?}: {result}");
+    }
+}
+
+/// Of 0.1 rad/s, and 200 s.
+const WARM_UP: &str = r#"
+[[effect]]
+id = "gyro_warm_up"
+sensor = "gyro"
+about = ""
+formula = "x = C (u - S e) + o, e_i = sum of coefficient * regressor"
+direction = "raw to SI"
+form = { name = "time_constant_s", value = 200.0 }
+coefficients = [{ name = "x", value = 0.1, sigma = 1e-6, unit = "rad/s" }]
+"#;
 
 #[test]
 fn the_compensated_stream_is_compared_sample_by_sample() {

@@ -47,7 +47,7 @@ fn frames() -> Vec<Vec<u8>> {
         samples_lost: 0,
         batches_dropped: 0,
         temp_c: f32::NAN,
-        flags: 0xff,
+        flags: u16::MAX,
     };
     let samples: Vec<u8> = (0..20 * RAW_BYTES).map(|i| i as u8).collect();
     let batch = |samples| {
@@ -56,6 +56,7 @@ fn frames() -> Vec<Vec<u8>> {
             head,
             gyro_volts,
             accel_volts,
+            gyro_temps_c: [f32::NAN, f32::INFINITY, 0.0],
             samples,
         })))
     };

@@ -12,7 +12,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use mimu_core::wire::{
-    Decoder, MAGIC, MAX_FRAME, Message, PROTOCOL, Refusal, Reply, Start, Version,
+    Decoder, MAGIC, MAX_FRAME, Message, PROTOCOL, Refusal, Reply, Start, Version, checks,
     effects_of_this_build, encode,
 };
 
@@ -80,11 +80,15 @@ pub struct Script {
     pub speed: f64,
     /// Added to the compensated gyro x, rad/s: a device that computes wrongly.
     pub bent: f32,
-    pub self_test_passed: u8,
+    pub self_test_passed: u16,
     /// Why it started.
     pub start: Start<'static>,
     /// Name of the port in place of that of the terminal: one that stays as the terminal goes and another comes.
     pub link: Option<PathBuf>,
+    /// Time since power-on when it began to sample.
+    pub powered_for_ms: Option<u32>,
+    /// Carried by all its batches.
+    pub flags: u16,
 }
 
 impl Default for Script {
@@ -101,7 +105,9 @@ impl Default for Script {
             acts: Vec::new(),
             speed: 1.0,
             bent: 0.0,
-            self_test_passed: 0b1111,
+            self_test_passed: checks::ALL,
+            powered_for_ms: Some(0),
+            flags: 0,
             start: Start::Panic {
                 file: "src/x.rs",
                 line: 7,

@@ -49,7 +49,8 @@ fn speaking(major: u8, minor: u8) -> Script {
 fn an_older_a_newer_and_a_foreign_device_are_told_apart() {
     let (major, minor) = (PROTOCOL.major, PROTOCOL.minor);
     let newer = info(speaking(major + 1, 0), &[]);
-    newer.refused(&["the device is newer", "protocol 3.0", "update mimu"]);
+    let speaks = format!("protocol {}.0", major + 1);
+    newer.refused(&["the device is newer", &speaks, "update mimu"]);
     let older = info(speaking(0, 9), &[]);
     older.refused(&["the device is older", "protocol 0.9", "flash"]);
     let warned = info(speaking(major, minor + 1), &["--json", "-"]).json();

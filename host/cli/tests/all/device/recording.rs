@@ -252,12 +252,13 @@ fn a_recording_goes_on_over_a_restart_and_tells_it() {
 }
 
 #[test]
-fn the_clock_of_a_device_counts_from_power_on_only_if_that_is_why_it_started() {
-    let recorded = |start| {
+fn a_recording_counts_from_power_on_over_a_reset_as_long_as_the_device_knows_it() {
+    let recorded = |start, powered_for_ms| {
         let place = Place::new();
         let peer = Peer::new(Script {
             speed: 4.0,
             start,
+            powered_for_ms,
             ..Script::default()
         });
         let arguments = [
@@ -266,12 +267,16 @@ fn the_clock_of_a_device_counts_from_power_on_only_if_that_is_why_it_started() {
         mimu(&place, &arguments).json();
         rows(&place, "rec").0.manifest
     };
-    let by_power = recorded(Start::PowerOn);
-    assert_eq!(by_power.power_on_s, Some(0.0));
+    let by_power = recorded(Start::PowerOn, Some(70));
+    assert_eq!(by_power.power_on_s, Some(-0.07));
     assert_eq!(by_power.start_without_power_on(), None);
-    let by_button = recorded(Start::ResetPin);
-    assert_eq!(by_button.power_on_s, None);
-    assert_eq!(by_button.start_without_power_on(), Some("reset pin"));
+    // The button does not cool the die.
+    let by_button = recorded(Start::ResetPin, Some(600_500));
+    assert_eq!(by_button.power_on_s, Some(-600.5));
+    assert_eq!(by_button.start_without_power_on(), None);
+    let forgotten = recorded(Start::ResetPin, None);
+    assert_eq!(forgotten.power_on_s, None);
+    assert_eq!(forgotten.start_without_power_on(), Some("reset pin"));
 }
 
 #[test]

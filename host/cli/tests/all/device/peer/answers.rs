@@ -52,6 +52,7 @@ impl Device {
             starts: 3,
             stored,
             slots: [first, Slot::Empty],
+            powered_for_ms: self.script.powered_for_ms,
         };
         let message = Message::Greeting { id, greeting };
         match id {
@@ -134,6 +135,9 @@ impl Device {
                     gyro_st2_v: [0.27; 3],
                     accel_fine_v: [1.65, 1.65, 2.45],
                     accel_coarse_v: [1.65, 1.65, 1.85],
+                    gyro_temps_c: [25.0, 26.0, 27.0],
+                    reference_v: 2.5,
+                    supply_v: 3.3,
                     passed: self.script.self_test_passed,
                 }));
             }

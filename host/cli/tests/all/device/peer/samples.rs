@@ -68,18 +68,23 @@ impl Device {
             samples_lost: self.lost,
             batches_dropped: self.dropped,
             temp_c: TEMP_C,
-            flags: if first.is_multiple_of(1000) {
-                flags::SATURATED
-            } else {
-                0
-            },
+            flags: self.script.flags
+                | match first.is_multiple_of(1000) {
+                    true => flags::SATURATED,
+                    false => 0,
+                },
         };
         let held = self.seen.lock().unwrap().stored.clone();
         if let (None, Some(bytes)) = (&self.calibrated, held) {
+            let effects = effects::State::new(1000.0);
+            let (effects, powered_for_ms) = match self.script.powered_for_ms {
+                Some(ms) => (effects, ms),
+                None => (effects.long_after_power_on(), 0),
+            };
             self.calibrated = Some(Calibrated {
                 stored: stored::decode(&bytes).unwrap(),
-                effects: effects::State::new(1000.0),
-                followed: 0,
+                effects,
+                followed: 0_u32.wrapping_sub(powered_for_ms),
             });
         }
         let (mut raw, mut compensated) = (Vec::new(), Vec::new());
@@ -130,6 +135,7 @@ impl Device {
                 head,
                 gyro_volts: GYRO_VOLTS,
                 accel_volts: ACCEL_VOLTS,
+                gyro_temps_c: [TEMP_C; 3],
                 samples: &raw,
             };
             self.frame(&Message::Event(Event::Raw(batch)), garble);

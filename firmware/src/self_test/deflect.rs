@@ -1,0 +1,68 @@
+//! Deflects the sensors by their inputs, and measures what comes of it.
+
+use embassy_stm32::gpio::Output;
+use embassy_time::Timer;
+use mimu_core::compensation::Sample;
+use mimu_core::wire::{self, flags};
+
+use super::{Measured, judge};
+use crate::board::SelfTestPins;
+use crate::design_parameters::{SELF_TEST_SAMPLES, SELF_TEST_SETTLE_MS};
+use crate::pipeline::Shared;
+use crate::supply::Supply;
+
+/// Takes about a second. The inputs are as before afterwards.
+pub async fn run(
+    pins: &mut SelfTestPins,
+    supply: &mut Supply,
+    pipeline: &Shared,
+) -> wire::SelfTest {
+    pipeline.lock(|p| p.borrow_mut().flag(flags::SELF_TEST, true));
+    let rest = mean(pipeline).await;
+    pins.st1.set_high();
+    let st1 = mean(pipeline).await.gyro - rest.gyro;
+    pins.st1.set_low();
+    pins.st2.set_high();
+    let st2 = mean(pipeline).await.gyro - rest.gyro;
+    pins.st2.set_low();
+    pins.range.iter_mut().for_each(Output::set_high);
+    let coarse = mean(pipeline).await.accel;
+    pins.range.iter_mut().for_each(Output::set_low);
+    // The sensors have to be back before the flag goes.
+    Timer::after_millis(SELF_TEST_SETTLE_MS).await;
+    pipeline.lock(|p| p.borrow_mut().flag(flags::SELF_TEST, false));
+
+    let supply_v = supply.volts().await;
+    let slow = pipeline.lock(|p| *p.borrow().slow());
+    let measured = Measured {
+        gyro_st1_v: st1.into(),
+        gyro_st2_v: st2.into(),
+        accel_fine_v: rest.accel.into(),
+        accel_coarse_v: coarse.into(),
+        temperatures_count: slow.temperatures_that_count(),
+        reference_v: slow.reference_share() * supply_v,
+        supply_v,
+    };
+    wire::SelfTest {
+        gyro_st1_v: measured.gyro_st1_v,
+        gyro_st2_v: measured.gyro_st2_v,
+        accel_fine_v: measured.accel_fine_v,
+        accel_coarse_v: measured.accel_coarse_v,
+        gyro_temps_c: slow.gyro_temps_c(),
+        reference_v: measured.reference_v,
+        supply_v,
+        passed: judge(&measured),
+    }
+}
+
+/// Mean of some samples, V, once the sensors have settled.
+async fn mean(pipeline: &Shared) -> Sample<f32> {
+    Timer::after_millis(SELF_TEST_SETTLE_MS).await;
+    pipeline.lock(|p| p.borrow_mut().measure(SELF_TEST_SAMPLES));
+    loop {
+        Timer::after_millis(u64::from(SELF_TEST_SAMPLES) / 4).await;
+        if let Some(mean) = pipeline.lock(|p| p.borrow().measured()) {
+            return mean;
+        }
+    }
+}

@@ -1,0 +1,110 @@
+//! Samples whose batch carries a flag, counted.
+
+use mimu::quantity::AXES;
+use mimu_core::wire::flags;
+use serde::Serialize;
+
+/// Samples in batches that carry each of the [`flags`] which say that something is wrong with them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+pub struct Flagged {
+    /// A reading was at a stop of a sensor's output.
+    pub saturated: u64,
+    /// The gyros' reference was not there.
+    pub without_reference: u64,
+    /// The TEMP pin of gyro x, y, z was left out of the temperature.
+    pub temperature_left_out: [u64; 3],
+    /// No TEMP pin was left: the temperature is the last good one.
+    pub without_temperature: u64,
+    /// The time since power-on was not known to the device.
+    pub power_on_unknown: u64,
+    /// A self-test deflected the sensors.
+    pub self_test: u64,
+}
+
+impl Flagged {
+    /// Takes in so many samples of a batch with these flags.
+    pub fn count(&mut self, of: u16, samples: u64) {
+        let [x, y, z] = &mut self.temperature_left_out;
+        let [left_out_x, left_out_y, left_out_z] = flags::TEMPERATURE_LEFT_OUT;
+        for (flag, counter) in [
+            (flags::SATURATED, &mut self.saturated),
+            (flags::NO_REFERENCE, &mut self.without_reference),
+            (left_out_x, x),
+            (left_out_y, y),
+            (left_out_z, z),
+            (flags::NO_TEMPERATURE, &mut self.without_temperature),
+            (flags::POWER_ON_UNKNOWN, &mut self.power_on_unknown),
+            (flags::SELF_TEST, &mut self.self_test),
+        ] {
+            if of & flag != 0 {
+                *counter += samples;
+            }
+        }
+    }
+
+    /// A sentence for each that there are samples of.
+    pub fn warnings(&self) -> Vec<String> {
+        let mut all = Vec::new();
+        let mut warn = |count: u64, what: &str| {
+            if count > 0 {
+                all.push(format!("{count} samples {what}"));
+            }
+        };
+        warn(
+            self.saturated,
+            "in batches with a reading where a sensor's output ends",
+        );
+        warn(
+            self.without_reference,
+            "without the gyros' reference: their drift with the supply is in them; check its pin",
+        );
+        for (axis, count) in AXES.iter().zip(self.temperature_left_out) {
+            let what = format!(
+                "whose temperature leaves gyro {axis} out: its TEMP pin is out of range or disagrees with the \
+                 others; check its wiring"
+            );
+            warn(count, &what);
+        }
+        warn(
+            self.without_temperature,
+            "at the last good temperature: no TEMP pin is left; check their wiring",
+        );
+        warn(
+            self.power_on_unknown,
+            "of a device that does not know when its power came: it takes a warm-up for over",
+        );
+        warn(self.self_test, "while the self-test deflected the sensors");
+        all
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_flag_counts_its_own_samples_and_is_told() {
+        let mut flagged = Flagged::default();
+        flagged.count(0, 20);
+        assert_eq!((flagged, flagged.warnings().len()), (Flagged::default(), 0));
+        flagged.count(flags::TEMPERATURE_LEFT_OUT[1] | flags::SATURATED, 20);
+        flagged.count(flags::TEMPERATURE_LEFT_OUT[1], 7);
+        assert_eq!(
+            (flagged.saturated, flagged.temperature_left_out),
+            (20, [0, 27, 0])
+        );
+        let told = flagged.warnings();
+        assert_eq!(told.len(), 2);
+        assert!(told[1].starts_with("27 samples whose temperature leaves gyro y out"));
+        for flag in [
+            flags::NO_REFERENCE,
+            flags::NO_TEMPERATURE,
+            flags::POWER_ON_UNKNOWN,
+            flags::SELF_TEST,
+        ] {
+            let mut one = Flagged::default();
+            one.count(flag, 1);
+            assert_eq!(one.warnings().len(), 1, "{flag}");
+        }
+    }
+}
