@@ -23,7 +23,7 @@ pub(super) fn of(calibration: &Calibration, place: &str, warnings: &mut Vec<Stri
 /// Bytes of as many pairs of hexadecimal digits; `None` if these are no such digits, or all zero, which stands for unknown.
 fn bytes<const N: usize>(digits: &str) -> Option<[u8; N]> {
     let mut bytes = [0; N];
-    let pairs = digits.as_bytes().chunks_exact(2);
+    let (pairs, _) = digits.as_bytes().as_chunks::<2>();
     if digits.len() != 2 * N || !digits.bytes().all(|b| b.is_ascii_hexdigit()) {
         return None;
     }

@@ -4,6 +4,7 @@ use std::time::{Duration, Instant};
 
 use mimu_core::compensation::Affine;
 use mimu_core::wire::{Request, flags};
+use mimu_device::record::shortest;
 use mimu_device::{Event, Samples, Session, Started};
 use mimu_recording::RawUnit;
 use mimu_recording::error::{Error, Result};
@@ -103,7 +104,7 @@ impl DeviceSource {
         for sample in &samples.values {
             let mut row = [0.0; 6];
             for (to, from) in row.iter_mut().zip(sample.gyro.iter().chain(&sample.accel)) {
-                *to = f64::from(*from);
+                *to = shortest(*from);
             }
             if row.iter().any(|v| !v.is_finite()) {
                 return Err(Error::device(
@@ -118,7 +119,7 @@ impl DeviceSource {
         Ok(Heard::Samples(Chunk {
             tick,
             values,
-            temp_c: f64::from(samples.head.temp_c),
+            temp_c: shortest(samples.head.temp_c),
             saturated: samples.head.flags & flags::SATURATED != 0,
             self_test: samples.head.flags & flags::SELF_TEST != 0,
             power_on_s: self

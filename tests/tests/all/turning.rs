@@ -57,7 +57,7 @@ fn errors(found: &Diagnosis) -> [Vec<f64>; 2] {
                     Sensor::Gyro => SENSITIVITY[at(0)][at(1)].to_radians() / G,
                     Sensor::Accel => 1e-3 * BESIDE_MM[at(1)],
                 };
-                (c.value - truth) / c.sigma
+                (c.value - truth) / c.sigma.unwrap()
             })
             .collect()
     })

@@ -7,6 +7,8 @@ mod clock;
 mod known;
 mod line;
 mod plan;
+mod reading;
+mod run;
 mod steps;
 
 use std::path::{Path, PathBuf};
@@ -18,10 +20,11 @@ use serde::{Serialize, Serializer};
 
 pub use known::Known;
 pub use plan::{Plan, Planned};
+pub use reading::shortest;
 pub use steps::Steps;
 
 use crate::flagged::Flagged;
-use crate::heard::{Event, LineCount, Samples};
+use crate::heard::LineCount;
 use crate::result::TOOL;
 use crate::session::Session;
 use crate::who::{Started, unit_name};
@@ -30,9 +33,7 @@ use mimu_recording::error::{Error, Result};
 use mimu_recording::{
     Batch, Columns, Growing, Manifest, RawUnit, Recorded, Reference, Restart, SampleFormat,
 };
-
-/// Silence after which the device is asked whether it is still there.
-const SILENCE: Duration = Duration::from_secs(2);
+use run::Run;
 
 /// What to record.
 #[derive(Debug, Clone, PartialEq)]
@@ -247,225 +248,4 @@ pub fn record(
 fn kept(error: Error, samples: u64, directory: &Path) -> Error {
     let kept = format!(" ({samples} samples are kept in {})", directory.display());
     error.map(|e| e.problem += &kept)
-}
-
-struct Run {
-    growing: Growing,
-    clock: Clock,
-    steps: Steps,
-    known: Option<Known>,
-    standing: Standing,
-    /// Tick of the first sample.
-    begun: Option<u64>,
-    heard: Instant,
-    unit_id: String,
-    /// Starts of the device since it has power.
-    starts: u32,
-    line: line::Heard,
-}
-
-/// What the device is asked for.
-const RAW: Request<'_> = Request::Stream {
-    raw: true,
-    compensated: false,
-};
-
-impl Run {
-    fn receive(
-        &mut self,
-        session: &mut Session,
-        options: &RecordOptions,
-        look: &mut impl FnMut(&Standing) -> Wish,
-    ) -> Result<()> {
-        session.begin_stream(RAW)?;
-        let rate_hz = f64::from(session.who().sample_rate_hz);
-        let end = self.steps.end().into_iter().chain(options.duration).min();
-        let wanted = end.map(|d| (d.as_secs_f64() * rate_hz).round() as u64);
-        loop {
-            match self.hear(session, wanted) {
-                Ok(true) => return Ok(()),
-                Ok(false) => {}
-                Err(lost) if session.is_lost() => {
-                    if !self.reconnect(session, options.reconnect, &lost, look)? {
-                        return Ok(());
-                    }
-                }
-                Err(error) => return Err(error),
-            }
-            self.standing.line = self.line.total(session.count());
-            if self.asks_to_end(look) || self.steps.is_done() {
-                return Ok(());
-            }
-        }
-    }
-
-    /// Shows how it stands, and takes the marks.
-    fn asks_to_end(&mut self, look: &mut impl FnMut(&Standing) -> Wish) -> bool {
-        let wish = look(&self.standing);
-        for _ in 0..wish.marks {
-            self.steps.mark();
-        }
-        wish.end
-    }
-
-    /// Takes in what comes next; whether it was the last that was wanted.
-    fn hear(&mut self, session: &mut Session, wanted: Option<u64>) -> Result<bool> {
-        match session.event()? {
-            Some(Event::Raw(batch)) => {
-                self.take(session.port(), &batch, wanted)?;
-                return Ok(self.is_done(wanted));
-            }
-            Some(Event::Started(who)) => {
-                if who.unit_id != self.unit_id {
-                    let problem = format!("another device is at the port now ({})", who.unit_id);
-                    return Err(Error::new(
-                        session.port(),
-                        problem,
-                        "record each for itself",
-                    ));
-                }
-                self.starts = who.starts;
-                self.clock.restarted(Some(who.start.clone()));
-                session.done(RAW, "to stream")?;
-            }
-            Some(_) => {}
-            None if self.heard.elapsed() > SILENCE => {
-                // It may have restarted, and its greeting been lost.
-                session.hello()?;
-                session.done(RAW, "to stream")?;
-                self.standing.resumed += 1;
-                self.heard = Instant::now();
-            }
-            None => {}
-        }
-        Ok(false)
-    }
-
-    /// Waits until the unit is there again; whether it is, or the person has had enough.
-    fn reconnect(
-        &mut self,
-        session: &mut Session,
-        patience: Duration,
-        lost: &Error,
-        look: &mut impl FnMut(&Standing) -> Wish,
-    ) -> Result<bool> {
-        self.standing.waiting = true;
-        let (port, unit_id) = (session.port().to_owned(), self.unit_id.clone());
-        let go_on = || !self.asks_to_end(look);
-        let Some(again) = line::wait_for(&port, &unit_id, patience, lost, go_on)? else {
-            return Ok(false);
-        };
-        self.standing.waiting = false;
-        self.standing.reconnected += 1;
-        self.line.lost(session.count(), again.count());
-        *session = again;
-        let who = session.who();
-        let start = who.start.clone();
-        if who.starts != self.starts {
-            self.clock.restarted(Some(start));
-            self.starts = who.starts;
-        } else {
-            self.clock.reconnected(start);
-        }
-        session.begin_stream(RAW)?;
-        Ok(true)
-    }
-
-    fn is_done(&self, wanted: Option<u64>) -> bool {
-        let next = self.clock.next();
-        wanted.is_some_and(|wanted| self.begun.is_some_and(|begun| next - begun >= wanted))
-    }
-
-    fn take(&mut self, port: &str, samples: &Samples, wanted: Option<u64>) -> Result<()> {
-        let silence = self.heard.elapsed();
-        self.heard = Instant::now();
-        let arrival = self.clock.arrive(samples.head.first, silence);
-        let first = arrival.tick;
-        let begun = *self.begun.get_or_insert(first);
-        if arrival.missing > 0 {
-            self.standing.missing += arrival.missing;
-            self.standing.gaps += 1;
-        }
-        if let Some(start) = arrival.restart {
-            self.standing.restarts.push(Restart {
-                t_s: self.clock.seconds(first),
-                start: start.map_or("its greeting was lost".into(), |s: Started| s.to_string()),
-            });
-        }
-        let room = wanted.map_or(u64::MAX, |wanted| (begun + wanted).saturating_sub(first));
-        let count = samples
-            .values
-            .len()
-            .min(usize::try_from(room).unwrap_or(usize::MAX));
-        let mut batch = Batch {
-            first_row: self.growing.rows(),
-            ..Batch::default()
-        };
-        for (tick, sample) in (first..).zip(&samples.values[..count]) {
-            batch.t_s.push(self.clock.seconds(tick));
-            if let Some(step) = self.steps.at(self.clock.length(tick - begun)) {
-                batch.step.push(step);
-                if let Some(known) = &mut self.known {
-                    let input = known.next(step);
-                    for ((column, value), there) in
-                        batch.reference.iter_mut().zip(input).zip(known.columns())
-                    {
-                        column.extend(there.then_some(value));
-                    }
-                }
-                self.standing.step = (step >= 0).then_some(step);
-                self.standing.dwells = self.standing.dwells.max((step + 1) as u32);
-            }
-            batch.temp_c.push(shortest(samples.head.temp_c));
-            let values = sample.gyro.iter().chain(sample.accel.iter());
-            for (column, value) in batch.raw.iter_mut().zip(values) {
-                if !value.is_finite() {
-                    let problem = "the device sent a reading that is not a number";
-                    return Err(Error::new(
-                        port,
-                        problem,
-                        "reset the board, and report this",
-                    ));
-                }
-                column.push(shortest(*value));
-            }
-        }
-        self.clock.passed(samples.values.len());
-        if count == 0 {
-            return Ok(());
-        }
-        self.growing.write(&batch)?;
-        let standing = &mut self.standing;
-        standing.samples += count as u64;
-        standing.temp_c = shortest(samples.head.temp_c);
-        standing.flagged.count(samples.head.flags, count as u64);
-        standing.first_s.get_or_insert(self.clock.seconds(first));
-        standing.last_s = Some(self.clock.seconds(first + count as u64 - 1));
-        Ok(())
-    }
-}
-
-/// The shortest decimal number that is this one in single precision: as `f32` it is what the device has sent, and it is off by less than
-/// half of the last place of that, where all the digits of the same `f32` in double precision take twice the room.
-fn shortest(value: f32) -> f64 {
-    // What the standard library writes of an `f32` is the shortest that reads back as it.
-    value.to_string().parse().unwrap_or(f64::from(value))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_reading_keeps_all_bits_of_single_precision_in_its_shortest_form() {
-        let mut readings: Vec<f32> = (59_000..70_000).map(|n| n as f32 * 4.2e-5).collect();
-        readings.extend([0.0, -0.0, 1e-30, f32::MAX, f32::MIN_POSITIVE, 16_777_217.0]);
-        for reading in readings {
-            let kept = shortest(reading);
-            assert_eq!((kept as f32).to_bits(), reading.to_bits());
-            assert_eq!(kept.to_string(), reading.to_string());
-        }
-        assert_eq!(shortest(2.478), 2.478);
-        assert_ne!(f64::from(2.478_f32), 2.478);
-    }
 }

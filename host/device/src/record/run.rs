@@ -1,0 +1,218 @@
+//! A recording while it is received.
+
+use std::time::{Duration, Instant};
+
+use mimu_core::wire::Request;
+
+use mimu_recording::error::{Error, Result};
+use mimu_recording::{Batch, Growing, Restart};
+
+use super::clock::Clock;
+use super::known::Known;
+use super::line;
+use super::reading::shortest;
+use super::steps::Steps;
+use super::{RecordOptions, Standing, Wish};
+use crate::heard::{Event, Samples};
+use crate::session::Session;
+use crate::who::Started;
+
+/// Silence after which the device is asked whether it is still there.
+const SILENCE: Duration = Duration::from_secs(2);
+
+/// What is received, and how it stands.
+pub(super) struct Run {
+    pub growing: Growing,
+    pub clock: Clock,
+    pub steps: Steps,
+    pub known: Option<Known>,
+    pub standing: Standing,
+    /// Tick of the first sample.
+    pub begun: Option<u64>,
+    pub heard: Instant,
+    pub unit_id: String,
+    /// Starts of the device since it has power.
+    pub starts: u32,
+    pub line: line::Heard,
+}
+
+/// What the device is asked for.
+const RAW: Request<'_> = Request::Stream {
+    raw: true,
+    compensated: false,
+};
+
+impl Run {
+    pub fn receive(
+        &mut self,
+        session: &mut Session,
+        options: &RecordOptions,
+        look: &mut impl FnMut(&Standing) -> Wish,
+    ) -> Result<()> {
+        session.begin_stream(RAW)?;
+        let rate_hz = f64::from(session.who().sample_rate_hz);
+        let end = self.steps.end().into_iter().chain(options.duration).min();
+        let wanted = end.map(|d| (d.as_secs_f64() * rate_hz).round() as u64);
+        loop {
+            match self.hear(session, wanted) {
+                Ok(true) => return Ok(()),
+                Ok(false) => {}
+                Err(lost) if session.is_lost() => {
+                    if !self.reconnect(session, options.reconnect, &lost, look)? {
+                        return Ok(());
+                    }
+                }
+                Err(error) => return Err(error),
+            }
+            self.standing.line = self.line.total(session.count());
+            if self.asks_to_end(look) || self.steps.is_done() {
+                return Ok(());
+            }
+        }
+    }
+
+    /// Shows how it stands, and takes the marks.
+    fn asks_to_end(&mut self, look: &mut impl FnMut(&Standing) -> Wish) -> bool {
+        let wish = look(&self.standing);
+        for _ in 0..wish.marks {
+            self.steps.mark();
+        }
+        wish.end
+    }
+
+    /// Takes in what comes next; whether it was the last that was wanted.
+    fn hear(&mut self, session: &mut Session, wanted: Option<u64>) -> Result<bool> {
+        match session.event()? {
+            Some(Event::Raw(batch)) => {
+                self.take(session.port(), &batch, wanted)?;
+                return Ok(self.is_done(wanted));
+            }
+            Some(Event::Started(who)) => {
+                if who.unit_id != self.unit_id {
+                    let problem = format!("another device is at the port now ({})", who.unit_id);
+                    return Err(Error::new(
+                        session.port(),
+                        problem,
+                        "record each for itself",
+                    ));
+                }
+                self.starts = who.starts;
+                self.clock.restarted(Some(who.start.clone()));
+                session.done(RAW, "to stream")?;
+            }
+            Some(_) => {}
+            None if self.heard.elapsed() > SILENCE => {
+                // It may have restarted, and its greeting been lost.
+                session.hello()?;
+                session.done(RAW, "to stream")?;
+                self.standing.resumed += 1;
+                self.heard = Instant::now();
+            }
+            None => {}
+        }
+        Ok(false)
+    }
+
+    /// Waits until the unit is there again; whether it is, or the person has had enough.
+    fn reconnect(
+        &mut self,
+        session: &mut Session,
+        patience: Duration,
+        lost: &Error,
+        look: &mut impl FnMut(&Standing) -> Wish,
+    ) -> Result<bool> {
+        self.standing.waiting = true;
+        let (port, unit_id) = (session.port().to_owned(), self.unit_id.clone());
+        let go_on = || !self.asks_to_end(look);
+        let Some(again) = line::wait_for(&port, &unit_id, patience, lost, go_on)? else {
+            return Ok(false);
+        };
+        self.standing.waiting = false;
+        self.standing.reconnected += 1;
+        self.line.lost(session.count(), again.count());
+        *session = again;
+        let who = session.who();
+        let start = who.start.clone();
+        if who.starts != self.starts {
+            self.clock.restarted(Some(start));
+            self.starts = who.starts;
+        } else {
+            self.clock.reconnected(start);
+        }
+        session.begin_stream(RAW)?;
+        Ok(true)
+    }
+
+    fn is_done(&self, wanted: Option<u64>) -> bool {
+        let next = self.clock.next();
+        wanted.is_some_and(|wanted| self.begun.is_some_and(|begun| next - begun >= wanted))
+    }
+
+    fn take(&mut self, port: &str, samples: &Samples, wanted: Option<u64>) -> Result<()> {
+        let silence = self.heard.elapsed();
+        self.heard = Instant::now();
+        let arrival = self.clock.arrive(samples.head.first, silence);
+        let first = arrival.tick;
+        let begun = *self.begun.get_or_insert(first);
+        if arrival.missing > 0 {
+            self.standing.missing += arrival.missing;
+            self.standing.gaps += 1;
+        }
+        if let Some(start) = arrival.restart {
+            self.standing.restarts.push(Restart {
+                t_s: self.clock.seconds(first),
+                start: start.map_or("its greeting was lost".into(), |s: Started| s.to_string()),
+            });
+        }
+        let room = wanted.map_or(u64::MAX, |wanted| (begun + wanted).saturating_sub(first));
+        let count = samples
+            .values
+            .len()
+            .min(usize::try_from(room).unwrap_or(usize::MAX));
+        let mut batch = Batch {
+            first_row: self.growing.rows(),
+            ..Batch::default()
+        };
+        for (tick, sample) in (first..).zip(&samples.values[..count]) {
+            batch.t_s.push(self.clock.seconds(tick));
+            if let Some(step) = self.steps.at(self.clock.length(tick - begun)) {
+                batch.step.push(step);
+                if let Some(known) = &mut self.known {
+                    let input = known.next(step);
+                    for ((column, value), there) in
+                        batch.reference.iter_mut().zip(input).zip(known.columns())
+                    {
+                        column.extend(there.then_some(value));
+                    }
+                }
+                self.standing.step = (step >= 0).then_some(step);
+                self.standing.dwells = self.standing.dwells.max((step + 1) as u32);
+            }
+            batch.temp_c.push(shortest(samples.head.temp_c));
+            let values = sample.gyro.iter().chain(sample.accel.iter());
+            for (column, value) in batch.raw.iter_mut().zip(values) {
+                if !value.is_finite() {
+                    let problem = "the device sent a reading that is not a number";
+                    return Err(Error::new(
+                        port,
+                        problem,
+                        "reset the board, and report this",
+                    ));
+                }
+                column.push(shortest(*value));
+            }
+        }
+        self.clock.passed(samples.values.len());
+        if count == 0 {
+            return Ok(());
+        }
+        self.growing.write(&batch)?;
+        let standing = &mut self.standing;
+        standing.samples += count as u64;
+        standing.temp_c = shortest(samples.head.temp_c);
+        standing.flagged.count(samples.head.flags, count as u64);
+        standing.first_s.get_or_insert(self.clock.seconds(first));
+        standing.last_s = Some(self.clock.seconds(first + count as u64 - 1));
+        Ok(())
+    }
+}
