@@ -17,7 +17,9 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use mimu_recording::error::{Error, Result};
-use mimu_recording::{Batch, Columns, Growing, Manifest, Recording, SampleFormat};
+use mimu_recording::{
+    Batch, Columns, Growing, MANIFEST_FILE, Manifest, Recording, Restart, SampleFormat,
+};
 use serde::{Deserialize, Serialize};
 
 use crate::procedure::Asked;
@@ -109,6 +111,8 @@ pub struct Begun {
     pub format: String,
     /// Of the unit.
     pub unit_id: String,
+    /// Samples a second.
+    pub rate_hz: f64,
     /// What was asked.
     pub asked: Asked,
 }
@@ -273,7 +277,7 @@ impl Taking {
         folder: &Folder,
         part: Part,
         columns: Columns,
-        manifest: &Manifest,
+        mut manifest: Manifest,
     ) -> Result<Self> {
         let directory = folder.file(part.name());
         let last = folder.entries().iter().rev().find_map(|entry| match entry {
@@ -292,9 +296,11 @@ impl Taking {
                 if directory.exists() {
                     fs::remove_dir_all(&directory).map_err(|e| Error::io(&directory, &e))?;
                 }
-                Growing::create(&directory, columns, manifest)?
+                Growing::create(&directory, columns, &manifest)?
             }
             Some((rows, bytes)) => {
+                // When the power came was known when it was begun: the clock of the recording has gone on since, whatever the device has done.
+                manifest.power_on_s = Manifest::read(&directory.join(MANIFEST_FILE))?.power_on_s;
                 let growing = Growing::resume(&directory, columns, rows, bytes)?;
                 Recording::open(&directory)?.for_each_batch(
                     |_| {},
@@ -317,7 +323,7 @@ impl Taking {
         let mut taking = Self {
             part,
             growing,
-            manifest: manifest.clone(),
+            manifest,
             samples,
         };
         taking.manifest.dropped_steps = folder.dropped(part);
@@ -339,6 +345,13 @@ impl Taking {
     /// The dwell of this number does not count any more.
     pub fn drop_dwell(&mut self, number: i32) {
         self.manifest.dropped_steps.push(number);
+    }
+
+    /// The device has restarted, at this time of the recording, s.
+    pub fn restarted(&mut self, t_s: f64, start: String) {
+        if let Some(recorded) = &mut self.manifest.recorded {
+            recorded.restarts.push(Restart { t_s, start });
+        }
     }
 
     /// The manifest.

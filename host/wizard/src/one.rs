@@ -41,6 +41,21 @@ struct Dwell {
     from: u64,
 }
 
+/// What a unit is looked at for.
+#[derive(Debug, Clone, Copy)]
+pub struct Round<'a> {
+    /// What is asked of the session.
+    pub asked: &'a Asked,
+    /// The step that is wanted now.
+    pub step: Option<&'a Step>,
+    /// Those to come.
+    pub others: &'a [Step],
+    /// Whether the table still moves.
+    pub busy: bool,
+    /// Whether another step may be had first, as a person may.
+    pub any_order: bool,
+}
+
 /// One of the units.
 pub struct One {
     /// Its port.
@@ -124,7 +139,7 @@ impl One {
             });
         }
         self.part = part;
-        self.taking = Some(Taking::begin(&self.folder, part, columns, &manifest)?);
+        self.taking = Some(Taking::begin(&self.folder, part, columns, manifest)?);
         self.number = self
             .folder
             .dwells(part)
@@ -161,16 +176,8 @@ impl One {
         (last.fold(0.0, f64::max) * rate_hz) as u64 + (10.0 * rate_hz) as u64
     }
 
-    /// Takes what has come. What is to be told is added to `tell`.
-    pub fn listen(
-        &mut self,
-        asked: &Asked,
-        step: Option<&Step>,
-        others: &[Step],
-        busy: bool,
-        any_order: bool,
-        tell: &mut Vec<Event>,
-    ) -> Result<bool> {
+    /// Takes what has come. What is to be told is added to `tell`; whether there was anything.
+    pub fn listen(&mut self, round: &Round<'_>, tell: &mut Vec<Event>) -> Result<bool> {
         let mut some = false;
         while let Some(news) = self.station.next()? {
             some = true;
@@ -179,13 +186,17 @@ impl One {
                     self.keep(&chunk);
                     if let Some(seen) = self.watch.take(&chunk) {
                         self.seen = Some(seen);
-                        self.stand(&seen, asked, step);
-                        if let (Some(step), false) = (step, self.done) {
-                            self.consider(&seen, asked, step, others, busy, any_order, tell)?;
+                        self.stand(&seen, round.asked, round.step);
+                        if let (Some(step), false) = (round.step, self.done) {
+                            self.consider(&seen, round, step, tell)?;
                         }
                     }
                 }
                 News::Restarted(why) => {
+                    let next = self.next.unwrap_or(0) as f64 / self.station.unit.rate_hz;
+                    if let Some(taking) = &mut self.taking {
+                        taking.restarted(next, why.clone());
+                    }
                     self.interrupted(format!("the device has restarted: {why}"), tell)?;
                 }
                 News::Lost(why) => self.interrupted(format!("the line is lost: {why}"), tell)?,
@@ -292,11 +303,14 @@ impl One {
                 });
             }
         }
-        let nominal = self
-            .nominal
-            .unwrap_or_else(|| guessed(seen, asked.gravity_mps2));
-        let rate = self.watch.rate(seen, &nominal[0]);
-        if self.nominal.is_some() {
+        None
+    }
+
+    /// Why its rate is not that of the step.
+    fn turns_otherwise(&self, seen: &Seen, step: &Step) -> Option<String> {
+        let turning = step.rate_dps != 0.0;
+        if let Some(nominal) = &self.nominal {
+            let rate = self.watch.rate(seen, &nominal[0]);
             let wanted = step.rate();
             let off = (rate - wanted).norm().to_degrees();
             if off > RATE_SHARE * step.rate_dps.abs() + RATE_DPS {
@@ -316,30 +330,26 @@ impl One {
         None
     }
 
-    #[allow(clippy::too_many_arguments)]
     fn consider(
         &mut self,
         seen: &Seen,
-        asked: &Asked,
+        round: &Round<'_>,
         step: &Step,
-        others: &[Step],
-        busy: bool,
-        any_order: bool,
         tell: &mut Vec<Event>,
     ) -> Result<()> {
+        let asked = round.asked;
         let rate_hz = self.station.unit.rate_hz;
         let up = self.up(seen, asked);
         let running = self.dwell.map(|d| d.step);
-        let found = match self.waits(seen, asked, running.as_ref().unwrap_or(step), busy) {
+        let wanted = running.unwrap_or(*step);
+        let found = match self.waits(seen, asked, &wanted, round.busy) {
             Some(why) => Err(why),
-            None => self.pose(
-                &up,
-                asked,
-                running.as_ref().unwrap_or(step),
-                others,
-                any_order && running.is_none(),
-            ),
+            None => self.pose(&up, round, &wanted, running.is_none()),
         };
+        let found = found.and_then(|step| match self.turns_otherwise(seen, &step) {
+            Some(why) => Err(why),
+            None => Ok(step),
+        });
         match (found, self.dwell) {
             (Err(why), _) => {
                 self.throw(&why, tell)?;
@@ -376,15 +386,15 @@ impl One {
         Ok(())
     }
 
-    /// The step that this pose is, of the one that is wanted and, where a person turns the unit, of those to come.
+    /// The step that this pose is: the one that is wanted or, where a person turns the unit and no dwell runs yet, one of those to come.
     fn pose(
         &self,
         up: &Vector3<f64>,
-        asked: &Asked,
+        round: &Round<'_>,
         step: &Step,
-        others: &[Step],
-        any_order: bool,
+        begins: bool,
     ) -> std::result::Result<Step, String> {
+        let asked = round.asked;
         let off = |s: &Step| up.angle(&s.up()).to_degrees();
         let limit = asked.fixture.tolerance_deg();
         let by_hand = asked.fixture != Fixture::Table;
@@ -401,8 +411,9 @@ impl One {
         if off(step) <= limit && !again {
             return Ok(as_it_is(step));
         }
-        if any_order && !again {
-            let nearest = others
+        if begins && round.any_order && !again {
+            let nearest = round
+                .others
                 .iter()
                 .filter(|s| s.rate_dps == step.rate_dps && off(s) <= limit);
             let nearest = nearest.min_by(|a, b| off(a).total_cmp(&off(b)));

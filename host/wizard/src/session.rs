@@ -92,7 +92,7 @@ pub fn run(
             Some(begun) => {
                 kept = begun.asked.clone();
                 let opened = Folder::open(&folder)?;
-                let next = One::first_tick(&opened, RATE_GUESS_HZ);
+                let next = One::first_tick(&opened, begun.rate_hz);
                 let station = Station::open(opener, next, Some(&begun.unit_id))?;
                 let dwells = opened.dwells(Part::Calibration).len();
                 view.tell(&Event::Resumed { dwells });
@@ -103,6 +103,7 @@ pub fn run(
                 let begun = Begun {
                     format: "mimu-wizard-session/1".into(),
                     unit_id: station.unit.id.clone(),
+                    rate_hz: station.unit.rate_hz,
                     asked: kept.clone(),
                 };
                 (Folder::create(&folder, &begun)?, station)
@@ -133,9 +134,6 @@ pub fn run(
         units: outcomes,
     })
 }
-
-/// Rate by which the first tick of a session that goes on is found; it only has to be behind the last sample.
-const RATE_GUESS_HZ: f64 = 1e4;
 
 struct Whole<'a> {
     wizard: Wizard<'a>,

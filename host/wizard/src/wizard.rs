@@ -7,7 +7,7 @@ use mimu_recording::error::{Error, Result};
 use crate::drive::Driver;
 use crate::event::{Event, Question, Standing, View, Wish};
 use crate::folder::{Entry, Part};
-use crate::one::One;
+use crate::one::{One, Round};
 use crate::procedure::{Asked, Fixture, next_step};
 use crate::step::Step;
 
@@ -90,10 +90,16 @@ impl<'a> Wizard<'a> {
     /// Listens to all units once, and shows how they stand. Whether a wish came.
     fn round(&mut self, step: Option<&Step>, busy: bool) -> Result<Option<Wish>> {
         let mut tell = Vec::new();
-        let any_order = self.driver.is_person();
+        let round = Round {
+            asked: &self.asked,
+            step,
+            others: &self.queue,
+            busy,
+            any_order: self.driver.is_person(),
+        };
         let mut some = false;
         for unit in &mut self.units {
-            some |= unit.listen(&self.asked, step, &self.queue, busy, any_order, &mut tell)?;
+            some |= unit.listen(&round, &mut tell)?;
         }
         for event in tell {
             self.view.tell(&event);

@@ -84,13 +84,15 @@ fn a_session_that_was_killed_and_unplugged_goes_on_to_a_stored_calibration_that_
     let before = journal.lines().filter(|l| l.contains("\"dwell\"")).count();
     assert!(before >= 3, "{journal}");
 
+    std::fs::remove_file(bench.path("events.jsonl")).unwrap();
     let mut child = bench.wizard(&arguments).spawn().unwrap();
     assert!(bench.heard(&mut child, "dwell", 2));
     bench.tell("LINK OFF");
     std::thread::sleep(std::time::Duration::from_millis(300));
     bench.tell("LINK ON");
-    assert!(bench.heard(&mut child, "interrupted", 1));
+    let interrupted = bench.heard(&mut child, "interrupted", 1);
     let out = child.wait_with_output().unwrap();
+    assert!(interrupted, "{out:?}");
     let told =
         String::from_utf8_lossy(&out.stdout).into_owned() + &String::from_utf8_lossy(&out.stderr);
     assert!(out.status.success(), "{told}");
