@@ -12,7 +12,7 @@ ON_PC := --workspace --exclude mimu-counted --exclude mimu-no-panic
 # Of `make test`, and each also by itself: `make clippy`. Tests are linked before they run, so that both times are seen.
 STAGES := fmt clippy rustdoc images no-panic build-tests run-tests
 
-.PHONY: help test $(STAGES) nightly demo papers blind bench budget device fuzz audit toolchain
+.PHONY: help test $(STAGES) nightly demo example papers blind bench budget device fuzz audit toolchain
 
 help: ## this list
 	@sed -n 's/^\([a-z]*\):.*## /  make \1\t/p' Makefile
@@ -65,9 +65,18 @@ nightly: toolchain blind fuzz ## what takes hours: more seeds, ten minutes of sa
 	$(FIRMWARE)
 	$(CARGO) test --locked --release $(ON_PC) -- --ignored --nocapture --test-threads=2
 
-demo: toolchain ## import and fit a recording: the best real one at hand, or the small one in tests/
+# Where the demo leaves its recordings and its page.
+DEMO ?= target/demo-$(SEED)
+SEED ?= 1
+demo: toolchain ## an uncalibrated board on the virtual bench, to a verified one; SEED=n is another unit with another effect
+	@$(FIRMWARE) -q
+	@$(CARGO) build --locked --release -q -p mimu-cli -p mimu-board-tests --bin mimu --bin demo
+	@rm -rf $(DEMO)
+	@target/release/demo $(SEED) $(DEMO)
+
+example: toolchain ## import and fit a recording: the best real one at hand, or the small one in tests/
 	$(CARGO) build --locked --release --bin mimu
-	./tests/demo.sh target/release/mimu
+	./tests/example.sh target/release/mimu
 
 papers: toolchain ## compute every figure and plot of docs/papers.md
 	$(CARGO) run --locked --release -p mimu-tests --bin papers

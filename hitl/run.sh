@@ -8,6 +8,7 @@
 #   MIMU_PORT=/dev/ttyACM0             port of the board; without it the only one at which a device greets
 #   MIMU_SECONDS=60                    length of the recording
 #   MIMU_NO_PROBE=1                    neither flash nor reset
+#   MIMU_WIZARD=hands                  the wizard too, with hands, cube or table; MIMU_DRIVER is the driver file of a turntable
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -94,6 +95,15 @@ if [ -n "$calibration" ]; then
   fi
 else
   step "left out, without a calibration: upload, download, check"
+fi
+
+if [ -n "${MIMU_WIZARD:-}" ]; then
+  # With MIMU_DRIVER nobody is asked; without it a person turns the board, and says yes and no.
+  step "the wizard"
+  driver=()
+  [ -z "${MIMU_DRIVER:-}" ] || driver=(--driver "$MIMU_DRIVER" --yes)
+  "$mimu" wizard -o "$work/session" --fixture "$MIMU_WIZARD" --gravity 9.81 "${driver[@]}" "${port[@]}" --json "$work/wizard.json"
+  json "$work/wizard.json" "all(u['stored'] for u in r['units'])"
 fi
 
 step "nothing was lost, garbled or late"

@@ -9,7 +9,7 @@
 //! | `tests/all/`           | agreement of estimators, intervals, diagnosis, published results  |
 //! | `papers/`, `blind/`    | figures of `docs/papers.md`; units with undeclared effects        |
 //! | `board/`, `counted/`, `no_panic/` | crates of their own: the firmware's image on the emulated board, what its loops cost, what cannot panic |
-//! | `demo.sh`, `demo/`     | what `make demo` runs, and the small recording that it falls back on |
+//! | `example.sh`, `example/` | what `make example` runs, and the small recording that it falls back on |
 
 pub mod bench;
 pub mod blind;

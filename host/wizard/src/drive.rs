@@ -65,6 +65,44 @@ impl Driver for Person {
     }
 }
 
+/// Several that are all told the same: fixtures side by side, each with its boards.
+pub struct Together(pub Vec<Box<dyn Driver>>);
+
+impl Driver for Together {
+    fn held(&mut self) -> Result<Option<String>> {
+        for driver in &mut self.0 {
+            if let Some(why) = driver.held()? {
+                return Ok(Some(why));
+            }
+        }
+        Ok(None)
+    }
+
+    fn go(&mut self, step: &Step) -> Result<()> {
+        self.0.iter_mut().try_for_each(|d| d.go(step))
+    }
+
+    fn busy(&mut self) -> Result<bool> {
+        let mut busy = false;
+        for driver in &mut self.0 {
+            busy |= driver.busy()?;
+        }
+        Ok(busy)
+    }
+
+    fn stop(&mut self) -> Result<()> {
+        self.0.iter_mut().try_for_each(|d| d.stop())
+    }
+
+    fn power_cycle(&mut self) -> Result<bool> {
+        let mut all = true;
+        for driver in &mut self.0 {
+            all &= driver.power_cycle()?;
+        }
+        Ok(all)
+    }
+}
+
 /// How a turntable is spoken to: `mimu-driver/1`.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]

@@ -10,7 +10,7 @@ use mimu::result::diagnosis::DiagnosisResult;
 use mimu_device::record::Plan;
 use mimu_recording::error::{Error, Result};
 use mimu_wizard::device::DeviceSource;
-use mimu_wizard::drive::{Driver, Person, TextDriver};
+use mimu_wizard::drive::{Driver, Person, TextDriver, Together};
 use mimu_wizard::procedure::{Asked, Fixture, Targets, first_steps, verification};
 use mimu_wizard::session::{Wanted, run as carry_out};
 use mimu_wizard::source::{Opener, Source};
@@ -35,9 +35,9 @@ pub(crate) struct WizardArgs {
     /// What carries the unit
     #[arg(long, value_enum, default_value = "hands")]
     fixture: FixtureArg,
-    /// Driver file of a turntable; without it a person is told what to do
-    #[arg(long, value_name = "FILE")]
-    driver: Option<PathBuf>,
+    /// Driver file of a turntable; without it a person is told what to do. Several: tables that are all told the same
+    #[arg(long = "driver", value_name = "FILE")]
+    drivers: Vec<PathBuf>,
     /// Local gravity, m/s²; without it, normal gravity at sea level of --latitude
     #[arg(long)]
     gravity: Option<f64>,
@@ -233,9 +233,15 @@ fn planned(plan: &Plan, fixture: Fixture, gravity_mps2: f64, path: &Path) -> Res
 pub(crate) fn run(args: &WizardArgs) -> Result<()> {
     check_outputs(&[args.json.file()], &[])?;
     let asked = args.asked()?;
-    let driver: Box<dyn Driver> = match &args.driver {
-        Some(path) => Box::new(TextDriver::open(path)?),
-        None => Box::new(Person),
+    let driver: Box<dyn Driver> = match args.drivers.as_slice() {
+        [] => Box::new(Person),
+        [path] => Box::new(TextDriver::open(path)?),
+        paths => {
+            let each = paths
+                .iter()
+                .map(|path| -> Result<Box<dyn Driver>> { Ok(Box::new(TextDriver::open(path)?)) });
+            Box::new(Together(each.collect::<Result<_>>()?))
+        }
     };
     let beforehand = match args.yes {
         true => Beforehand {

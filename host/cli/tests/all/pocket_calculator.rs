@@ -19,7 +19,7 @@ fn mimu(folder: &Path, arguments: &[&str]) -> String {
 
 /// Imports and fits the small recording of the demo in `folder`; returns the JSON of the fit.
 fn fitted(folder: &Path) -> serde_json::Value {
-    let demo = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../tests/demo");
+    let demo = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../tests/example");
     let files = ["accel.txt", "gyro.txt"].map(|f| demo.join(f).to_str().unwrap().to_string());
     let columns = ["t_s,accel_x,accel_y,accel_z", "t_s,gyro_x,gyro_y,gyro_z"];
     mimu(

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Imports a recording by hand and calibrates it: the best real recording that is
-# there, or the small simulated one beside this script. Usage: demo.sh PATH-OF-MIMU
+# there, or the small simulated one beside this script. Usage: example.sh PATH-OF-MIMU
 set -euo pipefail
 mimu=$(realpath "$1")
 here=$(cd "$(dirname "$0")" && pwd)
@@ -13,8 +13,8 @@ if [ -f "$data/imu_tk_xsens/xsens_acc.mat" ]; then
     gravity=9.81744
 else
     echo "no real recordings at hand (docs/recordings.md says where to get them): using the simulated one"
-    accel=$here/demo/accel.txt
-    gyro=$here/demo/gyro.txt
+    accel=$here/example/accel.txt
+    gyro=$here/example/gyro.txt
     gravity=9.80665
 fi
 cd "$out"
