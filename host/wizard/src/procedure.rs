@@ -307,7 +307,7 @@ pub fn verification(
         _ => spiral.collect(),
     };
     let mut taken: Vec<Vector3<f64>> = used.iter().map(Step::up).collect();
-    let wanted = if asked_of == Fixture::Table { 8 } else { 6 };
+    let wanted = 6;
     let mut chosen = Vec::new();
     for k in 0..wanted {
         let distance = |up: &Vector3<f64>| {
@@ -325,7 +325,7 @@ pub fn verification(
         taken.push(up.1);
         let rate_dps = match (asked_of, k % 2) {
             (Fixture::Table, 0) => {
-                let share = [0.7, -0.7, 0.3, -0.3][k / 2 % 4];
+                let share = [0.7, -0.7, 0.3][k / 2 % 3];
                 (10.0 * share * largest_rate_dps).round() / 10.0
             }
             _ => 0.0,

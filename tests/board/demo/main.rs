@@ -197,9 +197,9 @@ fn wizard(port: &Path, driver: &Path, folder: &Path) -> Result<Value, String> {
             "--fixture",
             "table",
             "--rate",
-            "250",
+            "120",
             "--dwell",
-            "3",
+            "2",
             "--as-planned",
         ])
         .args(["--gravity", "9.793", "--warm-up", "0", "--yes"])
