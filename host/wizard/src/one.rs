@@ -182,6 +182,9 @@ impl One {
                 News::Restarted(why) => {
                     self.interrupted(format!("the device has restarted: {why}"), tell)?;
                 }
+                News::Note(words) => tell.push(Event::Note {
+                    words: format!("{}: {words}", self.name()),
+                }),
                 News::Lost(why) => self.interrupted(format!("the line is lost: {why}"), tell)?,
                 News::Other(why) => {
                     self.standing.waiting = Some(why.clone());
@@ -237,11 +240,17 @@ impl One {
         let up = force(seen, &nominal[1]);
         let standing = &mut self.standing;
         standing.motion = Some(seen.motion);
+        let wanted_dps = step.map_or(0.0, |s| s.rate_dps);
+        standing.motion_limits = motion_limits(wanted_dps);
+        standing.rate_limit_dps = rate_limit_dps(wanted_dps);
+        standing.trend_limit_c_per_min = asked.warm_c_per_min;
         standing.temp_c = seen.temp_c.is_finite().then_some(seen.temp_c);
         standing.trend_c_per_min = seen.trend;
         standing.tilt_deg = step.map(|s| up.angle(&s.up()).to_degrees());
         let rate = self.watch.rate(seen, &nominal[0]);
-        standing.rate_dps = Some(rate.dot(&up.normalize()).to_degrees());
+        // What was guessed of a gyro has no scale.
+        let known = self.nominal.is_some();
+        standing.rate_dps = known.then(|| rate.dot(&up.normalize()).to_degrees());
     }
 
     /// Up by the last second, of length 1.
@@ -273,7 +282,7 @@ impl One {
             return Some("a reading is at the end of its range".into());
         }
         let turning = step.rate_dps != 0.0;
-        let limits = [if turning { 5.0 } else { 1.0 }, 1.0];
+        let limits = motion_limits(step.rate_dps);
         for sensor in Sensor::BOTH {
             let motion = seen.motion[sensor as usize];
             if motion > limits[sensor as usize] {
@@ -292,7 +301,7 @@ impl One {
         if self.nominal.is_some() {
             let wanted = step.rate();
             let off = (rate - wanted).norm().to_degrees();
-            if off > RATE_SHARE * step.rate_dps.abs() + RATE_DPS {
+            if off > rate_limit_dps(step.rate_dps) {
                 let is = rate.dot(&step.up()).to_degrees();
                 return Some(match (turning, is * step.rate_dps < 0.0) {
                     (true, true) => format!(
@@ -578,6 +587,16 @@ fn known(step: &Step, asked: &Asked) -> [f64; 6] {
     let rate = up * step.rate_dps + earth.unwrap_or_default().map(f64::to_degrees);
     let force = up * asked.gravity_mps2;
     [rate.x, rate.y, rate.z, force.x, force.y, force.z]
+}
+
+/// Motion of gyro and accelerometer that is allowed at a rate: a table's own unsteadiness is no movement of the unit on it.
+fn motion_limits(rate_dps: f64) -> [f64; 2] {
+    [if rate_dps != 0.0 { 5.0 } else { 1.0 }, 1.0]
+}
+
+/// Departure from a rate that is allowed, deg/s.
+fn rate_limit_dps(rate_dps: f64) -> f64 {
+    RATE_SHARE * rate_dps.abs() + RATE_DPS
 }
 
 /// Without the first rows.

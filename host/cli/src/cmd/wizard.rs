@@ -1,6 +1,6 @@
 //! `mimu wizard`: arguments and what follows from them.
 
-use std::io::IsTerminal as _;
+use std::io::{IsTerminal as _, Write};
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
@@ -9,6 +9,7 @@ use mimu::result::diagnosis::DiagnosisResult;
 use mimu_recording::error::{Error, Result};
 use mimu_wizard::device::DeviceSource;
 use mimu_wizard::drive::{Driver, Person, TextDriver};
+use mimu_wizard::event::View;
 use mimu_wizard::procedure::{Asked, Fixture, Targets, first_steps, verification};
 use mimu_wizard::session::{Wanted, run as carry_out};
 use mimu_wizard::source::{Opener, Source};
@@ -20,6 +21,7 @@ use crate::output::{check_outputs, print};
 use crate::report::{self, Made};
 use crate::views::answers::{Beforehand, Typed};
 use crate::views::lines::Lines;
+use crate::views::screen::Screen;
 
 #[derive(Args)]
 pub(crate) struct WizardArgs {
@@ -71,6 +73,9 @@ pub(crate) struct WizardArgs {
     /// Write what happens as JSON lines (`-`: to standard output)
     #[arg(long, value_name = "FILE")]
     events: Option<PathBuf>,
+    /// Lines of text, also on a terminal of 80 x 24 characters and more, which gets a full screen otherwise
+    #[arg(long)]
+    plain: bool,
     #[command(flatten)]
     json: JsonArgs,
 }
@@ -186,22 +191,30 @@ pub(crate) fn run(args: &WizardArgs) -> Result<()> {
         },
         false => Beforehand::default(),
     };
-    let mut lines = Lines::new(Typed::new(interruption()?)?, beforehand);
-    lines.sketches = driver.is_person() && std::io::stdout().is_terminal();
-    match &args.events {
-        Some(path) if path == Path::new("-") => {
-            lines.events = Some(Box::new(std::io::stdout()));
-            lines.text = Some(Box::new(std::io::stderr()));
+    let to_output = args.events.as_deref() == Some(Path::new("-"));
+    let events: Option<Box<dyn Write>> = match &args.events {
+        Some(_) if to_output => Some(Box::new(std::io::stdout())),
+        Some(path) => Some(Box::new(
+            std::fs::File::create(path).map_err(|e| Error::io(path, &e))?,
+        )),
+        None => None,
+    };
+    let stop = interruption()?;
+    let quiet = args.json.is_standard_output();
+    let mut view: Box<dyn View> = match !args.plain && !to_output && !quiet && Screen::fits() {
+        true => Box::new(Screen::new(stop, beforehand, events)?),
+        false => {
+            let mut lines = Lines::new(Typed::new(stop)?, beforehand);
+            lines.sketches = driver.is_person() && std::io::stdout().is_terminal();
+            lines.events = events;
+            lines.text = match (to_output, quiet) {
+                (true, _) => Some(Box::new(std::io::stderr())),
+                (false, true) => None,
+                (false, false) => Some(Box::new(std::io::stdout())),
+            };
+            Box::new(lines)
         }
-        Some(path) => {
-            let file = std::fs::File::create(path).map_err(|e| Error::io(path, &e))?;
-            lines.events = Some(Box::new(file));
-        }
-        None => {}
-    }
-    if lines.text.is_none() && !args.json.is_standard_output() {
-        lines.text = Some(Box::new(std::io::stdout()));
-    }
+    };
     let page = |found: &DiagnosisResult, folder: &Path| {
         let made = Made {
             recording: folder.join("calibration").display().to_string(),
@@ -213,7 +226,10 @@ pub(crate) fn run(args: &WizardArgs) -> Result<()> {
         };
         report::diagnosis_page(found, &made)
     };
-    let outcome = carry_out(asked, args.wanted(), driver, &mut lines, &page)?;
+    let outcome = carry_out(asked, args.wanted(), driver, view.as_mut(), &page);
+    // The terminal is given back before anything is printed to it.
+    drop(view);
+    let outcome = outcome?;
     print(&args.json, &report::wizard_text(&outcome), &outcome, None)?;
     let unstored = outcome.units.iter().filter(|u| u.stored.is_none());
     let failed: Vec<String> = unstored.flat_map(|u| u.notes.clone()).collect();
