@@ -45,12 +45,17 @@ pub struct Text {
 pub struct TextOpener {
     text: Text,
     rate_hz: Option<f64>,
+    patience: Duration,
 }
 
 impl TextOpener {
     /// Of a board. `rate_hz`: that of the session that goes on, if one does.
     pub fn new(text: Text, rate_hz: Option<f64>) -> Self {
-        Self { text, rate_hz }
+        Self {
+            text,
+            rate_hz,
+            patience: NOTHING,
+        }
     }
 
     /// Opens it, and waits until its rate is known. `next`: the first tick that it may use.
@@ -58,7 +63,7 @@ impl TextOpener {
     /// Errors: the port does not open; within 5 s no line is what was described.
     pub fn open(&mut self, next: u64) -> Result<TextSource> {
         let input = open(&self.text)?;
-        let source = TextSource::of(input, &self.text, self.rate_hz, next)?;
+        let source = TextSource::of(input, self, next)?;
         self.rate_hz = Some(source.unit.rate_hz);
         Ok(source)
     }
@@ -96,13 +101,9 @@ pub struct TextSource {
 }
 
 impl TextSource {
-    /// Of an open line. `rate_hz`: what it was before, if it was opened before.
-    fn of(
-        input: Box<dyn Read + Send>,
-        text: &Text,
-        rate_hz: Option<f64>,
-        next: u64,
-    ) -> Result<Self> {
+    /// Of an open line.
+    fn of(input: Box<dyn Read + Send>, opener: &TextOpener, next: u64) -> Result<Self> {
+        let (text, rate_hz) = (&opener.text, opener.rate_hz);
         let name = text.name.clone().unwrap_or_else(|| text.port.clone());
         let unit = Unit {
             id: name.clone(),
@@ -127,15 +128,15 @@ impl TextSource {
             ready: VecDeque::new(),
             tell_at: 1,
         };
-        source.find_rate()?;
+        source.find_rate(opener.patience)?;
         Ok(source)
     }
 
-    /// Listens until the rate is known.
-    fn find_rate(&mut self) -> Result<()> {
-        while self.regular.rate_hz().is_none() {
+    /// Listens until the rate is known and a line has come.
+    fn find_rate(&mut self, patience: Duration) -> Result<()> {
+        while self.regular.rate_hz().is_none() || self.lines.count() == 0 {
             self.take()?;
-            if self.heard.elapsed() < NOTHING {
+            if self.heard.elapsed() < patience {
                 continue;
             }
             return Err(match self.lines.count() {
@@ -288,5 +289,127 @@ fn identity() -> Affine<f64> {
     Affine {
         matrix: Matrix3::identity(),
         offset: Vector3::zeros(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fmt::Write as _;
+    use std::io::Write as _;
+    use std::net::TcpListener;
+
+    use super::*;
+
+    fn board(columns: &str, writes: Vec<String>, stays: Duration) -> TextOpener {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let port = format!("tcp://{}", listener.local_addr().unwrap());
+        // One after the other, and hung up so long behind each.
+        std::thread::spawn(move || {
+            for text in writes {
+                let mut line = listener.accept().unwrap().0;
+                let _ = line.write_all(text.as_bytes());
+                std::thread::sleep(stays);
+            }
+        });
+        let text = Text {
+            port,
+            baud: 115_200,
+            columns: Columns::parse(columns).unwrap(),
+            raw_unit: RawUnit::Count,
+            name: None,
+        };
+        TextOpener {
+            patience: Duration::from_millis(200),
+            ..TextOpener::new(text, None)
+        }
+    }
+
+    /// Lines with a clock, which show their number as a reading; `odd` gives another one in the place of some.
+    fn numbered(rate_hz: f64, count: usize, odd: impl Fn(usize) -> Option<String>) -> String {
+        let mut text = String::from("cut\n");
+        for k in 0..count {
+            let t_us = (1e6 * k as f64 / rate_hz).round();
+            match odd(k) {
+                None => writeln!(text, "{t_us},{k},0,4096,1,2,3").unwrap(),
+                Some(other) => text.push_str(&other),
+            }
+        }
+        text
+    }
+
+    /// All samples until the line is lost: tick and number; and what was noted.
+    fn all(source: &mut TextSource) -> (Vec<(u64, usize)>, Vec<String>) {
+        let (mut samples, mut notes) = (Vec::new(), Vec::new());
+        while let Ok(heard) = source.next() {
+            match heard {
+                Heard::Samples(chunk) => {
+                    let numbered = (chunk.tick..).zip(&chunk.values);
+                    samples.extend(numbered.map(|(tick, v)| (tick, v[3] as usize)));
+                }
+                Heard::Restarted(words) | Heard::Note(words) => notes.push(words),
+                Heard::Nothing => {}
+            }
+        }
+        (samples, notes)
+    }
+
+    const CLOCKED: &str = "t_us,ax,ay,az,gx,gy,gz";
+
+    #[test]
+    fn lines_that_are_lost_or_garbled_are_missing_ticks_and_are_counted() {
+        let odd = |k: usize| match k {
+            300 => Some(String::new()),
+            400 => Some("4000000,4\u{fffd}\n".into()),
+            k if (500..540).contains(&k) => Some("#\n".into()),
+            _ => None,
+        };
+        let mut opener = board(CLOCKED, vec![numbered(100.0, 1000, odd)], Duration::ZERO);
+        let mut source = opener.open(50).unwrap();
+        assert!((source.unit.rate_hz - 100.0).abs() < 1e-6);
+        let (samples, notes) = all(&mut source);
+        assert_eq!(samples[0], (51, 0));
+        assert!(samples.iter().all(|(tick, k)| *tick == 51 + *k as u64));
+        let numbers: Vec<usize> = samples.iter().map(|s| s.1).collect();
+        let whole = (0..numbers.len() + 42).filter(|k| odd(*k).is_none());
+        assert_eq!(numbers, whole.collect::<Vec<_>>());
+        let told = [source.unit.told.clone(), notes].concat().join("; ");
+        assert!(told.contains("are not data"), "{told}");
+        assert_eq!(source.lines.refused(), 41);
+    }
+
+    #[test]
+    fn a_port_that_comes_back_goes_on_behind_the_last_sample_at_the_same_rate() {
+        let first = numbered(250.0, 2000, |_| None);
+        // The second time the rate would be found otherwise.
+        let second = numbered(251.0, 2000, |_| None);
+        let mut opener = board(CLOCKED, vec![first, second], Duration::ZERO);
+        let mut source = opener.open(0).unwrap();
+        let (samples, _) = all(&mut source);
+        let next = samples.last().unwrap().0 + 1;
+        let mut again = opener.open(next).unwrap();
+        assert_eq!(again.unit.rate_hz, source.unit.rate_hz);
+        let (samples, _) = all(&mut again);
+        assert_eq!(samples[0], (next + 1, 0));
+        assert!(samples.windows(2).all(|p| p[1].0 > p[0].0));
+    }
+
+    #[test]
+    fn a_board_that_restarts_is_told_of_and_its_ticks_never_go_back() {
+        let text = numbered(100.0, 1200, |_| None).repeat(2);
+        let mut source = board(CLOCKED, vec![text], Duration::ZERO).open(0).unwrap();
+        let (samples, notes) = all(&mut source);
+        assert_eq!(notes, ["its clock has gone back"]);
+        assert!(samples.windows(2).all(|p| p[1].0 > p[0].0));
+        assert!(samples.len() > 2300, "{}", samples.len());
+    }
+
+    #[test]
+    fn where_nothing_fits_the_error_shows_the_first_lines() {
+        let text = "cut\nMPU6050 OK\n1,2,3\n1,2,3\n1,2,3\n".to_string();
+        let stays = Duration::from_secs(1);
+        let opened = board("ax,ay,az,gx,gy,gz", vec![text], stays).open(0);
+        let error = opened.err().unwrap().to_string();
+        let wanted = "no line within 5 s is 6 numbers, ax,ay,az,gx,gy,gz; the first are \"MPU6050 OK\", \"1,2,3\", \"1,2,3\"";
+        assert!(error.contains(wanted), "{error}");
     }
 }

@@ -7,12 +7,15 @@ use clap::{Args, ValueEnum};
 use mimu::quantity::normal_gravity;
 use mimu::result::diagnosis::DiagnosisResult;
 use mimu_recording::error::{Error, Result};
+use mimu_recording::{Manifest, RawUnit};
 use mimu_wizard::device::DeviceSource;
 use mimu_wizard::drive::{Driver, Person, TextDriver};
 use mimu_wizard::event::View;
 use mimu_wizard::procedure::{Asked, Fixture, Targets, first_steps, verification};
 use mimu_wizard::session::{Wanted, run as carry_out};
 use mimu_wizard::source::{Opener, Source};
+use mimu_wizard::text::{Text, TextOpener};
+use mimu_wizard::text_line::Columns;
 
 use crate::arguments::JsonArgs;
 use crate::cmd::design::number;
@@ -43,6 +46,8 @@ pub(crate) struct WizardArgs {
     /// Latitude, degrees
     #[arg(long, allow_negative_numbers = true)]
     latitude: Option<f64>,
+    #[command(flatten)]
+    text: TextArgs,
     /// Length of a dwell, s
     #[arg(long, value_name = "S", default_value_t = 4.0, value_parser = |t: &str| number(t, 1.0, 600.0))]
     dwell: f64,
@@ -78,6 +83,54 @@ pub(crate) struct WizardArgs {
     plain: bool,
     #[command(flatten)]
     json: JsonArgs,
+}
+
+/// A board of another maker, which writes its readings as lines of text.
+#[derive(Args)]
+struct TextArgs {
+    /// The board writes lines of text: names of the numbers of a line in their order, of ax, ay, az, gx, gy, gz, t_us, t_ms or t_s (the
+    /// board's clock), temp_c, and `-` for one that is not needed. MotionCal's `Raw:` is known by itself
+    #[arg(long, value_name = "NAMES", num_args = 0..=1, default_missing_value = "ax,ay,az,gx,gy,gz")]
+    text: Option<String>,
+    /// Bits a second of a board that writes lines of text
+    #[arg(long, value_name = "N", default_value_t = 115_200, requires = "text")]
+    baud: u32,
+    /// Unit of its readings: count, V, or SI (rad/s and m/s²)
+    #[arg(long, value_name = "UNIT", default_value = "count", value_parser = raw_unit, requires = "text")]
+    raw_unit: RawUnit,
+    /// What it is called; without it, as its port
+    #[arg(long, value_name = "NAME", requires = "text")]
+    device: Option<String>,
+}
+
+fn raw_unit(text: &str) -> std::result::Result<RawUnit, String> {
+    match text {
+        "count" => Ok(RawUnit::Count),
+        "V" => Ok(RawUnit::Volt),
+        "SI" => Ok(RawUnit::Si),
+        _ => Err("count, V or SI is needed".into()),
+    }
+}
+
+impl TextArgs {
+    /// Opens the board at this port, once for each time that it is called.
+    fn opener(&self, names: &str, port: &str, k: Option<usize>, folder: &Path) -> Result<Opener> {
+        let numbered = |name: &String| k.map_or_else(|| name.clone(), |k| format!("{name}-{k}"));
+        let text = Text {
+            port: port.to_owned(),
+            baud: self.baud,
+            columns: Columns::parse(names)?,
+            raw_unit: self.raw_unit,
+            name: self.device.as_ref().map(numbered),
+        };
+        // A session that goes on counts its time by the rate that it was begun with.
+        let begun = Manifest::read(&folder.join("calibration").join("recording.toml"));
+        let mut opener = TextOpener::new(text, begun.ok().map(|m| m.sample_rate_hz));
+        Ok(Box::new(move |next| {
+            let source = opener.open(next)?;
+            Ok(Box::new(source) as Box<dyn Source>)
+        }))
+    }
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -148,37 +201,46 @@ impl WizardArgs {
     }
 
     /// The units: each with its port and its folder.
-    fn wanted(&self) -> Vec<Wanted> {
-        let opener = |port: Option<String>| -> Opener {
-            Box::new(move |next| {
-                let source = DeviceSource::open(port.as_deref(), next)?;
-                Ok(Box::new(source) as Box<dyn Source>)
-            })
+    fn wanted(&self) -> Result<Vec<Wanted>> {
+        let ports: Vec<Option<String>> = match (self.ports.as_slice(), &self.text.text) {
+            ([], None) => vec![None],
+            // Who writes lines of text cannot be asked who it is.
+            ([], Some(_)) => match mimu_device::ports().as_slice() {
+                [port] => vec![Some(port.clone())],
+                several => {
+                    let problem = format!("{} serial ports are there", several.len());
+                    let remedy = "name the one of the board with --port";
+                    return Err(Error::new("--text", problem, remedy));
+                }
+            },
+            (ports, _) => ports.iter().cloned().map(Some).collect(),
         };
-        match self.ports.as_slice() {
-            [] => vec![Wanted {
-                opener: opener(None),
-                folder: self.output.clone(),
-            }],
-            [port] => vec![Wanted {
-                opener: opener(Some(port.clone())),
-                folder: self.output.clone(),
-            }],
-            ports => {
-                let each = (1..).zip(ports);
-                each.map(|(k, port)| Wanted {
-                    opener: opener(Some(port.clone())),
-                    folder: self.output.join(format!("board-{k}")),
-                })
-                .collect()
-            }
-        }
+        let several = ports.len() > 1;
+        let units = (1..).zip(ports).map(|(k, port)| {
+            let folder = match several {
+                true => self.output.join(format!("board-{k}")),
+                false => self.output.clone(),
+            };
+            let opener: Opener = match (&self.text.text, &port) {
+                (Some(names), Some(port)) => {
+                    let number = several.then_some(k);
+                    self.text.opener(names, port, number, &folder)?
+                }
+                _ => Box::new(move |next| {
+                    let source = DeviceSource::open(port.as_deref(), next)?;
+                    Ok(Box::new(source) as Box<dyn Source>)
+                }),
+            };
+            Ok(Wanted { opener, folder })
+        });
+        units.collect()
     }
 }
 
 pub(crate) fn run(args: &WizardArgs) -> Result<()> {
     check_outputs(&[args.json.file()], &[])?;
     let asked = args.asked()?;
+    let wanted = args.wanted()?;
     let driver: Box<dyn Driver> = match &args.driver {
         Some(path) => Box::new(TextDriver::open(path)?),
         None => Box::new(Person),
@@ -226,7 +288,7 @@ pub(crate) fn run(args: &WizardArgs) -> Result<()> {
         };
         report::diagnosis_page(found, &made)
     };
-    let outcome = carry_out(asked, args.wanted(), driver, view.as_mut(), &page);
+    let outcome = carry_out(asked, wanted, driver, view.as_mut(), &page);
     // The terminal is given back before anything is printed to it.
     drop(view);
     let outcome = outcome?;

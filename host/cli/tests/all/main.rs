@@ -10,3 +10,4 @@ mod fuzz;
 mod import_command;
 mod pocket_calculator;
 mod readme;
+mod wizard;

@@ -9,7 +9,7 @@ mod fuzz;
 mod peer;
 mod ports;
 mod recording;
-mod terminal;
+pub(crate) mod terminal;
 
 use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
