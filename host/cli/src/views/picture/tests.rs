@@ -5,7 +5,8 @@ mod svg;
 use std::path::Path;
 
 use mimu::quantity::Sensor;
-use mimu_wizard::refit::Aims;
+use mimu_wizard::event::UnitStanding;
+use mimu_wizard::refit::{Aim, Aims};
 use mimu_wizard::step::Step;
 use nalgebra::Vector3;
 use ratatui::Terminal;
@@ -205,12 +206,12 @@ fn several_units_have_two_lines_each_where_there_is_no_room_and_those_that_wait_
     let mut units: Vec<UnitStanding> = (1..=3).map(|k| unit(&format!("mimu-000{k}"))).collect();
     units[2].waiting = Some("it moves (accel 1.8 times the limit)".into());
     units[2].left_s = None;
-    let mut standing = standing(units);
-    standing.progress[1].sensors[0].aims[0].half_width = 1.5;
+    let mut three = standing(units);
+    three.progress[1].sensors[0].aims[0].half_width = 1.5;
     let log = log();
-    is_as_in("three-units", &shown(&standing, &log), LEAST);
+    is_as_in("three-units", &shown(&three, &log), LEAST);
     let many = (1..=9).map(|k| unit(&format!("mimu-000{k}"))).collect();
-    let many = super::tests::standing(many);
+    let many = standing(many);
     let is = as_text(&drawn(&shown(&many, &log), LEAST));
     assert!(is.contains("5 more: make the terminal larger"), "{is}");
 }
