@@ -116,10 +116,10 @@ impl Regular {
     }
 
     /// The next sample whose tick is certain; `now_s` on the clock of the lines, where that goes on without them.
-    pub fn next(&mut self, now_s: Option<f64>) -> Option<(u64, Timed)> {
+    pub fn certain(&mut self, now_s: Option<f64>) -> Option<(u64, Timed)> {
         let last = now_s.or(self.waiting.back().map(|l| l.t_s))?;
-        let certain = last - self.waiting.front()?.t_s >= WINDOW_S;
-        certain.then(|| self.settle()).flatten()
+        let is = last - self.waiting.front()?.t_s >= WINDOW_S;
+        is.then(|| self.settle()).flatten()
     }
 
     /// The next sample, certain or not.
@@ -237,7 +237,7 @@ mod tests {
         for k in (0..count).filter(|k| !lost(*k)) {
             now = now.max(k as f64 / rate_hz + delay_s(k));
             regular.take(line(k, now));
-            while let Some((tick, line)) = regular.next(None) {
+            while let Some((tick, line)) = regular.certain(None) {
                 all.push((line.raw[0] as usize, tick));
             }
         }
@@ -321,7 +321,7 @@ mod tests {
                 let t_s = (k as f64 / 0.4).floor() / 1000.0;
                 assert!(!regular.take(line(k, t_s)));
             }
-            ticks.extend(std::iter::from_fn(|| regular.next(None)));
+            ticks.extend(std::iter::from_fn(|| regular.certain(None)));
         }
         let rate = regular.rate_hz().unwrap();
         assert!((rate / 400.0 - 1.0).abs() < 3e-4, "{rate}");

@@ -221,7 +221,7 @@ impl TextSource {
         self.garbled = self.regular.garbled();
         // On the computer's clock time goes on without lines as well.
         let now = (!self.lines.has_clock()).then_some(arrived_s);
-        while let Some((tick, sample)) = self.regular.next(now) {
+        while let Some((tick, sample)) = self.regular.certain(now) {
             self.emit(tick, &sample);
         }
         Ok(())

@@ -52,7 +52,8 @@ pub fn of(buffer: &Buffer) -> String {
             let first = &buffer[(x, y)];
             let same = |x: u16| {
                 let cell = &buffer[(x, y)];
-                let kind = |c: &Cell| (arms(c.symbol()).is_some(), c.symbol() == "█");
+                let alone = |s: &str| arms(s).is_some() || s == "█";
+                let kind = |c: &Cell| alone(c.symbol()).then(|| c.symbol().to_owned());
                 (cell.fg, cell.modifier, kind(cell)) == (first.fg, first.modifier, kind(first))
             };
             let end = (x..buffer.area.width)
@@ -86,17 +87,24 @@ fn run(svg: &mut String, buffer: &Buffer, [from, to]: [u16; 2], y: u16, [left, t
             return;
         }
     }
-    if arms(first.symbol()).is_some() {
+    if first.symbol() == "─" {
+        let y = top + h / 2.0;
+        let _ = writeln!(
+            svg,
+            "<path d=\"M{left:.1} {y:.1}h{wide:.1}\" stroke=\"{fill}\" stroke-opacity=\"0.6\"/>"
+        );
+        return;
+    }
+    if let Some(arms) = arms(first.symbol()) {
+        let ends = [
+            [-w / 2.0, 0.0],
+            [w / 2.0, 0.0],
+            [0.0, -h / 2.0],
+            [0.0, h / 2.0],
+        ];
         let mut path = String::new();
         for x in from..to {
             let middle = [left + w * (f64::from(x - from) + 0.5), top + h / 2.0];
-            let ends = [
-                [-w / 2.0, 0.0],
-                [w / 2.0, 0.0],
-                [0.0, -h / 2.0],
-                [0.0, h / 2.0],
-            ];
-            let arms = arms(buffer[(x, y)].symbol()).unwrap_or_default();
             for (end, _) in ends.iter().zip(arms).filter(|e| e.1) {
                 let _ = write!(
                     path,
