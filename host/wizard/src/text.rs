@@ -163,6 +163,7 @@ impl TextSource {
             format!("{}: lines of text, {}", self.port, self.lines.description()),
             format!("{rate_hz:.2} samples a second, {clock}"),
         ];
+        self.unit.told.extend(self.lines.others_in_words());
         self.unit.told.extend(self.lines.refused_in_words());
         self.tell_at = TOLD_AGAIN * self.lines.refused().max(1);
         Ok(())

@@ -117,6 +117,8 @@ pub struct Lines {
     label: Option<String>,
     count: u64,
     refused: u64,
+    /// Lines of numbers with another label than those that are data.
+    others: u64,
     first_seen: Vec<String>,
     last_clock: Option<f64>,
     wrapped_s: f64,
@@ -132,6 +134,7 @@ impl Lines {
             label: None,
             count: 0,
             refused: 0,
+            others: 0,
             first_seen: Vec::new(),
             last_clock: None,
             wrapped_s: 0.0,
@@ -163,7 +166,13 @@ impl Lines {
     }
 
     fn line(&mut self, text: &str) -> Option<Reading> {
-        let found = numbers(text).and_then(|(label, numbers)| self.reading(label, &numbers));
+        let parsed = numbers(text);
+        let other = |(label, _): &(&str, Vec<f64>)| self.label.as_ref().is_some_and(|l| l != label);
+        if parsed.as_ref().is_some_and(other) {
+            self.others += 1;
+            return None;
+        }
+        let found = parsed.and_then(|(label, numbers)| self.reading(label, &numbers));
         match found {
             Some(reading) => {
                 self.count += 1;
@@ -181,11 +190,6 @@ impl Lines {
     }
 
     fn reading(&mut self, label: &str, numbers: &[f64]) -> Option<Reading> {
-        if let Some(known) = &self.label
-            && known != label
-        {
-            return None;
-        }
         if numbers.len() != self.columns.columns.len() {
             let motion_cal = Columns::motion_cal();
             let is = self.label.is_none() && label == "Raw";
@@ -255,6 +259,16 @@ impl Lines {
             self.refused,
             self.refused + self.count
         ))
+    }
+
+    /// How many lines of numbers had another label; `None` if none had.
+    pub fn others_in_words(&self) -> Option<String> {
+        let label = self.label.as_deref().unwrap_or_default();
+        let others = self.others;
+        (others > 0).then(|| match label {
+            "" => format!("{others} lines with a label are left out"),
+            label => format!("{others} lines without the label {label:?} are left out"),
+        })
     }
 
     /// Whether the board has a clock of its own.
@@ -350,7 +364,9 @@ mod tests {
     fn motion_cal_is_known_by_itself_and_its_lines_in_si_are_left_out() {
         let raw = "Raw:10,20,8192,1,2,3,400,500,600\r\nUni:0.01,0.02,9.8,0.1,0.2,0.3,40,50,60\r\n";
         let (readings, lines) = read(SIX, &raw.repeat(3));
-        assert_eq!((readings.len(), lines.refused()), (3, 3));
+        assert_eq!((readings.len(), lines.refused()), (3, 0));
+        let words = lines.others_in_words().unwrap();
+        assert_eq!(words, "3 lines without the label \"Raw\" are left out");
         assert_eq!(readings[0].raw, [1.0, 2.0, 3.0, 10.0, 20.0, 8192.0]);
     }
 
