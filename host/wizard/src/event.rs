@@ -140,16 +140,22 @@ pub struct UnitStanding {
     pub unit: String,
     /// Motion of gyro and accelerometer over what still counts as still.
     pub motion: Option<[f64; 2]>,
+    /// What is allowed of it: 1, and more of the gyro while it turns.
+    pub motion_limits: [f64; 2],
     /// Angle between up and the direction that is wanted up, degrees.
     pub tilt_deg: Option<f64>,
     /// What is allowed of it.
     pub tilt_limit_deg: f64,
-    /// Rate about the vertical, deg/s.
+    /// Rate about the vertical, deg/s; `None` where no data sheet is known and there is no calibration yet.
     pub rate_dps: Option<f64>,
+    /// Departure from the rate that is wanted that is allowed, deg/s.
+    pub rate_limit_dps: f64,
     /// °C.
     pub temp_c: Option<f64>,
     /// °C/min.
     pub trend_c_per_min: Option<f64>,
+    /// What is allowed of it while it warms up, if that is waited for.
+    pub trend_limit_c_per_min: Option<f64>,
     /// Samples received, and lost since the beginning.
     pub samples: u64,
     /// Samples that are missing.

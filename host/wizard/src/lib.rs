@@ -6,6 +6,7 @@
 //! | [`step`] | a dwell that is wanted: which way is up, how fast it turns, how long |
 //! | [`procedure`] | what is asked of a session; the steps to begin with, the next best one, those that verify |
 //! | [`source`], [`device`] | where samples come from |
+//! | [`text`], [`text_line`], [`regular`] | a board of another maker: its port, its lines, and their times as a regular rate |
 //! | [`station`] | a port with a thread of its own, opened again when it was gone |
 //! | [`watch`] | is the unit still, which way is up, how fast does it turn |
 //! | [`refit`] | the calibration so far, every parameter beside its target |
@@ -25,11 +26,14 @@ pub mod folder;
 pub mod one;
 pub mod procedure;
 pub mod refit;
+pub mod regular;
 pub mod session;
 pub mod source;
 pub mod station;
 pub mod step;
 pub mod store;
+pub mod text;
+pub mod text_line;
 pub mod verdict;
 pub mod watch;
 pub mod wizard;

@@ -155,9 +155,10 @@ impl One {
         });
         self.number = redone.max().unwrap_or(0).max(self.number);
         // What waits is of the time before.
-        while self.station.next()?.is_some() {}
+        while self.station.news()?.is_some() {}
         (self.pending, self.dwell, self.next) = (Batch::default(), None, None);
         self.watch.interrupted();
+        self.watch.begin();
         Ok(())
     }
 
@@ -179,7 +180,7 @@ impl One {
     /// Takes what has come. What is to be told is added to `tell`; whether there was anything.
     pub fn listen(&mut self, round: &Round<'_>, tell: &mut Vec<Event>) -> Result<bool> {
         let mut some = false;
-        while let Some(news) = self.station.next()? {
+        while let Some(news) = self.station.news()? {
             some = true;
             match news {
                 News::Samples(chunk) => {
@@ -199,6 +200,9 @@ impl One {
                     }
                     self.interrupted(format!("the device has restarted: {why}"), tell)?;
                 }
+                News::Note(words) => tell.push(Event::Note {
+                    words: format!("{}: {words}", self.name()),
+                }),
                 News::Lost(why) => self.interrupted(format!("the line is lost: {why}"), tell)?,
                 News::Other(why) => {
                     self.standing.waiting = Some(why.clone());
@@ -255,11 +259,17 @@ impl One {
         let up = force(seen, &nominal[1]);
         let standing = &mut self.standing;
         standing.motion = Some(seen.motion);
+        let wanted_dps = step.map_or(0.0, |s| s.rate_dps);
+        standing.motion_limits = motion_limits(wanted_dps);
+        standing.rate_limit_dps = rate_limit_dps(wanted_dps);
+        standing.trend_limit_c_per_min = asked.warm_c_per_min;
         standing.temp_c = seen.temp_c.is_finite().then_some(seen.temp_c);
         standing.trend_c_per_min = seen.trend;
         standing.tilt_deg = step.map(|s| up.angle(&s.up()).to_degrees());
         let rate = self.watch.rate(seen, &nominal[0]);
-        standing.rate_dps = Some(rate.dot(&up.normalize()).to_degrees());
+        // What was guessed of a gyro has no scale.
+        let known = self.nominal.is_some();
+        standing.rate_dps = known.then(|| rate.dot(&up.normalize()).to_degrees());
     }
 
     /// Up by the last second, of length 1.
@@ -291,7 +301,7 @@ impl One {
             return Some("a reading is at the end of its range".into());
         }
         let turning = step.rate_dps != 0.0;
-        let limits = [if turning { 5.0 } else { 1.0 }, 1.0];
+        let limits = motion_limits(step.rate_dps);
         for sensor in Sensor::BOTH {
             let motion = seen.motion[sensor as usize];
             if motion > limits[sensor as usize] {
@@ -313,7 +323,7 @@ impl One {
             let rate = self.watch.rate(seen, &nominal[0]);
             let wanted = step.rate();
             let off = (rate - wanted).norm().to_degrees();
-            if off > RATE_SHARE * step.rate_dps.abs() + RATE_DPS {
+            if off > rate_limit_dps(step.rate_dps) {
                 let is = rate.dot(&step.up()).to_degrees();
                 return Some(match (turning, is * step.rate_dps < 0.0) {
                     (true, true) => format!(
@@ -599,6 +609,16 @@ fn known(step: &Step, asked: &Asked) -> [f64; 6] {
     let rate = up * step.rate_dps + earth.unwrap_or_default().map(f64::to_degrees);
     let force = up * asked.gravity_mps2;
     [rate.x, rate.y, rate.z, force.x, force.y, force.z]
+}
+
+/// Motion of gyro and accelerometer that is allowed at a rate: a table's own unsteadiness is no movement of the unit on it.
+fn motion_limits(rate_dps: f64) -> [f64; 2] {
+    [if rate_dps != 0.0 { 5.0 } else { 1.0 }, 1.0]
+}
+
+/// Departure from a rate that is allowed, deg/s.
+fn rate_limit_dps(rate_dps: f64) -> f64 {
+    RATE_SHARE * rate_dps.abs() + RATE_DPS
 }
 
 /// Without the first rows.

@@ -50,6 +50,8 @@ pub enum Heard {
     Samples(Chunk),
     /// The device has restarted, and why.
     Restarted(String),
+    /// Something that a person should know.
+    Note(String),
     /// Nothing, for a little while.
     Nothing,
 }

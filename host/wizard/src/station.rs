@@ -19,6 +19,8 @@ pub enum News {
     Samples(Chunk),
     /// The device has restarted, and why.
     Restarted(String),
+    /// Something that a person should know.
+    Note(String),
     /// The line is lost, and why.
     Lost(String),
     /// Another unit is at the port.
@@ -63,7 +65,7 @@ impl Station {
     }
 
     /// What has come; `None` if nothing has.
-    pub fn next(&mut self) -> Result<Option<News>> {
+    pub fn news(&mut self) -> Result<Option<News>> {
         match self.news.try_recv() {
             Ok(News::Back(unit)) => {
                 self.unit = (*unit).clone();
@@ -152,6 +154,7 @@ fn listen(
             Some(open) => match open.next() {
                 Ok(Heard::Nothing) => continue,
                 Ok(Heard::Restarted(why)) => News::Restarted(why),
+                Ok(Heard::Note(words)) => News::Note(words),
                 Ok(Heard::Samples(chunk)) => {
                     next = chunk.tick + chunk.values.len() as u64;
                     News::Samples(chunk)

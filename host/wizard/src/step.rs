@@ -80,40 +80,49 @@ pub fn words(up: &Vector3<f64>) -> String {
     }
 }
 
-/// A box seen from the front left above, its faces named as they lie with `up` upwards: what is on top, in front and to the right.
+/// A box seen from the front right above, its faces named as they lie with `up` upwards: what is on top, in front and to the right.
 ///
-/// Only faces can be drawn so; an edge or a corner is drawn on its nearest face, with an arrow to the side that is lifted.
+/// Only faces can be drawn so: an edge or a corner is drawn on its first face, turned so that what is to be lifted is seen, and beside
+/// it stands what to lift.
 pub fn sketch(up: &Vector3<f64>) -> [String; 7] {
-    let all = parts(up);
-    let name = |axis: usize, sign: f64| {
-        format!(
-            "{}{}",
-            if sign < 0.0 { '-' } else { '+' },
-            mimu::quantity::AXES[axis]
-        )
+    let faces: Vec<Vector3<f64>> = parts(up)
+        .iter()
+        .map(|p| Vector3::ith(p.0, p.1.signum()))
+        .collect();
+    let name = |face: &Vector3<f64>| {
+        let axis = face.iamax();
+        let sign = if face[axis] < 0.0 { '-' } else { '+' };
+        format!("{sign}{}", mimu::quantity::AXES[axis])
     };
-    let (top, sign) = all
-        .first()
-        .copied()
-        .map_or((2, 1.0), |p| (p.0, p.1.signum()));
     // A right-handed box: front x right = top.
-    let (front, right) = ((top + 1) % 3, (top + 2) % 3);
-    let [t, f, r] = [name(top, sign), name(front, 1.0), name(right, sign)];
-    let lifted = all[1.min(all.len())..].iter();
-    let lifted: Vec<String> = lifted.map(|p| name(p.0, p.1)).collect();
-    let note = match lifted.is_empty() {
-        true => String::new(),
-        false => format!("  and lift the side of {}", lifted.join(" and ")),
+    let (top, front) = match faces.as_slice() {
+        [] => (Vector3::z(), Vector3::x()),
+        [top] => {
+            let axis = (top.iamax() + 1) % 3;
+            (*top, Vector3::ith(axis, 1.0))
+        }
+        [top, one] => (*top, *one),
+        // One of the two orders has the other face to the right, and not hidden to the left.
+        [top, one, other, ..] if top.cross(one) == *other => (*top, *one),
+        [top, _, other, ..] => (*top, *other),
     };
+    let right = top.cross(&front);
+    let lift = match faces.len() {
+        0 | 1 => ["", "", ""],
+        2 => ["lift its front", "until that edge", "is up"],
+        _ => ["lift its front", "and right until", "that corner is up"],
+    };
+    let [t, f, r] = [top, front, right].map(|face| name(&face));
     [
-        "      ________".into(),
-        format!("     /   {t}  /|"),
-        "    /_______/ |".into(),
-        "   |        | |".into(),
-        format!("   |   {f}   |{r}"),
-        "   |________|/ ".into(),
-        note,
+        "       ________".into(),
+        format!("      /  {t}   /|"),
+        "     /       / |".into(),
+        format!("    /_______/{r}|"),
+        format!("    |       |  /   {}", lift[0]),
+        format!("    |  {f}   | /    {}", lift[1]),
+        format!("    |_______|/     {}", lift[2]),
     ]
+    .map(|line: String| line.trim_end().into())
 }
 
 #[cfg(test)]
@@ -134,26 +143,47 @@ mod tests {
     }
 
     #[test]
-    fn front_times_right_of_the_sketch_is_up() {
-        for axis in 0..3 {
-            for sign in [1.0, -1.0] {
-                let up = Vector3::ith(axis, sign);
-                let lines = sketch(&up).join("\n");
-                let at = |s: &str| {
-                    let k = mimu::quantity::AXES
-                        .iter()
-                        .position(|a| s.ends_with(a))
-                        .unwrap();
-                    Vector3::ith(k, if s.starts_with('-') { -1.0 } else { 1.0 })
-                };
-                let names: Vec<&str> = lines
-                    .split(|c: char| !(c == '+' || c == '-' || c.is_alphabetic()))
-                    .filter(|w| w.len() == 2)
-                    .collect();
-                let [top, front, right] = [names[0], names[1], names[2]].map(at);
-                assert_eq!(front.cross(&right), top, "{lines}");
-                assert_eq!(top, up);
+    fn front_times_right_of_the_sketch_is_up_and_what_is_lifted_is_seen() {
+        for k in 0..27 {
+            let up = Vector3::new(k / 9 - 1, k / 3 % 3 - 1, k % 3 - 1).cast::<f64>();
+            if up == Vector3::zeros() {
+                continue;
             }
+            let lines = sketch(&up).join("\n");
+            let at = |s: &str| {
+                let axis = mimu::quantity::AXES
+                    .iter()
+                    .position(|a| s.ends_with(a))
+                    .unwrap();
+                Vector3::ith(axis, if s.starts_with('-') { -1.0 } else { 1.0 })
+            };
+            let names: Vec<&str> = lines
+                .split(|c: char| !(c == '+' || c == '-' || c.is_alphabetic()))
+                .filter(|w| w.starts_with(['+', '-']))
+                .collect();
+            // As they are read, from the top: top, right, front.
+            let [top, right, front] = [names[0], names[1], names[2]].map(at);
+            assert_eq!(front.cross(&right), top, "{lines}");
+            let seen = match lines.contains("lift") {
+                false => top,
+                true if lines.contains("right until") => top + front + right,
+                true => top + front,
+            };
+            assert_eq!(seen, up, "{lines}");
         }
+    }
+
+    #[test]
+    fn a_corner_is_drawn_with_all_its_faces_seen() {
+        let lines = sketch(&Vector3::new(1.0, 1.0, -1.0)).join("\n");
+        let drawn = "
+       ________
+      /  +x   /|
+     /       / |
+    /_______/+y|
+    |       |  /   lift its front
+    |  -z   | /    and right until
+    |_______|/     that corner is up";
+        assert_eq!(lines, drawn[1..]);
     }
 }

@@ -92,6 +92,8 @@ pub struct Watch {
     floor: Option<[f64; 6]>,
     /// Mean reading of the gyro in that second.
     rest: [f64; 3],
+    /// Whether the unit may be turned by now.
+    begun: bool,
     temperatures: VecDeque<(u64, f64)>,
 }
 
@@ -107,6 +109,7 @@ impl Watch {
             next: None,
             floor: None,
             rest: [0.0; 3],
+            begun: false,
             temperatures: VecDeque::new(),
         }
     }
@@ -143,6 +146,11 @@ impl Watch {
     pub fn interrupted(&mut self) {
         (self.open, self.window) = (Block::default(), VecDeque::new());
         self.temperatures.clear();
+    }
+
+    /// From now on the unit may be turned: what the gyro reads at rest is known.
+    pub fn begin(&mut self) {
+        self.begun = true;
     }
 
     /// Whether it knows yet how quiet the unit can be.
@@ -193,8 +201,8 @@ impl Watch {
         let sum = |v: &[f64; 6]| v[..3].iter().sum::<f64>();
         if stuck.is_none() && !saturated {
             let floor = self.floor.get_or_insert(variance);
-            // The quietest second is where the rate is that of rest.
-            if sum(&variance) <= sum(floor) {
+            // The quietest second of those before anything was to turn: a steady rate is as quiet as rest.
+            if !self.begun && sum(&variance) <= sum(floor) {
                 self.rest = [0, 1, 2].map(|c| all.mean[c]);
             }
             for c in 0..6 {
@@ -285,6 +293,21 @@ mod tests {
             last = watch.take(&chunk(20 * k, 20, 1.0, 0.05)).or(last);
         }
         assert!(last.unwrap().motion.iter().all(|m| *m > 1.0), "{last:?}");
+    }
+
+    #[test]
+    fn a_steady_rate_is_not_taken_for_rest_because_it_is_quieter() {
+        let mut watch = Watch::new(1000.0, false);
+        for k in 0..100 {
+            watch.take(&chunk(20 * k, 20, 1.0, 0.01));
+        }
+        watch.begin();
+        let mut last = None;
+        for k in 100..200 {
+            last = watch.take(&chunk(20 * k, 20, 1.5, 0.009)).or(last);
+        }
+        let plain = guessed(&last.unwrap(), 9.8)[0];
+        assert!((watch.rate(&last.unwrap(), &plain).x - 0.5).abs() < 1e-3);
     }
 
     #[test]

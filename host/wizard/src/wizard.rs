@@ -140,6 +140,13 @@ impl<'a> Wizard<'a> {
     pub fn warm_up(&mut self) -> Result<Ended> {
         let mut since = Instant::now();
         self.current = None;
+        // A session that was killed may have left the table turning.
+        self.driver.stop()?;
+        while self.driver.busy()? {
+            if self.round(None, true)? == Some(Wish::Cancel) {
+                return Ok(Ended::Cancelled);
+            }
+        }
         loop {
             if self.round(None, false)? == Some(Wish::Cancel) {
                 return Ok(Ended::Cancelled);

@@ -14,6 +14,7 @@ const CRATES: [&str; 8] = [
     "host/recording",
     "host/mimu",
     "host/device",
+    "host/wizard",
     "host/cli",
     "rig",
     "rig/board",

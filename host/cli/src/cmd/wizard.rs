@@ -1,6 +1,6 @@
 //! `mimu wizard`: arguments and what follows from them.
 
-use std::io::IsTerminal as _;
+use std::io::{IsTerminal as _, Write};
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
@@ -9,12 +9,16 @@ use mimu::readable::STANDARD_GRAVITY;
 use mimu::result::diagnosis::DiagnosisResult;
 use mimu_device::record::Plan;
 use mimu_recording::error::{Error, Result};
+use mimu_recording::{Manifest, RawUnit};
 use mimu_wizard::device::DeviceSource;
 use mimu_wizard::drive::{Driver, Person, TextDriver, Together};
+use mimu_wizard::event::View;
 use mimu_wizard::procedure::{Asked, Fixture, Targets, first_steps, verification};
 use mimu_wizard::session::{Wanted, run as carry_out};
 use mimu_wizard::source::{Opener, Source};
 use mimu_wizard::step::Step;
+use mimu_wizard::text::{Text, TextOpener};
+use mimu_wizard::text_line::Columns;
 
 use crate::arguments::JsonArgs;
 use crate::cmd::design::number;
@@ -23,6 +27,7 @@ use crate::output::{check_outputs, print};
 use crate::report::{self, Made};
 use crate::views::answers::{Beforehand, Typed};
 use crate::views::lines::Lines;
+use crate::views::screen::Screen;
 
 #[derive(Args)]
 pub(crate) struct WizardArgs {
@@ -44,6 +49,8 @@ pub(crate) struct WizardArgs {
     /// Latitude, degrees
     #[arg(long, allow_negative_numbers = true)]
     latitude: Option<f64>,
+    #[command(flatten)]
+    text: TextArgs,
     /// Length of a dwell, s
     #[arg(long, value_name = "S", default_value_t = 4.0, value_parser = |t: &str| number(t, 1.0, 600.0))]
     dwell: f64,
@@ -80,8 +87,59 @@ pub(crate) struct WizardArgs {
     /// Write what happens as JSON lines (`-`: to standard output)
     #[arg(long, value_name = "FILE")]
     events: Option<PathBuf>,
+    /// Lines of text, also on a terminal of 80 x 24 characters and more, which gets a full screen otherwise
+    #[arg(long)]
+    plain: bool,
     #[command(flatten)]
     json: JsonArgs,
+}
+
+/// A board of another maker, which writes its readings as lines of text.
+#[derive(Args)]
+struct TextArgs {
+    /// The board writes lines of text: names of the numbers of a line in their order, of ax, ay, az, gx, gy, gz, t_us, t_ms or t_s (the
+    /// board's clock), temp_c, and `-` for one that is not needed. MotionCal's `Raw:` is known by itself
+    #[arg(long, value_name = "NAMES", num_args = 0..=1, default_missing_value = "ax,ay,az,gx,gy,gz")]
+    text: Option<String>,
+    /// Bits a second of a board that writes lines of text
+    #[arg(long, value_name = "N", default_value_t = 115_200, requires = "text")]
+    baud: u32,
+    /// Unit of its readings: count, V, or SI (rad/s and m/s²)
+    #[arg(long, value_name = "UNIT", default_value = "count", value_parser = raw_unit, requires = "text")]
+    raw_unit: RawUnit,
+    /// What it is called; without it, as its port
+    #[arg(long, value_name = "NAME", requires = "text")]
+    device: Option<String>,
+}
+
+fn raw_unit(text: &str) -> std::result::Result<RawUnit, String> {
+    match text {
+        "count" => Ok(RawUnit::Count),
+        "V" => Ok(RawUnit::Volt),
+        "SI" => Ok(RawUnit::Si),
+        _ => Err("count, V or SI is needed".into()),
+    }
+}
+
+impl TextArgs {
+    /// Opens the board at this port, once for each time that it is called.
+    fn opener(&self, names: &str, port: &str, k: Option<usize>, folder: &Path) -> Result<Opener> {
+        let numbered = |name: &String| k.map_or_else(|| name.clone(), |k| format!("{name}-{k}"));
+        let text = Text {
+            port: port.to_owned(),
+            baud: self.baud,
+            columns: Columns::parse(names)?,
+            raw_unit: self.raw_unit,
+            name: self.device.as_ref().map(numbered),
+        };
+        // A session that goes on counts its time by the rate that it was begun with.
+        let begun = Manifest::read(&folder.join("calibration").join("recording.toml"));
+        let mut opener = TextOpener::new(text, begun.ok().map(|m| m.sample_rate_hz));
+        Ok(Box::new(move |next| {
+            let source = opener.open(next)?;
+            Ok(Box::new(source) as Box<dyn Source>)
+        }))
+    }
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -170,31 +228,38 @@ impl WizardArgs {
     }
 
     /// The units: each with its port and its folder.
-    fn wanted(&self) -> Vec<Wanted> {
-        let opener = |port: Option<String>| -> Opener {
-            Box::new(move |next| {
-                let source = DeviceSource::open(port.as_deref(), next)?;
-                Ok(Box::new(source) as Box<dyn Source>)
-            })
-        };
-        match self.ports.as_slice() {
-            [] => vec![Wanted {
-                opener: opener(None),
-                folder: self.output.clone(),
-            }],
-            [port] => vec![Wanted {
-                opener: opener(Some(port.clone())),
-                folder: self.output.clone(),
-            }],
-            ports => {
-                let each = (1..).zip(ports);
-                each.map(|(k, port)| Wanted {
-                    opener: opener(Some(port.clone())),
-                    folder: self.output.join(format!("board-{k}")),
-                })
-                .collect()
+    fn wanted(&self) -> Result<Vec<Wanted>> {
+        let ports: Vec<Option<String>> = match (self.ports.as_slice(), &self.text.text) {
+            ([], None) => vec![None],
+            // Who writes lines of text cannot be asked who it is.
+            ([], Some(_)) => {
+                let mimu_device::Ports { of_boards, others } = mimu_device::ports();
+                let there = [of_boards, others].concat().join(", ");
+                let problem =
+                    format!("which port writes the lines is not said; there are: {there}");
+                return Err(Error::new("--text", problem, "name it with --port"));
             }
-        }
+            (ports, _) => ports.iter().cloned().map(Some).collect(),
+        };
+        let several = ports.len() > 1;
+        let units = (1..).zip(ports).map(|(k, port)| {
+            let folder = match several {
+                true => self.output.join(format!("board-{k}")),
+                false => self.output.clone(),
+            };
+            let opener: Opener = match (&self.text.text, &port) {
+                (Some(names), Some(port)) => {
+                    let number = several.then_some(k);
+                    self.text.opener(names, port, number, &folder)?
+                }
+                _ => Box::new(move |next| {
+                    let source = DeviceSource::open(port.as_deref(), next)?;
+                    Ok(Box::new(source) as Box<dyn Source>)
+                }),
+            };
+            Ok(Wanted { opener, folder })
+        });
+        units.collect()
     }
 }
 
@@ -233,6 +298,7 @@ fn planned(plan: &Plan, fixture: Fixture, gravity_mps2: f64, path: &Path) -> Res
 pub(crate) fn run(args: &WizardArgs) -> Result<()> {
     check_outputs(&[args.json.file()], &[])?;
     let asked = args.asked()?;
+    let wanted = args.wanted()?;
     let driver: Box<dyn Driver> = match args.drivers.as_slice() {
         [] => Box::new(Person),
         [path] => Box::new(TextDriver::open(path)?),
@@ -251,22 +317,30 @@ pub(crate) fn run(args: &WizardArgs) -> Result<()> {
         },
         false => Beforehand::default(),
     };
-    let mut lines = Lines::new(Typed::new(interruption()?)?, beforehand);
-    lines.sketches = driver.is_person() && std::io::stdout().is_terminal();
-    match &args.events {
-        Some(path) if path == Path::new("-") => {
-            lines.events = Some(Box::new(std::io::stdout()));
-            lines.text = Some(Box::new(std::io::stderr()));
+    let to_output = args.events.as_deref() == Some(Path::new("-"));
+    let events: Option<Box<dyn Write>> = match &args.events {
+        Some(_) if to_output => Some(Box::new(std::io::stdout())),
+        Some(path) => Some(Box::new(
+            std::fs::File::create(path).map_err(|e| Error::io(path, &e))?,
+        )),
+        None => None,
+    };
+    let stop = interruption()?;
+    let quiet = args.json.is_standard_output();
+    let mut view: Box<dyn View> = match !args.plain && !to_output && !quiet && Screen::fits() {
+        true => Box::new(Screen::new(stop, beforehand, events)?),
+        false => {
+            let mut lines = Lines::new(Typed::new(stop)?, beforehand);
+            lines.sketches = driver.is_person() && std::io::stdout().is_terminal();
+            lines.events = events;
+            lines.text = match (to_output, quiet) {
+                (true, _) => Some(Box::new(std::io::stderr())),
+                (false, true) => None,
+                (false, false) => Some(Box::new(std::io::stdout())),
+            };
+            Box::new(lines)
         }
-        Some(path) => {
-            let file = std::fs::File::create(path).map_err(|e| Error::io(path, &e))?;
-            lines.events = Some(Box::new(file));
-        }
-        None => {}
-    }
-    if lines.text.is_none() && !args.json.is_standard_output() {
-        lines.text = Some(Box::new(std::io::stdout()));
-    }
+    };
     let page = |found: &DiagnosisResult, folder: &Path| {
         let made = Made {
             recording: folder.join("calibration").display().to_string(),
@@ -278,7 +352,10 @@ pub(crate) fn run(args: &WizardArgs) -> Result<()> {
         };
         report::diagnosis_page(found, &made)
     };
-    let outcome = carry_out(asked, args.wanted(), driver, &mut lines, &page)?;
+    let outcome = carry_out(asked, wanted, driver, view.as_mut(), &page);
+    // The terminal is given back before anything is printed to it.
+    drop(view);
+    let outcome = outcome?;
     print(&args.json, &report::wizard_text(&outcome), &outcome, None)?;
     let unstored = outcome.units.iter().filter(|u| u.stored.is_none());
     let failed: Vec<String> = unstored.flat_map(|u| u.notes.clone()).collect();

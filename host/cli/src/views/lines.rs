@@ -41,12 +41,18 @@ impl Lines {
     }
 }
 
+/// An event as a line of JSON.
+pub(crate) fn write_event(out: &mut dyn Write, event: &Event) {
+    if let Ok(line) = serde_json::to_string(event) {
+        // As in [`Lines::say`].
+        let _ = writeln!(out, "{line}").and_then(|()| out.flush());
+    }
+}
+
 impl View for Lines {
     fn tell(&mut self, event: &Event) {
-        if let Some(out) = &mut self.events
-            && let Ok(line) = serde_json::to_string(event)
-        {
-            let _ = writeln!(out, "{line}").and_then(|()| out.flush());
+        if let Some(out) = &mut self.events {
+            write_event(out.as_mut(), event);
         }
         for line in report::wizard_lines(event) {
             self.say(&line);

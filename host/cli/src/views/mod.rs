@@ -2,3 +2,5 @@
 
 pub(crate) mod answers;
 pub(crate) mod lines;
+pub(crate) mod picture;
+pub(crate) mod screen;

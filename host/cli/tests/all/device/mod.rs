@@ -10,7 +10,7 @@ mod kept;
 mod peer;
 mod ports;
 mod recording;
-mod terminal;
+pub(crate) mod terminal;
 
 use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};

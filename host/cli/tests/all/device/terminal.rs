@@ -47,6 +47,11 @@ impl Terminal {
         is
     }
 
+    /// Whether anybody has it open.
+    pub fn is_open(&self) -> bool {
+        !self.wait(PollFlags::OUT).contains(PollFlags::HUP)
+    }
+
     /// What was sent to it, after 2 ms at most.
     pub fn read(&mut self, into: &mut [u8]) -> usize {
         self.wait(PollFlags::IN);

@@ -1,0 +1,239 @@
+//! A session on the full screen of a terminal, which is given back as it was on every way out.
+
+use std::io::{IsTerminal as _, Write};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use mimu_recording::error::{Error, Result};
+use mimu_wizard::event::{Event, Question, Standing, View, Wish};
+use ratatui::DefaultTerminal;
+use ratatui::crossterm::event as keys;
+use ratatui::crossterm::event::{KeyCode, KeyEventKind, KeyModifiers};
+
+use super::answers::Beforehand;
+use super::lines::write_event;
+use super::picture::{LEAST, Shown, draw};
+use crate::report;
+
+/// So much of what has happened is kept: more than any screen shows.
+const KEPT: usize = 200;
+/// How long the keyboard is waited for before the end is looked for.
+const POLL: Duration = Duration::from_millis(100);
+
+/// What a key means.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Key {
+    Cancel,
+    Redo,
+    Skip,
+    Yes,
+    No,
+}
+
+impl Key {
+    fn of(code: KeyCode, modifiers: KeyModifiers) -> Option<Self> {
+        match code {
+            KeyCode::Char('c') if modifiers.contains(KeyModifiers::CONTROL) => Some(Self::Cancel),
+            KeyCode::Char('q') => Some(Self::Cancel),
+            KeyCode::Char('r') => Some(Self::Redo),
+            KeyCode::Char('s') => Some(Self::Skip),
+            KeyCode::Char('y') => Some(Self::Yes),
+            KeyCode::Char('n') => Some(Self::No),
+            _ => None,
+        }
+    }
+}
+
+/// The terminal in the state that a full screen needs, from its making to its end.
+struct Taken {
+    terminal: DefaultTerminal,
+}
+
+impl Drop for Taken {
+    fn drop(&mut self) {
+        ratatui::restore();
+    }
+}
+
+/// The full screen.
+pub(crate) struct Screen {
+    taken: Taken,
+    keys: Receiver<Key>,
+    keyboard: Option<JoinHandle<()>>,
+    ended: Arc<AtomicBool>,
+    stop: Arc<AtomicBool>,
+    /// Where the events go, if anywhere.
+    events: Option<Box<dyn Write>>,
+    beforehand: Beforehand,
+    standing: Standing,
+    log: Vec<String>,
+    question: Option<Question>,
+    answer: Option<bool>,
+}
+
+impl Screen {
+    /// Whether this process is at a terminal that is large enough.
+    pub(crate) fn fits() -> bool {
+        let at_terminal = std::io::stdout().is_terminal() && std::io::stdin().is_terminal();
+        let size = ratatui::crossterm::terminal::size();
+        at_terminal && size.is_ok_and(|(w, h)| w >= LEAST[0] && h >= LEAST[1])
+    }
+
+    /// Takes the terminal. `stop` is raised from outside to end the session.
+    pub(crate) fn new(
+        stop: Arc<AtomicBool>,
+        beforehand: Beforehand,
+        events: Option<Box<dyn Write>>,
+    ) -> Result<Self> {
+        let failed = |error: std::io::Error| {
+            Error::new("terminal", error, "run it with --plain for lines of text")
+        };
+        // Its hook gives the terminal back before a panic is told of, which would else be written to a screen that vanishes.
+        let taken = Taken {
+            terminal: ratatui::try_init().map_err(failed)?,
+        };
+        let (tell, keys) = channel();
+        let ended = Arc::new(AtomicBool::new(false));
+        let end = ended.clone();
+        let keyboard = std::thread::Builder::new()
+            .name("keyboard".into())
+            .spawn(move || listen(&tell, &end))
+            .map_err(failed)?;
+        Ok(Self {
+            taken,
+            keys,
+            keyboard: Some(keyboard),
+            ended,
+            stop,
+            events,
+            beforehand,
+            standing: Standing::default(),
+            log: Vec::new(),
+            question: None,
+            answer: None,
+        })
+    }
+
+    fn draw(&mut self) {
+        let question = self.question.as_ref().map(report::wizard_question);
+        let shown = Shown {
+            standing: &self.standing,
+            log: &self.log,
+            question: question.as_deref(),
+        };
+        // A terminal that was closed shows nothing to anybody, and the session's files hold what counts.
+        let _ = self.taken.terminal.draw(|frame| draw(frame, &shown));
+    }
+}
+
+impl Drop for Screen {
+    fn drop(&mut self) {
+        self.ended.store(true, Ordering::Relaxed);
+        if let Some(keyboard) = self.keyboard.take() {
+            let _ = keyboard.join();
+        }
+    }
+}
+
+impl View for Screen {
+    fn tell(&mut self, event: &Event) {
+        if let Some(out) = &mut self.events {
+            write_event(out.as_mut(), event);
+        }
+        if let Event::Phase { phase, .. } = event {
+            (self.standing.phase, self.standing.step) = (phase, None);
+        }
+        if let Event::Dwell { number, words, .. } = event {
+            self.log.push(format!("dwell {number}: {words}"));
+        }
+        // What is to be done and the half-widths have places of their own.
+        if !matches!(
+            event,
+            Event::Step { .. } | Event::Dwell { .. } | Event::Progress { .. }
+        ) {
+            let lines = report::wizard_lines(event).into_iter();
+            let lines = lines
+                .map(|l| l.trim().to_string())
+                .filter(|l| !l.is_empty());
+            self.log.extend(lines);
+            let spare = self.log.len().saturating_sub(KEPT);
+            self.log.drain(..spare);
+        }
+        // Nothing is shown in between while a calibration is judged or stored.
+        self.draw();
+    }
+
+    fn show(&mut self, standing: &Standing) {
+        self.standing = standing.clone();
+        self.draw();
+    }
+
+    fn wish(&mut self) -> Option<Wish> {
+        if self.stop.load(Ordering::Relaxed) {
+            return Some(Wish::Cancel);
+        }
+        while let Ok(key) = self.keys.try_recv() {
+            match key {
+                Key::Cancel => return Some(Wish::Cancel),
+                Key::Redo => return Some(Wish::RedoLast),
+                Key::Skip => return Some(Wish::Skip),
+                // An answer that was typed before the question is none.
+                Key::Yes | Key::No if self.question.is_none() => {}
+                Key::Yes | Key::No => self.answer = Some(key == Key::Yes),
+            }
+        }
+        None
+    }
+
+    fn ask(&mut self, question: &Question) -> Option<bool> {
+        if let Some(answer) = self.beforehand.answer(question) {
+            return Some(answer);
+        }
+        if self.question.as_ref() != Some(question) {
+            (self.question, self.answer) = (Some(question.clone()), None);
+            self.draw();
+        }
+        let answer = self.answer.take();
+        if answer.is_some() {
+            self.question = None;
+            self.draw();
+        }
+        answer
+    }
+}
+
+/// Takes keys until the end. A second wish for the end while nobody hears the first one ends the program: a diagnosis takes half a
+/// minute, and the terminal sends no signal in the state that it is in.
+fn listen(tell: &Sender<Key>, end: &AtomicBool) {
+    let mut cancelled = 0;
+    while !end.load(Ordering::Relaxed) {
+        match keys::poll(POLL) {
+            Ok(true) => {}
+            Ok(false) => continue,
+            Err(_) => return,
+        }
+        let Ok(keys::Event::Key(key)) = keys::read() else {
+            continue;
+        };
+        if key.kind != KeyEventKind::Press {
+            continue;
+        }
+        let control_c =
+            key.code == KeyCode::Char('c') && key.modifiers.contains(KeyModifiers::CONTROL);
+        cancelled += u32::from(control_c);
+        if cancelled == 2 {
+            ratatui::restore();
+            eprintln!("ended; the same command goes on from here");
+            std::process::exit(130);
+        }
+        let Some(key) = Key::of(key.code, key.modifiers) else {
+            continue;
+        };
+        if tell.send(key).is_err() {
+            return;
+        }
+    }
+}

@@ -1,0 +1,163 @@
+//! `mimu wizard` against the firmware's release image on the emulated board, on a turntable and in hands that it commands: what is killed,
+//! unplugged, garbled and moved ends in the right calibration or in a clear stop, and never in a wrong one that is stored.
+use super::bench::{Bench, in_repository, unit};
+use mimu::calibration::Calibration;
+use mimu::quantity::Sensor;
+use mimu_rig::rig_file::RigTruth;
+use mimu_rig::rotation::Vector;
+
+/// Twelve dwells of a second that determine both triads, little turned between them.
+fn short_plan(bench: &Bench) -> String {
+    let mut plan =
+        String::from("format = \"mimu-plan/1\"\nsample_rate_hz = 1000.0\ncarrier = \"table\"\n");
+    for up in [
+        "1.0, 0.0, 0.0",
+        "0.0, 1.0, 0.0",
+        "0.0, 0.0, 1.0",
+        "-1.0, 0.0, 0.0",
+        "0.0, -1.0, 0.0",
+        "0.0, 0.0, -1.0",
+    ] {
+        for rate in [-60.0, 60.0] {
+            plan += &format!("[[step]]\nup = [{up}]\nrate_dps = {rate:?}\ndwell_s = 1.0\n");
+        }
+    }
+    std::fs::write(bench.path("plan.toml"), plan).unwrap();
+    "plan.toml".into()
+}
+
+/// Largest error of the calibration over inputs of full size, beside the largest half-width of it: gyro (rad/s at 60 deg/s), accelerometer.
+fn errors(calibration: &Calibration, truth: &RigTruth) -> [f64; 2] {
+    let unit = &truth.file.unit;
+    let affine = [
+        unit.gyro_affine.as_ref().unwrap(),
+        unit.accel_affine.as_ref().unwrap(),
+    ];
+    // The firmware reads the gyros against the first one's reference pin, as if that were nominal.
+    let ratio = [2.5 / unit.gyro_reference_v.unwrap()[0], 1.0];
+    let size = [1.0, 9.793];
+    Sensor::BOTH.map(|sensor| {
+        let k = sensor as usize;
+        let inverse = calibration.inverse(sensor).unwrap();
+        let mut worst: f64 = 0.0;
+        for axis in 0..3 {
+            for sign in [1.0, -1.0, 0.0] {
+                let input: Vector =
+                    std::array::from_fn(|i| if i == axis { sign * size[k] } else { 0.0 });
+                let raw = nalgebra::Vector3::from_fn(|i, _| {
+                    let row = &affine[k].matrix[i];
+                    let sum: f64 = row.iter().zip(&input).map(|(m, x)| m * x).sum();
+                    ratio[k] * (sum + affine[k].bias[i])
+                });
+                let error = inverse.apply(&raw) - nalgebra::Vector3::from(input);
+                worst = worst.max(error.norm());
+            }
+        }
+        worst
+    })
+}
+
+#[test]
+fn a_session_that_was_killed_and_unplugged_goes_on_to_a_stored_calibration_that_holds_the_truth() {
+    let mut bench = Bench::new("table", unit(7), 7);
+    let plan = short_plan(&bench);
+    let arguments = [
+        "--fixture",
+        "table",
+        "--plan",
+        &plan,
+        "--as-planned",
+        "--dwell",
+        "1",
+        "--rate",
+        "60",
+    ];
+    let mut child = bench.wizard(&arguments).spawn().unwrap();
+    assert!(bench.heard(&mut child, "dwell", 3));
+    child.kill().unwrap();
+    child.wait().unwrap();
+    let journal = std::fs::read_to_string(bench.path("session/journal.jsonl")).unwrap();
+    let before = journal.lines().filter(|l| l.contains("\"dwell\"")).count();
+    assert!(before >= 3, "{journal}");
+
+    std::fs::remove_file(bench.path("events.jsonl")).unwrap();
+    let mut child = bench.wizard(&arguments).spawn().unwrap();
+    assert!(bench.heard(&mut child, "dwell", 2));
+    bench.tell("LINK OFF");
+    std::thread::sleep(std::time::Duration::from_millis(300));
+    bench.tell("LINK ON");
+    let interrupted = bench.heard(&mut child, "interrupted", 1);
+    let out = child.wait_with_output().unwrap();
+    assert!(interrupted, "{out:?}");
+    let told =
+        String::from_utf8_lossy(&out.stdout).into_owned() + &String::from_utf8_lossy(&out.stderr);
+    assert!(out.status.success(), "{told}");
+    assert!(
+        told.contains(&format!("goes on behind {before} dwells")),
+        "{told}"
+    );
+    let outcome = bench.outcome();
+    let found = &outcome["units"][0];
+    assert_eq!(found["dwells"], 12, "{told}");
+    assert_eq!(found["stored"], "session/calibration.toml", "{told}");
+
+    let calibration = Calibration::read(&bench.path("session/calibration.toml")).unwrap();
+    let [gyro, accel] = errors(&calibration, &bench.truth);
+    println!("errors: gyro {gyro:.5} rad/s, accel {accel:.5} m/s²");
+    // A dwell of a second is good to 0.06 deg/s and 0.3 mg.
+    assert!(gyro < 0.2f64.to_radians() && accel < 0.02, "{gyro} {accel}");
+    // The recording is one like any other.
+    let manifest =
+        std::fs::read_to_string(bench.path("session/calibration/recording.toml")).unwrap();
+    assert!(!manifest.contains("unfinished"), "{manifest}");
+}
+
+#[test]
+fn a_table_that_turns_the_wrong_axis_stops_the_session_and_nothing_is_stored() {
+    let bench = Bench::new("table", unit(7), 7);
+    let driver = std::fs::read_to_string(bench.path("driver.toml")).unwrap();
+    std::fs::write(
+        bench.path("driver.toml"),
+        driver.replace("{x} {y} {z}", "{y} {z} {x}"),
+    )
+    .unwrap();
+    let plan = short_plan(&bench);
+    let arguments = [
+        "--fixture",
+        "table",
+        "--plan",
+        &plan,
+        "--as-planned",
+        "--patience",
+        "4",
+    ];
+    let out = bench.wizard(&arguments).output().unwrap();
+    let told = String::from_utf8_lossy(&out.stderr);
+    assert_eq!(out.status.code(), Some(1), "{told}");
+    assert!(
+        told.contains("does not come about") && told.contains("wrong pose"),
+        "{told}"
+    );
+    assert!(!bench.path("session/calibration.toml").exists());
+}
+
+#[test]
+fn a_driver_file_with_a_mistake_is_refused_with_its_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let driver = folder.path().join("driver.toml");
+    let text = std::fs::read_to_string(in_repository("tests/board/demo/turntable.toml")).unwrap();
+    std::fs::write(&driver, text.replace("interlock =", "interlok =")).unwrap();
+    let out = std::process::Command::new(env!("CARGO_BIN_EXE_mimu"))
+        .args(["wizard", "--gravity", "9.8", "-o"])
+        .arg(folder.path().join("session"))
+        .arg("--driver")
+        .arg(&driver)
+        .output()
+        .unwrap();
+    let told = String::from_utf8_lossy(&out.stderr);
+    assert!(
+        told.contains("line 5") && told.contains("interlok"),
+        "{told}"
+    );
+    assert_eq!(out.status.code(), Some(1));
+}

@@ -1,0 +1,354 @@
+//! Lines that come when they come, as samples at a regular rate.
+//!
+//! A board samples at a steady rate, and its lines arrive late by what the USB and both systems make of it: some together, never one
+//! early. So the rate, and when a sample was taken, go by the lines that were delayed least. Where even the least delayed of the
+//! next half second is late by a period and more, lines are missing. With a clock of the board's own the same is done with its times,
+//! which have next to no delay.
+
+use std::collections::VecDeque;
+
+/// The rate is found from so many seconds: a least delay that varies by half a millisecond leaves 100 ppm of it, which is a twentieth
+/// of what a gyro's scale factor is wanted to by hand.
+const FOUND_S: f64 = 5.0;
+/// Parts of that, each with a line that is delayed least.
+const PARTS: usize = 10;
+/// Fewest lines for it.
+const FEWEST: usize = 4 * PARTS;
+/// So long is waited for a line that is delayed less; USB to serial converters keep bytes for 16 ms, and a busy computer for 200.
+const WINDOW_S: f64 = 0.5;
+/// How fast a drift of the clocks against each other is followed, s.
+const SMOOTHED_S: f64 = 2.0;
+/// Part of a period that a line is late by where one is missing.
+const LATE: f64 = 0.75;
+/// Least time that this is by the computer's clock, s: what its system may be late by for half a second.
+const JITTER_S: f64 = 2e-3;
+/// A clock that goes on by more than this, s, or back, has to do so for three lines in a row to be believed.
+const LEAP_S: f64 = 1.0;
+/// See [`LEAP_S`].
+const BELIEVED: usize = 3;
+
+/// A line with its time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Timed {
+    /// When it came or, by the board's clock, when it was taken, s.
+    pub t_s: f64,
+    /// Gyro x, y, z, accelerometer x, y, z, raw.
+    pub raw: [f64; 6],
+    /// °C, not a number where unknown.
+    pub temp_c: f64,
+}
+
+/// Samples with their ticks, from lines with their times.
+#[derive(Debug)]
+pub struct Regular {
+    period_s: Option<f64>,
+    /// Whether times are those of the board's clock.
+    own_clock: bool,
+    waiting: VecDeque<Timed>,
+    /// Tick of the next line if none is missing, and when that line is due if it is delayed least.
+    tick: u64,
+    due_s: Option<f64>,
+    last_s: Option<f64>,
+    odd: Vec<Timed>,
+    garbled: u64,
+}
+
+impl Regular {
+    /// With a rate that is known already, or that is to be found. `tick`: of the first sample.
+    pub fn new(rate_hz: Option<f64>, own_clock: bool, tick: u64) -> Self {
+        Self {
+            period_s: rate_hz.map(f64::recip),
+            own_clock,
+            waiting: VecDeque::new(),
+            tick,
+            due_s: None,
+            last_s: None,
+            odd: Vec::new(),
+            garbled: 0,
+        }
+    }
+
+    /// Samples a second, once that is known.
+    pub fn rate_hz(&self) -> Option<f64> {
+        self.period_s.map(f64::recip)
+    }
+
+    /// Lines whose time cannot be, and that were left out.
+    pub fn garbled(&self) -> u64 {
+        self.garbled
+    }
+
+    /// Takes a line. Whether the board's clock has begun anew: then all before is to be taken out with [`Regular::rest`], and
+    /// [`Regular::begin_anew`] goes on with what is behind.
+    pub fn take(&mut self, line: Timed) -> bool {
+        let leaps = |last: f64, t: f64| self.own_clock && !(t > last && t <= last + LEAP_S);
+        if self.last_s.is_some_and(|last| leaps(last, line.t_s)) {
+            if self.odd.last().is_some_and(|odd| leaps(odd.t_s, line.t_s)) {
+                self.garbled += self.odd.len() as u64;
+                self.odd.clear();
+            }
+            self.odd.push(line);
+            if self.odd.len() < BELIEVED {
+                return false;
+            }
+            if self.odd.first().map(|o| o.t_s) <= self.last_s {
+                return true;
+            }
+            self.waiting.extend(self.odd.drain(..));
+        } else {
+            self.garbled += self.odd.len() as u64;
+            self.odd.clear();
+            self.waiting.push_back(line);
+        }
+        self.last_s = Some(line.t_s);
+        if self.period_s.is_none() {
+            self.find();
+        }
+        false
+    }
+
+    /// Goes on behind a restart of the board. How long that took nobody knows: more than nothing is all that is claimed.
+    pub fn begin_anew(&mut self) {
+        self.waiting = self.odd.drain(..).collect();
+        self.last_s = self.waiting.back().map(|l| l.t_s);
+        self.due_s = None;
+        self.tick += 1;
+    }
+
+    /// The next sample whose tick is certain; `now_s` on the clock of the lines, where that goes on without them.
+    pub fn certain(&mut self, now_s: Option<f64>) -> Option<(u64, Timed)> {
+        let last = now_s.or(self.waiting.back().map(|l| l.t_s))?;
+        let is = last - self.waiting.front()?.t_s >= WINDOW_S;
+        is.then(|| self.settle()).flatten()
+    }
+
+    /// The next sample, certain or not.
+    pub fn rest(&mut self) -> Option<(u64, Timed)> {
+        self.settle()
+    }
+
+    fn settle(&mut self) -> Option<(u64, Timed)> {
+        let period = self.period_s?;
+        let first = *self.waiting.front()?;
+        let due = self.due_s.unwrap_or(first.t_s);
+        let near = self
+            .waiting
+            .iter()
+            .take_while(|l| l.t_s <= first.t_s + WINDOW_S);
+        let late = (0..)
+            .zip(near)
+            .map(|(k, l)| l.t_s - (due + f64::from(k) * period));
+        let late = late.fold(f64::INFINITY, f64::min);
+        let least = LATE * period;
+        let least = if self.own_clock {
+            least
+        } else {
+            least.max(JITTER_S)
+        };
+        let missing = match late > least {
+            true => (late / period).round(),
+            false => 0.0,
+        };
+        let late = late - missing * period;
+        // Nothing comes before it is sent: what is early shows that the others were late.
+        let follow = if late < 0.0 {
+            1.0
+        } else {
+            (period / SMOOTHED_S).min(1.0)
+        };
+        self.due_s = Some(due + (missing + 1.0) * period + follow * late);
+        let tick = self.tick + missing as u64;
+        self.tick = tick + 1;
+        self.waiting.pop_front();
+        Some((tick, first))
+    }
+
+    /// Finds the rate, if there is enough to go by.
+    fn find(&mut self) {
+        let (Some(first), Some(last)) = (self.waiting.front(), self.waiting.back()) else {
+            return;
+        };
+        if self.waiting.len() < FEWEST || last.t_s - first.t_s < FOUND_S {
+            return;
+        }
+        let times: Vec<f64> = self.waiting.iter().map(|l| l.t_s).collect();
+        self.period_s = Some(period(&times, self.own_clock));
+    }
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values[values.len() / 2]
+}
+
+/// Period of lines by their times, whatever their delays, and where some lines are missing.
+fn period(times: &[f64], own_clock: bool) -> f64 {
+    let apart = times.len() / 5;
+    let pairs = times.iter().zip(&times[apart..]);
+    // A gap is in a fifth of the pairs, and leaves the median alone.
+    let mut period = median(pairs.map(|(a, b)| (b - a) / apart as f64).collect());
+    for _ in 0..3 {
+        let late = |k: &usize| times[*k] - *k as f64 * period;
+        let part = |n: usize| n * times.len() / PARTS..(n + 1) * times.len() / PARTS;
+        let least: Vec<usize> = (0..PARTS)
+            .filter_map(|n| part(n).min_by(|a, b| late(a).total_cmp(&late(b))))
+            .collect();
+        let steps: Vec<f64> = least
+            .windows(2)
+            .map(|p| late(&p[1]) - late(&p[0]))
+            .collect();
+        let usual = median(steps.clone());
+        // Both ends of a step are least delays, and half a period is nearer to one line that is missing than to none.
+        let limit = 0.5 * period + if own_clock { 0.0 } else { JITTER_S };
+        let leaps = steps.iter().filter(|s| (*s - usual).abs() > limit);
+        let missing: f64 = leaps.map(|s| ((s - usual) / period).round()).sum();
+        let (first, last) = (least[0], least[PARTS - 1]);
+        period = (times[last] - times[first]) / ((last - first) as f64 + missing);
+    }
+    period
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Numbers that look random, from 0 to 1, the same each time.
+    fn chance(k: usize, of: f64) -> f64 {
+        (k as f64 * of + (k * k) as f64 * 0.414_213_56).fract()
+    }
+
+    fn line(k: usize, t_s: f64) -> Timed {
+        Timed {
+            t_s,
+            raw: [k as f64; 6],
+            temp_c: f64::NAN,
+        }
+    }
+
+    /// Samples 0, 1, 2, … at this rate arrive by these rules; which tick each has got, less that of the first.
+    fn arrived(
+        rate_hz: f64,
+        count: usize,
+        lost: impl Fn(usize) -> bool,
+        delay_s: impl Fn(usize) -> f64,
+    ) -> (f64, Vec<(usize, u64)>) {
+        let mut regular = Regular::new(None, false, 0);
+        let (mut all, mut now) = (Vec::new(), 0.0_f64);
+        for k in (0..count).filter(|k| !lost(*k)) {
+            now = now.max(k as f64 / rate_hz + delay_s(k));
+            regular.take(line(k, now));
+            while let Some((tick, line)) = regular.certain(None) {
+                all.push((line.raw[0] as usize, tick));
+            }
+        }
+        (regular.rate_hz().unwrap(), all)
+    }
+
+    fn holds(all: &[(usize, u64)], tolerated: u64) {
+        let first = all[0].0 as u64;
+        for (k, tick) in all {
+            let off = (*k as u64 - first).abs_diff(*tick);
+            assert!(off <= tolerated, "sample {k} has tick {tick}");
+        }
+    }
+
+    #[test]
+    fn lines_that_the_usb_delivers_together_are_apart_again_at_their_rate() {
+        // Every 16 ms what has come, and some more by chance; 4 ms long the least.
+        let bundle = |k: usize, rate: f64| {
+            let t = k as f64 / rate;
+            let poll = (t / 0.016).ceil();
+            poll * 0.016 - t + 0.004 * chance(poll as usize, 0.618)
+        };
+        for rate in [23.7, 100.03, 333.0, 1000.2] {
+            let count = (20.0 * rate) as usize;
+            let (found, all) = arrived(rate, count, |_| false, |k| bundle(k, rate));
+            assert!((found / rate - 1.0).abs() < 1e-3, "{found} of {rate}");
+            holds(&all, 0);
+            assert!(all.len() as f64 > 19.0 * rate);
+        }
+    }
+
+    #[test]
+    fn lines_that_were_dropped_are_missing_ticks_where_they_were() {
+        let lost = |k: usize| [50, 250, 251, 900, 901, 902, 903].contains(&k) || k / 40 == 33;
+        let (found, all) = arrived(100.0, 2000, lost, |k| 0.003 * chance(k, 0.618));
+        assert!((found / 100.0 - 1.0).abs() < 1e-3, "{found}");
+        holds(&all, 0);
+    }
+
+    #[test]
+    fn a_computer_that_is_busy_for_a_while_loses_no_sample_and_no_time() {
+        // Nothing is read for 0.3 s, four times.
+        let busy = |k: usize| match k % 500 {
+            k @ 0..30 => (30 - k) as f64 / 100.0,
+            _ => 0.001 * chance(k, 0.618),
+        };
+        let (_, all) = arrived(100.0, 2000, |_| false, busy);
+        holds(&all, 0);
+    }
+
+    #[test]
+    fn a_board_that_pauses_has_taken_no_samples_meanwhile() {
+        let pause = |k: usize| if k >= 800 { 0.25 } else { 0.0 };
+        let (_, all) = arrived(100.0, 1600, |_| false, pause);
+        let of = |k: usize| all.iter().find(|a| a.0 == k).unwrap().1;
+        assert_eq!(of(799) - of(0), 799);
+        assert_eq!(of(801) - of(799), 2 + 25);
+    }
+
+    #[test]
+    fn clocks_that_drift_apart_make_no_sample_missing() {
+        let (_, all) = arrived(
+            200.0,
+            40_000,
+            |_| false,
+            |k| {
+                // 200 ppm, which begin when the rate has been found.
+                let t = k as f64 / 200.0;
+                0.001 * chance(k, 0.618) + 2e-4 * (t - 10.0).max(0.0)
+            },
+        );
+        holds(&all, 0);
+    }
+
+    #[test]
+    fn a_clock_in_whole_milliseconds_gives_a_rate_that_is_none_of_them() {
+        let mut regular = Regular::new(None, true, 7);
+        let mut ticks = Vec::new();
+        for k in 0..6000 {
+            if k != 4000 {
+                let t_s = (k as f64 / 0.4).floor() / 1000.0;
+                assert!(!regular.take(line(k, t_s)));
+            }
+            ticks.extend(std::iter::from_fn(|| regular.certain(None)));
+        }
+        let rate = regular.rate_hz().unwrap();
+        assert!((rate / 400.0 - 1.0).abs() < 3e-4, "{rate}");
+        for (tick, line) in ticks {
+            assert_eq!(tick, 7 + line.raw[0] as u64);
+        }
+    }
+
+    #[test]
+    fn a_time_that_was_garbled_is_left_out_and_one_that_goes_back_for_good_is_a_restart() {
+        let mut regular = Regular::new(Some(100.0), true, 0);
+        for k in 0..300 {
+            let t_s = match k {
+                100 => 0.1,
+                200 => 1e9,
+                _ => k as f64 / 100.0,
+            };
+            assert!(!regular.take(line(k, t_s)), "{k}");
+        }
+        assert_eq!(regular.garbled(), 2);
+        let begun: Vec<bool> = (0..3)
+            .map(|k| regular.take(line(k, 0.01 * k as f64)))
+            .collect();
+        assert_eq!(begun, [false, false, true]);
+        let before = std::iter::from_fn(|| regular.rest()).last().unwrap();
+        assert_eq!(before.0, 299);
+        regular.begin_anew();
+        assert_eq!(regular.rest().unwrap().0, 301);
+    }
+}

@@ -1,0 +1,413 @@
+//! Lines of text as readings: which numbers are what, and which lines are none.
+//!
+//! Sketches write numbers with commas, semicolons, tabs or blanks between them, often a label in front (`a/g:`, `Accel: 1, 2, 3 Gyro: …`)
+//! or one for each number (`ax:1,ay:2`, the Arduino plotter's way), and words of greeting before. MotionCal's boards write `Raw:` with
+//! nine integers and, in turns with it, `Uni:` with nine of the same in SI.
+
+use mimu_recording::error::{Error, Result};
+
+/// Longest line, bytes; a board that writes none of them as long as this with ten numbers.
+const LONGEST: usize = 400;
+/// So many lines that are not data are kept to be shown.
+const SHOWN: usize = 3;
+
+/// What a number of a line is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Column {
+    /// Gyro x, y, z, accelerometer x, y, z.
+    Channel(usize),
+    /// The board's clock; seconds in one of its units, and where it begins anew, s.
+    Clock { unit_s: f64, wraps_s: f64 },
+    /// °C.
+    Temperature,
+    /// Not needed.
+    Skipped,
+}
+
+/// The columns of a line.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Columns {
+    names: String,
+    columns: Vec<Column>,
+}
+
+const CHANNELS: [&str; 6] = ["gx", "gy", "gz", "ax", "ay", "az"];
+/// What sketches count in 32 bits.
+const BITS: f64 = 4_294_967_296.0;
+
+impl Columns {
+    /// From names with commas between them: `ax`, `ay`, `az`, `gx`, `gy`, `gz`, at most one of `t_us`, `t_ms` and `t_s`, `temp_c`, and
+    /// `-` for what is not needed.
+    ///
+    /// Errors: a name that there is not, or is there twice; a missing axis.
+    pub fn parse(names: &str) -> Result<Self> {
+        let refused = |problem: String| {
+            let remedy = "name ax, ay, az, gx, gy and gz in the order of the line, also t_us, t_ms or t_s, temp_c, and `-` for what is not needed";
+            Error::new(format!("--text {names:?}"), problem, remedy)
+        };
+        let mut columns = Vec::new();
+        for name in names.split(',').map(str::trim) {
+            let clock = |unit_s: f64, wraps_s: f64| Column::Clock { unit_s, wraps_s };
+            let channel = CHANNELS.iter().position(|c| *c == name);
+            let column = match (name, channel) {
+                (_, Some(channel)) => Column::Channel(channel),
+                ("t_us", _) => clock(1e-6, 1e-6 * BITS),
+                ("t_ms", _) => clock(1e-3, 1e-3 * BITS),
+                ("t_s", _) => clock(1.0, f64::INFINITY),
+                ("temp_c", _) => Column::Temperature,
+                ("-", _) => Column::Skipped,
+                _ => return Err(refused(format!("there is no column {name:?}"))),
+            };
+            let alike = |other: &Column| match (other, column) {
+                (Column::Clock { .. }, Column::Clock { .. }) => true,
+                (other, column) => *other == column && column != Column::Skipped,
+            };
+            if columns.iter().any(alike) {
+                return Err(refused(format!("{name} is there a second time")));
+            }
+            columns.push(column);
+        }
+        for (k, name) in CHANNELS.iter().enumerate() {
+            if !columns.contains(&Column::Channel(k)) {
+                return Err(refused(format!("there is no {name}")));
+            }
+        }
+        Ok(Self {
+            names: names.into(),
+            columns,
+        })
+    }
+
+    /// `Raw:` of MotionCal: accelerometer, gyro, and a magnetometer, which is not needed.
+    fn motion_cal() -> Self {
+        let mut columns: Vec<Column> = [3, 4, 5, 0, 1, 2].map(Column::Channel).to_vec();
+        columns.extend([Column::Skipped; 3]);
+        Self {
+            names: "Raw:ax,ay,az,gx,gy,gz,mx,my,mz".into(),
+            columns,
+        }
+    }
+
+    /// Whether the board has a clock of its own.
+    pub fn has_clock(&self) -> bool {
+        let is_clock = |c: &Column| matches!(c, Column::Clock { .. });
+        self.columns.iter().any(is_clock)
+    }
+}
+
+/// The numbers of a line.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Reading {
+    /// Gyro x, y, z, accelerometer x, y, z, raw.
+    pub raw: [f64; 6],
+    /// °C, not a number where there is none.
+    pub temp_c: f64,
+    /// The board's clock, s, where there is one.
+    pub t_s: Option<f64>,
+}
+
+/// Bytes in, readings out.
+#[derive(Debug)]
+pub struct Lines {
+    columns: Columns,
+    open: Vec<u8>,
+    /// What is before the first end of a line may be its second half.
+    whole: bool,
+    /// What stands before the first number of the lines that are data.
+    label: Option<String>,
+    count: u64,
+    refused: u64,
+    /// Lines of numbers with another label than those that are data.
+    others: u64,
+    first_seen: Vec<String>,
+    last_clock: Option<f64>,
+    wrapped_s: f64,
+}
+
+impl Lines {
+    /// Of lines with these columns, or of MotionCal.
+    pub fn new(columns: Columns) -> Self {
+        Self {
+            columns,
+            open: Vec::new(),
+            whole: false,
+            label: None,
+            count: 0,
+            refused: 0,
+            others: 0,
+            first_seen: Vec::new(),
+            last_clock: None,
+            wrapped_s: 0.0,
+        }
+    }
+
+    /// Takes bytes; the lines that end in them and are data.
+    pub fn take(&mut self, bytes: &[u8]) -> Vec<Reading> {
+        let mut readings = Vec::new();
+        for byte in bytes {
+            match byte {
+                b'\n' | b'\r' => {
+                    let line = std::mem::take(&mut self.open);
+                    if !self.whole {
+                        self.whole = true;
+                        continue;
+                    }
+                    let text = String::from_utf8_lossy(&line);
+                    if !text.trim().is_empty() {
+                        readings.extend(self.line(text.trim()));
+                    }
+                }
+                // What is longer is no line of numbers, whatever follows.
+                _ if self.open.len() > LONGEST => {}
+                byte => self.open.push(*byte),
+            }
+        }
+        readings
+    }
+
+    fn line(&mut self, text: &str) -> Option<Reading> {
+        let parsed = numbers(text);
+        let other = |(label, _): &(&str, Vec<f64>)| self.label.as_ref().is_some_and(|l| l != label);
+        if parsed.as_ref().is_some_and(other) {
+            self.others += 1;
+            return None;
+        }
+        let found = parsed.and_then(|(label, numbers)| self.reading(label, &numbers));
+        match found {
+            Some(reading) => {
+                self.count += 1;
+                Some(reading)
+            }
+            None => {
+                self.refused += 1;
+                if self.first_seen.len() < SHOWN {
+                    let short: String = text.chars().take(60).collect();
+                    self.first_seen.push(short);
+                }
+                None
+            }
+        }
+    }
+
+    fn reading(&mut self, label: &str, numbers: &[f64]) -> Option<Reading> {
+        if numbers.len() != self.columns.columns.len() {
+            let motion_cal = Columns::motion_cal();
+            let is = self.label.is_none() && label == "Raw";
+            if !is || numbers.len() != motion_cal.columns.len() {
+                return None;
+            }
+            self.columns = motion_cal;
+        }
+        if self.label.is_none() {
+            self.label = Some(label.to_owned());
+        }
+        let mut reading = Reading {
+            raw: [0.0; 6],
+            temp_c: f64::NAN,
+            t_s: None,
+        };
+        for (column, number) in self.columns.columns.iter().zip(numbers) {
+            match column {
+                Column::Channel(c) => reading.raw[*c] = *number,
+                Column::Temperature => reading.temp_c = *number,
+                Column::Skipped => {}
+                Column::Clock { unit_s, wraps_s } => {
+                    let t_s = number * unit_s;
+                    // 32 bits of microseconds are full after 71 minutes. A clock that goes back elsewhere has been set to 0.
+                    let near = 10.0;
+                    let last = self.last_clock.unwrap_or(t_s);
+                    if last > wraps_s - near && t_s < near {
+                        self.wrapped_s += wraps_s;
+                    }
+                    self.last_clock = Some(t_s);
+                    reading.t_s = Some(t_s + self.wrapped_s);
+                }
+            }
+        }
+        Some(reading)
+    }
+
+    /// Lines that were data.
+    pub fn count(&self) -> u64 {
+        self.count
+    }
+
+    /// Lines that were not, without the first, which may be a half.
+    pub fn refused(&self) -> u64 {
+        self.refused
+    }
+
+    /// Lines that turned out not to be data by their time.
+    pub fn refuse(&mut self, count: u64) {
+        self.refused += count;
+        self.count -= count.min(self.count);
+        if count > 0 && self.first_seen.is_empty() {
+            self.first_seen.push("a time that cannot be".into());
+        }
+    }
+
+    /// The first lines that were not data.
+    pub fn first_seen(&self) -> &[String] {
+        &self.first_seen
+    }
+
+    /// How many lines were not data, and the first of them; `None` if all were.
+    pub fn refused_in_words(&self) -> Option<String> {
+        let first = self.first_seen.first()?;
+        Some(format!(
+            "{} of {} lines are not data, the first {first:?}",
+            self.refused,
+            self.refused + self.count
+        ))
+    }
+
+    /// How many lines of numbers had another label; `None` if none had.
+    pub fn others_in_words(&self) -> Option<String> {
+        let label = self.label.as_deref().unwrap_or_default();
+        let others = self.others;
+        (others > 0).then(|| match label {
+            "" => format!("{others} lines with a label are left out"),
+            label => format!("{others} lines without the label {label:?} are left out"),
+        })
+    }
+
+    /// Whether the board has a clock of its own.
+    pub fn has_clock(&self) -> bool {
+        self.columns.has_clock()
+    }
+
+    /// What a line of data is.
+    pub fn description(&self) -> String {
+        format!(
+            "{} numbers, {}",
+            self.columns.columns.len(),
+            self.columns.names
+        )
+    }
+}
+
+/// The label in front and the numbers of a line; `None` if anything else is in it.
+fn numbers(text: &str) -> Option<(&str, Vec<f64>)> {
+    let mut label = "";
+    let mut numbers = Vec::new();
+    for word in text.split([',', ';', '\t', ' ']) {
+        let number = match word.rfind([':', '=']) {
+            Some(at) => {
+                if numbers.is_empty() && label.is_empty() {
+                    label = &word[..at];
+                }
+                &word[at + 1..]
+            }
+            None => word,
+        };
+        if number.is_empty() {
+            continue;
+        }
+        let value: f64 = number.parse().ok().filter(|v: &f64| v.is_finite())?;
+        numbers.push(value);
+    }
+    Some((label, numbers))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SIX: &str = "ax,ay,az,gx,gy,gz";
+
+    fn read(columns: &str, text: &str) -> (Vec<Reading>, Lines) {
+        let mut lines = Lines::new(Columns::parse(columns).unwrap());
+        let readings = lines.take(format!("cut,1\n{text}").as_bytes());
+        (readings, lines)
+    }
+
+    #[test]
+    fn sketches_separate_and_label_their_numbers_in_many_ways() {
+        for line in [
+            "1,2,3,4,5,6\r\n",
+            "1, 2, 3, 4, 5, 6,\n",
+            "1;2;3;4;5;6\n",
+            "1\t2\t3\t4\t5\t6\t\r\n",
+            "1.0 2.00 3e0  +4 5 6\r",
+            "a/g:\t1\t2\t3\t4\t5\t6\n",
+            "ax:1,ay:2,az:3,gx:4,gy:5,gz:6\n",
+            "ax=1 ay=2 az=3 gx=4 gy=5 gz=6\n",
+            "Accel: 1, 2, 3 Gyro: 4, 5, 6\n",
+        ] {
+            let (readings, lines) = read(SIX, line);
+            assert_eq!(readings.len(), 1, "{line}");
+            assert_eq!(readings[0].raw, [4.0, 5.0, 6.0, 1.0, 2.0, 3.0], "{line}");
+            assert_eq!(lines.refused(), 0, "{line}");
+        }
+    }
+
+    #[test]
+    fn what_is_no_data_is_counted_and_the_first_of_it_is_shown() {
+        let (readings, lines) = read(
+            SIX,
+            "MPU6050 OK\n1,2,3,4,5,6\n1,2,3,4,5\n1,2,3,4,5,nan\n1,2,3,4,5,6,7\n\u{fffd},2,3,4,5,6\n\n9,2,3,4,5,6\n",
+        );
+        assert_eq!((readings.len(), lines.refused()), (2, 5));
+        let words = lines.refused_in_words().unwrap();
+        assert_eq!(words, "5 of 7 lines are not data, the first \"MPU6050 OK\"");
+    }
+
+    #[test]
+    fn the_first_line_may_be_cut_and_never_counts() {
+        let mut lines = Lines::new(Columns::parse(SIX).unwrap());
+        assert!(lines.take(b"34,2,3,4,5,6\n").is_empty());
+        assert_eq!(lines.take(b"1234,2,3,4,").len(), 0);
+        assert_eq!(lines.take(b"5,6\n")[0].raw[3], 1234.0);
+    }
+
+    #[test]
+    fn motion_cal_is_known_by_itself_and_its_lines_in_si_are_left_out() {
+        let raw = "Raw:10,20,8192,1,2,3,400,500,600\r\nUni:0.01,0.02,9.8,0.1,0.2,0.3,40,50,60\r\n";
+        let (readings, lines) = read(SIX, &raw.repeat(3));
+        assert_eq!((readings.len(), lines.refused()), (3, 0));
+        let words = lines.others_in_words().unwrap();
+        assert_eq!(words, "3 lines without the label \"Raw\" are left out");
+        assert_eq!(readings[0].raw, [1.0, 2.0, 3.0, 10.0, 20.0, 8192.0]);
+    }
+
+    #[test]
+    fn columns_may_be_left_out_and_a_clock_and_a_temperature_be_there() {
+        let (readings, _) = read(
+            "t_ms,ax,ay,az,-,gx,gy,gz,temp_c",
+            "1500,1,2,3,99,4,5,6,25.5\n",
+        );
+        assert_eq!(readings[0].t_s, Some(1.5));
+        assert_eq!(readings[0].temp_c, 25.5);
+        assert_eq!(readings[0].raw, [4.0, 5.0, 6.0, 1.0, 2.0, 3.0]);
+    }
+
+    #[test]
+    fn microseconds_go_on_behind_32_bits() {
+        let (readings, _) = read(
+            "t_us,ax,ay,az,gx,gy,gz",
+            "4294960000,1,2,3,4,5,6\n2704,1,2,3,4,5,6\n",
+        );
+        let t = |k: usize| readings[k].t_s.unwrap();
+        assert!((t(1) - t(0) - 0.01).abs() < 1e-9);
+    }
+
+    #[test]
+    fn columns_that_cannot_be_are_refused_with_the_name() {
+        for (names, says) in [
+            ("ax,ay,az,gx,gy", "there is no gz"),
+            ("ax,ay,az,gx,gy,gz,ax", "ax is there a second time"),
+            ("t_s,t_ms,ax,ay,az,gx,gy,gz", "t_ms is there a second time"),
+            ("ax,ay,az,gx,gy,gz,mx", "there is no column \"mx\""),
+        ] {
+            let error = Columns::parse(names).unwrap_err().to_string();
+            assert!(error.contains(says), "{error}");
+        }
+    }
+
+    #[test]
+    fn a_line_without_an_end_takes_no_memory() {
+        let mut lines = Lines::new(Columns::parse(SIX).unwrap());
+        lines.take(&vec![b'7'; 1_000_000]);
+        assert!(lines.open.len() <= LONGEST + 1);
+    }
+}
