@@ -143,10 +143,14 @@ fn a_board_that_writes_lines_ends_in_a_calibration_whose_intervals_hold_its_para
         for i in 0..3 {
             for j in 0..3 {
                 if sensor == Sensor::Gyro || j <= i {
-                    judge(table.C[i][j], table.interval_C[i][j], matrix[(i, j)]);
+                    judge(
+                        table.C[i][j],
+                        table.interval_C.unwrap()[i][j],
+                        matrix[(i, j)],
+                    );
                 }
             }
-            judge(table.o[i], table.interval_o[i], offset[i]);
+            judge(table.o[i], table.interval_o.unwrap()[i], offset[i]);
         }
     }
     // Of 21 intervals of 95 % five and more miss with a chance of 0.3 %.
