@@ -22,12 +22,12 @@ use serde_json::Value;
 const EFFECTS: [&str; 9] = [
     "gyro_g_sensitivity",
     "accel_scale_quadratic",
-    "gyro_scale_quadratic",
+    "accel_cross_axis_product",
     "accel_size_effect",
     "gyro_scale_asymmetry",
     "x_gyro_g_squared",
     "accel_scale_cubic",
-    "gyro_scale_cubic",
+    "gyro_readout_code",
     "x_gyro_dead_zone",
 ];
 
