@@ -19,7 +19,8 @@ fn the_fit_in_the_readme_is_that_of_the_example() {
     );
     let printed = String::from_utf8(example.stdout).unwrap();
     let readme = std::fs::read_to_string(root.join("README.md")).unwrap();
-    let shown = readme.split("```\n").nth(1).unwrap().trim_end();
+    let (_, below) = readme.split_once("make example -->\n```\n").unwrap();
+    let shown = below.split("```\n").next().unwrap().trim_end();
     assert!(
         printed.contains(shown),
         "the README shows\n{shown}\nand the example prints\n{printed}"
