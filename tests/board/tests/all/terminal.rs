@@ -103,7 +103,8 @@ fn at_the_pace_of_the_wall_a_second_takes_no_less_than_a_second() {
 fn the_command_that_the_page_of_the_bench_shows_is_served() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let page = std::fs::read_to_string(root.join("docs/bench.md")).unwrap();
-    let mut commands = page.lines().filter(|l| l.contains("mimu-board -- serve"));
+    let with_unit = |l: &&str| l.contains("mimu-board -- serve") && l.contains("--unit");
+    let mut commands = page.lines().filter(with_unit);
     let words: Vec<&str> = commands.next().unwrap().split_whitespace().collect();
     assert_eq!(commands.next(), None);
     let option = |name: &str| {
