@@ -58,6 +58,7 @@ fn errors(calibration: &Calibration, truth: &RigTruth) -> [f64; 2] {
 }
 
 #[test]
+#[ignore = "nightly: a whole session on the emulated board takes a minute"]
 fn a_session_that_was_killed_and_unplugged_goes_on_to_a_stored_calibration_that_holds_the_truth() {
     let mut bench = Bench::new("table", unit(7), 7);
     let plan = short_plan(&bench);
