@@ -347,6 +347,13 @@ impl Taking {
         self.manifest.dropped_steps.push(number);
     }
 
+    /// So many samples are missing between those that came.
+    pub fn missing(&mut self, samples: u64) {
+        if let Some(recorded) = &mut self.manifest.recorded {
+            recorded.missing += samples;
+        }
+    }
+
     /// The device has restarted, at this time of the recording, s.
     pub fn restarted(&mut self, t_s: f64, start: String) {
         if let Some(recorded) = &mut self.manifest.recorded {

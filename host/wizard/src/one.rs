@@ -140,20 +140,14 @@ impl One {
         }
         self.part = part;
         self.taking = Some(Taking::begin(&self.folder, part, columns, manifest)?);
-        self.number = self
-            .folder
-            .dwells(part)
-            .iter()
-            .map(|d| d.0 + 1)
-            .max()
-            .unwrap_or(0);
-        let redone = self.folder.entries().iter().filter_map(|e| match e {
+        // Those that do not count keep their numbers.
+        let had = self.folder.entries().iter().filter_map(|e| match e {
             Entry::Dwell {
                 part: of, number, ..
             } if *of == part => Some(number + 1),
             _ => None,
         });
-        self.number = redone.max().unwrap_or(0).max(self.number);
+        self.number = had.max().unwrap_or(0);
         // What waits is of the time before.
         while self.station.news()?.is_some() {}
         (self.pending, self.dwell, self.next) = (Batch::default(), None, None);
@@ -234,6 +228,9 @@ impl One {
         self.next = Some(chunk.tick + chunk.values.len() as u64);
         self.power_on_s = chunk.power_on_s;
         self.standing.lost += missing;
+        if let Some(taking) = &mut self.taking {
+            taking.missing(missing);
+        }
         self.standing.samples += chunk.values.len() as u64;
         let rate_hz = self.station.unit.rate_hz;
         let rows = &mut self.pending;
