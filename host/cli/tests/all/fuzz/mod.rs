@@ -468,12 +468,15 @@ fn environment(name: &str) -> Option<u64> {
     )
 }
 
-/// Ends the process when a case makes no progress: a thread that hangs cannot be stopped.
-fn watch(case: Arc<AtomicU64>, seed: u64) {
+/// Ends the process when a case makes no progress: a thread that hangs cannot be stopped. It ends with the
+/// test that holds `case`: the tests beside it may run for longer than a case is allowed to.
+fn watch(case: &Arc<AtomicU64>, seed: u64) {
+    let case = Arc::downgrade(case);
     std::thread::spawn(move || {
         let (mut last, mut since) = (u64::MAX, Instant::now());
         loop {
             std::thread::sleep(Duration::from_millis(500));
+            let Some(case) = case.upgrade() else { return };
             let now = case.load(Ordering::Relaxed);
             if now != last {
                 (last, since) = (now, Instant::now());
@@ -493,7 +496,7 @@ fn no_mutation_ends_in_a_panic_a_hang_or_a_number_that_is_none() {
     let folder = tempfile::tempdir().unwrap();
     let seeds = Seeds::new(folder.path());
     let current = Arc::new(AtomicU64::new(0));
-    watch(current.clone(), seed);
+    watch(&current, seed);
     let default_hook = std::panic::take_hook();
     if only.is_none() {
         // Readers catch the panics of their decoders, which would fill the screen.
