@@ -14,6 +14,8 @@ pub struct Bank {
     triad: Triad,
     noise: Vector3<f32>,
     filters: kalman::Bank<f32>,
+    /// Filters and updates to go back to.
+    kept: (kalman::Bank<f32>, u32),
     input: Option<Vector3<f32>>,
     last: u32,
     updates: u32,
@@ -45,6 +47,7 @@ impl Bank {
         noise_is.then_some(Self {
             triad,
             noise,
+            kept: (filters, 0),
             filters,
             input: None,
             last: 0,
@@ -62,6 +65,17 @@ impl Bank {
             self.input = input.map(Vector3::from);
         }
         finite
+    }
+
+    /// Keeps what it knows.
+    pub fn keep(&mut self) {
+        self.kept = (self.filters, self.updates);
+    }
+
+    /// Knows again what was kept; takes no sample in until it is told the input.
+    pub fn back(&mut self) {
+        (self.filters, self.updates) = self.kept;
+        self.input = None;
     }
 
     /// Samples that were lost.

@@ -161,17 +161,12 @@ impl Commands<'_> {
                 prior,
             } => self.start_bank(triad, noise, prior)?,
             Request::KalmanInput { triad, input } => {
-                let set = pipeline.lock(|p| {
-                    let mut p = p.borrow_mut();
-                    let bank = p.banks[triad as usize].as_mut();
-                    bank.map(|bank| bank.set_input(input))
-                });
-                match set {
-                    Some(true) => {}
-                    Some(false) => return Err(Refusal::BadNumber),
-                    None => return Err(Refusal::NoBank),
+                if !self.with_bank(triad, |bank| bank.set_input(input))? {
+                    return Err(Refusal::BadNumber);
                 }
             }
+            Request::KalmanKeep { triad } => self.with_bank(triad, Bank::keep)?,
+            Request::KalmanBack { triad } => self.with_bank(triad, Bank::back)?,
             Request::KalmanEnd { triad } => {
                 let bank = pipeline.lock(|p| p.borrow_mut().banks[triad as usize].take());
                 let bank = bank.ok_or(Refusal::NoBank)?;
@@ -188,6 +183,17 @@ impl Commands<'_> {
         self.pipeline
             .lock(|p| p.borrow_mut().banks[triad as usize] = Some(bank));
         Ok(())
+    }
+
+    fn with_bank<T>(
+        &self,
+        triad: Triad,
+        errand: impl FnOnce(&mut Bank) -> T,
+    ) -> Result<T, Refusal> {
+        self.pipeline.lock(|p| {
+            let bank = &mut p.borrow_mut().banks[triad as usize];
+            bank.as_mut().map(errand).ok_or(Refusal::NoBank)
+        })
     }
 
     async fn commit(&mut self) -> Result<(), Refusal> {

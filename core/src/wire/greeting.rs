@@ -11,7 +11,7 @@ use crate::stored;
 pub const MAGIC: [u8; 4] = *b"mimu";
 
 /// The protocol of this build.
-pub const PROTOCOL: Version = Version { major: 2, minor: 0 };
+pub const PROTOCOL: Version = Version { major: 2, minor: 1 };
 
 /// Version of a protocol.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize)]

@@ -88,6 +88,17 @@ pub enum Request<'a> {
         /// Of the sensors.
         triad: Triad,
     },
+    /// Keep what the bank knows now, for [`Request::KalmanBack`]. → [`Reply::Done`]
+    KalmanKeep {
+        /// Of the sensors.
+        triad: Triad,
+    },
+    /// Know again what was kept, or what the bank began with; the input is unknown from now on. What came in between is forgotten, as of a
+    /// dwell in which the unit moved. → [`Reply::Done`]
+    KalmanBack {
+        /// Of the sensors.
+        triad: Triad,
+    },
 }
 
 /// What the device sends.

@@ -107,6 +107,8 @@ fn requests() {
     );
     let triad = Triad::Gyro;
     request(Request::KalmanEnd { triad }, "0c 00");
+    request(Request::KalmanKeep { triad }, "0d 00");
+    request(Request::KalmanBack { triad }, "0e 00");
 }
 
 fn greeting<'a>(start: Start<'a>, stored: Option<StoredInfo>, slots: [Slot; 2]) -> Message<'a> {

@@ -133,6 +133,29 @@ pub enum Event {
     },
 }
 
+impl Event {
+    /// The unit that it is about, if it is about one.
+    pub fn unit(&self) -> Option<&str> {
+        match self {
+            Self::Greeted { unit, .. }
+            | Self::SelfTested { unit, .. }
+            | Self::Waiting { unit, .. }
+            | Self::Dwell { unit, .. }
+            | Self::Thrown { unit, .. }
+            | Self::Progress { unit, .. }
+            | Self::Interrupted { unit, .. }
+            | Self::Verified { unit, .. }
+            | Self::Stored { unit, .. }
+            | Self::Diagnosed { unit, .. } => Some(unit),
+            Self::Resumed { .. }
+            | Self::Phase { .. }
+            | Self::Step { .. }
+            | Self::Redo { .. }
+            | Self::Note { .. } => None,
+        }
+    }
+}
+
 /// How a unit stands.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct UnitStanding {

@@ -22,6 +22,7 @@ use mimu_recording::{
 };
 use serde::{Deserialize, Serialize};
 
+use crate::bank::ByDevice;
 use crate::procedure::Asked;
 use crate::step::Step;
 
@@ -100,6 +101,8 @@ pub enum Entry {
         /// Whether it has effects.
         effects: Vec<String>,
     },
+    /// What the device's own filters have estimated of all dwells.
+    ByDevice(ByDevice),
     /// All is done.
     Done,
 }

@@ -12,6 +12,7 @@
 //! | [`refit`] | the calibration so far, every parameter beside its target |
 //! | [`folder`] | the journal and the recordings, from which a killed session goes on |
 //! | [`one`] | one of the units: its dwells, had or thrown away |
+//! | [`bank`] | the device's own Kalman filters beside it |
 //! | [`drive`] | what turns the unit: a person, or a turntable that takes text commands |
 //! | [`event`] | what a session says and asks; views show it |
 //! | [`wizard`] | which step comes next, and who has had it |
@@ -19,6 +20,7 @@
 //! | [`verdict`] | whether a calibration keeps what it promises |
 //! | [`session`] | all of it, in order |
 
+pub mod bank;
 pub mod device;
 pub mod drive;
 pub mod event;

@@ -1,6 +1,8 @@
 //! One of the units of a session: what comes from it, and the dwells that are made of it.
 
-use mimu::estimate::earth::Earth;
+mod conditions;
+mod rows;
+
 use mimu::fit::Fit;
 use mimu::quantity::Sensor;
 use mimu::stillness::GUARD_S;
@@ -9,25 +11,22 @@ use mimu_recording::error::{Error, Result};
 use mimu_recording::{Batch, Columns, Manifest, Recorded};
 use nalgebra::Vector3;
 
+use self::conditions::{motion_limits, rate_limit_dps};
+use self::rows::{cut, known, shorten};
+use crate::bank::DeviceBanks;
 use crate::event::{Event, UnitStanding};
 use crate::folder::{Entry, Folder, Part, Taking, append};
-use crate::procedure::{Asked, Fixture, SAME_POSE_DEG};
+use crate::procedure::{Asked, Fixture};
 use crate::refit::{Progress, calibrate, progress};
 use crate::source::Chunk;
 use crate::station::{News, Station};
-use crate::step::{Step, words};
+use crate::step::Step;
 use crate::watch::{Seen, Watch, force, guessed};
 
-/// Share of the samples of a second that may be missing where only means matter, and where turns are integrated as well.
-const LOST_SHARE: [f64; 2] = [0.5, 0.1];
 /// Part of the second before that belongs to a dwell already: it was as still.
 const BEFORE_S: f64 = 0.5;
 /// A dwell that ends earlier than this has not begun, s.
 const BEGUN_S: f64 = 0.5;
-/// Departure of a rate that still is the one that is wanted: sensitivities differ from the data sheet's by some per cent.
-const RATE_SHARE: f64 = 0.2;
-/// The same of any rate, deg/s: noise and what the null has moved by.
-const RATE_DPS: f64 = 2.0;
 /// So much of what has come is kept between two dwells, s: a turn takes seconds.
 const KEPT_S: f64 = 120.0;
 
@@ -81,6 +80,8 @@ pub struct One {
     seen: Option<Seen>,
     part: Part,
     number: i32,
+    /// The device's own filters, where its estimate is to be the calibration.
+    pub banks: Option<DeviceBanks>,
 }
 
 impl One {
@@ -107,6 +108,7 @@ impl One {
             seen: None,
             part: Part::Calibration,
             number: 0,
+            banks: None,
         }
     }
 
@@ -148,6 +150,12 @@ impl One {
             _ => None,
         });
         self.number = had.max().unwrap_or(0);
+        self.banks = (asked.by_device && part == Part::Calibration).then(|| match self.number {
+            0 => DeviceBanks::default(),
+            _ => DeviceBanks::lacking(
+                "the session was ended in between, and they lack the dwells before",
+            ),
+        });
         // What waits is of the time before.
         while self.station.news()?.is_some() {}
         (self.pending, self.dwell, self.next) = (Batch::default(), None, None);
@@ -193,6 +201,9 @@ impl One {
                         taking.restarted(next, why.clone());
                     }
                     self.interrupted(format!("the device has restarted: {why}"), tell)?;
+                    if let Some(banks) = &mut self.banks {
+                        banks.lacks("the device has restarted, and they lack the dwells before");
+                    }
                 }
                 News::Note(words) => tell.push(Event::Note {
                     words: format!("{}: {words}", self.name()),
@@ -277,66 +288,6 @@ impl One {
         force(seen, &nominal[1]).normalize()
     }
 
-    /// Why no dwell can run now.
-    fn waits(&self, seen: &Seen, asked: &Asked, step: &Step, busy: bool) -> Option<String> {
-        let rate_hz = self.station.unit.rate_hz;
-        let share = LOST_SHARE[usize::from(asked.fixture != Fixture::Table)];
-        if busy {
-            return Some("the table moves".into());
-        }
-        if let Some(c) = seen.stuck {
-            let column = mimu_recording::RAW_COLUMNS[c];
-            return Some(format!("{column} repeats one value: check its wiring"));
-        }
-        if seen.missing as f64 > share * rate_hz {
-            return Some(format!(
-                "samples are lost, {} of the last {:.0}: check the cable",
-                seen.missing, rate_hz
-            ));
-        }
-        if seen.saturated {
-            return Some("a reading is at the end of its range".into());
-        }
-        let turning = step.rate_dps != 0.0;
-        let limits = motion_limits(step.rate_dps);
-        for sensor in Sensor::BOTH {
-            let motion = seen.motion[sensor as usize];
-            if motion > limits[sensor as usize] {
-                return Some(match turning {
-                    true => {
-                        format!("the rate is not steady ({sensor} {motion:.1} times the limit)")
-                    }
-                    false => format!("it moves ({sensor} {motion:.1} times the limit)"),
-                });
-            }
-        }
-        None
-    }
-
-    /// Why its rate is not that of the step.
-    fn turns_otherwise(&self, seen: &Seen, step: &Step) -> Option<String> {
-        let turning = step.rate_dps != 0.0;
-        if let Some(nominal) = &self.nominal {
-            let rate = self.watch.rate(seen, &nominal[0]);
-            let wanted = step.rate();
-            let off = (rate - wanted).norm().to_degrees();
-            if off > rate_limit_dps(step.rate_dps) {
-                let is = rate.dot(&step.up()).to_degrees();
-                return Some(match (turning, is * step.rate_dps < 0.0) {
-                    (true, true) => format!(
-                        "it turns the other way: {is:+.0} deg/s, {:+.0} wanted",
-                        step.rate_dps
-                    ),
-                    (true, false) => {
-                        format!("it turns at {is:+.1} deg/s, {:+.1} wanted", step.rate_dps)
-                    }
-                    (false, _) => format!("it turns at {off:.1} deg/s"),
-                });
-            }
-        }
-        None
-    }
-
     fn consider(
         &mut self,
         seen: &Seen,
@@ -376,6 +327,7 @@ impl One {
             }
             (Ok(step), None) => {
                 let from = seen.tick.saturating_sub((BEFORE_S * rate_hz) as u64);
+                self.begin_banks(&step, asked);
                 self.dwell = Some(Dwell { step, from });
                 self.standing.waiting = None;
                 self.standing.left_s = Some(step.dwell_s);
@@ -393,52 +345,17 @@ impl One {
         Ok(())
     }
 
-    /// The step that this pose is: the one that is wanted or, where a person turns the unit and no dwell runs yet, one of those to come.
-    fn pose(
-        &self,
-        up: &Vector3<f64>,
-        round: &Round<'_>,
-        step: &Step,
-        begins: bool,
-    ) -> std::result::Result<Step, String> {
-        let asked = round.asked;
-        let off = |s: &Step| up.angle(&s.up()).to_degrees();
-        let limit = asked.fixture.tolerance_deg();
-        let by_hand = asked.fixture != Fixture::Table;
-        // By hand a pose is what it is, and only has to be another than those before.
-        let as_it_is = |s: &Step| match by_hand {
-            true => Step::at_rest(*up, s.dwell_s),
-            false => *s,
+    /// Tells the device's filters what they sense from now on.
+    fn begin_banks(&mut self, step: &Step, asked: &Asked) {
+        let (Some(banks), Some(noise)) = (&mut self.banks, self.watch.noise()) else {
+            return;
         };
-        let had = self.folder.dwells(self.part);
-        let near = |d: &Step| off(d) < SAME_POSE_DEG;
-        // The last pose is no turn; one before it may be asked for again.
-        let same = by_hand && had.last().is_some_and(|d| near(&d.1));
-        let again = same || by_hand && off(step) > limit && had.iter().any(|d| near(&d.1));
-        if off(step) <= limit && !again {
-            return Ok(as_it_is(step));
+        let mut input = known(step, asked);
+        for rate in &mut input[..3] {
+            *rate = rate.to_radians();
         }
-        if begins && round.any_order && !again {
-            let nearest = round
-                .others
-                .iter()
-                .filter(|s| s.rate_dps == step.rate_dps && off(s) <= limit);
-            let nearest = nearest.min_by(|a, b| off(a).total_cmp(&off(b)));
-            if let Some(other) = nearest {
-                return Ok(as_it_is(other));
-            }
-            if asked.fixture == Fixture::Hands {
-                return Ok(as_it_is(step));
-            }
-        }
-        let lies = words(up);
-        Err(match again {
-            true => format!("pose had already ({lies}): turn it on"),
-            false => format!(
-                "wrong pose: {lies}, {:.0} degrees off what is wanted",
-                off(step)
-            ),
-        })
+        let spans = [asked.largest_rate_dps.to_radians(), asked.gravity_mps2];
+        banks.begin(&self.station, &noise, input, spans);
     }
 
     /// Throws the dwell that runs away.
@@ -447,6 +364,9 @@ impl One {
         let Some(dwell) = self.dwell.take() else {
             return Ok(());
         };
+        if let Some(banks) = &mut self.banks {
+            banks.back(&self.station);
+        }
         let rate_hz = self.station.unit.rate_hz;
         let lasted = self.next.unwrap_or(dwell.from).saturating_sub(dwell.from);
         if lasted as f64 > (BEFORE_S + BEGUN_S) * rate_hz {
@@ -472,6 +392,9 @@ impl One {
     ) -> Result<()> {
         let rate_hz = self.station.unit.rate_hz;
         self.check_temperature(seen, asked)?;
+        if let Some(banks) = &mut self.banks {
+            banks.keep(&self.station);
+        }
         let Some(taking) = &mut self.taking else {
             return Ok(());
         };
@@ -571,6 +494,9 @@ impl One {
         };
         let part = self.part;
         self.folder.add(Entry::Redo { part, number })?;
+        if let Some(banks) = &mut self.banks {
+            banks.lacks("a dwell that they had taken in was had again");
+        }
         if let Some(taking) = &mut self.taking {
             taking.drop_dwell(number);
         }
@@ -593,49 +519,5 @@ impl One {
     /// Whether samples come and it is known how quiet the unit can be.
     pub fn is_heard(&self) -> bool {
         self.watch.knows_rest()
-    }
-}
-
-/// Known inputs of a step on a table: rates, deg/s, and specific forces, m/s².
-fn known(step: &Step, asked: &Asked) -> [f64; 6] {
-    let up = step.up();
-    // Of the Earth's rate the table's heading leaves open all but what is along the vertical.
-    let earth = asked
-        .latitude_deg
-        .map(|_| Earth::at(asked.latitude_deg).rate(&up));
-    let rate = up * step.rate_dps + earth.unwrap_or_default().map(f64::to_degrees);
-    let force = up * asked.gravity_mps2;
-    [rate.x, rate.y, rate.z, force.x, force.y, force.z]
-}
-
-/// Motion of gyro and accelerometer that is allowed at a rate: a table's own unsteadiness is no movement of the unit on it.
-fn motion_limits(rate_dps: f64) -> [f64; 2] {
-    [if rate_dps != 0.0 { 5.0 } else { 1.0 }, 1.0]
-}
-
-/// Departure from a rate that is allowed, deg/s.
-fn rate_limit_dps(rate_dps: f64) -> f64 {
-    RATE_SHARE * rate_dps.abs() + RATE_DPS
-}
-
-/// Without the first rows.
-fn cut(rows: &mut Batch, first: usize) {
-    rows.t_s.drain(..first);
-    rows.step.drain(..first);
-    rows.temp_c.drain(..first);
-    for c in 0..6 {
-        rows.raw[c].drain(..first);
-        rows.reference[c].drain(..first);
-    }
-}
-
-/// Without the rows from this one on.
-fn shorten(rows: &mut Batch, to: usize) {
-    rows.t_s.truncate(to);
-    rows.step.truncate(to);
-    rows.temp_c.truncate(to);
-    for c in 0..6 {
-        rows.raw[c].truncate(to);
-        rows.reference[c].truncate(to);
     }
 }

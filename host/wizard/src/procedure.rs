@@ -72,6 +72,9 @@ pub struct Asked {
     pub most_drift_c: f64,
     /// Half-widths of the 95 % intervals that are wanted.
     pub targets: Targets,
+    /// Whether the calibration is what the device's own Kalman filters estimate; on a table only.
+    #[serde(default)]
+    pub by_device: bool,
 }
 
 /// Half-widths of 95 % intervals that are wanted.
@@ -397,6 +400,7 @@ mod tests {
             warm_c_per_min: None,
             most_drift_c: 5.0,
             targets: Targets::default(),
+            by_device: false,
         };
         let next = next_step(&asked, &done, [false, true]);
         assert!(next.up[0] < -0.5, "{next:?}");

@@ -178,6 +178,11 @@ impl Whole<'_> {
             let directory = unit.folder.file(Part::Calibration.name());
             fits.push(fit(prepared(&directory)?, Options::default())?);
         }
+        if self.wizard.asked.by_device {
+            for (k, fitted) in fits.iter_mut().enumerate() {
+                self.take_from_device(k, fitted)?;
+            }
+        }
         let wizard = &mut self.wizard;
         let steps = wizard.asked.verification.clone();
         let words = format!("{} poses that were not used", steps.len());
@@ -209,6 +214,36 @@ impl Whole<'_> {
             return Ok(Ended::Done);
         }
         self.with_effects(found)
+    }
+
+    /// Puts the estimate of the device's own filters in the place of the fit, if they have had all dwells.
+    fn take_from_device(&mut self, k: usize, fitted: &mut Fit) -> Result<()> {
+        let unit = &mut self.wizard.units[k];
+        let name = unit.name();
+        let before = unit.folder.entries().iter().rev().find_map(|e| match e {
+            Entry::ByDevice(found) => Some(*found),
+            _ => None,
+        });
+        let found = match (before, unit.banks.take()) {
+            (Some(found), _) => Ok(found),
+            (None, Some(mut banks)) => banks.end(&unit.station),
+            (None, None) => Err("they were not run".into()),
+        };
+        let words = match found {
+            Ok(found) => {
+                if before.is_none() {
+                    unit.folder.add(Entry::ByDevice(found))?;
+                }
+                found.replace(fitted, &name)?
+            }
+            Err(why) => format!(
+                "the calibration is the PC's fit, as the device's filters have not had all dwells: {why}"
+            ),
+        };
+        self.outcomes[k].notes.push(words.clone());
+        let words = format!("{name}: {words}");
+        self.wizard.tell(Event::Note { words });
+        Ok(())
     }
 
     fn file(&self, k: usize, name: &str) -> PathBuf {

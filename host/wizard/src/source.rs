@@ -66,6 +66,9 @@ pub trait Source: Send {
 
     /// The session, where there is a mimu device. Whatever is asked of it, the stream begins again with the next [`Source::next`].
     fn device(&mut self) -> Option<&mut Session>;
+
+    /// The same for short calls that leave the stream as it is: no sample is lost by them.
+    fn aside(&mut self) -> Option<&mut Session>;
 }
 
 /// Opens a source: at the beginning, and after it was gone. The tick is the first that it may use.

@@ -29,7 +29,7 @@ pub enum News {
     Back(Box<Unit>),
 }
 
-type Errand = Box<dyn FnOnce(Option<&mut Session>) + Send>;
+type Errand = Box<dyn FnOnce(&mut Option<Box<dyn Source>>) + Send>;
 
 /// A unit at its port.
 pub struct Station {
@@ -82,9 +82,25 @@ impl Station {
         &self,
         errand: impl FnOnce(&mut Session) -> Result<T> + Send + 'static,
     ) -> Result<T> {
+        self.of(|source| source.device(), errand)
+    }
+
+    /// The same for short calls, by which no sample is lost.
+    pub fn aside<T: Send + 'static>(
+        &self,
+        errand: impl FnOnce(&mut Session) -> Result<T> + Send + 'static,
+    ) -> Result<T> {
+        self.of(|source| source.aside(), errand)
+    }
+
+    fn of<T: Send + 'static>(
+        &self,
+        session: impl FnOnce(&mut dyn Source) -> Option<&mut Session> + Send + 'static,
+        errand: impl FnOnce(&mut Session) -> Result<T> + Send + 'static,
+    ) -> Result<T> {
         let (back, answer) = channel();
-        let errand: Errand = Box::new(move |session| {
-            let done = match session {
+        let errand: Errand = Box::new(move |source| {
+            let done = match source.as_mut().and_then(|s| session(s.as_mut())) {
                 Some(session) => errand(session),
                 None => Err(Error::device(
                     "device",
@@ -144,7 +160,7 @@ fn listen(
     loop {
         match to_do.try_recv() {
             Ok(errand) => {
-                errand(source.as_mut().and_then(|s| s.device()));
+                errand(&mut source);
                 continue;
             }
             Err(TryRecvError::Disconnected) => return,

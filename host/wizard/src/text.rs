@@ -282,6 +282,10 @@ impl Source for TextSource {
         Ok(self.ready.pop_front().unwrap_or(Heard::Nothing))
     }
 
+    fn aside(&mut self) -> Option<&mut Session> {
+        None
+    }
+
     fn device(&mut self) -> Option<&mut Session> {
         None
     }

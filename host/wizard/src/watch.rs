@@ -114,6 +114,11 @@ impl Watch {
         }
     }
 
+    /// Variances of single readings in the quietest second so far, raw.
+    pub fn noise(&self) -> Option<[f64; 6]> {
+        self.floor
+    }
+
     /// Takes samples in; what the last second was like, if one is whole.
     pub fn take(&mut self, chunk: &Chunk) -> Option<Seen> {
         let missing = chunk.tick.saturating_sub(self.next.unwrap_or(chunk.tick));

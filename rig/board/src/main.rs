@@ -62,6 +62,9 @@ struct Serve {
     /// Another seed is another unit, another person, and other noise.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
+    /// Number of the unit, 24 hexadecimal digits, which the part's maker would have written to it [default: the seed]
+    #[arg(long, value_name = "HEX", value_parser = unit_id)]
+    unit_id: Option<[u8; 12]>,
     /// How fast virtual time goes.
     #[arg(long, default_value = "wall")]
     pace: Pace,
@@ -97,6 +100,26 @@ fn main() -> ExitCode {
     }
 }
 
+/// Reads 24 hexadecimal digits.
+fn unit_id(text: &str) -> Result<[u8; 12], String> {
+    let mut id = [0; 12];
+    let refused = || format!("{text:?} is no unit id: write 24 hexadecimal digits");
+    if text.len() != 2 * id.len() || !text.is_ascii() {
+        return Err(refused());
+    }
+    for (byte, at) in id.iter_mut().zip((0..).step_by(2)) {
+        *byte = u8::from_str_radix(&text[at..at + 2], 16).map_err(|_| refused())?;
+    }
+    Ok(id)
+}
+
+/// The seed as a unit id.
+fn seeded(seed: u64) -> [u8; 12] {
+    let mut id = [0; 12];
+    id[4..].copy_from_slice(&seed.to_be_bytes());
+    id
+}
+
 /// Time between two warnings of lost bytes, of which a second loses a thousand chunks.
 const BETWEEN_WARNINGS: Duration = Duration::from_secs(1);
 
@@ -125,7 +148,8 @@ impl Serve {
             Some(_) => Front::commanded(&plan, &truth, self.seed)?,
             None => Front::bench(&plan, &truth, self.seed)?,
         };
-        let board = Board::new(&image, front)?;
+        let unit_id = self.unit_id.unwrap_or_else(|| seeded(self.seed));
+        let board = Board::numbered(&image, front, unit_id)?;
         let pace = match self.pace {
             Pace::Wall => serve::Pace::Wall,
             Pace::Fast => serve::Pace::Fast,
@@ -149,16 +173,25 @@ impl Serve {
                 );
             }
         }
-        let mut told = (served.traffic().lost, Instant::now());
+        let mut told = (served.traffic().lost, served.behind(), Instant::now());
         loop {
             served.step()?;
-            let lost = served.traffic().lost;
-            if lost != told.0 && told.1.elapsed() >= BETWEEN_WARNINGS {
+            let (lost, behind) = (served.traffic().lost, served.behind());
+            if told.2.elapsed() < BETWEEN_WARNINGS {
+                continue;
+            }
+            if lost != told.0 {
                 eprintln!(
                     "mimu-board: {lost} bytes lost: whoever has the port open does not read them"
                 );
-                told = (lost, Instant::now());
             }
+            if behind > told.1 + BETWEEN_WARNINGS / 10 {
+                eprintln!(
+                    "mimu-board: {:.1} s behind the clock: this machine is too slow, or busy",
+                    behind.as_secs_f64()
+                );
+            }
+            told = (lost, behind, Instant::now());
         }
     }
 }

@@ -1,8 +1,11 @@
 //! The microcontroller of the board: the emulator's STM32H743 with three of its models in the bench's hands, and
 //! a reset by the supply.
 
+use std::path::Path;
+
 use rigless::device::{ErasedDevice, Level, ResetCause};
 use rigless::emulator::CoreSpec;
+use rigless::image::Image;
 use rigless::machine::stm32h743_bench::Stm32h743Bench;
 use rigless::machine::{Board, Target};
 use rigless::mcu::{Mcu, Operate};
@@ -22,6 +25,9 @@ use crate::watchdog::Watchdog;
 
 /// The serial line to the debugger's USB bridge.
 const SERIAL: &str = "USART3";
+
+/// Where the part keeps its number of 96 bits (RM0433, section 61.1).
+const UNIT_ID_AT: u64 = 0x1FF1_E800;
 
 /// The microcontroller.
 #[derive(Debug)]
@@ -180,9 +186,13 @@ pub(crate) struct Machine {
 }
 
 impl Machine {
-    pub(crate) fn new(front: Front, far_end: FarEnd) -> Result<Self, Error> {
+    /// `unit_id`: what the part's maker has written to it.
+    pub(crate) fn new(front: Front, far_end: FarEnd, unit_id: [u8; 12]) -> Result<Self, Error> {
         // The emulator describes this part's core nowhere else.
-        let core = Stm32h743Bench::new()?.targets().swap_remove(0).core;
+        let mut core = Stm32h743Bench::new()?.targets().swap_remove(0).core;
+        let written = Image::new(Path::new("unit id"), unit_id.to_vec(), Some(UNIT_ID_AT));
+        core.factory_images
+            .push(written.expect("bytes that are no ELF file have an address"));
         Ok(Self {
             part: Part::new(front, far_end)?,
             core,

@@ -58,12 +58,20 @@ pub struct Board {
 }
 
 impl Board {
-    /// A board with an image in its flash, and nothing else there.
+    /// A board with an image in its flash, and nothing else there. Its unit id is zero.
     ///
     /// Errors: an image that the part has no room for.
     pub fn new(image: &Image, front: Front) -> Result<Self, String> {
+        Self::numbered(image, front, [0; 12])
+    }
+
+    /// The same with a unit id, the number of 96 bits that the part's maker gives to each.
+    ///
+    /// Errors: as [`Board::new`].
+    pub fn numbered(image: &Image, front: Front, unit_id: [u8; 12]) -> Result<Self, String> {
         let line = Line::default();
-        let machine = Machine::new(front, FarEnd(line.clone())).map_err(|e| e.to_string())?;
+        let machine =
+            Machine::new(front, FarEnd(line.clone()), unit_id).map_err(|e| e.to_string())?;
         let (orders, orders_in) = channel();
         let (reports_out, reports) = channel();
         let images = vec![image.placed.clone()];

@@ -37,6 +37,9 @@ const SLICE_NS: u64 = 1_000_000;
 /// The same at the fast pace, where two threads that hand over a thousand times in a second of it cost a fifth of the time.
 const FAST_SLICE_NS: u64 = 5_000_000;
 
+/// A board that is later than this at the wall's pace stays behind. Less is made up for: other programs take such turns.
+const MOST_LATE: Duration = Duration::from_millis(20);
+
 /// Bytes that may wait for the line towards the device. The rest stays in the terminal, which holds up the sender
 /// as a port's driver would.
 const WAITING: usize = 256;
@@ -91,6 +94,8 @@ pub struct Served {
     /// When it began, by the wall's clock and by the board's, ns.
     began: Instant,
     first_ns: u64,
+    /// By how much all of it came later than the wall's clock.
+    behind: Duration,
 }
 
 impl Served {
@@ -120,6 +125,7 @@ impl Served {
             waiting: Vec::new(),
             began: Instant::now(),
             first_ns,
+            behind: Duration::ZERO,
         })
     }
 
@@ -215,10 +221,27 @@ impl Served {
             self.board.front(|front, ns| front.advance(ns))?;
         }
         if self.pace == Pace::Wall {
-            let due = self.began + Duration::from_nanos(standing.ns - self.first_ns);
-            std::thread::sleep(due.saturating_duration_since(Instant::now()));
+            self.keep_pace(standing.ns);
         }
         Ok(())
+    }
+
+    /// Waits for the wall's clock. A board that is late does not hurry after it, as no crystal does: at three times its rate it would
+    /// send faster than whoever reads it has to be able to read.
+    fn keep_pace(&mut self, now_ns: u64) {
+        let due = self.began + Duration::from_nanos(now_ns - self.first_ns);
+        let now = Instant::now();
+        std::thread::sleep(due.saturating_duration_since(now));
+        let late = now.saturating_duration_since(due);
+        if late > MOST_LATE {
+            self.began += late;
+            self.behind += late;
+        }
+    }
+
+    /// By how much the board has fallen behind the wall's clock, at its pace.
+    pub fn behind(&self) -> Duration {
+        self.behind
     }
 
     /// Writes what has changed in the flash to the file.

@@ -69,6 +69,9 @@ pub(crate) struct WizardArgs {
     /// Plan of `mimu design` to begin with; without it one is made
     #[arg(long, value_name = "PLAN")]
     plan: Option<PathBuf>,
+    /// Whose estimate becomes the calibration; the other is compared with it
+    #[arg(long, value_enum, default_value = "pc")]
+    by: By,
     /// All planned dwells and no more, whatever the targets say
     #[arg(long)]
     as_planned: bool,
@@ -142,6 +145,14 @@ impl TextArgs {
     }
 }
 
+#[derive(Clone, Copy, PartialEq, ValueEnum)]
+enum By {
+    /// The fit of this program
+    Pc,
+    /// The device's own Kalman filters, which need a table
+    Device,
+}
+
 #[derive(Clone, Copy, ValueEnum)]
 enum FixtureArg {
     /// A turntable: attitudes and rates are known
@@ -191,6 +202,12 @@ impl WizardArgs {
 
     fn asked(&self) -> Result<Asked> {
         let fixture = self.fixture.fixture();
+        if self.by == By::Device && (fixture != Fixture::Table || self.text.text.is_some()) {
+            let problem =
+                "the device's Kalman filters have to be told the input, which only a table knows";
+            let remedy = "use --fixture table with a mimu device, or leave --by device out";
+            return Err(Error::new("--by device", problem, remedy));
+        }
         let mut gravity = self.gravity.or(self.latitude.map(normal_gravity));
         let mut latitude_deg = self.latitude;
         let steps = match &self.plan {
@@ -224,6 +241,7 @@ impl WizardArgs {
             warm_c_per_min: (self.warm_up > 0.0).then_some(self.warm_up),
             most_drift_c: self.drift,
             targets: self.targets()?,
+            by_device: self.by == By::Device,
         })
     }
 

@@ -1,5 +1,6 @@
 //! A session as lines of text: what happens, once each. For pipes, logs and small terminals.
 
+use std::collections::BTreeSet;
 use std::io::Write;
 
 use mimu_wizard::event::{Event, Question, Standing, View, Wish};
@@ -7,6 +8,9 @@ use mimu_wizard::step::sketch;
 
 use super::answers::{Beforehand, Typed};
 use crate::report;
+
+/// Characters of a unit's name that tell it from others.
+const TAIL: usize = 6;
 
 /// Lines of text on one side, JSON lines on the other, either of them or both.
 pub(crate) struct Lines {
@@ -19,6 +23,8 @@ pub(crate) struct Lines {
     pub typed: Typed,
     pub beforehand: Beforehand,
     asked: Option<Question>,
+    /// Those that have greeted: with several, lines say which they are about.
+    units: BTreeSet<String>,
 }
 
 impl Lines {
@@ -30,6 +36,18 @@ impl Lines {
             typed,
             beforehand,
             asked: None,
+            units: BTreeSet::new(),
+        }
+    }
+
+    /// What a line about one of several units begins with: the end of its name, as unit ids of one lot begin alike.
+    fn whose(&self, event: &Event) -> String {
+        match event.unit().filter(|_| self.units.len() > 1) {
+            Some(unit) => {
+                let from = unit.char_indices().rev().nth(TAIL - 1).map_or(0, |c| c.0);
+                format!("{}: ", &unit[from..])
+            }
+            None => String::new(),
         }
     }
 
@@ -54,8 +72,12 @@ impl View for Lines {
         if let Some(out) = &mut self.events {
             write_event(out.as_mut(), event);
         }
+        if let Event::Greeted { unit, .. } = event {
+            self.units.insert(unit.clone());
+        }
+        let whose = self.whose(event);
         for line in report::wizard_lines(event) {
-            self.say(&line);
+            self.say(&format!("{whose}{line}"));
         }
         if let Event::Step { step, .. } = event
             && self.sketches

@@ -57,22 +57,53 @@ fn errors(calibration: &Calibration, truth: &RigTruth) -> [f64; 2] {
     })
 }
 
-#[test]
-#[ignore = "nightly: a whole session on the emulated board takes a minute"]
-fn a_session_that_was_killed_and_unplugged_goes_on_to_a_stored_calibration_that_holds_the_truth() {
-    let mut bench = Bench::new("table", unit(7), 7);
-    let plan = short_plan(&bench);
-    let arguments = [
+/// What the sessions on this plan have in common.
+fn on_table(plan: &str) -> [&str; 9] {
+    [
         "--fixture",
         "table",
         "--plan",
-        &plan,
+        plan,
         "--as-planned",
         "--dwell",
         "1",
         "--rate",
         "60",
-    ];
+    ]
+}
+
+#[test]
+fn the_devices_own_filters_make_the_calibration_and_a_dwell_with_a_lost_line_leaves_no_trace() {
+    let mut bench = Bench::new("table", unit(8), 8);
+    let plan = short_plan(&bench);
+    let mut arguments = on_table(&plan).to_vec();
+    arguments.extend(["--by", "device"]);
+    let mut child = bench.wizard(&arguments).spawn().unwrap();
+    assert!(bench.heard(&mut child, "dwell", 2));
+    bench.tell("LINK OFF");
+    std::thread::sleep(std::time::Duration::from_millis(300));
+    bench.tell("LINK ON");
+    let out = child.wait_with_output().unwrap();
+    let told =
+        String::from_utf8_lossy(&out.stdout).into_owned() + &String::from_utf8_lossy(&out.stderr);
+    assert!(out.status.success(), "{told}");
+    assert!(
+        told.contains("the calibration is the device's own estimate"),
+        "{told}"
+    );
+    let stored = bench.outcome()["units"][0]["stored"].clone();
+    assert_eq!(stored, "session/calibration.toml", "{told}");
+    let calibration = Calibration::read(&bench.path("session/calibration.toml")).unwrap();
+    let [gyro, accel] = errors(&calibration, &bench.truth);
+    println!("errors: gyro {gyro:.5} rad/s, accel {accel:.5} m/s²; {told}");
+    assert!(gyro < 0.2f64.to_radians() && accel < 0.02, "{gyro} {accel}");
+}
+
+#[test]
+fn a_session_that_was_killed_and_unplugged_goes_on_to_a_stored_calibration_that_holds_the_truth() {
+    let mut bench = Bench::new("table", unit(7), 7);
+    let plan = short_plan(&bench);
+    let arguments = on_table(&plan);
     let mut child = bench.wizard(&arguments).spawn().unwrap();
     assert!(bench.heard(&mut child, "dwell", 3));
     child.kill().unwrap();

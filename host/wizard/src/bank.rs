@@ -1,0 +1,221 @@
+//! The device's own Kalman filters beside the session: told each dwell's input while it lasts, taken back where a dwell is thrown away.
+
+use mimu::fit::Fit;
+use mimu::quantity::{AXES, Sensor};
+use mimu::triad::{Forward, Triad};
+use mimu_core::wire::{KalmanState, Prior, Request, Triad as Which};
+use mimu_device::{Answer, Session};
+use mimu_recording::error::{Error, Result};
+use nalgebra::{Matrix3, Vector3};
+use serde::{Deserialize, Serialize};
+use std::time::Duration;
+
+use crate::station::Station;
+
+/// Longest wait for an answer.
+const PATIENCE: Duration = Duration::from_secs(1);
+/// Departure of the device's estimate from the PC's, in standard deviations of the PC's, beyond which they contradict each other. Both are
+/// made of the same readings, weighted in other ways.
+const MOST_APART: f64 = 3.0;
+const BOTH: [Which; 2] = [Which::Gyro, Which::Accel];
+
+/// `[b, P1, P2, P3]` of the sensors x, y, z of a triad, SI to raw: V, and V per rad/s or per m/s².
+type Rows = [[f64; 4]; 3];
+
+/// What the device's filters have estimated.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct ByDevice {
+    /// Gyro.
+    pub gyro: Rows,
+    /// Accelerometer.
+    pub accel: Rows,
+}
+
+/// The two banks of a device.
+#[derive(Debug, Clone, Default)]
+pub struct DeviceBanks {
+    runs: bool,
+    /// Whether they have taken in what they should not have, and go back before they go on.
+    spoiled: bool,
+    /// Why they lack a dwell.
+    lack: Option<String>,
+}
+
+impl DeviceBanks {
+    /// Banks that have missed something already.
+    pub fn lacking(why: &str) -> Self {
+        Self {
+            lack: Some(why.into()),
+            ..Self::default()
+        }
+    }
+
+    /// A dwell runs. `noise`: variances of single readings, V²; `input`: rates, rad/s, and specific forces, m/s²; `spans`: sizes of both.
+    pub fn begin(&mut self, station: &Station, noise: &[f64; 6], input: [f64; 6], spans: [f64; 2]) {
+        if self.lack.is_some() {
+            return;
+        }
+        let (begin, spoiled) = (!self.runs, self.spoiled);
+        let noise = noise.map(|v| v as f32);
+        let input = input.map(|v| v as f32);
+        let told = station.aside(move |session| {
+            for (k, triad) in BOTH.into_iter().enumerate() {
+                let three = |of: &[f32; 6]| [0, 1, 2].map(|i| of[3 * k + i]);
+                if begin {
+                    let prior = Prior::Diffuse {
+                        span: spans[k] as f32,
+                    };
+                    let noise = three(&noise);
+                    done(
+                        session,
+                        Request::KalmanStart {
+                            triad,
+                            noise,
+                            prior,
+                        },
+                    )?;
+                } else if spoiled {
+                    done(session, Request::KalmanBack { triad })?;
+                }
+                let input = Some(three(&input));
+                done(session, Request::KalmanInput { triad, input })?;
+            }
+            Ok(())
+        });
+        // What has come half the way is taken back by the next dwell.
+        (self.runs, self.spoiled) = (true, true);
+        self.heed(told);
+    }
+
+    /// The dwell is over, and counts.
+    pub fn keep(&mut self, station: &Station) {
+        if self.lack.is_some() {
+            return;
+        }
+        let told = station.aside(|session| {
+            for triad in BOTH {
+                done(session, Request::KalmanInput { triad, input: None })?;
+            }
+            BOTH.into_iter()
+                .try_for_each(|triad| done(session, Request::KalmanKeep { triad }))
+        });
+        self.spoiled = told.is_err();
+        self.heed(told);
+    }
+
+    /// The dwell does not count.
+    pub fn back(&mut self, station: &Station) {
+        if self.lack.is_some() || !self.runs {
+            return;
+        }
+        let told = station.aside(|session| {
+            BOTH.into_iter()
+                .try_for_each(|triad| done(session, Request::KalmanBack { triad }))
+        });
+        // A line that is lost is found again, and then it is done.
+        self.spoiled = told.is_err();
+    }
+
+    /// A dwell that was taken in does not count any more, or the device has restarted.
+    pub fn lacks(&mut self, why: &str) {
+        if self.runs {
+            self.lack.get_or_insert_with(|| why.into());
+        }
+    }
+
+    fn heed(&mut self, told: Result<()>) {
+        if let Err(error) = told {
+            self.lack.get_or_insert_with(|| error.to_string());
+        }
+    }
+
+    /// Ends them. The error says why they are not a calibration.
+    pub fn end(&mut self, station: &Station) -> std::result::Result<ByDevice, String> {
+        if let Some(why) = &self.lack {
+            return Err(why.clone());
+        }
+        if !self.runs {
+            return Err("they have taken in no dwell".into());
+        }
+        self.runs = false;
+        let spoiled = self.spoiled;
+        let ended = station.aside(move |session| {
+            let mut rows = [[[0.0; 4]; 3]; 2];
+            for (rows, triad) in rows.iter_mut().zip(BOTH) {
+                if spoiled {
+                    done(session, Request::KalmanBack { triad })?;
+                }
+                let end = Request::KalmanEnd { triad };
+                match session.call(end, "for its estimate", PATIENCE)? {
+                    Answer::Kalman(state) => *rows = rows_of(&state),
+                    _ => return Err(session.unexpected("for its estimate")),
+                }
+            }
+            let [gyro, accel] = rows;
+            Ok(ByDevice { gyro, accel })
+        });
+        ended.map_err(|e| e.to_string())
+    }
+}
+
+fn done(session: &mut Session, request: Request<'_>) -> Result<()> {
+    session.done(request, "to run its Kalman filters")
+}
+
+fn rows_of(state: &KalmanState) -> Rows {
+    state.axes.map(|axis| axis.mean.map(f64::from))
+}
+
+impl ByDevice {
+    fn forward(&self, sensor: Sensor) -> Forward {
+        let rows = match sensor {
+            Sensor::Gyro => &self.gyro,
+            Sensor::Accel => &self.accel,
+        };
+        Forward {
+            matrix: Matrix3::from_fn(|i, j| rows[i][1 + j]),
+            bias: Vector3::from_fn(|i, _| rows[i][0]),
+        }
+    }
+
+    /// Puts the device's estimate in the place of the PC's, and says how far apart they are. How well it is known stays the PC's judgement:
+    /// the filters know of nothing but the white noise of the readings.
+    ///
+    /// Errors: the two contradict each other.
+    pub fn replace(&self, fitted: &mut Fit, unit: &str) -> Result<String> {
+        let mut most = (0.0, String::new());
+        for sensor in &mut fitted.sensors {
+            let before = &sensor.estimated.triad;
+            let inverse = self.forward(sensor.sensor).inverse();
+            let triad = inverse.and_then(|c| Triad::from_inverse(c, before.inverse_parts()));
+            let Some(triad) = triad else {
+                let problem = format!("the device's estimate of the {} is singular", sensor.sensor);
+                let remedy = "take the PC's: run it again without --by device";
+                return Err(Error::new(unit, problem, remedy));
+            };
+            let both = before.forward_estimates().into_iter();
+            let names = AXES
+                .into_iter()
+                .flat_map(|i| AXES.map(|j| format!("P of {} {i}{j}", sensor.sensor)))
+                .chain(AXES.map(|i| format!("bias of {} {i}", sensor.sensor)));
+            for ((a, b), name) in both.zip(triad.forward_estimates()).zip(names) {
+                let apart = (a.value - b.value).abs() / a.sigma;
+                if !(apart <= most.0) {
+                    most = (apart, name);
+                }
+            }
+            sensor.estimated.triad = triad;
+        }
+        let (apart, name) = most;
+        if !(apart <= MOST_APART) {
+            let problem = format!(
+                "the device's Kalman filters and the PC's fit of the same dwells are {apart:.1} standard deviations apart in {name}"
+            );
+            let remedy = "run it again without --by device, and report this";
+            return Err(Error::new(unit, problem, remedy));
+        }
+        Ok(format!(
+            "the calibration is the device's own estimate; from the PC's it is {apart:.2} standard deviations away at most ({name})"
+        ))
+    }
+}

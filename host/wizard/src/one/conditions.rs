@@ -1,0 +1,143 @@
+//! What has to hold for a dwell to run: samples come, the unit is as still or as steady as it can be, and its pose and rate are those of
+//! a step.
+
+use mimu::quantity::Sensor;
+use nalgebra::Vector3;
+
+use super::{One, Round};
+use crate::procedure::{Asked, Fixture, SAME_POSE_DEG};
+use crate::step::{Step, words};
+use crate::watch::Seen;
+
+/// Share of the samples of a second that may be missing where only means matter, and where turns are integrated as well.
+const LOST_SHARE: [f64; 2] = [0.5, 0.1];
+/// Departure of a rate that still is the one that is wanted: sensitivities differ from the data sheet's by some per cent.
+const RATE_SHARE: f64 = 0.2;
+/// The same of any rate, deg/s: noise and what the null has moved by.
+const RATE_DPS: f64 = 2.0;
+
+impl One {
+    /// Why no dwell can run now.
+    pub(super) fn waits(
+        &self,
+        seen: &Seen,
+        asked: &Asked,
+        step: &Step,
+        busy: bool,
+    ) -> Option<String> {
+        let rate_hz = self.station.unit.rate_hz;
+        let share = LOST_SHARE[usize::from(asked.fixture != Fixture::Table)];
+        if busy {
+            return Some("the table moves".into());
+        }
+        if let Some(c) = seen.stuck {
+            let column = mimu_recording::RAW_COLUMNS[c];
+            return Some(format!("{column} repeats one value: check its wiring"));
+        }
+        if seen.missing as f64 > share * rate_hz {
+            return Some(format!(
+                "samples are lost, {} of the last {:.0}: check the cable",
+                seen.missing, rate_hz
+            ));
+        }
+        if seen.saturated {
+            return Some("a reading is at the end of its range".into());
+        }
+        let turning = step.rate_dps != 0.0;
+        let limits = motion_limits(step.rate_dps);
+        for sensor in Sensor::BOTH {
+            let motion = seen.motion[sensor as usize];
+            if motion > limits[sensor as usize] {
+                return Some(match turning {
+                    true => {
+                        format!("the rate is not steady ({sensor} {motion:.1} times the limit)")
+                    }
+                    false => format!("it moves ({sensor} {motion:.1} times the limit)"),
+                });
+            }
+        }
+        None
+    }
+
+    /// Why its rate is not that of the step.
+    pub(super) fn turns_otherwise(&self, seen: &Seen, step: &Step) -> Option<String> {
+        let turning = step.rate_dps != 0.0;
+        if let Some(nominal) = &self.nominal {
+            let rate = self.watch.rate(seen, &nominal[0]);
+            let wanted = step.rate();
+            let off = (rate - wanted).norm().to_degrees();
+            if off > rate_limit_dps(step.rate_dps) {
+                let is = rate.dot(&step.up()).to_degrees();
+                return Some(match (turning, is * step.rate_dps < 0.0) {
+                    (true, true) => format!(
+                        "it turns the other way: {is:+.0} deg/s, {:+.0} wanted",
+                        step.rate_dps
+                    ),
+                    (true, false) => {
+                        format!("it turns at {is:+.1} deg/s, {:+.1} wanted", step.rate_dps)
+                    }
+                    (false, _) => format!("it turns at {off:.1} deg/s"),
+                });
+            }
+        }
+        None
+    }
+
+    /// The step that this pose is: the one that is wanted or, where a person turns the unit and no dwell runs yet, one of those to come.
+    pub(super) fn pose(
+        &self,
+        up: &Vector3<f64>,
+        round: &Round<'_>,
+        step: &Step,
+        begins: bool,
+    ) -> std::result::Result<Step, String> {
+        let asked = round.asked;
+        let off = |s: &Step| up.angle(&s.up()).to_degrees();
+        let limit = asked.fixture.tolerance_deg();
+        let by_hand = asked.fixture != Fixture::Table;
+        // By hand a pose is what it is, and only has to be another than those before.
+        let as_it_is = |s: &Step| match by_hand {
+            true => Step::at_rest(*up, s.dwell_s),
+            false => *s,
+        };
+        let had = self.folder.dwells(self.part);
+        let near = |d: &Step| off(d) < SAME_POSE_DEG;
+        // The last pose is no turn; one before it may be asked for again.
+        let same = by_hand && had.last().is_some_and(|d| near(&d.1));
+        let again = same || by_hand && off(step) > limit && had.iter().any(|d| near(&d.1));
+        if off(step) <= limit && !again {
+            return Ok(as_it_is(step));
+        }
+        if begins && round.any_order && !again {
+            let nearest = round
+                .others
+                .iter()
+                .filter(|s| s.rate_dps == step.rate_dps && off(s) <= limit);
+            let nearest = nearest.min_by(|a, b| off(a).total_cmp(&off(b)));
+            if let Some(other) = nearest {
+                return Ok(as_it_is(other));
+            }
+            if asked.fixture == Fixture::Hands {
+                return Ok(as_it_is(step));
+            }
+        }
+        let lies = words(up);
+        Err(match again {
+            true => format!("pose had already ({lies}): turn it on"),
+            false => format!(
+                "wrong pose: {lies}, {:.0} degrees off what is wanted",
+                off(step)
+            ),
+        })
+    }
+}
+
+/// Motion of gyro and accelerometer that is allowed at a rate: a table's own unsteadiness is no movement of the unit on it.
+pub(super) fn motion_limits(rate_dps: f64) -> [f64; 2] {
+    [if rate_dps != 0.0 { 5.0 } else { 1.0 }, 1.0]
+}
+
+/// Departure from a rate that is allowed, deg/s.
+pub(super) fn rate_limit_dps(rate_dps: f64) -> f64 {
+    RATE_SHARE * rate_dps.abs() + RATE_DPS
+}

@@ -1,0 +1,41 @@
+//! Rows of a recording between two dwells, and the known inputs of those of a dwell.
+
+use mimu::estimate::earth::Earth;
+use mimu_recording::Batch;
+
+use crate::procedure::Asked;
+use crate::step::Step;
+
+/// Known inputs of a step on a table: rates, deg/s, and specific forces, m/s².
+pub(super) fn known(step: &Step, asked: &Asked) -> [f64; 6] {
+    let up = step.up();
+    // Of the Earth's rate the table's heading leaves open all but what is along the vertical.
+    let earth = asked
+        .latitude_deg
+        .map(|_| Earth::at(asked.latitude_deg).rate(&up));
+    let rate = up * step.rate_dps + earth.unwrap_or_default().map(f64::to_degrees);
+    let force = up * asked.gravity_mps2;
+    [rate.x, rate.y, rate.z, force.x, force.y, force.z]
+}
+
+/// Without the first rows.
+pub(super) fn cut(rows: &mut Batch, first: usize) {
+    rows.t_s.drain(..first);
+    rows.step.drain(..first);
+    rows.temp_c.drain(..first);
+    for c in 0..6 {
+        rows.raw[c].drain(..first);
+        rows.reference[c].drain(..first);
+    }
+}
+
+/// Without the rows from this one on.
+pub(super) fn shorten(rows: &mut Batch, to: usize) {
+    rows.t_s.truncate(to);
+    rows.step.truncate(to);
+    rows.temp_c.truncate(to);
+    for c in 0..6 {
+        rows.raw[c].truncate(to);
+        rows.reference[c].truncate(to);
+    }
+}
