@@ -516,6 +516,11 @@ impl One {
         })
     }
 
+    /// What came so far may be of a table that turned.
+    pub fn was_turning(&mut self) {
+        self.watch.was_turning();
+    }
+
     /// Whether samples come and it is known how quiet the unit can be.
     pub fn is_heard(&self) -> bool {
         self.watch.knows_rest()

@@ -90,8 +90,10 @@ pub struct Watch {
     next: Option<u64>,
     /// Variance of one sample in the quietest second so far, raw.
     floor: Option<[f64; 6]>,
-    /// Mean reading of the gyro in that second.
-    rest: [f64; 3],
+    /// Mean reading of the gyro at rest, and the sum of its variances in that second, once two seconds in a row have agreed on it.
+    rest: Option<([f64; 3], f64)>,
+    /// The seconds that ended within the last one: means and variances of the gyro.
+    before: VecDeque<[[f64; 3]; 2]>,
     /// Whether the unit may be turned by now.
     begun: bool,
     temperatures: VecDeque<(u64, f64)>,
@@ -108,7 +110,8 @@ impl Watch {
             window: VecDeque::new(),
             next: None,
             floor: None,
-            rest: [0.0; 3],
+            rest: None,
+            before: VecDeque::new(),
             begun: false,
             temperatures: VecDeque::new(),
         }
@@ -150,7 +153,14 @@ impl Watch {
     /// Forgets what it has seen of the last second: what comes next has nothing to do with it.
     pub fn interrupted(&mut self) {
         (self.open, self.window) = (Block::default(), VecDeque::new());
+        self.before.clear();
         self.temperatures.clear();
+    }
+
+    /// Forgets what it knows of rest: the unit may have been turning.
+    pub fn was_turning(&mut self) {
+        self.interrupted();
+        (self.floor, self.rest) = (None, None);
     }
 
     /// From now on the unit may be turned: what the gyro reads at rest is known.
@@ -160,7 +170,30 @@ impl Watch {
 
     /// Whether it knows yet how quiet the unit can be.
     pub fn knows_rest(&self) -> bool {
-        self.floor.is_some()
+        self.rest.is_some()
+    }
+
+    /// Looks whether a second of the gyro (mean and variance of each axis) is rest: as that before it, which a table that slows down is not.
+    /// A table may say that it stands while samples of its turning are still on their way.
+    fn find_rest(&mut self, second: [[f64; 2]; 3]) {
+        let (mean, variance) = (second.map(|s| s[0]), second.map(|s| s[1]));
+        let whole = (WINDOW_S / BLOCK_S).round() as usize;
+        let agrees = |[mean_0, variance_0]: &[[f64; 3]; 2]| {
+            (0..3).all(|c| {
+                let least = variance[c].min(variance_0[c]);
+                let most = variance[c].max(variance_0[c]);
+                (mean[c] - mean_0[c]).powi(2) <= least && most <= STILL_FACTOR * least
+            })
+        };
+        let agreed = self.before.len() == whole && self.before.front().is_some_and(agrees);
+        let sum = variance.iter().sum();
+        if agreed && self.rest.is_none_or(|(_, quietest)| sum <= quietest) {
+            self.rest = Some((mean, sum));
+        }
+        if self.before.len() == whole {
+            self.before.pop_front();
+        }
+        self.before.push_back([mean, variance]);
     }
 
     fn follow(&mut self, tick: u64, temp_c: f64) {
@@ -203,13 +236,12 @@ impl Watch {
         }
         let variance = all.squares.map(|s| s / (all.count - 1.0));
         let stuck = (0..6).find(|c| variance[*c] == 0.0);
-        let sum = |v: &[f64; 6]| v[..3].iter().sum::<f64>();
         if stuck.is_none() && !saturated {
-            let floor = self.floor.get_or_insert(variance);
-            // The quietest second of those before anything was to turn: a steady rate is as quiet as rest.
-            if !self.begun && sum(&variance) <= sum(floor) {
-                self.rest = [0, 1, 2].map(|c| all.mean[c]);
+            // Before anything was to turn: a steady rate is as quiet as rest.
+            if !self.begun {
+                self.find_rest([0, 1, 2].map(|c| [all.mean[c], variance[c]]));
             }
+            let floor = self.floor.get_or_insert(variance);
             for c in 0..6 {
                 floor[c] = floor[c].min(variance[c]);
             }
@@ -237,7 +269,8 @@ impl Watch {
 
     /// Rate of a second against that of rest, rad/s, by `gyro`, raw to SI.
     pub fn rate(&self, seen: &Seen, gyro: &Affine<f64>) -> Vector3<f64> {
-        gyro.matrix * Vector3::from_fn(|c, _| seen.mean[c] - self.rest[c])
+        let rest = self.rest.map_or([0.0; 3], |r| r.0);
+        gyro.matrix * Vector3::from_fn(|c, _| seen.mean[c] - rest[c])
     }
 
     /// Standard deviation of one sample of the gyro at rest, by `gyro`, rad/s; the noisiest axis.
@@ -298,6 +331,24 @@ mod tests {
             last = watch.take(&chunk(20 * k, 20, 1.0, 0.05)).or(last);
         }
         assert!(last.unwrap().motion.iter().all(|m| *m > 1.0), "{last:?}");
+    }
+
+    #[test]
+    fn a_second_in_which_the_table_slows_down_is_not_rest() {
+        let mut watch = Watch::new(1000.0, false);
+        for k in 0..60 {
+            let turning = 1.0 + 0.01 * (50.0 - k as f64).max(0.0);
+            watch.take(&chunk(20 * k, 20, turning, 0.01));
+        }
+        assert!(!watch.knows_rest());
+        let mut last = None;
+        for k in 60..200 {
+            last = watch.take(&chunk(20 * k, 20, 1.0, 0.01)).or(last);
+        }
+        let plain = guessed(&last.unwrap(), 9.8)[0];
+        assert!(watch.knows_rest() && watch.rate(&last.unwrap(), &plain).norm() < 1e-3);
+        watch.was_turning();
+        assert!(!watch.knows_rest());
     }
 
     #[test]

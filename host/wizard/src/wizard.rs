@@ -147,6 +147,9 @@ impl<'a> Wizard<'a> {
                 return Ok(Ended::Cancelled);
             }
         }
+        for unit in &mut self.units {
+            unit.was_turning();
+        }
         loop {
             if self.round(None, false)? == Some(Wish::Cancel) {
                 return Ok(Ended::Cancelled);
@@ -156,12 +159,14 @@ impl<'a> Wizard<'a> {
                 if since.elapsed() > SILENT {
                     let silent = self.units.iter().find(|u| !u.is_heard());
                     let name = silent.map_or_else(String::new, One::name);
-                    let problem = "no samples come";
-                    return Err(Error::device(
-                        name,
-                        problem,
-                        "reset the board and run it again",
-                    ));
+                    let (problem, remedy) = match silent.is_some_and(|u| u.standing.samples > 0) {
+                        true => (
+                            "it does not come to rest: no two seconds in a row read alike",
+                            "leave it still until the first step, and run it again",
+                        ),
+                        false => ("no samples come", "reset the board and run it again"),
+                    };
+                    return Err(Error::device(name, problem, remedy));
                 }
                 continue;
             }

@@ -97,13 +97,18 @@ impl Bench {
 
     /// Tells the bench something; it has to agree.
     pub fn tell(&mut self, line: &str) {
+        assert_eq!(self.ask(line), "OK", "{line}");
+    }
+
+    /// Tells or asks the bench something; what it answers.
+    pub fn ask(&mut self, line: &str) -> String {
         self.control
             .get_mut()
             .write_all(format!("{line}\n").as_bytes())
             .unwrap();
         let mut answer = String::new();
         self.control.read_line(&mut answer).unwrap();
-        assert_eq!(answer.trim(), "OK", "{line}");
+        answer.trim().to_owned()
     }
 
     pub fn path(&self, name: &str) -> PathBuf {

@@ -123,7 +123,7 @@ fn a_session_that_was_killed_and_unplugged_goes_on_to_a_stored_calibration_that_
     assert!(interrupted, "{out:?}");
     let told =
         String::from_utf8_lossy(&out.stdout).into_owned() + &String::from_utf8_lossy(&out.stderr);
-    assert!(out.status.success(), "{told}");
+    assert!(out.status.success(), "{}\n{told}", bench.ask("TRUTH?"));
     assert!(
         told.contains(&format!("goes on behind {before} dwells")),
         "{told}"

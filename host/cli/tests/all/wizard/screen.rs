@@ -83,8 +83,14 @@ impl Sitting {
     /// The end: what was seen, and whether the terminal is as it was.
     fn end(mut self) -> (String, bool, Option<i32>) {
         let status = self.child.wait().unwrap();
-        while let Ok(text) = self.output.recv_timeout(Duration::from_millis(100)) {
-            self.seen.push_str(&text);
+        // What was written last may be on its way on a busy machine.
+        for patience in [2000, 300] {
+            while let Ok(text) = self.output.recv_timeout(Duration::from_millis(patience)) {
+                self.seen.push_str(&text);
+                if self.seen.contains(LEFT) {
+                    break;
+                }
+            }
         }
         let is = tcgetattr(&self.other).unwrap();
         let same = is.local_modes == self.before.local_modes
