@@ -16,8 +16,10 @@
 //! | [`findings`]  | what the emulator found out about the firmware                                |
 //! | [`running`]   | a board that runs: time, bytes, supply, reset, counters                       |
 //! | [`serve`], [`terminal`], `port` | the same behind a pseudo-terminal                            |
+//! | [`commanded`] | the same in a thread, with somebody who commands it                         |
 //! | `control`, `interference` | commands over TCP; garbled bytes                                  |
 
+pub mod commanded;
 mod control;
 mod driver;
 pub mod fault;

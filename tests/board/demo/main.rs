@@ -3,17 +3,11 @@
 //! `demo SEED FOLDER`: another seed is another unit and another effect. The image, the serial line, the turntable and the command are the
 //! real ones; only silicon and steel are computed. The folder is left for whoever wants to look.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, ExitCode, Stdio};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-use mimu_board::front::Front;
-use mimu_board::running::Board;
-use mimu_board::serve::{Pace, Served};
-use mimu_rig::located::Source;
-use mimu_rig::plan::Plan;
+use mimu_board::commanded::Commanded;
 use mimu_rig::rig_file::RigTruth;
 use mimu_tests::blind::{is_listed, unit};
 use serde_json::Value;
@@ -31,10 +25,6 @@ const EFFECTS: [&str; 9] = [
     "x_gyro_dead_zone",
 ];
 
-/// Where the unit is, and which way is up before it is told otherwise.
-const PLACE: &str = "format = \"mimu-plan/1\"\ndevice = \"unit-007\"\nsample_rate_hz = 1000.0\ncarrier = \"table\"\n\
-     latitude_deg = 30.5\ngravity_mps2 = 9.793\nlead_in_s = 1.0\n[[step]]\nup = [0.0, 0.0, 1.0]\ndwell_s = 1.0\n";
-
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let seed = arguments.first().map_or(Ok(1), |a| a.parse());
@@ -51,52 +41,8 @@ fn main() -> ExitCode {
     }
 }
 
-/// A board that runs while the port is open.
-struct Running {
-    end: Arc<AtomicBool>,
-    thread: Option<std::thread::JoinHandle<Result<f64, String>>>,
-    port: PathBuf,
-    control: String,
-}
-
-impl Running {
-    fn start(truth: &RigTruth, seed: u64, folder: &Path) -> Result<Self, String> {
-        let plan = Plan::parse(Source::new("place", PLACE))?;
-        let image = mimu_board_tests::image();
-        let board = Board::new(&image, Front::commanded(&plan, truth, seed)?)?;
-        let mut served = Served::new(board, Pace::Fast, Some(&folder.join("flash.bin")))?;
-        let control = served.listen("127.0.0.1:0", seed)?.to_string();
-        served.start()?;
-        let port = served.path().to_owned();
-        let end = Arc::new(AtomicBool::new(false));
-        let ended = end.clone();
-        let thread = std::thread::spawn(move || {
-            while !ended.load(Ordering::Relaxed) {
-                served.step()?;
-            }
-            Ok(served.board().standing().ns as f64 * 1e-9)
-        });
-        Ok(Self {
-            end,
-            thread: Some(thread),
-            port,
-            control,
-        })
-    }
-
-    /// Switches it off; how long it ran by its own clock, s.
-    fn stop(mut self) -> Result<f64, String> {
-        self.end.store(true, Ordering::Relaxed);
-        match self.thread.take().map(std::thread::JoinHandle::join) {
-            Some(Ok(ran)) => ran,
-            _ => Err("the board's thread broke down".into()),
-        }
-    }
-}
-
 fn demo(seed: u64, folder: &Path) -> Result<(), String> {
     let began = Instant::now();
-    std::fs::create_dir_all(folder).map_err(|e| format!("the folder: {e}"))?;
     let effect = EFFECTS[(seed as usize + EFFECTS.len() - 1) % EFFECTS.len()];
     let mut file = unit(&[effect], seed);
     // It has run for long: nobody wants to watch it warm up.
@@ -105,11 +51,14 @@ fn demo(seed: u64, folder: &Path) -> Result<(), String> {
     println!(
         "A unit with unknown errors (seed {seed}) is on a turntable; the firmware's image runs on an emulated board."
     );
-    let board = Running::start(&truth, seed, folder)?;
+    let image = mimu_board_tests::image();
+    let mut unit_id = [0; 12];
+    unit_id[4..].copy_from_slice(&seed.to_be_bytes());
+    let board = Commanded::start(&image, "table", &truth, seed, unit_id, folder)?;
     let driver = folder.join("turntable.toml");
-    let text = include_str!("turntable.toml").replace("HOST:PORT", &board.control);
+    let text = include_str!("turntable.toml").replace("HOST:PORT", &board.address().to_string());
     std::fs::write(&driver, text).map_err(|e| format!("the driver file: {e}"))?;
-    let outcome = wizard(&board.port, &driver, folder);
+    let outcome = wizard(&board.path("port"), &driver, folder);
     let ran_s = board.stop()?;
     let outcome = outcome?;
     let unit = &outcome["units"][0];

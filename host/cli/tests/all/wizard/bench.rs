@@ -1,31 +1,20 @@
 //! The firmware's release image on the emulated board, on a turntable or in hands that take commands, and the command beside it.
 
-use std::io::{BufRead as _, BufReader, Write as _};
-use std::net::TcpStream;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use mimu_board::front::Front;
+use mimu_board::commanded::Commanded;
 use mimu_board::image::{Image, release_image};
-use mimu_board::running::Board;
-use mimu_board::serve::{Pace, Served};
-use mimu_rig::located::Source;
-use mimu_rig::plan::Plan;
 use mimu_rig::rig_file::{RigFile, RigTruth};
 use mimu_rig::table::TableTruth;
 use serde_json::Value;
 
-/// A board that runs.
+/// A board that runs, in a folder that goes with it.
 pub struct Bench {
-    pub folder: tempfile::TempDir,
     pub truth: RigTruth,
-    control: BufReader<TcpStream>,
-    end: Arc<AtomicBool>,
-    thread: Option<JoinHandle<()>>,
+    board: Commanded,
+    _folder: tempfile::TempDir,
 }
 
 pub fn in_repository(path: &str) -> PathBuf {
@@ -57,69 +46,42 @@ pub fn unit(seed: u64) -> RigTruth {
 
 impl Bench {
     /// On a `table` or in `hands`.
-    pub fn new(carrier: &str, truth: RigTruth, seed: u64) -> Self {
+    pub fn new(fixture: &str, truth: RigTruth, seed: u64) -> Self {
         let folder = tempfile::tempdir().unwrap();
-        let place = format!(
-            "format = \"mimu-plan/1\"\nsample_rate_hz = 1000.0\ncarrier = \"{carrier}\"\nlatitude_deg = 30.5\ngravity_mps2 = 9.793\n\
-             lead_in_s = 1.0\n[[step]]\nup = [0.0, 0.0, 1.0]\ndwell_s = 1.0\n"
-        );
-        let plan = Plan::parse(Source::new("place", &place)).unwrap();
-        let front = Front::commanded(&plan, &truth, seed).unwrap();
-        let board = Board::new(&image(), front).unwrap();
-        let mut served =
-            Served::new(board, Pace::Fast, Some(&folder.path().join("flash"))).unwrap();
-        let address = served.listen("127.0.0.1:0", seed).unwrap();
-        served.link(&folder.path().join("port")).unwrap();
-        served.start().unwrap();
+        let mut unit_id = [0; 12];
+        unit_id[11] = seed as u8;
+        let board =
+            Commanded::start(&image(), fixture, &truth, seed, unit_id, folder.path()).unwrap();
         let driver =
             std::fs::read_to_string(in_repository("tests/board/demo/turntable.toml")).unwrap();
-        let driver = driver.replace("HOST:PORT", &address.to_string());
+        let driver = driver.replace("HOST:PORT", &board.address().to_string());
         std::fs::write(folder.path().join("driver.toml"), driver).unwrap();
-        let end = Arc::new(AtomicBool::new(false));
-        let ended = end.clone();
-        let thread = std::thread::spawn(move || {
-            while !ended.load(Ordering::Relaxed) {
-                served.step().unwrap();
-            }
-        });
-        let stream = TcpStream::connect(address).unwrap();
-        stream
-            .set_read_timeout(Some(Duration::from_secs(60)))
-            .unwrap();
         Self {
-            folder,
             truth,
-            control: BufReader::new(stream),
-            end,
-            thread: Some(thread),
+            board,
+            _folder: folder,
         }
     }
 
     /// Tells the bench something; it has to agree.
     pub fn tell(&mut self, line: &str) {
-        assert_eq!(self.ask(line), "OK", "{line}");
+        self.board.tell(line).unwrap();
     }
 
-    /// Tells or asks the bench something; what it answers.
+    /// Asks the bench something.
     pub fn ask(&mut self, line: &str) -> String {
-        self.control
-            .get_mut()
-            .write_all(format!("{line}\n").as_bytes())
-            .unwrap();
-        let mut answer = String::new();
-        self.control.read_line(&mut answer).unwrap();
-        answer.trim().to_owned()
+        self.board.ask(line).unwrap()
     }
 
     pub fn path(&self, name: &str) -> PathBuf {
-        self.folder.path().join(name)
+        self.board.path(name)
     }
 
     /// The command, with what every session here has in common.
     pub fn wizard(&self, arguments: &[&str]) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_mimu"));
         command
-            .current_dir(self.folder.path())
+            .current_dir(self.path(""))
             .args([
                 "wizard",
                 "-o",
@@ -161,14 +123,5 @@ impl Bench {
     pub fn outcome(&self) -> Value {
         let text = std::fs::read_to_string(self.path("outcome.json")).unwrap();
         serde_json::from_str(&text).unwrap()
-    }
-}
-
-impl Drop for Bench {
-    fn drop(&mut self) {
-        self.end.store(true, Ordering::Relaxed);
-        if let Some(thread) = self.thread.take() {
-            let _ = thread.join();
-        }
     }
 }

@@ -1,0 +1,306 @@
+//! What can go wrong in a session of the wizard, done to it on purpose: each ends in a calibration that holds the truth, or in a stop that
+//! says why. Prints a line for each.
+//!
+//! `faults [NAME ...]`: all of them without names.
+
+mod session;
+
+use std::path::Path;
+use std::process::ExitCode;
+use std::time::Duration;
+
+use mimu_board::commanded::Commanded;
+use session::{Ended, Sitting, unit};
+
+/// Errors above these are a wrong calibration: several times what dwells of a second leave. deg/s, mg.
+const RIGHT: [f64; 2] = [0.3, 3.0];
+/// Kills of the command in one session.
+const KILLS: usize = 50;
+
+type Scenario = fn(&Path) -> Result<Ended, String>;
+
+const ALL: &[(&str, Scenario)] = &[
+    ("nothing", nothing),
+    ("by-device", by_device),
+    ("garbled", garbled),
+    ("bursts", bursts),
+    ("link", link),
+    ("reset", reset),
+    ("supply", supply),
+    ("killed", killed),
+    ("other-unit", other_unit),
+    ("drift", drift),
+    ("wrong-axis", wrong_axis),
+    ("fidget", fidget),
+    ("any-order", any_order),
+    ("hands", hands),
+    ("hands-fixed", hands_fixed),
+];
+
+fn main() -> ExitCode {
+    let names: Vec<String> = std::env::args().skip(1).collect();
+    println!(
+        "{:12} {:>6} {:>7} {:>6} {:>6} {:>6}  outcome",
+        "fault", "s", "unit s", "dwells", "thrown", "broken"
+    );
+    let mut wrong = 0;
+    for (name, scenario) in ALL {
+        if !names.is_empty() && !names.iter().any(|n| n == name) {
+            continue;
+        }
+        let folder = match tempfile::tempdir() {
+            Ok(folder) => folder,
+            Err(e) => {
+                eprintln!("faults: {e}");
+                return ExitCode::FAILURE;
+            }
+        };
+        match scenario(folder.path()) {
+            Ok(ended) => wrong += usize::from(!report(name, &ended)),
+            Err(problem) => {
+                println!("{name:12} {problem}");
+                wrong += 1;
+            }
+        }
+    }
+    match wrong {
+        0 => ExitCode::SUCCESS,
+        _ => ExitCode::FAILURE,
+    }
+}
+
+/// Prints a line; whether nothing wrong is stored.
+fn report(name: &str, ended: &Ended) -> bool {
+    let outcome = match (ended.stored, &ended.stopped) {
+        (Some([gyro, accel]), _) => format!(
+            "stored, errs by {gyro:.3} deg/s and {accel:.2} mg; {}",
+            ended.verdict
+        ),
+        (None, Some(why)) => format!("stopped, nothing stored: {why}"),
+        (None, None) => format!("nothing stored; {}", ended.verdict),
+    };
+    println!(
+        "{name:12} {:6.0} {:7.0} {:6} {:6} {:6}  {outcome}",
+        ended.seconds, ended.recorded_s, ended.dwells, ended.thrown, ended.interrupted
+    );
+    for note in &ended.notes {
+        println!("{:12} note: {note}", "");
+    }
+    let right = |e: [f64; 2]| e[0] < RIGHT[0] && e[1] < RIGHT[1];
+    ended.stored.is_none_or(right)
+}
+
+const TABLE: [&str; 9] = [
+    "--fixture",
+    "table",
+    "--driver",
+    "driver.toml",
+    "--dwell",
+    "1",
+    "--rate",
+    "60",
+    "--as-planned",
+];
+
+fn on_table(seed: u64, folder: &Path) -> Result<Sitting, String> {
+    let mut sitting = Sitting::new("table", seed, folder, &TABLE)?;
+    sitting.run()?;
+    Ok(sitting)
+}
+
+fn nothing(folder: &Path) -> Result<Ended, String> {
+    on_table(1, folder)?.end()
+}
+
+fn by_device(folder: &Path) -> Result<Ended, String> {
+    let arguments = [&TABLE[..], &["--by", "device"]].concat();
+    let mut sitting = Sitting::new("table", 2, folder, &arguments)?;
+    sitting.run()?;
+    sitting.end()
+}
+
+fn garbled(folder: &Path) -> Result<Ended, String> {
+    let mut sitting = on_table(3, folder)?;
+    sitting.board.tell("GARBLE 1000")?;
+    sitting.end()
+}
+
+/// Something after every so many dwells, so many times.
+fn now_and_then(
+    folder: &Path,
+    seed: u64,
+    times: usize,
+    mut strike: impl FnMut(&mut Commanded) -> Result<(), String>,
+) -> Result<Ended, String> {
+    let mut sitting = on_table(seed, folder)?;
+    for k in 1..=times {
+        // Later ones strike verification and store too, where dwells are fewer.
+        if !sitting.wait_for(|s| s.told("step") >= 2 * k)? {
+            return Err(format!("it ended after {} of {times}", k - 1));
+        }
+        strike(&mut sitting.board)?;
+    }
+    sitting.end()
+}
+
+fn bursts(folder: &Path) -> Result<Ended, String> {
+    now_and_then(folder, 4, 10, |board| board.tell("BURST 200"))
+}
+
+fn link(folder: &Path) -> Result<Ended, String> {
+    now_and_then(folder, 5, 10, |board| {
+        board.tell("LINK OFF")?;
+        std::thread::sleep(Duration::from_millis(300));
+        board.tell("LINK ON")
+    })
+}
+
+fn reset(folder: &Path) -> Result<Ended, String> {
+    now_and_then(folder, 6, 2, |board| board.tell("RESET"))
+}
+
+fn supply(folder: &Path) -> Result<Ended, String> {
+    now_and_then(folder, 7, 2, |board| {
+        board.tell("POWER OFF")?;
+        std::thread::sleep(Duration::from_millis(300));
+        board.tell("POWER ON")
+    })
+}
+
+fn killed(folder: &Path) -> Result<Ended, String> {
+    let mut sitting = on_table(8, folder)?;
+    let mut kills = 0;
+    // Instants that have nothing to do with what it does, a third of a second to three seconds after it was started.
+    for k in 0..4 * KILLS {
+        let wait = 0.3 + 2.7 * (k as f64 * 0.618_034).fract();
+        std::thread::sleep(Duration::from_secs_f64(wait));
+        if kills == KILLS {
+            break;
+        }
+        if !sitting.kill()? {
+            break;
+        }
+        kills += 1;
+        // Once in five it gets further, or no dwell would ever end.
+        if kills % 5 == 0 {
+            sitting.run()?;
+            sitting.wait_for(|s| s.told("dwell") >= 1)?;
+        } else {
+            sitting.run()?;
+        }
+    }
+    let mut ended = sitting.end()?;
+    ended.notes.push(format!("killed {kills} times"));
+    Ok(ended)
+}
+
+fn other_unit(folder: &Path) -> Result<Ended, String> {
+    let mut sitting = on_table(9, folder)?;
+    sitting.wait_for(|s| s.told("dwell") >= 3)?;
+    sitting.board.tell("LINK OFF")?;
+    let other_folder = folder.join("other");
+    let image = mimu_board_tests::image();
+    let mut other = Commanded::start(
+        &image,
+        "table",
+        &unit(99, "table")?,
+        99,
+        [9; 12],
+        &other_folder,
+    )?;
+    // Plugged into the same port.
+    let port = std::fs::read_link(other_folder.join("port")).map_err(|e| e.to_string())?;
+    let link = folder.join("port");
+    std::os::unix::fs::symlink(port, &link).map_err(|e| e.to_string())?;
+    let before = sitting.told("interrupted");
+    sitting.wait_for(|s| s.told("interrupted") > before)?;
+    std::thread::sleep(Duration::from_secs(3));
+    let dwells = sitting.told("dwell");
+    other.tell("LINK OFF")?;
+    std::fs::remove_file(&link).map_err(|e| e.to_string())?;
+    sitting.board.tell("LINK ON")?;
+    let mut ended = sitting.end()?;
+    ended
+        .notes
+        .push(format!("{dwells} dwells when the right unit was back"));
+    Ok(ended)
+}
+
+fn drift(folder: &Path) -> Result<Ended, String> {
+    let mut sitting = on_table(10, folder)?;
+    sitting.board.tell("CHAMBER 70 20")?;
+    sitting.end()
+}
+
+fn wrong_axis(folder: &Path) -> Result<Ended, String> {
+    let arguments = [&TABLE[..], &["--patience", "10"]].concat();
+    let mut sitting = Sitting::new("table", 11, folder, &arguments)?;
+    let path = folder.join("driver.toml");
+    let driver = std::fs::read_to_string(&path).map_err(|e| e.to_string())?;
+    let driver = driver.replace("{x} {y} {z}", "{y} {z} {x}");
+    std::fs::write(&path, driver).map_err(|e| e.to_string())?;
+    sitting.run()?;
+    sitting.end()
+}
+
+const HANDS: [&str; 6] = [
+    "--fixture",
+    "hands",
+    "--driver",
+    "driver.toml",
+    "--dwell",
+    "2",
+];
+
+fn fidget(folder: &Path) -> Result<Ended, String> {
+    let mut sitting = Sitting::new("hands", 12, folder, &HANDS)?;
+    sitting.board.tell("FIDGET 3")?;
+    sitting.run()?;
+    sitting.end()
+}
+
+/// A person who has the faces, edges and corners of a box in an order of their own.
+fn any_order(folder: &Path) -> Result<Ended, String> {
+    let mut sitting = Sitting::new("hands", 13, folder, &["--fixture", "hands", "--dwell", "2"])?;
+    sitting.run()?;
+    let mut poses = Vec::new();
+    for x in [-1, 0, 1] {
+        for y in [1, 0, -1] {
+            for z in [0, -1, 1] {
+                if [x, y, z] != [0; 3] {
+                    poses.push(format!("MOVE {x} {y} {z}"));
+                }
+            }
+        }
+    }
+    let mut next = 0;
+    // Until the recognised poses are enough.
+    while next < 10 * poses.len() {
+        let had = sitting.told("dwell");
+        sitting.board.tell(&poses[(7 * next) % poses.len()])?;
+        next += 1;
+        let asked = std::time::Instant::now();
+        let patience = Duration::from_secs(12);
+        let goes_on = sitting.wait_for(|s| s.told("dwell") > had || asked.elapsed() > patience)?;
+        if !goes_on {
+            break;
+        }
+    }
+    let mut ended = sitting.end()?;
+    ended.notes.push(format!("{next} poses were shown"));
+    Ok(ended)
+}
+
+fn hands(folder: &Path) -> Result<Ended, String> {
+    let mut sitting = Sitting::new("hands", 14, folder, &HANDS)?;
+    sitting.run()?;
+    sitting.end()
+}
+
+/// The same person with as many poses as planned, whatever is known already.
+fn hands_fixed(folder: &Path) -> Result<Ended, String> {
+    let arguments = [&HANDS[..], &["--as-planned"]].concat();
+    let mut sitting = Sitting::new("hands", 14, folder, &arguments)?;
+    sitting.run()?;
+    sitting.end()
+}
