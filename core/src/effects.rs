@@ -29,8 +29,9 @@ mod triad;
 use nalgebra::{RealField, Vector3, convert};
 
 use crate::compensation::{Affine, Sample};
+use crate::die::{BEYOND_C, lagged};
 use law::Conditions;
-use triad::{Memory, Triad, lagged, put};
+use triad::{Memory, Triad, put};
 
 pub use code::FARTHEST_ZERO;
 pub use directions::Directions;
@@ -65,6 +66,8 @@ pub const RATE_LAG_S: f64 = 30.0;
 pub struct Effects<T: RealField, const N: usize> {
     gyro: Triad<T, N>,
     accel: Triad<T, N>,
+    /// Temperatures that the effects see, °C.
+    seen_c: Option<[T; 2]>,
 }
 
 /// What the effects remember of one stream of samples.
@@ -146,7 +149,16 @@ impl<T: RealField + Copy, const N: usize> Effects<T, N> {
         Self {
             gyro: Triad::new(gyro),
             accel: Triad::new(accel),
+            seen_c: None,
         }
+    }
+
+    /// The same of a calibration for these temperatures, °C: beyond them the effects see the temperature go on for [`BEYOND_C`] and then
+    /// stand still, as the curves of the calibration do. A square of the temperature would leave every size behind.
+    pub fn within(mut self, limits: Option<[T; 2]>) -> Self {
+        let most: T = convert(BEYOND_C);
+        self.seen_c = limits.map(|[from, to]| [from - most, to + most]);
+        self
     }
 
     /// Adds one.
@@ -160,8 +172,8 @@ impl<T: RealField + Copy, const N: usize> Effects<T, N> {
 
     /// Follows temperature, °C, and time, s since the call before or since power-on: some times a second is enough.
     ///
-    /// A temperature that is not a number is that of before; as long as there was none, the reference. A step of time that is not
-    /// positive is none.
+    /// The temperature is that of the thermometer, as effects are found by it: one of them is the lag of the dies behind it. One that is
+    /// not a number is that of before; as long as there was none, the reference. A step of time that is not positive is none.
     pub fn slow(&self, state: &mut State<T, N>, dt_s: T, temp_c: T) {
         let dt = match dt_s > T::zero() && dt_s.is_finite() {
             true => dt_s,
@@ -173,6 +185,10 @@ impl<T: RealField + Copy, const N: usize> Effects<T, N> {
         state.lost = (time - state.time) - step;
         state.time = time;
 
+        let temp_c = match (temp_c.is_finite(), self.seen_c) {
+            (true, Some([least, most])) => temp_c.max(least).min(most),
+            _ => temp_c,
+        };
         let before = state.temperature_offset;
         let temperature_offset = match temp_c.is_finite() {
             true => temp_c - convert(REFERENCE_C),

@@ -6,7 +6,8 @@
 //! | [`compensation`] | inverse model, raw to SI: `x = C u + o` for gyro and accelerometer |
 //! | [`effects`]      | what the affine model lacks, removed sample by sample              |
 //! | [`kalman`]       | bank of three four-state Kalman filters fed one scalar at a time  |
-//! | [`table`]        | inverse models at several temperatures, and between them          |
+//! | [`table`]        | inverse models at several temperatures, and curves between them   |
+//! | [`die`]          | temperature of the dies from that of the thermometer              |
 //! | [`single`]       | what runs with every sample, in single precision                   |
 //! | [`stored`]       | all of this as bytes, for the device to keep                       |
 //! | [`wire`]         | messages between device and host, and their frames                 |
@@ -17,6 +18,7 @@
 #![no_std]
 
 pub mod compensation;
+pub mod die;
 pub mod effects;
 pub mod kalman;
 pub mod single;

@@ -1,8 +1,14 @@
-//! Compensation over temperature: inverse models at several temperatures, and between them.
+//! Compensation over temperature: inverse models at several temperatures, and curves between them.
 //!
-//! A node holds the whole of C and o of both triads, and these are interpolated linearly. Not a scale factor K(T) in front of a fixed
-//! M: what drifts is the sensor, a row of the forward matrix and so a column of C; row factors would be wrong by drift times
-//! misalignment, of which 1 % each make 100 ppm.
+//! A node holds the whole of C and o of both triads. Not a scale factor K(T) in front of a fixed M: what drifts is the sensor, a row of
+//! the forward matrix and so a column of C; row factors would be wrong by drift times misalignment, of which 1 % each make 100 ppm.
+//!
+//! Between nodes each number is a cubic Hermite piece: it has the values and the derivatives of both nodes. Drifts of MEMS sensors are
+//! cubics of the temperature (niu), which 16 nodes with straight lines between them miss by 18 deg/h; Hermite pieces hold a cubic exactly,
+//! and joined at the nodes they have no kink there.
+//!
+//! Outside the nodes a cubic leaves the data at its third power. There each number goes on along the slope of the end node for
+//! [`BEYOND_C`], and is held from there on: the error grows linearly at first, and then no more.
 //!
 //! Temperature moves slowly, so this runs some times a second ([`Table::follow`]), and what runs with every sample is
 //! [`Compensation::apply`] of the model that it leaves behind.
@@ -13,16 +19,37 @@ use nalgebra::{RealField, convert};
 use crate::compensation::{Affine, Compensation};
 use crate::effects::REFERENCE_C;
 
-/// Inverse models of a unit at one temperature.
+pub use crate::die::BEYOND_C;
+
+/// Inverse models of a unit at one temperature, and how they change with it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Node<T: RealField> {
-    /// Temperature, °C.
+    /// Temperature of the dies, °C.
     pub temp_c: T,
     /// Raw to SI.
     pub model: Compensation<T>,
+    /// Derivative of each number of the model by the temperature, per kelvin.
+    pub slope: Compensation<T>,
 }
 
 impl<T: RealField + Copy> Node<T> {
+    /// A node whose numbers do not change with temperature.
+    pub fn constant(temp_c: T, model: Compensation<T>) -> Self {
+        let none = Affine {
+            matrix: nalgebra::Matrix3::zeros(),
+            offset: nalgebra::Vector3::zeros(),
+        };
+        let slope = Compensation {
+            gyro: none,
+            accel: none,
+        };
+        Self {
+            temp_c,
+            model,
+            slope,
+        }
+    }
+
     fn is_finite(&self) -> bool {
         let affine = |a: &Affine<T>| {
             a.matrix
@@ -30,7 +57,11 @@ impl<T: RealField + Copy> Node<T> {
                 .chain(a.offset.iter())
                 .all(|v| v.is_finite())
         };
-        self.temp_c.is_finite() && affine(&self.model.gyro) && affine(&self.model.accel)
+        self.temp_c.is_finite()
+            && affine(&self.model.gyro)
+            && affine(&self.model.accel)
+            && affine(&self.slope.gyro)
+            && affine(&self.slope.accel)
     }
 }
 
@@ -43,6 +74,18 @@ pub enum Refused {
     Order(usize),
     /// A number of this node is not finite.
     NotFinite(usize),
+    /// An end of the range is not finite, or the first is above the second.
+    Range,
+}
+
+/// What stands between two nodes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Curve {
+    /// Cubic Hermite pieces.
+    Hermite,
+    /// Straight lines, without slopes: nodes as they were before there were any. No slopes could stand for them, as a line bends at a
+    /// node and a node has one slope.
+    Linear,
 }
 
 /// Nodes in the order of their temperatures: immutable, for any number of streams.
@@ -51,16 +94,19 @@ pub struct Table<T: RealField, const N: usize> {
     /// Apart, because there always is one.
     first: Node<T>,
     others: Vec<Node<T>, N>,
+    curve: Curve,
+    /// Dies' temperatures that the nodes were found from, °C.
+    range_c: Option<[T; 2]>,
 }
 
 /// Where a temperature is in a table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Place {
-    /// Between the first node and the last.
+    /// Within the range that the calibration is for.
     Inside,
-    /// Below the first, whose model is used as it is.
+    /// Below it, by however little.
     Below,
-    /// Above the last, whose model is used as it is.
+    /// Above it, by however little.
     Above,
 }
 
@@ -69,7 +115,7 @@ pub enum Place {
 pub struct State<T: RealField> {
     /// Raw to SI.
     pub model: Compensation<T>,
-    /// Whether it is that of a temperature outside the nodes. A single node is for all temperatures, and has no outside.
+    /// Whether it is that of a temperature outside the range. See [`Table::limits`].
     pub place: Place,
 }
 
@@ -85,6 +131,8 @@ impl<T: RealField + Copy, const N: usize> Table<T, N> {
         let mut table = Self {
             first,
             others: Vec::new(),
+            curve: Curve::Hermite,
+            range_c: None,
         };
         for node in nodes {
             let at = table.len();
@@ -103,12 +151,53 @@ impl<T: RealField + Copy, const N: usize> Table<T, N> {
         Ok(table)
     }
 
+    /// The same nodes with straight lines between them, held outside; slopes are not looked at. For nodes from before there were slopes.
+    pub fn with_straight_lines(mut self) -> Self {
+        let others = self.others.iter_mut();
+        for node in core::iter::once(&mut self.first).chain(others) {
+            *node = Node::constant(node.temp_c, node.model);
+        }
+        self.curve = Curve::Linear;
+        self
+    }
+
+    /// The same nodes, found from dies of these temperatures, °C.
+    pub fn with_range(mut self, range_c: [T; 2]) -> Result<Self, Refused> {
+        let [from, to] = range_c;
+        match from.is_finite() && to.is_finite() && from <= to {
+            true => self.range_c = Some(range_c),
+            false => return Err(Refused::Range),
+        }
+        Ok(self)
+    }
+
+    /// Dies' temperatures that the nodes were found from, °C.
+    pub fn range_c(&self) -> Option<[T; 2]> {
+        self.range_c
+    }
+
+    /// Whether straight lines stand between the nodes.
+    pub fn is_straight(&self) -> bool {
+        self.curve == Curve::Linear
+    }
+
+    /// The temperatures that the calibration is for, °C: those that it was found from, and of several nodes none outside them. `None`: a
+    /// single node of no known range, which is for all temperatures as nothing says otherwise.
+    pub fn limits(&self) -> Option<[T; 2]> {
+        let nodes = self.others.last();
+        let nodes = nodes.map(|last| [self.first.temp_c, last.temp_c]);
+        match (self.range_c, nodes) {
+            (Some([a, b]), Some([c, d])) => Some([a.max(c), b.min(d)]),
+            (one, other) => one.or(other),
+        }
+    }
+
     /// The state of a stream whose temperature is not known yet: that of [`REFERENCE_C`].
     pub fn state(&self) -> State<T> {
         self.at(convert(REFERENCE_C))
     }
 
-    /// Follows the temperature, °C. One that is not a number changes nothing.
+    /// Follows the temperature of the dies, °C. One that is not a number changes nothing.
     pub fn follow(&self, state: &mut State<T>, temp_c: T) {
         if temp_c.is_finite() {
             *state = self.at(temp_c);
@@ -126,46 +215,65 @@ impl<T: RealField + Copy, const N: usize> Table<T, N> {
     }
 
     fn at(&self, temp_c: T) -> State<T> {
-        let held = |node: &Node<T>, place| State {
-            model: node.model,
-            place,
+        let place = match self.limits() {
+            Some([from, _]) if temp_c < from => Place::Below,
+            Some([_, to]) if temp_c > to => Place::Above,
+            _ => Place::Inside,
         };
+        State {
+            model: self.model(temp_c),
+            place,
+        }
+    }
+
+    fn model(&self, temp_c: T) -> Compensation<T> {
         let mut low = &self.first;
         for high in &self.others {
             if temp_c < low.temp_c {
                 break;
             }
             if temp_c <= high.temp_c {
-                let weight = (temp_c - low.temp_c) / (high.temp_c - low.temp_c);
-                return State {
-                    model: between(&low.model, &high.model, weight),
-                    place: Place::Inside,
-                };
+                return self.between(low, high, temp_c);
             }
             low = high;
         }
-        match temp_c < low.temp_c {
-            _ if self.others.is_empty() => held(low, Place::Inside),
-            true => held(low, Place::Below),
-            false if temp_c > low.temp_c => held(low, Place::Above),
-            false => held(low, Place::Inside),
+        let most: T = convert(BEYOND_C);
+        let away = (temp_c - low.temp_c).max(-most).min(most);
+        let beyond = |at: &Affine<T>, slope: &Affine<T>| Affine {
+            matrix: at.matrix + slope.matrix * away,
+            offset: at.offset + slope.offset * away,
+        };
+        Compensation {
+            gyro: beyond(&low.model.gyro, &low.slope.gyro),
+            accel: beyond(&low.model.accel, &low.slope.accel),
         }
     }
-}
 
-/// `low` at weight 0, `high` at 1; both ends exactly, which `low + weight (high - low)` would miss at the upper one.
-fn between<T: RealField + Copy>(
-    low: &Compensation<T>,
-    high: &Compensation<T>,
-    weight: T,
-) -> Compensation<T> {
-    let rest = T::one() - weight;
-    let affine = |low: &Affine<T>, high: &Affine<T>| Affine {
-        matrix: low.matrix * rest + high.matrix * weight,
-        offset: low.offset * rest + high.offset * weight,
-    };
-    Compensation {
-        gyro: affine(&low.gyro, &high.gyro),
-        accel: affine(&low.accel, &high.accel),
+    /// The four weights of a piece are 1 and three zeros at either end, so that a node has its own numbers to the last bit.
+    fn between(&self, low: &Node<T>, high: &Node<T>, temp_c: T) -> Compensation<T> {
+        let (one, width) = (T::one(), high.temp_c - low.temp_c);
+        let w = (temp_c - low.temp_c) / width;
+        let rest = one - w;
+        let [a, b, c, d] = match self.curve {
+            Curve::Linear => [rest, w, T::zero(), T::zero()],
+            Curve::Hermite => [
+                (one + w + w) * rest * rest,
+                (one + rest + rest) * w * w,
+                w * rest * rest * width,
+                -w * w * rest * width,
+            ],
+        };
+        let affine = |of: fn(&Compensation<T>) -> &Affine<T>| {
+            let (u, v) = (of(&low.model), of(&high.model));
+            let (du, dv) = (of(&low.slope), of(&high.slope));
+            Affine {
+                matrix: u.matrix * a + v.matrix * b + du.matrix * c + dv.matrix * d,
+                offset: u.offset * a + v.offset * b + du.offset * c + dv.offset * d,
+            }
+        };
+        Compensation {
+            gyro: affine(|model| &model.gyro),
+            accel: affine(|model| &model.accel),
+        }
     }
 }

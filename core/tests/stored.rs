@@ -1,10 +1,12 @@
-//! Calibrations as bytes, and interpolation between nodes, against a reader and a line written out here in double precision.
+//! Calibrations as bytes, and curves between nodes, against a reader, cubics and lines written out here in double precision.
 
 use mimu_core::compensation::{Affine, Compensation, Sample};
 use mimu_core::effects::{Sensor, Variable};
 use mimu_core::single;
-use mimu_core::stored::{NODES, Origin, ROOM, Record, Refused, decode, encode, hash};
-use mimu_core::table::{self, Node, Place, Table};
+use mimu_core::stored::{
+    Curves, MAX_LENGTH, NODES, Origin, ROOM, Record, Refused, decode, encode, hash,
+};
+use mimu_core::table::{BEYOND_C, Node, Place, Table};
 use nalgebra::{Matrix3, Vector3};
 use proptest::prelude::*;
 
@@ -15,14 +17,24 @@ fn affine(numbers: &[f32]) -> Affine<f32> {
     }
 }
 
-/// A node of 24 numbers: C by rows and o of the gyro, then of the accelerometer.
+/// C by rows and o of the gyro, then of the accelerometer.
+fn model(numbers: &[f32; 24]) -> Compensation<f32> {
+    Compensation {
+        gyro: affine(&numbers[..12]),
+        accel: affine(&numbers[12..]),
+    }
+}
+
+/// A node of 24 numbers that do not change with temperature.
 fn node(temp_c: f32, numbers: &[f32; 24]) -> Node<f32> {
+    Node::constant(temp_c, model(numbers))
+}
+
+/// One of which they do.
+fn sloping(temp_c: f32, numbers: &[f32; 24], slopes: &[f32; 24]) -> Node<f32> {
     Node {
-        temp_c,
-        model: Compensation {
-            gyro: affine(&numbers[..12]),
-            accel: affine(&numbers[12..]),
-        },
+        slope: model(slopes),
+        ..node(temp_c, numbers)
     }
 }
 
@@ -46,16 +58,14 @@ fn regular() -> [f32; 24] {
 }
 
 fn bytes(nodes: &[Node<f32>], effects: &[Record<'_>]) -> Vec<u8> {
-    let mut out = [0; 4096];
+    with_curves(&Curves::of(nodes), effects)
+}
+
+fn with_curves(curves: &Curves<'_>, effects: &[Record<'_>]) -> Vec<u8> {
+    let mut out = [0; MAX_LENGTH];
     let matrix = Matrix3::from_diagonal_element(3.5);
-    let length = encode(
-        &Origin::UNKNOWN,
-        [&matrix, &matrix],
-        nodes,
-        effects,
-        &mut out,
-    )
-    .unwrap();
+    let matrices = [&matrix, &matrix];
+    let length = encode(&Origin::UNKNOWN, matrices, curves, effects, &mut out).unwrap();
     out[..length].to_vec()
 }
 
@@ -107,22 +117,32 @@ fn the_layout_is_that_of_the_table_in_the_documentation() {
     // Sensors that look along -y, x and z, 2, 4 and 0.5 V per unit; and C of a gyro that looks along y, -x and z.
     let accel = Matrix3::new(0.0, 0.25, 0.0, -0.5, 0.0, 0.0, 0.0, 0.0, 2.0);
     let gyro = Matrix3::new(0.0, -2.0, 0.0, 4.0, 0.0, 0.0, 0.0, 0.0, 0.5);
-    let mut all = [0; 4096];
-    let one = [node(25.0, &regular())];
+    let mut all = [0; MAX_LENGTH];
+    let slopes: [f32; 24] = std::array::from_fn(|k| -0.001 * k as f32);
+    let one = [sloping(25.0, &regular(), &slopes)];
+    let curves = Curves {
+        nodes: &one,
+        range_c: Some([-10.5, 60.25]),
+        lag_s: Some(61.5),
+    };
     let origin = Origin {
         unit_id: Some([1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12]),
         // 2026-01-01, in seconds since 1970.
         created_s: Some(0x6955_b900),
         samples_sha256: Some([0xab; 32]),
+        // A day later.
+        trimmed_s: Some(0x6957_0a80),
     };
-    let length = encode(&origin, [&gyro, &accel], &one, &effects, &mut all).unwrap();
+    let length = encode(&origin, [&gyro, &accel], &curves, &effects, &mut all).unwrap();
     let all = &all[..length];
-    let mut expected = b"mimc\x04\x00".to_vec();
+    let mut expected = b"mimc\x05\x00".to_vec();
     expected.extend((all.len() as u16).to_le_bytes());
-    expected.extend([1, 4, 0, 0]);
+    // One node, four effects, the TEMP pins; range and lag are known.
+    expected.extend([1, 4, 0, 3]);
     expected.extend([1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12]);
     expected.extend([0x00, 0xb9, 0x55, 0x69, 0, 0, 0, 0]);
     expected.extend([0xab; 32]);
+    expected.extend([0x80, 0x0a, 0x57, 0x69, 0, 0, 0, 0]);
     // D by rows, and R: of right angles the one is the other transposed.
     for rows in [
         [[0, 1, 0], [-1, 0, 0], [0, 0, 1]],
@@ -134,8 +154,10 @@ fn the_layout_is_that_of_the_table_in_the_documentation() {
             expected.extend((*value as f32).to_le_bytes());
         }
     }
-    expected.extend(25.0_f32.to_le_bytes());
-    for value in regular() {
+    for value in [-10.5_f32, 60.25, 61.5, 25.0] {
+        expected.extend(value.to_le_bytes());
+    }
+    for value in regular().into_iter().chain(slopes) {
         expected.extend(value.to_le_bytes());
     }
     expected.extend(b"\x00\x0cgyro_warm_up\x03");
@@ -164,6 +186,8 @@ fn the_layout_is_that_of_the_table_in_the_documentation() {
     let stored = decode(all).unwrap();
     assert_eq!((stored.table.len(), stored.effect_count), (1, 4));
     assert_eq!(stored.origin, origin);
+    assert_eq!(stored.table.range_c(), Some([-10.5, 60.25]));
+    assert_eq!((stored.lag_s, stored.lag().lag_s()), (Some(61.5), 61.5));
     // 384 of 256 codes to 1.65 V are bits 0 and -1, and 255 are bits -1 to -8; half a code more, so that no error turns any.
     let right = Vector3::new(384.5, 0.5, 255.5) * (1.65 / 256.0);
     let read = Sample {
@@ -182,8 +206,25 @@ fn the_layout_is_that_of_the_table_in_the_documentation() {
     assert_eq!(clean.accel, Vector3::new(2.475, 0.0, 0.004));
 }
 
+/// The same nodes without slopes as version 4 has them: an origin of 52 bytes, neither range nor lag, nodes of 100 bytes, its own number.
+fn of_version_4(bytes: &[u8]) -> Vec<u8> {
+    let nodes = usize::from(bytes[8]);
+    let directions = 12 + 60;
+    let (from, end) = (directions + 144 + 12, directions + 144 + 12 + 196 * nodes);
+    let mut older = [&bytes[..64], &bytes[directions..directions + 144]].concat();
+    for node in bytes[from..end].chunks(196) {
+        older.extend(&node[..100]);
+    }
+    older.extend(&bytes[end..]);
+    (older[4], older[10], older[11]) = (4, 0, 0);
+    let length = older.len() as u16;
+    older[6..8].copy_from_slice(&length.to_le_bytes());
+    resealed(older)
+}
+
 /// The same as version 3 has it: no origin, and its own number.
 fn of_version_3(bytes: &[u8]) -> Vec<u8> {
+    let bytes = of_version_4(bytes);
     let mut older = [&bytes[..12], &bytes[64..]].concat();
     older[4] = 3;
     let length = older.len() as u16;
@@ -208,10 +249,84 @@ fn a_calibration_of_version_3_is_read_as_one_of_no_unit() {
     assert_eq!(refused, Some(Refused::Version { found: 2 }));
 }
 
+/// What an earlier firmware computed: lines between the nodes, and the end nodes outside.
+#[test]
+fn nodes_of_version_4_stay_straight_and_are_held_outside() {
+    let low = regular();
+    let (middle, high) = (low.map(|v| 2.0 * v), low.map(|v| v - 1.0));
+    let nodes = [node(0.0, &low), node(20.0, &middle), node(50.0, &high)];
+    let older = decode(&of_version_4(&bytes(&nodes, &[]))).unwrap();
+    assert!(older.table.is_straight());
+    assert_eq!((older.lag_s, older.table.range_c()), (None, None));
+    let mut state = older.table.state();
+    for (temp_c, low, high, weight, place) in [
+        (-30.0, &low, &low, 0.0, Place::Below),
+        (-0.1, &low, &low, 0.0, Place::Below),
+        (5.0, &low, &middle, 0.25, Place::Inside),
+        (20.0, &middle, &middle, 0.0, Place::Inside),
+        (35.0, &middle, &high, 0.5, Place::Inside),
+        (51.0, &high, &high, 0.0, Place::Above),
+    ] {
+        older.table.follow(&mut state, temp_c);
+        for (found, (low, high)) in numbers_of(&state.model).iter().zip(low.iter().zip(high)) {
+            let expected = low * (1.0 - weight) + high * weight;
+            assert_eq!(*found, expected, "{temp_c}");
+        }
+        assert_eq!(state.place, place, "{temp_c}");
+    }
+}
+
+/// Bytes that a firmware of layout 4 has kept; they never change. Its nodes are from 24 to 39 °C.
+#[test]
+fn a_calibration_that_is_kept_in_flash_since_layout_4_is_read() {
+    let bytes = include_bytes!("layouts/4.calibration");
+    assert_eq!(&bytes[..6], b"mimc\x04\x00");
+    let older = decode(bytes).unwrap();
+    assert!(older.table.is_straight());
+    assert_eq!((older.table.len(), older.effect_count), (16, 0));
+    assert_eq!(older.table.limits(), Some([24.0, 39.0]));
+    // C of the gyro and of the next node in the first number, as they stand in the bytes; halfway between.
+    let at = |node: usize| {
+        let from = 12 + 52 + 144 + 100 * node + 4;
+        f32::from_le_bytes(bytes[from..from + 4].try_into().unwrap())
+    };
+    let mut state = older.table.state();
+    older.table.follow(&mut state, 30.5);
+    let expected = at(6) * 0.5 + at(7) * 0.5;
+    assert_eq!(state.model.gyro.matrix[(0, 0)], expected);
+}
+
+/// Neither the thermometer of a later version nor numbers that no dies have are taken for something else.
+#[test]
+fn a_range_a_lag_or_a_thermometer_that_makes_no_sense_is_refused() {
+    let one = [node(25.0, &regular())];
+    let refused = |range_c, lag_s| {
+        let nodes = &one;
+        let curves = Curves {
+            nodes,
+            range_c,
+            lag_s,
+        };
+        decode(&with_curves(&curves, &[])).err()
+    };
+    let no = Some(Refused::Temperature);
+    assert_eq!(refused(Some([10.0, 40.0]), Some(-120.0)), None);
+    assert_eq!(refused(Some([10.0, 10.0]), Some(600.0)), None);
+    assert_eq!(refused(Some([40.0, 10.0]), None), no);
+    assert_eq!(refused(Some([f32::NAN, 10.0]), None), no);
+    assert_eq!(refused(Some([0.0, f32::INFINITY]), None), no);
+    for lag_s in [-121.0, 601.0, f32::NAN] {
+        assert_eq!(refused(None, Some(lag_s)), no, "{lag_s}");
+    }
+    let mut later = bytes(&one, &[]);
+    later[10] = 1;
+    assert_eq!(decode(&resealed(later)).err(), no);
+}
+
 #[test]
 fn what_is_not_known_of_an_origin_is_zero() {
     let unknown = bytes(&[node(25.0, &regular())], &[]);
-    assert_eq!(unknown[12..64], [0; 52]);
+    assert_eq!(unknown[12..72], [0; 60]);
     assert_eq!(decode(&unknown).unwrap().origin, Origin::UNKNOWN);
 }
 
@@ -307,11 +422,11 @@ fn every_refusal_has_its_name() {
     assert_eq!(nodes(&many[..NODES]), None);
     assert_eq!(nodes(&many), Some(Refused::Node { at: 17 }));
     let flat = Matrix3::zeros();
-    let mut out = [0; 4096];
+    let mut out = [0; MAX_LENGTH];
     let length = encode(
         &Origin::UNKNOWN,
         [&flat, &flat],
-        &[node(0.0, &regular())],
+        &Curves::of(&[node(0.0, &regular())]),
         &[],
         &mut out,
     )
@@ -349,31 +464,81 @@ fn every_flipped_bit_is_noticed() {
     }
 }
 
-#[test]
-fn outside_the_nodes_the_nearest_is_used_and_said_so() {
+/// Each number of a node that grows by 0.1 per kelvin at the lower end, and by -0.2 at the upper.
+fn two_nodes() -> [Node<f32>; 2] {
     let low = regular();
     let high = low.map(|v| 2.0 * v);
-    let table = Table::<f32, 16>::new([node(0.0, &low), node(50.0, &high)]).unwrap();
+    [
+        sloping(0.0, &low, &[0.1; 24]),
+        sloping(50.0, &high, &[-0.2; 24]),
+    ]
+}
+
+#[test]
+fn outside_the_nodes_the_end_slope_goes_on_for_five_kelvin_and_is_then_held() {
+    let nodes = two_nodes();
+    let (low, high) = (numbers_of(&nodes[0].model), numbers_of(&nodes[1].model));
+    let table = Table::<f32, 16>::new(nodes).unwrap();
     let mut state = table.state();
-    // At 25 °C to begin with: halfway.
-    assert_eq!(numbers_of(&state.model)[0], 1.5 * low[0]);
-    for (temp_c, numbers, place) in [
-        (-1.0, low, Place::Below),
-        (0.0, low, Place::Inside),
-        (50.0, high, Place::Inside),
-        (51.0, high, Place::Above),
+    for (temp_c, ends, grown, place) in [
+        (-40.0, &low, -0.5, Place::Below),
+        (-5.0, &low, -0.5, Place::Below),
+        (-2.0, &low, -0.2, Place::Below),
+        (-0.01, &low, -0.001, Place::Below),
+        (0.0, &low, 0.0, Place::Inside),
+        (50.0, &high, 0.0, Place::Inside),
+        (50.01, &high, -0.002, Place::Above),
+        (54.0, &high, -0.8, Place::Above),
+        (55.0, &high, -1.0, Place::Above),
+        (99.0, &high, -1.0, Place::Above),
     ] {
         table.follow(&mut state, temp_c);
-        assert_eq!(numbers_of(&state.model), numbers);
-        assert_eq!(state.place, place);
+        for (found, end) in numbers_of(&state.model).iter().zip(ends) {
+            assert!((found - (end + grown)).abs() < 3e-6, "{temp_c}");
+        }
+        assert_eq!(state.place, place, "{temp_c}");
     }
     table.follow(&mut state, f32::NAN);
-    assert_eq!(state.place, Place::Above);
-    let alone = Table::<f32, 16>::new([node(0.0, &low)]).unwrap();
-    alone.follow(&mut state, 90.0);
-    assert_eq!(state.place, Place::Inside);
+    assert_eq!(state.place, Place::Above, "as before");
     let none = Table::<f32, 16>::new([]);
-    assert_eq!(none.err(), Some(table::Refused::Count));
+    assert_eq!(none.err(), Some(mimu_core::table::Refused::Count));
+}
+
+#[test]
+fn a_single_node_is_for_all_temperatures_unless_its_range_is_known() {
+    let [one, other] = two_nodes();
+    let table = Table::<f32, 16>::new([one]).unwrap();
+    let place = |table: &Table<f32, 16>, temp_c| {
+        let mut state = table.state();
+        table.follow(&mut state, temp_c);
+        state.place
+    };
+    assert_eq!(table.limits(), None);
+    assert_eq!(place(&table, 90.0), Place::Inside);
+    let known = table.with_range([20.0, 30.0]).unwrap();
+    assert_eq!(known.limits(), Some([20.0, 30.0]));
+    for (temp_c, expected) in [
+        (19.9, Place::Below),
+        (20.0, Place::Inside),
+        (30.0, Place::Inside),
+        (30.1, Place::Above),
+    ] {
+        assert_eq!(place(&known, temp_c), expected, "{temp_c}");
+    }
+    // Of several nodes only what both have: the nodes are from 0 to 50.
+    let two = Table::<f32, 16>::new([one, other]).unwrap();
+    let limits = |range| two.clone().with_range(range).unwrap().limits();
+    assert_eq!(limits([-20.0, 40.0]), Some([0.0, 40.0]));
+    assert_eq!(limits([10.0, 90.0]), Some([10.0, 50.0]));
+}
+
+/// A cubic in double precision by Newton's divided differences with both ends doubled, and not by Hermite's weights.
+fn cubic([t0, t1]: [f64; 2], [v0, v1]: [f64; 2], [s0, s1]: [f64; 2], t: f64) -> f64 {
+    let (h, d) = (t1 - t0, t - t0);
+    let secant = (v1 - v0) / h;
+    let second = (secant - s0) / h;
+    let third = (s1 - 2.0 * secant + s0) / (h * h);
+    v0 + s0 * d + second * d * d + third * d * d * (t - t1)
 }
 
 proptest! {
@@ -390,40 +555,46 @@ proptest! {
         prop_assert_eq!(single::compensate(&model, &raw), model.apply(&raw));
     }
 
-    /// Every number on the line between its neighbours, in double precision.
+    /// Every number on the cubic of its two neighbours, on the end slope for five kelvin outside, and held farther out.
     #[test]
-    fn between_nodes_everything_is_linear(
-        steps in prop::collection::vec(0.5_f32..30.0, 1..16),
+    fn every_number_is_on_the_curve_of_its_nodes(
+        steps in prop::collection::vec(0.5_f32..30.0, 0..16),
         values in prop::collection::vec(-20.0_f32..20.0, 24 * 16),
-        at in 0.0..1.0_f64,
+        slopes in prop::collection::vec(-0.2_f32..0.2, 24 * 16),
+        at in -0.3..1.3_f64,
     ) {
         let mut temp_c = -40.0;
         let mut nodes = Vec::new();
-        for (k, step) in steps.iter().enumerate() {
-            let numbers: [f32; 24] = values[24 * k..24 * k + 24].try_into().unwrap();
-            nodes.push(node(temp_c, &numbers));
+        let of = |all: &[f32], k: usize| -> [f32; 24] { all[24 * k..24 * k + 24].try_into().unwrap() };
+        for (k, step) in std::iter::once(&0.0).chain(&steps).take(16).enumerate() {
             temp_c += step;
+            nodes.push(sloping(temp_c, &of(&values, k), &of(&slopes, k)));
         }
-        let table = Table::<f32, 16>::new(nodes.clone()).unwrap();
-        let (first, last) = (f64::from(nodes[0].temp_c), f64::from(nodes[nodes.len() - 1].temp_c));
-        let wanted = (first + at * (last - first)) as f32;
-        let mut state = table.state();
-        table.follow(&mut state, wanted);
-        let t = f64::from(wanted);
-        let pair = nodes.windows(2).find(|w| t <= f64::from(w[1].temp_c));
+        let single = Table::<f32, 16>::new(nodes.clone()).unwrap();
+        let temps: Vec<f64> = nodes.iter().map(|n| f64::from(n.temp_c)).collect();
+        let (first, last) = (temps[0], temps[temps.len() - 1]);
+        let wanted = (first + at * (last - first + 20.0)) as f32;
+        let mut state = single.state();
+        single.follow(&mut state, wanted);
         let found = numbers_of(&state.model);
+        let t = f64::from(wanted);
+        let end = if t < first { 0 } else { nodes.len() - 1 };
+        let pair = temps.windows(2).position(|w| (w[0]..=w[1]).contains(&t));
         for k in 0..24 {
-            let of = |n: &Node<f32>| (f64::from(n.temp_c), f64::from(numbers_of(&n.model)[k]));
+            let value = |i: usize| f64::from(numbers_of(&nodes[i].model)[k]);
+            let slope = |i: usize| f64::from(numbers_of(&nodes[i].slope)[k]);
             let expected = match pair {
-                Some(w) => {
-                    let ((t0, v0), (t1, v1)) = (of(&w[0]), of(&w[1]));
-                    v0 + (v1 - v0) * (t - t0) / (t1 - t0)
-                }
-                None => of(&nodes[0]).1,
+                Some(i) => cubic([temps[i], temps[i + 1]], [value(i), value(i + 1)], [slope(i), slope(i + 1)], t),
+                None => value(end) + slope(end) * (t - temps[end]).clamp(-BEYOND_C, BEYOND_C),
             };
-            // Two roundings of numbers up to 20, and that of the weight, whose temperatures are up to 440 apart.
-            prop_assert!((f64::from(found[k]) - expected).abs() < 2e-5, "{} {}", found[k], expected);
+            // Some roundings of numbers up to 20 (2e-6 each), and that of the place between nodes, whose temperatures are rounded to 3e-5
+            // and whose numbers change by up to 120 a kelvin where nodes are half a kelvin apart.
+            let steepest = pair.map_or(0.0, |i| 2.0 * (value(i + 1) - value(i)).abs() / (temps[i + 1] - temps[i]));
+            let bound = 1.2e-5 + 1.6e-5 * (steepest + 0.2);
+            prop_assert!((f64::from(found[k]) - expected).abs() < bound, "{} {expected} {bound}", found[k]);
         }
+        let inside = (first..=last).contains(&t) || nodes.len() == 1;
+        prop_assert_eq!(state.place == Place::Inside, inside);
     }
 
     /// Whatever the bytes are, they are refused or make a calibration; the check is made to hold, or nothing would get past it.

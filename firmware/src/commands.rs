@@ -258,6 +258,7 @@ impl Commands<'_> {
                 .and(Capabilities::TERMS)
                 .and(Capabilities::KALMAN)
                 .and(Capabilities::SELF_TEST)
+                .and(Capabilities::CURVES)
                 .and(usb),
             effects: effects_of_this_build(),
             effects_room: ROOM as u8,

@@ -16,7 +16,7 @@ use crate::design_parameters::{
     DIVIDER_RATIO, GYRO_REFERENCE_V, GYRO_TEMPERATURE_NULL_C, GYRO_TEMPERATURE_NULL_V,
     GYRO_TEMPERATURE_V_PER_C, REFERENCE_TOLERANCE, SAMPLE_HZ, SLOW_S,
 };
-use crate::temperature::that_count;
+use crate::temperature::Thermometer;
 
 /// The code at the converter's reference voltage. A full scale of 2^16 - 1 and not 2^16 (RM0433 25.4.35).
 pub const FULL_SCALE: u32 = u16::MAX as u32;
@@ -66,9 +66,9 @@ pub struct Slow {
     reference_sum: f32,
     /// By the TEMP pins of gyro x, y, z, °C.
     pins_c: [Lag; 3],
-    /// Which of them count.
-    count: [bool; 3],
-    /// Mean of those that count, °C.
+    /// Which of them count, and what they say together.
+    thermometer: Thermometer,
+    /// The same filtered, °C.
     temp_c: Lag,
 }
 
@@ -78,7 +78,7 @@ impl Slow {
         reference: Lag::NEW,
         reference_sum: 0.0,
         pins_c: [Lag::NEW; 3],
-        count: [false; 3],
+        thermometer: Thermometer::NEW,
         temp_c: Lag::NEW,
     };
 
@@ -98,12 +98,9 @@ impl Slow {
         for (pin, read) in self.pins_c.iter_mut().zip(pins_c) {
             pin.take(read, count);
         }
-        self.count = that_count(pins_c);
-        let counted = || pins_c.iter().zip(self.count).filter(|(_, counts)| *counts);
-        let how_many = counted().count() as f32;
-        if how_many > 0.0 {
-            let sum: f32 = counted().map(|(read, _)| read).sum();
-            self.temp_c.take(sum / how_many, count);
+        let seconds = count / SAMPLE_HZ as f32;
+        if let Some(together_c) = self.thermometer.take(pins_c, seconds) {
+            self.temp_c.take(together_c, count);
         }
     }
 
@@ -131,12 +128,17 @@ impl Slow {
         self.reference_sum / SUM_FULL_SCALE as f32 / DIVIDER_RATIO
     }
 
-    /// Mean temperature of the gyros whose pins count, °C; while none does the last one, and before there was one 25 °C.
+    /// Temperature of the gyros by the pins that count, °C; while none does the last one, and before there was one 25 °C.
     pub fn temp_c(&self) -> f32 {
-        match self.temp_c.samples > 0.0 {
+        match self.has_known_temperature() {
             true => self.temp_c.value,
             false => GYRO_TEMPERATURE_NULL_C,
         }
+    }
+
+    /// Whether there was a good temperature yet.
+    pub fn has_known_temperature(&self) -> bool {
+        self.temp_c.samples > 0.0
     }
 
     /// Temperatures by the TEMP pins of gyro x, y, z, °C, also of those that do not count.
@@ -146,18 +148,19 @@ impl Slow {
 
     /// Which of them count.
     pub fn temperatures_that_count(&self) -> [bool; 3] {
-        self.count
+        self.thermometer.that_count()
     }
 
     /// What of it cannot be believed, as [`flags`].
     pub fn flags(&self) -> u16 {
-        let left_out = flags::TEMPERATURE_LEFT_OUT.iter().zip(self.count);
+        let count = self.temperatures_that_count();
+        let left_out = flags::TEMPERATURE_LEFT_OUT.iter().zip(count);
         let left_out = left_out.filter(|(_, counts)| !counts);
         let mut all = left_out.fold(0, |all, (flag, _)| all | flag);
         if !self.has_reference() {
             all |= flags::NO_REFERENCE;
         }
-        if self.count == [false; 3] {
+        if count == [false; 3] {
             all |= flags::NO_TEMPERATURE;
         }
         all

@@ -36,6 +36,28 @@ pub const GYRO_TEMPERATURE_RANGE_C: [f32; 2] = [-55.0, 100.0];
 /// themselves (5 °C, by 30 mW) and by where they sit on the board.
 pub const GYRO_TEMPERATURE_SPREAD_C: f32 = 20.0;
 
+/// Most that a gyro's die changes between two batches, 20 ms, °C. Its package, 0.4 g of ceramic, holds about 0.3 J/K: 1 °C in 20 ms are 15 W
+/// into it, and it makes 0.03 W itself. The mean of a batch is of 40 conversions, each within 0.03 °C. A contact that opens, a multiplexer that
+/// reads a neighbour, or a changed resistor is above it.
+pub const GYRO_TEMPERATURE_STEP_C: f32 = 1.0;
+
+/// Fastest that the dies change for longer than a batch, °C/s: a board of 20 g (16 J/K) that a hot-air gun puts 8 W into. So much farther from
+/// the last good temperature is believed for each second that there was none.
+pub const GYRO_TEMPERATURE_RATE_C_PER_S: f32 = 0.5;
+
+/// Most that a TEMP pin departs from where it stood beside the others, °C. References drift by a few tenths of a percent over the range (1 °C),
+/// and gyros on three faces of a unit in a stream of air differ by 2 or 3. A pin that stands still while the others move is found once they have
+/// moved by this. That its code stays the same says nothing by itself: so does that of a good pin in an even temperature, but for the
+/// converter's noise, and a pin that is tied to a voltage has that noise too.
+pub const GYRO_TEMPERATURE_DEPARTURE_C: f32 = 5.0;
+
+/// Time over which it is learnt where a TEMP pin stands beside the others, s: longer than a ramp takes to reach
+/// [`GYRO_TEMPERATURE_DEPARTURE_C`], or a pin that stands still would be followed.
+pub const GYRO_TEMPERATURE_OFFSET_S: f32 = 3_600.0;
+
+/// Over the first so many seconds it is the mean: 500 batches.
+pub const GYRO_TEMPERATURE_BEGINNING_S: f32 = 10.0;
+
 /// The gyros' reference as the data sheet of the ADXRS300 allows, V: 2.45 to 2.55. By as much again it may be off where it is measured: by
 /// the dividers (0.8 % with 1 % resistors), and by the converter's supply, which the internal reference tells within 1 %.
 pub const GYRO_REFERENCE_TOLERANCE_V: f32 = 0.1;

@@ -9,6 +9,7 @@ use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::NoopRawMutex;
 use heapless::Vec;
 use mimu_core::compensation::Sample;
+use mimu_core::die::{self, DieLag};
 use mimu_core::effects;
 use mimu_core::single;
 use mimu_core::stored::{ROOM, Stored};
@@ -23,7 +24,8 @@ use crate::bank::Bank;
 use crate::channels::Channels;
 use crate::convert::{ACCEL_VOLTS, Slow};
 use crate::design_parameters::{
-    ACCEL_STOP_MARGIN_V, ACCEL_STOPS_V, GYRO_STOP_MARGIN_V, GYRO_STOPS_V, SAMPLE_HZ,
+    ACCEL_STOP_MARGIN_V, ACCEL_STOPS_V, GYRO_STOP_MARGIN_V, GYRO_STOPS_V, GYRO_TEMPERATURE_NULL_C,
+    SAMPLE_HZ,
 };
 
 /// The path of the samples, between tasks of one executor: none of them holds it while it waits.
@@ -32,10 +34,16 @@ pub type Shared = Mutex<NoopRawMutex, RefCell<Pipeline>>;
 /// A calibration with what it remembers of the stream.
 struct Calibrated {
     stored: Stored,
+    lag: DieLag<f32>,
+    die: die::State<f32>,
+    /// Temperature of the dies at the beginning of the batch, °C.
+    die_c: f32,
     model: table::State<f32>,
     effects: effects::State<f32, ROOM>,
     /// Number of the sample at which the slow effects were followed last; time since power-on is counted by it.
     followed: u32,
+    /// The same of the dies, whose lag begins with the first reading of the thermometer, however long the power has been there.
+    die_followed: Option<u32>,
 }
 
 /// Which streams are sent.
@@ -158,7 +166,15 @@ impl Pipeline {
             Some(ms) => (effects, ms),
             None => (effects.long_after_power_on(), 0),
         };
+        let lag = stored.lag();
+        // The dies do not know that they have another calibration: what is left of a ramp goes on, where it is of the same lag.
+        let before = self.calibrated.as_ref();
+        let before = before.filter(|before| before.lag == lag);
         self.calibrated = Some(Calibrated {
+            die: before.map_or_else(die::State::new, |before| before.die),
+            die_followed: before.and_then(|before| before.die_followed),
+            die_c: GYRO_TEMPERATURE_NULL_C,
+            lag,
             model: stored.table.state(),
             effects,
             // A number is a millisecond. Time since power-on goes on, whenever the calibration comes.
@@ -307,6 +323,7 @@ impl Pipeline {
                 .update(channels.reference, channels.temperature, 1);
         }
         let temp_c = self.slow.temp_c();
+        let known = self.slow.has_known_temperature();
         let batch = &mut self.batch;
         batch.streams = self.streams;
         batch.compensated.clear();
@@ -322,7 +339,7 @@ impl Pipeline {
             flags: self.slow.flags(),
         };
         if let Some(calibrated) = &mut self.calibrated {
-            if calibrated.follow(number, temp_c) != Place::Inside {
+            if calibrated.follow(number, temp_c, known) != Place::Inside {
                 batch.head.flags |= flags::OUTSIDE_NODES;
             }
         } else {
@@ -350,9 +367,12 @@ impl Pipeline {
             });
             dropped += u32::from(!send(&Message::Event(event)));
         }
-        if streams.compensated {
+        if let (true, Some(calibrated)) = (streams.compensated, &self.calibrated) {
             let event = Event::Compensated(CompensatedBatch {
-                head,
+                head: BatchHead {
+                    temp_c: calibrated.die_c,
+                    ..head
+                },
                 samples: batch.compensated.as_flattened(),
             });
             dropped += u32::from(!send(&Message::Event(event)));
@@ -363,12 +383,22 @@ impl Pipeline {
 }
 
 impl Calibrated {
-    /// Follows temperature and time to the beginning of a batch.
-    fn follow(&mut self, number: u32, temp_c: f32) -> Place {
-        self.stored.table.follow(&mut self.model, temp_c);
+    /// Follows temperature and time to the beginning of a batch. `known`: there was a reading of the thermometer, and `temp_c` is not
+    /// what stands in for one.
+    fn follow(&mut self, number: u32, temp_c: f32, known: bool) -> Place {
+        let seconds = |samples: u32| samples as f32 / SAMPLE_HZ as f32;
+        self.die_c = temp_c;
+        if known {
+            let passed = self
+                .die_followed
+                .map_or(0, |before| number.wrapping_sub(before));
+            let die_c = self.lag.follow(&mut self.die, seconds(passed), temp_c);
+            self.die_c = die_c.unwrap_or(temp_c);
+            self.die_followed = Some(number);
+        }
+        self.stored.table.follow(&mut self.model, self.die_c);
         if let Some(all) = &self.stored.effects {
-            let passed = number.wrapping_sub(self.followed);
-            let dt_s = passed as f32 / SAMPLE_HZ as f32;
+            let dt_s = seconds(number.wrapping_sub(self.followed));
             all.slow(&mut self.effects, dt_s, temp_c);
             self.followed = number;
         }

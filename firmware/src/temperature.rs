@@ -1,12 +1,136 @@
-//! Which of the gyros' TEMP pins count.
+//! The thermometer: the gyros' TEMP pins, of which some may be wrong.
+//!
+//! Where each pin stands beside the others is learnt while it counts: their references differ by as much as 12 °C. What they say together is
+//! the mean of the pins less these offsets, so that a pin that is lost takes nothing but itself out of it: the temperature makes no step.
+//!
+//! A pin counts as long as it is in the range of a working gyro, agrees with another one, makes no step that no die can make, and stays where
+//! it stands beside the others. One that left comes back when it is there again. When all have left at once, the last good temperature
+//! holds, and one is believed again that the dies may have reached since.
 
-use crate::design_parameters::{GYRO_TEMPERATURE_RANGE_C, GYRO_TEMPERATURE_SPREAD_C};
+use crate::design_parameters::{
+    GYRO_TEMPERATURE_BEGINNING_S, GYRO_TEMPERATURE_DEPARTURE_C, GYRO_TEMPERATURE_OFFSET_S,
+    GYRO_TEMPERATURE_RANGE_C, GYRO_TEMPERATURE_RATE_C_PER_S, GYRO_TEMPERATURE_SPREAD_C,
+    GYRO_TEMPERATURE_STEP_C,
+};
 
-/// Whether each pin counts, from what the three read at the same time, °C.
+/// A TEMP pin.
+#[derive(Clone, Copy, Debug)]
+struct Pin {
+    /// What it read last, °C.
+    read_c: f32,
+    /// Where it stands beside the others, °C, once it has counted.
+    offset_c: Option<f32>,
+    /// For how long that was learnt, s.
+    learnt_s: f32,
+    /// Whether it counts.
+    counts: bool,
+}
+
+/// The TEMP pins of gyro x, y, z, batch after batch.
+#[derive(Clone, Copy, Debug)]
+pub struct Thermometer {
+    pins: [Pin; 3],
+    /// What those that counted last said together, °C, and how long ago, s.
+    together_c: f32,
+    since_s: f32,
+}
+
+impl Thermometer {
+    /// Before the first reading.
+    pub const NEW: Self = Self {
+        pins: [Pin {
+            read_c: 0.0,
+            offset_c: None,
+            learnt_s: 0.0,
+            counts: false,
+        }; 3],
+        together_c: 0.0,
+        since_s: 0.0,
+    };
+
+    /// Which pins count.
+    pub fn that_count(&self) -> [bool; 3] {
+        self.pins.map(|pin| pin.counts)
+    }
+
+    /// Takes in what the pins read on the average of the next `seconds`, °C; the temperature of those that count, or `None` if none does.
+    pub fn take(&mut self, pins_c: [f32; 3], seconds: f32) -> Option<f32> {
+        self.since_s += seconds;
+        let plausible = plausible(pins_c);
+        let steady = core::array::from_fn(|i| {
+            let pin = &self.pins[i];
+            let step_c = (pins_c[i] - pin.read_c).abs();
+            plausible[i] && pin.counts && step_c <= GYRO_TEMPERATURE_STEP_C
+        });
+        let counts: [bool; 3] =
+            core::array::from_fn(|i| plausible[i] && self.may_be(i, pins_c, steady));
+        // A pin that has never counted says nothing of the others' offsets, and takes its own from them.
+        let known = core::array::from_fn(|i| counts[i] && self.pins[i].offset_c.is_some());
+        let together_c = self
+            .mean(known, pins_c)
+            .or_else(|| self.mean(counts, pins_c));
+        for (i, pin) in self.pins.iter_mut().enumerate() {
+            (pin.counts, pin.read_c) = (counts[i], pins_c[i]);
+            if let (true, Some(together_c)) = (pin.counts, together_c) {
+                pin.learn(pins_c[i] - together_c, seconds);
+            }
+        }
+        if let Some(together_c) = together_c {
+            (self.together_c, self.since_s) = (together_c, 0.0);
+        }
+        together_c
+    }
+
+    /// Whether a pin may be right, by what was before and by the others that are steady.
+    fn may_be(&self, i: usize, pins_c: [f32; 3], steady: [bool; 3]) -> bool {
+        let pin = &self.pins[i];
+        let Some(offset_c) = pin.offset_c else {
+            return true;
+        };
+        let others = core::array::from_fn(|j| j != i && steady[j]);
+        let away = |from_c: f32| (pins_c[i] - offset_c - from_c).abs();
+        match (pin.counts, self.mean(others, pins_c)) {
+            (true, None) => steady[i],
+            (true, Some(others_c)) => steady[i] && away(others_c) <= GYRO_TEMPERATURE_DEPARTURE_C,
+            (false, Some(others_c)) => away(others_c) <= GYRO_TEMPERATURE_STEP_C,
+            // The dies may have gone so far since.
+            (false, None) => {
+                let gone_c = GYRO_TEMPERATURE_RATE_C_PER_S * self.since_s;
+                away(self.together_c) <= GYRO_TEMPERATURE_STEP_C + gone_c
+            }
+        }
+    }
+
+    /// Mean of what some pins read without their offsets, °C.
+    fn mean(&self, which: [bool; 3], pins_c: [f32; 3]) -> Option<f32> {
+        let all = (0..3).filter(|i| which[*i]);
+        let (sum, count) = all.fold((0.0, 0.0), |(sum, count), i| {
+            let offset_c = self.pins[i].offset_c.unwrap_or(0.0);
+            (sum + pins_c[i] - offset_c, count + 1.0)
+        });
+        (count > 0.0).then(|| sum / count)
+    }
+}
+
+impl Pin {
+    /// Takes in where it stands: the mean of the beginning, and then a lag. A mean of all so far would follow, after a minute, whatever
+    /// departs within the next.
+    fn learn(&mut self, beside_c: f32, seconds: f32) {
+        let before = self.offset_c.unwrap_or(beside_c);
+        self.learnt_s = (self.learnt_s + seconds).min(GYRO_TEMPERATURE_BEGINNING_S);
+        let over_s = match self.learnt_s < GYRO_TEMPERATURE_BEGINNING_S {
+            true => self.learnt_s,
+            false => GYRO_TEMPERATURE_OFFSET_S,
+        };
+        self.offset_c = Some(before + seconds / over_s * (beside_c - before));
+    }
+}
+
+/// Whether each pin may be right by what the three read at the same time, °C.
 ///
-/// One counts if it is in the range of a working gyro, and agrees with another such pin or is the only one. Of two that disagree neither
-/// counts: which of them is wrong cannot be told, and a mean of both is wrong for certain.
-pub fn that_count(pins_c: [f32; 3]) -> [bool; 3] {
+/// One may if it is in the range of a working gyro, and agrees with another such pin or is the only one. Of two that disagree neither
+/// may: which of them is wrong cannot be told, and a mean of both is wrong for certain.
+fn plausible(pins_c: [f32; 3]) -> [bool; 3] {
     let [least, most] = GYRO_TEMPERATURE_RANGE_C;
     let in_range = pins_c.map(|c| (least..=most).contains(&c));
     core::array::from_fn(|i| {
@@ -19,22 +143,121 @@ pub fn that_count(pins_c: [f32; 3]) -> [bool; 3] {
 
 #[cfg(test)]
 mod tests {
-    use super::that_count;
+    use super::*;
 
-    #[test]
-    fn a_pin_out_of_range_or_that_disagrees_with_both_others_does_not_count() {
-        assert_eq!(that_count([20.0, 32.0, 25.0]), [true; 3]);
-        // Open or at ground, and at 5 V.
-        assert_eq!(that_count([-272.6, 25.0, 26.0]), [false, true, true]);
-        assert_eq!(that_count([25.0, 322.6, 26.0]), [true, false, true]);
-        assert_eq!(that_count([25.0, 26.0, 60.0]), [true, true, false]);
+    /// A batch.
+    const BATCH_S: f32 = 0.02;
+    /// Where the pins stand beside each other for good.
+    const APART_C: [f32; 3] = [3.0, -1.0, -2.0];
+
+    /// What the pins read where the dies are.
+    fn pins(die_c: f32) -> [f32; 3] {
+        APART_C.map(|apart| die_c + apart)
+    }
+
+    /// After a minute at this temperature.
+    fn learnt(die_c: f32) -> Thermometer {
+        let mut thermometer = Thermometer::NEW;
+        for _ in 0..3000 {
+            thermometer.take(pins(die_c), BATCH_S);
+        }
+        thermometer
     }
 
     #[test]
-    fn the_only_one_counts_and_of_two_that_disagree_neither() {
-        assert_eq!(that_count([-272.6, 40.0, 322.6]), [false, true, false]);
-        assert_eq!(that_count([-272.6, 40.0, 70.0]), [false; 3]);
-        assert_eq!(that_count([-20.0, 40.0, 70.0]), [false; 3]);
-        assert_eq!(that_count([f32::NAN, -272.6, 322.6]), [false; 3]);
+    fn a_pin_out_of_range_or_that_disagrees_with_both_others_may_not_be_right() {
+        assert_eq!(plausible([20.0, 32.0, 25.0]), [true; 3]);
+        // Open or at ground, and at 5 V.
+        assert_eq!(plausible([-272.6, 25.0, 26.0]), [false, true, true]);
+        assert_eq!(plausible([25.0, 322.6, 26.0]), [true, false, true]);
+        assert_eq!(plausible([25.0, 26.0, 60.0]), [true, true, false]);
+    }
+
+    #[test]
+    fn the_only_one_may_and_of_two_that_disagree_neither() {
+        assert_eq!(plausible([-272.6, 40.0, 322.6]), [false, true, false]);
+        assert_eq!(plausible([-272.6, 40.0, 70.0]), [false; 3]);
+        assert_eq!(plausible([-20.0, 40.0, 70.0]), [false; 3]);
+        assert_eq!(plausible([f32::NAN, -272.6, 322.6]), [false; 3]);
+    }
+
+    #[test]
+    fn a_pin_that_is_lost_takes_no_step_with_it_and_comes_back_without_one() {
+        let mut thermometer = learnt(30.0);
+        for k in 0..500 {
+            // The dies warm up by 3 °C meanwhile.
+            let die_c = 30.0 + 0.006 * k as f32;
+            let mut read = pins(die_c);
+            if (100..400).contains(&k) {
+                read[0] = -272.6;
+            }
+            let found = thermometer.take(read, BATCH_S).unwrap();
+            assert!((found - die_c).abs() < 0.02, "{k}: {found} {die_c}");
+            let lost = (100..400).contains(&k);
+            assert_eq!(thermometer.that_count(), [!lost, true, true], "{k}");
+        }
+    }
+
+    #[test]
+    fn a_step_that_no_die_makes_is_left_out_as_long_as_it_lasts() {
+        for step_c in [1.5, -4.0, 15.0] {
+            for pin in 0..3 {
+                let mut thermometer = learnt(30.0);
+                let mut read = pins(30.0);
+                read[pin] += step_c;
+                for _ in 0..10_000 {
+                    let found = thermometer.take(read, BATCH_S).unwrap();
+                    assert!((found - 30.0).abs() < 0.01, "{step_c}: {found}");
+                    assert!(!thermometer.that_count()[pin]);
+                }
+                thermometer.take(pins(30.0), BATCH_S);
+                assert_eq!(thermometer.that_count(), [true; 3]);
+            }
+        }
+    }
+
+    /// Air of a hot-air gun warms the dies by 0.5 °C/s.
+    #[test]
+    fn the_fastest_that_dies_warm_up_is_followed() {
+        let mut thermometer = learnt(20.0);
+        for k in 0..5000 {
+            let die_c = 20.0 + 0.5 * BATCH_S * k as f32;
+            let found = thermometer.take(pins(die_c), BATCH_S).unwrap();
+            assert!((found - die_c).abs() < 0.01, "{found} {die_c}");
+        }
+        assert_eq!(thermometer.that_count(), [true; 3]);
+    }
+
+    #[test]
+    fn when_all_step_the_last_good_one_holds_until_the_dies_may_be_there() {
+        let mut thermometer = learnt(30.0);
+        let mut held_s = 0.0;
+        while thermometer.take(pins(40.0), BATCH_S).is_none() {
+            assert_eq!(thermometer.that_count(), [false; 3]);
+            held_s += BATCH_S;
+        }
+        // 9 of the 10 °C at 0.5 °C/s.
+        assert!((held_s - 18.0).abs() < 0.1, "{held_s}");
+    }
+
+    #[test]
+    fn a_pin_that_stands_still_is_found_once_the_others_have_moved_by_five_degrees() {
+        let mut thermometer = learnt(30.0);
+        let stuck = pins(30.0)[1];
+        // 2 °C a minute.
+        let mut found_at = None;
+        for k in 0..30_000 {
+            let die_c = 30.0 + BATCH_S * k as f32 / 30.0;
+            let mut read = pins(die_c);
+            read[1] = stuck;
+            thermometer.take(read, BATCH_S);
+            let counts = thermometer.that_count();
+            assert!(counts[0] && counts[2], "{k}");
+            if !counts[1] && found_at.is_none() {
+                found_at = Some(die_c);
+            }
+        }
+        let found_at = found_at.expect("found");
+        assert!((35.0..37.0).contains(&found_at), "{found_at}");
     }
 }

@@ -104,7 +104,7 @@ impl<'a> Upload<'a> {
 mod tests {
     use super::*;
     use mimu_core::compensation::{Affine, Compensation};
-    use mimu_core::stored::Origin;
+    use mimu_core::stored::{Curves, Origin};
     use mimu_core::table::Node;
     use nalgebra::{Matrix3, Vector3};
 
@@ -121,10 +121,8 @@ mod tests {
             gyro: affine,
             accel: affine,
         };
-        let node = Node {
-            temp_c: 25.0,
-            model,
-        };
+        let nodes = [Node::constant(25.0, model)];
+        let curves = Curves::of(&nodes);
         let refused = Err(Refusal::OtherUnit { unit_id: OTHER });
         for (unit_id, other_unit, expected) in [
             (None, false, Ok(())),
@@ -138,7 +136,7 @@ mod tests {
             };
             let mut bytes = [0; MAX_LENGTH];
             let matrices = [&affine.matrix, &affine.matrix];
-            let length = stored::encode(&origin, matrices, &[node], &[], &mut bytes).unwrap();
+            let length = stored::encode(&origin, matrices, &curves, &[], &mut bytes).unwrap();
             let bytes = &bytes[..length];
             let mut received = Vec::new();
             let mut upload = Upload::new(&mut received);
@@ -157,7 +155,10 @@ mod tests {
         let mut upload = Upload::new(&mut received);
         assert_eq!(upload.chunk(0, &[1]), Err(Refusal::NoUpload));
         let room = MAX_LENGTH as u32;
-        assert_eq!(upload.begin(4097, 0, false), Err(Refusal::TooLong { room }));
+        assert_eq!(
+            upload.begin(room + 1, 0, false),
+            Err(Refusal::TooLong { room })
+        );
         // CRC-64/XZ of "123456789", by the catalogue of CRC algorithms.
         upload.begin(9, 0x995d_c9bb_df19_39fa, false).unwrap();
         upload.chunk(0, b"12345").unwrap();

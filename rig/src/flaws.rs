@@ -37,6 +37,12 @@ pub struct FlawsTruth {
     pub upset_turns: u32,
     /// By this much, deg/s, along any direction.
     pub upset_dps: f64,
+    /// From when to when the thermometer sticks and reports what it last did, s of the recording.
+    pub thermometer_sticks_s: [f64; 2],
+    /// When the thermometer jumps, s of the recording.
+    pub thermometer_jumps_s: f64,
+    /// By how much it reads more from then on, K.
+    pub thermometer_jump_c: f64,
     /// Frequency at which the building sways, Hz.
     pub building_hz: f64,
     /// Amplitude of its acceleration along both level axes, mg.
@@ -57,6 +63,9 @@ impl Default for FlawsTruth {
             turning_dps: 5.0,
             upset_turns: 0,
             upset_dps: 5.0,
+            thermometer_sticks_s: [0.0; 2],
+            thermometer_jumps_s: 0.0,
+            thermometer_jump_c: 0.0,
             building_hz: 0.56,
             building_mg: 0.0,
         }
@@ -66,7 +75,15 @@ impl Default for FlawsTruth {
 impl FlawsTruth {
     /// Refuses what no recording has.
     pub(crate) fn check(&self) -> Result<(), Refusal> {
-        let size = [0.0, 1000.0];
+        let (size, time) = ([0.0, 1000.0], [0.0, 48.0 * 3600.0]);
+        let [from, to] = self.thermometer_sticks_s;
+        if from > to {
+            return Err(Refusal::new(
+                "flaws.thermometer_sticks_s",
+                format!("`thermometer_sticks_s` ends at {to} s, before it begins"),
+                "give [from, to]",
+            ));
+        }
         for (key, values, range) in [
             ("stamp_jitter_s", &[self.stamp_jitter_s][..], [0.0, 1.0]),
             (
@@ -80,6 +97,13 @@ impl FlawsTruth {
             ("settle_s", &[self.settle_s], [0.01, 600.0]),
             ("turning_dps", &[self.turning_dps], size),
             ("upset_dps", &[self.upset_dps], size),
+            ("thermometer_sticks_s", &self.thermometer_sticks_s, time),
+            ("thermometer_jumps_s", &[self.thermometer_jumps_s], time),
+            (
+                "thermometer_jump_c",
+                &[self.thermometer_jump_c],
+                [-100.0, 100.0],
+            ),
             ("building_hz", &[self.building_hz], [0.0, 100.0]),
             ("building_mg", &[self.building_mg], size),
         ] {
@@ -122,6 +146,7 @@ pub(crate) struct Flaws {
     upset: Vec<Vector>,
     last_step: Option<u32>,
     phase: [f64; 2],
+    stuck_c: Option<f64>,
 }
 
 impl Flaws {
@@ -145,6 +170,7 @@ impl Flaws {
             upset,
             last_step: None,
             phase: [0; 2].map(|_| TAU * building.uniform()),
+            stuck_c: None,
         }
     }
 
@@ -171,6 +197,20 @@ impl Flaws {
             rate: add(instant.motion.rate, upset.copied().unwrap_or_default()),
             ..instant.motion
         }
+    }
+
+    /// What the thermometer reports at a time where it should report `temp_c`.
+    pub(crate) fn thermometer(&mut self, t_s: f64, temp_c: f64) -> f64 {
+        let truth = &self.truth;
+        let mut reported = temp_c;
+        if truth.thermometer_jump_c != 0.0 && t_s >= truth.thermometer_jumps_s {
+            reported += truth.thermometer_jump_c;
+        }
+        let [from, to] = truth.thermometer_sticks_s;
+        if t_s >= from && t_s < to {
+            return *self.stuck_c.get_or_insert(reported);
+        }
+        reported
     }
 
     /// Time stamp of sample `index`, which was taken at `t_s`. Always later than the one before.

@@ -220,10 +220,12 @@ impl Hands {
         let random = &mut random;
         let mut turns: Vec<Turn> = Vec::new();
         let mut end_s = 0.0;
-        for step in &plan.steps {
+        for step in (0..plan.rounds).flat_map(|_| &plan.steps) {
             let poses = match step.pose {
                 Pose::Up(up) => vec![up],
                 Pose::Many(count) => chosen(count, random),
+                // A plan by hand has a pose in every step.
+                Pose::Here => Vec::new(),
             };
             for up in poses {
                 for _ in 0..step.repeat {

@@ -20,6 +20,7 @@
 //! | [`mod@unit`], [`sensor`], [`filter`] | from motion and chamber to the voltages at the pins         |
 //! | [`noise`], [`thermal`]         | what disturbs every sensor                                        |
 //! | [`effects`]                    | what the affine model lacks, switched on one by one               |
+//! | [`curves`]                     | what each sensor does over the temperature of its die             |
 //! | [`pins`], [`converter`]        | from the pins to the readings of a recording                      |
 //! | [`catalog`], [`rig_file`], [`refusal`] | sensors by their data sheets; RIG.toml, and the truth drawn by it |
 //! | [`ideal`]                      | forward models of papers, for Monte Carlo studies                 |
@@ -29,6 +30,7 @@ pub mod catalog;
 pub mod chain;
 pub mod command;
 pub mod converter;
+pub mod curves;
 pub mod effects;
 pub mod filter;
 pub mod flaws;

@@ -11,6 +11,10 @@ use crate::place::Place;
 use crate::rotation::{Rotation, Vector};
 
 mod reading;
+mod step;
+mod turn;
+
+pub use turn::{TableAxis, Turn};
 
 /// A checked plan.
 #[derive(Debug, Clone)]
@@ -34,6 +38,11 @@ pub struct Plan {
     pub lead_in_s: f64,
     /// What to do, in order.
     pub steps: Vec<Step>,
+    /// So many times all steps are done.
+    pub rounds: u32,
+    /// Time from the beginning of a round to that of the next, s. Without it they follow each other.
+    pub round_s: Option<f64>,
+    round_at: Range<usize>,
 }
 
 /// Storage of samples.
@@ -56,7 +65,7 @@ pub enum CarriedBy {
     Hands,
 }
 
-/// One `[[step]]`: a pose or many, each with `repeat` dwells.
+/// One `[[step]]`: a pose or many, each with `repeat` dwells; or a turn.
 #[derive(Debug, Clone)]
 pub struct Step {
     /// Where up is.
@@ -67,7 +76,9 @@ pub struct Step {
     pub rate: f64,
     /// Rate about the body's z axis during the dwell, by the inner axis, rad/s.
     pub spin: f64,
-    /// Length of each dwell, s.
+    /// A turn by an angle in place of the dwells.
+    pub turn: Option<Turn>,
+    /// Length of each dwell, s; of a turn, without its ramps.
     pub dwell_s: f64,
     /// Dwells in a row at each pose.
     pub repeat: u32,
@@ -82,6 +93,7 @@ impl Step {
             heading,
             rate: 0.0,
             spin: 0.0,
+            turn: None,
             dwell_s,
             repeat: 1,
             at: Places::default(),
@@ -91,7 +103,7 @@ impl Step {
     /// Dwells in it.
     pub fn dwells(&self) -> u64 {
         let poses = match self.pose {
-            Pose::Up(_) => 1,
+            Pose::Up(_) | Pose::Here => 1,
             Pose::Many(poses) => poses,
         };
         u64::from(poses) * u64::from(self.repeat)
@@ -105,6 +117,8 @@ pub enum Pose {
     Up(Vector),
     /// So many poses: spread evenly by a table, chosen as people do by hand.
     Many(u32),
+    /// Where the step before left it.
+    Here,
 }
 
 /// Where in the file the values of a step stand.
@@ -186,6 +200,28 @@ pub(crate) struct Beyond {
     pub(crate) remedy: &'static str,
 }
 
+impl Beyond {
+    /// Of the turn or the pose of a step.
+    pub(crate) fn step(step: &Step, problem: String, remedy: &'static str) -> Self {
+        let at = step.at.pose.clone();
+        Self {
+            at,
+            problem,
+            remedy,
+        }
+    }
+
+    /// Of the time from round to round.
+    pub(crate) fn rounds(plan: &Plan, problem: String, remedy: &'static str) -> Self {
+        let at = plan.round_at.clone();
+        Self {
+            at,
+            problem,
+            remedy,
+        }
+    }
+}
+
 impl Limits {
     /// Refuses a step that a table of these limits cannot carry out.
     pub(crate) fn check(&self, step: &Step) -> Result<(), Beyond> {
@@ -224,7 +260,7 @@ impl Limits {
             }
         } else if !self.outer && step.rate != 0.0 {
             let problem =
-                "`rate_dps` is about the vertical, where the table has no axis in most poses";
+                "`rate_dps` is about the vertical, where the table need not have an axis here";
             return refused(&step.at.rate, problem.into(), "use `spin_dps`");
         }
         let (outer, inner) = if self.outer {

@@ -10,7 +10,7 @@ use crate::converter::{Converter, Readings};
 use crate::flaws::Flaws;
 use crate::hands::Hands;
 use crate::motion::{Carrier, Instant};
-use crate::plan::{CarriedBy, Plan, Samples, Step};
+use crate::plan::{CarriedBy, Plan, Samples};
 use crate::rig_file::RigTruth;
 use crate::table::Table;
 use crate::unit::Unit;
@@ -54,7 +54,7 @@ pub fn samples<'a>(plan: &'a Plan, truth: &RigTruth, seed: u64) -> Result<Run<'a
     };
     plan.check_length(carrier.duration_s())?;
     let period_s = 1.0 / plan.sample_rate_hz;
-    let dwells = plan.steps.iter().map(Step::dwells).sum();
+    let dwells = plan.dwells();
     Ok(Run {
         plan,
         // All before the end. The ends of dwells are sums: a rounding error beyond a sample is none.
@@ -82,10 +82,12 @@ impl Iterator for Run<'_> {
         self.flaws.sway(&mut instant);
         let felt = self.flaws.felt(&instant);
         let pins = self.unit.step(&felt, self.plan.chamber_c(t_s));
+        let mut readings = self.converter.read(&pins);
+        readings.temp_c = self.flaws.thermometer(t_s, readings.temp_c);
         Some(Row {
             instant,
             stamp_s,
-            readings: self.converter.read(&pins),
+            readings,
         })
     }
 

@@ -96,6 +96,11 @@ impl Axis {
         dot(self.truth.direction, vector)
     }
 
+    /// From here on each reading has this noise, standard deviation, raw.
+    pub(crate) fn set_reading_noise(&mut self, sigma: f64) {
+        self.truth.white_per_sample = sigma;
+    }
+
     /// Output one step on, raw, at the input in SI along the axis and the supply relative to nominal.
     #[inline]
     pub fn step(&mut self, input: f64, supply: f64) -> f64 {

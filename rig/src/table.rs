@@ -44,7 +44,7 @@ impl Table {
     pub fn new(plan: &Plan, truth: &TableTruth) -> Result<Self, String> {
         truth.check()?;
         plan.check(&truth.limits())?;
-        let controller = Controller::carry_out(plan, truth);
+        let controller = Controller::carry_out(plan, truth).map_err(|e| plan.beyond(&e))?;
         let duration_s = controller.dwells.last().map_or(0.0, |dwell| dwell.end_s);
         Ok(Self::driven(controller, duration_s, plan, truth))
     }
@@ -84,6 +84,7 @@ impl Carrier for Table {
         }
         let dwell = dwells.get(self.cursor).filter(|dwell| dwell.start_s <= t_s);
         let step = dwell.map(|_| self.cursor as u32);
+        let by_angle = dwell.is_some_and(|dwell| dwell.by_angle);
         let mut resting = true;
         for axis in &mut self.controller.axes {
             resting &= axis.advance(t_s);
@@ -97,14 +98,16 @@ impl Carrier for Table {
             still.step = step;
             return still;
         }
-        let instant = self.moving(t_s, step);
+        let stated = if by_angle { [1.0; 3] } else { self.stated };
+        let instant = self.moving(t_s, step, stated);
         self.still = resting.then_some((segments, instant));
         instant
     }
 }
 
 impl Table {
-    fn moving(&self, t_s: f64, step: Option<u32>) -> Instant {
+    /// `stated` is stated over true rate of each axis.
+    fn moving(&self, t_s: f64, step: Option<u32>, stated: Vector) -> Instant {
         let mut angle = [Jet::default(); 3];
         let mut tilt = [Jet::default(); 3];
         let mut rate = [0.0; 3];
@@ -114,7 +117,7 @@ impl Table {
             let (s, c) = commanded.value.sin_cos();
             angle[i] = commanded + commanded.through([s, c, -s]).times(self.encoder[i]) + lag;
             tilt[i] = commanded.through([c, -s, -c]).times(self.wobble[i]);
-            rate[i] = commanded.rate * self.stated[i];
+            rate[i] = commanded.rate * stated[i];
             (sine[i], cosine[i]) = (s, c);
         }
         // Each axis tilts about a direction of the part that carries it: the outer and the inner about x,

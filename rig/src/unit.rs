@@ -4,12 +4,14 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::curves::{Curves, CurvesTruth};
 use crate::effects::{Active, Condition, Disturbance, EffectTruth, Sensors};
+use crate::filter::LowPass;
 use crate::motion::Motion;
 use crate::pins::Pins;
 use crate::random::Random;
 use crate::sensor::{Axis, TriadTruth};
-use crate::thermal::{Thermal, ThermalTruth};
+use crate::thermal::{Temperatures, Thermal, ThermalTruth};
 
 /// A voltage that others are measured by.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -26,12 +28,39 @@ pub struct VoltageTruth {
 
 /// Where the unit measures the temperature that it reports.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
+#[serde(rename_all = "snake_case")]
 pub enum TemperatureSensor {
     /// Mean of the gyros' own TEMP pins.
     Dies,
     /// A part of its own on the board.
     Board,
+    /// TEMP pin of the x gyro.
+    GyroX,
+    /// TEMP pin of the y gyro.
+    GyroY,
+    /// TEMP pin of the z gyro.
+    GyroZ,
+    /// A thermometer in the accelerometer.
+    Accel,
+}
+
+impl TemperatureSensor {
+    /// Temperature where it is, °C.
+    fn temperature(self, at: Temperatures) -> f64 {
+        self.mean(at.board, at.die)
+    }
+
+    /// Of a quantity of the board and one of each die, that at the sensor.
+    fn mean(self, board: f64, die: [f64; 4]) -> f64 {
+        match self {
+            Self::Dies => (die[0] + die[1] + die[2]) / 3.0,
+            Self::Board => board,
+            Self::GyroX => die[0],
+            Self::GyroY => die[1],
+            Self::GyroZ => die[2],
+            Self::Accel => die[3],
+        }
+    }
 }
 
 /// The sensor of the reported temperature.
@@ -39,6 +68,8 @@ pub enum TemperatureSensor {
 pub struct TemperatureTruth {
     /// Where it is.
     pub at: TemperatureSensor,
+    /// Lag of the sensor behind the place where it is, s: its own package. 0 is none.
+    pub lag_s: f64,
     /// Constant error, K.
     pub offset_c: f64,
     /// White noise of each step, standard deviation, K.
@@ -66,6 +97,20 @@ pub struct UnitTruth {
     pub gyro_reference_v: [f64; 3],
     /// What the affine model lacks.
     pub effects: Vec<EffectTruth>,
+    /// What the sensors do over temperature.
+    pub curves: CurvesTruth,
+}
+
+impl UnitTruth {
+    /// How late each die (gyros x, y, z, then the accelerometer) is behind the reported temperature on a ramp that has
+    /// lasted long, s. Negative: the die leads.
+    ///
+    /// On such a ramp a chain of first-order lags is late by their sum.
+    pub fn die_lag_behind_reported_s(&self) -> [f64; 4] {
+        let die = self.thermal.die_lag_s;
+        let reported = self.temperature.at.mean(0.0, die) + self.temperature.lag_s;
+        die.map(|lag| lag - reported)
+    }
 }
 
 /// State of a voltage.
@@ -101,10 +146,13 @@ pub struct Unit {
     supply: Voltage,
     converter_reference: Voltage,
     temperature: TemperatureTruth,
+    temperature_lag: Option<LowPass>,
+    temperature_started: bool,
     temperature_stream: Random,
     gyro_reference_v: [f64; 3],
     on_before_s: f64,
     effects: Vec<Active>,
+    curves: Curves,
 }
 
 impl Unit {
@@ -133,6 +181,9 @@ impl Unit {
                 seed,
             ),
             temperature: truth.temperature,
+            temperature_lag: (truth.temperature.lag_s > 0.0)
+                .then(|| LowPass::new(truth.temperature.lag_s, dt_s, 0.0)),
+            temperature_started: false,
             temperature_stream: Random::new(seed, "temperature reading"),
             gyro_reference_v: truth.gyro_reference_v,
             on_before_s: truth.thermal.on_before_s,
@@ -141,6 +192,7 @@ impl Unit {
                 .iter()
                 .map(|e| e.activate(sensors, seed, dt_s))
                 .collect(),
+            curves: Curves::new(&truth.curves),
         }
     }
 
@@ -159,13 +211,25 @@ impl Unit {
         for effect in &mut self.effects {
             effect.disturb(&at, &mut add);
         }
+        self.curves
+            .add(motion, temperatures, &mut add.gyro, &mut add.accel);
+        let [gyro_noise, accel_noise] = self.curves.noise(temperatures);
+        for (axes, noise) in [(&mut self.gyro, gyro_noise), (&mut self.accel, accel_noise)] {
+            for (axis, sigma) in axes.iter_mut().zip(noise.into_iter().flatten()) {
+                axis.set_reading_noise(sigma);
+            }
+        }
         let supply = self.supply.step(temperatures.board);
         let reference = self.converter_reference.step(temperatures.board);
         let die = temperatures.die;
-        let sensor_c = match self.temperature.at {
-            TemperatureSensor::Dies => (die[0] + die[1] + die[2]) / 3.0,
-            TemperatureSensor::Board => temperatures.board,
-        };
+        let mut sensor_c = self.temperature.at.temperature(temperatures);
+        if let Some(lag) = &mut self.temperature_lag {
+            if !self.temperature_started {
+                lag.settle(sensor_c);
+            }
+            sensor_c = lag.step(sensor_c);
+        }
+        self.temperature_started = true;
         let mut noise_c = 0.0;
         if self.temperature.noise_c > 0.0 {
             noise_c = self.temperature.noise_c * self.temperature_stream.normal();

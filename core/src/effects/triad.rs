@@ -7,6 +7,7 @@ use super::code::Code;
 use super::directions::Directions;
 use super::effect::{Kind, Refused, Sensor};
 use super::law::{Ambient, Conditions, Fast, Slow, Slowly, Values};
+use crate::die::lagged;
 
 /// Evaluations of a sample that none goes before.
 const COLD: usize = 2;
@@ -29,8 +30,7 @@ pub(super) struct Memory<T: RealField, const N: usize> {
     bias: Vector3<T>,
     /// Error of the sample before, body frame; `None` if there was none.
     before: Option<Vector3<T>>,
-    /// Of each slow effect: its lagged temperature, minus itself, °C. Kept as the difference: the lagged temperature itself
-    /// would stand still in single precision once its step is below the last digit of some 10 °C.
+    /// Of each slow effect: its lagged temperature, minus itself, °C.
     lags: [T; N],
 }
 
@@ -49,17 +49,6 @@ impl<T: RealField + Copy, const N: usize> Memory<T, N> {
     pub fn gap(&mut self) {
         self.before = None;
     }
-}
-
-/// A step of the lagged temperature minus the temperature over `dt` behind a first-order lag, `step` being that of the temperature: exact if it is a ramp.
-pub(super) fn lagged<T: RealField + Copy>(difference: T, dt: T, step: T, lag: T) -> T {
-    let z = dt / lag;
-    // No time passed: all of the step is yet to come.
-    if !(z > T::zero()) {
-        return difference - step;
-    }
-    let gone = -(-z).exp_m1();
-    difference - difference * gone - step * (gone / z)
 }
 
 impl<T: RealField + Copy, const N: usize> Triad<T, N> {

@@ -18,7 +18,8 @@ pub const COMPENSATED_BYTES: usize = 24;
 
 /// Bits of [`BatchHead::flags`].
 pub mod flags {
-    /// The temperature is outside the nodes of the calibration: that of the nearest node is used.
+    /// The temperature of the dies is outside what the calibration is for, by however little: its curves go on along their slope for 5 K, and are
+    /// held farther out.
     pub const OUTSIDE_NODES: u16 = 1;
     /// The self-test deflects the sensors.
     pub const SELF_TEST: u16 = 1 << 1;
@@ -28,8 +29,8 @@ pub mod flags {
     pub const SATURATED: u16 = 1 << 3;
     /// The gyros' reference is not where it can be: its pin is open, and its nominal voltage is used.
     pub const NO_REFERENCE: u16 = 1 << 4;
-    /// The TEMP pins of gyro x, y, z: one that reads what no working gyro has, or that disagrees with the others, is left out of
-    /// [`BatchHead::temp_c`](super::BatchHead::temp_c).
+    /// The TEMP pins of gyro x, y, z: one that reads what no working gyro has, that disagrees with the others, that has made a step that no die
+    /// makes, or that stands still while the others move is left out of [`BatchHead::temp_c`](super::BatchHead::temp_c).
     pub const TEMPERATURE_LEFT_OUT: [u16; 3] = [1 << 5, 1 << 6, 1 << 7];
     /// No TEMP pin is left, and the last good temperature is used; before there was one, 25 °C.
     pub const NO_TEMPERATURE: u16 = 1 << 8;
@@ -56,7 +57,8 @@ pub struct BatchHead {
     pub samples_lost: u32,
     /// Batches that were lost so far because the line was behind.
     pub batches_dropped: u32,
-    /// Temperature of the gyros, filtered, °C: the mean of those TEMP pins that are not left out, and what compensation goes by.
+    /// Temperature, °C. In a raw batch that of the thermometer, filtered: the gyros' TEMP pins that are not left out. In a compensated batch that of
+    /// the dies, which is what compensation goes by: the same behind the lag of the calibration.
     pub temp_c: f32,
     /// [`flags`].
     pub flags: u16,

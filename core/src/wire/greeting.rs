@@ -80,6 +80,8 @@ impl Capabilities {
     pub const SELF_TEST: Self = Self(1 << 3);
     /// Is connected by its own USB and not by a serial line.
     pub const USB: Self = Self(1 << 4);
+    /// Stores temperature nodes with derivatives, range and lag: layout 5 of [`stored`].
+    pub const CURVES: Self = Self(1 << 5);
 
     /// Whether all of `those` are among them.
     pub const fn contains(self, those: Self) -> bool {

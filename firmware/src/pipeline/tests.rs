@@ -5,7 +5,7 @@ use std::vec::Vec;
 
 use mimu_core::compensation::{Affine, Compensation};
 use mimu_core::effects::Sensor;
-use mimu_core::stored::{self, Record};
+use mimu_core::stored::{self, Curves, Record};
 use mimu_core::table::Node;
 use mimu_core::wire::Prior;
 use nalgebra::Matrix3;
@@ -72,11 +72,20 @@ fn calibration(effects: &[Record<'_>]) -> Stored {
             matrix: Matrix3::from_diagonal_element(gain),
             offset: Vector3::repeat(-gain),
         };
+        let model = Compensation {
+            gyro: affine,
+            accel: affine,
+        };
+        let slope = Affine {
+            matrix: Matrix3::from_diagonal_element(2.0 / 70.0),
+            offset: Vector3::repeat(-2.0 / 70.0),
+        };
         Node {
             temp_c,
-            model: Compensation {
-                gyro: affine,
-                accel: affine,
+            model,
+            slope: Compensation {
+                gyro: slope,
+                accel: slope,
             },
         }
     };
@@ -86,7 +95,7 @@ fn calibration(effects: &[Record<'_>]) -> Stored {
     let length = stored::encode(
         &stored::Origin::UNKNOWN,
         [&one, &one],
-        &nodes,
+        &Curves::of(&nodes),
         effects,
         &mut bytes,
     )

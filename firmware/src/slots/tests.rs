@@ -156,17 +156,14 @@ fn calibration(k: u8, nodes: usize) -> Vec<u8> {
         accel: affine,
     };
     let nodes: Vec<_> = (0..nodes)
-        .map(|n| Node {
-            temp_c: n as f32,
-            model,
-        })
+        .map(|n| Node::constant(n as f32, model))
         .collect();
     let mut bytes = vec![0; MAX_LENGTH];
     let found_with = [&affine.matrix, &affine.matrix];
     let length = stored::encode(
         &stored::Origin::UNKNOWN,
         found_with,
-        &nodes,
+        &stored::Curves::of(&nodes),
         &[],
         &mut bytes,
     )

@@ -2,7 +2,8 @@
 
 use std::time::{Duration, Instant};
 
-use mimu_core::compensation::Sample;
+use mimu_core::compensation::{Affine, Sample};
+use mimu_core::die::{self, DieLag};
 use mimu_core::effects;
 use mimu_core::single;
 use mimu_core::stored::{ROOM, Stored};
@@ -14,7 +15,7 @@ use serde::Serialize;
 use super::heard::{Event, Samples};
 use super::image::{Image, remembers};
 use super::session::Session;
-use mimu::calibration::Calibration;
+use mimu::calibration::{Calibration, Curves};
 use mimu::quantity::Sensor;
 use mimu_recording::error::{Error, Result};
 
@@ -51,11 +52,19 @@ pub struct Checked {
     pub gyro: Difference,
     /// Of the accelerometer.
     pub accel: Difference,
+    /// Between the temperature of the dies that the device has compensated at and the PC's from the thermometer, K; `None` if no lag is
+    /// applied.
+    pub die_temperature_k: Option<f64>,
+    /// The coldest and the warmest that the dies were meanwhile, °C: the stretch of the curves that was compared.
+    pub die_range_c: Option<[f32; 2]>,
     /// Ids of effects that remember what was before the comparison, so that double precision could not be judged.
     pub not_judged_for: Vec<String>,
     /// Whether device and PC differ by rounding only. With effects that remember the time before, only time tells.
     pub holds: bool,
 }
+
+/// Most that the two may differ by, K: both add up steps of some microkelvin of rounding, and forget them within the lag.
+const DIE_K: f64 = 1e-3;
 
 /// The PC's side, twice: as the device computes, and in double precision from the file.
 struct Twin {
@@ -63,7 +72,10 @@ struct Twin {
     stored: Stored,
     model: table::State<f32>,
     single: effects::State<f32, ROOM>,
-    affine: [mimu_core::compensation::Affine<f64>; 2],
+    affine: [Affine<f64>; 2],
+    curves: Option<Curves>,
+    lag: DieLag<f32>,
+    die: Option<die::State<f32>>,
     effects: effects::Effects<f64, ROOM>,
     double: effects::State<f64, ROOM>,
     /// Number of the first sample of the batch before; time since power-on is counted by it, as on the device.
@@ -103,6 +115,8 @@ pub fn check(
         unpaired: 0,
         gyro: Difference::none(Sensor::Gyro),
         accel: Difference::none(Sensor::Accel),
+        die_temperature_k: None,
+        die_range_c: None,
         holds: false,
         not_judged_for: image
             .effects
@@ -161,8 +175,10 @@ pub fn check(
     }
     session.done(Request::Stop, "to stop streaming")?;
     session.forget_events();
-    found.holds =
-        found.samples > 0 && found.gyro.rounding_share <= 1.0 && found.accel.rounding_share <= 1.0;
+    found.holds = found.samples > 0
+        && found.gyro.rounding_share <= 1.0
+        && found.accel.rounding_share <= 1.0
+        && found.die_temperature_k.is_none_or(|off| off <= DIE_K);
     Ok(found)
 }
 
@@ -192,6 +208,9 @@ impl Twin {
             rate_hz,
             model: stored.table.state(),
             single,
+            lag: stored.lag(),
+            die: None,
+            curves: calibration.curves(),
             stored,
             affine: [model(Sensor::Gyro)?, model(Sensor::Accel)?],
             effects: calibration.core_effects()?,
@@ -204,8 +223,9 @@ impl Twin {
     /// Follows the device through a batch, and notes how far it is off.
     fn compare(&mut self, raw: &Samples, device: &Samples, found: &mut Checked) {
         let head = &raw.head;
-        self.follow(head);
         let first = self.next != Some(head.first);
+        self.follow_dies(head, device.head.temp_c, first, found);
+        self.follow(head);
         if first {
             self.single.gap();
             self.double.gap();
@@ -228,8 +248,35 @@ impl Twin {
         self.next = Some(head.first.wrapping_add(raw.values.len() as u32));
     }
 
+    /// Takes the models of the temperature of the dies that the device says it has used, and compares it with that of the thermometer
+    /// behind the lag. What was before the comparison is in both temperatures of its first batch.
+    fn follow_dies(&mut self, head: &BatchHead, die_c: f32, first: bool, found: &mut Checked) {
+        let dt_s = head.first.wrapping_sub(self.followed) as f32 / self.rate_hz as f32;
+        match self.die.as_mut().filter(|_| !first) {
+            Some(state) if self.lag != DieLag::none() => {
+                let ours = self.lag.follow(state, dt_s, head.temp_c);
+                let off = ours.map_or(f64::INFINITY, |c| f64::from((c - die_c).abs()));
+                let most = found.die_temperature_k.unwrap_or(0.0);
+                found.die_temperature_k = Some(if off.is_nan() {
+                    f64::INFINITY
+                } else {
+                    most.max(off)
+                });
+            }
+            _ => self.die = Some(self.lag.state_of(head.temp_c, die_c)),
+        }
+        let [low, high] = found.die_range_c.unwrap_or([die_c; 2]);
+        found.die_range_c = Some([low.min(die_c), high.max(die_c)]);
+        self.stored.table.follow(&mut self.model, die_c);
+        if let Some(curves) = &self.curves {
+            for (sensor, model) in Sensor::BOTH.into_iter().zip(&mut self.affine) {
+                let at = curves.inverse(sensor, f64::from(die_c));
+                *model = at.unwrap_or(*model);
+            }
+        }
+    }
+
     fn follow(&mut self, head: &BatchHead) {
-        self.stored.table.follow(&mut self.model, head.temp_c);
         let passed = head.first.wrapping_sub(self.followed);
         self.followed = head.first;
         if let Some(all) = &self.stored.effects {
@@ -285,7 +332,9 @@ impl Twin {
     fn double(&mut self, raw: &Sample<f32>) -> (Sample<f64>, [Vector3<f64>; 2]) {
         let raw = self.without_code_errors(raw);
         let [gyro, accel] = [0, 1].map(|i| self.affine[i].apply(&raw[i]));
-        let bounds = [0, 1].map(|i| rounding(&self.affine[i], &raw[i]));
+        // On a curve each number is itself a sum of four terms.
+        let times = if self.curves.is_some() { 2.0 } else { 1.0 };
+        let bounds = [0, 1].map(|i| rounding(&self.affine[i], &raw[i]) * times);
         let sample = Sample { gyro, accel };
         (self.effects.remove(&mut self.double, &sample), bounds)
     }
@@ -294,7 +343,7 @@ impl Twin {
 /// Most that single precision can make of `x = C u + o` for a reading, SI: C, o and the four operations of a sum of four terms each round
 /// by half a unit of the last place, ε/2, of what is not larger than the sum S of the sizes of the terms: 3 ε S for the affine part.
 /// As much again for effects, whose errors are small beside S.
-pub fn rounding(model: &mimu_core::compensation::Affine<f64>, raw: &Vector3<f64>) -> Vector3<f64> {
+pub fn rounding(model: &Affine<f64>, raw: &Vector3<f64>) -> Vector3<f64> {
     let sizes = model.matrix.abs() * raw.abs() + model.offset.abs();
     sizes * (6.0 * f64::from(f32::EPSILON))
 }

@@ -7,7 +7,7 @@ use mimu_core::table::Node;
 use serde::Serialize;
 
 use super::origin;
-use super::who::Hash;
+use super::who::{Hash, unusable};
 use mimu::calibration::{Calibration, Kept, OnDevice, What};
 use mimu::quantity::{self, AXES};
 use mimu_recording::error::{Error, Result};
@@ -29,6 +29,8 @@ pub struct Contents {
     pub created: Option<String>,
     /// SHA-256 of the samples that it was made from, if it says so.
     pub samples_sha256: Option<String>,
+    /// When its offsets were set anew on the device, RFC 3339, if they were.
+    pub trimmed: Option<String>,
     /// `x = C u + o`.
     pub formula: &'static str,
     /// `raw to SI`.
@@ -37,6 +39,12 @@ pub struct Contents {
     pub raw_unit: &'static str,
     /// Frame of x.
     pub frame: &'static str,
+    /// Dies' temperatures that it is for, °C, if it says so.
+    pub range_c: Option<[f32; 2]>,
+    /// Lag of the dies behind the thermometer, s, if it is known.
+    pub lag_s: Option<f32>,
+    /// What stands between the nodes: `cubic`, or `straight` in the layouts of earlier versions.
+    pub between_nodes: &'static str,
     /// Temperature nodes, the coldest first.
     pub nodes: Vec<NodeContents>,
     /// What the affine model lacks.
@@ -46,12 +54,16 @@ pub struct Contents {
 /// A temperature node.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NodeContents {
-    /// °C.
+    /// Of the dies, °C.
     pub temp_c: f32,
     /// Of the gyro.
     pub gyro: Inverse,
     /// Of the accelerometer.
     pub accel: Inverse,
+    /// Derivatives of the numbers of the gyro, per kelvin.
+    pub gyro_slope: Inverse,
+    /// Of those of the accelerometer.
+    pub accel_slope: Inverse,
 }
 
 /// `x = C u + o` of a triad, raw to SI, u in V at the sensors, x in the body frame.
@@ -107,10 +119,17 @@ pub fn contents(bytes: &[u8]) -> std::result::Result<Contents, stored::Refused> 
         unit_id: origin.unit_id.as_ref().map(origin::digits),
         created: origin.created_s.and_then(origin::date),
         samples_sha256: origin.samples_sha256.as_ref().map(origin::digits),
+        trimmed: origin.trimmed_s.and_then(origin::date),
         formula: "x = C u + o",
         direction: "raw to SI",
         raw_unit: "V",
         frame: "body",
+        range_c: stored.table.range_c(),
+        lag_s: stored.lag_s,
+        between_nodes: match stored.table.is_straight() {
+            true => "straight",
+            false => "cubic",
+        },
         nodes,
         effects,
     })
@@ -119,7 +138,7 @@ pub fn contents(bytes: &[u8]) -> std::result::Result<Contents, stored::Refused> 
 /// The calibration file of `bytes` that [`contents`] has read, of the unit of this name; `place` is where they come from.
 ///
 /// # Errors
-/// Several temperature nodes, which no calibration file has.
+/// Several temperature nodes of a layout without derivatives: the lines between them bend at each node, and no calibration file has such.
 pub fn calibration(bytes: &[u8], device: &str, place: &str) -> Result<Calibration> {
     let (mut nodes, mut effects) = (Vec::new(), Vec::new());
     let stored = stored::read(
@@ -127,25 +146,28 @@ pub fn calibration(bytes: &[u8], device: &str, place: &str) -> Result<Calibratio
         |node| nodes.push(*node),
         |record| effects.push(on_device(record)),
     );
-    let (Ok(stored), [node]) = (stored, nodes.as_slice()) else {
+    let stored = stored.map_err(|refused| {
+        let problem = format!("it cannot be used: {}", unusable(&refused));
+        Error::device(place, problem, "upload a calibration again")
+    })?;
+    if stored.table.is_straight() && nodes.len() > 1 {
         let problem = format!(
-            "it keeps {} temperature nodes, and a calibration file is of one temperature",
+            "it keeps {} temperature nodes with straight lines between them, which no calibration file has",
             nodes.len()
         );
-        return Err(Error::device(
-            place,
-            problem,
-            "fetch the bytes: --bytes FILE",
-        ));
-    };
+        let remedy = "fetch the bytes: --bytes FILE";
+        return Err(Error::device(place, problem, remedy));
+    }
     let origin = stored.origin;
     let kept = Kept {
         device: device.to_owned(),
         unit_id: origin.unit_id.as_ref().map(origin::digits),
         created: origin.created_s.and_then(origin::date),
+        trimmed: origin.trimmed_s.and_then(origin::date),
         sha256: origin.samples_sha256.as_ref().map(origin::digits),
-        temp_c: node.temp_c,
-        models: [node.model.gyro, node.model.accel],
+        nodes,
+        range_c: stored.table.range_c(),
+        lag_s: stored.lag_s,
         effects,
     };
     Calibration::kept(&kept, place)
@@ -212,6 +234,8 @@ fn node(node: &Node<f32>) -> NodeContents {
         temp_c: node.temp_c,
         gyro: inverse(&node.model.gyro, quantity::Sensor::Gyro),
         accel: inverse(&node.model.accel, quantity::Sensor::Accel),
+        gyro_slope: inverse(&node.slope.gyro, quantity::Sensor::Gyro),
+        accel_slope: inverse(&node.slope.accel, quantity::Sensor::Accel),
     }
 }
 

@@ -2,14 +2,14 @@
 
 use mimu_core::compensation::{Affine, Compensation};
 use mimu_core::effects::{REFERENCE_C, Sensor as DeviceSensor};
-use mimu_core::stored::{self, MAX_LENGTH, NODES, Origin, ROOM, Record, Stored};
+use mimu_core::stored::{self, Curves, MAX_LENGTH, NODES, Origin, ROOM, Record, Stored};
 use mimu_core::table::Node;
 use mimu_core::wire::Capabilities;
 use nalgebra::{Matrix3, Vector3};
 
 use super::origin;
 use super::who::{Hash, Who, unusable};
-use mimu::calibration::{Calibration, NO_SENSE, OnDevice, What};
+use mimu::calibration::{Calibration, NO_SENSE, OnDevice, What, reference_node};
 use mimu::quantity::Sensor;
 use mimu_recording::RawUnit;
 use mimu_recording::error::{Argument, Error, Result};
@@ -32,8 +32,8 @@ pub struct Image {
 }
 
 impl Image {
-    /// The image of a calibration of one temperature; `place` is its file. Refused: raw readings in anything but volts, which are
-    /// what the device measures, one triad alone, and effects that no device removes.
+    /// The image of a calibration; `place` is its file. Refused: raw readings in anything but volts, which are what the device measures,
+    /// one triad alone, and effects that no device removes.
     pub fn new(calibration: &Calibration, place: &str) -> Result<Self> {
         let models = [Sensor::Gyro, Sensor::Accel].map(|sensor| model(calibration, sensor, place));
         let [gyro, accel] = models;
@@ -42,22 +42,26 @@ impl Image {
             accel: accel?,
         };
         let mut warnings = Vec::new();
-        let temp_c = calibration.recording.temp_c.unwrap_or_else(|| {
-            warnings.push(format!(
-                "{place}: the temperature is not known; the device uses the calibration at all of them, and lists it at {REFERENCE_C} °C"
-            ));
-            REFERENCE_C
-        });
+        let nodes = nodes(calibration, model, place, &mut warnings);
         let origin = origin::of(calibration, place, &mut warnings);
         let effects = on_device(calibration, place)?;
         let records: Vec<Record<'_>> = effects.iter().map(record).collect();
-        let node = Node {
-            temp_c: temp_c as f32,
-            model,
+        let node_temp_c: Vec<f32> = nodes.iter().map(|node| node.temp_c).collect();
+        let temperature = calibration.temperature.as_ref();
+        let range_c = match temperature {
+            Some(of) => Some(of.range_c),
+            None => calibration.recording.temp_range_c,
         };
+        let curves = Curves {
+            nodes: &nodes,
+            range_c: range_c.map(|range| range.map(|t| t as f32)),
+            lag_s: temperature.and_then(|of| of.lag_s).map(|lag| lag as f32),
+        };
+        let temperatures: Vec<f64> = node_temp_c.iter().map(|t| f64::from(*t)).collect();
+        let reference = reference_node(&temperatures).map_or(model, |at| nodes[at].model);
+        let found_with = [&reference.gyro.matrix, &reference.accel.matrix];
         let mut bytes = vec![0; MAX_LENGTH];
-        let found_with = [&model.gyro.matrix, &model.accel.matrix];
-        let length = stored::encode(&origin, found_with, &[node], &records, &mut bytes);
+        let length = stored::encode(&origin, found_with, &curves, &records, &mut bytes);
         let length = length.map_err(|_| {
             let problem = format!("it is longer than the {MAX_LENGTH} bytes that a device stores");
             Error::new(place, problem, "use fewer effects")
@@ -73,7 +77,7 @@ impl Image {
             hash: Hash(stored::hash(&bytes)),
             bytes,
             origin,
-            node_temp_c: vec![node.temp_c],
+            node_temp_c,
             effects: calibration
                 .effects()
                 .iter()
@@ -109,6 +113,13 @@ impl Image {
         if who.raw_unit != "V" {
             let unit = &who.raw_unit;
             let problem = format!("it is for raw readings in V, and the device's are in {unit}");
+            return refuse(place.into(), problem);
+        }
+        if !who.capabilities.contains(Capabilities::CURVES) {
+            let problem = format!(
+                "the device (firmware {}) stores no derivatives by the temperature, which calibrations have now",
+                who.firmware
+            );
             return refuse(place.into(), problem);
         }
         for id in &self.effects {
@@ -148,6 +159,41 @@ impl Image {
     pub fn stored(&self) -> std::result::Result<Stored, stored::Refused> {
         stored::decode(&self.bytes)
     }
+}
+
+/// The nodes of a calibration: those of its curves, or one with the model `at_all` of all temperatures.
+fn nodes(
+    calibration: &Calibration,
+    at_all: Compensation<f32>,
+    place: &str,
+    warnings: &mut Vec<String>,
+) -> Vec<Node<f32>> {
+    let Some(temperature) = &calibration.temperature else {
+        let temp_c = calibration.recording.temp_c.unwrap_or_else(|| {
+            warnings.push(format!(
+                "{place}: the temperature is not known; the device uses the calibration at all of them, and lists it at {REFERENCE_C} °C"
+            ));
+            REFERENCE_C
+        });
+        return vec![Node::constant(temp_c as f32, at_all)];
+    };
+    let single = |model: Affine<f64>| Affine {
+        matrix: model.matrix.map(|x| x as f32),
+        offset: model.offset.map(|x| x as f32),
+    };
+    let nodes = temperature.nodes.iter().map(|node| {
+        let mut all = Node::constant(node.temp_c as f32, at_all);
+        for (table, model, slope) in [
+            (&node.gyro, &mut all.model.gyro, &mut all.slope.gyro),
+            (&node.accel, &mut all.model.accel, &mut all.slope.accel),
+        ] {
+            if let Some(table) = table {
+                (*model, *slope) = (single(table.model()), single(table.slope()));
+            }
+        }
+        all
+    });
+    nodes.collect()
 }
 
 /// Inverse model of a triad, raw in V.

@@ -12,11 +12,15 @@ pub(super) fn of(calibration: &Calibration, place: &str, warnings: &mut Vec<Stri
             "{place}: the calibration does not say of which unit it is, so that nothing tells it from that of another one; fit a recording of `mimu record`, or write unit_id into the file"
         ));
     }
-    let time = calibration.created.as_deref().map(str::parse::<Timestamp>);
+    let seconds = |date: &Option<String>| {
+        let time: Timestamp = date.as_deref()?.parse().ok()?;
+        u64::try_from(time.as_second()).ok()
+    };
     Origin {
         unit_id,
-        created_s: time.and_then(|time| u64::try_from(time.ok()?.as_second()).ok()),
+        created_s: seconds(&calibration.created),
         samples_sha256: calibration.recording.sha256.as_deref().and_then(bytes),
+        trimmed_s: seconds(&calibration.trimmed),
     }
 }
 

@@ -326,6 +326,9 @@ pub fn unusable(refused: &Refused) -> String {
         Refused::EffectUnknown { at } => format!("effect {at} is not known"),
         Refused::EffectValue { at } => format!("effect {at} has numbers that make no sense"),
         Refused::EffectsFull { at } => format!("there is no room for effect {at}"),
+        Refused::Temperature => {
+            "the range of its temperatures, its lag or its thermometer makes no sense".into()
+        }
     }
 }
 

@@ -10,7 +10,8 @@ use nalgebra::{Matrix3, Vector3};
 use serde::Serialize;
 
 use crate::blocks::{Condensed, Rails};
-use crate::calibration::Calibration;
+use crate::calibration::{Calibration, Curves};
+use crate::die_temperature::{WITHOUT_TEMPERATURE, of_blocks, outside};
 use crate::effects::quantity::Need;
 use crate::quantity::Sensor;
 use crate::rails::find;
@@ -102,6 +103,7 @@ pub fn apply(
     // First pass: rails and the first temperature are only known at the end.
     let condensed = Condensed::read(recording, false, |share| progress(0.5 * share))?;
     warnings.extend(condensed.warnings.iter().cloned());
+    warnings.extend(outside(calibration, &condensed.blocks));
     let mut compensator = Compensator::new(
         calibration,
         &condensed,
@@ -154,11 +156,14 @@ struct Slow {
     first_row: u64,
     middle_s: f64,
     temp_c: f64,
+    /// Of the dies, if the calibration has curves.
+    die_c: Option<f64>,
 }
 
 /// Compensates batches of samples in their order.
 struct Compensator {
     models: [Affine<f64>; 2],
+    curves: Option<Curves>,
     has: [bool; 2],
     effects: Effects<f64, ROOM>,
     ids: Vec<String>,
@@ -205,7 +210,13 @@ impl Compensator {
         }
         // Before the first temperature it is that one, as for a fit.
         let mut temp_c = first_temp_c.unwrap_or(f64::NAN);
-        let slow = blocks.iter().map(|block| {
+        let curves = calibration.curves();
+        let lag = curves.as_ref().map(Curves::lag);
+        let die_c = lag.and_then(|lag| of_blocks(blocks, lag));
+        if curves.is_some() && die_c.is_none() {
+            warnings.push(WITHOUT_TEMPERATURE.into());
+        }
+        let slow = blocks.iter().enumerate().map(|(at, block)| {
             if block.temp_c.mean.is_finite() {
                 temp_c = block.temp_c.mean;
             }
@@ -213,6 +224,7 @@ impl Compensator {
                 first_row: block.first_row,
                 middle_s: 0.5 * (block.start_s + block.last_s),
                 temp_c,
+                die_c: die_c.as_ref().map(|all| all[at]),
             }
         });
         let first_s = blocks.first().map_or(0.0, |block| block.start_s);
@@ -231,6 +243,7 @@ impl Compensator {
         };
         Ok(Self {
             models,
+            curves: curves.clone(),
             has,
             effects: calibration.effects_of_models(&models)?,
             ids: calibration
@@ -283,11 +296,16 @@ impl Compensator {
         out
     }
 
-    /// Tells the effects time and temperature of the block that `row` is in.
+    /// Tells the effects time and temperature of the block that `row` is in, and takes the models of that temperature.
     fn follow(&mut self, row: u64) {
         while let Some(slow) = self.slow.get(self.reached).filter(|s| s.first_row <= row) {
             let dt_s = slow.middle_s - self.told_s;
             self.effects.slow(&mut self.state, dt_s, slow.temp_c);
+            if let (Some(curves), Some(die_c)) = (&self.curves, slow.die_c) {
+                for (sensor, model) in Sensor::BOTH.into_iter().zip(&mut self.models) {
+                    *model = curves.inverse(sensor, die_c).unwrap_or(*model);
+                }
+            }
             self.told_s = slow.middle_s;
             self.reached += 1;
         }

@@ -4,10 +4,12 @@ mod effect;
 mod kept;
 mod of_fit;
 mod on_device;
+mod over_temperature;
 
 pub use effect::{CoefficientTable, ConverterTable, EffectTable, FormTable};
 pub use kept::Kept;
 pub use on_device::{NO_SENSE, OnDevice, What};
+pub use over_temperature::{Curves, NodeTable, OverTemperature, TemperatureNode, reference_node};
 
 use std::path::Path;
 
@@ -24,8 +26,10 @@ use crate::triad::{Covariance, Forward};
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{Manifest, RawUnit, Reference, read_text};
 
-/// Version of the layout.
+/// Version of the layout of a calibration at one temperature.
 const FORMAT: &str = "mimu-calibration/1";
+/// Version of one with curves over temperature: a program that does not know them refuses it by this, and does not apply the one model.
+const FORMAT_OF_CURVES: &str = "mimu-calibration/2";
 /// How a triad's numbers are applied, and from what to what.
 const FORMULA: &str = "x = C u + o";
 const INVERSE_DIRECTION: &str = "raw to SI";
@@ -44,6 +48,13 @@ const HEADER_OF_KEYS: &str = "\
 # non-orthogonalities yz, zy, zx. sha256 is that of the samples file, temp_c the mean of its dwells in degrees Celsius.
 ";
 
+const HEADER_OF_CURVES: &str = "\
+# [gyro] and [accel] hold at recording.temp_c. Over temperature C and o follow the nodes of [temperature], by the temperature of the dies:
+# between two nodes, h apart, with w from 0 to 1, a number p and its slope s are
+#   (1+2w)(1-w)^2 p0 + w^2(3-2w) p1 + h w(1-w)^2 s0 - h w^2(1-w) s1;
+# outside they go on along the slope for 5 kelvin, and are held from there on. The dies follow the thermometer with lag_s.
+";
+
 const HEADER_OF_KEPT: &str = "\
 # Fetched from a device, which keeps no standard deviations, no covariance and no error figures: how well it is known is not in here.
 # Numbers are of single precision. temp_c is the temperature that the device lists it at, in degrees Celsius.
@@ -53,7 +64,7 @@ const HEADER_OF_KEPT: &str = "\
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Calibration {
-    /// `mimu-calibration/1`.
+    /// `mimu-calibration/1`, or `/2` if and only if there is a [temperature](Self::temperature).
     pub format: String,
     /// Unit that it is for.
     pub device: String,
@@ -63,6 +74,9 @@ pub struct Calibration {
     /// When it was made, RFC 3339; unknown of one that a device did not keep it of.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub created: Option<String>,
+    /// When its offsets were set anew on the device, everything else kept, RFC 3339.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub trimmed: Option<String>,
     /// Program and version that made it.
     pub tool: String,
     /// What it was made from.
@@ -73,6 +87,9 @@ pub struct Calibration {
     /// Accelerometer triad.
     #[serde(default)]
     pub accel: Option<TriadTable>,
+    /// The models over temperature.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub temperature: Option<OverTemperature>,
     /// What the affine models lack.
     #[serde(default, rename = "effect", skip_serializing_if = "Vec::is_empty")]
     pub effect_tables: Vec<EffectTable>,
@@ -99,6 +116,9 @@ pub struct Origin {
     /// Mean temperature of the dwells, °C, if known.
     #[serde(default)]
     pub temp_c: Option<f64>,
+    /// Temperatures of the coldest and of the warmest of them, °C, if known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub temp_range_c: Option<[f64; 2]>,
 }
 
 /// One triad in a calibration file. Standard deviations, intervals, covariance and error figures are there all together, or not at all, as
@@ -250,22 +270,16 @@ impl Calibration {
             true => HEADER_OF_KEYS,
             false => HEADER_OF_KEPT,
         };
-        toml_layout::to_toml(&format!("{HEADER}{effects}{keys}"), self)
+        let curves = match self.temperature {
+            None => "",
+            Some(_) => HEADER_OF_CURVES,
+        };
+        toml_layout::to_toml(&format!("{HEADER}{effects}{curves}{keys}"), self)
     }
 
     /// What can be applied, with its effects as they are removed.
     fn checked(mut self, place: &str) -> Result<Self> {
-        if self.format != FORMAT {
-            let problem = format!(
-                "format is {:?}, and this program reads {FORMAT:?}",
-                self.format
-            );
-            return Err(Error::new(
-                place,
-                problem,
-                "use the version of mimu that wrote it",
-            ));
-        }
+        self.check_format(place)?;
         for sensor in Sensor::BOTH {
             let Some(table) = self.table(sensor) else {
                 continue;
@@ -322,6 +336,7 @@ impl Calibration {
             };
             check_both_ways(table, &forward, &place)?;
         }
+        self.check_temperatures(place)?;
         let digits = |id: &str| id.len() == 24 && id.bytes().all(|b| b.is_ascii_hexdigit());
         if let Some(id) = self.unit_id.as_ref().filter(|id| !digits(id)) {
             return Err(Error::new(
@@ -339,6 +354,43 @@ impl Calibration {
         }
         self.effects = effect::read(&self, place)?;
         Ok(self)
+    }
+
+    fn check_format(&self, place: &str) -> Result<()> {
+        let curves = self.temperature.is_some();
+        let expected = if curves { FORMAT_OF_CURVES } else { FORMAT };
+        let problem = match self.format.as_str() {
+            format if format == expected => return Ok(()),
+            FORMAT => "there is a [temperature], and format is that of a calibration without one",
+            FORMAT_OF_CURVES => {
+                "there is no [temperature], and format is that of a calibration with one"
+            }
+            other => {
+                let problem = format!(
+                    "format is {other:?}, and this program reads {FORMAT:?} and {FORMAT_OF_CURVES:?}"
+                );
+                let remedy = "use the version of mimu that wrote it";
+                return Err(Error::new(place, problem, remedy));
+            }
+        };
+        let remedy = "the file is cut or was edited: copy it again, or fit the recordings again";
+        Err(Error::new(place, problem, remedy))
+    }
+
+    fn check_temperatures(&self, place: &str) -> Result<()> {
+        if let Some([from, to]) = self.recording.temp_range_c
+            && !(from.is_finite() && to.is_finite() && from <= to)
+        {
+            return Err(Error::new(
+                format!("{place}, [recording]"),
+                format!("temp_range_c is [{from}, {to}], and has to rise"),
+                "fit the recording again",
+            ));
+        }
+        match &self.temperature {
+            None => Ok(()),
+            Some(all) => all.check(place, [self.gyro.is_some(), self.accel.is_some()]),
+        }
     }
 
     /// What the affine models lack.
@@ -402,6 +454,35 @@ impl Calibration {
             matrix: Matrix3::from_fn(|i, j| table.C[i][j]),
             offset: Vector3::from(table.o),
         })
+    }
+}
+
+impl Calibration {
+    /// The inverse models over temperature, to be evaluated many times; `None` if there is one for all temperatures.
+    pub fn curves(&self) -> Option<Curves> {
+        Curves::of(self)
+    }
+
+    /// The temperatures that it is for, °C, as the device takes them; `None` if it does not say.
+    pub fn limits(&self) -> Option<[f64; 2]> {
+        match self.curves() {
+            Some(curves) => curves.table().limits(),
+            None => self.recording.temp_range_c,
+        }
+    }
+
+    /// The inverse model of `sensor` at a temperature of the dies, °C, raw to SI: by cubic Hermite pieces between the nodes, on along the
+    /// end slope for 5 K outside, and held from there on. Without nodes it is that of all temperatures.
+    pub fn inverse_at(&self, sensor: Sensor, die_temp_c: f64) -> Option<Affine<f64>> {
+        match self.curves() {
+            Some(curves) => curves.inverse(sensor, die_temp_c),
+            None => self.inverse(sensor),
+        }
+    }
+
+    /// The version of the layout that a calibration has to say it has, with curves or without.
+    pub fn format_of(curves: bool) -> &'static str {
+        if curves { FORMAT_OF_CURVES } else { FORMAT }
     }
 }
 

@@ -74,6 +74,7 @@ mod contrast;
 mod course;
 pub mod design;
 pub mod diagnose;
+pub mod die_temperature;
 pub mod dwell;
 pub mod effects;
 pub mod estimate;

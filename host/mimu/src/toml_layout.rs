@@ -38,11 +38,17 @@ fn table(from: InlineTable) -> Table {
     out
 }
 
-/// An entry of an array of tables: what it holds is on a line each.
+/// An entry of an array of tables: what it holds is on a line each, but for a table with arrays in it, which has a head of its own.
 fn entry(from: InlineTable) -> Table {
     let mut out = Table::new();
     for (key, value) in from {
-        out.insert(&key, Item::Value(laid_out(value)));
+        let item = match value {
+            Value::InlineTable(inner) if inner.iter().any(|(_, v)| v.is_array()) => {
+                Item::Table(table(inner))
+            }
+            other => Item::Value(laid_out(other)),
+        };
+        out.insert(&key, item);
     }
     out
 }

@@ -4,6 +4,7 @@ use mimu_core::compensation::Affine;
 use nalgebra::{Matrix3, Vector3};
 
 use crate::calibration::Calibration;
+use crate::die_temperature::{WITHOUT_TEMPERATURE, at_one_temperature, outside};
 use crate::effects::removal::{removable, remove};
 use crate::estimate::turn::{Turn, direction_error};
 use crate::fit::refuse_wrong_gravity;
@@ -59,7 +60,16 @@ pub fn verify(prepared: &Prepared, calibration: &Calibration) -> Result<Verifica
     if same_recording {
         warnings.push("this is the recording that the calibration was made from: the figures say nothing about new data".into());
     }
+    warnings.extend(outside(calibration, &prepared.condensed.blocks));
     let cleaned = without_effects(prepared, calibration)?;
+    let curves = calibration.curves();
+    let at_one = |p: &Prepared| at_one_temperature(p, calibration, curves.as_ref()?);
+    let cleaned = cleaned.map(|cleaned| at_one(&cleaned).unwrap_or(cleaned));
+    let moved = at_one(prepared);
+    if curves.is_some() && moved.is_none() {
+        warnings.push(WITHOUT_TEMPERATURE.into());
+    }
+    let prepared = moved.as_ref().unwrap_or(prepared);
     let mut sensors = Vec::new();
     for sensor in Sensor::BOTH {
         if calibration.inverse(sensor).is_none() || !prepared.has(sensor) {

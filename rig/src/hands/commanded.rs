@@ -44,6 +44,7 @@ impl Hands {
                 match first.pose {
                     Pose::Up(up) => Some(up),
                     Pose::Many(count) => chosen(count, &mut random).first().copied(),
+                    Pose::Here => None,
                 },
                 first.heading,
             ),

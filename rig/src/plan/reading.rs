@@ -1,15 +1,14 @@
 //! Reading and checking `PLAN.toml`: every refusal names the file and the line.
 
-use std::fmt::Display;
 use std::ops::Range;
 
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::{CarriedBy, Places, Plan, Pose, Samples, Step};
+use super::step::RawStep;
+use super::{CarriedBy, Plan, Pose, Samples, Step};
 use crate::located::{Source, written};
 use crate::place::Place;
-use crate::rotation::{Vector, direction};
 
 /// Longest recording, s: a plan that asks for more has a wrong unit in it.
 const LONGEST_S: f64 = 48.0 * 3600.0;
@@ -18,7 +17,7 @@ const MOST_DWELLS: u64 = 100_000;
 /// Most samples, for the same reason: 48 h at 1 kHz are 173 million, and each is some hundred bytes on disk.
 const MOST_SAMPLES: f64 = 200e6;
 /// Beyond any centrifuge that takes a board, degrees per second.
-const FASTEST_DPS: f64 = 36_000.0;
+pub(super) const FASTEST_DPS: f64 = 36_000.0;
 /// What people write for a key.
 const SYNONYMS: [(&str, &str); 16] = [
     ("chamber_temp", "chamber_c"),
@@ -54,20 +53,10 @@ struct RawPlan {
     #[serde(default)]
     chamber_c: Vec<Spanned<[f64; 2]>>,
     lead_in_s: Option<Spanned<f64>>,
+    rounds: Option<Spanned<u32>>,
+    round_s: Option<Spanned<f64>>,
     #[serde(default)]
     step: Vec<Spanned<RawStep>>,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct RawStep {
-    up: Option<Spanned<Vector>>,
-    poses: Option<Spanned<u32>>,
-    heading_deg: Option<Spanned<f64>>,
-    rate_dps: Option<Spanned<f64>>,
-    spin_dps: Option<Spanned<f64>>,
-    dwell_s: Spanned<f64>,
-    repeat: Option<Spanned<u32>>,
 }
 
 fn unit() -> Spanned<String> {
@@ -121,7 +110,13 @@ impl Plan {
             .iter()
             .map(|step| reader.step(step, raw.carrier, sample_rate_hz))
             .collect::<Result<Vec<_>, _>>()?;
-        reader.length(lead_in_s, sample_rate_hz, &steps)?;
+        let (rounds, round_s) = reader.rounds(&raw)?;
+        if let (Some(first), Pose::Here) = (steps.first(), steps[0].pose) {
+            let remedy = "add `up`, the body direction that points up";
+            let problem = "the first step has no pose to begin in";
+            return Err(source.error(&first.at.pose, problem, remedy));
+        }
+        reader.length(lead_in_s, sample_rate_hz, &steps, rounds)?;
         Ok(Self {
             device: device.clone(),
             sample_rate_hz,
@@ -132,16 +127,24 @@ impl Plan {
             chamber: reader.chamber(&raw.chamber_c)?,
             lead_in_s,
             steps,
+            rounds,
+            round_s,
+            round_at: raw.round_s.as_ref().map_or(0..0, Spanned::span),
             source,
         })
     }
 }
 
 impl Plan {
+    /// Dwells and turns in it, over all rounds.
+    pub fn dwells(&self) -> u64 {
+        u64::from(self.rounds) * self.steps.iter().map(Step::dwells).sum::<u64>()
+    }
+
     /// Refuses a plan that takes too long with the moves from pose to pose, at its last step.
     pub(crate) fn check_length(&self, duration_s: f64) -> Result<(), String> {
         let last = self.steps.last().map_or(0..0, |step| step.at.pose.clone());
-        let dwells = self.steps.iter().map(Step::dwells).sum();
+        let dwells = self.dwells();
         let what = "with the moves from pose to pose the plan has";
         too_long(
             &self.source,
@@ -177,12 +180,12 @@ fn too_long(
 }
 
 /// What is checked after parsing.
-struct Reader<'a> {
-    source: &'a Source,
+pub(super) struct Reader<'a> {
+    pub(super) source: &'a Source,
 }
 
 impl Reader<'_> {
-    fn within(
+    pub(super) fn within(
         &self,
         key: &str,
         value: &Spanned<f64>,
@@ -199,7 +202,7 @@ impl Reader<'_> {
     }
 
     /// As [`Reader::within`], 0 for what is left out, and in radians.
-    fn angle(
+    pub(super) fn angle(
         &self,
         key: &str,
         value: &Option<Spanned<f64>>,
@@ -212,107 +215,39 @@ impl Reader<'_> {
         Ok(degrees.transpose()?.unwrap_or(0.0).to_radians())
     }
 
-    fn step(
-        &self,
-        raw: &Spanned<RawStep>,
-        carrier: CarriedBy,
-        sample_rate_hz: f64,
-    ) -> Result<Step, String> {
-        let (at, raw) = (raw.span(), raw.get_ref());
-        let place = |value: Option<Range<usize>>| value.unwrap_or(at.clone());
-        let refuse = |at: &Range<usize>, problem: &dyn Display, remedy: &str| {
-            Err(self.source.error(at, problem, remedy))
-        };
-        let (pose, pose_at) = match (&raw.up, &raw.poses) {
-            (Some(up), None) => {
-                let v = *up.get_ref();
-                if !v.iter().all(|x| x.is_finite()) {
-                    return refuse(&up.span(), &"`up` is not finite", "give three numbers");
-                }
-                let Some(v) = direction(v) else {
-                    let remedy = "give the body direction that points up, as [0.0, 0.0, 1.0]";
-                    return refuse(&up.span(), &"`up` has no length", remedy);
-                };
-                (Pose::Up(v), up.span())
-            }
-            (None, Some(poses)) => {
-                if *poses.get_ref() == 0 {
-                    return refuse(&poses.span(), &"`poses` is 0", "give one or more");
-                }
-                (Pose::Many(*poses.get_ref()), poses.span())
-            }
-            (Some(_), Some(poses)) => {
-                return refuse(
-                    &poses.span(),
-                    &"`up` and `poses` in one step",
-                    "keep one of them",
-                );
-            }
-            (None, None) => {
-                let remedy = "add the body direction that points up, or `poses = ...`";
-                return refuse(&at, &"`up` is missing", remedy);
-            }
-        };
-        let dwell_s = *raw.dwell_s.get_ref();
-        if !(dwell_s.is_finite() && dwell_s * sample_rate_hz >= 1.0) {
-            let problem = format!("`dwell_s` is {}", written(dwell_s));
-            return refuse(
-                &raw.dwell_s.span(),
-                &problem,
-                "give the dwell in seconds, a sample or longer",
-            );
+    /// How often all steps are done, and the time from one round to the next.
+    fn rounds(&self, raw: &RawPlan) -> Result<(u32, Option<f64>), String> {
+        let rounds = raw.rounds.as_ref().map_or(1, |r| *r.get_ref());
+        if let (0, Some(key)) = (rounds, &raw.rounds) {
+            let remedy = "give one or more, or leave it out";
+            return Err(self.source.error(&key.span(), "`rounds` is 0", remedy));
         }
-        let repeat = raw.repeat.as_ref().map_or(1, |r| *r.get_ref());
-        if let Some(r) = &raw.repeat
-            && repeat == 0
-        {
-            return refuse(
-                &r.span(),
-                &"`repeat` is 0",
-                "give one or more, or remove the step",
-            );
+        if let (Some(key), CarriedBy::Hands) = (&raw.round_s, raw.carrier) {
+            let problem = "`round_s` by hand: nobody keeps such times";
+            let remedy = "remove it, or set `carrier = \"table\"`";
+            return Err(self.source.error(&key.span(), problem, remedy));
         }
-        for (key, value) in [("rate_dps", &raw.rate_dps), ("spin_dps", &raw.spin_dps)] {
-            if let (Some(value), CarriedBy::Hands) = (value, carrier) {
-                let problem = format!("`{key}` by hand: nobody turns at a steady rate");
-                return refuse(
-                    &value.span(),
-                    &problem,
-                    "remove it, or set `carrier = \"table\"`",
-                );
-            }
-        }
-        Ok(Step {
-            pose,
-            heading: match &raw.heading_deg {
-                Some(_) => Some(self.angle("heading_deg", &raw.heading_deg, 360.0, "degrees")?),
-                None => None,
-            },
-            rate: self.angle("rate_dps", &raw.rate_dps, FASTEST_DPS, "degrees per second")?,
-            spin: self.angle("spin_dps", &raw.spin_dps, FASTEST_DPS, "degrees per second")?,
-            dwell_s,
-            repeat,
-            at: Places {
-                heading: place(raw.heading_deg.as_ref().map(Spanned::span)),
-                rate: place(raw.rate_dps.as_ref().map(Spanned::span)),
-                spin: place(
-                    raw.spin_dps
-                        .as_ref()
-                        .or(raw.rate_dps.as_ref())
-                        .map(Spanned::span),
-                ),
-                pose: pose_at,
-            },
-        })
+        let round_s = raw
+            .round_s
+            .as_ref()
+            .map(|s| self.within("round_s", s, [0.0, LONGEST_S], "s"));
+        Ok((rounds, round_s.transpose()?))
     }
 
     /// Refuses more than the longest recording, at the step where it becomes too long. Moves come on top, see
     /// [`Plan::check_length`].
-    fn length(&self, lead_in_s: f64, rate_hz: f64, steps: &[Step]) -> Result<(), String> {
+    fn length(
+        &self,
+        lead_in_s: f64,
+        rate_hz: f64,
+        steps: &[Step],
+        rounds: u32,
+    ) -> Result<(), String> {
         let (mut seconds, mut dwells) = (lead_in_s, 0_u64);
         for step in steps {
-            seconds += step.dwells() as f64 * step.dwell_s;
-            dwells += step.dwells();
+            let count = u64::from(rounds) * step.dwells();
+            seconds += count as f64 * step.dwell_s;
+            dwells += count;
             let what = "up to this step the plan has";
             too_long(self.source, &step.at.pose, what, dwells, seconds, rate_hz)?;
         }

@@ -180,7 +180,13 @@ pub(super) fn write(
     let name = folder.file_name().unwrap_or_default().to_string_lossy();
     let text = format!(
         "{TRUTH}{name}, made with seed {seed}. As a rig file, with the same plan and seed, it\n\
-         # makes the same samples again. It judges estimates; whatever makes them must not read it.\n\n{}",
+         # makes the same samples again. It judges estimates; whatever makes them must not read it.\n\
+         # On a long ramp the dies (gyros x, y, z, accelerometer) are behind temp_c by {} s.\n\n{}",
+        truth
+            .unit
+            .die_lag_behind_reported_s()
+            .map(|lag| format!("{lag:.3}"))
+            .join(", "),
         truth.file.to_toml()
     );
     fs::write(&new_truth, text).map_err(failed(truth_path))?;

@@ -72,6 +72,7 @@ impl RigFile {
             }
         }
         self.check_numbers()?;
+        self.curves.check()?;
         self.table.check()?;
         self.hands.check()?;
         self.flaws.check()?;
@@ -120,6 +121,11 @@ impl RigFile {
         // Error, drift and noise of a voltage: at the worst of all three it still has its sign.
         let (error, drift, noise) = ([-2e5, 2e5], [-2e3, 2e3], [0.0, 2e4]);
         for (path, value, range) in [
+            (
+                "unit.temperature_lag_s",
+                unit.temperature_lag_s,
+                [0.0, LAG[1]],
+            ),
             (
                 "unit.temperature_offset_c",
                 unit.temperature_offset_c,

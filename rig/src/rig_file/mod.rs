@@ -7,6 +7,7 @@
 //! "raw" in a key is V or counts, "si" is rad/s for gyros and m/s² for accelerometers.
 
 mod check;
+mod curves;
 mod effect;
 mod lines;
 mod resolve;
@@ -23,6 +24,7 @@ use crate::rotation::Vector;
 use crate::table::TableTruth;
 use crate::unit::TemperatureSensor;
 
+pub use curves::{AccelCurvesFile, CurvesFile, GyroCurvesFile};
 pub use resolve::RigTruth;
 
 /// What the key `format` must be.
@@ -57,6 +59,9 @@ pub struct RigFile {
     /// Heat.
     #[serde(default)]
     pub thermal: ThermalFile,
+    /// What the sensors do over temperature.
+    #[serde(default)]
+    pub curves: CurvesFile,
     /// The converter.
     #[serde(default)]
     pub converter: ConverterFile,
@@ -97,6 +102,9 @@ pub struct UnitFile {
     /// Default: the dies where the gyros have TEMP pins (ADXRS300), else the board.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub temperature: Option<TemperatureSensor>,
+    /// Lag of that thermometer behind the place where it is. Default 0.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub temperature_lag_s: Option<f64>,
     /// Constant error of the reported temperature, K. Default: drawn within 2.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub temperature_offset_c: Option<f64>,
@@ -255,6 +263,7 @@ impl Default for RigFile {
             draw_effects: None,
             unit: UnitFile::default(),
             thermal: ThermalFile::default(),
+            curves: CurvesFile::default(),
             converter: ConverterFile::default(),
             table: TableTruth::default(),
             hands: HandsTruth::default(),

@@ -81,6 +81,7 @@ impl RigTruth {
         };
         let temperature = TemperatureTruth {
             at: *unit.temperature.get_or_insert(usual),
+            lag_s: *unit.temperature_lag_s.get_or_insert(0.0),
             offset_c: *unit
                 .temperature_offset_c
                 .get_or_insert_with(|| random("temperature offset").within(2.0)),
@@ -133,6 +134,7 @@ impl RigTruth {
             };
         }
 
+        let curves = file.curves.resolve(seed);
         let thermal = thermal(&mut file, [gyro[0], gyro[1], gyro[2], accel[0]], seed);
         let (table, hands, flaws) = (file.table.clone(), file.hands.clone(), file.flaws.clone());
         Ok(Self {
@@ -148,6 +150,7 @@ impl RigTruth {
                 gyro_reference_nominal_v,
                 gyro_reference_v,
                 effects,
+                curves,
             },
             converter,
             table,

@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use super::truth::TableTruth;
 use crate::axis::{Axis, nearest_turn};
-use crate::plan::{Beyond, Limits, Plan, Pose, Step, UPRIGHT, attitude, tilt};
+use crate::plan::{Beyond, Limits, Plan, Pose, Step, TableAxis, Turn, UPRIGHT, attitude, tilt};
 use crate::rotation::{Rotation, Vector};
 
 pub(super) const OUTER: usize = 0;
@@ -16,6 +16,8 @@ pub(super) const INNER: usize = 2;
 pub(super) struct Dwell {
     pub(super) start_s: f64,
     pub(super) end_s: f64,
+    /// Whether it is a turn by an angle, which the encoder ends and no rate's error reaches.
+    pub(super) by_angle: bool,
 }
 
 /// Carries out steps by appending to the axes' commands.
@@ -26,6 +28,8 @@ pub(super) struct Controller {
     lead_in_s: f64,
     pub(super) axes: [Axis; 3],
     pub(super) dwells: Vec<Dwell>,
+    /// Whether it has turned by an angle, and the load has had no time to come to rest.
+    unsettled: bool,
     /// Under command: rates about the vertical and about the inner axis that it was told last, rad/s.
     pub(super) rates: [f64; 2],
     /// When the move that it was told last is over, s, and when the load has come to rest behind it.
@@ -37,19 +41,44 @@ pub(super) struct Controller {
 
 impl Controller {
     /// All of a plan that is within the table's limits.
-    pub(super) fn carry_out(plan: &Plan, truth: &TableTruth) -> Self {
+    pub(super) fn carry_out(plan: &Plan, truth: &TableTruth) -> Result<Self, Beyond> {
         let mut controller = Self::new(plan, truth);
-        for step in &plan.steps {
-            match step.pose {
-                Pose::Up(up) => controller.step(step, up),
-                Pose::Many(count) => {
-                    for up in spread(count, &truth.limits()) {
-                        controller.step(step, up);
+        for round in 0..plan.rounds {
+            if let Some(round_s) = plan.round_s {
+                controller.await_round(plan, round, round_s)?;
+            }
+            for step in &plan.steps {
+                match (step.turn, step.pose) {
+                    (Some(turn), _) => controller.turn_by(step, turn)?,
+                    (None, Pose::Up(up)) => controller.step(step, Some(up)),
+                    (None, Pose::Here) => controller.step(step, None),
+                    (None, Pose::Many(count)) => {
+                        for up in spread(count, &truth.limits()) {
+                            controller.step(step, Some(up));
+                        }
                     }
                 }
             }
         }
-        controller
+        Ok(controller)
+    }
+
+    /// Stands where it is until a round is due.
+    fn await_round(&mut self, plan: &Plan, round: u32, round_s: f64) -> Result<(), Beyond> {
+        let due_s = self.lead_in_s + f64::from(round) * round_s;
+        if round == 0 {
+            return Ok(());
+        }
+        // The ends of dwells are sums: a rounding error beyond the time is none.
+        if self.now() > due_s + 1e-6 {
+            let problem = format!(
+                "round {round} is due at {due_s} s, and the one before takes until {:.1} s",
+                self.now()
+            );
+            return Err(Beyond::rounds(plan, problem, "give `round_s` more"));
+        }
+        self.hold((due_s - self.now()).max(0.0));
+        Ok(())
     }
 
     /// At rest in the first pose of a plan, within the table's limits, about to be told what to do.
@@ -62,6 +91,7 @@ impl Controller {
             let up = match first.pose {
                 Pose::Up(up) => Some(up),
                 Pose::Many(count) => spread(count, &controller.limits).next(),
+                Pose::Here => None,
             };
             if let Some(up) = up {
                 controller.stand(up, first.heading);
@@ -78,6 +108,7 @@ impl Controller {
             axes: [0, 1, 2].map(|_| Axis::new(0.0, truth.settling)),
             dwells: Vec::new(),
             rates: [0.0; 2],
+            unsettled: false,
             pose_s: 0.0,
             settled_s: 0.0,
             busy_s: 0.0,
@@ -90,29 +121,93 @@ impl Controller {
         self.axes = target.map(|angle| Axis::new(angle, self.truth.settling));
     }
 
-    /// Pose, rates up, dwells, rates down. Between the dwells of one pose nothing stops.
-    fn step(&mut self, step: &Step, up: Vector) {
+    /// To a pose, or nowhere. When it was done with what came before, s.
+    fn pose(&mut self, up: Option<Vector>, heading: Option<f64>) -> f64 {
         let first = self.dwells.is_empty();
         let before = if first { self.lead_in_s } else { self.now() };
-        if first {
+        match up {
             // The table stands at the first pose when the recording begins.
-            self.stand(up, step.heading);
-            self.hold(self.lead_in_s);
-        } else {
-            self.slew(up, step.heading);
+            Some(up) if first => {
+                self.stand(up, heading);
+                self.hold(self.lead_in_s);
+            }
+            Some(up) => self.slew(up, heading),
+            None => {}
         }
         self.hold(0.0);
-        self.run(self.axis_rates([step.rate, step.spin], up));
-        self.hold(0.0);
-        if self.now() > before {
+        before
+    }
+
+    /// Time for the load to come to rest, if anything has moved since `before`.
+    fn settle(&mut self, before: f64) {
+        if self.now() > before || self.unsettled {
             self.hold(self.truth.settle_s);
         }
+        self.unsettled = false;
+    }
+
+    /// Pose, then one axis by an angle.
+    fn turn_by(&mut self, step: &Step, turn: Turn) -> Result<(), Beyond> {
+        let up = match step.pose {
+            Pose::Up(up) => Some(up),
+            Pose::Here | Pose::Many(_) => None,
+        };
+        let before = self.pose(up, step.heading);
+        if self.now() > before {
+            self.settle(before);
+        }
+        let i = turn.axis.number();
+        let to = self.axes[i].end().0 + turn.angle;
+        self.check_turn(step, turn, to)?;
+        let start_s = self.now();
+        let acceleration = self.truth.max_acceleration_dps2[i].to_radians();
+        self.axes[i].move_to(to, turn.rate, acceleration);
+        self.hold(0.0);
+        self.unsettled = true;
+        self.dwells.push(Dwell {
+            start_s,
+            end_s: self.now(),
+            by_angle: true,
+        });
+        Ok(())
+    }
+
+    fn check_turn(&self, step: &Step, turn: Turn, to: f64) -> Result<(), Beyond> {
+        let name = turn.axis.name();
+        let fastest = self.truth.max_rate_dps[turn.axis.number()];
+        let (problem, remedy) = if turn.axis == TableAxis::Outer && !self.limits.outer {
+            let problem = "a turn about the outer axis, and the table has none".to_owned();
+            (problem, "turn the inner axis upright and take that one")
+        } else if turn.axis == TableAxis::Middle && !self.limits.reaches(to) {
+            let [low, high] = self.limits.middle.map(f64::to_degrees);
+            let problem = format!(
+                "the turn ends with the middle axis at {:.1} degrees, and the table has {low:.1} to {high:.1}",
+                to.to_degrees()
+            );
+            (problem, "turn less, or the other way")
+        } else if turn.rate > fastest.to_radians() * (1.0 + 1e-12) {
+            let problem = format!("`turn_dps` is more than the {name} axis's {fastest}");
+            (problem, "slow down")
+        } else {
+            return Ok(());
+        };
+        Err(Beyond::step(step, problem, remedy))
+    }
+
+    /// Pose, rates up, dwells, rates down. Between the dwells of one pose nothing stops. Without a pose it stays.
+    fn step(&mut self, step: &Step, up: Option<Vector>) {
+        let before = self.pose(up, step.heading);
+        let up = up.unwrap_or_else(|| self.position(self.now()).0);
+        self.run(self.axis_rates([step.rate, step.spin], up));
+        self.hold(0.0);
+        self.settle(before);
         for _ in 0..step.repeat {
             let start_s = self.now();
             self.hold(step.dwell_s);
             self.dwells.push(Dwell {
                 start_s,
                 end_s: self.now(),
+                by_angle: false,
             });
         }
         self.run([0.0; 3]);

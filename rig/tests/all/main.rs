@@ -2,6 +2,7 @@
 //!
 //! One binary, as linking one for each subject took longer than running it.
 
+mod curves;
 mod effects;
 mod extremes;
 mod flaws;

@@ -65,6 +65,12 @@ fn the_page_has_every_key_of_both_files_and_no_other() {
             rig(&format!("[unit.gyro_affine]\n{unknown}")),
         ),
         ("`[thermal]`", rig(&format!("[thermal]\n{unknown}"))),
+        ("`[curves]`", rig(&format!("[curves]\n{unknown}"))),
+        ("`[curves.gyro]`", rig(&format!("[curves.gyro]\n{unknown}"))),
+        (
+            "`[curves.accel]`",
+            rig(&format!("[curves.accel]\n{unknown}")),
+        ),
         ("`[converter]`", rig(&format!("[converter]\n{unknown}"))),
         ("`[table]`", rig(&format!("[table]\n{unknown}"))),
         (

@@ -17,7 +17,7 @@ use mimu_board::running::Board;
 use mimu_board::schematic::Volts;
 use mimu_core::compensation::{Affine, Compensation};
 use mimu_core::effects::{Sensor, Variable};
-use mimu_core::stored::{self, Record};
+use mimu_core::stored::{self, Curves, Record};
 use mimu_core::table::Node;
 use mimu_core::wire::{BATCH, Prior, Request, Triad};
 use mimu_rig::located::Source;
@@ -137,10 +137,7 @@ fn model(warmth: f64) -> Compensation<f32> {
 }
 
 fn stored(temps: &[f64], records: &[Record<'_>]) -> Vec<u8> {
-    let node = |&temp_c: &f64| Node {
-        temp_c: temp_c as f32,
-        model: model(temp_c - 25.0),
-    };
+    let node = |&temp_c: &f64| Node::constant(temp_c as f32, model(temp_c - 25.0));
     let nodes: Vec<_> = temps.iter().map(node).collect();
     let found_with = model(0.0);
     let mut bytes = vec![0; stored::MAX_LENGTH];
@@ -148,7 +145,7 @@ fn stored(temps: &[f64], records: &[Record<'_>]) -> Vec<u8> {
     let length = stored::encode(
         &stored::Origin::UNKNOWN,
         matrices,
-        &nodes,
+        &Curves::of(&nodes),
         records,
         &mut bytes,
     )

@@ -6,10 +6,11 @@
 #![no_std]
 
 use mimu_core::compensation::{Affine, Compensation, Sample};
+use mimu_core::die::{self, DieLag};
 use mimu_core::effects::{Directions, Effect, Effects, Refused, Sensor, State, Variable};
 use mimu_core::kalman::{Bank, Filter, Innovation, Rejected};
 use mimu_core::single;
-use mimu_core::stored::{self, Origin, Record, Stored, TooLong};
+use mimu_core::stored::{self, Curves, Origin, Record, Stored, TooLong};
 use mimu_core::table::{self, Node, Table};
 use mimu_core::wire::{
     Call, CompensatedBatch, Decoder, EncodeError, MAX_FRAME, Message, RawBatch, Sums,
@@ -164,16 +165,37 @@ pub fn table_follow(table: &Table<f32, 16>, temp_c: f32) -> table::State<f32> {
     state
 }
 
+/// [`Table::with_straight_lines`], [`Table::with_range`] and [`Effects::within`].
+#[inline(never)]
+pub fn table_within(
+    table: Table<f32, 16>,
+    range_c: [f32; 2],
+    effects: Effects<f32, 8>,
+) -> Result<(Table<f32, 16>, Effects<f32, 8>), table::Refused> {
+    let table = table.with_straight_lines().with_range(range_c)?;
+    let effects = effects.within(table.limits());
+    Ok((table, effects))
+}
+
+/// [`DieLag`].
+#[inline(never)]
+pub fn die_follow(lag_s: f32, dt_s: f32, readings_c: [f32; 2]) -> Option<f32> {
+    let lag = DieLag::new(lag_s).unwrap_or_else(DieLag::none);
+    let [before_c, now_c] = readings_c;
+    let die_c = lag.follow(&mut die::State::new(), dt_s, before_c)?;
+    lag.follow(&mut lag.state_of(before_c, die_c), dt_s, now_c)
+}
+
 /// [`stored::encode`].
 #[inline(never)]
 pub fn stored_encode(
     origin: &Origin,
     found_with: [&Matrix3<f32>; 2],
-    nodes: &[Node<f32>],
+    curves: &Curves<'_>,
     effects: &[Record<'_>],
     out: &mut [u8],
 ) -> Result<usize, TooLong> {
-    stored::encode(origin, found_with, nodes, effects, out)
+    stored::encode(origin, found_with, curves, effects, out)
 }
 
 /// [`stored::decode`] and [`stored::hash`].

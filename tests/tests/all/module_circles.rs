@@ -8,11 +8,12 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Crates, as folders from the root of the repository.
-const CRATES: [&str; 9] = [
+const CRATES: [&str; 10] = [
     "core",
     "firmware",
     "host/recording",
     "host/mimu",
+    "host/thermal",
     "host/device",
     "host/wizard",
     "host/cli",

@@ -2,13 +2,15 @@
 
 use mimu_core::compensation::Affine;
 use mimu_core::effects::{Sensor as DeviceSensor, Variable};
+use mimu_core::table::Node;
 use nalgebra::{Matrix3, Vector3};
 
 use super::effect::{DIRECTION, FORMULA as FORMULA_OF_EFFECTS, candidate};
 use super::of_fit::{forward_table, physical_table};
 use super::{
-    Calibration, CoefficientTable, ConverterTable, EffectTable, FORMAT, FORMULA, FormTable,
-    INVERSE_DIRECTION, OnDevice, Origin, TriadTable, What,
+    Calibration, CoefficientTable, ConverterTable, EffectTable, FORMULA, FormTable,
+    INVERSE_DIRECTION, NodeTable, OnDevice, Origin, OverTemperature, TemperatureNode, TriadTable,
+    What, reference_node,
 };
 use crate::effects::candidate::Candidate;
 use crate::effects::converter::{BITS, Converter};
@@ -29,12 +31,16 @@ pub struct Kept {
     pub unit_id: Option<String>,
     /// As in [`Calibration::created`].
     pub created: Option<String>,
+    /// As in [`Calibration::trimmed`].
+    pub trimmed: Option<String>,
     /// As in [`Origin::sha256`].
     pub sha256: Option<String>,
-    /// Temperature of the node, °C.
-    pub temp_c: f32,
-    /// Inverse models of the gyro and of the accelerometer: rad/s and m/s² from V.
-    pub models: [Affine<f32>; 2],
+    /// Temperature nodes, the coldest first: rad/s and m/s² from V.
+    pub nodes: Vec<Node<f32>>,
+    /// As in [`OverTemperature::range_c`], of one node as in [`Origin::temp_range_c`].
+    pub range_c: Option<[f32; 2]>,
+    /// As in [`OverTemperature::lag_s`].
+    pub lag_s: Option<f32>,
     /// What they lack. Converters of the axes of a triad are parts of one effect.
     pub effects: Vec<OnDevice<f32>>,
 }
@@ -47,28 +53,66 @@ impl Calibration {
     /// An effect that this program does not know; `place` is where it comes from.
     pub fn kept(kept: &Kept, place: &str) -> Result<Self> {
         let singular = || Error::new(place, "C is singular", "upload a calibration again");
-        let [gyro, accel] = &kept.models;
+        let temperatures: Vec<f64> = kept.nodes.iter().map(|n| f64::from(n.temp_c)).collect();
+        let reference = reference_node(&temperatures).map(|at| kept.nodes[at]);
+        let empty = || Error::new(place, "it keeps no node", "upload a calibration again");
+        let node = reference.ok_or_else(empty)?;
         let triad = |model, sensor| triad_table(model, sensor).ok_or_else(singular);
+        let temperature = over_temperature(kept);
+        let range_c = kept.range_c.map(|range| range.map(f64::from));
         let calibration = Self {
-            format: FORMAT.into(),
+            format: Self::format_of(temperature.is_some()).into(),
             device: kept.device.clone(),
             unit_id: kept.unit_id.clone(),
             created: kept.created.clone(),
+            trimmed: kept.trimmed.clone(),
             tool: concat!("mimu ", env!("CARGO_PKG_VERSION")).into(),
             recording: Origin {
                 sha256: kept.sha256.clone(),
                 reference: None,
                 raw_unit: RawUnit::Volt,
                 gravity_mps2: None,
-                temp_c: Some(f64::from(kept.temp_c)),
+                temp_c: Some(f64::from(node.temp_c)),
+                temp_range_c: range_c.filter(|_| temperature.is_none()),
             },
-            gyro: Some(triad(gyro, Sensor::Gyro)?),
-            accel: Some(triad(accel, Sensor::Accel)?),
+            gyro: Some(triad(&node.model.gyro, Sensor::Gyro)?),
+            accel: Some(triad(&node.model.accel, Sensor::Accel)?),
+            temperature,
             effect_tables: effect_tables(&kept.effects, place)?,
             effects: Vec::new(),
         };
         calibration.checked(place)
     }
+}
+
+/// The nodes, unless there is one that does not change with temperature and no lag, which is a calibration at one temperature.
+fn over_temperature(kept: &Kept) -> Option<OverTemperature> {
+    let plain = |node: &Node<f32>| *node == Node::constant(node.temp_c, node.model);
+    if let ([node], None) = (kept.nodes.as_slice(), kept.lag_s)
+        && plain(node)
+    {
+        return None;
+    }
+    let ends = [kept.nodes.first()?.temp_c, kept.nodes.last()?.temp_c];
+    let table = |model: &Affine<f32>, slope: &Affine<f32>| NodeTable {
+        C: rows(&model.matrix.map(f64::from)),
+        o: exact(&model.offset.map(f64::from)),
+        slope_C: rows(&slope.matrix.map(f64::from)),
+        slope_o: exact(&slope.offset.map(f64::from)),
+        sigma_C: None,
+        sigma_o: None,
+    };
+    let nodes = kept.nodes.iter().map(|node| TemperatureNode {
+        temp_c: f64::from(node.temp_c),
+        gyro: Some(table(&node.model.gyro, &node.slope.gyro)),
+        accel: Some(table(&node.model.accel, &node.slope.accel)),
+    });
+    Some(OverTemperature {
+        range_c: kept.range_c.unwrap_or(ends).map(f64::from),
+        lag_s: kept.lag_s.map(f64::from),
+        interval_lag_s: None,
+        nodes: nodes.collect(),
+    })
 }
 
 /// `None` if the matrix is singular.

@@ -32,6 +32,7 @@ impl Calibration {
             device: manifest.device.clone(),
             unit_id: manifest.unit_id().map(str::to_owned),
             created: Some(created.into()),
+            trimmed: None,
             tool: concat!("mimu ", env!("CARGO_PKG_VERSION")).into(),
             recording: Origin {
                 sha256: Some(fit.prepared.condensed.sha256.clone()),
@@ -39,14 +40,23 @@ impl Calibration {
                 raw_unit: manifest.raw_unit,
                 gravity_mps2: Some(manifest.gravity_mps2),
                 temp_c: mean.is_finite().then_some(mean),
+                temp_range_c: range(&temperatures),
             },
             gyro: triad(Sensor::Gyro),
             accel: triad(Sensor::Accel),
+            temperature: None,
             effect_tables: effects.iter().cloned().map(readable).collect(),
             effects: Vec::new(),
         };
         calibration.checked(&format!("calibration of {:?}", manifest.device))
     }
+}
+
+/// The coldest and the warmest, °C.
+fn range(temperatures: &[f64]) -> Option<[f64; 2]> {
+    let mut all = temperatures.iter().copied();
+    let first = all.next()?;
+    Some(all.fold([first; 2], |[a, b], t| [a.min(t), b.max(t)]))
 }
 
 /// An effect with as many digits of its sigmas as the triads have.

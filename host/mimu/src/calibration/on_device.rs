@@ -172,7 +172,10 @@ pub(super) fn effects_of_models<T: RealField + Copy, const N: usize>(
 ) -> Result<Effects<T, N>> {
     let place = format!("calibration of {:?}", calibration.device);
     let singular = || Error::new(&place, "C is singular", "fit the recording again");
-    let mut all = Effects::new(gyro, accel).ok_or_else(singular)?;
+    let limits = calibration.limits().map(|limits| limits.map(convert));
+    let mut all = Effects::new(gyro, accel)
+        .ok_or_else(singular)?
+        .within(limits);
     for removed in calibration.effects() {
         let refuse = |problem: String, remedy: &str| {
             let id = removed.candidate.id();

@@ -5,6 +5,7 @@ mod commands;
 mod flaws;
 mod hands;
 mod table;
+mod turns;
 
 use mimu_rig::motion::Carrier;
 use mimu_rig::place::Place;

@@ -219,8 +219,16 @@ fn the_plans_in_the_repository_can_be_carried_out() {
     assert!(plans.len() >= 3);
     for path in plans {
         let plan = Plan::read(&path).unwrap();
+        // One plan is made for the table of a paper, which stands in that paper's rig file.
+        let table = match path.ends_with("niu-ramp.toml") {
+            true => {
+                let rig = path.with_file_name("../rigs/niu-mtig.toml");
+                RigFile::read(&rig).unwrap().table
+            }
+            false => TableTruth::default(),
+        };
         match plan.carrier {
-            CarriedBy::Table => drop(Table::new(&plan, &TableTruth::default()).unwrap()),
+            CarriedBy::Table => drop(Table::new(&plan, &table).unwrap()),
             CarriedBy::Hands => drop(Hands::new(&plan, &HandsTruth::default(), 1).unwrap()),
         }
     }

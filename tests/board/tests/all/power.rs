@@ -9,7 +9,7 @@ use mimu_board::serve::{Pace, Served};
 use mimu_board_tests::conversation::{Answer, Conversation};
 use mimu_board_tests::{MS, still};
 use mimu_core::compensation::{Affine, Compensation};
-use mimu_core::stored;
+use mimu_core::stored::{self, Curves};
 use mimu_core::table::Node;
 use mimu_core::wire::{CHUNK, Call, Decoder, MAX_FRAME, Message, Refusal, Request, encode};
 use nalgebra::{Matrix3, Vector3};
@@ -26,18 +26,18 @@ fn calibration_of(origin: &stored::Origin, nodes: u32, scale: f32) -> Vec<u8> {
         matrix: Matrix3::from_diagonal_element(scale + k as f32 * 0.001),
         offset: Vector3::repeat(-2.5 * scale),
     };
-    let node = |k| Node {
-        temp_c: 10.0 * k as f32,
-        model: Compensation {
+    let node = |k| {
+        let model = Compensation {
             gyro: affine(k),
             accel: affine(k),
-        },
+        };
+        Node::constant(10.0 * k as f32, model)
     };
     let nodes: Vec<_> = (0..nodes).map(node).collect();
     let found_with = Matrix3::identity();
     let mut bytes = vec![0; stored::MAX_LENGTH];
-    let length =
-        stored::encode(origin, [&found_with, &found_with], &nodes, &[], &mut bytes).unwrap();
+    let (matrices, curves) = ([&found_with, &found_with], Curves::of(&nodes));
+    let length = stored::encode(origin, matrices, &curves, &[], &mut bytes).unwrap();
     bytes.truncate(length);
     bytes
 }

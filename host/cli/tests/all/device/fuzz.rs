@@ -170,7 +170,7 @@ fn image() -> Vec<u8> {
         gyro: affine,
         accel: affine,
     };
-    let nodes = [10.0, 30.0].map(|temp_c| Node { temp_c, model });
+    let nodes = [10.0, 30.0].map(|temp_c| Node::constant(temp_c, model));
     let records = [
         Record::Named {
             id: "gyro_warm_up",
@@ -189,7 +189,7 @@ fn image() -> Vec<u8> {
     let length = stored::encode(
         &stored::Origin::UNKNOWN,
         matrices,
-        &nodes,
+        &stored::Curves::of(&nodes),
         &records,
         &mut bytes,
     )

@@ -115,35 +115,79 @@ fn a_file_with_half_of_its_uncertainty_is_refused() {
     refused.refused(&["unit_id", "\"12\" is no number of a unit", "24 hexadecimal"]);
 }
 
+/// A calibration that a firmware of layout 4 has stored, of 16 nodes with straight lines between them.
 #[test]
-fn several_temperature_nodes_are_fetched_as_bytes_only() {
-    use mimu_core::compensation::{Affine, Compensation};
-    use mimu_core::stored::{self, Origin};
-    use mimu_core::table::Node;
-    use nalgebra::{Matrix3, Vector3};
-
-    let affine = Affine {
-        matrix: Matrix3::identity(),
-        offset: Vector3::zeros(),
-    };
-    let model = Compensation {
-        gyro: affine,
-        accel: affine,
-    };
-    let nodes = [10.0, 30.0].map(|temp_c| Node { temp_c, model });
-    let mut bytes = vec![0; stored::MAX_LENGTH];
-    let matrices = [&affine.matrix, &affine.matrix];
-    let length = stored::encode(&Origin::UNKNOWN, matrices, &nodes, &[], &mut bytes).unwrap();
-    bytes.truncate(length);
+fn several_nodes_of_an_earlier_layout_are_fetched_as_bytes_only() {
+    let bytes = include_bytes!("../../../../../core/tests/layouts/4.calibration").to_vec();
     let place = Place::new();
     let peer = Peer::new(Script {
         stored: Some(bytes.clone()),
         ..Script::default()
     });
     let file = ["download", "-o", "cal.toml", "--bytes", "cal.bin"];
-    device(&place, &peer, &file).refused(&["2 temperature nodes", "--bytes FILE"]);
+    let straight = "16 temperature nodes with straight lines";
+    device(&place, &peer, &file).refused(&[straight, "--bytes FILE"]);
     assert!(!place.path("cal.bin").exists() && !place.path("cal.toml").exists());
     let only_bytes = device(&place, &peer, &["download", "--bytes", "cal.bin"]);
     assert_eq!(only_bytes.status, Some(0), "{}", only_bytes.stderr);
     assert_eq!(std::fs::read(place.path("cal.bin")).unwrap(), bytes);
+}
+
+/// The calibration file of the unit with three nodes over temperature.
+fn over_temperature(place: &Place) -> String {
+    let plain = of_unit(place, &unit());
+    let text = std::fs::read_to_string(&plain).unwrap();
+    let node = |temp_c: f64, gain: f64| {
+        let triad = |sensor: &str, gain: f64| {
+            format!(
+                "[temperature.node.{sensor}]\nC = [[{gain}, 0.01, 0.0], [0.0, {gain}, 0.0], [0.0, 0.0, {gain}]]\n\
+                 o = [{}, 0.1, 0.2]\nslope_C = [[0.001, 0.0, 0.0], [0.0, 0.002, 0.0], [0.0, 0.0, -0.001]]\n\
+                 slope_o = [-0.003, 0.0, 0.001]\n",
+                -2.5 * gain
+            )
+        };
+        let (gyro, accel) = (triad("gyro", gain), triad("accel", 4.0 * gain));
+        format!("[[temperature.node]]\ntemp_c = {temp_c}\n{gyro}{accel}")
+    };
+    let nodes = [node(-10.0, 3.4), node(24.0, 3.5), node(60.0, 3.7)].concat();
+    let curves = format!("[temperature]\nrange_c = [-9.5, 59.0]\nlag_s = 61.2\n{nodes}");
+    let text = text.replace("mimu-calibration/1", "mimu-calibration/2");
+    let path = place.path("curves.toml");
+    std::fs::write(&path, format!("{text}\n{curves}")).unwrap();
+    path.display().to_string()
+}
+
+#[test]
+fn curves_that_are_fetched_and_stored_again_are_the_same_to_the_last_byte() {
+    let place = Place::new();
+    let peer = Peer::new(Script::default());
+    let file = over_temperature(&place);
+    let sent = device(&place, &peer, &["upload", &file, "--json", "-"]).json();
+    assert_eq!(sent["node_temp_c"], serde_json::json!([-10.0, 24.0, 60.0]));
+    let held = peer.seen.lock().unwrap().stored.clone().unwrap();
+    assert_eq!(held[4], 5, "layout");
+    let fetched = ["download", "-o", "back.toml", "--json", "-"];
+    let fetched = device(&place, &peer, &fetched).json();
+    assert_eq!(fetched["range_c"], serde_json::json!([-9.5, 59.0]));
+    assert_eq!(fetched["between_nodes"], "cubic");
+    let lag = fetched["lag_s"].as_f64().unwrap();
+    assert!((lag - 61.2).abs() < 1e-5, "{lag}");
+    let back = std::fs::read_to_string(place.path("back.toml")).unwrap();
+    assert!(back.contains("format = \"mimu-calibration/2\""), "{back}");
+    assert_eq!(back.matches("[[temperature.node]]").count(), 3);
+    let again = ["upload", "back.toml", "--json", "-"];
+    assert_eq!(device(&place, &peer, &again).json()["was_there"], true);
+}
+
+#[test]
+fn a_device_that_stores_no_curves_is_refused_before_anything_is_sent() {
+    let place = Place::new();
+    let peer = Peer::new(Script {
+        curves: false,
+        ..Script::default()
+    });
+    let file = of_unit(&place, &unit());
+    let refused = device(&place, &peer, &["upload", &file]);
+    refused.refused(&["9.8.7", "flash newer firmware"]);
+    assert_eq!(peer.count("UploadBegin"), 0);
 }

@@ -68,6 +68,8 @@ pub struct Script {
     pub protocol: Version,
     pub magic: [u8; 4],
     pub effects: u32,
+    /// Whether it stores derivatives over temperature.
+    pub curves: bool,
     pub stored: Option<Vec<u8>>,
     /// Every so many answers one is lost, if not 0; and as many are garbled.
     pub losing: u32,
@@ -98,6 +100,7 @@ impl Default for Script {
             protocol: PROTOCOL,
             magic: MAGIC,
             effects: effects_of_this_build(),
+            curves: true,
             stored: None,
             losing: 0,
             refuse_commit: None,

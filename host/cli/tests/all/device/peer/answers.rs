@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use mimu_core::kalman::Bank;
-use mimu_core::stored::{self, ROOM};
+use mimu_core::stored::{self, MAX_LENGTH, ROOM};
 use mimu_core::wire::{
     Call, Capabilities, Counters, Greeting, KalmanAxis, KalmanState, Message, Prior, Refusal,
     Reply, Request, SelfTest, Slot, StoredInfo,
@@ -40,11 +40,15 @@ impl Device {
             capabilities: Capabilities::TEMPERATURE_NODES
                 .and(Capabilities::TERMS)
                 .and(Capabilities::KALMAN)
-                .and(Capabilities::SELF_TEST),
+                .and(Capabilities::SELF_TEST)
+                .and(match self.script.curves {
+                    true => Capabilities::CURVES,
+                    false => Capabilities(0),
+                }),
             effects: self.script.effects,
             effects_room: ROOM as u8,
             nodes_room: 16,
-            stored_room: 4096,
+            stored_room: MAX_LENGTH as u32,
             sample_rate_hz: 1000,
             channels: "gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z",
             raw_unit: "V",

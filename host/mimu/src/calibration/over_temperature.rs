@@ -1,0 +1,276 @@
+//! Calibration over temperature in a calibration file: nodes with derivatives, the range that they were found from, and the lag between
+//! thermometer and dies.
+
+use mimu_core::compensation::{Affine, Compensation};
+use mimu_core::die::{DieLag, LAG_RANGE_S};
+use mimu_core::effects::REFERENCE_C;
+use mimu_core::stored::NODES;
+use mimu_core::table::{Node, Table};
+use nalgebra::{Matrix3, Vector3};
+use serde::{Deserialize, Serialize};
+
+use super::Calibration;
+use crate::quantity::Sensor;
+use crate::triad::Forward;
+use mimu_recording::error::{Error, Result};
+
+/// `[temperature]` of a calibration file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct OverTemperature {
+    /// Dies' temperatures in the recordings that it was fitted to, °C.
+    pub range_c: [f64; 2],
+    /// Lag of the dies behind the thermometer, s; negative: they lead. `None`: not determined, and none is applied.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lag_s: Option<f64>,
+    /// Bounds of it with 95 %, s.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub interval_lag_s: Option<[f64; 2]>,
+    /// One to sixteen, the coldest first.
+    #[serde(rename = "node", default)]
+    pub nodes: Vec<TemperatureNode>,
+}
+
+/// Inverse models at one temperature of the dies.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TemperatureNode {
+    /// °C.
+    pub temp_c: f64,
+    /// Of the gyro.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gyro: Option<NodeTable>,
+    /// Of the accelerometer.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub accel: Option<NodeTable>,
+}
+
+/// Inverse model `x = C u + o` of a triad at a node, raw to SI, and its derivatives by the temperature.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[allow(non_snake_case)] // C: the letter of the formula, in the file as in the papers
+pub struct NodeTable {
+    /// SI per raw unit, by rows.
+    pub C: [[f64; 3]; 3],
+    /// SI.
+    pub o: [f64; 3],
+    /// Derivatives of C, SI per raw unit and kelvin.
+    pub slope_C: [[f64; 3]; 3],
+    /// Derivatives of o, SI per kelvin.
+    pub slope_o: [f64; 3],
+    /// Standard deviations of C.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sigma_C: Option<[[f64; 3]; 3]>,
+    /// Standard deviations of o.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sigma_o: Option<[f64; 3]>,
+}
+
+/// Inverse models of a calibration over temperature, ready to be evaluated as the device does, in double precision.
+#[derive(Debug, Clone)]
+pub struct Curves {
+    table: Table<f64, NODES>,
+    lag: DieLag<f64>,
+    has: [bool; 2],
+}
+
+/// Of nodes of these temperatures, °C, the one that stands for a calibration where one model has to: nearest to the temperature that
+/// effects count from. It follows from what a device keeps. `None` if there are none.
+pub fn reference_node(temperatures: &[f64]) -> Option<usize> {
+    let off = |at: &usize| (temperatures[*at] - REFERENCE_C).abs();
+    (0..temperatures.len()).min_by(|a, b| off(a).total_cmp(&off(b)))
+}
+
+impl NodeTable {
+    fn affine(matrix: &[[f64; 3]; 3], offset: &[f64; 3]) -> Affine<f64> {
+        Affine {
+            matrix: Matrix3::from_fn(|i, j| matrix[i][j]),
+            offset: Vector3::from(*offset),
+        }
+    }
+
+    /// The inverse model, raw to SI.
+    pub fn model(&self) -> Affine<f64> {
+        Self::affine(&self.C, &self.o)
+    }
+
+    /// Its derivatives by the temperature, per kelvin.
+    pub fn slope(&self) -> Affine<f64> {
+        Self::affine(&self.slope_C, &self.slope_o)
+    }
+
+    /// What is wrong with it.
+    fn problem(&self) -> Option<&'static str> {
+        let finite = |matrix: &[[f64; 3]; 3], vector: &[f64; 3]| {
+            let mut all = matrix.iter().flatten().chain(vector);
+            all.all(|x| x.is_finite())
+        };
+        let positive = |mut all: std::iter::Flatten<std::slice::Iter<'_, [f64; 3]>>| {
+            all.all(|x| x.is_finite() && *x >= 0.0)
+        };
+        if !finite(&self.C, &self.o) || !finite(&self.slope_C, &self.slope_o) {
+            return Some("C, o or a slope has an entry that is not a number");
+        }
+        let sigmas = self.sigma_C.iter().flatten().chain(&self.sigma_o);
+        if sigmas.copied().any(|row| !positive([row].iter().flatten())) {
+            return Some("sigma_C or sigma_o has an entry that is no standard deviation");
+        }
+        if Forward::of(&self.model()).is_none() {
+            return Some("C is singular");
+        }
+        None
+    }
+}
+
+impl TemperatureNode {
+    /// The table of `sensor`.
+    pub fn table(&self, sensor: Sensor) -> Option<&NodeTable> {
+        match sensor {
+            Sensor::Gyro => self.gyro.as_ref(),
+            Sensor::Accel => self.accel.as_ref(),
+        }
+    }
+}
+
+impl OverTemperature {
+    /// Whether its nodes have `sensor`.
+    pub fn has(&self, sensor: Sensor) -> bool {
+        self.nodes.iter().any(|node| node.table(sensor).is_some())
+    }
+
+    /// Refuses what cannot be applied; a bad node is named by its number, from 1. `has`: the sensors of the calibration.
+    pub(super) fn check(&self, place: &str, has: [bool; 2]) -> Result<()> {
+        const AGAIN: &str = "fit the recordings over temperature again";
+        let refuse = |what: &str, problem: String| {
+            Err(Error::new(
+                format!("{place}, [temperature]{what}"),
+                problem,
+                AGAIN,
+            ))
+        };
+        let [from, to] = self.range_c;
+        if !(from.is_finite() && to.is_finite() && from <= to) {
+            let problem = format!("range_c is [{from}, {to}], and has to rise");
+            return refuse("", problem);
+        }
+        let [least, most] = LAG_RANGE_S;
+        if let Some(lag_s) = self.lag_s.filter(|lag| !(least..=most).contains(lag)) {
+            let problem = format!("lag_s is {lag_s}, and has to be from {least} to {most}");
+            return refuse("", problem);
+        }
+        if let Some([lower, upper]) = self.interval_lag_s
+            && !(lower <= upper && self.lag_s.is_some())
+        {
+            let problem = match self.lag_s {
+                None => "interval_lag_s is there and lag_s is not".into(),
+                Some(_) => format!("interval_lag_s is [{lower}, {upper}], and has to rise"),
+            };
+            return refuse("", problem);
+        }
+        if self.nodes.is_empty() || self.nodes.len() > NODES {
+            let problem = format!(
+                "it has {} nodes, and there have to be 1 to {NODES}",
+                self.nodes.len()
+            );
+            return refuse("", problem);
+        }
+        for (k, node) in self.nodes.iter().enumerate() {
+            let before = k.checked_sub(1).map(|k| self.nodes[k].temp_c);
+            if let Some(problem) = self.problem(node, before, has) {
+                return refuse(&format!(", node {}", k + 1), problem);
+            }
+        }
+        Ok(())
+    }
+
+    /// What is wrong with a node behind one of the temperature `before`.
+    fn problem(
+        &self,
+        node: &TemperatureNode,
+        before: Option<f64>,
+        has: [bool; 2],
+    ) -> Option<String> {
+        let temp_c = node.temp_c;
+        if !temp_c.is_finite() {
+            return Some(format!("temp_c is {temp_c}"));
+        }
+        if let Some(before) = before.filter(|before| temp_c <= *before) {
+            return Some(format!(
+                "temp_c is {temp_c}, and that of the node before is {before}: they have to rise"
+            ));
+        }
+        for sensor in Sensor::BOTH {
+            match (node.table(sensor), has[sensor as usize]) {
+                (Some(_), false) => {
+                    return Some(format!("it has [{sensor}], and the calibration has none"));
+                }
+                (None, _) if self.has(sensor) => {
+                    return Some(format!("it has no [{sensor}], and another node has"));
+                }
+                (table, _) => {
+                    if let Some(problem) = table.and_then(NodeTable::problem) {
+                        return Some(format!("[{sensor}]: {problem}"));
+                    }
+                }
+            }
+        }
+        (!self.has(Sensor::Gyro) && !self.has(Sensor::Accel))
+            .then(|| "it has neither [gyro] nor [accel]".into())
+    }
+}
+
+impl Curves {
+    /// Those of a calibration that has nodes. A sensor without any has its one model at all temperatures.
+    pub(super) fn of(calibration: &Calibration) -> Option<Self> {
+        let temperature = calibration.temperature.as_ref()?;
+        let none = Affine {
+            matrix: Matrix3::zeros(),
+            offset: Vector3::zeros(),
+        };
+        let constant = Sensor::BOTH.map(|sensor| calibration.inverse(sensor));
+        let nodes = temperature.nodes.iter().map(|node| {
+            let of = |sensor: Sensor| match node.table(sensor) {
+                Some(table) => (table.model(), table.slope()),
+                None => (constant[sensor as usize].unwrap_or(none), none),
+            };
+            let [(gyro, gyro_slope), (accel, accel_slope)] = Sensor::BOTH.map(of);
+            Node {
+                temp_c: node.temp_c,
+                model: Compensation { gyro, accel },
+                slope: Compensation {
+                    gyro: gyro_slope,
+                    accel: accel_slope,
+                },
+            }
+        });
+        let table = Table::new(nodes).ok()?;
+        Some(Self {
+            table: table.with_range(temperature.range_c).ok()?,
+            lag: temperature
+                .lag_s
+                .and_then(DieLag::new)
+                .unwrap_or_else(DieLag::none),
+            has: constant.map(|model| model.is_some()),
+        })
+    }
+
+    /// The inverse model of `sensor` at this temperature of the dies, °C, raw to SI.
+    pub fn inverse(&self, sensor: Sensor, die_c: f64) -> Option<Affine<f64>> {
+        let mut state = self.table.state();
+        self.table.follow(&mut state, die_c);
+        self.has[sensor as usize].then_some(match sensor {
+            Sensor::Gyro => state.model.gyro,
+            Sensor::Accel => state.model.accel,
+        })
+    }
+
+    /// The lag of the dies behind the thermometer.
+    pub fn lag(&self) -> &DieLag<f64> {
+        &self.lag
+    }
+
+    /// The same nodes for the device's arithmetic in double precision.
+    pub fn table(&self) -> &Table<f64, NODES> {
+        &self.table
+    }
+}

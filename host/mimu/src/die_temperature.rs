@@ -1,0 +1,147 @@
+//! A recording under a calibration over temperature: where the dies were, how far that is outside what the calibration is for, and what the
+//! sensors would have read at one temperature.
+
+use mimu_core::compensation::Affine;
+use mimu_core::die::{BEYOND_C, DieLag, State};
+use nalgebra::{Matrix3, Vector3};
+
+use crate::blocks::Block;
+use crate::calibration::{Calibration, Curves};
+use crate::prepared::Prepared;
+use crate::quantity::Sensor;
+
+/// What is said of a recording without a temperature.
+pub const WITHOUT_TEMPERATURE: &str =
+    "the recording has no temp_c: the calibration's one model is used, and not its curves";
+
+/// Temperatures of the dies, °C, in the middle of each block: those of the thermometer behind the lag. Where it has no reading it is that of
+/// the block before, and before the first that one. `None` if it has none at all.
+pub fn of_blocks(blocks: &[Block], lag: &DieLag<f64>) -> Option<Vec<f64>> {
+    let first = blocks
+        .iter()
+        .map(|b| b.temp_c.mean)
+        .find(|t| t.is_finite())?;
+    let mut state = State::new();
+    let mut before_s = None;
+    let each = blocks.iter().map(|block| {
+        let middle_s = 0.5 * (block.start_s + block.last_s);
+        let dt_s = before_s.map_or(0.0, |before| middle_s - before);
+        before_s = Some(middle_s);
+        lag.follow(&mut state, dt_s, block.temp_c.mean)
+            .unwrap_or(first)
+    });
+    Some(each.collect())
+}
+
+/// A sentence on the samples of a recording at temperatures that a calibration is not for; `None` if there are none, or if it does not say
+/// what it is for.
+///
+/// Curves are for the dies in their range, from the first degree on. A calibration at one temperature holds near it, and is
+/// left where the thermometer is more than 5 K outside what it was made from.
+pub fn outside(calibration: &Calibration, blocks: &[Block]) -> Option<String> {
+    let curves = calibration.curves();
+    let (temperatures, [from, to], margin_c) = match &curves {
+        Some(curves) => (
+            of_blocks(blocks, curves.lag())?,
+            curves.table().limits()?,
+            0.0,
+        ),
+        None => (
+            of_blocks(blocks, &DieLag::none())?,
+            calibration.recording.temp_range_c?,
+            BEYOND_C,
+        ),
+    };
+    let away = |t: f64| (from - t).max(t - to);
+    let (mut count, mut all, mut farthest) = (0_u64, 0_u64, 0.0_f64);
+    for (block, t) in blocks.iter().zip(&temperatures) {
+        let rows = u64::from(block.rows);
+        all += rows;
+        if away(*t) > margin_c {
+            count += rows;
+            farthest = farthest.max(away(*t));
+        }
+    }
+    if count == 0 {
+        return None;
+    }
+    let what = match curves {
+        Some(_) => {
+            format!("beyond {BEYOND_C} K its curves are held, and before that they go on straight")
+        }
+        None => {
+            "it has no curves over temperature: fit one with recordings over temperature".into()
+        }
+    };
+    Some(format!(
+        "{count} of {all} samples are outside the {from:.1} to {to:.1} °C that the calibration was made from, by up to {farthest:.1} K: {what}"
+    ))
+}
+
+/// The recording as its sensors would have read at the one temperature that `[gyro]` and `[accel]` of the calibration hold at: of each reading
+/// u with the model C(T), o(T) of its temperature, the one that C, o makes the same of. Whatever judges readings by the one model judges
+/// them by the curves then. `None` if the recording has no temperature or the calibration is singular.
+pub fn at_one_temperature(
+    prepared: &Prepared,
+    calibration: &Calibration,
+    curves: &Curves,
+) -> Option<Prepared> {
+    let blocks = &prepared.condensed.blocks;
+    let temperatures = of_blocks(blocks, curves.lag())?;
+    let mut out = prepared.clone();
+    for sensor in Sensor::BOTH {
+        let Some(model) = calibration.inverse(sensor) else {
+            continue;
+        };
+        let back = model.matrix.try_inverse()?;
+        let from = sensor.channels().start;
+        let moved: Vec<Affine<f64>> = temperatures
+            .iter()
+            .filter_map(|t| {
+                let at = curves.inverse(sensor, *t)?;
+                Some(Affine {
+                    matrix: back * at.matrix,
+                    offset: back * (at.offset - model.offset),
+                })
+            })
+            .collect();
+        move_sensor(&mut out, prepared, from, &moved);
+    }
+    Some(out)
+}
+
+/// Has the readings of a triad, from channel `from` on, moved block by block.
+fn move_sensor(out: &mut Prepared, prepared: &Prepared, from: usize, moved: &[Affine<f64>]) {
+    let blocks = &prepared.condensed.blocks;
+    for (block, by) in out.condensed.blocks.iter_mut().zip(moved) {
+        let raw = Vector3::from_fn(|i, _| block.raw[from + i].mean);
+        let new = by.apply(&raw);
+        for i in 0..3 {
+            block.raw[from + i].mean = new[i];
+        }
+    }
+    if from == Sensor::Gyro.channels().start {
+        for piece in &mut out.condensed.increments {
+            let t_s = piece.end_s - 0.5 * piece.duration_s;
+            let at = blocks.partition_point(|b| b.last_s < t_s);
+            let by = &moved[at.min(moved.len() - 1)];
+            let new = by.matrix * Vector3::from(piece.integral) + by.offset * piece.duration_s;
+            piece.integral = new.into();
+        }
+    }
+    for dwell in &mut out.dwells.list {
+        let range = dwell.blocks.clone();
+        // A dwell is short beside the drift of the temperature: the mean of its blocks' models is that of its mean reading.
+        let (mut matrix, mut offset) = (Matrix3::zeros(), Vector3::zeros());
+        let share = 1.0 / range.len().max(1) as f64;
+        for by in &moved[range] {
+            matrix += by.matrix * share;
+            offset += by.offset * share;
+        }
+        let raw = Vector3::from_fn(|i, _| dwell.raw[from + i].mean);
+        let new = matrix * raw + offset;
+        for i in 0..3 {
+            dwell.raw[from + i].mean = new[i];
+        }
+    }
+}

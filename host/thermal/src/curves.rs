@@ -1,0 +1,190 @@
+//! The curves of a triad: its forward model at every temperature of the die, with its covariance.
+
+use mimu::triad::{Angles, Covariance, Forward, Part, Triad};
+use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
+
+use crate::regression::{Kind, Problem};
+use crate::smoothness::TriadFit;
+
+/// Curves of one triad, averaged over the lags that the data allow.
+#[derive(Debug, Clone)]
+pub struct TriadCurves {
+    problem: Problem,
+    /// Estimates with their weights.
+    fits: Vec<(f64, TriadFit)>,
+    /// Temperatures of the die in the recordings, °C.
+    pub range_c: [f64; 2],
+}
+
+/// Twelve numbers of a forward model: P by rows, then b.
+type Twelve = SVector<f64, 12>;
+
+impl TriadCurves {
+    /// Of `fits` with their weights, which sum to one.
+    pub fn new(problem: Problem, fits: Vec<(f64, TriadFit)>, range_c: [f64; 2]) -> Self {
+        Self {
+            problem,
+            fits,
+            range_c,
+        }
+    }
+
+    /// What they were estimated from.
+    pub fn problem(&self) -> &Problem {
+        &self.problem
+    }
+
+    /// Whether the scale factors and cross terms are unknown.
+    pub fn biases_only(&self) -> bool {
+        self.problem.biases_only
+    }
+
+    /// Forward model at `temp_c` of the die, SI to raw, and its derivative by temperature, per kelvin.
+    pub fn forward(&self, temp_c: f64) -> [Forward; 2] {
+        let mut sum = [Twelve::zeros(); 2];
+        for (weight, fit) in &self.fits {
+            for (derivative, sum) in sum.iter_mut().enumerate() {
+                *sum += self.numbers(fit, temp_c, derivative == 1) * *weight;
+            }
+        }
+        sum.map(|s| forward(&s))
+    }
+
+    /// Covariance of the forward model at `temp_c`, in the order of [`mimu::triad::vector`]: of the noise, and of the lag.
+    pub fn covariance(&self, temp_c: f64) -> Covariance {
+        let each: Vec<(f64, Twelve)> = self
+            .fits
+            .iter()
+            .map(|(w, fit)| (*w, self.numbers(fit, temp_c, false)))
+            .collect();
+        let mean: Twelve = each.iter().map(|(w, n)| n * *w).sum();
+        let mut covariance = Covariance::zeros();
+        for ((weight, fit), (_, numbers)) in self.fits.iter().zip(&each) {
+            let off = numbers - mean;
+            covariance += (self.within(fit, temp_c) + off * off.transpose()) * *weight;
+        }
+        covariance
+    }
+
+    /// Calibration at `temp_c` of the die, with its covariance. `None` where P is singular or not estimated.
+    pub fn triad(&self, temp_c: f64) -> Option<Triad> {
+        if self.biases_only() {
+            return None;
+        }
+        let [model, _] = self.forward(temp_c);
+        let part = Part {
+            covariance: self.covariance(temp_c),
+            dof: f64::INFINITY,
+        };
+        Triad::from_forward(model, vec![part])
+    }
+
+    /// Scale factors at `temp_c`, raw per SI: norms of the rows of P; ones where only biases are estimated.
+    pub fn scale(&self, temp_c: f64) -> Vector3<f64> {
+        match self.triad(temp_c) {
+            Some(triad) => triad.physical(Angles::Exact).scale.map(|s| s.value).into(),
+            None => Vector3::repeat(1.0),
+        }
+    }
+
+    /// Bias of the session k over that of the first, raw.
+    pub fn session_offset(&self, session: usize) -> Vector3<f64> {
+        let mut offset = Vector3::zeros();
+        if session == 0 {
+            return offset;
+        }
+        for (weight, fit) in &self.fits {
+            for axis in 0..3 {
+                let column = self.problem.columns(axis) - self.problem.sessions + session;
+                offset[axis] +=
+                    weight * fit.axes[axis].coefficients[column] * self.problem.gain[axis];
+            }
+        }
+        offset
+    }
+
+    /// Standard deviation that the smoothness of `kind` leaves a curve to depart from a line over the range; zero for a line.
+    pub fn departure(&self, kind: Kind) -> f64 {
+        let span = self.range_c[1] - self.range_c[0];
+        let mean: f64 = self
+            .fits
+            .iter()
+            .map(|(w, f)| w * f.smoothness[kind as usize][0])
+            .sum();
+        (mean * span.powi(3) / 48.0).sqrt()
+    }
+
+    fn numbers(&self, fit: &TriadFit, temp_c: f64, derivative: bool) -> Twelve {
+        let problem = &self.problem;
+        let mut out = Twelve::zeros();
+        for axis in 0..3 {
+            let gain = problem.gain[axis];
+            for part in problem.parts(axis) {
+                let basis = problem.basis(part.kind);
+                let (from, values) = match derivative {
+                    true => basis.slopes(temp_c),
+                    false => basis.values(temp_c),
+                };
+                let coefficients = &fit.axes[axis].coefficients;
+                let used = values.iter().take(basis.len() - from).enumerate();
+                let value: f64 = used
+                    .map(|(k, v)| v * coefficients[part.from + from + k])
+                    .sum();
+                out[index(axis, part.input)] = value * gain;
+            }
+            if !derivative {
+                out[9 + axis] += problem.null[axis];
+                if problem.biases_only {
+                    out[3 * axis + axis] = 1.0;
+                }
+            } else if problem.biases_only {
+                out[3 * axis + axis] = 0.0;
+            }
+        }
+        out
+    }
+
+    /// Covariance by noise for one lag: the axes are independent.
+    fn within(&self, fit: &TriadFit, temp_c: f64) -> Covariance {
+        let problem = &self.problem;
+        let mut out = Covariance::zeros();
+        for axis in 0..3 {
+            let gain = problem.gain[axis] * problem.gain[axis];
+            let parts = problem.parts(axis);
+            let values: Vec<(usize, usize, [f64; 4])> = parts
+                .iter()
+                .map(|p| {
+                    let basis = problem.basis(p.kind);
+                    let (from, v) = basis.values(temp_c);
+                    (p.from + from, (basis.len() - from).min(4), v)
+                })
+                .collect();
+            let known = &fit.axes[axis].covariance;
+            for (a, (from_a, n_a, v_a)) in parts.iter().zip(&values) {
+                for (b, (from_b, n_b, v_b)) in parts.iter().zip(&values) {
+                    let mut sum = 0.0;
+                    for i in 0..*n_a {
+                        for j in 0..*n_b {
+                            sum += v_a[i] * v_b[j] * known[(from_a + i, from_b + j)];
+                        }
+                    }
+                    out[(index(axis, a.input), index(axis, b.input))] = sum * gain;
+                }
+            }
+        }
+        out
+    }
+}
+
+/// Place of a curve among the twelve numbers.
+fn index(axis: usize, input: Option<usize>) -> usize {
+    input.map_or(9 + axis, |i| 3 * axis + i)
+}
+
+fn forward(numbers: &Twelve) -> Forward {
+    let matrix: SMatrix<f64, 3, 3> = Matrix3::from_fn(|i, j| numbers[3 * i + j]);
+    Forward {
+        matrix,
+        bias: Vector3::from_fn(|i, _| numbers[9 + i]),
+    }
+}

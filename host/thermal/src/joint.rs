@@ -1,0 +1,416 @@
+//! The joint estimate of all curves and of the lag.
+
+use mimu::quantity::{AXES, Sensor, duration, significant};
+use mimu_recording::Reference;
+use mimu_recording::error::{Error, Result};
+
+use crate::basis::{SLOPE_SPAN, Shape};
+use crate::curves::TriadCurves;
+use crate::noise;
+use crate::profile::{LAGS, Lag, Profile};
+use crate::regression::{AxisNoise, Normal, Problem};
+use crate::session::Session;
+use crate::smoothness::{self, Penalties, Smoothness, TriadFit};
+use crate::thermometer::{Die, Start};
+
+/// Rounds of noise and smoothness in turn, where the bias wanders: each is found with the other.
+const ROUNDS: usize = 4;
+/// Drop in deviance that tells the lags of gyro and accelerometer apart: one degree of freedom at 1 %.
+const TWO_LAGS: f64 = 6.63;
+/// The die may lag behind by this share of the range at most; beyond, a first-order lag that is a tenth off shifts curves by kelvins.
+const BEHIND_SHARE: f64 = 0.25;
+/// Start of the record: so much lag times slope, K, for a lag of a minute makes it worth asking what the die was like.
+const START_OFFSET_K: f64 = 0.2;
+
+/// How the curves are estimated.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Choice {
+    /// Richest shape of the curves; the span may allow less.
+    pub shape: Shape,
+    /// A lag that is given, s; none to estimate it.
+    pub lag_s: Option<f64>,
+}
+
+impl Choice {
+    /// Smooth splines and an unknown lag.
+    pub const JOINT: Self = Self {
+        shape: Shape::Spline,
+        lag_s: None,
+    };
+}
+
+/// Profiles of gyro and accelerometer, and the drop in deviance against one lag for both.
+pub type Apart = ([Profile; 2], f64);
+
+/// Curves of both triads and the lag.
+#[derive(Debug, Clone)]
+pub struct Joint {
+    /// Curves of gyro and accelerometer; none of a triad that was not recorded.
+    pub curves: [Option<TriadCurves>; 2],
+    /// Lag of both.
+    pub profile: Profile,
+    /// Lags of each, where the data tell them apart; the drop in deviance says by how much.
+    pub apart: Option<Apart>,
+    /// Noise of the rows.
+    pub noise: [Option<[AxisNoise; 3]>; 2],
+    /// How each session began.
+    pub starts: Vec<Start>,
+    /// What a person should know.
+    pub warnings: Vec<String>,
+}
+
+impl Joint {
+    /// Lag that the device is to apply, s: none where it is not determined.
+    pub fn lag(&self) -> Option<Lag> {
+        Some(self.profile.lag).filter(Lag::is_determined)
+    }
+
+    /// Die temperatures of `sessions` by the best lag.
+    pub fn dies(&self, sessions: &[Session]) -> Vec<Die> {
+        let lag = self.profile.lag.value;
+        let each = sessions.iter().zip(&self.starts);
+        each.map(|(s, start)| s.thermometer.die(lag, *start))
+            .collect()
+    }
+}
+
+/// One triad with all that does not depend on the lag.
+struct Evaluator<'a> {
+    sessions: &'a [Session],
+    problem: Problem,
+    penalties: Penalties,
+    noise: [AxisNoise; 3],
+    smoothness: Smoothness,
+    known: Vec<(f64, Option<TriadFit>)>,
+}
+
+impl<'a> Evaluator<'a> {
+    fn new(sessions: &'a [Session], sensor: Sensor, shape: Shape) -> Result<Option<Self>> {
+        let rows = sessions.iter().map(|s| s.rows[sensor as usize].len());
+        if rows.sum::<usize>() == 0 {
+            return Ok(None);
+        }
+        let range = range_of_rows(sessions, sensor);
+        let gravity = sessions.iter().any(|s| s.reference == Reference::Gravity);
+        let problem = Problem::new(sessions, sensor, shape, range, gravity)?;
+        let penalties = Penalties::of(&problem);
+        let noise = noise::white(&problem).map(|white| AxisNoise {
+            white,
+            wander: 0.0,
+            correlation_s: 1.0,
+        });
+        let smoothness = smoothness::times(&smoothness::largest(&problem), 1e-4);
+        Ok(Some(Self {
+            sessions,
+            problem,
+            penalties,
+            noise,
+            smoothness,
+            known: Vec::new(),
+        }))
+    }
+
+    /// Die temperatures of the rows.
+    fn dies(&self, lag_s: f64, starts: &[Start]) -> Vec<f64> {
+        let each = self.sessions.iter().zip(starts);
+        let dies: Vec<Die> = each
+            .map(|(s, start)| s.thermometer.die(lag_s, *start))
+            .collect();
+        let rows = self.problem.rows.iter();
+        rows.map(|r| dies[r.session].at(r.middle_s)).collect()
+    }
+
+    fn evaluate(&mut self, lag_s: f64, starts: &[Start]) -> Option<TriadFit> {
+        let dies = self.dies(lag_s, starts);
+        let normals = [0, 1, 2]
+            .map(|axis| Normal::of(&self.problem, axis, &dies, &self.noise[axis], |_| true));
+        let fit = smoothness::fit(&self.problem, &self.penalties, &normals, &self.smoothness)?;
+        self.smoothness = fit.smoothness;
+        Some(fit)
+    }
+
+    /// Criterion of a lag; the estimates are kept.
+    fn criterion(&mut self, lag_s: f64, starts: &[Start]) -> Option<f64> {
+        if let Some((_, fit)) = self.known.iter().find(|k| k.0 == lag_s) {
+            return fit.as_ref().map(|f| f.criterion);
+        }
+        let fit = self.evaluate(lag_s, starts);
+        let criterion = fit.as_ref().map(|f| f.criterion);
+        self.known.push((lag_s, fit));
+        criterion
+    }
+
+    /// Noise with the curves at `lag_s`; whether any bias wanders.
+    fn learn_noise(&mut self, lag_s: f64, starts: &[Start]) -> bool {
+        self.known.clear();
+        let dies = self.dies(lag_s, starts);
+        for _ in 0..ROUNDS {
+            for axis in 0..3 {
+                self.noise[axis] = noise::estimate(
+                    &self.problem,
+                    &self.penalties,
+                    axis,
+                    &dies,
+                    &self.smoothness,
+                    &self.noise[axis],
+                );
+            }
+            if self.noise.iter().all(|n| n.wander == 0.0) || self.evaluate(lag_s, starts).is_none()
+            {
+                break;
+            }
+        }
+        self.noise.iter().any(|n| n.wander > 0.0)
+    }
+
+    fn curves(self, profile: &Profile, range_c: [f64; 2]) -> TriadCurves {
+        let fits = profile.weights.iter().filter_map(|(lag, weight)| {
+            let found = self.known.iter().find(|k| k.0 == *lag)?;
+            Some((*weight, found.1.clone()?))
+        });
+        let fits: Vec<(f64, TriadFit)> = fits.collect();
+        let sum: f64 = fits.iter().map(|f| f.0).sum();
+        let fits = fits.into_iter().map(|(w, f)| (w / sum, f)).collect();
+        TriadCurves::new(self.problem, fits, range_c)
+    }
+}
+
+/// Temperatures of the thermometer that rows were taken at, with those of a die that leads by as much as any.
+fn range_of_rows(sessions: &[Session], sensor: Sensor) -> [f64; 2] {
+    let mut range = [f64::INFINITY, f64::NEG_INFINITY];
+    for session in sessions {
+        let led = session.thermometer.die(LAGS[0], Start::Settled);
+        for row in &session.rows[sensor as usize] {
+            let (temp_c, _) = session.thermometer.at(row.middle_s);
+            for t in [temp_c, led.at(row.middle_s)] {
+                range = [range[0].min(t), range[1].max(t)];
+            }
+        }
+    }
+    range
+}
+
+/// Temperatures of the thermometer over all rows of `sessions`.
+fn measured_range(sessions: &[Session]) -> [f64; 2] {
+    let temps = sessions.iter().flat_map(|s| {
+        let rows = s.rows.iter().flatten();
+        rows.map(|r| s.thermometer.at(r.middle_s).0)
+    });
+    temps.fold([f64::INFINITY, f64::NEG_INFINITY], |r, t| {
+        [r[0].min(t), r[1].max(t)]
+    })
+}
+
+/// Estimates all curves, and the lag unless it is given.
+///
+/// # Errors
+/// Recordings of several units; a span below 10 K; a sensor whose parameters the inputs do not determine; a ramp that is too fast for the
+/// lag.
+pub fn estimate(sessions: &[Session], choice: Choice) -> Result<Joint> {
+    check_alike(sessions)?;
+    let range = measured_range(sessions);
+    let span = range[1] - range[0];
+    check_span(sessions, span)?;
+    let shape = match (choice.shape, Shape::allowed(span)) {
+        (_, Shape::Constant) | (Shape::Constant, _) => Shape::Constant,
+        (_, Shape::Line) | (Shape::Line, _) => Shape::Line,
+        (other, _) => other,
+    };
+    let mut warnings = Vec::new();
+    if shape != choice.shape {
+        warnings.push(format!(
+            "the recordings span {} K: curves are straight lines, as curvature needs 20 K",
+            significant(span)
+        ));
+    }
+    let mut triads = Vec::new();
+    for sensor in Sensor::BOTH {
+        triads.push(Evaluator::new(sessions, sensor, shape)?);
+    }
+    let mut starts = vec![Start::Settled; sessions.len()];
+    let rough = rough_lag(&mut triads, &mut starts, sessions, choice.lag_s)?;
+    for triad in triads.iter_mut().flatten() {
+        triad.learn_noise(rough, &starts);
+    }
+    let (profile, apart) = lags(&mut triads, &starts, choice.lag_s)?;
+    let mut joint = Joint {
+        curves: [None, None],
+        profile,
+        apart,
+        noise: [None, None],
+        starts,
+        warnings,
+    };
+    check_speed(sessions, &joint, span)?;
+    let dies = joint.dies(sessions);
+    let [gyro, accel] = <[_; 2]>::try_from(triads).unwrap_or_else(|_| [None, None]);
+    for (k, triad) in [gyro, accel].into_iter().enumerate() {
+        let Some(triad) = triad else { continue };
+        let rows = triad.problem.rows.iter();
+        let temps = rows.map(|r| dies[r.session].at(r.middle_s));
+        let range_c = temps.fold([f64::INFINITY, f64::NEG_INFINITY], |r, t| {
+            [r[0].min(t), r[1].max(t)]
+        });
+        joint.noise[k] = Some(triad.noise);
+        joint.curves[k] = Some(triad.curves(&joint.profile, range_c));
+    }
+    Ok(joint)
+}
+
+/// A first lag with white noise, and how each session began: the likelihood chooses.
+fn rough_lag(
+    triads: &mut [Option<Evaluator<'_>>],
+    starts: &mut [Start],
+    sessions: &[Session],
+    given: Option<f64>,
+) -> Result<f64> {
+    let mut best = |starts: &[Start]| {
+        for triad in triads.iter_mut().flatten() {
+            triad.known.clear();
+        }
+        let lags = given.map_or(LAGS.to_vec(), |lag| vec![lag]);
+        let each = lags.into_iter().filter_map(|lag| {
+            let sum = total(triads, lag, starts)?;
+            Some((lag, sum))
+        });
+        each.min_by(|a, b| a.1.total_cmp(&b.1))
+    };
+    let mut found = best(starts).ok_or_else(|| no_solution(sessions))?;
+    for k in 0..sessions.len() {
+        let [settled, ramp] = [Start::Settled, Start::OnRamp].map(|start| {
+            let die = sessions[k].thermometer.die(60.0, start);
+            die.at(f64::NEG_INFINITY)
+        });
+        if (settled - ramp).abs() < START_OFFSET_K {
+            continue;
+        }
+        starts[k] = Start::OnRamp;
+        match best(starts) {
+            Some(other) if other.1 < found.1 => found = other,
+            _ => starts[k] = Start::Settled,
+        }
+    }
+    Ok(found.0)
+}
+
+fn total(triads: &mut [Option<Evaluator<'_>>], lag_s: f64, starts: &[Start]) -> Option<f64> {
+    let each = triads.iter_mut().flatten();
+    each.map(|t| t.criterion(lag_s, starts)).sum()
+}
+
+/// One lag for both triads, or one for each where the likelihood tells them apart.
+fn lags(
+    triads: &mut [Option<Evaluator<'_>>],
+    starts: &[Start],
+    given: Option<f64>,
+) -> Result<(Profile, Option<Apart>)> {
+    let none = || Error::undetermined("lag", "no lag explains the readings", "record again");
+    if let Some(lag_s) = given {
+        let criterion = total(triads, lag_s, starts).ok_or_else(none)?;
+        return Ok((Profile::fixed(lag_s, criterion), None));
+    }
+    let both = Profile::of(|lag| total(triads, lag, starts)).ok_or_else(none)?;
+    let each: Vec<Profile> = triads
+        .iter_mut()
+        .flatten()
+        .filter_map(|t| Profile::of(|lag| t.criterion(lag, starts)))
+        .collect();
+    let apart = <[Profile; 2]>::try_from(each).ok().and_then(|each| {
+        let drop = both.criterion - each[0].criterion - each[1].criterion;
+        (drop > TWO_LAGS).then_some((each, drop))
+    });
+    Ok((both, apart))
+}
+
+fn no_solution(sessions: &[Session]) -> Error {
+    let place = sessions.first().map_or("thermal", |s| s.place.as_str());
+    Error::undetermined(
+        place,
+        "the rows do not determine the curves at any lag",
+        "excite every axis at all temperatures",
+    )
+}
+
+fn check_alike(sessions: &[Session]) -> Result<()> {
+    let Some(first) = sessions.first() else {
+        return Err(Error::new(
+            "recordings",
+            "there is none",
+            "give at least one",
+        ));
+    };
+    for other in &sessions[1..] {
+        let alike = match (&first.unit_id, &other.unit_id) {
+            (Some(a), Some(b)) => a.eq_ignore_ascii_case(b),
+            _ => first.device == other.device,
+        };
+        if !alike {
+            let problem = format!(
+                "this is a recording of {:?}, and {} is one of {:?}: two units have two sets of curves",
+                other.device, first.place, first.device
+            );
+            let remedy = "fit the recordings of each unit by themselves";
+            return Err(Error::new(&other.place, problem, remedy));
+        }
+        if first.raw_unit != other.raw_unit || first.reference != other.reference {
+            let problem = format!(
+                "its readings are in {} with reference {:?}, those of {} in {} with reference {:?}",
+                other.raw_unit, other.reference, first.place, first.raw_unit, first.reference
+            );
+            let remedy = "fit recordings of one kind together";
+            return Err(Error::new(&other.place, problem, remedy));
+        }
+    }
+    Ok(())
+}
+
+fn check_span(sessions: &[Session], span: f64) -> Result<()> {
+    if span >= SLOPE_SPAN {
+        return Ok(());
+    }
+    let problem = format!(
+        "the temperature spans {} K only: a slope needs {SLOPE_SPAN} K, curvature 20 K",
+        significant(span.max(0.0))
+    );
+    let remedy = "heat or cool the unit further, or use `mimu fit`, which is for one temperature";
+    Err(Error::undetermined(
+        format!("{}, temp_c", sessions[0].place),
+        problem,
+        remedy,
+    ))
+}
+
+/// Refuses a ramp in which the die is so far behind that a first-order lag decides everything.
+fn check_speed(sessions: &[Session], joint: &Joint, span: f64) -> Result<()> {
+    let Some(lag) = joint.lag() else {
+        return Ok(());
+    };
+    for session in sessions {
+        let rows = session.rows.iter().flatten();
+        let mut slopes: Vec<f64> = rows
+            .map(|r| session.thermometer.at(r.middle_s).1.abs())
+            .collect();
+        slopes.sort_by(f64::total_cmp);
+        let Some(&fastest) = slopes.get(slopes.len() * 9 / 10) else {
+            continue;
+        };
+        let behind = fastest * lag.value.abs();
+        if behind > BEHIND_SHARE * span {
+            let problem = format!(
+                "the ramp of {} K/min is too fast: the dies are {} K off the thermometer by their lag of {}",
+                significant(fastest * 60.0),
+                significant(behind),
+                duration(lag.value.abs())
+            );
+            let slow = 0.4 * BEHIND_SHARE * span / lag.value.abs() * 60.0;
+            let remedy = format!("heat and cool by at most {} K/min", significant(slow));
+            return Err(Error::undetermined(&session.place, problem, remedy));
+        }
+    }
+    Ok(())
+}
+
+/// Names of the axes for messages about `sensor`.
+pub fn axis_name(sensor: Sensor, axis: usize) -> String {
+    format!("{sensor}_{}", AXES[axis])
+}

@@ -1,0 +1,96 @@
+//! Noise of the rows of an axis: white noise from within the dwells, and the slow wander of the bias from what the curves leave.
+//!
+//! Means of neighbouring rows are not independent where the bias wanders, and intervals that take them for independent are too narrow.
+
+use nalgebra::Vector3;
+
+use crate::regression::{AxisNoise, Normal, Problem};
+use crate::smoothness::{Penalties, Smoothness, solve, times};
+
+/// Correlation times that are tried, s. The longest is a random walk over most recordings.
+const CORRELATION_S: [f64; 4] = [40.0, 200.0, 1000.0, 10_000.0];
+/// Variances of the wander over that of a row, in steps of a factor of ten and then of refinement.
+const RATIOS: [f64; 6] = [1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0];
+/// What wander has to lower the deviance by: two parameters at the price of Akaike's criterion.
+const DEVIANCE: f64 = 4.0;
+
+/// White noise of rows of weight 1, SI², by the differences of neighbouring rows of a dwell, in which nothing else moves.
+pub fn white(problem: &Problem) -> [f64; 3] {
+    let (mut sum, mut n) = (Vector3::zeros(), 0.0);
+    for pair in problem.rows.windows(2) {
+        let [a, b] = [&pair[0], &pair[1]];
+        if a.session == b.session && a.step == b.step && (a.input - b.input).norm() < 1e-9 {
+            let difference = b.reading - a.reading;
+            sum += difference.component_mul(&difference) / (1.0 / a.weight + 1.0 / b.weight);
+            n += 1.0;
+        }
+    }
+    [0, 1, 2].map(|k| (sum[k] / n).max(f64::MIN_POSITIVE))
+}
+
+/// Noise of `axis` at the die temperatures `dies`, where the curves are as smooth as `smoothness`; `before` is the noise found so far.
+///
+/// The restricted likelihood of the variance and the correlation time of the wander, with the white variance profiled out.
+pub fn estimate(
+    problem: &Problem,
+    penalties: &Penalties,
+    axis: usize,
+    dies: &[f64],
+    smoothness: &Smoothness,
+    before: &AxisNoise,
+) -> AxisNoise {
+    let scaled = times(smoothness, 1.0 / before.white);
+    let deviance = |ratio: f64, correlation_s: f64| {
+        let relative = AxisNoise {
+            white: 1.0,
+            wander: ratio,
+            correlation_s,
+        };
+        let normal = Normal::of(problem, axis, dies, &relative, |_| true);
+        let solved = solve(problem, penalties, axis, &normal, &scaled)?;
+        let free: usize = problem
+            .parts(axis)
+            .iter()
+            .map(|p| problem.basis(p.kind).free())
+            .sum();
+        let n = normal.rows - (free + problem.sessions - 1) as f64;
+        let white = solved.left / n;
+        (white > 0.0).then(|| (n * white.ln() + solved.determinants, white))
+    };
+    let Some((without, white)) = deviance(0.0, 1.0) else {
+        return *before;
+    };
+    let mut best = (without - DEVIANCE, 0.0, 1.0, white);
+    let mut attempt = |ratio: f64, correlation_s: f64| {
+        if let Some((d, white)) = deviance(ratio, correlation_s)
+            && d < best.0
+        {
+            best = (d, ratio, correlation_s, white);
+        }
+        best
+    };
+    for correlation_s in CORRELATION_S {
+        for ratio in RATIOS {
+            attempt(ratio, correlation_s);
+        }
+    }
+    if attempt(0.0, 1.0).1 > 0.0 {
+        for factor in [2.5, 1.6, 1.25] {
+            let (_, ratio, correlation_s, _) = attempt(0.0, 1.0);
+            for [a, b] in [
+                [factor, 1.0],
+                [1.0 / factor, 1.0],
+                [1.0, factor],
+                [1.0, 1.0 / factor],
+            ] {
+                attempt(ratio * a, correlation_s * b);
+            }
+        }
+    }
+    let (_, ratio, correlation_s, white) = best;
+    AxisNoise {
+        white,
+        wander: ratio * white,
+        correlation_s,
+    }
+}

@@ -1,0 +1,382 @@
+//! The readings of a triad as a linear regression, once the temperature of the die is known.
+//!
+//! `u_j = Σ_i P_ji(T) x_i + b_j(T) + b_js + noise` for the axis j in the session s: every P_ji and b_j is a sum of functions of the die's
+//! temperature ([`Basis`]), and the first session has no offset b_js of its own. Readings are scaled by a first affine fit, so that the
+//! same curve of any sensor has the same size: biases in SI, the rest as ratios.
+
+use mimu::quantity::{AXES, Sensor};
+use mimu_recording::error::{Error, Result};
+use nalgebra::{DMatrix, DVector, Matrix4, Vector3, Vector4};
+
+use crate::basis::{Basis, Shape};
+use crate::session::Session;
+
+/// What a curve is the temperature dependence of; its smoothness is estimated for each of these.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// Bias.
+    Bias,
+    /// Scale factor: diagonal of P.
+    Scale,
+    /// Cross terms: the rest of P.
+    Cross,
+}
+
+impl Kind {
+    /// All kinds.
+    pub const ALL: [Self; 3] = [Self::Bias, Self::Scale, Self::Cross];
+}
+
+/// Smallest eigenvalue of the correlation of inputs and bias that determines all of them.
+const SMALLEST_EIGENVALUE: f64 = 1e-5;
+
+/// A row of all sessions.
+#[derive(Debug, Clone, Copy)]
+pub struct ProblemRow {
+    /// Its session.
+    pub session: usize,
+    /// Middle, s of its session.
+    pub middle_s: f64,
+    /// Number of samples over the largest.
+    pub weight: f64,
+    /// Known input, SI; zero where only biases are estimated.
+    pub input: Vector3<f64>,
+    /// Reading minus [`Problem::null`], over [`Problem::gain`].
+    pub reading: Vector3<f64>,
+    /// Number of the dwell in its session.
+    pub step: i32,
+}
+
+/// What one triad is estimated from.
+#[derive(Debug, Clone)]
+pub struct Problem {
+    /// The triad.
+    pub sensor: Sensor,
+    /// Rows of all sessions, in order.
+    pub rows: Vec<ProblemRow>,
+    /// Raw per SI of each axis.
+    pub gain: Vector3<f64>,
+    /// Raw reading without input.
+    pub null: Vector3<f64>,
+    /// Functions of temperature of each [`Kind`].
+    pub bases: [Basis; 3],
+    /// Number of sessions.
+    pub sessions: usize,
+    /// Whether only biases are estimated: nothing is known of the input, or it does not excite the rest.
+    pub biases_only: bool,
+    /// Samples of the row of weight 1.
+    pub samples: f64,
+}
+
+/// A curve of one axis among the columns of its regression.
+#[derive(Debug, Clone, Copy)]
+pub struct Part {
+    /// Input that multiplies it; none of a bias.
+    pub input: Option<usize>,
+    /// What it is.
+    pub kind: Kind,
+    /// Its first column.
+    pub from: usize,
+}
+
+impl Problem {
+    /// Of the rows of `sensor` in `sessions`, with curves of `shape` over the temperatures `range`. `biases_only` where the input is
+    /// not known.
+    ///
+    /// # Errors
+    /// An experiment whose inputs do not determine every parameter.
+    pub fn new(
+        sessions: &[Session],
+        sensor: Sensor,
+        shape: Shape,
+        range: [f64; 2],
+        biases_only: bool,
+    ) -> Result<Self> {
+        let mut rows = Vec::new();
+        for (k, session) in sessions.iter().enumerate() {
+            rows.extend(session.rows[sensor as usize].iter().map(|r| ProblemRow {
+                session: k,
+                middle_s: r.middle_s,
+                weight: r.samples,
+                input: if biases_only {
+                    Vector3::zeros()
+                } else {
+                    r.input
+                },
+                reading: r.raw,
+                step: r.step,
+            }));
+        }
+        let samples = rows.iter().map(|r| r.weight).fold(1.0, f64::max);
+        rows.iter_mut().for_each(|r| r.weight /= samples);
+        let mut problem = Self {
+            sensor,
+            rows,
+            gain: Vector3::repeat(1.0),
+            null: Vector3::zeros(),
+            bases: Kind::ALL.map(|_| Basis::new(shape, range)),
+            sessions: sessions.len(),
+            biases_only,
+            samples,
+        };
+        problem.scale()?;
+        Ok(problem)
+    }
+
+    /// Scales the readings by an affine fit without temperature.
+    fn scale(&mut self) -> Result<()> {
+        if self.biases_only {
+            let n = self.rows.len().max(1) as f64;
+            self.null = self.rows.iter().map(|r| r.reading).sum::<Vector3<f64>>() / n;
+        } else {
+            let mut gram = Matrix4::zeros();
+            let mut with: [Vector4<f64>; 3] = [Vector4::zeros(); 3];
+            for r in &self.rows {
+                let x = r.input.push(1.0);
+                gram += x * x.transpose() * r.weight;
+                for (k, with) in with.iter_mut().enumerate() {
+                    *with += x * r.reading[k] * r.weight;
+                }
+            }
+            check_excitation(&gram, self.sensor)?;
+            let inverse = gram.try_inverse().unwrap_or_else(Matrix4::zeros);
+            for k in 0..3 {
+                let fitted = inverse * with[k];
+                self.gain[k] = fitted.fixed_rows::<3>(0).norm();
+                self.null[k] = fitted[3];
+            }
+            if !self.gain.iter().all(|g| *g > 0.0) {
+                return Err(Error::undetermined(
+                    self.sensor,
+                    "the readings do not follow the known inputs at all",
+                    "check the ref_ columns and which columns are the sensor's",
+                ));
+            }
+        }
+        for r in &mut self.rows {
+            r.reading = (r.reading - self.null).component_div(&self.gain);
+        }
+        Ok(())
+    }
+
+    /// Functions of temperature of curves of `kind`.
+    pub fn basis(&self, kind: Kind) -> &Basis {
+        &self.bases[kind as usize]
+    }
+
+    /// Curves of `axis`, in the order of its columns.
+    pub fn parts(&self, axis: usize) -> Vec<Part> {
+        let inputs = (0..3).map(Some).filter(|_| !self.biases_only);
+        let mut from = 0;
+        let curves = inputs.chain([None]).map(|input| {
+            let kind = match input {
+                None => Kind::Bias,
+                Some(i) if i == axis => Kind::Scale,
+                Some(_) => Kind::Cross,
+            };
+            let part = Part { input, kind, from };
+            from += self.basis(kind).len();
+            part
+        });
+        curves.collect()
+    }
+
+    /// Number of columns of `axis`: its curves, then an offset for each session but the first.
+    pub fn columns(&self, axis: usize) -> usize {
+        let curves: usize = self
+            .parts(axis)
+            .iter()
+            .map(|p| self.basis(p.kind).len())
+            .sum();
+        curves + self.sessions - 1
+    }
+
+    /// Writes the entries of `row` of `axis` at the die's temperature `temp_c`, then the reading at [`Self::columns`].
+    pub fn entries(
+        &self,
+        axis: usize,
+        row: &ProblemRow,
+        temp_c: f64,
+        parts: &[Part],
+        out: &mut Vec<(usize, f64)>,
+    ) {
+        out.clear();
+        for part in parts {
+            let (from, values) = self.basis(part.kind).values(temp_c);
+            let factor = part.input.map_or(1.0, |i| row.input[i]);
+            if factor != 0.0 {
+                let each = values.iter().enumerate().filter(|(_, v)| **v != 0.0);
+                out.extend(each.map(|(k, v)| (part.from + from + k, v * factor)));
+            }
+        }
+        let columns = self.columns(axis);
+        if row.session > 0 {
+            out.push((columns - self.sessions + row.session, 1.0));
+        }
+        out.push((columns, row.reading[axis]));
+    }
+}
+
+/// Refuses inputs that leave a parameter undetermined, and names it.
+fn check_excitation(gram: &Matrix4<f64>, sensor: Sensor) -> Result<()> {
+    let scale = gram
+        .diagonal()
+        .map(|d| if d > 0.0 { 1.0 / d.sqrt() } else { 0.0 });
+    let correlation = Matrix4::from_fn(|i, j| gram[(i, j)] * scale[i] * scale[j]);
+    let eigen = correlation.symmetric_eigen();
+    let weakest = eigen.eigenvalues.imin();
+    if eigen.eigenvalues[weakest] > SMALLEST_EIGENVALUE {
+        return Ok(());
+    }
+    let along = eigen.eigenvectors.column(weakest);
+    let axis = (0..3)
+        .max_by(|a, b| along[*a].abs().total_cmp(&along[*b].abs()))
+        .unwrap_or(0);
+    let (problem, remedy) = match sensor {
+        Sensor::Gyro => (
+            format!(
+                "no turn tells its scale factors along {} from its biases",
+                AXES[axis]
+            ),
+            "turn about every axis both ways at all temperatures",
+        ),
+        Sensor::Accel => (
+            format!(
+                "no pose tells its scale factors along {} from its biases",
+                AXES[axis]
+            ),
+            "point every axis up and down at all temperatures",
+        ),
+    };
+    Err(Error::undetermined(sensor, problem, remedy))
+}
+
+/// Noise of one axis: white noise of the rows, and a bias that wanders with an exponential correlation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AxisNoise {
+    /// Variance of a row of weight 1, SI².
+    pub white: f64,
+    /// Variance of the wander, SI².
+    pub wander: f64,
+    /// Its correlation time, s.
+    pub correlation_s: f64,
+}
+
+/// Normal equations of one axis, of rows whose noise was made white with a variance of one.
+#[derive(Debug, Clone)]
+pub struct Normal {
+    /// Of the columns.
+    pub gram: DMatrix<f64>,
+    /// Of columns and reading.
+    pub with: DVector<f64>,
+    /// Sum of squares of the readings.
+    pub squares: f64,
+    /// Logarithm of the determinant of the rows' covariance.
+    pub log_det: f64,
+    /// Number of rows.
+    pub rows: f64,
+}
+
+impl Normal {
+    /// Of `axis` of `problem` with its rows at the die temperatures `dies`; rows that `used` refuses are left out.
+    pub fn of(
+        problem: &Problem,
+        axis: usize,
+        dies: &[f64],
+        noise: &AxisNoise,
+        used: impl Fn(usize) -> bool,
+    ) -> Self {
+        match noise.wander > 0.0 {
+            true => Self::correlated(problem, axis, dies, noise, used),
+            false => Self::white(problem, axis, dies, noise, used),
+        }
+    }
+
+    fn white(
+        problem: &Problem,
+        axis: usize,
+        dies: &[f64],
+        noise: &AxisNoise,
+        used: impl Fn(usize) -> bool,
+    ) -> Self {
+        let p = problem.columns(axis);
+        let parts = problem.parts(axis);
+        let mut both = DMatrix::zeros(p + 1, p + 1);
+        let mut entries = Vec::new();
+        let (mut log_det, mut rows) = (0.0, 0.0);
+        for (k, row) in problem.rows.iter().enumerate().filter(|(k, _)| used(*k)) {
+            problem.entries(axis, row, dies[k], &parts, &mut entries);
+            let variance = noise.white / row.weight;
+            log_det += variance.ln();
+            rows += 1.0;
+            for &(i, a) in &entries {
+                for &(j, b) in &entries {
+                    both[(i, j)] += a * b / variance;
+                }
+            }
+        }
+        Self::split(&both, p, log_det, rows)
+    }
+
+    /// A Kalman filter of the wander turns readings and columns alike into innovations, which are white.
+    fn correlated(
+        problem: &Problem,
+        axis: usize,
+        dies: &[f64],
+        noise: &AxisNoise,
+        used: impl Fn(usize) -> bool,
+    ) -> Self {
+        let p = problem.columns(axis);
+        let parts = problem.parts(axis);
+        let count = (0..problem.rows.len()).filter(|k| used(*k)).count();
+        let mut white = DMatrix::zeros(p + 1, count);
+        let mut entries = Vec::new();
+        let mut state = vec![0.0; p + 1];
+        let mut innovation = vec![0.0; p + 1];
+        let (mut variance, mut log_det) = (noise.wander, 0.0);
+        let mut before: Option<&ProblemRow> = None;
+        let used_rows = problem.rows.iter().enumerate().filter(|(k, _)| used(*k));
+        for (column, (k, row)) in used_rows.enumerate() {
+            match before {
+                Some(b) if b.session == row.session => {
+                    let keep = (-(row.middle_s - b.middle_s).abs() / noise.correlation_s).exp();
+                    state.iter_mut().for_each(|s| *s *= keep);
+                    variance = keep * keep * variance + noise.wander * (1.0 - keep * keep);
+                }
+                _ => {
+                    state.fill(0.0);
+                    variance = noise.wander;
+                }
+            }
+            before = Some(row);
+            problem.entries(axis, row, dies[k], &parts, &mut entries);
+            for (i, s) in innovation.iter_mut().zip(&state) {
+                *i = -s;
+            }
+            for &(i, a) in &entries {
+                innovation[i] += a;
+            }
+            let total = variance + noise.white / row.weight;
+            let (gain, root) = (variance / total, 1.0 / total.sqrt());
+            log_det += total.ln();
+            variance *= 1.0 - gain;
+            let mut out = white.column_mut(column);
+            for i in 0..=p {
+                out[i] = innovation[i] * root;
+                state[i] += gain * innovation[i];
+            }
+        }
+        let both = &white * white.transpose();
+        Self::split(&both, p, log_det, count as f64)
+    }
+
+    fn split(both: &DMatrix<f64>, p: usize, log_det: f64, rows: f64) -> Self {
+        Self {
+            gram: both.view((0, 0), (p, p)).into_owned(),
+            with: both.view((0, p), (p, 1)).column(0).into_owned(),
+            squares: both[(p, p)],
+            log_det,
+            rows,
+        }
+    }
+}

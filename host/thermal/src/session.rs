@@ -1,0 +1,179 @@
+//! One recording, from power-on to power-off, as rows: means of some seconds with their known input, and the thermometer.
+
+use mimu::blocks::{Block, Condensed};
+use mimu::dwell::Dwell;
+use mimu::prepared::Prepared;
+use mimu::quantity::Sensor;
+use mimu_recording::error::{Error, Result};
+use mimu_recording::{RawUnit, Reference};
+use nalgebra::Vector3;
+
+use crate::thermometer::Thermometer;
+
+/// Length of a row, s. At 5 K/min a die moves by 0.2 K in it, over which any curve is a line.
+const ROW_S: f64 = 2.5;
+/// Shortest row, s: the rest of a dwell.
+const SHORTEST_S: f64 = 0.5;
+/// Longest dwell with a moving input, s, that is taken as one mean.
+const LONGEST_MOVE_S: f64 = 60.0;
+
+/// Mean of a stretch within one dwell.
+#[derive(Debug, Clone, Copy)]
+pub struct Row {
+    /// Middle of the stretch, s.
+    pub middle_s: f64,
+    /// Number of samples.
+    pub samples: f64,
+    /// Raw reading.
+    pub raw: Vector3<f64>,
+    /// Known input, SI; not a number where it is unknown.
+    pub input: Vector3<f64>,
+    /// Number of the dwell.
+    pub step: i32,
+}
+
+/// A recording made ready for curves over temperature.
+#[derive(Debug, Clone)]
+pub struct Session {
+    /// Path of the samples, for messages.
+    pub place: String,
+    /// Unit that was recorded.
+    pub device: String,
+    /// Its own number, where it is known.
+    pub unit_id: Option<String>,
+    /// Unit of the readings.
+    pub raw_unit: RawUnit,
+    /// What is known of the input.
+    pub reference: Reference,
+    /// Local gravity, m/s².
+    pub gravity_mps2: f64,
+    /// SHA-256 of the samples file.
+    pub sha256: String,
+    /// Samples a second.
+    pub rate_hz: f64,
+    /// The thermometer.
+    pub thermometer: Thermometer,
+    /// Rows of gyro and accelerometer.
+    pub rows: [Vec<Row>; 2],
+    /// What a person should know.
+    pub warnings: Vec<String>,
+}
+
+impl Session {
+    /// Of `prepared`.
+    ///
+    /// # Errors
+    /// Those of the thermometer; means without samples.
+    pub fn of(prepared: &Prepared) -> Result<Self> {
+        let manifest = &prepared.manifest;
+        if manifest.means {
+            let problem = "these are means of poses, without times and without a thermometer";
+            let remedy = "give the recording of samples that they were made of";
+            return Err(Error::new(&prepared.place, problem, remedy));
+        }
+        let condensed = &prepared.condensed;
+        let thermometer = Thermometer::of(condensed, manifest.power_on_s, &prepared.place)?;
+        let mut warnings = condensed.warnings.clone();
+        warnings.extend(prepared.dwells.warnings.iter().cloned());
+        Ok(Self {
+            place: prepared.place.clone(),
+            device: manifest.device.clone(),
+            unit_id: manifest.unit_id().map(str::to_owned),
+            raw_unit: manifest.raw_unit,
+            reference: manifest.reference,
+            gravity_mps2: manifest.gravity_mps2,
+            sha256: condensed.sha256.clone(),
+            rate_hz: 1.0 / condensed.period_s,
+            thermometer,
+            rows: Sensor::BOTH.map(|sensor| rows(prepared, sensor)),
+            warnings,
+        })
+    }
+}
+
+/// Rows of all dwells that `sensor` can use.
+fn rows(prepared: &Prepared, sensor: Sensor) -> Vec<Row> {
+    if !prepared.has(sensor) {
+        return Vec::new();
+    }
+    let usable = prepared.dwells.list.iter();
+    let usable: Vec<&Dwell> = usable.filter(|d| d.fault(sensor).is_none()).collect();
+    // What an input does within a dwell is read late or early by some milliseconds. Over a whole turn of the gyro that cancels; of a
+    // force that turns it does not.
+    let stands = usable.iter().any(|d| !d.moves(sensor) && !d.turn);
+    let mut rows = Vec::new();
+    for dwell in usable {
+        let whole = dwell.moves(sensor) || dwell.turn;
+        if whole && (sensor == Sensor::Accel && stands || dwell.duration_s > LONGEST_MOVE_S) {
+            continue;
+        }
+        let length_s = if whole { f64::INFINITY } else { ROW_S };
+        rows.extend(of_dwell(prepared, sensor, dwell, length_s));
+    }
+    rows
+}
+
+fn of_dwell(prepared: &Prepared, sensor: Sensor, dwell: &Dwell, length_s: f64) -> Vec<Row> {
+    let condensed = &prepared.condensed;
+    let known = prepared.manifest.reference == Reference::Table;
+    let mut rows = Vec::new();
+    let mut open = Open::default();
+    let count = (dwell.duration_s / length_s).round().max(1.0);
+    let samples = dwell.rows as f64 / count;
+    for block in &condensed.blocks[dwell.blocks.clone()] {
+        if open.rows > 0.0 && (open.rows + 0.5 * f64::from(block.rows) > samples || block.after_gap)
+        {
+            rows.extend(open.close(condensed, dwell.step));
+        }
+        let rails = &prepared.dwells.rails;
+        let clipped = sensor
+            .channels()
+            .any(|c| block.raw[c].n < block.rows || rails[c].touched_by(&block.raw[c]));
+        if !clipped {
+            open.add(block, sensor, known);
+        }
+    }
+    rows.extend(open.close(condensed, dwell.step));
+    rows
+}
+
+/// Sums of a row that is not closed yet.
+#[derive(Default)]
+struct Open {
+    rows: f64,
+    time: f64,
+    raw: Vector3<f64>,
+    input: Vector3<f64>,
+}
+
+impl Open {
+    fn add(&mut self, block: &Block, sensor: Sensor, known: bool) {
+        let n = f64::from(block.rows);
+        let from = sensor.channels().start;
+        self.rows += n;
+        self.time += n * 0.5 * (block.start_s + block.last_s);
+        self.raw += n * Vector3::from_fn(|k, _| block.raw[from + k].mean);
+        self.input += n * Vector3::from_fn(|k, _| match (known, sensor) {
+            (false, _) => f64::NAN,
+            (true, Sensor::Gyro) => block.reference[from + k].mean.to_radians(),
+            (true, Sensor::Accel) => block.reference[from + k].mean,
+        });
+    }
+
+    /// The row, unless it is too short or its input is to be known and is not.
+    fn close(&mut self, condensed: &Condensed, step: i32) -> Option<Row> {
+        let open = std::mem::take(self);
+        let known = condensed.has_reference.iter().any(|r| *r);
+        let row = Row {
+            middle_s: open.time / open.rows,
+            samples: open.rows,
+            raw: open.raw / open.rows,
+            input: open.input / open.rows,
+            step,
+        };
+        let long = open.rows * condensed.period_s >= SHORTEST_S;
+        let partly = row.input.iter().any(|x| x.is_finite()) && known;
+        let whole = row.input.iter().all(|x| x.is_finite());
+        (long && (whole || !partly)).then_some(row)
+    }
+}

@@ -1,0 +1,136 @@
+//! What is estimated is the truth, as nearly as it says.
+
+use mimu_thermal::joint::{Choice, Joint, estimate};
+
+use crate::session;
+use crate::simulation::{Experiment, GAIN, bounds, truth};
+
+const TEMPS: [f64; 8] = [-4.0, 6.0, 16.0, 26.0, 36.0, 46.0, 56.0, 66.0];
+
+/// Error and standard deviation of the twelve numbers of `sensor` at `temp_c`, over the gain.
+fn errors(joint: &Joint, sensor: usize, temp_c: f64) -> [(f64, f64); 12] {
+    let curves = joint.curves[sensor].as_ref().unwrap();
+    let (matrix, bias) = truth(sensor, temp_c);
+    let [found, _] = curves.forward(temp_c);
+    let error =
+        mimu::triad::vector(&found.matrix, &found.bias) - mimu::triad::vector(&matrix, &bias);
+    let covariance = curves.covariance(temp_c);
+    std::array::from_fn(|k| {
+        (
+            error[k] / GAIN[sensor],
+            covariance[(k, k)].sqrt() / GAIN[sensor],
+        )
+    })
+}
+
+#[test]
+fn curves_and_lag_of_a_whole_cycle_are_those_of_the_unit_as_nearly_as_they_say() {
+    for (lag_s, seed) in [(60.0, 1), (-30.0, 2), (0.0, 3)] {
+        let experiment = Experiment::ramp(lag_s, true);
+        let joint = estimate(&[session(experiment.record(seed)).unwrap()], Choice::JOINT).unwrap();
+        let lag = joint.lag().expect("a cycle determines the lag");
+        let sigma = (lag.upper - lag.lower) / 3.92;
+        assert!(
+            (lag.value - lag_s).abs() < 4.0 * sigma && sigma < 4.0,
+            "{lag:?}"
+        );
+        let bounds = bounds(&experiment, true, &TEMPS);
+        for sensor in 0..2 {
+            let (mut squared, mut bound, mut normal) = (0.0, 0.0, 0.0);
+            for (t, temp_c) in TEMPS.iter().enumerate() {
+                for (k, (error, sigma)) in errors(&joint, sensor, *temp_c).into_iter().enumerate() {
+                    assert!(
+                        error.abs() < 5.0 * sigma,
+                        "{sensor} {k} {temp_c}: {error} {sigma}"
+                    );
+                    squared += (error / bounds[sensor][t][k]).powi(2);
+                    bound += 1.0;
+                    normal += (error / sigma).powi(2);
+                }
+            }
+            // 96 numbers, some twenty of them independent: six sigmas of chi-square on either side.
+            let (ratio, scatter) = ((squared / bound).sqrt(), (normal / bound).sqrt());
+            assert!(
+                (0.5..1.6).contains(&ratio),
+                "{sensor}: {ratio} times the bound"
+            );
+            assert!((0.5..1.5).contains(&scatter), "{sensor}: {scatter} sigmas");
+        }
+    }
+}
+
+#[test]
+fn without_a_lag_the_biases_are_wrong_by_what_the_die_lags() {
+    let experiment = Experiment::ramp(60.0, false);
+    let sessions = [session(experiment.record(4)).unwrap()];
+    let without = Choice {
+        lag_s: Some(0.0),
+        ..Choice::JOINT
+    };
+    let worst = |choice| {
+        let joint = estimate(&sessions, choice).unwrap();
+        let each = TEMPS.iter().map(|t| errors(&joint, 1, *t)[9].0.abs());
+        each.fold(0.0, f64::max)
+    };
+    assert!(worst(without) > 2.0 * worst(Choice::JOINT));
+}
+
+#[test]
+fn a_further_session_has_its_own_biases_and_the_same_curves() {
+    let first = Experiment::ramp(60.0, true);
+    let second = Experiment {
+        offset: [0.002, 0.03],
+        ..first.clone()
+    };
+    let sessions = [
+        session(first.record(5)).unwrap(),
+        session(second.record(6)).unwrap(),
+    ];
+    let joint = estimate(&sessions, Choice::JOINT).unwrap();
+    for (sensor, tolerance) in [(0, 1e-4), (1, 4e-4)] {
+        let curves = joint.curves[sensor].as_ref().unwrap();
+        let offset = curves.session_offset(1) / GAIN[sensor];
+        for axis in 0..3 {
+            let error = offset[axis] - second.offset[sensor];
+            assert!(error.abs() < tolerance, "{sensor} {axis}: {error}");
+        }
+        for (k, (error, sigma)) in errors(&joint, sensor, 31.0).into_iter().enumerate() {
+            assert!(error.abs() < 5.0 * sigma, "{sensor} {k}: {error} {sigma}");
+        }
+    }
+}
+
+#[test]
+fn biases_that_wander_widen_the_intervals_of_the_biases() {
+    let still = Experiment::ramp(60.0, true);
+    let walk = Experiment {
+        walk: 0.05,
+        ..still.clone()
+    };
+    let [still, walk] =
+        [still, walk].map(|e| estimate(&[session(e.record(7)).unwrap()], Choice::JOINT).unwrap());
+    for sensor in 0..2 {
+        let wander = walk.noise[sensor].unwrap();
+        assert!(
+            wander.iter().filter(|n| n.wander > 0.0).count() >= 2,
+            "{wander:?}"
+        );
+        let [narrow, wide] = [&still, &walk].map(|j| errors(j, sensor, 31.0)[10].1);
+        assert!(wide > 1.5 * narrow, "{sensor}: {wide} {narrow}");
+    }
+}
+
+#[test]
+fn a_derivative_is_that_of_the_curve() {
+    let joint = estimate(
+        &[session(Experiment::ramp(60.0, true).record(8)).unwrap()],
+        Choice::JOINT,
+    )
+    .unwrap();
+    let curves = joint.curves[0].as_ref().unwrap();
+    let [[below, _], [_, slope], [above, _]] = [19.99, 20.0, 20.01].map(|t| curves.forward(t));
+    let numeric = (above.matrix - below.matrix) / 0.02;
+    assert!((numeric - slope.matrix).norm() < 1e-6 * slope.matrix.norm().max(1e-9) + 1e-10);
+    let numeric = (above.bias - below.bias) / 0.02;
+    assert!((numeric - slope.bias).norm() < 1e-4 * slope.bias.norm());
+}

@@ -1,0 +1,17 @@
+//! Curves over temperature from recordings of a unit whose curves are known, and recordings that are refused.
+
+mod estimates;
+mod refused;
+#[path = "../../../../tests/thermal/simulation.rs"]
+#[allow(dead_code)]
+mod simulation;
+
+use mimu::prepared::Prepared;
+use mimu::stillness::STILL_FACTOR;
+use mimu::{Manifest, Samples};
+use mimu_thermal::session::Session;
+
+/// A session as a user's recording becomes one.
+fn session((manifest, samples): (Manifest, Samples)) -> Result<Session, mimu::Error> {
+    Session::of(&Prepared::of(manifest, &samples, STILL_FACTOR)?)
+}

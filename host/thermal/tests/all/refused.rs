@@ -1,0 +1,99 @@
+//! Recordings that say nothing of temperature, or the wrong thing: each is refused with what is wrong and what to do.
+
+use mimu::{Manifest, Samples};
+use mimu_thermal::joint::{Choice, estimate};
+
+use crate::session;
+use crate::simulation::Experiment;
+
+/// What the recording is refused with once `change` was made to it.
+fn refusal(change: impl FnOnce(&mut Manifest, &mut Samples)) -> String {
+    let (mut manifest, mut samples) = Experiment::ramp(60.0, false).record(1);
+    change(&mut manifest, &mut samples);
+    let result = session((manifest, samples)).and_then(|s| estimate(&[s], Choice::JOINT));
+    result.map(|_| ()).unwrap_err().to_string()
+}
+
+#[test]
+fn a_thermometer_that_sticks_is_named_with_its_time() {
+    let said = refusal(|_, samples| {
+        let stuck = samples.temp_c[8000];
+        samples.temp_c[8000..11_000].fill(stuck);
+    });
+    assert!(
+        said.contains("sticks: from 800") && said.contains("temp_c"),
+        "{said}"
+    );
+}
+
+#[test]
+fn a_thermometer_that_jumps_is_named_with_its_time() {
+    let said = refusal(|_, samples| samples.temp_c[9000..].iter_mut().for_each(|t| *t += 4.0));
+    assert!(
+        said.contains("jumps by 4.") && said.contains("K at 900 s"),
+        "{said}"
+    );
+}
+
+#[test]
+fn a_temperature_that_is_missing_in_part_is_named_from_and_to() {
+    let said = refusal(|_, samples| samples.temp_c[5000..6000].fill(f64::NAN));
+    assert!(
+        said.contains("no temperature from 49") && said.contains("to 600"),
+        "{said}"
+    );
+    let said = refusal(|_, samples| samples.temp_c.clear());
+    assert!(said.contains("there is no temperature"), "{said}");
+}
+
+#[test]
+fn a_span_that_shows_no_slope_is_refused_with_what_is_needed() {
+    let said = refusal(|_, samples| {
+        samples
+            .temp_c
+            .iter_mut()
+            .for_each(|t| *t = 25.0 + 0.1 * (*t - 25.0));
+    });
+    assert!(
+        said.contains("a slope needs 10 K, curvature 20 K"),
+        "{said}"
+    );
+}
+
+#[test]
+fn two_units_have_two_sets_of_curves() {
+    let [first, mut second] = [1, 2].map(|seed| Experiment::ramp(60.0, false).record(seed));
+    second.0.device = "another".into();
+    let sessions = [session(first).unwrap(), session(second).unwrap()];
+    let said = estimate(&sessions, Choice::JOINT).unwrap_err().to_string();
+    assert!(
+        said.contains("\"another\"") && said.contains("\"mti-g\""),
+        "{said}"
+    );
+}
+
+#[test]
+fn inputs_that_leave_a_scale_factor_open_are_named() {
+    let said = refusal(|_, samples| samples.reference[2].fill(0.0));
+    assert!(said.contains("gyro") && said.contains("along z"), "{said}");
+}
+
+#[test]
+fn a_ramp_too_fast_for_the_lag_is_refused_with_the_rate_that_is_not() {
+    let experiment = Experiment {
+        corners: vec![
+            (0.0, -10.0),
+            (480.0, 70.0),
+            (1500.0, 70.0),
+            (1980.0, -10.0),
+            (3000.0, -10.0),
+        ],
+        ..Experiment::ramp(180.0, true)
+    };
+    let fast = session(experiment.record(3)).unwrap();
+    let said = estimate(&[fast], Choice::JOINT).unwrap_err().to_string();
+    assert!(
+        said.contains("too fast") && said.contains("at most"),
+        "{said}"
+    );
+}

@@ -1,0 +1,400 @@
+//! What the sensors do over temperature, against curves and branches written out here.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use mimu_rig::located::Source;
+use mimu_rig::motion::Motion;
+use mimu_rig::plan::Plan;
+use mimu_rig::record;
+use mimu_rig::rig_file::{RigFile, RigTruth};
+use mimu_rig::rotation::Rotation;
+use mimu_rig::unit::Unit;
+
+/// Degrees per hour and thousandths of standard gravity, in SI.
+const DEG_PER_H: f64 = std::f64::consts::PI / 180.0 / 3600.0;
+const MG: f64 = 9.80665e-3;
+
+/// A unit without noise, filters, rails or heat of its own, whose dies are at the chamber's temperature: 1 raw per SI.
+const PLAIN: &str = "format = \"mimu-rig/1\"
+[unit]
+supply_error_ppm = 0
+temperature_offset_c = 0
+temperature_noise_c = 0
+[unit.gyro_affine]
+matrix = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
+bias = [0, 0, 0]
+[unit.accel_affine]
+matrix = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
+bias = [0, 0, 0]
+[unit.gyro_axes]
+white_si = [0, 0, 0]
+instability_si = [0, 0, 0]
+walk_si = [0, 0, 0]
+bandwidth_hz = [inf, inf, inf]
+low_raw = -1e9
+high_raw = 1e9
+[unit.accel_axes]
+white_si = [0, 0, 0]
+instability_si = [0, 0, 0]
+walk_si = [0, 0, 0]
+bandwidth_hz = [inf, inf, inf]
+rc_hz = inf
+low_raw = -1e9
+high_raw = 1e9
+[thermal]
+board_lag_s = 0.01
+die_lag_s = [0.01, 0.01, 0.01, 0.01]
+board_heating_c = 0
+die_heating_c = [0, 0, 0, 0]
+";
+
+fn truth(curves: &str, seed: u64) -> RigTruth {
+    let source = Source::new("RIG.toml", format!("{PLAIN}{curves}"));
+    RigTruth::resolve(&RigFile::parse(&source).unwrap(), seed).unwrap()
+}
+
+/// Steps of a second: the lags of a hundredth are over.
+fn unit(curves: &str) -> Unit {
+    Unit::new(&truth(curves, 1).unit, 1, 1.0)
+}
+
+fn motion(rate: [f64; 3], force: [f64; 3]) -> Motion {
+    Motion {
+        t_s: 0.0,
+        attitude: Rotation::NONE,
+        rate,
+        angular_acceleration: [0.0; 3],
+        force,
+    }
+}
+
+/// Readings after the chamber has been at a temperature for three seconds.
+fn at(unit: &mut Unit, motion: &Motion, chamber_c: f64) -> ([f64; 3], [f64; 3]) {
+    let mut last = ([0.0; 3], [0.0; 3]);
+    for _ in 0..3 {
+        let pins = unit.step(motion, chamber_c);
+        last = (pins.gyro_v, pins.accel_v);
+    }
+    last
+}
+
+fn near(found: f64, expected: f64, within: f64) {
+    assert!(
+        (found - expected).abs() <= within,
+        "{found:e}, expected {expected:e}"
+    );
+}
+
+#[test]
+fn each_axis_errs_by_its_cubics_of_bias_scale_and_misalignment() {
+    let mut unit = unit(
+        "[curves]
+reference_c = 10
+[curves.gyro]
+bias_deg_per_h = [[1, 2, 3, 4], [0, 0, 0, 0], [-5, 0.1, 0, 0]]
+scale_ppm = [[100, 0, 0, 0], [0, 10, 0, 0], [0, 0, 1, 0.5]]
+misalignment_ppm = [[1000, 0, 0, 0], [0, 20, 0, 0], [300, 0, 0, 0], [0, 0, 0, 0.1], [0, 0, 0, 0], [7, 7, 7, 0]]
+[curves.accel]
+bias_mg = [[2, 0, 0, 0], [0, -0.5, 0, 0], [0, 0, 0, 0.001]]
+scale_ppm = [[0, 30, 0, 0], [0, 0, 0, 0], [0, 0, 0, 0]]
+misalignment_ppm = [[0, 0, 0, 0], [50, 0, 0, 0], [0, 0, 0, 0], [0, 0, 0, 0], [0, 40, 0, 0], [0, 0, 0, 0]]",
+    );
+    let (w, f) = ([0.3, -0.7, 1.1], [2.0, -5.0, 8.0]);
+    for chamber_c in [-40.0, 10.0, 25.0, 70.0] {
+        let (gyro, accel) = at(&mut unit, &motion(w, f), chamber_c);
+        let t = chamber_c - 10.0;
+        let ppm = 1e-6;
+        let expected = [
+            w[0] + DEG_PER_H * (1.0 + 2.0 * t + 3.0 * t * t + 4.0 * t * t * t)
+                + ppm * (100.0 * w[0] + 1000.0 * w[1] + 20.0 * t * w[2]),
+            w[1] + ppm * (10.0 * t * w[1] + 300.0 * w[0] + 0.1 * t * t * t * w[2]),
+            w[2] + DEG_PER_H * (0.1 * t - 5.0)
+                + ppm * ((t * t + 0.5 * t * t * t) * w[2] + (7.0 + 7.0 * t + 7.0 * t * t) * w[1]),
+        ];
+        for i in 0..3 {
+            near(gyro[i], expected[i], 1e-12);
+        }
+        let expected = [
+            f[0] + 2.0 * MG + ppm * (30.0 * t * f[0] + 50.0 * f[2]),
+            f[1] - 0.5 * t * MG,
+            f[2] + 1e-3 * t * t * t * MG + ppm * 40.0 * t * f[0],
+        ];
+        for i in 0..3 {
+            near(accel[i], expected[i], 1e-12);
+        }
+    }
+}
+
+#[test]
+fn curves_count_from_25_c_when_nothing_else_is_given() {
+    let mut unit =
+        unit("[curves.gyro]\nbias_deg_per_h = [[0, 1, 0, 0], [0, 0, 0, 0], [0, 0, 0, 0]]");
+    let rest = motion([0.0; 3], [0.0; 3]);
+    near(at(&mut unit, &rest, 25.0).0[0], 0.0, 1e-15);
+    // Two lags of nearly equal length lose a few nanokelvin to rounding.
+    near(at(&mut unit, &rest, 26.0).0[0], DEG_PER_H, 1e-7 * DEG_PER_H);
+}
+
+#[test]
+fn hysteresis_goes_by_the_path_of_the_temperature_and_not_by_its_rate() {
+    let curves = "[curves.gyro]\nhysteresis_deg_per_h = [30, -60, 0]\nhysteresis_width_c = 8";
+    let rest = motion([0.0; 3], [0.0; 3]);
+    // Up by 20 K, down by 4 (half the width: between the branches), down by 16 more, up by 2, and down by 2 again: a small
+    // loop within the play leaves nothing behind.
+    let path = [0.0, 20.0, 16.0, 0.0, 2.0, 0.0];
+    let branch = [0.0, 1.0, 0.0, -1.0, -0.5, -1.0];
+    for steps in [1, 7, 400] {
+        let mut unit = unit(curves);
+        let mut from = path[0];
+        for (to, expected) in path.into_iter().zip(branch) {
+            for k in 1..=steps {
+                let c = from + (to - from) * f64::from(k) / f64::from(steps);
+                unit.step(&rest, c);
+            }
+            from = to;
+            let gyro = at(&mut unit, &rest, to).0;
+            near(gyro[0], 30.0 * DEG_PER_H * expected, 1e-12);
+            near(gyro[1], -60.0 * DEG_PER_H * expected, 1e-12);
+            near(gyro[2], 0.0, 1e-15);
+        }
+    }
+}
+
+#[test]
+fn a_bias_scatters_from_power_on_to_power_on_by_its_standard_deviation() {
+    let curves = "[curves.gyro]\npower_on_sigma_deg_per_h = [10, 0, 40]\n[curves.accel]\npower_on_sigma_mg = [1, 2, 3]";
+    let n = 2000;
+    let mut squares = [0.0; 4];
+    for seed in 0..n {
+        let unit = truth(curves, seed).unit.curves;
+        let (g, a) = (unit.gyro.power_on, unit.accel.power_on);
+        assert_eq!(g[1], 0.0);
+        let relative = [
+            g[0] / (10.0 * DEG_PER_H),
+            g[2] / (40.0 * DEG_PER_H),
+            a[0] / MG,
+            a[2] / (3.0 * MG),
+        ];
+        for (s, r) in squares.iter_mut().zip(relative) {
+            *s += r * r;
+        }
+    }
+    // Chi-square with 2000 degrees of freedom: 3.2 % one sigma of the variance.
+    for s in squares {
+        near(s / n as f64, 1.0, 4.0 * 0.032);
+    }
+    // The truth of one power-on makes it again, and without the biases another seed is another power-on.
+    let first = truth(curves, 5);
+    let again = RigFile::parse(&Source::new("truth.toml", first.file.to_toml())).unwrap();
+    assert_eq!(RigTruth::resolve(&again, 6).unwrap(), first);
+    let mut anew = again;
+    anew.curves.gyro.power_on_deg_per_h = None;
+    let anew = RigTruth::resolve(&anew, 6).unwrap().unit;
+    assert_ne!(anew.curves.gyro.power_on, first.unit.curves.gyro.power_on);
+    assert_eq!(anew.curves.accel, first.unit.curves.accel);
+}
+
+#[test]
+fn the_noise_of_a_reading_follows_the_temperature_of_the_die() {
+    let mut unit = unit(
+        "[curves.gyro]\nnoise_at_c_raw = [[0, 0.1, 0, 1], [10, 0.3, 0, 1], [20, 0.3, 0, 2]]\n\
+         [curves.accel]\nnoise_at_c_raw = [[0, 1, 1, 1]]",
+    );
+    let rest = motion([0.0; 3], [0.0; 3]);
+    let n = 4000;
+    for (chamber_c, expected) in [
+        (-20.0, [0.1, 0.0, 1.0]),
+        (5.0, [0.2, 0.0, 1.0]),
+        (15.0, [0.3, 0.0, 1.5]),
+        (60.0, [0.3, 0.0, 2.0]),
+    ] {
+        at(&mut unit, &rest, chamber_c);
+        let (mut gyro, mut accel) = ([0.0; 3], 0.0);
+        for _ in 0..n {
+            let pins = unit.step(&rest, chamber_c);
+            for (s, x) in gyro.iter_mut().zip(pins.gyro_v) {
+                *s += x * x / f64::from(n);
+            }
+            accel += pins.accel_v[1].powi(2) / f64::from(n);
+        }
+        // 1.1 % one sigma of a standard deviation from 4000 readings.
+        for i in 0..3 {
+            near(gyro[i].sqrt(), expected[i], 4.0 * 0.0112 * expected[i]);
+        }
+        near(accel.sqrt(), 1.0, 4.0 * 0.0112);
+    }
+}
+
+/// Reported temperature and bias of the x gyro (deg/h, 1 deg/h/K from 25 °C) late on a ramp of 2 K/min; and the lags
+/// that the truth gives.
+fn late_on_a_ramp(thermal: &str) -> (f64, f64, [f64; 4]) {
+    let curves = "[curves.gyro]\nbias_deg_per_h = [[0, 1, 0, 0], [0, 0, 0, 0], [0, 0, 0, 0]]";
+    let text = format!(
+        "{}\n{curves}\n",
+        PLAIN
+            .replace(
+                "board_lag_s = 0.01\ndie_lag_s = [0.01, 0.01, 0.01, 0.01]\n",
+                ""
+            )
+            .replace("[unit]\n", &format!("{thermal}\n[unit]\n"))
+            .replace("format = \"mimu-rig/1\"\n", "")
+    );
+    let (keys, rest) = text.split_once("[unit]\n").unwrap();
+    let [unit_keys, thermal_keys] = keys.split_once('|').map(|(a, b)| [a, b]).unwrap();
+    let rest = rest.replace("[thermal]\n", &format!("[thermal]\n{thermal_keys}\n"));
+    let text = format!("format = \"mimu-rig/1\"\n[unit]\n{unit_keys}\n{rest}");
+    let file = RigFile::parse(&Source::new("RIG.toml", text)).unwrap();
+    let truth = RigTruth::resolve(&file, 1).unwrap();
+    let mut unit = Unit::new(&truth.unit, 1, 1.0);
+    let still = motion([0.0; 3], [0.0; 3]);
+    let mut last = (0.0, 0.0);
+    for s in 0..20_000 {
+        let pins = unit.step(&still, f64::from(s) / 30.0);
+        last = (pins.temp_c, pins.gyro_v[0] / DEG_PER_H);
+    }
+    (last.0, last.1, truth.unit.die_lag_behind_reported_s())
+}
+
+#[test]
+fn a_die_may_be_behind_the_thermometer_or_ahead_of_it_by_a_lag_that_the_truth_gives() {
+    for (thermal, lag_s) in [
+        // A thermometer on the board: the die is behind it by its own lag.
+        (
+            "temperature = \"board\" | board_lag_s = 300\ndie_lag_s = [150, 5, 5, 5]",
+            150.0,
+        ),
+        // One with a package of its own on the same board: the die leads.
+        (
+            "temperature = \"board\"\ntemperature_lag_s = 200 | board_lag_s = 300\ndie_lag_s = [20, 5, 5, 5]",
+            -180.0,
+        ),
+        (
+            "temperature = \"gyro_x\" | board_lag_s = 300\ndie_lag_s = [150, 5, 5, 5]",
+            0.0,
+        ),
+        (
+            "temperature = \"gyro_y\" | board_lag_s = 300\ndie_lag_s = [150, 40, 5, 5]",
+            110.0,
+        ),
+        (
+            "temperature = \"gyro_z\" | board_lag_s = 300\ndie_lag_s = [10, 5, 70, 5]",
+            -60.0,
+        ),
+        (
+            "temperature = \"accel\" | board_lag_s = 300\ndie_lag_s = [10, 5, 5, 30]",
+            -20.0,
+        ),
+        (
+            "temperature = \"dies\" | board_lag_s = 300\ndie_lag_s = [90, 30, 60, 30]",
+            30.0,
+        ),
+    ] {
+        let (temp_c, bias, given) = late_on_a_ramp(thermal);
+        near(given[0], lag_s, 1e-9);
+        // The bias shows the temperature of the die.
+        near(temp_c - (25.0 + bias), lag_s / 30.0, 1e-5);
+    }
+}
+
+#[test]
+fn a_thermometer_that_sticks_or_jumps_leaves_everything_else_as_it_was() {
+    let plan = "format = \"mimu-plan/1\"\nsample_rate_hz = 10\ncarrier = \"table\"\nchamber_c = [[0, 0], [100, 50]]\n\
+                [[step]]\nup = [0, 0, 1]\ndwell_s = 100\n";
+    let plan = Plan::parse(Source::new("PLAN.toml", plan)).unwrap();
+    let run = |flaws: &str| {
+        let rows = record::samples(&plan, &truth(flaws, 3), 3).unwrap();
+        rows.collect::<Vec<_>>()
+    };
+    let good = run("");
+    let bad = run(
+        "[flaws]\nthermometer_sticks_s = [20, 30]\nthermometer_jumps_s = 60\nthermometer_jump_c = -3",
+    );
+    assert_eq!(good.len(), bad.len());
+    for (good, bad) in good.iter().zip(&bad) {
+        let t = good.stamp_s;
+        // The chamber rises by half a kelvin a second, and the plain unit follows within hundredths.
+        let expected = match t {
+            t if (20.0..30.0).contains(&t) => 0.5 * 20.0,
+            t if t >= 60.0 => 0.5 * t - 3.0,
+            t => 0.5 * t,
+        };
+        near(bad.readings.temp_c, expected, 0.02);
+        assert_eq!(bad.readings.gyro, good.readings.gyro);
+        assert_eq!(bad.readings.accel, good.readings.accel);
+    }
+}
+
+#[test]
+fn what_is_wrong_with_curves_and_thermometer_is_named_with_its_line() {
+    for (text, complaint) in [
+        (
+            "[curves.gyro]\nbias_mg = [[0, 0, 0, 0]]",
+            "unknown key `bias_mg`",
+        ),
+        (
+            "[curves.gyro]\nhysteresis_width_c = 0",
+            "3: `hysteresis_width_c` is 0; give 0.01 to 300",
+        ),
+        (
+            "[curves.accel]\npower_on_sigma_mg = [1, -1, 1]",
+            "3: `power_on_sigma_mg` is -1; give 0 to 1000000",
+        ),
+        (
+            "[curves.accel]\nnoise_at_c_raw = [[10, 1, 1, 1], [0, 1, 1, 1]]",
+            "3: `noise_at_c_raw`: 0 °C comes after 10 °C; give [°C, x, y, z] in order of temperature",
+        ),
+        (
+            "[flaws]\nthermometer_sticks_s = [30, 20]",
+            "3: `thermometer_sticks_s` ends at 20 s, before it begins; give [from, to]",
+        ),
+        (
+            "[unit]\ntemperature_lag_s = -1",
+            "3: `temperature_lag_s` is -1; give 0 to 1000000",
+        ),
+    ] {
+        let source = Source::new("RIG.toml", format!("format = \"mimu-rig/1\"\n{text}"));
+        let found = RigFile::parse(&source).unwrap_err();
+        assert!(found.contains(complaint), "{found}");
+    }
+}
+
+fn example(folder: &str, name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join(folder)
+        .join(name)
+}
+
+#[test]
+fn the_head_of_a_truth_gives_the_lags_of_the_dies() {
+    let folder = tempfile::tempdir().unwrap();
+    let plan = "format = \"mimu-plan/1\"\nsample_rate_hz = 10\ncarrier = \"table\"\n[[step]]\nup = [0, 0, 1]\ndwell_s = 1\n";
+    let plan = Plan::parse(Source::new("PLAN.toml", plan)).unwrap();
+    let rig = RigFile::read(&example("rigs", "niu-mtig.toml")).unwrap();
+    let rig = RigTruth::resolve(&rig, 1).unwrap();
+    let output = record::Output::new(&folder.path().join("rec"), &plan).unwrap();
+    record::write(&plan, &rig, 1, &output).unwrap();
+    let text = fs::read_to_string(&output.truth).unwrap();
+    let line = "are behind temp_c by 60.000, 60.000, 60.000, 30.000 s.";
+    assert!(text.contains(line), "{text}");
+}
+
+#[test]
+fn every_example_plan_over_temperature_is_one_that_its_bench_can_carry_out() {
+    for (plan, rig, dwells) in [
+        ("niu-ramp.toml", "niu-mtig.toml", 83 * 16),
+        ("niu-ramp.toml", "niu-nv.toml", 83 * 16),
+        ("soak.toml", "thermal.toml", 9 * 12),
+        ("fang-soak.toml", "fang-soak.toml", 9 * 12),
+    ] {
+        let plan = Plan::read(&example("plans", plan)).unwrap();
+        let rig = RigFile::read(&example("rigs", rig)).unwrap();
+        let rig = RigTruth::resolve(&rig, 1).unwrap();
+        let run = record::samples(&plan, &rig, 1).unwrap();
+        assert_eq!(plan.dwells(), dwells);
+        // The last breakpoint of the chamber is where the recording ends, within a round.
+        let end_s = run.len() as f64 / plan.sample_rate_hz;
+        let last = plan.chamber[plan.chamber.len() - 1][0];
+        assert!((end_s - last).abs() < 152.0, "{end_s} {last}");
+    }
+}

@@ -1,0 +1,198 @@
+//! Many runs of one experiment, and what is left of them.
+
+use mimu::prepared::Prepared;
+use mimu::stillness::STILL_FACTOR;
+use mimu_thermal::joint::{Choice, Joint, estimate};
+use mimu_thermal::session::Session;
+use nalgebra::SVector;
+use rayon::prelude::*;
+
+use crate::simulation::{Experiment, GAIN, bounds, truth};
+
+/// Temperatures at which curves are judged, °C: every 5 K over the range of the die in all experiments.
+fn temps() -> Vec<f64> {
+    (0..=14).map(|k| -4.0 + 5.0 * f64::from(k)).collect()
+}
+
+/// One experiment.
+pub struct Study {
+    name: String,
+    experiment: Experiment,
+}
+
+/// Of one run: squared errors relative to the gain and whether the interval held the truth, by sensor, temperature and number.
+struct Outcome {
+    squared: [Vec<[f64; 12]>; 2],
+    inside: [Vec<[bool; 12]>; 2],
+    lag: f64,
+    lag_inside: bool,
+    lag_determined: bool,
+}
+
+/// Heading of the table.
+pub fn print_header(runs: u64) {
+    println!(
+        "worst axis, rms over {} to {} °C, {runs} runs",
+        temps()[0],
+        temps()[14]
+    );
+    println!(
+        "{:58}  bias, scale, cross: gyro deg/h ppm ppm; accel µg ppm ppm",
+        ""
+    );
+}
+
+impl Study {
+    /// With its name in the table.
+    pub fn new(name: &str, experiment: Experiment) -> Self {
+        Self {
+            name: name.into(),
+            experiment,
+        }
+    }
+
+    /// The joint estimate, with the Cramér-Rao bound.
+    pub fn run_joint(&self, runs: u64) {
+        let outcomes = self.run(runs, Choice::JOINT);
+        let errors = self.print("joint", &outcomes);
+        if self.experiment.walk == 0.0 {
+            let bound = bounds(&self.experiment, true, &temps());
+            let squares = [0, 1].map(|s| bound[s].iter().map(|b| b.map(|v| v * v)).collect());
+            let bound = worst(&squares);
+            print_row("  Cramér-Rao bound", &bound);
+            let ratio: Vec<String> = (0..6)
+                .map(|k| format!("{:.2}", errors[k] / bound[k]))
+                .collect();
+            println!("{:58}  {}", "  error over bound", ratio.join("  "));
+        }
+    }
+
+    /// The same with dies that are taken to be as warm as the thermometer.
+    pub fn run_without_lag(&self, runs: u64) {
+        let choice = Choice {
+            lag_s: Some(0.0),
+            ..Choice::JOINT
+        };
+        self.print("without a lag", &self.run(runs, choice));
+    }
+
+    fn run(&self, runs: u64, choice: Choice) -> Vec<Outcome> {
+        let each = (0..runs).into_par_iter();
+        each.map(|seed| self.once(seed, choice)).collect()
+    }
+
+    fn once(&self, seed: u64, choice: Choice) -> Outcome {
+        let (manifest, batch) = self.experiment.record(seed);
+        let prepared = Prepared::of(manifest, &batch, STILL_FACTOR).expect("it is prepared");
+        let session = Session::of(&prepared).expect("its thermometer works");
+        let joint = estimate(&[session], choice).expect("it is estimated");
+        self.judge(&joint)
+    }
+
+    fn judge(&self, joint: &Joint) -> Outcome {
+        let mut squared = [Vec::new(), Vec::new()];
+        let mut inside = [Vec::new(), Vec::new()];
+        for sensor in 0..2 {
+            let curves = joint.curves[sensor].as_ref().expect("both were recorded");
+            for t in temps() {
+                let (matrix, bias) = truth(sensor, t);
+                let [found, _] = curves.forward(t);
+                let truth: SVector<f64, 12> = mimu::triad::vector(&matrix, &bias);
+                let error = mimu::triad::vector(&found.matrix, &found.bias) - truth;
+                let covariance = curves.covariance(t);
+                let relative = |k: usize| (error[k] / GAIN[sensor]).powi(2);
+                squared[sensor].push(std::array::from_fn(relative));
+                let held = |k: usize| error[k].abs() <= 1.96 * covariance[(k, k)].sqrt();
+                inside[sensor].push(std::array::from_fn(held));
+            }
+        }
+        let (lag, true_lag) = (joint.profile.lag, self.experiment.lag_s);
+        Outcome {
+            squared,
+            inside,
+            lag: lag.value,
+            lag_inside: (lag.lower..=lag.upper).contains(&true_lag),
+            lag_determined: lag.is_determined(),
+        }
+    }
+
+    fn print(&self, estimator: &str, outcomes: &[Outcome]) -> [f64; 6] {
+        let n = outcomes.len() as f64;
+        let mean = [0, 1].map(|s| {
+            let at = |t: usize| {
+                std::array::from_fn(|k| {
+                    outcomes.iter().map(|o| o.squared[s][t][k]).sum::<f64>() / n
+                })
+            };
+            (0..temps().len()).map(at).collect::<Vec<[f64; 12]>>()
+        });
+        let errors = worst(&mean);
+        print_row(&format!("{}, {estimator}", self.name), &errors);
+        let share = |sensor: usize, numbers: &[usize]| {
+            let held = outcomes.iter().flat_map(|o| &o.inside[sensor]);
+            let each = held.flat_map(|t| numbers.iter().map(|k| t[*k]));
+            let (sum, all) = each.fold((0.0, 0.0), |(s, a), h| {
+                (s + f64::from(u8::from(h)), a + 1.0)
+            });
+            100.0 * sum / all
+        };
+        let shares: Vec<String> = kinds()
+            .iter()
+            .map(|(s, numbers)| format!("{:.1}", share(*s, numbers)))
+            .collect();
+        println!(
+            "{:58}  {} %",
+            "  intervals of 95 % that hold the truth",
+            shares.join("  ")
+        );
+        let lag = outcomes.iter().map(|o| o.lag).sum::<f64>() / n;
+        let sd = (outcomes.iter().map(|o| (o.lag - lag).powi(2)).sum::<f64>() / n).sqrt();
+        let count =
+            |f: fn(&Outcome) -> bool| 100.0 * outcomes.iter().filter(|o| f(o)).count() as f64 / n;
+        println!(
+            "{:58}  mean {lag:.2} s, scatter {sd:.2} s, interval holds it in {:.1} %, determined in {:.1} %",
+            "  lag",
+            count(|o| o.lag_inside),
+            count(|o| o.lag_determined)
+        );
+        errors
+    }
+}
+
+/// Bias, scale factors and cross terms of gyro and accelerometer among the twelve numbers.
+fn kinds() -> [(usize, Vec<usize>); 6] {
+    let of = |sensor| {
+        [
+            (sensor, vec![9, 10, 11]),
+            (sensor, vec![0, 4, 8]),
+            (sensor, vec![1, 2, 3, 5, 6, 7]),
+        ]
+    };
+    let [a, b, c] = of(0);
+    let [d, e, f] = of(1);
+    [a, b, c, d, e, f]
+}
+
+/// Root mean square over temperature of the worst number of each kind, in the units of the table.
+fn worst(squared: &[Vec<[f64; 12]>; 2]) -> [f64; 6] {
+    let units = [
+        180.0 / std::f64::consts::PI * 3600.0,
+        1e6,
+        1e6,
+        1e6 / 9.80665,
+        1e6,
+        1e6,
+    ];
+    let kinds = kinds();
+    std::array::from_fn(|k| {
+        let (sensor, numbers) = &kinds[k];
+        let all = &squared[*sensor];
+        let rms = |n: &usize| (all.iter().map(|t| t[*n]).sum::<f64>() / all.len() as f64).sqrt();
+        units[k] * numbers.iter().map(rms).fold(0.0, f64::max)
+    })
+}
+
+fn print_row(name: &str, figures: &[f64; 6]) {
+    let each: Vec<String> = figures.iter().map(|f| format!("{f:.1}")).collect();
+    println!("{name:58}  {}", each.join("  "));
+}
