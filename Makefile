@@ -12,7 +12,7 @@ ON_PC := --workspace --exclude mimu-counted --exclude mimu-no-panic
 # Of `make test`, and each also by itself: `make clippy`. Tests are linked before they run, so that both times are seen.
 STAGES := fmt clippy rustdoc images no-panic build-tests run-tests
 
-.PHONY: help test $(STAGES) nightly demo example papers blind bench budget device fuzz audit toolchain
+.PHONY: help test $(STAGES) nightly demo faults example papers blind bench budget device fuzz audit toolchain
 
 help: ## this list
 	@sed -n 's/^\([a-z]*\):.*## /  make \1\t/p' Makefile
@@ -73,6 +73,11 @@ demo: toolchain ## an uncalibrated board on the virtual bench, to a verified one
 	@$(CARGO) build --locked --release -q -p mimu-cli -p mimu-board-tests --bin mimu --bin demo
 	@rm -rf $(DEMO)
 	@target/release/demo $(SEED) $(DEMO)
+
+faults: toolchain ## what can go wrong in a session of the wizard, done to it on purpose
+	@$(FIRMWARE) -q
+	$(CARGO) build --locked --release -p mimu-cli -p mimu-board-tests
+	target/release/faults
 
 example: toolchain ## import and fit a recording: the best real one at hand, or the small one in tests/
 	$(CARGO) build --locked --release --bin mimu

@@ -38,6 +38,15 @@ const KNOWN: f64 = 20.0;
 struct Dwell {
     step: Step,
     from: u64,
+    /// Samples that are missing in it. It lasts so much longer: a fit counts what is there.
+    missing: u64,
+}
+
+impl Dwell {
+    /// Tick behind its last sample, at so many samples a second.
+    fn to(&self, rate_hz: f64) -> u64 {
+        self.from + (self.step.dwell_s * rate_hz).round() as u64 + self.missing
+    }
 }
 
 /// What a unit is looked at for.
@@ -239,6 +248,9 @@ impl One {
         self.next = Some(chunk.tick + chunk.values.len() as u64);
         self.power_on_s = chunk.power_on_s;
         self.standing.lost += missing;
+        if let Some(dwell) = &mut self.dwell {
+            dwell.missing += missing;
+        }
         if let Some(taking) = &mut self.taking {
             taking.missing(missing);
         }
@@ -328,17 +340,25 @@ impl One {
             (Ok(step), None) => {
                 let from = seen.tick.saturating_sub((BEFORE_S * rate_hz) as u64);
                 self.begin_banks(&step, asked);
-                self.dwell = Some(Dwell { step, from });
+                let had = self.pending.t_s.iter().rev();
+                let had = had
+                    .take_while(|t| (**t * rate_hz).round() >= from as f64)
+                    .count() as u64;
+                self.dwell = Some(Dwell {
+                    step,
+                    from,
+                    missing: (seen.tick - from).saturating_sub(had),
+                });
                 self.standing.waiting = None;
                 self.standing.left_s = Some(step.dwell_s);
             }
             (Ok(_), Some(dwell)) => {
-                let length = (dwell.step.dwell_s * rate_hz).round() as u64;
                 let guard = (GUARD_S * rate_hz) as u64;
-                let left = (dwell.from + length + guard).saturating_sub(seen.tick);
+                let to = dwell.to(rate_hz);
+                let left = (to + guard).saturating_sub(seen.tick);
                 self.standing.left_s = Some(left as f64 / rate_hz);
                 if left == 0 {
-                    self.accept(dwell, dwell.from + length, seen, asked, tell)?;
+                    self.accept(dwell, to, seen, asked, tell)?;
                 }
             }
         }

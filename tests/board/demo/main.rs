@@ -47,6 +47,10 @@ fn demo(seed: u64, folder: &Path) -> Result<(), String> {
     let mut file = unit(&[effect], seed);
     // It has run for long: nobody wants to watch it warm up.
     file.thermal.on_before_s = Some(f64::INFINITY);
+    // A quick table, of the kind that is sold for sensors of this size: what it saves on its way goes into longer dwells.
+    file.table.slew_dps = [240.0; 3];
+    file.table.max_acceleration_dps2 = [1000.0; 3];
+    file.table.settle_s = 0.3;
     let truth = RigTruth::resolve(&file, seed)?;
     println!(
         "A unit with unknown errors (seed {seed}) is on a turntable; the firmware's image runs on an emulated board."
@@ -148,7 +152,7 @@ fn wizard(port: &Path, driver: &Path, folder: &Path) -> Result<Value, String> {
             "--rate",
             "120",
             "--dwell",
-            "2",
+            "3",
             "--as-planned",
         ])
         .args(["--gravity", "9.793", "--warm-up", "0", "--yes"])
