@@ -57,26 +57,29 @@ pub struct Inverse {
     pub offset: Vector,
 }
 
-/// xu, table 1, averages of the gyros: raw in rad/s, to rad/s.
+/// Degree per second, rad/s.
+const DPS: f64 = std::f64::consts::PI / 180.0;
+
+/// xu, table 1, averages of the gyros: raw in rad/s, to rad/s. The offsets are printed in rad/s; in deg/s, as here, the table agrees with
+/// table 3.
 pub const XU_TABLE_1: Inverse = Inverse {
     matrix: [
         [0.99972, -0.01199, -0.00059],
         [0.02394, 1.00046, 0.01053],
         [0.01087, 0.01490, 1.00579],
     ],
-    offset: [-0.04317, -0.12395, -0.35153],
+    offset: [-0.04317 * DPS, -0.12395 * DPS, -0.35153 * DPS],
 };
 
-const MG: f64 = 1e-3 * 9.80665;
-
-/// xu, table 2, averages of the accelerometers: raw in m/s², to m/s². The offsets are printed in mg.
+/// xu, table 2, averages of the accelerometers: raw in m/s², to m/s². The offsets are printed in mg, which their scatter rules out; g and
+/// m/s² it does not tell apart, and here they are in m/s², the unit of the model.
 pub const XU_TABLE_2: Inverse = Inverse {
     matrix: [
         [0.96667, 0.01434, -0.00180],
         [-0.01760, 0.96965, -0.00851],
         [0.01476, -0.01494, 0.99326],
     ],
-    offset: [-0.16417 * MG, 0.10724 * MG, 0.26508 * MG],
+    offset: [-0.16417, 0.10724, 0.26508],
 };
 
 impl Ideal {

@@ -7,6 +7,7 @@
 mod dwells;
 mod fang;
 mod intervals;
+mod niu;
 mod page;
 mod plot;
 mod schemes;
@@ -34,6 +35,7 @@ fn run(check: bool) -> Result<(), Box<dyn std::error::Error>> {
     let mut blocks: Vec<page::Block> = fang::blocks()
         .into_iter()
         .chain(xu::blocks())
+        .chain(niu::blocks())
         .chain(dwells)
         .chain(schemes::blocks())
         .collect();

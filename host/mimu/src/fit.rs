@@ -138,7 +138,7 @@ pub fn fit(mut prepared: Prepared, options: Options) -> Result<Fit> {
     }
     let mut warnings = prepared.condensed.warnings.clone();
     warnings.extend(prepared.dwells.warnings.iter().cloned());
-    warn_of_temperature(&prepared, &mut warnings);
+    warnings.extend(without_temperature(&prepared, &Sensor::BOTH));
     let mut sensors = match prepared.manifest.reference {
         Reference::Table => fit_known(&prepared, options, &mut warnings)?,
         Reference::Gravity => fit_gravity(&prepared, options, &mut warnings)?,
@@ -157,7 +157,9 @@ pub fn fit(mut prepared: Prepared, options: Options) -> Result<Fit> {
 /// A bias of 0.1 deg/s per °C is ordinary for these sensors: five degrees are half a degree a second.
 const ISOTHERMAL_C: f64 = 5.0;
 
-fn warn_of_temperature(prepared: &Prepared, warnings: &mut Vec<String>) {
+/// That the models of `sensors` have no temperature in them, where the dwells differ in it by more than [`ISOTHERMAL_C`]. With both
+/// sensors it is said of the model as a whole.
+pub(crate) fn without_temperature(prepared: &Prepared, sensors: &[Sensor]) -> Option<String> {
     let temperatures = || {
         prepared
             .dwells
@@ -168,11 +170,17 @@ fn warn_of_temperature(prepared: &Prepared, warnings: &mut Vec<String>) {
     };
     let high = temperatures().fold(f64::NEG_INFINITY, f64::max);
     let low = temperatures().fold(f64::INFINITY, f64::min);
-    if high - low > ISOTHERMAL_C {
-        warnings.push(format!(
-            "the dwells range from {low:.1} to {high:.1} °C, and the model has no temperature in it"
-        ));
-    }
+    let whose = match sensors {
+        [] => return None,
+        [Sensor::Gyro] => "the gyro's model",
+        [Sensor::Accel] => "the accelerometer's model",
+        _ => "the model",
+    };
+    (high - low > ISOTHERMAL_C).then(|| {
+        format!(
+            "the dwells range from {low:.1} to {high:.1} °C, and {whose} has no temperature in it"
+        )
+    })
 }
 
 /// Fewer degrees of freedom than this show no error of the model.

@@ -4,15 +4,17 @@
 //! of the dwell is what two successive means differ by (fang (8), section 3). What wanders more slowly than a dwell lasts only a
 //! longer record at rest can tell: its noise file, and [`wander`].
 
+mod pool;
 pub mod wander;
 
 use nalgebra::{DMatrix, Vector3};
 
 use mimu_core::compensation::Affine;
 
+use self::pool::{Series, block_s, pooled, ramps, within};
 use self::wander::{Slow, Span};
 use crate::allan::variance::AllanModel;
-use crate::blocks::{Block, Condensed, Rails};
+use crate::blocks::{Condensed, Rails};
 use crate::course::Course;
 use crate::dwell::Dwell;
 use crate::noise_file::NoiseFile;
@@ -94,8 +96,8 @@ pub struct Noise {
 const ANOTHER_NOISE: f64 = 2.0;
 
 impl Noise {
-    /// Pools the overlapping Allan variance within all usable dwells at rest or at a constant rate, and fits the
-    /// model to it. Where no input stands, of what the readings do not follow of theirs; `rails` are those of the channels.
+    /// Pools the overlapping Allan variance within all usable dwells at rest or at a constant rate, the Hadamard variance where the
+    /// temperature ramps, and fits the model to it. Where no input stands, of what the readings do not follow of theirs; `rails` are those of the channels.
     pub fn within(dwells: &[Dwell], condensed: &Condensed, rails: &[Rails; 6]) -> Self {
         let mut channels: [ChannelNoise; 6] = Default::default();
         for sensor in Sensor::BOTH {
@@ -123,7 +125,10 @@ impl Noise {
                                 let blocks = course.blocks.iter();
                                 let means: Vec<f64> =
                                     blocks.map(|i| condensed.blocks[*i].raw[c].mean).collect();
-                                course.unfollowed(sensor, &means)
+                                Some(Series {
+                                    means: course.unfollowed(sensor, &means)?,
+                                    ramps: ramps(d, condensed),
+                                })
                             });
                             pooled(left, block_s(condensed).1)
                         }
@@ -314,204 +319,4 @@ impl Noise {
 /// Time that a dwell takes.
 fn span(dwell: &Dwell) -> Span {
     [dwell.start_s, dwell.start_s + dwell.duration_s]
-}
-
-/// Noise of `value` of the blocks within `dwells`.
-fn within<'a>(
-    dwells: impl Iterator<Item = &'a Dwell>,
-    condensed: &Condensed,
-    value: impl Fn(&Block) -> Option<f64>,
-) -> ChannelNoise {
-    let (rows, block_s) = block_s(condensed);
-    let series = dwells.map(|dwell| {
-        let blocks = condensed.blocks[dwell.blocks.clone()].iter();
-        let whole = blocks.filter(|b| b.rows == rows);
-        whole.filter_map(&value).collect()
-    });
-    pooled(series, block_s)
-}
-
-/// Samples of a full block, and its length, s.
-fn block_s(condensed: &Condensed) -> (u32, f64) {
-    let rows = condensed.blocks.iter().map(|b| b.rows).max().unwrap_or(1);
-    (rows, f64::from(rows) * condensed.period_s)
-}
-
-/// Noise of series of means over `block_s`, pooled.
-fn pooled(series: impl Iterator<Item = Vec<f64>>, block_s: f64) -> ChannelNoise {
-    // Sum of squared differences and their number, by octave of block length.
-    let mut octaves: Vec<(f64, f64, f64)> = Vec::new();
-    for means in series {
-        let mut sums = Vec::with_capacity(means.len() + 1);
-        sums.push(0.0);
-        for m in &means {
-            sums.push(sums[sums.len() - 1] + (m - means[0]));
-        }
-        for octave in 0.. {
-            let m = 1usize << octave;
-            if 2 * m > means.len() {
-                break;
-            }
-            if octaves.len() <= octave {
-                octaves.push((0.0, 0.0, 0.0));
-            }
-            let terms = means.len() + 1 - 2 * m;
-            let sum: f64 = (0..terms)
-                .map(|j| (sums[j + 2 * m] - 2.0 * sums[j + m] + sums[j]) / m as f64)
-                .map(|d| d * d)
-                .sum();
-            octaves[octave].0 += 0.5 * sum;
-            octaves[octave].1 += terms as f64;
-            // Differences that share no sample, as the weight of the point.
-            octaves[octave].2 += (means.len() / (2 * m)) as f64;
-        }
-    }
-    let points: Vec<(f64, f64, f64)> = octaves
-        .iter()
-        .enumerate()
-        .filter(|(_, o)| o.1 > 0.0)
-        .map(|(k, o)| (block_s * f64::from(1u32 << k), o.0 / o.1, o.2))
-        .collect();
-    let model = fit(&points);
-    // A variance of n independent differences is known to √(2/n) of itself.
-    let fits = |&(tau, variance, n): &(f64, f64, f64)| {
-        (variance / model.variance(tau)).ln().abs() <= MISFIT_SIGMAS * (2.0 / n).sqrt()
-    };
-    let known: Vec<(f64, f64)> = points
-        .iter()
-        .filter(|p| p.2 >= CURVE_DIFFERENCES && p.1 > 0.0)
-        .map(|p| (p.0, p.1))
-        .collect();
-    let misfit = points.iter().any(|p| p.2 >= CURVE_DIFFERENCES && !fits(p));
-    ChannelNoise {
-        model,
-        curve: (misfit && known.len() >= 2).then_some(known),
-    }
-}
-
-/// A point of the Allan curve this many of its sigmas from the model refuses the model.
-const MISFIT_SIGMAS: f64 = 4.0;
-/// Points with fewer independent differences than this decide nothing: their variance is known to a half only.
-const CURVE_DIFFERENCES: f64 = 8.0;
-
-/// A smaller variance is none: the square of its weight would overflow.
-const SMALLEST: f64 = 1e-100;
-
-/// What a further term must lower the deviance by: significant at 0.5 %.
-const TERM_DEVIANCE: f64 = 8.0;
-
-/// Fits the three terms to `(tau, variance, number of independent differences)`, none of them negative.
-///
-/// A variance of n differences is gamma distributed, and that likelihood is maximized (iterated least squares, weighted by
-/// the model). Weights by the measured variance would let one small value from two differences outweigh a hundred.
-/// With three terms every subset can be tried. A term that does not lower the deviance by [`TERM_DEVIANCE`] is left out:
-/// taken whenever it is positive, the noise of the curve alone made the means of white noise a tenth too noisy (errors in
-/// sigmas of 0.88 where 1 is right).
-fn fit(points: &[(f64, f64, f64)]) -> AllanModel {
-    let points: Vec<_> = points.iter().filter(|p| p.1 > SMALLEST).collect();
-    let mut best = (f64::INFINITY, AllanModel::default());
-    for subset in 1..8usize {
-        let terms: Vec<usize> = (0..3).filter(|k| subset & (1 << k) != 0).collect();
-        if terms.len() > points.len() {
-            continue;
-        }
-        let basis = |tau: f64, k: usize| [1.0 / tau, 1.0, tau][k];
-        let a = nalgebra::DMatrix::from_fn(points.len(), terms.len(), |i, j| {
-            basis(points[i].0, terms[j])
-        });
-        let y = nalgebra::DVector::from_fn(points.len(), |i, _| points[i].1);
-        let mut model = y.clone();
-        let mut x = nalgebra::DVector::zeros(terms.len());
-        for _ in 0..50 {
-            let weights = nalgebra::DVector::from_fn(points.len(), |i, _| {
-                (0.5 * points[i].2).sqrt() / model[i]
-            });
-            let mut weighted = a.clone();
-            for (mut row, w) in weighted.row_iter_mut().zip(weights.iter()) {
-                row *= *w;
-            }
-            // Columns differ by the square of the longest time: scaled, or the smallest is lost.
-            let scale: Vec<f64> = weighted.column_iter().map(|c| c.norm()).collect();
-            for (mut column, s) in weighted.column_iter_mut().zip(&scale) {
-                column /= *s;
-            }
-            let Ok(scaled) = weighted
-                .svd(true, true)
-                .solve(&y.component_mul(&weights), 1e-12)
-            else {
-                break;
-            };
-            let next = nalgebra::DVector::from_fn(terms.len(), |j, _| scaled[j] / scale[j]);
-            let done = (&next - &x).amax() <= 1e-9 * next.amax();
-            x = next;
-            model = (&a * &x).zip_map(&y, |m, v| m.max(1e-3 * v));
-            if done {
-                break;
-            }
-        }
-        if x.iter().any(|v| !(*v > 0.0)) {
-            continue;
-        }
-        let deviance: f64 = points
-            .iter()
-            .zip(model.iter())
-            .map(|(p, m)| p.2 * (p.1 / m - 1.0 - (p.1 / m).ln()))
-            .sum();
-        let cost = deviance + TERM_DEVIANCE * terms.len() as f64;
-        if cost < best.0 {
-            let mut coefficients = [0.0; 3];
-            for (k, v) in terms.iter().zip(x.iter()) {
-                coefficients[*k] = *v;
-            }
-            let [white, flicker, walk] = coefficients;
-            best = (
-                cost,
-                AllanModel {
-                    white,
-                    flicker,
-                    walk,
-                },
-            );
-        }
-    }
-    best.1
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn terms_that_made_a_curve_are_found_again() {
-        let truth = AllanModel {
-            white: 4e-6,
-            flicker: 1e-7,
-            walk: 2e-9,
-        };
-        let points: Vec<_> = (0..12)
-            .map(|k| 0.1 * f64::from(1 << k))
-            .map(|t| (t, truth.variance(t), 1e4))
-            .collect();
-        let found = fit(&points);
-        for (a, b) in [
-            (truth.white, found.white),
-            (truth.flicker, found.flicker),
-            (truth.walk, found.walk),
-        ] {
-            assert!((a / b - 1.0).abs() < 1e-9, "{found:?}");
-        }
-    }
-
-    #[test]
-    fn white_noise_alone_is_given_no_other_term() {
-        let points: Vec<_> = (0..6)
-            .map(|k| 0.1 * f64::from(1 << k))
-            .map(|t| (t, 4e-6 / t, 10.0))
-            .collect();
-        let found = fit(&points);
-        assert!(
-            (found.white / 4e-6 - 1.0).abs() < 1e-9 && found.variance(100.0) < 4.1e-8,
-            "{found:?}"
-        );
-    }
 }

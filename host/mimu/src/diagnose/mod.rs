@@ -31,7 +31,7 @@ use serde::Serialize;
 
 use crate::calibration::Calibration;
 use crate::effects::removal::{Removed, removable, remove};
-use crate::fit::{Fit, Options, fit, fit_biases};
+use crate::fit::{Fit, Options, fit, fit_biases, without_temperature};
 use crate::prepared::Prepared;
 use crate::quantity::Sensor;
 use crate::triad::{Part, Triad};
@@ -225,6 +225,25 @@ fn matrices(recordings: &Recordings) -> Option<[Option<Affine<f64>>; 2]> {
     (first.manifest.raw_unit == RawUnit::Si && never_turned).then_some([Some(unit); 2])
 }
 
+/// The warning of the fit that its model has no temperature in it is true of the sensors only that no thermal effect was accepted of.
+fn with_temperature(now: &mut Fit, sensors: &[SensorDiagnosis]) {
+    let thermal = |s: &&SensorDiagnosis| {
+        let mut accepted = s.decision.accepted.iter();
+        accepted.any(|a| a.chosen.candidate.is_thermal())
+    };
+    let (with, without): (Vec<_>, Vec<_>) = sensors.iter().partition(thermal);
+    let plain = without_temperature(&now.prepared, &Sensor::BOTH);
+    if let (false, Some(plain)) = (with.is_empty(), plain) {
+        let count = now.warnings.len();
+        now.warnings.retain(|w| *w != plain);
+        if now.warnings.len() < count {
+            let without: Vec<Sensor> = without.iter().map(|s| s.sensor).collect();
+            now.warnings
+                .extend(without_temperature(&now.prepared, &without));
+        }
+    }
+}
+
 /// What a calibration that was fetched from a device leaves open.
 const UNCERTAIN: &str = "the calibration does not say how well it is known, as one that a device kept: its matrix is taken as exact, so that what it is off by may be found as an effect, and the intervals of a new calibration lack it";
 
@@ -333,6 +352,7 @@ pub fn diagnose(recordings: Recordings, options: Options) -> Result<Diagnosis> {
         now.warnings.push(UNCERTAIN.into());
     }
     sensors.reverse();
+    with_temperature(&mut now, &sensors);
     let open = |d: &Decision| d.unexplained().next().is_some() || !d.undecided.is_empty();
     let left = sensors.iter().any(|s| open(&s.decision));
     let verdict = match (left, effects.is_empty()) {
