@@ -93,7 +93,12 @@ impl Slow {
             let off = self.reference_sum - NOMINAL_REFERENCE;
             self.reference.take(off, count);
         }
-        let volts = self.gyro_volts();
+        // By the reference of the same samples: a supply that steps would otherwise be a temperature that does, until the filter has followed.
+        let volts = GYRO_REFERENCE_V
+            / match self.has_reference() {
+                true => self.reference_sum,
+                false => NOMINAL_REFERENCE,
+            };
         let pins_c = temperatures.map(|total| celsius(total as f32 / count * volts));
         for (pin, read) in self.pins_c.iter_mut().zip(pins_c) {
             pin.take(read, count);

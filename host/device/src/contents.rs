@@ -239,6 +239,11 @@ fn node(node: &Node<f32>) -> NodeContents {
     }
 }
 
+/// Public id of an effect.
+pub(super) fn id(record: &Record<'_>) -> String {
+    effect(record).id
+}
+
 fn effect(record: &Record<'_>) -> EffectContents {
     let axis_name = |axis: u8| AXES.get(usize::from(axis)).copied().unwrap_or("?");
     let (id, coefficients) = match record {

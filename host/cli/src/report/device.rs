@@ -352,6 +352,16 @@ pub fn check_text(result: &DeviceResult<Checked>) -> String {
             100.0 * d.rounding_share
         );
     }
+    if let Some([low, high]) = found.die_range_c {
+        line!(out, "the dies were at {low:.2} to {high:.2} °C meanwhile");
+    }
+    if let Some(off) = found.die_temperature_k {
+        line!(
+            out,
+            "temperature of the dies behind the lag: {} K off",
+            significant(off)
+        );
+    }
     if found.holds {
         line!(out, "device and PC agree to rounding");
     } else if !found.not_judged_for.is_empty() {
