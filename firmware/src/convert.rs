@@ -66,7 +66,7 @@ pub struct Slow {
     reference_sum: f32,
     /// By the TEMP pins of gyro x, y, z, °C.
     pins_c: [Lag; 3],
-    /// Which of them count, and what they say together.
+    /// Which of them count, and their common temperature.
     thermometer: Thermometer,
     /// The same filtered, °C.
     temp_c: Lag,

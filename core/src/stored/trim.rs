@@ -11,7 +11,7 @@ const NODE: usize = 196;
 /// Where o of the gyro and o of the accelerometer stand in a node.
 const OFFSETS_AT: [usize; 2] = [4 + 36, 4 + 48 + 36];
 
-/// Adds to o of the gyro (rad/s) and of the accelerometer (m/s²) of every node, so that the curves move as they are, and says when, UTC
+/// Adds to o of the gyro (rad/s) and of the accelerometer (m/s²) of every node, so that the curves move as they are, and writes when that was, UTC
 /// seconds since 1970. Origin, effects and all else stay as they are, bit by bit.
 ///
 /// # Errors

@@ -51,5 +51,5 @@ pub use self_test::{Passed, SelfTested, self_test};
 pub use session::{Session, refused};
 pub use stream::{Moments, Stream, Streamed, stream};
 pub use trim::{Pose, SHORTEST_TRIM_S, Trimmed, TrimmedTriad, trim};
-pub use upload::{Uploaded, download, upload};
+pub use upload::{Uploaded, download, outside_now, upload};
 pub use who::{Hash, Held, Room, Started, Who, unit_name, unusable};

@@ -65,9 +65,9 @@ pub struct Trimmed {
     pub temp_c: f64,
     /// Averaged before and after, s each.
     pub averaged_s: f64,
-    /// What the calibration before is told apart by.
+    /// Hash of the calibration before.
     pub before: Hash,
-    /// And the one now.
+    /// Hash of the one now.
     pub hash: Hash,
     /// One sentence for each thing that a person should know.
     pub warnings: Vec<String>,
@@ -145,7 +145,7 @@ fn warnings(before: &Average, after: &Average) -> Vec<String> {
     }
     if let Some(motion) = after.motion() {
         all.push(format!(
-            "{motion} after the calibration was stored: the figures after it say nothing; they may be looked at with `mimu device stream compensated`"
+            "{motion} after the calibration was stored: the figures after it are of a unit that moved; look again with `mimu device stream compensated`"
         ));
     }
     all
@@ -187,7 +187,7 @@ fn refuse(session: &Session, refused: &Refused) -> Error {
     let problem = match refused {
         Refused::Version { found } if (OLDEST..VERSION).contains(found) => {
             format!(
-                "the device keeps its calibration in layout {found}, which says nothing of a trim"
+                "the device keeps its calibration in layout {found}, which has no place for the time of a trim"
             )
         }
         other => format!("its calibration cannot be trimmed: {}", unusable(other)),

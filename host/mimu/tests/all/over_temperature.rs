@@ -155,6 +155,10 @@ fn what_cannot_be_applied_is_refused_and_a_bad_node_is_named_by_its_number() {
             &["node 2", "[gyro]", "singular"],
         ),
         (text_with("range_c = [50.0, 0.0]", &nodes[0]), &["range_c"]),
+        (
+            text_with("range_c = [70.0, 90.0]", &nodes.concat()),
+            &["70", "from -10 to 60"],
+        ),
         (text_with("range_c = [0.0, nan]", &nodes[0]), &["range_c"]),
         (
             good.replace("lag_s = 61.2", "lag_s = 700.0"),
@@ -169,7 +173,10 @@ fn what_cannot_be_applied_is_refused_and_a_bad_node_is_named_by_its_number() {
             &["interval_lag_s is there"],
         ),
         (good.replace("temp_c = 31.0", "temp_c = nan"), &["node 3"]),
-        (good.replace("slope_o = [", "slope_o = [inf, "), &["node 1", "not a number"]),
+        (
+            good.replace("slope_o = [", "slope_o = [inf, "),
+            &["node 1", "not a number"],
+        ),
         (
             good.replace("calibration/2", "calibration/1"),
             &["[temperature]", "format"],
