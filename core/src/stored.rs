@@ -36,6 +36,7 @@ mod bytes;
 mod curves;
 mod origin;
 mod record;
+mod trim;
 
 use crc::{CRC_32_ISO_HDLC, CRC_64_XZ, Crc, NoTable};
 use nalgebra::Matrix3;
@@ -50,6 +51,7 @@ pub use bytes::TooLong;
 pub use curves::Curves;
 pub use origin::Origin;
 pub use record::Record;
+pub use trim::trim;
 
 /// Version of the layout that is written.
 pub const VERSION: u16 = 5;

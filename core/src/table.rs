@@ -182,7 +182,7 @@ impl<T: RealField + Copy, const N: usize> Table<T, N> {
     }
 
     /// The temperatures that the calibration is for, °C: those that it was found from, and of several nodes none outside them. `None`: a
-    /// single node of no known range, which is for all temperatures as nothing says otherwise.
+    /// single node of no known range, which is for all temperatures, as nothing else is known.
     pub fn limits(&self) -> Option<[T; 2]> {
         let nodes = self.others.last();
         let nodes = nodes.map(|last| [self.first.temp_c, last.temp_c]);

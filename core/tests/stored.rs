@@ -4,7 +4,7 @@ use mimu_core::compensation::{Affine, Compensation, Sample};
 use mimu_core::effects::{Sensor, Variable};
 use mimu_core::single;
 use mimu_core::stored::{
-    Curves, MAX_LENGTH, NODES, Origin, ROOM, Record, Refused, decode, encode, hash,
+    Curves, MAX_LENGTH, NODES, Origin, ROOM, Record, Refused, decode, encode, hash, read, trim,
 };
 use mimu_core::table::{BEYOND_C, Node, Place, Table};
 use nalgebra::{Matrix3, Vector3};
@@ -294,6 +294,54 @@ fn a_calibration_that_is_kept_in_flash_since_layout_4_is_read() {
     older.table.follow(&mut state, 30.5);
     let expected = at(6) * 0.5 + at(7) * 0.5;
     assert_eq!(state.model.gyro.matrix[(0, 0)], expected);
+}
+
+#[test]
+fn a_trim_moves_the_curves_as_they_are_and_nothing_else() {
+    let named = Record::Named {
+        id: "gyro_scale_cubic",
+        coefficients: &[1e-3; 3],
+        nonlinear: None,
+    };
+    let curves = Curves {
+        nodes: &two_nodes(),
+        range_c: Some([1.0, 49.0]),
+        lag_s: Some(-20.0),
+    };
+    let before = with_curves(&curves, &[named]);
+    let (mut after, mut nodes) = (before.clone(), Vec::new());
+    let add = [[0.01, -0.02, 0.03], [0.5, 0.25, -0.125]];
+    trim(&mut after, add, 0x6957_0a80).unwrap();
+    let stored = read(&after, |node| nodes.push(*node), |_| {}).unwrap();
+    assert_eq!(stored.origin.trimmed_s, Some(0x6957_0a80));
+    for (node, was) in nodes.iter().zip(two_nodes()) {
+        let mut expected = was;
+        for (triad, add) in [&mut expected.model.gyro, &mut expected.model.accel]
+            .into_iter()
+            .zip(add)
+        {
+            triad.offset += Vector3::from(add);
+        }
+        assert_eq!(*node, expected);
+    }
+    // Besides the offsets (three each of two triads of two nodes), the time and the CRC, no byte.
+    let changed = before.iter().zip(&after).filter(|(a, b)| a != b).count();
+    assert!(changed <= 4 * 12 + 8 + 4, "{changed}");
+    // Back again, but for rounding.
+    trim(&mut after, add.map(|triad| triad.map(|x| -x)), 1).unwrap();
+    let mut back = Vec::new();
+    read(&after, |node| back.push(*node), |_| {}).unwrap();
+    for (node, was) in back.iter().zip(two_nodes()) {
+        assert!((node.model.gyro.offset - was.model.gyro.offset).amax() < 1e-6);
+        assert!((node.model.accel.offset - was.model.accel.offset).amax() < 1e-6);
+    }
+    let mut older = of_version_4(&before);
+    let refused = trim(&mut older, add, 1).err();
+    assert_eq!(refused, Some(Refused::Version { found: 4 }));
+    assert_eq!(
+        trim(&mut after, [[f32::NAN; 3]; 2], 1).err(),
+        Some(Refused::Node { at: 0 })
+    );
 }
 
 /// Neither the thermometer of a later version nor numbers that no dies have are taken for something else.

@@ -66,7 +66,7 @@ pub struct Slow {
     reference_sum: f32,
     /// By the TEMP pins of gyro x, y, z, °C.
     pins_c: [Lag; 3],
-    /// Which of them count, and what they say together.
+    /// Which of them count, and their common temperature.
     thermometer: Thermometer,
     /// The same filtered, °C.
     temp_c: Lag,
@@ -93,7 +93,12 @@ impl Slow {
             let off = self.reference_sum - NOMINAL_REFERENCE;
             self.reference.take(off, count);
         }
-        let volts = self.gyro_volts();
+        // By the reference of the same samples: a supply that steps would otherwise be a temperature that does, until the filter has followed.
+        let volts = GYRO_REFERENCE_V
+            / match self.has_reference() {
+                true => self.reference_sum,
+                false => NOMINAL_REFERENCE,
+            };
         let pins_c = temperatures.map(|total| celsius(total as f32 / count * volts));
         for (pin, read) in self.pins_c.iter_mut().zip(pins_c) {
             pin.take(read, count);

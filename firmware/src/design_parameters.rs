@@ -47,7 +47,7 @@ pub const GYRO_TEMPERATURE_RATE_C_PER_S: f32 = 0.5;
 
 /// Most that a TEMP pin departs from where it stood beside the others, °C. References drift by a few tenths of a percent over the range (1 °C),
 /// and gyros on three faces of a unit in a stream of air differ by 2 or 3. A pin that stands still while the others move is found once they have
-/// moved by this. That its code stays the same says nothing by itself: so does that of a good pin in an even temperature, but for the
+/// moved by this. That its code stays the same proves nothing by itself: so does that of a good pin in an even temperature, but for the
 /// converter's noise, and a pin that is tied to a voltage has that noise too.
 pub const GYRO_TEMPERATURE_DEPARTURE_C: f32 = 5.0;
 

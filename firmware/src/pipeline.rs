@@ -3,48 +3,33 @@
 //! Once for every sample: volts, compensation, effects, banks. Once for every batch: reference and temperature, the model at that
 //! temperature, and what else moves slowly. All samples of a batch are therefore compensated by the same numbers, which the batch states.
 
+mod calibrated;
+
 use core::cell::RefCell;
 
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::NoopRawMutex;
 use heapless::Vec;
 use mimu_core::compensation::Sample;
-use mimu_core::die::{self, DieLag};
-use mimu_core::effects;
-use mimu_core::single;
-use mimu_core::stored::{ROOM, Stored};
-use mimu_core::table::{self, Place};
+use mimu_core::stored::Stored;
+use mimu_core::table::Place;
 use mimu_core::wire::{
     BATCH, BatchHead, COMPENSATED_BYTES, CompensatedBatch, Event, Message, RAW_BYTES, RawBatch,
     Sums, Triad, flags, volts,
 };
 use nalgebra::Vector3;
 
+use calibrated::Calibrated;
+
 use crate::bank::Bank;
 use crate::channels::Channels;
 use crate::convert::{ACCEL_VOLTS, Slow};
 use crate::design_parameters::{
-    ACCEL_STOP_MARGIN_V, ACCEL_STOPS_V, GYRO_STOP_MARGIN_V, GYRO_STOPS_V, GYRO_TEMPERATURE_NULL_C,
-    SAMPLE_HZ,
+    ACCEL_STOP_MARGIN_V, ACCEL_STOPS_V, GYRO_STOP_MARGIN_V, GYRO_STOPS_V,
 };
 
 /// The path of the samples, between tasks of one executor: none of them holds it while it waits.
 pub type Shared = Mutex<NoopRawMutex, RefCell<Pipeline>>;
-
-/// A calibration with what it remembers of the stream.
-struct Calibrated {
-    stored: Stored,
-    lag: DieLag<f32>,
-    die: die::State<f32>,
-    /// Temperature of the dies at the beginning of the batch, °C.
-    die_c: f32,
-    model: table::State<f32>,
-    effects: effects::State<f32, ROOM>,
-    /// Number of the sample at which the slow effects were followed last; time since power-on is counted by it.
-    followed: u32,
-    /// The same of the dies, whose lag begins with the first reading of the thermometer, however long the power has been there.
-    die_followed: Option<u32>,
-}
 
 /// Which streams are sent.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -161,26 +146,8 @@ impl Pipeline {
 
     /// Compensates by this from the next batch on.
     pub fn calibrate(&mut self, stored: Stored) {
-        let effects = effects::State::new(SAMPLE_HZ as f32);
-        let (effects, powered_for_ms) = match self.powered_for_ms {
-            Some(ms) => (effects, ms),
-            None => (effects.long_after_power_on(), 0),
-        };
-        let lag = stored.lag();
-        // The dies do not know that they have another calibration: what is left of a ramp goes on, where it is of the same lag.
         let before = self.calibrated.as_ref();
-        let before = before.filter(|before| before.lag == lag);
-        self.calibrated = Some(Calibrated {
-            die: before.map_or_else(die::State::new, |before| before.die),
-            die_followed: before.and_then(|before| before.die_followed),
-            die_c: GYRO_TEMPERATURE_NULL_C,
-            lag,
-            model: stored.table.state(),
-            effects,
-            // A number is a millisecond. Time since power-on goes on, whenever the calibration comes.
-            followed: 0_u32.wrapping_sub(powered_for_ms),
-            stored,
-        });
+        self.calibrated = Some(Calibrated::new(stored, self.powered_for_ms, before));
     }
 
     /// What moves slowly.
@@ -255,7 +222,7 @@ impl Pipeline {
                 bank.skip(lost);
             }
             if let Some(calibrated) = &mut self.calibrated {
-                calibrated.effects.gap();
+                calibrated.gap();
             }
         }
         if self.batch.raw.is_empty() {
@@ -370,7 +337,7 @@ impl Pipeline {
         if let (true, Some(calibrated)) = (streams.compensated, &self.calibrated) {
             let event = Event::Compensated(CompensatedBatch {
                 head: BatchHead {
-                    temp_c: calibrated.die_c,
+                    temp_c: calibrated.die_c(),
                     ..head
                 },
                 samples: batch.compensated.as_flattened(),
@@ -379,42 +346,6 @@ impl Pipeline {
         }
         batch.raw.clear();
         self.losses.batches = self.losses.batches.wrapping_add(dropped);
-    }
-}
-
-impl Calibrated {
-    /// Follows temperature and time to the beginning of a batch. `known`: there was a reading of the thermometer, and `temp_c` is not
-    /// what stands in for one.
-    fn follow(&mut self, number: u32, temp_c: f32, known: bool) -> Place {
-        let seconds = |samples: u32| samples as f32 / SAMPLE_HZ as f32;
-        self.die_c = temp_c;
-        if known {
-            let passed = self
-                .die_followed
-                .map_or(0, |before| number.wrapping_sub(before));
-            let die_c = self.lag.follow(&mut self.die, seconds(passed), temp_c);
-            self.die_c = die_c.unwrap_or(temp_c);
-            self.die_followed = Some(number);
-        }
-        self.stored.table.follow(&mut self.model, self.die_c);
-        if let Some(all) = &self.stored.effects {
-            let dt_s = seconds(number.wrapping_sub(self.followed));
-            all.slow(&mut self.effects, dt_s, temp_c);
-            self.followed = number;
-        }
-        self.model.place
-    }
-
-    #[inline]
-    fn apply(&mut self, raw: &Sample<f32>) -> Sample<f32> {
-        let model = &self.model.model;
-        match &self.stored.effects {
-            Some(all) => {
-                let raw = single::without_code_errors(all, raw);
-                single::remove(all, &mut self.effects, &single::compensate(model, &raw))
-            }
-            None => single::compensate(model, raw),
-        }
     }
 }
 

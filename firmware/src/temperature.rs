@@ -1,7 +1,7 @@
 //! The thermometer: the gyros' TEMP pins, of which some may be wrong.
 //!
-//! Where each pin stands beside the others is learnt while it counts: their references differ by as much as 12 °C. What they say together is
-//! the mean of the pins less these offsets, so that a pin that is lost takes nothing but itself out of it: the temperature makes no step.
+//! Where each pin stands beside the others is learnt while it counts: their references differ by as much as 12 °C. Their common temperature is
+//! the mean of the pins minus these offsets, so that a pin that is lost takes nothing but itself out of it: the temperature makes no step.
 //!
 //! A pin counts as long as it is in the range of a working gyro, agrees with another one, makes no step that no die can make, and stays where
 //! it stands beside the others. One that left comes back when it is there again. When all have left at once, the last good temperature
@@ -30,7 +30,7 @@ struct Pin {
 #[derive(Clone, Copy, Debug)]
 pub struct Thermometer {
     pins: [Pin; 3],
-    /// What those that counted last said together, °C, and how long ago, s.
+    /// Common temperature of those that counted last, °C, and how long ago that was, s.
     together_c: f32,
     since_s: f32,
 }
@@ -64,7 +64,7 @@ impl Thermometer {
         });
         let counts: [bool; 3] =
             core::array::from_fn(|i| plausible[i] && self.may_be(i, pins_c, steady));
-        // A pin that has never counted says nothing of the others' offsets, and takes its own from them.
+        // A pin that has never counted has no offset yet, and takes its own from the others.
         let known = core::array::from_fn(|i| counts[i] && self.pins[i].offset_c.is_some());
         let together_c = self
             .mean(known, pins_c)
@@ -129,7 +129,7 @@ impl Pin {
 /// Whether each pin may be right by what the three read at the same time, °C.
 ///
 /// One may if it is in the range of a working gyro, and agrees with another such pin or is the only one. Of two that disagree neither
-/// may: which of them is wrong cannot be told, and a mean of both is wrong for certain.
+/// may: which of them is wrong cannot be known, and a mean of both is wrong for certain.
 fn plausible(pins_c: [f32; 3]) -> [bool; 3] {
     let [least, most] = GYRO_TEMPERATURE_RANGE_C;
     let in_range = pins_c.map(|c| (least..=most).contains(&c));

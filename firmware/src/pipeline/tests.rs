@@ -10,6 +10,8 @@ use mimu_core::table::Node;
 use mimu_core::wire::Prior;
 use nalgebra::Matrix3;
 
+mod temperature;
+
 use super::*;
 use crate::convert::NOMINAL_REFERENCE;
 
@@ -67,6 +69,11 @@ fn both() -> Streams {
 
 /// Compensation that doubles from -10 °C to 60 °C, where 25 °C is in the middle.
 fn calibration(effects: &[Record<'_>]) -> Stored {
+    with_lag(effects, None)
+}
+
+/// The same of dies that follow with this lag, found between 0 and 50 °C.
+fn with_lag(effects: &[Record<'_>], lag_s: Option<f32>) -> Stored {
     let node = |temp_c, gain: f32| {
         let affine = Affine {
             matrix: Matrix3::from_diagonal_element(gain),
@@ -95,7 +102,11 @@ fn calibration(effects: &[Record<'_>]) -> Stored {
     let length = stored::encode(
         &stored::Origin::UNKNOWN,
         [&one, &one],
-        &Curves::of(&nodes),
+        &Curves {
+            nodes: &nodes,
+            range_c: Some([0.0, 50.0]),
+            lag_s,
+        },
         effects,
         &mut bytes,
     )

@@ -6,6 +6,7 @@
 mod allan;
 pub mod allan_plot;
 mod apply;
+mod comparison;
 mod design;
 mod device;
 mod diagnosis;
@@ -13,18 +14,20 @@ mod fit;
 mod import;
 mod svg;
 mod text;
+mod trim;
 mod verify;
 mod wizard;
 
 pub use allan::allan_text;
 pub use apply::apply_text;
+pub use comparison::{check_text, kalman_text};
 pub use design::{comparison_text, design_text, next_text};
 pub use device::{
-    check_text, counters_text, download_text, info_text, kalman_text, record_text, self_test_text,
-    stream_text, upload_text,
+    counters_text, download_text, info_text, record_text, self_test_text, stream_text, upload_text,
 };
 pub use diagnosis::{Made, diagnosis_page, diagnosis_text, not_in_plan_text};
 pub use fit::{dwell_table, fit_text};
 pub use import::import_text;
+pub use trim::trim_text;
 pub use verify::verify_text;
 pub(crate) use wizard::{wizard_lines, wizard_question, wizard_text};

@@ -1,30 +1,25 @@
 //! The compensated stream against this program's own compensation of the raw stream, sample by sample.
 
+mod twin;
+
 use std::time::{Duration, Instant};
 
-use mimu_core::compensation::{Affine, Sample};
-use mimu_core::die::{self, DieLag};
-use mimu_core::effects;
-use mimu_core::single;
-use mimu_core::stored::{ROOM, Stored};
-use mimu_core::table;
-use mimu_core::wire::{BatchHead, Request};
+use mimu_core::wire::Request;
 use nalgebra::Vector3;
 use serde::Serialize;
 
 use super::heard::{Event, Samples};
 use super::image::{Image, remembers};
 use super::session::Session;
-use mimu::calibration::{Calibration, Curves};
+use mimu::calibration::Calibration;
 use mimu::quantity::Sensor;
 use mimu_recording::error::{Error, Result};
+use twin::Twin;
+
+pub use twin::rounding;
 
 /// Longest silence of a stream.
 const SILENCE: Duration = Duration::from_secs(3);
-
-/// Part of a reading that single precision may be off by at the turn of a bit: a reading, its product, and the sum with the code at
-/// reading 0, which is up to 64 weights where the reading is of one.
-const TURN: f64 = 64.0 * f32::EPSILON as f64;
 
 /// Largest differences of one triad.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -65,24 +60,6 @@ pub struct Checked {
 
 /// Most that the two may differ by, K: both add up steps of some microkelvin of rounding, and forget them within the lag.
 const DIE_K: f64 = 1e-3;
-
-/// The PC's side, twice: as the device computes, and in double precision from the file.
-struct Twin {
-    rate_hz: u32,
-    stored: Stored,
-    model: table::State<f32>,
-    single: effects::State<f32, ROOM>,
-    affine: [Affine<f64>; 2],
-    curves: Option<Curves>,
-    lag: DieLag<f32>,
-    die: Option<die::State<f32>>,
-    effects: effects::Effects<f64, ROOM>,
-    double: effects::State<f64, ROOM>,
-    /// Number of the first sample of the batch before; time since power-on is counted by it, as on the device.
-    followed: u32,
-    /// Of the sample that would come next.
-    next: Option<u32>,
-}
 
 /// Compares for `duration` of samples. Refused if the device holds another calibration than that of the file.
 pub fn check(
@@ -180,172 +157,6 @@ pub fn check(
         && found.accel.rounding_share <= 1.0
         && found.die_temperature_k.is_none_or(|off| off <= DIE_K);
     Ok(found)
-}
-
-impl Twin {
-    fn new(
-        calibration: &Calibration,
-        image: &Image,
-        rate_hz: u32,
-        powered_for_ms: Option<u32>,
-        place: &str,
-    ) -> Result<Self> {
-        let unusable = |_| Error::device(place, "the device could not use it", "fit it again");
-        let stored = image.stored().map_err(unusable)?;
-        let model = |sensor| {
-            let missing = || Error::device(place, "a sensor is missing", "calibrate both sensors");
-            calibration.inverse(sensor).ok_or_else(missing)
-        };
-        let (mut single, mut double) = (
-            effects::State::new(rate_hz as f32),
-            effects::State::new(f64::from(rate_hz)),
-        );
-        if powered_for_ms.is_none() {
-            (single, double) = (single.long_after_power_on(), double.long_after_power_on());
-        }
-        let before = u64::from(powered_for_ms.unwrap_or_default()) * u64::from(rate_hz) / 1000;
-        Ok(Self {
-            rate_hz,
-            model: stored.table.state(),
-            single,
-            lag: stored.lag(),
-            die: None,
-            curves: calibration.curves(),
-            stored,
-            affine: [model(Sensor::Gyro)?, model(Sensor::Accel)?],
-            effects: calibration.core_effects()?,
-            double,
-            followed: 0_u32.wrapping_sub(before as u32),
-            next: None,
-        })
-    }
-
-    /// Follows the device through a batch, and notes how far it is off.
-    fn compare(&mut self, raw: &Samples, device: &Samples, found: &mut Checked) {
-        let head = &raw.head;
-        let first = self.next != Some(head.first);
-        self.follow_dies(head, device.head.temp_c, first, found);
-        self.follow(head);
-        if first {
-            self.single.gap();
-            self.double.gap();
-        }
-        for (k, (raw, device)) in raw.values.iter().zip(&device.values).enumerate() {
-            let single = self.single(raw);
-            let (double, bounds) = self.double(raw);
-            // The angular acceleration of a sample is its difference to the one before, which is not known of the first.
-            if first && k == 0 && self.stored.effects.is_some() {
-                continue;
-            }
-            found.samples += 1;
-            found
-                .gyro
-                .note(&device.gyro, &single.gyro, &double.gyro, &bounds[0]);
-            found
-                .accel
-                .note(&device.accel, &single.accel, &double.accel, &bounds[1]);
-        }
-        self.next = Some(head.first.wrapping_add(raw.values.len() as u32));
-    }
-
-    /// Takes the models of the temperature of the dies that the device says it has used, and compares it with that of the thermometer
-    /// behind the lag. What was before the comparison is in both temperatures of its first batch.
-    fn follow_dies(&mut self, head: &BatchHead, die_c: f32, first: bool, found: &mut Checked) {
-        let dt_s = head.first.wrapping_sub(self.followed) as f32 / self.rate_hz as f32;
-        match self.die.as_mut().filter(|_| !first) {
-            Some(state) if self.lag != DieLag::none() => {
-                let ours = self.lag.follow(state, dt_s, head.temp_c);
-                let off = ours.map_or(f64::INFINITY, |c| f64::from((c - die_c).abs()));
-                let most = found.die_temperature_k.unwrap_or(0.0);
-                found.die_temperature_k = Some(if off.is_nan() {
-                    f64::INFINITY
-                } else {
-                    most.max(off)
-                });
-            }
-            _ => self.die = Some(self.lag.state_of(head.temp_c, die_c)),
-        }
-        let [low, high] = found.die_range_c.unwrap_or([die_c; 2]);
-        found.die_range_c = Some([low.min(die_c), high.max(die_c)]);
-        self.stored.table.follow(&mut self.model, die_c);
-        if let Some(curves) = &self.curves {
-            for (sensor, model) in Sensor::BOTH.into_iter().zip(&mut self.affine) {
-                let at = curves.inverse(sensor, f64::from(die_c));
-                *model = at.unwrap_or(*model);
-            }
-        }
-    }
-
-    fn follow(&mut self, head: &BatchHead) {
-        let passed = head.first.wrapping_sub(self.followed);
-        self.followed = head.first;
-        if let Some(all) = &self.stored.effects {
-            // By the same operation as the firmware, which is what decides the last digit.
-            let dt_s = passed as f32 / self.rate_hz as f32;
-            all.slow(&mut self.single, dt_s, head.temp_c);
-        }
-        let (dt_s, temp_c) = (
-            f64::from(passed) / f64::from(self.rate_hz),
-            f64::from(head.temp_c),
-        );
-        self.effects.slow(&mut self.double, dt_s, temp_c);
-    }
-
-    /// As the device computes.
-    fn single(&mut self, raw: &Sample<f32>) -> Sample<f32> {
-        let model = &self.model.model;
-        match &self.stored.effects {
-            Some(all) => {
-                let raw = single::without_code_errors(all, raw);
-                all.remove(&mut self.single, &model.apply(&raw))
-            }
-            None => model.apply(raw),
-        }
-    }
-
-    /// Readings without errors by the code, in double precision. Within rounding of a turn either side is right, and a bit's error apart: the
-    /// one that single precision takes.
-    fn without_code_errors(&self, raw: &Sample<f32>) -> [Vector3<f64>; 2] {
-        let exact = [raw.gyro, raw.accel].map(|u| u.map(f64::from));
-        let Some(stored) = &self.stored.effects else {
-            return exact;
-        };
-        let single = single::without_code_errors(stored, raw);
-        let single = [single.gyro, single.accel].map(|u| u.map(f64::from));
-        let beside = |by: f64| {
-            let [gyro, accel] = exact.map(|u| u * (1.0 + by));
-            let clean = self.effects.without_code_errors(&Sample { gyro, accel });
-            [exact[0] - gyro + clean.gyro, exact[1] - accel + clean.accel]
-        };
-        let sides = [0.0, TURN, -TURN].map(beside);
-        [0, 1].map(|triad| {
-            Vector3::from_fn(|axis, _| {
-                let off =
-                    |side: &[Vector3<f64>; 2]| (side[triad][axis] - single[triad][axis]).abs();
-                let nearest = sides.iter().min_by(|a, b| off(a).total_cmp(&off(b)));
-                nearest.map_or(f64::NAN, |side| side[triad][axis])
-            })
-        })
-    }
-
-    /// In double precision, with what rounding can make of it.
-    fn double(&mut self, raw: &Sample<f32>) -> (Sample<f64>, [Vector3<f64>; 2]) {
-        let raw = self.without_code_errors(raw);
-        let [gyro, accel] = [0, 1].map(|i| self.affine[i].apply(&raw[i]));
-        // On a curve each number is itself a sum of four terms.
-        let times = if self.curves.is_some() { 2.0 } else { 1.0 };
-        let bounds = [0, 1].map(|i| rounding(&self.affine[i], &raw[i]) * times);
-        let sample = Sample { gyro, accel };
-        (self.effects.remove(&mut self.double, &sample), bounds)
-    }
-}
-
-/// Most that single precision can make of `x = C u + o` for a reading, SI: C, o and the four operations of a sum of four terms each round
-/// by half a unit of the last place, ε/2, of what is not larger than the sum S of the sizes of the terms: 3 ε S for the affine part.
-/// As much again for effects, whose errors are small beside S.
-pub fn rounding(model: &Affine<f64>, raw: &Vector3<f64>) -> Vector3<f64> {
-    let sizes = model.matrix.abs() * raw.abs() + model.offset.abs();
-    sizes * (6.0 * f64::from(f32::EPSILON))
 }
 
 impl Difference {

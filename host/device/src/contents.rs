@@ -39,7 +39,7 @@ pub struct Contents {
     pub raw_unit: &'static str,
     /// Frame of x.
     pub frame: &'static str,
-    /// Dies' temperatures that it is for, °C, if it says so.
+    /// Dies' temperatures that it is for, °C, if they are known.
     pub range_c: Option<[f32; 2]>,
     /// Lag of the dies behind the thermometer, s, if it is known.
     pub lag_s: Option<f32>,
@@ -237,6 +237,11 @@ fn node(node: &Node<f32>) -> NodeContents {
         gyro_slope: inverse(&node.slope.gyro, quantity::Sensor::Gyro),
         accel_slope: inverse(&node.slope.accel, quantity::Sensor::Accel),
     }
+}
+
+/// Public id of an effect.
+pub(super) fn id(record: &Record<'_>) -> String {
+    effect(record).id
 }
 
 fn effect(record: &Record<'_>) -> EffectContents {

@@ -19,6 +19,8 @@ pub struct Flagged {
     pub power_on_unknown: u64,
     /// A self-test deflected the sensors.
     pub self_test: u64,
+    /// The dies were at a temperature that the calibration is not for.
+    pub outside_range: u64,
 }
 
 impl Flagged {
@@ -35,6 +37,7 @@ impl Flagged {
             (flags::NO_TEMPERATURE, &mut self.without_temperature),
             (flags::POWER_ON_UNKNOWN, &mut self.power_on_unknown),
             (flags::SELF_TEST, &mut self.self_test),
+            (flags::OUTSIDE_NODES, &mut self.outside_range),
         ] {
             if of & flag != 0 {
                 *counter += samples;
@@ -60,8 +63,8 @@ impl Flagged {
         );
         for (axis, count) in AXES.iter().zip(self.temperature_left_out) {
             let what = format!(
-                "whose temperature leaves gyro {axis} out: its TEMP pin is out of range or disagrees with the \
-                 others; check its wiring"
+                "whose temperature leaves gyro {axis} out: its TEMP pin is out of range, disagrees with the others, \
+                 has made a step or stands still; check its wiring"
             );
             warn(count, &what);
         }
@@ -74,6 +77,10 @@ impl Flagged {
             "of a device that does not know when its power came: it takes a warm-up for over",
         );
         warn(self.self_test, "while the self-test deflected the sensors");
+        warn(
+            self.outside_range,
+            "at temperatures that the stored calibration was not made from: its curves go on straight for 5 K, and are held farther out",
+        );
         all
     }
 }
@@ -101,6 +108,7 @@ mod tests {
             flags::NO_TEMPERATURE,
             flags::POWER_ON_UNKNOWN,
             flags::SELF_TEST,
+            flags::OUTSIDE_NODES,
         ] {
             let mut one = Flagged::default();
             one.count(flag, 1);

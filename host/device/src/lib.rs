@@ -10,6 +10,7 @@
 //! | `origin`     | of which unit, from when and of what recording a calibration is                        |
 //! | `upload`     | sending them and fetching them back                                                    |
 //! | `contents`   | what stands in them                                                                    |
+//! | `trim`       | offsets of the stored calibration set anew while the unit lies still                   |
 //! | `self_test`  | the self-test, and whether the unit stood still for it                                 |
 //! | `flagged`    | samples that carry a flag, counted                                                     |
 //! | `stream`     | samples as they come                                                                   |
@@ -32,6 +33,7 @@ mod result;
 mod self_test;
 mod session;
 mod stream;
+mod trim;
 mod upload;
 mod who;
 
@@ -48,5 +50,6 @@ pub use result::{Counted, DeviceResult};
 pub use self_test::{Passed, SelfTested, self_test};
 pub use session::{Session, refused};
 pub use stream::{Moments, Stream, Streamed, stream};
-pub use upload::{Uploaded, download, upload};
+pub use trim::{Pose, SHORTEST_TRIM_S, Trimmed, TrimmedTriad, trim};
+pub use upload::{Uploaded, download, outside_now, upload};
 pub use who::{Hash, Held, Room, Started, Who, unit_name, unusable};

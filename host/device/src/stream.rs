@@ -62,7 +62,7 @@ pub struct Moments {
 }
 
 impl Streamed {
-    fn new(stream: Stream) -> Self {
+    pub(super) fn new(stream: Stream) -> Self {
         let units = match stream {
             Stream::Raw => ["V", "V"],
             Stream::Compensated => ["rad/s", "m/s^2"],

@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use mimu_core::die::BEYOND_C;
 use mimu_core::stored;
 use mimu_core::wire::{CHUNK, Refusal, Request};
 use serde::Serialize;
@@ -10,11 +11,15 @@ use super::heard::Answer;
 use super::image::Image;
 use super::origin;
 use super::session::{PATIENCE, Session, refused};
+use super::stream::{Stream, stream};
 use super::who::Hash;
+use mimu::calibration::Calibration;
 use mimu_recording::error::{Error, Result};
 
 /// Longest wait for a commit: a sector is erased, which takes about a second, and 4 kB are programmed.
 const COMMIT: Duration = Duration::from_secs(15);
+/// Length of the raw stream that gives the temperature.
+const LOOK: Duration = Duration::from_millis(100);
 /// Times that an upload begins anew: a device that restarts in the middle of it has forgotten it.
 const BEGINNINGS: u32 = 3;
 
@@ -156,6 +161,26 @@ fn send(
         ));
     }
     Ok(true)
+}
+
+/// A warning if the device is now at a temperature that a calibration is not for: outside its curves, or for a calibration at one
+/// temperature by more than 5 K. `None` if it is not, or if what it is for is not known; a tenth of a second of its raw stream is looked at.
+pub fn outside_now(session: &mut Session, calibration: &Calibration) -> Result<Option<String>> {
+    let Some([from, to]) = calibration.limits() else {
+        return Ok(None);
+    };
+    let margin_k = match calibration.temperature {
+        Some(_) => 0.0,
+        None => BEYOND_C,
+    };
+    let seen = stream(session, Stream::Raw, Some(LOOK), || false, |_, _, _| Ok(()))?;
+    let away_k = (from - seen.temp_c).max(seen.temp_c - to);
+    Ok((away_k > margin_k).then(|| {
+        format!(
+            "the device is at {:.1} °C, {away_k:.1} K outside the {from:.1} to {to:.1} °C that the calibration was made from",
+            seen.temp_c
+        )
+    }))
 }
 
 /// `error`, with what the device holds now.

@@ -10,7 +10,7 @@ use crate::calibration::{Calibration, Curves};
 use crate::prepared::Prepared;
 use crate::quantity::Sensor;
 
-/// What is said of a recording without a temperature.
+/// Warning on a recording without a temperature.
 pub const WITHOUT_TEMPERATURE: &str =
     "the recording has no temp_c: the calibration's one model is used, and not its curves";
 
@@ -33,8 +33,8 @@ pub fn of_blocks(blocks: &[Block], lag: &DieLag<f64>) -> Option<Vec<f64>> {
     Some(each.collect())
 }
 
-/// A sentence on the samples of a recording at temperatures that a calibration is not for; `None` if there are none, or if it does not say
-/// what it is for.
+/// A sentence on the samples of a recording at temperatures that a calibration is not for; `None` if there are none, or if what it
+/// is for is not known.
 ///
 /// Curves are for the dies in their range, from the first degree on. A calibration at one temperature holds near it, and is
 /// left where the thermometer is more than 5 K outside what it was made from.

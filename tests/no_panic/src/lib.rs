@@ -204,6 +204,16 @@ pub fn stored_decode(bytes: &[u8]) -> (u64, Result<Stored, stored::Refused>) {
     (stored::hash(bytes), stored::decode(bytes))
 }
 
+/// [`stored::trim`].
+#[inline(never)]
+pub fn stored_trim(
+    bytes: &mut [u8],
+    add: [[f32; 3]; 2],
+    trimmed_s: u64,
+) -> Result<(), stored::Refused> {
+    stored::trim(bytes, add, trimmed_s)
+}
+
 /// [`encode`] of what a device sends.
 #[inline(never)]
 pub fn wire_send(message: &Message<'_>, out: &mut [u8; MAX_FRAME]) -> Result<usize, EncodeError> {

@@ -76,6 +76,16 @@ pub fn run(args: &DiagnoseArgs) -> Result<()> {
         Some(path) => Some(Calibration::read(path)?),
         None => None,
     };
+    if let (Some(path), true) = (
+        &args.calibration,
+        given.as_ref().is_some_and(|c| c.temperature.is_some()),
+    ) {
+        return Err(Error::new(
+            format!("{}, [temperature]", path.display()),
+            "a diagnosis goes by one model for all temperatures, and the curves would be left out",
+            "compensate the recording first (`mimu apply`), and diagnose that",
+        ));
+    }
     let mut all = Vec::new();
     for path in &args.recordings {
         all.push(open(path)?);

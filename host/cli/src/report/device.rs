@@ -7,8 +7,7 @@ use mimu::quantity::{AXES, significant};
 use mimu_core::wire::Counters;
 use mimu_device::record::RecordSummary;
 use mimu_device::{
-    Checked, Contents, Counted, DeviceResult, KalmanRun, LineCount, SelfTested, Streamed, Uploaded,
-    Who,
+    Contents, Counted, DeviceResult, LineCount, SelfTested, Streamed, Uploaded, Who,
 };
 
 /// Writing to a string does not fail.
@@ -148,9 +147,30 @@ pub fn download_text(result: &DeviceResult<Contents>) -> String {
         found.raw_unit,
         found.frame
     );
+    if let Some(at) = &found.trimmed {
+        line!(out, "offsets trimmed {at}");
+    }
+    if let Some([from, to]) = found.range_c {
+        line!(out, "for {from} to {to} °C of the dies");
+    }
+    if let Some(lag_s) = found.lag_s {
+        line!(out, "lag of the dies behind the thermometer {lag_s} s");
+    }
+    if found.nodes.len() > 1 {
+        line!(out, "{} between the nodes", found.between_nodes);
+    }
     for node in &found.nodes {
         line!(out, "\nat {} °C", node.temp_c);
-        for (sensor, model) in [("gyro", &node.gyro), ("accel", &node.accel)] {
+        for (sensor, model) in [
+            ("gyro", &node.gyro),
+            ("accel", &node.accel),
+            ("gyro/K", &node.gyro_slope),
+            ("accel/K", &node.accel_slope),
+        ] {
+            let mut numbers = model.C.as_flattened().iter().chain(&model.o);
+            if sensor.ends_with("/K") && numbers.all(|x| *x == 0.0) {
+                continue;
+            }
             line!(out, "  {sensor:<6} {:>42}   {:>14}", "C", "o");
             for (row, o) in model.C.iter().zip(model.o) {
                 line!(
@@ -325,91 +345,8 @@ pub fn stream_text(result: &DeviceResult<Streamed>) -> String {
 }
 
 /// A unit of a file as it is printed.
-fn printed(unit: &str) -> String {
+pub(super) fn printed(unit: &str) -> String {
     unit.replace("^2", "²")
-}
-
-/// Result of `mimu device check`.
-pub fn check_text(result: &DeviceResult<Checked>) -> String {
-    let mut out = String::new();
-    let found = &result.found;
-    line!(
-        out,
-        "{}: {} samples compared, {} without a counterpart",
-        result.port,
-        found.samples,
-        found.unpaired
-    );
-    line!(out, "largest difference, device minus PC:");
-    for (sensor, d) in [("gyro", &found.gyro), ("accel", &found.accel)] {
-        let unit = printed(d.unit);
-        line!(
-            out,
-            "{sensor:<6} same precision {} ulps ({} {unit}), double precision {} {unit}, {:.0} % of what rounding allows",
-            d.ulps,
-            significant(d.single),
-            significant(d.double),
-            100.0 * d.rounding_share
-        );
-    }
-    if found.holds {
-        line!(out, "device and PC agree to rounding");
-    } else if !found.not_judged_for.is_empty() {
-        line!(
-            out,
-            "not judged: {} depends on temperatures before the comparison",
-            found.not_judged_for.join(", ")
-        );
-    } else {
-        line!(out, "device and PC DIFFER");
-    }
-    out
-}
-
-/// Result of `mimu device kalman`.
-pub fn kalman_text(result: &DeviceResult<KalmanRun>) -> String {
-    let mut out = String::new();
-    let run = &result.found;
-    line!(
-        out,
-        "{}: Kalman bank of the {}, forward model u = P x + b, {}",
-        result.port,
-        run.triad,
-        run.direction
-    );
-    for applied in &run.inputs {
-        let [x, y, z] = applied.input;
-        line!(
-            out,
-            "input {x:>9} {y:>9} {z:>9} {}   samples {} to {}",
-            run.input_unit,
-            applied.first,
-            applied.last
-        );
-    }
-    line!(
-        out,
-        "              device          sigma            PC   difference / sigma"
-    );
-    for (i, axis) in AXES.iter().enumerate() {
-        for (k, (name, unit)) in run.parameters.iter().zip(run.units).enumerate() {
-            line!(
-                out,
-                "{axis} {name:<3} {:>14.7} {:>14} {:>13.7}   {:>10}   {unit}",
-                run.device[i].mean[k],
-                significant(run.device[i].sigma[k]),
-                run.host[i].mean[k],
-                significant(run.distance_sigma[i][k]),
-            );
-        }
-    }
-    line!(
-        out,
-        "largest difference {} sigma; samples rejected: {}",
-        significant(run.largest_distance_sigma),
-        run.rejected
-    );
-    out
 }
 
 /// Result of `mimu record`.

@@ -8,6 +8,7 @@ mod diagnosis_page;
 mod effects;
 mod fuzz;
 mod import_command;
+mod over_temperature;
 mod pocket_calculator;
 mod readme;
 mod wizard;

@@ -174,6 +174,15 @@ impl OverTemperature {
             );
             return refuse("", problem);
         }
+        if let [first, .., last] = self.nodes.as_slice()
+            && (last.temp_c < from || first.temp_c > to)
+        {
+            let problem = format!(
+                "range_c is [{from}, {to}], and the nodes are from {} to {} °C",
+                first.temp_c, last.temp_c
+            );
+            return refuse("", problem);
+        }
         for (k, node) in self.nodes.iter().enumerate() {
             let before = k.checked_sub(1).map(|k| self.nodes[k].temp_c);
             if let Some(problem) = self.problem(node, before, has) {

@@ -5,5 +5,6 @@ mod allan_vectors;
 mod design;
 mod held_out;
 mod moving_input;
+mod over_temperature;
 mod spectrum;
 mod written_files;

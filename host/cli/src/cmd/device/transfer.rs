@@ -7,7 +7,7 @@ use clap::Args;
 use mimu::calibration::Calibration;
 use mimu_core::stored::{OLDEST, Refused};
 use mimu_device::{
-    DeviceResult, Image, calibration, contents, download, unit_name, unusable, upload,
+    DeviceResult, Image, calibration, contents, download, outside_now, unit_name, unusable, upload,
 };
 use mimu_recording::error::{Error, Result};
 use mimu_recording::result_file::stage;
@@ -58,10 +58,12 @@ pub fn run_upload(args: &UploadArgs) -> Result<()> {
     }
     image.check_device(&calibration, session.who(), &place)?;
     let bar = progress("uploading");
-    let done = upload(&mut session, &image, args.other_unit, |share| {
+    let mut done = upload(&mut session, &image, args.other_unit, |share| {
         bar.set_position((share * 1000.0) as u64)
     })?;
     bar.finish_and_clear();
+    done.warnings
+        .extend(outside_now(&mut session, &calibration)?);
     let result = DeviceResult::new("upload", session.port(), done);
     print(&args.json, &report::upload_text(&result), &result, None)
 }

@@ -25,12 +25,12 @@ use super::calibration::{Forward, text_of};
 use super::recording::rows;
 use super::{Place, Ran, command, mimu, start};
 
-const GRAVITY: f64 = 9.793;
+pub const GRAVITY: f64 = 9.793;
 /// What the firmware takes the reference pin of a gyro to have (data sheet).
 const NOMINAL_REFERENCE_V: f64 = 2.5;
 
 /// A board that runs while its port is open.
-struct Bench {
+pub struct Bench {
     port: String,
     /// The virtual clock, ms.
     now_ms: Arc<AtomicU64>,
@@ -81,22 +81,22 @@ impl Bench {
     }
 
     /// A unit carried through a plan.
-    fn carried(plan: &str, truth: &RigTruth) -> Self {
+    pub fn carried(plan: &str, truth: &RigTruth) -> Self {
         let plan = Plan::parse(Source::new("plan", plan)).unwrap();
         Self::new(Front::bench(&plan, truth, 7).unwrap())
     }
 
-    fn run(&self, place: &Place, arguments: &[&str]) -> Ran {
+    pub fn run(&self, place: &Place, arguments: &[&str]) -> Ran {
         mimu(place, &[arguments, &["--port", &self.port]].concat())
     }
 
-    fn json(&self, place: &Place, arguments: &[&str]) -> Value {
+    pub fn json(&self, place: &Place, arguments: &[&str]) -> Value {
         self.run(place, &[arguments, &["--json", "-"]].concat())
             .json()
     }
 
     /// Ends it. Nothing was lost on the line, and no rule of the part's manual was broken.
-    fn end(mut self) {
+    pub fn end(mut self) {
         self.end.store(true, Ordering::Relaxed);
         let mut served = self.thread.take().unwrap().join().unwrap();
         assert_eq!(served.traffic().lost, 0);
@@ -106,14 +106,14 @@ impl Bench {
 }
 
 /// The unit of fang's table 4.
-fn unit() -> RigTruth {
+pub fn unit() -> RigTruth {
     let file = RigFile::read(&in_repository("rig/rigs/fang.toml")).unwrap();
     RigTruth::resolve(&file, 7).unwrap()
 }
 
 /// What its readings are by the firmware's volts: those of the gyros relative to the first one's reference pin, those of the
 /// accelerometer relative to its supply, which is nominal in the rig file.
-fn forward(truth: &RigTruth) -> Forward {
+pub fn forward(truth: &RigTruth) -> Forward {
     let matrix = |m: [[f64; 3]; 3]| Matrix3::from_fn(|i, j| m[i][j]);
     let unit = &truth.file.unit;
     let (gyro, accel) = (
@@ -131,7 +131,7 @@ fn forward(truth: &RigTruth) -> Forward {
     ]
 }
 
-const AT_REST: &str = "format = \"mimu-plan/1\"\ndevice = \"unit-007\"\nsample_rate_hz = 1000.0\ncarrier = \"table\"\n\
+pub const AT_REST: &str = "format = \"mimu-plan/1\"\ndevice = \"unit-007\"\nsample_rate_hz = 1000.0\ncarrier = \"table\"\n\
      latitude_deg = 30.5\ngravity_mps2 = 9.793\nlead_in_s = 1.0\n[[step]]\nup = [0.0, 0.0, 1.0]\ndwell_s = 1000.0\n";
 
 fn significant(value: &Value) -> Vector3<f64> {

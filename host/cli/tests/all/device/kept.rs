@@ -180,6 +180,27 @@ fn curves_that_are_fetched_and_stored_again_are_the_same_to_the_last_byte() {
 }
 
 #[test]
+fn a_device_at_a_temperature_that_the_calibration_is_not_for_is_reported() {
+    let place = Place::new();
+    let peer = Peer::new(Script::default());
+    let upload = |range: &str| {
+        let file = of_unit(&place, &unit());
+        let text = std::fs::read_to_string(&file).unwrap();
+        let range = format!("temp_c = 26.5\ntemp_range_c = {range}");
+        std::fs::write(&file, text.replace("temp_c = 26.5", &range)).unwrap();
+        let sent = device(&place, &peer, &["upload", &file, "--json", "-"]).json();
+        sent["warnings"].as_array().unwrap().len()
+    };
+    let seen = device(&place, &peer, &["stream", "--for", "100ms", "--json", "-"]).json();
+    let temp_c = seen["temp_c"].as_f64().unwrap();
+    let range = |from: f64| format!("[{from:?}, {:?}]", from + 1.0);
+    assert_eq!(upload(&range(temp_c)), 0);
+    assert_eq!(upload(&range(temp_c + 4.0)), 0);
+    assert_eq!(upload(&range(temp_c + 6.0)), 1);
+    assert_eq!(upload(&range(temp_c - 8.0)), 1);
+}
+
+#[test]
 fn a_device_that_stores_no_curves_is_refused_before_anything_is_sent() {
     let place = Place::new();
     let peer = Peer::new(Script {

@@ -10,6 +10,7 @@ mod kept;
 mod peer;
 mod ports;
 mod recording;
+mod temperature;
 pub(crate) mod terminal;
 
 use std::path::PathBuf;

@@ -6,7 +6,7 @@ mod gaps;
 mod kept;
 mod law;
 mod refused;
-mod unit;
+pub mod unit;
 
 use std::process::Command;
 
@@ -201,7 +201,7 @@ fn every_effect_goes_into_the_bytes_of_a_device() {
     }
 }
 
-fn mimu(arguments: &[&str]) -> (bool, String) {
+pub fn mimu(arguments: &[&str]) -> (bool, String) {
     let run = Command::new(env!("CARGO_BIN_EXE_mimu"))
         .args(arguments)
         .output()

@@ -1,0 +1,51 @@
+//! Offsets of a stored calibration set anew, everything else kept.
+
+use super::bytes::Reader;
+use super::{CHECK, CRC, CURVES, HEADER, LENGTH_AT, Refused, decode};
+
+/// Where the time of the trim stands.
+const TRIMMED_AT: usize = HEADER + 52;
+/// Where the first node stands: behind the origin, the directions, the range and the lag.
+const NODES_AT: usize = HEADER + 60 + 144 + 12;
+const NODE: usize = 196;
+/// Where o of the gyro and o of the accelerometer stand in a node.
+const OFFSETS_AT: [usize; 2] = [4 + 36, 4 + 48 + 36];
+
+/// Adds to o of the gyro (rad/s) and of the accelerometer (m/s²) of every node, so that the curves move as they are, and writes when that was, UTC
+/// seconds since 1970. Origin, effects and all else stay as they are, bit by bit.
+///
+/// # Errors
+/// Why the bytes are no calibration, before or after; of a layout before [`VERSION`](super::VERSION) it is that version.
+pub fn trim(bytes: &mut [u8], add: [[f32; 3]; 2], trimmed_s: u64) -> Result<(), Refused> {
+    decode(bytes)?;
+    let mut head = Reader(bytes.get(LENGTH_AT - 2..).ok_or(Refused::Length)?);
+    let found = head.u16().ok_or(Refused::Length)?;
+    if found < CURVES {
+        return Err(Refused::Version { found });
+    }
+    let nodes = usize::from(*bytes.get(HEADER - 4).ok_or(Refused::Length)?);
+    put(bytes, TRIMMED_AT, &trimmed_s.to_le_bytes())?;
+    for node in 0..nodes {
+        for (triad, at) in add.iter().zip(OFFSETS_AT) {
+            for (axis, add) in triad.iter().enumerate() {
+                let at = NODES_AT + NODE * node + at + 4 * axis;
+                let mut from = Reader(bytes.get(at..).ok_or(Refused::Length)?);
+                let offset = from.f32().ok_or(Refused::Length)?;
+                put(bytes, at, &(offset + add).to_le_bytes())?;
+            }
+        }
+    }
+    let (body, check) = bytes
+        .split_last_chunk_mut::<CHECK>()
+        .ok_or(Refused::Length)?;
+    *check = CRC.checksum(body).to_le_bytes();
+    decode(bytes).map(|_| ())
+}
+
+fn put(bytes: &mut [u8], at: usize, new: &[u8]) -> Result<(), Refused> {
+    let room = bytes.get_mut(at..).ok_or(Refused::Length)?;
+    for (room, byte) in room.iter_mut().zip(new) {
+        *room = *byte;
+    }
+    Ok(())
+}

@@ -1,0 +1,279 @@
+//! `mimu verify` and `mimu apply` with a calibration over temperature, on a unit whose forward model is written out here: cubics of the
+//! temperature of dies that follow the thermometer late.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use mimu::calibration::{Calibration, NodeTable, OverTemperature, TemperatureNode};
+use mimu::fit::{Method, Options, fit};
+use mimu::prepared::Prepared;
+use mimu::stillness::STILL_FACTOR;
+use mimu_recording::{Batch, Recording};
+use nalgebra::{Matrix3, Vector3};
+
+use super::effects::{mimu, unit};
+
+const DWELLS: usize = 72;
+const RATE_HZ: f64 = 50.0;
+const ROWS: usize = 100;
+/// Lag of the dies, s, and the ramp of the thermometer, °C/s from 0 °C on.
+const LAG_S: f64 = 20.0;
+const RAMP: f64 = 0.35;
+
+/// Forward model at a temperature of the dies, V per SI: rows are sensors.
+fn forward(sensor: usize, die_c: f64) -> (Matrix3<f64>, Vector3<f64>) {
+    let (p, b) = unit::forward(sensor);
+    let w = die_c - 25.0;
+    let gain = |k: f64| 1.0 + 4e-4 * k * w + 3e-6 * w * w - 2e-8 * k * w * w * w;
+    let drift = |k: f64| 1e-3 * k * w - 2e-5 * w * w + 4e-7 * k * w * w * w;
+    let gains = Matrix3::from_diagonal(&Vector3::new(gain(1.0), gain(-1.0), gain(2.0)));
+    (
+        gains * p,
+        b + Vector3::new(drift(1.0), drift(-2.0), drift(0.5)),
+    )
+}
+
+/// Inverse model, raw to SI.
+fn inverse(sensor: usize, die_c: f64) -> (Matrix3<f64>, Vector3<f64>) {
+    let (p, b) = forward(sensor, die_c);
+    let c = p.try_inverse().unwrap();
+    (c, -c * b)
+}
+
+fn thermometer_c(t_s: f64) -> f64 {
+    RAMP * t_s
+}
+
+/// The lag's solution for the ramp.
+fn die_c(t_s: f64) -> f64 {
+    RAMP * (t_s - LAG_S * (1.0 - (-t_s / LAG_S).exp()))
+}
+
+/// Records the unit on a table: at 25 °C, or over the ramp.
+fn record(folder: &Path, ramp: bool) {
+    std::fs::create_dir(folder).unwrap();
+    let manifest = format!(
+        "format = \"mimu-recording/1\"\ndevice = \"bench\"\nsample_rate_hz = {RATE_HZ:?}\n\
+         gravity_mps2 = {:?}\nraw_unit = \"V\"\nreference = \"table\"\n",
+        unit::G
+    );
+    std::fs::write(folder.join("recording.toml"), manifest).unwrap();
+    let mut out = String::from(
+        "t_s,step,temp_c,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z,ref_rate_x_dps,ref_rate_y_dps,\
+         ref_rate_z_dps,ref_force_x_mps2,ref_force_y_mps2,ref_force_z_mps2\n",
+    );
+    let mut seed = 11_u64;
+    let mut normal = move || {
+        let mut next = || {
+            seed = seed
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            (seed >> 11) as f64 / (1u64 << 53) as f64
+        };
+        (0..12).map(|_| next()).sum::<f64>() - 6.0
+    };
+    for k in 0..DWELLS * ROWS {
+        let (t, step) = (k as f64 / RATE_HZ, k / ROWS);
+        let s = step as f64;
+        let force =
+            Vector3::new((2.4 * s).sin(), (2.4 * s).cos(), (0.9 * s).sin()).normalize() * unit::G;
+        let rate_dps = Vector3::new((1.3 * s).sin(), (1.7 * s).cos(), (2.9 * s).sin()) * 60.0;
+        let (shown, die) = match ramp {
+            true => (thermometer_c(t), die_c(t)),
+            false => (25.0, 25.0),
+        };
+        write!(out, "{t:.4},{step},{shown:.6}").unwrap();
+        for (sensor, input) in [rate_dps.map(f64::to_radians), force].iter().enumerate() {
+            let (p, b) = forward(sensor, die);
+            for u in (p * input + b).iter() {
+                write!(out, ",{:.9}", u + unit::NOISE[sensor] * normal()).unwrap();
+            }
+        }
+        for v in rate_dps.iter().chain(force.iter()) {
+            write!(out, ",{v:.9}").unwrap();
+        }
+        out.push('\n');
+    }
+    std::fs::write(folder.join("samples.csv"), out).unwrap();
+}
+
+/// A node with the truth at a temperature, and its derivative by the difference of neighbours.
+fn node(temp_c: f64) -> TemperatureNode {
+    let table = |sensor: usize| {
+        let (c, o) = inverse(sensor, temp_c);
+        let h = 1e-3;
+        let ((c1, o1), (c2, o2)) = (inverse(sensor, temp_c - h), inverse(sensor, temp_c + h));
+        let rows = |m: &Matrix3<f64>| [0, 1, 2].map(|i| [0, 1, 2].map(|j| m[(i, j)]));
+        Some(NodeTable {
+            C: rows(&c),
+            o: o.into(),
+            slope_C: rows(&((c2 - c1) / (2.0 * h))),
+            slope_o: ((o2 - o1) / (2.0 * h)).into(),
+            sigma_C: None,
+            sigma_o: None,
+        })
+    };
+    TemperatureNode {
+        temp_c,
+        gyro: table(0),
+        accel: table(1),
+    }
+}
+
+/// Fits the recording at 25 °C, and writes that calibration, and the same with the true curves.
+fn calibrations(folder: &Path) {
+    record(&folder.join("even"), false);
+    let recording = Recording::open(&folder.join("even")).unwrap();
+    let prepared = Prepared::read(&recording, STILL_FACTOR, |_| ()).unwrap();
+    let options = Options {
+        method: Method::LeastSquares,
+        holdout_blocks: 0,
+        still_factor: STILL_FACTOR,
+        only: None,
+    };
+    let fit = fit(prepared, options).unwrap();
+    let mut calibration = Calibration::of(&fit, &[], "2026-01-01T00:00:00Z").unwrap();
+    assert_eq!(calibration.recording.temp_range_c, Some([25.0, 25.0]));
+    std::fs::write(folder.join("one.toml"), calibration.to_toml()).unwrap();
+    calibration.format = Calibration::format_of(true).into();
+    calibration.temperature = Some(OverTemperature {
+        range_c: [10.0, 40.0],
+        lag_s: Some(LAG_S),
+        interval_lag_s: Some([19.0, 21.0]),
+        nodes: (0..7).map(|k| node(10.0 * f64::from(k) - 5.0)).collect(),
+    });
+    std::fs::write(folder.join("curves.toml"), calibration.to_toml()).unwrap();
+}
+
+fn verified(folder: &Path, calibration: &str) -> serde_json::Value {
+    let [rec, cal] = ["ramp", calibration].map(|name| folder.join(name).display().to_string());
+    let (done, text) = mimu(&["verify", &rec, "--calibration", &cal, "--json", "-"]);
+    assert!(done, "{text}");
+    serde_json::from_str(&text).unwrap()
+}
+
+/// Count and distance of the warning on temperatures.
+fn outside(json: &serde_json::Value) -> (f64, f64) {
+    let all: Vec<&str> = json["warnings"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .filter_map(|w| w.as_str())
+        .collect();
+    let of: Vec<&&str> = all
+        .iter()
+        .filter(|w| w.contains("samples are outside"))
+        .collect();
+    let [warning] = of[..] else { panic!("{all:?}") };
+    let count = warning.split(' ').next().unwrap().parse().unwrap();
+    let by = warning
+        .split("by up to ")
+        .nth(1)
+        .unwrap()
+        .split(' ')
+        .next()
+        .unwrap();
+    (count, by.parse().unwrap())
+}
+
+#[test]
+fn curves_and_lag_leave_the_noise_and_the_model_of_one_temperature_does_not() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    calibrations(folder);
+    record(&folder.join("ramp"), true);
+    let (one, curves) = (
+        verified(folder, "one.toml"),
+        verified(folder, "curves.toml"),
+    );
+    for sensor in ["gyro", "accel"] {
+        let figure =
+            |json: &serde_json::Value, name: &str| json["sensors"][sensor][name].as_f64().unwrap();
+        let floor = figure(&curves, "noise_floor");
+        assert!(figure(&curves, "rms") < 2.0 * floor, "{curves}");
+        assert!(figure(&one, "rms") > 50.0 * floor, "{one}");
+    }
+    // Block by block, so within a block of either end.
+    let seconds = |inside: &dyn Fn(f64) -> bool| {
+        let all = (0..DWELLS * ROWS).map(|k| k as f64 / RATE_HZ);
+        all.filter(|t| !inside(*t)).count() as f64
+    };
+    let (count, by) = outside(&curves);
+    let expected = seconds(&|t| (10.0..=40.0).contains(&die_c(t)));
+    assert!(
+        (count - expected).abs() <= 2.0 * ROWS as f64,
+        "{count} {expected}"
+    );
+    assert!((by - 10.0).abs() < 0.5, "{by}");
+    let (count, by) = outside(&one);
+    let expected = seconds(&|t| (20.0..=30.0).contains(&thermometer_c(t)));
+    assert!(
+        (count - expected).abs() <= 2.0 * ROWS as f64,
+        "{count} {expected}"
+    );
+    assert!((by - 25.0).abs() < 0.5, "{by}");
+}
+
+#[test]
+fn a_compensated_recording_follows_the_dies() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    calibrations(folder);
+    record(&folder.join("ramp"), true);
+    let [rec, cal, out] =
+        ["ramp", "curves.toml", "out"].map(|name| folder.join(name).display().to_string());
+    let (done, text) = mimu(&[
+        "apply",
+        &rec,
+        "--calibration",
+        &cal,
+        "-o",
+        &out,
+        "--json",
+        "-",
+    ]);
+    assert!(done, "{text}");
+    outside(&serde_json::from_str(&text).unwrap());
+    let mut all = Batch::default();
+    let collect = |batch: &Batch| {
+        for (into, from) in all.raw.iter_mut().zip(&batch.raw) {
+            into.extend(from);
+        }
+        for (into, from) in all.reference.iter_mut().zip(&batch.reference) {
+            into.extend(from);
+        }
+        Ok(())
+    };
+    let recording = Recording::open(Path::new(&out)).unwrap();
+    recording.for_each_batch(|_| (), collect).unwrap();
+    for c in 0..6 {
+        let unit = if c < 3 { 1.0_f64.to_radians() } else { 1.0 };
+        let errors: Vec<f64> = all.raw[c]
+            .iter()
+            .zip(&all.reference[c])
+            .map(|(x, input)| x - input * unit)
+            .collect();
+        for (k, dwell) in errors.chunks(ROWS).enumerate() {
+            let mean = dwell.iter().sum::<f64>() / ROWS as f64;
+            // Six sigmas of a mean: 1e-4 V and 2e-4 V of noise, 0.3 V/(rad/s) and 0.07 V/(m/s²).
+            let bound = if c < 3 { 2.5e-4 } else { 2e-3 };
+            assert!(mean.abs() < bound, "channel {c}, dwell {k}: {mean}");
+        }
+    }
+}
+
+#[test]
+fn a_recording_without_temperatures_is_verified_by_the_one_model_and_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    calibrations(folder);
+    record(&folder.join("ramp"), false);
+    let samples = folder.join("ramp/samples.csv");
+    let text = std::fs::read_to_string(&samples).unwrap();
+    std::fs::write(&samples, text.replace(",25.000000,", ",,")).unwrap();
+    let json = verified(folder, "curves.toml");
+    let warnings = json["warnings"].to_string();
+    assert!(warnings.contains("no temp_c"), "{warnings}");
+    let floor = json["sensors"]["gyro"]["noise_floor"].as_f64().unwrap();
+    assert!(json["sensors"]["gyro"]["rms"].as_f64().unwrap() < 2.0 * floor);
+}

@@ -1,0 +1,331 @@
+//! Offsets of the stored calibration set anew while the unit lies still: biases move by more within a month than anything else does, and
+//! need no rate table.
+
+use std::time::Duration;
+
+use mimu_core::compensation::Sample;
+use mimu_core::stored::{self, OLDEST, Refused, VERSION};
+use serde::Serialize;
+
+use super::image::Image;
+use super::session::Session;
+use super::stream::{Stream, Streamed, stream};
+use super::upload::{download, upload};
+use super::who::{Hash, unusable};
+use mimu::quantity::{AXES, Sensor};
+use mimu_recording::error::{Error, Result};
+
+/// Length of the stretches whose means are compared, s: their scatter is what is left of the noise, whatever its spectrum is within them.
+const STRETCH_S: f64 = 0.5;
+/// Shortest average, s: eight stretches, of which a deviation is known within a quarter.
+pub const SHORTEST_TRIM_S: f64 = 8.0 * STRETCH_S;
+/// Most that the means of stretches scatter by, and differ between the halves, while the unit lies still: 0.5 deg/s, where a gyro's noise makes
+/// 0.1, and 0.1 m/s², a tilt by 0.6 degrees, where the accelerometer's makes 0.004.
+const STILL: [f64; 2] = [0.0087, 0.1];
+/// Most that is trimmed: 10 deg/s and 2 m/s². Biases do not drift so far within the sensors' range of temperature; a unit that turns steadily about
+/// the vertical, and one in another pose than the one that was given, look like it.
+const MOST: [f64; 2] = [0.175, 2.0];
+
+/// What is known of the state of the unit while it lies still.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pose {
+    /// Specific force in the body frame, m/s²: gravity's magnitude along the direction that points up. `None`: not known, and the
+    /// accelerometer keeps its offsets. Its magnitude alone would not do: it is one number for three offsets, and the one that it gives, along the
+    /// pose, is as well an error of scale.
+    pub force_mps2: Option<[f64; 3]>,
+}
+
+/// Errors of the output of a triad while the unit lay still.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct TrimmedTriad {
+    /// Whether its offsets were set anew.
+    pub trimmed: bool,
+    /// Mean error of the compensated output x, y, z before; without a known input, the output.
+    pub before: [f64; 3],
+    /// Standard deviations of these means.
+    pub sigma_before: [f64; 3],
+    /// The same after it was stored, by new samples.
+    pub after: [f64; 3],
+    /// Standard deviations of these.
+    pub sigma_after: [f64; 3],
+    /// What was added to o of every node.
+    pub added: [f32; 3],
+    /// rad/s or m/s^2.
+    pub unit: &'static str,
+}
+
+/// How a trim went: the result of `mimu device trim`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Trimmed {
+    /// Gyro.
+    pub gyro: TrimmedTriad,
+    /// Accelerometer.
+    pub accel: TrimmedTriad,
+    /// Temperature of the dies, °C, that it was done at. The curves move by the same everywhere.
+    pub temp_c: f64,
+    /// Averaged before and after, s each.
+    pub averaged_s: f64,
+    /// Hash of the calibration before.
+    pub before: Hash,
+    /// Hash of the one now.
+    pub hash: Hash,
+    /// One sentence for each thing that a person should know.
+    pub warnings: Vec<String>,
+}
+
+/// Means of stretches of the compensated stream.
+struct Average {
+    means: Vec<Sample<f64>>,
+    summary: Streamed,
+}
+
+/// Averages the compensated output for `duration` while the unit lies still, adds to the offsets of all nodes what makes it right, has the
+/// calibration stored, and looks at the output again. `trimmed_s`: now, UTC seconds since 1970. `progress` hears the share that is done.
+///
+/// Unit, date and recording of the calibration stay those that they were.
+pub fn trim(
+    session: &mut Session,
+    pose: &Pose,
+    duration: Duration,
+    trimmed_s: u64,
+    progress: impl Fn(f64),
+) -> Result<Trimmed> {
+    let mut bytes = download(session)?;
+    let held = Hash(stored::hash(&bytes));
+    // Refused before the time is spent: the numbers do not matter.
+    stored::trim(&mut bytes.clone(), [[0.0; 3]; 2], trimmed_s)
+        .map_err(|refused| refuse(session, &refused))?;
+    let before = average(session, duration, |share| progress(0.45 * share))?;
+    if let Some(motion) = before.motion() {
+        let remedy = "let it lie still and trim again; the calibration is as it was";
+        return Err(Error::device(session.port(), motion, remedy));
+    }
+    let input = [Some([0.0; 3]), pose.force_mps2];
+    let errors = before.errors(input);
+    check_size(session, &errors, input)?;
+    let add = [0, 1].map(|i| match input[i] {
+        Some(_) => errors[i].0.map(|error| -error as f32),
+        None => [0.0; 3],
+    });
+    stored::trim(&mut bytes, add, trimmed_s).map_err(|refused| refuse(session, &refused))?;
+    let image = Image::stored_before(bytes).map_err(|refused| refuse(session, &refused))?;
+    // The device holds a calibration of this unit already: somebody has insisted on it then.
+    upload(session, &image, true, |share| progress(0.45 + 0.1 * share))?;
+    let after = average(session, duration, |share| progress(0.55 + 0.45 * share))?;
+    let left = after.errors(input);
+    let triad = |sensor: Sensor| {
+        let i = sensor as usize;
+        TrimmedTriad {
+            trimmed: input[i].is_some(),
+            before: errors[i].0,
+            sigma_before: errors[i].1,
+            after: left[i].0,
+            sigma_after: left[i].1,
+            added: add[i],
+            unit: sensor.unit(),
+        }
+    };
+    Ok(Trimmed {
+        gyro: triad(Sensor::Gyro),
+        accel: triad(Sensor::Accel),
+        temp_c: before.summary.temp_c,
+        averaged_s: duration.as_secs_f64(),
+        before: held,
+        hash: image.hash,
+        warnings: warnings(&before, &after),
+    })
+}
+
+fn warnings(before: &Average, after: &Average) -> Vec<String> {
+    let mut all = before.summary.flagged.warnings();
+    all.extend(after.summary.flagged.warnings());
+    let missing = before.summary.missing + after.summary.missing;
+    if missing > 0 {
+        all.push(format!("{missing} samples were missing"));
+    }
+    if let Some(motion) = after.motion() {
+        all.push(format!(
+            "{motion} after the calibration was stored: the figures after it are of a unit that moved; look again with `mimu device stream compensated`"
+        ));
+    }
+    all
+}
+
+/// Refuses a trim that no drift explains.
+fn check_size(
+    session: &Session,
+    errors: &[([f64; 3], [f64; 3]); 2],
+    input: [Option<[f64; 3]>; 2],
+) -> Result<()> {
+    for sensor in Sensor::BOTH {
+        let (i, unit) = (sensor as usize, sensor.unit());
+        if input[i].is_none() {
+            continue;
+        }
+        for (axis, error) in AXES.iter().zip(errors[i].0) {
+            if !(error.abs() <= MOST[i]) {
+                let problem = format!(
+                    "{sensor} {axis} is off by {error:.3} {unit}, and a drift is at most {} {unit}",
+                    MOST[i]
+                );
+                let remedy = match sensor {
+                    Sensor::Gyro => {
+                        "check that the unit does not turn, and that the calibration is of this unit"
+                    }
+                    Sensor::Accel => {
+                        "check the pose that was given, and that the calibration is of this unit"
+                    }
+                };
+                return Err(Error::device(session.port(), problem, remedy));
+            }
+        }
+    }
+    Ok(())
+}
+
+fn refuse(session: &Session, refused: &Refused) -> Error {
+    let problem = match refused {
+        Refused::Version { found } if (OLDEST..VERSION).contains(found) => {
+            format!(
+                "the device keeps its calibration in layout {found}, which has no place for the time of a trim"
+            )
+        }
+        other => format!("its calibration cannot be trimmed: {}", unusable(other)),
+    };
+    let remedy = "upload the calibration file again, then trim";
+    Error::device(session.port(), problem, remedy)
+}
+
+/// The compensated output of a unit that lies still.
+fn average(session: &mut Session, duration: Duration, progress: impl Fn(f64)) -> Result<Average> {
+    let rate_hz = f64::from(session.who().sample_rate_hz);
+    let stretch = (STRETCH_S * rate_hz).round() as u64;
+    let wanted = duration.as_secs_f64() * rate_hz;
+    let (mut means, mut sum, mut count, mut taken) = (Vec::new(), zero(), 0, 0_u64);
+    let summary = stream(
+        session,
+        Stream::Compensated,
+        Some(duration),
+        || false,
+        |_, _, sample| {
+            sum.gyro += sample.gyro.map(f64::from);
+            sum.accel += sample.accel.map(f64::from);
+            count += 1;
+            taken += 1;
+            if count == stretch {
+                let n = count as f64;
+                means.push(Sample {
+                    gyro: sum.gyro / n,
+                    accel: sum.accel / n,
+                });
+                (sum, count) = (zero(), 0);
+                progress(taken as f64 / wanted);
+            }
+            Ok(())
+        },
+    )?;
+    Ok(Average { means, summary })
+}
+
+fn zero() -> Sample<f64> {
+    Sample {
+        gyro: nalgebra::Vector3::zeros(),
+        accel: nalgebra::Vector3::zeros(),
+    }
+}
+
+impl Average {
+    /// Mean errors of gyro and accelerometer against these inputs, and their standard deviations.
+    fn errors(&self, input: [Option<[f64; 3]>; 2]) -> [([f64; 3], [f64; 3]); 2] {
+        let values = |i: usize, axis: usize| {
+            let means = self.means.iter();
+            means.map(move |m| [m.gyro, m.accel][i][axis])
+        };
+        [0, 1].map(|i| {
+            let (mut error, mut sigma) = ([0.0; 3], [0.0; 3]);
+            for axis in 0..3 {
+                let n = self.means.len() as f64;
+                let mean = values(i, axis).sum::<f64>() / n;
+                let squares: f64 = values(i, axis).map(|v| (v - mean).powi(2)).sum();
+                error[axis] = mean - input[i].unwrap_or_default()[axis];
+                sigma[axis] = (squares / (n - 1.0).max(1.0) / n).sqrt();
+            }
+            (error, sigma)
+        })
+    }
+
+    /// What moved, if anything did: the first half against the second, and the scatter of all.
+    fn motion(&self) -> Option<String> {
+        let mean = |of: &[f64]| of.iter().sum::<f64>() / of.len().max(1) as f64;
+        for sensor in Sensor::BOTH {
+            let (i, unit) = (sensor as usize, sensor.unit());
+            for (axis, name) in AXES.iter().enumerate() {
+                let all: Vec<f64> = self
+                    .means
+                    .iter()
+                    .map(|m| [m.gyro, m.accel][i][axis])
+                    .collect();
+                let (first, second) = all.split_at(all.len() / 2);
+                let apart = mean(second) - mean(first);
+                let middle = mean(&all);
+                let squares: Vec<f64> = all.iter().map(|v| (v - middle).powi(2)).collect();
+                let scatter = mean(&squares).sqrt();
+                if !(apart.abs() <= STILL[i] && scatter <= STILL[i]) {
+                    return Some(format!(
+                        "the unit moved: {sensor} {name} scattered by {scatter:.4} {unit}, and changed by {apart:.4} {unit}"
+                    ));
+                }
+            }
+        }
+        None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Vector3;
+
+    fn average(means: impl Iterator<Item = (Vector3<f64>, Vector3<f64>)>) -> Average {
+        Average {
+            means: means.map(|(gyro, accel)| Sample { gyro, accel }).collect(),
+            summary: Streamed::new(Stream::Compensated),
+        }
+    }
+
+    #[test]
+    fn errors_are_means_less_the_input_with_the_scatter_of_the_stretches() {
+        let alternating = |k: usize| if k % 2 == 0 { 1.0 } else { -1.0 };
+        let found = average((0..16).map(|k| {
+            let off = Vector3::new(0.01, 0.0, -0.02).add_scalar(0.001 * alternating(k));
+            (off, Vector3::new(0.1, -0.1, 9.9))
+        }));
+        assert_eq!(found.motion(), None);
+        let [(gyro, sigma), (accel, none)] = found.errors([Some([0.0; 3]), Some([0.0, 0.0, 9.8])]);
+        // 16 values of ±1 have a standard deviation of sqrt(16/15), and their mean one of that over 4.
+        let expected = 0.001 * (16.0_f64 / 15.0).sqrt() / 4.0;
+        for axis in 0..3 {
+            assert!((gyro[axis] - [0.01, 0.0, -0.02][axis]).abs() < 1e-12);
+            assert!((sigma[axis] - expected).abs() < 1e-12);
+            assert!((accel[axis] - [0.1, -0.1, 0.1][axis]).abs() < 1e-12);
+            assert!(none[axis] < 1e-12);
+        }
+    }
+
+    #[test]
+    fn a_unit_that_tilts_or_turns_for_a_while_has_moved() {
+        let still = Vector3::new(0.0, 0.0, 9.8);
+        let tilted = average((0..16).map(|k| {
+            let tilt = if k < 8 { 0.0 } else { 0.15 };
+            (Vector3::zeros(), still + Vector3::x() * tilt)
+        }));
+        let motion = tilted.motion().unwrap();
+        assert!(motion.contains("accel x"), "{motion}");
+        let turned = average((0..16).map(|k| {
+            let rate = if k == 5 { 0.05 } else { 0.0 };
+            (Vector3::y() * rate, still)
+        }));
+        let motion = turned.motion().unwrap();
+        assert!(motion.contains("gyro y"), "{motion}");
+    }
+}

@@ -1,0 +1,163 @@
+//! What a calibration file has to be to be applied.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::{
+    Calibration, FORMAT, FORMAT_OF_CURVES, FORMULA, INVERSE_DIRECTION, TriadTable, effect,
+};
+use crate::quantity::Sensor;
+use crate::triad::Forward;
+use mimu_recording::error::{Error, Result};
+
+impl Calibration {
+    /// What can be applied, with its effects as they are removed.
+    pub(super) fn checked(mut self, place: &str) -> Result<Self> {
+        self.check_format(place)?;
+        for sensor in Sensor::BOTH {
+            let Some(table) = self.table(sensor) else {
+                continue;
+            };
+            let place = format!("{place}, [{sensor}]");
+            let numbers = table
+                .C
+                .iter()
+                .flatten()
+                .chain(&table.o)
+                .chain(table.covariance.iter().flatten());
+            if !numbers.into_iter().all(|x| x.is_finite()) {
+                return Err(Error::new(
+                    place,
+                    "C, o or covariance has an entry that is not a number",
+                    "fit the recording again",
+                ));
+            }
+            if table.direction != INVERSE_DIRECTION || table.formula != FORMULA {
+                let problem = format!(
+                    "formula {:?}, direction {:?}: only {FORMULA}, {INVERSE_DIRECTION}, can be applied",
+                    table.formula, table.direction
+                );
+                return Err(Error::new(
+                    place,
+                    problem,
+                    "use the version of mimu that wrote it",
+                ));
+            }
+            if let Some((there, missing)) = table.half_uncertain() {
+                return Err(Error::new(
+                    place,
+                    format!("{there} is there and {missing} is not: the file is cut or was edited"),
+                    "copy it again, or fit the recording again",
+                ));
+            }
+            let known = table.sigma_C.is_some();
+            if known && table.covariance.len() != 12
+                || table.covariance.iter().any(|r| r.len() != 12)
+            {
+                return Err(Error::new(
+                    place,
+                    "covariance is not 12 by 12",
+                    "fit the recording again",
+                ));
+            }
+            let inverse = self.inverse(sensor);
+            let Some(forward) = inverse.as_ref().and_then(Forward::of) else {
+                return Err(Error::new(
+                    place,
+                    "C is singular",
+                    "fit the recording again",
+                ));
+            };
+            check_both_ways(table, &forward, &place)?;
+        }
+        self.check_temperatures(place)?;
+        let digits = |id: &str| id.len() == 24 && id.bytes().all(|b| b.is_ascii_hexdigit());
+        if let Some(id) = self.unit_id.as_ref().filter(|id| !digits(id)) {
+            return Err(Error::new(
+                format!("{place}, unit_id"),
+                format!("{id:?} is no number of a unit"),
+                "write 24 hexadecimal digits, as `mimu device info` gives them, or leave the key out",
+            ));
+        }
+        if self.gyro.is_none() && self.accel.is_none() {
+            return Err(Error::new(
+                place,
+                "there is neither [gyro] nor [accel]",
+                "fit the recording again",
+            ));
+        }
+        self.effects = effect::read(&self, place)?;
+        Ok(self)
+    }
+
+    fn check_format(&self, place: &str) -> Result<()> {
+        let curves = self.temperature.is_some();
+        let expected = if curves { FORMAT_OF_CURVES } else { FORMAT };
+        let problem = match self.format.as_str() {
+            format if format == expected => return Ok(()),
+            FORMAT => "there is a [temperature], and format is that of a calibration without one",
+            FORMAT_OF_CURVES => {
+                "there is no [temperature], and format is that of a calibration with one"
+            }
+            other => {
+                let problem = format!(
+                    "format is {other:?}, and this program reads {FORMAT:?} and {FORMAT_OF_CURVES:?}"
+                );
+                let remedy = "use the version of mimu that wrote it";
+                return Err(Error::new(place, problem, remedy));
+            }
+        };
+        let remedy = "the file is cut or was edited: copy it again, or fit the recordings again";
+        Err(Error::new(place, problem, remedy))
+    }
+
+    fn check_temperatures(&self, place: &str) -> Result<()> {
+        if let Some([from, to]) = self.recording.temp_range_c
+            && !(from.is_finite() && to.is_finite() && from <= to)
+        {
+            return Err(Error::new(
+                format!("{place}, [recording]"),
+                format!("temp_range_c is [{from}, {to}], and has to rise"),
+                "fit the recording again",
+            ));
+        }
+        match &self.temperature {
+            None => Ok(()),
+            Some(all) => all.check(place, [self.gyro.is_some(), self.accel.is_some()]),
+        }
+    }
+}
+
+impl TriadTable {
+    /// Of what belongs together, something that is there and something that is not.
+    fn half_uncertain(&self) -> Option<(&'static str, &'static str)> {
+        let all = [
+            ("sigma_C", self.sigma_C.is_some()),
+            ("sigma_o", self.sigma_o.is_some()),
+            ("interval_C", self.interval_C.is_some()),
+            ("interval_o", self.interval_o.is_some()),
+            ("covariance", !self.covariance.is_empty()),
+            ("[judged]", self.judged.is_some()),
+        ];
+        let there = all.iter().find(|(_, there)| *there)?;
+        let missing = all.iter().find(|(_, there)| !*there)?;
+        Some((there.0, missing.0))
+    }
+}
+
+/// Refuses a file in which the two directions of the calibration disagree: one of them was edited.
+fn check_both_ways(table: &TriadTable, forward: &Forward, place: &str) -> Result<()> {
+    let (matrix, offset) = (forward.matrix, forward.bias);
+    let off_p = Matrix3::from_fn(|i, j| table.forward.P[i][j] - matrix[(i, j)]);
+    let off_b = Vector3::from(table.forward.b) - offset;
+    // Both are written to all their digits; what an inversion loses stays far below.
+    let alike = off_p.norm() <= 1e-6 * matrix.norm()
+        && off_b.norm() <= 1e-6 * (offset.norm() + matrix.norm());
+    if alike {
+        return Ok(());
+    }
+    Err(Error::new(
+        place,
+        "C and o are not the inverse of forward.P and forward.b: the file was edited",
+        "fit the recording again",
+    ))
+}
