@@ -22,7 +22,7 @@ mod views;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use cmd::{allan, apply, design, device, diagnose, fit, import, record, verify, wizard};
+use cmd::{allan, apply, design, device, diagnose, fit, import, record, thermal, verify, wizard};
 
 /// Calibration of inertial units made of analog MEMS sensors.
 ///
@@ -51,6 +51,8 @@ enum Command {
     Diagnose(diagnose::DiagnoseArgs),
     /// Design the experiment: which attitudes and rates, how many, for how long
     Design(design::DesignArgs),
+    /// Curves over temperature, and the lag of the dies behind the thermometer: fit, compare
+    Thermal(thermal::ThermalArgs),
     /// Noise of a unit at rest: Allan deviation, N, B, K, Q and R
     Allan(allan::AllanArgs),
     /// Write noise coefficients in the format of another program
@@ -71,6 +73,7 @@ pub fn run() -> ExitCode {
         Command::Apply(args) => apply::run(&args),
         Command::Diagnose(args) => diagnose::run(&args),
         Command::Design(args) => design::run(&args),
+        Command::Thermal(args) => thermal::run(&args),
         Command::Allan(args) => allan::run(&args),
         Command::Export(args) => cmd::export::run(&args),
         Command::Record(args) => record::run(&args),
