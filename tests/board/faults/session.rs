@@ -148,7 +148,10 @@ impl Sitting {
         let outcome: Value = serde_json::from_str(&read("outcome.json")).unwrap_or_default();
         let found = &outcome["units"][0];
         let stored = match found["stored"].as_str() {
-            Some(file) => Some(errors(&self.folder.join(file), &self.truth)?),
+            Some(file) => {
+                let by_hand = self.arguments.iter().any(|a| a == "hands");
+                Some(errors(&self.folder.join(file), &self.truth, by_hand)?)
+            }
             None => None,
         };
         let text = |v: &Value| v.as_str().unwrap_or_default().to_owned();
@@ -167,8 +170,19 @@ impl Sitting {
     }
 }
 
+/// The axes that a calibration by hand is given in, by rows: x along the accelerometer's x, and the xy plane through its y.
+fn own_axes(accel: &[[f64; 3]; 3]) -> [[f64; 3]; 3] {
+    let dot = |a: [f64; 3], b: [f64; 3]| a.iter().zip(&b).map(|(a, b)| a * b).sum::<f64>();
+    let unit = |a: [f64; 3]| a.map(|v| v / dot(a, a).sqrt());
+    let x = unit(accel[0]);
+    let along = dot(accel[1], x);
+    let y = unit([0, 1, 2].map(|i| accel[1][i] - along * x[i]));
+    let z = [0, 1, 2].map(|i| x[(i + 1) % 3] * y[(i + 2) % 3] - x[(i + 2) % 3] * y[(i + 1) % 3]);
+    [x, y, z]
+}
+
 /// Largest errors of a calibration file over inputs of full size along each axis, and none: deg/s, mg.
-fn errors(file: &Path, truth: &RigTruth) -> Result<[f64; 2], String> {
+fn errors(file: &Path, truth: &RigTruth, by_hand: bool) -> Result<[f64; 2], String> {
     let text = std::fs::read_to_string(file).map_err(|e| format!("{}: {e}", file.display()))?;
     let table: toml::Table = text
         .parse()
@@ -178,6 +192,11 @@ fn errors(file: &Path, truth: &RigTruth) -> Result<[f64; 2], String> {
         .gyro_reference_v
         .ok_or("the unit has no reference pins")?;
     let affine = [("gyro", &unit.gyro_affine), ("accel", &unit.accel_affine)];
+    let body = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    let axes = match (by_hand, &unit.accel_affine) {
+        (true, Some(accel)) => own_axes(&accel.matrix),
+        _ => body,
+    };
     let mut worst = [0.0_f64; 2];
     for (k, (name, forward)) in affine.into_iter().enumerate() {
         let forward = forward.as_ref().ok_or("the unit has no affine model")?;
@@ -199,8 +218,11 @@ fn errors(file: &Path, truth: &RigTruth) -> Result<[f64; 2], String> {
             for sign in [1.0, -1.0, 0.0] {
                 let input: [f64; 3] =
                     std::array::from_fn(|i| if i == axis { sign * size } else { 0.0 });
+                // In the body's axes, which the unit's truth is given in.
+                let turned: [f64; 3] =
+                    std::array::from_fn(|j| (0..3).map(|k| axes[k][j] * input[k]).sum());
                 let raw: [f64; 3] = std::array::from_fn(|i| {
-                    let sum: f64 = (0..3).map(|j| forward.matrix[i][j] * input[j]).sum();
+                    let sum: f64 = (0..3).map(|j| forward.matrix[i][j] * turned[j]).sum();
                     ratio * (sum + forward.bias[i])
                 });
                 let error = (0..3).map(|i| {
