@@ -76,7 +76,7 @@ pub const STEPS: [Step; 6] = [
         banks: false,
     },
     Step {
-        // The gyros warm up after power-on by some degrees, through several nodes.
+        // The gyros warm up after power-on by some degrees, through several nodes, which the dies follow late.
         name: "temperature",
         plan: "carrier = \"table\"\nlead_in_s = 0.3\n[[step]]\nup = [0.0, 0.0, 1.0]\ndwell_s = 20.0\n",
         calibration: nodes,
@@ -136,8 +136,27 @@ fn model(warmth: f64) -> Compensation<f32> {
     }
 }
 
-fn stored(temps: &[f64], records: &[Record<'_>]) -> Vec<u8> {
-    let node = |&temp_c: &f64| Node::constant(temp_c as f32, model(temp_c - 25.0));
+fn stored(temps: &[f64], lag_s: Option<f32>, records: &[Record<'_>]) -> Vec<u8> {
+    let slope = |before: &Affine<f32>, after: &Affine<f32>| Affine {
+        matrix: after.matrix - before.matrix,
+        offset: after.offset - before.offset,
+    };
+    let node = |&temp_c: &f64| {
+        let warmth = temp_c - 25.0;
+        if temps.len() == 1 {
+            return Node::constant(temp_c as f32, model(warmth));
+        }
+        // Derivatives by the difference over a kelvin.
+        let (before, after) = (model(warmth - 0.5), model(warmth + 0.5));
+        Node {
+            temp_c: temp_c as f32,
+            model: model(warmth),
+            slope: Compensation {
+                gyro: slope(&before.gyro, &after.gyro),
+                accel: slope(&before.accel, &after.accel),
+            },
+        }
+    };
     let nodes: Vec<_> = temps.iter().map(node).collect();
     let found_with = model(0.0);
     let mut bytes = vec![0; stored::MAX_LENGTH];
@@ -145,7 +164,10 @@ fn stored(temps: &[f64], records: &[Record<'_>]) -> Vec<u8> {
     let length = stored::encode(
         &stored::Origin::UNKNOWN,
         matrices,
-        &Curves::of(&nodes),
+        &Curves {
+            lag_s,
+            ..Curves::of(&nodes)
+        },
         records,
         &mut bytes,
     )
@@ -155,12 +177,12 @@ fn stored(temps: &[f64], records: &[Record<'_>]) -> Vec<u8> {
 }
 
 fn affine() -> Vec<u8> {
-    stored(&[25.0], &[])
+    stored(&[25.0], None, &[])
 }
 
 fn nodes() -> Vec<u8> {
     let temps: Vec<f64> = (0..16).map(|k| 24.0 + f64::from(k)).collect();
-    stored(&temps, &[])
+    stored(&temps, Some(5.0), &[])
 }
 
 /// One of every kind of law. Without lags, whose state when the stream begins is not on the line, and without the warm-up, whose
@@ -207,7 +229,7 @@ fn with_effects() -> Vec<u8> {
             errors: &[3e-4, 0.0, -2e-4, 0.0, 1e-4, 0.0, 0.0, 0.0, 2e-4],
         },
     ];
-    stored(&[20.0, 30.0, 40.0], &records)
+    stored(&[20.0, 30.0, 40.0], None, &records)
 }
 
 /// A trace.
