@@ -259,7 +259,7 @@ fn fidget(folder: &Path) -> Result<Ended, String> {
     sitting.end()
 }
 
-/// A person who has the faces, edges and corners of a box in an order of their own.
+/// A person who has the faces, edges and corners of a box in an order of their own, and only then does what is asked.
 fn any_order(folder: &Path) -> Result<Ended, String> {
     let mut sitting = Sitting::new("hands", 13, folder, &["--fixture", "hands", "--dwell", "2"])?;
     sitting.run()?;
@@ -274,10 +274,13 @@ fn any_order(folder: &Path) -> Result<Ended, String> {
         }
     }
     let mut next = 0;
-    // Until the recognised poses are enough.
-    while next < 10 * poses.len() {
+    while next < 4 * poses.len() {
         let had = sitting.told("dwell");
-        sitting.board.tell(&poses[(7 * next) % poses.len()])?;
+        let pose = match next < poses.len() {
+            true => poses[(7 * next) % poses.len()].clone(),
+            false => sitting.asked_pose()?,
+        };
+        sitting.board.tell(&pose)?;
         next += 1;
         let asked = std::time::Instant::now();
         let patience = Duration::from_secs(12);

@@ -106,6 +106,18 @@ impl Sitting {
         text.lines().filter(|l| l.starts_with(&wanted)).count()
     }
 
+    /// The pose that is asked for now, as the bench is told it.
+    pub fn asked_pose(&self) -> Result<String, String> {
+        let text = std::fs::read_to_string(self.folder.join("events.jsonl")).unwrap_or_default();
+        let last = text.lines().rfind(|l| l.starts_with("{\"event\":\"step\""));
+        let event: Value = serde_json::from_str(last.unwrap_or_default()).unwrap_or_default();
+        let up = event["step"]["up"]
+            .as_array()
+            .ok_or("no pose was asked for")?;
+        let up: Vec<String> = up.iter().map(Value::to_string).collect();
+        Ok(format!("MOVE {}", up.join(" ")))
+    }
+
     /// Waits until `ready`; `false` if the command has ended before.
     pub fn wait_for(&mut self, ready: impl Fn(&Self) -> bool) -> Result<bool, String> {
         loop {
