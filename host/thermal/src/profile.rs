@@ -89,7 +89,8 @@ impl Profile {
             grid.clone_from(&points);
         }
         Some(Self {
-            lag: interval(&points, best.0),
+            // Not from all points: those of the refinement lie so close together that what rounds one bends the line through them.
+            lag: interval(&grid, best.0),
             weights: weights(&grid, best.1),
             criterion: best.1,
             points,
@@ -173,6 +174,14 @@ fn weights(grid: &[(f64, f64)], lowest: f64) -> Vec<(f64, f64)> {
 
 /// 2.5 % and 97.5 % points of the likelihood as a density, the criterion interpolated between its points.
 fn interval(points: &[(f64, f64)], value: f64) -> Lag {
+    if points.len() < 3 {
+        let [lower, upper] = [RANGE[0], RANGE[1]];
+        return Lag {
+            value,
+            lower,
+            upper,
+        };
+    }
     let lowest = points.iter().map(|p| p.1).fold(f64::INFINITY, f64::min);
     const PIECES: usize = 64;
     let mut cumulated = vec![(points[0].0, 0.0)];
