@@ -135,11 +135,12 @@ fn vertex(points: &[(f64, f64)]) -> Option<(f64, f64)> {
     Some(((x1 + step).clamp(x0, x2), curvature * step * step))
 }
 
-/// Standard deviation by the curvature at `best`, from the points that are nearest where it has risen by a half or more.
+/// Standard deviation by the curvature at `best`, from the nearest points at which the criterion has risen by that of two standard
+/// deviations: from smaller rises it would be as uncertain as the smoothness that each point was found with.
 fn sigma(points: &[(f64, f64)], best: (f64, f64)) -> Option<f64> {
     let estimate = |p: &(f64, f64)| {
         let rise = p.1 - best.1;
-        (rise > 0.25).then(|| (p.0 - best.0).abs() / rise.sqrt())
+        (rise > 4.0).then(|| (p.0 - best.0).abs() / rise.sqrt())
     };
     let below = points.iter().rev().filter(|p| p.0 < best.0);
     let above = points.iter().filter(|p| p.0 > best.0);
