@@ -25,6 +25,7 @@ struct Outcome {
     squared: [Vec<[f64; 12]>; 2],
     inside: [Vec<[bool; 12]>; 2],
     lag: f64,
+    lag_width: f64,
     lag_inside: bool,
     lag_determined: bool,
 }
@@ -111,6 +112,7 @@ impl Study {
             squared,
             inside,
             lag: lag.value,
+            lag_width: lag.upper - lag.lower,
             lag_inside: (lag.lower..=lag.upper).contains(&true_lag),
             lag_determined: lag.is_determined(),
         }
@@ -150,8 +152,9 @@ impl Study {
         let count =
             |f: fn(&Outcome) -> bool| 100.0 * outcomes.iter().filter(|o| f(o)).count() as f64 / n;
         println!(
-            "{:58}  mean {lag:.2} s, scatter {sd:.2} s, interval holds it in {:.1} %, determined in {:.1} %",
+            "{:58}  mean {lag:.2} s, scatter {sd:.2} s, mean interval {:.2} s wide, holds it in {:.1} %, determined in {:.1} %",
             "  lag",
+            outcomes.iter().map(|o| o.lag_width).sum::<f64>() / n,
             count(|o| o.lag_inside),
             count(|o| o.lag_determined)
         );

@@ -100,7 +100,7 @@ fn mean_temperature(session: &Session, rows: &[&Row]) -> f64 {
     sum.sum::<f64>() / n
 }
 
-fn by_temperature<'a>(session: &'a Session, sensor: Sensor) -> Vec<Vec<&'a Row>> {
+fn by_temperature(session: &Session, sensor: Sensor) -> Vec<Vec<&Row>> {
     let bin = |r: &Row| (session.thermometer.at(r.middle_s).0 / NODE_K).floor() as i64;
     let mut rows: Vec<&Row> = session.rows[sensor as usize].iter().collect();
     rows.sort_by_key(|r| bin(r));
@@ -110,7 +110,7 @@ fn by_temperature<'a>(session: &'a Session, sensor: Sensor) -> Vec<Vec<&'a Row>>
 }
 
 /// Stretches in which the temperature stands, whether it has settled or not.
-fn plateaus<'a>(session: &'a Session, sensor: Sensor) -> Vec<Vec<&'a Row>> {
+fn plateaus(session: &Session, sensor: Sensor) -> Vec<Vec<&Row>> {
     let fastest = fastest(session);
     let rows = session.rows[sensor as usize].iter();
     let still: Vec<&Row> = rows
@@ -127,7 +127,7 @@ fn along(v: &Vector3<f64>) -> Option<(usize, bool)> {
 }
 
 /// Cycles of the scheme: each ends as soon as it has seen all that niu's computation needs of the sensor.
-fn cycles<'a>(session: &'a Session, sensor: Sensor) -> Vec<Vec<&'a Row>> {
+fn cycles(session: &Session, sensor: Sensor) -> Vec<Vec<&Row>> {
     let mut out = Vec::new();
     let mut open: Vec<&Row> = Vec::new();
     for dwell in session.rows[sensor as usize].chunk_by(|a, b| a.step == b.step) {

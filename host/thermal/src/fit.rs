@@ -183,7 +183,7 @@ fn of_literature(sessions: &[Session], classic: Classic) -> Result<Joint> {
         curves.push(classic::estimate(sessions, sensor, classic)?);
     }
     Ok(Joint {
-        curves: curves.try_into().unwrap_or_else(|_| [None, None]),
+        curves: curves.try_into().unwrap_or([None, None]),
         profile: Profile::fixed(0.0, 0.0),
         apart: None,
         noise: [None, None],

@@ -1,25 +1,23 @@
 //! The joint estimate of all curves and of the lag.
 
-use mimu::quantity::{Sensor, duration, significant};
+use mimu::quantity::{Sensor, significant};
 use mimu_recording::Reference;
 use mimu_recording::error::{Error, Result};
 
-use crate::basis::{SLOPE_SPAN, Shape};
+use crate::basis::Shape;
 use crate::curves::TriadCurves;
 use crate::noise;
-use crate::path::fastest;
 use crate::profile::{LAGS, Lag, Profile};
 use crate::regression::{AxisNoise, Normal, Problem};
 use crate::session::Session;
 use crate::smoothness::{self, Penalties, Smoothness, TriadFit};
+use crate::suitability::{check_alike, check_span, check_speed};
 use crate::thermometer::{Die, Start};
 
 /// Rounds of noise and smoothness in turn, where the bias wanders: each is found with the other.
 const ROUNDS: usize = 4;
 /// Drop in deviance that tells the lags of gyro and accelerometer apart: one degree of freedom at 1 %.
 const TWO_LAGS: f64 = 6.63;
-/// The die may lag behind by this share of the range at most; beyond, a first-order lag that is a tenth off shifts curves by kelvins.
-const BEHIND_SHARE: f64 = 0.25;
 /// Start of the record: so much lag times slope, K, for a lag of a minute makes it worth asking what the die was like.
 const START_OFFSET_K: f64 = 0.2;
 
@@ -249,9 +247,9 @@ pub fn estimate(sessions: &[Session], choice: Choice) -> Result<Joint> {
         starts,
         warnings,
     };
-    check_speed(sessions, &joint, span)?;
+    check_speed(sessions, joint.lag(), span)?;
     let dies = joint.dies(sessions);
-    let [gyro, accel] = <[_; 2]>::try_from(triads).unwrap_or_else(|_| [None, None]);
+    let [gyro, accel] = <[_; 2]>::try_from(triads).unwrap_or([None, None]);
     for (k, triad) in [gyro, accel].into_iter().enumerate() {
         let Some(triad) = triad else { continue };
         let rows = triad.problem.rows.iter();
@@ -337,76 +335,4 @@ fn no_solution(sessions: &[Session]) -> Error {
         "the rows do not determine the curves at any lag",
         "excite every axis at all temperatures",
     )
-}
-
-fn check_alike(sessions: &[Session]) -> Result<()> {
-    let Some(first) = sessions.first() else {
-        return Err(Error::new(
-            "recordings",
-            "there is none",
-            "give at least one",
-        ));
-    };
-    for other in &sessions[1..] {
-        let alike = match (&first.unit_id, &other.unit_id) {
-            (Some(a), Some(b)) => a.eq_ignore_ascii_case(b),
-            _ => first.device == other.device,
-        };
-        if !alike {
-            let problem = format!(
-                "this is a recording of {:?}, and {} is one of {:?}: two units have two sets of curves",
-                other.device, first.place, first.device
-            );
-            let remedy = "fit the recordings of each unit by themselves";
-            return Err(Error::new(&other.place, problem, remedy));
-        }
-        if first.raw_unit != other.raw_unit || first.reference != other.reference {
-            let problem = format!(
-                "its readings are in {} with reference {:?}, those of {} in {} with reference {:?}",
-                other.raw_unit, other.reference, first.place, first.raw_unit, first.reference
-            );
-            let remedy = "fit recordings of one kind together";
-            return Err(Error::new(&other.place, problem, remedy));
-        }
-    }
-    Ok(())
-}
-
-fn check_span(sessions: &[Session], span: f64) -> Result<()> {
-    if span >= SLOPE_SPAN {
-        return Ok(());
-    }
-    let problem = format!(
-        "the temperature spans {} K only: a slope needs {SLOPE_SPAN} K, curvature 20 K",
-        significant(span.max(0.0))
-    );
-    let remedy = "heat or cool the unit further, or use `mimu fit`, which is for one temperature";
-    Err(Error::undetermined(
-        format!("{}, temp_c", sessions[0].place),
-        problem,
-        remedy,
-    ))
-}
-
-/// Refuses a ramp in which the die is so far behind that a first-order lag decides everything.
-fn check_speed(sessions: &[Session], joint: &Joint, span: f64) -> Result<()> {
-    let Some(lag) = joint.lag() else {
-        return Ok(());
-    };
-    for session in sessions {
-        let fastest = fastest(session);
-        let behind = fastest * lag.value.abs();
-        if behind > BEHIND_SHARE * span {
-            let problem = format!(
-                "the ramp of {} K/min is too fast: the dies are {} K off the thermometer by their lag of {}",
-                significant(fastest * 60.0),
-                significant(behind),
-                duration(lag.value.abs())
-            );
-            let slow = 0.4 * BEHIND_SHARE * span / lag.value.abs() * 60.0;
-            let remedy = format!("heat and cool by at most {} K/min", significant(slow));
-            return Err(Error::undetermined(&session.place, problem, remedy));
-        }
-    }
-    Ok(())
 }

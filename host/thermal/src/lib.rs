@@ -8,6 +8,7 @@
 //! | [`regression`] | the readings of a triad as a linear regression |
 //! | [`smoothness`], [`noise`] | its variance components: how smooth the curves are, how the readings are disturbed |
 //! | [`profile`] | likelihood of the lag |
+//! | [`suitability`] | recordings that are refused |
 //! | [`joint`] | all of these: the estimate |
 //! | [`curves`], [`nodes`] | its result at any temperature, and in a calibration file |
 //! | [`path`] | whether a recording comes back to temperatures that it has been at |
@@ -34,4 +35,5 @@ pub mod regression;
 pub mod result;
 pub mod session;
 pub mod smoothness;
+pub mod suitability;
 pub mod thermometer;

@@ -3,8 +3,8 @@
 use crate::session::Session;
 use crate::thermometer::Die;
 
-/// Width of the bins of temperature, K.
-const BIN_K: f64 = 5.0;
+/// Bins of temperature over the range of a record.
+const BINS: usize = 16;
 /// Slower than this share of the fastest ramp the temperature stands.
 const STANDS: f64 = 0.1;
 /// Share of the range that has to be heated through and cooled through.
@@ -14,23 +14,38 @@ const SOAKED: f64 = 0.5;
 /// Instants of a record that are looked at, s apart.
 const EVERY_S: f64 = 10.0;
 
+/// Half of the time over which a slope is taken, s, or this share of the record where that is longer: within less a coarse or noisy
+/// thermometer shows slopes that are none.
+const AROUND_S: f64 = 30.0;
+const AROUND_SHARE: f64 = 0.01;
+
+/// Slope of the thermometer around `t_s`, K/s.
+fn slope(session: &Session, t_s: f64) -> f64 {
+    let thermometer = &session.thermometer;
+    let half = AROUND_S.max(AROUND_SHARE * thermometer.duration_s());
+    let end_s = thermometer.start_s() + thermometer.duration_s();
+    let from = (t_s - half).max(thermometer.start_s());
+    let to = (t_s + half).min(end_s);
+    (thermometer.at(to).0 - thermometer.at(from).0) / (to - from).max(1.0)
+}
+
 /// Whether a recording heats or cools at `t_s` with the slope that is usual for it: 1, -1, or 0 where the temperature stands.
 pub fn direction(session: &Session, fastest: f64, t_s: f64) -> i32 {
-    match session.thermometer.at(t_s).1 {
+    match slope(session, t_s) {
         slope if slope.abs() < STANDS * fastest => 0,
         slope if slope > 0.0 => 1,
         _ => -1,
     }
 }
 
-/// Slope of the ramp of `session`, K/s: that which nine tenths of its rows do not exceed.
+/// Slope of the ramp of `session`, K/s: that which nine tenths of its record do not exceed.
 pub fn fastest(session: &Session) -> f64 {
-    let rows = session.rows.iter().flatten();
-    let mut slopes: Vec<f64> = rows
-        .map(|r| session.thermometer.at(r.middle_s).1.abs())
-        .collect();
+    let from = session.thermometer.start_s();
+    let count = (session.thermometer.duration_s() / EVERY_S) as usize;
+    let at = |k: usize| slope(session, from + k as f64 * EVERY_S).abs();
+    let mut slopes: Vec<f64> = (0..=count).map(at).collect();
     slopes.sort_by(f64::total_cmp);
-    slopes.get(slopes.len() * 9 / 10).copied().unwrap_or(0.0)
+    slopes[slopes.len() * 9 / 10]
 }
 
 /// Whether lag and slope cannot be told apart, because no session comes back to temperatures that it has been at, nor stands at several.
@@ -40,18 +55,18 @@ pub fn is_one_way(sessions: &[Session], dies: &[Die]) -> bool {
 
 fn one_way(session: &Session, die: &Die) -> bool {
     let [low, high] = die.range();
-    let bins = ((high - low) / BIN_K).ceil().max(1.0) as usize;
-    let mut seen = vec![[false; 3]; bins];
+    let mut seen = [[false; 3]; BINS];
     let fastest = fastest(session);
     let from = session.thermometer.start_s();
     let count = (session.thermometer.duration_s() / EVERY_S) as usize;
     for k in 0..=count {
         let t_s = from + k as f64 * EVERY_S;
-        let bin = (((die.at(t_s) - low) / BIN_K) as usize).min(bins - 1);
+        let share = (die.at(t_s) - low) / (high - low).max(1e-9);
+        let bin = ((share * BINS as f64) as usize).min(BINS - 1);
         let way = direction(session, fastest, t_s) + 1;
         seen[bin][way.clamp(0, 2) as usize] = true;
     }
     let share =
-        |of: fn(&[bool; 3]) -> bool| seen.iter().filter(|s| of(s)).count() as f64 / bins as f64;
+        |of: fn(&[bool; 3]) -> bool| seen.iter().filter(|s| of(s)).count() as f64 / BINS as f64;
     share(|s| s[0] && s[2]) < BOTH_WAYS && share(|s| s[1]) < SOAKED
 }

@@ -89,7 +89,8 @@ impl Profile {
             grid.clone_from(&points);
         }
         Some(Self {
-            lag: interval(&points, best.0),
+            // Not from all points: those of the refinement lie so close together that what rounds one bends the line through them.
+            lag: interval(&grid, best.0),
             weights: weights(&grid, best.1),
             criterion: best.1,
             points,
@@ -134,11 +135,12 @@ fn vertex(points: &[(f64, f64)]) -> Option<(f64, f64)> {
     Some(((x1 + step).clamp(x0, x2), curvature * step * step))
 }
 
-/// Standard deviation by the curvature at `best`, from the points that are nearest where it has risen by a half or more.
+/// Standard deviation by the curvature at `best`, from the nearest points at which the criterion has risen by that of two standard
+/// deviations: from smaller rises it would be as uncertain as the smoothness that each point was found with.
 fn sigma(points: &[(f64, f64)], best: (f64, f64)) -> Option<f64> {
     let estimate = |p: &(f64, f64)| {
         let rise = p.1 - best.1;
-        (rise > 0.25).then(|| (p.0 - best.0).abs() / rise.sqrt())
+        (rise > 4.0).then(|| (p.0 - best.0).abs() / rise.sqrt())
     };
     let below = points.iter().rev().filter(|p| p.0 < best.0);
     let above = points.iter().filter(|p| p.0 > best.0);
@@ -173,6 +175,14 @@ fn weights(grid: &[(f64, f64)], lowest: f64) -> Vec<(f64, f64)> {
 
 /// 2.5 % and 97.5 % points of the likelihood as a density, the criterion interpolated between its points.
 fn interval(points: &[(f64, f64)], value: f64) -> Lag {
+    if points.len() < 3 {
+        let [lower, upper] = [RANGE[0], RANGE[1]];
+        return Lag {
+            value,
+            lower,
+            upper,
+        };
+    }
     let lowest = points.iter().map(|p| p.1).fold(f64::INFINITY, f64::min);
     const PIECES: usize = 64;
     let mut cumulated = vec![(points[0].0, 0.0)];

@@ -20,7 +20,7 @@ const ACCEL_DEPARTURE: [f64; 3] = [0.5, 0.02, 0.02];
 const NONE: [f64; 2] = [1e-10, 1e-8];
 /// Steps of the fixed point from anywhere, and from the smoothness of a lag nearby. The criterion is at its minimum there, so that what the
 /// last step leaves counts squared.
-pub const ITERATIONS: [usize; 2] = [60, 8];
+pub const ITERATIONS: [usize; 2] = [60, 20];
 const TOLERANCE: f64 = 5e-2;
 
 /// Variances of the second and fourth derivatives, by kind: SI²/K³ or 1/K³, and SI²/K⁷ or 1/K⁷.
