@@ -10,6 +10,7 @@ use crate::located::Source;
 use crate::place::Place;
 use crate::rotation::{Rotation, Vector};
 
+mod reader;
 mod reading;
 mod step;
 mod turn;

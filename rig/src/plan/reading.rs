@@ -5,6 +5,7 @@ use std::ops::Range;
 use serde::Deserialize;
 use toml::Spanned;
 
+use super::reader::Reader;
 use super::step::RawStep;
 use super::{CarriedBy, Plan, Pose, Samples, Step};
 use crate::located::{Source, written};
@@ -16,8 +17,6 @@ const LONGEST_S: f64 = 48.0 * 3600.0;
 const MOST_DWELLS: u64 = 100_000;
 /// Most samples, for the same reason: 48 h at 1 kHz are 173 million, and each is some hundred bytes on disk.
 const MOST_SAMPLES: f64 = 200e6;
-/// Beyond any centrifuge that takes a board, degrees per second.
-pub(super) const FASTEST_DPS: f64 = 36_000.0;
 /// What people write for a key.
 const SYNONYMS: [(&str, &str); 16] = [
     ("chamber_temp", "chamber_c"),
@@ -179,42 +178,7 @@ fn too_long(
     ))
 }
 
-/// What is checked after parsing.
-pub(super) struct Reader<'a> {
-    pub(super) source: &'a Source,
-}
-
 impl Reader<'_> {
-    pub(super) fn within(
-        &self,
-        key: &str,
-        value: &Spanned<f64>,
-        [low, high]: [f64; 2],
-        unit: &str,
-    ) -> Result<f64, String> {
-        let x = *value.get_ref();
-        if x >= low && x <= high {
-            return Ok(x);
-        }
-        let problem = format!("`{key}` is {}", written(x));
-        let remedy = format_args!("give {low} to {high} {unit}");
-        Err(self.source.error(&value.span(), problem, remedy))
-    }
-
-    /// As [`Reader::within`], 0 for what is left out, and in radians.
-    pub(super) fn angle(
-        &self,
-        key: &str,
-        value: &Option<Spanned<f64>>,
-        most: f64,
-        unit: &str,
-    ) -> Result<f64, String> {
-        let degrees = value
-            .as_ref()
-            .map(|v| self.within(key, v, [-most, most], unit));
-        Ok(degrees.transpose()?.unwrap_or(0.0).to_radians())
-    }
-
     /// How often all steps are done, and the time from one round to the next.
     fn rounds(&self, raw: &RawPlan) -> Result<(u32, Option<f64>), String> {
         let rounds = raw.rounds.as_ref().map_or(1, |r| *r.get_ref());

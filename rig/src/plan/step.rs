@@ -6,7 +6,7 @@ use std::ops::Range;
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::reading::{FASTEST_DPS, Reader};
+use super::reader::{FASTEST_DPS, Reader};
 use super::{CarriedBy, Places, Pose, Step, TableAxis};
 use crate::located::written;
 use crate::rotation::{Vector, direction};

@@ -3,7 +3,7 @@
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::reading::{FASTEST_DPS, Reader};
+use super::reader::{FASTEST_DPS, Reader};
 use super::step::RawStep;
 
 /// Axes of a table.
