@@ -8,7 +8,7 @@
 //! | [`report`] | results as JSON, text and page |
 //! | `views` | how a session of the wizard is shown while it runs |
 //! | `hint` | flags of the command beside what an error says to set otherwise |
-//! | `export` | noise coefficients for other programs |
+//! | `export` | noise coefficients and biases over temperature for other programs |
 
 mod arguments;
 mod cmd;
@@ -22,7 +22,7 @@ mod views;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use cmd::{allan, apply, design, device, diagnose, fit, import, record, verify, wizard};
+use cmd::{allan, apply, design, device, diagnose, fit, import, record, thermal, verify, wizard};
 
 /// Calibration of inertial units made of analog MEMS sensors.
 ///
@@ -51,9 +51,11 @@ enum Command {
     Diagnose(diagnose::DiagnoseArgs),
     /// Design the experiment: which attitudes and rates, how many, for how long
     Design(design::DesignArgs),
+    /// Curves over temperature: plan
+    Thermal(thermal::ThermalArgs),
     /// Noise of a unit at rest: Allan deviation, N, B, K, Q and R
     Allan(allan::AllanArgs),
-    /// Write noise coefficients in the format of another program
+    /// Write noise coefficients, or biases over temperature, in the format of another program
     Export(cmd::export::ExportArgs),
     /// Record the raw stream of a device
     Record(record::RecordArgs),
@@ -71,6 +73,7 @@ pub fn run() -> ExitCode {
         Command::Apply(args) => apply::run(&args),
         Command::Diagnose(args) => diagnose::run(&args),
         Command::Design(args) => design::run(&args),
+        Command::Thermal(args) => thermal::run(&args),
         Command::Allan(args) => allan::run(&args),
         Command::Export(args) => cmd::export::run(&args),
         Command::Record(args) => record::run(&args),

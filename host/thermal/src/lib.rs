@@ -10,11 +10,13 @@
 //! | [`profile`] | likelihood of the lag |
 //! | [`joint`] | all of these: the estimate |
 //! | [`curves`] | its result at any temperature |
+//! | [`plan`] | procedures in chamber and table, and how well the curves are known afterwards |
 
 pub mod basis;
 pub mod curves;
 pub mod joint;
 pub mod noise;
+pub mod plan;
 pub mod profile;
 pub mod regression;
 pub mod session;

@@ -9,5 +9,6 @@ pub(crate) mod export;
 pub(crate) mod fit;
 pub(crate) mod import;
 pub(crate) mod record;
+pub(crate) mod thermal;
 pub(crate) mod verify;
 pub(crate) mod wizard;

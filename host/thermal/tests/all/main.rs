@@ -1,6 +1,7 @@
 //! Curves over temperature from recordings of a unit whose curves are known, and recordings that are refused.
 
 mod estimates;
+mod plan;
 mod refused;
 #[path = "../../../../tests/thermal/simulation.rs"]
 #[allow(dead_code)]
