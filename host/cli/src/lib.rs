@@ -51,7 +51,7 @@ enum Command {
     Diagnose(diagnose::DiagnoseArgs),
     /// Design the experiment: which attitudes and rates, how many, for how long
     Design(design::DesignArgs),
-    /// Curves over temperature: plan
+    /// Curves over temperature, and the lag of the dies behind the thermometer: fit, compare, plan
     Thermal(thermal::ThermalArgs),
     /// Noise of a unit at rest: Allan deviation, N, B, K, Q and R
     Allan(allan::AllanArgs),

@@ -13,6 +13,7 @@ mod fit;
 mod import;
 mod svg;
 mod text;
+mod thermal;
 mod thermal_plan;
 mod verify;
 mod wizard;
@@ -27,6 +28,7 @@ pub use device::{
 pub use diagnosis::{Made, diagnosis_page, diagnosis_text, not_in_plan_text};
 pub use fit::{dwell_table, fit_text};
 pub use import::import_text;
+pub use thermal::{thermal_comparison_text, thermal_text};
 pub use thermal_plan::thermal_plan_text;
 pub use verify::verify_text;
 pub(crate) use wizard::{wizard_lines, wizard_question, wizard_text};

@@ -2,12 +2,14 @@
 
 mod effect;
 mod kept;
+mod of_curves;
 mod of_fit;
 mod on_device;
 mod over_temperature;
 
 pub use effect::{CoefficientTable, ConverterTable, EffectTable, FormTable};
 pub use kept::Kept;
+pub use of_curves::{CurvesOfUnit, TriadOfCurves};
 pub use on_device::{NO_SENSE, OnDevice, What};
 pub use over_temperature::{Curves, NodeTable, OverTemperature, TemperatureNode, reference_node};
 

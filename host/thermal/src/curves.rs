@@ -4,7 +4,7 @@ use mimu::triad::{Angles, Covariance, Forward, Part, Triad};
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
 use crate::regression::{Kind, Problem};
-use crate::smoothness::TriadFit;
+use crate::smoothness::{Smoothness, TriadFit};
 
 /// Curves of one triad, averaged over the lags that the data allow.
 #[derive(Debug, Clone)]
@@ -77,6 +77,28 @@ impl TriadCurves {
             dof: f64::INFINITY,
         };
         Triad::from_forward(model, vec![part])
+    }
+
+    /// Condition of the design at `temp_c`, as the covariance of the model there shows it: ratio of the largest to the smallest standard
+    /// deviation of a combination of the parameters of one axis, in units of their own standard deviations.
+    pub fn condition(&self, temp_c: f64) -> f64 {
+        let covariance = self.covariance(temp_c);
+        let of_axis = |axis: usize| {
+            let places = [3 * axis, 3 * axis + 1, 3 * axis + 2, 9 + axis];
+            let correlation = nalgebra::Matrix4::from_fn(|i, j| {
+                let [a, b] = [places[i], places[j]];
+                covariance[(a, b)] / (covariance[(a, a)] * covariance[(b, b)]).sqrt()
+            });
+            let values = correlation.symmetric_eigenvalues();
+            (values.max() / values.min().max(f64::MIN_POSITIVE)).sqrt()
+        };
+        (0..3).map(of_axis).fold(1.0, f64::max)
+    }
+
+    /// Smoothness that the likeliest lag was found with.
+    pub fn smoothness(&self) -> Option<Smoothness> {
+        let best = self.fits.iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
+        Some(best.1.smoothness)
     }
 
     /// Scale factors at `temp_c`, raw per SI: norms of the rows of P; ones where only biases are estimated.

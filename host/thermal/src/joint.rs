@@ -1,12 +1,13 @@
 //! The joint estimate of all curves and of the lag.
 
-use mimu::quantity::{AXES, Sensor, duration, significant};
+use mimu::quantity::{Sensor, duration, significant};
 use mimu_recording::Reference;
 use mimu_recording::error::{Error, Result};
 
 use crate::basis::{SLOPE_SPAN, Shape};
 use crate::curves::TriadCurves;
 use crate::noise;
+use crate::path::fastest;
 use crate::profile::{LAGS, Lag, Profile};
 use crate::regression::{AxisNoise, Normal, Problem};
 use crate::session::Session;
@@ -124,7 +125,14 @@ impl<'a> Evaluator<'a> {
         let dies = self.dies(lag_s, starts);
         let normals = [0, 1, 2]
             .map(|axis| Normal::of(&self.problem, axis, &dies, &self.noise[axis], |_| true));
-        let fit = smoothness::fit(&self.problem, &self.penalties, &normals, &self.smoothness)?;
+        let off = |k: &(f64, Option<TriadFit>)| (k.0 - lag_s).abs();
+        let nearest = self.known.iter().filter(|k| k.1.is_some());
+        let nearest = nearest.min_by(|a, b| off(a).total_cmp(&off(b)));
+        let start = match nearest.and_then(|k| k.1.as_ref()) {
+            Some(fit) => (&fit.smoothness, smoothness::ITERATIONS[1]),
+            None => (&self.smoothness, smoothness::ITERATIONS[0]),
+        };
+        let fit = smoothness::fit(&self.problem, &self.penalties, &normals, start)?;
         self.smoothness = fit.smoothness;
         Some(fit)
     }
@@ -386,14 +394,7 @@ fn check_speed(sessions: &[Session], joint: &Joint, span: f64) -> Result<()> {
         return Ok(());
     };
     for session in sessions {
-        let rows = session.rows.iter().flatten();
-        let mut slopes: Vec<f64> = rows
-            .map(|r| session.thermometer.at(r.middle_s).1.abs())
-            .collect();
-        slopes.sort_by(f64::total_cmp);
-        let Some(&fastest) = slopes.get(slopes.len() * 9 / 10) else {
-            continue;
-        };
+        let fastest = fastest(session);
         let behind = fastest * lag.value.abs();
         if behind > BEHIND_SHARE * span {
             let problem = format!(
@@ -408,9 +409,4 @@ fn check_speed(sessions: &[Session], joint: &Joint, span: f64) -> Result<()> {
         }
     }
     Ok(())
-}
-
-/// Names of the axes for messages about `sensor`.
-pub fn axis_name(sensor: Sensor, axis: usize) -> String {
-    format!("{sensor}_{}", AXES[axis])
 }

@@ -9,16 +9,31 @@
 //! | [`smoothness`], [`noise`] | its variance components: how smooth the curves are, how the readings are disturbed |
 //! | [`profile`] | likelihood of the lag |
 //! | [`joint`] | all of these: the estimate |
-//! | [`curves`] | its result at any temperature |
+//! | [`curves`], [`nodes`] | its result at any temperature, and in a calibration file |
+//! | [`path`] | whether a recording comes back to temperatures that it has been at |
+//! | [`judge`] | errors of dwells, by temperature, heating and cooling apart |
+//! | [`classic`], [`points`] | estimators of the literature, for comparison |
+//! | [`mod@fit`], [`extrapolation`] | one of them, judged; whether curvature is there at all |
+//! | [`mod@compare`] | two calibrations, curve by curve |
 //! | [`plan`] | procedures in chamber and table, and how well the curves are known afterwards |
+//! | [`result`] | what was found, which JSON is |
 
 pub mod basis;
+pub mod classic;
+pub mod compare;
 pub mod curves;
+pub mod extrapolation;
+pub mod fit;
 pub mod joint;
+pub mod judge;
+pub mod nodes;
 pub mod noise;
+pub mod path;
 pub mod plan;
+pub mod points;
 pub mod profile;
 pub mod regression;
+pub mod result;
 pub mod session;
 pub mod smoothness;
 pub mod thermometer;

@@ -18,7 +18,9 @@ const ACCEL_DEPARTURE: [f64; 3] = [0.5, 0.02, 0.02];
 /// Below these shares of the largest variances a curve is a line, or a cubic, to all digits that matter: a penalty that is stiffer by
 /// many more orders of magnitude than the other leaves nothing of that one's digits.
 const NONE: [f64; 2] = [1e-10, 1e-8];
-const ITERATIONS: usize = 60;
+/// Steps of the fixed point from anywhere, and from the smoothness of a lag nearby. The criterion is at its minimum there, so that what the
+/// last step leaves counts squared.
+pub const ITERATIONS: [usize; 2] = [60, 8];
 const TOLERANCE: f64 = 5e-2;
 
 /// Variances of the second and fourth derivatives, by kind: SI²/K³ or 1/K³, and SI²/K⁷ or 1/K⁷.
@@ -168,18 +170,18 @@ pub fn solve(
     })
 }
 
-/// Best smoothness for `normals`, begun at `start`, and the estimates with it. `None` if the rows do not determine them.
+/// Best smoothness for `normals`, begun at `start` and looked for in so many steps, and the estimates with it. `None` if the rows do not determine them.
 pub fn fit(
     problem: &Problem,
     penalties: &Penalties,
     normals: &[Normal; 3],
-    start: &Smoothness,
+    (start, iterations): (&Smoothness, usize),
 ) -> Option<TriadFit> {
     let most = largest(problem);
     let bounded = |k: usize, i: usize, v: f64| v.clamp(NONE[i] * most[k][i], most[k][i]);
     let mut smoothness: Smoothness =
         std::array::from_fn(|k| [0, 1].map(|i| bounded(k, i, start[k][i])));
-    for _ in 0..ITERATIONS {
+    for _ in 0..iterations {
         let next = step(problem, penalties, normals, &smoothness)?;
         let mut change = 0f64;
         for (k, pair) in smoothness.iter_mut().enumerate() {

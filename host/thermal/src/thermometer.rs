@@ -1,6 +1,6 @@
 //! The thermometer over a whole recording: refused where it sticks, jumps or is missing, evenly spaced and smoothed.
 
-use mimu::blocks::Condensed;
+use mimu::blocks::{Block, Condensed};
 use mimu::quantity::{duration, significant};
 use mimu_recording::error::{Error, Result};
 
@@ -37,7 +37,7 @@ impl Thermometer {
     pub fn of(condensed: &Condensed, power_on_s: Option<f64>, place: &str) -> Result<Self> {
         let place = format!("{place}, temp_c");
         let blocks = || condensed.blocks.iter();
-        let middle = |b: &mimu::blocks::Block| 0.5 * (b.start_s + b.last_s);
+        let middle = |b: &Block| 0.5 * (b.start_s + b.last_s);
         let known: Vec<(f64, f64)> = blocks()
             .filter(|b| b.temp_c.mean.is_finite())
             .map(|b| (middle(b), b.temp_c.mean))
@@ -48,8 +48,7 @@ impl Thermometer {
         if known.is_empty() {
             return Err(missing(&place, "there is no temperature"));
         }
-        let ends = [(first.start_s, 0.0), (last.last_s, 0.0)];
-        check_gaps(&known, ends.map(|e| e.0), &place)?;
+        check_gaps(&condensed.blocks, &place)?;
         check_stuck(&known, &place)?;
         let mut series = Self::evenly(&known, first.start_s, last.last_s);
         check_jumps(&series, &place)?;
@@ -137,6 +136,11 @@ impl Thermometer {
     /// Lowest and highest temperature, °C.
     pub fn range(&self) -> [f64; 2] {
         extremes(&self.temp_c)
+    }
+
+    /// Begin of the record, s.
+    pub fn start_s(&self) -> f64 {
+        self.start_s
     }
 
     /// Duration of the record, s.
@@ -237,11 +241,12 @@ fn missing(place: &str, problem: &str) -> Error {
     Error::new(place, problem, remedy)
 }
 
-fn check_gaps(known: &[(f64, f64)], [first, last]: [f64; 2], place: &str) -> Result<()> {
-    let inner = known.windows(2).map(|p| [p[0].0, p[1].0]);
-    let outer = [[first, known[0].0], [known[known.len() - 1].0, last]];
-    let longest = inner
-        .chain(outer)
+/// Refuses samples without a temperature for longer than can be interpolated. Where there are no samples, none is missing.
+fn check_gaps(blocks: &[Block], place: &str) -> Result<()> {
+    let runs = blocks.chunk_by(|a, b| a.temp_c.mean.is_nan() == b.temp_c.mean.is_nan());
+    let without = runs.filter(|run| run[0].temp_c.mean.is_nan());
+    let longest = without
+        .map(|run| [run[0].start_s, run[run.len() - 1].last_s])
         .max_by(|a, b| (a[1] - a[0]).total_cmp(&(b[1] - b[0])));
     match longest {
         Some([from, to]) if to - from > LONGEST_GAP_S => {

@@ -2,8 +2,23 @@
 
 mod plan;
 
-use clap::{Args, Subcommand};
+use std::path::PathBuf;
+
+use clap::{Args, Subcommand, ValueEnum};
+use mimu::calibration::Calibration;
+use mimu::stillness::Finding;
 use mimu_recording::error::Result;
+use mimu_recording::result_file::stage;
+use mimu_thermal::classic::Classic;
+use mimu_thermal::compare::compare;
+use mimu_thermal::fit::{Estimator, Options, fit};
+use mimu_thermal::result::ThermalResult;
+use mimu_thermal::session::Session;
+
+use crate::arguments::{JsonArgs, StillArgs};
+use crate::output::{check_outputs, print};
+use crate::reading::read;
+use crate::report;
 
 #[derive(Args)]
 pub(crate) struct ThermalArgs {
@@ -13,12 +28,142 @@ pub(crate) struct ThermalArgs {
 
 #[derive(Subcommand)]
 enum ThermalCommand {
-    /// Plan a procedure over temperature: how long it takes, and how well the curves are known afterwards
+    /// Estimate all parameters over temperature, and the lag of the dies behind the thermometer
+    Fit(FitArgs),
+    /// Compare two calibrations over temperature, curve by curve
+    Compare(CompareArgs),
+    /// Plan a procedure: how long it takes, and how well the curves are known afterwards
     Plan(plan::PlanArgs),
+}
+
+#[derive(Args)]
+struct FitArgs {
+    /// Directories of the recordings of one unit, one for each time that the power came
+    #[arg(required = true)]
+    recordings: Vec<PathBuf>,
+    /// Recording that is only judged by: a sweep at another rate, or a soak
+    #[arg(long, value_name = "REC")]
+    verify: Vec<PathBuf>,
+    /// Estimator; all but the first are there for comparison
+    #[arg(long, value_enum, default_value = "joint")]
+    estimator: EstimatorArg,
+    /// Lag of the dies where it is known; 0 for none
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = lag)]
+    lag: Option<f64>,
+    /// Temperatures of the dies that the curves have to cover, or nothing is written
+    #[arg(long, value_name = "FROM..TO", allow_hyphen_values = true, value_parser = range)]
+    range: Option<[f64; 2]>,
+    #[command(flatten)]
+    still: StillArgs,
+    /// Calibration file to write
+    #[arg(short, value_name = "FILE")]
+    output: Option<PathBuf>,
+    #[command(flatten)]
+    json: JsonArgs,
+}
+
+#[derive(Args)]
+struct CompareArgs {
+    /// Calibration file
+    first: PathBuf,
+    /// Another one; the differences are this one minus the first
+    second: PathBuf,
+    #[command(flatten)]
+    json: JsonArgs,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum EstimatorArg {
+    /// Smooth curves of all parameters and the lag at once, with the noise
+    Joint,
+    /// The same with one cubic for each parameter
+    Cubic,
+    /// An affine fit in every 10 K, without a lag
+    Nodes,
+    /// Ramp of niu: each cycle of the scheme, and cubics through them
+    RampNiu,
+    /// Soak: each plateau with all 24 parameters
+    Soak,
+    /// Soak by fang (33), (34) as printed: one scalar a pose
+    SoakFang,
+}
+
+impl EstimatorArg {
+    fn estimator(self) -> Estimator {
+        match self {
+            Self::Joint => Estimator::Joint,
+            Self::Cubic => Estimator::Cubic,
+            Self::Nodes => Estimator::Classic(Classic::Nodes),
+            Self::RampNiu => Estimator::Classic(Classic::RampNiu),
+            Self::Soak => Estimator::Classic(Classic::Soak),
+            Self::SoakFang => Estimator::Classic(Classic::SoakAsPrinted),
+        }
+    }
+}
+
+fn lag(text: &str) -> std::result::Result<f64, String> {
+    match text.parse() {
+        Ok(s) if (-120.0..=600.0).contains(&s) => Ok(s),
+        _ => Err("write seconds from -120 (the dies lead) to 600".into()),
+    }
+}
+
+fn range(text: &str) -> std::result::Result<[f64; 2], String> {
+    let ends = text.split_once("..");
+    let numbers = ends.and_then(|(a, b)| Some([a.parse().ok()?, b.parse().ok()?]));
+    match numbers {
+        Some([from, to]) if from < to => Ok([from, to]),
+        _ => Err("write FROM..TO in degrees Celsius, as in -20..60".into()),
+    }
 }
 
 pub(crate) fn run(args: &ThermalArgs) -> Result<()> {
     match &args.command {
+        ThermalCommand::Fit(args) => run_fit(args),
+        ThermalCommand::Compare(args) => run_compare(args),
         ThermalCommand::Plan(args) => plan::run(args),
     }
+}
+
+fn run_fit(args: &FitArgs) -> Result<()> {
+    let outputs = [args.output.as_deref(), args.json.file()];
+    let session = |directory: &PathBuf, finding: Finding| {
+        Session::of(&read(directory, finding, &outputs, &[])?)
+    };
+    let all = |list: &[PathBuf]| -> Result<Vec<Session>> {
+        let each = list.iter();
+        each.map(|d| session(d, args.still.finding())).collect()
+    };
+    let (sessions, verify) = (all(&args.recordings)?, all(&args.verify)?);
+    let options = Options {
+        estimator: args.estimator.estimator(),
+        lag_s: args.lag,
+        range_c: args.range,
+    };
+    let fitted = fit(sessions, &verify, options)?;
+    let result = ThermalResult::of(&fitted);
+    let mut text = report::thermal_text(&result);
+    let mut calibration = None;
+    if let Some(path) = &args.output {
+        let now = jiff::Timestamp::now()
+            .round(jiff::Unit::Second)
+            .unwrap_or_default();
+        let made = fitted.calibration(&now.to_string())?;
+        calibration = Some(stage(path, made.to_toml())?);
+        text.push_str(&format!("\ncalibration: {}\n", path.display()));
+    }
+    print(&args.json, &text, &result, calibration)
+}
+
+fn run_compare(args: &CompareArgs) -> Result<()> {
+    let inputs = [args.first.as_path(), args.second.as_path()];
+    check_outputs(&[args.json.file()], &inputs)?;
+    let [first, second] = [&args.first, &args.second].map(|path| Calibration::read(path));
+    let result = compare(&first?, &second?)?;
+    print(
+        &args.json,
+        &report::thermal_comparison_text(&result),
+        &result,
+        None,
+    )
 }

@@ -8,9 +8,9 @@ use super::{
 };
 use crate::fit::{Fit, SensorFit};
 use crate::quantity::{Sensor, inverse_names, rounded};
-use crate::triad::{Angles, Estimate, Forward, Physical};
-use mimu_recording::Reference;
+use crate::triad::{Angles, Estimate, Forward, Physical, Triad};
 use mimu_recording::error::Result;
+use mimu_recording::{RawUnit, Reference};
 
 /// Digits of what says how well something is known.
 const SIGMA_DIGITS: usize = 4;
@@ -69,12 +69,6 @@ fn readable(mut effect: EffectTable) -> EffectTable {
 }
 
 fn table(fit: &Fit, found: &SensorFit) -> TriadTable {
-    let triad = &found.estimated.triad;
-    let estimates = triad.inverse_estimates();
-    let covariance = &triad.inverse_covariance;
-    let physical = triad.physical(Angles::Exact);
-    let sigmas = |i: usize| rounded(estimates[i].sigma, SIGMA_DIGITS);
-    let intervals = |i: usize| rounded(estimates[i].interval, SIGMA_DIGITS);
     let frame = match (fit.prepared.manifest.reference, found.sensor) {
         (Reference::Table, _) => "body: the axes of the ref_ columns",
         (Reference::Gravity, Sensor::Accel) => {
@@ -84,12 +78,45 @@ fn table(fit: &Fit, found: &SensorFit) -> TriadTable {
             "body: the accelerometer's (x along its x, xy plane through its y)"
         }
     };
+    let judged = Judged {
+        estimator: fit.estimator(found.sensor).into(),
+        figure: found.figure.description().into(),
+        unit: found.figure.unit(found.sensor).into(),
+        rms: rounded(found.rms(), FIGURE_DIGITS),
+        held_out_rms: found.held_out_rms().map(|r| rounded(r, FIGURE_DIGITS)),
+        noise_floor: rounded(found.noise_floor(), FIGURE_DIGITS),
+        dwells: found.dwells,
+        condition: rounded(found.estimated.condition, SIGMA_DIGITS + 1),
+    };
+    let raw_unit = fit.prepared.manifest.raw_unit;
+    triad_table(
+        &found.estimated.triad,
+        found.sensor,
+        raw_unit,
+        frame,
+        judged,
+    )
+}
+
+/// The table of a triad whose axes are those of `frame`.
+pub(super) fn triad_table(
+    triad: &Triad,
+    sensor: Sensor,
+    raw_unit: RawUnit,
+    frame: &str,
+    judged: Judged,
+) -> TriadTable {
+    let estimates = triad.inverse_estimates();
+    let covariance = &triad.inverse_covariance;
+    let physical = triad.physical(Angles::Exact);
+    let sigmas = |i: usize| rounded(estimates[i].sigma, SIGMA_DIGITS);
+    let intervals = |i: usize| rounded(estimates[i].interval, SIGMA_DIGITS);
     let degrees = 1f64.to_degrees();
     TriadTable {
         formula: FORMULA.into(),
         direction: INVERSE_DIRECTION.into(),
-        raw_unit: fit.prepared.manifest.raw_unit,
-        unit: found.sensor.unit().into(),
+        raw_unit,
+        unit: sensor.unit().into(),
         frame: frame.into(),
         C: by_rows(&triad.inverse.matrix),
         o: plain(&triad.inverse.offset),
@@ -101,16 +128,7 @@ fn table(fit: &Fit, found: &SensorFit) -> TriadTable {
         covariance: (0..12)
             .map(|i| (0..12).map(|j| covariance[(i, j)] + 0.0).collect())
             .collect(),
-        judged: Some(Judged {
-            estimator: fit.estimator(found.sensor).into(),
-            figure: found.figure.description().into(),
-            unit: found.figure.unit(found.sensor).into(),
-            rms: rounded(found.rms(), FIGURE_DIGITS),
-            held_out_rms: found.held_out_rms().map(|r| rounded(r, FIGURE_DIGITS)),
-            noise_floor: rounded(found.noise_floor(), FIGURE_DIGITS),
-            dwells: found.dwells,
-            condition: rounded(found.estimated.condition, SIGMA_DIGITS + 1),
-        }),
+        judged: Some(judged),
         forward: forward_table(&triad.forward),
         physical: PhysicalTable {
             sigma_scale_factor: Some(sigmas_of(&physical.scale, 1.0)),

@@ -1,6 +1,8 @@
 //! Curves over temperature from recordings of a unit whose curves are known, and recordings that are refused.
 
+mod at_rest;
 mod estimates;
+mod judged;
 mod plan;
 mod refused;
 #[path = "../../../../tests/thermal/simulation.rs"]

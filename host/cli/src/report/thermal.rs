@@ -1,0 +1,182 @@
+//! A fit over temperature for people.
+
+use std::fmt::Write as _;
+
+use mimu::quantity::{plus_minus, significant};
+use mimu::readable;
+use mimu_thermal::compare::Comparison;
+use mimu_thermal::judge::Bin;
+use mimu_thermal::result::{CurveResult, SensorResult, ThermalResult};
+
+use crate::report::text::{warn, wrap};
+
+/// Temperatures at which curves are shown.
+const SHOWN: usize = 5;
+
+/// Result of `mimu thermal fit`.
+pub fn thermal_text(result: &ThermalResult) -> String {
+    let mut out = String::new();
+    let [from, to] = result.range_c;
+    let _ = writeln!(
+        out,
+        "{}: {} recording{}, dies at {from:.1} to {to:.1} °C, estimator {}: {}",
+        result.device,
+        result.recordings.len(),
+        if result.recordings.len() == 1 {
+            ""
+        } else {
+            "s"
+        },
+        result.estimator,
+        result.verdict
+    );
+    if result.verdict == "one-way" {
+        let why = "the temperature goes one way only: lag and slope cannot be told apart, and the intervals are those of any lag. A \
+                   whole cycle, heating and cooling, tells them apart.";
+        wrap(&mut out, "", why);
+    }
+    for (name, sensor) in result.sensors.named() {
+        let _ = writeln!(out);
+        sensor_text(&mut out, name, sensor);
+        curves_text(&mut out, name, result);
+    }
+    if !result.warnings.is_empty() {
+        let _ = writeln!(out);
+        warn(&mut out, result.warnings.iter());
+    }
+    out
+}
+
+fn sensor_text(out: &mut String, name: &str, sensor: &SensorResult) {
+    let unit = readable::error(sensor.unit);
+    let _ = writeln!(out, "{name}");
+    match (&sensor.lag_s, &sensor.lag_reason) {
+        (Some(lag), _) => {
+            let _ = writeln!(
+                out,
+                "  lag of the die behind the thermometer: {} s, 95 % from {} to {} s",
+                significant(lag.value),
+                significant(lag.lower),
+                significant(lag.upper)
+            );
+        }
+        (None, reason) => wrap(out, "  lag: ", reason.as_deref().unwrap_or("none")),
+    }
+    if let Some(what) = sensor.inseparable {
+        wrap(out, "  inseparable: ", what);
+    }
+    if let (Some(rms), Some(floor)) = (sensor.rms, sensor.noise_floor) {
+        let _ = write!(out, "  error rms {}", unit.write(rms));
+        if let Some(held_out) = sensor.held_out_rms {
+            let _ = write!(out, ", held out {}", unit.write(held_out));
+        }
+        if let Some(without) = sensor.held_out_rms_without_session_bias {
+            let _ = write!(out, " ({} without its bias)", unit.write(without));
+        }
+        let _ = writeln!(out, ", by noise alone {}", unit.write(floor));
+    }
+    bins_text(out, &sensor.bins, sensor.unit);
+    for h in sensor.hysteresis.iter().flatten() {
+        let value = plus_minus(h.value * unit.factor, h.half_width * unit.factor);
+        let kelvin = match h.kelvin {
+            Some(k) => format!(", {} K", significant(k)),
+            None => String::new(),
+        };
+        let _ = writeln!(
+            out,
+            "  hysteresis {}: heating minus cooling {value} {}{kelvin}",
+            h.axis, unit.unit
+        );
+    }
+}
+
+fn bins_text(out: &mut String, bins: &[Bin], si: &str) {
+    if bins.is_empty() {
+        return;
+    }
+    let unit = readable::error(si);
+    let head = format!("error, {}", unit.unit);
+    let _ = writeln!(
+        out,
+        "  {head:<16}{:>10}{:>10}{:>10}{:>8}",
+        "heating", "cooling", "noise", "dwells"
+    );
+    let shown = |v: Option<f64>| v.map_or("-".into(), |v| significant(v * unit.factor));
+    for b in bins {
+        let range = format!("{:.0} to {:.0} °C", b.from_c, b.to_c);
+        let _ = writeln!(
+            out,
+            "  {range:<16}{:>10}{:>10}{:>10}{:>8}",
+            shown(b.heating),
+            shown(b.cooling),
+            shown(Some(b.noise_floor)),
+            b.dwells
+        );
+    }
+}
+
+/// Physical parameters at some temperatures; JSON has the inverse model too, and more temperatures.
+fn curves_text(out: &mut String, name: &str, result: &ThermalResult) {
+    let own = |c: &&CurveResult| c.sensor.name() == name;
+    let physical = |c: &&CurveResult| {
+        let rest = c.name.trim_start_matches(name).trim_start_matches('_');
+        !rest.starts_with("C_") && !rest.starts_with("o_")
+    };
+    let curves: Vec<&CurveResult> = result.curves.iter().filter(own).filter(physical).collect();
+    let Some(first) = curves.first() else {
+        return;
+    };
+    let last = first.temp_c.len() - 1;
+    let shown: Vec<usize> = (0..SHOWN).map(|k| k * last / (SHOWN - 1)).collect();
+    let _ = write!(out, "  {:<34}", "95 % intervals at");
+    for &k in &shown {
+        let _ = write!(out, "{:>22}", format!("{:.1} °C", first.temp_c[k]));
+    }
+    let _ = writeln!(out);
+    for curve in curves {
+        let unit = readable::parameter(&curve.unit);
+        let label = curve.name.trim_start_matches(name).trim_start_matches('_');
+        let _ = write!(out, "  {:<34}", format!("{label}, {}", unit.unit));
+        for &k in &shown {
+            let half = 0.5 * (curve.upper[k] - curve.lower[k]) * unit.factor;
+            let _ = write!(
+                out,
+                "{:>22}",
+                plus_minus(curve.value[k] * unit.factor, half)
+            );
+        }
+        let _ = writeln!(out);
+    }
+}
+
+/// Result of `mimu thermal compare`.
+pub fn thermal_comparison_text(result: &Comparison) -> String {
+    let mut out = String::new();
+    let [from, to] = result.range_c;
+    let lag = |k: usize| result.lag_s[k].map_or("none".into(), |s| format!("{} s", significant(s)));
+    let _ = writeln!(
+        out,
+        "second minus first, dies at {from:.1} to {to:.1} °C; lags {} and {}",
+        lag(0),
+        lag(1)
+    );
+    let _ = writeln!(
+        out,
+        "{:<16}{:>12}{:>14}{:>12}{:>10}  unit",
+        "", "rms", "largest", "at °C", "sigmas"
+    );
+    for c in &result.curves {
+        let sigmas = c.sigmas.map_or("-".into(), significant);
+        let _ = writeln!(
+            out,
+            "{:<16}{:>12}{:>14}{:>12}{sigmas:>10}  {}",
+            c.name,
+            significant(c.rms),
+            significant(c.largest[0]),
+            format!("{:.1}", c.largest[1]),
+            c.unit
+        );
+    }
+    warn(&mut out, result.warnings.iter());
+    out
+}

@@ -1,0 +1,106 @@
+//! The calibration that curves over temperature give.
+
+use super::of_fit::triad_table;
+use super::{Calibration, Judged, Origin, OverTemperature};
+use crate::quantity::{Figure, Sensor, rounded};
+use crate::triad::Triad;
+use mimu_recording::error::Result;
+use mimu_recording::{RawUnit, Reference};
+
+/// Digits of the error figures.
+const FIGURE_DIGITS: usize = 7;
+
+/// A triad at the temperature of one node, and how well its curves did.
+#[derive(Debug, Clone)]
+pub struct TriadOfCurves {
+    /// The model there.
+    pub triad: Triad,
+    /// How it was estimated.
+    pub estimator: &'static str,
+    /// Rms of the compensated dwell means minus the known input, SI, at all temperatures.
+    pub rms: f64,
+    /// The same on data that the curves had not seen.
+    pub held_out_rms: Option<f64>,
+    /// What noise alone would give.
+    pub noise_floor: f64,
+    /// Dwells used.
+    pub dwells: usize,
+    /// Condition of the experiment at one temperature.
+    pub condition: f64,
+}
+
+/// What a calibration over temperature is made of.
+#[derive(Debug, Clone)]
+pub struct CurvesOfUnit {
+    /// Name of the unit.
+    pub device: String,
+    /// Its own number, if it is known.
+    pub unit_id: Option<String>,
+    /// SHA-256 of the samples of the first recording.
+    pub sha256: String,
+    /// Unit of the readings.
+    pub raw_unit: RawUnit,
+    /// What was known of the input.
+    pub reference: Reference,
+    /// Local gravity, m/s².
+    pub gravity_mps2: f64,
+    /// Temperature of the dies that `triads` are for, °C.
+    pub temp_c: f64,
+    /// Gyro and accelerometer at that temperature.
+    pub triads: [Option<TriadOfCurves>; 2],
+    /// The models at all temperatures.
+    pub temperature: OverTemperature,
+}
+
+impl Calibration {
+    /// The calibration over temperature of `unit`, made at `created` (RFC 3339).
+    ///
+    /// # Errors
+    /// Curves that cannot be applied, as where C is singular at a node.
+    pub fn of_curves(unit: CurvesOfUnit, created: &str) -> Result<Self> {
+        let table = |sensor: Sensor| {
+            let found = unit.triads[sensor as usize].as_ref()?;
+            let figure = Figure::Input;
+            let judged = Judged {
+                estimator: found.estimator.into(),
+                figure: figure.description().into(),
+                unit: figure.unit(sensor).into(),
+                rms: rounded(found.rms, FIGURE_DIGITS),
+                held_out_rms: found.held_out_rms.map(|r| rounded(r, FIGURE_DIGITS)),
+                noise_floor: rounded(found.noise_floor, FIGURE_DIGITS),
+                dwells: found.dwells,
+                condition: rounded(found.condition, 5),
+            };
+            let frame = "body: the axes of the ref_ columns";
+            Some(triad_table(
+                &found.triad,
+                sensor,
+                unit.raw_unit,
+                frame,
+                judged,
+            ))
+        };
+        let calibration = Self {
+            format: Self::format_of(true).into(),
+            device: unit.device.clone(),
+            unit_id: unit.unit_id.clone(),
+            created: Some(created.into()),
+            trimmed: None,
+            tool: concat!("mimu ", env!("CARGO_PKG_VERSION")).into(),
+            recording: Origin {
+                sha256: Some(unit.sha256.clone()).filter(|s| !s.is_empty()),
+                reference: Some(unit.reference),
+                raw_unit: unit.raw_unit,
+                gravity_mps2: Some(unit.gravity_mps2),
+                temp_c: Some(unit.temp_c),
+                temp_range_c: Some(unit.temperature.range_c),
+            },
+            gyro: table(Sensor::Gyro),
+            accel: table(Sensor::Accel),
+            effect_tables: Vec::new(),
+            effects: Vec::new(),
+            temperature: Some(unit.temperature),
+        };
+        calibration.checked(&format!("calibration of {:?}", unit.device))
+    }
+}

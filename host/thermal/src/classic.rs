@@ -1,0 +1,254 @@
+//! Estimators that others use, for comparison: each takes the die to be as warm as the thermometer.
+
+use mimu::quantity::Sensor;
+use mimu_recording::error::{Error, Result};
+use nalgebra::{Matrix4, Matrix4x3, Vector3};
+
+use crate::basis::Shape;
+use crate::curves::TriadCurves;
+use crate::path::{direction, fastest};
+use crate::points::{Point, curves};
+use crate::session::{Row, Session};
+
+/// Width of the bins of the independent nodes, K.
+const NODE_K: f64 = 10.0;
+/// Cosine of the angle to an axis within which a pose or a turn is along it.
+const ALONG: f64 = 0.98;
+/// Rates below this, rad/s, are rest: fifty times the Earth's.
+const REST: f64 = 0.004;
+/// Time between two plateaus of a soak, s, and the shortest plateau.
+const PLATEAU_S: f64 = 120.0;
+
+/// An estimator of the literature.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Classic {
+    /// Affine fits in bins of 10 K, and a spline through them.
+    Nodes,
+    /// The ramp of niu: every cycle of the scheme by itself, cubics through them.
+    RampNiu,
+    /// Soak, fang section 4.4: one fit a plateau; all 18 scalars of a triad's six poses.
+    Soak,
+    /// The same by fang (33), (34) as printed: one scalar a pose, misalignments taken from elsewhere.
+    SoakAsPrinted,
+}
+
+impl Classic {
+    /// As on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Nodes => "nodes",
+            Self::RampNiu => "ramp-niu",
+            Self::Soak => "soak",
+            Self::SoakAsPrinted => "soak-fang",
+        }
+    }
+}
+
+/// Curves of `sensor` by `classic`; `None` where it was not recorded.
+///
+/// # Errors
+/// Too few temperatures at which the inputs determine everything.
+pub fn estimate(
+    sessions: &[Session],
+    sensor: Sensor,
+    classic: Classic,
+) -> Result<Option<TriadCurves>> {
+    let rows = |s: &Session| s.rows[sensor as usize].len();
+    if sessions.iter().map(rows).sum::<usize>() == 0 {
+        return Ok(None);
+    }
+    let mut points = Vec::new();
+    for session in sessions {
+        let groups = match classic {
+            Classic::Nodes => by_temperature(session, sensor),
+            Classic::RampNiu => cycles(session, sensor),
+            Classic::Soak | Classic::SoakAsPrinted => plateaus(session, sensor),
+        };
+        points.extend(groups.iter().filter_map(|group| {
+            let numbers = match (classic, sensor) {
+                (Classic::RampNiu, Sensor::Gyro) => gyro_of_cycle(group),
+                (Classic::SoakAsPrinted, _) => six_positions(group),
+                _ => affine(group),
+            };
+            let (numbers, variances) = numbers?;
+            Some(Point {
+                temp_c: mean_temperature(session, group),
+                numbers,
+                variances,
+            })
+        }));
+    }
+    let shape = match classic {
+        Classic::RampNiu => Shape::Cubic,
+        _ => Shape::Spline,
+    };
+    let count = points.len();
+    curves(sensor, &points, shape).map(Some).ok_or_else(|| {
+        Error::undetermined(
+            format!("{sensor}, estimator {}", classic.name()),
+            format!("only {count} temperatures have all the poses and turns that it needs"),
+            "use --estimator joint, or repeat the whole scheme at five temperatures or more",
+        )
+    })
+}
+
+fn mean_temperature(session: &Session, rows: &[&Row]) -> f64 {
+    let n: f64 = rows.iter().map(|r| r.samples).sum();
+    let sum = rows
+        .iter()
+        .map(|r| r.samples * session.thermometer.at(r.middle_s).0);
+    sum.sum::<f64>() / n
+}
+
+fn by_temperature<'a>(session: &'a Session, sensor: Sensor) -> Vec<Vec<&'a Row>> {
+    let bin = |r: &Row| (session.thermometer.at(r.middle_s).0 / NODE_K).floor() as i64;
+    let mut rows: Vec<&Row> = session.rows[sensor as usize].iter().collect();
+    rows.sort_by_key(|r| bin(r));
+    rows.chunk_by(|a, b| bin(a) == bin(b))
+        .map(<[_]>::to_vec)
+        .collect()
+}
+
+/// Stretches in which the temperature stands, whether it has settled or not.
+fn plateaus<'a>(session: &'a Session, sensor: Sensor) -> Vec<Vec<&'a Row>> {
+    let fastest = fastest(session);
+    let rows = session.rows[sensor as usize].iter();
+    let still: Vec<&Row> = rows
+        .filter(|r| direction(session, fastest, r.middle_s) == 0)
+        .collect();
+    let apart = |a: &&Row, b: &&Row| b.middle_s - a.middle_s < PLATEAU_S;
+    still.chunk_by(apart).map(<[_]>::to_vec).collect()
+}
+
+/// The signed axis that `v` is along.
+fn along(v: &Vector3<f64>) -> Option<(usize, bool)> {
+    let axis = v.iamax();
+    (v[axis].abs() > ALONG * v.norm()).then_some((axis, v[axis] > 0.0))
+}
+
+/// Cycles of the scheme: each ends as soon as it has seen all that niu's computation needs of the sensor.
+fn cycles<'a>(session: &'a Session, sensor: Sensor) -> Vec<Vec<&'a Row>> {
+    let mut out = Vec::new();
+    let mut open: Vec<&Row> = Vec::new();
+    for dwell in session.rows[sensor as usize].chunk_by(|a, b| a.step == b.step) {
+        open.extend(dwell);
+        let complete = match sensor {
+            Sensor::Gyro => gyro_of_cycle(&open).is_some(),
+            // Five poses: x and y up and down, z down.
+            Sensor::Accel => {
+                let seen = |axis: usize, up: bool| {
+                    open.iter().any(|r| along(&r.input) == Some((axis, up)))
+                };
+                seen(0, true)
+                    && seen(0, false)
+                    && seen(1, true)
+                    && seen(1, false)
+                    && (seen(2, true) || seen(2, false))
+            }
+        };
+        if complete {
+            out.push(std::mem::take(&mut open));
+        }
+    }
+    out
+}
+
+type Numbers = ([f64; 12], [f64; 12]);
+
+/// Mean reading and samples of the rows that `of` picks.
+fn mean(rows: &[&Row], of: impl Fn(&Row) -> bool) -> Option<(Vector3<f64>, Vector3<f64>, f64)> {
+    let (mut raw, mut input, mut n) = (Vector3::zeros(), Vector3::zeros(), 0.0);
+    for r in rows.iter().filter(|r| of(r)) {
+        raw += r.raw * r.samples;
+        input += r.input * r.samples;
+        n += r.samples;
+    }
+    (n > 0.0).then(|| (raw / n, input / n, n))
+}
+
+/// niu (a.7) to (a.10), reconstructed from the text around them, as the equations are not in it: biases from rest, the Earth's rate
+/// taken off by the known input; scale factors and cross terms from turns both ways. Poses are not known from the gyro alone, so all
+/// rests are averaged where niu pairs opposite ones.
+fn gyro_of_cycle(rows: &[&Row]) -> Option<Numbers> {
+    let (bias, earth, n) = mean(rows, |r| r.input.norm() < REST)?;
+    let (mut numbers, mut variances) = ([0.0; 12], [0.0; 12]);
+    for i in 0..3 {
+        let turning =
+            |up: bool| move |r: &Row| r.input.norm() >= REST && along(&r.input) == Some((i, up));
+        let (plus, x_plus, n_plus) = mean(rows, turning(true))?;
+        let (minus, x_minus, n_minus) = mean(rows, turning(false))?;
+        let change = x_plus[i] - x_minus[i];
+        for j in 0..3 {
+            numbers[3 * j + i] = (plus[j] - minus[j]) / change;
+            variances[3 * j + i] = (1.0 / n_plus + 1.0 / n_minus) / (change * change);
+        }
+    }
+    for j in 0..3 {
+        let known: f64 = (0..3).map(|i| numbers[3 * j + i] * earth[i]).sum();
+        numbers[9 + j] = bias[j] - known;
+        variances[9 + j] = 1.0 / n;
+    }
+    Some(scaled(rows, numbers, variances))
+}
+
+/// Least squares of all twelve numbers, niu (a.6) for the accelerometer.
+fn affine(rows: &[&Row]) -> Option<Numbers> {
+    let mut gram = Matrix4::zeros();
+    let mut with = Matrix4x3::zeros();
+    for r in rows {
+        let x = r.input.push(1.0);
+        gram += x * x.transpose() * r.samples;
+        with += x * r.raw.transpose() * r.samples;
+    }
+    let scale = gram.diagonal().map(|d| 1.0 / d.max(1e-300).sqrt());
+    let correlation = Matrix4::from_fn(|i, j| gram[(i, j)] * scale[i] * scale[j]);
+    if correlation.symmetric_eigenvalues().min() < 1e-4 {
+        return None;
+    }
+    let inverse = gram.try_inverse()?;
+    let solved = inverse * with;
+    let (mut numbers, mut variances) = ([0.0; 12], [0.0; 12]);
+    for j in 0..3 {
+        for i in 0..4 {
+            let k = if i < 3 { 3 * j + i } else { 9 + j };
+            numbers[k] = solved[(i, j)];
+            variances[k] = inverse[(i, i)];
+        }
+    }
+    Some(scaled(rows, numbers, variances))
+}
+
+/// fang (33), (34): k and b of an axis from the readings of that axis with the input along it, both ways; M never enters.
+fn six_positions(rows: &[&Row]) -> Option<Numbers> {
+    let (mut numbers, mut variances) = ([0.0; 12], [0.0; 12]);
+    for i in 0..3 {
+        let pose = |up: bool| move |r: &Row| along(&r.input) == Some((i, up));
+        let (plus, x_plus, n_plus) = mean(rows, pose(true))?;
+        let (minus, x_minus, n_minus) = mean(rows, pose(false))?;
+        let change = x_plus[i] - x_minus[i];
+        let by_noise = 1.0 / n_plus + 1.0 / n_minus;
+        numbers[3 * i + i] = (plus[i] - minus[i]) / change;
+        numbers[9 + i] = 0.5 * (plus[i] + minus[i]);
+        variances[3 * i + i] = by_noise / (change * change);
+        variances[9 + i] = 0.25 * by_noise;
+        for j in (0..3).filter(|j| *j != i) {
+            variances[3 * i + j] = by_noise / (change * change);
+        }
+    }
+    Some(scaled(rows, numbers, variances))
+}
+
+/// Variances of unit noise times that of a sample, from neighbouring rows of a dwell.
+fn scaled(rows: &[&Row], numbers: [f64; 12], mut variances: [f64; 12]) -> Numbers {
+    let (mut sum, mut n) = (Vector3::zeros(), 0.0);
+    for pair in rows.windows(2).filter(|p| p[0].step == p[1].step) {
+        let off = pair[1].raw - pair[0].raw;
+        sum += off.component_mul(&off) / (1.0 / pair[0].samples + 1.0 / pair[1].samples);
+        n += 1.0;
+    }
+    for (k, v) in variances.iter_mut().enumerate() {
+        let axis = if k < 9 { k / 3 } else { k - 9 };
+        *v *= (sum[axis] / f64::max(n, 1.0)).max(1e-30);
+    }
+    (numbers, variances)
+}

@@ -1,0 +1,322 @@
+//! `mimu thermal fit` from memory: curves by one of the estimators, judged.
+
+use mimu::calibration::{Calibration, CurvesOfUnit, TriadOfCurves, reference_node};
+use mimu::quantity::{Sensor, significant};
+use mimu_recording::Reference;
+use mimu_recording::error::{Error, Result};
+
+use crate::basis::{CURVATURE_SPAN, Shape};
+use crate::classic::{self, Classic};
+use crate::extrapolation;
+use crate::joint::{Choice, Joint, estimate};
+use crate::judge::{self, Bin, DwellError, Hysteresis, rms};
+use crate::nodes;
+use crate::path::is_one_way;
+use crate::profile::Profile;
+use crate::session::Session;
+use crate::thermometer::Start;
+
+/// How the curves are estimated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Estimator {
+    /// All curves and the lag together.
+    Joint,
+    /// The same with one cubic for each parameter.
+    Cubic,
+    /// One of the literature.
+    Classic(Classic),
+}
+
+impl Estimator {
+    /// As on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Joint => "joint",
+            Self::Cubic => "cubic",
+            Self::Classic(classic) => classic.name(),
+        }
+    }
+}
+
+/// What a fit is to do.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Options {
+    /// Estimator.
+    pub estimator: Estimator,
+    /// A lag that is known, s; none to estimate it.
+    pub lag_s: Option<f64>,
+    /// Temperatures that the curves have to cover, °C.
+    pub range_c: Option<[f64; 2]>,
+}
+
+/// Whether lag and slope are told apart.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Verdict {
+    /// Heating and cooling, or plateaus, tell them apart.
+    Fitted,
+    /// They cannot be told apart: the temperature goes one way only.
+    OneWay,
+}
+
+impl Verdict {
+    /// As in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Fitted => "fitted",
+            Self::OneWay => "one-way",
+        }
+    }
+}
+
+/// Figures of one triad.
+#[derive(Debug, Clone)]
+pub struct Judged {
+    /// Errors of the dwells that the curves were fitted to.
+    pub errors: Vec<DwellError>,
+    /// Errors of dwells that they had not seen.
+    pub held_out: Option<Vec<DwellError>>,
+    /// Of the latter where there are any, else of the former.
+    pub bins: Vec<Bin>,
+    /// What heating and cooling differ by after the lag.
+    pub hysteresis: Option<Vec<Hysteresis>>,
+    /// Rms of the same, biases of a verifying session taken off; none without one.
+    pub without_session_bias: Option<f64>,
+}
+
+/// Curves over temperature, judged.
+#[derive(Debug, Clone)]
+pub struct ThermalFit {
+    /// Curves, lag and noise. Of an estimator of the literature the lag is given as zero.
+    pub joint: Joint,
+    /// The recordings.
+    pub sessions: Vec<Session>,
+    /// As asked for.
+    pub options: Options,
+    /// Whether lag and slope are told apart.
+    pub verdict: Verdict,
+    /// Figures of gyro and accelerometer; none where only biases are estimated.
+    pub judged: [Option<Judged>; 2],
+    /// What a person should know.
+    pub warnings: Vec<String>,
+}
+
+/// Fits `sessions`; `verify` are recordings that are only compensated, whole sweeps or soaks.
+///
+/// # Errors
+/// Those of [`estimate`]; a range that was not covered.
+pub fn fit(sessions: Vec<Session>, verify: &[Session], options: Options) -> Result<ThermalFit> {
+    let mut warnings: Vec<String> = sessions
+        .iter()
+        .chain(verify)
+        .flat_map(|s| s.warnings.iter().cloned())
+        .collect();
+    check_verifying(&sessions, verify)?;
+    let joint = match options.estimator {
+        Estimator::Joint => smooth(&sessions, options, &mut warnings)?,
+        Estimator::Cubic => {
+            let choice = Choice {
+                shape: Shape::Cubic,
+                lag_s: options.lag_s,
+            };
+            estimate(&sessions, choice)?
+        }
+        Estimator::Classic(classic) => of_literature(&sessions, classic)?,
+    };
+    warnings.extend(joint.warnings.iter().cloned());
+    check_range(&joint, options.range_c)?;
+    let dies = joint.dies(&sessions);
+    let verdict = match is_one_way(&sessions, &dies) {
+        true => Verdict::OneWay,
+        false => Verdict::Fitted,
+    };
+    if let Some((_, drop)) = &joint.apart {
+        warnings.push(format!(
+            "gyro and accelerometer have two lags (drop in deviance {}): the calibration file has one, that of both together",
+            significant(*drop)
+        ));
+    }
+    let judged = [0, 1].map(|k| judge(&sessions, verify, &joint, k));
+    Ok(ThermalFit {
+        joint,
+        sessions,
+        options,
+        verdict,
+        judged,
+        warnings,
+    })
+}
+
+/// The joint estimate; where the temperature goes one way only, curvature has to prove itself by extrapolation.
+fn smooth(sessions: &[Session], options: Options, warnings: &mut Vec<String>) -> Result<Joint> {
+    let choice = |shape| Choice {
+        shape,
+        lag_s: options.lag_s,
+    };
+    let joint = estimate(sessions, choice(Shape::Spline))?;
+    let dies = joint.dies(sessions);
+    let span = dies.iter().map(|d| d.range()[1] - d.range()[0]);
+    if !is_one_way(sessions, &dies) || span.fold(0.0, f64::max) < CURVATURE_SPAN {
+        return Ok(joint);
+    }
+    let Some([line, curve]) = extrapolation::compare(sessions, options.lag_s) else {
+        return Ok(joint);
+    };
+    if curve <= line {
+        return Ok(joint);
+    }
+    warnings.push(format!(
+        "curvature refused: fitted to the first two thirds, curves miss the last third {} times as far as straight lines do, and a drift \
+         in time is not told from curvature where the temperature goes one way only",
+        significant(curve / line)
+    ));
+    estimate(sessions, choice(Shape::Line))
+}
+
+fn of_literature(sessions: &[Session], classic: Classic) -> Result<Joint> {
+    let mut curves = Vec::new();
+    for sensor in Sensor::BOTH {
+        if sessions.iter().any(|s| s.reference == Reference::Gravity) {
+            let problem = format!("the estimator {} needs known inputs", classic.name());
+            let remedy = "use --estimator joint, or record with a table";
+            return Err(Error::new(&sessions[0].place, problem, remedy));
+        }
+        curves.push(classic::estimate(sessions, sensor, classic)?);
+    }
+    Ok(Joint {
+        curves: curves.try_into().unwrap_or_else(|_| [None, None]),
+        profile: Profile::fixed(0.0, 0.0),
+        apart: None,
+        noise: [None, None],
+        starts: vec![Start::Settled; sessions.len()],
+        warnings: Vec::new(),
+    })
+}
+
+fn check_verifying(sessions: &[Session], verify: &[Session]) -> Result<()> {
+    let Some(first) = sessions.first() else {
+        return Ok(());
+    };
+    for other in verify {
+        if other.device != first.device {
+            let problem = format!(
+                "this is a recording of {:?}, not of {:?}",
+                other.device, first.device
+            );
+            let remedy = "verify with a recording of the same unit";
+            return Err(Error::new(&other.place, problem, remedy));
+        }
+    }
+    Ok(())
+}
+
+fn check_range(joint: &Joint, wanted: Option<[f64; 2]>) -> Result<()> {
+    let Some([from, to]) = wanted else {
+        return Ok(());
+    };
+    let [low, high] = range(joint);
+    if low <= from + 1.0 && high >= to - 1.0 {
+        return Ok(());
+    }
+    let problem = format!(
+        "the dies were at {low:.1} to {high:.1} °C, and the curves are to cover {from} to {to} °C"
+    );
+    let remedy = "heat and cool the unit through the whole range, with time for the dies to follow";
+    Err(Error::undetermined("range", problem, remedy))
+}
+
+/// Temperatures of the dies, °C.
+pub fn range(joint: &Joint) -> [f64; 2] {
+    let all = joint.curves.iter().flatten().map(|c| c.range_c);
+    all.fold([f64::INFINITY, f64::NEG_INFINITY], |r, c| {
+        [r[0].min(c[0]), r[1].max(c[1])]
+    })
+}
+
+fn judge(sessions: &[Session], verify: &[Session], joint: &Joint, k: usize) -> Option<Judged> {
+    let sensor = Sensor::BOTH[k];
+    let curves = joint.curves[k].as_ref()?;
+    if curves.biases_only() {
+        return None;
+    }
+    let dies = joint.dies(sessions);
+    let mut errors = Vec::new();
+    for (i, session) in sessions.iter().enumerate() {
+        let offset = curves.session_offset(i);
+        errors.extend(judge::dwell_errors(
+            session, sensor, &dies[i], curves, &offset,
+        ));
+    }
+    let mut without = None;
+    let held_out = match verify {
+        [] => joint.noise[k].and_then(|noise| judge::held_out(sessions, joint, sensor, &noise)),
+        _ => {
+            let mut all = Vec::new();
+            let mut centred = Vec::new();
+            for session in verify {
+                let lag = joint.profile.lag.value;
+                let die = session.thermometer.die(lag, Start::Settled);
+                let own =
+                    judge::dwell_errors(session, sensor, &die, curves, &nalgebra::Vector3::zeros());
+                let mean = own.iter().map(|e| e.error).sum::<nalgebra::Vector3<f64>>()
+                    / own.len().max(1) as f64;
+                centred.extend(own.iter().map(|e| DwellError {
+                    error: e.error - mean,
+                    ..*e
+                }));
+                all.extend(own);
+            }
+            without = Some(rms(&centred)[0]);
+            Some(all)
+        }
+    };
+    let shown = held_out.as_ref().unwrap_or(&errors);
+    Some(Judged {
+        bins: judge::bins(shown),
+        hysteresis: judge::hysteresis(&errors, curves),
+        errors,
+        held_out,
+        without_session_bias: without,
+    })
+}
+
+impl ThermalFit {
+    /// The calibration file, made at `created` (RFC 3339).
+    ///
+    /// # Errors
+    /// Curves of biases alone.
+    pub fn calibration(&self, created: &str) -> Result<Calibration> {
+        let mut temperature = nodes::over_temperature(&self.joint)?;
+        if self.verdict == Verdict::OneWay {
+            (temperature.lag_s, temperature.interval_lag_s) = (None, None);
+        }
+        let temps: Vec<f64> = temperature.nodes.iter().map(|n| n.temp_c).collect();
+        let temp_c = reference_node(&temps).map_or(f64::NAN, |k| temps[k]);
+        let first = &self.sessions[0];
+        let triads = [0, 1].map(|k| {
+            let curves = self.joint.curves[k].as_ref()?;
+            let judged = self.judged[k].as_ref()?;
+            let [own, floor] = rms(&judged.errors);
+            Some(TriadOfCurves {
+                triad: curves.triad(temp_c)?,
+                estimator: self.options.estimator.name(),
+                rms: own,
+                held_out_rms: judged.held_out.as_ref().map(|h| rms(h)[0]),
+                noise_floor: floor,
+                dwells: judged.errors.len(),
+                condition: curves.condition(temp_c),
+            })
+        });
+        let unit = CurvesOfUnit {
+            device: first.device.clone(),
+            unit_id: first.unit_id.clone(),
+            sha256: first.sha256.clone(),
+            raw_unit: first.raw_unit,
+            reference: first.reference,
+            gravity_mps2: first.gravity_mps2,
+            temp_c,
+            triads,
+            temperature,
+        };
+        Calibration::of_curves(unit, created)
+    }
+}

@@ -1,0 +1,256 @@
+//! How well curves compensate a recording: errors of the dwells, by temperature, heating and cooling apart, over the noise.
+
+use mimu::quantity::Sensor;
+use mimu_core::compensation::Affine;
+use nalgebra::Vector3;
+use serde::Serialize;
+
+use crate::curves::TriadCurves;
+use crate::joint::Joint;
+use crate::nodes::inverse;
+use crate::path::{direction, fastest};
+use crate::regression::{AxisNoise, Normal};
+use crate::session::{Row, Session};
+use crate::smoothness::{Penalties, fixed};
+use crate::thermometer::Die;
+
+/// Width of the bins, K.
+const BIN_K: f64 = 10.0;
+/// Parts of the time that are held out one after the other, and pieces that each consists of: a piece is shorter than a sweep, so that
+/// the rest covers all temperatures.
+const FOLDS: usize = 4;
+const PIECES: usize = 10;
+
+/// Error of one dwell.
+#[derive(Debug, Clone, Copy)]
+pub struct DwellError {
+    /// Compensated mean minus known input, SI.
+    pub error: Vector3<f64>,
+    /// Mean temperature of the die, °C.
+    pub die_c: f64,
+    /// 1 where the temperature rises, -1 where it falls, 0 where it stands.
+    pub way: i32,
+    /// Variance that noise alone gives the error of an axis, SI².
+    pub floor: f64,
+}
+
+/// Errors of the dwells of `sensor` in `session`, whose die is `die`; `offset` is the raw bias of the session over the curves'. Empty
+/// where the inverse is not known.
+pub fn dwell_errors(
+    session: &Session,
+    sensor: Sensor,
+    die: &Die,
+    curves: &TriadCurves,
+    offset: &Vector3<f64>,
+) -> Vec<DwellError> {
+    if curves.biases_only() {
+        return Vec::new();
+    }
+    let model = |temp_c: f64| inverse(curves, temp_c).map(|[model, _]| model);
+    errors_by(session, sensor, die, model, offset, |_| true)
+}
+
+fn errors_by(
+    session: &Session,
+    sensor: Sensor,
+    die: &Die,
+    model: impl Fn(f64) -> Option<Affine<f64>>,
+    offset: &Vector3<f64>,
+    used: impl Fn(usize) -> bool,
+) -> Vec<DwellError> {
+    let all = session.rows[sensor as usize].iter().enumerate();
+    let rows: Vec<(&Row, Vector3<f64>)> = all
+        .filter(|(k, r)| used(*k) && r.input.iter().all(|x| x.is_finite()))
+        .filter_map(|(_, r)| {
+            let at = model(die.at(r.middle_s))?;
+            Some((r, at.apply(&(r.raw - offset)) - r.input))
+        })
+        .collect();
+    let variance = sample_variance(&rows);
+    let fastest = fastest(session);
+    let mut out = Vec::new();
+    for dwell in rows.chunk_by(|a, b| a.0.step == b.0.step) {
+        let n: f64 = dwell.iter().map(|(r, _)| r.samples).sum();
+        let mean =
+            |of: fn(&Row) -> f64| dwell.iter().map(|(r, _)| r.samples * of(r)).sum::<f64>() / n;
+        let middle_s = mean(|r| r.middle_s);
+        out.push(DwellError {
+            error: dwell
+                .iter()
+                .map(|(r, e)| e * r.samples)
+                .sum::<Vector3<f64>>()
+                / n,
+            die_c: die.at(middle_s),
+            way: direction(session, fastest, middle_s),
+            floor: variance / n,
+        });
+    }
+    out
+}
+
+/// Variance of one sample, mean of the axes, by differences of neighbouring rows: the slope of the temperature is not in them.
+fn sample_variance(rows: &[(&Row, Vector3<f64>)]) -> f64 {
+    let (mut sum, mut n) = (0.0, 0.0);
+    for pair in rows.windows(2) {
+        let ([(a, x), (b, y)], true) = ([pair[0], pair[1]], pair[0].0.step == pair[1].0.step)
+        else {
+            continue;
+        };
+        sum += (y - x).norm_squared() / 3.0 / (1.0 / a.samples + 1.0 / b.samples);
+        n += 1.0;
+    }
+    sum / f64::max(n, 1.0)
+}
+
+/// Root mean square over dwells and axes, and that of noise alone.
+pub fn rms(errors: &[DwellError]) -> [f64; 2] {
+    let n = errors.len().max(1) as f64;
+    let squares: f64 = errors.iter().map(|e| e.error.norm_squared() / 3.0).sum();
+    let floor: f64 = errors.iter().map(|e| e.floor).sum();
+    [(squares / n).sqrt(), (floor / n).sqrt()]
+}
+
+/// Errors in a bin of temperature, SI.
+#[derive(Debug, Clone, Serialize)]
+pub struct Bin {
+    /// Its lower end, °C of the die.
+    pub from_c: f64,
+    /// Its upper end.
+    pub to_c: f64,
+    /// Rms of the dwells in which the temperature rises; null where there is none.
+    pub heating: Option<f64>,
+    /// Rms of those in which it falls; null where there is none.
+    pub cooling: Option<f64>,
+    /// Rms by noise alone.
+    pub noise_floor: f64,
+    /// Dwells.
+    pub dwells: usize,
+}
+
+/// `errors` in bins of 10 K.
+pub fn bins(errors: &[DwellError]) -> Vec<Bin> {
+    let bin = |e: &DwellError| (e.die_c / BIN_K).floor() as i64;
+    let Some(first) = errors.iter().map(bin).min() else {
+        return Vec::new();
+    };
+    let last = errors.iter().map(bin).max().unwrap_or(first);
+    let each = (first..=last).filter_map(|k| {
+        let own: Vec<DwellError> = errors.iter().copied().filter(|e| bin(e) == k).collect();
+        let way = |w: i32| {
+            let of: Vec<DwellError> = own.iter().copied().filter(|e| e.way == w).collect();
+            (!of.is_empty()).then(|| rms(&of)[0])
+        };
+        (!own.is_empty()).then(|| Bin {
+            from_c: k as f64 * BIN_K,
+            to_c: (k + 1) as f64 * BIN_K,
+            heating: way(1),
+            cooling: way(-1),
+            noise_floor: rms(&own)[1],
+            dwells: own.len(),
+        })
+    });
+    each.collect()
+}
+
+/// What is left between heating and cooling after the lag: hysteresis, reported and never fitted.
+#[derive(Debug, Clone, Serialize)]
+pub struct Hysteresis {
+    /// Axis.
+    pub axis: &'static str,
+    /// Mean error when heating minus that when cooling, at the same temperatures, SI.
+    pub value: f64,
+    /// Half of its 95 % interval, SI.
+    pub half_width: f64,
+    /// The same as a difference of temperature, K, by the slope of the bias; null where the bias hardly changes.
+    pub kelvin: Option<f64>,
+}
+
+/// Difference between heating and cooling of each axis, over the bins that have both.
+pub fn hysteresis(errors: &[DwellError], curves: &TriadCurves) -> Option<Vec<Hysteresis>> {
+    let bin = |e: &DwellError| (e.die_c / BIN_K).floor() as i64;
+    let mut keys: Vec<i64> = errors.iter().map(bin).collect();
+    keys.sort_unstable();
+    keys.dedup();
+    let (mut sum, mut variance, mut n) = (Vector3::zeros(), 0.0, 0.0);
+    for key in keys {
+        let mean = |way: i32| {
+            let own = errors.iter().filter(|e| bin(e) == key && e.way == way);
+            let own: Vec<&DwellError> = own.collect();
+            let count = own.len() as f64;
+            let mean = own.iter().map(|e| e.error).sum::<Vector3<f64>>() / count;
+            let floor = own.iter().map(|e| e.floor).sum::<f64>() / (count * count);
+            (count > 0.0).then_some((mean, floor))
+        };
+        if let (Some((up, a)), Some((down, b))) = (mean(1), mean(-1)) {
+            sum += up - down;
+            variance += a + b;
+            n += 1.0;
+        }
+    }
+    if n == 0.0 {
+        return None;
+    }
+    let half_width = 1.96 * (variance / (n * n)).sqrt();
+    let middle = 0.5 * (curves.range_c[0] + curves.range_c[1]);
+    let [model, slope] = curves.forward(middle);
+    Some(
+        (0..3)
+            .map(|k| {
+                let value = sum[k] / n;
+                let by_kelvin = slope.bias[k] / model.matrix.row(k).norm();
+                let known = by_kelvin.abs() > half_width;
+                Hysteresis {
+                    axis: mimu::quantity::AXES[k],
+                    value,
+                    half_width,
+                    kelvin: known.then(|| value / by_kelvin),
+                }
+            })
+            .collect(),
+    )
+}
+
+/// Errors of the dwells of `sensor`, each by curves that had not seen it: four parts of the time in turn, lag, noise and smoothness kept.
+pub fn held_out(
+    sessions: &[Session],
+    joint: &Joint,
+    sensor: Sensor,
+    noise: &[AxisNoise; 3],
+) -> Option<Vec<DwellError>> {
+    let curves = joint.curves[sensor as usize].as_ref()?;
+    if curves.biases_only() {
+        return None;
+    }
+    let problem = curves.problem();
+    let dies = joint.dies(sessions);
+    let temps: Vec<f64> = problem
+        .rows
+        .iter()
+        .map(|r| dies[r.session].at(r.middle_s))
+        .collect();
+    let fold = |session: usize, t_s: f64| {
+        let s = &sessions[session].thermometer;
+        let share = (t_s - s.start_s()) / s.duration_s().max(1.0);
+        (share * (FOLDS * PIECES) as f64) as usize % FOLDS
+    };
+    let penalties = Penalties::of(problem);
+    let smoothness = curves.smoothness()?;
+    let mut all = Vec::new();
+    for part in 0..FOLDS {
+        let seen = |k: usize| {
+            let row = &problem.rows[k];
+            fold(row.session, row.middle_s) != part
+        };
+        let normals = [0, 1, 2].map(|a| Normal::of(problem, a, &temps, &noise[a], seen));
+        let fit = fixed(problem, &penalties, &normals, &smoothness)?;
+        let part_curves = TriadCurves::new(problem.clone(), vec![(1.0, fit)], curves.range_c);
+        let model = |temp_c: f64| inverse(&part_curves, temp_c).map(|[model, _]| model);
+        for (k, session) in sessions.iter().enumerate() {
+            let rows = &session.rows[sensor as usize];
+            let unseen = |i: usize| fold(k, rows[i].middle_s) == part;
+            let offset = part_curves.session_offset(k);
+            all.extend(errors_by(session, sensor, &dies[k], model, &offset, unseen));
+        }
+    }
+    Some(all)
+}

@@ -1,0 +1,86 @@
+//! Curves through estimates at single temperatures: the second stage of every estimator but the joint one.
+
+use mimu::quantity::Sensor;
+use nalgebra::{DMatrix, DVector, Vector3};
+
+use crate::basis::{Basis, Shape};
+use crate::curves::TriadCurves;
+use crate::regression::{Kind, Normal, Problem};
+use crate::smoothness::{Penalties, TriadFit, fixed, largest};
+
+/// Forward model at one temperature: P by rows, then b, raw per SI and raw, with variances.
+#[derive(Debug, Clone, Copy)]
+pub struct Point {
+    /// °C of the thermometer.
+    pub temp_c: f64,
+    /// The twelve numbers.
+    pub numbers: [f64; 12],
+    /// Their variances.
+    pub variances: [f64; 12],
+}
+
+/// Curves of `shape` through `points`, each number by itself by weighted least squares. `None` with fewer points than a curve has
+/// numbers.
+pub fn curves(sensor: Sensor, points: &[Point], shape: Shape) -> Option<TriadCurves> {
+    let temps = points.iter().map(|p| p.temp_c);
+    let range_c = temps.fold([f64::INFINITY, f64::NEG_INFINITY], |r, t| {
+        [r[0].min(t), r[1].max(t)]
+    });
+    let basis = Basis::new(shape, range_c);
+    if points.len() < basis.free() + 1 || !(range_c[0] < range_c[1]) {
+        return None;
+    }
+    let mean = |k: usize| points.iter().map(|p| p.numbers[k]).sum::<f64>() / points.len() as f64;
+    let problem = Problem {
+        sensor,
+        rows: Vec::new(),
+        gain: Vector3::from_fn(|i, _| mean(3 * i + i).abs()),
+        null: Vector3::from_fn(|i, _| mean(9 + i)),
+        bases: Kind::ALL.map(|_| basis.clone()),
+        sessions: 1,
+        biases_only: false,
+        samples: 1.0,
+    };
+    let normals = [0, 1, 2].map(|axis| normal(&problem, axis, points));
+    // The penalty only decides where points are missing: as little as data sheets allow.
+    let penalties = Penalties::of(&problem);
+    let fit: TriadFit = fixed(&problem, &penalties, &normals, &largest(&problem))?;
+    Some(TriadCurves::new(problem, vec![(1.0, fit)], range_c))
+}
+
+fn normal(problem: &Problem, axis: usize, points: &[Point]) -> Normal {
+    let n = problem.columns(axis);
+    let mut gram = DMatrix::zeros(n, n);
+    let mut with = DVector::zeros(n);
+    let mut squares = 0.0;
+    for part in problem.parts(axis) {
+        let number = part.input.map_or(9 + axis, |i| 3 * axis + i);
+        let basis = problem.basis(part.kind);
+        let null = if part.input.is_none() {
+            problem.null[axis]
+        } else {
+            0.0
+        };
+        for p in points {
+            let value = (p.numbers[number] - null) / problem.gain[axis];
+            let weight = problem.gain[axis].powi(2) / p.variances[number];
+            let (from, v) = basis.values(p.temp_c);
+            let used = 4.min(basis.len() - from);
+            for i in 0..used {
+                let a = part.from + from + i;
+                with[a] += weight * v[i] * value;
+                for j in 0..used {
+                    gram[(a, part.from + from + j)] += weight * v[i] * v[j];
+                }
+            }
+            squares += weight * value * value;
+        }
+    }
+    Normal {
+        gram,
+        with,
+        squares,
+        log_det: 0.0,
+        rows: points.len() as f64,
+    }
+}

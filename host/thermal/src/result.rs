@@ -1,0 +1,320 @@
+//! `mimu-thermal/1`: what a fit over temperature found. SI and raw units throughout; what is not a number is null.
+
+use mimu::quantity::{AXES, Sensor, inverse_names, raw_unit, scale_unit};
+use mimu::result::Sensors;
+use mimu::triad::{Angles, Estimate};
+use mimu_recording::RawUnit;
+use serde::Serialize;
+
+use crate::curves::TriadCurves;
+use crate::fit::{ThermalFit, Verdict, range};
+use crate::judge::{Bin, Hysteresis, rms};
+use crate::profile::{Lag, RANGE};
+
+/// Temperatures that a curve is given at.
+const COUNT: usize = 33;
+
+/// Result of a fit over temperature.
+#[derive(Debug, Clone, Serialize)]
+pub struct ThermalResult {
+    /// `mimu-thermal/1`.
+    pub format: &'static str,
+    /// Program and version.
+    pub tool: &'static str,
+    /// Unit that was recorded.
+    pub device: String,
+    /// Samples files, with their SHA-256.
+    pub recordings: Vec<RecordingResult>,
+    /// How it was estimated.
+    pub estimator: &'static str,
+    /// `fitted`, or `one-way` where lag and slope cannot be told apart.
+    pub verdict: &'static str,
+    /// Lowest and highest temperature of the dies, °C.
+    pub range_c: [f64; 2],
+    /// Figures of the triads.
+    pub sensors: Sensors<SensorResult>,
+    /// All parameters over the temperature of the die.
+    pub curves: Vec<CurveResult>,
+    /// What a person should know.
+    pub warnings: Vec<String>,
+}
+
+/// A recording that was fitted.
+#[derive(Debug, Clone, Serialize)]
+pub struct RecordingResult {
+    /// Path of its samples.
+    pub samples: String,
+    /// SHA-256 of them.
+    pub sha256: String,
+    /// Biases of this power-on over those of the first, gyro x, y, z, accelerometer x, y, z; raw.
+    pub bias_offset_raw: [f64; 6],
+}
+
+/// Figures of one triad.
+#[derive(Debug, Clone, Serialize)]
+pub struct SensorResult {
+    /// SI unit of the figures.
+    pub unit: &'static str,
+    /// Compensated dwell means minus known input, over dwells and axes, rms; null where the input is not known.
+    pub rms: Option<f64>,
+    /// The same of data that were held out; null where none were.
+    pub held_out_rms: Option<f64>,
+    /// The same with the biases of the verifying recording taken off; null without one.
+    pub held_out_rms_without_session_bias: Option<f64>,
+    /// What noise alone would give, the slope over temperature removed; null where the input is not known.
+    pub noise_floor: Option<f64>,
+    /// Time constant of the die behind the thermometer, s, negative where it leads; null with [`Self::lag_reason`].
+    pub lag_s: Option<LagResult>,
+    /// Why there is no lag; null where there is one.
+    pub lag_reason: Option<String>,
+    /// What is inseparable in the curves of this sensor; null where nothing is.
+    pub inseparable: Option<&'static str>,
+    /// Errors by temperature, of the held-out data where there are any.
+    pub bins: Vec<Bin>,
+    /// What heating and cooling differ by after the lag; null where they share no temperature.
+    pub hysteresis: Option<Vec<Hysteresis>>,
+}
+
+/// A lag with its 95 % interval, s.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct LagResult {
+    /// Most likely.
+    pub value: f64,
+    /// Lower end.
+    pub lower: f64,
+    /// Upper end.
+    pub upper: f64,
+}
+
+/// A parameter over temperature.
+#[derive(Debug, Clone, Serialize)]
+pub struct CurveResult {
+    /// Sensor and name of the parameter, as a fit at one temperature calls it: `gyro_C_xx`, `accel_bias_z`.
+    pub name: String,
+    /// Sensor.
+    pub sensor: Sensor,
+    /// Unit of values and bounds.
+    pub unit: String,
+    /// Temperatures of the die, °C.
+    pub temp_c: Vec<f64>,
+    /// Estimates.
+    pub value: Vec<f64>,
+    /// Lower ends of the 95 % intervals, those of the lag included.
+    pub lower: Vec<f64>,
+    /// Upper ends.
+    pub upper: Vec<f64>,
+}
+
+impl ThermalResult {
+    /// The result of `fit`.
+    pub fn of(fit: &ThermalFit) -> Self {
+        let raw = fit.sessions[0].raw_unit;
+        let curves = Sensor::BOTH.into_iter().flat_map(|sensor| {
+            let found = fit.joint.curves[sensor as usize].as_ref();
+            found.map(|c| curves_of(c, sensor, raw)).unwrap_or_default()
+        });
+        let of = |sensor| SensorResult::of(fit, sensor);
+        Self {
+            format: "mimu-thermal/1",
+            tool: concat!("mimu ", env!("CARGO_PKG_VERSION")),
+            device: fit.sessions[0].device.clone(),
+            recordings: recordings(fit),
+            estimator: fit.options.estimator.name(),
+            verdict: fit.verdict.name(),
+            range_c: range(&fit.joint),
+            sensors: Sensors {
+                gyro: of(Sensor::Gyro),
+                accel: of(Sensor::Accel),
+            },
+            curves: curves.collect(),
+            warnings: fit.warnings.clone(),
+        }
+    }
+
+    /// The curve `name`.
+    pub fn curve(&self, name: &str) -> Option<&CurveResult> {
+        self.curves.iter().find(|c| c.name == name)
+    }
+}
+
+fn recordings(fit: &ThermalFit) -> Vec<RecordingResult> {
+    let each = fit.sessions.iter().enumerate();
+    each.map(|(k, s)| {
+        let mut bias_offset_raw = [0.0; 6];
+        for sensor in Sensor::BOTH {
+            if let Some(curves) = &fit.joint.curves[sensor as usize] {
+                let offset = curves.session_offset(k);
+                bias_offset_raw[sensor.channels()].copy_from_slice(offset.as_slice());
+            }
+        }
+        RecordingResult {
+            samples: s.place.clone(),
+            sha256: s.sha256.clone(),
+            bias_offset_raw,
+        }
+    })
+    .collect()
+}
+
+impl SensorResult {
+    fn of(fit: &ThermalFit, sensor: Sensor) -> Option<Self> {
+        let curves = fit.joint.curves[sensor as usize].as_ref()?;
+        let judged = fit.judged[sensor as usize].as_ref();
+        let figures = judged.map(|j| rms(&j.errors));
+        let held_out = judged.and_then(|j| j.held_out.as_ref());
+        let lag = lag(fit, sensor);
+        let gravity = curves.biases_only() && sensor == Sensor::Accel;
+        Some(Self {
+            unit: sensor.unit(),
+            rms: figures.map(|f| f[0]),
+            held_out_rms: held_out.map(|h| rms(h)[0]),
+            held_out_rms_without_session_bias: judged.and_then(|j| j.without_session_bias),
+            noise_floor: figures.map(|f| f[1]),
+            lag_s: lag.as_ref().ok().copied(),
+            lag_reason: lag.err(),
+            inseparable: gravity.then_some(
+                "in one pose the bias along gravity and the scale factor times gravity are one number: the curves are of their sum",
+            ),
+            bins: judged.map(|j| j.bins.clone()).unwrap_or_default(),
+            hysteresis: judged.and_then(|j| j.hysteresis.clone()),
+        })
+    }
+}
+
+/// The lag of `sensor`, or why there is none.
+fn lag(fit: &ThermalFit, sensor: Sensor) -> Result<LagResult, String> {
+    let joint = &fit.joint;
+    let found = match &joint.apart {
+        Some((each, _)) => each[sensor as usize].lag,
+        None => joint.profile.lag,
+    };
+    let Lag {
+        value,
+        lower,
+        upper,
+    } = found;
+    if joint.profile.points.len() == 1 {
+        return Err(match fit.options.lag_s {
+            Some(given) => format!("it was given as {given} s"),
+            None => "this estimator has none".into(),
+        });
+    }
+    if fit.verdict == Verdict::OneWay {
+        return Err("the temperature goes one way only: lag and slope cannot be told apart".into());
+    }
+    if !found.is_determined() {
+        return Err(format!(
+            "not determined: its 95 % interval, {lower:.0} to {upper:.0} s, is wider than half the range from {:.0} to {:.0} s",
+            RANGE[0], RANGE[1]
+        ));
+    }
+    Ok(LagResult {
+        value,
+        lower,
+        upper,
+    })
+}
+
+/// Curves of one triad.
+fn curves_of(curves: &TriadCurves, sensor: Sensor, raw: RawUnit) -> Vec<CurveResult> {
+    let [from, to] = curves.range_c;
+    let temps: Vec<f64> = (0..COUNT)
+        .map(|k| from + (to - from) * k as f64 / (COUNT - 1) as f64)
+        .collect();
+    let mut out: Vec<CurveResult> = Vec::new();
+    for &temp_c in &temps {
+        for (k, (name, unit, e)) in at(curves, sensor, raw, temp_c).into_iter().enumerate() {
+            if out.len() <= k {
+                out.push(CurveResult {
+                    name: format!("{sensor}_{name}"),
+                    sensor,
+                    unit,
+                    temp_c: Vec::new(),
+                    value: Vec::new(),
+                    lower: Vec::new(),
+                    upper: Vec::new(),
+                });
+            }
+            let curve = &mut out[k];
+            curve.temp_c.push(temp_c);
+            curve.value.push(e.value);
+            curve.lower.push(e.value - e.interval);
+            curve.upper.push(e.value + e.interval);
+        }
+    }
+    out
+}
+
+/// Parameters at one temperature: name, unit, estimate.
+fn at(
+    curves: &TriadCurves,
+    sensor: Sensor,
+    raw: RawUnit,
+    temp_c: f64,
+) -> Vec<(String, String, Estimate)> {
+    let si = sensor.unit();
+    let Some(triad) = curves.triad(temp_c) else {
+        return biases(curves, sensor, raw, temp_c);
+    };
+    let inverse_unit = match raw {
+        RawUnit::Si => "1".to_string(),
+        other => format!("({si})/{other}"),
+    };
+    let mut all = Vec::new();
+    let inverse = inverse_names().into_iter().zip(triad.inverse_estimates());
+    for (k, (name, e)) in inverse.enumerate() {
+        all.push((
+            name,
+            if k < 9 {
+                inverse_unit.clone()
+            } else {
+                si.into()
+            },
+            e,
+        ));
+    }
+    let physical = triad.physical(Angles::Exact);
+    for (name, axes, estimates, unit) in [
+        ("scale", AXES, physical.scale, scale_unit(raw, si)),
+        ("bias", AXES, physical.bias, raw_unit(raw, si)),
+        ("misalignment", AXES, physical.misalignment, "rad".into()),
+        (
+            "non_orthogonality",
+            ["yz", "zy", "zx"],
+            physical.non_orthogonality,
+            "rad".into(),
+        ),
+    ] {
+        for (axis, e) in axes.iter().zip(estimates) {
+            all.push((format!("{name}_{axis}"), unit.clone(), e));
+        }
+    }
+    all
+}
+
+/// Biases where nothing else is estimated; of the accelerometer with what gravity adds in the one pose.
+fn biases(
+    curves: &TriadCurves,
+    sensor: Sensor,
+    raw: RawUnit,
+    temp_c: f64,
+) -> Vec<(String, String, Estimate)> {
+    let [model, _] = curves.forward(temp_c);
+    let covariance = curves.covariance(temp_c);
+    let name = match sensor {
+        Sensor::Gyro => "bias",
+        Sensor::Accel => "bias_and_gravity",
+    };
+    (0..3)
+        .map(|k| {
+            let sigma = covariance[(9 + k, 9 + k)].max(0.0).sqrt();
+            let estimate = Estimate {
+                value: model.bias[k],
+                sigma,
+                interval: 1.96 * sigma,
+            };
+            let unit = raw_unit(raw, sensor.unit());
+            (format!("{name}_{}", AXES[k]), unit, estimate)
+        })
+        .collect()
+}
