@@ -170,13 +170,26 @@ const LAG: &str = "lag of the dies";
 
 impl Remainder {
     fn of(source: &'static str, condition: &'static str, errors: &[Vector3<f64>]) -> Self {
-        let all = || errors.iter().flat_map(|e| e.iter());
-        let squares: f64 = all().map(|e| e * e).sum();
-        let max = all().fold(0.0, |m: f64, e| m.max(e.abs()));
+        let last = errors.len().saturating_sub(1);
+        // Ends count half, so that the mean over the range is an integral.
+        let weights = (0..=last).map(|k| {
+            if last > 0 && (k == 0 || k == last) {
+                0.5
+            } else {
+                1.0
+            }
+        });
+        let (squares, sum) = errors
+            .iter()
+            .zip(weights)
+            .fold((0.0, 0.0), |(squares, sum), (e, w)| {
+                (squares + w * e.norm_squared(), sum + 3.0 * w)
+            });
+        let max = errors.iter().map(|e| e.amax()).fold(0.0, f64::max);
         Self {
             source,
             condition,
-            rms: Some((squares / all().count().max(1) as f64).sqrt()),
+            rms: Some(f64::sqrt(squares / sum)),
             max: Some(max),
         }
     }
@@ -246,9 +259,12 @@ fn cubic(values: Vec<f64>, range_c: [f64; 2], reference_c: f64) -> [f64; 4] {
     let n = values.len();
     let half = 0.5 * (range_c[1] - range_c[0]);
     let unit = |k: usize| 2.0 * k as f64 / (n - 1) as f64 - 1.0;
+    // Ends count half, so that sums are integrals.
+    let weight = |k: usize| if k == 0 || k == n - 1 { 0.5 } else { 1.0 };
     let powers = DMatrix::from_fn(n, 4, |k, p| unit(k).powi(p as i32));
-    let with = powers.transpose() * DVector::from_vec(values);
-    let gram = powers.transpose() * &powers;
+    let weighted = DMatrix::from_fn(n, 4, |k, p| weight(k) * powers[(k, p)]);
+    let with = weighted.transpose() * DVector::from_vec(values);
+    let gram = weighted.transpose() * &powers;
     // Four powers of -1 to 1 at even distances: always regular.
     let a = gram
         .cholesky()

@@ -153,6 +153,9 @@ pub fn autopilot(
             )),
         }
     }
+    if !calibration.effects().is_empty() {
+        notes.push("The effects of the calibration are left out: they have no place here.".into());
+    }
     match options.autopilot {
         Autopilot::Px4 => sensors
             .iter()

@@ -225,13 +225,14 @@ fn rest_ramp(request: &Request) -> Schedule {
     }
 }
 
-/// Six faces at rest, then both ways about each axis upright.
+/// Six faces at rest, then both ways about each axis.
 fn faces_and_rates(request: &Request) -> Round {
     let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
     let at_rest = axes.iter().flat_map(|up| [(*up, 0.0), (-up, 0.0)]);
+    // Turned about the vertical at one rate with the axis up and with it down: both ways in the body, and forces that stay balanced.
     let rates = axes
         .iter()
-        .flat_map(|up| [1.0, -1.0].map(|sign| (*up, sign * request.largest_dps)));
+        .flat_map(|up| [(*up, request.largest_dps), (-up, request.largest_dps)]);
     let settings: Vec<Setting> = at_rest
         .chain(rates)
         .map(|(up, dps)| Setting {

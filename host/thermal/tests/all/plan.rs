@@ -33,7 +33,7 @@ fn a_soak_at_four_set_points_knows_at_each_what_its_own_dwells_give_and_between_
  {
     let found = plan(&request(Procedure::Soak)).unwrap();
     // Twelve dwells of 20 s, each axis as often up as down and turned both ways: what is estimated is uncorrelated. Force along an axis
-    // is in four dwells, rate about it in two.
+    // is in four dwells, two of them at rest; rate about it in two.
     let bias = WHITE.map(|n| n / (12.0 * 20f64).sqrt());
     let scale = [
         WHITE[0] / (50f64.to_radians() * 40f64.sqrt()),
