@@ -206,7 +206,7 @@ impl Scheme {
 
     /// Step, rate (rad/s) and mean specific force over the next sample.
     fn next(&mut self) -> (i32, Vector3<f64>, Vector3<f64>) {
-        let turning = self.part % 2 == 0;
+        let turning = self.part.is_multiple_of(2);
         let length = if turning { TURN } else { DWELL };
         let step = self.part as i32;
         let mut rate = Vector3::zeros();

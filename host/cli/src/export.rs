@@ -1,4 +1,6 @@
-//! Noise coefficients in the formats of other programs.
+//! Noise coefficients, and biases over temperature, in the formats of other programs.
+
+pub mod autopilot;
 
 use std::fmt::Write as _;
 

@@ -8,7 +8,7 @@
 //! | [`report`] | results as JSON, text and page |
 //! | `views` | how a session of the wizard is shown while it runs |
 //! | `hint` | flags of the command beside what an error says to set otherwise |
-//! | `export` | noise coefficients for other programs |
+//! | `export` | noise coefficients and biases over temperature for other programs |
 
 mod arguments;
 mod cmd;
@@ -51,11 +51,11 @@ enum Command {
     Diagnose(diagnose::DiagnoseArgs),
     /// Design the experiment: which attitudes and rates, how many, for how long
     Design(design::DesignArgs),
-    /// Curves over temperature, and the lag of the dies behind the thermometer: fit, compare
+    /// Curves over temperature, and the lag of the dies behind the thermometer: fit, compare, plan
     Thermal(thermal::ThermalArgs),
     /// Noise of a unit at rest: Allan deviation, N, B, K, Q and R
     Allan(allan::AllanArgs),
-    /// Write noise coefficients in the format of another program
+    /// Write noise coefficients, or biases over temperature, in the format of another program
     Export(cmd::export::ExportArgs),
     /// Record the raw stream of a device
     Record(record::RecordArgs),

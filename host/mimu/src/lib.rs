@@ -15,6 +15,7 @@
 //! | [`mod@fit`]     | both triads, judged on what they have not seen; what cannot be right is refused |
 //! | [`calibration`], [`verify`] | the file, and judging it by another recording                     |
 //! | [`mod@apply`]   | the recording that it compensates                                             |
+//! | [`bias_cubic`]  | its biases over temperature as cubics, and the error that these leave         |
 //! | [`diagnose`]    | the effect behind a residual: found, added, proved on other data              |
 //! | [`design`]      | experiments: which attitudes and rates, how many, for how long                |
 //! | [`next_experiment`] | what to record next, where a diagnosis leaves something open              |
@@ -68,6 +69,7 @@
 
 pub mod allan;
 pub mod apply;
+pub mod bias_cubic;
 pub mod blocks;
 pub mod calibration;
 mod contrast;

@@ -16,6 +16,7 @@
 //! | [`classic`], [`points`] | estimators of the literature, for comparison |
 //! | [`mod@fit`], [`extrapolation`] | one of them, judged; whether curvature is there at all |
 //! | [`mod@compare`] | two calibrations, curve by curve |
+//! | [`plan`] | procedures in chamber and table, and how well the curves are known afterwards |
 //! | [`result`] | what was found, which JSON is |
 
 pub mod basis;
@@ -29,6 +30,7 @@ pub mod judge;
 pub mod nodes;
 pub mod noise;
 pub mod path;
+pub mod plan;
 pub mod points;
 pub mod profile;
 pub mod regression;

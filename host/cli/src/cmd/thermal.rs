@@ -1,5 +1,7 @@
 //! `mimu thermal`.
 
+mod plan;
+
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand, ValueEnum};
@@ -30,6 +32,8 @@ enum ThermalCommand {
     Fit(FitArgs),
     /// Compare two calibrations over temperature, curve by curve
     Compare(CompareArgs),
+    /// Plan a procedure: how long it takes, and how well the curves are known afterwards
+    Plan(plan::PlanArgs),
 }
 
 #[derive(Args)]
@@ -117,6 +121,7 @@ pub(crate) fn run(args: &ThermalArgs) -> Result<()> {
     match &args.command {
         ThermalCommand::Fit(args) => run_fit(args),
         ThermalCommand::Compare(args) => run_compare(args),
+        ThermalCommand::Plan(args) => plan::run(args),
     }
 }
 

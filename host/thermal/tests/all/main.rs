@@ -3,6 +3,7 @@
 mod at_rest;
 mod estimates;
 mod judged;
+mod plan;
 mod refused;
 #[path = "../../../../tests/thermal/simulation.rs"]
 #[allow(dead_code)]

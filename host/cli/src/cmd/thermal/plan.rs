@@ -1,0 +1,142 @@
+//! `mimu thermal plan`: arguments and what follows from them.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use mimu::design::budget::DwellNoise;
+use mimu::noise_file::NoiseFile;
+use mimu::quantity::Sensor;
+use mimu_recording::error::Result;
+use mimu_recording::result_file::stage;
+use mimu_thermal::basis::Shape;
+use mimu_thermal::plan::{Procedure, Request, plan, to_toml};
+
+use crate::arguments::JsonArgs;
+use crate::cmd::design::number;
+use crate::output::{check_outputs, print};
+use crate::report;
+
+#[derive(Args)]
+pub(super) struct PlanArgs {
+    /// Sequence of temperatures and motions
+    #[arg(long, value_enum)]
+    procedure: ProcedureArg,
+    /// Temperatures of the chamber, °C
+    #[arg(long, value_name = "FROM..TO", default_value = "-10..70", allow_hyphen_values = true, value_parser = range)]
+    range: [f64; 2],
+    /// Curves of all parameters over temperature, for the prediction
+    #[arg(long, value_enum, default_value = "cubic")]
+    curves: CurvesArg,
+    /// Rate of the chamber, K/min
+    #[arg(long, value_name = "K/MIN", default_value_t = 2.0, value_parser = |t: &str| number(t, 0.01, 30.0))]
+    rate: f64,
+    /// Set points of a soak
+    #[arg(long, value_name = "N", default_value_t = 9, value_parser = clap::value_parser!(u16).range(1..=100))]
+    points: u16,
+    /// Time at each set point, or before and after a ramp, min; without it 60 for a soak and 30 for the others
+    #[arg(long, value_name = "MIN", value_parser = |t: &str| number(t, 0.0, 2880.0))]
+    soak: Option<f64>,
+    /// Length of a dwell, s; without it 9 for niu and 20 for the others
+    #[arg(long, value_name = "S", value_parser = |t: &str| number(t, 0.1, 3600.0))]
+    dwell: Option<f64>,
+    /// Largest rate of the table, deg/s; niu's turns are at 10 or less
+    #[arg(long, value_name = "DPS", default_value_t = 50.0, value_parser = |t: &str| number(t, 0.1, 10_000.0))]
+    table_rate: f64,
+    /// Noise file of the unit, by `mimu allan -o`; without it that of fang's sensors
+    #[arg(long, value_name = "FILE")]
+    noise: Option<PathBuf>,
+    /// Samples a second
+    #[arg(long, value_name = "HZ", default_value_t = 100.0, value_parser = |t: &str| number(t, 1.0, 20_000.0))]
+    sample_rate: f64,
+    /// Plan to write, for `mimu-rig record` or a person at a chamber
+    #[arg(short, value_name = "FILE")]
+    output: Option<PathBuf>,
+    #[command(flatten)]
+    json: JsonArgs,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum ProcedureArg {
+    /// Set points, at each of which the unit soaks before it is measured (fang, 3)
+    Soak,
+    /// Positions and quarter turns on a ramp up and down (niu, 3.2)
+    Niu,
+    /// Six faces and rates about all axes on a ramp up and down
+    Ramp,
+    /// At rest with z up on a ramp up: biases only
+    RestRamp,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum CurvesArg {
+    /// A straight line, from 10 K
+    Line,
+    /// One cubic, from 20 K
+    Cubic,
+}
+
+fn range(text: &str) -> std::result::Result<[f64; 2], String> {
+    let ends = text.split_once("..");
+    let ends = ends.and_then(|(from, to)| Some([from.parse().ok()?, to.parse().ok()?]));
+    match ends {
+        Some([from, to]) if -100.0 <= from && from < to && to <= 300.0 => Ok([from, to]),
+        _ => Err("write two temperatures, the lower first, as -10..70".into()),
+    }
+}
+
+impl PlanArgs {
+    fn request(&self) -> Result<Request> {
+        let procedure = match self.procedure {
+            ProcedureArg::Soak => Procedure::Soak,
+            ProcedureArg::Niu => Procedure::Niu,
+            ProcedureArg::Ramp => Procedure::Ramp,
+            ProcedureArg::RestRamp => Procedure::RestRamp,
+        };
+        let noise = match &self.noise {
+            None => Sensor::BOTH.map(DwellNoise::fang),
+            Some(path) => {
+                let file = NoiseFile::read(path)?;
+                let of = |sensor| DwellNoise::stated(&file, sensor);
+                [of(Sensor::Gyro)?, of(Sensor::Accel)?]
+            }
+        };
+        let usual_min = if procedure == Procedure::Soak {
+            60.0
+        } else {
+            30.0
+        };
+        let usual_s = if procedure == Procedure::Niu {
+            9.0
+        } else {
+            20.0
+        };
+        Ok(Request {
+            procedure,
+            range_c: self.range,
+            shape: match self.curves {
+                CurvesArg::Line => Shape::Line,
+                CurvesArg::Cubic => Shape::Cubic,
+            },
+            kelvin_per_min: self.rate,
+            set_points: usize::from(self.points),
+            soak_s: 60.0 * self.soak.unwrap_or(usual_min),
+            dwell_s: self.dwell.unwrap_or(usual_s),
+            largest_dps: self.table_rate,
+            sample_rate_hz: self.sample_rate,
+            noise,
+        })
+    }
+}
+
+pub(super) fn run(args: &PlanArgs) -> Result<()> {
+    let stated: Vec<_> = args.noise.as_deref().into_iter().collect();
+    check_outputs(&[args.output.as_deref(), args.json.file()], &stated)?;
+    let planned = plan(&args.request()?)?;
+    let mut text = report::thermal_plan_text(&planned);
+    let mut file = None;
+    if let Some(path) = &args.output {
+        file = Some(stage(path, to_toml(&planned, args.sample_rate))?);
+        text.push_str(&format!("\nplan: {}\n", path.display()));
+    }
+    print(&args.json, &text, &planned, file)
+}

@@ -1,0 +1,102 @@
+//! The command `mimu thermal plan`: what it writes is what the bench reads.
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+use mimu_rig::plan::{Plan, Pose};
+use mimu_rig::table::{Table, TableTruth};
+
+fn mimu(folder: &Path, arguments: &str) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_mimu"));
+    command.current_dir(folder).args(["thermal", "plan"]);
+    command.args(arguments.split(' ')).output().unwrap()
+}
+
+fn planned(folder: &Path, arguments: &str) -> (Plan, serde_json::Value) {
+    let out = mimu(
+        folder,
+        &format!("{arguments} -o plan.toml --json plan.json"),
+    );
+    assert!(
+        out.status.success(),
+        "{}",
+        String::from_utf8_lossy(&out.stderr)
+    );
+    let json = std::fs::read(folder.join("plan.json")).unwrap();
+    let plan = Plan::read(&folder.join("plan.toml")).unwrap();
+    (plan, serde_json::from_slice(&json).unwrap())
+}
+
+#[test]
+fn the_bench_reads_every_procedure_and_its_table_can_carry_it_out() {
+    let folder = tempfile::tempdir().unwrap();
+    for (procedure, dwells) in [("soak", 12), ("niu", 16), ("ramp", 12), ("rest-ramp", 1)] {
+        let arguments = format!("--procedure {procedure} --range -20..60 --rate 2");
+        let (plan, json) = planned(folder.path(), &arguments);
+        assert_eq!(plan.steps.len(), dwells);
+        assert_eq!(json["format"], "mimu-thermal-plan/1");
+        assert_eq!(json["dwells"].as_u64().unwrap(), plan.dwells());
+        let chamber: Vec<f64> = plan.chamber.iter().map(|c| c[1]).collect();
+        let least = chamber.iter().copied().fold(f64::INFINITY, f64::min);
+        let most = chamber.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        assert_eq!((least, most), (-20.0, 60.0));
+        // It refuses rounds that take longer than they may, and poses out of reach.
+        Table::new(&plan, &TableTruth::ideal()).unwrap();
+    }
+}
+
+#[test]
+fn a_soak_measures_at_the_end_of_every_set_point() {
+    let folder = tempfile::tempdir().unwrap();
+    let (plan, json) = planned(
+        folder.path(),
+        "--procedure soak --range -10..70 --points 5 --soak 45",
+    );
+    assert_eq!(plan.rounds, 5);
+    let length = plan.round_s.unwrap();
+    for round in 0..5 {
+        let begin = plan.lead_in_s + f64::from(round) * length;
+        let set_point = -10.0 + 20.0 * f64::from(round);
+        assert_eq!(plan.chamber_c(begin), set_point);
+        // Since the ramp has ended, at 2 K/min, the unit has had most of 45 minutes.
+        assert_eq!(plan.chamber_c(begin - 1800.0), set_point);
+    }
+    let hours = json["duration_s"].as_f64().unwrap() / 3600.0;
+    assert!((hours - (5.0 * 0.75 + 4.0 / 6.0)).abs() < 0.01, "{hours}");
+}
+
+#[test]
+fn nius_cycle_is_the_published_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let (plan, json) = planned(folder.path(), "--procedure niu --range -35..75");
+    let turns: Vec<_> = plan.steps.iter().filter_map(|s| s.turn).collect();
+    assert_eq!(turns.len(), 8);
+    assert!(
+        turns
+            .iter()
+            .all(|t| (t.rate.to_degrees() - 10.0).abs() < 1e-9)
+    );
+    let rests = plan.steps.iter().filter(|s| s.turn.is_none());
+    assert!(rests.clone().count() == 8 && rests.clone().skip(1).all(|s| s.pose == Pose::Here));
+    // 152 s a cycle, niu 3.2, of which 3 h 50 min have some ninety.
+    let rounds = f64::from(plan.rounds);
+    let round_s = (json["duration_s"].as_f64().unwrap() - plan.lead_in_s) / rounds;
+    assert!((round_s - 152.0).abs() < 0.1, "{round_s}");
+}
+
+#[test]
+fn people_read_what_is_refused_and_what_is_inseparable() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = mimu(folder.path(), "--procedure ramp --range 20..35");
+    let error = String::from_utf8(out.stderr).unwrap();
+    assert!(
+        out.status.code() == Some(1) && error.contains("needs 20 K"),
+        "{error}"
+    );
+    let out = mimu(folder.path(), "--procedure rest-ramp --range 0..50");
+    let text = String::from_utf8(out.stdout).unwrap();
+    assert!(
+        text.contains("inseparable: ") && text.contains("not determined"),
+        "{text}"
+    );
+}

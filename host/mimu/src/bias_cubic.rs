@@ -1,0 +1,330 @@
+//! The biases of a calibration over temperature as cubics, for programs that compensate nothing else over temperature, and the error
+//! that is left because scale factors, cross terms and the lag of the dies have no place there.
+
+use nalgebra::{DMatrix, DVector, Vector3};
+use serde::Serialize;
+
+use crate::calibration::{Calibration, Curves};
+use crate::quantity::{AXES, Sensor};
+use crate::readable::STANDARD_GRAVITY;
+use crate::triad::Forward;
+use mimu_recording::RawUnit;
+use mimu_recording::error::{Error, Result};
+
+/// Temperatures at which a cubic is fitted and judged.
+const POINTS: usize = 401;
+/// Narrowest range, K: a cubic over less is made of the errors of the curves.
+const NARROWEST_K: f64 = 10.0;
+/// Largest share of an axis' sensitivity that may lie along the other two: beyond it, the axes are permuted.
+const MOST_ACROSS: f64 = 0.3;
+/// Rate that the thermometer is taken to change at, K/s, where the lag of the dies is judged: 2 K/min, as in a chamber.
+const RAMP_K_PER_S: f64 = 2.0 / 60.0;
+
+/// How the program converts a raw reading, axis by axis: `v_i = si_per_raw_i (u_i - zero_i)`, raw to SI.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Conversion {
+    /// rad/s or m/s² per raw unit.
+    pub si_per_raw: [f64; 3],
+    /// Raw reading that it takes for no input.
+    pub zero_raw: [f64; 3],
+}
+
+/// What a person knows of a conversion; the rest follows from the calibration.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct KnownConversion {
+    /// One factor for the three axes, rad/s or m/s² per raw unit.
+    pub si_per_raw: Option<f64>,
+    /// One zero reading for the three axes, raw.
+    pub zero_raw: Option<f64>,
+}
+
+/// An error that is left, over the range of temperatures and the three axes.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Remainder {
+    /// Where it comes from.
+    pub source: &'static str,
+    /// For which input or state it holds.
+    pub condition: &'static str,
+    /// Root of the mean square, SI; `None` where it is not known.
+    pub rms: Option<f64>,
+    /// Largest size, SI.
+    pub max: Option<f64>,
+}
+
+/// Bias of a triad as cubics: `bias_i(T) = Σ_k coefficients[i][k] (T - reference_c)^k` in SI, in the program's readings.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct BiasCubics {
+    /// The triad.
+    pub sensor: Sensor,
+    /// rad/s or m/s².
+    pub unit: &'static str,
+    /// °C.
+    pub reference_c: f64,
+    /// °C.
+    pub range_c: [f64; 2],
+    /// SI/K^k, in single precision, which is what programs hold them in.
+    pub coefficients: [[f64; 4]; 3],
+    /// How the readings come about.
+    pub conversion: Conversion,
+    /// Errors that are left once the cubic is subtracted and the program is calibrated at `settled_c`.
+    pub remains: Vec<Remainder>,
+    /// Temperature at which the program's own scale factors hold, °C.
+    pub settled_c: f64,
+}
+
+impl BiasCubics {
+    /// Of `sensor` over `range_c`, about `reference_c`; `None` if the calibration has no curves of it.
+    ///
+    /// # Errors
+    /// A range of less than 10 K; readings that are not those of the sensor's own axes, which a bias for each axis cannot correct.
+    pub fn of(
+        calibration: &Calibration,
+        sensor: Sensor,
+        known: &KnownConversion,
+        range_c: [f64; 2],
+        reference_c: f64,
+    ) -> Result<Option<Self>> {
+        let (Some(curves), Some(over)) = (calibration.curves(), &calibration.temperature) else {
+            return Ok(None);
+        };
+        if !over.has(sensor) {
+            return Ok(None);
+        }
+        let [from, to] = range_c;
+        if !(to - from >= NARROWEST_K) {
+            return Err(Error::new(
+                sensor,
+                format!(
+                    "{from:.1} to {to:.1} °C is less than {NARROWEST_K} K, which no cubic follows from"
+                ),
+                "fit a recording over a wider range",
+            ));
+        }
+        let settled_c = match calibration.recording.temp_c {
+            Some(temp_c) if (from..=to).contains(&temp_c) => temp_c,
+            _ => 0.5 * (from + to),
+        };
+        let at = |temp_c: f64| forward(&curves, sensor, temp_c);
+        let conversion = conversion(calibration, sensor, known, &at(settled_c)?)?;
+        let temperatures =
+            || (0..POINTS).map(|k| from + (to - from) * k as f64 / (POINTS - 1) as f64);
+        let models: Vec<Forward> = temperatures().map(at).collect::<Result<_>>()?;
+        let bias = |model: &Forward| conversion.bias(model);
+        let biases: Vec<Vector3<f64>> = models.iter().map(bias).collect();
+        let coefficients = [0, 1, 2].map(|axis| {
+            let values = biases.iter().map(|b| b[axis]);
+            cubic(values.collect(), range_c, reference_c)
+        });
+        let mut cubics = Self {
+            sensor,
+            unit: sensor.unit(),
+            reference_c,
+            range_c,
+            coefficients,
+            conversion,
+            remains: Vec::new(),
+            settled_c,
+        };
+        let misses = temperatures().zip(&biases);
+        let misses: Vec<_> = misses.map(|(t, b)| b - cubics.at(t)).collect();
+        cubics.remains.push(Remainder::of(
+            "bias, which is no cubic",
+            "without input",
+            &misses,
+        ));
+        cubics
+            .remains
+            .extend(linear(&models, &at(settled_c)?, sensor));
+        cubics.remains.push(match over.lag_s {
+            None => Remainder::unknown(LAG, "lag not determined"),
+            Some(lag_s) => {
+                let late = temperatures().zip(&biases).map(|(t, b)| {
+                    let die_c = (t - lag_s * RAMP_K_PER_S).clamp(from, to);
+                    Ok(b - bias(&at(die_c)?))
+                });
+                Remainder::of(LAG, "at 2 K/min", &late.collect::<Result<Vec<_>>>()?)
+            }
+        });
+        Ok(Some(cubics))
+    }
+
+    /// The biases at `temp_c`, held outside the range, SI.
+    pub fn at(&self, temp_c: f64) -> Vector3<f64> {
+        let t = temp_c.clamp(self.range_c[0], self.range_c[1]) - self.reference_c;
+        Vector3::from(
+            self.coefficients
+                .map(|[a, b, c, d]| a + t * (b + t * (c + t * d))),
+        )
+    }
+
+    /// Largest input that the remainders are given for, SI.
+    pub fn input(sensor: Sensor) -> f64 {
+        match sensor {
+            Sensor::Gyro => 100f64.to_radians(),
+            Sensor::Accel => STANDARD_GRAVITY,
+        }
+    }
+}
+
+const LAG: &str = "lag of the dies";
+
+impl Remainder {
+    fn of(source: &'static str, condition: &'static str, errors: &[Vector3<f64>]) -> Self {
+        let last = errors.len().saturating_sub(1);
+        // Ends count half, so that the mean over the range is an integral.
+        let weights = (0..=last).map(|k| {
+            if last > 0 && (k == 0 || k == last) {
+                0.5
+            } else {
+                1.0
+            }
+        });
+        let (squares, sum) = errors
+            .iter()
+            .zip(weights)
+            .fold((0.0, 0.0), |(squares, sum), (e, w)| {
+                (squares + w * e.norm_squared(), sum + 3.0 * w)
+            });
+        let max = errors.iter().map(|e| e.amax()).fold(0.0, f64::max);
+        Self {
+            source,
+            condition,
+            rms: Some(f64::sqrt(squares / sum)),
+            max: Some(max),
+        }
+    }
+
+    fn unknown(source: &'static str, condition: &'static str) -> Self {
+        Self {
+            source,
+            condition,
+            rms: None,
+            max: None,
+        }
+    }
+}
+
+impl Conversion {
+    /// Bias of the readings, SI.
+    fn bias(&self, model: &Forward) -> Vector3<f64> {
+        let off = model.bias - Vector3::from(self.zero_raw);
+        off.component_mul(&Vector3::from(self.si_per_raw))
+    }
+}
+
+/// Model of the sensor at a temperature of the die, SI to raw.
+fn forward(curves: &Curves, sensor: Sensor, temp_c: f64) -> Result<Forward> {
+    let inverse = curves.inverse(sensor, temp_c);
+    inverse.as_ref().and_then(Forward::of).ok_or_else(|| {
+        let problem = format!("C is singular at {temp_c:.1} °C");
+        Error::new(sensor, problem, "fit the recordings over temperature again")
+    })
+}
+
+/// What is not known follows from the unit of the readings, or else from the model where the program is calibrated.
+fn conversion(
+    calibration: &Calibration,
+    sensor: Sensor,
+    known: &KnownConversion,
+    settled: &Forward,
+) -> Result<Conversion> {
+    let si = calibration.recording.raw_unit == RawUnit::Si;
+    let conversion = Conversion {
+        si_per_raw: [0, 1, 2].map(|i| match known.si_per_raw {
+            Some(factor) => factor,
+            None if si => 1.0,
+            None => 1.0 / settled.matrix[(i, i)],
+        }),
+        zero_raw: [known.zero_raw.unwrap_or(0.0); 3],
+    };
+    for (i, axis) in AXES.iter().enumerate() {
+        let row = settled.matrix.row(i);
+        let along = row[i] * conversion.si_per_raw[i];
+        let across = (row.norm_squared() - row[i] * row[i]).sqrt() / row.norm();
+        if !(across <= MOST_ACROSS && (0.5..=2.0).contains(&along)) {
+            return Err(Error::new(
+                format!("{sensor}, axis {axis}"),
+                format!(
+                    "a reading changes by {along:.3} along its own axis and by {across:.3} of its sensitivity across, and has to by 1 and 0"
+                ),
+                "permute the columns as the program has its axes, or state its conversion",
+            ));
+        }
+    }
+    Ok(conversion)
+}
+
+/// Coefficients, about `reference_c`, of the cubic nearest to `values` at even distances over `range_c`, in single precision.
+fn cubic(values: Vec<f64>, range_c: [f64; 2], reference_c: f64) -> [f64; 4] {
+    let n = values.len();
+    let half = 0.5 * (range_c[1] - range_c[0]);
+    let unit = |k: usize| 2.0 * k as f64 / (n - 1) as f64 - 1.0;
+    // Ends count half, so that sums are integrals.
+    let weight = |k: usize| if k == 0 || k == n - 1 { 0.5 } else { 1.0 };
+    let powers = DMatrix::from_fn(n, 4, |k, p| unit(k).powi(p as i32));
+    let weighted = DMatrix::from_fn(n, 4, |k, p| weight(k) * powers[(k, p)]);
+    let with = weighted.transpose() * DVector::from_vec(values);
+    let gram = weighted.transpose() * &powers;
+    // Four powers of -1 to 1 at even distances: always regular.
+    let a = gram
+        .cholesky()
+        .map_or(DVector::zeros(4), |c| c.solve(&with));
+    // Σ a_k ((T - reference + d) / half)^k, expanded.
+    let d = (reference_c - 0.5 * (range_c[0] + range_c[1])) / half;
+    let expanded = [
+        a[0] + d * (a[1] + d * (a[2] + d * a[3])),
+        (a[1] + d * (2.0 * a[2] + 3.0 * d * a[3])) / half,
+        (a[2] + 3.0 * d * a[3]) / half.powi(2),
+        a[3] / half.powi(3),
+    ];
+    expanded.map(|c| f64::from(c as f32))
+}
+
+/// What scale factors and cross terms leave, against the model where the program is calibrated.
+fn linear(models: &[Forward], settled: &Forward, sensor: Sensor) -> [Remainder; 3] {
+    let input = BiasCubics::input(sensor);
+    let gain = settled.matrix.diagonal();
+    let across = |matrix: &nalgebra::Matrix3<f64>| {
+        Vector3::from_fn(|i, _| {
+            let row = matrix.row(i);
+            input * (row.norm_squared() - row[i] * row[i]).max(0.0).sqrt() / gain[i].abs()
+        })
+    };
+    let scale = |m: &Forward| {
+        let off = m.matrix.diagonal() - gain;
+        off.component_div(&gain) * input
+    };
+    let cross = |m: &Forward| across(&(m.matrix - settled.matrix));
+    let condition = match sensor {
+        Sensor::Gyro => "at 100 deg/s",
+        Sensor::Accel => "at 1 g",
+    };
+    let scales: Vec<_> = models.iter().map(scale).collect();
+    let crosses: Vec<_> = models.iter().map(cross).collect();
+    [
+        Remainder::of("scale factors over temperature", condition, &scales),
+        Remainder::of("cross terms over temperature", condition, &crosses),
+        Remainder::of(
+            "cross terms, constant",
+            condition,
+            &[across(&settled.matrix)],
+        ),
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cubic_is_found_as_it_is_about_any_reference() {
+        let truth = |t: f64| 0.3 - 0.02 * t + 4e-4 * t * t - 5e-6 * t * t * t;
+        let values = (0..POINTS).map(|k| truth(-40.0 + 110.0 * k as f64 / 400.0));
+        let found = cubic(values.collect(), [-40.0, 70.0], 35.0);
+        for t in [-40.0, -3.0, 35.0, 70.0f64] {
+            let d = t - 35.0;
+            let value = found[0] + d * (found[1] + d * (found[2] + d * found[3]));
+            assert!((value - truth(t)).abs() < 1e-6, "{t}");
+        }
+    }
+}

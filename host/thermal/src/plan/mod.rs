@@ -1,0 +1,141 @@
+//! Procedures over temperature, planned: what the chamber and the table do, and how well every curve is known afterwards.
+//!
+//! The sigmas are those of the regression that the estimate solves ([`crate::regression`]), with one cubic or one line for each parameter in place of
+//! smooth splines, and with the temperature of the die taken for that of the chamber: how well a lag is determined is not predicted.
+
+mod prediction;
+mod procedure;
+mod sheet;
+
+pub use prediction::{At, SensorPrediction};
+pub use procedure::{Procedure, Schedule, Step};
+pub use sheet::to_toml;
+
+use mimu::design::budget::DwellNoise;
+use mimu::quantity::{duration, significant};
+use mimu_recording::error::{Error, Result};
+use serde::Serialize;
+
+use crate::basis::{CURVATURE_SPAN, SLOPE_SPAN, Shape};
+
+/// Longest plan that a bench carries out, s.
+const LONGEST_S: f64 = 48.0 * 3600.0;
+
+/// What is to be planned.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Request {
+    /// Sequence of temperatures and motions.
+    pub procedure: Procedure,
+    /// Temperatures of the chamber, °C.
+    pub range_c: [f64; 2],
+    /// Curve of every parameter: [`Shape::Line`] or [`Shape::Cubic`].
+    pub shape: Shape,
+    /// Rate of the chamber from one temperature to the next, K/min.
+    pub kelvin_per_min: f64,
+    /// Set points of a soak.
+    pub set_points: usize,
+    /// Time at a set point of a soak, or before a ramp and at its end, s.
+    pub soak_s: f64,
+    /// Length of a dwell, s.
+    pub dwell_s: f64,
+    /// Largest rate of the table, deg/s.
+    pub largest_dps: f64,
+    /// Samples a second.
+    pub sample_rate_hz: f64,
+    /// Noise of gyro and accelerometer, SI.
+    pub noise: [DwellNoise; 2],
+}
+
+/// A procedure with its duration and what it determines.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Planned {
+    /// `mimu-thermal-plan/1`.
+    pub format: &'static str,
+    /// Procedure.
+    pub procedure: Procedure,
+    /// °C.
+    pub range_c: [f64; 2],
+    /// `line` or `cubic`.
+    pub curves: &'static str,
+    /// s.
+    pub duration_s: f64,
+    /// Dwells and turns.
+    pub dwells: usize,
+    /// Predicted standard deviations.
+    pub sensors: Vec<SensorPrediction>,
+    /// What it cannot tell apart.
+    pub inseparable: Vec<&'static str>,
+    /// Noise of gyro and accelerometer that the prediction is for, SI.
+    pub noise: [DwellNoise; 2],
+    /// What chamber and table do.
+    #[serde(skip)]
+    pub schedule: Schedule,
+}
+
+/// Plans a procedure.
+///
+/// # Errors
+/// A span that determines no such curve; too few set points; a set point that is too short for its dwells; more than two days.
+pub fn plan(request: &Request) -> Result<Planned> {
+    let [from, to] = request.range_c;
+    let curves = check_span(to - from, request.shape)?;
+    let schedule = Schedule::of(request)?;
+    let duration_s = schedule.duration_s();
+    if duration_s > LONGEST_S {
+        return Err(Error::new(
+            request.procedure.name(),
+            format!(
+                "it takes {}, and a plan has two days at most",
+                duration(duration_s)
+            ),
+            "take fewer set points, shorter soaks or a faster ramp",
+        ));
+    }
+    let inseparable = match request.procedure {
+        Procedure::RestRamp => INSEPARABLE_AT_REST.to_vec(),
+        _ => Vec::new(),
+    };
+    Ok(Planned {
+        format: "mimu-thermal-plan/1",
+        procedure: request.procedure,
+        range_c: request.range_c,
+        curves,
+        duration_s,
+        dwells: schedule.dwells(),
+        sensors: prediction::predict(request, &schedule),
+        inseparable,
+        noise: request.noise,
+        schedule,
+    })
+}
+
+/// One pose, one ramp, from power-on.
+const INSEPARABLE_AT_REST: [&str; 3] = [
+    "accelerometer, along gravity: bias and 1 g times the change of the scale factor are one curve; the bias of z is predicted as if the scale factor were known",
+    "all other scale factors and cross terms: nothing excites them",
+    "warm-up since power-on, lag of the dies and slope over temperature: one ramp at one rate moves all three together; come back at another rate, or soak and measure again",
+];
+
+/// Refuses a span over which no such curve is determined; else its name.
+fn check_span(kelvin: f64, shape: Shape) -> Result<&'static str> {
+    let refuse = |least: f64, what: &str, remedy: &str| {
+        let problem = format!("{} K: {what} needs {least} K", significant(kelvin));
+        Err(Error::new("--range", problem, remedy))
+    };
+    if !(kelvin >= SLOPE_SPAN) {
+        let what = "over less than that noise and drift pass for a slope over temperature, which";
+        return refuse(SLOPE_SPAN, what, "widen the range");
+    }
+    match shape {
+        Shape::Line | Shape::Constant => Ok("line"),
+        _ if kelvin < CURVATURE_SPAN => {
+            let what = "over less than that the slope passes for curvature, which";
+            refuse(
+                CURVATURE_SPAN,
+                what,
+                "widen the range, or take --curves line",
+            )
+        }
+        _ => Ok("cubic"),
+    }
+}

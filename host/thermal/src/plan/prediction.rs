@@ -1,0 +1,197 @@
+//! Standard deviations of the curves that a procedure gives, from the information matrix of the regression.
+
+use mimu::allan::model::FLOOR;
+use mimu::design::budget::DwellNoise;
+use mimu::quantity::Sensor;
+use nalgebra::{DMatrix, DVector, Vector3};
+use serde::Serialize;
+
+use super::Request;
+use super::procedure::{Procedure, Schedule, Step};
+use crate::basis::Basis;
+use crate::regression::{AxisNoise, Kind, Normal, Part, Problem, ProblemRow};
+
+/// Longest row, s. Shorter ones say no more of noise that wanders over many minutes.
+const ROW_S: f64 = 10.0;
+/// Correlation time of the wander, s: bias instability as an exponentially correlated bias of the variance of its floor.
+const WANDER_S: f64 = 1000.0;
+/// Standard gravity, m/s²: which gravity it is makes no difference to a prediction.
+const GRAVITY: f64 = mimu::readable::STANDARD_GRAVITY;
+
+/// What is known of the curves of one triad.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SensorPrediction {
+    /// The triad.
+    pub sensor: Sensor,
+    /// SI unit of the bias.
+    pub unit: &'static str,
+    /// At the lower end of the range, in its middle and at its upper end.
+    pub at: [At; 3],
+}
+
+/// Standard deviations at one temperature, of the worst axis; `None` of what is not determined.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct At {
+    /// °C.
+    pub temp_c: f64,
+    /// Bias, SI.
+    pub bias: Option<f64>,
+    /// Scale factor, as a ratio.
+    pub scale: Option<f64>,
+    /// Cross terms, rad.
+    pub cross: Option<f64>,
+}
+
+/// Predicts both triads.
+pub(super) fn predict(request: &Request, schedule: &Schedule) -> Vec<SensorPrediction> {
+    let each = Sensor::BOTH.into_iter();
+    each.map(|sensor| of(request, schedule, sensor)).collect()
+}
+
+fn of(request: &Request, schedule: &Schedule, sensor: Sensor) -> SensorPrediction {
+    let (rows, dies) = rows(request, schedule, sensor);
+    let samples = rows.iter().map(|r| r.weight).fold(0.0, f64::max);
+    let mut problem = Problem {
+        sensor,
+        rows,
+        gain: Vector3::repeat(1.0),
+        null: Vector3::zeros(),
+        bases: Kind::ALL.map(|_| Basis::new(request.shape, request.range_c)),
+        sessions: 1,
+        biases_only: request.procedure == Procedure::RestRamp,
+        samples,
+    };
+    problem.rows.iter_mut().for_each(|r| r.weight /= samples);
+    let noise = axis_noise(
+        &request.noise[sensor as usize],
+        samples / request.sample_rate_hz,
+    );
+    let covariances = [0, 1, 2].map(|axis| {
+        let normal = Normal::of(&problem, axis, &dies, &noise, |_| true);
+        inverse(&normal.gram)
+    });
+    let [from, to] = request.range_c;
+    let at = [from, 0.5 * (from + to), to].map(|temp_c| {
+        let worst = |kind| worst(&problem, &covariances, kind, temp_c);
+        At {
+            temp_c,
+            bias: worst(Kind::Bias),
+            scale: worst(Kind::Scale),
+            cross: worst(Kind::Cross),
+        }
+    });
+    SensorPrediction {
+        sensor,
+        unit: sensor.unit(),
+        at,
+    }
+}
+
+/// White noise of a row of `row_s`, and the floor and the random walk of the bias as wander.
+fn axis_noise(noise: &DwellNoise, row_s: f64) -> AxisNoise {
+    AxisNoise {
+        white: noise.n.powi(2) / row_s,
+        // A random walk has gone so far in the correlation time.
+        wander: FLOOR * noise.b.powi(2) + noise.k.powi(2) * WANDER_S,
+        correlation_s: WANDER_S,
+    }
+}
+
+/// Rows of `sensor`, with their numbers of samples for weights, and the temperatures of the die.
+fn rows(request: &Request, schedule: &Schedule, sensor: Sensor) -> (Vec<ProblemRow>, Vec<f64>) {
+    let (mut rows, mut dies) = (Vec::new(), Vec::new());
+    for round in 0..schedule.rounds {
+        let begin = schedule.lead_in_s + round as f64 * schedule.round_s;
+        for (k, (step, [from, to])) in schedule.steps.iter().zip(&schedule.times_s).enumerate() {
+            let (input, moves) = input(step, sensor);
+            let Some(input) = input else { continue };
+            let count = if moves {
+                1.0
+            } else {
+                ((to - from) / ROW_S).ceil()
+            };
+            let length_s = (to - from) / count;
+            for part in 0..count as usize {
+                let middle_s = begin + from + (part as f64 + 0.5) * length_s;
+                dies.push(schedule.temp_c(middle_s));
+                rows.push(ProblemRow {
+                    session: 0,
+                    middle_s,
+                    weight: length_s * request.sample_rate_hz,
+                    input,
+                    reading: Vector3::zeros(),
+                    step: (round * schedule.steps.len() + k) as i32,
+                });
+            }
+        }
+    }
+    (rows, dies)
+}
+
+/// Mean input in a step, SI, without the rate of the Earth; `None` where the sensor is not evaluated. And whether it moves.
+fn input(step: &Step, sensor: Sensor) -> (Option<Vector3<f64>>, bool) {
+    match (step, sensor) {
+        (Step::Dwell { up, rate_dps, .. }, Sensor::Gyro) => {
+            (Some(up * rate_dps.to_radians()), *rate_dps != 0.0)
+        }
+        (Step::Dwell { up, .. }, Sensor::Accel) => (Some(up * GRAVITY), false),
+        (
+            Step::Turn {
+                about, rate_dps, ..
+            },
+            Sensor::Gyro,
+        ) => (Some(about * rate_dps.to_radians()), true),
+        // What turns against gravity within a row tells more of the table's timing than of the sensor.
+        (Step::Turn { .. }, Sensor::Accel) => (None, true),
+    }
+}
+
+/// Inverse of an information matrix whose columns have very different sizes; `None` of a singular one.
+fn inverse(gram: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let size = gram.diagonal().map(f64::sqrt);
+    if size.iter().any(|s| !(*s > 0.0)) {
+        return None;
+    }
+    let scale = size.map(|s| 1.0 / s);
+    let alike = DMatrix::from_fn(gram.nrows(), gram.ncols(), |i, j| {
+        gram[(i, j)] * scale[i] * scale[j]
+    });
+    let inverse = alike.cholesky()?.inverse();
+    // Rounding lets a singular matrix pass with variances as large as its condition.
+    let determined = inverse.diagonal().iter().all(|v| *v < 1e10);
+    determined.then(|| {
+        DMatrix::from_fn(gram.nrows(), gram.ncols(), |i, j| {
+            inverse[(i, j)] * scale[i] * scale[j]
+        })
+    })
+}
+
+/// Standard deviation of the curves of a kind at `temp_c`, of the axis and the input where it is largest.
+fn worst(
+    problem: &Problem,
+    covariances: &[Option<DMatrix<f64>>; 3],
+    kind: Kind,
+    temp_c: f64,
+) -> Option<f64> {
+    let mut largest = None;
+    for (axis, covariance) in covariances.iter().enumerate() {
+        let covariance = covariance.as_ref()?;
+        let parts = problem.parts(axis);
+        for part in parts.iter().filter(|p| p.kind == kind) {
+            let along = row(problem, part, temp_c, covariance.nrows());
+            let sigma = along.dot(&(covariance * &along)).sqrt();
+            largest = Some(sigma.max(largest.unwrap_or(0.0)));
+        }
+    }
+    largest
+}
+
+/// The functions of a curve at `temp_c`, at its columns.
+fn row(problem: &Problem, part: &Part, temp_c: f64, columns: usize) -> DVector<f64> {
+    let (from, values) = problem.basis(part.kind).values(temp_c);
+    let mut row = DVector::zeros(columns);
+    for (k, value) in values.iter().enumerate().filter(|(_, v)| **v != 0.0) {
+        row[part.from + from + k] = *value;
+    }
+    row
+}

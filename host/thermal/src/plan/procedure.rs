@@ -1,0 +1,308 @@
+//! What chamber and table do in each procedure, and when.
+
+use mimu::design::model::Setting;
+use mimu::design::reach::Fixture;
+use mimu::design::tour::Motion;
+use mimu::quantity::duration;
+use mimu_recording::error::{Error, Result};
+use nalgebra::Vector3;
+use serde::Serialize;
+
+use super::Request;
+use crate::basis::Shape;
+
+/// Sequences of temperatures and motions.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Procedure {
+    /// Set points, at each of which the unit takes the chamber's temperature before it is measured: fang, section 3.
+    Soak,
+    /// Positions and quarter turns while the chamber goes up and down: niu, section 3.2.
+    Niu,
+    /// Six faces and rates about all axes while the chamber goes up and down.
+    Ramp,
+    /// At rest with z up while the chamber goes up, as autopilots calibrate themselves.
+    RestRamp,
+}
+
+impl Procedure {
+    /// As on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Soak => "soak",
+            Self::Niu => "niu",
+            Self::Ramp => "ramp",
+            Self::RestRamp => "rest-ramp",
+        }
+    }
+}
+
+/// A dwell, or a turn of one axis of the table.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Step {
+    /// Body direction that points up, and a rate about it, deg/s. `stay`: the turn before has brought it there.
+    Dwell {
+        /// Up in the body's axes.
+        up: Vector3<f64>,
+        /// deg/s.
+        rate_dps: f64,
+        /// Whether the pose is where the turn before it ended.
+        stay: bool,
+    },
+    /// Turn from rest to rest.
+    Turn {
+        /// `middle` or `inner`.
+        axis: &'static str,
+        /// Degrees, right-hand rule about the table's axis.
+        angle_deg: f64,
+        /// deg/s.
+        rate_dps: f64,
+        /// Axis in the body about which it turns, with the sign.
+        about: Vector3<f64>,
+    },
+}
+
+/// A procedure in time.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Schedule {
+    /// Temperature of the chamber: s and °C, linear between, held outside.
+    pub chamber_c: Vec<[f64; 2]>,
+    /// Time before the first round, s.
+    pub lead_in_s: f64,
+    /// So often all steps are done.
+    pub rounds: usize,
+    /// From the beginning of a round to that of the next, s.
+    pub round_s: f64,
+    /// Whether the table waits for the next round; if not, rounds follow each other.
+    pub waits: bool,
+    /// What is done in a round.
+    pub steps: Vec<Step>,
+    /// Beginning and end of each step in a round, s.
+    pub times_s: Vec<[f64; 2]>,
+}
+
+/// Time to come to rest and to begin a turn, s: niu, 3.2, ten seconds a position of which nine are measured.
+const NIU_SETTLE_S: f64 = 0.95;
+const NIU_RAMPS_S: f64 = 0.05;
+/// Rate of niu's turns, deg/s.
+const NIU_DPS: f64 = 10.0;
+
+impl Schedule {
+    /// Of a procedure.
+    ///
+    /// # Errors
+    /// Too few set points for the curves; soaks that are too short for their dwells.
+    pub fn of(request: &Request) -> Result<Self> {
+        match request.procedure {
+            Procedure::Soak => soak(request),
+            Procedure::Niu => Ok(sweep(request, niu(request))),
+            Procedure::Ramp => Ok(sweep(request, faces_and_rates(request))),
+            Procedure::RestRamp => Ok(rest_ramp(request)),
+        }
+    }
+
+    /// From power-on to the end of the last dwell, s.
+    pub fn duration_s(&self) -> f64 {
+        let last = self.times_s.last().map_or(0.0, |t| t[1]);
+        self.lead_in_s + (self.rounds - 1) as f64 * self.round_s + last
+    }
+
+    /// Dwells and turns.
+    pub fn dwells(&self) -> usize {
+        self.rounds * self.steps.len()
+    }
+
+    /// Temperature of the chamber at a time, °C.
+    pub fn temp_c(&self, t_s: f64) -> f64 {
+        let after = self.chamber_c.partition_point(|p| p[0] <= t_s);
+        let before = after.checked_sub(1).map(|k| self.chamber_c[k]);
+        match (before, self.chamber_c.get(after)) {
+            (Some([t0, c0]), Some([t1, c1])) => c0 + (c1 - c0) * (t_s - t0) / (t1 - t0),
+            (Some([_, c]), None) | (None, Some(&[_, c])) => c,
+            (None, None) => f64::NAN,
+        }
+    }
+}
+
+/// Steps with their times in a round.
+struct Round {
+    steps: Vec<Step>,
+    times_s: Vec<[f64; 2]>,
+    length_s: f64,
+    waits: bool,
+}
+
+fn soak(request: &Request) -> Result<Schedule> {
+    let [from, to] = request.range_c;
+    let needed = if request.shape == Shape::Line { 2 } else { 4 };
+    let n = request.set_points;
+    if n < needed {
+        let problem = format!("{n} set points, and the curves have {needed} coefficients");
+        let remedy = format!("take {needed} or more, one more to see whether the curves hold");
+        return Err(Error::new("--points", problem, remedy));
+    }
+    let round = faces_and_rates(request);
+    if round.length_s > request.soak_s {
+        return Err(Error::new(
+            "--soak",
+            format!(
+                "{} at a set point, and its dwells with the moves take {}",
+                duration(request.soak_s),
+                duration(round.length_s)
+            ),
+            "soak for longer, or take shorter dwells",
+        ));
+    }
+    let apart = (to - from) / (n - 1) as f64;
+    let round_s = request.soak_s + apart / request.kelvin_per_min * 60.0;
+    let points = (0..n).flat_map(|k| {
+        let (t, c) = (k as f64 * round_s, from + k as f64 * apart);
+        [[t, c], [t + request.soak_s, c]]
+    });
+    Ok(Schedule {
+        chamber_c: points.collect(),
+        lead_in_s: request.soak_s - round.length_s,
+        rounds: n,
+        round_s,
+        waits: true,
+        steps: round.steps,
+        times_s: round.times_s,
+    })
+}
+
+/// Up, held, and down again, with as many rounds as go into it.
+fn sweep(request: &Request, round: Round) -> Schedule {
+    let [from, to] = request.range_c;
+    let ramp_s = (to - from) / request.kelvin_per_min * 60.0;
+    let soak_s = request.soak_s;
+    let ends = [
+        soak_s,
+        soak_s + ramp_s,
+        2.0 * soak_s + ramp_s,
+        2.0 * (soak_s + ramp_s),
+    ];
+    let chamber_c = vec![
+        [0.0, from],
+        [ends[0], from],
+        [ends[1], to],
+        [ends[2], to],
+        [ends[3], from],
+    ];
+    // A round at each end of the range belongs to it.
+    let lead_in_s = (soak_s - round.length_s).max(0.0);
+    let rounds = ((ends[3] - lead_in_s) / round.length_s).ceil() + 1.0;
+    Schedule {
+        chamber_c,
+        lead_in_s,
+        rounds: rounds as usize,
+        round_s: round.length_s,
+        waits: round.waits,
+        steps: round.steps,
+        times_s: round.times_s,
+    }
+}
+
+fn rest_ramp(request: &Request) -> Schedule {
+    let [from, to] = request.range_c;
+    let ramp_s = (to - from) / request.kelvin_per_min * 60.0;
+    let end_s = ramp_s + 2.0 * request.soak_s;
+    Schedule {
+        chamber_c: vec![
+            [0.0, from],
+            [request.soak_s, from],
+            [request.soak_s + ramp_s, to],
+        ],
+        lead_in_s: 0.0,
+        rounds: 1,
+        round_s: end_s,
+        waits: false,
+        steps: vec![Step::Dwell {
+            up: Vector3::z(),
+            rate_dps: 0.0,
+            stay: false,
+        }],
+        times_s: vec![[0.0, end_s]],
+    }
+}
+
+/// Six faces at rest, then both ways about each axis.
+fn faces_and_rates(request: &Request) -> Round {
+    let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
+    let at_rest = axes.iter().flat_map(|up| [(*up, 0.0), (-up, 0.0)]);
+    // Turned about the vertical at one rate with the axis up and with it down: both ways in the body, and forces that stay balanced.
+    let rates = axes
+        .iter()
+        .flat_map(|up| [(*up, request.largest_dps), (-up, request.largest_dps)]);
+    let settings: Vec<Setting> = at_rest
+        .chain(rates)
+        .map(|(up, dps)| Setting {
+            up,
+            rate: f64::to_radians(dps),
+        })
+        .collect();
+    let motion = Motion::of(Fixture::ThreeAxis);
+    let mut times_s = Vec::new();
+    let mut t = 0.0;
+    for (k, setting) in settings.iter().enumerate() {
+        // From the last dwell of a round to its first.
+        let before = if k == 0 { settings.len() - 1 } else { k - 1 };
+        t += motion.between(&settings[before], setting);
+        times_s.push([t, t + request.dwell_s]);
+        t += request.dwell_s;
+    }
+    let steps = settings.iter().map(|s| Step::Dwell {
+        up: s.up,
+        rate_dps: s.rate.to_degrees(),
+        stay: false,
+    });
+    Round {
+        steps: steps.collect(),
+        times_s,
+        // To a whole second, with a second in hand for a table that is slower.
+        length_s: t.ceil() + 1.0,
+        waits: true,
+    }
+}
+
+/// Eight positions and eight quarter turns. The order is not in niu's text; this one turns both ways about each axis and
+/// reaches the poses of its appendix, upside down: with z up in place of down it stays within 90 degrees of tilt, which every table has.
+fn niu(request: &Request) -> Round {
+    let [x, y, z] = [Vector3::x(), Vector3::y(), Vector3::z()];
+    let rate_dps = NIU_DPS.min(request.largest_dps);
+    let cycle = [
+        (z, "middle", 90.0, x),
+        (y, "inner", 90.0, z),
+        (x, "middle", -90.0, y),
+        (z, "inner", -90.0, -z),
+        (z, "middle", -90.0, -x),
+        (-y, "inner", 90.0, z),
+        (-x, "middle", 90.0, -y),
+        (z, "inner", -90.0, -z),
+    ];
+    let (mut steps, mut times_s, mut t) = (Vec::new(), Vec::new(), 0.0);
+    for (k, (up, axis, angle_deg, about)) in cycle.into_iter().enumerate() {
+        t += NIU_SETTLE_S;
+        times_s.push([t, t + request.dwell_s]);
+        t += request.dwell_s;
+        let turn_s = 90.0 / rate_dps + NIU_RAMPS_S;
+        times_s.push([t, t + turn_s]);
+        t += turn_s;
+        steps.push(Step::Dwell {
+            up,
+            rate_dps: 0.0,
+            stay: k > 0,
+        });
+        steps.push(Step::Turn {
+            axis,
+            angle_deg,
+            rate_dps,
+            about,
+        });
+    }
+    Round {
+        steps,
+        times_s,
+        length_s: t,
+        waits: false,
+    }
+}
