@@ -295,7 +295,7 @@ mod tests {
 
     #[test]
     fn errors_are_means_less_the_input_with_the_scatter_of_the_stretches() {
-        let alternating = |k: usize| if k % 2 == 0 { 1.0 } else { -1.0 };
+        let alternating = |k: usize| if k.is_multiple_of(2) { 1.0 } else { -1.0 };
         let found = average((0..16).map(|k| {
             let off = Vector3::new(0.01, 0.0, -0.02).add_scalar(0.001 * alternating(k));
             (off, Vector3::new(0.1, -0.1, 9.9))
