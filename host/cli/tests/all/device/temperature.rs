@@ -87,7 +87,9 @@ fn means(csv: &str) -> Vec<([f64; 3], f64, bool)> {
         .skip(1)
         .map(|line| line.split(',').map(|cell| cell.parse().unwrap()).collect())
         .collect();
-    rows.as_chunks::<2000>().0.iter()
+    rows.as_chunks::<2000>()
+        .0
+        .iter()
         .map(|chunk| {
             let mean = |c: usize| chunk.iter().map(|r| r[c]).sum::<f64>() / 2000.0;
             let last = &chunk[1999];
