@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Hardware in the loop: the release image on a real board, from flashing to a recording. The unit lies still, z up.
 #
-# NOT RUN YET on a board: nobody has had one at hand. All but flashing and resetting can be tried on the emulated board:
+# NOT RUN YET on a board: nobody has had one at hand. All but flashing and resetting holds on the emulated board, the wizard on a table included:
 #   mimu-board serve &   then   MIMU_NO_PROBE=1 MIMU_PORT=/dev/pts/N hitl/run.sh cal.toml
 #
 #   hitl/run.sh [CALIBRATION.toml]     a calibration in volts; without one, what needs it is left out, and said

@@ -16,6 +16,8 @@ const SHORTEST_STUCK_S: f64 = 60.0;
 const STUCK_FACTOR: f64 = 50.0;
 /// Smallest change within a second, K, that can be a jump.
 const SMALLEST_JUMP: f64 = 0.5;
+/// So long after power-on, s, nothing is a jump: a die warms by kelvins within seconds, by its own power.
+const POWERED_UP_S: f64 = 60.0;
 /// A jump is this many times what all but one second in two hundred change by.
 const JUMP_FACTOR: f64 = 12.0;
 
@@ -51,7 +53,8 @@ impl Thermometer {
         check_gaps(&condensed.blocks, &place)?;
         check_stuck(&known, &place)?;
         let mut series = Self::evenly(&known, first.start_s, last.last_s);
-        check_jumps(&series, &place)?;
+        // Where nobody knows when the power came, the beginning may have been it.
+        check_jumps(&series, power_on_s.unwrap_or(first.start_s), &place)?;
         series.from_power_on = power_on_s.is_some_and(|p| first.start_s - p < LONGEST_GAP_S);
         series.smooth(smoothing(&known));
         Ok(series)
@@ -296,7 +299,8 @@ fn check_stuck(known: &[(f64, f64)], place: &str) -> Result<()> {
     }
 }
 
-fn check_jumps(series: &Thermometer, place: &str) -> Result<()> {
+fn check_jumps(series: &Thermometer, power_on_s: f64, place: &str) -> Result<()> {
+    let powered_up = (power_on_s + POWERED_UP_S - series.start_s) / STEP_S;
     let mut steps: Vec<f64> = series
         .temp_c
         .windows(2)
@@ -306,6 +310,7 @@ fn check_jumps(series: &Thermometer, place: &str) -> Result<()> {
         .iter()
         .copied()
         .enumerate()
+        .filter(|(k, _)| *k as f64 >= powered_up)
         .max_by(|a, b| a.1.total_cmp(&b.1))
     else {
         return Ok(());
