@@ -16,6 +16,7 @@ mod svg;
 mod text;
 mod thermal;
 mod thermal_plan;
+pub(crate) mod thermal_plot;
 mod trim;
 mod verify;
 mod wizard;

@@ -18,7 +18,7 @@ use mimu_thermal::session::Session;
 use crate::arguments::{JsonArgs, StillArgs};
 use crate::output::{check_outputs, print};
 use crate::reading::read;
-use crate::report;
+use crate::report::{self, thermal_plot};
 
 #[derive(Args)]
 pub(crate) struct ThermalArgs {
@@ -58,6 +58,9 @@ struct FitArgs {
     /// Calibration file to write
     #[arg(short, value_name = "FILE")]
     output: Option<PathBuf>,
+    /// Draw all curves with their bands, and the errors while it heats and cools, as SVG
+    #[arg(long, value_name = "FILE")]
+    plot: Option<PathBuf>,
     #[command(flatten)]
     json: JsonArgs,
 }
@@ -126,7 +129,11 @@ pub(crate) fn run(args: &ThermalArgs) -> Result<()> {
 }
 
 fn run_fit(args: &FitArgs) -> Result<()> {
-    let outputs = [args.output.as_deref(), args.json.file()];
+    let outputs = [
+        args.output.as_deref(),
+        args.plot.as_deref(),
+        args.json.file(),
+    ];
     let session = |directory: &PathBuf, finding: Finding| {
         Session::of(&read(directory, finding, &outputs, &[])?)
     };
@@ -143,16 +150,20 @@ fn run_fit(args: &FitArgs) -> Result<()> {
     let fitted = fit(sessions, &verify, options)?;
     let result = ThermalResult::of(&fitted);
     let mut text = report::thermal_text(&result);
-    let mut calibration = None;
+    let mut staged = Vec::new();
     if let Some(path) = &args.output {
         let now = jiff::Timestamp::now()
             .round(jiff::Unit::Second)
             .unwrap_or_default();
         let made = fitted.calibration(&now.to_string())?;
-        calibration = Some(stage(path, made.to_toml())?);
+        staged.push(stage(path, made.to_toml())?);
         text.push_str(&format!("\ncalibration: {}\n", path.display()));
     }
-    print(&args.json, &text, &result, calibration)
+    if let Some(path) = &args.plot {
+        staged.push(stage(path, thermal_plot::svg(&result))?);
+        text.push_str(&format!("\nplot: {}\n", path.display()));
+    }
+    print(&args.json, &text, &result, staged)
 }
 
 fn run_compare(args: &CompareArgs) -> Result<()> {
