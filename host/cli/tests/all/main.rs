@@ -12,5 +12,6 @@ mod import_command;
 mod over_temperature;
 mod pocket_calculator;
 mod readme;
+mod thermal_command;
 mod thermal_plan_command;
 mod wizard;

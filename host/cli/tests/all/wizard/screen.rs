@@ -84,12 +84,11 @@ impl Sitting {
     fn end(mut self) -> (String, bool, Option<i32>) {
         let status = self.child.wait().unwrap();
         // What was written last may be on its way on a busy machine.
-        for patience in [2000, 300] {
-            while let Ok(text) = self.output.recv_timeout(Duration::from_millis(patience)) {
-                self.seen.push_str(&text);
-                if self.seen.contains(LEFT) {
-                    break;
-                }
+        let mut patience = Duration::from_secs(2);
+        while let Ok(text) = self.output.recv_timeout(patience) {
+            self.seen.push_str(&text);
+            if self.seen.contains(LEFT) {
+                patience = Duration::from_millis(500);
             }
         }
         let is = tcgetattr(&self.other).unwrap();

@@ -1,0 +1,95 @@
+//! The command `mimu thermal fit` on niu's unit and procedure, whose truth is the bench's.
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+use mimu_rig::plan::Plan;
+use mimu_rig::rig_file::{RigFile, RigTruth};
+use serde_json::Value;
+
+fn mimu(folder: &Path, arguments: &str) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_mimu"));
+    command.current_dir(folder);
+    command.args(arguments.split(' ')).output().unwrap()
+}
+
+fn done(folder: &Path, arguments: &str) -> String {
+    let out = mimu(folder, arguments);
+    let told = String::from_utf8_lossy(&out.stderr).into_owned();
+    assert!(out.status.success(), "{arguments}: {told}");
+    String::from_utf8(out.stdout).unwrap()
+}
+
+/// niu's MTi-G in its chamber: one unit, and the noise of each seed.
+fn record(folder: &Path, name: &str, noise: u64) {
+    let rig = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../rig");
+    let file = RigFile::read(&rig.join("rigs/niu-mtig.toml")).unwrap();
+    let truth = RigTruth::resolve(&file, 1).unwrap();
+    let plan = Plan::read(&rig.join("plans/niu-ramp.toml")).unwrap();
+    let output = mimu_rig::record::Output::new(&folder.join(name), &plan).unwrap();
+    mimu_rig::record::write(&plan, &truth, noise, &output).unwrap();
+}
+
+#[test]
+fn niu_s_unit_gets_curves_and_lags_that_hold_the_truth_and_another_run_agrees() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    record(folder, "niu", 1);
+    record(folder, "again", 2);
+    let fitted = done(
+        folder,
+        "thermal fit niu --verify again -o cal.toml --plot curves.svg --json -",
+    );
+    let result: Value = serde_json::from_str(&fitted).unwrap();
+    assert_eq!(result["format"], "mimu-thermal/1");
+    assert_eq!(result["verdict"], "fitted");
+    // The dies' lags in `rigs/niu-mtig.toml`: 60 s of the gyros, 30 s of the accelerometer. An interval of 99.9 %, as there are two.
+    for (sensor, truth) in [("gyro", 60.0), ("accel", 30.0)] {
+        let found = &result["sensors"][sensor];
+        let number = |key: &str| found["lag_s"][key].as_f64().unwrap();
+        let half = 0.5 * (number("upper") - number("lower"));
+        let off = (number("value") - truth).abs();
+        assert!(off < 3.3 / 1.96 * half, "{sensor}: {found}");
+        assert!(half < 15.0, "{sensor}: {found}");
+        let ratio =
+            found["held_out_rms"].as_f64().unwrap() / found["noise_floor"].as_f64().unwrap();
+        assert!(
+            ratio < 1.15,
+            "{sensor}: {ratio} of the noise in another run"
+        );
+    }
+    assert_eq!(result["curves"].as_array().unwrap().len() % 2, 0);
+    let calibration = std::fs::read_to_string(folder.join("cal.toml")).unwrap();
+    assert!(calibration.contains("format = \"mimu-calibration/2\""));
+    let picture = std::fs::read_to_string(folder.join("curves.svg")).unwrap();
+    let bands = picture.matches(" band\"").count();
+    assert_eq!(bands, 24, "a band for each parameter");
+    let same = done(folder, "thermal compare cal.toml cal.toml --json -");
+    let same: Value = serde_json::from_str(&same).unwrap();
+    assert_eq!(same["format"], "mimu-thermal-comparison/1");
+
+    // What a fit at one temperature leaves, beside it.
+    done(folder, "fit niu -o one.toml");
+    let left = |calibration: &str| -> f64 {
+        let text = done(
+            folder,
+            &format!("verify again --calibration {calibration} --json -"),
+        );
+        let result: Value = serde_json::from_str(&text).unwrap();
+        result["sensors"]["gyro"]["rms"].as_f64().unwrap()
+    };
+    let [curves, one] = [left("cal.toml"), left("one.toml")];
+    assert!(
+        curves < 0.5 * one,
+        "{curves} rad/s with curves, {one} without"
+    );
+}
+
+#[test]
+fn what_is_no_recording_over_temperature_is_refused_and_nothing_is_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let out = mimu(folder, "thermal fit nowhere -o cal.toml --plot curves.svg");
+    assert_eq!(out.status.code(), Some(1));
+    assert!(!folder.join("cal.toml").exists() && !folder.join("curves.svg").exists());
+}
