@@ -159,11 +159,16 @@ fn legend(frame: &Frame, key: &[(&str, &str)]) -> Markup {
     let wide = |name: &str| 26.0 + 7.5 * name.len() as f64;
     let mut x = frame.across.end - key.iter().map(|k| wide(k.1)).sum::<f64>();
     let y = frame.down.start - 12.0;
+    let placed = key.iter().map(|(class, name)| {
+        let at = x;
+        x += wide(name);
+        (at, class, name)
+    });
+    let placed: Vec<_> = placed.collect();
     html! {
-        @for (class, name) in key {
+        @for (x, class, name) in placed {
             path class=(class) d={ "M" (px(x)) " " (px(y)) "h16" } {}
             text class="tick" x=(px(x + 20.0)) y=(px(y + 4.0)) { (name) }
-            @let _ = x += wide(name);
         }
     }
 }
