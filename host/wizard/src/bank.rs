@@ -15,8 +15,9 @@ use crate::station::Station;
 /// Longest wait for an answer.
 const PATIENCE: Duration = Duration::from_secs(1);
 /// Departure of the device's estimate from the PC's, in standard deviations of the PC's, beyond which they contradict each other. Both are
-/// made of the same readings, weighted in other ways.
-const MOST_APART: f64 = 3.0;
+/// made of the same dwells and not of the same samples, as the device begins when a dwell is recognised, half a second later: of short dwells
+/// they are nearly independent, and then the largest of 24 differences exceeds 6 once in a thousand sessions.
+const MOST_APART: f64 = 6.0;
 const BOTH: [Which; 2] = [Which::Gyro, Which::Accel];
 
 /// `[b, P1, P2, P3]` of the sensors x, y, z of a triad, SI to raw: V, and V per rad/s or per m/s².
