@@ -6,7 +6,6 @@ mod judged;
 mod plan;
 mod refused;
 #[path = "../../../../tests/thermal/simulation.rs"]
-#[allow(dead_code)]
 mod simulation;
 
 use mimu::prepared::Prepared;
