@@ -8,6 +8,7 @@ mod module_circles;
 mod next_experiment;
 mod noise_of_the_bench;
 mod papers;
+mod ramps;
 mod real_ferraris;
 mod real_mikoff;
 mod real_xsens;

@@ -15,7 +15,7 @@ use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::rows::Rows;
-use super::search::{Chosen, Search, beside};
+use super::search::{Chosen, FALSE_LISTED, Found, MOST, Search, beside};
 use super::variance::Fitted;
 use crate::calibration::EffectTable;
 use crate::effects::candidate::Kind;
@@ -180,7 +180,11 @@ pub fn decide(
         .fit_at(&search.basis, &search.variance.none())?;
     let dof = rows.y.len() as f64 - search.basis.ncols() as f64;
     let omnibus_p = ChiSquared::new(dof).map_or(1.0, |d| d.sf(known.chi2));
-    let (chosen, mut with) = search.run()?;
+    let Found {
+        chosen,
+        fit: mut with,
+        superfluous,
+    } = search.run()?;
     let said = |value: f64| rows.figure.said(rows.sensor, value);
     let mut rejected = without.to_vec();
     let mut kept: Vec<Chosen> = Vec::new();
@@ -246,91 +250,107 @@ pub fn decide(
         };
         (shares, split)
     };
-    loop {
-        let seconds = elsewhere(&kept, &shares(&search, &kept, &with));
-        let (weights, split) = common(&kept, &with);
-        let with_all = held(&kept, &with, split);
-        let mut worst: Option<(usize, String, bool)> = None;
-        for i in (0..kept.len()).rev() {
-            let mut rest = kept.clone();
-            rest.remove(i);
-            let share = weights[i];
-            let without = search.fit(&rest)?;
-            let both = [held(&rest, &without, split), with_all.clone()];
-            let [a, b] = both.each_ref().map(|h| h.as_ref().map(|r| rms(rows, r)));
-            let parts = match &both {
-                [Some(a), Some(b)] => parts_helped(rows, split, [a, b], kept[i].columns.ncols()),
-                _ => [0; 2],
-            };
-            let why = match (a, b) {
-                _ if share > LEVERAGE => {
-                    format!("it rests to {:.0} % on one dwell", 100.0 * share)
-                }
-                (Some(a), Some(b)) if !(b < a) => {
-                    format!(
-                        "the held-out error does not go down: {} without, {} with",
-                        said(a),
-                        said(b)
-                    )
-                }
-                _ if seconds[i].is_some_and(|s| s.contradicts()) => {
-                    let nan = [f64::NAN; 2];
-                    let ([a, b], [c, d]) = seconds[i].map_or((nan, nan), |s| (s.chi2, s.rms));
-                    format!(
-                        "the error of the second recording does not go down: chi-square {a:.0} without, {b:.0} with; rms {} and {}",
-                        said(c),
-                        said(d)
-                    )
-                }
-                (Some(_), Some(_)) if parts[1] >= 2 && parts[1] >= parts[0] => format!(
-                    "the held-out error goes down in {} of the parts, and up in {}",
-                    parts[0], parts[1]
-                ),
-                (_, None) => "what is left when a block is held out does not determine it".into(),
-                _ => {
-                    let models = [&search.model(&rest), &search.model(&kept)];
-                    match chance_without_a_dwell(&search, &kept[i], models, &with) {
-                        Some(p) if p > SURVIVES => format!(
-                            "it does not survive the loss of one dwell and of those in its pose: without them, {}",
-                            p_value(p)
-                        ),
-                        _ => continue,
-                    }
-                }
-            };
-            let too_few_dwells = share > LEVERAGE || b.is_none();
-            worst = Some((i, why, too_few_dwells));
-            break;
-        }
-        let Some((i, why, too_few_dwells)) = worst else {
-            break;
-        };
-        let candidate = kept.remove(i).candidate;
-        // More dwells may prove it: it is asked for in the next experiment.
-        if let Kind::Effect(effect) = &candidate.kind
-            && too_few_dwells
-            && !not_excited.iter().any(|n| n.0 == effect.id)
-        {
-            not_excited.push((effect.id.into(), effect.needs.into()));
-        }
-        rejected.push((candidate.id(), why));
-        with = search.fit(&kept)?;
-    }
-    // A product that no physics asks for is a suggestion.
-    let seconds = elsewhere(&kept, &shares(&search, &kept, &with));
     let mut suggested = Vec::new();
-    let mut confirmed = seconds.iter().map(|s| s.is_some_and(|s| s.shows()));
-    kept.retain(|one| {
-        let confirmed = confirmed.next().unwrap_or(false);
-        let id = one.candidate.id();
-        let taken = one.candidate.is_listed() || confirmed || accept.contains(&id);
-        if !taken {
-            suggested.push(one.clone());
+    loop {
+        loop {
+            let seconds = elsewhere(&kept, &shares(&search, &kept, &with));
+            let (weights, split) = common(&kept, &with);
+            let with_all = held(&kept, &with, split);
+            let mut worst: Option<(usize, String, bool)> = None;
+            for i in (0..kept.len()).rev() {
+                let mut rest = kept.clone();
+                rest.remove(i);
+                let share = weights[i];
+                let without = search.fit(&rest)?;
+                let both = [held(&rest, &without, split), with_all.clone()];
+                let [a, b] = both.each_ref().map(|h| h.as_ref().map(|r| rms(rows, r)));
+                let parts = match &both {
+                    [Some(a), Some(b)] => {
+                        parts_helped(rows, split, [a, b], kept[i].columns.ncols())
+                    }
+                    _ => [0; 2],
+                };
+                let why = match (a, b) {
+                    _ if share > LEVERAGE => {
+                        format!("it rests to {:.0} % on one dwell", 100.0 * share)
+                    }
+                    (Some(a), Some(b)) if !(b < a) => {
+                        format!(
+                            "the held-out error does not go down: {} without, {} with",
+                            said(a),
+                            said(b)
+                        )
+                    }
+                    _ if seconds[i].is_some_and(|s| s.contradicts()) => {
+                        let nan = [f64::NAN; 2];
+                        let ([a, b], [c, d]) = seconds[i].map_or((nan, nan), |s| (s.chi2, s.rms));
+                        format!(
+                            "the error of the second recording does not go down: chi-square {a:.0} without, {b:.0} with; rms {} and {}",
+                            said(c),
+                            said(d)
+                        )
+                    }
+                    (Some(_), Some(_)) if parts[1] >= 2 && parts[1] >= parts[0] => format!(
+                        "the held-out error goes down in {} of the parts, and up in {}",
+                        parts[0], parts[1]
+                    ),
+                    (_, None) => {
+                        "what is left when a block is held out does not determine it".into()
+                    }
+                    _ => {
+                        let models = [&search.model(&rest), &search.model(&kept)];
+                        match chance_without_a_dwell(&search, &kept[i], models, &with) {
+                            Some(p) if p > SURVIVES => format!(
+                                "it does not survive the loss of one dwell and of those in its pose: without them, {}",
+                                p_value(p)
+                            ),
+                            _ => continue,
+                        }
+                    }
+                };
+                let too_few_dwells = share > LEVERAGE || b.is_none();
+                worst = Some((i, why, too_few_dwells));
+                break;
+            }
+            let Some((i, why, too_few_dwells)) = worst else {
+                break;
+            };
+            let candidate = kept.remove(i).candidate;
+            // More dwells may prove it: it is asked for in the next experiment.
+            if let Kind::Effect(effect) = &candidate.kind
+                && too_few_dwells
+                && !not_excited.iter().any(|n| n.0 == effect.id)
+            {
+                not_excited.push((effect.id.into(), effect.needs.into()));
+            }
+            rejected.push((candidate.id(), why));
+            with = search.fit(&kept)?;
         }
-        taken
-    });
-    if !suggested.is_empty() {
+        // A product that no physics asks for is a suggestion.
+        let seconds = elsewhere(&kept, &shares(&search, &kept, &with));
+        let known = suggested.len();
+        let mut confirmed = seconds.iter().map(|s| s.is_some_and(|s| s.shows()));
+        kept.retain(|one| {
+            let confirmed = confirmed.next().unwrap_or(false);
+            let id = one.candidate.id();
+            let taken = one.candidate.is_listed() || confirmed || accept.contains(&id);
+            if !taken {
+                suggested.push(one.clone());
+            }
+            taken
+        });
+        if suggested.len() == known {
+            break;
+        }
         with = search.fit(&kept)?;
+        // What a suggestion had explained, an effect with a name may explain as well.
+        let more = search.beside(kept.clone(), |c| {
+            c.is_listed() && !rejected.iter().any(|r| r.0 == c.id())
+        })?;
+        if more.chosen.len() == kept.len() {
+            break;
+        }
+        (kept, with) = (more.chosen, more.fit);
     }
     nonlinear::refine(&search, &mut kept, &mut with);
     others_in_time(&search, &mut kept, &with);
@@ -408,10 +428,7 @@ pub fn decide(
             rms(rows, &(&rows.y - search.model(&kept) * &with.coefficients)),
             held_rms(&kept, &with, usual),
         );
-        let chance = match one.p {
-            p if p > 0.5 => "no better than chance".to_string(),
-            p => p_value(p),
-        };
+        let chance = not_taken(&one, &kept, &superfluous);
         let figures = match (held, now) {
             (Some((sample, held)), (before, Some(out))) => format!(
                 "; in sample {} to {}, held out {} to {}",
@@ -465,6 +482,23 @@ pub fn decide(
         rows: [rows.y.len(), search.basis.ncols()],
         omnibus_p,
     })
+}
+
+/// Why a named effect that is not among the `kept` is not: it may be chance, or have lost to others, whatever its probability is now.
+fn not_taken(one: &Chosen, kept: &[Chosen], superfluous: &[String]) -> String {
+    let listed = kept.iter().filter(|k| k.candidate.is_listed()).count();
+    let why = match one.p {
+        p if p > 0.5 => return "no better than chance".into(),
+        p if p > FALSE_LISTED => return p_value(p),
+        _ if superfluous.contains(&one.candidate.id()) => {
+            "it was found, and given up when others explained the same".into()
+        }
+        _ if listed >= MOST => {
+            format!("{listed} effects of the sensor were found before it, and no more are sought")
+        }
+        _ => "beside all that was sought at first it was not significant".to_string(),
+    };
+    format!("{}, but {why}", p_value(one.p))
 }
 
 /// Known variances of the judged rows, summed: by noise, and by errors of the reference.

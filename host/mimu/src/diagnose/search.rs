@@ -25,8 +25,9 @@ pub const FALSE_LISTED: f64 = 1.5e-3;
 pub const FALSE_FOUND: f64 = 1e-3;
 /// Candidates that are fitted with noise of their own.
 const FINALISTS: usize = 8;
-/// Most effects of one sensor.
-const MOST: usize = 5;
+/// Most effects of one sensor, and most terms and jumps found from the data. Counted apart: over a wide range of temperatures the cubes of three
+/// axes took three of five places, were not accepted, and kept out a lag that halved what was left.
+pub const MOST: usize = 5;
 
 /// A candidate as part of a model.
 #[derive(Debug, Clone)]
@@ -43,6 +44,16 @@ pub struct Chosen {
     pub drop: f64,
     /// Others that would do nearly as well in its place, and by how much worse their score is.
     pub alternatives: Vec<(String, f64)>,
+}
+
+/// What a search led to.
+pub struct Found {
+    /// What the rows ask for.
+    pub chosen: Vec<Chosen>,
+    /// The model with it.
+    pub fit: Fitted,
+    /// Ids of what was chosen, and made superfluous by others.
+    pub superfluous: Vec<String>,
 }
 
 /// Columns of a candidate at a value of its nonlinear parameter.
@@ -367,14 +378,32 @@ impl<'a> Search<'a> {
     ///
     /// A named effect goes before a term found from the data unless the term is better by 12 in score: with two thousand terms
     /// some product is always near an effect.
-    pub fn run(&self) -> Option<(Vec<Chosen>, Fitted)> {
-        let mut chosen: Vec<Chosen> = Vec::new();
+    pub fn run(&self) -> Option<Found> {
+        self.beside(Vec::new(), |_| true)
+    }
+
+    /// The same beside what is chosen already, of the candidates that `may` be tried.
+    pub fn beside(
+        &self,
+        mut chosen: Vec<Chosen>,
+        may: impl Fn(&Candidate) -> bool,
+    ) -> Option<Found> {
         let mut now = self.fit(&chosen)?;
         // What others have made superfluous does not come back: two that make each other superfluous would take turns for ever.
         let mut gone: Vec<String> = Vec::new();
-        while chosen.len() < MOST {
+        loop {
+            let full = [true, false].map(|listed| {
+                let alike = chosen.iter().filter(|c| c.candidate.is_listed() == listed);
+                alike.count() >= MOST
+            });
+            if full == [true; 2] {
+                break;
+            }
             let mut finalists = self.finalists(&chosen, &now);
-            finalists.retain(|c| !gone.contains(&c.candidate.id()));
+            finalists.retain(|c| {
+                let room = !full[usize::from(!c.candidate.is_listed())];
+                room && may(&c.candidate) && !gone.contains(&c.candidate.id())
+            });
             let significant = |c: &&Chosen| {
                 c.p < if c.candidate.is_listed() {
                     FALSE_LISTED
@@ -415,7 +444,11 @@ impl<'a> Search<'a> {
             let stays = |id: &String| chosen.iter().any(|c| c.candidate.id() == *id);
             gone.extend(before.into_iter().filter(|id| !stays(id)));
         }
-        Some((chosen, now))
+        Some(Found {
+            chosen,
+            fit: now,
+            superfluous: gone,
+        })
     }
 
     /// Tests each of the chosen again beside the others: what they have made superfluous goes.

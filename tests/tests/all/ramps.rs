@@ -1,0 +1,170 @@
+//! What a fit and a diagnosis say of recordings whose temperature ramps: the noise floor, the warning, and what is found. The truth is the
+//! bench's.
+
+use mimu::diagnose::{Recordings, diagnose};
+use mimu::fit::{Method, Options, fit};
+use mimu::prepared::Prepared;
+use mimu::quantity::Sensor;
+use mimu::result::diagnosis::DiagnosisResult;
+use mimu::stillness::STILL_FACTOR;
+use mimu_rig::random::Random;
+use mimu_rig::rig_file::RigFile;
+use mimu_tests::bench;
+
+const OPTIONS: Options = Options {
+    method: Method::LeastSquares,
+    holdout_blocks: 0,
+    still_factor: STILL_FACTOR,
+    only: None,
+};
+
+/// Six faces at rest and rates both ways, over and over, while the chamber goes through `chamber_c`.
+fn plan(rounds: u32, dwell_s: f64, chamber_c: &[[f64; 2]]) -> String {
+    let mut plan = format!(
+        "format = \"mimu-plan/1\"\nsample_rate_hz = 100.0\ncarrier = \"table\"\nrounds = {rounds}\nlead_in_s = 5.0\nchamber_c = {chamber_c:?}\n"
+    );
+    for axis in 0..3 {
+        let up: [f64; 3] = std::array::from_fn(|i| f64::from(u8::from(i == axis)));
+        let down = up.map(|u| -u);
+        for (up, rate_dps) in [(up, 0.0), (down, 0.0), (up, 50.0), (up, -50.0)] {
+            plan +=
+                &format!("[[step]]\nup = {up:?}\nrate_dps = {rate_dps:?}\ndwell_s = {dwell_s:?}\n");
+        }
+    }
+    plan
+}
+
+/// A unit of the usual parts, warmed up, whose die is at the temperature of its board.
+fn unit(seed: u64) -> RigFile {
+    let mut random = Random::new(seed, "unit");
+    let (gyro, accel) = (bench::gyro(&mut random), bench::accel(&mut random));
+    let mut file = bench::clean(gyro, accel);
+    file.thermal.on_before_s = Some(f64::INFINITY);
+    file.thermal.board_lag_s = Some(60.0);
+    file.thermal.die_lag_s = Some([1.0; 4]);
+    file.thermal.die_heating_c = Some([0.0; 4]);
+    file
+}
+
+/// The same, whose biases follow the temperature, degrees per hour per kelvin and mg per kelvin.
+fn thermal(seed: u64) -> RigFile {
+    let mut file = unit(seed);
+    let line = |slope: f64| [0.0, slope, 0.0, 0.0];
+    file.curves.gyro.bias_deg_per_h = Some([line(300.0), line(-360.0), line(240.0)]);
+    file.curves.accel.bias_mg = Some([line(2.0), line(-1.5), line(1.0)]);
+    file
+}
+
+fn floors(prepared: Prepared) -> [f64; 2] {
+    let fitted = fit(prepared, OPTIONS).expect("a fit");
+    Sensor::BOTH.map(|s| fitted.sensor(s).expect("recorded").noise_floor())
+}
+
+#[test]
+fn a_drift_with_a_temperature_that_ramps_is_not_taken_for_noise() {
+    // 3 K/min up and down.
+    let ramp = plan(5, 20.0, &[[0.0, 0.0], [700.0, 35.0], [1400.0, 0.0]]);
+    for seed in [1, 2, 3] {
+        let still = floors(bench::recorded(&ramp, &unit(seed), seed));
+        let drifting = floors(bench::recorded(&ramp, &thermal(seed), seed));
+        // 2 mg/K over a kelvin of a dwell is 20 mm/s², the noise of its mean below 1.
+        for (a, b) in still.iter().zip(&drifting) {
+            assert!((b / a - 1.0).abs() < 0.02, "{still:?} {drifting:?}");
+        }
+    }
+}
+
+#[test]
+fn at_a_constant_temperature_the_noise_floor_is_that_of_two_successive_means() {
+    // The thermometer alone makes the difference between the two variances: one that is not there, and one that shows a constant
+    // temperature, with its own noise.
+    let constant = plan(3, 20.0, &[[0.0, 25.0]]);
+    for seed in [1, 2, 3] {
+        let with = bench::recorded(&constant, &unit(seed), seed);
+        let mut without = with.clone();
+        for block in &mut without.condensed.blocks {
+            block.temp_c.mean = f64::NAN;
+        }
+        let floor = |p: &Prepared| {
+            let noise = mimu::noise::Noise::within(&p.dwells.list, &p.condensed, &p.dwells.rails);
+            [0, 3].map(|c| noise.channels[c].variance(20.0).sqrt())
+        };
+        assert_eq!(floor(&with), floor(&without));
+    }
+}
+
+#[test]
+fn a_diagnosis_that_accepted_thermal_effects_does_not_say_that_the_model_has_no_temperature() {
+    let ramp = plan(5, 10.0, &[[0.0, 0.0], [350.0, 35.0], [700.0, 0.0]]);
+    let of = |file: &RigFile| {
+        let diagnosis = diagnose(Recordings::from(bench::recorded(&ramp, file, 4)), OPTIONS);
+        let diagnosis = diagnosis.expect("a diagnosis");
+        let next = mimu::next_experiment::next(&diagnosis);
+        DiagnosisResult::of(&diagnosis, &next, None)
+    };
+    let said = |result: &DiagnosisResult| {
+        let said = result.warnings.iter();
+        let said = said.filter(|w| w.contains("has no temperature in it"));
+        said.cloned().collect::<Vec<_>>()
+    };
+    let both = of(&thermal(4));
+    assert!(both.effects.len() >= 2);
+    assert_eq!(said(&both), Vec::<String>::new());
+    let mut gyro = thermal(4);
+    gyro.curves.accel.bias_mg = None;
+    let one = of(&gyro);
+    assert_eq!(said(&one).len(), 1, "{:?}", one.warnings);
+    assert!(said(&one)[0].ends_with("and the accelerometer's model has no temperature in it"));
+    let none = of(&unit(4));
+    assert!(said(&none)[0].ends_with("and the model has no temperature in it"));
+}
+
+/// Cubics of bias and scale factor, and dies behind the thermometer by 150 s, from -20 to 70 °C and back.
+#[test]
+fn what_is_found_from_the_data_does_not_keep_out_a_lag_and_what_is_significant_is_rejected_with_a_reason()
+ {
+    let ramp = plan(
+        20,
+        10.0,
+        &[
+            [0.0, -20.0],
+            [300.0, -20.0],
+            [3000.0, 70.0],
+            [3300.0, 70.0],
+            [6000.0, -20.0],
+        ],
+    );
+    let mut file = unit(5);
+    file.thermal.die_lag_s = Some([150.0; 4]);
+    file.unit.temperature = Some(mimu_rig::unit::TemperatureSensor::Board);
+    let gyro = &mut file.curves.gyro;
+    gyro.bias_deg_per_h = Some([
+        [0.0, 120.0, 1.5, 0.02],
+        [0.0, -80.0, 1.0, -0.03],
+        [0.0, 60.0, -2.0, 0.015],
+    ]);
+    gyro.scale_ppm = Some([
+        [0.0, 120.0, -2.0, 0.02],
+        [0.0, -90.0, 1.0, 0.0],
+        [0.0, 60.0, 2.0, -0.02],
+    ]);
+    let only = Options {
+        only: Some(Sensor::Gyro),
+        ..OPTIONS
+    };
+    let diagnosis = diagnose(Recordings::from(bench::recorded(&ramp, &file, 5)), only);
+    let diagnosis = diagnosis.expect("a diagnosis");
+    let decision = &diagnosis.sensors[0].decision;
+    let accepted = decision.accepted.iter().map(|a| a.chosen.candidate.id());
+    let accepted: Vec<String> = accepted.collect();
+    assert!(
+        accepted.contains(&"gyro_thermal_lag".to_string()),
+        "{accepted:?} {:?}",
+        decision.rejected
+    );
+    let bare = |(id, why): &&(String, String)| {
+        !id.starts_with("term:") && why.starts_with("p < 1e-6") && !why.contains("but ")
+    };
+    let without: Vec<_> = decision.rejected.iter().filter(bare).collect();
+    assert!(without.is_empty(), "{without:?}");
+}
