@@ -12,9 +12,11 @@ mod device;
 mod diagnosis;
 mod fit;
 mod import;
+mod page;
 mod svg;
 mod text;
 mod thermal;
+mod thermal_page;
 mod thermal_plan;
 pub(crate) mod thermal_plot;
 mod trim;
@@ -28,10 +30,12 @@ pub use design::{comparison_text, design_text, next_text};
 pub use device::{
     counters_text, download_text, info_text, record_text, self_test_text, stream_text, upload_text,
 };
-pub use diagnosis::{Made, diagnosis_page, diagnosis_text, not_in_plan_text};
+pub use diagnosis::{diagnosis_page, diagnosis_text, not_in_plan_text};
 pub use fit::{dwell_table, fit_text};
 pub use import::import_text;
+pub use page::Made;
 pub use thermal::{thermal_comparison_text, thermal_text};
+pub use thermal_page::thermal_page;
 pub use thermal_plan::thermal_plan_text;
 pub use trim::trim_text;
 pub use verify::verify_text;

@@ -109,20 +109,65 @@ impl TriadCurves {
         }
     }
 
-    /// Bias of the session k over that of the first, raw.
+    /// Bias of the session k, in its first pose, over that of the first, raw.
     pub fn session_offset(&self, session: usize) -> Vector3<f64> {
         let mut offset = Vector3::zeros();
-        if session == 0 {
+        let mut rows = self.problem.rows.iter();
+        let first = rows.find(|r| r.session == session).map_or(0, |r| r.offset);
+        if first == 0 {
             return offset;
         }
         for (weight, fit) in &self.fits {
             for axis in 0..3 {
-                let column = self.problem.columns(axis) - self.problem.sessions + session;
+                let column = self.problem.columns(axis) - self.problem.offsets + first;
                 offset[axis] +=
                     weight * fit.axes[axis].coefficients[column] * self.problem.gain[axis];
             }
         }
         offset
+    }
+
+    /// Change of the biases between two temperatures of the die, raw, with its covariance.
+    pub fn bias_change(&self, from_c: f64, to_c: f64) -> (Vector3<f64>, Matrix3<f64>) {
+        let each: Vec<(f64, Vector3<f64>, Vector3<f64>)> = self
+            .fits
+            .iter()
+            .map(|(weight, fit)| {
+                let of_axes = [0, 1, 2].map(|axis| self.bias_change_of(fit, axis, [from_c, to_c]));
+                let [change, variance] = [0, 1].map(|k| Vector3::from(of_axes.map(|a| a[k])));
+                (*weight, change, variance)
+            })
+            .collect();
+        let mean: Vector3<f64> = each.iter().map(|(w, change, _)| change * *w).sum();
+        let covariance = each.iter().map(|(w, change, variance)| {
+            let off = change - mean;
+            (Matrix3::from_diagonal(variance) + off * off.transpose()) * *w
+        });
+        (mean, covariance.sum())
+    }
+
+    /// The same of one axis for one lag: change and variance.
+    fn bias_change_of(&self, fit: &TriadFit, axis: usize, temps: [f64; 2]) -> [f64; 2] {
+        let (problem, fitted) = (&self.problem, &fit.axes[axis]);
+        let basis = problem.basis(Kind::Bias);
+        let parts = problem.parts(axis);
+        let first = parts
+            .iter()
+            .find(|p| p.input.is_none())
+            .map_or(0, |p| p.from);
+        let mut terms = Vec::new();
+        for (temp_c, sign) in temps.into_iter().zip([-1.0, 1.0]) {
+            let (from, values) = basis.values(temp_c);
+            let used = values.iter().take(basis.len() - from).enumerate();
+            terms.extend(used.map(|(k, v)| (first + from + k, sign * v)));
+        }
+        let change: f64 = terms.iter().map(|(k, v)| v * fitted.coefficients[*k]).sum();
+        let pairs = terms.iter().flat_map(|a| terms.iter().map(move |b| (a, b)));
+        let variance: f64 = pairs
+            .map(|(a, b)| a.1 * b.1 * fitted.covariance[(a.0, b.0)])
+            .sum();
+        let gain = problem.gain[axis];
+        [gain * change, gain * gain * variance.max(0.0)]
     }
 
     /// Standard deviation that the smoothness of `kind` leaves a curve to depart from a line over the range; zero for a line.

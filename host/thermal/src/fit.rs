@@ -243,7 +243,7 @@ fn judge(sessions: &[Session], verify: &[Session], joint: &Joint, k: usize) -> O
     for (i, session) in sessions.iter().enumerate() {
         let offset = curves.session_offset(i);
         errors.extend(judge::dwell_errors(
-            session, sensor, &dies[i], curves, &offset,
+            i, session, sensor, &dies[i], curves, &offset,
         ));
     }
     let mut without = None;
@@ -252,11 +252,17 @@ fn judge(sessions: &[Session], verify: &[Session], joint: &Joint, k: usize) -> O
         _ => {
             let mut all = Vec::new();
             let mut centred = Vec::new();
-            for session in verify {
+            for (i, session) in verify.iter().enumerate() {
                 let lag = joint.profile.lag.value;
                 let die = session.thermometer.die(lag, Start::Settled);
-                let own =
-                    judge::dwell_errors(session, sensor, &die, curves, &nalgebra::Vector3::zeros());
+                let own = judge::dwell_errors(
+                    i,
+                    session,
+                    sensor,
+                    &die,
+                    curves,
+                    &nalgebra::Vector3::zeros(),
+                );
                 let mean = own.iter().map(|e| e.error).sum::<nalgebra::Vector3<f64>>()
                     / own.len().max(1) as f64;
                 centred.extend(own.iter().map(|e| DwellError {
@@ -277,6 +283,13 @@ fn judge(sessions: &[Session], verify: &[Session], joint: &Joint, k: usize) -> O
         held_out,
         without_session_bias: without,
     })
+}
+
+impl Judged {
+    /// Errors of the dwells that were held out where there are any, else of those that were fitted.
+    pub fn shown(&self) -> &[DwellError] {
+        self.held_out.as_ref().unwrap_or(&self.errors)
+    }
 }
 
 impl ThermalFit {

@@ -1,5 +1,7 @@
 //! How well curves compensate a recording: errors of the dwells, by temperature, heating and cooling apart, over the noise.
 
+use std::cmp::Ordering;
+
 use mimu::quantity::Sensor;
 use mimu_core::compensation::Affine;
 use nalgebra::Vector3;
@@ -24,6 +26,10 @@ const PIECES: usize = 10;
 /// Error of one dwell.
 #[derive(Debug, Clone, Copy)]
 pub struct DwellError {
+    /// Number of its recording among those that are judged, from 0.
+    pub recording: usize,
+    /// Its middle, s of its recording.
+    pub middle_s: f64,
     /// Compensated mean minus known input, SI.
     pub error: Vector3<f64>,
     /// Mean temperature of the die, °C.
@@ -34,9 +40,10 @@ pub struct DwellError {
     pub floor: f64,
 }
 
-/// Errors of the dwells of `sensor` in `session`, whose die is `die`; `offset` is the raw bias of the session over the curves'. Empty
+/// Errors of the dwells of `sensor` in `session`, the recording of this number, whose die is `die`; `offset` is the raw bias of the session over the curves'. Empty
 /// where the inverse is not known.
 pub fn dwell_errors(
+    recording: usize,
     session: &Session,
     sensor: Sensor,
     die: &Die,
@@ -47,10 +54,11 @@ pub fn dwell_errors(
         return Vec::new();
     }
     let model = |temp_c: f64| inverse(curves, temp_c).map(|[model, _]| model);
-    errors_by(session, sensor, die, model, offset, |_| true)
+    errors_by(recording, session, sensor, die, model, offset, |_| true)
 }
 
 fn errors_by(
+    recording: usize,
     session: &Session,
     sensor: Sensor,
     die: &Die,
@@ -75,6 +83,8 @@ fn errors_by(
             |of: fn(&Row) -> f64| dwell.iter().map(|(r, _)| r.samples * of(r)).sum::<f64>() / n;
         let middle_s = mean(|r| r.middle_s);
         out.push(DwellError {
+            recording,
+            middle_s,
             error: dwell
                 .iter()
                 .map(|(r, e)| e * r.samples)
@@ -249,8 +259,15 @@ pub fn held_out(
             let rows = &session.rows[sensor as usize];
             let unseen = |i: usize| fold(k, rows[i].middle_s) == part;
             let offset = part_curves.session_offset(k);
-            all.extend(errors_by(session, sensor, &dies[k], model, &offset, unseen));
+            all.extend(errors_by(
+                k, session, sensor, &dies[k], model, &offset, unseen,
+            ));
         }
     }
+    all.sort_by(|a, b| {
+        (a.recording, a.middle_s)
+            .partial_cmp(&(b.recording, b.middle_s))
+            .unwrap_or(Ordering::Equal)
+    });
     Some(all)
 }

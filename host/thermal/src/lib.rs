@@ -11,6 +11,7 @@
 //! | [`suitability`] | recordings that are refused |
 //! | [`joint`] | all of these: the estimate |
 //! | [`curves`], [`nodes`] | its result at any temperature, and in a calibration file |
+//! | [`base`] | curves of the biases upon a calibration at one temperature |
 //! | [`path`] | whether a recording comes back to temperatures that it has been at |
 //! | [`judge`] | errors of dwells, by temperature, heating and cooling apart |
 //! | [`classic`], [`points`] | estimators of the literature, for comparison |
@@ -19,6 +20,7 @@
 //! | [`plan`] | procedures in chamber and table, and how well the curves are known afterwards |
 //! | [`result`] | what was found, which JSON is |
 
+pub mod base;
 pub mod basis;
 pub mod classic;
 pub mod compare;

@@ -18,8 +18,18 @@ const SHARE_OF_SIGMA: f64 = 0.05;
 /// Temperatures between two nodes at which that is looked at.
 const BETWEEN: usize = 4;
 
-/// `[temperature]` of a calibration file by `joint`: as few nodes, evenly over the range of the dies, as keep the Hermite error of C and
-/// o below a twentieth of their standard deviations, or sixteen.
+/// An inverse model at one temperature of the dies.
+#[derive(Debug, Clone, Copy)]
+pub struct Inverse {
+    /// `x = C u + o`, raw to SI.
+    pub model: Affine<f64>,
+    /// Its derivative by temperature, per kelvin.
+    pub slope: Affine<f64>,
+    /// Standard deviations of C by rows, then of o.
+    pub sigma: [f64; 12],
+}
+
+/// `[temperature]` of a calibration file by `joint`.
 ///
 /// # Errors
 /// Curves of biases alone, which are no calibration; a matrix that is singular somewhere.
@@ -33,54 +43,70 @@ pub fn over_temperature(joint: &Joint) -> Result<OverTemperature> {
         return Err(Error::undetermined(
             "calibration",
             "only biases were estimated, and a calibration needs scale factors and misalignments too",
-            "fit a recording with a table (reference = \"table\"), or leave -o out",
+            "give the unit's calibration at one temperature with --base, fit a recording with a table, or leave -o out",
         ));
     }
-    let mut best = None;
-    for count in FEWEST..=MOST {
-        let nodes = nodes(&curves, range_c, count)?;
-        let error = hermite_error(&curves, &nodes)?;
-        best = Some(nodes);
-        if error < SHARE_OF_SIGMA {
-            break;
-        }
-    }
+    let of = |sensor: usize, temp_c: f64| with_sigma(curves[sensor]?, temp_c);
+    let has = curves.map(|c| c.is_some());
+    Ok(with_lag(joint, range_c, fewest(of, has, range_c)?))
+}
+
+/// `nodes` with the range and the lag of `joint`.
+pub fn with_lag(joint: &Joint, range_c: [f64; 2], nodes: Vec<TemperatureNode>) -> OverTemperature {
     let lag = joint.lag().filter(|_| joint.profile.points.len() > 1);
-    Ok(OverTemperature {
+    OverTemperature {
         range_c,
         lag_s: lag.map(|l| l.value),
         interval_lag_s: lag.map(|l| [l.lower, l.upper]),
-        nodes: best.unwrap_or_default(),
-    })
+        nodes,
+    }
+}
+
+/// As few nodes, evenly over the range, as keep the Hermite error of C and o below a twentieth of their standard deviations, or sixteen.
+/// `of`: the model of the gyro (0) or the accelerometer (1) at a temperature of the dies, for those that it `has`.
+///
+/// # Errors
+/// A matrix that is singular somewhere.
+pub fn fewest(
+    of: impl Fn(usize, f64) -> Option<Inverse>,
+    has: [bool; 2],
+    range_c: [f64; 2],
+) -> Result<Vec<TemperatureNode>> {
+    let at = |k: usize, temp_c: f64| {
+        of(k, temp_c).ok_or_else(|| {
+            Error::undetermined(
+                Sensor::BOTH[k],
+                format!("its scale factors vanish at {temp_c:.1} °C"),
+                "excite every axis at all temperatures",
+            )
+        })
+    };
+    let mut best = Vec::new();
+    for count in FEWEST..=MOST {
+        best = nodes(&at, has, range_c, count)?;
+        if hermite_error(&at, &best)? < SHARE_OF_SIGMA {
+            break;
+        }
+    }
+    Ok(best)
 }
 
 fn nodes(
-    curves: &[Option<&TriadCurves>; 2],
+    at: &impl Fn(usize, f64) -> Result<Inverse>,
+    has: [bool; 2],
     [from, to]: [f64; 2],
     count: usize,
 ) -> Result<Vec<TemperatureNode>> {
-    let at = |k: usize| from + (to - from) * k as f64 / (count - 1) as f64;
-    let node = |temp_c: f64| {
-        let table = |k: usize| {
-            curves[k]
-                .map(|c| table(c, temp_c).ok_or_else(|| singular(k, temp_c)))
-                .transpose()
-        };
+    let node = |k: usize| {
+        let temp_c = from + (to - from) * k as f64 / (count - 1) as f64;
+        let table = |k: usize| has[k].then(|| at(k, temp_c).map(table)).transpose();
         Ok(TemperatureNode {
             temp_c,
             gyro: table(0)?,
             accel: table(1)?,
         })
     };
-    (0..count).map(|k| node(at(k))).collect()
-}
-
-fn singular(sensor: usize, temp_c: f64) -> Error {
-    Error::undetermined(
-        Sensor::BOTH[sensor],
-        format!("its scale factors vanish at {temp_c:.1} °C"),
-        "excite every axis at all temperatures",
-    )
+    (0..count).map(node).collect()
 }
 
 /// C, o and their derivatives at `temp_c`: of `u = P x + b` they are `C = P⁻¹`, `C' = -C P' C`, `o = -C b`, `o' = -C' b - C b'`.
@@ -95,22 +121,33 @@ pub fn inverse(curves: &TriadCurves, temp_c: f64) -> Option<[Affine<f64>; 2]> {
     Some([matrix, derivative])
 }
 
-fn table(curves: &TriadCurves, temp_c: f64) -> Option<NodeTable> {
+fn with_sigma(curves: &TriadCurves, temp_c: f64) -> Option<Inverse> {
     let [model, slope] = inverse(curves, temp_c)?;
     let estimates = curves.triad(temp_c)?.inverse_estimates();
-    let rows = |a: &Affine<f64>| [0, 1, 2].map(|i| [0, 1, 2].map(|j| a.matrix[(i, j)]));
-    Some(NodeTable {
-        C: rows(&model),
-        o: model.offset.into(),
-        slope_C: rows(&slope),
-        slope_o: slope.offset.into(),
-        sigma_C: Some([0, 1, 2].map(|i| [0, 1, 2].map(|j| estimates[3 * i + j].sigma))),
-        sigma_o: Some([0, 1, 2].map(|i| estimates[9 + i].sigma)),
+    Some(Inverse {
+        model,
+        slope,
+        sigma: estimates.map(|e| e.sigma),
     })
 }
 
+fn table(at: Inverse) -> NodeTable {
+    let rows = |a: &Affine<f64>| [0, 1, 2].map(|i| [0, 1, 2].map(|j| a.matrix[(i, j)]));
+    NodeTable {
+        C: rows(&at.model),
+        o: at.model.offset.into(),
+        slope_C: rows(&at.slope),
+        slope_o: at.slope.offset.into(),
+        sigma_C: Some([0, 1, 2].map(|i| [0, 1, 2].map(|j| at.sigma[3 * i + j]))),
+        sigma_o: Some([0, 1, 2].map(|i| at.sigma[9 + i])),
+    }
+}
+
 /// Largest error of the Hermite pieces between `nodes`, over the standard deviation of each number.
-fn hermite_error(curves: &[Option<&TriadCurves>; 2], nodes: &[TemperatureNode]) -> Result<f64> {
+fn hermite_error(
+    at: &impl Fn(usize, f64) -> Result<Inverse>,
+    nodes: &[TemperatureNode],
+) -> Result<f64> {
     let mut worst = 0f64;
     for pair in nodes.windows(2) {
         let h = pair[1].temp_c - pair[0].temp_c;
@@ -118,22 +155,17 @@ fn hermite_error(curves: &[Option<&TriadCurves>; 2], nodes: &[TemperatureNode]) 
             let w = step as f64 / (BETWEEN + 1) as f64;
             let temp_c = pair[0].temp_c + w * h;
             for sensor in Sensor::BOTH {
-                let Some(curve) = curves[sensor as usize] else {
-                    continue;
-                };
                 let ends = [pair[0].table(sensor), pair[1].table(sensor)];
                 let [Some(a), Some(b)] = ends else { continue };
-                let off = || singular(sensor as usize, temp_c);
-                let [exact, _] = inverse(curve, temp_c).ok_or_else(off)?;
-                let triad = curve.triad(temp_c).ok_or_else(off)?;
-                let sigma = triad.inverse_estimates().map(|e| e.sigma);
+                let at = at(sensor as usize, temp_c)?;
                 let piece = hermite(a, b, h, w);
                 for k in 0..12 {
                     let exact = match k {
-                        0..9 => exact.matrix[(k / 3, k % 3)],
-                        _ => exact.offset[k - 9],
+                        0..9 => at.model.matrix[(k / 3, k % 3)],
+                        _ => at.model.offset[k - 9],
                     };
-                    worst = worst.max((piece[k] - exact).abs() / sigma[k].max(f64::MIN_POSITIVE));
+                    worst =
+                        worst.max((piece[k] - exact).abs() / at.sigma[k].max(f64::MIN_POSITIVE));
                 }
             }
         }

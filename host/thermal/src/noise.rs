@@ -19,7 +19,7 @@ pub fn white(problem: &Problem) -> [f64; 3] {
     let (mut sum, mut n) = (Vector3::zeros(), 0.0);
     for pair in problem.rows.windows(2) {
         let [a, b] = [&pair[0], &pair[1]];
-        if a.session == b.session && a.step == b.step && (a.input - b.input).norm() < 1e-9 {
+        if a.offset == b.offset && a.step == b.step && (a.input - b.input).norm() < 1e-9 {
             let difference = b.reading - a.reading;
             sum += difference.component_mul(&difference) / (1.0 / a.weight + 1.0 / b.weight);
             n += 1.0;
@@ -53,7 +53,7 @@ pub fn estimate(
             .iter()
             .map(|p| problem.basis(p.kind).free())
             .sum();
-        let n = normal.rows - (free + problem.sessions - 1) as f64;
+        let n = normal.rows - (free + problem.offsets - 1) as f64;
         let white = solved.left / n;
         (white > 0.0).then(|| (n * white.ln() + solved.determinants, white))
     };

@@ -37,7 +37,7 @@ pub fn curves(sensor: Sensor, points: &[Point], shape: Shape) -> Option<TriadCur
         gain: Vector3::from_fn(|i, _| mean(3 * i + i).abs()),
         null: Vector3::from_fn(|i, _| mean(9 + i)),
         bases: Kind::ALL.map(|_| basis.clone()),
-        sessions: 1,
+        offsets: 1,
         biases_only: false,
         samples: 1.0,
     };

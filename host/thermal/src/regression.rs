@@ -35,6 +35,8 @@ const SMALLEST_EIGENVALUE: f64 = 1e-5;
 pub struct ProblemRow {
     /// Its session.
     pub session: usize,
+    /// Number of its bias offset: 0 of the first power-on in its first pose.
+    pub offset: usize,
     /// Middle, s of its session.
     pub middle_s: f64,
     /// Number of samples over the largest.
@@ -60,8 +62,8 @@ pub struct Problem {
     pub null: Vector3<f64>,
     /// Functions of temperature of each [`Kind`].
     pub bases: [Basis; 3],
-    /// Number of sessions.
-    pub sessions: usize,
+    /// Number of bias offsets with the first, which is zero: one for each power-on, and in recordings without a table one for each pose.
+    pub offsets: usize,
     /// Whether only biases are estimated: nothing is known of the input, or it does not excite the rest.
     pub biases_only: bool,
     /// Samples of the row of weight 1.
@@ -92,10 +94,11 @@ impl Problem {
         range: [f64; 2],
         biases_only: bool,
     ) -> Result<Self> {
-        let mut rows = Vec::new();
+        let (mut rows, mut offsets) = (Vec::new(), 0);
         for (k, session) in sessions.iter().enumerate() {
             rows.extend(session.rows[sensor as usize].iter().map(|r| ProblemRow {
                 session: k,
+                offset: offsets + session.poses_before(r.middle_s),
                 middle_s: r.middle_s,
                 weight: r.samples,
                 input: if biases_only {
@@ -106,6 +109,7 @@ impl Problem {
                 reading: r.raw,
                 step: r.step,
             }));
+            offsets += 1 + session.moved_s.len();
         }
         let samples = rows.iter().map(|r| r.weight).fold(1.0, f64::max);
         rows.iter_mut().for_each(|r| r.weight /= samples);
@@ -115,7 +119,7 @@ impl Problem {
             gain: Vector3::repeat(1.0),
             null: Vector3::zeros(),
             bases: Kind::ALL.map(|_| Basis::new(shape, range)),
-            sessions: sessions.len(),
+            offsets,
             biases_only,
             samples,
         };
@@ -181,14 +185,14 @@ impl Problem {
         curves.collect()
     }
 
-    /// Number of columns of `axis`: its curves, then an offset for each session but the first.
+    /// Number of columns of `axis`: its curves, then the bias offsets but the first.
     pub fn columns(&self, axis: usize) -> usize {
         let curves: usize = self
             .parts(axis)
             .iter()
             .map(|p| self.basis(p.kind).len())
             .sum();
-        curves + self.sessions - 1
+        curves + self.offsets - 1
     }
 
     /// Writes the entries of `row` of `axis` at the die's temperature `temp_c`, then the reading at [`Self::columns`].
@@ -210,8 +214,8 @@ impl Problem {
             }
         }
         let columns = self.columns(axis);
-        if row.session > 0 {
-            out.push((columns - self.sessions + row.session, 1.0));
+        if row.offset > 0 {
+            out.push((columns - self.offsets + row.offset, 1.0));
         }
         out.push((columns, row.reading[axis]));
     }

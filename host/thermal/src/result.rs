@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use crate::curves::TriadCurves;
 use crate::fit::{ThermalFit, Verdict, range};
-use crate::judge::{Bin, Hysteresis, rms};
+use crate::judge::{Bin, DwellError, Hysteresis, rms};
 use crate::profile::{Lag, RANGE};
 
 /// Temperatures that a curve is given at.
@@ -71,8 +71,41 @@ pub struct SensorResult {
     pub inseparable: Option<&'static str>,
     /// Errors by temperature, of the held-out data where there are any.
     pub bins: Vec<Bin>,
+    /// The dwells behind these errors, in the order of time.
+    pub dwells: Vec<DwellResult>,
     /// What heating and cooling differ by after the lag; null where they share no temperature.
     pub hysteresis: Option<Vec<Hysteresis>>,
+}
+
+/// Error of one dwell.
+#[derive(Debug, Clone, Serialize)]
+pub struct DwellResult {
+    /// Number of its recording, from 0: of those that verify where there are any, else of those that were fitted.
+    pub recording: usize,
+    /// Its middle, s of its recording.
+    pub middle_s: f64,
+    /// Mean temperature of the die, °C.
+    pub die_c: f64,
+    /// `heating`, `cooling`, or `standing` where the temperature hardly changes.
+    pub temperature: &'static str,
+    /// Compensated mean minus known input, x, y, z, SI.
+    pub error: [f64; 3],
+}
+
+impl DwellResult {
+    fn of(dwell: &DwellError) -> Self {
+        Self {
+            recording: dwell.recording,
+            middle_s: dwell.middle_s,
+            die_c: dwell.die_c,
+            temperature: match dwell.way {
+                1 => "heating",
+                -1 => "cooling",
+                _ => "standing",
+            },
+            error: dwell.error.into(),
+        }
+    }
 }
 
 /// A lag with its 95 % interval, s.
@@ -176,6 +209,7 @@ impl SensorResult {
                 "in one pose the bias along gravity and the scale factor times gravity are one number: the curves are of their sum",
             ),
             bins: judged.map(|j| j.bins.clone()).unwrap_or_default(),
+            dwells: judged.map_or(Vec::new(), |j| j.shown().iter().map(DwellResult::of).collect()),
             hysteresis: judged.and_then(|j| j.hysteresis.clone()),
         })
     }

@@ -3,7 +3,7 @@
 use mimu::blocks::{Block, Condensed};
 use mimu::dwell::Dwell;
 use mimu::prepared::Prepared;
-use mimu::quantity::Sensor;
+use mimu::quantity::{Sensor, plural};
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{RawUnit, Reference};
 use nalgebra::Vector3;
@@ -14,6 +14,12 @@ use crate::thermometer::Thermometer;
 const ROW_S: f64 = 2.5;
 /// Shortest row, s: the rest of a dwell.
 const SHORTEST_S: f64 = 0.5;
+/// A change between two dwells is a move if it is larger than so many times that between neighbouring rows, with so many times the largest
+/// drift: being taken for one costs six numbers, and a move that is missed bends the curves.
+const MOVED_SIGMAS: f64 = 6.0;
+const MOVED_DRIFTS: f64 = 2.0;
+/// Rows that a drift is taken over: half a minute.
+const DRIFT_ROWS: usize = 12;
 /// Longest dwell with a moving input, s, that is taken as one mean.
 const LONGEST_MOVE_S: f64 = 60.0;
 
@@ -55,6 +61,8 @@ pub struct Session {
     pub thermometer: Thermometer,
     /// Rows of gyro and accelerometer.
     pub rows: [Vec<Row>; 2],
+    /// Where the input is not known: times, s, at which the unit was put into another pose.
+    pub moved_s: Vec<f64>,
     /// What a person should know.
     pub warnings: Vec<String>,
 }
@@ -75,6 +83,12 @@ impl Session {
         let thermometer = Thermometer::of(condensed, manifest.power_on_s, &prepared.place)?;
         let mut warnings = condensed.warnings.clone();
         warnings.extend(prepared.dwells.warnings.iter().cloned());
+        let rows = Sensor::BOTH.map(|sensor| rows(prepared, sensor));
+        let moved_s = match manifest.reference {
+            Reference::Gravity => moves(&rows[Sensor::Accel as usize]),
+            _ => Vec::new(),
+        };
+        warnings.extend(moves_warning(&moved_s));
         Ok(Self {
             place: prepared.place.clone(),
             device: manifest.device.clone(),
@@ -85,10 +99,54 @@ impl Session {
             sha256: condensed.sha256.clone(),
             rate_hz: 1.0 / condensed.period_s,
             thermometer,
-            rows: Sensor::BOTH.map(|sensor| rows(prepared, sensor)),
+            rows,
+            moved_s,
             warnings,
         })
     }
+
+    /// How often the unit was put into another pose before `t_s`.
+    pub fn poses_before(&self, t_s: f64) -> usize {
+        self.moved_s.partition_point(|moved| *moved < t_s)
+    }
+}
+
+/// Times between two dwells at which what the accelerometer shows changes by more than its noise and the drift of the temperature do: the
+/// pose is another one there, and with it what gravity adds to the biases.
+fn moves(rows: &[Row]) -> Vec<f64> {
+    let within = rows.windows(2).filter(|p| p[0].step == p[1].step);
+    let changes: Vec<Vector3<f64>> = within.map(|p| p[1].raw - p[0].raw).collect();
+    let rms = |axis: usize| {
+        let squares = changes.iter().map(|c| c[axis] * c[axis]).sum::<f64>();
+        (squares / changes.len().max(1) as f64).sqrt()
+    };
+    let noise = Vector3::from_fn(|axis, _| rms(axis));
+    let drift = Vector3::from_fn(|axis, _| {
+        let apart = rows.windows(1 + DRIFT_ROWS).filter_map(|w| {
+            let (first, last) = (w.first()?, w.last()?);
+            let over_s = last.middle_s - first.middle_s;
+            (first.step == last.step).then(|| (last.raw - first.raw)[axis].abs() / over_s)
+        });
+        apart.fold(0.0, f64::max)
+    });
+    let between = rows.windows(2).filter(|p| p[0].step != p[1].step);
+    let moved = between.filter(|p| {
+        let gap_s = p[1].middle_s - p[0].middle_s;
+        let most = noise * MOVED_SIGMAS + drift * (MOVED_DRIFTS * gap_s);
+        let change = (p[1].raw - p[0].raw).abs();
+        (0..3).any(|axis| change[axis] > most[axis])
+    });
+    moved
+        .map(|p| 0.5 * (p[0].middle_s + p[1].middle_s))
+        .collect()
+}
+
+fn moves_warning(moved_s: &[f64]) -> Option<String> {
+    let first = moved_s.first()?;
+    let times = plural(moved_s.len() as u64, "time");
+    Some(format!(
+        "the unit was moved {times}, first at {first:.0} s: each pose has six bias offsets of its own, as gravity adds to them"
+    ))
 }
 
 /// Rows of all dwells that `sensor` can use.

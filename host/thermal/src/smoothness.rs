@@ -234,7 +234,7 @@ fn of_lines(problem: &Problem, axis: usize, normal: &Normal) -> Option<f64> {
         .iter()
         .map(|p| problem.basis(p.kind).lines().ncols())
         .sum();
-    let offsets = problem.sessions - 1;
+    let offsets = problem.offsets - 1;
     let n = problem.columns(axis);
     let mut lines = DMatrix::zeros(n, free + offsets);
     let mut column = 0;

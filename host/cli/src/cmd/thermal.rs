@@ -9,6 +9,7 @@ use mimu::calibration::Calibration;
 use mimu::stillness::Finding;
 use mimu_recording::error::Result;
 use mimu_recording::result_file::stage;
+use mimu_thermal::base;
 use mimu_thermal::classic::Classic;
 use mimu_thermal::compare::compare;
 use mimu_thermal::fit::{Estimator, Options, fit};
@@ -16,9 +17,10 @@ use mimu_thermal::result::ThermalResult;
 use mimu_thermal::session::Session;
 
 use crate::arguments::{JsonArgs, StillArgs};
+use crate::cmd::diagnose::command_line;
 use crate::output::{check_outputs, print};
 use crate::reading::read;
-use crate::report::{self, thermal_plot};
+use crate::report::{self, Made, thermal_plot};
 
 #[derive(Args)]
 pub(crate) struct ThermalArgs {
@@ -53,6 +55,9 @@ struct FitArgs {
     /// Temperatures of the dies that the curves have to cover, or nothing is written
     #[arg(long, value_name = "FROM..TO", allow_hyphen_values = true, value_parser = range)]
     range: Option<[f64; 2]>,
+    /// Calibration of the unit at one temperature, which the biases of recordings at rest are added to: with it they give a calibration
+    #[arg(long, value_name = "FILE")]
+    base: Option<PathBuf>,
     #[command(flatten)]
     still: StillArgs,
     /// Calibration file to write
@@ -61,6 +66,9 @@ struct FitArgs {
     /// Draw all curves with their bands, and the errors while it heats and cools, as SVG
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
+    /// The same with all figures as one HTML page
+    #[arg(long, value_name = "FILE")]
+    page: Option<PathBuf>,
     #[command(flatten)]
     json: JsonArgs,
 }
@@ -132,10 +140,13 @@ fn run_fit(args: &FitArgs) -> Result<()> {
     let outputs = [
         args.output.as_deref(),
         args.plot.as_deref(),
+        args.page.as_deref(),
         args.json.file(),
     ];
+    let beside = [args.base.as_deref()];
+    let base = args.base.as_deref().map(Calibration::read).transpose()?;
     let session = |directory: &PathBuf, finding: Finding| {
-        Session::of(&read(directory, finding, &outputs, &[])?)
+        Session::of(&read(directory, finding, &outputs, &beside)?)
     };
     let all = |list: &[PathBuf]| -> Result<Vec<Session>> {
         let each = list.iter();
@@ -151,17 +162,31 @@ fn run_fit(args: &FitArgs) -> Result<()> {
     let result = ThermalResult::of(&fitted);
     let mut text = report::thermal_text(&result);
     let mut staged = Vec::new();
+    let now = jiff::Timestamp::now()
+        .round(jiff::Unit::Second)
+        .unwrap_or_default()
+        .to_string();
     if let Some(path) = &args.output {
-        let now = jiff::Timestamp::now()
-            .round(jiff::Unit::Second)
-            .unwrap_or_default();
-        let made = fitted.calibration(&now.to_string())?;
+        let made = match &base {
+            None => fitted.calibration(&now)?,
+            Some(base) => base::calibration(&fitted, base, &now)?,
+        };
         staged.push(stage(path, made.to_toml())?);
         text.push_str(&format!("\ncalibration: {}\n", path.display()));
     }
     if let Some(path) = &args.plot {
         staged.push(stage(path, thermal_plot::svg(&result))?);
         text.push_str(&format!("\nplot: {}\n", path.display()));
+    }
+    if let Some(path) = &args.page {
+        let named = args.recordings.iter().map(|r| r.display().to_string());
+        let made = Made {
+            recording: named.collect::<Vec<_>>().join(", "),
+            command: command_line(),
+            created: now,
+        };
+        staged.push(stage(path, report::thermal_page(&result, &made))?);
+        text.push_str(&format!("\npage: {}\n", path.display()));
     }
     print(&args.json, &text, &result, staged)
 }

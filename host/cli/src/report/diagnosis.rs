@@ -3,7 +3,7 @@
 mod page;
 mod text;
 
-pub use page::{Made, diagnosis_page};
+pub use page::diagnosis_page;
 pub use text::{diagnosis_text, not_in_plan_text};
 
 use mimu::diagnose::Verdict;

@@ -11,7 +11,11 @@ use mimu_thermal::result::{CurveResult, SensorResult, ThermalResult};
 use crate::report::text::{warn, wrap};
 
 /// Temperatures at which curves are shown.
-const SHOWN: usize = 5;
+pub(super) const SHOWN: usize = 5;
+
+/// What the verdict `one-way` means.
+pub(super) const VERDICT_ONE_WAY: &str = "the temperature goes one way only: lag and slope cannot be told apart, and the intervals are those of \
+     any lag. A whole cycle, heating and cooling, tells them apart.";
 
 /// Result of `mimu thermal fit`.
 pub fn thermal_text(result: &ThermalResult) -> String {
@@ -31,9 +35,7 @@ pub fn thermal_text(result: &ThermalResult) -> String {
         result.verdict
     );
     if result.verdict == "one-way" {
-        let why = "the temperature goes one way only: lag and slope cannot be told apart, and the intervals are those of any lag. A \
-                   whole cycle, heating and cooling, tells them apart.";
-        wrap(&mut out, "", why);
+        wrap(&mut out, "", VERDICT_ONE_WAY);
     }
     for (name, sensor) in result.sensors.named() {
         let _ = writeln!(out);
@@ -115,14 +117,18 @@ fn bins_text(out: &mut String, bins: &[Bin], si: &str) {
     }
 }
 
+/// Whether a curve is one of `sensor`'s that people know: not of C and o.
+pub(super) fn physical(curve: &CurveResult, sensor: &str) -> bool {
+    let rest = curve
+        .name
+        .trim_start_matches(sensor)
+        .trim_start_matches('_');
+    curve.sensor.name() == sensor && !rest.starts_with("C_") && !rest.starts_with("o_")
+}
+
 /// Physical parameters at some temperatures; JSON has the inverse model too, and more temperatures.
 fn curves_text(out: &mut String, name: &str, result: &ThermalResult) {
-    let own = |c: &&CurveResult| c.sensor.name() == name;
-    let physical = |c: &&CurveResult| {
-        let rest = c.name.trim_start_matches(name).trim_start_matches('_');
-        !rest.starts_with("C_") && !rest.starts_with("o_")
-    };
-    let curves: Vec<&CurveResult> = result.curves.iter().filter(own).filter(physical).collect();
+    let curves: Vec<&CurveResult> = result.curves.iter().filter(|c| physical(c, name)).collect();
     let Some(first) = curves.first() else {
         return;
     };

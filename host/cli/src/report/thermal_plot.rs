@@ -1,22 +1,30 @@
-//! Curves over temperature as SVG: what each parameter changes by from the middle of the range, with its band, and the errors while the
-//! temperature rises and falls.
+//! Curves over temperature as SVG: what each parameter changes by from the middle of the range, with its band, and below them the errors
+//! of the dwells: while the temperature rises and falls, over temperature, and over time.
+
+use std::ops::Range;
 
 use maud::{Markup, html};
 
 use super::svg::{Frame, px, range};
-use mimu::quantity::Sensor;
+use mimu::quantity::{AXES, Sensor};
 use mimu::readable;
-use mimu_thermal::result::{CurveResult, SensorResult, ThermalResult};
+use mimu_thermal::result::{CurveResult, DwellResult, SensorResult, ThermalResult};
 
 /// Width and height of one panel, pixels.
 const PANEL: (f64, f64) = (400.0, 330.0);
 
 /// Colours that stay apart for the colour-blind (Okabe and Ito), as those of Allan curves.
-const STYLE: &str = "text{font:13px sans-serif;fill:#000}.tick{font-size:12px}.name{font-size:13px}.heading{font-size:15px}\
-path{fill:none;stroke-width:2}.grid{stroke:#e1e1e1;stroke-width:1}.zero{stroke:#888;stroke-width:1}.axis{stroke:#000;stroke-width:1}\
-.a{stroke:#e69f00}.b{stroke:#0072b2}.c{stroke:#009e73}.noise{stroke:#888;stroke-dasharray:2 3}\
-.band{stroke:none;opacity:.2}.a.band{fill:#e69f00}.b.band{fill:#0072b2}.c.band{fill:#009e73}\
-.heating{stroke:#d55e00}.cooling{stroke:#56b4e9}";
+const STYLE: &str = ".curves text{font:13px sans-serif;fill:#000;font-weight:400}.curves .tick{font-size:12px}\
+.curves .name{font-size:13px}.curves .heading{font-size:15px}.curves path{fill:none;stroke-width:2}\
+.curves .grid{stroke:#e1e1e1;stroke-width:1}.curves .zero{stroke:#888;stroke-width:1}\
+.curves .a{stroke:#e69f00}.curves .b{stroke:#0072b2}.curves .c{stroke:#009e73}\
+.curves .noise{stroke:#888;stroke-dasharray:2 3}.curves .band{stroke:none;opacity:.2}\
+.curves .a.band{fill:#e69f00}.curves .b.band{fill:#0072b2}.curves .c.band{fill:#009e73}\
+.curves .heating{stroke:#d55e00}.curves .cooling{stroke:#56b4e9}\
+.curves .dot{stroke-width:4;stroke-linecap:round;opacity:.6}.curves .begin{stroke:#888;stroke-width:1;stroke-dasharray:4 3}";
+
+/// Most marks of an axis: of more dwells neighbours are averaged.
+const MARKS: usize = 200;
 
 /// Colours of the three numbers of a kind.
 const CLASSES: [&str; 3] = ["a", "b", "c"];
@@ -29,7 +37,7 @@ const KINDS: [(&str, &str, bool); 4] = [
     ("non_orthogonality", "non-orthogonality", false),
 ];
 
-/// All of them, a row for each sensor.
+/// All of them, two rows for each sensor: curves, and errors where the inputs are known.
 pub fn svg(result: &ThermalResult) -> String {
     let of = |sensor: Sensor| match sensor {
         Sensor::Gyro => result.sensors.gyro.as_ref(),
@@ -39,17 +47,32 @@ pub fn svg(result: &ThermalResult) -> String {
         .into_iter()
         .filter_map(|sensor| Some((sensor, of(sensor)?)))
         .collect();
-    let (width, height) = (PANEL.0 * 5.0, PANEL.1 * rows.len() as f64);
+    // The curves, and below them the errors.
+    let tall = |found: &SensorResult| if found.dwells.is_empty() { 1.0 } else { 2.0 };
+    let mut height = 0.0;
+    let placed: Vec<(f64, Sensor, &SensorResult)> = rows
+        .into_iter()
+        .map(|(sensor, found)| {
+            let top = height;
+            height += tall(found) * PANEL.1;
+            (top, sensor, found)
+        })
+        .collect();
+    let width = PANEL.0 * KINDS.len() as f64;
     let drawn = html! {
-        svg xmlns="http://www.w3.org/2000/svg" width=(width) height=(height) viewBox={ "0 0 " (width) " " (height) } {
+        svg class="curves" xmlns="http://www.w3.org/2000/svg" width=(width) height=(height) viewBox={ "0 0 " (width) " " (height) } {
             style { (STYLE) }
             rect width=(width) height=(height) fill="#fff" {}
-            @for (k, (sensor, found)) in rows.iter().enumerate() {
-                g transform={ "translate(0 " (PANEL.1 * k as f64) ")" } {
+            @for (top, sensor, found) in &placed {
+                g transform={ "translate(0 " (top) ")" } {
                     @for (i, kind) in KINDS.iter().enumerate() {
                         g transform={ "translate(" (PANEL.0 * i as f64) ")" } { (curves(result, *sensor, kind)) }
                     }
-                    g transform={ "translate(" (PANEL.0 * 4.0) ")" } { (errors(result, *sensor, found)) }
+                }
+                @if !found.dwells.is_empty() {
+                    g transform={ "translate(0 " (top + PANEL.1) ")" } { (errors(result, *sensor, found)) }
+                    g transform={ "translate(" (PANEL.0) " " (top + PANEL.1) ")" } { (by_temperature(result, *sensor, found)) }
+                    g transform={ "translate(" (PANEL.0 * 2.0) " " (top + PANEL.1) ")" } { (by_time(*sensor, found)) }
                 }
             }
         }
@@ -57,7 +80,7 @@ pub fn svg(result: &ThermalResult) -> String {
     drawn.into_string() + "\n"
 }
 
-fn frame(result: &ThermalResult, y: std::ops::Range<f64>) -> Frame {
+fn frame(result: &ThermalResult, y: Range<f64>) -> Frame {
     Frame {
         across: 78.0..PANEL.0 - 12.0,
         down: 34.0..PANEL.1 - 46.0,
@@ -146,11 +169,106 @@ fn errors(result: &ThermalResult, sensor: Sensor, found: &SensorResult) -> Marku
     let frame = frame(result, range(highest.chain([0.0])));
     let key = ["heating", "cooling", "noise"].map(|name| (name, name));
     html! {
-        (frame.axes(&format!("{} error", sensor.name()), true))
+        (frame.axes(&format!("{} rms error", sensor.name()), true))
         @for (class, points) in &lines { (frame.line(class, points.iter().copied())) }
         (frame.x_name("die, °C", &frame))
         (frame.y_name(&format!("rms over dwells, {}", unit.unit)))
         (legend(&frame, &key))
+    }
+}
+
+/// Mean of neighbouring dwells, in the unit that is shown: hours from the beginning of the first recording, die's temperature, error.
+struct Mark {
+    hours: f64,
+    die_c: f64,
+    error: [f64; 3],
+}
+
+/// All marks of a sensor.
+struct Marks {
+    all: Vec<Mark>,
+    /// Dwells that each is the mean of.
+    each: usize,
+    /// Where the second recording and those after it begin, hours.
+    begins: Vec<f64>,
+}
+
+impl Marks {
+    fn of(found: &SensorResult) -> Self {
+        let factor = readable::error(found.unit).factor;
+        let each = found.dwells.len().div_ceil(MARKS).max(1);
+        let (mut all, mut begins, mut start) = (Vec::new(), Vec::new(), 0.0);
+        for recording in found.dwells.chunk_by(|a, b| a.recording == b.recording) {
+            if recording[0].recording > 0 {
+                begins.push(start);
+            }
+            for dwells in recording.chunks(each) {
+                let n = dwells.len() as f64;
+                let mean =
+                    |of: &dyn Fn(&DwellResult) -> f64| dwells.iter().map(of).sum::<f64>() / n;
+                all.push(Mark {
+                    hours: start + mean(&|d| d.middle_s) / 3600.0,
+                    die_c: mean(&|d| d.die_c),
+                    error: [0, 1, 2].map(|k| factor * mean(&|d| d.error[k])),
+                });
+            }
+            start += recording[recording.len() - 1].middle_s / 3600.0;
+        }
+        Self { all, each, begins }
+    }
+
+    fn errors(&self) -> Range<f64> {
+        range(self.all.iter().flat_map(|m| m.error))
+    }
+
+    /// Name of the ordinate.
+    fn ordinate(&self, found: &SensorResult) -> String {
+        let unit = readable::error(found.unit).unit;
+        match self.each {
+            1 => format!("dwell, {unit}"),
+            n => format!("mean of {n} dwells, {unit}"),
+        }
+    }
+
+    /// The three axes in `frame`.
+    fn draw(&self, frame: &Frame, at: fn(&Mark) -> f64) -> Markup {
+        let key: Vec<(&str, &str)> = CLASSES.into_iter().zip(AXES).collect();
+        html! {
+            @for (axis, class) in CLASSES.iter().enumerate() {
+                (frame.dots(&format!("{class} dot"), self.all.iter().map(|m| (at(m), m.error[axis]))))
+            }
+            (legend(frame, &key))
+        }
+    }
+}
+
+fn by_temperature(result: &ThermalResult, sensor: Sensor, found: &SensorResult) -> Markup {
+    let marks = Marks::of(found);
+    let frame = frame(result, marks.errors());
+    html! {
+        (frame.axes(&format!("{} error", sensor.name()), true))
+        (marks.draw(&frame, |m| m.die_c))
+        (frame.x_name("die, °C", &frame))
+        (frame.y_name(&marks.ordinate(found)))
+    }
+}
+
+fn by_time(sensor: Sensor, found: &SensorResult) -> Markup {
+    let marks = Marks::of(found);
+    let frame = Frame {
+        across: 78.0..2.0 * PANEL.0 - 12.0,
+        down: 34.0..PANEL.1 - 46.0,
+        x: range(marks.all.iter().map(|m| m.hours)),
+        y: marks.errors(),
+    };
+    html! {
+        (frame.axes(&format!("{} error over time", sensor.name()), true))
+        @for hours in &marks.begins {
+            path class="begin" d={ "M" (px(frame.at_x(*hours))) " " (px(frame.down.start)) "V" (px(frame.down.end)) } {}
+        }
+        (marks.draw(&frame, |m| m.hours))
+        (frame.x_name("time, h", &frame))
+        (frame.y_name(&marks.ordinate(found)))
     }
 }
 

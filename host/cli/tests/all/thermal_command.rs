@@ -38,7 +38,7 @@ fn niu_s_unit_gets_curves_and_lags_that_hold_the_truth_and_another_run_agrees() 
     record(folder, "again", 2);
     let fitted = done(
         folder,
-        "thermal fit niu --verify again -o cal.toml --plot curves.svg --json -",
+        "thermal fit niu --verify again -o cal.toml --plot curves.svg --page curves.html --json -",
     );
     let result: Value = serde_json::from_str(&fitted).unwrap();
     assert_eq!(result["format"], "mimu-thermal/1");
@@ -64,6 +64,28 @@ fn niu_s_unit_gets_curves_and_lags_that_hold_the_truth_and_another_run_agrees() 
     let picture = std::fs::read_to_string(folder.join("curves.svg")).unwrap();
     let bands = picture.matches(" band\"").count();
     assert_eq!(bands, 24, "a band for each parameter");
+    let dwells = result["sensors"]["gyro"]["dwells"].as_array().unwrap();
+    assert_eq!(dwells.len(), {
+        let bins = result["sensors"]["gyro"]["bins"].as_array().unwrap();
+        bins.iter()
+            .map(|b| b["dwells"].as_u64().unwrap())
+            .sum::<u64>() as usize
+    });
+    assert!(dwells.iter().any(|d| d["temperature"] == "cooling"));
+    let page = std::fs::read_to_string(folder.join("curves.html")).unwrap();
+    let options = roxmltree::ParsingOptions {
+        allow_dtd: true,
+        ..Default::default()
+    };
+    let page = roxmltree::Document::parse_with_options(&page, options).unwrap();
+    let numbers = page.descendants().filter(|n| n.has_tag_name("data"));
+    let values: Vec<f64> = numbers
+        .map(|n| n.attribute("value").unwrap().parse().unwrap())
+        .collect();
+    let lag = result["sensors"]["accel"]["lag_s"]["value"]
+        .as_f64()
+        .unwrap();
+    assert!(values.contains(&lag), "the lag is on the page as in JSON");
     let same = done(folder, "thermal compare cal.toml cal.toml --json -");
     let same: Value = serde_json::from_str(&same).unwrap();
     assert_eq!(same["format"], "mimu-thermal-comparison/1");

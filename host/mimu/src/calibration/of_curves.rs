@@ -103,4 +103,34 @@ impl Calibration {
         };
         calibration.checked(&format!("calibration of {:?}", unit.device))
     }
+
+    /// This calibration, which holds at one temperature, with `temperature`; made at `created` (RFC 3339). `triads` are the models of its
+    /// sensors at `temp_c` of the dies. Error figures stay those that it has.
+    ///
+    /// # Errors
+    /// Curves that cannot be applied.
+    pub fn with_curves(
+        &self,
+        temperature: OverTemperature,
+        temp_c: f64,
+        triads: [Option<Triad>; 2],
+        created: &str,
+    ) -> Result<Self> {
+        let mut all = self.clone();
+        let tables = [&mut all.gyro, &mut all.accel];
+        for ((sensor, table), triad) in Sensor::BOTH.into_iter().zip(tables).zip(&triads) {
+            if let (Some(kept), Some(triad)) = (table, triad)
+                && let Some(judged) = kept.judged.take()
+            {
+                *kept = triad_table(triad, sensor, kept.raw_unit, &kept.frame, judged);
+            }
+        }
+        all.format = Self::format_of(true).into();
+        all.created = Some(created.into());
+        all.tool = concat!("mimu ", env!("CARGO_PKG_VERSION")).into();
+        all.recording.temp_c = Some(temp_c);
+        all.recording.temp_range_c = Some(temperature.range_c);
+        all.temperature = Some(temperature);
+        all.checked(&format!("calibration of {:?}", self.device))
+    }
 }

@@ -57,7 +57,7 @@ fn of(request: &Request, schedule: &Schedule, sensor: Sensor) -> SensorPredictio
         gain: Vector3::repeat(1.0),
         null: Vector3::zeros(),
         bases: Kind::ALL.map(|_| Basis::new(request.shape, request.range_c)),
-        sessions: 1,
+        offsets: 1,
         biases_only: request.procedure == Procedure::RestRamp,
         samples,
     };
@@ -116,6 +116,7 @@ fn rows(request: &Request, schedule: &Schedule, sensor: Sensor) -> (Vec<ProblemR
                 dies.push(schedule.temp_c(middle_s));
                 rows.push(ProblemRow {
                     session: 0,
+                    offset: 0,
                     middle_s,
                     weight: length_s * request.sample_rate_hz,
                     input,

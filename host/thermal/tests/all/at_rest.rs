@@ -8,24 +8,32 @@ use nalgebra::Vector3;
 use crate::session;
 use crate::simulation::{Experiment, GAIN, GRAVITY, RATE_HZ, Random, WHITE, truth};
 
-const JOINT: Options = Options {
+pub const JOINT: Options = Options {
     estimator: Estimator::Joint,
     lag_s: None,
     range_c: None,
 };
 
 /// The unit flat on a table while the temperature does what `experiment` says.
-fn at_rest(experiment: &Experiment, seed: u64) -> (Manifest, Samples) {
+pub fn at_rest(experiment: &Experiment, seed: u64) -> (Manifest, Samples) {
+    in_poses(experiment, seed, &[Vector3::z()])
+}
+
+/// The same with each of the directions `up` for an equal part of the time.
+pub fn in_poses(experiment: &Experiment, seed: u64, up: &[Vector3<f64>]) -> (Manifest, Samples) {
     let mut random = Random(seed);
     let mut out = Samples::default();
-    for (k, [thermometer, die]) in experiment.temperatures().into_iter().enumerate() {
+    let temperatures = experiment.temperatures();
+    let count = temperatures.len();
+    for (k, [thermometer, die]) in temperatures.into_iter().enumerate() {
+        let pose = k * up.len() / count;
         out.t_s.push(k as f64 / RATE_HZ);
-        out.step.push(0);
+        out.step.push(pose as i32);
         out.temp_c.push(thermometer + 0.02 * random.normal());
         for sensor in 0..2 {
             let (matrix, bias) = truth(sensor, die);
             let input = if sensor == 0 { 0.0 } else { GRAVITY };
-            let raw = matrix * Vector3::new(0.0, 0.0, input) + bias;
+            let raw = matrix * (up[pose] * input) + bias;
             for axis in 0..3 {
                 let noise = GAIN[sensor] * WHITE[sensor] * RATE_HZ.sqrt() * random.normal();
                 out.raw[3 * sensor + axis].push(raw[axis] + noise);

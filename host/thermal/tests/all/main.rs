@@ -1,6 +1,7 @@
 //! Curves over temperature from recordings of a unit whose curves are known, and recordings that are refused.
 
 mod at_rest;
+mod base;
 mod estimates;
 mod judged;
 mod plan;

@@ -1,11 +1,9 @@
-//! The diagnosis as a page: one HTML file that needs nothing else, for a reviewer who wants to see it.
-//!
-//! It is XML too, so that any parser reads it. A number in it is a `data` element whose value is that of the JSON.
+//! The diagnosis as a page.
 
 mod figures;
 mod tables;
 
-use maud::{Markup, PreEscaped, html};
+use maud::{Markup, html};
 
 use super::meaning;
 use super::text::{USUAL, by};
@@ -18,22 +16,8 @@ use mimu::result::diagnosis::{AcceptedResult, DiagnosisResult, SensorDiagnosisRe
 use mimu_recording::Reference;
 use mimu_recording::error::{Error, Result};
 
-use tables::{chance, number};
-
-/// How the page came about.
-#[derive(Debug, Clone)]
-pub struct Made {
-    /// Recording, as it was given.
-    pub recording: String,
-    /// Command line.
-    pub command: String,
-    /// Date and time.
-    pub created: String,
-}
-
-const STYLE: &str = include_str!("page/style.css");
-/// Elements without an end, closed as XML wants it.
-const META: &str = r#"<meta charset="utf-8"/><meta name="viewport" content="width=device-width, initial-scale=1"/>"#;
+use crate::report::page::{Made, number, page, spoken};
+use tables::chance;
 
 /// One sensor's figures and what is drawn of them.
 struct Shown<'a> {
@@ -63,15 +47,7 @@ pub fn diagnosis_page(d: &DiagnosisResult, made: &Made) -> Result<String> {
             "diagnose without --page, and report this",
         )
     })?;
-    let page = html! {
-        (PreEscaped("<!DOCTYPE html>"))
-        html lang="en" xmlns="http://www.w3.org/1999/xhtml" {
-            head {
-                (PreEscaped(META))
-                title { "Diagnosis of " (d.device) ": " (d.verdict.name()) }
-                style { (PreEscaped(STYLE)) }
-            }
-            body { main {
+    let main = html! {
                 (head(d, made))
                 h2 { "Error before and after" }
                 (tables::errors(&sensors))
@@ -101,18 +77,9 @@ pub fn diagnosis_page(d: &DiagnosisResult, made: &Made) -> Result<String> {
                 (recorded(d))
                 (method())
                 p class="dim" { (d.tool) ", " (made.created) ": " code { (made.command) } }
-            } }
-        }
     };
-    Ok(page.into_string() + "\n")
-}
-
-/// Names of sensors in sentences.
-fn spoken(sensor: &str) -> &str {
-    match sensor {
-        "accel" => "accelerometer",
-        other => other,
-    }
+    let title = format!("Diagnosis of {}: {}", d.device, d.verdict.name());
+    Ok(page(&title, &main))
 }
 
 fn head(d: &DiagnosisResult, made: &Made) -> Markup {

@@ -2,10 +2,10 @@
 
 use maud::{Markup, PreEscaped, html};
 
-use super::{Shown, sentence, spoken};
+use super::{Shown, sentence};
 use crate::report::diagnosis::remarks;
 use crate::report::diagnosis::text::{by_experiment, by_score, converter};
-use crate::report::svg::raised;
+use crate::report::page::{number, spoken, written};
 use mimu::quantity::{Figure, p_value, significant};
 use mimu::readable;
 use mimu::result::diagnosis::{
@@ -15,15 +15,6 @@ use mimu::result::diagnosis::{
 /// A line break that is HTML and XML.
 const BR: PreEscaped<&str> = PreEscaped("<br/>");
 
-/// A number for people, which holds that of the JSON.
-pub fn number(si: f64, factor: f64, unit: &str) -> Markup {
-    html! {
-        @if si.is_finite() {
-            data value=(si) { (written(&significant(si * factor))) @if !unit.is_empty() { " " (unit) } }
-        } @else { "–" }
-    }
-}
-
 /// An error figure: none where there are as many parameters as residuals, and only rounding is left.
 pub fn figure_of(s: &SensorDiagnosisResult, si: f64) -> Markup {
     let figure = readable::error(s.unit);
@@ -31,15 +22,6 @@ pub fn figure_of(s: &SensorDiagnosisResult, si: f64) -> Markup {
         true => number(si, figure.factor, &figure.unit),
         false => html! { "–" },
     }
-}
-
-/// With a minus sign in place of a hyphen, and powers of ten as people write them.
-fn written(text: &str) -> String {
-    let text = match text.split_once('e') {
-        Some((digits, power)) => format!("{digits}·10{}", raised(power)),
-        None => text.into(),
-    };
-    text.replace('-', "−")
 }
 
 /// Probability of chance.

@@ -1,0 +1,158 @@
+//! A fit over temperature as a page.
+
+use maud::{Markup, PreEscaped, html};
+use mimu::quantity::plus_minus;
+use mimu::readable;
+use mimu_thermal::judge::{Bin, Hysteresis};
+use mimu_thermal::result::{CurveResult, SensorResult, ThermalResult};
+
+use super::page::{Made, number, page, spoken, written};
+use super::thermal::{SHOWN, VERDICT_ONE_WAY, physical};
+use super::thermal_plot;
+
+/// The page of a fit.
+pub fn thermal_page(result: &ThermalResult, made: &Made) -> String {
+    let main = html! {
+        (head(result, made))
+        h2 { "Errors and lag" }
+        (errors(result))
+        @for (name, sensor) in result.sensors.named() {
+            @if let Some(what) = sensor.inseparable { p { (spoken(name)) ", inseparable: " (what) "." } }
+        }
+        h2 { "Curves" }
+        figure {
+            div class="scroll" { (PreEscaped(thermal_plot::svg(result))) }
+            figcaption {
+                "What each parameter changes by from the middle of the range, with its 95 % interval. Below: errors of the dwells, rms while the \
+                 temperature rises and falls, each axis over temperature, and over time; a dashed line is where the next recording begins."
+            }
+        }
+        @for (name, sensor) in result.sensors.named() {
+            h2 class="sensor" { (spoken(name)) }
+            @if !sensor.bins.is_empty() { (bins(sensor)) }
+            @if let Some(all) = &sensor.hysteresis { (hysteresis(sensor, all)) }
+            (curves(result, name))
+        }
+        @if !result.warnings.is_empty() {
+            h2 { "To know" }
+            ul { @for warning in &result.warnings { li { (warning) } } }
+        }
+        p class="dim" { (result.tool) ", " (made.created) ": " code { (made.command) } }
+    };
+    let title = format!("{} over temperature: {}", result.device, result.verdict);
+    page(&title, &main)
+}
+
+fn head(result: &ThermalResult, made: &Made) -> Markup {
+    let [from, to] = result.range_c;
+    html! {
+        h1 { (result.device) " over temperature" }
+        p class={ "verdict " @if result.verdict == "fitted" { "explained" } @else { "unexplained" } } {
+            strong { (result.verdict) } ": dies at " (written(&format!("{from:.1}"))) " to " (written(&format!("{to:.1}"))) " °C. "
+            @if result.verdict == "fitted" { "Heating and cooling, or plateaus, tell the lag of the dies from the slopes of the curves." }
+            @else { (VERDICT_ONE_WAY) }
+        }
+        dl {
+            @for recording in &result.recordings {
+                dt { "Recording" } dd { code { (recording.samples) } ", SHA-256 " code { (recording.sha256) } }
+            }
+            dt { "Estimator" } dd { (result.estimator) }
+            dt { "Fitted" } dd { (made.created) }
+        }
+    }
+}
+
+fn errors(result: &ThermalResult) -> Markup {
+    html! {
+        div class="scroll" { table {
+            caption { "Root mean square error of the dwells, and the lag of the dies behind the thermometer with its 95 % interval." }
+            thead { tr {
+                th { "sensor" } th class="n" { "in sample" } th class="n" { "held out" } th class="n" { "noise alone" } th { "lag" }
+            } }
+            tbody {
+                @for (name, sensor) in result.sensors.named() {
+                    @let unit = readable::error(sensor.unit);
+                    @let cell = |v: Option<f64>| html! { td class="n" { (number(v.unwrap_or(f64::NAN), unit.factor, &unit.unit)) } };
+                    tr {
+                        td { (spoken(name)) }
+                        (cell(sensor.rms)) (cell(sensor.held_out_rms)) (cell(sensor.noise_floor))
+                        td {
+                            @if let Some(lag) = sensor.lag_s {
+                                (number(lag.value, 1.0, "s")) ", from " (number(lag.lower, 1.0, "")) " to " (number(lag.upper, 1.0, "s"))
+                            } @else { (sensor.lag_reason.as_deref().unwrap_or("none")) }
+                        }
+                    }
+                }
+            }
+        } }
+    }
+}
+
+fn bins(sensor: &SensorResult) -> Markup {
+    let unit = readable::error(sensor.unit);
+    let cell = |v: Option<f64>| html! { td class="n" { (number(v.unwrap_or(f64::NAN), unit.factor, "")) } };
+    let range = |b: &Bin| written(&format!("{:.0} to {:.0} °C", b.from_c, b.to_c));
+    html! {
+        div class="scroll" { table {
+            caption { "Error by temperature of the die, rms, " (unit.unit) }
+            thead { tr {
+                th { "die" } th class="n" { "heating" } th class="n" { "cooling" } th class="n" { "noise alone" } th class="n" { "dwells" }
+            } }
+            tbody {
+                @for b in &sensor.bins {
+                    tr { td { (range(b)) } (cell(b.heating)) (cell(b.cooling)) (cell(Some(b.noise_floor))) td class="n" { (b.dwells) } }
+                }
+            }
+        } }
+    }
+}
+
+fn hysteresis(sensor: &SensorResult, all: &[Hysteresis]) -> Markup {
+    let unit = readable::error(sensor.unit);
+    html! {
+        div class="scroll" { table {
+            caption { "Hysteresis: what heating and cooling differ by after the lag, which is reported and not fitted" }
+            thead { tr { th { "axis" } th class="n" { "heating minus cooling, " (unit.unit) } th class="n" { "as a temperature, K" } } }
+            tbody {
+                @for h in all {
+                    tr {
+                        td { (h.axis) }
+                        td class="n" { data value=(h.value) { (written(&plus_minus(h.value * unit.factor, h.half_width * unit.factor))) } }
+                        td class="n" { (number(h.kelvin.unwrap_or(f64::NAN), 1.0, "")) }
+                    }
+                }
+            }
+        } }
+    }
+}
+
+fn curves(result: &ThermalResult, name: &str) -> Markup {
+    let found: Vec<&CurveResult> = result.curves.iter().filter(|c| physical(c, name)).collect();
+    let Some(first) = found.first() else {
+        return html! {};
+    };
+    let last = first.temp_c.len() - 1;
+    let shown: Vec<usize> = (0..SHOWN).map(|k| k * last / (SHOWN - 1)).collect();
+    html! {
+        div class="scroll" { table {
+            caption { "Parameters with 95 % intervals, by temperature of the die" }
+            thead { tr {
+                th { "parameter" }
+                @for k in &shown { th class="n" { (written(&format!("{:.1} °C", first.temp_c[*k]))) } }
+            } }
+            tbody {
+                @for curve in found {
+                    @let unit = readable::parameter(&curve.unit);
+                    @let label = curve.name.trim_start_matches(name).trim_start_matches('_');
+                    tr {
+                        td { (label) ", " (unit.unit) }
+                        @for k in &shown {
+                            @let half = 0.5 * (curve.upper[*k] - curve.lower[*k]) * unit.factor;
+                            td class="n" { data value=(curve.value[*k]) { (written(&plus_minus(curve.value[*k] * unit.factor, half))) } }
+                        }
+                    }
+                }
+            }
+        } }
+    }
+}
