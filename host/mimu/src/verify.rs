@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::calibration::Calibration;
 use crate::die_temperature::{WITHOUT_TEMPERATURE, at_one_temperature, outside};
-use crate::effects::removal::{removable, remove};
+use crate::effects::removal::{removable, remove_within};
 use crate::estimate::turn::{Turn, direction_error};
 use crate::fit::refuse_wrong_gravity;
 use crate::prepared::{Prepared, si_covariance};
@@ -150,7 +150,8 @@ fn without_effects(prepared: &Prepared, calibration: &Calibration) -> Result<Opt
     }
     removable(prepared, effects)?;
     let [gyro, accel] = Sensor::BOTH.map(|s| calibration.inverse(s));
-    let cleaned = remove(prepared, gyro.as_ref(), accel.as_ref(), effects);
+    let limits_c = calibration.limits();
+    let cleaned = remove_within(prepared, gyro.as_ref(), accel.as_ref(), effects, limits_c);
     let singular = || {
         let place = format!("calibration of {:?}", calibration.device);
         Error::new(place, "C is singular", "fit the recording again")

@@ -1,5 +1,6 @@
 //! From the rows of one sensor to a verdict: what is tried, what is accepted, what is left.
 
+mod acceptance;
 mod hold_out;
 mod in_time;
 mod leftover;
@@ -24,12 +25,11 @@ use crate::effects::regressor::Product;
 use crate::effects::removal::Removed;
 use crate::fit::Split;
 use crate::quantity::p_value;
-use hold_out::{chance_without_a_dwell, leverage, parts_helped};
+use acceptance::Acceptance;
 use in_time::others_in_time;
 use leftover::leftover;
 pub(super) use leftover::noisier;
 use reading::of_readings;
-use second::second;
 use together::together;
 use tried::candidates;
 use undecided::undecided;
@@ -199,149 +199,28 @@ pub fn decide(
     if !jumps.is_empty() {
         with = search.fit(&kept)?;
     }
-    // What does not hold out goes, the one with the smallest drop in deviance first.
-    let held = |chosen: &[Chosen], fit: &Fitted, split: Split| {
-        held_out(&search, &search.model(chosen), fit, split)
-    };
-    let held_rms = |chosen: &[Chosen], fit: &Fitted, split: Split| {
-        held(chosen, fit, split).map(|r| rms(rows, &r))
-    };
-    // All rates in one block of time, and without it there is no calibration.
-    let usual = match held_rms(&[], &null, Split::Blocks) {
-        Some(_) => Split::Blocks,
-        None => Split::Interleaved,
-    };
-    let split_of = |rest: &[Chosen], one: &Chosen, with: &Fitted| {
-        let [dwell, block] = leverage(rows, &search.model(rest), &one.columns);
-        let mut all = rest.to_vec();
-        all.push(one.clone());
-        let alone = block > LEVERAGE || held_rms(&all, with, usual).is_none();
-        (dwell, if alone { Split::Interleaved } else { usual })
-    };
-    let elsewhere = |kept: &[Chosen], values: &[DVector<f64>]| -> Vec<Option<Second>> {
-        let each = kept.iter().zip(values);
-        let given: Vec<Removed> = each
-            .map(|(c, values)| {
-                let (candidate, values) = c.candidate.lasting(values.as_slice());
-                Removed {
-                    candidate,
-                    parameter: c.parameter,
-                    values,
-                }
-            })
-            .collect();
-        match unseen.and_then(|u| second(u, &given)) {
-            Some(all) => all.into_iter().map(Some).collect(),
-            None => vec![None; kept.len()],
-        }
-    };
-    // One way of holding out for all: where a warm-up is seen in one block only, a model that has not seen that block misses it by so
-    // much that nothing else in the model would show.
-    let common = |kept: &[Chosen], with: &Fitted| {
-        let each = (0..kept.len()).map(|i| {
-            let mut rest = kept.to_vec();
-            let one = rest.remove(i);
-            split_of(&rest, &one, with)
-        });
-        let (shares, splits): (Vec<f64>, Vec<Split>) = each.unzip();
-        let split = match splits.contains(&Split::Interleaved) {
-            true => Split::Interleaved,
-            false => usual,
-        };
-        (shares, split)
-    };
+    let judge = Acceptance::new(&search, unseen, &null);
+    let usual = judge.usual;
     let mut suggested = Vec::new();
     loop {
-        loop {
-            let seconds = elsewhere(&kept, &shares(&search, &kept, &with));
-            let (weights, split) = common(&kept, &with);
-            let with_all = held(&kept, &with, split);
-            let mut worst: Option<(usize, String, bool)> = None;
-            for i in (0..kept.len()).rev() {
-                let mut rest = kept.clone();
-                rest.remove(i);
-                let share = weights[i];
-                let without = search.fit(&rest)?;
-                let both = [held(&rest, &without, split), with_all.clone()];
-                let [a, b] = both.each_ref().map(|h| h.as_ref().map(|r| rms(rows, r)));
-                let parts = match &both {
-                    [Some(a), Some(b)] => {
-                        parts_helped(rows, split, [a, b], kept[i].columns.ncols())
-                    }
-                    _ => [0; 2],
-                };
-                let why = match (a, b) {
-                    _ if share > LEVERAGE => {
-                        format!("it rests to {:.0} % on one dwell", 100.0 * share)
-                    }
-                    (Some(a), Some(b)) if !(b < a) => {
-                        format!(
-                            "the held-out error does not go down: {} without, {} with",
-                            said(a),
-                            said(b)
-                        )
-                    }
-                    _ if seconds[i].is_some_and(|s| s.contradicts()) => {
-                        let nan = [f64::NAN; 2];
-                        let ([a, b], [c, d]) = seconds[i].map_or((nan, nan), |s| (s.chi2, s.rms));
-                        format!(
-                            "the error of the second recording does not go down: chi-square {a:.0} without, {b:.0} with; rms {} and {}",
-                            said(c),
-                            said(d)
-                        )
-                    }
-                    (Some(_), Some(_)) if parts[1] >= 2 && parts[1] >= parts[0] => format!(
-                        "the held-out error goes down in {} of the parts, and up in {}",
-                        parts[0], parts[1]
-                    ),
-                    (_, None) => {
-                        "what is left when a block is held out does not determine it".into()
-                    }
-                    _ => {
-                        let models = [&search.model(&rest), &search.model(&kept)];
-                        match chance_without_a_dwell(&search, &kept[i], models, &with) {
-                            Some(p) if p > SURVIVES => format!(
-                                "it does not survive the loss of one dwell and of those in its pose: without them, {}",
-                                p_value(p)
-                            ),
-                            _ => continue,
-                        }
-                    }
-                };
-                let too_few_dwells = share > LEVERAGE || b.is_none();
-                worst = Some((i, why, too_few_dwells));
-                break;
-            }
-            let Some((i, why, too_few_dwells)) = worst else {
-                break;
-            };
-            let candidate = kept.remove(i).candidate;
+        // What does not hold out goes, the one with the smallest drop in deviance first.
+        while let Some(failed) = judge.first_to_fail(&kept, &with)? {
+            let candidate = kept.remove(failed.at).candidate;
             // More dwells may prove it: it is asked for in the next experiment.
             if let Kind::Effect(effect) = &candidate.kind
-                && too_few_dwells
+                && failed.too_few_dwells
                 && !not_excited.iter().any(|n| n.0 == effect.id)
             {
                 not_excited.push((effect.id.into(), effect.needs.into()));
             }
-            rejected.push((candidate.id(), why));
+            rejected.push((candidate.id(), failed.why));
             with = search.fit(&kept)?;
         }
-        // A product that no physics asks for is a suggestion.
-        let seconds = elsewhere(&kept, &shares(&search, &kept, &with));
-        let known = suggested.len();
-        let mut confirmed = seconds.iter().map(|s| s.is_some_and(|s| s.shows()));
-        kept.retain(|one| {
-            let confirmed = confirmed.next().unwrap_or(false);
-            let id = one.candidate.id();
-            let taken = one.candidate.is_listed() || confirmed || accept.contains(&id);
-            if !taken {
-                suggested.push(one.clone());
-            }
-            taken
-        });
-        if suggested.len() == known {
+        let set_aside = judge.suggestions(&mut kept, &with, accept);
+        if set_aside.is_empty() {
             break;
         }
+        suggested.extend(set_aside);
         with = search.fit(&kept)?;
         // What a suggestion had explained, an effect with a name may explain as well.
         let more = search.beside(kept.clone(), |c| {
@@ -355,14 +234,14 @@ pub fn decide(
     nonlinear::refine(&search, &mut kept, &mut with);
     others_in_time(&search, &mut kept, &with);
     let one_at_these_inputs = together(&search, &mut kept, &with);
-    let split = common(&kept, &with).1;
+    let split = judge.common(&kept, &with).1;
     let before = Model::of(&search, &[], &null, split)?;
     let after = Model::of(&search, &kept, &with, split)?;
     let nonlinear = Nonlinear::of(&search, &kept, &after);
     let (model, last) = (&after.columns, &after.fitted);
     let mut accepted = Vec::new();
     let values = shares(&search, &kept, last);
-    let seconds = elsewhere(&kept, &values);
+    let seconds = judge.elsewhere(&kept, &values);
     let (first, mut from) = (search.basis.ncols(), 0);
     for (i, one) in kept.iter().enumerate() {
         let count = one.columns.ncols();
@@ -370,8 +249,8 @@ pub fn decide(
         rest.remove(i);
         let without = search.fit(&rest)?;
         let held = [
-            held_rms(&rest, &without, split),
-            held_rms(&kept, &with, split),
+            judge.held_rms(&rest, &without, split),
+            judge.held_rms(&kept, &with, split),
         ];
         accepted.push(Accepted {
             chosen: one.clone(),
@@ -417,7 +296,7 @@ pub fn decide(
         more.push(one.clone());
         let held = search
             .fit(&more)
-            .and_then(|f| Some((f.clone(), held_rms(&more, &f, usual)?)))
+            .and_then(|f| Some((f.clone(), judge.held_rms(&more, &f, usual)?)))
             .map(|(f, held)| {
                 (
                     rms(rows, &(&rows.y - search.model(&more) * &f.coefficients)),
@@ -426,7 +305,7 @@ pub fn decide(
             });
         let now = (
             rms(rows, &(&rows.y - search.model(&kept) * &with.coefficients)),
-            held_rms(&kept, &with, usual),
+            judge.held_rms(&kept, &with, usual),
         );
         let chance = not_taken(&one, &kept, &superfluous);
         let figures = match (held, now) {
@@ -455,7 +334,7 @@ pub fn decide(
         let change = model * &last.coefficients - search.model(&more) * &fitted.coefficients;
         left.push(Leftover::suggested(&one.candidate, rows, &change));
     }
-    let interleaved = held_rms(&kept, last, Split::Interleaved);
+    let interleaved = judge.held_rms(&kept, last, Split::Interleaved);
     let models = [before, after];
     let [floor, reference] = known_in(rows).map(|sum| {
         let items = rows.judged.0 / rows.judged.1;

@@ -30,7 +30,7 @@ use rows::{ForceErrors, Free, Rows};
 use serde::Serialize;
 
 use crate::calibration::Calibration;
-use crate::effects::removal::{Removed, removable, remove};
+use crate::effects::removal::{Removed, removable, remove_within};
 use crate::fit::{Fit, Options, fit, fit_biases, without_temperature};
 use crate::prepared::Prepared;
 use crate::quantity::Sensor;
@@ -276,7 +276,8 @@ pub fn diagnose(recordings: Recordings, options: Options) -> Result<Diagnosis> {
     };
     let without = |prepared: &Prepared| match (recordings.given, held) {
         (Some(given), Some([gyro, accel])) => {
-            remove(prepared, gyro.as_ref(), accel.as_ref(), given.effects())
+            let (gyro, accel) = (gyro.as_ref(), accel.as_ref());
+            remove_within(prepared, gyro, accel, given.effects(), given.limits())
         }
         _ => Some(prepared.clone()),
     };

@@ -1,6 +1,7 @@
 //! Taking effects out of readings, by what the device itself measures.
 
 use mimu_core::compensation::Affine;
+use mimu_core::die::BEYOND_C;
 use nalgebra::{Matrix3, Vector3};
 
 use super::candidate::Candidate;
@@ -110,6 +111,35 @@ pub fn remove(
         if models[sensor as usize].is_some() && !ours.is_empty() {
             of_sensor(prepared, sensor, models, &ours, &mut out)?;
         }
+    }
+    Some(out)
+}
+
+/// The same of a calibration for these temperatures, °C: as on the device, beyond them the effects see the temperature go on for
+/// [`BEYOND_C`] and then stand.
+pub fn remove_within(
+    prepared: &Prepared,
+    gyro: Option<&Affine<f64>>,
+    accel: Option<&Affine<f64>>,
+    effects: &[Removed],
+    limits_c: Option<[f64; 2]>,
+) -> Option<Prepared> {
+    let Some([from, to]) = limits_c else {
+        return remove(prepared, gyro, accel, effects);
+    };
+    let mut seen = prepared.clone();
+    for block in &mut seen.condensed.blocks {
+        // Of what is not a number clamp() leaves that.
+        block.temp_c.mean = block.temp_c.mean.clamp(from - BEYOND_C, to + BEYOND_C);
+    }
+    let mut out = remove(&seen, gyro, accel, effects)?;
+    for (block, read) in out
+        .condensed
+        .blocks
+        .iter_mut()
+        .zip(&prepared.condensed.blocks)
+    {
+        block.temp_c = read.temp_c;
     }
     Some(out)
 }

@@ -4,7 +4,7 @@ use mimu::blocks::Moments;
 use mimu::calibration::Calibration;
 use mimu::diagnose::{Recordings, diagnose};
 use mimu::dwell::Fault;
-use mimu::effects::removal::{Removed, remove};
+use mimu::effects::removal::{Removed, remove, remove_within};
 use mimu::fit::{Method, Options};
 use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
@@ -90,6 +90,34 @@ fn a_lag_begins_at_the_first_temperature() {
     for (a, b) in after.dwells.list.iter().zip(&late.dwells.list) {
         assert_eq!(a.raw, b.raw);
     }
+}
+
+#[test]
+fn beyond_the_temperatures_of_the_calibration_an_effect_is_held_as_on_the_device() {
+    const PER_K: f64 = 1e-3;
+    let (mut whole, calibration) = unit(&[("gyro_thermal_bias", PER_K, 3)]);
+    let [_, to] = calibration.limits().unwrap();
+    let inverse = calibration.inverse(Sensor::Gyro).unwrap();
+    let [gyro, accel] = Sensor::BOTH.map(|s| calibration.inverse(s).unwrap());
+    let mut bias_at = |temp_c: f64| {
+        for block in &mut whole.condensed.blocks {
+            block.temp_c.mean = temp_c;
+        }
+        let effects = calibration.effects();
+        let limits = calibration.limits();
+        let after = remove_within(&whole, Some(&gyro), Some(&accel), effects, limits).unwrap();
+        assert_eq!(
+            after.condensed.blocks[0].temp_c.mean, temp_c,
+            "what was read stays"
+        );
+        let [a, b] =
+            [&after, &whole].map(|p| inverse.apply(&p.dwells.list[0].raw_mean(Sensor::Gyro)));
+        (b - a).norm()
+    };
+    let [at_end, beyond, far] = [to, to + 5.0, to + 40.0].map(&mut bias_at);
+    let per_k = (beyond - at_end) / 5.0;
+    assert!((per_k / (PER_K * 3f64.sqrt()) - 1.0).abs() < 0.1, "{per_k}");
+    assert!((far - beyond).abs() < 1e-9, "{far} {beyond}");
 }
 
 #[test]

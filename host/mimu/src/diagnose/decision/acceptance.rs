@@ -1,0 +1,210 @@
+//! What is accepted of what was found: it has to hold out, in a second recording too where there is one, and not rest on one dwell.
+
+use nalgebra::DVector;
+
+use super::hold_out::{chance_without_a_dwell, leverage, parts_helped};
+use super::second::second;
+use super::{LEVERAGE, SURVIVES, Second, held_out, rms, shares};
+use crate::diagnose::rows::Rows;
+use crate::diagnose::search::{Chosen, Search};
+use crate::diagnose::variance::Fitted;
+use crate::effects::removal::Removed;
+use crate::fit::Split;
+use crate::quantity::p_value;
+
+/// What the chosen of one sensor are judged by.
+pub(super) struct Acceptance<'a> {
+    search: &'a Search<'a>,
+    rows: &'a Rows,
+    unseen: Option<&'a Rows>,
+    /// How dwells are held out, where that of a block leaves a calibration.
+    pub usual: Split,
+}
+
+/// One of the chosen that is not accepted.
+pub(super) struct Failed {
+    /// Its place among them.
+    pub at: usize,
+    /// The reason.
+    pub why: String,
+    /// Whether more dwells might prove it.
+    pub too_few_dwells: bool,
+}
+
+impl<'a> Acceptance<'a> {
+    /// By the rows of `search` and, where there is a second recording, by `unseen`. `null` is the fit without any effect.
+    pub fn new(search: &'a Search<'a>, unseen: Option<&'a Rows>, null: &Fitted) -> Self {
+        let mut all = Self {
+            search,
+            rows: search.rows,
+            unseen,
+            usual: Split::Blocks,
+        };
+        // All rates in one block of time, and without it there is no calibration.
+        if all.held_rms(&[], null, Split::Blocks).is_none() {
+            all.usual = Split::Interleaved;
+        }
+        all
+    }
+
+    fn held(&self, chosen: &[Chosen], fit: &Fitted, split: Split) -> Option<DVector<f64>> {
+        held_out(self.search, &self.search.model(chosen), fit, split)
+    }
+
+    /// Held-out root mean square.
+    pub fn held_rms(&self, chosen: &[Chosen], fit: &Fitted, split: Split) -> Option<f64> {
+        self.held(chosen, fit, split).map(|r| rms(self.rows, &r))
+    }
+
+    fn split_of(&self, rest: &[Chosen], one: &Chosen, with: &Fitted) -> (f64, Split) {
+        let [dwell, block] = leverage(self.rows, &self.search.model(rest), &one.columns);
+        let mut all = rest.to_vec();
+        all.push(one.clone());
+        let alone = block > LEVERAGE || self.held_rms(&all, with, self.usual).is_none();
+        let split = if alone {
+            Split::Interleaved
+        } else {
+            self.usual
+        };
+        (dwell, split)
+    }
+
+    /// Largest share of one dwell in each of the `kept`, and one way of holding out for all: where a warm-up is seen in one block only, a
+    /// model that has not seen that block misses it by so much that nothing else in the model would show.
+    pub fn common(&self, kept: &[Chosen], with: &Fitted) -> (Vec<f64>, Split) {
+        let each = (0..kept.len()).map(|i| {
+            let mut rest = kept.to_vec();
+            let one = rest.remove(i);
+            self.split_of(&rest, &one, with)
+        });
+        let (shares, splits): (Vec<f64>, Vec<Split>) = each.unzip();
+        let split = match splits.contains(&Split::Interleaved) {
+            true => Split::Interleaved,
+            false => self.usual,
+        };
+        (shares, split)
+    }
+
+    /// What each of the `kept`, with these coefficients, does to the second recording.
+    pub fn elsewhere(&self, kept: &[Chosen], values: &[DVector<f64>]) -> Vec<Option<Second>> {
+        let each = kept.iter().zip(values);
+        let given: Vec<Removed> = each
+            .map(|(c, values)| {
+                let (candidate, values) = c.candidate.lasting(values.as_slice());
+                Removed {
+                    candidate,
+                    parameter: c.parameter,
+                    values,
+                }
+            })
+            .collect();
+        match self.unseen.and_then(|u| second(u, &given)) {
+            Some(all) => all.into_iter().map(Some).collect(),
+            None => vec![None; kept.len()],
+        }
+    }
+
+    /// The last of the `kept` that is not accepted; the outer `None` where a model is singular.
+    pub fn first_to_fail(&self, kept: &[Chosen], with: &Fitted) -> Option<Option<Failed>> {
+        let seconds = self.elsewhere(kept, &shares(self.search, kept, with));
+        let (weights, split) = self.common(kept, with);
+        let with_all = self.held(kept, with, split);
+        for at in (0..kept.len()).rev() {
+            let mut rest = kept.to_vec();
+            rest.remove(at);
+            let without = self.search.fit(&rest)?;
+            let both = [self.held(&rest, &without, split), with_all.clone()];
+            let too_few_dwells = weights[at] > LEVERAGE || both[1].is_none();
+            let why = match weights[at] {
+                share if share > LEVERAGE => {
+                    Some(format!("it rests to {:.0} % on one dwell", 100.0 * share))
+                }
+                _ => self
+                    .not_held_out(&both, split, &kept[at], seconds[at])
+                    .or_else(|| self.lost_with_a_dwell([&rest, kept], &kept[at], with)),
+            };
+            if let Some(why) = why {
+                return Some(Some(Failed {
+                    at,
+                    why,
+                    too_few_dwells,
+                }));
+            }
+        }
+        Some(None)
+    }
+
+    /// Why the residuals of held-out dwells, without and with `one`, do not show it.
+    fn not_held_out(
+        &self,
+        both: &[Option<DVector<f64>>; 2],
+        split: Split,
+        one: &Chosen,
+        second: Option<Second>,
+    ) -> Option<String> {
+        let said = |value: f64| self.rows.figure.said(self.rows.sensor, value);
+        let [a, b] = both
+            .each_ref()
+            .map(|h| h.as_ref().map(|r| rms(self.rows, r)));
+        if let (Some(a), Some(b)) = (a, b)
+            && !(b < a)
+        {
+            return Some(format!(
+                "the held-out error does not go down: {} without, {} with",
+                said(a),
+                said(b)
+            ));
+        }
+        if let Some(second) = second.filter(Second::contradicts) {
+            let ([a, b], [c, d]) = (second.chi2, second.rms);
+            return Some(format!(
+                "the error of the second recording does not go down: chi-square {a:.0} without, {b:.0} with; rms {} and {}",
+                said(c),
+                said(d)
+            ));
+        }
+        if let [Some(a), Some(b)] = both {
+            let [helped, hurt] = parts_helped(self.rows, split, [a, b], one.columns.ncols());
+            return (hurt >= 2 && hurt >= helped).then(|| {
+                format!("the held-out error goes down in {helped} of the parts, and up in {hurt}")
+            });
+        }
+        let undetermined = "what is left when a block is held out does not determine it";
+        both[1].is_none().then(|| undetermined.into())
+    }
+
+    /// Why `one`, which the second of the `models` has and the first has not, is no more significant without the dwell that speaks most for it.
+    fn lost_with_a_dwell(
+        &self,
+        models: [&[Chosen]; 2],
+        one: &Chosen,
+        with: &Fitted,
+    ) -> Option<String> {
+        let [rest, kept] = models.map(|m| self.search.model(m));
+        let p = chance_without_a_dwell(self.search, one, [&rest, &kept], with)?;
+        (p > SURVIVES).then(|| {
+            format!(
+                "it does not survive the loss of one dwell and of those in its pose: without them, {}",
+                p_value(p)
+            )
+        })
+    }
+
+    /// Takes out of the `kept` what no physics asks for, the second recording does not show and nobody accepts: suggestions.
+    pub fn suggestions(
+        &self,
+        kept: &mut Vec<Chosen>,
+        with: &Fitted,
+        accept: &[String],
+    ) -> Vec<Chosen> {
+        let seconds = self.elsewhere(kept, &shares(self.search, kept, with));
+        let confirmed = seconds.iter().map(|s| s.is_some_and(|s| s.shows()));
+        let (taken, suggested): (Vec<_>, Vec<_>) =
+            kept.drain(..).zip(confirmed).partition(|(one, confirmed)| {
+                let listed = one.candidate.is_listed();
+                listed || *confirmed || accept.contains(&one.candidate.id())
+            });
+        *kept = taken.into_iter().map(|t| t.0).collect();
+        suggested.into_iter().map(|s| s.0).collect()
+    }
+}
