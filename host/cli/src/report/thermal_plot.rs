@@ -169,7 +169,7 @@ fn errors(result: &ThermalResult, sensor: Sensor, found: &SensorResult) -> Marku
     let frame = frame(result, range(highest.chain([0.0])));
     let key = ["heating", "cooling", "noise"].map(|name| (name, name));
     html! {
-        (frame.axes(&format!("{} rms error", sensor.name()), true))
+        (frame.axes(&format!("{} error", sensor.name()), true))
         @for (class, points) in &lines { (frame.line(class, points.iter().copied())) }
         (frame.x_name("die, °C", &frame))
         (frame.y_name(&format!("rms over dwells, {}", unit.unit)))
