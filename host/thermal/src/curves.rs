@@ -111,15 +111,21 @@ impl TriadCurves {
 
     /// Bias of the session k, in its first pose, over that of the first, raw.
     pub fn session_offset(&self, session: usize) -> Vector3<f64> {
+        self.pose_offset(session, 0)
+    }
+
+    /// The same after so many moves of the unit.
+    pub fn pose_offset(&self, session: usize, moves: usize) -> Vector3<f64> {
         let mut offset = Vector3::zeros();
         let mut rows = self.problem.rows.iter();
         let first = rows.find(|r| r.session == session).map_or(0, |r| r.offset);
-        if first == 0 {
+        let number = first + moves;
+        if number == 0 || number >= self.problem.offsets {
             return offset;
         }
         for (weight, fit) in &self.fits {
             for axis in 0..3 {
-                let column = self.problem.columns(axis) - self.problem.offsets + first;
+                let column = self.problem.columns(axis) - self.problem.offsets + number;
                 offset[axis] +=
                     weight * fit.axes[axis].coefficients[column] * self.problem.gain[axis];
             }

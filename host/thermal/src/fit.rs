@@ -9,12 +9,12 @@ use crate::basis::{CURVATURE_SPAN, Shape};
 use crate::classic::{self, Classic};
 use crate::extrapolation;
 use crate::joint::{Choice, Joint, estimate};
-use crate::judge::{self, Bin, DwellError, Hysteresis, rms};
+use crate::judge::{self, Bin, DwellError, Hysteresis, Judging, rms};
 use crate::nodes;
 use crate::path::is_one_way;
 use crate::profile::Profile;
 use crate::session::Session;
-use crate::thermometer::Start;
+use crate::thermometer::{Die, Start};
 
 /// How the curves are estimated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -94,7 +94,7 @@ pub struct ThermalFit {
     pub options: Options,
     /// Whether lag and slope are told apart.
     pub verdict: Verdict,
-    /// Figures of gyro and accelerometer; none where only biases are estimated.
+    /// Figures of gyro and accelerometer: SI, raw where only biases are estimated.
     pub judged: [Option<Judged>; 2],
     /// What a person should know.
     pub warnings: Vec<String>,
@@ -235,34 +235,32 @@ pub fn range(joint: &Joint) -> [f64; 2] {
 fn judge(sessions: &[Session], verify: &[Session], joint: &Joint, k: usize) -> Option<Judged> {
     let sensor = Sensor::BOTH[k];
     let curves = joint.curves[k].as_ref()?;
-    if curves.biases_only() {
-        return None;
-    }
     let dies = joint.dies(sessions);
-    let mut errors = Vec::new();
-    for (i, session) in sessions.iter().enumerate() {
-        let offset = curves.session_offset(i);
-        errors.extend(judge::dwell_errors(
-            i, session, sensor, &dies[i], curves, &offset,
-        ));
-    }
+    let lag = joint.profile.lag.value;
+    let unseen = verify
+        .iter()
+        .map(|s| s.thermometer.die(lag, Start::Settled));
+    let unseen: Vec<Die> = unseen.collect();
+    let judging = |recording: usize, session, die, fitted| Judging {
+        recording,
+        session,
+        sensor,
+        die,
+        curves,
+        fitted,
+    };
+    let each = sessions.iter().zip(&dies).enumerate();
+    let errors: Vec<DwellError> = each
+        .flat_map(|(i, (session, die))| judging(i, session, die, true).errors())
+        .collect();
     let mut without = None;
     let held_out = match verify {
         [] => joint.noise[k].and_then(|noise| judge::held_out(sessions, joint, sensor, &noise)),
         _ => {
             let mut all = Vec::new();
             let mut centred = Vec::new();
-            for (i, session) in verify.iter().enumerate() {
-                let lag = joint.profile.lag.value;
-                let die = session.thermometer.die(lag, Start::Settled);
-                let own = judge::dwell_errors(
-                    i,
-                    session,
-                    sensor,
-                    &die,
-                    curves,
-                    &nalgebra::Vector3::zeros(),
-                );
+            for (i, (session, die)) in verify.iter().zip(&unseen).enumerate() {
+                let own = judging(i, session, die, false).errors();
                 let mean = own.iter().map(|e| e.error).sum::<nalgebra::Vector3<f64>>()
                     / own.len().max(1) as f64;
                 centred.extend(own.iter().map(|e| DwellError {

@@ -3,7 +3,6 @@
 use std::cmp::Ordering;
 
 use mimu::quantity::Sensor;
-use mimu_core::compensation::Affine;
 use nalgebra::Vector3;
 use serde::Serialize;
 
@@ -16,6 +15,8 @@ use crate::session::{Row, Session};
 use crate::smoothness::{Penalties, fixed};
 use crate::thermometer::Die;
 
+/// Length of a piece of a recording at rest, s.
+const PIECE_S: f64 = 30.0;
 /// Width of the bins, K.
 const BIN_K: f64 = 10.0;
 /// Parts of the time that are held out one after the other, and pieces that each consists of: a piece is shorter than a sweep, so that
@@ -40,62 +41,80 @@ pub struct DwellError {
     pub floor: f64,
 }
 
-/// Errors of the dwells of `sensor` in `session`, the recording of this number, whose die is `die`; `offset` is the raw bias of the session over the curves'. Empty
-/// where the inverse is not known.
-pub fn dwell_errors(
-    recording: usize,
-    session: &Session,
-    sensor: Sensor,
-    die: &Die,
-    curves: &TriadCurves,
-    offset: &Vector3<f64>,
-) -> Vec<DwellError> {
-    if curves.biases_only() {
-        return Vec::new();
-    }
-    let model = |temp_c: f64| inverse(curves, temp_c).map(|[model, _]| model);
-    errors_by(recording, session, sensor, die, model, offset, |_| true)
+/// A recording that curves are judged by.
+#[derive(Debug, Clone, Copy)]
+pub struct Judging<'a> {
+    /// Its number, from 0.
+    pub recording: usize,
+    /// It.
+    pub session: &'a Session,
+    /// The triad.
+    pub sensor: Sensor,
+    /// Temperature of the die.
+    pub die: &'a Die,
+    /// The curves.
+    pub curves: &'a TriadCurves,
+    /// Whether it is one of those that the curves were fitted to, whose bias offsets are known and taken off.
+    pub fitted: bool,
 }
 
-fn errors_by(
-    recording: usize,
-    session: &Session,
-    sensor: Sensor,
-    die: &Die,
-    model: impl Fn(f64) -> Option<Affine<f64>>,
-    offset: &Vector3<f64>,
-    used: impl Fn(usize) -> bool,
-) -> Vec<DwellError> {
-    let all = session.rows[sensor as usize].iter().enumerate();
-    let rows: Vec<(&Row, Vector3<f64>)> = all
-        .filter(|(k, r)| used(*k) && r.input.iter().all(|x| x.is_finite()))
-        .filter_map(|(_, r)| {
-            let at = model(die.at(r.middle_s))?;
-            Some((r, at.apply(&(r.raw - offset)) - r.input))
-        })
-        .collect();
-    let variance = sample_variance(&rows);
-    let fastest = fastest(session);
-    let mut out = Vec::new();
-    for dwell in rows.chunk_by(|a, b| a.0.step == b.0.step) {
-        let n: f64 = dwell.iter().map(|(r, _)| r.samples).sum();
-        let mean =
-            |of: fn(&Row) -> f64| dwell.iter().map(|(r, _)| r.samples * of(r)).sum::<f64>() / n;
-        let middle_s = mean(|r| r.middle_s);
-        out.push(DwellError {
-            recording,
-            middle_s,
-            error: dwell
-                .iter()
-                .map(|(r, e)| e * r.samples)
-                .sum::<Vector3<f64>>()
-                / n,
-            die_c: die.at(middle_s),
-            way: direction(session, fastest, middle_s),
-            floor: variance / n,
-        });
+impl Judging<'_> {
+    /// Errors of all dwells. Where only biases were estimated, of pieces of half a minute, and raw: readings minus what the curves
+    /// give for them, in that pose.
+    pub fn errors(&self) -> Vec<DwellError> {
+        self.errors_of(|_| true)
     }
-    out
+
+    fn errors_of(&self, used: impl Fn(usize) -> bool) -> Vec<DwellError> {
+        let Self { session, die, .. } = self;
+        let at_rest = self.curves.biases_only();
+        let all = session.rows[self.sensor as usize].iter().enumerate();
+        let rows: Vec<(&Row, Vector3<f64>)> = all
+            .filter(|(k, r)| used(*k) && (at_rest || r.input.iter().all(|x| x.is_finite())))
+            .filter_map(|(_, r)| {
+                let [at, _] = inverse(self.curves, die.at(r.middle_s))?;
+                let offset = match self.fitted {
+                    true => self.offset(r),
+                    false => Vector3::zeros(),
+                };
+                let input = if at_rest { Vector3::zeros() } else { r.input };
+                Some((r, at.apply(&(r.raw - offset)) - input))
+            })
+            .collect();
+        let variance = sample_variance(&rows);
+        let fastest = fastest(session);
+        let piece = |r: &Row| {
+            if at_rest {
+                (r.middle_s / PIECE_S) as u64
+            } else {
+                0
+            }
+        };
+        let dwells = rows.chunk_by(|(a, _), (b, _)| a.step == b.step && piece(a) == piece(b));
+        let each = dwells.map(|dwell| {
+            let n: f64 = dwell.iter().map(|(r, _)| r.samples).sum();
+            let middle_s = dwell
+                .iter()
+                .map(|(r, _)| r.samples * r.middle_s)
+                .sum::<f64>()
+                / n;
+            let sum = dwell.iter().map(|(r, e)| e * r.samples);
+            DwellError {
+                recording: self.recording,
+                middle_s,
+                error: sum.sum::<Vector3<f64>>() / n,
+                die_c: die.at(middle_s),
+                way: direction(session, fastest, middle_s),
+                floor: variance / n,
+            }
+        });
+        each.collect()
+    }
+
+    fn offset(&self, row: &Row) -> Vector3<f64> {
+        let moves = self.session.poses_before(row.middle_s);
+        self.curves.pose_offset(self.recording, moves)
+    }
 }
 
 /// Variance of one sample, mean of the axes, by differences of neighbouring rows: the slope of the temperature is not in them.
@@ -228,9 +247,6 @@ pub fn held_out(
     noise: &[AxisNoise; 3],
 ) -> Option<Vec<DwellError>> {
     let curves = joint.curves[sensor as usize].as_ref()?;
-    if curves.biases_only() {
-        return None;
-    }
     let problem = curves.problem();
     let dies = joint.dies(sessions);
     let temps: Vec<f64> = problem
@@ -254,14 +270,17 @@ pub fn held_out(
         let normals = [0, 1, 2].map(|a| Normal::of(problem, a, &temps, &noise[a], seen));
         let fit = fixed(problem, &penalties, &normals, &smoothness)?;
         let part_curves = TriadCurves::new(problem.clone(), vec![(1.0, fit)], curves.range_c);
-        let model = |temp_c: f64| inverse(&part_curves, temp_c).map(|[model, _]| model);
         for (k, session) in sessions.iter().enumerate() {
             let rows = &session.rows[sensor as usize];
-            let unseen = |i: usize| fold(k, rows[i].middle_s) == part;
-            let offset = part_curves.session_offset(k);
-            all.extend(errors_by(
-                k, session, sensor, &dies[k], model, &offset, unseen,
-            ));
+            let judging = Judging {
+                recording: k,
+                session,
+                sensor,
+                die: &dies[k],
+                curves: &part_curves,
+                fitted: true,
+            };
+            all.extend(judging.errors_of(|i| fold(k, rows[i].middle_s) == part));
         }
     }
     all.sort_by(|a, b| {

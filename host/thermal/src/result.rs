@@ -53,8 +53,8 @@ pub struct RecordingResult {
 /// Figures of one triad.
 #[derive(Debug, Clone, Serialize)]
 pub struct SensorResult {
-    /// SI unit of the figures.
-    pub unit: &'static str,
+    /// Unit of the figures: SI, that of the readings where only biases are estimated.
+    pub unit: String,
     /// Compensated dwell means minus known input, over dwells and axes, rms; null where the input is not known.
     pub rms: Option<f64>,
     /// The same of data that were held out; null where none were.
@@ -198,7 +198,10 @@ impl SensorResult {
         let lag = lag(fit, sensor);
         let gravity = curves.biases_only() && sensor == Sensor::Accel;
         Some(Self {
-            unit: sensor.unit(),
+            unit: match curves.biases_only() {
+                true => raw_unit(fit.sessions[0].raw_unit, sensor.unit()),
+                false => sensor.unit().into(),
+            },
             rms: figures.map(|f| f[0]),
             held_out_rms: held_out.map(|h| rms(h)[0]),
             held_out_rms_without_session_bias: judged.and_then(|j| j.without_session_bias),

@@ -50,7 +50,7 @@ pub fn thermal_text(result: &ThermalResult) -> String {
 }
 
 fn sensor_text(out: &mut String, name: &str, sensor: &SensorResult) {
-    let unit = readable::error(sensor.unit);
+    let unit = readable::error(&sensor.unit);
     let _ = writeln!(out, "{name}");
     match (&sensor.lag_s, &sensor.lag_reason) {
         (Some(lag), _) => {
@@ -77,7 +77,7 @@ fn sensor_text(out: &mut String, name: &str, sensor: &SensorResult) {
         }
         let _ = writeln!(out, ", by noise alone {}", unit.write(floor));
     }
-    bins_text(out, &sensor.bins, sensor.unit);
+    bins_text(out, &sensor.bins, &sensor.unit);
     for h in sensor.hysteresis.iter().flatten() {
         let value = plus_minus(h.value * unit.factor, h.half_width * unit.factor);
         let kelvin = match h.kelvin {

@@ -71,7 +71,7 @@ fn errors(result: &ThermalResult) -> Markup {
             } }
             tbody {
                 @for (name, sensor) in result.sensors.named() {
-                    @let unit = readable::error(sensor.unit);
+                    @let unit = readable::error(&sensor.unit);
                     @let cell = |v: Option<f64>| html! { td class="n" { (number(v.unwrap_or(f64::NAN), unit.factor, &unit.unit)) } };
                     tr {
                         td { (spoken(name)) }
@@ -89,7 +89,7 @@ fn errors(result: &ThermalResult) -> Markup {
 }
 
 fn bins(sensor: &SensorResult) -> Markup {
-    let unit = readable::error(sensor.unit);
+    let unit = readable::error(&sensor.unit);
     let cell = |v: Option<f64>| html! { td class="n" { (number(v.unwrap_or(f64::NAN), unit.factor, "")) } };
     let range = |b: &Bin| written(&format!("{:.0} to {:.0} °C", b.from_c, b.to_c));
     html! {
@@ -108,7 +108,7 @@ fn bins(sensor: &SensorResult) -> Markup {
 }
 
 fn hysteresis(sensor: &SensorResult, all: &[Hysteresis]) -> Markup {
-    let unit = readable::error(sensor.unit);
+    let unit = readable::error(&sensor.unit);
     html! {
         div class="scroll" { table {
             caption { "Hysteresis: what heating and cooling differ by after the lag, which is reported and not fitted" }

@@ -149,7 +149,7 @@ fn curves(
 
 /// Errors of dwells by temperature, heating and cooling apart.
 fn errors(result: &ThermalResult, sensor: Sensor, found: &SensorResult) -> Markup {
-    let unit = readable::error(found.unit);
+    let unit = readable::error(&found.unit);
     let points = |of: fn(&mimu_thermal::judge::Bin) -> Option<f64>| -> Vec<(f64, f64)> {
         let each = found.bins.iter();
         let [from, to] = result.range_c;
@@ -195,7 +195,7 @@ struct Marks {
 
 impl Marks {
     fn of(found: &SensorResult) -> Self {
-        let factor = readable::error(found.unit).factor;
+        let factor = readable::error(&found.unit).factor;
         let each = found.dwells.len().div_ceil(MARKS).max(1);
         let (mut all, mut begins, mut start) = (Vec::new(), Vec::new(), 0.0);
         for recording in found.dwells.chunk_by(|a, b| a.recording == b.recording) {
@@ -223,7 +223,7 @@ impl Marks {
 
     /// Name of the ordinate.
     fn ordinate(&self, found: &SensorResult) -> String {
-        let unit = readable::error(found.unit).unit;
+        let unit = readable::error(&found.unit).unit;
         match self.each {
             1 => format!("dwell, {unit}"),
             n => format!("mean of {n} dwells, {unit}"),

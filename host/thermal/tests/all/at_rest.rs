@@ -60,6 +60,20 @@ fn there_and_back_shows_the_biases_of_the_gyro_and_names_what_is_inseparable() {
             .contains("scale factor times gravity")
     );
     assert!(result.curve("gyro_scale_x").is_none());
+    for sensor in [result.sensors.gyro.as_ref().unwrap(), accel] {
+        assert_eq!(sensor.unit, "V");
+        let ratio = sensor.held_out_rms.unwrap() / sensor.noise_floor.unwrap();
+        assert!((0.9..1.15).contains(&ratio), "{ratio} of the noise");
+        assert!(sensor.bins.len() >= 6, "{:?}", sensor.bins);
+        let hysteresis = sensor.hysteresis.as_ref().unwrap();
+        // Three axes of each sensor: an interval of 99.9 %.
+        assert!(
+            hysteresis
+                .iter()
+                .all(|h| h.value.abs() < 3.3 / 1.96 * h.half_width),
+            "{hysteresis:?}"
+        );
+    }
     for (axis, name) in ["gyro_bias_x", "gyro_bias_y", "gyro_bias_z"]
         .iter()
         .enumerate()
