@@ -37,43 +37,39 @@ const KINDS: [(&str, &str, bool); 4] = [
     ("non_orthogonality", "non-orthogonality", false),
 ];
 
-/// All of them, two rows for each sensor: curves, and errors where the inputs are known.
+/// All of them: for each sensor a row of curves and one of errors; a single one where there are only biases.
 pub fn svg(result: &ThermalResult) -> String {
-    let of = |sensor: Sensor| match sensor {
-        Sensor::Gyro => result.sensors.gyro.as_ref(),
-        Sensor::Accel => result.sensors.accel.as_ref(),
-    };
-    let rows: Vec<(Sensor, &SensorResult)> = Sensor::BOTH
-        .into_iter()
-        .filter_map(|sensor| Some((sensor, of(sensor)?)))
-        .collect();
-    // The curves, and below them the errors.
-    let tall = |found: &SensorResult| if found.dwells.is_empty() { 1.0 } else { 2.0 };
+    let mut panels: Vec<(f64, f64, Markup)> = Vec::new();
     let mut height = 0.0;
-    let placed: Vec<(f64, Sensor, &SensorResult)> = rows
-        .into_iter()
-        .map(|(sensor, found)| {
-            let top = height;
-            height += tall(found) * PANEL.1;
-            (top, sensor, found)
-        })
-        .collect();
+    for (sensor, found) in [
+        (Sensor::Gyro, &result.sensors.gyro),
+        (Sensor::Accel, &result.sensors.accel),
+    ] {
+        let Some(found) = found else { continue };
+        let kinds = KINDS.iter().map(|kind| curves(result, sensor, kind));
+        let of_curves: Vec<Markup> = kinds.flatten().collect();
+        let mut next = of_curves.len();
+        for (k, drawn) in of_curves.into_iter().enumerate() {
+            panels.push((PANEL.0 * k as f64, height, drawn));
+        }
+        if !found.dwells.is_empty() {
+            if next > 1 {
+                (next, height) = (1, height + PANEL.1);
+                panels.push((0.0, height, errors(result, sensor, found)));
+            }
+            let [at, over] = [next, next + 1].map(|k| PANEL.0 * k as f64);
+            panels.push((at, height, by_temperature(result, sensor, found)));
+            panels.push((over, height, by_time(sensor, found)));
+        }
+        height += PANEL.1;
+    }
     let width = PANEL.0 * KINDS.len() as f64;
     let drawn = html! {
         svg class="curves" xmlns="http://www.w3.org/2000/svg" width=(width) height=(height) viewBox={ "0 0 " (width) " " (height) } {
             style { (STYLE) }
             rect width=(width) height=(height) fill="#fff" {}
-            @for (top, sensor, found) in &placed {
-                g transform={ "translate(0 " (top) ")" } {
-                    @for (i, kind) in KINDS.iter().enumerate() {
-                        g transform={ "translate(" (PANEL.0 * i as f64) ")" } { (curves(result, *sensor, kind)) }
-                    }
-                }
-                @if !found.dwells.is_empty() {
-                    g transform={ "translate(0 " (top + PANEL.1) ")" } { (errors(result, *sensor, found)) }
-                    g transform={ "translate(" (PANEL.0) " " (top + PANEL.1) ")" } { (by_temperature(result, *sensor, found)) }
-                    g transform={ "translate(" (PANEL.0 * 2.0) " " (top + PANEL.1) ")" } { (by_time(*sensor, found)) }
-                }
+            @for (x, y, drawn) in &panels {
+                g transform={ "translate(" (x) " " (y) ")" } { (drawn) }
             }
         }
     };
@@ -92,18 +88,18 @@ fn frame(result: &ThermalResult, y: Range<f64>) -> Frame {
 /// Temperature, value, lower and upper end of one curve, as changes from its middle.
 type Points = Vec<(f64, f64, f64, f64)>;
 
-/// One kind of numbers of a sensor.
+/// One kind of numbers of a sensor, if it has them.
 fn curves(
     result: &ThermalResult,
     sensor: Sensor,
     (begins, heading, relative): &(&str, &str, bool),
-) -> Markup {
+) -> Option<Markup> {
     let prefix = format!("{}_{begins}_", sensor.name());
     let found = result.curves.iter().filter(|c| c.sensor == sensor);
     let found: Vec<&CurveResult> = found.filter(|c| c.name.starts_with(&prefix)).collect();
-    let Some(first) = found.first() else {
-        return html! {};
-    };
+    // In one pose: "bias_and_gravity_x".
+    let axis_of = |c: &CurveResult| c.name.rsplit('_').next().unwrap_or_default().to_owned();
+    let first = found.first()?;
     let unit = readable::parameter(&first.unit);
     let all: Vec<(String, Points)> = found
         .iter()
@@ -118,7 +114,7 @@ fn curves(
                 let [low, high] = [curve.lower[k], curve.upper[k]].map(change);
                 (curve.temp_c[k], change(curve.value[k]), low, high)
             });
-            (curve.name[prefix.len()..].to_owned(), points.collect())
+            (axis_of(curve), points.collect())
         })
         .collect();
     let frame = frame(
@@ -134,7 +130,7 @@ fn curves(
         .zip(&all)
         .map(|(c, a)| (*c, a.0.as_str()))
         .collect();
-    html! {
+    Some(html! {
         (frame.axes(&format!("{} {heading}", sensor.name()), true))
         @for (class, (_, points)) in CLASSES.iter().zip(&all) {
             @let band: Vec<_> = points.iter().map(|p| (p.0, p.2, p.3)).collect();
@@ -144,7 +140,7 @@ fn curves(
         (frame.x_name("die, °C", &frame))
         (frame.y_name(&format!("change from the middle, {of_unit}")))
         (legend(&frame, &key))
-    }
+    })
 }
 
 /// Errors of dwells by temperature, heating and cooling apart.
@@ -225,8 +221,8 @@ impl Marks {
     fn ordinate(&self, found: &SensorResult) -> String {
         let unit = readable::error(&found.unit).unit;
         match self.each {
-            1 => format!("dwell, {unit}"),
-            n => format!("mean of {n} dwells, {unit}"),
+            1 => format!("error, {unit}"),
+            n => format!("error, means of {n}, {unit}"),
         }
     }
 
