@@ -8,12 +8,14 @@
 //! | `cooling` | lines against curvature on a recording that only cools |
 //! | `compensation [FOLDER]` | niu's six tests of compensation, by the device's arithmetic |
 //! | `fang RUNS` | fang's soak, with and without misalignments |
+//! | `planned RUNS` | what `mimu thermal plan --procedure ramp` promises |
 //! | `sweep RUNS` | poses spread over the sphere while the temperature goes up and down, with the default unit |
 
 mod compensation;
 mod cooling;
 mod fang;
 mod on_bench;
+mod planned;
 mod side_by_side;
 mod simulation;
 mod soak;
@@ -33,6 +35,7 @@ fn main() {
         "compensation" => compensation::run(arguments.get(1).map(Path::new)),
         "cooling" => cooling::run(),
         "fang" => fang::run(count(1).unwrap_or(10)),
+        "planned" => planned::run(count(1).unwrap_or(20)),
         "sweep" => sweep::run(count(1).unwrap_or(20)),
         _ => coverage(count(0).unwrap_or(200), arguments.get(1)),
     }
