@@ -14,6 +14,7 @@ use mimu_rig::located::Source;
 use mimu_rig::plan::Plan;
 use mimu_rig::record::samples;
 use mimu_rig::rig_file::{RigFile, RigTruth};
+use mimu_rig::unit::TemperatureSensor;
 use mimu_thermal::fit::{Estimator, Options, fit};
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -26,6 +27,9 @@ const NULL_V: [f64; 2] = [2.5, 1.65];
 /// Samples between two looks at the temperature: 20 ms, a batch of the device.
 const FOLLOW: usize = 2;
 const RATE_HZ: usize = 100;
+/// Length of a test, s, and of the one on the emulated board, which takes as long as the real one.
+const HOUR_S: f64 = 3600.0;
+const QUICK_S: f64 = 1200.0;
 /// Lag of the dies behind the thermometer, s, gyro and accelerometer, as in the rig files.
 const DIE_LAG_S: [f64; 2] = [60.0, 30.0];
 /// deg/h and µg.
@@ -40,7 +44,7 @@ struct Outcome {
     range_c: [f64; 2],
 }
 
-/// Prints both units' tests. Into `folder`, where there is one, go the rig files, the calibrations and the plans, for the emulated board.
+/// Prints both units' tests. Into `folder`, where there is one, go rig files and a quicker plan for the emulated board.
 pub fn run(folder: Option<&Path>) {
     for (name, rig) in [("MTi-G", "niu-mtig"), ("NV-IMU100", "niu-nv")] {
         let file = unit(&on_board(&read(&format!("rigs/{rig}.toml"))), 1);
@@ -83,16 +87,19 @@ pub fn run(folder: Option<&Path>) {
         }
         println!();
         if let Some(folder) = folder {
-            let write = |name: String, text: String| {
-                std::fs::write(folder.join(name), text).expect("a folder to write to")
-            };
-            write(format!("{rig}.toml"), file.to_toml());
-            write(format!("{rig}.calibration.toml"), calibration.to_toml());
-            for k in 0..6 {
-                write(format!("test-{k}.toml"), plan(k));
-            }
+            // The device's thermometer is in the dies of its gyros.
+            let mut file = file.clone();
+            file.unit.temperature = Some(TemperatureSensor::Dies);
+            write(folder, &format!("{rig}.toml"), &file.to_toml());
         }
     }
+    if let Some(folder) = folder {
+        write(folder, "gyro-z.toml", &plan(2, QUICK_S));
+    }
+}
+
+fn write(folder: &Path, name: &str, text: &str) {
+    std::fs::write(folder.join(name), text).expect("a folder to write to");
 }
 
 /// niu's unit behind parts with outputs in volts, with a supply and a reference that are nominal, on a table that turns about any axis.
@@ -128,12 +135,12 @@ fn on_board(rig: &str) -> String {
 }
 
 /// Gyro x, y, z at 10 deg/s, then accelerometer x, y, z at rest, that axis upright.
-fn plan(test: usize) -> String {
+fn plan(test: usize, ramp_s: f64) -> String {
     let up: [f64; 3] = std::array::from_fn(|i| f64::from(u8::from(i == test % 3)));
     let rate_dps = if test < 3 { 10.0 } else { 0.0 };
     format!(
         "format = \"mimu-plan/1\"\nsample_rate_hz = {RATE_HZ}.0\ncarrier = \"table\"\nlatitude_deg = 30.5\ngravity_mps2 = 9.793\n\
-         chamber_c = [[0.0, -10.0], [3600.0, 70.0]]\n[[step]]\nup = {up:?}\nrate_dps = {rate_dps:?}\ndwell_s = 3590.0\n"
+         chamber_c = [[0.0, -10.0], [{ramp_s:?}, 70.0]]\n[[step]]\nup = {up:?}\nrate_dps = {rate_dps:?}\ndwell_s = {ramp_s:?}\n"
     )
 }
 
@@ -143,7 +150,7 @@ fn test(file: &RigFile, stored: &Stored, k: usize) -> Outcome {
     // niu's table has two axes, on which x and y are never upright and turning.
     file.table.axes = 3;
     let truth = RigTruth::resolve(&file, 1).expect("a rig");
-    let plan = Plan::parse(Source::new("plan", plan(k))).expect("a plan");
+    let plan = Plan::parse(Source::new("plan", plan(k, HOUR_S))).expect("a plan");
     let (lag, mut die) = (stored.lag(), die::State::new());
     let mut model = stored.table.state();
     let mut warm = f64::NAN;

@@ -122,20 +122,12 @@ pub fn run() {
         high.unwrap_or(f64::NAN),
         noise.sqrt().to_degrees()
     );
-    let third = bursts.len() - bursts.len() / 3;
-    let last: Vec<bool> = (0..bursts.len()).map(|k| k >= third).collect();
-    let edge = low
-        .zip(high)
-        .map_or(f64::NAN, |(low, high)| low + (high - low) / 3.0);
-    let coldest: Vec<bool> = bursts.iter().map(|b| b.temp_c < edge).collect();
     let interleaved = (0..PARTS).map(|part| (0..bursts.len()).map(|k| k % PARTS == part).collect());
     let interleaved: Vec<Vec<bool>> = interleaved.collect();
     println!("rms of what is held out, deg/s (over that of the line)\n");
-    println!(
-        "| curve | every fourth burst | last third of the time | coldest third of the range |"
-    );
-    println!("|---|---|---|---|");
-    let mut of_line = [f64::NAN; 3];
+    println!("| curve | every fourth burst | last 7 | last 8 | last 9 | last 10 |");
+    println!("|---|---|---|---|---|---|");
+    let mut of_line = [f64::NAN; 5];
     for (name, curve) in [
         ("line", Curve::Polynomial(1)),
         ("parabola", Curve::Polynomial(2)),
@@ -160,16 +152,23 @@ pub fn run() {
             }
             squares.map(|s| f64::sqrt(s / n).to_degrees())
         };
-        let rms = [
-            &interleaved[..],
-            std::slice::from_ref(&last),
-            std::slice::from_ref(&coldest),
-        ]
-        .map(|masks| (miss(masks).norm_squared() / 3.0).sqrt());
+        let rms = [0, 7, 8, 9, 10].map(|last| {
+            let end = vec![
+                (0..bursts.len())
+                    .map(|k| k >= bursts.len() - last)
+                    .collect(),
+            ];
+            let masks = if last == 0 { &interleaved } else { &end };
+            (miss(masks).norm_squared() / 3.0).sqrt()
+        });
         if of_line[0].is_nan() {
             of_line = rms;
         }
-        let cell = |k: usize| format!("{:.4} ({:.2})", rms[k], rms[k] / of_line[k]);
-        println!("| {name} | {} | {} | {} |", cell(0), cell(1), cell(2));
+        let cells: Vec<String> = rms
+            .iter()
+            .zip(of_line)
+            .map(|(r, line)| format!("{r:.4} ({:.2})", r / line))
+            .collect();
+        println!("| {name} | {} |", cells.join(" | "));
     }
 }
