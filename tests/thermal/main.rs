@@ -1,20 +1,49 @@
 //! Errors of the estimates over temperature, their bounds, and how often their intervals hold the truth: the table of `docs/thermal.md`.
 //!
-//! `cargo run --release -p mimu-tests --bin thermal -- RUNS`
+//! `cargo run --release -p mimu-tests --bin thermal -- RUNS`, or one of
+//!
+//! | command | what |
+//! |---|---|
+//! | `estimators RUNS` | estimators side by side, on a soak and on a ramp |
+//! | `cooling` | lines against curvature on a recording that only cools |
+//! | `compensation [FOLDER]` | niu's six tests of compensation, by the device's arithmetic |
+//! | `fang RUNS` | fang's soak, with and without misalignments |
+//! | `planned RUNS` | what `mimu thermal plan --procedure ramp` promises |
+//! | `sweep RUNS` | poses spread over the sphere while the temperature goes up and down, with the default unit |
 
+mod compensation;
+mod cooling;
+mod fang;
+mod on_bench;
+mod planned;
+mod side_by_side;
 mod simulation;
+mod soak;
 mod study;
+mod sweep;
+
+use std::path::Path;
 
 use simulation::Experiment;
 use study::{Study, print_header};
 
 fn main() {
-    let runs = std::env::args()
-        .nth(1)
-        .and_then(|a| a.parse().ok())
-        .unwrap_or(200);
-    let only = std::env::args().nth(2);
-    let wanted = |name: &str| only.as_ref().is_none_or(|o| name.contains(o.as_str()));
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let count = |k: usize| arguments.get(k).and_then(|a| a.parse().ok());
+    match arguments.first().map_or("", String::as_str) {
+        "estimators" => side_by_side::run(count(1).unwrap_or(40)),
+        "compensation" => compensation::run(arguments.get(1).map(Path::new)),
+        "cooling" => cooling::run(),
+        "fang" => fang::run(count(1).unwrap_or(10)),
+        "planned" => planned::run(count(1).unwrap_or(20)),
+        "sweep" => sweep::run(count(1).unwrap_or(20)),
+        _ => coverage(count(0).unwrap_or(200), arguments.get(1)),
+    }
+}
+
+/// Errors of the joint estimate and how often its intervals hold the truth; `only` names an experiment.
+fn coverage(runs: u64, only: Option<&String>) {
+    let wanted = |name: &str| only.is_none_or(|o| name.contains(o.as_str()));
     print_header(runs);
     for (name, lag_s, whole) in [
         ("lag 60 s, whole cycle", 60.0, true),

@@ -2,6 +2,7 @@
 
 use mimu::prepared::Prepared;
 use mimu::stillness::STILL_FACTOR;
+use mimu_thermal::curves::TriadCurves;
 use mimu_thermal::joint::{Choice, Joint, estimate};
 use mimu_thermal::session::Session;
 use nalgebra::SVector;
@@ -10,7 +11,7 @@ use rayon::prelude::*;
 use crate::simulation::{Experiment, GAIN, bounds, truth};
 
 /// Temperatures at which curves are judged, °C: every 5 K over the range of the die in all experiments.
-fn temps() -> Vec<f64> {
+pub fn temps() -> Vec<f64> {
     (0..=14).map(|k| -4.0 + 5.0 * f64::from(k)).collect()
 }
 
@@ -21,9 +22,14 @@ pub struct Study {
 }
 
 /// Of one run: squared errors relative to the gain and whether the interval held the truth, by sensor, temperature and number.
-struct Outcome {
+pub struct Errors {
     squared: [Vec<[f64; 12]>; 2],
     inside: [Vec<[bool; 12]>; 2],
+}
+
+/// Of one run of the joint estimate.
+struct Outcome {
+    errors: Errors,
     lag: f64,
     lag_width: f64,
     lag_inside: bool,
@@ -57,9 +63,7 @@ impl Study {
         let outcomes = self.run(runs, Choice::JOINT);
         let errors = self.print("joint", &outcomes);
         if self.experiment.walk == 0.0 {
-            let bound = bounds(&self.experiment, true, &temps());
-            let squares = [0, 1].map(|s| bound[s].iter().map(|b| b.map(|v| v * v)).collect());
-            let bound = worst(&squares);
+            let bound = bound(&self.experiment, true);
             print_row("  Cramér-Rao bound", &bound);
             let ratio: Vec<String> = (0..6)
                 .map(|k| format!("{:.2}", errors[k] / bound[k]))
@@ -91,26 +95,9 @@ impl Study {
     }
 
     fn judge(&self, joint: &Joint) -> Outcome {
-        let mut squared = [Vec::new(), Vec::new()];
-        let mut inside = [Vec::new(), Vec::new()];
-        for sensor in 0..2 {
-            let curves = joint.curves[sensor].as_ref().expect("both were recorded");
-            for t in temps() {
-                let (matrix, bias) = truth(sensor, t);
-                let [found, _] = curves.forward(t);
-                let truth: SVector<f64, 12> = mimu::triad::vector(&matrix, &bias);
-                let error = mimu::triad::vector(&found.matrix, &found.bias) - truth;
-                let covariance = curves.covariance(t);
-                let relative = |k: usize| (error[k] / GAIN[sensor]).powi(2);
-                squared[sensor].push(std::array::from_fn(relative));
-                let held = |k: usize| error[k].abs() <= 1.96 * covariance[(k, k)].sqrt();
-                inside[sensor].push(std::array::from_fn(held));
-            }
-        }
         let (lag, true_lag) = (joint.profile.lag, self.experiment.lag_s);
         Outcome {
-            squared,
-            inside,
+            errors: Errors::of(&joint.curves),
             lag: lag.value,
             lag_width: lag.upper - lag.lower,
             lag_inside: (lag.lower..=lag.upper).contains(&true_lag),
@@ -120,28 +107,10 @@ impl Study {
 
     fn print(&self, estimator: &str, outcomes: &[Outcome]) -> [f64; 6] {
         let n = outcomes.len() as f64;
-        let mean = [0, 1].map(|s| {
-            let at = |t: usize| {
-                std::array::from_fn(|k| {
-                    outcomes.iter().map(|o| o.squared[s][t][k]).sum::<f64>() / n
-                })
-            };
-            (0..temps().len()).map(at).collect::<Vec<[f64; 12]>>()
-        });
-        let errors = worst(&mean);
+        let each: Vec<&Errors> = outcomes.iter().map(|o| &o.errors).collect();
+        let errors = rms(&each);
         print_row(&format!("{}, {estimator}", self.name), &errors);
-        let share = |sensor: usize, numbers: &[usize]| {
-            let held = outcomes.iter().flat_map(|o| &o.inside[sensor]);
-            let each = held.flat_map(|t| numbers.iter().map(|k| t[*k]));
-            let (sum, all) = each.fold((0.0, 0.0), |(s, a), h| {
-                (s + f64::from(u8::from(h)), a + 1.0)
-            });
-            100.0 * sum / all
-        };
-        let shares: Vec<String> = kinds()
-            .iter()
-            .map(|(s, numbers)| format!("{:.1}", share(*s, numbers)))
-            .collect();
+        let shares = shares(&each).map(|s| format!("{s:.1}"));
         println!(
             "{:58}  {} %",
             "  intervals of 95 % that hold the truth",
@@ -160,6 +129,61 @@ impl Study {
         );
         errors
     }
+}
+
+impl Errors {
+    /// Of the curves of gyro and accelerometer.
+    pub fn of(found: &[Option<TriadCurves>; 2]) -> Self {
+        let mut squared = [Vec::new(), Vec::new()];
+        let mut inside = [Vec::new(), Vec::new()];
+        for sensor in 0..2 {
+            let curves = found[sensor].as_ref().expect("both were recorded");
+            for t in temps() {
+                let (matrix, bias) = truth(sensor, t);
+                let [found, _] = curves.forward(t);
+                let truth: SVector<f64, 12> = mimu::triad::vector(&matrix, &bias);
+                let error = mimu::triad::vector(&found.matrix, &found.bias) - truth;
+                let covariance = curves.covariance(t);
+                let relative = |k: usize| (error[k] / GAIN[sensor]).powi(2);
+                squared[sensor].push(std::array::from_fn(relative));
+                let held = |k: usize| error[k].abs() <= 1.96 * covariance[(k, k)].sqrt();
+                inside[sensor].push(std::array::from_fn(held));
+            }
+        }
+        Self { squared, inside }
+    }
+}
+
+/// Errors of many runs, rms over runs and temperatures, in the units of the table.
+pub fn rms(runs: &[&Errors]) -> [f64; 6] {
+    let n = runs.len() as f64;
+    let mean = [0, 1].map(|s| {
+        let at = |t: usize| {
+            std::array::from_fn(|k| runs.iter().map(|o| o.squared[s][t][k]).sum::<f64>() / n)
+        };
+        (0..temps().len()).map(at).collect::<Vec<[f64; 12]>>()
+    });
+    worst(&mean)
+}
+
+/// Share of the intervals of 95 % that hold the truth, in %.
+pub fn shares(runs: &[&Errors]) -> [f64; 6] {
+    let kinds = kinds();
+    std::array::from_fn(|kind| {
+        let (sensor, numbers) = &kinds[kind];
+        let held = runs.iter().flat_map(|o| &o.inside[*sensor]);
+        let each = held.flat_map(|t| numbers.iter().map(|k| t[*k]));
+        let (sum, all) = each.fold((0.0, 0.0), |(s, a), h| {
+            (s + f64::from(u8::from(h)), a + 1.0)
+        });
+        100.0 * sum / all
+    })
+}
+
+/// Cramér-Rao bound of `experiment` in the units of the table, with a lag that is unknown too or known.
+pub fn bound(experiment: &Experiment, lag: bool) -> [f64; 6] {
+    let bound = bounds(experiment, lag, &temps());
+    worst(&[0, 1].map(|s| bound[s].iter().map(|b| b.map(|v| v * v)).collect()))
 }
 
 /// Bias, scale factors and cross terms of gyro and accelerometer among the twelve numbers.

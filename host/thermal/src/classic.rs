@@ -6,7 +6,7 @@ use nalgebra::{Matrix4, Matrix4x3, Vector3};
 
 use crate::basis::Shape;
 use crate::curves::TriadCurves;
-use crate::path::{direction, fastest};
+use crate::path::{fastest, stands};
 use crate::points::{Point, curves};
 use crate::session::{Row, Session};
 
@@ -114,7 +114,7 @@ fn plateaus(session: &Session, sensor: Sensor) -> Vec<Vec<&Row>> {
     let fastest = fastest(session);
     let rows = session.rows[sensor as usize].iter();
     let still: Vec<&Row> = rows
-        .filter(|r| direction(session, fastest, r.middle_s) == 0)
+        .filter(|r| stands(session, fastest, r.middle_s))
         .collect();
     let apart = |a: &&Row, b: &&Row| b.middle_s - a.middle_s < PLATEAU_S;
     still.chunk_by(apart).map(<[_]>::to_vec).collect()

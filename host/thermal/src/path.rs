@@ -21,12 +21,28 @@ const AROUND_SHARE: f64 = 0.01;
 
 /// Slope of the thermometer around `t_s`, K/s.
 fn slope(session: &Session, t_s: f64) -> f64 {
+    let half = half(session);
+    between(session, t_s - half, t_s + half)
+}
+
+fn half(session: &Session) -> f64 {
+    AROUND_S.max(AROUND_SHARE * session.thermometer.duration_s())
+}
+
+/// Slope of the thermometer from one instant to another, K/s, or to the ends of the record.
+fn between(session: &Session, from_s: f64, to_s: f64) -> f64 {
     let thermometer = &session.thermometer;
-    let half = AROUND_S.max(AROUND_SHARE * thermometer.duration_s());
-    let end_s = thermometer.start_s() + thermometer.duration_s();
-    let from = (t_s - half).max(thermometer.start_s());
-    let to = (t_s + half).min(end_s);
+    let from = from_s.max(thermometer.start_s());
+    let to = to_s.min(thermometer.start_s() + thermometer.duration_s());
     (thermometer.at(to).0 - thermometer.at(from).0) / (to - from).max(1.0)
+}
+
+/// Whether the temperature stands before or behind `t_s`: at the end of a soak the slope around an instant has the next ramp in it.
+pub fn stands(session: &Session, fastest: f64, t_s: f64) -> bool {
+    let half = half(session);
+    let sides = [[t_s - half, t_s], [t_s, t_s + half]];
+    let slopes = sides.map(|[from, to]| between(session, from, to).abs());
+    slopes[0].min(slopes[1]) < STANDS * fastest
 }
 
 /// Whether a recording heats or cools at `t_s` with the slope that is usual for it: 1, -1, or 0 where the temperature stands.

@@ -8,6 +8,9 @@ mod plan;
 mod refused;
 #[path = "../../../../tests/thermal/simulation.rs"]
 mod simulation;
+#[path = "../../../../tests/thermal/soak.rs"]
+mod soak;
+mod soaked;
 
 use mimu::prepared::Prepared;
 use mimu::stillness::STILL_FACTOR;

@@ -1,0 +1,243 @@
+//! niu, section 5: three tests at 10 deg/s and three at rest while the chamber goes from -10 to 70 °C in an hour, compensated as a device does.
+//!
+//! The units are niu's, behind sensors with outputs in volts, as the device has them. The calibration is that of `mimu thermal fit` on niu's
+//! own ramp; it is encoded and decoded as for the device, and applied in single precision by the code that the firmware runs.
+
+use std::path::Path;
+
+use mimu::quantity::Sensor;
+use mimu_core::compensation::Sample;
+use mimu_core::die;
+use mimu_core::stored::Stored;
+use mimu_device::Image;
+use mimu_rig::located::Source;
+use mimu_rig::plan::Plan;
+use mimu_rig::record::samples;
+use mimu_rig::rig_file::{RigFile, RigTruth};
+use mimu_rig::unit::TemperatureSensor;
+use mimu_thermal::fit::{Estimator, Options, fit};
+use nalgebra::Vector3;
+use rayon::prelude::*;
+
+use crate::on_bench::{read, session, unit};
+
+/// Volts per rad/s and per m/s² of the parts that stand in, and their volts without input.
+const GAIN: [f64; 2] = [0.2865, 0.08];
+const NULL_V: [f64; 2] = [2.5, 1.65];
+/// Samples between two looks at the temperature: 20 ms, a batch of the device.
+const FOLLOW: usize = 2;
+const RATE_HZ: usize = 100;
+/// Length of a test, s, and of the one on the emulated board, which takes as long as the real one.
+const HOUR_S: f64 = 3600.0;
+const QUICK_S: f64 = 1200.0;
+/// Lag of the dies behind the thermometer, s, gyro and accelerometer, as in the rig files.
+const DIE_LAG_S: [f64; 2] = [60.0, 30.0];
+/// deg/h and µg.
+const UNITS: [f64; 2] = [180.0 / std::f64::consts::PI * 3600.0, 1e6 / 9.80665];
+
+/// Mean and rms of one test, raw, compensated, and as the curves of Table 9 have it at the temperatures of the test.
+struct Outcome {
+    name: String,
+    raw: [f64; 2],
+    compensated: [f64; 2],
+    curves: [f64; 2],
+    range_c: [f64; 2],
+}
+
+/// Prints both units' tests. Into `folder`, where there is one, go rig files and a quicker plan for the emulated board.
+pub fn run(folder: Option<&Path>) {
+    for (name, rig) in [("MTi-G", "niu-mtig"), ("NV-IMU100", "niu-nv")] {
+        let file = unit(&on_board(&read(&format!("rigs/{rig}.toml"))), 1);
+        let recorded = session(&read("plans/niu-ramp.toml"), &file, 1);
+        let options = Options {
+            estimator: Estimator::Joint,
+            lag_s: None,
+            range_c: None,
+        };
+        let found = fit(vec![recorded], &[], options).expect("it is fitted");
+        let lag = found.joint.profile.lag;
+        let calibration = found
+            .calibration("2026-01-01T00:00:00Z")
+            .expect("it has scale factors");
+        let image = Image::new(&calibration, name).expect("the device takes it");
+        let stored = image.stored().expect("it reads what it stores");
+        println!(
+            "{name}: lag {:.1} s, {} nodes\n",
+            lag.value,
+            image.node_temp_c.len()
+        );
+        println!(
+            "| test | dies, °C | Table 9 there: mean, rms | raw: mean, rms | compensated: mean, rms | removed, % of the mean |"
+        );
+        println!("|---|---|---|---|---|---|");
+        let tests = (0..6).into_par_iter().map(|k| test(&file, &stored, k));
+        for o in tests.collect::<Vec<_>>() {
+            let two = |v: [f64; 2]| format!("{:.0}, {:.0}", v[0], v[1]);
+            println!(
+                "| {} | {:.0} to {:.0} | {} | {} | {:.1}, {:.1} | {:.1} |",
+                o.name,
+                o.range_c[0],
+                o.range_c[1],
+                two(o.curves),
+                two(o.raw),
+                o.compensated[0],
+                o.compensated[1],
+                100.0 * (1.0 - o.compensated[0].abs() / o.raw[0].abs())
+            );
+        }
+        println!();
+        if let Some(folder) = folder {
+            // The device's thermometer is in the dies of its gyros.
+            let mut file = file.clone();
+            file.unit.temperature = Some(TemperatureSensor::Dies);
+            write(folder, &format!("{rig}.toml"), &file.to_toml());
+        }
+    }
+    if let Some(folder) = folder {
+        write(folder, "gyro-z.toml", &plan(2, QUICK_S));
+    }
+}
+
+fn write(folder: &Path, name: &str, text: &str) {
+    std::fs::write(folder.join(name), text).expect("a folder to write to");
+}
+
+/// niu's unit behind parts with outputs in volts, with a supply and a reference that are nominal, on a table that turns about any axis.
+fn on_board(rig: &str) -> String {
+    let matrix =
+        |gain: f64| format!("[[{gain:?}, 0.0, 0.0], [0.0, {gain:?}, 0.0], [0.0, 0.0, {gain:?}]]");
+    let mut section = "";
+    let lines = rig.lines().map(|line| {
+        if line.starts_with('[') {
+            section = line.split(']').next().unwrap_or_default();
+        }
+        let sensor = usize::from(section == "[unit.accel_affine");
+        match (section, line.split('=').next().unwrap_or_default().trim()) {
+            ("[unit", "gyro") => {
+                "gyro = \"ADXRS300\"\ngyro_reference_v = [2.5, 2.5, 2.5]\nsupply_error_ppm = 0.0"
+                    .into()
+            }
+            ("[unit", "accel") => "accel = \"MMA7260QT\"".into(),
+            ("[unit.gyro_affine" | "[unit.accel_affine", "matrix") => {
+                format!("matrix = {}", matrix(GAIN[sensor]))
+            }
+            ("[unit.gyro_affine" | "[unit.accel_affine", "bias") => {
+                format!("bias = {:?}", [NULL_V[sensor]; 3])
+            }
+            _ => line.to_owned(),
+        }
+    });
+    let lines: Vec<String> = lines.collect();
+    format!(
+        "{}\n[converter]\nreference_error_ppm = 0.0\n",
+        lines.join("\n")
+    )
+}
+
+/// Gyro x, y, z at 10 deg/s, then accelerometer x, y, z at rest, that axis upright.
+fn plan(test: usize, ramp_s: f64) -> String {
+    let up: [f64; 3] = std::array::from_fn(|i| f64::from(u8::from(i == test % 3)));
+    let rate_dps = if test < 3 { 10.0 } else { 0.0 };
+    format!(
+        "format = \"mimu-plan/1\"\nsample_rate_hz = {RATE_HZ}.0\ncarrier = \"table\"\nlatitude_deg = 30.5\ngravity_mps2 = 9.793\n\
+         chamber_c = [[0.0, -10.0], [{ramp_s:?}, 70.0]]\n[[step]]\nup = {up:?}\nrate_dps = {rate_dps:?}\ndwell_s = {ramp_s:?}\n"
+    )
+}
+
+fn test(file: &RigFile, stored: &Stored, k: usize) -> Outcome {
+    let (sensor, axis) = (k / 3, k % 3);
+    let mut file = file.clone();
+    // niu's table has two axes, on which x and y are never upright and turning.
+    file.table.axes = 3;
+    let truth = RigTruth::resolve(&file, 1).expect("a rig");
+    let plan = Plan::parse(Source::new("plan", plan(k, HOUR_S))).expect("a plan");
+    let (lag, mut die) = (stored.lag(), die::State::new());
+    let mut model = stored.table.state();
+    let mut warm = f64::NAN;
+    let mut sums = [[0.0; 3]; 2];
+    let mut second = ([0.0; 3], 0);
+    let mut range_c = [f64::INFINITY, f64::NEG_INFINITY];
+    let mut seconds = 0.0;
+    for (n, row) in samples(&plan, &truth, 100 + k as u64)
+        .expect("a run")
+        .enumerate()
+    {
+        let temp_c = row.readings.temp_c;
+        if n.is_multiple_of(FOLLOW)
+            && let Some(die_c) = lag.follow(&mut die, FOLLOW as f32 / RATE_HZ as f32, temp_c as f32)
+        {
+            stored.table.follow(&mut model, die_c);
+        }
+        warm = if warm.is_nan() {
+            temp_c
+        } else {
+            warm + (temp_c - warm) / DIE_LAG_S[sensor] / RATE_HZ as f64
+        };
+        if row.instant.step.is_none() {
+            continue;
+        }
+        let volts = |v: [f64; 3]| Vector3::from(v.map(|x| x as f32));
+        let raw = Sample {
+            gyro: volts(row.readings.gyro),
+            accel: volts(row.readings.accel),
+        };
+        let out = model.model.apply(&raw);
+        let motion = &row.instant.motion;
+        let (input, read, out) = match sensor {
+            0 => (motion.rate[axis], row.readings.gyro[axis], out.gyro[axis]),
+            _ => (
+                motion.force[axis],
+                row.readings.accel[axis],
+                out.accel[axis],
+            ),
+        };
+        let nominal = (read - NULL_V[sensor]) / GAIN[sensor];
+        for (sum, error) in second.0.iter_mut().zip([
+            nominal - input,
+            f64::from(out) - input,
+            curve(&file, k, warm, input),
+        ]) {
+            *sum += error * UNITS[sensor];
+        }
+        second.1 += 1;
+        range_c = [range_c[0].min(warm), range_c[1].max(warm)];
+        if second.1 == RATE_HZ {
+            for (i, sum) in second.0.iter().enumerate() {
+                let mean = sum / RATE_HZ as f64;
+                sums[0][i] += mean;
+                sums[1][i] += mean * mean;
+            }
+            second = ([0.0; 3], 0);
+            seconds += 1.0;
+        }
+    }
+    let of = |i: usize| [sums[0][i] / seconds, f64::sqrt(sums[1][i] / seconds)];
+    let name = match Sensor::BOTH[sensor] {
+        Sensor::Gyro => format!("gyro {}, deg/h", ["x", "y", "z"][axis]),
+        Sensor::Accel => format!("accel {}, µg", ["x", "y", "z"][axis]),
+    };
+    Outcome {
+        name,
+        raw: of(0),
+        compensated: of(1),
+        curves: of(2),
+        range_c,
+    }
+}
+
+/// Error along the axis of a test by bias and scale factor of Table 9, SI.
+fn curve(file: &RigFile, test: usize, temp_c: f64, input: f64) -> f64 {
+    let cubic = |a: [f64; 4]| a[0] + temp_c * (a[1] + temp_c * (a[2] + temp_c * a[3]));
+    let (axis, curves) = (test % 3, &file.curves);
+    let (bias, scale) = match test < 3 {
+        true => (
+            curves.gyro.bias_deg_per_h.expect("given")[axis].map(|a| a / UNITS[0]),
+            curves.gyro.scale_ppm,
+        ),
+        false => (
+            curves.accel.bias_mg.expect("given")[axis].map(|a| 1e3 * a / UNITS[1]),
+            curves.accel.scale_ppm,
+        ),
+    };
+    cubic(bias) + 1e-6 * cubic(scale.expect("given")[axis]) * input
+}

@@ -1,0 +1,182 @@
+//! fang, 5.2 and 5.3: a soak at nine temperatures with the noise of Table 5, and what each estimator leaves of the errors.
+
+use mimu::triad::Forward;
+use mimu_core::compensation::Affine;
+use mimu_thermal::classic::Classic;
+use mimu_thermal::fit::{Estimator, Options, fit};
+use mimu_thermal::joint::Joint;
+use mimu_thermal::session::Session;
+use nalgebra::{Matrix3, Vector3};
+use rayon::prelude::*;
+
+use crate::on_bench::{noiseless, read, rms, session, unit};
+
+/// Steps of a round: six faces, then six rates.
+const STEPS: i32 = 12;
+const FACES: i32 = 6;
+const Z_UP: i32 = 4;
+
+/// How a model at a temperature is made of the curves.
+#[derive(Clone, Copy, PartialEq)]
+enum Model {
+    /// As they are.
+    AsFitted,
+    /// Its scale factors and biases; misalignments of all scalars in the middle of the range, which do not change (fang, 4.4).
+    WithM,
+    /// Those of the middle of the range at all temperatures.
+    OneTemperature,
+}
+
+const ROWS: [(&str, Estimator, Model); 5] = [
+    (
+        "all 18 scalars, at the middle temperature alone",
+        Estimator::Classic(Classic::Soak),
+        Model::OneTemperature,
+    ),
+    (
+        "fang (33), (34) as printed",
+        Estimator::Classic(Classic::SoakAsPrinted),
+        Model::AsFitted,
+    ),
+    (
+        "the same, with M of the middle temperature",
+        Estimator::Classic(Classic::SoakAsPrinted),
+        Model::WithM,
+    ),
+    (
+        "all 18 scalars of each plateau (`soak`)",
+        Estimator::Classic(Classic::Soak),
+        Model::AsFitted,
+    ),
+    ("joint", Estimator::Joint, Model::AsFitted),
+];
+
+/// Errors of one run: accelerometer with z up, on all faces, gyro on the faces, gyro at rates.
+type Errors = [Vec<Vector3<f64>>; 4];
+
+const DEG_PER_H: f64 = 180.0 / std::f64::consts::PI * 3600.0;
+
+/// Prints the tables.
+pub fn run(runs: u64) {
+    let (plan, file) = (
+        read("plans/fang-soak.toml"),
+        unit(&read("rigs/fang-soak.toml"), 1),
+    );
+    let truth = session(&plan, &noiseless(&file), 1);
+    let mut white = file.clone();
+    for axes in [&mut white.unit.gyro_axes, &mut white.unit.accel_axes] {
+        (axes.instability_si, axes.walk_si) = (Some([0.0; 3]), Some([0.0; 3]));
+    }
+    for (name, file) in [
+        ("noise of Table 5 alone", &white),
+        ("biases that wander by the data sheets too", &file),
+    ] {
+        let each = (0..runs)
+            .into_par_iter()
+            .map(|k| once(&session(&plan, file, 100 + k), &truth));
+        let each: Vec<Vec<Errors>> = each.collect();
+        println!("\n{name}, {runs} soaks, rms over runs and temperatures:\n");
+        println!(
+            "| | accelerometer, z up, x / y / z, mm/s² | six faces, mm/s² | gyro, at rest, deg/h | gyro, at 50 deg/s, deg/h |"
+        );
+        println!("|---|---|---|---|---|");
+        for (row, (name, ..)) in ROWS.iter().enumerate() {
+            let all = |kind: usize| -> Vec<Vector3<f64>> {
+                each.iter()
+                    .flat_map(|r| r[row][kind].iter().copied())
+                    .collect()
+            };
+            let axes = rms(&all(0)).map(|e| format!("{:.2}", 1e3 * e));
+            let axes = axes.as_slice().join(" / ");
+            let whole = |kind, unit| (rms(&all(kind)).norm_squared() / 3.0).sqrt() * unit;
+            println!(
+                "| {name} | {axes} | {:.2} | {:.0} | {:.0} |",
+                whole(1, 1e3),
+                whole(2, DEG_PER_H),
+                whole(3, DEG_PER_H)
+            );
+        }
+    }
+}
+
+fn once(noisy: &Session, truth: &Session) -> Vec<Errors> {
+    let by = |estimator| {
+        let options = Options {
+            estimator,
+            lag_s: None,
+            range_c: None,
+        };
+        fit(vec![noisy.clone()], &[], options)
+            .expect("it is fitted")
+            .joint
+    };
+    let (soak, printed, joint) = (
+        by(Estimator::Classic(Classic::Soak)),
+        by(Estimator::Classic(Classic::SoakAsPrinted)),
+        by(Estimator::Joint),
+    );
+    let each = ROWS.iter().map(|(_, estimator, model)| {
+        let own = match estimator {
+            Estimator::Classic(Classic::Soak) => &soak,
+            Estimator::Classic(_) => &printed,
+            _ => &joint,
+        };
+        errors(own, &soak, *model, truth)
+    });
+    each.collect()
+}
+
+/// What is left of the noiseless readings: compensated minus known input.
+fn errors(joint: &Joint, soak: &Joint, how: Model, truth: &Session) -> Errors {
+    let die = truth
+        .thermometer
+        .die(joint.profile.lag.value, joint.starts[0]);
+    let mut out = Errors::default();
+    for sensor in [0, 1] {
+        let rows = &truth.rows[sensor];
+        let errors = rows.iter().map(|row| {
+            let model = inverse(joint, soak, how, sensor, die.at(row.middle_s));
+            (row.step % STEPS, model.apply(&row.raw) - row.input)
+        });
+        for (step, error) in errors {
+            match (sensor, step < FACES) {
+                (1, true) => {
+                    out[1].push(error);
+                    if step == Z_UP {
+                        out[0].push(error);
+                    }
+                }
+                (0, true) => out[2].push(error),
+                (0, false) => out[3].push(error),
+                _ => {}
+            }
+        }
+    }
+    out
+}
+
+fn inverse(joint: &Joint, soak: &Joint, how: Model, sensor: usize, die_c: f64) -> Affine<f64> {
+    let at = |joint: &Joint, temp_c: f64| {
+        let curves = joint.curves[sensor].as_ref().expect("both were recorded");
+        curves.forward(temp_c)[0]
+    };
+    let [low, high] = soak.curves[sensor]
+        .as_ref()
+        .expect("both were recorded")
+        .range_c;
+    let middle = 0.5 * (low + high);
+    let model = match how {
+        Model::AsFitted => at(joint, die_c),
+        Model::OneTemperature => at(joint, middle),
+        Model::WithM => {
+            let (own, all) = (at(joint, die_c), at(soak, middle).matrix);
+            let m = Matrix3::from_fn(|i, j| all[(i, j)] / all[(i, i)]);
+            let scale = Matrix3::from_diagonal(&own.matrix.diagonal());
+            Forward {
+                matrix: scale * m,
+                bias: own.bias,
+            }
+        }
+    };
+    model.inverse().expect("scale factors do not vanish")
+}

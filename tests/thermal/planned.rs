@@ -1,0 +1,117 @@
+//! Standard deviations that `mimu thermal plan --procedure ramp` promises, against the scatter of as many recordings of that plan.
+
+use mimu::design::budget::DwellNoise;
+use mimu::quantity::Sensor;
+use mimu_thermal::basis::Shape;
+use mimu_thermal::fit::{Estimator, Options, fit};
+use mimu_thermal::joint::Joint;
+use mimu_thermal::plan::{Procedure, Request, plan, to_toml};
+use nalgebra::SVector;
+use rayon::prelude::*;
+
+use crate::on_bench::{noiseless, read, session, unit};
+
+/// What the command asks for without further options.
+fn request() -> Request {
+    Request {
+        procedure: Procedure::Ramp,
+        range_c: [-10.0, 70.0],
+        shape: Shape::Cubic,
+        kelvin_per_min: 2.0,
+        set_points: 9,
+        soak_s: 1800.0,
+        dwell_s: 20.0,
+        largest_dps: 50.0,
+        sample_rate_hz: 100.0,
+        noise: Sensor::BOTH.map(DwellNoise::fang),
+    }
+}
+
+/// Prints promised and found, of the worst axis: deg/h, ppm and ppm; µg, ppm and ppm.
+pub fn run(runs: u64) {
+    let planned = plan(&request()).expect("a plan");
+    let text = to_toml(&planned, request().sample_rate_hz);
+    let mut file = unit(&read("rigs/fang-soak.toml"), 1);
+    // The dies are as warm as the chamber, as the plan takes them to be; the noise is all that it was made for.
+    file.thermal.board_lag_s = Some(10.0);
+    file.thermal.board_heating_c = Some(0.0);
+    file.thermal.die_heating_c = Some([0.0; 4]);
+    (
+        file.curves.gyro.noise_at_c_raw,
+        file.curves.accel.noise_at_c_raw,
+    ) = (None, None);
+    for (axes, noise) in [&mut file.unit.gyro_axes, &mut file.unit.accel_axes]
+        .into_iter()
+        .zip(request().noise)
+    {
+        (axes.white_si, axes.instability_si, axes.walk_si) =
+            (Some([noise.n; 3]), Some([noise.b; 3]), Some([noise.k; 3]));
+    }
+    let by = |session| {
+        let options = Options {
+            estimator: Estimator::Cubic,
+            lag_s: None,
+            range_c: None,
+        };
+        fit(vec![session], &[], options)
+            .expect("it is fitted")
+            .joint
+    };
+    let each = (0..runs)
+        .into_par_iter()
+        .map(|k| by(session(&text, &file, 100 + k)));
+    let each: Vec<Joint> = each.collect();
+    // Cubics are what the curves of this unit are, so that a fit without noise is the truth.
+    let truth = by(session(&text, &noiseless(&file), 1));
+    println!("{runs} recordings: promised, rms of the errors of one cubic (of their mean)\n");
+    println!("| sensor, °C | bias | scale factor | cross terms |\n|---|---|---|---|");
+    for prediction in &planned.sensors {
+        let sensor = prediction.sensor as usize;
+        let bias = [180.0 / std::f64::consts::PI * 3600.0, 1e6 / 9.80665][sensor];
+        for at in &prediction.at {
+            let model = |joint: &Joint| {
+                let curves = joint.curves[sensor].as_ref().expect("recorded");
+                curves.forward(at.temp_c)[0]
+            };
+            let numbers = |joint: &Joint| -> SVector<f64, 12> {
+                mimu::triad::vector(&model(joint).matrix, &model(joint).bias)
+            };
+            let gains = model(&truth).matrix.diagonal();
+            let errors: Vec<SVector<f64, 12>> = each
+                .iter()
+                .map(|joint| numbers(joint) - numbers(&truth))
+                .collect();
+            let mean = errors.iter().sum::<SVector<f64, 12>>() / runs as f64;
+            let squares = errors
+                .iter()
+                .map(|e| e.map(|x| x * x))
+                .sum::<SVector<f64, 12>>()
+                / runs as f64;
+            let kinds = [
+                (at.bias, &[9, 10, 11][..], bias),
+                (at.scale, &[0, 4, 8], 1e6),
+                (at.cross, &[1, 2, 3, 5, 6, 7], 1e6),
+            ];
+            let cells = kinds.map(|(promised, kind, unit)| {
+                let relative = |k: usize| unit / gains[if k < 9 { k / 3 } else { k - 9 }];
+                let worst = |of: &dyn Fn(usize) -> f64| {
+                    kind.iter()
+                        .map(|k| of(*k) * relative(*k))
+                        .fold(0.0, f64::max)
+                };
+                format!(
+                    "{:.1}, {:.1} ({:.1})",
+                    promised.unwrap_or(f64::NAN) * unit,
+                    worst(&|k| squares[k].sqrt()),
+                    worst(&|k| mean[k].abs())
+                )
+            });
+            println!(
+                "| {}, {:.0} | {} |",
+                prediction.sensor,
+                at.temp_c,
+                cells.join(" | ")
+            );
+        }
+    }
+}

@@ -1,0 +1,304 @@
+//! `rig/plans/thermal.toml` with units of `rig/rigs/thermal.toml`: one fit for each seed, against the truth and against what was planned.
+//!
+//! The truth is asked of the bench itself: the same unit without noise, for a few seconds at each of several temperatures at which it has
+//! stood for ever, with six faces and rates both ways.
+
+use std::fmt::Write as _;
+
+use mimu::quantity::Sensor;
+use mimu_rig::rig_file::RigFile;
+use mimu_thermal::basis::Shape;
+use mimu_thermal::fit::{Estimator, Options, ThermalFit, fit};
+use mimu_thermal::regression::{AxisNoise, Normal, Problem};
+use mimu_thermal::session::Session;
+use nalgebra::{Matrix4, Matrix4x3, SVector};
+use rayon::prelude::*;
+
+use crate::on_bench::{noiseless, read, session, unit};
+
+/// Temperatures of the chamber at which the truth is asked for, °C.
+const PROBES: [f64; 7] = [-16.0, -5.0, 6.0, 17.0, 28.0, 39.0, 50.0];
+/// Bias instability as a bias that wanders for so long, s, as `mimu thermal plan` has it, and its floor.
+const WANDER_S: f64 = 1000.0;
+const FLOOR: f64 = 0.664;
+/// Units of bias, scale factor and cross terms: of gyro, then accelerometer.
+const UNITS: [f64; 6] = [
+    180.0 / std::f64::consts::PI * 3600.0,
+    1e6,
+    1e6,
+    1e6 / 9.80665,
+    1e6,
+    1e6,
+];
+/// Errors beyond so many of their own standard deviations, rms, are wrong.
+const WRONG: f64 = 2.0;
+/// Seeds of the variants.
+const FEWER: u64 = 8;
+
+/// Twelve numbers at a temperature of the thermometer.
+type At = (f64, SVector<f64, 12>);
+
+/// Of one seed: for each of the six kinds errors and standard deviations, claimed and planned.
+struct Outcome {
+    verdict: String,
+    numbers: [Vec<[f64; 3]>; 6],
+}
+
+/// Prints a table of seeds for each variant.
+pub fn run(runs: u64) {
+    let rig = read("rigs/thermal.toml");
+    let lagging = "[[effect]]\nid = \"gyro_thermal_lag\"\n";
+    let without = rig.replace(lagging, "");
+    assert_ne!(rig, without, "the rig file has the effect");
+    let plan = read("plans/thermal.toml");
+    let chamber = plan
+        .split("chamber_c = ")
+        .nth(1)
+        .and_then(|s| s.lines().next());
+    println!("chamber: {}", chamber.unwrap_or_default());
+    for (name, text, own_lag) in [
+        ("as it is", &rig, false),
+        (
+            "as it is, with the lag of the accelerometer alone",
+            &rig,
+            true,
+        ),
+        ("without gyro_thermal_lag", &without, false),
+    ] {
+        println!(
+            "\n{name}: rms of errors over their standard deviations, then errors (planned sigma): bias, scale, cross terms"
+        );
+        // The first is the question, the others say why.
+        let runs = if text == &rig && !own_lag {
+            runs
+        } else {
+            runs.min(FEWER)
+        };
+        let each = (1..=runs)
+            .into_par_iter()
+            .map(|seed| once(&plan, text, own_lag, seed));
+        let outcomes: Vec<Outcome> = each.collect();
+        for (k, o) in outcomes.iter().enumerate() {
+            println!("| {} | {} | {}", k + 1, o.verdict, cells(&[o]));
+        }
+        println!("| all | | {}", cells(&outcomes.iter().collect::<Vec<_>>()));
+    }
+}
+
+fn cells(outcomes: &[&Outcome]) -> String {
+    let mut out = String::new();
+    for kind in 0..6 {
+        let all: Vec<&[f64; 3]> = outcomes.iter().flat_map(|o| &o.numbers[kind]).collect();
+        if all.is_empty() {
+            out.push_str(" - |");
+            continue;
+        }
+        let rms = |of: &dyn Fn(&[f64; 3]) -> f64| {
+            (all.iter().map(|n| of(n).powi(2)).sum::<f64>() / all.len() as f64).sqrt()
+        };
+        let held = all.iter().filter(|n| n[0].abs() <= 1.96 * n[1]).count();
+        let _ = write!(
+            out,
+            " {:.1}, {:.0} %, {:.1} ({}) |",
+            rms(&|n| n[0] / n[1]),
+            100.0 * held as f64 / all.len() as f64,
+            rms(&|n| n[0]),
+            match rms(&|n| n[2]) {
+                planned if planned.is_finite() => format!("{planned:.1}"),
+                _ => "not determined".into(),
+            }
+        );
+    }
+    out
+}
+
+fn once(plan: &str, rig: &str, own_lag: bool, seed: u64) -> Outcome {
+    let file = unit(rig, seed);
+    let recorded = session(plan, &file, seed);
+    let by = |lag_s| {
+        let options = Options {
+            estimator: Estimator::Joint,
+            lag_s,
+            range_c: None,
+        };
+        fit(vec![recorded.clone()], &[], options)
+    };
+    let mut found = by(None);
+    if let (true, Ok(first)) = (own_lag, &found)
+        && let Some((each, _)) = &first.joint.apart
+    {
+        found = by(Some(each[1].lag.value));
+    }
+    match found {
+        Err(refused) => Outcome {
+            verdict: format!("refused: {refused}"),
+            numbers: Default::default(),
+        },
+        Ok(found) => judged(&found, &recorded, &file, seed),
+    }
+}
+
+fn judged(found: &ThermalFit, recorded: &Session, file: &RigFile, seed: u64) -> Outcome {
+    let mut numbers: [Vec<[f64; 3]>; 6] = Default::default();
+    for sensor in Sensor::BOTH {
+        let curves = found.joint.curves[sensor as usize]
+            .as_ref()
+            .expect("recorded");
+        let planned = planned(recorded, file, sensor);
+        for (temp_c, truth) in probes(file, sensor, seed) {
+            if !(curves.range_c[0]..=curves.range_c[1]).contains(&temp_c) {
+                continue;
+            }
+            let [model, _] = curves.forward(temp_c);
+            let error = mimu::triad::vector(&model.matrix, &model.bias) - truth;
+            let (covariance, gain) = (curves.covariance(temp_c), truth[0]);
+            for k in 0..12 {
+                let kind = 3 * sensor as usize
+                    + match k {
+                        0 | 4 | 8 => 1,
+                        9.. => 0,
+                        _ => 2,
+                    };
+                let unit = UNITS[kind] / gain;
+                let sigma = covariance[(k, k)].sqrt();
+                numbers[kind].push([
+                    error[k] * unit,
+                    sigma * unit,
+                    planned(k, temp_c) * UNITS[kind],
+                ]);
+            }
+        }
+    }
+    let wrong = |n: &Vec<[f64; 3]>| {
+        (n.iter().map(|n| (n[0] / n[1]).powi(2)).sum::<f64>() / n.len() as f64).sqrt() > WRONG
+    };
+    let names = [
+        "gyro bias",
+        "gyro scale",
+        "gyro cross",
+        "accel bias",
+        "accel scale",
+        "accel cross",
+    ];
+    let bad = numbers
+        .iter()
+        .zip(names)
+        .filter(|(n, _)| wrong(n))
+        .map(|(_, name)| name);
+    let bad: Vec<&str> = bad.collect();
+    let lag = match &found.joint.apart {
+        Some(([g, a], _)) => format!("{:.1} / {:.1}", g.lag.value, a.lag.value),
+        None => "one".into(),
+    };
+    Outcome {
+        verdict: format!(
+            "{}, lag {:.1} s (of each: {lag}), {}",
+            found.verdict.name(),
+            found.joint.profile.lag.value,
+            match bad.is_empty() {
+                true => "right".into(),
+                false => format!("wrong: {}", bad.join(", ")),
+            }
+        ),
+        numbers,
+    }
+}
+
+/// True forward models of `sensor`, by least squares through readings without noise.
+fn probes(file: &RigFile, sensor: Sensor, seed: u64) -> Vec<At> {
+    let mut still = noiseless(file);
+    still.thermal.on_before_s = Some(f64::INFINITY);
+    let each = PROBES.iter().map(|chamber_c| {
+        let mut plan = format!(
+            "format = \"mimu-plan/1\"\nsample_rate_hz = 50.0\ncarrier = \"table\"\nlatitude_deg = 30.5\ngravity_mps2 = 9.793\n\
+             chamber_c = [[0.0, {chamber_c:?}]]\nlead_in_s = 2.0\n"
+        );
+        for axis in 0..3 {
+            for sign in [1.0, -1.0] {
+                let up: [f64; 3] = std::array::from_fn(|i| if i == axis { sign } else { 0.0 });
+                let still = format!("[[step]]\nup = {up:?}\ndwell_s = 2.0\n");
+                plan.push_str(&still);
+                let up = up.map(f64::abs);
+                let _ = write!(plan, "[[step]]\nup = {up:?}\nrate_dps = {:?}\ndwell_s = 2.0\n", 50.0 * sign);
+            }
+        }
+        let probe = session(&plan, &still, seed);
+        let rows = &probe.rows[sensor as usize];
+        let (mut gram, mut with) = (Matrix4::zeros(), Matrix4x3::zeros());
+        for r in rows {
+            let x = r.input.push(1.0);
+            gram += x * x.transpose();
+            with += x * r.raw.transpose();
+        }
+        let solved = gram.try_inverse().expect("it is excited") * with;
+        let temp_c = rows.iter().map(|r| probe.thermometer.at(r.middle_s).0).sum::<f64>() / rows.len() as f64;
+        let number = |k: usize, _| if k < 9 { solved[(k % 3, k / 3)] } else { solved[(3, k - 9)] };
+        (temp_c, SVector::<f64, 12>::from_fn(number))
+    });
+    each.collect()
+}
+
+/// Standard deviation of a number at a temperature by the information matrix of cubics with the true noise and a lag of zero, relative to
+/// the gain; infinite where it is singular.
+fn planned(recorded: &Session, file: &RigFile, sensor: Sensor) -> impl Fn(usize, f64) -> f64 {
+    let temp = |r: &mimu_thermal::session::Row| recorded.thermometer.at(r.middle_s).0;
+    let dies: Vec<f64> = recorded.rows[sensor as usize].iter().map(temp).collect();
+    let range = dies
+        .iter()
+        .fold([f64::INFINITY, f64::NEG_INFINITY], |r, t| {
+            [r[0].min(*t), r[1].max(*t)]
+        });
+    let problem = Problem::new(
+        std::slice::from_ref(recorded),
+        sensor,
+        Shape::Cubic,
+        range,
+        false,
+    )
+    .expect("determined");
+    let axes = match sensor {
+        Sensor::Gyro => &file.unit.gyro_axes,
+        Sensor::Accel => &file.unit.accel_axes,
+    };
+    let of = |key: Option<[f64; 3]>, axis: usize| key.expect("drawn")[axis];
+    let row_s = problem.samples / recorded.rate_hz;
+    let inverses = [0, 1, 2].map(|axis| {
+        let noise = AxisNoise {
+            white: of(axes.white_si, axis).powi(2) / row_s,
+            wander: (FLOOR * of(axes.instability_si, axis)).powi(2)
+                + of(axes.walk_si, axis).powi(2) * WANDER_S,
+            correlation_s: WANDER_S,
+        };
+        let gram = Normal::of(&problem, axis, &dies, &noise, |_| true).gram;
+        let scale = gram.diagonal().map(|d| 1.0 / d.max(1e-300).sqrt());
+        let both = nalgebra::DMatrix::from_diagonal(&scale);
+        let correlation = &both * gram * &both;
+        let least = correlation.symmetric_eigenvalues().min();
+        correlation
+            .try_inverse()
+            .filter(|_| least > 1e-12)
+            .map(|i| &both * i * &both)
+    });
+    move |number, temp_c| {
+        let (axis, input) = if number < 9 {
+            (number / 3, Some(number % 3))
+        } else {
+            (number - 9, None)
+        };
+        let Some(inverse) = &inverses[axis] else {
+            return f64::INFINITY;
+        };
+        let parts = problem.parts(axis);
+        let part = parts
+            .iter()
+            .find(|p| p.input == input)
+            .expect("every curve has a part");
+        let (from, v) = problem.basis(part.kind).values(temp_c);
+        let at = part.from + from;
+        let sum: f64 = (0..4)
+            .flat_map(|i| (0..4).map(move |j| (i, j)))
+            .map(|(i, j)| v[i] * v[j] * inverse[(at + i, at + j)])
+            .sum();
+        sum.sqrt()
+    }
+}
