@@ -1,7 +1,7 @@
 //! `mimu wizard`, from its arguments to its exit status.
 #![cfg(unix)]
 
-mod bench;
+pub mod bench;
 mod on_board;
 mod playback;
 mod screen;
