@@ -7,7 +7,6 @@ use std::process::{Child, Output, Stdio};
 use std::time::{Duration, Instant};
 
 use mimu::calibration::Calibration;
-use mimu::quantity::Sensor;
 use mimu_recording::{Manifest, Recording, Reference};
 use mimu_rig::located::Source;
 use mimu_rig::plan::Plan;
@@ -15,6 +14,7 @@ use mimu_rig::rig_file::RigTruth;
 use serde_json::Value;
 
 use crate::wizard::bench::{Bench, unit};
+use crate::wizard::on_board::errors;
 
 /// Rates both ways about all axes, and a turn by an angle there and back, while the chamber goes from 12 to 25 °C.
 fn sweep() -> String {
@@ -164,9 +164,16 @@ fn a_plan_is_carried_out_and_its_recording_has_the_inputs_of_the_bench_and_is_fi
         .unwrap();
     assert!(out.status.success(), "{}", self::told(&out));
     let fit = json(&bench.path("fit.json"));
-    println!("{told}\n{}", serde_json::to_string_pretty(&fit).unwrap());
+    let range = &fit["range_c"];
+    println!("{told}\n{}", fit["sensors"]);
+    // By their own power the dies are warmer than the chamber.
+    let span = range[1].as_f64().unwrap() - range[0].as_f64().unwrap();
+    assert!((10.0..14.0).contains(&span), "{range}");
     let calibration = Calibration::read(&bench.path("cal.toml")).unwrap();
-    let _ = (calibration, Sensor::BOTH);
+    let [gyro, accel] = errors(&calibration, &bench.truth);
+    println!("errors: gyro {gyro:.5} rad/s, accel {accel:.5} m/s²");
+    // As of a session of the wizard: 18 dwells of 1.5 s in place of twelve of a second, and a slope over temperature besides.
+    assert!(gyro < 0.2f64.to_radians() && accel < 0.02, "{gyro} {accel}");
 }
 
 /// Waits until the command has written so many bytes of samples.

@@ -9,7 +9,6 @@ use serde::Deserialize;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::read_text;
 
-use super::procedure::Procedure;
 use super::turn::{Angles, TableAxis, Turn};
 
 /// A plan of more is a mistake in it.
@@ -39,13 +38,13 @@ pub struct Plan {
     #[serde(default)]
     pub gravity_mps2: Option<f64>,
     #[serde(default)]
-    chamber_c: Vec<[f64; 2]>,
+    pub(super) chamber_c: Vec<[f64; 2]>,
     #[serde(default)]
-    lead_in_s: f64,
+    pub(super) lead_in_s: f64,
     #[serde(default = "once")]
-    rounds: u32,
+    pub(super) rounds: u32,
     #[serde(default)]
-    round_s: Option<f64>,
+    pub(super) round_s: Option<f64>,
     step: Vec<Step>,
 }
 
@@ -128,8 +127,10 @@ impl Plan {
                 "correct the line, or have `mimu design -o` or `mimu thermal plan -o` write the plan",
             )
         })?;
-        if plan.rounds == 0 {
-            return Err(Error::new(place, "rounds is 0", "write one or more"));
+        if !(1..=MOST_DWELLS).contains(&(plan.rounds as usize)) {
+            let problem = format!("rounds is {}", plan.rounds);
+            let remedy = format!("write one or more, up to {MOST_DWELLS}");
+            return Err(Error::new(place, problem, remedy));
         }
         if plan.format != "mimu-plan/1" {
             let problem = format!("format is {:?}, and a plan is \"mimu-plan/1\"", plan.format);
@@ -173,21 +174,6 @@ impl Plan {
             true => Err(Error::new(place, "it has no dwell", "add a [[step]]")),
             false => Ok(all),
         }
-    }
-
-    /// The same with the temperatures of the chamber, and when each is due.
-    pub fn procedure(&self, gravity_mps2: f64, place: &str) -> Result<Procedure> {
-        let dwells = self.dwells(gravity_mps2, place)?;
-        let rounds = self.rounds as usize;
-        Procedure {
-            per_round: dwells.len() / rounds,
-            dwells,
-            rounds,
-            chamber_c: self.chamber_c.clone(),
-            lead_in_s: self.lead_in_s,
-            round_s: self.round_s,
-        }
-        .checked(place)
     }
 }
 

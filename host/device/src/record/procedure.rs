@@ -2,7 +2,7 @@
 
 use mimu_recording::error::{Error, Result};
 
-use super::plan::Planned;
+use super::plan::{Plan, Planned};
 
 /// Longest procedure, s: a plan that asks for more has a wrong unit in it.
 const LONGEST_S: f64 = 48.0 * 3600.0;
@@ -24,8 +24,25 @@ pub struct Procedure {
     pub round_s: Option<f64>,
 }
 
+impl Plan {
+    /// Its dwells with the temperatures of the chamber, and when each is due; `place` is its path.
+    pub fn procedure(&self, gravity_mps2: f64, place: &str) -> Result<Procedure> {
+        let dwells = self.dwells(gravity_mps2, place)?;
+        let rounds = self.rounds as usize;
+        Procedure {
+            per_round: dwells.len() / rounds,
+            dwells,
+            rounds,
+            chamber_c: self.chamber_c.clone(),
+            lead_in_s: self.lead_in_s,
+            round_s: self.round_s,
+        }
+        .checked(place)
+    }
+}
+
 impl Procedure {
-    pub(super) fn checked(self, place: &str) -> Result<Self> {
+    fn checked(self, place: &str) -> Result<Self> {
         let at = |key: &str| format!("{place}, {key}");
         if self.chamber_c.is_empty() {
             let problem = "the plan has no temperatures (chamber_c)";

@@ -2,7 +2,7 @@
 #![cfg(unix)]
 
 pub mod bench;
-mod on_board;
+pub mod on_board;
 mod playback;
 mod screen;
 mod text;
