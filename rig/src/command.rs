@@ -1,6 +1,7 @@
 //! A carrier that is told where to go while it goes, in place of a plan.
 
 use crate::motion::Carrier;
+use crate::plan::Turn;
 use crate::rotation::Vector;
 
 /// What a carrier can be told.
@@ -17,6 +18,8 @@ pub enum Command {
     Rate(f64),
     /// Rate about the body's z axis by the inner axis, rad/s, kept likewise.
     Spin(f64),
+    /// From rest, one axis of a table by an angle.
+    Turn(Turn),
     /// To rest where it is.
     Stop,
     /// In every so many-th pose from now on a hand moves once, some seconds after it has come to rest; 0 is never.

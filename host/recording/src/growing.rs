@@ -41,6 +41,11 @@ struct Disk {
 }
 
 impl Growing {
+    /// Refuses a directory in which none can be begun.
+    pub fn check(directory: &Path) -> Result<()> {
+        check_target(directory, None)
+    }
+
     /// Begins a recording in a new directory. Its manifest is written now, and says that it is unfinished.
     pub fn create(directory: &Path, columns: Columns, manifest: &Manifest) -> Result<Self> {
         let place = directory.join(MANIFEST_FILE).display().to_string();

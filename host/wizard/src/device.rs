@@ -16,7 +16,7 @@ use crate::source::{Chunk, Heard, Source, Unit};
 const SILENCE: Duration = Duration::from_secs(2);
 
 /// What the sensors' data sheets say: ADXRS300, 2.5 V and 5 mV per deg/s; MMA7260QT at 1.5 g, 1.65 V and 800 mV/g.
-fn nominal() -> [Affine<f64>; 2] {
+pub(crate) fn nominal() -> [Affine<f64>; 2] {
     let triad = |null: f64, raw_per_si: f64| Affine {
         matrix: Matrix3::identity() / raw_per_si,
         offset: Vector3::repeat(-null / raw_per_si),

@@ -13,7 +13,8 @@
 //! | [`folder`] | the journal and the recordings, from which a killed session goes on |
 //! | [`one`] | one of the units: its dwells, had or thrown away |
 //! | [`bank`] | the device's own Kalman filters beside it |
-//! | [`drive`] | what turns the unit: a person, or a turntable that takes text commands |
+//! | [`drive`] | what turns and warms the unit: a person, or a table and a chamber that take text commands |
+//! | [`carry_out`] | a procedure over temperature: chamber and table led through a plan, and one recording of it |
 //! | [`event`] | what a session says and asks; views show it |
 //! | [`wizard`] | which step comes next, and who has had it |
 //! | [`store`] | into the device, back, and over a loss of the supply |
@@ -21,6 +22,7 @@
 //! | [`session`] | all of it, in order |
 
 pub mod bank;
+pub mod carry_out;
 pub mod device;
 pub mod drive;
 pub mod event;

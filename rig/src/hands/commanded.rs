@@ -147,7 +147,7 @@ impl Commanded for Hands {
                     told.busy_s = told.busy_s.min(last.dwell[0].max(t_s));
                 }
             }
-            Command::Rate(_) | Command::Spin(_) => {
+            Command::Rate(_) | Command::Spin(_) | Command::Turn(_) => {
                 let problem = "by hand nobody turns at a steady rate; serve a bench with a table";
                 done = Err(problem.into());
             }

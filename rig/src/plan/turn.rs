@@ -29,7 +29,7 @@ impl TableAxis {
     }
 
     /// What a plan calls it.
-    pub(crate) fn name(self) -> &'static str {
+    pub fn name(self) -> &'static str {
         ["outer", "middle", "inner"][self.number()]
     }
 }

@@ -43,6 +43,10 @@ impl Commanded for Table {
             }
             Command::Rate(rate) => self.turn(t_s, rate, spin)?,
             Command::Spin(spin) => self.turn(t_s, rate, spin)?,
+            Command::Turn(turn) => {
+                let done = self.controller.turn_from(t_s, turn);
+                done.map_err(|(problem, remedy)| format!("{problem}; {remedy}"))?;
+            }
             Command::Stop => self.controller.halt(t_s),
             Command::Fidget(_) | Command::Hold(_) => {
                 return Err("the unit is on a table; serve a bench by hand".into());

@@ -158,7 +158,8 @@ impl Controller {
         }
         let i = turn.axis.number();
         let to = self.axes[i].end().0 + turn.angle;
-        self.check_turn(step, turn, to)?;
+        let refused = |(problem, remedy)| Beyond::step(step, problem, remedy);
+        self.check_turn(turn, to).map_err(refused)?;
         let start_s = self.now();
         let acceleration = self.truth.max_acceleration_dps2[i].to_radians();
         self.axes[i].move_to(to, turn.rate, acceleration);
@@ -172,7 +173,8 @@ impl Controller {
         Ok(())
     }
 
-    fn check_turn(&self, step: &Step, turn: Turn, to: f64) -> Result<(), Beyond> {
+    /// Refuses a turn to an angle that the axis does not reach, or too fast a one: what is wrong, and what to do.
+    fn check_turn(&self, turn: Turn, to: f64) -> Result<(), (String, &'static str)> {
         let name = turn.axis.name();
         let fastest = self.truth.max_rate_dps[turn.axis.number()];
         let (problem, remedy) = if turn.axis == TableAxis::Outer && !self.limits.outer {
@@ -191,7 +193,7 @@ impl Controller {
         } else {
             return Ok(());
         };
-        Err(Beyond::step(step, problem, remedy))
+        Err((problem, remedy))
     }
 
     /// Pose, rates up, dwells, rates down. Between the dwells of one pose nothing stops. Without a pose it stays.
@@ -262,6 +264,25 @@ impl Controller {
         self.hold(0.0);
         self.rates = [0.0; 2];
         self.posed(t_s);
+    }
+
+    /// One axis by an angle from where all of them stand.
+    pub(super) fn turn_from(&mut self, t_s: f64, turn: Turn) -> Result<(), (String, &'static str)> {
+        // On the way to a pose nobody could say where the turn begins.
+        if t_s < self.busy_s || self.rates != [0.0; 2] {
+            let problem = "a turn by an angle begins at rest, and the table moves".to_owned();
+            return Err((problem, "send `STOP`, and wait until `BUSY?` is 0"));
+        }
+        let i = turn.axis.number();
+        let to = self.axes[i].end().0 + turn.angle;
+        self.check_turn(turn, to)?;
+        let from_s = t_s.max(self.lead_in_s);
+        self.halt(from_s);
+        let acceleration = self.truth.max_acceleration_dps2[i].to_radians();
+        self.axes[i].move_to(to, turn.rate, acceleration);
+        self.hold(0.0);
+        self.posed(from_s);
+        Ok(())
     }
 
     /// Takes note of when it is done with what it was told at `from_s`.

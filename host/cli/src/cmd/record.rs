@@ -66,7 +66,7 @@ pub struct RecordArgs {
     json: JsonArgs,
 }
 
-fn patience(text: &str) -> std::result::Result<Duration, String> {
+pub(crate) fn patience(text: &str) -> std::result::Result<Duration, String> {
     match text {
         "0" => Ok(Duration::ZERO),
         text => duration(text),
@@ -83,24 +83,15 @@ pub fn run(args: &RecordArgs) -> Result<()> {
     let inputs: Vec<&Path> = inputs.into_iter().flatten().collect();
     check_outputs(&[args.json.file()], &inputs)?;
     let plan = args.plan.as_deref().map(Plan::read).transpose()?;
-    let of_plan = |key: fn(&Plan) -> Option<f64>| plan.as_ref().and_then(key);
-    let latitude_deg = args.latitude.or(of_plan(|plan| plan.latitude_deg));
-    let given = args.gravity.or(match args.latitude {
-        None => of_plan(|plan| plan.gravity_mps2),
-        Some(_) => None,
-    });
-    let gravity_mps2 = match (given, latitude_deg) {
-        (Some(gravity), _) => gravity,
-        (None, Some(latitude)) => normal_gravity(latitude),
-        (None, None) => {
-            eprintln!(
-                "warning: gravity is taken to be 9.80665 m/s²; it ranges from 9.78 to 9.83, and every scale factor of the accelerometer with it: give --gravity or --latitude"
-            );
-            9.80665
-        }
-    };
+    let latitude_deg = args.latitude.or(plan.as_ref().and_then(|p| p.latitude_deg));
+    let gravity_mps2 = gravity(args.gravity, args.latitude, plan.as_ref());
     let (known, table) = match (&plan, &args.plan, &args.inputs) {
         (Some(plan), Some(path), _) => {
+            if args.transit.is_some() && plan.is_procedure() {
+                let problem = "its turns or rounds take as long as the table does, and no fixed transit fits them";
+                let remedy = "have `mimu thermal record` carry it out, or mark the dwells: --steps";
+                return Err(Error::new(path.display(), problem, remedy));
+            }
             let dwells = plan.dwells(gravity_mps2, &path.display().to_string())?;
             (Some(Known::of_plan(dwells)), plan.is_of_table())
         }
@@ -138,6 +129,7 @@ pub fn run(args: &RecordArgs) -> Result<()> {
         duration: args.duration,
         steps,
         reconnect: args.reconnect,
+        one_power_on: false,
         table,
         device: (args.device.clone()).or(plan.as_ref().and_then(|plan| plan.device.clone())),
         gravity_mps2,
@@ -158,6 +150,7 @@ pub fn run(args: &RecordArgs) -> Result<()> {
         Wish {
             end: stop.load(Ordering::Relaxed),
             marks: marks.as_ref().map_or(0, |m| m.swap(0, Ordering::Relaxed)),
+            drop: None,
         }
     };
     let bar = progress("writing parquet");
@@ -168,6 +161,25 @@ pub fn run(args: &RecordArgs) -> Result<()> {
     bar.finish_and_clear();
     print(&args.json, &report::record_text(&summary), &summary, None)?;
     summary.broken_off.map_or(Ok(()), Err)
+}
+
+/// Local gravity, m/s²: given, or that of the plan unless a latitude is given, or of the latitude.
+pub(crate) fn gravity(given: Option<f64>, latitude_deg: Option<f64>, plan: Option<&Plan>) -> f64 {
+    let of_plan = |key: fn(&Plan) -> Option<f64>| plan.and_then(key);
+    let given = given.or(match latitude_deg {
+        None => of_plan(|plan| plan.gravity_mps2),
+        Some(_) => None,
+    });
+    match (given, latitude_deg.or(of_plan(|plan| plan.latitude_deg))) {
+        (Some(gravity), _) => gravity,
+        (None, Some(latitude)) => normal_gravity(latitude),
+        (None, None) => {
+            eprintln!(
+                "warning: gravity is taken to be 9.80665 m/s²; it ranges from 9.78 to 9.83, and every scale factor of the accelerometer with it: give --gravity or --latitude"
+            );
+            9.80665
+        }
+    }
 }
 
 /// What is to be done in each dwell, as far as that is known.

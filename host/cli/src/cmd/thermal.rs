@@ -1,6 +1,7 @@
 //! `mimu thermal`.
 
 mod plan;
+mod record;
 
 use std::path::PathBuf;
 
@@ -36,6 +37,8 @@ enum ThermalCommand {
     Compare(CompareArgs),
     /// Plan a procedure: how long it takes, and how well the curves are known afterwards
     Plan(plan::PlanArgs),
+    /// Carry a plan out: lead the chamber, move the table, and record the device
+    Record(record::RecordArgs),
 }
 
 #[derive(Args)]
@@ -133,6 +136,7 @@ pub(crate) fn run(args: &ThermalArgs) -> Result<()> {
         ThermalCommand::Fit(args) => run_fit(args),
         ThermalCommand::Compare(args) => run_compare(args),
         ThermalCommand::Plan(args) => plan::run(args),
+        ThermalCommand::Record(args) => record::run(args),
     }
 }
 

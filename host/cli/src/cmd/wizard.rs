@@ -295,6 +295,12 @@ fn planned(plan: &Plan, fixture: Fixture, gravity_mps2: f64, path: &Path) -> Res
                 "write up = [x, y, z], or leave --plan out",
             ));
         };
+        if dwell.turn.is_some() {
+            let at = format!("{place}, dwell {k}");
+            let problem = "it is a turn by an angle, and the wizard has dwells only";
+            let remedy = "have `mimu thermal record` carry it out, or give another plan";
+            return Err(Error::new(at, problem, remedy));
+        }
         if dwell.rate_dps != 0.0 && fixture != Fixture::Table {
             let at = format!("{place}, dwell {k}");
             let problem = "it turns, and nothing but a table holds a rate";
@@ -319,11 +325,11 @@ pub(crate) fn run(args: &WizardArgs) -> Result<()> {
     let wanted = args.wanted()?;
     let driver: Box<dyn Driver> = match args.drivers.as_slice() {
         [] => Box::new(Person),
-        [path] => Box::new(TextDriver::open(path)?),
+        [path] => Box::new(TextDriver::open_table(path)?),
         paths => {
-            let each = paths
-                .iter()
-                .map(|path| -> Result<Box<dyn Driver>> { Ok(Box::new(TextDriver::open(path)?)) });
+            let each = paths.iter().map(|path| -> Result<Box<dyn Driver>> {
+                Ok(Box::new(TextDriver::open_table(path)?))
+            });
             Box::new(Together(each.collect::<Result<_>>()?))
         }
     };

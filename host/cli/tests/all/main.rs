@@ -14,4 +14,5 @@ mod pocket_calculator;
 mod readme;
 mod thermal_command;
 mod thermal_plan_command;
+mod thermal_record_command;
 mod wizard;

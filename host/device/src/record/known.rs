@@ -47,7 +47,9 @@ impl Known {
         match &self.source {
             Source::Table(inputs) => inputs.columns,
             Source::Plan(dwells) => {
-                std::array::from_fn(|i| dwells.iter().any(|d| !d.input[i].is_nan()))
+                let known =
+                    |d: &Planned, i: usize| !d.input[i].is_nan() || i < 3 && d.turn.is_some();
+                std::array::from_fn(|i| dwells.iter().any(|d| known(d, i)))
             }
         }
     }
@@ -88,7 +90,7 @@ impl Known {
             return UNKNOWN;
         };
         let known = match &mut self.source {
-            Source::Plan(dwells) => dwells.get(at).map(|d| d.input),
+            Source::Plan(dwells) => dwells.get(at).map(|d| d.input_over(duration_s)),
             Source::Table(inputs) => {
                 let label = self.labels.get(at).map(String::as_str);
                 inputs.of_step(step, label, duration_s)
@@ -99,7 +101,21 @@ impl Known {
 
     /// Whether a rate was not known before the end of its dwell.
     pub(super) fn has_turns(&self) -> bool {
-        matches!(&self.source, Source::Table(inputs) if inputs.has_turns)
+        match &self.source {
+            Source::Table(inputs) => inputs.has_turns,
+            Source::Plan(dwells) => dwells.iter().any(|d| d.turn.is_some()),
+        }
+    }
+
+    /// Whether a dwell is a turn of a plan, which is of no use unless all of it was recorded.
+    pub(super) fn is_turn(&self, step: i32) -> bool {
+        let at = usize::try_from(step).ok();
+        match &self.source {
+            Source::Table(_) => false,
+            Source::Plan(dwells) => at
+                .and_then(|at| dwells.get(at))
+                .is_some_and(|d| d.turn.is_some()),
+        }
     }
 
     /// Writes the inputs of whole dwells into rows, at the rate of the samples: n samples span n periods.
@@ -123,7 +139,10 @@ impl Known {
     pub(super) fn turns(&self) -> Vec<i32> {
         match &self.source {
             Source::Table(inputs) => inputs.turns.iter().copied().collect(),
-            Source::Plan(_) => Vec::new(),
+            Source::Plan(_) => {
+                let recorded = self.samples.keys().copied();
+                recorded.filter(|step| self.is_turn(*step)).collect()
+            }
         }
     }
 

@@ -7,9 +7,11 @@ mod clock;
 mod known;
 mod line;
 mod plan;
+mod procedure;
 mod reading;
 mod run;
 mod steps;
+mod turn;
 
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -20,8 +22,10 @@ use serde::{Serialize, Serializer};
 
 pub use known::Known;
 pub use plan::{Plan, Planned};
+pub use procedure::Procedure;
 pub use reading::shortest;
 pub use steps::Steps;
+pub use turn::{TableAxis, Turn};
 
 use crate::flagged::Flagged;
 use crate::heard::LineCount;
@@ -46,6 +50,8 @@ pub struct RecordOptions {
     pub steps: Steps,
     /// How long to wait for a port that has vanished; with zero the recording ends.
     pub reconnect: Duration,
+    /// Whether it ends when the device loses its power: what comes then is of another power-on.
+    pub one_power_on: bool,
     /// Whether every dwell has an input that is known: the reference is a table then.
     pub table: bool,
     /// Name of the unit; without it, the number of its microcontroller.
@@ -65,6 +71,8 @@ pub struct Wish {
     pub end: bool,
     /// Times that a dwell was to begin, or the running one to end.
     pub marks: u32,
+    /// A dwell that does not count.
+    pub drop: Option<i32>,
 }
 
 /// How a recording stands.
@@ -94,6 +102,14 @@ pub struct Standing {
     /// The port has vanished, and is waited for.
     #[serde(skip)]
     pub waiting: bool,
+    /// Dwells that do not count: turns that were not recorded as a whole, and what is found to be another input.
+    pub dropped: Vec<i32>,
+    /// It is over, and what was received is about to be ended as a recording: whoever moves the unit may rest.
+    #[serde(skip)]
+    pub ended: bool,
+    /// Mean of the last readings: gyro, accelerometer.
+    #[serde(skip)]
+    pub raw: [f64; 6],
     /// °C, the last.
     pub temp_c: f64,
     /// What the device says is wrong with them.
@@ -196,10 +212,14 @@ pub fn record(
         heard: Instant::now(),
         unit_id: who.unit_id,
         starts: who.starts,
+        one_power_on: options.one_power_on,
         // A program that was killed may have left half a frame.
         line: line::Heard::from(session.count()),
     };
     let ended = run.receive(session, options, &mut look);
+    run.standing.ended = true;
+    run.asks_to_end(&mut look);
+    run.drop_open_turn();
     let mut standing = run.standing;
     standing.line = run.line.total(session.count());
     standing.waiting = false;
@@ -208,6 +228,7 @@ pub fn record(
         recorded.restarts = standing.restarts.clone();
     }
     let rate_hz = manifest.sample_rate_hz;
+    manifest.dropped_steps = standing.dropped.clone();
     let mut known = run.known;
     if let Some(known) = &known {
         manifest.turn_steps = known.turns();

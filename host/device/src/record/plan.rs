@@ -9,12 +9,14 @@ use serde::Deserialize;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::read_text;
 
+use super::turn::{Angles, TableAxis, Turn};
+
 /// A plan of more is a mistake in it.
 const MOST_DWELLS: usize = 100_000;
 /// Directions whose cosine is as near to 1 are the same: a hundredth of a degree.
 const PARALLEL: f64 = 1.5e-8;
 
-/// A plan as `mimu design` writes it. What only the bench needs is read and left alone.
+/// A plan as `mimu design` and `mimu thermal plan` write it. What only the bench needs is read and left alone.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Plan {
@@ -35,10 +37,14 @@ pub struct Plan {
     /// Local gravity, m/s².
     #[serde(default)]
     pub gravity_mps2: Option<f64>,
-    #[serde(default, rename = "chamber_c")]
-    _chamber_c: Vec<[f64; 2]>,
     #[serde(default)]
-    lead_in_s: f64,
+    pub(super) chamber_c: Vec<[f64; 2]>,
+    #[serde(default)]
+    pub(super) lead_in_s: f64,
+    #[serde(default = "once")]
+    pub(super) rounds: u32,
+    #[serde(default)]
+    pub(super) round_s: Option<f64>,
     step: Vec<Step>,
 }
 
@@ -62,7 +68,12 @@ struct Step {
     rate_dps: f64,
     #[serde(default)]
     spin_dps: f64,
-    dwell_s: f64,
+    #[serde(default)]
+    stay: bool,
+    turn_axis: Option<TableAxis>,
+    turn_deg: Option<f64>,
+    turn_dps: Option<f64>,
+    dwell_s: Option<f64>,
     #[serde(default = "once")]
     repeat: u32,
 }
@@ -85,6 +96,21 @@ pub struct Planned {
     pub up: Option<[f64; 3]>,
     /// Rate about it, deg/s.
     pub rate_dps: f64,
+    /// A turn by an angle in place of a dwell. Of its input only the mean is known, and only once it is over.
+    pub turn: Option<Turn>,
+}
+
+impl Planned {
+    /// Its input, if it has taken this long.
+    pub(super) fn input_over(&self, duration_s: f64) -> [f64; 6] {
+        let mut input = self.input;
+        if let Some(turn) = &self.turn {
+            for (cell, deg) in input.iter_mut().zip(turn.about_deg) {
+                *cell = deg / duration_s;
+            }
+        }
+        input
+    }
 }
 
 impl Plan {
@@ -98,9 +124,14 @@ impl Plan {
             Error::new(
                 format!("{place}, line {line}"),
                 error.message().trim(),
-                "correct the line, or have `mimu design -o` write the plan",
+                "correct the line, or have `mimu design -o` or `mimu thermal plan -o` write the plan",
             )
         })?;
+        if !(1..=MOST_DWELLS).contains(&(plan.rounds as usize)) {
+            let problem = format!("rounds is {}", plan.rounds);
+            let remedy = format!("write one or more, up to {MOST_DWELLS}");
+            return Err(Error::new(place, problem, remedy));
+        }
         if plan.format != "mimu-plan/1" {
             let problem = format!("format is {:?}, and a plan is \"mimu-plan/1\"", plan.format);
             return Err(Error::new(place, problem, "give the plan of an experiment"));
@@ -118,18 +149,26 @@ impl Plan {
         Duration::try_from_secs_f64(self.lead_in_s).unwrap_or_default()
     }
 
+    /// Whether only a program that moves the table can carry it out: turns are as long as the table takes, and rounds begin by the clock.
+    pub fn is_procedure(&self) -> bool {
+        self.round_s.is_some() || self.step.iter().any(|step| step.turn_axis.is_some())
+    }
+
     /// Its dwells in order, with local gravity, m/s²; `place` is its path.
     pub fn dwells(&self, gravity_mps2: f64, place: &str) -> Result<Vec<Planned>> {
         let mut all = Vec::new();
-        for (k, step) in self.step.iter().enumerate() {
-            let at = format!("{place}, [[step]] {}", k + 1);
-            let dwell = step.planned(self.carrier, gravity_mps2, &at)?;
-            let count = step.repeat as usize * step.poses.unwrap_or(1) as usize;
-            if all.len() + count > MOST_DWELLS {
-                let problem = format!("the plan has more than {MOST_DWELLS} dwells by here");
-                return Err(Error::new(at, problem, "plan fewer"));
+        let mut stands = None;
+        for _ in 0..self.rounds {
+            for (k, step) in self.step.iter().enumerate() {
+                let at = format!("{place}, [[step]] {}", k + 1);
+                let dwell = step.planned(self.carrier, gravity_mps2, &mut stands, &at)?;
+                let count = step.repeat as usize * step.poses.unwrap_or(1) as usize;
+                if all.len() + count > MOST_DWELLS {
+                    let problem = format!("the plan has more than {MOST_DWELLS} dwells by here");
+                    return Err(Error::new(at, problem, "plan fewer"));
+                }
+                all.extend(std::iter::repeat_n(dwell, count));
             }
-            all.extend(std::iter::repeat_n(dwell, count));
         }
         match all.is_empty() {
             true => Err(Error::new(place, "it has no dwell", "add a [[step]]")),
@@ -138,46 +177,46 @@ impl Plan {
     }
 }
 
+/// A dwell whose input nobody knows.
+fn unknown(up: Option<[f64; 3]>, title: String, length: Duration) -> Planned {
+    Planned {
+        input: [f64::NAN; 6],
+        length,
+        title,
+        up,
+        rate_dps: 0.0,
+        turn: None,
+    }
+}
+
 impl Step {
-    fn planned(&self, carrier: Carrier, gravity_mps2: f64, at: &str) -> Result<Planned> {
-        let refuse = |problem: &str, remedy: &str| Err(Error::new(at, problem, remedy));
-        let length = Duration::try_from_secs_f64(self.dwell_s).unwrap_or_default();
-        if length.is_zero() {
-            return refuse("dwell_s is no length of time", "write seconds above 0");
+    /// It as a dwell; `stands` is where the step before has left a table, and then where this one leaves it.
+    fn planned(
+        &self,
+        carrier: Carrier,
+        gravity_mps2: f64,
+        stands: &mut Option<Angles>,
+        at: &str,
+    ) -> Result<Planned> {
+        self.check_turn(carrier, at)?;
+        let Some(up) = self.pose(carrier, *stands, at)? else {
+            return Ok(unknown(None, "another pose".into(), self.length(at)?));
+        };
+        let angles = match (*stands, self.up) {
+            (Some(angles), None) => angles,
+            _ => Angles::of(&up),
+        };
+        *stands = Some(angles);
+        if let Some(axis) = self.turn_axis {
+            return self.turned(axis, angles, stands, at);
         }
-        let unknown = |title: String| Planned {
-            input: [f64::NAN; 6],
-            length,
-            title,
-            up: self.up.map(|up| Vector3::from(up).normalize().into()),
-            rate_dps: 0.0,
-        };
-        let (up, poses) = (self.up.map(Vector3::from), self.poses);
-        let up = match (up, poses, carrier) {
-            (Some(up), None, _) if up.norm() > 0.0 && up.norm().is_finite() => up.normalize(),
-            (None, Some(_), Carrier::Hands) => return Ok(unknown("another pose".into())),
-            (None, Some(_), Carrier::Table) => {
-                let problem = "poses lets the bench choose the attitudes, so that none is known";
-                return refuse(problem, "write the direction that points up in each: up");
-            }
-            _ => return refuse("there has to be up, or poses", "write up = [x, y, z]"),
-        };
+        let length = self.length(at)?;
         let shown = up.map(|c| (c * 1e3).round() / 1e3 + 0.0);
         let mut title = format!("up {}, {}, {}", shown.x, shown.y, shown.z);
         if carrier == Carrier::Hands {
-            return Ok(unknown(title));
+            return Ok(unknown(Some(up.into()), title, length));
         }
-        let turns_up = up.z.abs() < 1.0 - PARALLEL;
-        if self.spin_dps != 0.0 && turns_up {
-            let problem = "spin_dps turns the direction of gravity within the dwell, so that it has no one input";
-            let remedy = "record it with --step-every or --steps, and import it with ref_ columns";
-            return refuse(problem, remedy);
-        }
-        // A turn about the vertical is one about the body direction that points up.
-        let rate = up * self.rate_dps + Vector3::z() * self.spin_dps;
-        if !rate.iter().all(|r| r.is_finite()) {
-            return refuse("a rate is not a number", "write degrees per second");
-        }
+        let rate = self.rate(&up, at)?;
         if rate.norm() > 0.0 {
             title += &format!(", {} deg/s about it", rate.dot(&up));
         }
@@ -193,66 +232,118 @@ impl Step {
             title,
             up: Some(up.into()),
             rate_dps: rate.dot(&up),
+            turn: None,
+        })
+    }
+
+    /// Refuses what belongs to a turn by an angle where there is none, and turns by hand.
+    fn check_turn(&self, carrier: Carrier, at: &str) -> Result<()> {
+        let refuse = |problem: &str, remedy: &str| Err(Error::new(at, problem, remedy));
+        if carrier == Carrier::Hands && (self.turn_axis.is_some() || self.stay) {
+            let problem = "by hand nobody turns by an angle, or stays without a pose";
+            return refuse(problem, "write up = [x, y, z], or carrier = \"table\"");
+        }
+        if self.turn_axis.is_none() && self.turn_deg.or(self.turn_dps).is_some() {
+            let remedy = "add turn_axis = \"outer\", \"middle\" or \"inner\"";
+            return refuse("turn_deg or turn_dps without turn_axis", remedy);
+        }
+        if self.stay && self.up.is_some() {
+            return refuse("stay in a step with a pose", "keep one of them");
+        }
+        Ok(())
+    }
+
+    /// Direction that points up in it; `None` by hand, where any will do.
+    fn pose(
+        &self,
+        carrier: Carrier,
+        stands: Option<Angles>,
+        at: &str,
+    ) -> Result<Option<Vector3<f64>>> {
+        let refuse = |problem: &str, remedy: &str| Err(Error::new(at, problem, remedy));
+        let stays = self.stay || self.turn_axis.is_some();
+        match (self.up.map(Vector3::from), self.poses, carrier) {
+            (Some(up), None, _) if up.norm() > 0.0 && up.norm().is_finite() => {
+                Ok(Some(up.normalize()))
+            }
+            (None, Some(_), Carrier::Hands) => Ok(None),
+            (None, Some(_), Carrier::Table) => {
+                let problem = "poses lets the bench choose the attitudes, so that none is known";
+                refuse(problem, "write the direction that points up in each: up")
+            }
+            (None, None, Carrier::Table) if stays => match stands {
+                Some(angles) => Ok(Some(angles.up())),
+                None => refuse(
+                    "the first step has no pose to begin in",
+                    "add up = [x, y, z]",
+                ),
+            },
+            _ => refuse("there has to be up, or poses", "write up = [x, y, z]"),
+        }
+    }
+
+    /// Rate in the body, deg/s.
+    fn rate(&self, up: &Vector3<f64>, at: &str) -> Result<Vector3<f64>> {
+        let refuse = |problem: &str, remedy: &str| Err(Error::new(at, problem, remedy));
+        let turns_up = up.z.abs() < 1.0 - PARALLEL;
+        if self.spin_dps != 0.0 && turns_up {
+            let problem = "spin_dps turns the direction of gravity within the dwell, so that it has no one input";
+            let remedy = "record it with --step-every or --steps, and import it with ref_ columns";
+            return refuse(problem, remedy);
+        }
+        // A turn about the vertical is one about the body direction that points up.
+        let rate = up * self.rate_dps + Vector3::z() * self.spin_dps;
+        match rate.iter().all(|r| r.is_finite()) {
+            true => Ok(rate),
+            false => refuse("a rate is not a number", "write degrees per second"),
+        }
+    }
+
+    fn length(&self, at: &str) -> Result<Duration> {
+        let length = Duration::try_from_secs_f64(self.dwell_s.unwrap_or_default());
+        match length.unwrap_or_default() {
+            Duration::ZERO => {
+                let problem = "dwell_s is no length of time";
+                Err(Error::new(at, problem, "write seconds above 0"))
+            }
+            length => Ok(length),
+        }
+    }
+
+    /// A turn of one axis from where the table stands.
+    fn turned(
+        &self,
+        axis: TableAxis,
+        from: Angles,
+        stands: &mut Option<Angles>,
+        at: &str,
+    ) -> Result<Planned> {
+        let refuse = |problem: &str, remedy: &str| Err(Error::new(at, problem, remedy));
+        let (deg, dps) = match (self.turn_deg, self.turn_dps) {
+            (Some(deg), Some(dps)) if deg != 0.0 && deg.is_finite() && dps > 0.0 => (deg, dps),
+            _ => {
+                let remedy =
+                    "write turn_deg in degrees and turn_dps in degrees per second, above 0";
+                return refuse("a turn needs an angle and a rate", remedy);
+            }
+        };
+        let more = self.dwell_s.is_some() || self.poses.is_some() || self.repeat != 1;
+        if more || self.rate_dps != 0.0 || self.spin_dps != 0.0 {
+            let remedy = "make the dwell a step of its own";
+            return refuse("a turn by an angle is no dwell besides", remedy);
+        }
+        let (turn, to) = from.turn(axis, deg, dps);
+        *stands = Some(to);
+        Ok(Planned {
+            input: [f64::NAN; 6],
+            length: Duration::try_from_secs_f64(deg.abs() / dps).unwrap_or_default(),
+            title: format!("turn of the {} axis by {deg} degrees", axis.name()),
+            up: Some(turn.to_up),
+            rate_dps: 0.0,
+            turn: Some(turn),
         })
     }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn dwells(steps: &str, carrier: &str) -> Result<Vec<Planned>> {
-        let folder = std::env::temp_dir().join(format!("mimu-plan-{}", std::process::id()));
-        let name = format!("{carrier}-{}.toml", steps.len());
-        std::fs::create_dir_all(&folder).unwrap();
-        let path = folder.join(name);
-        let head = "format = \"mimu-plan/1\"\nsample_rate_hz = 1000.0\n";
-        let text = format!("{head}carrier = \"{carrier}\"\n{steps}");
-        std::fs::write(&path, text).unwrap();
-        let plan = Plan::read(&path)?;
-        plan.dwells(9.8, "plan.toml")
-    }
-
-    #[test]
-    fn a_rate_about_the_vertical_is_along_the_direction_that_points_up() {
-        let all = dwells(
-            "[[step]]\nup = [0.0, -2.0, 0.0]\nrate_dps = 100.0\ndwell_s = 2.0\nrepeat = 2\n\
-             [[step]]\nup = [0.0, 0.0, -1.0]\nspin_dps = 10.0\ndwell_s = 1.5\n",
-            "table",
-        )
-        .unwrap();
-        assert_eq!(all.len(), 3);
-        assert_eq!(all[0], all[1]);
-        assert_eq!(all[0].input, [0.0, -100.0, 0.0, 0.0, -9.8, 0.0]);
-        assert_eq!(all[0].length, Duration::from_secs(2));
-        // About the body's own z, whichever way that points.
-        assert_eq!(all[2].input, [0.0, 0.0, 10.0, 0.0, 0.0, -9.8]);
-    }
-
-    #[test]
-    fn by_hand_no_input_is_known() {
-        let all = dwells("[[step]]\nposes = 3\ndwell_s = 1.0\n", "hands").unwrap();
-        assert_eq!(all.len(), 3);
-        assert!(all[2].input.iter().all(|v| v.is_nan()));
-    }
-
-    #[test]
-    fn what_has_no_input_is_refused_by_its_step() {
-        for (steps, words) in [
-            ("[[step]]\nposes = 3\ndwell_s = 1.0\n", "[[step]] 1: poses"),
-            (
-                "[[step]]\nup = [1.0, 0.0, 0.0]\nspin_dps = 1.0\ndwell_s = 1.0\n",
-                "no one input",
-            ),
-            ("[[step]]\ndwell_s = 1.0\n", "up, or poses"),
-            (
-                "[[step]]\nup = [0.0, 0.0, 1.0]\ndwell_s = -1.0\n",
-                "dwell_s",
-            ),
-            ("[[step]]\nup = [0.0, 0.0, 1.0]\ndwel = 1.0\n", "line 6"),
-        ] {
-            let line = dwells(steps, "table").unwrap_err().to_string();
-            assert!(line.contains(words), "{line}");
-        }
-    }
-}
+mod tests;

@@ -34,6 +34,7 @@ pub(super) struct Run {
     /// Starts of the device since it has power.
     pub starts: u32,
     pub line: line::Heard,
+    pub one_power_on: bool,
 }
 
 /// What the device is asked for.
@@ -72,12 +73,27 @@ impl Run {
     }
 
     /// Shows how it stands, and takes the marks.
-    fn asks_to_end(&mut self, look: &mut impl FnMut(&Standing) -> Wish) -> bool {
+    pub fn asks_to_end(&mut self, look: &mut impl FnMut(&Standing) -> Wish) -> bool {
         let wish = look(&self.standing);
         for _ in 0..wish.marks {
             self.steps.mark();
         }
+        self.drop_step(wish.drop);
         wish.end
+    }
+
+    fn drop_step(&mut self, step: Option<i32>) {
+        let dropped = &mut self.standing.dropped;
+        dropped.extend(step.filter(|step| !dropped.contains(step)));
+    }
+
+    /// A turn that was not recorded to its end has another angle.
+    pub fn drop_open_turn(&mut self) {
+        self.drop_step(self.steps.running().filter(|step| self.is_turn(*step)));
+    }
+
+    fn is_turn(&self, step: i32) -> bool {
+        self.known.as_ref().is_some_and(|known| known.is_turn(step))
     }
 
     /// Takes in what comes next; whether it was the last that was wanted.
@@ -158,7 +174,17 @@ impl Run {
             self.standing.missing += arrival.missing;
             self.standing.gaps += 1;
         }
+        if (arrival.missing > 0 || arrival.restart.is_some())
+            && let Some(step) = self.steps.at(self.clock.length(first - begun))
+        {
+            // Nobody knows how far it turned meanwhile.
+            self.drop_step(Some(step).filter(|step| self.is_turn(*step)));
+        }
         if let Some(start) = arrival.restart {
+            if self.one_power_on && lost_power(&start) {
+                let at_s = self.clock.seconds(first);
+                return Err(cut_short(port, start, at_s));
+            }
             self.standing.restarts.push(Restart {
                 t_s: self.clock.seconds(first),
                 start: start.map_or("its greeting was lost".into(), |s: Started| s.to_string()),
@@ -208,6 +234,7 @@ impl Run {
         }
         self.growing.write(&batch)?;
         let standing = &mut self.standing;
+        standing.raw = std::array::from_fn(|i| batch.raw[i].iter().sum::<f64>() / count as f64);
         standing.samples += count as u64;
         standing.temp_c = shortest(samples.head.temp_c);
         standing.flagged.count(samples.head.flags, count as u64);
@@ -215,4 +242,23 @@ impl Run {
         standing.last_s = Some(self.clock.seconds(first + count as u64 - 1));
         Ok(())
     }
+}
+
+/// Whether a start is one for which the power came, or may have.
+fn lost_power(start: &Option<Started>) -> bool {
+    matches!(
+        start,
+        None | Some(Started::PowerOn | Started::Other | Started::NotKnown)
+    )
+}
+
+fn cut_short(port: &str, start: Option<Started>, at_s: f64) -> Error {
+    let why = start.map_or("its greeting was lost".into(), |s| s.to_string());
+    Error::device(
+        port,
+        format!(
+            "the device has started anew ({why}) before {at_s:.1} s, and a recording is of one power-on"
+        ),
+        "check the supply, and record the rest as another one: `mimu thermal fit` takes several",
+    )
 }

@@ -62,6 +62,14 @@ impl Steps {
         matches!(self, Self::Marks(marks) if !marks.dwells && marks.most == Some(marks.begun))
     }
 
+    /// The dwell that runs by marks: one that has not ended.
+    pub(super) fn running(&self) -> Option<i32> {
+        match self {
+            Self::Marks(marks) if marks.dwells => Some(marks.begun - 1),
+            _ => None,
+        }
+    }
+
     /// Begins a dwell, or ends it.
     pub(super) fn mark(&mut self) {
         if let Self::Marks(marks) = self {

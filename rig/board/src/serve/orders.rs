@@ -2,7 +2,7 @@
 
 use mimu_rig::command::Command;
 use mimu_rig::motion::Motion;
-use mimu_rig::plan::CarriedBy;
+use mimu_rig::plan::{CarriedBy, TableAxis, Turn};
 use mimu_rig::rotation::direction;
 
 use super::{SLICE_NS, Served};
@@ -11,7 +11,7 @@ use crate::interference::MILLION;
 use crate::running::Board;
 
 /// Every command with its arguments, in the order of docs/bench.md.
-pub const COMMANDS: [(&str, &str); 24] = [
+pub const COMMANDS: [(&str, &str); 25] = [
     ("*IDN?", ""),
     ("TIME?", ""),
     ("PORT?", ""),
@@ -21,6 +21,7 @@ pub const COMMANDS: [(&str, &str); 24] = [
     ("MOVE", "ux uy uz [heading_deg]"),
     ("RATE", "dps"),
     ("SPIN", "dps"),
+    ("TURN", "outer|middle|inner deg dps"),
     ("STOP", ""),
     ("HOLD", "ON|OFF"),
     ("FIDGET", "n"),
@@ -217,6 +218,7 @@ impl Served {
             "MOVE" => return self.go(line),
             "RATE" => return self.moved(Command::Rate(rate()?)),
             "SPIN" => return self.moved(Command::Spin(rate()?)),
+            "TURN" => return self.turn(line),
             "STOP" => self.at_front(|front, ns| front.command(ns, Command::Stop))?,
             "HOLD" => {
                 let held = line.switch()?;
@@ -287,6 +289,17 @@ impl Served {
         }
         self.at_front(move |front, ns| front.command(ns, command))?;
         Ok(String::new())
+    }
+
+    fn turn(&mut self, line: &Line<'_>) -> Result<String, Problem> {
+        let word = line.arguments[0].to_lowercase();
+        let axes = [TableAxis::Outer, TableAxis::Middle, TableAxis::Inner];
+        let Some(axis) = axes.into_iter().find(|axis| axis.name() == word) else {
+            return refused(format!("`TURN`: `{word}` is no axis; {}", line.usage));
+        };
+        let angle = line.required(1, [-36e3, 36e3])?.to_radians();
+        let rate = line.required(2, [1e-3, 36e3])?.to_radians();
+        self.moved(Command::Turn(Turn { axis, angle, rate }))
     }
 
     fn go(&mut self, line: &Line<'_>) -> Result<String, Problem> {

@@ -180,7 +180,17 @@ fn a_table_goes_where_it_is_told_and_turns_as_fast_as_it_is_told() {
         }
         assert_eq!(client.ask("POSITION?"), "1 0 0 0");
 
+        // By the right-hand rule: the body's z, then the tilt axis, which lies along x by then.
+        client.carry_out("TURN inner -90 45");
+        assert_eq!(client.ask("POSITION?"), "0 1 0 0");
+        client.carry_out("TURN middle -90 45");
+        assert_eq!(client.ask("POSITION?"), "0 0 1 0");
+        assert!(client.refusal("TURN inner 90 500").contains("400"));
+        assert!(client.refusal("TURN up 90 5").contains("no axis"));
+        client.carry_out("MOVE 1 0 0");
+
         client.carry_out("RATE 90");
+        assert!(client.refusal("TURN inner 90 5").contains("at rest"));
         let truth = client.numbers("TRUTH?");
         // The Earth adds 0.004 deg/s at most.
         for (rate, wanted) in truth.iter().zip([90.0, 0.0, 0.0]) {
@@ -193,7 +203,7 @@ fn a_table_goes_where_it_is_told_and_turns_as_fast_as_it_is_told() {
         client.carry_out("INTERLOCK 0");
         let rate = client.numbers("TRUTH?");
         assert!(rate[..3].iter().all(|x| x.abs() < 0.01), "{rate:?}");
-        for line in ["MOVE 0 0 1", "RATE 1", "SPIN 1"] {
+        for line in ["MOVE 0 0 1", "RATE 1", "SPIN 1", "TURN inner 1 1"] {
             assert!(client.refusal(line).contains("interlock"), "{line}");
         }
         client.tell("STOP");

@@ -77,6 +77,18 @@ impl Bench {
         self.board.path(name)
     }
 
+    /// The command, in the folder of the bench.
+    pub fn mimu(&self, arguments: &str) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_mimu"));
+        command
+            .current_dir(self.path(""))
+            .args(arguments.split(' '))
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped());
+        command
+    }
+
     /// The command, with what every session here has in common.
     pub fn wizard(&self, arguments: &[&str]) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_mimu"));

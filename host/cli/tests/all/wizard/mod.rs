@@ -1,8 +1,8 @@
 //! `mimu wizard`, from its arguments to its exit status.
 #![cfg(unix)]
 
-mod bench;
-mod on_board;
+pub mod bench;
+pub mod on_board;
 mod playback;
 mod screen;
 mod text;

@@ -27,7 +27,7 @@ fn short_plan(bench: &Bench) -> String {
 }
 
 /// Largest error of the calibration over inputs of full size, beside the largest half-width of it: gyro (rad/s at 60 deg/s), accelerometer.
-fn errors(calibration: &Calibration, truth: &RigTruth) -> [f64; 2] {
+pub fn errors(calibration: &Calibration, truth: &RigTruth) -> [f64; 2] {
     let unit = &truth.file.unit;
     let affine = [
         unit.gyro_affine.as_ref().unwrap(),

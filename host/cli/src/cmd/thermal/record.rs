@@ -1,0 +1,159 @@
+//! `mimu thermal record`: arguments and what follows from them.
+
+use std::path::{Path, PathBuf};
+use std::sync::atomic::Ordering;
+use std::time::Duration;
+
+use clap::Args;
+use indicatif::ProgressBar;
+use mimu_device::Session;
+use mimu_device::record::{Plan, Procedure, RecordOptions, Steps};
+use mimu_recording::error::Result;
+use mimu_recording::{Growing, SampleFormat};
+use mimu_wizard::carry_out::{Equipped, Progress, carry_out};
+use mimu_wizard::drive::{Driver, TextDriver};
+
+use crate::arguments::JsonArgs;
+use crate::cmd::device::{PortArgs, interruption};
+use crate::cmd::record::{gravity, patience};
+use crate::output::{check_outputs, print, progress};
+use crate::report;
+
+/// Time of the procedure between two lines of progress within a round, s.
+const LINE_S: f64 = 60.0;
+
+#[derive(Args)]
+pub(super) struct RecordArgs {
+    /// Plan of the procedure, by `mimu thermal plan -o`
+    plan: PathBuf,
+    /// Driver file of a table, a chamber, or both; may be repeated. Without one a person warms a unit that lies still
+    #[arg(long = "driver", value_name = "FILE")]
+    drivers: Vec<PathBuf>,
+    #[command(flatten)]
+    port: PortArgs,
+    /// Directory of the new recording
+    #[arg(short, value_name = "DIR")]
+    output: PathBuf,
+    /// How long to wait for a port that has vanished, as when the cable was pulled; 0 ends the recording
+    #[arg(long, value_name = "TIME", default_value = "30s", value_parser = patience)]
+    reconnect: Duration,
+    /// Name of the unit; without it, that of the plan, or the number of its microcontroller
+    #[arg(long)]
+    device: Option<String>,
+    /// Local gravity, m/s²; without it, that of the plan, normal gravity at sea level of --latitude, or 9.80665 and a warning
+    #[arg(long, allow_negative_numbers = true)]
+    gravity: Option<f64>,
+    /// Latitude, degrees
+    #[arg(long, allow_negative_numbers = true)]
+    latitude: Option<f64>,
+    /// Format of the samples in the end: csv or parquet. While it records it is CSV, which can be read at any time
+    #[arg(long, default_value = "csv")]
+    format: SampleFormat,
+    #[command(flatten)]
+    json: JsonArgs,
+}
+
+pub(super) fn run(args: &RecordArgs) -> Result<()> {
+    let inputs: Vec<&Path> = std::iter::once(&args.plan)
+        .chain(&args.drivers)
+        .map(PathBuf::as_path)
+        .collect();
+    check_outputs(&[args.json.file()], &inputs)?;
+    Growing::check(&args.output)?;
+    let plan = Plan::read(&args.plan)?;
+    let gravity_mps2 = gravity(args.gravity, args.latitude, Some(&plan));
+    let place = args.plan.display().to_string();
+    let procedure = plan.procedure(gravity_mps2, &place)?;
+    let drivers = args
+        .drivers
+        .iter()
+        .map(|path| -> Result<Box<dyn Driver>> { Ok(Box::new(TextDriver::open(path)?)) });
+    let equipped = Equipped::new(&procedure, &place, drivers.collect::<Result<_>>()?)?;
+    let options = RecordOptions {
+        directory: args.output.clone(),
+        duration: None,
+        steps: Steps::marks_for(procedure.dwells.len()),
+        reconnect: args.reconnect,
+        one_power_on: true,
+        table: equipped.has_table(),
+        device: args.device.clone().or(plan.device.clone()),
+        gravity_mps2,
+        latitude_deg: args.latitude.or(plan.latitude_deg),
+        format: args.format,
+    };
+    let mut session = Session::open(args.port.path.as_deref())?;
+    for warning in &session.who().warnings {
+        eprintln!("warning: {warning}");
+    }
+    begin(&procedure, &equipped);
+    let stop = interruption()?;
+    let mut lines = Lines::new(equipped.has_chamber());
+    let bar = progress("writing the recording");
+    let made = carry_out(
+        &mut session,
+        &options,
+        &procedure,
+        equipped,
+        || stop.load(Ordering::Relaxed),
+        |at| lines.show(at),
+        |share| bar.set_position((share * 1000.0) as u64),
+    )?;
+    lines.spinner.finish_and_clear();
+    bar.finish_and_clear();
+    print(&args.json, &report::thermal_record_text(&made), &made, None)?;
+    match made.cut_short.or(made.not_at_rest.into_iter().next()) {
+        Some(error) => Err(error),
+        None => Ok(()),
+    }
+}
+
+/// Says what nobody but a person does.
+fn begin(procedure: &Procedure, equipped: &Equipped) {
+    let first = &procedure.dwells[0];
+    if !equipped.has_table()
+        && let Some(up) = first.up
+    {
+        let words = mimu_wizard::step::words(&up.into());
+        eprintln!(
+            "no table is driven: the unit lies still, {words}, and gravity is all that is known"
+        );
+    }
+    if !equipped.has_chamber() {
+        let [low, high] = procedure.range_c();
+        eprintln!(
+            "no chamber is driven, and no temperature is set: warm the unit from {low} to {high} °C as the lines say"
+        );
+    }
+}
+
+/// A line for each round, and for each minute; on a terminal also how it stands at this instant.
+struct Lines {
+    has_chamber: bool,
+    spinner: ProgressBar,
+    told: Option<(Option<usize>, f64, bool)>,
+}
+
+impl Lines {
+    fn new(has_chamber: bool) -> Self {
+        Self {
+            has_chamber,
+            spinner: ProgressBar::new_spinner(),
+            told: None,
+        }
+    }
+
+    fn show(&mut self, at: &Progress) {
+        let line = report::thermal_progress(at, self.has_chamber);
+        let round = at.since_s.map(|_| at.round[0]);
+        let now_s = at.since_s.unwrap_or_default();
+        let new = self.told.is_none_or(|(told, told_s, lost)| {
+            told != round || now_s >= told_s + LINE_S || lost != at.line_lost
+        });
+        if new {
+            self.told = Some((round, now_s, at.line_lost));
+            self.spinner.suspend(|| eprintln!("{line}"));
+        }
+        self.spinner.set_message(format!("{line}; Ctrl-C ends it"));
+        self.spinner.tick();
+    }
+}

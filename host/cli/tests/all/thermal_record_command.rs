@@ -1,0 +1,282 @@
+//! `mimu thermal record` against the firmware's release image on the emulated board, with its table and its chamber.
+#![cfg(unix)]
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::process::{Child, Output, Stdio};
+use std::time::{Duration, Instant};
+
+use mimu::calibration::Calibration;
+use mimu_recording::{Manifest, Recording, Reference};
+use mimu_rig::located::Source;
+use mimu_rig::plan::Plan;
+use mimu_rig::rig_file::RigTruth;
+use serde_json::Value;
+
+use crate::wizard::bench::{Bench, unit};
+use crate::wizard::on_board::errors;
+
+/// Rates both ways about all axes, and a turn by an angle there and back, while the chamber goes from 12 to 25 °C.
+fn sweep() -> String {
+    let mut plan = String::from(
+        "format = \"mimu-plan/1\"\nsample_rate_hz = 1000.0\ncarrier = \"table\"\ngravity_mps2 = 9.793\n\
+         chamber_c = [[0.0, 12.0], [5.0, 12.0], [65.0, 25.0]]\nlead_in_s = 2.0\nrounds = 3\n",
+    );
+    for (up, rate) in [
+        ("0.0, 0.0, 1.0", 60.0),
+        ("1.0, 0.0, 0.0", 60.0),
+        ("0.0, 1.0, 0.0", 60.0),
+        ("0.0, 0.0, -1.0", 60.0),
+        ("-1.0, 0.0, 0.0", 60.0),
+        ("0.0, -1.0, 0.0", 60.0),
+        ("0.0, 0.0, 1.0", 0.0),
+    ] {
+        plan += &format!("[[step]]\nup = [{up}]\nrate_dps = {rate:?}\ndwell_s = 1.5\n");
+    }
+    for (deg, then) in [
+        (90.0, "[[step]]\nstay = true\ndwell_s = 1.5\n"),
+        (-90.0, ""),
+    ] {
+        plan += &format!(
+            "[[step]]\nturn_axis = \"middle\"\nturn_deg = {deg:?}\nturn_dps = 45.0\n{then}"
+        );
+    }
+    plan
+}
+
+/// A unit that follows the chamber within seconds, on a brisk table: the whole takes a minute or two.
+fn brisk(seed: u64) -> RigTruth {
+    let mut truth = unit(seed);
+    let mut file = truth.file.clone();
+    file.thermal.board_lag_s = Some(2.0);
+    file.thermal.die_lag_s = Some([1.0; 4]);
+    file.table.settle_s = 0.2;
+    file.table.slew_dps = [300.0; 3];
+    file.table.max_acceleration_dps2 = [2000.0; 3];
+    truth = RigTruth::resolve(&file, seed).unwrap();
+    truth
+}
+
+fn spawned(bench: &Bench, arguments: &str) -> Child {
+    bench.mimu(arguments).spawn().unwrap()
+}
+
+fn told(out: &Output) -> String {
+    String::from_utf8_lossy(&out.stdout).into_owned() + &String::from_utf8_lossy(&out.stderr)
+}
+
+fn json(path: &Path) -> Value {
+    serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
+}
+
+/// Mean input of each dwell times its length in samples, and that length.
+type Inputs = BTreeMap<i32, ([f64; 6], f64)>;
+
+fn recorded(path: &Path) -> Inputs {
+    let mut all = Inputs::new();
+    let recording = Recording::open(path).unwrap();
+    let each = recording.for_each_batch(
+        |_| {},
+        |batch| {
+            for (row, step) in batch.step.iter().enumerate() {
+                let (sum, count) = all.entry(*step).or_default();
+                *count += 1.0;
+                for (sum, column) in sum.iter_mut().zip(&batch.reference) {
+                    *sum += column[row];
+                }
+            }
+            Ok(())
+        },
+    );
+    each.unwrap();
+    all
+}
+
+/// What the bench writes when it carries out the same plan by itself.
+fn by_the_bench(plan: &str, truth: &RigTruth) -> Inputs {
+    let plan = Plan::parse(Source::new("plan", plan)).unwrap();
+    let mut all = Inputs::new();
+    for row in mimu_rig::record::samples(&plan, truth, 1).unwrap() {
+        let (sum, count) = all
+            .entry(row.instant.step.map_or(-1, |s| s as i32))
+            .or_default();
+        *count += 1.0;
+        let rate = row.instant.stated_rate.unwrap().map(f64::to_degrees);
+        let input = [rate, row.instant.stated_force.unwrap()].concat();
+        for (sum, value) in sum.iter_mut().zip(input) {
+            *sum += value;
+        }
+    }
+    all
+}
+
+#[test]
+fn a_plan_is_carried_out_and_its_recording_has_the_inputs_of_the_bench_and_is_fitted() {
+    let bench = Bench::new("table", brisk(11), 11);
+    let plan = sweep();
+    std::fs::write(bench.path("plan.toml"), &plan).unwrap();
+    let command =
+        "thermal record plan.toml --driver driver.toml --port port -o sweep --json made.json";
+    let out = bench.mimu(command).output().unwrap();
+    let told = told(&out);
+    assert!(out.status.success(), "{told}");
+    let made = json(&bench.path("made.json"));
+    assert_eq!(made["format"], "mimu-thermal-record/1");
+    assert_eq!(made["dwells_done"], 30, "{told}");
+    assert_eq!(made["cut_short"], Value::Null);
+    for round in 1..=3 {
+        assert!(told.contains(&format!("round {round} of 3")), "{told}");
+    }
+
+    let (found, wanted) = (
+        recorded(&bench.path("sweep")),
+        by_the_bench(&plan, &bench.truth),
+    );
+    assert_eq!(found.len(), wanted.len(), "the same dwells, and transit");
+    for (step, (wanted, count)) in wanted.iter().filter(|(step, _)| **step >= 0) {
+        let (input, samples) = &found[step];
+        let is_turn = matches!(step % 10, 7 | 9);
+        for (axis, (wanted, input)) in wanted.iter().zip(input).enumerate() {
+            match is_turn {
+                // The angle, whatever time the table takes; the force turns meanwhile, and is not stated.
+                true if axis < 3 => {
+                    let off = (wanted - input) / 1000.0;
+                    assert!(off.abs() < 0.1, "turn {step}: {wanted} {input}");
+                }
+                true => assert!(input.is_nan()),
+                false => {
+                    let off = wanted / count - input / samples;
+                    assert!(off.abs() < 1e-6, "dwell {step}, axis {axis}: {off}");
+                }
+            }
+        }
+        let longer = samples - count;
+        let most = if is_turn { 3000.0 } else { 100.0 };
+        assert!(
+            (0.0..most).contains(&longer),
+            "dwell {step}: {longer} samples longer"
+        );
+    }
+
+    let out = bench
+        .mimu("thermal fit sweep -o cal.toml --json fit.json")
+        .output()
+        .unwrap();
+    assert!(out.status.success(), "{}", self::told(&out));
+    let fit = json(&bench.path("fit.json"));
+    let range = &fit["range_c"];
+    println!("{told}\n{}", fit["sensors"]);
+    // By their own power the dies are warmer than the chamber.
+    let span = range[1].as_f64().unwrap() - range[0].as_f64().unwrap();
+    assert!((10.0..14.0).contains(&span), "{range}");
+    let calibration = Calibration::read(&bench.path("cal.toml")).unwrap();
+    let [gyro, accel] = errors(&calibration, &bench.truth);
+    println!("errors: gyro {gyro:.5} rad/s, accel {accel:.5} m/s²");
+    // As of a session of the wizard: 18 dwells of 1.5 s in place of twelve of a second, and a slope over temperature besides.
+    assert!(gyro < 0.2f64.to_radians() && accel < 0.02, "{gyro} {accel}");
+}
+
+/// Waits until the command has written so many bytes of samples.
+fn recording(bench: &Bench, name: &str, bytes: u64, child: &mut Child) {
+    let since = Instant::now();
+    let path = bench.path(name).join("samples.csv");
+    while std::fs::metadata(&path).map_or(0, |m| m.len()) < bytes {
+        assert!(child.try_wait().unwrap().is_none(), "it has ended");
+        assert!(since.elapsed() < Duration::from_secs(120), "no samples");
+        std::thread::sleep(Duration::from_millis(50));
+    }
+}
+
+#[test]
+fn a_procedure_that_is_interrupted_or_loses_its_power_keeps_what_it_has_and_leaves_the_chamber_safe()
+ {
+    let mut bench = Bench::new("table", brisk(12), 12);
+    let plan = "format = \"mimu-plan/1\"\nsample_rate_hz = 100.0\ncarrier = \"table\"\nchamber_c = [[0.0, 40.0], [600.0, 60.0]]\n\
+                [[step]]\nup = [0.0, 0.0, 1.0]\ndwell_s = 600.0\n";
+    std::fs::write(bench.path("plan.toml"), plan).unwrap();
+    // The chamber alone: the unit lies still, and nobody moves it.
+    let driver = std::fs::read_to_string(bench.path("driver.toml")).unwrap();
+    let address = driver.lines().find(|l| l.starts_with("tcp")).unwrap();
+    let (_, chamber) = driver.split_once("[chamber]").unwrap();
+    let chamber = format!("format = \"mimu-driver/1\"\n{address}\n[chamber]{chamber}");
+    std::fs::write(bench.path("chamber.toml"), chamber).unwrap();
+
+    let command = |name: &str| {
+        format!(
+            "thermal record plan.toml --driver chamber.toml --port port --gravity 9.793 -o {name} --json {name}.json"
+        )
+    };
+    let mut child = spawned(&bench, &command("short"));
+    recording(&bench, "short", 300_000, &mut child);
+    let warm: f64 = bench.ask("CHAMBER?").parse().unwrap();
+    assert!((40.0..45.0).contains(&warm), "{warm}");
+    let interrupt = rustix::process::Signal::INT;
+    let pid = rustix::process::Pid::from_child(&child);
+    rustix::process::kill_process(pid, interrupt).unwrap();
+    let out = child.wait_with_output().unwrap();
+    let words = told(&out);
+    assert_eq!(out.status.code(), Some(1), "{words}");
+    assert!(
+        words.contains("it was interrupted, and is cut short"),
+        "{words}"
+    );
+    assert!(words.contains("no table is driven"), "{words}");
+    assert_eq!(bench.ask("CHAMBER?"), "25", "{words}");
+    let manifest = Manifest::read(&bench.path("short/recording.toml")).unwrap();
+    assert!(!manifest.unfinished && manifest.reference == Reference::Gravity);
+    let kept = recorded(&bench.path("short"));
+    assert!(kept[&0].1 > 2000.0, "the dwell is kept: {kept:?}");
+    assert!(json(&bench.path("short.json"))["cut_short"].is_string());
+
+    let mut child = spawned(&bench, &command("cut"));
+    recording(&bench, "cut", 300_000, &mut child);
+    bench.tell("POWER OFF");
+    bench.tell("POWER ON");
+    let out = child.wait_with_output().unwrap();
+    let words = told(&out);
+    assert_eq!(out.status.code(), Some(1), "{words}");
+    assert!(words.contains("a recording is of one power-on"), "{words}");
+    assert_eq!(bench.ask("CHAMBER?"), "25", "{words}");
+    let manifest = Manifest::read(&bench.path("cut/recording.toml")).unwrap();
+    let restarts = manifest.recorded.unwrap().restarts;
+    assert!(!manifest.unfinished && restarts.is_empty());
+}
+
+#[test]
+fn what_cannot_be_carried_out_is_refused_in_a_line_before_anything_is_opened() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let write = |name: &str, text: &str| std::fs::write(path(name), text).unwrap();
+    write("plan.toml", &sweep());
+    write("cold.toml", &sweep().replace("chamber_c", "# chamber_c"));
+    std::fs::create_dir(path("there")).unwrap();
+    write("there/samples.csv", "");
+    write(
+        "none.toml",
+        "format = \"mimu-driver/1\"\ntcp = \"127.0.0.1:9\"\n",
+    );
+    for (arguments, words) in [
+        ("plan.toml -o rec", "there is no driver"),
+        ("cold.toml -o rec", "no temperatures (chamber_c)"),
+        ("plan.toml -o there", "it exists already"),
+        (
+            "plan.toml -o rec --driver none.toml",
+            "neither `move` nor [chamber]",
+        ),
+        ("nowhere.toml -o rec", "nowhere.toml"),
+    ] {
+        let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_mimu"));
+        let command = command
+            .current_dir(folder.path())
+            .args(["thermal", "record"]);
+        let out = command
+            .args(arguments.split(' '))
+            .stdin(Stdio::null())
+            .output()
+            .unwrap();
+        let line = String::from_utf8(out.stderr).unwrap();
+        assert_eq!(out.status.code(), Some(1), "{line}");
+        assert!(line.contains(words), "{arguments}: {line}");
+        assert!(!path("rec").exists());
+    }
+}

@@ -1,0 +1,201 @@
+//! A procedure over temperature, carried out: the chamber is led along its temperatures, the table through its dwells and turns, and one
+//! recording is made of all of it.
+
+mod checked;
+mod equipment;
+mod needs;
+mod progress;
+mod sequence;
+
+use std::cell::RefCell;
+
+use mimu_device::Session;
+use mimu_device::record::{Known, Procedure, RecordOptions, RecordSummary, Standing, Wish, record};
+use mimu_recording::error::{Error, Result};
+use serde::{Serialize, Serializer};
+
+use checked::Checked;
+use equipment::Equipment;
+use sequence::{Seen, Sequence};
+
+pub use needs::Equipped;
+pub use progress::Progress;
+
+/// What became of a procedure: the result of `mimu thermal record`.
+#[derive(Debug, Serialize)]
+pub struct CarriedOut {
+    /// `mimu-thermal-record/1`.
+    pub format: &'static str,
+    /// Dwells and turns that were had to their ends.
+    pub dwells_done: usize,
+    /// As planned.
+    pub dwells_planned: usize,
+    /// Whole rounds that were had.
+    pub rounds_done: usize,
+    /// As planned.
+    pub rounds_planned: usize,
+    /// Whether a table moved the unit: its inputs are known then, and gravity alone otherwise.
+    pub table: bool,
+    /// Temperatures that the chamber was set to on the way.
+    pub set_points: usize,
+    /// What the chamber was left at, °C; `None` without one.
+    pub rest_c: Option<f64>,
+    /// Why it ended before it was to: the recording is whole up to there.
+    #[serde(serialize_with = "as_words")]
+    pub cut_short: Option<Error>,
+    /// What could not be brought to rest.
+    #[serde(serialize_with = "each_as_words")]
+    pub not_at_rest: Vec<Error>,
+    /// The recording.
+    pub recorded: RecordSummary,
+}
+
+fn as_words<S: Serializer>(of: &Option<Error>, to: S) -> std::result::Result<S::Ok, S::Error> {
+    of.as_ref().map(Error::to_string).serialize(to)
+}
+
+fn each_as_words<S: Serializer>(of: &[Error], to: S) -> std::result::Result<S::Ok, S::Error> {
+    to.collect_seq(of.iter().map(Error::to_string))
+}
+
+/// Carries out `procedure` with `equipped`, and records into what `options` say. `stop` is asked many times a second whether somebody
+/// has had enough; `show` is shown how it stands; `finishing` as of [`record`].
+///
+/// An error means that there is no recording. The table is at rest and the chamber at its temperature of rest whatever happens.
+pub fn carry_out(
+    session: &mut Session,
+    options: &RecordOptions,
+    procedure: &Procedure,
+    equipped: Equipped,
+    stop: impl Fn() -> bool,
+    mut show: impl FnMut(&Progress),
+    finishing: impl Fn(f64),
+) -> Result<CarriedOut> {
+    let known = match options.table {
+        true => Some(Known::of_plan(procedure.dwells.clone())),
+        false => None,
+    };
+    let has_table = equipped.table.is_some();
+    let (rest_c, chamber) = (equipped.rest_c(), equipped.chamber.is_some());
+    let run = RefCell::new(Run {
+        procedure,
+        equipment: Some(Equipment::start(equipped)?),
+        sequence: Sequence::new(procedure, has_table, chamber),
+        checked: has_table.then(Checked::default),
+        cut_short: None,
+        not_at_rest: Vec::new(),
+    });
+    let look = |standing: &Standing| {
+        let mut run = run.borrow_mut();
+        let wish = run.look(standing, &stop);
+        show(&run.progress(standing));
+        wish
+    };
+    let recorded = record(session, options, known, look, finishing);
+    let mut run = run.into_inner();
+    // A recording that could not even be begun was never looked at.
+    run.rest();
+    let done = run.sequence.done();
+    let planned = procedure.dwells.len();
+    let recorded = match recorded {
+        Ok(recorded) => recorded,
+        Err(error) => return Err(run.cut_short.unwrap_or(error)),
+    };
+    let cut_short = recorded.broken_off.clone().or(run.cut_short);
+    let whole = format!(
+        "; {done} of {planned} dwells and turns were had, and what was recorded is kept in {}",
+        recorded.recording
+    );
+    Ok(CarriedOut {
+        format: "mimu-thermal-record/1",
+        dwells_done: done,
+        dwells_planned: planned,
+        rounds_done: done / procedure.per_round,
+        rounds_planned: procedure.rounds,
+        table: has_table,
+        set_points: run.sequence.set_points(),
+        rest_c,
+        cut_short: cut_short.map(|error| error.map(|e| e.problem += &whole)),
+        not_at_rest: run.not_at_rest,
+        recorded,
+    })
+}
+
+struct Run<'a> {
+    procedure: &'a Procedure,
+    equipment: Option<Equipment>,
+    sequence: Sequence<'a>,
+    /// Whether the unit undergoes what the table was told; without a table nothing was.
+    checked: Option<Checked>,
+    cut_short: Option<Error>,
+    not_at_rest: Vec<Error>,
+}
+
+impl Run<'_> {
+    /// What comes next.
+    fn look(&mut self, standing: &Standing, stop: &impl Fn() -> bool) -> Wish {
+        if standing.ended {
+            self.rest();
+        }
+        let Some(equipment) = &mut self.equipment else {
+            return Wish::default();
+        };
+        if let Some(error) = equipment.take_news() {
+            return self.end(error, true);
+        }
+        if stop() {
+            let place = standing.last_s.unwrap_or_default();
+            let place = format!("at {place:.1} s");
+            let problem = "it was interrupted, and is cut short";
+            return self.end(Error::new(place, problem, "begin anew for the rest"), false);
+        }
+        let seen = Seen {
+            now_s: self.sequence.clock(standing),
+            line_lost: standing.waiting,
+            arrived: equipment.is_done(),
+            chamber_c: equipment.chamber_c(),
+        };
+        let does = self.sequence.look(&seen);
+        for order in does.orders {
+            equipment.order(order);
+        }
+        let running = self.sequence.running();
+        let wrong = self
+            .checked
+            .as_mut()
+            .and_then(|checked| checked.look(running, &self.procedure.dwells, standing));
+        if let Some((dwell, error)) = wrong {
+            let mut wish = self.end(error, false);
+            (wish.marks, wish.drop) = (does.marks, Some(dwell as i32));
+            return wish;
+        }
+        Wish {
+            end: false,
+            marks: does.marks,
+            drop: None,
+        }
+    }
+
+    /// Ends it all; a dwell that runs `spoiled` does not count.
+    fn end(&mut self, error: Error, spoiled: bool) -> Wish {
+        self.cut_short = Some(error);
+        self.rest();
+        let running = self.sequence.running().filter(|_| spoiled);
+        Wish {
+            end: true,
+            marks: 0,
+            drop: running.map(|k| k as i32),
+        }
+    }
+
+    fn rest(&mut self) {
+        if let Some(equipment) = self.equipment.take() {
+            self.not_at_rest = equipment.rest();
+        }
+    }
+
+    fn progress(&self, standing: &Standing) -> Progress {
+        let chamber_c = self.equipment.as_ref().and_then(Equipment::chamber_c);
+        Progress::of(self.procedure, &self.sequence, standing, chamber_c)
+    }
+}

@@ -1,0 +1,94 @@
+//! Whether the unit undergoes what the table was told: a tilt axis that turns the other way, or an interlock that was open for an instant,
+//! would make known inputs of false ones.
+
+use mimu_device::record::{Planned, Standing};
+use mimu_recording::error::Error;
+use nalgebra::Vector3;
+
+use crate::device::nominal;
+use crate::step::words;
+
+/// Angle between what is up and what was planned that is no other pose, degrees. Wrong axes are off by 90 or more; biases of a unit
+/// that nobody has calibrated yet, at the ends of its temperatures, by 20 at most.
+const SAME_POSE_DEG: f64 = 30.0;
+/// As in the wizard: sensitivities differ from the data sheet's by some per cent, and nulls move.
+const RATE_SHARE: f64 = 0.2;
+const RATE_DPS: f64 = 2.0;
+/// Time over which readings are averaged, s.
+const WINDOW_S: f64 = 1.0;
+
+/// Readings of the dwell that runs, by the data sheet.
+#[derive(Debug, Default)]
+pub(super) struct Checked {
+    dwell: Option<usize>,
+    since_s: f64,
+    /// Samples so far when the last readings came.
+    samples: u64,
+    sum: [f64; 6],
+    batches: f64,
+    /// The gyro at rest, raw, in the last dwell that was at rest.
+    at_rest: Option<Vector3<f64>>,
+}
+
+impl Checked {
+    /// Takes in the last readings; the dwell that is none of the plan, and why. `running` is the one from now on.
+    pub fn look(
+        &mut self,
+        running: Option<usize>,
+        dwells: &[Planned],
+        standing: &Standing,
+    ) -> Option<(usize, Error)> {
+        let now_s = standing.last_s.unwrap_or_default();
+        if standing.samples != self.samples && self.dwell.is_some() {
+            self.batches += 1.0;
+            for (sum, value) in self.sum.iter_mut().zip(standing.raw) {
+                *sum += value;
+            }
+        }
+        self.samples = standing.samples;
+        let over = running != self.dwell || now_s - self.since_s >= WINDOW_S;
+        if !over {
+            return None;
+        }
+        let of = self.dwell.filter(|_| self.batches > 0.0);
+        let mean = self.sum.map(|sum| sum / self.batches);
+        (self.dwell, self.since_s) = (running, now_s);
+        (self.sum, self.batches) = ([0.0; 6], 0.0);
+        let wrong = of.and_then(|k| self.judge(&dwells[k], mean));
+        Some((
+            of?,
+            wrong?.map(|e| e.place = format!("dwell {}", of.unwrap_or_default())),
+        ))
+    }
+
+    fn judge(&mut self, dwell: &Planned, mean: [f64; 6]) -> Option<Error> {
+        let up = Vector3::from(dwell.up.filter(|_| dwell.turn.is_none())?);
+        let [gyro, accel] = [0, 3].map(|at| Vector3::new(mean[at], mean[at + 1], mean[at + 2]));
+        let [by_gyro, by_accel] = nominal();
+        let force = by_accel.matrix * accel + by_accel.offset;
+        if force.angle(&up).to_degrees() > SAME_POSE_DEG {
+            let (is, planned) = (words(&force.normalize()), words(&up));
+            let problem = format!("by the accelerometer it is {is}, and {planned} was planned");
+            let remedy = "check how the unit is mounted, and the directions in the driver file";
+            return Some(Error::new("", problem, remedy));
+        }
+        if dwell.rate_dps == 0.0 {
+            self.at_rest = Some(gyro);
+            return None;
+        }
+        let rate = by_gyro.matrix * (gyro - self.at_rest?);
+        let off = (rate - up * dwell.rate_dps.to_radians())
+            .norm()
+            .to_degrees();
+        if off <= RATE_SHARE * dwell.rate_dps.abs() + RATE_DPS {
+            return None;
+        }
+        let is = rate.dot(&up).to_degrees();
+        let problem = format!(
+            "by the gyro it turns at {is:+.1} deg/s about the vertical, and {:+} was planned",
+            dwell.rate_dps
+        );
+        let remedy = "check the sign of `rate` in the driver file, and whether the interlock stopped the table";
+        Some(Error::new("", problem, remedy))
+    }
+}

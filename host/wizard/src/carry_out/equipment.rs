@@ -1,0 +1,230 @@
+//! Table and chamber in a thread of their own: a table that takes seconds to answer must not keep the samples waiting, of which a port
+//! holds some tenths of a second.
+
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use mimu_device::record::Turn;
+use mimu_recording::error::{Error, Result};
+
+use super::needs::Equipped;
+use crate::drive::Driver;
+use crate::step::Step;
+
+/// Time between two questions whether the table still moves.
+const BUSY: Duration = Duration::from_millis(100);
+/// Time between two questions whether an interlock is open: a table that it has stopped must not be taken for one that turns.
+const HELD: Duration = Duration::from_millis(500);
+/// Time between two looks at the temperature in the chamber.
+const READ: Duration = Duration::from_secs(2);
+
+/// What is to be done.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Order {
+    /// A pose, at rest or at a rate.
+    Go(Step),
+    /// A turn by an angle.
+    Turn(Turn),
+    /// To rest where it is.
+    Halt,
+    /// A temperature of the chamber, °C.
+    Set(f64),
+}
+
+enum News {
+    /// So many motions are done with.
+    Done(usize),
+    Chamber(f64),
+    Failed(Error),
+}
+
+/// Table and chamber, at rest when this is dropped.
+pub(super) struct Equipment {
+    orders: Option<Sender<Order>>,
+    news: Receiver<News>,
+    thread: Option<JoinHandle<Vec<Error>>>,
+    /// Motions that were ordered, and are done with.
+    motions: [usize; 2],
+    chamber_c: Option<f64>,
+}
+
+impl Equipment {
+    pub fn start(equipped: Equipped) -> Result<Self> {
+        let (orders, to_do) = channel();
+        let (tell, news) = channel();
+        let chamber_c = equipped.chamber_c;
+        let mut hands = Hands {
+            equipped,
+            tell,
+            ordered: false,
+            motions: 0,
+            moves: false,
+            held: Instant::now(),
+            read: None,
+        };
+        let work = move || {
+            if let Err(error) = hands.work(&to_do) {
+                // Nobody hears it only where the recording has ended too.
+                let _ = hands.tell.send(News::Failed(error));
+            }
+            hands.rest()
+        };
+        let thread = std::thread::Builder::new().name("equipment".into());
+        let thread = thread
+            .spawn(work)
+            .map_err(|e| Error::new("equipment", e, "close other programs"))?;
+        Ok(Self {
+            orders: Some(orders),
+            news,
+            thread: Some(thread),
+            motions: [0; 2],
+            chamber_c,
+        })
+    }
+
+    pub fn order(&mut self, order: Order) {
+        self.motions[0] += usize::from(!matches!(order, Order::Set(_)));
+        // A thread that has ended has said why.
+        let _ = self.orders.as_ref().map(|orders| orders.send(order));
+    }
+
+    /// Takes in what has happened; an error after which nothing goes on.
+    pub fn take_news(&mut self) -> Option<Error> {
+        for news in self.news.try_iter() {
+            match news {
+                News::Done(motions) => self.motions[1] = motions,
+                News::Chamber(temp_c) => self.chamber_c = Some(temp_c),
+                News::Failed(error) => return Some(error),
+            }
+        }
+        None
+    }
+
+    /// Whether all that was ordered of the table is done, and it moves no more or steadily.
+    pub fn is_done(&self) -> bool {
+        self.motions[0] == self.motions[1]
+    }
+
+    /// Temperature in the chamber, °C, where it can be asked.
+    pub fn chamber_c(&self) -> Option<f64> {
+        self.chamber_c
+    }
+
+    /// Table at rest, chamber at its temperature of rest; what of that could not be done.
+    pub fn rest(mut self) -> Vec<Error> {
+        self.end()
+    }
+
+    fn end(&mut self) -> Vec<Error> {
+        self.orders = None;
+        let ended = self.thread.take().map(JoinHandle::join);
+        match ended {
+            Some(Err(_)) => vec![Error::new(
+                "equipment",
+                "the thread of table and chamber broke down",
+                "stop the table and set the chamber by hand, and report this",
+            )],
+            Some(Ok(errors)) => errors,
+            None => Vec::new(),
+        }
+    }
+}
+
+impl Drop for Equipment {
+    fn drop(&mut self) {
+        self.end();
+    }
+}
+
+struct Hands {
+    equipped: Equipped,
+    tell: Sender<News>,
+    /// Whether anything was told: what nobody has touched is left as it was found.
+    ordered: bool,
+    motions: usize,
+    moves: bool,
+    held: Instant,
+    read: Option<Instant>,
+}
+
+impl Hands {
+    /// Carries out orders until there are no more.
+    fn work(&mut self, to_do: &Receiver<Order>) -> Result<()> {
+        loop {
+            match to_do.recv_timeout(BUSY) {
+                Ok(order) => self.carry_out(&order)?,
+                Err(RecvTimeoutError::Timeout) => self.look()?,
+                Err(RecvTimeoutError::Disconnected) => return Ok(()),
+            }
+        }
+    }
+
+    fn of(&mut self, which: Option<usize>) -> Option<&mut (dyn Driver + 'static)> {
+        Some(self.equipped.drivers[which?].as_mut())
+    }
+
+    fn carry_out(&mut self, order: &Order) -> Result<()> {
+        let table = self.equipped.table;
+        self.ordered = true;
+        if let Order::Set(temp_c) = order {
+            let chamber = self.equipped.chamber;
+            return self.of(chamber).map_or(Ok(()), |c| c.set_chamber(*temp_c));
+        }
+        self.motions += 1;
+        self.moves = true;
+        let Some(table) = self.of(table) else {
+            return Ok(());
+        };
+        match order {
+            Order::Go(step) => table.go(step),
+            Order::Turn(turn) => table.turn(turn),
+            Order::Halt | Order::Set(_) => table.stop(),
+        }
+    }
+
+    fn look(&mut self) -> Result<()> {
+        let (table, chamber) = (self.equipped.table, self.equipped.chamber);
+        if self.moves && !self.of(table).map_or(Ok(false), |t| t.busy())? {
+            self.moves = false;
+            let _ = self.tell.send(News::Done(self.motions));
+        }
+        if self.held.elapsed() >= HELD {
+            self.held = Instant::now();
+            for driver in &mut self.equipped.drivers {
+                if let Some(why) = driver.held()? {
+                    let remedy = "close it, and record the rest as another recording";
+                    return Err(Error::device(driver.abilities().place, why, remedy));
+                }
+            }
+        }
+        if self.read.is_none_or(|read| read.elapsed() >= READ) {
+            self.read = Some(Instant::now());
+            if let Some(temp_c) = self.of(chamber).map_or(Ok(None), |c| c.chamber_c())? {
+                let _ = self.tell.send(News::Chamber(temp_c));
+            }
+        }
+        Ok(())
+    }
+
+    /// Each by itself: a table that does not answer must not leave the chamber hot.
+    fn rest(&mut self) -> Vec<Error> {
+        let (table, chamber) = (self.equipped.table, self.equipped.chamber);
+        let rest_c = self.equipped.rest_c();
+        if !self.ordered {
+            return Vec::new();
+        }
+        let stopped = self.of(table).map_or(Ok(()), |t| t.stop());
+        let set = match (self.of(chamber), rest_c) {
+            (Some(chamber), Some(rest_c)) => chamber.set_chamber(rest_c),
+            _ => Ok(()),
+        };
+        let by_hand = |error: Error, what: &str| error.map(|e| e.remedy = what.to_owned());
+        let stopped = stopped.map_err(|e| by_hand(e, "stop the table by hand"));
+        let set = set.map_err(|e| by_hand(e, "set the chamber to a safe temperature by hand"));
+        [stopped, set].into_iter().filter_map(Result::err).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,76 @@
+//! How a procedure stands, for a person.
+
+use mimu_device::record::{Planned, Procedure, Standing};
+
+use super::sequence::Sequence;
+
+/// How it stands.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Progress {
+    /// Time since the procedure began, s; `None` while the chamber is on its way to the first temperature.
+    pub since_s: Option<f64>,
+    /// Round that runs, from 1, and rounds.
+    pub round: [usize; 2],
+    /// Dwells and turns that were had, and as planned.
+    pub dwells: [usize; 2],
+    /// Time that is left, at the pace so far, s.
+    pub left_s: f64,
+    /// What the chamber is to be at, °C.
+    pub planned_c: f64,
+    /// What it is at, °C, where it can be asked.
+    pub chamber_c: Option<f64>,
+    /// The unit's thermometer, °C.
+    pub temp_c: f64,
+    /// Samples that are missing.
+    pub missing: u64,
+    /// Turns that were not recorded as a whole.
+    pub dropped: usize,
+    /// The port has vanished, and is waited for.
+    pub line_lost: bool,
+}
+
+impl Progress {
+    pub(super) fn of(
+        procedure: &Procedure,
+        sequence: &Sequence<'_>,
+        standing: &Standing,
+        chamber_c: Option<f64>,
+    ) -> Self {
+        let (done, planned) = (sequence.done(), procedure.dwells.len());
+        let since_s = sequence.since_s();
+        let round = (done / procedure.per_round + 1).min(procedure.rounds);
+        Self {
+            since_s,
+            round: [round, procedure.rounds],
+            dwells: [done, planned],
+            left_s: left_s(procedure, done, since_s.unwrap_or_default()),
+            planned_c: procedure.temp_c(since_s.unwrap_or_default()),
+            chamber_c,
+            temp_c: standing.temp_c,
+            missing: standing.missing,
+            dropped: standing.dropped.len(),
+            line_lost: standing.waiting,
+        }
+    }
+}
+
+/// Time until the last dwell is over, s: rounds that begin by the clock are known, and others take as long for each dwell as those before.
+fn left_s(procedure: &Procedure, done: usize, since_s: f64) -> f64 {
+    let length =
+        |dwells: &[Planned]| -> f64 { dwells.iter().map(|d| d.length.as_secs_f64()).sum() };
+    let (had, to_come) = procedure.dwells.split_at(done);
+    if let Some(round_s) = procedure.round_s {
+        let end_s = procedure.lead_in_s + procedure.rounds as f64 * round_s;
+        return (end_s - since_s).max(0.0);
+    }
+    let lead_in_s = (procedure.lead_in_s - since_s).max(0.0);
+    let pace = match length(had) {
+        had_s if had_s > 0.0 => ((since_s - procedure.lead_in_s) / had_s).max(1.0),
+        _ => 1.0,
+    };
+    // Of the dwell that runs a part may be over; for one that lasts all day that is all there is to tell.
+    match procedure.dwells.len() {
+        1 => (procedure.lead_in_s + length(to_come) - since_s).max(0.0),
+        _ => lead_in_s + pace * length(to_come),
+    }
+}

@@ -1,0 +1,157 @@
+//! How a table or a chamber is spoken to: the file `mimu-driver/1`.
+
+use std::path::Path;
+
+use mimu_device::record::TableAxis;
+use mimu_recording::error::{Error, Result};
+use mimu_recording::read_text;
+use serde::Deserialize;
+
+use super::{ChamberLimits, Limits};
+
+/// The file.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct DriverFile {
+    format: String,
+    /// `host:port`.
+    pub tcp: Option<String>,
+    /// Path of a serial port.
+    pub serial: Option<String>,
+    #[serde(default = "usual_baud")]
+    pub baud: u32,
+    /// Longest wait for an answer, s.
+    #[serde(default = "usual_timeout")]
+    pub timeout_s: f64,
+    pub interlock: Option<Question>,
+    #[serde(rename = "move")]
+    pub to_pose: Option<Command>,
+    pub rate: Option<Command>,
+    #[serde(default)]
+    pub turn: Turns,
+    pub busy: Option<Question>,
+    pub stop: Option<Command>,
+    pub power: Option<Power>,
+    #[serde(default)]
+    pub limits: Limits,
+    pub chamber: Option<Chamber>,
+}
+
+fn usual_baud() -> u32 {
+    9600
+}
+
+fn usual_timeout() -> f64 {
+    5.0
+}
+
+/// Something to ask, and the answer that means yes.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Question {
+    pub ask: String,
+    pub answer: String,
+}
+
+/// Lines to say one after the other, what each is answered with (nothing is waited for without it), and a pause after them.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Command {
+    pub say: Vec<String>,
+    pub expect: Option<String>,
+    #[serde(default)]
+    pub pause_s: f64,
+}
+
+/// A turn by an angle, for each axis that can: tables number their axes as they like.
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Turns {
+    outer: Option<Command>,
+    middle: Option<Command>,
+    inner: Option<Command>,
+}
+
+impl Turns {
+    pub fn of(&self, axis: TableAxis) -> Option<&Command> {
+        match axis {
+            TableAxis::Outer => self.outer.as_ref(),
+            TableAxis::Middle => self.middle.as_ref(),
+            TableAxis::Inner => self.inner.as_ref(),
+        }
+    }
+}
+
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Power {
+    pub off: Command,
+    pub on: Command,
+}
+
+/// A chamber, alone or beside a table.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Chamber {
+    /// With `{temp_c}`.
+    pub set: Command,
+    /// Is answered by a line whose first number is the temperature in it, °C.
+    pub read: Option<String>,
+    /// Lowest and highest temperature that it may be set to, °C.
+    from_c: f64,
+    to_c: f64,
+    /// Largest ramp, K/min.
+    c_per_min: Option<f64>,
+    /// What it is left at, °C.
+    #[serde(default = "room")]
+    rest_c: f64,
+}
+
+/// Temperature at which a chamber is left: nothing in it freezes, condenses or burns a hand.
+fn room() -> f64 {
+    25.0
+}
+
+impl Chamber {
+    pub fn limits(&self) -> ChamberLimits {
+        ChamberLimits {
+            from_c: self.from_c,
+            to_c: self.to_c,
+            c_per_min: self.c_per_min,
+            rest_c: self.rest_c,
+        }
+    }
+}
+
+impl DriverFile {
+    pub fn read(path: &Path) -> Result<Self> {
+        let place = path.display().to_string();
+        let text = read_text(path)?;
+        let file: Self = toml::from_str(&text).map_err(|error| {
+            let line = error
+                .span()
+                .map(|s| 1 + text[..s.start].matches('\n').count());
+            let place = line.map_or(place.clone(), |l| format!("{place}, line {l}"));
+            let remedy = "docs/wizard.md has all keys of a driver file";
+            Error::new(place, error.message().trim(), remedy)
+        })?;
+        let refuse = |problem: &str, remedy: &str| Err(Error::new(&place, problem, remedy));
+        if file.format != "mimu-driver/1" {
+            let problem = format!("format is {:?}", file.format);
+            return refuse(&problem, "write format = \"mimu-driver/1\"");
+        }
+        if file.to_pose.is_none() && file.chamber.is_none() {
+            let remedy = "say how a table is moved, or how a chamber is set";
+            return refuse("it has neither `move` nor [chamber]", remedy);
+        }
+        if let Some(chamber) = &file.chamber {
+            let [from, to, rest] = [chamber.from_c, chamber.to_c, chamber.rest_c];
+            if !(from <= rest && rest <= to) {
+                let problem = format!("[chamber]: rest_c = {rest} is not within {from} to {to}");
+                let remedy = "give from_c and to_c, what the chamber can do, and a temperature within that is safe";
+                return refuse(&problem, remedy);
+            }
+        }
+        Ok(file)
+    }
+}
