@@ -3,7 +3,7 @@
 use mimu_rig::command::{Command, Commanded};
 use mimu_rig::hands::{Hands, HandsTruth};
 use mimu_rig::motion::{Carrier, Motion};
-use mimu_rig::plan::Plan;
+use mimu_rig::plan::{Plan, TableAxis, Turn};
 use mimu_rig::rotation::{Vector, dot, norm, scale};
 use mimu_rig::table::{Table, TableTruth};
 
@@ -118,6 +118,37 @@ fn a_table_goes_where_it_is_told_and_stands_there_within_its_own_errors() {
             assert!(position.heading.unwrap().abs() < 1e-12);
         }
     }
+}
+
+#[test]
+fn a_turn_by_an_angle_is_that_of_a_plan_and_begins_at_rest() {
+    let truth = TableTruth::default();
+    let steps = "lead_in_s = 1\n[[step]]\nup = [0, 0, 1]\ndwell_s = 1\n[[step]]\nturn_axis = \"middle\"\nturn_deg = 90\nturn_dps = 30";
+    let mut planned = table(steps, &truth);
+    let mut told = Table::commanded(&plan(steps), &truth).unwrap();
+    let mut course = Course::new(&mut told);
+    course.run(2.0);
+    let turn = Turn {
+        axis: TableAxis::Middle,
+        angle: 90f64.to_radians(),
+        rate: 30f64.to_radians(),
+    };
+    course.tell(Command::Turn(turn));
+    for _ in 0..3000 {
+        let motion = course.step();
+        let other = planned.at(motion.t_s).motion;
+        assert_near(motion.rate, other.rate, 1e-9);
+    }
+    course.wait();
+    assert_near(
+        course.carrier.position(course.t_s()).up,
+        [0.0, 1.0, 0.0],
+        1e-12,
+    );
+    course.tell(Command::Rate(0.5));
+    let t_s = course.t_s();
+    let refused = course.carrier.command(t_s, Command::Turn(turn));
+    assert!(refused.unwrap_err().contains("at rest"));
 }
 
 #[test]

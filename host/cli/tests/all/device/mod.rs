@@ -12,6 +12,7 @@ mod ports;
 mod recording;
 mod temperature;
 pub(crate) mod terminal;
+mod thermal_record;
 
 use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
