@@ -56,6 +56,9 @@ pub fn run(runs: u64) {
         .nth(1)
         .and_then(|s| s.lines().next());
     println!("chamber: {}", chamber.unwrap_or_default());
+    let still = "instability_si = [0.0, 0.0, 0.0]\nwalk_si = [0.0, 0.0, 0.0]\n";
+    let still = format!("[unit.gyro_axes]\n{still}[unit.accel_axes]\n{still}[[effect]]");
+    let white = without.replacen("[[effect]]", &still, 1);
     for (name, text, own_lag) in [
         ("as it is", &rig, false),
         (
@@ -64,6 +67,7 @@ pub fn run(runs: u64) {
             true,
         ),
         ("without gyro_thermal_lag", &without, false),
+        ("without it and without wander", &white, false),
     ] {
         println!(
             "\n{name}: rms of errors over their standard deviations, then errors (planned sigma): bias, scale, cross terms"
