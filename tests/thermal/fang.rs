@@ -67,8 +67,14 @@ pub fn run(runs: u64) {
     for axes in [&mut white.unit.gyro_axes, &mut white.unit.accel_axes] {
         (axes.instability_si, axes.walk_si) = (Some([0.0; 3]), Some([0.0; 3]));
     }
+    let mut centred = white.clone();
+    centred.table.offset_mm = [0.0; 3];
     for (name, file) in [
-        ("noise of Table 5 alone", &white),
+        (
+            "noise of Table 5 alone, the unit where the axes of the table meet",
+            &centred,
+        ),
+        ("the same, the unit off the axes by 2, -3 and 5 mm", &white),
         ("biases that wander by the data sheets too", &file),
     ] {
         let each = (0..runs)
