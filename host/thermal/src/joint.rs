@@ -98,7 +98,12 @@ impl<'a> Evaluator<'a> {
         let gravity = sessions.iter().any(|s| s.reference == Reference::Gravity);
         let problem = Problem::new(sessions, sensor, shape, range, gravity)?;
         let penalties = Penalties::of(&problem);
-        let noise = noise::white(&problem).map(|white| AxisNoise {
+        let white = noise::white(&problem).ok_or_else(|| {
+            let problem = "no dwell is long enough to see its noise";
+            let remedy = "dwell for a second or longer";
+            Error::undetermined(format!("{}, {sensor}", sessions[0].place), problem, remedy)
+        })?;
+        let noise = white.map(|white| AxisNoise {
             white,
             wander: 0.0,
             correlation_s: 1.0,
@@ -261,7 +266,9 @@ pub fn estimate(sessions: &[Session], choice: Choice) -> Result<Joint> {
     }
     let (mut profile, mut apart) = lags(&mut triads, &starts, choice.lag_s)?;
     if (profile.lag.value - rough).abs() > SETTLED_S {
+        // The noise too: what a wrong lag leaves of an accelerometer over a ramp is far beyond its noise.
         for triad in triads.iter_mut().flatten() {
+            triad.learn_noise(profile.lag.value, &starts);
             triad.settle(profile.lag.value, &starts);
         }
         (profile, apart) = lags(&mut triads, &starts, choice.lag_s)?;

@@ -14,8 +14,9 @@ const RATIOS: [f64; 6] = [1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0];
 /// What wander has to lower the deviance by: two parameters at the price of Akaike's criterion.
 const DEVIANCE: f64 = 4.0;
 
-/// White noise of rows of weight 1, SI², by the differences of neighbouring rows of a dwell, in which nothing else moves.
-pub fn white(problem: &Problem) -> [f64; 3] {
+/// White noise of rows of weight 1, SI², by the differences of neighbouring rows of a dwell, in which nothing else moves. `None` where no dwell
+/// has two.
+pub fn white(problem: &Problem) -> Option<[f64; 3]> {
     let (mut sum, mut n) = (Vector3::zeros(), 0.0);
     for pair in problem.rows.windows(2) {
         let [a, b] = [&pair[0], &pair[1]];
@@ -25,7 +26,7 @@ pub fn white(problem: &Problem) -> [f64; 3] {
             n += 1.0;
         }
     }
-    [0, 1, 2].map(|k| (sum[k] / n).max(f64::MIN_POSITIVE))
+    (n > 0.0).then(|| [0, 1, 2].map(|k| (sum[k] / n).max(f64::MIN_POSITIVE)))
 }
 
 /// Noise of `axis` at the die temperatures `dies`, where the curves are as smooth as `smoothness`; `before` is the noise found so far.
