@@ -83,7 +83,8 @@ fn recorded(path: &Path) -> Inputs {
                 let (sum, count) = all.entry(*step).or_default();
                 *count += 1.0;
                 for (sum, column) in sum.iter_mut().zip(&batch.reference) {
-                    *sum += column[row];
+                    // At rest without a table there are none.
+                    *sum += column.get(row).copied().unwrap_or(f64::NAN);
                 }
             }
             Ok(())
