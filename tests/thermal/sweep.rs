@@ -18,9 +18,6 @@ use crate::on_bench::{noiseless, read, session, unit};
 
 /// Temperatures of the chamber at which the truth is asked for, °C.
 const PROBES: [f64; 7] = [-16.0, -5.0, 6.0, 17.0, 28.0, 39.0, 50.0];
-/// Bias instability as a bias that wanders for so long, s, as `mimu thermal plan` has it, and its floor.
-const WANDER_S: f64 = 1000.0;
-const FLOOR: f64 = 0.664;
 /// Units of bias, scale factor and cross terms: of gyro, then accelerometer.
 const UNITS: [f64; 6] = [
     180.0 / std::f64::consts::PI * 3600.0,
@@ -269,12 +266,8 @@ fn planned(recorded: &Session, file: &RigFile, sensor: Sensor) -> impl Fn(usize,
     let of = |key: Option<[f64; 3]>, axis: usize| key.expect("drawn")[axis];
     let row_s = problem.samples / recorded.rate_hz;
     let inverses = [0, 1, 2].map(|axis| {
-        let noise = AxisNoise {
-            white: of(axes.white_si, axis).powi(2) / row_s,
-            wander: (FLOOR * of(axes.instability_si, axis)).powi(2)
-                + of(axes.walk_si, axis).powi(2) * WANDER_S,
-            correlation_s: WANDER_S,
-        };
+        let sheet = [axes.white_si, axes.instability_si, axes.walk_si];
+        let noise = AxisNoise::of_densities(sheet.map(|key| of(key, axis)), row_s);
         let gram = Normal::of(&problem, axis, &dies, &noise, |_| true).gram;
         let scale = gram.diagonal().map(|d| 1.0 / d.max(1e-300).sqrt());
         let both = nalgebra::DMatrix::from_diagonal(&scale);

@@ -107,6 +107,7 @@ impl<'a> Evaluator<'a> {
             white,
             wander: 0.0,
             correlation_s: 1.0,
+            parts: 1,
         });
         let smoothness = smoothness::times(&smoothness::largest(&problem), 1e-4);
         Ok(Some(Self {

@@ -4,11 +4,17 @@
 
 use nalgebra::Vector3;
 
-use crate::regression::{AxisNoise, Normal, Problem};
+use crate::regression::{AxisNoise, LONGEST_S, MOST_PARTS, Normal, Problem};
 use crate::smoothness::{Penalties, Smoothness, solve, times};
 
 /// Correlation times that are tried, s. The longest is a random walk over most recordings.
 const CORRELATION_S: [f64; 4] = [40.0, 200.0, 1000.0, 10_000.0];
+/// What a single process has to lower the deviance by further than flicker noise does: a record of an hour or two sees little of what is slower,
+/// and says nothing against it.
+const SINGLE: f64 = 6.0;
+/// Flicker noise, which the bias of a MEMS sensor has. A single process that fits its minutes misses its hours, and with them what a bias is
+/// uncertain by.
+const FLICKER: (usize, f64) = (MOST_PARTS, LONGEST_S);
 /// Variances of the wander over that of a row, in steps of a factor of ten and then of refinement.
 const RATIOS: [f64; 6] = [1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0];
 /// What wander has to lower the deviance by: two parameters at the price of Akaike's criterion.
@@ -41,11 +47,12 @@ pub fn estimate(
     before: &AxisNoise,
 ) -> AxisNoise {
     let scaled = times(smoothness, 1.0 / before.white);
-    let deviance = |ratio: f64, correlation_s: f64| {
+    let deviance = |ratio: f64, correlation_s: f64, parts: usize| {
         let relative = AxisNoise {
             white: 1.0,
             wander: ratio,
             correlation_s,
+            parts,
         };
         let normal = Normal::of(problem, axis, dies, &relative, |_| true);
         let solved = solve(problem, penalties, axis, &normal, &scaled)?;
@@ -58,40 +65,45 @@ pub fn estimate(
         let white = solved.left / n;
         (white > 0.0).then(|| (n * white.ln() + solved.determinants, white))
     };
-    let Some((without, white)) = deviance(0.0, 1.0) else {
+    let Some((without, white)) = deviance(0.0, 1.0, 1) else {
         return *before;
     };
-    let mut best = (without - DEVIANCE, 0.0, 1.0, white);
-    let mut attempt = |ratio: f64, correlation_s: f64| {
-        if let Some((d, white)) = deviance(ratio, correlation_s)
-            && d < best.0
+    let mut best = (without - DEVIANCE, 0.0, 1.0, 1, white);
+    let mut attempt = |ratio: f64, correlation_s: f64, parts: usize| {
+        let against = if parts == 1 { SINGLE } else { 0.0 };
+        if let Some((d, white)) = deviance(ratio, correlation_s, parts)
+            && d + against < best.0
         {
-            best = (d, ratio, correlation_s, white);
+            best = (d + against, ratio, correlation_s, parts, white);
         }
         best
     };
-    for correlation_s in CORRELATION_S {
+    let single = CORRELATION_S.map(|correlation_s| (1, correlation_s));
+    for (parts, correlation_s) in single.into_iter().chain([FLICKER]) {
         for ratio in RATIOS {
-            attempt(ratio, correlation_s);
+            attempt(ratio, correlation_s, parts);
         }
     }
-    if attempt(0.0, 1.0).1 > 0.0 {
+    if attempt(0.0, 1.0, 1).1 > 0.0 {
         for factor in [2.5, 1.6, 1.25] {
-            let (_, ratio, correlation_s, _) = attempt(0.0, 1.0);
+            let (_, ratio, correlation_s, parts, _) = attempt(0.0, 1.0, 1);
             for [a, b] in [
                 [factor, 1.0],
                 [1.0 / factor, 1.0],
                 [1.0, factor],
                 [1.0, 1.0 / factor],
             ] {
-                attempt(ratio * a, correlation_s * b);
+                // Flicker noise has no time of its own.
+                let b = if parts == 1 { b } else { 1.0 };
+                attempt(ratio * a, correlation_s * b, parts);
             }
         }
     }
-    let (_, ratio, correlation_s, white) = best;
+    let (_, ratio, correlation_s, parts, white) = best;
     AxisNoise {
         white,
         wander: ratio * white,
         correlation_s,
+        parts,
     }
 }

@@ -272,15 +272,40 @@ fn check_excitation(gram: &Matrix4<f64>, sensor: Sensor) -> Result<()> {
     Err(Error::undetermined(sensor, problem, remedy))
 }
 
-/// Noise of one axis: white noise of the rows, and a bias that wanders with an exponential correlation.
+/// Processes whose sum is flicker noise, and most that a wander is the sum of.
+pub const MOST_PARTS: usize = 4;
+/// Longest correlation time of flicker noise, s: beyond most recordings.
+pub const LONGEST_S: f64 = 10_000.0;
+/// Their correlation times are apart by this factor: so near that the sum has the spectrum of flicker noise between the ends, to a few per cent.
+const APART: f64 = 5.0;
+
+/// Noise of one axis: white noise of the rows, and a bias that wanders.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AxisNoise {
     /// Variance of a row of weight 1, SI².
     pub white: f64,
     /// Variance of the wander, SI².
     pub wander: f64,
-    /// Its correlation time, s.
+    /// Its longest correlation time, s.
     pub correlation_s: f64,
+    /// Number of processes with exponential correlation that share the variance evenly: one, or four with shorter and shorter times,
+    /// which are flicker noise.
+    pub parts: usize,
+}
+
+impl AxisNoise {
+    /// By the density N, the bias instability B and the random walk K of data sheets and Allan curves; a row of weight 1 is `row_s` long.
+    pub fn of_densities([n, b, k]: [f64; 3], row_s: f64) -> Self {
+        // A process of variance v for each factor r of correlation times has the density v / (f ln r); flicker noise has B² / (π f).
+        let of_flicker = b * b * APART.ln() / std::f64::consts::PI;
+        Self {
+            white: n * n / row_s,
+            // A random walk has gone so far, in the mean, over the longest time.
+            wander: MOST_PARTS as f64 * of_flicker + 0.5 * k * k * LONGEST_S,
+            correlation_s: LONGEST_S,
+            parts: MOST_PARTS,
+        }
+    }
 }
 
 /// Normal equations of one axis, of rows whose noise was made white with a variance of one.
@@ -352,40 +377,29 @@ impl Normal {
         let count = (0..problem.rows.len()).filter(|k| used(*k)).count();
         let mut white = DMatrix::zeros(p + 1, count);
         let mut entries = Vec::new();
-        let mut state = vec![0.0; p + 1];
         let mut innovation = vec![0.0; p + 1];
-        let (mut variance, mut log_det) = (noise.wander, 0.0);
+        let mut wander = Wander::new(noise, p + 1);
+        let mut log_det = 0.0;
         let mut before: Option<&ProblemRow> = None;
         let used_rows = problem.rows.iter().enumerate().filter(|(k, _)| used(*k));
         for (column, (k, row)) in used_rows.enumerate() {
             match before {
                 Some(b) if b.session == row.session => {
-                    let keep = (-(row.middle_s - b.middle_s).abs() / noise.correlation_s).exp();
-                    state.iter_mut().for_each(|s| *s *= keep);
-                    variance = keep * keep * variance + noise.wander * (1.0 - keep * keep);
+                    wander.pass((row.middle_s - b.middle_s).abs());
                 }
-                _ => {
-                    state.fill(0.0);
-                    variance = noise.wander;
-                }
+                _ => wander.begin(),
             }
             before = Some(row);
             problem.entries(axis, row, dies[k], &parts, &mut entries);
-            for (i, s) in innovation.iter_mut().zip(&state) {
-                *i = -s;
-            }
+            wander.expected(&mut innovation);
             for &(i, a) in &entries {
                 innovation[i] += a;
             }
-            let total = variance + noise.white / row.weight;
-            let (gain, root) = (variance / total, 1.0 / total.sqrt());
+            let total = wander.update(&innovation, noise.white / row.weight);
             log_det += total.ln();
-            variance *= 1.0 - gain;
-            let mut out = white.column_mut(column);
-            for i in 0..=p {
-                out[i] = innovation[i] * root;
-                state[i] += gain * innovation[i];
-            }
+            let root = 1.0 / total.sqrt();
+            let each = white.column_mut(column).into_iter().zip(&innovation);
+            each.for_each(|(out, innovation)| *out = innovation * root);
         }
         let both = &white * white.transpose();
         Self::split(&both, p, log_det, count as f64)
@@ -399,5 +413,80 @@ impl Normal {
             log_det,
             rows,
         }
+    }
+}
+
+/// Kalman filter of a wander, for the readings and all columns at once.
+struct Wander {
+    parts: usize,
+    /// Variance of each process.
+    variance: f64,
+    correlation_s: [f64; MOST_PARTS],
+    /// Of each process, by column.
+    state: [Vec<f64>; MOST_PARTS],
+    covariance: [[f64; MOST_PARTS]; MOST_PARTS],
+}
+
+impl Wander {
+    fn new(noise: &AxisNoise, columns: usize) -> Self {
+        let parts = noise.parts.clamp(1, MOST_PARTS);
+        Self {
+            parts,
+            variance: noise.wander / parts as f64,
+            correlation_s: std::array::from_fn(|k| noise.correlation_s / APART.powi(k as i32)),
+            state: std::array::from_fn(|k| vec![0.0; if k < parts { columns } else { 0 }]),
+            covariance: [[0.0; MOST_PARTS]; MOST_PARTS],
+        }
+    }
+
+    /// Another power-on.
+    fn begin(&mut self) {
+        self.state.iter_mut().for_each(|s| s.fill(0.0));
+        self.covariance = std::array::from_fn(|i| {
+            std::array::from_fn(|j| {
+                if i == j && i < self.parts {
+                    self.variance
+                } else {
+                    0.0
+                }
+            })
+        });
+    }
+
+    /// Time passes.
+    fn pass(&mut self, dt_s: f64) {
+        let keep = self.correlation_s.map(|tau| (-dt_s / tau).exp());
+        for (k, state) in self.state.iter_mut().enumerate() {
+            state.iter_mut().for_each(|s| *s *= keep[k]);
+        }
+        for i in 0..self.parts {
+            for j in 0..self.parts {
+                self.covariance[i][j] *= keep[i] * keep[j];
+            }
+            self.covariance[i][i] += self.variance * (1.0 - keep[i] * keep[i]);
+        }
+    }
+
+    /// Writes what is expected of each column, with its sign turned.
+    fn expected(&self, out: &mut [f64]) {
+        out.fill(0.0);
+        for state in &self.state {
+            out.iter_mut().zip(state).for_each(|(o, s)| *o -= s);
+        }
+    }
+
+    /// Takes in the innovations of a row with this white variance; returns their variance.
+    fn update(&mut self, innovation: &[f64], white: f64) -> f64 {
+        let seen = self.covariance.map(|row| row.iter().sum::<f64>());
+        let total = seen.iter().sum::<f64>() + white;
+        for (i, state) in self.state.iter_mut().enumerate() {
+            let gain = seen[i] / total;
+            let each = state.iter_mut().zip(innovation);
+            each.for_each(|(s, innovation)| *s += gain * innovation);
+            for j in 0..self.parts {
+                self.covariance[i][j] -= gain * seen[j];
+            }
+        }
+        total
     }
 }

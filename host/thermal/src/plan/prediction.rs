@@ -1,7 +1,5 @@
 //! Standard deviations of the curves that a procedure gives, from the information matrix of the regression.
 
-use mimu::allan::model::FLOOR;
-use mimu::design::budget::DwellNoise;
 use mimu::quantity::Sensor;
 use nalgebra::{DMatrix, DVector, Vector3};
 use serde::Serialize;
@@ -13,8 +11,6 @@ use crate::regression::{AxisNoise, Kind, Normal, Part, Problem, ProblemRow};
 
 /// Longest row, s. Shorter ones say no more of noise that wanders over many minutes.
 const ROW_S: f64 = 10.0;
-/// Correlation time of the wander, s: bias instability as an exponentially correlated bias of the variance of its floor.
-const WANDER_S: f64 = 1000.0;
 /// Standard gravity, m/s²: which gravity it is makes no difference to a prediction.
 const GRAVITY: f64 = mimu::readable::STANDARD_GRAVITY;
 
@@ -62,10 +58,8 @@ fn of(request: &Request, schedule: &Schedule, sensor: Sensor) -> SensorPredictio
         samples,
     };
     problem.rows.iter_mut().for_each(|r| r.weight /= samples);
-    let noise = axis_noise(
-        &request.noise[sensor as usize],
-        samples / request.sample_rate_hz,
-    );
+    let of = &request.noise[sensor as usize];
+    let noise = AxisNoise::of_densities([of.n, of.b, of.k], samples / request.sample_rate_hz);
     let covariances = [0, 1, 2].map(|axis| {
         let normal = Normal::of(&problem, axis, &dies, &noise, |_| true);
         inverse(&normal.gram)
@@ -84,16 +78,6 @@ fn of(request: &Request, schedule: &Schedule, sensor: Sensor) -> SensorPredictio
         sensor,
         unit: sensor.unit(),
         at,
-    }
-}
-
-/// White noise of a row of `row_s`, and the floor and the random walk of the bias as wander.
-fn axis_noise(noise: &DwellNoise, row_s: f64) -> AxisNoise {
-    AxisNoise {
-        white: noise.n.powi(2) / row_s,
-        // A random walk has gone so far in the correlation time.
-        wander: FLOOR * noise.b.powi(2) + noise.k.powi(2) * WANDER_S,
-        correlation_s: WANDER_S,
     }
 }
 
