@@ -3,6 +3,7 @@
 //! | in order of use | what |
 //! |---|---|
 //! | [`thermometer`] | the thermometer of a recording, and the temperature of a die that follows it |
+//! | [`excitation`] | whether inputs tell all parameters apart |
 //! | [`session`] | a recording as means of some seconds with their known input |
 //! | [`basis`] | the functions of temperature that a curve is a sum of |
 //! | [`regression`] | the readings of a triad as a linear regression |
@@ -25,6 +26,7 @@ pub mod basis;
 pub mod classic;
 pub mod compare;
 pub mod curves;
+pub mod excitation;
 pub mod extrapolation;
 pub mod fit;
 pub mod joint;

@@ -8,7 +8,7 @@ use mimu_recording::error::{Error, Result};
 use mimu_recording::{RawUnit, Reference};
 use nalgebra::Vector3;
 
-use crate::regression::tells_apart;
+use crate::excitation::tells_apart;
 use crate::thermometer::Thermometer;
 
 /// Length of a row, s. At 5 K/min a die moves by 0.2 K in it, over which any curve is a line.
