@@ -57,7 +57,7 @@ pub fn thermal_plan_text(planned: &Planned) -> String {
         &mut out,
         "",
         "By the information matrix of the estimate with one curve of this kind for each parameter, dies as warm as the chamber, and a bias \
-         that wanders with a correlation time of 1000 s. What a lag of the dies adds is not predicted.",
+         that wanders as flicker noise of up to 10 000 s. What a lag of the dies adds is not predicted.",
     );
     for what in &planned.inseparable {
         wrap(&mut out, "inseparable: ", what);
