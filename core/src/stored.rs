@@ -9,10 +9,10 @@
 //! | 2     | length of everything                                                                              |
 //! | 1, 1  | number of nodes (1 to [`NODES`]), of effects                                                      |
 //! | 1     | thermometer that temperatures are of: 0, the mean of the gyros' TEMP pins; there is no other yet  |
-//! | 1     | bits: 0, the range is known; 1, the lag is known                                                  |
+//! | 1     | bits: 0, the range is known; 1, the lags are known                                                |
 //! | 60    | [`Origin`], zero where it is unknown: number of the unit, 12; when it was made, UTC seconds since 1970, 8; SHA-256 of the samples that it was made from, 32; when its offsets were trimmed, UTC seconds since 1970, 8 |
 //! | 144   | [`Directions`] of the gyro, D and R, then of the accelerometer: those of C that the effects were found with |
-//! | 8, 4  | range of the dies' temperatures, °C, and lag of the dies behind the thermometer, s; zero where it is not known |
+//! | 8, 8  | range of the dies' temperatures, °C, and lags of the dies of gyro and accelerometer behind the thermometer, s; zero where they are not known |
 //! | 196   | each node: temperature of the dies, °C; C and o (rad/s) of the gyro; C and o (m/s²) of the accelerometer; the derivatives of these 24 numbers, per kelvin |
 //! | ...   | each effect, see below                                                                            |
 //! | 4     | CRC-32/ISO-HDLC of everything before                                                              |
@@ -25,7 +25,7 @@
 //!
 //! [`Variable`]: crate::effects::Variable
 //!
-//! Version 4 has two zeros in place of thermometer and bits, an origin of 52 bytes without the time of a trim, no range, no lag, and nodes of
+//! Version 5 has one lag, of the dies of both, and 4 bytes less for it. Version 4 has two zeros in place of thermometer and bits, an origin of 52 bytes without the time of a trim, no range, no lag, and nodes of
 //! 100 bytes without derivatives. What an earlier firmware computed with it stays: straight lines between the nodes, the end nodes held
 //! outside. No derivatives could stand for these lines, as they bend at each node. Version 3 is version 4 without an origin.
 //!
@@ -54,7 +54,7 @@ pub use record::Record;
 pub use trim::trim;
 
 /// Version of the layout that is written.
-pub const VERSION: u16 = 5;
+pub const VERSION: u16 = 6;
 /// The oldest that is read.
 pub const OLDEST: u16 = 3;
 /// Most temperature nodes.
@@ -68,6 +68,8 @@ const MAGIC: [u8; 4] = *b"mimc";
 const HEADER: usize = 12;
 /// The first version whose nodes have derivatives.
 const CURVES: u16 = 5;
+/// The first version with a lag for each triad.
+const TWO_LAGS: u16 = 6;
 const CHECK: usize = 4;
 /// Where the length stands.
 const LENGTH_AT: usize = 6;
@@ -89,8 +91,8 @@ pub struct Stored {
     pub origin: Origin,
     /// Compensation over the temperature of the dies.
     pub table: Table<f32, NODES>,
-    /// Lag of the dies behind the thermometer, s, if it is known; otherwise none is applied.
-    pub lag_s: Option<f32>,
+    /// Lags of the dies of gyro and accelerometer behind the thermometer, s, if they are known; otherwise none is applied.
+    pub lags_s: Option<[f32; 2]>,
     /// What the affine model lacks; `None` if there are none, so that no sample pays for it.
     pub effects: Option<Effects<f32, ROOM>>,
     /// How many records of effects: errors by the code have one for each converter.
@@ -133,16 +135,16 @@ pub enum Refused {
         /// The first that has none.
         at: u8,
     },
-    /// The range is not one of temperatures, the lag is none that dies have, or the thermometer is one that this build does not know.
+    /// The range is not one of temperatures, a lag is none that dies have, or the thermometer is one that this build does not know.
     Temperature,
 }
 
 impl Stored {
-    /// The lag between thermometer and dies.
-    pub fn lag(&self) -> DieLag<f32> {
-        self.lag_s
-            .and_then(DieLag::new)
-            .unwrap_or_else(DieLag::none)
+    /// The lags between the thermometer and the dies of gyro and accelerometer.
+    pub fn lags(&self) -> [DieLag<f32>; 2] {
+        let lag = |lag_s| DieLag::new(lag_s).unwrap_or_else(DieLag::none);
+        self.lags_s
+            .map_or_else(|| [DieLag::none(); 2], |lags_s| lags_s.map(lag))
     }
 }
 
@@ -226,8 +228,14 @@ pub fn read(
     let origin = origin.ok_or(Refused::Length)?;
     let gyro = directions(&mut from).ok_or(Refused::Length)?;
     let accel = directions(&mut from).ok_or(Refused::Length)?;
-    let (table, lag_s) = match version >= CURVES {
-        true => curves::read(&mut from, nodes, thermometer, known, node)?,
+    let head = curves::Head {
+        nodes,
+        thermometer,
+        known,
+        two_lags: version >= TWO_LAGS,
+    };
+    let (table, lags_s) = match version >= CURVES {
+        true => curves::read(&mut from, head, node)?,
         false => (curves::read_straight(&mut from, nodes, node)?, None),
     };
     let sum = |of: &Directions<f32>| of.sensed.iter().chain(&of.to_body).sum::<f32>();
@@ -240,7 +248,7 @@ pub fn read(
         true => Ok(Stored {
             origin,
             table,
-            lag_s,
+            lags_s,
             effects: (effects > 0).then_some(all),
             effect_count: effects,
         }),

@@ -10,6 +10,8 @@
 //! Outside the nodes a cubic leaves the data at its third power. There each number goes on along the slope of the end node for
 //! [`BEYOND_C`], and is held from there on: the error grows linearly at first, and then no more.
 //!
+//! Each triad has the model of its own dies: gyro and accelerometer are other packages, in other places on the board.
+//!
 //! Temperature moves slowly, so this runs some times a second ([`Table::follow`]), and what runs with every sample is
 //! [`Compensation::apply`] of the model that it leaves behind.
 
@@ -194,13 +196,13 @@ impl<T: RealField + Copy, const N: usize> Table<T, N> {
 
     /// The state of a stream whose temperature is not known yet: that of [`REFERENCE_C`].
     pub fn state(&self) -> State<T> {
-        self.at(convert(REFERENCE_C))
+        self.at([convert(REFERENCE_C); 2])
     }
 
-    /// Follows the temperature of the dies, °C. One that is not a number changes nothing.
-    pub fn follow(&self, state: &mut State<T>, temp_c: T) {
-        if temp_c.is_finite() {
-            *state = self.at(temp_c);
+    /// Follows the temperatures of the dies of gyro and accelerometer, °C. If one is not a number, nothing changes.
+    pub fn follow(&self, state: &mut State<T>, dies_c: [T; 2]) {
+        if dies_c.iter().all(|die_c| die_c.is_finite()) {
+            *state = self.at(dies_c);
         }
     }
 
@@ -214,43 +216,47 @@ impl<T: RealField + Copy, const N: usize> Table<T, N> {
         false
     }
 
-    fn at(&self, temp_c: T) -> State<T> {
+    fn at(&self, [gyro_c, accel_c]: [T; 2]) -> State<T> {
         let place = match self.limits() {
-            Some([from, _]) if temp_c < from => Place::Below,
-            Some([_, to]) if temp_c > to => Place::Above,
+            Some([from, _]) if gyro_c < from || accel_c < from => Place::Below,
+            Some([_, to]) if gyro_c > to || accel_c > to => Place::Above,
             _ => Place::Inside,
         };
-        State {
-            model: self.model(temp_c),
-            place,
-        }
+        let model = Compensation {
+            gyro: self.model(gyro_c, |both| &both.gyro),
+            accel: self.model(accel_c, |both| &both.accel),
+        };
+        State { model, place }
     }
 
-    fn model(&self, temp_c: T) -> Compensation<T> {
+    fn model(&self, temp_c: T, of: fn(&Compensation<T>) -> &Affine<T>) -> Affine<T> {
         let mut low = &self.first;
         for high in &self.others {
             if temp_c < low.temp_c {
                 break;
             }
             if temp_c <= high.temp_c {
-                return self.between(low, high, temp_c);
+                return self.between(low, high, temp_c, of);
             }
             low = high;
         }
         let most: T = convert(BEYOND_C);
         let away = (temp_c - low.temp_c).max(-most).min(most);
-        let beyond = |at: &Affine<T>, slope: &Affine<T>| Affine {
+        let (at, slope) = (of(&low.model), of(&low.slope));
+        Affine {
             matrix: at.matrix + slope.matrix * away,
             offset: at.offset + slope.offset * away,
-        };
-        Compensation {
-            gyro: beyond(&low.model.gyro, &low.slope.gyro),
-            accel: beyond(&low.model.accel, &low.slope.accel),
         }
     }
 
     /// The four weights of a piece are 1 and three zeros at either end, so that a node has its own numbers to the last bit.
-    fn between(&self, low: &Node<T>, high: &Node<T>, temp_c: T) -> Compensation<T> {
+    fn between(
+        &self,
+        low: &Node<T>,
+        high: &Node<T>,
+        temp_c: T,
+        of: fn(&Compensation<T>) -> &Affine<T>,
+    ) -> Affine<T> {
         let (one, width) = (T::one(), high.temp_c - low.temp_c);
         let w = (temp_c - low.temp_c) / width;
         let rest = one - w;
@@ -263,17 +269,11 @@ impl<T: RealField + Copy, const N: usize> Table<T, N> {
                 -w * w * rest * width,
             ],
         };
-        let affine = |of: fn(&Compensation<T>) -> &Affine<T>| {
-            let (u, v) = (of(&low.model), of(&high.model));
-            let (du, dv) = (of(&low.slope), of(&high.slope));
-            Affine {
-                matrix: u.matrix * a + v.matrix * b + du.matrix * c + dv.matrix * d,
-                offset: u.offset * a + v.offset * b + du.offset * c + dv.offset * d,
-            }
-        };
-        Compensation {
-            gyro: affine(|model| &model.gyro),
-            accel: affine(|model| &model.accel),
+        let (u, v) = (of(&low.model), of(&high.model));
+        let (du, dv) = (of(&low.slope), of(&high.slope));
+        Affine {
+            matrix: u.matrix * a + v.matrix * b + du.matrix * c + dv.matrix * d,
+            offset: u.offset * a + v.offset * b + du.offset * c + dv.offset * d,
         }
     }
 }

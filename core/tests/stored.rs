@@ -123,7 +123,7 @@ fn the_layout_is_that_of_the_table_in_the_documentation() {
     let curves = Curves {
         nodes: &one,
         range_c: Some([-10.5, 60.25]),
-        lag_s: Some(61.5),
+        lags_s: Some([61.5, -4.25]),
     };
     let origin = Origin {
         unit_id: Some([1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12]),
@@ -135,9 +135,9 @@ fn the_layout_is_that_of_the_table_in_the_documentation() {
     };
     let length = encode(&origin, [&gyro, &accel], &curves, &effects, &mut all).unwrap();
     let all = &all[..length];
-    let mut expected = b"mimc\x05\x00".to_vec();
+    let mut expected = b"mimc\x06\x00".to_vec();
     expected.extend((all.len() as u16).to_le_bytes());
-    // One node, four effects, the TEMP pins; range and lag are known.
+    // One node, four effects, the TEMP pins; range and lags are known.
     expected.extend([1, 4, 0, 3]);
     expected.extend([1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12]);
     expected.extend([0x00, 0xb9, 0x55, 0x69, 0, 0, 0, 0]);
@@ -154,7 +154,7 @@ fn the_layout_is_that_of_the_table_in_the_documentation() {
             expected.extend((*value as f32).to_le_bytes());
         }
     }
-    for value in [-10.5_f32, 60.25, 61.5, 25.0] {
+    for value in [-10.5_f32, 60.25, 61.5, -4.25, 25.0] {
         expected.extend(value.to_le_bytes());
     }
     for value in regular().into_iter().chain(slopes) {
@@ -187,7 +187,8 @@ fn the_layout_is_that_of_the_table_in_the_documentation() {
     assert_eq!((stored.table.len(), stored.effect_count), (1, 4));
     assert_eq!(stored.origin, origin);
     assert_eq!(stored.table.range_c(), Some([-10.5, 60.25]));
-    assert_eq!((stored.lag_s, stored.lag().lag_s()), (Some(61.5), 61.5));
+    assert_eq!(stored.lags_s, Some([61.5, -4.25]));
+    assert_eq!(stored.lags().map(|lag| lag.lag_s()), [61.5, -4.25]);
     // 384 of 256 codes to 1.65 V are bits 0 and -1, and 255 are bits -1 to -8; half a code more, so that no error turns any.
     let right = Vector3::new(384.5, 0.5, 255.5) * (1.65 / 256.0);
     let read = Sample {
@@ -210,7 +211,8 @@ fn the_layout_is_that_of_the_table_in_the_documentation() {
 fn of_version_4(bytes: &[u8]) -> Vec<u8> {
     let nodes = usize::from(bytes[8]);
     let directions = 12 + 60;
-    let (from, end) = (directions + 144 + 12, directions + 144 + 12 + 196 * nodes);
+    let from = directions + 144 + 16;
+    let end = from + 196 * nodes;
     let mut older = [&bytes[..64], &bytes[directions..directions + 144]].concat();
     for node in bytes[from..end].chunks(196) {
         older.extend(&node[..100]);
@@ -257,7 +259,7 @@ fn nodes_of_version_4_stay_straight_and_are_held_outside() {
     let nodes = [node(0.0, &low), node(20.0, &middle), node(50.0, &high)];
     let older = decode(&of_version_4(&bytes(&nodes, &[]))).unwrap();
     assert!(older.table.is_straight());
-    assert_eq!((older.lag_s, older.table.range_c()), (None, None));
+    assert_eq!((older.lags_s, older.table.range_c()), (None, None));
     let mut state = older.table.state();
     for (temp_c, low, high, weight, place) in [
         (-30.0, &low, &low, 0.0, Place::Below),
@@ -267,7 +269,7 @@ fn nodes_of_version_4_stay_straight_and_are_held_outside() {
         (35.0, &middle, &high, 0.5, Place::Inside),
         (51.0, &high, &high, 0.0, Place::Above),
     ] {
-        older.table.follow(&mut state, temp_c);
+        older.table.follow(&mut state, [temp_c; 2]);
         for (found, (low, high)) in numbers_of(&state.model).iter().zip(low.iter().zip(high)) {
             let expected = low * (1.0 - weight) + high * weight;
             assert_eq!(*found, expected, "{temp_c}");
@@ -291,9 +293,34 @@ fn a_calibration_that_is_kept_in_flash_since_layout_4_is_read() {
         f32::from_le_bytes(bytes[from..from + 4].try_into().unwrap())
     };
     let mut state = older.table.state();
-    older.table.follow(&mut state, 30.5);
+    older.table.follow(&mut state, [30.5; 2]);
     let expected = at(6) * 0.5 + at(7) * 0.5;
     assert_eq!(state.model.gyro.matrix[(0, 0)], expected);
+}
+
+/// Bytes that a firmware of layout 5 has kept, of one lag for both triads; they never change.
+#[test]
+fn a_calibration_that_is_kept_in_flash_since_layout_5_is_read_and_trimmed() {
+    let bytes = include_bytes!("layouts/5.calibration");
+    assert_eq!(&bytes[..6], b"mimc\x05\x00");
+    let older = decode(bytes).unwrap();
+    assert_eq!((older.table.len(), older.effect_count), (1, 4));
+    assert_eq!(older.lags_s, Some([61.5; 2]));
+    assert_eq!(older.table.range_c(), Some([-10.5, 60.25]));
+    let node_of = |bytes: &[u8]| {
+        let mut nodes = Vec::new();
+        read(bytes, |node| nodes.push(*node), |_| {}).unwrap();
+        nodes[0]
+    };
+    let slopes: [f32; 24] = std::array::from_fn(|k| -0.001 * k as f32);
+    assert_eq!(node_of(bytes), sloping(25.0, &regular(), &slopes));
+    let mut trimmed = *bytes;
+    trim(&mut trimmed, [[0.5, 0.0, 0.0], [0.0, 0.0, 0.25]], 7).unwrap();
+    let mut expected = node_of(bytes);
+    expected.model.gyro.offset.x += 0.5;
+    expected.model.accel.offset.z += 0.25;
+    assert_eq!(node_of(&trimmed), expected);
+    assert_eq!(decode(&trimmed).unwrap().lags_s, Some([61.5; 2]));
 }
 
 #[test]
@@ -306,7 +333,7 @@ fn a_trim_moves_the_curves_as_they_are_and_nothing_else() {
     let curves = Curves {
         nodes: &two_nodes(),
         range_c: Some([1.0, 49.0]),
-        lag_s: Some(-20.0),
+        lags_s: Some([-20.0, 30.0]),
     };
     let before = with_curves(&curves, &[named]);
     let (mut after, mut nodes) = (before.clone(), Vec::new());
@@ -348,23 +375,25 @@ fn a_trim_moves_the_curves_as_they_are_and_nothing_else() {
 #[test]
 fn a_range_a_lag_or_a_thermometer_that_makes_no_sense_is_refused() {
     let one = [node(25.0, &regular())];
-    let refused = |range_c, lag_s| {
+    let refused = |range_c, lags_s| {
         let nodes = &one;
         let curves = Curves {
             nodes,
             range_c,
-            lag_s,
+            lags_s,
         };
         decode(&with_curves(&curves, &[])).err()
     };
     let no = Some(Refused::Temperature);
-    assert_eq!(refused(Some([10.0, 40.0]), Some(-120.0)), None);
-    assert_eq!(refused(Some([10.0, 10.0]), Some(600.0)), None);
+    assert_eq!(refused(Some([10.0, 40.0]), Some([-120.0, 0.0])), None);
+    assert_eq!(refused(Some([10.0, 10.0]), Some([600.0; 2])), None);
     assert_eq!(refused(Some([40.0, 10.0]), None), no);
     assert_eq!(refused(Some([f32::NAN, 10.0]), None), no);
     assert_eq!(refused(Some([0.0, f32::INFINITY]), None), no);
     for lag_s in [-121.0, 601.0, f32::NAN] {
-        assert_eq!(refused(None, Some(lag_s)), no, "{lag_s}");
+        for lags_s in [[lag_s, 0.0], [0.0, lag_s]] {
+            assert_eq!(refused(None, Some(lags_s)), no, "{lag_s}");
+        }
     }
     let mut later = bytes(&one, &[]);
     later[10] = 1;
@@ -540,14 +569,31 @@ fn outside_the_nodes_the_end_slope_goes_on_for_five_kelvin_and_is_then_held() {
         (55.0, &high, -1.0, Place::Above),
         (99.0, &high, -1.0, Place::Above),
     ] {
-        table.follow(&mut state, temp_c);
+        table.follow(&mut state, [temp_c; 2]);
         for (found, end) in numbers_of(&state.model).iter().zip(ends) {
             assert!((found - (end + grown)).abs() < 3e-6, "{temp_c}");
         }
         assert_eq!(state.place, place, "{temp_c}");
     }
-    table.follow(&mut state, f32::NAN);
-    assert_eq!(state.place, Place::Above, "as before");
+    for lost in [[f32::NAN; 2], [20.0, f32::NAN], [f32::NAN, 20.0]] {
+        table.follow(&mut state, lost);
+        assert_eq!(state.place, Place::Above, "as before");
+    }
+    // One triad outside is outside, and either is on its own curve.
+    for (dies_c, place) in [
+        ([20.0, 51.0], Place::Above),
+        ([51.0, 20.0], Place::Above),
+        ([20.0, -1.0], Place::Below),
+        ([20.0, 30.0], Place::Inside),
+    ] {
+        table.follow(&mut state, dies_c);
+        assert_eq!(state.place, place, "{dies_c:?}");
+        let (mut gyro, mut accel) = (table.state(), table.state());
+        table.follow(&mut gyro, [dies_c[0]; 2]);
+        table.follow(&mut accel, [dies_c[1]; 2]);
+        assert_eq!(state.model.gyro, gyro.model.gyro);
+        assert_eq!(state.model.accel, accel.model.accel);
+    }
     let none = Table::<f32, 16>::new([]);
     assert_eq!(none.err(), Some(mimu_core::table::Refused::Count));
 }
@@ -558,7 +604,7 @@ fn a_single_node_is_for_all_temperatures_unless_its_range_is_known() {
     let table = Table::<f32, 16>::new([one]).unwrap();
     let place = |table: &Table<f32, 16>, temp_c| {
         let mut state = table.state();
-        table.follow(&mut state, temp_c);
+        table.follow(&mut state, [temp_c; 2]);
         state.place
     };
     assert_eq!(table.limits(), None);
@@ -623,7 +669,7 @@ proptest! {
         let (first, last) = (temps[0], temps[temps.len() - 1]);
         let wanted = (first + at * (last - first + 20.0)) as f32;
         let mut state = single.state();
-        single.follow(&mut state, wanted);
+        single.follow(&mut state, [wanted; 2]);
         let found = numbers_of(&state.model);
         let t = f64::from(wanted);
         let end = if t < first { 0 } else { nodes.len() - 1 };

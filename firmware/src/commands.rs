@@ -259,6 +259,7 @@ impl Commands<'_> {
                 .and(Capabilities::KALMAN)
                 .and(Capabilities::SELF_TEST)
                 .and(Capabilities::CURVES)
+                .and(Capabilities::TWO_LAGS)
                 .and(usb),
             effects: effects_of_this_build(),
             effects_room: ROOM as u8,

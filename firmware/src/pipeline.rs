@@ -335,12 +335,14 @@ impl Pipeline {
             dropped += u32::from(!send(&Message::Event(event)));
         }
         if let (true, Some(calibrated)) = (streams.compensated, &self.calibrated) {
+            let (gyro_c, accel_c) = calibrated.dies_c();
             let event = Event::Compensated(CompensatedBatch {
                 head: BatchHead {
-                    temp_c: calibrated.die_c(),
+                    temp_c: gyro_c,
                     ..head
                 },
                 samples: batch.compensated.as_flattened(),
+                accel_die_c: accel_c,
             });
             dropped += u32::from(!send(&Message::Event(event)));
         }

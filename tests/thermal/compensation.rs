@@ -55,15 +55,14 @@ pub fn run(folder: Option<&Path>) {
             range_c: None,
         };
         let found = fit(vec![recorded], &[], options).expect("it is fitted");
-        let lag = found.joint.profile.lag;
+        let [gyro, accel] = found.joint.profiles.each_ref().map(|p| p.lag.value);
         let calibration = found
             .calibration("2026-01-01T00:00:00Z")
             .expect("it has scale factors");
         let image = Image::new(&calibration, name).expect("the device takes it");
         let stored = image.stored().expect("it reads what it stores");
         println!(
-            "{name}: lag {:.1} s, {} nodes\n",
-            lag.value,
+            "{name}: lags {gyro:.1} and {accel:.1} s, {} nodes\n",
             image.node_temp_c.len()
         );
         println!(
@@ -151,7 +150,7 @@ fn test(file: &RigFile, stored: &Stored, k: usize) -> Outcome {
     file.table.axes = 3;
     let truth = RigTruth::resolve(&file, 1).expect("a rig");
     let plan = Plan::parse(Source::new("plan", plan(k, HOUR_S))).expect("a plan");
-    let (lag, mut die) = (stored.lag(), die::State::new());
+    let (lags, mut dies) = (stored.lags(), [die::State::new(); 2]);
     let mut model = stored.table.state();
     let mut warm = f64::NAN;
     let mut sums = [[0.0; 3]; 2];
@@ -163,10 +162,13 @@ fn test(file: &RigFile, stored: &Stored, k: usize) -> Outcome {
         .enumerate()
     {
         let temp_c = row.readings.temp_c;
-        if n.is_multiple_of(FOLLOW)
-            && let Some(die_c) = lag.follow(&mut die, FOLLOW as f32 / RATE_HZ as f32, temp_c as f32)
-        {
-            stored.table.follow(&mut model, die_c);
+        if n.is_multiple_of(FOLLOW) {
+            let dt_s = FOLLOW as f32 / RATE_HZ as f32;
+            let follow = |k: usize, die| lags[k].follow(die, dt_s, temp_c as f32);
+            let [gyro, accel] = &mut dies;
+            if let (Some(gyro_c), Some(accel_c)) = (follow(0, gyro), follow(1, accel)) {
+                stored.table.follow(&mut model, [gyro_c, accel_c]);
+            }
         }
         warm = if warm.is_nan() {
             temp_c

@@ -134,11 +134,10 @@ fn once(noisy: &Session, truth: &Session) -> Vec<Errors> {
 
 /// What is left of the noiseless readings: compensated minus known input.
 fn errors(joint: &Joint, soak: &Joint, how: Model, truth: &Session) -> Errors {
-    let die = truth
-        .thermometer
-        .die(joint.profile.lag.value, joint.starts[0]);
     let mut out = Errors::default();
     for sensor in [0, 1] {
+        let lag = joint.profiles[sensor].lag.value;
+        let die = truth.thermometer.die(lag, joint.starts[0]);
         let rows = &truth.rows[sensor];
         let errors = rows.iter().map(|row| {
             let model = inverse(joint, soak, how, sensor, die.at(row.middle_s));

@@ -83,8 +83,10 @@ pub fn truth(sensor: usize, temp_c: f64) -> (Matrix3<f64>, Vector3<f64>) {
 pub struct Experiment {
     /// Corners of the driving temperature: s, °C. The die follows them, or the thermometer where the lag is negative.
     pub corners: Vec<(f64, f64)>,
-    /// Lag of the die behind the thermometer, s.
+    /// Lag of the dies behind the thermometer, s.
     pub lag_s: f64,
+    /// Lag of the accelerometer's die, s, if it has one of its own; not negative, and the other is not either.
+    pub accel_lag_s: Option<f64>,
     /// Random walk of the biases over what white noise gives in a second, per √s; zero for none.
     pub walk: f64,
     /// White noise of the thermometer, K, at 10 Hz.
@@ -101,6 +103,7 @@ impl Experiment {
         Self {
             corners: up.into_iter().chain(back).collect(),
             lag_s,
+            accel_lag_s: None,
             walk: 0.0,
             thermometer_noise: 0.02,
             offset: [0.0; 2],
@@ -120,22 +123,25 @@ impl Experiment {
         }
     }
 
-    /// Temperatures of thermometer and die, sample by sample.
-    pub fn temperatures(&self) -> Vec<[f64; 2]> {
+    /// Temperatures of thermometer, gyro and accelerometer, sample by sample.
+    pub fn temperatures(&self) -> Vec<[f64; 3]> {
         let n = (self.corners.last().map_or(0.0, |c| c.0) * RATE_HZ) as usize;
         let step = 1.0 / RATE_HZ;
-        let mut follower = self.driven(0.0);
-        let follow = 1.0 - (-step / self.lag_s.abs().max(1e-6)).exp();
+        let accel_lag_s = self.accel_lag_s.unwrap_or(self.lag_s);
+        let mut followers = [self.driven(0.0); 2];
+        let follow = [self.lag_s, accel_lag_s].map(|lag| 1.0 - (-step / lag.abs().max(1e-6)).exp());
         let mut out = Vec::with_capacity(n);
         for k in 0..n {
             let driven = self.driven(k as f64 * step);
             out.push(match self.lag_s {
-                lag if lag >= 0.0 => [driven, follower],
-                _ => [follower, driven],
+                lag if lag >= 0.0 => [driven, followers[0], followers[1]],
+                _ => [followers[0], driven, driven],
             });
             // Between two samples the driving temperature is that of their middle.
             let middle = self.driven((k as f64 + 0.5) * step);
-            follower += follow * (middle - follower);
+            for (follower, follow) in followers.iter_mut().zip(follow) {
+                *follower += follow * (middle - *follower);
+            }
         }
         out
     }
@@ -146,14 +152,14 @@ impl Experiment {
         let mut out = Batch::default();
         let mut scheme = Scheme::new();
         let mut wander = [Vector3::<f64>::zeros(); 2];
-        for (k, [thermometer, die]) in self.temperatures().into_iter().enumerate() {
+        for (k, [thermometer, gyro_c, accel_c]) in self.temperatures().into_iter().enumerate() {
             let (step, rate, force) = scheme.next();
             out.t_s.push(k as f64 / RATE_HZ);
             out.step.push(step);
             out.temp_c
                 .push(thermometer + self.thermometer_noise * random.normal());
             for (sensor, input) in [rate, force].into_iter().enumerate() {
-                let (matrix, bias) = truth(sensor, die);
+                let (matrix, bias) = truth(sensor, [gyro_c, accel_c][sensor]);
                 let sigma = WHITE[sensor] * RATE_HZ.sqrt();
                 let raw = matrix * input + bias;
                 for axis in 0..3 {

@@ -95,7 +95,7 @@ impl Study {
     }
 
     fn judge(&self, joint: &Joint) -> Outcome {
-        let (lag, true_lag) = (joint.profile.lag, self.experiment.lag_s);
+        let (lag, true_lag) = (joint.profiles[0].lag, self.experiment.lag_s);
         Outcome {
             errors: Errors::of(&joint.curves),
             lag: lag.value,

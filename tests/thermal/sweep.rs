@@ -56,28 +56,19 @@ pub fn run(runs: u64) {
     let still = "instability_si = [0.0, 0.0, 0.0]\nwalk_si = [0.0, 0.0, 0.0]\n";
     let still = format!("[unit.gyro_axes]\n{still}[unit.accel_axes]\n{still}[[effect]]");
     let white = without.replacen("[[effect]]", &still, 1);
-    for (name, text, own_lag) in [
-        ("as it is", &rig, false),
-        (
-            "as it is, with the lag of the accelerometer alone",
-            &rig,
-            true,
-        ),
-        ("without gyro_thermal_lag", &without, false),
-        ("without it and without wander", &white, false),
+    for (name, text) in [
+        ("as it is", &rig),
+        ("without gyro_thermal_lag", &without),
+        ("without it and without wander", &white),
     ] {
         println!(
             "\n{name}: rms of errors over their standard deviations, then errors (planned sigma): bias, scale, cross terms"
         );
         // The first is the question, the others say why.
-        let runs = if text == &rig && !own_lag {
-            runs
-        } else {
-            runs.min(FEWER)
-        };
+        let runs = if text == &rig { runs } else { runs.min(FEWER) };
         let each = (1..=runs)
             .into_par_iter()
-            .map(|seed| once(&plan, text, own_lag, seed));
+            .map(|seed| once(&plan, text, seed));
         let outcomes: Vec<Outcome> = each.collect();
         for (k, o) in outcomes.iter().enumerate() {
             println!("| {} | {} | {}", k + 1, o.verdict, cells(&[o]));
@@ -113,24 +104,15 @@ fn cells(outcomes: &[&Outcome]) -> String {
     out
 }
 
-fn once(plan: &str, rig: &str, own_lag: bool, seed: u64) -> Outcome {
+fn once(plan: &str, rig: &str, seed: u64) -> Outcome {
     let file = unit(rig, seed);
     let recorded = session(plan, &file, seed);
-    let by = |lag_s| {
-        let options = Options {
-            estimator: Estimator::Joint,
-            lag_s,
-            range_c: None,
-        };
-        fit(vec![recorded.clone()], &[], options)
+    let options = Options {
+        estimator: Estimator::Joint,
+        lag_s: None,
+        range_c: None,
     };
-    let mut found = by(None);
-    if let (true, Ok(first)) = (own_lag, &found)
-        && let Some((each, _)) = &first.joint.apart
-    {
-        found = by(Some(each[1].lag.value));
-    }
-    match found {
+    match fit(vec![recorded.clone()], &[], options) {
         Err(refused) => Outcome {
             verdict: format!("refused: {refused}"),
             numbers: Default::default(),
@@ -187,15 +169,11 @@ fn judged(found: &ThermalFit, recorded: &Session, file: &RigFile, seed: u64) -> 
         .filter(|(n, _)| wrong(n))
         .map(|(_, name)| name);
     let bad: Vec<&str> = bad.collect();
-    let lag = match &found.joint.apart {
-        Some(([g, a], _)) => format!("{:.1} / {:.1}", g.lag.value, a.lag.value),
-        None => "one".into(),
-    };
+    let [gyro, accel] = found.joint.profiles.each_ref().map(|p| p.lag.value);
     Outcome {
         verdict: format!(
-            "{}, lag {:.1} s (of each: {lag}), {}",
+            "{}, lags {gyro:.1}, {accel:.1} s, {}",
             found.verdict.name(),
-            found.joint.profile.lag.value,
             match bad.is_empty() {
                 true => "right".into(),
                 false => format!("wrong: {}", bad.join(", ")),

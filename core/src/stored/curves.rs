@@ -11,7 +11,7 @@ use crate::table::{self, Node, Table};
 /// The thermometer is the mean of the gyros' TEMP pins.
 pub(super) const TEMP_PINS: u8 = 0;
 const RANGE_KNOWN: u8 = 1;
-const LAG_KNOWN: u8 = 1 << 1;
+const LAGS_KNOWN: u8 = 1 << 1;
 
 /// Compensation over temperature as it is written.
 #[derive(Debug, Clone, Copy)]
@@ -20,31 +20,32 @@ pub struct Curves<'a> {
     pub nodes: &'a [Node<f32>],
     /// Dies' temperatures that they were found from, °C.
     pub range_c: Option<[f32; 2]>,
-    /// Lag of the dies behind the thermometer, s; negative: they lead.
-    pub lag_s: Option<f32>,
+    /// Lags of the dies of gyro and accelerometer behind the thermometer, s; negative: they lead.
+    pub lags_s: Option<[f32; 2]>,
 }
 
 impl<'a> Curves<'a> {
-    /// These nodes, of no known range and no known lag.
+    /// These nodes, of no known range and no known lags.
     pub const fn of(nodes: &'a [Node<f32>]) -> Self {
         Self {
             nodes,
             range_c: None,
-            lag_s: None,
+            lags_s: None,
         }
     }
 
     /// Bits of what is known.
     pub(super) fn known(&self) -> u8 {
         let bit = |known: bool, bit: u8| if known { bit } else { 0 };
-        bit(self.range_c.is_some(), RANGE_KNOWN) | bit(self.lag_s.is_some(), LAG_KNOWN)
+        bit(self.range_c.is_some(), RANGE_KNOWN) | bit(self.lags_s.is_some(), LAGS_KNOWN)
     }
 
     pub(super) fn write(&self, to: &mut Writer<'_>) -> Result<(), TooLong> {
-        let [from_c, to_c] = self.range_c.unwrap_or_default();
-        to.f32(from_c)?;
-        to.f32(to_c)?;
-        to.f32(self.lag_s.unwrap_or_default())?;
+        for pair in [self.range_c, self.lags_s] {
+            let [first, second] = pair.unwrap_or_default();
+            to.f32(first)?;
+            to.f32(second)?;
+        }
         for node in self.nodes {
             to.f32(node.temp_c)?;
             for triad in [
@@ -61,19 +62,36 @@ impl<'a> Curves<'a> {
     }
 }
 
-/// Range, lag and nodes.
+/// What stands in front of the nodes, and how much of it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Head {
+    /// Number of nodes.
+    pub nodes: u8,
+    /// As in the layout.
+    pub thermometer: u8,
+    /// Bits of what is known.
+    pub known: u8,
+    /// Whether each triad has a lag of its own, and not both the same one.
+    pub two_lags: bool,
+}
+
+/// Range and lags as a table and what [`Curves::lags_s`] was, and the nodes.
 pub(super) fn read(
     from: &mut Reader<'_>,
-    nodes: u8,
-    thermometer: u8,
-    known: u8,
+    head: Head,
     show: impl FnMut(&Node<f32>),
-) -> Result<(Table<f32, NODES>, Option<f32>), Refused> {
+) -> Result<(Table<f32, NODES>, Option<[f32; 2]>), Refused> {
     let mut number = || from.f32().ok_or(Refused::Length);
-    let (range_c, lag_s) = ([number()?, number()?], number()?);
-    let table = read_nodes(from, nodes, true, show)?;
-    let known = |bit: u8| known & bit != 0;
-    if thermometer != TEMP_PINS || known(LAG_KNOWN) && DieLag::new(lag_s).is_none() {
+    let (range_c, first_s) = ([number()?, number()?], number()?);
+    let second_s = match head.two_lags {
+        true => number()?,
+        false => first_s,
+    };
+    let lags_s = [first_s, second_s];
+    let table = read_nodes(from, head.nodes, true, show)?;
+    let known = |bit: u8| head.known & bit != 0;
+    let no_lags = lags_s.iter().any(|lag_s| DieLag::new(*lag_s).is_none());
+    if head.thermometer != TEMP_PINS || known(LAGS_KNOWN) && no_lags {
         return Err(Refused::Temperature);
     }
     let table = match known(RANGE_KNOWN) {
@@ -82,7 +100,7 @@ pub(super) fn read(
             .map_err(|_| Refused::Temperature)?,
         false => table,
     };
-    Ok((table, known(LAG_KNOWN).then_some(lag_s)))
+    Ok((table, known(LAGS_KNOWN).then_some(lags_s)))
 }
 
 /// Nodes of a version without derivatives.

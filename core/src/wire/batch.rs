@@ -3,6 +3,7 @@
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
+use super::extensible;
 use crate::compensation::Sample;
 
 /// Most samples of a batch. Fewer come where a sample is missing, since those of a batch are consecutive.
@@ -58,7 +59,7 @@ pub struct BatchHead {
     /// Batches that were lost so far because the line was behind.
     pub batches_dropped: u32,
     /// Temperature, °C. In a raw batch that of the thermometer, filtered: the gyros' TEMP pins that are not left out. In a compensated batch that of
-    /// the dies, which is what compensation goes by: the same behind the lag of the calibration.
+    /// the gyros' dies, which is what compensation goes by: the same behind the lag of the calibration.
     pub temp_c: f32,
     /// [`flags`].
     pub flags: u16,
@@ -87,6 +88,10 @@ pub struct CompensatedBatch<'a> {
     pub head: BatchHead,
     /// Gyro x, y, z, rad/s, accel x, y, z, m/s², each an `f32`, little end first; sample after sample.
     pub samples: &'a [u8],
+    /// Temperature of the accelerometer's die, °C, where the calibration has a lag of its own for it; `None` where it is that of the
+    /// gyros. Since protocol 2.2.
+    #[serde(with = "extensible::last")]
+    pub accel_die_c: Option<f32>,
 }
 
 impl<'a> RawBatch<'a> {
@@ -161,6 +166,12 @@ impl<'a> CompensatedBatch<'a> {
     pub fn is_whole(&self) -> bool {
         self.samples.len().is_multiple_of(COMPENSATED_BYTES)
             && (1..=BATCH).contains(&(self.samples.len() / COMPENSATED_BYTES))
+    }
+
+    /// Temperatures of the dies of gyro and accelerometer, °C.
+    pub fn dies_c(&self) -> [f32; 2] {
+        let gyro_c = self.head.temp_c;
+        [gyro_c, self.accel_die_c.unwrap_or(gyro_c)]
     }
 
     /// Numbers and values of the samples, rad/s and m/s² in the body frame, in order.

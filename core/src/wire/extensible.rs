@@ -64,6 +64,30 @@ pub(super) mod pair {
     }
 }
 
+/// A last field that is not always there: none is no bytes at all, as a version sends it that does not know the field.
+pub(super) mod last {
+    use serde::de::{Deserialize, Deserializer};
+    use serde::ser::{Serialize, Serializer};
+
+    pub(in super::super) fn serialize<T: Serialize, S: Serializer>(
+        value: &Option<T>,
+        to: S,
+    ) -> Result<S::Ok, S::Error> {
+        match value {
+            Some(_) => value.serialize(to),
+            None => to.serialize_unit(),
+        }
+    }
+
+    pub(in super::super) fn deserialize<'de, T, D>(from: D) -> Result<Option<T>, D::Error>
+    where
+        T: Deserialize<'de>,
+        D: Deserializer<'de>,
+    {
+        Option::deserialize(from)
+    }
+}
+
 /// Bytes that go on with zeros behind their end. In postcard a zero is 0, false, none, the first variant, and text of no length.
 pub(super) struct Tolerant<'de> {
     rest: &'de [u8],

@@ -7,9 +7,9 @@ use serde::{Deserialize, Serialize};
 
 use super::extensible::Tolerant;
 use super::greeting::MAGIC;
-use super::message::{Call, Message, Refusal, Reply};
+use super::message::{Call, Event, Message, Refusal, Reply};
 
-/// Most bytes of a message. The longest is a compensated batch, some ten shorter.
+/// Most bytes of a message. The longest is a compensated batch, some bytes shorter.
 pub const MAX_PAYLOAD: usize = 512;
 
 const CHECK: usize = 4;
@@ -59,8 +59,8 @@ pub fn encode<T: Serialize>(message: &T, out: &mut [u8; MAX_FRAME]) -> Result<us
 pub struct Frame<'a>(pub &'a [u8]);
 
 impl<'a> Frame<'a> {
-    /// The message in it: all of it, or `None`. A [greeting](Message::Greeting), [counters](Reply::Counters) and the results of a
-    /// [self-test](Reply::SelfTest) may be followed by what later versions have appended, and may lack what this one has; then it is zero.
+    /// The message in it: all of it, or `None`. A [greeting](Message::Greeting), [counters](Reply::Counters), the results of a
+    /// [self-test](Reply::SelfTest) and a [compensated batch](Event::Compensated) may be followed by what later versions have appended, and may lack what this one has; then it is zero.
     /// A refusal for a reason that this build does not know is [`Refusal::NotKnown`].
     pub fn message(&self) -> Option<Message<'a>> {
         let Ok((message, tolerant)) = Tolerant::read::<Message<'a>>(self.0) else {
@@ -76,7 +76,8 @@ impl<'a> Frame<'a> {
             Message::Reply { reply, .. } => {
                 matches!(reply, Reply::Counters(_) | Reply::SelfTest(_))
             }
-            _ => false,
+            Message::Event(event) => matches!(event, Event::Compensated(_)),
+            Message::Refused { .. } => false,
         };
         (any_length || tolerant.is_exact()).then_some(message)
     }

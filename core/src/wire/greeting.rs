@@ -11,7 +11,7 @@ use crate::stored;
 pub const MAGIC: [u8; 4] = *b"mimu";
 
 /// The protocol of this build.
-pub const PROTOCOL: Version = Version { major: 2, minor: 1 };
+pub const PROTOCOL: Version = Version { major: 2, minor: 2 };
 
 /// Version of a protocol.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize)]
@@ -82,6 +82,8 @@ impl Capabilities {
     pub const USB: Self = Self(1 << 4);
     /// Stores temperature nodes with derivatives, range and lag: layout 5 of [`stored`].
     pub const CURVES: Self = Self(1 << 5);
+    /// And a lag for each triad: layout 6.
+    pub const TWO_LAGS: Self = Self(1 << 6);
 
     /// Whether all of `those` are among them.
     pub const fn contains(self, those: Self) -> bool {

@@ -71,6 +71,7 @@ fn full_batches_fit() {
     let compensated = frame(&Message::Event(Event::Compensated(CompensatedBatch {
         head: head(),
         samples: &compensated,
+        accel_die_c: Some(1.0),
     })));
     let frames_a_second = 1000 / BATCH;
     assert!(raw.len() * frames_a_second <= 24_000, "{}", raw.len());

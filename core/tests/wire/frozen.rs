@@ -5,8 +5,8 @@
 #![allow(clippy::needless_update)]
 
 use mimu_core::wire::{
-    Capabilities, Compatibility, Counters, Decoder, EFFECTS, Greeting, MAGIC, Message, Refusal,
-    Reply, SelfTest, Slot, Start, StoredInfo, Version, compatibility,
+    Capabilities, Compatibility, Counters, Decoder, EFFECTS, Event, Greeting, MAGIC, Message,
+    Refusal, Reply, SelfTest, Slot, Start, StoredInfo, Version, compatibility,
 };
 
 /// As the device sends it.
@@ -235,6 +235,36 @@ fn a_refusal_for_an_unknown_reason_is_a_refusal() {
     let refusal = Refusal::NotKnown;
     let expected = Message::Refused { id: 7, refusal };
     read(UNKNOWN_REFUSAL, |message| assert_eq!(*message, expected));
+}
+
+/// A device of protocol 2.1 ends a compensated batch with its samples, and a later one may append.
+#[test]
+fn a_compensated_batch_is_read_whatever_follows_its_samples() {
+    let sample = [0x40_u8; 24];
+    let before = [
+        &[3, 1, 5, 0, 0][..],
+        &25.0_f32.to_le_bytes(),
+        &[0, 24],
+        &sample,
+    ]
+    .concat();
+    let own = [&before[..], &[1], &30.0_f32.to_le_bytes()].concat();
+    let longer = [&own[..], &[7, 7]].concat();
+    for (bytes, dies_c) in [
+        (&before, [25.0, 25.0]),
+        (&own, [25.0, 30.0]),
+        (&longer, [25.0, 30.0]),
+    ] {
+        let message = mimu_core::wire::Frame(bytes).message();
+        let Some(Message::Event(Event::Compensated(batch))) = message else {
+            panic!("{message:?}");
+        };
+        assert!(batch.is_whole());
+        assert_eq!((batch.head.first, batch.dies_c()), (5, dies_c));
+    }
+    // What ends within the samples is none.
+    let message = mimu_core::wire::Frame(&before[..20]).message();
+    assert_eq!(message, None);
 }
 
 #[test]

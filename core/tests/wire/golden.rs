@@ -3,7 +3,7 @@
 
 use mimu_core::stored;
 use mimu_core::wire::{
-    BatchHead, Call, Capabilities, CompensatedBatch, Counters, Event, Greeting, KalmanAxis,
+    BatchHead, Call, Capabilities, CompensatedBatch, Counters, Event, Frame, Greeting, KalmanAxis,
     KalmanState, MAGIC, Message, Prior, RawBatch, Refusal, Reply, Request, SelfTest, Slot, Start,
     StoredInfo, Sums, Triad, Version, checks, flags,
 };
@@ -344,9 +344,23 @@ fn events() {
             "03 00 ac02 01 8001 0000003f 8204 0000803f 000000c0 0000003f 0000803f 000000c0 03 010203",
         ),
     );
+    // Its last field is not there where there is nothing to say.
+    let compensated = Message::Event(Event::Compensated(CompensatedBatch {
+        head,
+        samples,
+        accel_die_c: None,
+    }));
+    let bytes = hex("03 01 ac02 01 8001 0000003f 8204 03 010203");
+    let mut room = [0; 512];
+    assert_eq!(postcard::to_slice(&compensated, &mut room).unwrap(), bytes);
+    assert_eq!(Frame(&bytes).message(), Some(compensated));
     frozen(
-        Message::Event(Event::Compensated(CompensatedBatch { head, samples })),
-        &hex("03 01 ac02 01 8001 0000003f 8204 03 010203"),
+        Message::Event(Event::Compensated(CompensatedBatch {
+            head,
+            samples,
+            accel_die_c: Some(-2.0),
+        })),
+        &hex("03 01 ac02 01 8001 0000003f 8204 03 010203 01 000000c0"),
     );
     frozen(
         Message::Event(Event::Kalman(kalman())),
@@ -402,6 +416,7 @@ fn samples_of_a_batch() {
     let batch = CompensatedBatch {
         head,
         samples: &bytes,
+        accel_die_c: None,
     };
     assert!(batch.is_whole());
     let read: Vec<_> = batch.values().collect();

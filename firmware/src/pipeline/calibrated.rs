@@ -12,10 +12,11 @@ use crate::design_parameters::{GYRO_TEMPERATURE_NULL_C, SAMPLE_HZ};
 /// A calibration with what it remembers of the stream.
 pub(super) struct Calibrated {
     stored: Stored,
-    lag: DieLag<f32>,
-    die: die::State<f32>,
-    /// Temperature of the dies at the beginning of the batch, °C.
-    die_c: f32,
+    /// Of gyro and accelerometer, as all that is of the dies.
+    lags: [DieLag<f32>; 2],
+    dies: [die::State<f32>; 2],
+    /// Temperatures of the dies at the beginning of the batch, °C.
+    dies_c: [f32; 2],
     model: table::State<f32>,
     effects: effects::State<f32, ROOM>,
     /// Number of the sample at which the slow effects were followed last; time since power-on is counted by it.
@@ -33,14 +34,14 @@ impl Calibrated {
             Some(ms) => (effects, ms),
             None => (effects.long_after_power_on(), 0),
         };
-        let lag = stored.lag();
-        // The dies do not know that they have another calibration: what is left of a ramp goes on, where it is of the same lag.
-        let before = before.filter(|before| before.lag == lag);
+        let lags = stored.lags();
+        // The dies do not know that they have another calibration: what is left of a ramp goes on, where it is of the same lags.
+        let before = before.filter(|before| before.lags == lags);
         Self {
-            die: before.map_or_else(die::State::new, |before| before.die),
+            dies: before.map_or([die::State::new(); 2], |before| before.dies),
             die_followed: before.and_then(|before| before.die_followed),
-            die_c: GYRO_TEMPERATURE_NULL_C,
-            lag,
+            dies_c: [GYRO_TEMPERATURE_NULL_C; 2],
+            lags,
             model: stored.table.state(),
             effects,
             // A number is a millisecond. Time since power-on goes on, whenever the calibration comes.
@@ -54,25 +55,30 @@ impl Calibrated {
         self.effects.gap();
     }
 
-    /// Temperature of the dies at the beginning of the batch, °C.
-    pub fn die_c(&self) -> f32 {
-        self.die_c
+    /// Temperature of the gyros' dies at the beginning of the batch, °C, and that of the accelerometer's, if it has a lag of its own.
+    pub fn dies_c(&self) -> (f32, Option<f32>) {
+        let [gyro_c, accel_c] = self.dies_c;
+        let [gyro, accel] = &self.lags;
+        (gyro_c, (gyro != accel).then_some(accel_c))
     }
 
     /// Follows temperature and time to the beginning of a batch. `known`: there was a reading of the thermometer, and `temp_c` is not
     /// what stands in for one.
     pub fn follow(&mut self, number: u32, temp_c: f32, known: bool) -> Place {
         let seconds = |samples: u32| samples as f32 / SAMPLE_HZ as f32;
-        self.die_c = temp_c;
+        self.dies_c = [temp_c; 2];
         if known {
             let passed = self
                 .die_followed
                 .map_or(0, |before| number.wrapping_sub(before));
-            let die_c = self.lag.follow(&mut self.die, seconds(passed), temp_c);
-            self.die_c = die_c.unwrap_or(temp_c);
+            let triads = self.lags.iter().zip(&mut self.dies).zip(&mut self.dies_c);
+            for ((lag, die), die_c) in triads {
+                let followed = lag.follow(die, seconds(passed), temp_c);
+                *die_c = followed.unwrap_or(temp_c);
+            }
             self.die_followed = Some(number);
         }
-        self.stored.table.follow(&mut self.model, self.die_c);
+        self.stored.table.follow(&mut self.model, self.dies_c);
         if let Some(all) = &self.stored.effects {
             let dt_s = seconds(number.wrapping_sub(self.followed));
             all.slow(&mut self.effects, dt_s, temp_c);

@@ -19,7 +19,7 @@ use crate::convert::NOMINAL_REFERENCE;
 #[derive(Debug, PartialEq)]
 enum Sent {
     Raw(BatchHead, f32, Vec<(u32, Sums)>),
-    Compensated(BatchHead, Vec<(u32, Sample<f32>)>),
+    Compensated(BatchHead, Vec<(u32, Sample<f32>)>, [f32; 2]),
     Kalman(u32),
 }
 
@@ -31,7 +31,7 @@ fn keep(message: &Message<'_>) -> Sent {
         }
         Message::Event(Event::Compensated(batch)) => {
             assert!(batch.is_whole());
-            Sent::Compensated(batch.head, batch.values().collect())
+            Sent::Compensated(batch.head, batch.values().collect(), batch.dies_c())
         }
         Message::Event(Event::Kalman(state)) => Sent::Kalman(state.updates),
         other => panic!("{other:?}"),
@@ -69,11 +69,11 @@ fn both() -> Streams {
 
 /// Compensation that doubles from -10 °C to 60 °C, where 25 °C is in the middle.
 fn calibration(effects: &[Record<'_>]) -> Stored {
-    with_lag(effects, None)
+    with_lags(effects, None)
 }
 
-/// The same of dies that follow with this lag, found between 0 and 50 °C.
-fn with_lag(effects: &[Record<'_>], lag_s: Option<f32>) -> Stored {
+/// The same of dies that follow with these lags, of gyro and accelerometer, found between 0 and 50 °C.
+fn with_lags(effects: &[Record<'_>], lags_s: Option<[f32; 2]>) -> Stored {
     let node = |temp_c, gain: f32| {
         let affine = Affine {
             matrix: Matrix3::from_diagonal_element(gain),
@@ -105,7 +105,7 @@ fn with_lag(effects: &[Record<'_>], lag_s: Option<f32>) -> Stored {
         &Curves {
             nodes: &nodes,
             range_c: Some([0.0, 50.0]),
-            lag_s,
+            lags_s,
         },
         effects,
         &mut bytes,
@@ -180,7 +180,7 @@ fn compensated_samples_are_those_of_the_raw_ones_at_the_stated_temperature() {
     let sent = run(&mut pipeline, 0..20);
     let [
         Sent::Raw(head, volts, raw),
-        Sent::Compensated(same, compensated),
+        Sent::Compensated(same, compensated, _),
     ] = &sent[..]
     else {
         panic!("{sent:?}")
@@ -224,7 +224,7 @@ fn errors_of_the_code_are_taken_out_of_the_reading_before_its_temperature_matter
             sums.accel[axis] = 1000 + (number * 317 + axis as u32 * 41_003) % 129_000;
         }
         pipeline.take(number, &sums, &mut |message| {
-            let Sent::Compensated(head, samples) = keep(message) else {
+            let Sent::Compensated(head, samples, _) = keep(message) else {
                 return true;
             };
             let gain = 2.0 + 2.0 * (f64::from(head.temp_c) + 10.0) / 70.0;
@@ -267,7 +267,7 @@ fn heads(
         change(number, &mut sums);
         pipeline.take(number, &sums, &mut |message| {
             match keep(message) {
-                Sent::Raw(head, ..) | Sent::Compensated(head, _) => heads.push(head),
+                Sent::Raw(head, ..) | Sent::Compensated(head, ..) => heads.push(head),
                 Sent::Kalman(_) => {}
             }
             true
@@ -366,7 +366,7 @@ fn a_warm_up_goes_by_the_time_since_power_on_and_is_over_where_that_is_unknown()
                 compensated: true,
             });
             let sent = run(&mut pipeline, 0..20);
-            let [Sent::Compensated(head, samples)] = &sent[..] else {
+            let [Sent::Compensated(head, samples, _)] = &sent[..] else {
                 panic!("{sent:?}")
             };
             (head.flags, samples[0].1.gyro.x)

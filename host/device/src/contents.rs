@@ -41,8 +41,10 @@ pub struct Contents {
     pub frame: &'static str,
     /// Dies' temperatures that it is for, °C, if they are known.
     pub range_c: Option<[f32; 2]>,
-    /// Lag of the dies behind the thermometer, s, if it is known.
+    /// Lag of the dies behind the thermometer, s, if it is known; of the gyros' where the accelerometer has one of its own.
     pub lag_s: Option<f32>,
+    /// Lag of the accelerometer's die, s, if it has one of its own.
+    pub accel_lag_s: Option<f32>,
     /// What stands between the nodes: `cubic`, or `straight` in the layouts of earlier versions.
     pub between_nodes: &'static str,
     /// Temperature nodes, the coldest first.
@@ -111,6 +113,7 @@ pub fn contents(bytes: &[u8]) -> std::result::Result<Contents, stored::Refused> 
         |record| effects.push(effect(record)),
     )?;
     let origin = stored.origin;
+    let (lag_s, accel_lag_s) = lags(stored.lags_s);
     Ok(Contents {
         file: None,
         bytes_file: None,
@@ -125,7 +128,8 @@ pub fn contents(bytes: &[u8]) -> std::result::Result<Contents, stored::Refused> 
         raw_unit: "V",
         frame: "body",
         range_c: stored.table.range_c(),
-        lag_s: stored.lag_s,
+        lag_s,
+        accel_lag_s,
         between_nodes: match stored.table.is_straight() {
             true => "straight",
             false => "cubic",
@@ -159,6 +163,7 @@ pub fn calibration(bytes: &[u8], device: &str, place: &str) -> Result<Calibratio
         return Err(Error::device(place, problem, remedy));
     }
     let origin = stored.origin;
+    let (lag_s, accel_lag_s) = lags(stored.lags_s);
     let kept = Kept {
         device: device.to_owned(),
         unit_id: origin.unit_id.as_ref().map(origin::digits),
@@ -167,10 +172,19 @@ pub fn calibration(bytes: &[u8], device: &str, place: &str) -> Result<Calibratio
         sha256: origin.samples_sha256.as_ref().map(origin::digits),
         nodes,
         range_c: stored.table.range_c(),
-        lag_s: stored.lag_s,
+        lag_s,
+        accel_lag_s,
         effects,
     };
     Calibration::kept(&kept, place)
+}
+
+/// The lag of the gyros' dies, and that of the accelerometer's if it is another, s.
+fn lags(stored: Option<[f32; 2]>) -> (Option<f32>, Option<f32>) {
+    match stored {
+        Some([gyro_s, accel_s]) => (Some(gyro_s), (gyro_s != accel_s).then_some(accel_s)),
+        None => (None, None),
+    }
 }
 
 /// An effect in the words that it was uploaded with.

@@ -42,6 +42,8 @@ pub struct Samples {
     pub head: BatchHead,
     /// Temperatures by the TEMP pins of gyro x, y, z, °C; of raw readings only.
     pub gyro_temps_c: Option<[f32; 3]>,
+    /// Temperatures of the dies of gyro and accelerometer, °C; of compensated samples only.
+    pub dies_c: Option<[f32; 2]>,
     /// One after the other, the first of the number [`BatchHead::first`].
     pub values: Vec<Sample<f32>>,
 }
@@ -158,6 +160,7 @@ fn understood(frame: &Frame<'_>) -> Option<Heard> {
             Heard::Event(Event::Raw(Samples {
                 head: batch.head,
                 gyro_temps_c: Some(batch.gyro_temps_c),
+                dies_c: None,
                 values: batch.volts().map(|(_, sample)| sample).collect(),
             }))
         }
@@ -165,6 +168,7 @@ fn understood(frame: &Frame<'_>) -> Option<Heard> {
             Heard::Event(Event::Compensated(Samples {
                 head: batch.head,
                 gyro_temps_c: None,
+                dies_c: Some(batch.dies_c()),
                 values: batch.values().map(|(_, sample)| sample).collect(),
             }))
         }

@@ -9,7 +9,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::origin;
 use super::who::{Hash, Who, unusable};
-use mimu::calibration::{Calibration, NO_SENSE, OnDevice, What, reference_node};
+use mimu::calibration::{Calibration, NO_SENSE, OnDevice, OverTemperature, What, reference_node};
 use mimu::quantity::Sensor;
 use mimu_recording::RawUnit;
 use mimu_recording::error::{Argument, Error, Result};
@@ -55,7 +55,9 @@ impl Image {
         let curves = Curves {
             nodes: &nodes,
             range_c: range_c.map(|range| range.map(|t| t as f32)),
-            lag_s: temperature.and_then(|of| of.lag_s).map(|lag| lag as f32),
+            lags_s: temperature
+                .and_then(OverTemperature::lags_s)
+                .map(|lags| lags.map(|lag| lag as f32)),
         };
         let temperatures: Vec<f64> = node_temp_c.iter().map(|t| f64::from(*t)).collect();
         let reference = reference_node(&temperatures).map_or(model, |at| nodes[at].model);
@@ -133,9 +135,10 @@ impl Image {
             let problem = format!("it is for raw readings in V, and the device's are in {unit}");
             return refuse(place.into(), problem);
         }
-        if !who.capabilities.contains(Capabilities::CURVES) {
+        let layout = Capabilities::CURVES.and(Capabilities::TWO_LAGS);
+        if !who.capabilities.contains(layout) {
             let problem = format!(
-                "the device (firmware {}) stores no derivatives by the temperature, which calibrations have now",
+                "the device (firmware {}) stores calibrations of an earlier layout, without a lag for each triad or without curves",
                 who.firmware
             );
             return refuse(place.into(), problem);

@@ -11,7 +11,7 @@ use serde::Serialize;
 
 use crate::blocks::{Condensed, Rails};
 use crate::calibration::{Calibration, Curves};
-use crate::die_temperature::{WITHOUT_TEMPERATURE, of_blocks, outside};
+use crate::die_temperature::{WITHOUT_TEMPERATURE, of_triads, outside};
 use crate::effects::quantity::Need;
 use crate::quantity::Sensor;
 use crate::rails::find;
@@ -156,8 +156,8 @@ struct Slow {
     first_row: u64,
     middle_s: f64,
     temp_c: f64,
-    /// Of the dies, if the calibration has curves.
-    die_c: Option<f64>,
+    /// Of the dies of gyro and accelerometer, if the calibration has curves.
+    dies_c: Option<[f64; 2]>,
 }
 
 /// Compensates batches of samples in their order.
@@ -211,9 +211,8 @@ impl Compensator {
         // Before the first temperature it is that one, as for a fit.
         let mut temp_c = first_temp_c.unwrap_or(f64::NAN);
         let curves = calibration.curves();
-        let lag = curves.as_ref().map(Curves::lag);
-        let die_c = lag.and_then(|lag| of_blocks(blocks, lag));
-        if curves.is_some() && die_c.is_none() {
+        let dies_c = curves.as_ref().and_then(|of| of_triads(blocks, of));
+        if curves.is_some() && dies_c.is_none() {
             warnings.push(WITHOUT_TEMPERATURE.into());
         }
         let slow = blocks.iter().enumerate().map(|(at, block)| {
@@ -224,7 +223,7 @@ impl Compensator {
                 first_row: block.first_row,
                 middle_s: 0.5 * (block.start_s + block.last_s),
                 temp_c,
-                die_c: die_c.as_ref().map(|all| all[at]),
+                dies_c: dies_c.as_ref().map(|[gyro, accel]| [gyro[at], accel[at]]),
             }
         });
         let first_s = blocks.first().map_or(0.0, |block| block.start_s);
@@ -301,9 +300,10 @@ impl Compensator {
         while let Some(slow) = self.slow.get(self.reached).filter(|s| s.first_row <= row) {
             let dt_s = slow.middle_s - self.told_s;
             self.effects.slow(&mut self.state, dt_s, slow.temp_c);
-            if let (Some(curves), Some(die_c)) = (&self.curves, slow.die_c) {
+            if let (Some(curves), Some(dies_c)) = (&self.curves, slow.dies_c) {
                 for (sensor, model) in Sensor::BOTH.into_iter().zip(&mut self.models) {
-                    *model = curves.inverse(sensor, die_c).unwrap_or(*model);
+                    let at = curves.inverse(sensor, dies_c[sensor as usize]);
+                    *model = at.unwrap_or(*model);
                 }
             }
             self.told_s = slow.middle_s;

@@ -55,7 +55,8 @@ const HEADER_OF_CURVES: &str = "\
 # [gyro] and [accel] hold at recording.temp_c. Over temperature C and o follow the nodes of [temperature], by the temperature of the dies:
 # between two nodes, h apart, with w from 0 to 1, a number p and its slope s are
 #   (1+2w)(1-w)^2 p0 + w^2(3-2w) p1 + h w(1-w)^2 s0 - h w^2(1-w) s1;
-# outside they go on along the slope for 5 kelvin, and are held from there on. The dies follow the thermometer with lag_s.
+# outside they go on along the slope for 5 kelvin, and are held from there on. The dies follow the thermometer with lag_s, and where
+# there is an accel_lag_s, that of the accelerometer with it.
 ";
 
 const HEADER_OF_KEPT: &str = "\

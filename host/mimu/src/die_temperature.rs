@@ -33,6 +33,12 @@ pub fn of_blocks(blocks: &[Block], lag: &DieLag<f64>) -> Option<Vec<f64>> {
     Some(each.collect())
 }
 
+/// The same of the dies of gyro and accelerometer, by the lags of a calibration.
+pub fn of_triads(blocks: &[Block], curves: &Curves) -> Option<[Vec<f64>; 2]> {
+    let [gyro, accel] = Sensor::BOTH.map(|sensor| of_blocks(blocks, curves.lag(sensor)));
+    Some([gyro?, accel?])
+}
+
 /// A sentence on the samples of a recording at temperatures that a calibration is not for; `None` if there are none, or if what it
 /// is for is not known.
 ///
@@ -41,25 +47,23 @@ pub fn of_blocks(blocks: &[Block], lag: &DieLag<f64>) -> Option<Vec<f64>> {
 pub fn outside(calibration: &Calibration, blocks: &[Block]) -> Option<String> {
     let curves = calibration.curves();
     let (temperatures, [from, to], margin_c) = match &curves {
-        Some(curves) => (
-            of_blocks(blocks, curves.lag())?,
-            curves.table().limits()?,
-            0.0,
-        ),
+        Some(curves) => (of_triads(blocks, curves)?, curves.table().limits()?, 0.0),
         None => (
-            of_blocks(blocks, &DieLag::none())?,
+            [of_blocks(blocks, &DieLag::none())?, Vec::new()],
             calibration.recording.temp_range_c?,
             BEYOND_C,
         ),
     };
     let away = |t: f64| (from - t).max(t - to);
     let (mut count, mut all, mut farthest) = (0_u64, 0_u64, 0.0_f64);
-    for (block, t) in blocks.iter().zip(&temperatures) {
+    for (at, block) in blocks.iter().enumerate() {
         let rows = u64::from(block.rows);
         all += rows;
-        if away(*t) > margin_c {
+        let each = temperatures.iter().filter_map(|t| t.get(at));
+        let off = each.map(|t| away(*t)).fold(0.0, f64::max);
+        if off > margin_c {
             count += rows;
-            farthest = farthest.max(away(*t));
+            farthest = farthest.max(off);
         }
     }
     if count == 0 {
@@ -87,7 +91,7 @@ pub fn at_one_temperature(
     curves: &Curves,
 ) -> Option<Prepared> {
     let blocks = &prepared.condensed.blocks;
-    let temperatures = of_blocks(blocks, curves.lag())?;
+    let temperatures = of_triads(blocks, curves)?;
     let mut out = prepared.clone();
     for sensor in Sensor::BOTH {
         let Some(model) = calibration.inverse(sensor) else {
@@ -95,7 +99,7 @@ pub fn at_one_temperature(
         };
         let back = model.matrix.try_inverse()?;
         let from = sensor.channels().start;
-        let moved: Vec<Affine<f64>> = temperatures
+        let moved: Vec<Affine<f64>> = temperatures[sensor as usize]
             .iter()
             .filter_map(|t| {
                 let at = curves.inverse(sensor, *t)?;

@@ -14,7 +14,7 @@ use nalgebra::Matrix3;
 
 use crate::curves::TriadCurves;
 use crate::fit::{ThermalFit, Verdict, range};
-use crate::nodes::{Inverse, fewest, with_lag};
+use crate::nodes::{Inverse, fewest, with_lags};
 
 /// The dies have to have been this near to the temperature of the calibration, K.
 const NEAR_C: f64 = 1.0;
@@ -90,9 +90,9 @@ pub fn calibration(fit: &ThermalFit, base: &Calibration, created: &str) -> Resul
     });
     let of = |sensor: usize, temp_c: f64| Some(based[sensor].as_ref()?.inverse(temp_c));
     let nodes = fewest(of, based.each_ref().map(Option::is_some), range_c)?;
-    let mut temperature = with_lag(&fit.joint, range_c, nodes);
+    let mut temperature = with_lags(&fit.joint, range_c, nodes);
     if fit.verdict == Verdict::OneWay {
-        (temperature.lag_s, temperature.interval_lag_s) = (None, None);
+        temperature = temperature.without_lags();
     }
     let temps: Vec<f64> = temperature.nodes.iter().map(|n| n.temp_c).collect();
     let temp_c = reference_node(&temps).map_or(at_c, |k| temps[k]);

@@ -16,8 +16,8 @@ pub struct Comparison {
     pub format: &'static str,
     /// Temperatures of the dies that both are for, °C.
     pub range_c: [f64; 2],
-    /// Lags of the two, s; null where a calibration has none.
-    pub lag_s: [Option<f64>; 2],
+    /// Lags of the dies of gyro and accelerometer in the two, s; null where a calibration has none.
+    pub lags_s: [Option<[f64; 2]>; 2],
     /// Differences by parameter.
     pub curves: Vec<Difference>,
     /// What a person should know.
@@ -90,7 +90,7 @@ pub fn compare(a: &Calibration, b: &Calibration) -> Result<Comparison> {
     Ok(Comparison {
         format: "mimu-thermal-comparison/1",
         range_c,
-        lag_s: [a, b].map(|c| c.temperature.as_ref().and_then(|t| t.lag_s)),
+        lags_s: [a, b].map(|c| c.temperature.as_ref().and_then(|t| t.lags_s())),
         curves: curves.collect(),
         warnings,
     })

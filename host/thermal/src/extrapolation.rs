@@ -36,12 +36,12 @@ fn last_third(
     joint: &Joint,
     split: &impl Fn(&Session) -> f64,
 ) -> Option<f64> {
-    let dies = joint.dies(sessions);
     let (mut sum, mut n) = (0.0, 0.0);
     for sensor in Sensor::BOTH {
         let Some(curves) = joint.curves[sensor as usize].as_ref() else {
             continue;
         };
+        let dies = joint.dies(sessions, sensor);
         let noise = joint.noise[sensor as usize]?;
         let problem = curves.problem();
         for (k, session) in sessions.iter().enumerate() {

@@ -124,17 +124,10 @@ pub fn fit(sessions: Vec<Session>, verify: &[Session], options: Options) -> Resu
     };
     warnings.extend(joint.warnings.iter().cloned());
     check_range(&joint, options.range_c)?;
-    let dies = joint.dies(&sessions);
-    let verdict = match is_one_way(&sessions, &dies) {
+    let verdict = match goes_one_way(&sessions, &joint) {
         true => Verdict::OneWay,
         false => Verdict::Fitted,
     };
-    if let Some((_, drop)) = &joint.apart {
-        warnings.push(format!(
-            "gyro and accelerometer have two lags (drop in deviance {}): the calibration file has one, that of both together",
-            significant(*drop)
-        ));
-    }
     let judged = [0, 1].map(|k| judge(&sessions, verify, &joint, k));
     Ok(ThermalFit {
         joint,
@@ -146,6 +139,11 @@ pub fn fit(sessions: Vec<Session>, verify: &[Session], options: Options) -> Resu
     })
 }
 
+fn goes_one_way(sessions: &[Session], joint: &Joint) -> bool {
+    let mut dies = Sensor::BOTH.iter().map(|s| joint.dies(sessions, *s));
+    dies.any(|dies| is_one_way(sessions, &dies))
+}
+
 /// The joint estimate; where the temperature goes one way only, curvature has to prove itself by extrapolation.
 fn smooth(sessions: &[Session], options: Options, warnings: &mut Vec<String>) -> Result<Joint> {
     let choice = |shape| Choice {
@@ -153,9 +151,9 @@ fn smooth(sessions: &[Session], options: Options, warnings: &mut Vec<String>) ->
         lag_s: options.lag_s,
     };
     let joint = estimate(sessions, choice(Shape::Spline))?;
-    let dies = joint.dies(sessions);
-    let span = dies.iter().map(|d| d.range()[1] - d.range()[0]);
-    if !is_one_way(sessions, &dies) || span.fold(0.0, f64::max) < CURVATURE_SPAN {
+    let dies = Sensor::BOTH.map(|s| joint.dies(sessions, s));
+    let span = dies.iter().flatten().map(|d| d.range()[1] - d.range()[0]);
+    if !goes_one_way(sessions, &joint) || span.fold(0.0, f64::max) < CURVATURE_SPAN {
         return Ok(joint);
     }
     let Some([line, curve]) = extrapolation::compare(sessions, options.lag_s) else {
@@ -184,7 +182,7 @@ fn of_literature(sessions: &[Session], classic: Classic) -> Result<Joint> {
     }
     Ok(Joint {
         curves: curves.try_into().unwrap_or([None, None]),
-        profile: Profile::fixed(0.0, 0.0),
+        profiles: [0, 1].map(|_| Profile::fixed(0.0, 0.0)),
         apart: None,
         noise: [None, None],
         starts: vec![Start::Settled; sessions.len()],
@@ -235,8 +233,8 @@ pub fn range(joint: &Joint) -> [f64; 2] {
 fn judge(sessions: &[Session], verify: &[Session], joint: &Joint, k: usize) -> Option<Judged> {
     let sensor = Sensor::BOTH[k];
     let curves = joint.curves[k].as_ref()?;
-    let dies = joint.dies(sessions);
-    let lag = joint.profile.lag.value;
+    let dies = joint.dies(sessions, sensor);
+    let lag = joint.profiles[k].lag.value;
     let unseen = verify
         .iter()
         .map(|s| s.thermometer.die(lag, Start::Settled));
@@ -298,7 +296,7 @@ impl ThermalFit {
     pub fn calibration(&self, created: &str) -> Result<Calibration> {
         let mut temperature = nodes::over_temperature(&self.joint)?;
         if self.verdict == Verdict::OneWay {
-            (temperature.lag_s, temperature.interval_lag_s) = (None, None);
+            temperature = temperature.without_lags();
         }
         let temps: Vec<f64> = temperature.nodes.iter().map(|n| n.temp_c).collect();
         let temp_c = reference_node(&temps).map_or(f64::NAN, |k| temps[k]);

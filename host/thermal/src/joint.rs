@@ -40,18 +40,15 @@ impl Choice {
     };
 }
 
-/// Profiles of gyro and accelerometer, and the drop in deviance against one lag for both.
-pub type Apart = ([Profile; 2], f64);
-
-/// Curves of both triads and the lag.
+/// Curves of both triads and the lags of their dies.
 #[derive(Debug, Clone)]
 pub struct Joint {
     /// Curves of gyro and accelerometer; none of a triad that was not recorded.
     pub curves: [Option<TriadCurves>; 2],
-    /// Lag of both.
-    pub profile: Profile,
-    /// Lags of each, where the data tell them apart; the drop in deviance says by how much.
-    pub apart: Option<Apart>,
+    /// Lags of gyro and accelerometer: that of both together, unless the data tell the two apart.
+    pub profiles: [Profile; 2],
+    /// Drop in deviance by two lags against one, where they are told apart.
+    pub apart: Option<f64>,
     /// Noise of the rows.
     pub noise: [Option<[AxisNoise; 3]>; 2],
     /// How each session began.
@@ -61,14 +58,14 @@ pub struct Joint {
 }
 
 impl Joint {
-    /// Lag that the device is to apply, s: none where it is not determined.
-    pub fn lag(&self) -> Option<Lag> {
-        Some(self.profile.lag).filter(Lag::is_determined)
+    /// Lag of `sensor` that the device is to apply, s: none where it is not determined.
+    pub fn lag(&self, sensor: Sensor) -> Option<Lag> {
+        Some(self.profiles[sensor as usize].lag).filter(Lag::is_determined)
     }
 
-    /// Die temperatures of `sessions` by the best lag.
-    pub fn dies(&self, sessions: &[Session]) -> Vec<Die> {
-        let lag = self.profile.lag.value;
+    /// Temperatures of the die of `sensor` in `sessions` by its best lag.
+    pub fn dies(&self, sessions: &[Session], sensor: Sensor) -> Vec<Die> {
+        let lag = self.profiles[sensor as usize].lag.value;
         let each = sessions.iter().zip(&self.starts);
         each.map(|(s, start)| s.thermometer.die(lag, *start))
             .collect()
@@ -161,8 +158,8 @@ impl<'a> Evaluator<'a> {
         criterion
     }
 
-    /// Noise with the curves at `lag_s`; whether any bias wanders.
-    fn learn_noise(&mut self, lag_s: f64, starts: &[Start]) -> bool {
+    /// Noise with the curves at `lag_s`.
+    fn learn_noise(&mut self, lag_s: f64, starts: &[Start]) {
         self.known.clear();
         let dies = self.dies(lag_s, starts);
         for _ in 0..ROUNDS {
@@ -181,12 +178,13 @@ impl<'a> Evaluator<'a> {
                 break;
             }
         }
-        self.noise.iter().any(|n| n.wander > 0.0)
     }
 
-    /// Finds the smoothness at `lag_s`, and keeps it for all lags.
+    /// Finds noise and smoothness at `lag_s`, and keeps them for all lags. The noise too: what a wrong lag leaves of an accelerometer over a
+    /// ramp is far beyond its noise.
     fn settle(&mut self, lag_s: f64, starts: &[Start]) {
         self.settled = false;
+        self.learn_noise(lag_s, starts);
         self.known.clear();
         // Twice: the second begins where the first ended, and goes on.
         for _ in 0..2 {
@@ -262,38 +260,44 @@ pub fn estimate(sessions: &[Session], choice: Choice) -> Result<Joint> {
     let mut starts = vec![Start::Settled; sessions.len()];
     let rough = rough_lag(&mut triads, &mut starts, sessions, choice.lag_s)?;
     for triad in triads.iter_mut().flatten() {
-        triad.learn_noise(rough, &starts);
         triad.settle(rough, &starts);
     }
-    let (mut profile, mut apart) = lags(&mut triads, &starts, choice.lag_s)?;
-    if (profile.lag.value - rough).abs() > SETTLED_S {
-        // The noise too: what a wrong lag leaves of an accelerometer over a ramp is far beyond its noise.
-        for triad in triads.iter_mut().flatten() {
-            triad.learn_noise(profile.lag.value, &starts);
-            triad.settle(profile.lag.value, &starts);
+    let (mut profiles, mut apart) = lags(&mut triads, &starts, choice.lag_s)?;
+    let mut moved = false;
+    for (triad, profile) in triads.iter_mut().zip(&profiles) {
+        let lag_s = profile.lag.value;
+        if let Some(triad) = triad
+            && (lag_s - rough).abs() > SETTLED_S
+        {
+            triad.settle(lag_s, &starts);
+            moved = true;
         }
-        (profile, apart) = lags(&mut triads, &starts, choice.lag_s)?;
+    }
+    if moved {
+        (profiles, apart) = lags(&mut triads, &starts, choice.lag_s)?;
     }
     let mut joint = Joint {
         curves: [None, None],
-        profile,
+        profiles,
         apart,
         noise: [None, None],
         starts,
         warnings,
     };
-    check_speed(sessions, joint.lag(), span)?;
-    let dies = joint.dies(sessions);
+    for sensor in Sensor::BOTH {
+        check_speed(sessions, joint.lag(sensor), span)?;
+    }
     let [gyro, accel] = <[_; 2]>::try_from(triads).unwrap_or([None, None]);
     for (k, triad) in [gyro, accel].into_iter().enumerate() {
         let Some(triad) = triad else { continue };
+        let dies = joint.dies(sessions, Sensor::BOTH[k]);
         let rows = triad.problem.rows.iter();
         let temps = rows.map(|r| dies[r.session].at(r.middle_s));
         let range_c = temps.fold([f64::INFINITY, f64::NEG_INFINITY], |r, t| {
             [r[0].min(t), r[1].max(t)]
         });
         joint.noise[k] = Some(triad.noise);
-        joint.curves[k] = Some(triad.curves(&joint.profile, range_c));
+        joint.curves[k] = Some(triad.curves(&joint.profiles[k], range_c));
     }
     Ok(joint)
 }
@@ -339,16 +343,18 @@ fn total(triads: &mut [Option<Evaluator<'_>>], lag_s: f64, starts: &[Start]) -> 
     each.map(|t| t.criterion(lag_s, starts)).sum()
 }
 
-/// One lag for both triads, or one for each where the likelihood tells them apart.
+/// The lags of gyro and accelerometer: one for both, or one for each where the likelihood tells them apart and knows either; then the drop
+/// in deviance too.
 fn lags(
     triads: &mut [Option<Evaluator<'_>>],
     starts: &[Start],
     given: Option<f64>,
-) -> Result<(Profile, Option<Apart>)> {
+) -> Result<([Profile; 2], Option<f64>)> {
     let none = || Error::undetermined("lag", "no lag explains the readings", "record again");
     if let Some(lag_s) = given {
         let criterion = total(triads, lag_s, starts).ok_or_else(none)?;
-        return Ok((Profile::fixed(lag_s, criterion), None));
+        let fixed = Profile::fixed(lag_s, criterion);
+        return Ok(([fixed.clone(), fixed], None));
     }
     let both = Profile::of(|lag| total(triads, lag, starts)).ok_or_else(none)?;
     let each: Vec<Profile> = triads
@@ -356,11 +362,15 @@ fn lags(
         .flatten()
         .filter_map(|t| Profile::of(|lag| t.criterion(lag, starts)))
         .collect();
-    let apart = <[Profile; 2]>::try_from(each).ok().and_then(|each| {
+    if let Ok(each) = <[Profile; 2]>::try_from(each)
+        && each.iter().all(|p| p.lag.is_determined())
+    {
         let drop = both.criterion - each[0].criterion - each[1].criterion;
-        (drop > TWO_LAGS).then_some((each, drop))
-    });
-    Ok((both, apart))
+        if drop > TWO_LAGS {
+            return Ok((each, Some(drop)));
+        }
+    }
+    Ok(([both.clone(), both], None))
 }
 
 fn no_solution(sessions: &[Session]) -> Error {

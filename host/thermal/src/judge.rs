@@ -248,7 +248,7 @@ pub fn held_out(
 ) -> Option<Vec<DwellError>> {
     let curves = joint.curves[sensor as usize].as_ref()?;
     let problem = curves.problem();
-    let dies = joint.dies(sessions);
+    let dies = joint.dies(sessions, sensor);
     let temps: Vec<f64> = problem
         .rows
         .iter()

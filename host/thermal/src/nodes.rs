@@ -48,16 +48,23 @@ pub fn over_temperature(joint: &Joint) -> Result<OverTemperature> {
     }
     let of = |sensor: usize, temp_c: f64| with_sigma(curves[sensor]?, temp_c);
     let has = curves.map(|c| c.is_some());
-    Ok(with_lag(joint, range_c, fewest(of, has, range_c)?))
+    Ok(with_lags(joint, range_c, fewest(of, has, range_c)?))
 }
 
-/// `nodes` with the range and the lag of `joint`.
-pub fn with_lag(joint: &Joint, range_c: [f64; 2], nodes: Vec<TemperatureNode>) -> OverTemperature {
-    let lag = joint.lag().filter(|_| joint.profile.points.len() > 1);
+/// `nodes` with the range and the lags of `joint`.
+pub fn with_lags(joint: &Joint, range_c: [f64; 2], nodes: Vec<TemperatureNode>) -> OverTemperature {
+    let of = |sensor: Sensor| {
+        let estimated = joint.profiles[sensor as usize].points.len() > 1;
+        joint.lag(sensor).filter(|_| estimated)
+    };
+    let lag = of(Sensor::Gyro);
+    let accel = of(Sensor::Accel).filter(|_| joint.apart.is_some());
     OverTemperature {
         range_c,
         lag_s: lag.map(|l| l.value),
         interval_lag_s: lag.map(|l| [l.lower, l.upper]),
+        accel_lag_s: accel.map(|l| l.value),
+        interval_accel_lag_s: accel.map(|l| [l.lower, l.upper]),
         nodes,
     }
 }

@@ -220,17 +220,14 @@ impl SensorResult {
 
 /// The lag of `sensor`, or why there is none.
 fn lag(fit: &ThermalFit, sensor: Sensor) -> Result<LagResult, String> {
-    let joint = &fit.joint;
-    let found = match &joint.apart {
-        Some((each, _)) => each[sensor as usize].lag,
-        None => joint.profile.lag,
-    };
+    let profile = &fit.joint.profiles[sensor as usize];
+    let found = profile.lag;
     let Lag {
         value,
         lower,
         upper,
     } = found;
-    if joint.profile.points.len() == 1 {
+    if profile.points.len() == 1 {
         return Err(match fit.options.lag_s {
             Some(given) => format!("it was given as {given} s"),
             None => "this estimator has none".into(),

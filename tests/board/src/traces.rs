@@ -136,7 +136,7 @@ fn model(warmth: f64) -> Compensation<f32> {
     }
 }
 
-fn stored(temps: &[f64], lag_s: Option<f32>, records: &[Record<'_>]) -> Vec<u8> {
+fn stored(temps: &[f64], lags_s: Option<[f32; 2]>, records: &[Record<'_>]) -> Vec<u8> {
     let slope = |before: &Affine<f32>, after: &Affine<f32>| Affine {
         matrix: after.matrix - before.matrix,
         offset: after.offset - before.offset,
@@ -165,7 +165,7 @@ fn stored(temps: &[f64], lag_s: Option<f32>, records: &[Record<'_>]) -> Vec<u8> 
         &stored::Origin::UNKNOWN,
         matrices,
         &Curves {
-            lag_s,
+            lags_s,
             ..Curves::of(&nodes)
         },
         records,
@@ -182,7 +182,7 @@ fn affine() -> Vec<u8> {
 
 fn nodes() -> Vec<u8> {
     let temps: Vec<f64> = (0..16).map(|k| 24.0 + f64::from(k)).collect();
-    stored(&temps, Some(5.0), &[])
+    stored(&temps, Some([5.0, 9.0]), &[])
 }
 
 /// One of every kind of law. Without lags, whose state when the stream begins is not on the line, and without the warm-up, whose

@@ -159,9 +159,9 @@ pub fn table_new(nodes: &[Node<f32>]) -> Result<Table<f32, 16>, table::Refused> 
 
 /// [`Table::state`] and [`Table::follow`].
 #[inline(never)]
-pub fn table_follow(table: &Table<f32, 16>, temp_c: f32) -> table::State<f32> {
+pub fn table_follow(table: &Table<f32, 16>, dies_c: [f32; 2]) -> table::State<f32> {
     let mut state = table.state();
-    table.follow(&mut state, temp_c);
+    table.follow(&mut state, dies_c);
     state
 }
 

@@ -154,7 +154,13 @@ pub fn download_text(result: &DeviceResult<Contents>) -> String {
         line!(out, "for {from} to {to} °C of the dies");
     }
     if let Some(lag_s) = found.lag_s {
-        line!(out, "lag of the dies behind the thermometer {lag_s} s");
+        let accel = found.accel_lag_s;
+        let accel = accel.map(|s| format!(", of the accelerometer's {s} s"));
+        line!(
+            out,
+            "lag of the dies behind the thermometer {lag_s} s{}",
+            accel.unwrap_or_default()
+        );
     }
     if found.nodes.len() > 1 {
         line!(out, "{} between the nodes", found.between_nodes);

@@ -159,7 +159,15 @@ fn curves_text(out: &mut String, name: &str, result: &ThermalResult) {
 pub fn thermal_comparison_text(result: &Comparison) -> String {
     let mut out = String::new();
     let [from, to] = result.range_c;
-    let lag = |k: usize| result.lag_s[k].map_or("none".into(), |s| format!("{} s", significant(s)));
+    let lag = |k: usize| match result.lags_s[k] {
+        None => "none".into(),
+        Some([both, same]) if both == same => format!("{} s", significant(both)),
+        Some([gyro, accel]) => format!(
+            "{} s (gyro), {} s (accelerometer)",
+            significant(gyro),
+            significant(accel)
+        ),
+    };
     let _ = writeln!(
         out,
         "second minus first, dies at {from:.1} to {to:.1} °C; lags {} and {}",

@@ -16,8 +16,8 @@ use super::effects::{mimu, unit};
 const DWELLS: usize = 72;
 const RATE_HZ: f64 = 50.0;
 const ROWS: usize = 100;
-/// Lag of the dies, s, and the ramp of the thermometer, °C/s from 0 °C on.
-const LAG_S: f64 = 20.0;
+/// Lags of the dies of gyro and accelerometer, s, and the ramp of the thermometer, °C/s from 0 °C on.
+const LAGS_S: [f64; 2] = [20.0, 8.0];
 const RAMP: f64 = 0.35;
 
 /// Forward model at a temperature of the dies, V per SI: rows are sensors.
@@ -44,9 +44,9 @@ fn thermometer_c(t_s: f64) -> f64 {
     RAMP * t_s
 }
 
-/// The lag's solution for the ramp.
-fn die_c(t_s: f64) -> f64 {
-    RAMP * (t_s - LAG_S * (1.0 - (-t_s / LAG_S).exp()))
+/// The lags' solutions for the ramp.
+fn dies_c(t_s: f64) -> [f64; 2] {
+    LAGS_S.map(|lag_s| RAMP * (t_s - lag_s * (1.0 - (-t_s / lag_s).exp())))
 }
 
 /// Records the unit on a table: at 25 °C, or over the ramp.
@@ -78,13 +78,13 @@ fn record(folder: &Path, ramp: bool) {
         let force =
             Vector3::new((2.4 * s).sin(), (2.4 * s).cos(), (0.9 * s).sin()).normalize() * unit::G;
         let rate_dps = Vector3::new((1.3 * s).sin(), (1.7 * s).cos(), (2.9 * s).sin()) * 60.0;
-        let (shown, die) = match ramp {
-            true => (thermometer_c(t), die_c(t)),
-            false => (25.0, 25.0),
+        let (shown, dies) = match ramp {
+            true => (thermometer_c(t), dies_c(t)),
+            false => (25.0, [25.0; 2]),
         };
         write!(out, "{t:.4},{step},{shown:.6}").unwrap();
         for (sensor, input) in [rate_dps.map(f64::to_radians), force].iter().enumerate() {
-            let (p, b) = forward(sensor, die);
+            let (p, b) = forward(sensor, dies[sensor]);
             for u in (p * input + b).iter() {
                 write!(out, ",{:.9}", u + unit::NOISE[sensor] * normal()).unwrap();
             }
@@ -138,8 +138,10 @@ fn calibrations(folder: &Path) {
     calibration.format = Calibration::format_of(true).into();
     calibration.temperature = Some(OverTemperature {
         range_c: [10.0, 40.0],
-        lag_s: Some(LAG_S),
+        lag_s: Some(LAGS_S[0]),
         interval_lag_s: Some([19.0, 21.0]),
+        accel_lag_s: Some(LAGS_S[1]),
+        interval_accel_lag_s: Some([7.0, 9.0]),
         nodes: (0..7).map(|k| node(10.0 * f64::from(k) - 5.0)).collect(),
     });
     std::fs::write(folder.join("curves.toml"), calibration.to_toml()).unwrap();
@@ -199,7 +201,8 @@ fn curves_and_lag_leave_the_noise_and_the_model_of_one_temperature_does_not() {
         all.filter(|t| !inside(*t)).count() as f64
     };
     let (count, by) = outside(&curves);
-    let expected = seconds(&|t| (10.0..=40.0).contains(&die_c(t)));
+    let inside = |die_c: f64| (10.0..=40.0).contains(&die_c);
+    let expected = seconds(&|t| dies_c(t).into_iter().all(inside));
     assert!(
         (count - expected).abs() <= 2.0 * ROWS as f64,
         "{count} {expected}"

@@ -28,8 +28,8 @@ pub(super) struct Twin {
     single: effects::State<f32, ROOM>,
     affine: [Affine<f64>; 2],
     curves: Option<Curves>,
-    lag: DieLag<f32>,
-    die: Option<die::State<f32>>,
+    lags: [DieLag<f32>; 2],
+    dies: Option<[die::State<f32>; 2]>,
     effects: effects::Effects<f64, ROOM>,
     double: effects::State<f64, ROOM>,
     /// Number of the first sample of the batch before; time since power-on is counted by it, as on the device.
@@ -64,8 +64,8 @@ impl Twin {
             rate_hz,
             model: stored.table.state(),
             single,
-            lag: stored.lag(),
-            die: None,
+            lags: stored.lags(),
+            dies: None,
             curves: calibration.curves(),
             stored,
             affine: [model(Sensor::Gyro)?, model(Sensor::Accel)?],
@@ -80,7 +80,8 @@ impl Twin {
     pub fn compare(&mut self, raw: &Samples, device: &Samples, found: &mut Checked) {
         let head = &raw.head;
         let first = self.next != Some(head.first);
-        self.follow_dies(head, device.head.temp_c, first, found);
+        let dies_c = device.dies_c.unwrap_or([device.head.temp_c; 2]);
+        self.follow_dies(head, dies_c, first, found);
         self.follow(head);
         if first {
             self.single.gap();
@@ -104,28 +105,46 @@ impl Twin {
         self.next = Some(head.first.wrapping_add(raw.values.len() as u32));
     }
 
-    /// Takes the models of the temperature of the dies that the device says it has used, and compares it with that of the thermometer
-    /// behind the lag. What was before the comparison is in both temperatures of its first batch.
-    fn follow_dies(&mut self, head: &BatchHead, die_c: f32, first: bool, found: &mut Checked) {
+    /// Takes the models of the temperatures of the dies that the device says it has used, and compares them with that of the thermometer
+    /// behind their lags. What was before the comparison is in the temperatures of its first batch.
+    fn follow_dies(
+        &mut self,
+        head: &BatchHead,
+        dies_c: [f32; 2],
+        first: bool,
+        found: &mut Checked,
+    ) {
         let dt_s = head.first.wrapping_sub(self.followed) as f32 / self.rate_hz as f32;
-        match self.die.as_mut().filter(|_| !first) {
-            Some(state) if self.lag != DieLag::none() => {
-                let ours = self.lag.follow(state, dt_s, head.temp_c);
-                let off = ours.map_or(f64::INFINITY, |c| f64::from((c - die_c).abs()));
-                let most = found.die_temperature_k.unwrap_or(0.0);
-                found.die_temperature_k = Some(if off.is_nan() {
-                    f64::INFINITY
-                } else {
-                    most.max(off)
-                });
-            }
-            _ => self.die = Some(self.lag.state_of(head.temp_c, die_c)),
+        if first {
+            self.dies = None;
         }
-        let [low, high] = found.die_range_c.unwrap_or([die_c; 2]);
-        found.die_range_c = Some([low.min(die_c), high.max(die_c)]);
-        self.stored.table.follow(&mut self.model, die_c);
+        match &mut self.dies {
+            Some(states) => {
+                for ((lag, state), die_c) in self.lags.iter().zip(states).zip(dies_c) {
+                    if *lag == DieLag::none() {
+                        continue;
+                    }
+                    let ours = lag.follow(state, dt_s, head.temp_c);
+                    let off = ours.map_or(f64::INFINITY, |c| f64::from((c - die_c).abs()));
+                    let off = if off.is_nan() { f64::INFINITY } else { off };
+                    let most = found.die_temperature_k.unwrap_or(0.0);
+                    found.die_temperature_k = Some(most.max(off));
+                }
+            }
+            None => {
+                self.dies = Some([0, 1].map(|k| self.lags[k].state_of(head.temp_c, dies_c[k])));
+            }
+        }
+        let [mut low, mut high] = found.die_range_c.unwrap_or([dies_c[0]; 2]);
+        for die_c in dies_c {
+            (low, high) = (low.min(die_c), high.max(die_c));
+        }
+        found.die_range_c = Some([low, high]);
+        self.stored.table.follow(&mut self.model, dies_c);
         if let Some(curves) = &self.curves {
-            for (sensor, model) in Sensor::BOTH.into_iter().zip(&mut self.affine) {
+            for ((sensor, model), die_c) in
+                Sensor::BOTH.into_iter().zip(&mut self.affine).zip(dies_c)
+            {
                 let at = curves.inverse(sensor, f64::from(die_c));
                 *model = at.unwrap_or(*model);
             }

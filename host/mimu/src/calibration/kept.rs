@@ -41,6 +41,8 @@ pub struct Kept {
     pub range_c: Option<[f32; 2]>,
     /// As in [`OverTemperature::lag_s`].
     pub lag_s: Option<f32>,
+    /// As in [`OverTemperature::accel_lag_s`].
+    pub accel_lag_s: Option<f32>,
     /// What they lack. Converters of the axes of a triad are parts of one effect.
     pub effects: Vec<OnDevice<f32>>,
 }
@@ -111,6 +113,8 @@ fn over_temperature(kept: &Kept) -> Option<OverTemperature> {
         range_c: kept.range_c.unwrap_or(ends).map(f64::from),
         lag_s: kept.lag_s.map(f64::from),
         interval_lag_s: None,
+        accel_lag_s: kept.accel_lag_s.map(f64::from),
+        interval_accel_lag_s: None,
         nodes: nodes.collect(),
     })
 }

@@ -20,12 +20,19 @@ use mimu_recording::error::{Error, Result};
 pub struct OverTemperature {
     /// Dies' temperatures in the recordings that it was fitted to, °C.
     pub range_c: [f64; 2],
-    /// Lag of the dies behind the thermometer, s; negative: they lead. `None`: not determined, and none is applied.
+    /// Lag of the dies behind the thermometer, s; negative: they lead. `None`: not determined, and none is applied. Where there is an
+    /// [`Self::accel_lag_s`] too, that of the gyro's dies.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub lag_s: Option<f64>,
     /// Bounds of it with 95 %, s.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub interval_lag_s: Option<[f64; 2]>,
+    /// Lag of the accelerometer's die, s, where it is told apart from that of the gyro's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub accel_lag_s: Option<f64>,
+    /// Bounds of it with 95 %, s.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub interval_accel_lag_s: Option<[f64; 2]>,
     /// One to sixteen, the coldest first.
     #[serde(rename = "node", default)]
     pub nodes: Vec<TemperatureNode>,
@@ -70,7 +77,7 @@ pub struct NodeTable {
 #[derive(Debug, Clone)]
 pub struct Curves {
     table: Table<f64, NODES>,
-    lag: DieLag<f64>,
+    lags: [DieLag<f64>; 2],
     has: [bool; 2],
 }
 
@@ -153,18 +160,7 @@ impl OverTemperature {
             let problem = format!("range_c is [{from}, {to}], and has to rise");
             return refuse("", problem);
         }
-        let [least, most] = LAG_RANGE_S;
-        if let Some(lag_s) = self.lag_s.filter(|lag| !(least..=most).contains(lag)) {
-            let problem = format!("lag_s is {lag_s}, and has to be from {least} to {most}");
-            return refuse("", problem);
-        }
-        if let Some([lower, upper]) = self.interval_lag_s
-            && !(lower <= upper && self.lag_s.is_some())
-        {
-            let problem = match self.lag_s {
-                None => "interval_lag_s is there and lag_s is not".into(),
-                Some(_) => format!("interval_lag_s is [{lower}, {upper}], and has to rise"),
-            };
+        if let Some(problem) = self.problem_of_lags() {
             return refuse("", problem);
         }
         if self.nodes.is_empty() || self.nodes.len() > NODES {
@@ -190,6 +186,45 @@ impl OverTemperature {
             }
         }
         Ok(())
+    }
+
+    /// Lags of the dies of gyro and accelerometer, s; `None` if they are not determined.
+    pub fn lags_s(&self) -> Option<[f64; 2]> {
+        self.lag_s
+            .map(|lag_s| [lag_s, self.accel_lag_s.unwrap_or(lag_s)])
+    }
+
+    /// The same without lags: none is applied.
+    pub fn without_lags(self) -> Self {
+        Self {
+            lag_s: None,
+            interval_lag_s: None,
+            accel_lag_s: None,
+            interval_accel_lag_s: None,
+            ..self
+        }
+    }
+
+    fn problem_of_lags(&self) -> Option<String> {
+        if self.accel_lag_s.is_some() && self.lag_s.is_none() {
+            return Some("accel_lag_s is there and lag_s is not".into());
+        }
+        let [least, most] = LAG_RANGE_S;
+        let lags = [
+            ("lag_s", self.lag_s, self.interval_lag_s),
+            ("accel_lag_s", self.accel_lag_s, self.interval_accel_lag_s),
+        ];
+        lags.into_iter()
+            .find_map(|(name, lag_s, interval)| match (lag_s, interval) {
+                (Some(lag_s), _) if !(least..=most).contains(&lag_s) => Some(format!(
+                    "{name} is {lag_s}, and has to be from {least} to {most}"
+                )),
+                (None, Some(_)) => Some(format!("interval_{name} is there and {name} is not")),
+                (_, Some([lower, upper])) if !(lower <= upper) => Some(format!(
+                    "interval_{name} is [{lower}, {upper}], and has to rise"
+                )),
+                _ => None,
+            })
     }
 
     /// What is wrong with a node behind one of the temperature `before`.
@@ -255,10 +290,10 @@ impl Curves {
         let table = Table::new(nodes).ok()?;
         Some(Self {
             table: table.with_range(temperature.range_c).ok()?,
-            lag: temperature
-                .lag_s
-                .and_then(DieLag::new)
-                .unwrap_or_else(DieLag::none),
+            lags: temperature.lags_s().map_or_else(
+                || [DieLag::none(); 2],
+                |lags| lags.map(|s| DieLag::new(s).unwrap_or_else(DieLag::none)),
+            ),
             has: constant.map(|model| model.is_some()),
         })
     }
@@ -266,16 +301,16 @@ impl Curves {
     /// The inverse model of `sensor` at this temperature of the dies, °C, raw to SI.
     pub fn inverse(&self, sensor: Sensor, die_c: f64) -> Option<Affine<f64>> {
         let mut state = self.table.state();
-        self.table.follow(&mut state, die_c);
+        self.table.follow(&mut state, [die_c; 2]);
         self.has[sensor as usize].then_some(match sensor {
             Sensor::Gyro => state.model.gyro,
             Sensor::Accel => state.model.accel,
         })
     }
 
-    /// The lag of the dies behind the thermometer.
-    pub fn lag(&self) -> &DieLag<f64> {
-        &self.lag
+    /// The lag of the dies of `sensor` behind the thermometer.
+    pub fn lag(&self, sensor: Sensor) -> &DieLag<f64> {
+        &self.lags[sensor as usize]
     }
 
     /// The same nodes for the device's arithmetic in double precision.

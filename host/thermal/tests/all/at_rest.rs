@@ -25,13 +25,13 @@ pub fn in_poses(experiment: &Experiment, seed: u64, up: &[Vector3<f64>]) -> (Man
     let mut out = Samples::default();
     let temperatures = experiment.temperatures();
     let count = temperatures.len();
-    for (k, [thermometer, die]) in temperatures.into_iter().enumerate() {
+    for (k, [thermometer, gyro_c, accel_c]) in temperatures.into_iter().enumerate() {
         let pose = k * up.len() / count;
         out.t_s.push(k as f64 / RATE_HZ);
         out.step.push(pose as i32);
         out.temp_c.push(thermometer + 0.02 * random.normal());
         for sensor in 0..2 {
-            let (matrix, bias) = truth(sensor, die);
+            let (matrix, bias) = truth(sensor, [gyro_c, accel_c][sensor]);
             let input = if sensor == 0 { 0.0 } else { GRAVITY };
             let raw = matrix * (up[pose] * input) + bias;
             for axis in 0..3 {

@@ -189,9 +189,9 @@ fn a_soak_finds_all_parameters_and_as_printed_only_scale_factors_and_biases() {
     }
     let joint = fitted(&soak, 17, JOINT);
     assert!(
-        (joint.joint.lag().unwrap().value - 60.0).abs() < 15.0,
+        (joint.joint.lag(Sensor::Gyro).unwrap().value - 60.0).abs() < 15.0,
         "{:?}",
-        joint.joint.lag()
+        joint.joint.lag(Sensor::Gyro)
     );
 }
 

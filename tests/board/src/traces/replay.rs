@@ -63,8 +63,8 @@ pub fn replay(trace: &Trace) -> Result<Replayed, String> {
             Message::Event(Event::Compensated(batch)) => {
                 let (head, samples) = raw.take().ok_or("a compensated batch without a raw one")?;
                 let device: Vec<_> = batch.values().map(|(_, s)| s).collect();
-                // The temperature of the compensated batch is that of the dies.
-                let die_c = batch.head.temp_c;
+                // The temperatures of the compensated batch are those of the dies.
+                let dies_c = batch.dies_c();
                 let same = BatchHead {
                     temp_c: head.temp_c,
                     ..batch.head
@@ -72,7 +72,7 @@ pub fn replay(trace: &Trace) -> Result<Replayed, String> {
                 if head != same || samples.len() != device.len() {
                     return Err(format!("sample {}: the two batches differ", head.first));
                 }
-                found.compensated += twin.compare(&head, die_c, &samples, &device)?;
+                found.compensated += twin.compare(&head, dies_c, &samples, &device)?;
             }
             Message::Event(Event::Kalman(state)) => {
                 // The samples that it took in last come with the batch behind it.
@@ -126,11 +126,11 @@ impl Twin {
     fn compare(
         &mut self,
         head: &BatchHead,
-        die_c: f32,
+        dies_c: [f32; 2],
         raw: &[Sample<f32>],
         device: &[Sample<f32>],
     ) -> Result<usize, String> {
-        self.stored.table.follow(&mut self.model, die_c);
+        self.stored.table.follow(&mut self.model, dies_c);
         self.follow(head);
         let mut compared = 0;
         for (k, (raw, device)) in raw.iter().zip(device).enumerate() {

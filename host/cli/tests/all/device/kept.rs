@@ -150,7 +150,9 @@ fn over_temperature(place: &Place) -> String {
         format!("[[temperature.node]]\ntemp_c = {temp_c}\n{gyro}{accel}")
     };
     let nodes = [node(-10.0, 3.4), node(24.0, 3.5), node(60.0, 3.7)].concat();
-    let curves = format!("[temperature]\nrange_c = [-9.5, 59.0]\nlag_s = 61.2\n{nodes}");
+    let curves = format!(
+        "[temperature]\nrange_c = [-9.5, 59.0]\nlag_s = 61.2\naccel_lag_s = -12.5\n{nodes}"
+    );
     let text = text.replace("mimu-calibration/1", "mimu-calibration/2");
     let path = place.path("curves.toml");
     std::fs::write(&path, format!("{text}\n{curves}")).unwrap();
@@ -165,13 +167,14 @@ fn curves_that_are_fetched_and_stored_again_are_the_same_to_the_last_byte() {
     let sent = device(&place, &peer, &["upload", &file, "--json", "-"]).json();
     assert_eq!(sent["node_temp_c"], serde_json::json!([-10.0, 24.0, 60.0]));
     let held = peer.seen.lock().unwrap().stored.clone().unwrap();
-    assert_eq!(held[4], 5, "layout");
+    assert_eq!(held[4], 6, "layout");
     let fetched = ["download", "-o", "back.toml", "--json", "-"];
     let fetched = device(&place, &peer, &fetched).json();
     assert_eq!(fetched["range_c"], serde_json::json!([-9.5, 59.0]));
     assert_eq!(fetched["between_nodes"], "cubic");
     let lag = fetched["lag_s"].as_f64().unwrap();
     assert!((lag - 61.2).abs() < 1e-5, "{lag}");
+    assert_eq!(fetched["accel_lag_s"], -12.5);
     let back = std::fs::read_to_string(place.path("back.toml")).unwrap();
     assert!(back.contains("format = \"mimu-calibration/2\""), "{back}");
     assert_eq!(back.matches("[[temperature.node]]").count(), 3);

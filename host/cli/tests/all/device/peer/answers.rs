@@ -42,7 +42,7 @@ impl Device {
                 .and(Capabilities::KALMAN)
                 .and(Capabilities::SELF_TEST)
                 .and(match self.script.curves {
-                    true => Capabilities::CURVES,
+                    true => Capabilities::CURVES.and(Capabilities::TWO_LAGS),
                     false => Capabilities(0),
                 }),
             effects: self.script.effects,

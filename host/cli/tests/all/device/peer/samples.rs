@@ -91,7 +91,7 @@ impl Device {
         let mut model = None;
         if let Some(c) = &mut self.calibrated {
             let mut state = c.stored.table.state();
-            c.stored.table.follow(&mut state, TEMP_C);
+            c.stored.table.follow(&mut state, [TEMP_C; 2]);
             if let Some(all) = &c.stored.effects {
                 let dt_s = first.wrapping_sub(c.followed) as f32 / 1000.0;
                 all.slow(&mut c.effects, dt_s, TEMP_C);
@@ -142,7 +142,11 @@ impl Device {
         }
         if self.streams.1 && !compensated.is_empty() {
             let samples = &compensated;
-            let batch = CompensatedBatch { head, samples };
+            let batch = CompensatedBatch {
+                head,
+                samples,
+                accel_die_c: None,
+            };
             self.frame(&Message::Event(Event::Compensated(batch)), garble);
         }
     }
