@@ -1,5 +1,6 @@
 //! fang, 5.2 and 5.3: a soak at nine temperatures with the noise of Table 5, and what each estimator leaves of the errors.
 
+use mimu::quantity::Sensor;
 use mimu::triad::Forward;
 use mimu_core::compensation::Affine;
 use mimu_thermal::classic::Classic;
@@ -136,7 +137,7 @@ fn once(noisy: &Session, truth: &Session) -> Vec<Errors> {
 fn errors(joint: &Joint, soak: &Joint, how: Model, truth: &Session) -> Errors {
     let mut out = Errors::default();
     for sensor in [0, 1] {
-        let lag = joint.profiles[sensor].lag.value;
+        let lag = joint.applied_s(Sensor::BOTH[sensor]);
         let die = truth.thermometer.die(lag, joint.starts[0]);
         let rows = &truth.rows[sensor];
         let errors = rows.iter().map(|row| {

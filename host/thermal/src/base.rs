@@ -13,7 +13,7 @@ use mimu_recording::error::{Error, Result};
 use nalgebra::Matrix3;
 
 use crate::curves::TriadCurves;
-use crate::fit::{ThermalFit, Verdict, range};
+use crate::fit::{ThermalFit, range};
 use crate::nodes::{Inverse, fewest, with_lags};
 
 /// The dies have to have been this near to the temperature of the calibration, K.
@@ -90,10 +90,7 @@ pub fn calibration(fit: &ThermalFit, base: &Calibration, created: &str) -> Resul
     });
     let of = |sensor: usize, temp_c: f64| Some(based[sensor].as_ref()?.inverse(temp_c));
     let nodes = fewest(of, based.each_ref().map(Option::is_some), range_c)?;
-    let mut temperature = with_lags(&fit.joint, range_c, nodes);
-    if fit.verdict == Verdict::OneWay {
-        temperature = temperature.without_lags();
-    }
+    let temperature = with_lags(&fit.joint, range_c, nodes);
     let temps: Vec<f64> = temperature.nodes.iter().map(|n| n.temp_c).collect();
     let temp_c = reference_node(&temps).map_or(at_c, |k| temps[k]);
     let triads = based.each_ref().map(|b| b.as_ref()?.triad(temp_c));

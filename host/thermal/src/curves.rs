@@ -6,12 +6,22 @@ use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 use crate::regression::{Kind, Problem};
 use crate::smoothness::{Smoothness, TriadFit};
 
-/// Curves of one triad, averaged over the lags that the data allow.
+/// An estimate for one lag.
+#[derive(Debug, Clone)]
+pub struct LagFit {
+    /// The estimate.
+    pub fit: TriadFit,
+    /// Likelihood of the lag; those of all sum to one.
+    pub likelihood: f64,
+    /// Its share in the curves; those of all sum to one. The likelihood, unless the curves have to be those of one lag.
+    pub share: f64,
+}
+
+/// Curves of one triad. Their covariance is that about them over all lags that the data allow.
 #[derive(Debug, Clone)]
 pub struct TriadCurves {
     problem: Problem,
-    /// Estimates with their weights.
-    fits: Vec<(f64, TriadFit)>,
+    fits: Vec<LagFit>,
     /// Temperatures of the die in the recordings, °C.
     pub range_c: [f64; 2],
 }
@@ -20,13 +30,24 @@ pub struct TriadCurves {
 type Twelve = SVector<f64, 12>;
 
 impl TriadCurves {
-    /// Of `fits` with their weights, which sum to one.
-    pub fn new(problem: Problem, fits: Vec<(f64, TriadFit)>, range_c: [f64; 2]) -> Self {
+    /// Of `fits`.
+    pub fn new(problem: Problem, fits: Vec<LagFit>, range_c: [f64; 2]) -> Self {
         Self {
             problem,
             fits,
             range_c,
         }
+    }
+
+    /// Of one estimate, as where the lag is known.
+    pub fn of_one(problem: Problem, fit: TriadFit, range_c: [f64; 2]) -> Self {
+        let (likelihood, share) = (1.0, 1.0);
+        let only = LagFit {
+            fit,
+            likelihood,
+            share,
+        };
+        Self::new(problem, vec![only], range_c)
     }
 
     /// What they were estimated from.
@@ -42,9 +63,9 @@ impl TriadCurves {
     /// Forward model at `temp_c` of the die, SI to raw, and its derivative by temperature, per kelvin.
     pub fn forward(&self, temp_c: f64) -> [Forward; 2] {
         let mut sum = [Twelve::zeros(); 2];
-        for (weight, fit) in &self.fits {
+        for of in &self.fits {
             for (derivative, sum) in sum.iter_mut().enumerate() {
-                *sum += self.numbers(fit, temp_c, derivative == 1) * *weight;
+                *sum += self.numbers(&of.fit, temp_c, derivative == 1) * of.share;
             }
         }
         sum.map(|s| forward(&s))
@@ -52,16 +73,14 @@ impl TriadCurves {
 
     /// Covariance of the forward model at `temp_c`, in the order of [`mimu::triad::vector`]: of the noise, and of the lag.
     pub fn covariance(&self, temp_c: f64) -> Covariance {
-        let each: Vec<(f64, Twelve)> = self
-            .fits
-            .iter()
-            .map(|(w, fit)| (*w, self.numbers(fit, temp_c, false)))
-            .collect();
-        let mean: Twelve = each.iter().map(|(w, n)| n * *w).sum();
+        let numbers = |of: &LagFit| self.numbers(&of.fit, temp_c, false);
+        let each: Vec<Twelve> = self.fits.iter().map(numbers).collect();
+        let shares = self.fits.iter().map(|of| of.share);
+        let value: Twelve = each.iter().zip(shares).map(|(n, share)| n * share).sum();
         let mut covariance = Covariance::zeros();
-        for ((weight, fit), (_, numbers)) in self.fits.iter().zip(&each) {
-            let off = numbers - mean;
-            covariance += (self.within(fit, temp_c) + off * off.transpose()) * *weight;
+        for (of, numbers) in self.fits.iter().zip(&each) {
+            let off = numbers - value;
+            covariance += (self.within(&of.fit, temp_c) + off * off.transpose()) * of.likelihood;
         }
         covariance
     }
@@ -97,8 +116,8 @@ impl TriadCurves {
 
     /// Smoothness that the likeliest lag was found with.
     pub fn smoothness(&self) -> Option<Smoothness> {
-        let best = self.fits.iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
-        Some(best.1.smoothness)
+        let likelier = |a: &&LagFit, b: &&LagFit| a.likelihood.total_cmp(&b.likelihood);
+        Some(self.fits.iter().max_by(likelier)?.fit.smoothness)
     }
 
     /// Scale factors at `temp_c`, raw per SI: norms of the rows of P; ones where only biases are estimated.
@@ -123,11 +142,11 @@ impl TriadCurves {
         if number == 0 || number >= self.problem.offsets {
             return offset;
         }
-        for (weight, fit) in &self.fits {
+        for of in &self.fits {
             for axis in 0..3 {
                 let column = self.problem.columns(axis) - self.problem.offsets + number;
                 offset[axis] +=
-                    weight * fit.axes[axis].coefficients[column] * self.problem.gain[axis];
+                    of.share * of.fit.axes[axis].coefficients[column] * self.problem.gain[axis];
             }
         }
         offset
@@ -135,21 +154,22 @@ impl TriadCurves {
 
     /// Change of the biases between two temperatures of the die, raw, with its covariance.
     pub fn bias_change(&self, from_c: f64, to_c: f64) -> (Vector3<f64>, Matrix3<f64>) {
-        let each: Vec<(f64, Vector3<f64>, Vector3<f64>)> = self
+        let each: Vec<(&LagFit, Vector3<f64>, Vector3<f64>)> = self
             .fits
             .iter()
-            .map(|(weight, fit)| {
-                let of_axes = [0, 1, 2].map(|axis| self.bias_change_of(fit, axis, [from_c, to_c]));
+            .map(|of| {
+                let change_of = |axis| self.bias_change_of(&of.fit, axis, [from_c, to_c]);
+                let of_axes = [0, 1, 2].map(change_of);
                 let [change, variance] = [0, 1].map(|k| Vector3::from(of_axes.map(|a| a[k])));
-                (*weight, change, variance)
+                (of, change, variance)
             })
             .collect();
-        let mean: Vector3<f64> = each.iter().map(|(w, change, _)| change * *w).sum();
-        let covariance = each.iter().map(|(w, change, variance)| {
-            let off = change - mean;
-            (Matrix3::from_diagonal(variance) + off * off.transpose()) * *w
+        let value: Vector3<f64> = each.iter().map(|(of, change, _)| change * of.share).sum();
+        let covariance = each.iter().map(|(of, change, variance)| {
+            let off = change - value;
+            (Matrix3::from_diagonal(variance) + off * off.transpose()) * of.likelihood
         });
-        (mean, covariance.sum())
+        (value, covariance.sum())
     }
 
     /// The same of one axis for one lag: change and variance.
@@ -182,7 +202,7 @@ impl TriadCurves {
         let mean: f64 = self
             .fits
             .iter()
-            .map(|(w, f)| w * f.smoothness[kind as usize][0])
+            .map(|of| of.likelihood * of.fit.smoothness[kind as usize][0])
             .sum();
         (mean * span.powi(3) / 48.0).sqrt()
     }

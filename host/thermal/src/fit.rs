@@ -124,7 +124,7 @@ pub fn fit(sessions: Vec<Session>, verify: &[Session], options: Options) -> Resu
     };
     warnings.extend(joint.warnings.iter().cloned());
     check_range(&joint, options.range_c)?;
-    let verdict = match goes_one_way(&sessions, &joint) {
+    let verdict = match joint.one_way {
         true => Verdict::OneWay,
         false => Verdict::Fitted,
     };
@@ -139,11 +139,6 @@ pub fn fit(sessions: Vec<Session>, verify: &[Session], options: Options) -> Resu
     })
 }
 
-fn goes_one_way(sessions: &[Session], joint: &Joint) -> bool {
-    let mut dies = Sensor::BOTH.iter().map(|s| joint.dies(sessions, *s));
-    dies.any(|dies| is_one_way(sessions, &dies))
-}
-
 /// The joint estimate; where the temperature goes one way only, curvature has to prove itself by extrapolation.
 fn smooth(sessions: &[Session], options: Options, warnings: &mut Vec<String>) -> Result<Joint> {
     let choice = |shape| Choice {
@@ -153,7 +148,7 @@ fn smooth(sessions: &[Session], options: Options, warnings: &mut Vec<String>) ->
     let joint = estimate(sessions, choice(Shape::Spline))?;
     let dies = Sensor::BOTH.map(|s| joint.dies(sessions, s));
     let span = dies.iter().flatten().map(|d| d.range()[1] - d.range()[0]);
-    if !goes_one_way(sessions, &joint) || span.fold(0.0, f64::max) < CURVATURE_SPAN {
+    if !joint.one_way || span.fold(0.0, f64::max) < CURVATURE_SPAN {
         return Ok(joint);
     }
     let Some([line, curve]) = extrapolation::compare(sessions, options.lag_s) else {
@@ -180,9 +175,12 @@ fn of_literature(sessions: &[Session], classic: Classic) -> Result<Joint> {
         }
         curves.push(classic::estimate(sessions, sensor, classic)?);
     }
+    let settled = |s: &Session| s.thermometer.die(0.0, Start::Settled);
+    let dies: Vec<Die> = sessions.iter().map(settled).collect();
     Ok(Joint {
         curves: curves.try_into().unwrap_or([None, None]),
         profiles: [0, 1].map(|_| Profile::fixed(0.0, 0.0)),
+        one_way: is_one_way(sessions, &dies),
         apart: None,
         noise: [None, None],
         starts: vec![Start::Settled; sessions.len()],
@@ -234,7 +232,7 @@ fn judge(sessions: &[Session], verify: &[Session], joint: &Joint, k: usize) -> O
     let sensor = Sensor::BOTH[k];
     let curves = joint.curves[k].as_ref()?;
     let dies = joint.dies(sessions, sensor);
-    let lag = joint.profiles[k].lag.value;
+    let lag = joint.applied_s(sensor);
     let unseen = verify
         .iter()
         .map(|s| s.thermometer.die(lag, Start::Settled));
@@ -294,10 +292,7 @@ impl ThermalFit {
     /// # Errors
     /// Curves of biases alone.
     pub fn calibration(&self, created: &str) -> Result<Calibration> {
-        let mut temperature = nodes::over_temperature(&self.joint)?;
-        if self.verdict == Verdict::OneWay {
-            temperature = temperature.without_lags();
-        }
+        let temperature = nodes::over_temperature(&self.joint)?;
         let temps: Vec<f64> = temperature.nodes.iter().map(|n| n.temp_c).collect();
         let temp_c = reference_node(&temps).map_or(f64::NAN, |k| temps[k]);
         let first = &self.sessions[0];

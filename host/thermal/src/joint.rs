@@ -5,8 +5,9 @@ use mimu_recording::Reference;
 use mimu_recording::error::{Error, Result};
 
 use crate::basis::Shape;
-use crate::curves::TriadCurves;
+use crate::curves::{LagFit, TriadCurves};
 use crate::noise;
+use crate::path::is_one_way;
 use crate::profile::{LAGS, Lag, Profile};
 use crate::regression::{AxisNoise, Normal, Problem};
 use crate::session::Session;
@@ -45,8 +46,10 @@ impl Choice {
 pub struct Joint {
     /// Curves of gyro and accelerometer; none of a triad that was not recorded.
     pub curves: [Option<TriadCurves>; 2],
-    /// Lags of gyro and accelerometer: that of both together, unless the data tell the two apart.
+    /// Likelihoods of the lags of gyro and accelerometer: that of both together, unless the data tell the two apart.
     pub profiles: [Profile; 2],
+    /// Whether the temperature goes one way only, so that lag and slope cannot be told apart.
+    pub one_way: bool,
     /// Drop in deviance by two lags against one, where they are told apart.
     pub apart: Option<f64>,
     /// Noise of the rows.
@@ -58,14 +61,22 @@ pub struct Joint {
 }
 
 impl Joint {
-    /// Lag of `sensor` that the device is to apply, s: none where it is not determined.
+    /// Lag of `sensor` that is applied: given, or determined by the data; none otherwise.
     pub fn lag(&self, sensor: Sensor) -> Option<Lag> {
-        Some(self.profiles[sensor as usize].lag).filter(Lag::is_determined)
+        let profile = &self.profiles[sensor as usize];
+        let determined = profile.lag.is_determined() && !self.one_way;
+        (determined || profile.is_given()).then_some(profile.lag)
     }
 
-    /// Temperatures of the die of `sensor` in `sessions` by its best lag.
+    /// Lag that the curves of `sensor` are for, s: zero where none is applied. Curves for another lag than that which is applied to them
+    /// would be wrong on the very ramp that they come from.
+    pub fn applied_s(&self, sensor: Sensor) -> f64 {
+        self.lag(sensor).map_or(0.0, |lag| lag.value)
+    }
+
+    /// Temperatures of the die of `sensor` in `sessions` by the lag that is applied.
     pub fn dies(&self, sessions: &[Session], sensor: Sensor) -> Vec<Die> {
-        let lag = self.profiles[sensor as usize].lag.value;
+        let lag = self.applied_s(sensor);
         let each = sessions.iter().zip(&self.starts);
         each.map(|(s, start)| s.thermometer.die(lag, *start))
             .collect()
@@ -193,15 +204,38 @@ impl<'a> Evaluator<'a> {
         self.settled = true;
     }
 
-    fn curves(self, profile: &Profile, range_c: [f64; 2]) -> TriadCurves {
-        let fits = profile.weights.iter().filter_map(|(lag, weight)| {
-            let found = self.known.iter().find(|k| k.0 == *lag)?;
-            Some((*weight, found.1.clone()?))
+    /// Curves averaged over the lags of `profile`; those of no lag where none is applied, with their covariance over all lags.
+    fn curves(
+        mut self,
+        profile: &Profile,
+        lag: Option<Lag>,
+        starts: &[Start],
+        range_c: [f64; 2],
+    ) -> TriadCurves {
+        let only = lag.is_none().then(|| {
+            self.criterion(0.0, starts);
+            0.0
         });
-        let fits: Vec<(f64, TriadFit)> = fits.collect();
-        let sum: f64 = fits.iter().map(|f| f.0).sum();
-        let fits = fits.into_iter().map(|(w, f)| (w / sum, f)).collect();
-        TriadCurves::new(self.problem, fits, range_c)
+        let weight = |lag: f64| {
+            let of = profile.weights.iter().find(|w| w.0 == lag);
+            of.map_or(0.0, |w| w.1)
+        };
+        let used = self.known.into_iter().filter_map(|(lag, fit)| {
+            let likelihood = weight(lag);
+            let used = likelihood > 0.0 || only == Some(lag);
+            Some((lag, likelihood, fit.filter(|_| used)?))
+        });
+        let used: Vec<(f64, f64, TriadFit)> = used.collect();
+        let sum: f64 = used.iter().map(|f| f.1).sum();
+        let fits = used.into_iter().map(|(lag, likelihood, fit)| LagFit {
+            fit,
+            likelihood: likelihood / sum,
+            share: match only {
+                Some(only) => f64::from(only == lag),
+                None => likelihood / sum,
+            },
+        });
+        TriadCurves::new(self.problem, fits.collect(), range_c)
     }
 }
 
@@ -276,16 +310,22 @@ pub fn estimate(sessions: &[Session], choice: Choice) -> Result<Joint> {
     if moved {
         (profiles, apart) = lags(&mut triads, &starts, choice.lag_s)?;
     }
+    let one_way = profiles.iter().any(|profile| {
+        let each = sessions.iter().zip(&starts);
+        let die = |(s, start): (&Session, &Start)| s.thermometer.die(profile.lag.value, *start);
+        is_one_way(sessions, &each.map(die).collect::<Vec<Die>>())
+    });
     let mut joint = Joint {
         curves: [None, None],
         profiles,
+        one_way,
         apart,
         noise: [None, None],
         starts,
         warnings,
     };
-    for sensor in Sensor::BOTH {
-        check_speed(sessions, joint.lag(sensor), span)?;
+    for profile in &joint.profiles {
+        check_speed(sessions, &profile.lag, span)?;
     }
     let [gyro, accel] = <[_; 2]>::try_from(triads).unwrap_or([None, None]);
     for (k, triad) in [gyro, accel].into_iter().enumerate() {
@@ -297,7 +337,8 @@ pub fn estimate(sessions: &[Session], choice: Choice) -> Result<Joint> {
             [r[0].min(t), r[1].max(t)]
         });
         joint.noise[k] = Some(triad.noise);
-        joint.curves[k] = Some(triad.curves(&joint.profiles[k], range_c));
+        let (profile, lag) = (&joint.profiles[k], joint.lag(Sensor::BOTH[k]));
+        joint.curves[k] = Some(triad.curves(profile, lag, &joint.starts, range_c));
     }
     Ok(joint)
 }

@@ -269,7 +269,7 @@ pub fn held_out(
         };
         let normals = [0, 1, 2].map(|a| Normal::of(problem, a, &temps, &noise[a], seen));
         let fit = fixed(problem, &penalties, &normals, &smoothness)?;
-        let part_curves = TriadCurves::new(problem.clone(), vec![(1.0, fit)], curves.range_c);
+        let part_curves = TriadCurves::of_one(problem.clone(), fit, curves.range_c);
         for (k, session) in sessions.iter().enumerate() {
             let rows = &session.rows[sensor as usize];
             let judging = Judging {

@@ -9,6 +9,7 @@ use mimu_recording::error::{Error, Result};
 
 use crate::curves::TriadCurves;
 use crate::joint::Joint;
+use crate::profile::Lag;
 
 /// Most nodes of a file.
 const MOST: usize = 16;
@@ -53,18 +54,18 @@ pub fn over_temperature(joint: &Joint) -> Result<OverTemperature> {
 
 /// `nodes` with the range and the lags of `joint`.
 pub fn with_lags(joint: &Joint, range_c: [f64; 2], nodes: Vec<TemperatureNode>) -> OverTemperature {
-    let of = |sensor: Sensor| {
-        let estimated = joint.profiles[sensor as usize].points.len() > 1;
-        joint.lag(sensor).filter(|_| estimated)
-    };
+    let given = joint.profiles[0].is_given();
+    // A lag that is given as none is none.
+    let of = |sensor: Sensor| joint.lag(sensor).filter(|l| !given || l.value != 0.0);
     let lag = of(Sensor::Gyro);
     let accel = of(Sensor::Accel).filter(|_| joint.apart.is_some());
+    let interval = |lag: Option<Lag>| lag.filter(|_| !given).map(|l| [l.lower, l.upper]);
     OverTemperature {
         range_c,
         lag_s: lag.map(|l| l.value),
-        interval_lag_s: lag.map(|l| [l.lower, l.upper]),
+        interval_lag_s: interval(lag),
         accel_lag_s: accel.map(|l| l.value),
-        interval_accel_lag_s: accel.map(|l| [l.lower, l.upper]),
+        interval_accel_lag_s: interval(accel),
         nodes,
     }
 }

@@ -45,7 +45,7 @@ pub fn curves(sensor: Sensor, points: &[Point], shape: Shape) -> Option<TriadCur
     // The penalty only decides where points are missing: as little as data sheets allow.
     let penalties = Penalties::of(&problem);
     let fit: TriadFit = fixed(&problem, &penalties, &normals, &largest(&problem))?;
-    Some(TriadCurves::new(problem, vec![(1.0, fit)], range_c))
+    Some(TriadCurves::of_one(problem, fit, range_c))
 }
 
 fn normal(problem: &Problem, axis: usize, points: &[Point]) -> Normal {

@@ -49,6 +49,11 @@ pub struct Profile {
 }
 
 impl Profile {
+    /// Whether the lag was given and not estimated.
+    pub fn is_given(&self) -> bool {
+        self.points.len() == 1
+    }
+
     /// Of `criterion`, minus twice the logarithm of the likelihood of a lag, over the whole range; `None` where it is nowhere finite.
     pub fn of(mut criterion: impl FnMut(f64) -> Option<f64>) -> Option<Self> {
         let mut points: Vec<(f64, f64)> = LAGS

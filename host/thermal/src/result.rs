@@ -227,7 +227,7 @@ fn lag(fit: &ThermalFit, sensor: Sensor) -> Result<LagResult, String> {
         lower,
         upper,
     } = found;
-    if profile.points.len() == 1 {
+    if profile.is_given() {
         return Err(match fit.options.lag_s {
             Some(given) => format!("it was given as {given} s"),
             None => "this estimator has none".into(),

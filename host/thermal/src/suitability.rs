@@ -63,10 +63,10 @@ pub fn check_span(sessions: &[Session], span: f64) -> Result<()> {
 }
 
 /// Refuses a ramp in which the die is so far behind that a first-order lag decides everything.
-pub fn check_speed(sessions: &[Session], lag: Option<Lag>, span: f64) -> Result<()> {
-    let Some(lag) = lag else {
+pub fn check_speed(sessions: &[Session], lag: &Lag, span: f64) -> Result<()> {
+    if !lag.is_determined() {
         return Ok(());
-    };
+    }
     for session in sessions {
         let fastest = fastest(session);
         let behind = fastest * lag.value.abs();

@@ -194,17 +194,6 @@ impl OverTemperature {
             .map(|lag_s| [lag_s, self.accel_lag_s.unwrap_or(lag_s)])
     }
 
-    /// The same without lags: none is applied.
-    pub fn without_lags(self) -> Self {
-        Self {
-            lag_s: None,
-            interval_lag_s: None,
-            accel_lag_s: None,
-            interval_accel_lag_s: None,
-            ..self
-        }
-    }
-
     fn problem_of_lags(&self) -> Option<String> {
         if self.accel_lag_s.is_some() && self.lag_s.is_none() {
             return Some("accel_lag_s is there and lag_s is not".into());

@@ -87,7 +87,7 @@ fn curves_and_lag_of_a_whole_cycle_are_those_of_the_unit_as_nearly_as_they_say()
 
 #[test]
 fn without_a_lag_the_biases_are_wrong_by_what_the_die_lags() {
-    let experiment = Experiment::ramp(60.0, false);
+    let experiment = Experiment::ramp(60.0, true);
     let sessions = [session(experiment.record(4)).unwrap()];
     let without = Choice {
         lag_s: Some(0.0),

@@ -112,6 +112,34 @@ fn half_a_cycle_is_one_way_and_has_no_lag() {
     assert!(gyro.lag_s.is_none() && gyro.lag_reason.unwrap().contains("one way"));
     let file = half.calibration("2026-01-01T00:00:00Z").unwrap();
     assert!(file.temperature.unwrap().lag_s.is_none());
+    // Without a lag the curves are those that suit the ramp by its thermometer; how far dies may be off it is in their intervals.
+    let mut normal = 0.0;
+    for sensor in [0, 1] {
+        let curves = half.joint.curves[sensor].as_ref().unwrap();
+        let covariance = curves.covariance(40.0);
+        let (_, bias) = truth(sensor, 40.0);
+        let [model, _] = curves.forward(40.0);
+        for axis in 0..3 {
+            let error = model.bias[axis] - bias[axis];
+            normal += error * error / covariance[(9 + axis, 9 + axis)] / 6.0;
+        }
+    }
+    assert!(normal < 4.0, "{normal}");
+    for sensor in Sensor::BOTH {
+        let judged = half.judged[sensor as usize].as_ref().unwrap();
+        let [own, floor] = rms(&judged.errors);
+        assert!(own < 1.5 * floor, "{sensor}: {own} {floor}");
+    }
+    // A lag that is known by other means is applied, and stands in the file.
+    let known = Options {
+        lag_s: Some(60.0),
+        ..JOINT
+    };
+    let known = fitted(&Experiment::ramp(60.0, false), 13, known);
+    let file = known.calibration("2026-01-01T00:00:00Z").unwrap();
+    let temperature = file.temperature.unwrap();
+    assert_eq!(temperature.lag_s, Some(60.0));
+    assert_eq!(temperature.interval_lag_s, None);
 }
 
 #[test]
