@@ -5,6 +5,8 @@
 
 use std::fmt::Write as _;
 
+use mimu::allan::model::FLOOR;
+use mimu::allan::variance::AllanModel;
 use mimu::quantity::Sensor;
 use mimu_rig::rig_file::RigFile;
 use mimu_thermal::basis::Shape;
@@ -56,10 +58,11 @@ pub fn run(runs: u64) {
     let still = "instability_si = [0.0, 0.0, 0.0]\nwalk_si = [0.0, 0.0, 0.0]\n";
     let still = format!("[unit.gyro_axes]\n{still}[unit.accel_axes]\n{still}[[effect]]");
     let white = without.replacen("[[effect]]", &still, 1);
-    for (name, text) in [
-        ("as it is", &rig),
-        ("without gyro_thermal_lag", &without),
-        ("without it and without wander", &white),
+    for (name, text, stated) in [
+        ("as it is", &rig, false),
+        ("as it is, with the noise at rest (--noise)", &rig, true),
+        ("without gyro_thermal_lag", &without, false),
+        ("without it and without wander", &white, false),
     ] {
         println!(
             "\n{name}: rms of errors over their standard deviations, then errors (planned sigma): bias, scale, cross terms"
@@ -68,7 +71,7 @@ pub fn run(runs: u64) {
         let runs = if text == &rig { runs } else { runs.min(FEWER) };
         let each = (1..=runs)
             .into_par_iter()
-            .map(|seed| once(&plan, text, seed));
+            .map(|seed| once(&plan, text, stated, seed));
         let outcomes: Vec<Outcome> = each.collect();
         for (k, o) in outcomes.iter().enumerate() {
             println!("| {} | {} | {}", k + 1, o.verdict, cells(&[o]));
@@ -104,9 +107,12 @@ fn cells(outcomes: &[&Outcome]) -> String {
     out
 }
 
-fn once(plan: &str, rig: &str, seed: u64) -> Outcome {
+fn once(plan: &str, rig: &str, stated: bool, seed: u64) -> Outcome {
     let file = unit(rig, seed);
-    let recorded = session(plan, &file, seed);
+    let mut recorded = session(plan, &file, seed);
+    if stated {
+        recorded.stated = at_rest(&file, seed);
+    }
     let options = Options {
         estimator: Estimator::Joint,
         lag_s: None,
@@ -119,6 +125,24 @@ fn once(plan: &str, rig: &str, seed: u64) -> Outcome {
         },
         Ok(found) => judged(&found, &recorded, &file, seed),
     }
+}
+
+/// What a long record at rest says of the unit, raw: its own noise.
+fn at_rest(file: &RigFile, seed: u64) -> [Option<AllanModel>; 6] {
+    let [gyro, accel] = Sensor::BOTH.map(|sensor| probes(file, sensor, seed)[0].1);
+    std::array::from_fn(|channel| {
+        let (axes, truth) = match channel < 3 {
+            true => (&file.unit.gyro_axes, &gyro),
+            false => (&file.unit.accel_axes, &accel),
+        };
+        let gain = truth[4 * (channel % 3)];
+        let raw = |key: Option<[f64; 3]>| gain * key.expect("drawn")[channel % 3];
+        Some(AllanModel {
+            white: raw(axes.white_si).powi(2),
+            flicker: FLOOR * raw(axes.instability_si).powi(2),
+            walk: raw(axes.walk_si).powi(2) / 3.0,
+        })
+    })
 }
 
 fn judged(found: &ThermalFit, recorded: &Session, file: &RigFile, seed: u64) -> Outcome {

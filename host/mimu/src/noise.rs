@@ -157,6 +157,17 @@ impl Noise {
         }
     }
 
+    /// What a record at rest said of a channel, where it is used: of each term the largest over its temperatures.
+    pub fn largest_stated(&self, channel: usize) -> Option<AllanModel> {
+        let nodes = self.stated[channel].as_ref()?.nodes.iter();
+        let largest = nodes.fold(AllanModel::default(), |all, (_, node)| AllanModel {
+            white: all.white.max(node.white),
+            flicker: all.flicker.max(node.flicker),
+            walk: all.walk.max(node.walk),
+        });
+        Some(largest)
+    }
+
     /// Whether the variances of the means are known as they are, and not by that of their size.
     pub fn is_by_channel(&self, sensor: Sensor) -> bool {
         self.of_table || self.is_stated(sensor)

@@ -183,12 +183,28 @@ impl<'a> Evaluator<'a> {
                     &self.smoothness,
                     &self.noise[axis],
                 );
+                self.noise[axis] = self.with_stated(axis);
             }
             if self.noise.iter().all(|n| n.wander == 0.0) || self.evaluate(lag_s, starts).is_none()
             {
                 break;
             }
         }
+    }
+
+    /// The noise of `axis` with the wander of its bias that a record at rest states, where the recording shows less: of what is slower than
+    /// itself it shows hardly anything.
+    fn with_stated(&self, axis: usize) -> AxisNoise {
+        let found = self.noise[axis];
+        let channel = self.problem.sensor.channels().start + axis;
+        let all = self.sessions.iter().filter_map(|s| s.stated[channel]);
+        let wander = all.map(|model| AxisNoise::stated_wander(&model, self.problem.gain[axis]));
+        let more = wander.filter(|stated| stated.wander > found.wander);
+        more.max_by(|a, b| a.wander.total_cmp(&b.wander))
+            .map_or(found, |stated| AxisNoise {
+                white: found.white,
+                ..stated
+            })
     }
 
     /// Finds noise and smoothness at `lag_s`, and keeps them for all lags. The noise too: what a wrong lag leaves of an accelerometer over a

@@ -4,6 +4,8 @@
 //! temperature ([`Basis`]), and the first session has no offset b_js of its own. Readings are scaled by a first affine fit, so that the
 //! same curve of any sensor has the same size: biases in SI, the rest as ratios.
 
+use mimu::allan::model::FLOOR;
+use mimu::allan::variance::AllanModel;
 use mimu::quantity::Sensor;
 use mimu_recording::error::{Error, Result};
 use nalgebra::{DMatrix, DVector, Matrix4, Vector3, Vector4};
@@ -252,6 +254,12 @@ impl AxisNoise {
             correlation_s: LONGEST_S,
             parts: MOST_PARTS,
         }
+    }
+
+    /// The wander of the bias that a record at rest states, raw: over the `gain` of the axis, raw per SI.
+    pub fn stated_wander(model: &AllanModel, gain: f64) -> Self {
+        let (b, k) = ((model.flicker / FLOOR).sqrt(), (3.0 * model.walk).sqrt());
+        Self::of_densities([0.0, b / gain, k / gain], 1.0)
     }
 }
 

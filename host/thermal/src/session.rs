@@ -1,5 +1,6 @@
 //! One recording, from power-on to power-off, as rows: means of some seconds with their known input, and the thermometer.
 
+use mimu::allan::variance::AllanModel;
 use mimu::blocks::{Block, Condensed};
 use mimu::dwell::Dwell;
 use mimu::prepared::Prepared;
@@ -64,6 +65,8 @@ pub struct Session {
     pub thermometer: Thermometer,
     /// Rows of gyro and accelerometer.
     pub rows: [Vec<Row>; 2],
+    /// Noise of the six channels at rest, raw, where a noise file states it.
+    pub stated: [Option<AllanModel>; 6],
     /// Where the input is not known: times, s, at which the unit was put into another pose.
     pub moved_s: Vec<f64>,
     /// What a person should know.
@@ -103,6 +106,7 @@ impl Session {
             rate_hz: 1.0 / condensed.period_s,
             thermometer,
             rows,
+            stated: std::array::from_fn(|c| prepared.noise.largest_stated(c)),
             moved_s,
             warnings,
         })

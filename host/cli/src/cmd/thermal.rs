@@ -17,7 +17,7 @@ use mimu_thermal::fit::{Estimator, Options, fit};
 use mimu_thermal::result::ThermalResult;
 use mimu_thermal::session::Session;
 
-use crate::arguments::{JsonArgs, StillArgs};
+use crate::arguments::{JsonArgs, NoiseArgs, StillArgs};
 use crate::cmd::diagnose::command_line;
 use crate::output::{check_outputs, print};
 use crate::reading::read;
@@ -61,6 +61,8 @@ struct FitArgs {
     /// Calibration of the unit at one temperature, which the biases of recordings at rest are added to: with it they give a calibration
     #[arg(long, value_name = "FILE")]
     base: Option<PathBuf>,
+    #[command(flatten)]
+    noise: NoiseArgs,
     #[command(flatten)]
     still: StillArgs,
     /// Calibration file to write
@@ -147,10 +149,11 @@ fn run_fit(args: &FitArgs) -> Result<()> {
         args.page.as_deref(),
         args.json.file(),
     ];
-    let beside = [args.base.as_deref()];
+    let beside = [args.base.as_deref(), args.noise.file.as_deref()];
     let base = args.base.as_deref().map(Calibration::read).transpose()?;
     let session = |directory: &PathBuf, finding: Finding| {
-        Session::of(&read(directory, finding, &outputs, &beside)?)
+        let prepared = read(directory, finding, &outputs, &beside)?;
+        Session::of(&args.noise.state(prepared)?)
     };
     let all = |list: &[PathBuf]| -> Result<Vec<Session>> {
         let each = list.iter();
