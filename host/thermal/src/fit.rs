@@ -16,6 +16,10 @@ use crate::profile::Profile;
 use crate::session::Session;
 use crate::thermometer::{Die, Start};
 
+/// Warning on a fit without the noise at rest.
+const WITHOUT_NOISE: &str = "intervals of the biases hold the wander that the recordings show, and nothing of what is slower: a record of the unit at rest for \
+                             hours shows it (mimu allan -o noise.toml, and --noise noise.toml here)";
+
 /// How the curves are estimated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Estimator {
@@ -123,6 +127,10 @@ pub fn fit(sessions: Vec<Session>, verify: &[Session], options: Options) -> Resu
         Estimator::Classic(classic) => of_literature(&sessions, classic)?,
     };
     warnings.extend(joint.warnings.iter().cloned());
+    let estimated = !matches!(options.estimator, Estimator::Classic(_));
+    if estimated && sessions.iter().all(|s| s.stated == [None; 6]) {
+        warnings.push(WITHOUT_NOISE.into());
+    }
     check_range(&joint, options.range_c)?;
     let verdict = match joint.one_way {
         true => Verdict::OneWay,

@@ -67,6 +67,8 @@ fn niu_s_unit_gets_curves_and_lags_that_hold_the_truth_and_another_run_agrees() 
     assert_eq!(result["curves"].as_array().unwrap().len() % 2, 0);
     let calibration = std::fs::read_to_string(folder.join("cal.toml")).unwrap();
     assert!(calibration.contains("format = \"mimu-calibration/2\""));
+    // Half a minute apart, on ramps of 2 K/min: each has its own.
+    assert!(calibration.contains("\naccel_lag_s = "), "{calibration}");
     let picture = std::fs::read_to_string(folder.join("curves.svg")).unwrap();
     let bands = picture.matches(" band\"").count();
     assert_eq!(bands, 24, "a band for each parameter");

@@ -1,5 +1,6 @@
 //! What is estimated is the truth, as nearly as it says.
 
+use mimu::allan::variance::AllanModel;
 use mimu::quantity::Sensor;
 use mimu_thermal::joint::{Choice, Joint, estimate};
 
@@ -143,6 +144,39 @@ fn biases_that_wander_widen_the_intervals_of_the_biases() {
         );
         let [narrow, wide] = [&still, &walk].map(|j| errors(j, sensor, 31.0)[10].1);
         assert!(wide > 1.5 * narrow, "{sensor}: {wide} {narrow}");
+    }
+}
+
+/// What is slower than the recording shifts all of it, and only a longer one at rest tells how much.
+#[test]
+fn the_noise_at_rest_widens_the_intervals_of_the_biases_by_what_it_says_and_nothing_else() {
+    let recorded = session(Experiment::ramp(60.0, true).record(9)).unwrap();
+    let mut stated = recorded.clone();
+    // Bias instabilities B, SI: 60 deg/h, and 200 µg.
+    let instability = [60.0 / 3600.0_f64.to_degrees(), 2e-4 * 9.80665];
+    stated.stated = std::array::from_fn(|channel| {
+        let b = instability[channel / 3] * GAIN[channel / 3];
+        Some(AllanModel {
+            white: 0.0,
+            flicker: 2.0 * std::f64::consts::LN_2 / std::f64::consts::PI * b * b,
+            walk: 0.0,
+        })
+    });
+    let [without, with] = [recorded, stated].map(|s| estimate(&[s], Choice::JOINT).unwrap());
+    for sensor in 0..2 {
+        let [narrow, wide] = [&without, &with].map(|j| errors(j, sensor, 31.0));
+        for axis in 9..12 {
+            // Flicker noise from 40 to 10 000 s and longer has about this standard deviation, and no fit to 80 minutes of it averages it away.
+            let sigma = wide[axis].1;
+            let bounds = [0.7 * instability[sensor], 3.0 * instability[sensor]];
+            assert!((bounds[0]..bounds[1]).contains(&sigma), "{sensor}: {sigma}");
+            assert!(sigma > 3.0 * narrow[axis].1);
+        }
+        // What rates and turned poses tell is told within minutes.
+        for k in [0, 4, 8] {
+            let ratio = wide[k].1 / narrow[k].1;
+            assert!((0.8..2.0).contains(&ratio), "{sensor} {k}: {ratio}");
+        }
     }
 }
 
