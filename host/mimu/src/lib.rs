@@ -19,6 +19,7 @@
 //! | [`diagnose`]    | the effect behind a residual: found, added, proved on other data              |
 //! | [`design`]      | experiments: which attitudes and rates, how many, for how long                |
 //! | [`next_experiment`] | what to record next, where a diagnosis leaves something open              |
+//! | [`chamber`]     | the course of a chamber in a plan                                             |
 //! | [`allan`], [`survey`] | Allan deviation and noise model of a series; of the channels of a recording at rest |
 //! | [`spectrum`]    | lines that are no noise of the sensor, and the band in which it is white     |
 //! | [`noise_file`]  | its result for the other commands                                             |
@@ -72,6 +73,7 @@ pub mod apply;
 pub mod bias_cubic;
 pub mod blocks;
 pub mod calibration;
+pub mod chamber;
 mod contrast;
 mod course;
 pub mod design;

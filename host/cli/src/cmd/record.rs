@@ -19,6 +19,57 @@ use crate::cmd::device::{PortArgs, duration, interruption};
 use crate::output::{check_outputs, print, progress};
 use mimu::quantity::normal_gravity;
 
+/// What every recording of a device has, whoever moves the unit.
+#[derive(Args)]
+pub(crate) struct RecordingArgs {
+    /// How long to wait for a port that has vanished, as when the cable was pulled; 0 ends the recording
+    #[arg(long, value_name = "TIME", default_value = "30s", value_parser = patience)]
+    pub(crate) reconnect: Duration,
+    /// Name of the unit; without it, that of the plan, or the number of its microcontroller
+    #[arg(long)]
+    device: Option<String>,
+    /// Local gravity, m/s²; without it, that of the plan, normal gravity at sea level of --latitude, or 9.80665 and a warning
+    #[arg(long, allow_negative_numbers = true)]
+    gravity: Option<f64>,
+    /// Latitude, degrees
+    #[arg(long, allow_negative_numbers = true)]
+    latitude: Option<f64>,
+    /// Format of the samples in the end: csv or parquet. While it records it is CSV, which can be read at any time
+    #[arg(long, default_value = "csv")]
+    pub(crate) format: SampleFormat,
+}
+
+impl RecordingArgs {
+    /// Name of the unit.
+    pub(crate) fn device(&self, plan: Option<&Plan>) -> Option<String> {
+        let of_plan = plan.and_then(|plan| plan.device.clone());
+        self.device.clone().or(of_plan)
+    }
+
+    /// Latitude, degrees.
+    pub(crate) fn latitude_deg(&self, plan: Option<&Plan>) -> Option<f64> {
+        self.latitude.or(plan.and_then(|plan| plan.latitude_deg))
+    }
+
+    /// Local gravity, m/s²: given, or that of the plan unless a latitude is given, or of the latitude.
+    pub(crate) fn gravity_mps2(&self, plan: Option<&Plan>) -> f64 {
+        let of_plan = match self.latitude {
+            None => plan.and_then(|plan| plan.gravity_mps2),
+            Some(_) => None,
+        };
+        match (self.gravity.or(of_plan), self.latitude_deg(plan)) {
+            (Some(gravity), _) => gravity,
+            (None, Some(latitude)) => normal_gravity(latitude),
+            (None, None) => {
+                eprintln!(
+                    "warning: gravity is taken to be 9.80665 m/s²; it ranges from 9.78 to 9.83, and every scale factor of the accelerometer with it: give --gravity or --latitude"
+                );
+                9.80665
+            }
+        }
+    }
+}
+
 #[derive(Args)]
 pub struct RecordArgs {
     #[command(flatten)]
@@ -47,26 +98,13 @@ pub struct RecordArgs {
     /// One row for each dwell, by its number from 0; if the rows have labels in place of numbers, in the order of the rows.
     #[arg(long, value_name = "FILE")]
     inputs: Option<PathBuf>,
-    /// How long to wait for a port that has vanished, as when the cable was pulled; 0 ends the recording
-    #[arg(long, value_name = "TIME", default_value = "30s", value_parser = patience)]
-    reconnect: Duration,
-    /// Name of the unit; without it, that of the plan, or the number of its microcontroller
-    #[arg(long)]
-    device: Option<String>,
-    /// Local gravity, m/s²; without it, that of the plan, normal gravity at sea level of --latitude, or 9.80665 and a warning
-    #[arg(long, allow_negative_numbers = true)]
-    gravity: Option<f64>,
-    /// Latitude, degrees
-    #[arg(long, allow_negative_numbers = true)]
-    latitude: Option<f64>,
-    /// Format of the samples in the end: csv or parquet. While it records it is CSV, which can be read at any time
-    #[arg(long, default_value = "csv")]
-    format: SampleFormat,
+    #[command(flatten)]
+    of: RecordingArgs,
     #[command(flatten)]
     json: JsonArgs,
 }
 
-pub(crate) fn patience(text: &str) -> std::result::Result<Duration, String> {
+fn patience(text: &str) -> std::result::Result<Duration, String> {
     match text {
         "0" => Ok(Duration::ZERO),
         text => duration(text),
@@ -83,8 +121,7 @@ pub fn run(args: &RecordArgs) -> Result<()> {
     let inputs: Vec<&Path> = inputs.into_iter().flatten().collect();
     check_outputs(&[args.json.file()], &inputs)?;
     let plan = args.plan.as_deref().map(Plan::read).transpose()?;
-    let latitude_deg = args.latitude.or(plan.as_ref().and_then(|p| p.latitude_deg));
-    let gravity_mps2 = gravity(args.gravity, args.latitude, plan.as_ref());
+    let gravity_mps2 = args.of.gravity_mps2(plan.as_ref());
     let (known, table) = match (&plan, &args.plan, &args.inputs) {
         (Some(plan), Some(path), _) => {
             if args.transit.is_some() && plan.is_procedure() {
@@ -128,13 +165,13 @@ pub fn run(args: &RecordArgs) -> Result<()> {
         directory: args.output.clone(),
         duration: args.duration,
         steps,
-        reconnect: args.reconnect,
+        reconnect: args.of.reconnect,
         one_power_on: false,
         table,
-        device: (args.device.clone()).or(plan.as_ref().and_then(|plan| plan.device.clone())),
+        device: args.of.device(plan.as_ref()),
         gravity_mps2,
-        latitude_deg,
-        format: args.format,
+        latitude_deg: args.of.latitude_deg(plan.as_ref()),
+        format: args.of.format,
     };
     let titles = known.as_ref().map(titles).unwrap_or_default();
     let mut session = Session::open(args.port.path.as_deref())?;
@@ -161,25 +198,6 @@ pub fn run(args: &RecordArgs) -> Result<()> {
     bar.finish_and_clear();
     print(&args.json, &report::record_text(&summary), &summary, None)?;
     summary.broken_off.map_or(Ok(()), Err)
-}
-
-/// Local gravity, m/s²: given, or that of the plan unless a latitude is given, or of the latitude.
-pub(crate) fn gravity(given: Option<f64>, latitude_deg: Option<f64>, plan: Option<&Plan>) -> f64 {
-    let of_plan = |key: fn(&Plan) -> Option<f64>| plan.and_then(key);
-    let given = given.or(match latitude_deg {
-        None => of_plan(|plan| plan.gravity_mps2),
-        Some(_) => None,
-    });
-    match (given, latitude_deg.or(of_plan(|plan| plan.latitude_deg))) {
-        (Some(gravity), _) => gravity,
-        (None, Some(latitude)) => normal_gravity(latitude),
-        (None, None) => {
-            eprintln!(
-                "warning: gravity is taken to be 9.80665 m/s²; it ranges from 9.78 to 9.83, and every scale factor of the accelerometer with it: give --gravity or --latitude"
-            );
-            9.80665
-        }
-    }
 }
 
 /// What is to be done in each dwell, as far as that is known.

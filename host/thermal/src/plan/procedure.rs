@@ -1,5 +1,6 @@
 //! What chamber and table do in each procedure, and when.
 
+use mimu::chamber;
 use mimu::design::model::Setting;
 use mimu::design::reach::Fixture;
 use mimu::design::tour::Motion;
@@ -114,13 +115,7 @@ impl Schedule {
 
     /// Temperature of the chamber at a time, °C.
     pub fn temp_c(&self, t_s: f64) -> f64 {
-        let after = self.chamber_c.partition_point(|p| p[0] <= t_s);
-        let before = after.checked_sub(1).map(|k| self.chamber_c[k]);
-        match (before, self.chamber_c.get(after)) {
-            (Some([t0, c0]), Some([t1, c1])) => c0 + (c1 - c0) * (t_s - t0) / (t1 - t0),
-            (Some([_, c]), None) | (None, Some(&[_, c])) => c,
-            (None, None) => f64::NAN,
-        }
+        chamber::temp_c(&self.chamber_c, t_s)
     }
 }
 

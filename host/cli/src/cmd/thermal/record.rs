@@ -2,20 +2,19 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
-use std::time::Duration;
 
 use clap::Args;
 use indicatif::ProgressBar;
 use mimu_device::Session;
 use mimu_device::record::{Plan, Procedure, RecordOptions, Steps};
+use mimu_recording::Growing;
 use mimu_recording::error::Result;
-use mimu_recording::{Growing, SampleFormat};
 use mimu_wizard::carry_out::{Equipped, Progress, carry_out};
 use mimu_wizard::drive::{Driver, TextDriver};
 
 use crate::arguments::JsonArgs;
 use crate::cmd::device::{PortArgs, interruption};
-use crate::cmd::record::{gravity, patience};
+use crate::cmd::record::RecordingArgs;
 use crate::output::{check_outputs, print, progress};
 use crate::report;
 
@@ -34,21 +33,8 @@ pub(super) struct RecordArgs {
     /// Directory of the new recording
     #[arg(short, value_name = "DIR")]
     output: PathBuf,
-    /// How long to wait for a port that has vanished, as when the cable was pulled; 0 ends the recording
-    #[arg(long, value_name = "TIME", default_value = "30s", value_parser = patience)]
-    reconnect: Duration,
-    /// Name of the unit; without it, that of the plan, or the number of its microcontroller
-    #[arg(long)]
-    device: Option<String>,
-    /// Local gravity, m/s²; without it, that of the plan, normal gravity at sea level of --latitude, or 9.80665 and a warning
-    #[arg(long, allow_negative_numbers = true)]
-    gravity: Option<f64>,
-    /// Latitude, degrees
-    #[arg(long, allow_negative_numbers = true)]
-    latitude: Option<f64>,
-    /// Format of the samples in the end: csv or parquet. While it records it is CSV, which can be read at any time
-    #[arg(long, default_value = "csv")]
-    format: SampleFormat,
+    #[command(flatten)]
+    of: RecordingArgs,
     #[command(flatten)]
     json: JsonArgs,
 }
@@ -61,7 +47,7 @@ pub(super) fn run(args: &RecordArgs) -> Result<()> {
     check_outputs(&[args.json.file()], &inputs)?;
     Growing::check(&args.output)?;
     let plan = Plan::read(&args.plan)?;
-    let gravity_mps2 = gravity(args.gravity, args.latitude, Some(&plan));
+    let gravity_mps2 = args.of.gravity_mps2(Some(&plan));
     let place = args.plan.display().to_string();
     let procedure = plan.procedure(gravity_mps2, &place)?;
     let drivers = args
@@ -73,13 +59,13 @@ pub(super) fn run(args: &RecordArgs) -> Result<()> {
         directory: args.output.clone(),
         duration: None,
         steps: Steps::marks_for(procedure.dwells.len()),
-        reconnect: args.reconnect,
+        reconnect: args.of.reconnect,
         one_power_on: true,
         table: equipped.has_table(),
-        device: args.device.clone().or(plan.device.clone()),
+        device: args.of.device(Some(&plan)),
         gravity_mps2,
-        latitude_deg: args.latitude.or(plan.latitude_deg),
-        format: args.format,
+        latitude_deg: args.of.latitude_deg(Some(&plan)),
+        format: args.of.format,
     };
     let mut session = Session::open(args.port.path.as_deref())?;
     for warning in &session.who().warnings {
