@@ -31,8 +31,8 @@ pub(super) fn block_s(condensed: &Condensed) -> (u32, f64) {
 
 /// Change of the temperature over a dwell, over its standard error, from which on it ramps.
 const RAMPS_SIGMAS: f64 = 5.0;
-/// Least change over a dwell that counts, K: of 0.02 K a bias of 0.1 deg/s/K makes 2e-3 deg/s, below the noise of a dwell mean.
-const RAMPS_C: f64 = 0.02;
+/// Least change over a dwell that counts, K: of 0.1 K a bias of 0.1 deg/s/K makes 0.01 deg/s, which is what an analog gyro scatters by within a dwell.
+const RAMPS_C: f64 = 0.1;
 
 /// Whether the temperature ramps within a dwell: by the slope of a line through its blocks, against what they scatter about it.
 pub(super) fn ramps(dwell: &Dwell, condensed: &Condensed) -> bool {
