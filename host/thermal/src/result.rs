@@ -69,6 +69,8 @@ pub struct SensorResult {
     pub lag_reason: Option<String>,
     /// What is inseparable in the curves of this sensor; null where nothing is.
     pub inseparable: Option<&'static str>,
+    /// What an error is of: `dwells`, or `pieces` of 30 s where only biases are estimated. Bins and errors call both dwells.
+    pub judged_by: &'static str,
     /// Errors by temperature, of the held-out data where there are any.
     pub bins: Vec<Bin>,
     /// The dwells behind these errors, in the order of time.
@@ -211,6 +213,7 @@ impl SensorResult {
             inseparable: gravity.then_some(
                 "in one pose the bias along gravity and the scale factor times gravity are one number: the curves are of their sum",
             ),
+            judged_by: if curves.biases_only() { "pieces" } else { "dwells" },
             bins: judged.map(|j| j.bins.clone()).unwrap_or_default(),
             dwells: judged.map_or(Vec::new(), |j| j.shown().iter().map(DwellResult::of).collect()),
             hysteresis: judged.and_then(|j| j.hysteresis.clone()),

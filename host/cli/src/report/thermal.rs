@@ -5,7 +5,6 @@ use std::fmt::Write as _;
 use mimu::quantity::{plus_minus, significant};
 use mimu::readable;
 use mimu_thermal::compare::Comparison;
-use mimu_thermal::judge::Bin;
 use mimu_thermal::result::{CurveResult, SensorResult, ThermalResult};
 
 use crate::report::text::{warn, wrap};
@@ -77,7 +76,7 @@ fn sensor_text(out: &mut String, name: &str, sensor: &SensorResult) {
         }
         let _ = writeln!(out, ", by noise alone {}", unit.write(floor));
     }
-    bins_text(out, &sensor.bins, &sensor.unit);
+    bins_text(out, sensor);
     for h in sensor.hysteresis.iter().flatten() {
         let value = plus_minus(h.value * unit.factor, h.half_width * unit.factor);
         let kelvin = match h.kelvin {
@@ -92,16 +91,17 @@ fn sensor_text(out: &mut String, name: &str, sensor: &SensorResult) {
     }
 }
 
-fn bins_text(out: &mut String, bins: &[Bin], si: &str) {
+fn bins_text(out: &mut String, sensor: &SensorResult) {
+    let bins = &sensor.bins;
     if bins.is_empty() {
         return;
     }
-    let unit = readable::error(si);
+    let unit = readable::error(&sensor.unit);
     let head = format!("error, {}", unit.unit);
     let _ = writeln!(
         out,
         "  {head:<16}{:>10}{:>10}{:>10}{:>8}",
-        "heating", "cooling", "noise", "dwells"
+        "heating", "cooling", "noise", sensor.judged_by
     );
     let shown = |v: Option<f64>| v.map_or("-".into(), |v| significant(v * unit.factor));
     for b in bins {

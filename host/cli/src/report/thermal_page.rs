@@ -65,7 +65,7 @@ fn head(result: &ThermalResult, made: &Made) -> Markup {
 fn errors(result: &ThermalResult) -> Markup {
     html! {
         div class="scroll" { table {
-            caption { "Root mean square error of the dwells, and the lag of the dies behind the thermometer with its 95 % interval." }
+            caption { "Root mean square error of the dwells, or of pieces of 30 s where only biases are estimated, and the lag of the dies behind the thermometer with its 95 % interval." }
             thead { tr {
                 th { "sensor" } th class="n" { "in sample" } th class="n" { "held out" } th class="n" { "noise alone" } th { "lag" }
             } }
@@ -96,7 +96,7 @@ fn bins(sensor: &SensorResult) -> Markup {
         div class="scroll" { table {
             caption { "Error by temperature of the die, rms, " (unit.unit) }
             thead { tr {
-                th { "die" } th class="n" { "heating" } th class="n" { "cooling" } th class="n" { "noise alone" } th class="n" { "dwells" }
+                th { "die" } th class="n" { "heating" } th class="n" { "cooling" } th class="n" { "noise alone" } th class="n" { (sensor.judged_by) }
             } }
             tbody {
                 @for b in &sensor.bins {

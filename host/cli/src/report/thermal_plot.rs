@@ -100,6 +100,11 @@ fn curves(
     // In one pose: "bias_and_gravity_x".
     let axis_of = |c: &CurveResult| c.name.rsplit('_').next().unwrap_or_default().to_owned();
     let first = found.first()?;
+    let with_gravity = first.name.contains("_and_gravity_");
+    let heading = match with_gravity {
+        true => format!("{heading} and gravity"),
+        false => (*heading).to_owned(),
+    };
     let unit = readable::parameter(&first.unit);
     let all: Vec<(String, Points)> = found
         .iter()
@@ -168,7 +173,7 @@ fn errors(result: &ThermalResult, sensor: Sensor, found: &SensorResult) -> Marku
         (frame.axes(&format!("{} error", sensor.name()), true))
         @for (class, points) in &lines { (frame.line(class, points.iter().copied())) }
         (frame.x_name("die, °C", &frame))
-        (frame.y_name(&format!("rms over dwells, {}", unit.unit)))
+        (frame.y_name(&format!("rms over {}, {}", found.judged_by, unit.unit)))
         (legend(&frame, &key))
     }
 }
