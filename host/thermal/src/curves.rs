@@ -227,6 +227,7 @@ impl TriadCurves {
             }
             if !derivative {
                 out[9 + axis] += problem.null[axis];
+                out[3 * axis + axis] += problem.taken_off * gain;
                 if problem.biases_only {
                     out[3 * axis + axis] = 1.0;
                 }

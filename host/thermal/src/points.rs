@@ -40,6 +40,7 @@ pub fn curves(sensor: Sensor, points: &[Point], shape: Shape) -> Option<TriadCur
         offsets: 1,
         biases_only: false,
         samples: 1.0,
+        taken_off: 0.0,
     };
     let normals = [0, 1, 2].map(|axis| normal(&problem, axis, points));
     // The penalty only decides where points are missing: as little as data sheets allow.

@@ -43,7 +43,7 @@ pub struct ProblemRow {
     pub weight: f64,
     /// Known input, SI; zero where only biases are estimated.
     pub input: Vector3<f64>,
-    /// Reading minus [`Problem::null`], over [`Problem::gain`].
+    /// Reading minus [`Problem::null`], over [`Problem::gain`], minus so much of the input as [`Problem::taken_off`] says.
     pub reading: Vector3<f64>,
     /// Number of the dwell in its session.
     pub step: i32,
@@ -68,6 +68,10 @@ pub struct Problem {
     pub biases_only: bool,
     /// Samples of the row of weight 1.
     pub samples: f64,
+    /// Share of its own input that is taken off the reading of an axis beforehand, 1 or 0: scale factors are then estimated from there. With
+    /// all of gravity in them the squares of the readings were 1e11 times the noise, and what rounding left of their difference to those of the
+    /// curves made steps of several units in the likelihood of a lag.
+    pub taken_off: f64,
 }
 
 /// A curve of one axis among the columns of its regression.
@@ -122,6 +126,7 @@ impl Problem {
             offsets,
             biases_only,
             samples,
+            taken_off: 0.0,
         };
         problem.scale()?;
         Ok(problem)
@@ -157,8 +162,10 @@ impl Problem {
                 ));
             }
         }
+        self.taken_off = f64::from(!self.biases_only);
         for r in &mut self.rows {
-            r.reading = (r.reading - self.null).component_div(&self.gain);
+            let scaled = (r.reading - self.null).component_div(&self.gain);
+            r.reading = scaled - r.input * self.taken_off;
         }
         Ok(())
     }

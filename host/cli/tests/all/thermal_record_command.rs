@@ -209,7 +209,8 @@ fn a_procedure_that_is_interrupted_or_loses_its_power_keeps_what_it_has_and_leav
         )
     };
     let mut child = spawned(&bench, &command("short"));
-    recording(&bench, "short", 300_000, &mut child);
+    // Some five seconds: how many of them the chamber takes to get there goes by how busy this computer is.
+    recording(&bench, "short", 400_000, &mut child);
     let warm: f64 = bench.ask("CHAMBER?").parse().unwrap();
     assert!((40.0..45.0).contains(&warm), "{warm}");
     let interrupt = rustix::process::Signal::INT;
@@ -227,7 +228,7 @@ fn a_procedure_that_is_interrupted_or_loses_its_power_keeps_what_it_has_and_leav
     let manifest = Manifest::read(&bench.path("short/recording.toml")).unwrap();
     assert!(!manifest.unfinished && manifest.reference == Reference::Gravity);
     let kept = recorded(&bench.path("short"));
-    assert!(kept[&0].1 > 2000.0, "the dwell is kept: {kept:?}");
+    assert!(kept[&0].1 > 500.0, "the dwell is kept: {kept:?}");
     assert!(json(&bench.path("short.json"))["cut_short"].is_string());
 
     let mut child = spawned(&bench, &command("cut"));

@@ -56,6 +56,7 @@ fn of(request: &Request, schedule: &Schedule, sensor: Sensor) -> SensorPredictio
         offsets: 1,
         biases_only: request.procedure == Procedure::RestRamp,
         samples,
+        taken_off: 0.0,
     };
     problem.rows.iter_mut().for_each(|r| r.weight /= samples);
     let of = &request.noise[sensor as usize];
