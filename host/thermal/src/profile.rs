@@ -287,6 +287,25 @@ mod tests {
         }
     }
 
+    /// A quadratic only near its best: fifteen seconds off, where the search begins, it is far below the parabola.
+    #[test]
+    fn a_likelihood_that_flattens_far_away_gives_its_own_interval_too() {
+        for mean in [-30.4, -29.9, -30.02, 52.5, 59.7] {
+            for sigma in [0.6, 1.2, 4.0] {
+                let criterion = |lag: f64| {
+                    let squared = ((lag - mean) / sigma).powi(2);
+                    Some(200.0 * (squared / 200.0).ln_1p())
+                };
+                let lag = Profile::of(criterion).unwrap().lag;
+                assert!((lag.value - mean).abs() < 0.05 * sigma, "{mean}: {lag:?}");
+                for half in [lag.upper - mean, mean - lag.lower] {
+                    let ratio = half / (1.96 * sigma);
+                    assert!((0.95..1.07).contains(&ratio), "{mean} {sigma}: {lag:?}");
+                }
+            }
+        }
+    }
+
     #[test]
     fn a_flat_likelihood_determines_no_lag() {
         let profile = Profile::of(|lag: f64| Some(1e-3 * lag / 600.0)).unwrap();
