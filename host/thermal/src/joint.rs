@@ -1,22 +1,18 @@
 //! The joint estimate of all curves and of the lag.
 
 use mimu::quantity::{Sensor, significant};
-use mimu_recording::Reference;
 use mimu_recording::error::{Error, Result};
 
 use crate::basis::Shape;
-use crate::curves::{LagFit, TriadCurves};
-use crate::noise;
+use crate::curves::TriadCurves;
+use crate::evaluator::Evaluator;
 use crate::path::is_one_way;
 use crate::profile::{LAGS, Lag, Profile};
-use crate::regression::{AxisNoise, Normal, Problem};
+use crate::regression::AxisNoise;
 use crate::session::Session;
-use crate::smoothness::{self, Penalties, Smoothness, TriadFit};
 use crate::suitability::{check_alike, check_span, check_speed};
 use crate::thermometer::{Die, Start};
 
-/// Rounds of noise and smoothness in turn, where the bias wanders: each is found with the other.
-const ROUNDS: usize = 4;
 /// A best lag farther than this, s, from that which the smoothness was found at has it found anew.
 const SETTLED_S: f64 = 0.5;
 /// Drop in deviance that tells the lags of gyro and accelerometer apart: one degree of freedom at 1 %.
@@ -81,193 +77,6 @@ impl Joint {
         each.map(|(s, start)| s.thermometer.die(lag, *start))
             .collect()
     }
-}
-
-/// One triad with all that does not depend on the lag.
-struct Evaluator<'a> {
-    sessions: &'a [Session],
-    problem: Problem,
-    penalties: Penalties,
-    noise: [AxisNoise; 3],
-    smoothness: Smoothness,
-    /// Whether the smoothness is that of the lag which it was found at. Found anew at each lag it stops a little beside its best, by another
-    /// part of the criterion each time, and that noise of the profile left intervals that held the lag in 78 of 100 runs.
-    settled: bool,
-    known: Vec<(f64, Option<TriadFit>)>,
-}
-
-impl<'a> Evaluator<'a> {
-    fn new(sessions: &'a [Session], sensor: Sensor, shape: Shape) -> Result<Option<Self>> {
-        let rows = sessions.iter().map(|s| s.rows[sensor as usize].len());
-        if rows.sum::<usize>() == 0 {
-            return Ok(None);
-        }
-        let range = range_of_rows(sessions, sensor);
-        let gravity = sessions.iter().any(|s| s.reference == Reference::Gravity);
-        let problem = Problem::new(sessions, sensor, shape, range, gravity)?;
-        let penalties = Penalties::of(&problem);
-        let white = noise::white(&problem).ok_or_else(|| {
-            let problem = "no dwell is long enough to see its noise";
-            let remedy = "dwell for a second or longer";
-            Error::undetermined(format!("{}, {sensor}", sessions[0].place), problem, remedy)
-        })?;
-        let noise = white.map(|white| AxisNoise {
-            white,
-            wander: 0.0,
-            correlation_s: 1.0,
-            parts: 1,
-        });
-        let smoothness = smoothness::times(&smoothness::largest(&problem), 1e-4);
-        Ok(Some(Self {
-            sessions,
-            problem,
-            penalties,
-            noise,
-            smoothness,
-            settled: false,
-            known: Vec::new(),
-        }))
-    }
-
-    /// Die temperatures of the rows.
-    fn dies(&self, lag_s: f64, starts: &[Start]) -> Vec<f64> {
-        let each = self.sessions.iter().zip(starts);
-        let dies: Vec<Die> = each
-            .map(|(s, start)| s.thermometer.die(lag_s, *start))
-            .collect();
-        let rows = self.problem.rows.iter();
-        rows.map(|r| dies[r.session].at(r.middle_s)).collect()
-    }
-
-    fn evaluate(&mut self, lag_s: f64, starts: &[Start]) -> Option<TriadFit> {
-        let dies = self.dies(lag_s, starts);
-        let normals = [0, 1, 2]
-            .map(|axis| Normal::of(&self.problem, axis, &dies, &self.noise[axis], |_| true));
-        if self.settled {
-            return smoothness::fixed(&self.problem, &self.penalties, &normals, &self.smoothness);
-        }
-        let off = |k: &(f64, Option<TriadFit>)| (k.0 - lag_s).abs();
-        let nearest = self.known.iter().filter(|k| k.1.is_some());
-        let nearest = nearest.min_by(|a, b| off(a).total_cmp(&off(b)));
-        let start = match nearest.and_then(|k| k.1.as_ref()) {
-            Some(fit) => (&fit.smoothness, smoothness::ITERATIONS[1]),
-            None => (&self.smoothness, smoothness::ITERATIONS[0]),
-        };
-        let fit = smoothness::fit(&self.problem, &self.penalties, &normals, start)?;
-        self.smoothness = fit.smoothness;
-        Some(fit)
-    }
-
-    /// Criterion of a lag; the estimates are kept.
-    fn criterion(&mut self, lag_s: f64, starts: &[Start]) -> Option<f64> {
-        if let Some((_, fit)) = self.known.iter().find(|k| k.0 == lag_s) {
-            return fit.as_ref().map(|f| f.criterion);
-        }
-        let fit = self.evaluate(lag_s, starts);
-        let criterion = fit.as_ref().map(|f| f.criterion);
-        self.known.push((lag_s, fit));
-        criterion
-    }
-
-    /// Noise with the curves at `lag_s`.
-    fn learn_noise(&mut self, lag_s: f64, starts: &[Start]) {
-        self.known.clear();
-        let dies = self.dies(lag_s, starts);
-        for _ in 0..ROUNDS {
-            for axis in 0..3 {
-                self.noise[axis] = noise::estimate(
-                    &self.problem,
-                    &self.penalties,
-                    axis,
-                    &dies,
-                    &self.smoothness,
-                    &self.noise[axis],
-                );
-                self.noise[axis] = self.with_stated(axis);
-            }
-            if self.noise.iter().all(|n| n.wander == 0.0) || self.evaluate(lag_s, starts).is_none()
-            {
-                break;
-            }
-        }
-    }
-
-    /// The noise of `axis` with the wander of its bias that a record at rest states, where the recording shows less: of what is slower than
-    /// itself it shows hardly anything.
-    fn with_stated(&self, axis: usize) -> AxisNoise {
-        let found = self.noise[axis];
-        let channel = self.problem.sensor.channels().start + axis;
-        let all = self.sessions.iter().filter_map(|s| s.stated[channel]);
-        let wander = all.map(|model| AxisNoise::stated_wander(&model, self.problem.gain[axis]));
-        let more = wander.filter(|stated| stated.wander > found.wander);
-        more.max_by(|a, b| a.wander.total_cmp(&b.wander))
-            .map_or(found, |stated| AxisNoise {
-                white: found.white,
-                ..stated
-            })
-    }
-
-    /// Finds noise and smoothness at `lag_s`, and keeps them for all lags. The noise too: what a wrong lag leaves of an accelerometer over a
-    /// ramp is far beyond its noise.
-    fn settle(&mut self, lag_s: f64, starts: &[Start]) {
-        self.settled = false;
-        self.learn_noise(lag_s, starts);
-        self.known.clear();
-        // Twice: the second begins where the first ended, and goes on.
-        for _ in 0..2 {
-            let _ = self.evaluate(lag_s, starts);
-        }
-        self.settled = true;
-    }
-
-    /// Curves averaged over the lags of `profile`; those of no lag where none is applied, with their covariance over all lags.
-    fn curves(
-        mut self,
-        profile: &Profile,
-        lag: Option<Lag>,
-        starts: &[Start],
-        range_c: [f64; 2],
-    ) -> TriadCurves {
-        let only = lag.is_none().then(|| {
-            self.criterion(0.0, starts);
-            0.0
-        });
-        let weight = |lag: f64| {
-            let of = profile.weights.iter().find(|w| w.0 == lag);
-            of.map_or(0.0, |w| w.1)
-        };
-        let used = self.known.into_iter().filter_map(|(lag, fit)| {
-            let likelihood = weight(lag);
-            let used = likelihood > 0.0 || only == Some(lag);
-            Some((lag, likelihood, fit.filter(|_| used)?))
-        });
-        let used: Vec<(f64, f64, TriadFit)> = used.collect();
-        let sum: f64 = used.iter().map(|f| f.1).sum();
-        let fits = used.into_iter().map(|(lag, likelihood, fit)| LagFit {
-            fit,
-            likelihood: likelihood / sum,
-            share: match only {
-                Some(only) => f64::from(only == lag),
-                None => likelihood / sum,
-            },
-        });
-        TriadCurves::new(self.problem, fits.collect(), range_c)
-    }
-}
-
-/// Temperatures of the thermometer that rows were taken at, with those of a die that leads by as much as any.
-fn range_of_rows(sessions: &[Session], sensor: Sensor) -> [f64; 2] {
-    let mut range = [f64::INFINITY, f64::NEG_INFINITY];
-    for session in sessions {
-        let led = session.thermometer.die(LAGS[0], Start::Settled);
-        for row in &session.rows[sensor as usize] {
-            let (temp_c, _) = session.thermometer.at(row.middle_s);
-            for t in [temp_c, led.at(row.middle_s)] {
-                range = [range[0].min(t), range[1].max(t)];
-            }
-        }
-    }
-    range
 }
 
 /// Temperatures of the thermometer over all rows of `sessions`.
@@ -368,7 +177,7 @@ fn rough_lag(
 ) -> Result<f64> {
     let mut best = |starts: &[Start]| {
         for triad in triads.iter_mut().flatten() {
-            triad.known.clear();
+            triad.forget();
         }
         let lags = given.map_or(LAGS.to_vec(), |lag| vec![lag]);
         let each = lags.into_iter().filter_map(|lag| {

@@ -10,7 +10,7 @@
 //! | [`smoothness`], [`noise`] | its variance components: how smooth the curves are, how the readings are disturbed |
 //! | [`profile`] | likelihood of the lag |
 //! | [`suitability`] | recordings that are refused |
-//! | [`joint`] | all of these: the estimate |
+//! | `evaluator`, [`joint`] | one triad at any lag; both, and their lags: the estimate |
 //! | [`curves`], [`nodes`] | its result at any temperature, and in a calibration file |
 //! | [`base`] | curves of the biases upon a calibration at one temperature |
 //! | [`path`] | whether a recording comes back to temperatures that it has been at |
@@ -26,6 +26,7 @@ pub mod basis;
 pub mod classic;
 pub mod compare;
 pub mod curves;
+mod evaluator;
 pub mod excitation;
 pub mod extrapolation;
 pub mod fit;
