@@ -24,10 +24,14 @@ use crate::on_bench::{read, session, unit};
 /// Volts per rad/s and per m/s² of the parts that stand in, and their volts without input.
 const GAIN: [f64; 2] = [0.2865, 0.08];
 const NULL_V: [f64; 2] = [2.5, 1.65];
+/// Names of the tests as plans for the emulated board.
+const PLANS: [&str; 6] = [
+    "gyro-x", "gyro-y", "gyro-z", "accel-x", "accel-y", "accel-z",
+];
 /// Samples between two looks at the temperature: 20 ms, a batch of the device.
 const FOLLOW: usize = 2;
 const RATE_HZ: usize = 100;
-/// Length of a test, s, and of the one on the emulated board, which takes as long as the real one.
+/// Length of a test, s, and of those on the emulated board, which take nearly as long as the real ones.
 const HOUR_S: f64 = 3600.0;
 const QUICK_S: f64 = 1200.0;
 /// Lag of the dies behind the thermometer, s, gyro and accelerometer, as in the rig files.
@@ -44,7 +48,7 @@ struct Outcome {
     range_c: [f64; 2],
 }
 
-/// Prints both units' tests. Into `folder`, where there is one, go rig files and a quicker plan for the emulated board.
+/// Prints both units' tests. Into `folder`, where there is one, go rig files and quicker plans for the emulated board.
 pub fn run(folder: Option<&Path>) {
     for (name, rig) in [("MTi-G", "niu-mtig"), ("NV-IMU100", "niu-nv")] {
         let file = unit(&on_board(&read(&format!("rigs/{rig}.toml"))), 1);
@@ -89,11 +93,14 @@ pub fn run(folder: Option<&Path>) {
             // The device's thermometer is in the dies of its gyros.
             let mut file = file.clone();
             file.unit.temperature = Some(TemperatureSensor::Dies);
+            file.table.axes = 3;
             write(folder, &format!("{rig}.toml"), &file.to_toml());
         }
     }
     if let Some(folder) = folder {
-        write(folder, "gyro-z.toml", &plan(2, QUICK_S));
+        for (k, name) in PLANS.iter().enumerate() {
+            write(folder, &format!("{name}.toml"), &plan(k, QUICK_S));
+        }
     }
 }
 
