@@ -66,6 +66,12 @@ impl<T: RealField + Copy> DieLag<T> {
         (lag_s >= least && lag_s <= most).then_some(Self { lag_s })
     }
 
+    /// Of gyro and accelerometer by their lags, s; none where these are not known or outside [`LAG_RANGE_S`].
+    pub fn of_triads(lags_s: Option<[T; 2]>) -> [Self; 2] {
+        let known = |lag_s| Self::new(lag_s).unwrap_or_else(Self::none);
+        lags_s.map_or_else(|| [Self::none(); 2], |lags_s| lags_s.map(known))
+    }
+
     /// Seconds by which the dies follow the thermometer; negative: lead.
     pub fn lag_s(&self) -> T {
         self.lag_s

@@ -142,9 +142,7 @@ pub enum Refused {
 impl Stored {
     /// The lags between the thermometer and the dies of gyro and accelerometer.
     pub fn lags(&self) -> [DieLag<f32>; 2] {
-        let lag = |lag_s| DieLag::new(lag_s).unwrap_or_else(DieLag::none);
-        self.lags_s
-            .map_or_else(|| [DieLag::none(); 2], |lags_s| lags_s.map(lag))
+        DieLag::of_triads(self.lags_s)
     }
 }
 

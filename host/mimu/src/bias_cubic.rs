@@ -135,18 +135,17 @@ impl BiasCubics {
         cubics
             .remains
             .extend(linear(&models, &at(settled_c)?, sensor));
-        cubics
-            .remains
-            .push(match over.lags_s().map(|lags_s| lags_s[sensor as usize]) {
-                None => Remainder::unknown(LAG, "lag not determined"),
-                Some(lag_s) => {
-                    let late = temperatures().zip(&biases).map(|(t, b)| {
-                        let die_c = (t - lag_s * RAMP_K_PER_S).clamp(from, to);
-                        Ok(b - bias(&at(die_c)?))
-                    });
-                    Remainder::of(LAG, "at 2 K/min", &late.collect::<Result<Vec<_>>>()?)
-                }
-            });
+        let lag_s = over.lags_s().map(|lags_s| lags_s[sensor as usize]);
+        cubics.remains.push(match lag_s {
+            None => Remainder::unknown(LAG, "lag not determined"),
+            Some(lag_s) => {
+                let late = temperatures().zip(&biases).map(|(t, b)| {
+                    let die_c = (t - lag_s * RAMP_K_PER_S).clamp(from, to);
+                    Ok(b - bias(&at(die_c)?))
+                });
+                Remainder::of(LAG, "at 2 K/min", &late.collect::<Result<Vec<_>>>()?)
+            }
+        });
         Ok(Some(cubics))
     }
 

@@ -279,10 +279,7 @@ impl Curves {
         let table = Table::new(nodes).ok()?;
         Some(Self {
             table: table.with_range(temperature.range_c).ok()?,
-            lags: temperature.lags_s().map_or_else(
-                || [DieLag::none(); 2],
-                |lags| lags.map(|s| DieLag::new(s).unwrap_or_else(DieLag::none)),
-            ),
+            lags: DieLag::of_triads(temperature.lags_s()),
             has: constant.map(|model| model.is_some()),
         })
     }
