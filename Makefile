@@ -4,8 +4,8 @@ TOOLCHAIN := $(shell sed -n 's/^channel = "\(.*\)"/\1/p' rust-toolchain.toml)
 TARGET := thumbv7em-none-eabihf
 CARGO := cargo +$(TOOLCHAIN)
 # One by one: built together, the second would be given the vector table that the first brings.
-FIRMWARE := $(CARGO) build --locked -p mimu-firmware --release --target $(TARGET)
-COUNTED := $(CARGO) build --locked -p mimu-counted --release --target $(TARGET)
+FIRMWARE := $(CARGO) build --locked -p mimu-firmware --profile image --target $(TARGET)
+COUNTED := $(CARGO) build --locked -p mimu-counted --profile image --target $(TARGET)
 # All whose tests run on the PC.
 ON_PC := --workspace --exclude mimu-counted --exclude mimu-no-panic
 
@@ -40,15 +40,15 @@ fmt:
 
 clippy:
 	$(CARGO) clippy --locked --all-targets -- -D warnings
-	$(CARGO) clippy --locked -p mimu-firmware -p mimu-counted -p mimu-no-panic --release --target $(TARGET) -- -D warnings
-	$(CARGO) clippy --locked -p mimu-firmware --release --features usb --target $(TARGET) -- -D warnings
+	$(CARGO) clippy --locked -p mimu-firmware -p mimu-counted -p mimu-no-panic --profile image --target $(TARGET) -- -D warnings
+	$(CARGO) clippy --locked -p mimu-firmware --profile image --features usb --target $(TARGET) -- -D warnings
 
 rustdoc:
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --locked --no-deps
 
 # With USB first, as the image without it has the same name and is what the tests run.
 images:
-	$(CARGO) build --locked -p mimu-firmware --release --features usb --target $(TARGET)
+	$(CARGO) build --locked -p mimu-firmware --profile image --features usb --target $(TARGET)
 	$(FIRMWARE)
 	$(COUNTED)
 

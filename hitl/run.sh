@@ -16,7 +16,7 @@ calibration=${1:-}
 seconds=${MIMU_SECONDS:-60}
 target=${CARGO_TARGET_DIR:-target}
 mimu=${MIMU:-$target/release/mimu}
-image=$target/thumbv7em-none-eabihf/release/mimu-firmware
+image=$target/thumbv7em-none-eabihf/image/mimu-firmware
 chip=STM32H743ZITx
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
@@ -46,7 +46,7 @@ ask() {
 if [ -z "${MIMU_NO_PROBE:-}" ]; then
   step "build, flash and start"
   cargo build --locked --release --bin mimu
-  cargo build --locked --release -p mimu-firmware --target thumbv7em-none-eabihf
+  cargo build --locked --profile image -p mimu-firmware --target thumbv7em-none-eabihf
   probe-rs download --chip "$chip" --verify "$image"
   probe-rs reset --chip "$chip"
   # The converter calibrates and the greeting is sent within a tenth of a second; the debugger's USB takes longer.

@@ -8,7 +8,7 @@ out=$(mktemp -d)
 trap 'rm -rf "$out"' EXIT
 # Assembly of everything, since what mimu-core calls must be seen as well; with one unit and no debug information it is code and nothing
 # else. In a directory of its own: the flags would have the caller's built anew.
-RUSTFLAGS="-C target-cpu=cortex-m7 -C codegen-units=1 -C debuginfo=0 --emit=asm" CARGO_PROFILE_RELEASE_LTO=off \
+RUSTFLAGS="-C target-cpu=cortex-m7 -C codegen-units=1 -C debuginfo=0 --emit=asm" \
     "$@" build --locked --quiet -p mimu-no-panic --release --target thumbv7em-none-eabihf --target-dir "$out"
 asm=("$out"/thumbv7em-none-eabihf/release/deps/*.s)
 # From the functions of mimu-no-panic along every call, branch and address, through data too (a table of functions, say). What is

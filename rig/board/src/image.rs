@@ -27,12 +27,12 @@ pub struct Sizes {
     pub ram: u64,
 }
 
-/// Where `cargo build -p mimu-firmware --release --target thumbv7em-none-eabihf` leaves the image: in the target
+/// Where `cargo build -p mimu-firmware --profile image --target thumbv7em-none-eabihf` leaves the image: in the target
 /// directory that `CARGO_TARGET_DIR` names, or in `target` here.
 pub fn release_image() -> PathBuf {
     let target =
         std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| "target".into(), PathBuf::from);
-    target.join("thumbv7em-none-eabihf/release/mimu-firmware")
+    target.join("thumbv7em-none-eabihf/image/mimu-firmware")
 }
 
 impl Image {
@@ -43,7 +43,7 @@ impl Image {
         let name = path.display();
         let bytes = fs::read(path).map_err(|e| {
             format!(
-                "{name}: {e}; build it with `cargo build -p mimu-firmware --release --target \
+                "{name}: {e}; build it with `cargo build -p mimu-firmware --profile image --target \
                  thumbv7em-none-eabihf`"
             )
         })?;

@@ -42,7 +42,7 @@ pub fn built(name: &str) -> PathBuf {
     let root = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
     let target = std::env::var_os("CARGO_TARGET_DIR")
         .map_or_else(|| PathBuf::from(root).join("target"), PathBuf::from);
-    target.join("thumbv7em-none-eabihf/release").join(name)
+    target.join("thumbv7em-none-eabihf/image").join(name)
 }
 
 /// A board with the release image behind voltages that do not change.

@@ -2,7 +2,7 @@
 //! then shows in what is committed.
 //!
 //! ```text
-//! cargo build -p mimu-firmware --release --target thumbv7em-none-eabihf
+//! cargo build -p mimu-firmware --profile image --target thumbv7em-none-eabihf
 //! cargo run -p mimu-board-tests --bin traces [NAME...]
 //! ```
 //!
