@@ -23,40 +23,79 @@ impl Candidate {
         Some(candidate.behind_one(Converter::of(weight, 0.0)))
     }
 
-    /// The candidates that it is tried as: of the bits of a code, which are wrong has to be found as well, so each by itself
-    /// and all from the first down to each. The search goes on from the best of these.
+    /// The candidates that it is tried as. The search goes on from the best of these, and adds or drops [offered](Self::offered)
+    /// coefficients.
     ///
-    /// What is of the recording alone is tried as well, and costs its coefficients; of what goes by the temperature, whether the
-    /// thermometer is on the same die.
-    pub fn variants(mut self, rows: &Rows) -> Vec<Self> {
-        if !self.reads_code() {
-            let mut whole = self.clone();
-            whole.active.extend(self.of_recording());
-            let mut all = vec![self];
-            if whole.active.len() > all[0].active.len() {
+    /// Of the bits of a code each by itself, and all from the first down to each. Of other effects the coefficients that are `excited`, and
+    /// all that the rows can tell; both with the coefficients that are specific to the recording, and without. A thermal effect is tried
+    /// with and without the thermometer's self-heating.
+    pub fn variants(mut self, rows: &Rows, excited: &[usize]) -> Vec<Self> {
+        self.offered.clone_from(&self.active);
+        let with = |one: &Self, active: Vec<usize>| Self {
+            active,
+            ..one.clone()
+        };
+        if self.reads_code() {
+            let offered = &self.offered;
+            let alone = offered.iter().map(|bit| vec![*bit]);
+            let down = (2..=offered.len()).map(|k| offered[..k].to_vec());
+            return alone.chain(down).map(|bits| with(&self, bits)).collect();
+        }
+        self.offered.extend(self.of_recording());
+        let mut all = vec![self.clone()];
+        if !excited.is_empty() && excited.len() < self.active.len() {
+            all.push(with(&self, excited.to_vec()));
+        }
+        for k in 0..all.len() {
+            let mut whole = all[k].clone();
+            whole.active.extend(whole.of_recording());
+            if whole.active.len() > all[k].active.len() {
                 all.push(whole);
             }
-            if rows.thermometer_heats_itself() && all[0].is_thermal() {
-                let without = all.clone().into_iter().map(|c| Self {
-                    without_self_heating: true,
-                    ..c
-                });
-                all.extend(without.collect::<Vec<_>>());
-            }
-            let choices = all.len() as f64;
-            all.iter_mut().for_each(|c| c.choices = choices);
-            return all;
         }
-        let offered = self.active.clone();
-        self.offered.clone_from(&offered);
-        self.choices = (offered.len() as f64).exp2();
-        let with = |active: &[usize]| Self {
-            active: active.to_vec(),
+        if rows.thermometer_heats_itself() && self.is_thermal() {
+            let without = all.clone().into_iter().map(|c| Self {
+                without_self_heating: true,
+                ..c
+            });
+            all.extend(without.collect::<Vec<_>>());
+        }
+        let choices = all.len() as f64;
+        all.iter_mut().for_each(|c| c.choices = choices);
+        all
+    }
+
+    /// It with one of its offered coefficients added, or dropped with those that rest on it; `None` where that leaves nothing, or adds one
+    /// that rests on another.
+    pub fn toggled(&self, coefficient: usize) -> Option<Self> {
+        let mut active = self.active.clone();
+        match active.binary_search(&coefficient) {
+            Ok(at) => {
+                active.remove(at);
+                active.retain(|k| self.rests_on(*k) != Some(coefficient));
+            }
+            Err(at) => {
+                let base = self.rests_on(coefficient);
+                if base.is_some_and(|base| active.binary_search(&base).is_err()) {
+                    return None;
+                }
+                active.insert(at, coefficient);
+            }
+        }
+        (!active.is_empty()).then(|| Self {
+            active,
             ..self.clone()
-        };
-        let alone = offered.chunks(1).map(with);
-        let down = (2..=offered.len()).map(|k| with(&offered[..k]));
-        alone.chain(down).collect()
+        })
+    }
+
+    /// How many choices of coefficients its own is one of: any number of the offered is as likely, and of one number any choice.
+    pub fn choices_of_coefficients(&self) -> f64 {
+        let (n, k) = (self.offered.len(), self.active.len());
+        if n < 2 {
+            return 1.0;
+        }
+        let ratios = (0..k.min(n - k)).map(|i| (n - i) as f64 / (i + 1) as f64);
+        n as f64 * ratios.product::<f64>()
     }
 
     /// Its columns in `rows`.

@@ -34,6 +34,7 @@ use together::together;
 use tried::candidates;
 use undecided::undecided;
 
+use hold_out::rms_at_rest;
 pub(super) use hold_out::{held_out, part, rms};
 pub use leftover::{FALSE_LEFTOVER, Leftover};
 pub use model::Model;
@@ -62,6 +63,8 @@ pub struct Accepted {
     pub parameter: Option<Interval>,
     /// Held-out root mean square without it and with it, beside the others.
     pub held_out: [f64; 2],
+    /// The same of the rows at rest, SI, where the judged rows are turns.
+    pub held_out_at_rest: Option<[f64; 2]>,
     /// How it was held out.
     pub split: Split,
     /// What it does to the second recording, if there is one that can be judged by.
@@ -71,13 +74,19 @@ pub struct Accepted {
     pub of_unit: bool,
 }
 
-impl From<&Accepted> for EffectTable {
+impl From<&Accepted> for Removed {
     fn from(accepted: &Accepted) -> Self {
-        let removed = Removed {
+        Self {
             candidate: accepted.chosen.candidate.clone(),
             parameter: accepted.chosen.parameter,
             values: accepted.values.iter().copied().collect(),
-        };
+        }
+    }
+}
+
+impl From<&Accepted> for EffectTable {
+    fn from(accepted: &Accepted) -> Self {
+        let removed = Removed::from(accepted);
         let sigmas: Vec<f64> = accepted
             .covariance
             .diagonal()
@@ -203,8 +212,11 @@ pub fn decide(
     let usual = judge.usual;
     let mut suggested = Vec::new();
     loop {
+        let ids = |all: &[Chosen]| -> Vec<String> { all.iter().map(|c| c.candidate.id()).collect() };
+        let mut failed_any = false;
         // What does not hold out goes, the one with the smallest drop in deviance first.
         while let Some(failed) = judge.first_to_fail(&kept, &with)? {
+            failed_any = true;
             let candidate = kept.remove(failed.at).candidate;
             // More dwells may prove it: it is asked for in the next experiment.
             if let Kind::Effect(effect) = &candidate.kind
@@ -217,16 +229,17 @@ pub fn decide(
             with = search.fit(&kept)?;
         }
         let set_aside = judge.suggestions(&mut kept, &with, accept);
-        if set_aside.is_empty() {
+        if set_aside.is_empty() && !failed_any {
             break;
         }
         suggested.extend(set_aside);
         with = search.fit(&kept)?;
-        // What a suggestion had explained, an effect with a name may explain as well.
+        // What a suggestion or a rejected effect had explained, another effect with a name may explain as well. An accelerometer's warm-up of
+        // p < 1e-6 was reported as not significant, since what had taken its place in the search was rejected afterwards.
         let more = search.beside(kept.clone(), |c| {
             c.is_listed() && !rejected.iter().any(|r| r.0 == c.id())
         })?;
-        if more.chosen.len() == kept.len() {
+        if ids(&more.chosen) == ids(&kept) {
             break;
         }
         (kept, with) = (more.chosen, more.fit);
@@ -248,10 +261,12 @@ pub fn decide(
         let mut rest = kept.clone();
         rest.remove(i);
         let without = search.fit(&rest)?;
-        let held = [
-            judge.held_rms(&rest, &without, split),
-            judge.held_rms(&kept, &with, split),
+        let both = [
+            judge.held(&rest, &without, split),
+            judge.held(&kept, &with, split),
         ];
+        let held = both.each_ref().map(|h| h.as_ref().map(|h| rms(rows, h)));
+        let at_rest = both.each_ref().map(|h| h.as_ref().and_then(|h| rms_at_rest(rows, h)));
         accepted.push(Accepted {
             chosen: one.clone(),
             split,
@@ -267,6 +282,10 @@ pub fn decide(
                 .into_owned(),
             parameter: nonlinear.intervals[i],
             held_out: held.map(|h| h.unwrap_or(f64::NAN)),
+            held_out_at_rest: match at_rest {
+                [Some(without), Some(with)] => Some([without, with]),
+                _ => None,
+            },
             of_unit: one.candidate.is_error(),
         });
         from += count;
@@ -353,8 +372,12 @@ pub fn decide(
         noise_floor: floor,
         reference_rms: reference,
         accepted,
+        not_excited: {
+            let accepted = |id: &str| kept.iter().any(|k| k.candidate.id() == id);
+            not_excited.retain(|n| !accepted(&n.0));
+            not_excited
+        },
         rejected,
-        not_excited,
         leftover: left,
         undecided: undecided(&search, &kept),
         notes: [notes(rows, &kept), one_at_these_inputs].concat(),

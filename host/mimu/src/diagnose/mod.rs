@@ -3,6 +3,7 @@
 //!
 //! | module        | what                                                                            |
 //! |---------------|---------------------------------------------------------------------------------|
+//! | `as_written`  | whether the file with the effects errs less on other recordings                  |
 //! | `candidate`   | what is tried of the [effects](crate::effects), and its columns                  |
 //! | [`rows`]      | what the affine model leaves of dwells and turns, as one linear problem          |
 //! | [`variance`]    | how that scatters: known noise, more of it, a bias that walks                    |
@@ -12,6 +13,7 @@
 //! | [`uncertainty`] | what the coefficients of effects leave open of what stands on them               |
 //! | [`picture`]   | what of it can be drawn                                                          |
 
+mod as_written;
 mod candidate;
 pub mod decision;
 mod passes;

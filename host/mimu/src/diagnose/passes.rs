@@ -9,6 +9,7 @@
 use mimu_core::compensation::Affine;
 use nalgebra::Matrix3;
 
+use super::as_written::AsWritten;
 use super::decision::{Decision, decide, noisier};
 use super::rows::{ForceErrors, Free, Rows, Session};
 use crate::effects::removal::{Removed, remove};
@@ -57,12 +58,7 @@ fn later_session<'a>(prepared: &'a Prepared, models: &[Option<Affine<f64>>; 2]) 
 
 /// What was accepted, as it is removed.
 fn removed(decision: &Decision) -> Vec<Removed> {
-    let each = decision.accepted.iter().map(|a| Removed {
-        candidate: a.chosen.candidate.clone(),
-        parameter: a.chosen.parameter,
-        values: a.values.iter().copied().collect(),
-    });
-    each.collect()
+    decision.accepted.iter().map(Removed::from).collect()
 }
 
 /// By what share one affine model differs from another in scale and direction.
@@ -127,16 +123,40 @@ impl Passes<'_> {
         )
     }
 
-    /// What the rows lead to. Where that bent the affine model, or cannot be taken out, each effect of many coefficients is left away for
-    /// once, and what predicts best is taken.
+    /// What the rows lead to, without effects with which the calibration file would err more on another recording.
     pub fn best(&self) -> Result<Pass> {
-        let (mut best, strong) = self.settled(&[])?;
+        let judge = AsWritten {
+            sensor: self.sensor,
+            before: self.now,
+            others: self.later,
+            calibrate: self.calibrate,
+        };
+        let mut without = Vec::new();
+        loop {
+            let best = self.best_without(&without)?;
+            let worst = match &best.after {
+                Some(Ok((after, _))) => judge.worst(after, &best.decision),
+                _ => None,
+            };
+            match worst {
+                Some(worst) => without.push(worst),
+                None => return Ok(best),
+            }
+        }
+    }
+
+    /// The same with some effects not tried, each with the reason. Where the others bent the affine model, or cannot be taken out, each
+    /// effect of many coefficients is left away for once, and what predicts best is taken.
+    fn best_without(&self, without: &[(String, String)]) -> Result<Pass> {
+        let (mut best, strong) = self.settled(without)?;
         let complex = best.decision.accepted.iter();
         let complex = complex.filter(|a| strong && a.values.len() > SIMPLE);
         let ids: Vec<String> = complex.map(|a| a.chosen.candidate.id()).collect();
         for id in ids {
             let why = "another effect predicts better, with the calibration that it leaves".into();
-            let (other, _) = self.settled(&[(id, why)])?;
+            let mut without = without.to_vec();
+            without.push((id, why));
+            let (other, _) = self.settled(&without)?;
             let refused = matches!(best.after, Some(Err(_)));
             if matches!(other.after, Some(Ok(_))) && (refused || !best.stands_before(&other)) {
                 best = other;

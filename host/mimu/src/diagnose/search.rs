@@ -16,14 +16,14 @@ use super::variance::{By, Fitted, VarianceModel};
 use crate::effects::candidate::{Candidate, Kind};
 use crate::effects::effect::Effect;
 use crate::effects::quantity::Conditions;
-use refine::Beside;
+use refine::{Beside, With};
 use screen::Screened;
 
 /// Probability that a clean sensor is found to have an effect of the library.
 pub const FALSE_LISTED: f64 = 1.5e-3;
 /// That it is found to have a term found from the data, or a jump.
 pub const FALSE_FOUND: f64 = 1e-3;
-/// Candidates that are fitted with noise of their own.
+/// Products and jumps that are fitted with noise of their own.
 const FINALISTS: usize = 8;
 /// Most effects of one sensor, and most terms and jumps found from the data. Counted apart: over a wide range of temperatures the cubes of three
 /// axes took three of five places, were not accepted, and kept out a lag that halved what was left.
@@ -42,6 +42,8 @@ pub struct Chosen {
     pub p: f64,
     /// By how much the deviance grows without it.
     pub drop: f64,
+    /// By how much the sizes of its coefficients speak against it, in units of the deviance.
+    pub unlikely: f64,
     /// Others that would do nearly as well in its place, and by how much worse their score is.
     pub alternatives: Vec<(String, f64)>,
 }
@@ -294,31 +296,39 @@ impl<'a> Search<'a> {
             model: self.model(chosen),
             null,
         };
-        let (candidate, parameter, fitted) = match candidate.reads_code() {
+        let affine = beside_these.model.ncols();
+        let chance = |candidate: &Candidate, with: &With| {
+            self.chance(with.drop, with.columns.ncols(), affine, candidate)
+        };
+        let (mut candidate, parameter, with, whole) = match candidate.reads_code() {
             true => {
-                let (candidate, fitted) = beside_these.bits(candidate)?;
-                (candidate, screened.parameter, fitted)
+                let (candidate, with) = beside_these.bits(candidate)?;
+                (candidate, screened.parameter, with, 1.0)
             }
             false => {
                 let at = |c: &&Columns| c.parameter == screened.parameter;
                 let first = self.screened[screened.index].iter().find(at)?;
-                let (parameter, fitted) = beside_these.parameter(candidate, first)?;
-                (candidate.clone(), parameter, fitted)
+                let (parameter, with) = beside_these.parameter(candidate, first)?;
+                // By all of its coefficients an effect is one test, whatever choice of them follows.
+                let whole = chance(candidate, &with);
+                let before = candidate.active.len();
+                let (candidate, with) = beside_these.coefficients(candidate, parameter, with)?;
+                let (parameter, with) = match candidate.active.len() == before {
+                    true => (parameter, with),
+                    false => beside_these.parameter_from(&candidate, (parameter, with))?,
+                };
+                (candidate, parameter, with, whole)
             }
         };
-        let (drop, columns) = (fitted.drop, fitted.columns);
-        let p = self.chance(
-            drop,
-            columns.ncols(),
-            beside_these.model.ncols(),
-            &candidate,
-        );
+        candidate.choices = candidate.choices_of_coefficients() * candidate.choices;
+        let p = chance(&candidate, &with).min(whole);
         Some(Chosen {
+            unlikely: candidate.unlikely(&with.values),
+            columns: with.columns,
+            drop: with.drop,
             candidate,
             parameter,
-            columns,
             p,
-            drop,
             alternatives: Vec::new(),
         })
     }
@@ -326,11 +336,11 @@ impl<'a> Search<'a> {
     /// The best candidates beside the chosen, each with noise of its own, the least by chance first.
     fn finalists(&self, chosen: &[Chosen], null: &Fitted) -> Vec<Chosen> {
         let screened = self.screen(chosen, null);
+        // Every named effect is a rival of every other.
         let of = |listed: bool| {
-            screened
-                .iter()
-                .filter(move |s| self.candidates[s.index].is_listed() == listed)
-                .take(FINALISTS)
+            let alike = move |s: &&Screened| self.candidates[s.index].is_listed() == listed;
+            let count = if listed { usize::MAX } else { FINALISTS };
+            screened.iter().filter(alike).take(count)
         };
         let picked: Vec<_> = of(true).chain(of(false)).collect();
         let mut judged: Vec<Chosen> = picked
@@ -482,15 +492,18 @@ impl<'a> Search<'a> {
 }
 
 /// How good a candidate is among others with more or fewer coefficients: the drop of the deviance less what each coefficient
-/// costs (Akaike's two, doubled, as for each there are several candidates). Of products that are the same in this recording the
-/// shortest is told.
+/// costs (Akaike's two, doubled, as for each there are several candidates), and what speaks against their sizes. Of products that are the
+/// same in this recording the shortest is told.
+///
+/// A nonlinear parameter costs two coefficients. It has a limit, as a time constant that is infinite is a straight line, and should be
+/// told from it by two sigmas.
 fn score(c: &Chosen) -> f64 {
-    let coefficients = c.columns.ncols() as f64 + if c.parameter > 0.0 { 1.0 } else { 0.0 };
+    let coefficients = c.columns.ncols() as f64 + if c.parameter > 0.0 { 2.0 } else { 0.0 };
     let order = match &c.candidate.kind {
         Kind::Term(_, product) => f64::from(product.order()),
         _ => 0.0,
     };
-    c.drop - COEFFICIENT * coefficients - order
+    c.drop - COEFFICIENT * coefficients - order - c.unlikely
 }
 
 /// An effect whose coefficient of the size of a data sheet would not be this many sigmas is not excited.

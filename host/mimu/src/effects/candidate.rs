@@ -46,7 +46,7 @@ pub struct Candidate {
     pub inseparable: Vec<usize>,
     /// How many choices it is the best of.
     pub choices: f64,
-    /// Coefficients to choose from, where the choice is part of the search.
+    /// Coefficients to choose from: the choice is part of the search.
     pub offered: Vec<usize>,
 }
 
@@ -157,6 +157,34 @@ impl Candidate {
         all.filter(|(_, c)| c.scope == Scope::Recording && is_active(c.axis))
             .map(|(k, _)| k)
             .collect()
+    }
+
+    /// The coefficient without which coefficient `k` means nothing: the slope of a curvature, since the temperature that a curvature counts
+    /// from is a convention, and the lasting coefficient of the axis of one that is specific to the recording.
+    pub(crate) fn rests_on(&self, k: usize) -> Option<usize> {
+        let Kind::Effect(e) = &self.kind else {
+            return None;
+        };
+        let own = &e.coefficients[k];
+        let base = |other: &Coefficient| match own.scope {
+            Scope::Recording => other.scope != Scope::Recording,
+            _ => other.regressor.is_slope_of(&own.regressor),
+        };
+        let mut all = e.coefficients.iter();
+        all.position(|other| other.axis == own.axis && base(other))
+    }
+
+    /// By how much coefficients of `values` beyond the size of data sheets speak against it, in units of the deviance: a size is believed
+    /// to be log-normal, and each factor of ten is one sigma.
+    pub(crate) fn unlikely(&self, values: &[f64]) -> f64 {
+        let Kind::Effect(e) = &self.kind else {
+            return 0.0;
+        };
+        let each = self.active.iter().zip(values).map(|(k, value)| {
+            let ratio = value.abs() / e.coefficients[*k].typical;
+            ratio.log10().max(0.0).powi(2)
+        });
+        each.sum()
     }
 
     /// Regressors of its active coefficients; of a jump none.

@@ -244,6 +244,40 @@ impl Regressor {
         all
     }
 
+    /// Whether `other` is a higher power of the quantity that this one is proportional to.
+    pub(crate) fn is_slope_of(&self, other: &Self) -> bool {
+        let (Self::Product(slope), Self::Product(other)) = (self, other) else {
+            return false;
+        };
+        let (mut a, mut b) = (slope.parts(), other.parts());
+        match (a.next(), a.next(), b.next(), b.next()) {
+            (Some((p, 1)), None, Some((q, 2..)), None) => p == q,
+            _ => false,
+        }
+    }
+
+    /// Whether it is `term` in an error of `axis` of `sensor`: the input along a sensitive direction is that along the body axis, to within
+    /// the misalignment.
+    pub(crate) fn is_on_axis(&self, term: &Product, axis: usize, sensor: Sensor) -> bool {
+        let Self::Product(own) = self else {
+            return false;
+        };
+        let along = match sensor {
+            Sensor::Gyro => Quantity::Rate(axis),
+            Sensor::Accel => Quantity::Force(axis),
+        };
+        let of_body = |product: &Product| {
+            let parts = product.parts().map(|(q, p)| match q {
+                Quantity::Input => (along, p),
+                q => (q, p),
+            });
+            let mut all: Vec<(Quantity, u8)> = parts.collect();
+            all.sort_unstable();
+            all
+        };
+        of_body(own) == of_body(term)
+    }
+
     /// Whether it moves with temperature or time.
     pub fn is_slow(&self) -> bool {
         self.quantities().iter().any(|q| q.is_slow())

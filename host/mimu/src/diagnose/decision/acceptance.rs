@@ -1,8 +1,9 @@
 //! What is accepted of what was found: it has to hold out, in a second recording too where there is one, and not rest on one dwell.
 
 use nalgebra::DVector;
+use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use super::hold_out::{chance_without_a_dwell, leverage, parts_helped};
+use super::hold_out::{chance_without_a_dwell, held_out_by_part, leverage, parts_helped};
 use super::second::second;
 use super::{LEVERAGE, SURVIVES, Second, held_out, rms, shares};
 use crate::diagnose::rows::Rows;
@@ -10,7 +11,12 @@ use crate::diagnose::search::{Chosen, Search};
 use crate::diagnose::variance::Fitted;
 use crate::effects::removal::Removed;
 use crate::fit::Split;
-use crate::quantity::p_value;
+use crate::quantity::{p_value, significant};
+
+/// Mean square of the residual over that of the noise below which a model fits the noise, ...
+const BELOW_NOISE: f64 = 0.25;
+/// ... where chance makes it so small with less than this probability.
+const FITS_NOISE: f64 = 1e-4;
 
 /// What the chosen of one sensor are judged by.
 pub(super) struct Acceptance<'a> {
@@ -47,7 +53,8 @@ impl<'a> Acceptance<'a> {
         all
     }
 
-    fn held(&self, chosen: &[Chosen], fit: &Fitted, split: Split) -> Option<DVector<f64>> {
+    /// Held-out residuals.
+    pub fn held(&self, chosen: &[Chosen], fit: &Fitted, split: Split) -> Option<DVector<f64>> {
         held_out(self.search, &self.search.model(chosen), fit, split)
     }
 
@@ -120,7 +127,8 @@ impl<'a> Acceptance<'a> {
                     Some(format!("it rests to {:.0} % on one dwell", 100.0 * share))
                 }
                 _ => self
-                    .not_held_out(&both, split, &kept[at], seconds[at])
+                    .not_held_out(&both, (split, with), &kept[at], seconds[at])
+                    .or_else(|| self.below_noise([&rest, kept]))
                     .or_else(|| self.lost_with_a_dwell([&rest, kept], &kept[at], with)),
             };
             if let Some(why) = why {
@@ -138,21 +146,22 @@ impl<'a> Acceptance<'a> {
     fn not_held_out(
         &self,
         both: &[Option<DVector<f64>>; 2],
-        split: Split,
+        (split, with): (Split, &Fitted),
         one: &Chosen,
         second: Option<Second>,
     ) -> Option<String> {
         let said = |value: f64| self.rows.figure.said(self.rows.sensor, value);
-        let [a, b] = both
-            .each_ref()
-            .map(|h| h.as_ref().map(|r| rms(self.rows, r)));
-        if let (Some(a), Some(b)) = (a, b)
-            && !(b < a)
+        let variances = self.search.variance.variances(&with.components);
+        let sums = both.each_ref().map(|h| {
+            let of = |r| held_out_by_part(self.rows, split, r, &variances);
+            h.as_ref().map(of)
+        });
+        if let ([Some(a), Some(b)], [Some(left), Some(right)]) = (&sums, both)
+            && !(b.iter().sum::<f64>() < a.iter().sum())
         {
+            let [left, right] = [left, right].map(|r| said(rms(self.rows, r)));
             return Some(format!(
-                "the held-out error does not go down: {} without, {} with",
-                said(a),
-                said(b)
+                "the held-out error does not go down: {left} without, {right} with"
             ));
         }
         if let Some(second) = second.filter(Second::contradicts) {
@@ -163,14 +172,30 @@ impl<'a> Acceptance<'a> {
                 said(d)
             ));
         }
-        if let [Some(a), Some(b)] = both {
-            let [helped, hurt] = parts_helped(self.rows, split, [a, b], one.columns.ncols());
+        if let [Some(a), Some(b)] = &sums {
+            let [helped, hurt] = parts_helped([a, b], one.columns.ncols());
             return (hurt >= 2 && hurt >= helped).then(|| {
                 format!("the held-out error goes down in {helped} of the parts, and up in {hurt}")
             });
         }
         let undetermined = "what is left when a block is held out does not determine it";
         both[1].is_none().then(|| undetermined.into())
+    }
+
+    /// Why the second of the `models` fits noise: what it leaves is far less than the known noise, and what the first leaves is not.
+    fn below_noise(&self, models: [&[Chosen]; 2]) -> Option<String> {
+        let variance = &self.search.variance;
+        let [without, with] = models.map(|chosen| {
+            let columns = self.search.model(chosen);
+            let dof = self.rows.y.len() as f64 - columns.ncols() as f64;
+            let fitted = variance.fit_at(&columns, &variance.none())?;
+            Some((fitted.chi2 / dof, ChiSquared::new(dof).ok()?.cdf(fitted.chi2)))
+        });
+        let ((before, _), (after, by_chance)) = (without?, with?);
+        (after < BELOW_NOISE * before.min(1.0) && by_chance < FITS_NOISE).then(|| {
+            let [before, after] = [before, after].map(|c| significant(c.sqrt()));
+            format!("it fits the noise: the residual is {before} times the noise without it, and {after} times with it")
+        })
     }
 
     /// Why `one`, which the second of the `models` has and the first has not, is no more significant without the dwell that speaks most for it.

@@ -14,12 +14,18 @@ pub(super) struct Beside<'a> {
     pub null: &'a Fitted,
 }
 
+/// Sine of the least angle between a code and what the affine parameters span. The first four bits have one of 0.06 to a straight line, as
+/// they leave a sixteenth of the range; five have 0.03.
+const CLEAR: f64 = 0.05;
+
 /// A candidate beside it.
 #[derive(Clone)]
 pub(super) struct With {
     /// By how much the deviance is less.
     pub drop: f64,
     pub columns: DMatrix<f64>,
+    /// Coefficients of the columns.
+    pub values: Vec<f64>,
     components: Components,
 }
 
@@ -33,18 +39,26 @@ impl Beside<'_> {
     fn fit(&self, columns: DMatrix<f64>, start: &Components) -> Option<With> {
         let both = beside(&self.model, &unit_columns(&columns));
         let fitted = self.search.variance.fit(&both, start, By::Likelihood)?;
+        let own = fitted.coefficients.rows(self.model.ncols(), columns.ncols());
+        let each = own.iter().zip(columns.column_iter());
         Some(With {
+            values: each.map(|(v, c)| v / c.norm()).collect(),
             drop: (self.null.deviance - fitted.deviance).max(0.0),
             components: fitted.components,
             columns,
         })
     }
 
-    /// With the best value of its nonlinear constant, if it has one: a walk uphill from its columns at the `first` with ever smaller
+    /// With the best value of its nonlinear parameter, if it has one: a walk uphill from its columns at the `first` with ever smaller
     /// steps.
     pub fn parameter(&self, candidate: &Candidate, first: &Columns) -> Option<(f64, With)> {
         let at_first = self.fit(first.plain.clone(), &self.null.components)?;
         self.climb(candidate, (first.parameter, at_first), |columns| columns)
+    }
+
+    /// The same from where the walk of a candidate with other coefficients ended.
+    pub fn parameter_from(&self, candidate: &Candidate, start: (f64, With)) -> Option<(f64, With)> {
+        self.climb(candidate, start, |columns| columns)
     }
 
     /// The same of a law that is to do what the model does not yet: what of it is in the model already is no fault of it, and costs nothing.
@@ -89,37 +103,75 @@ impl Beside<'_> {
         Some(best)
     }
 
-    /// With the best choice of bits: one is added or dropped as long as that makes the score better.
+    /// A code with the best choice of bits, from its columns at the readings without what the model does not explain of them.
     pub fn bits(&self, from: &Candidate) -> Option<(Candidate, With)> {
         let conditions = self.search.freed(&self.model, self.null);
         let all = self.search.bits(from, &conditions)?;
-        let columns = |c: &Candidate| c.columns_of(&all);
-        let first = columns(from);
-        let mut best = (from.clone(), self.fit(first, &self.null.components)?);
+        let first = self.fit(from.columns_of(&all), &self.null.components)?;
+        self.choice(from, &all, first)
+    }
+
+    /// Another effect with the best choice of its coefficients at a value of its nonlinear parameter, from `start` on.
+    pub fn coefficients(
+        &self,
+        from: &Candidate,
+        parameter: f64,
+        start: With,
+    ) -> Option<(Candidate, With)> {
+        if from.offered.len() < 2 {
+            return Some((from.clone(), start));
+        }
+        let all = from.with_all_offered();
+        self.choice(from, &all.columns(self.search.rows, parameter), start)
+    }
+
+    /// With the best choice of coefficients, of which `all` are the columns: one is added or dropped as long as that makes the score better.
+    fn choice(
+        &self,
+        from: &Candidate,
+        all: &DMatrix<f64>,
+        start: With,
+    ) -> Option<(Candidate, With)> {
+        let mut best = (from.clone(), start);
         loop {
-            let toggled = from.offered.iter().filter_map(|&bit| {
-                let mut other = best.0.clone();
-                match other.active.binary_search(&bit) {
-                    Ok(at) => drop(other.active.remove(at)),
-                    Err(at) => other.active.insert(at, bit),
-                }
-                if other.active.is_empty() {
+            let toggled = from.offered.iter().filter_map(|&coefficient| {
+                let other = best.0.toggled(coefficient)?;
+                let columns = other.columns_of(all);
+                if columns.iter().any(|v| !v.is_finite()) {
                     return None;
                 }
                 // By the noise so far: by its own it could only be better.
-                let both = beside(&self.model, &unit_columns(&columns(&other)));
+                let both = beside(&self.model, &unit_columns(&columns));
                 let fitted = self.search.variance.fit_at(&both, &best.1.components)?;
                 let score = -fitted.deviance - COEFFICIENT * other.active.len() as f64;
                 Some((other, score))
             });
-            let Some((other, _)) = toggled.max_by(|a, b| a.1.total_cmp(&b.1)) else {
+            let mut toggled: Vec<(Candidate, f64)> = toggled.collect();
+            toggled.sort_by(|a, b| b.1.total_cmp(&a.1));
+            let clear = |c: &Candidate| !c.reads_code() || self.is_clear(&c.columns_of(all));
+            let Some((other, _)) = toggled.into_iter().find(|t| clear(&t.0)) else {
                 return Some(best);
             };
-            let with = self.fit(columns(&other), &best.1.components)?;
+            let with = self.fit(other.columns_of(all), &best.1.components)?;
             if with.score() <= best.1.score() {
                 return Some(best);
             }
             best = (other, with);
         }
+    }
+
+    /// Whether no sum of `columns` is nearly one of the affine columns.
+    ///
+    /// All bits of a code together are the reading, which the scale factor is the coefficient of: a fit that takes it away with nine bits
+    /// leaves a unit that reads nothing, whatever its input, and no residual.
+    fn is_clear(&self, columns: &DMatrix<f64>) -> bool {
+        let variance = &self.search.variance;
+        let Some(whitener) = variance.whitener(&self.null.components) else {
+            return false;
+        };
+        let affine = whitener.whiten(&self.search.basis).qr().q();
+        let own = whitener.whiten(&unit_columns(columns)).qr().q();
+        let cosine = affine.tr_mul(&own).singular_values().max();
+        1.0 - cosine * cosine > CLEAR * CLEAR
     }
 }

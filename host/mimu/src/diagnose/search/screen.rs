@@ -71,7 +71,7 @@ impl Search<'_> {
         let mut seen: Vec<usize> = Vec::new();
         found.retain(|s| {
             let candidate = &self.candidates[s.index];
-            let again = candidate.choices > 1.0
+            let again = candidate.is_listed()
                 && seen
                     .iter()
                     .any(|i| self.candidates[*i].is_variant_of(candidate));

@@ -1,0 +1,77 @@
+//! Whether the calibration file with the effects found errs less on the other recordings of the unit than the file without them.
+//!
+//! Rows of another recording are fitted with biases, and where nothing else is known with a matrix, of their own. What a fit absorbs there
+//! a file does not: an effect of which the affine part is wrong by a hundred times passes the one and not the other.
+
+use super::decision::{Accepted, Decision};
+use crate::calibration::{Calibration, EffectTable};
+use crate::effects::removal::{Removed, remove};
+use crate::fit::Fit;
+use crate::prepared::Prepared;
+use crate::quantity::{Figure, Sensor};
+use crate::readable;
+use crate::verify::verify;
+
+/// Ratio of the errors with the effects and without from which on the file is worse: below it they differ by the noise of the recording.
+const WORSE: f64 = 1.02;
+
+/// What the file with effects is judged by.
+pub(super) struct AsWritten<'a> {
+    pub sensor: Sensor,
+    /// The fit of the first recording without the effects of this sensor.
+    pub before: &'a Fit,
+    /// The other recordings, likewise.
+    pub others: &'a [Prepared],
+    pub calibrate: &'a dyn Fn(Prepared) -> mimu_recording::error::Result<Fit>,
+}
+
+impl AsWritten<'_> {
+    /// Error of the sensor in `recording` by the calibration file of `fit` and `effects`.
+    fn error(
+        &self,
+        recording: &Prepared,
+        fit: &Fit,
+        effects: &[EffectTable],
+    ) -> Option<(Figure, f64)> {
+        let file = Calibration::of(fit, effects, "").ok()?;
+        let judged = verify(recording, &file).ok()?;
+        let sensor = judged.sensors.iter().find(|s| s.sensor == self.sensor)?;
+        Some((sensor.figure, sensor.rms))
+    }
+
+    /// The effect that makes the file worse for another recording, and the reason; `after` is the fit of the first without the effects of
+    /// `decision`.
+    pub fn worst(&self, after: &Fit, decision: &Decision) -> Option<(String, String)> {
+        let lasting: Vec<&Accepted> = decision.accepted.iter().filter(|a| a.of_unit).collect();
+        let tables = |of: &[&Accepted]| -> Vec<EffectTable> {
+            of.iter().map(|a| EffectTable::from(*a)).collect()
+        };
+        let all = tables(&lasting);
+        let worse = self.others.iter().find_map(|recording| {
+            let (figure, before) = self.error(recording, self.before, &[])?;
+            let (_, after) = self.error(recording, after, &all)?;
+            // An error that is not finite is no better.
+            (!(after <= WORSE * before)).then_some((recording, figure, [before, after]))
+        });
+        let (recording, figure, both) = worse?;
+        let without = |k: usize| {
+            let mut rest = lasting.clone();
+            rest.remove(k);
+            let removed: Vec<Removed> = rest.iter().map(|a| Removed::from(*a)).collect();
+            let [gyro, accel] = Sensor::BOTH
+                .map(|s| Some(self.before.sensor(s)?.estimated.triad.inverse));
+            let first = &self.before.prepared;
+            let clean = remove(first, gyro.as_ref(), accel.as_ref(), &removed)?;
+            let fit = (self.calibrate)(clean).ok()?;
+            Some(self.error(recording, &fit, &tables(&rest))?.1)
+        };
+        let each = (0..lasting.len()).map(|k| (k, without(k).unwrap_or(f64::INFINITY)));
+        let (culprit, _) = each.min_by(|a, b| a.1.total_cmp(&b.1))?;
+        let [before, after] = both.map(|rms| readable::error(figure.unit(self.sensor)).write(rms));
+        let why = format!(
+            "the calibration file with it would err more on {}: {before} without effects, {after} with them",
+            recording.place
+        );
+        Some((lasting[culprit].chosen.candidate.id(), why))
+    }
+}
