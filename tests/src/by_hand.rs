@@ -98,7 +98,7 @@ fn counts(model: AffineFile, per_volt: f64) -> AffineFile {
 }
 
 /// A unit of `grade` with `ids`, sizes drawn over a decade around that of data sheets; its affine models are stated.
-fn unit(ids: &[&'static str], grade: Grade, seed: u64) -> RigFile {
+pub(crate) fn unit(ids: &[&'static str], grade: Grade, seed: u64) -> RigFile {
     let mut random = Random::new(seed, "unit");
     let (gyro, accel) = (bench::gyro(&mut random), bench::accel(&mut random));
     let mut file = match grade {
