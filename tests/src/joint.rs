@@ -342,12 +342,10 @@ impl Judged {
 }
 
 impl Case {
-    /// Whether `found` is what the unit has, or what the recordings cannot tell from it.
+    /// Whether `found` is what the unit has, or what the recordings cannot tell from it. The Earth turns.
     pub fn is_right(&self, found: &[String]) -> bool {
-        self.set
-            .effects
-            .iter()
-            .any(|t| found.iter().any(|f| f == t))
+        let is_true = |f: &String| f == "earth_rate" || self.set.effects.iter().any(|t| f == t);
+        found.iter().any(is_true)
     }
 
     /// Whether the file with effects is worse on another session than the file without them.
