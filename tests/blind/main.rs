@@ -1,10 +1,19 @@
 //! `make blind`: units with effects that nobody declares, and what the diagnosis says of them, as tables.
 //!
 //! `blind SEEDS CLEAN [NAME...]`: so many seeds of each effect and pair, so many clean units; names choose among the effects. Every
-//! case is a recording of its own; with names, each is printed. `blind by-hand SEEDS CLEAN [NAME...]`: the same of units in somebody's
-//! hands, so many of each grade. `blind turning SEEDS CLEAN [NAME...]`: the first on a plan that also turns gravity through the unit.
+//! case is a recording of its own; with names, each is printed.
+//!
+//! | | |
+//! |---|---|
+//! | `blind by-hand SEEDS CLEAN [NAME...]` | the same of units in somebody's hands, so many of each grade; then `slow-bias` |
+//! | `blind slow-bias SEEDS [NAME...]` | biases that move with time, with temperature and behind it, so many of each grade |
+//! | `blind turning SEEDS CLEAN [NAME...]` | the first on a plan that also turns gravity through the unit |
+//! | `blind joint SETS [FIRST]` | 2 to 9 sessions of one unit diagnosed together, and their file on another session; from the seed FIRST on |
+//! | `blind joint-warm-up SETS FIRST SESSIONS` | the same of digital units by hand with nothing but a warm-up of the accelerometer |
 
 mod by_hand;
+mod joint;
+mod slow_bias;
 
 use std::collections::BTreeMap;
 
@@ -98,14 +107,30 @@ fn main() {
     let mut args: Vec<String> = std::env::args().skip(1).collect();
     let in_hands = args.first().is_some_and(|a| a == "by-hand");
     let turning = args.first().is_some_and(|a| a == "turning");
-    if in_hands || turning {
+    let joint = args.first().is_some_and(|a| a == "joint");
+    let joint_warm_up = args.first().is_some_and(|a| a == "joint-warm-up");
+    let slow = args.first().is_some_and(|a| a == "slow-bias");
+    if in_hands || turning || slow || joint || joint_warm_up {
         args.remove(0);
     }
     let number = |k: usize, default| args.get(k).and_then(|s| s.parse().ok()).unwrap_or(default);
     let (seeds, clean): (u64, u64) = (number(0, 20), number(1, 200));
+    if joint || joint_warm_up {
+        let sessions = number(2, 3) as usize;
+        return joint::run(
+            number(0, 100),
+            number(1, 0),
+            joint_warm_up.then_some(sessions),
+        );
+    }
     let chosen: Vec<&str> = args.iter().skip(2).map(String::as_str).collect();
     if in_hands {
-        return by_hand::run(seeds, clean, &chosen);
+        by_hand::run(seeds, clean, &chosen);
+        return slow_bias::run(seeds, &chosen);
+    }
+    if slow {
+        let chosen: Vec<&str> = args.iter().skip(1).map(String::as_str).collect();
+        return slow_bias::run(seeds, &chosen);
     }
     let mut kinds: Vec<Vec<&str>> = specs().map(|s| vec![s.id]).collect();
     kinds.extend(PAIRS.iter().map(|p| p.to_vec()));

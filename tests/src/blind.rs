@@ -129,9 +129,10 @@ pub fn is_listed(id: &str) -> bool {
     effects::by_id(id).is_some()
 }
 
-/// Whether the effect `found` is what the bench's `id` does: codes that never come, and converters of each axis, are functions of the code.
+/// Whether the effect `found` is what the bench's `id` does: codes that never come, converters of each axis, and a signed low byte
+/// are functions of the code.
 pub fn is_right(found: &str, id: &str) -> bool {
-    let of_code = ["missing_codes", "converters"]
+    let of_code = ["missing_codes", "converters", "sign_extension"]
         .iter()
         .any(|k| id.ends_with(k));
     let sensor = id.split('_').next().unwrap_or_default();

@@ -98,7 +98,7 @@ fn counts(model: AffineFile, per_volt: f64) -> AffineFile {
 }
 
 /// A unit of `grade` with `ids`, sizes drawn over a decade around that of data sheets; its affine models are stated.
-fn unit(ids: &[&'static str], grade: Grade, seed: u64) -> RigFile {
+pub(crate) fn unit(ids: &[&'static str], grade: Grade, seed: u64) -> RigFile {
     let mut random = Random::new(seed, "unit");
     let (gyro, accel) = (bench::gyro(&mut random), bench::accel(&mut random));
     let mut file = match grade {
@@ -156,7 +156,7 @@ fn flaw(seed: u64) -> FlawsTruth {
 }
 
 /// 26 to 42 poses in 2 to 4 minutes at 100 Hz.
-fn plan(seed: u64) -> String {
+pub(crate) fn plan(seed: u64) -> String {
     let poses = 26 + (Random::new(seed, "poses").uniform() * 17.0) as usize;
     format!(
         "format = \"mimu-plan/1\"\nsample_rate_hz = 100.0\ncarrier = \"hands\"\nlatitude_deg = 48.0\nlead_in_s = 5.0\n\
@@ -201,19 +201,30 @@ fn inside(fit: &Fit, truths: &[SVector<f64, 12>; 2]) -> [[u32; 2]; 2] {
 
 /// Records and diagnoses a unit of `grade` with `ids`.
 pub fn case(ids: &[&'static str], grade: Grade, seed: u64, flawed: bool) -> Case {
-    let plan = plan(seed);
     let mut file = unit(ids, grade, seed);
     if flawed {
         file.flaws = flaw(seed);
     }
-    let with = bench::recorded(&plan, &file, seed);
+    case_of(&file, ids, &plan(seed), grade, seed, flawed)
+}
+
+/// Records the unit `file` with the effects `ids` and diagnoses it.
+pub(crate) fn case_of(
+    file: &RigFile,
+    ids: &[&'static str],
+    plan: &str,
+    grade: Grade,
+    seed: u64,
+    flawed: bool,
+) -> Case {
+    let with = bench::recorded(plan, file, seed);
     let strengths = (0..ids.len()).map(|k| {
         let mut less = file.clone();
         less.effect.remove(k);
-        strength(&with, &bench::recorded(&plan, &less, seed))
+        strength(&with, &bench::recorded(plan, &less, seed))
     });
     let strength = strengths.fold(f64::INFINITY, f64::min);
-    let wander = bench::wander(&plan, &file, seed);
+    let wander = bench::wander(plan, file, seed);
     let models = [&file.unit.gyro_affine, &file.unit.accel_affine];
     let truths = std::array::from_fn(|k| {
         let mut truth = bench::parameters(models[k].as_ref().expect("stated"));

@@ -4,6 +4,8 @@
 //! |------------------------|-------------------------------------------------------------------|
 //! | [`mod@bench`]          | units with known truth on the virtual bench, read as a user's would be |
 //! | [`blind`], [`by_hand`] | units with undeclared effects, on a table and in the hand         |
+//! | [`joint`]              | several sessions of one unit together, and their file on another one |
+//! | [`slow_bias`]          | units by hand whose biases move with time, with temperature, and behind it |
 //! | [`coverage`]           | how often intervals hold the truth, over the whole path of a recording |
 //! | [`recordings`]         | recordings by other people                                        |
 //! | `tests/all/`           | agreement of estimators, intervals, diagnosis, published results  |
@@ -15,4 +17,6 @@ pub mod bench;
 pub mod blind;
 pub mod by_hand;
 pub mod coverage;
+pub mod joint;
 pub mod recordings;
+pub mod slow_bias;

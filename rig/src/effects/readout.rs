@@ -24,6 +24,9 @@ const CONVERTERS: [Parameter; 2] = [
     },
 ];
 
+/// One more than the highest value of the low part of a code: that of a byte.
+const LOW_PART: [Parameter; 1] = [scalar("codes", 256.0)];
+
 pub(super) const SPECS: &[Spec] = &[
     Spec {
         id: "gyro_readout_code",
@@ -63,13 +66,26 @@ pub(super) const SPECS: &[Spec] = &[
         parameters: &CONVERTERS,
         build: |b| converters(b, b.sensors.accel, |pins| &mut pins.accel_v),
     },
+    // A firmware that puts a code together from two bytes and takes the low one for a signed number: from 128 on it counts 256 less.
+    Spec {
+        id: "gyro_sign_extension",
+        about: "the low part of a code is taken for a signed number: a code whose low part is in its upper half is too low by all of it, the power of two nearest to the size (256: a byte)",
+        parameters: &LOW_PART,
+        build: |b| sign_extension(b, b.sensors.gyro, |pins| &mut pins.gyro_v),
+    },
+    Spec {
+        id: "accel_sign_extension",
+        about: "the low part of a code is taken for a signed number: a code whose low part is in its upper half is too low by all of it, the power of two nearest to the size (256: a byte)",
+        parameters: &LOW_PART,
+        build: |b| sign_extension(b, b.sensors.accel, |pins| &mut pins.accel_v),
+    },
     // A short on the converter's data bus. Size: a bit low enough to pass for noise.
     Spec {
         id: "x_code_stuck_bit",
         about: "one bit of every code reads 0: the power of two nearest to the size, codes of 16 bits",
         parameters: &[scalar("lsb", 16.0)],
         build: |b| {
-            let bit = 1_i64 << b.number("lsb").abs().log2().round().clamp(0.0, 15.0) as u32;
+            let bit = power_of_two(b.number("lsb"), 0.0);
             let worth = move |code: i64| if code & bit != 0 { -bit as f64 } else { 0.0 };
             let spans = [Span::new(b, b.sensors.gyro), Span::new(b, b.sensors.accel)];
             read_out(move |_, pins| {
@@ -139,6 +155,25 @@ impl Span {
             *v += true_span / 65536.0 * error(axis, code);
         }
     }
+}
+
+/// The power of two nearest to `size`, from that of `lowest` up, within 16 bits.
+fn power_of_two(size: f64, lowest: f64) -> i64 {
+    1 << size.abs().log2().round().clamp(lowest, 15.0) as u32
+}
+
+fn sign_extension(b: &Build, triad: &TriadTruth, outputs: Outputs) -> Active {
+    // A part of one bit has no half.
+    let codes = power_of_two(b.number("codes"), 1.0);
+    let span = Span::new(b, triad);
+    read_out(move |_, pins| {
+        let reference = pins.converter_reference_v;
+        let worth = |code: i64| match code & (codes - 1) >= codes / 2 {
+            true => -codes as f64,
+            false => 0.0,
+        };
+        span.shift(outputs(pins), reference, worth);
+    })
 }
 
 fn missing(b: &Build, triad: &TriadTruth, outputs: Outputs) -> Active {

@@ -300,3 +300,40 @@ fn each_converter_has_errors_and_codes_of_its_own() {
         }
     }
 }
+
+/// What a firmware makes of a 16-bit code whose low byte it takes for a signed number.
+fn misread(code: i16) -> f64 {
+    let [high, low] = code.to_be_bytes().map(|b| f64::from(b as i8));
+    256.0 * high + low
+}
+
+#[test]
+fn a_signed_low_byte_makes_what_such_a_firmware_makes_of_its_two_bytes() {
+    let digital = "format = \"mimu-rig/1\"\n[unit]\ngyro = \"MPU6050-gyro\"\naccel = \"MPU6050-accel\"\n[unit.gyro_axes]\n\
+                   white_si = [0, 0, 0]\ninstability_si = [0, 0, 0]\nwalk_si = [0, 0, 0]\nbandwidth_hz = [inf, inf, inf]\n";
+    let mut pair = Pair::of(digital, "id = \"gyro_sign_extension\"\ncodes = 256", 1e-3);
+    let axis = pair.truth.unit.gyro.axes[0].clone();
+    for code in (-32_000..32_000).step_by(37) {
+        let rate = (f64::from(code) - axis.null) / axis.sensitivity;
+        let along = motion(0.0, axis.direction.map(|d| d * rate), [0.0; 3]);
+        let (with, without) = pair.pins(&along, 25.0);
+        assert_eq!(without.gyro_v[0].round(), f64::from(code));
+        assert_eq!(with.gyro_v[0].round(), misread(code as i16), "{code}");
+        assert_eq!(with.accel_v, without.accel_v);
+    }
+}
+
+#[test]
+fn the_low_byte_of_a_converter_behind_a_divider_is_misread_the_same_way() {
+    let effect = "id = \"gyro_sign_extension\"\ncodes = 256";
+    for (code, expected) in [
+        (32_767.0, -256.0),
+        (32_768.0, 0.0),
+        (32_895.0, 0.0),
+        (32_896.0, -256.0),
+    ] {
+        for found in by_code(effect, code) {
+            assert!((found - expected).abs() < 1e-6, "{code}: {found}");
+        }
+    }
+}

@@ -1,0 +1,418 @@
+//! Several sessions of one unit diagnosed together, and what the file that comes of it does to another session.
+//!
+//! The judge knows the true motion from the bench and shares nothing with the diagnosis: the file is written and read as the command does it,
+//! another session is compensated by it sample by sample (`mimu apply`), and rate and force are compared with the true ones.
+
+use mimu::apply::apply;
+use mimu::calibration::{Calibration, EffectTable};
+use mimu::diagnose::{Recordings, diagnose};
+use mimu::fit::fit;
+use mimu::prepared::Prepared;
+use mimu::stillness::STILL_FACTOR;
+use mimu_recording::error::Result;
+use mimu_recording::{Recording, SampleFormat};
+use mimu_rig::located::Source;
+use mimu_rig::plan::Plan;
+use mimu_rig::random::Random;
+use mimu_rig::record::{Output, samples, write};
+use mimu_rig::rig_file::{RigFile, RigTruth};
+use nalgebra::{Matrix3, Vector3};
+
+use crate::bench;
+use crate::blind::{options, reported};
+use crate::by_hand::{Grade, unit};
+
+/// Time of every file.
+const NOW: &str = "2026-01-01T00:00:00Z";
+/// Bias of a session beside that of the unit, standard deviation: deg/s and mg.
+const TURN_ON: [f64; 2] = [0.2, 3.0];
+/// A file is worse than another if its error is by more than this factor larger,
+const FACTOR: f64 = 1.05;
+/// and if what it has more, as a root of squares, is more than this share of what noise alone leaves in the same session.
+const SHARE_OF_NOISE: f64 = 0.5;
+
+/// One set of sessions.
+#[derive(Debug, Clone)]
+pub struct Set {
+    /// Effects of the unit.
+    pub effects: Vec<&'static str>,
+    /// Its sensors.
+    pub grade: Grade,
+    /// Sessions that are diagnosed together.
+    pub sessions: usize,
+    /// On a table, or by hand.
+    pub on_table: bool,
+    /// Share of the sessions that begin as the power comes. The others begin an hour later.
+    pub cold: f64,
+    seed: u64,
+}
+
+/// Errors of a file on another session: gyro (deg/s over dwells on a table, degrees after a turn by hand), accelerometer (m/s² over dwells).
+pub type Errors = [f64; 2];
+
+/// How a file without effects and one with them do on another session.
+#[derive(Debug, Clone, Copy)]
+pub struct Judged {
+    /// What noise alone leaves, the true model being known.
+    pub noise: Errors,
+    /// Of the file without effects, and of that with them.
+    pub of_files: [Errors; 2],
+}
+
+/// What became of a set.
+#[derive(Debug, Clone)]
+pub struct Case {
+    /// The set.
+    pub set: Set,
+    /// Effects that were accepted, each with those that it says the recordings do not tell from it.
+    pub found: Vec<Vec<String>>,
+    /// Verdict, or why the set was refused.
+    pub verdict: String,
+    /// A session with the biases of the first of the set, the files as they are written.
+    pub as_written: Option<Judged>,
+    /// A session with biases of its own, a constant error of each axis taken out.
+    pub without_offset: Option<Judged>,
+    /// The same session, the files as they are written: the change of the biases is in both.
+    pub own_biases: Option<Judged>,
+}
+
+impl Set {
+    /// That of a seed: effects and number of sessions in turn, all else drawn.
+    pub fn of(seed: u64) -> Self {
+        let mut random = Random::new(seed, "joint set");
+        let mut one_of = |all: &[&'static str]| all[(random.uniform() * all.len() as f64) as usize];
+        let effects = match seed % 6 {
+            0 => Vec::new(),
+            1 => vec!["accel_warm_up"],
+            2 => vec!["gyro_warm_up", "accel_warm_up"],
+            3 => vec!["gyro_g_sensitivity"],
+            4 => vec![one_of(&[
+                "gyro_scale_quadratic",
+                "gyro_scale_cubic",
+                "accel_scale_quadratic",
+                "accel_scale_cubic",
+            ])],
+            _ => vec![one_of(&["gyro_bias_drift", "accel_bias_drift"])],
+        };
+        Self {
+            effects,
+            grade: match random.uniform() < 0.5 {
+                true => Grade::Analog,
+                false => Grade::Consumer,
+            },
+            // 6 and 8 have a common factor: every kind of effects meets every number.
+            sessions: 2 + ((seed / 6 + seed) % 8) as usize,
+            on_table: random.uniform() < 1.0 / 3.0,
+            cold: [0.0, 0.5, 1.0][(random.uniform() * 3.0) as usize],
+            seed,
+        }
+    }
+
+    /// So many sessions by hand of a digital unit with nothing but a warm-up of the accelerometer, each recorded from the power on.
+    pub fn of_warm_up(sessions: usize, seed: u64) -> Self {
+        Self {
+            effects: vec!["accel_warm_up"],
+            grade: Grade::Consumer,
+            sessions,
+            on_table: false,
+            cold: 1.0,
+            seed,
+        }
+    }
+
+    fn plan(&self, session: u64) -> String {
+        let seed = self.session_seed(session);
+        let plan = match self.on_table {
+            true => bench::table_plan(Some(seed)),
+            false => {
+                let poses = 26 + (Random::new(seed, "poses").uniform() * 17.0) as usize;
+                bench::hand_plan(poses)
+            }
+        };
+        format!("latitude_deg = 48.0\nlead_in_s = 5.0\n{plan}")
+    }
+
+    fn session_seed(&self, session: u64) -> u64 {
+        1000 * self.seed + session
+    }
+
+    /// The unit in a session, with the biases of the session `biases`.
+    fn unit(&self, session: u64, biases: u64) -> RigFile {
+        let mut file = unit(&self.effects, self.grade, self.seed);
+        let mut random = Random::new(self.session_seed(biases), "turn-on");
+        let si = [TURN_ON[0].to_radians(), TURN_ON[1] * 9.80665e-3];
+        let models = [&mut file.unit.gyro_affine, &mut file.unit.accel_affine];
+        for (model, si) in models.into_iter().zip(si) {
+            let model = model.as_mut().expect("stated");
+            for (bias, row) in model.bias.iter_mut().zip(&model.matrix) {
+                *bias += si * Vector3::from(*row).norm() * random.normal();
+            }
+        }
+        let cold = Random::new(self.session_seed(session), "cold").uniform() < self.cold;
+        file.thermal.on_before_s = Some(if cold { 0.0 } else { 3600.0 });
+        file
+    }
+
+    /// Records a session, which says when the power came.
+    fn recorded(&self, session: u64, biases: u64) -> Session {
+        let file = self.unit(session, biases);
+        let seed = self.session_seed(session);
+        let text = self.plan(session);
+        let plan = Plan::parse(Source::new("plan", &text)).expect("a plan");
+        let truth = RigTruth::resolve(&file, seed).expect("a rig");
+        let folder = tempfile::tempdir().expect("a folder");
+        let place = folder.path().join("recording");
+        let output = Output::new(&place, &plan).expect("a name");
+        write(&plan, &truth, seed, &output).expect("written");
+        let manifest = place.join("recording.toml");
+        let mut text = std::fs::read_to_string(&manifest).expect("written");
+        let on_before_s = truth.unit.thermal.on_before_s;
+        text += &format!("power_on_s = {:?}\n", -on_before_s);
+        std::fs::write(&manifest, text).expect("writable");
+        Session {
+            recording: Recording::open(&place).expect("a recording"),
+            folder,
+            plan,
+            file,
+            seed,
+        }
+    }
+}
+
+/// A recording with what is true of it.
+struct Session {
+    folder: tempfile::TempDir,
+    recording: Recording,
+    plan: Plan,
+    file: RigFile,
+    seed: u64,
+}
+
+/// Error of rate (rad/s) and force (m/s²) at a sample, and the dwell that it belongs to.
+type Sample = ([Vector3<f64>; 2], Option<u32>);
+
+impl Session {
+    fn prepared(&self) -> Prepared {
+        Prepared::read(&self.recording, STILL_FACTOR, |_| ()).expect("readable")
+    }
+
+    /// What `calibration` errs by, sample by sample.
+    fn errors(&self, calibration: &Calibration) -> Result<Vec<Sample>> {
+        let out = self.folder.path().join("compensated");
+        apply(
+            &self.recording,
+            calibration,
+            &out,
+            SampleFormat::Parquet,
+            true,
+            |_| (),
+        )?;
+        let mut readings: Vec<[Vector3<f64>; 2]> = Vec::new();
+        Recording::open(&out)?.for_each_batch(
+            |_| (),
+            |batch| {
+                readings.extend(
+                    (0..batch.len()).map(|k| {
+                        [0, 3].map(|from| Vector3::from_fn(|i, _| batch.raw[from + i][k]))
+                    }),
+                );
+                Ok(())
+            },
+        )?;
+        let truth = RigTruth::resolve(&self.file, self.seed).expect("a rig");
+        let run = samples(&self.plan, &truth, self.seed).expect("a run");
+        Ok(run
+            .zip(readings)
+            .map(|(row, [rate, force])| {
+                let motion = row.instant.motion;
+                let errors = [
+                    rate - Vector3::from(motion.rate),
+                    force - Vector3::from(motion.force),
+                ];
+                (errors, row.instant.step)
+            })
+            .collect())
+    }
+
+    /// What noise alone makes of a perfect calibration of a unit without effects.
+    fn noise(&self) -> Vec<Sample> {
+        let mut file = self.file.clone();
+        file.effect.clear();
+        let truth = RigTruth::resolve(&file, self.seed).expect("a rig");
+        let models = [&file.unit.gyro_affine, &file.unit.accel_affine].map(|model| {
+            let model = model.as_ref().expect("stated");
+            let matrix = Matrix3::from_fn(|i, j| model.matrix[i][j]);
+            let inverse = matrix.try_inverse().expect("regular");
+            (inverse, Vector3::from(model.bias))
+        });
+        let run = samples(&self.plan, &truth, self.seed).expect("a run");
+        run.map(|row| {
+            let motion = row.instant.motion;
+            let of = |k: usize, raw: [f64; 3], input: [f64; 3]| {
+                let (inverse, bias) = models[k];
+                inverse * (Vector3::from(raw) - bias) - Vector3::from(input)
+            };
+            let errors = [
+                of(0, row.readings.gyro, motion.rate),
+                of(1, row.readings.accel, motion.force),
+            ];
+            (errors, row.instant.step)
+        })
+        .collect()
+    }
+
+    /// Root mean squares of the errors, as they are and without a constant error of each axis.
+    fn rms(&self, samples: &[Sample]) -> [Errors; 2] {
+        let on_table = matches!(self.plan.carrier, mimu_rig::plan::CarriedBy::Table);
+        // Sum and count of each dwell and of each turn between two.
+        let mut segments: Vec<(Option<u32>, [Vector3<f64>; 2], f64)> = Vec::new();
+        for (errors, step) in samples {
+            match segments.last_mut() {
+                Some((of, sums, count)) if of == step => {
+                    (0..2).for_each(|k| sums[k] += errors[k]);
+                    *count += 1.0;
+                }
+                _ => segments.push((*step, *errors, 1.0)),
+            }
+        }
+        let dwells: Vec<[Vector3<f64>; 2]> = segments
+            .iter()
+            .filter(|s| s.0.is_some())
+            .map(|(_, sums, count)| sums.map(|s| s / *count))
+            .collect();
+        // The lead-in and the end are no turns.
+        let first = segments.iter().position(|s| s.0.is_some()).unwrap_or(0);
+        let last = segments.iter().rposition(|s| s.0.is_some()).unwrap_or(0);
+        let turns: Vec<(Vector3<f64>, f64)> = segments[first..last]
+            .iter()
+            .filter(|s| s.0.is_none())
+            .map(|(_, sums, count)| {
+                let period_s = 1.0 / self.plan.sample_rate_hz;
+                (sums[0].map(f64::to_degrees) * period_s, count * period_s)
+            })
+            .collect();
+        let mean =
+            |k: usize| dwells.iter().map(|d| d[k]).sum::<Vector3<f64>>() / dwells.len() as f64;
+        let rms = |errors: Vec<Vector3<f64>>| {
+            let sum: f64 = errors.iter().map(Vector3::norm_squared).sum();
+            (sum / (3.0 * errors.len() as f64)).sqrt()
+        };
+        [0.0, 1.0].map(|out| {
+            let offset = [0, 1].map(|k| mean(k) * out);
+            let gyro = match on_table {
+                true => rms(dwells
+                    .iter()
+                    .map(|d| (d[0] - offset[0]).map(f64::to_degrees))
+                    .collect()),
+                false => rms(turns
+                    .iter()
+                    .map(|(angle, s)| angle - offset[0].map(f64::to_degrees) * *s)
+                    .collect()),
+            };
+            [gyro, rms(dwells.iter().map(|d| d[1] - offset[1]).collect())]
+        })
+    }
+
+    /// Errors of a file without effects and of one with them: as they are written, and without a constant error of each axis.
+    fn judge(&self, files: &[Calibration; 2]) -> Result<[Judged; 2]> {
+        let noise = self.rms(&self.noise());
+        let without = self.rms(&self.errors(&files[0])?);
+        let with = self.rms(&self.errors(&files[1])?);
+        Ok([0, 1].map(|k| Judged {
+            noise: noise[k],
+            of_files: [without[k], with[k]],
+        }))
+    }
+}
+
+impl Judged {
+    /// Error of the file with effects over that of the file without them.
+    pub fn ratio(&self) -> Errors {
+        [0, 1].map(|k| self.of_files[1][k] / self.of_files[0][k])
+    }
+
+    /// Of which sensors the file with effects is worse, by more than noise.
+    pub fn is_worse(&self) -> [bool; 2] {
+        [0, 1].map(|k| {
+            let [without, with] = self.of_files.map(|e| e[k]);
+            let more = with * with - without * without;
+            !(with <= FACTOR * without || more <= (SHARE_OF_NOISE * self.noise[k]).powi(2))
+        })
+    }
+}
+
+impl Case {
+    /// Whether `found` is what the unit has, or what the recordings cannot tell from it. The Earth turns.
+    pub fn is_right(&self, found: &[String]) -> bool {
+        let is_true = |f: &String| f == "earth_rate" || self.set.effects.iter().any(|t| f == t);
+        found.iter().any(is_true)
+    }
+
+    /// Whether the file with effects is worse on another session than the file without them.
+    pub fn is_worse(&self) -> bool {
+        let judged = [&self.as_written, &self.without_offset];
+        judged
+            .into_iter()
+            .flatten()
+            .any(|j| j.is_worse().contains(&true))
+    }
+}
+
+/// A file, as a command writes it and another one reads it.
+fn written(made: &Calibration) -> Result<Calibration> {
+    Calibration::parse(&made.to_toml(), "cal.toml")
+}
+
+/// Records a set, diagnoses it, and judges the file on another session.
+pub fn case(set: &Set) -> Case {
+    let mut case = Case {
+        set: set.clone(),
+        found: Vec::new(),
+        verdict: String::new(),
+        as_written: None,
+        without_offset: None,
+        own_biases: None,
+    };
+    if let Err(refusal) = judge(&mut case) {
+        case.verdict = format!("refused: {refusal}");
+    }
+    case
+}
+
+fn judge(case: &mut Case) -> Result<()> {
+    let set = case.set.clone();
+    let sessions = 0..set.sessions as u64;
+    let mut all: Vec<Prepared> = sessions.map(|k| set.recorded(k, k).prepared()).collect();
+    let first = all.remove(0);
+    let without = written(&Calibration::of(&fit(first.clone(), options())?, &[], NOW)?)?;
+    let recordings = Recordings {
+        first,
+        more: all,
+        second: None,
+        given: None,
+        accept: Vec::new(),
+    };
+    let diagnosis = reported(diagnose(recordings, options())?);
+    case.verdict = diagnosis.verdict.name().into();
+    let accepted = diagnosis.sensors.iter().flat_map(|s| &s.decision.accepted);
+    case.found = accepted
+        .clone()
+        .map(|a| {
+            let alike = a.chosen.alternatives.iter().map(|(id, _)| id.clone());
+            std::iter::once(a.chosen.candidate.id())
+                .chain(alike)
+                .collect()
+        })
+        .collect();
+    let mut effects: Vec<EffectTable> = Vec::new();
+    for table in accepted.filter(|a| a.of_unit).map(EffectTable::from) {
+        table.join(&mut effects).expect("each is there once");
+    }
+    let with = written(&Calibration::of(&diagnosis.after, &effects, NOW)?)?;
+    let files = [without, with];
+    let judge = set.sessions as u64;
+    case.as_written = Some(set.recorded(judge, 0).judge(&files)?[0]);
+    let [own, without_offset] = set.recorded(judge, judge).judge(&files)?;
+    (case.own_biases, case.without_offset) = (Some(own), Some(without_offset));
+    Ok(())
+}
