@@ -26,10 +26,10 @@ impl Candidate {
     /// The candidates that it is tried as. The search goes on from the best of these, and adds or drops [offered](Self::offered)
     /// coefficients.
     ///
-    /// Of the bits of a code each by itself, and all from the first down to each. Of other effects the coefficients that are `excited`, and
+    /// Of the bits of a code each by itself, and all from the first down to each. Of other effects the coefficients that are [excited](Self::excited), and
     /// all that the rows can tell; both with the coefficients that are specific to the recording, and without. A thermal effect is tried
     /// with and without the thermometer's self-heating.
-    pub fn variants(mut self, rows: &Rows, excited: &[usize]) -> Vec<Self> {
+    pub fn variants(mut self, rows: &Rows) -> Vec<Self> {
         self.offered.clone_from(&self.active);
         let with = |one: &Self, active: Vec<usize>| Self {
             active,
@@ -43,8 +43,8 @@ impl Candidate {
         }
         self.offered.extend(self.of_recording());
         let mut all = vec![self.clone()];
-        if !excited.is_empty() && excited.len() < self.active.len() {
-            all.push(with(&self, excited.to_vec()));
+        if !self.excited.is_empty() && self.excited.len() < self.active.len() {
+            all.push(with(&self, self.excited.clone()));
         }
         for k in 0..all.len() {
             let mut whole = all[k].clone();

@@ -244,6 +244,7 @@ pub fn decide(
         }
         (kept, with) = (more.chosen, more.fit);
     }
+    search.complete(&mut kept, &mut with);
     nonlinear::refine(&search, &mut kept, &mut with);
     others_in_time(&search, &mut kept, &with);
     let one_at_these_inputs = together(&search, &mut kept, &with);

@@ -250,6 +250,25 @@ impl<'a> Search<'a> {
         self.by_dwell.conditions_without(&left)
     }
 
+    /// Adds the [siblings](Candidate::siblings) of the coefficients of each chosen effect, where the rows determine them.
+    pub fn complete(&self, chosen: &mut [Chosen], now: &mut Fitted) {
+        for k in 0..chosen.len() {
+            let before = chosen[k].clone();
+            let more = before.candidate.siblings();
+            if before.candidate.reads_code() || more.is_empty() {
+                continue;
+            }
+            let one = &mut chosen[k];
+            one.candidate.active.extend(more);
+            one.candidate.active.sort_unstable();
+            one.columns = one.candidate.columns(self.rows, one.parameter);
+            match self.fit(chosen) {
+                Some(fit) => *now = fit,
+                None => chosen[k] = before,
+            }
+        }
+    }
+
     /// Columns of the affine parameters and of the chosen.
     pub fn model(&self, chosen: &[Chosen]) -> DMatrix<f64> {
         chosen
@@ -399,6 +418,8 @@ impl<'a> Search<'a> {
         may: impl Fn(&Candidate) -> bool,
     ) -> Option<Found> {
         let mut now = self.fit(&chosen)?;
+        let given = chosen.len();
+        let mut exchanges = 0;
         // What others have made superfluous does not come back: two that make each other superfluous would take turns for ever.
         let mut gone: Vec<String> = Vec::new();
         loop {
@@ -432,7 +453,14 @@ impl<'a> Search<'a> {
                 (Some(a), Some(b)) if score(b) > score(a) + PREFERENCE => b,
                 (Some(a), _) => a,
                 (None, Some(b)) => b,
-                (None, None) => break,
+                (None, None) => {
+                    let more = exchanges < EXCHANGES;
+                    if more && self.exchange(&mut chosen, &mut now, given, &may)? {
+                        exchanges += 1;
+                        continue;
+                    }
+                    break;
+                }
             };
             let mut best = best.clone();
             best.alternatives = finalists
@@ -459,6 +487,50 @@ impl<'a> Search<'a> {
             fit: now,
             superfluous: gone,
         })
+    }
+
+    /// Puts a named effect in the place of one of the chosen, from the `first` on, where that makes the score of the whole better; says
+    /// whether it did.
+    ///
+    /// One after the other, the first effect takes what belongs to others: a bias over temperature that lags was a bias, a warm-up and a
+    /// drift, and the lag was not significant beside them.
+    fn exchange(
+        &self,
+        chosen: &mut Vec<Chosen>,
+        now: &mut Fitted,
+        first: usize,
+        may: &impl Fn(&Candidate) -> bool,
+    ) -> Option<bool> {
+        let mut best: Option<(f64, usize, Chosen)> = None;
+        for k in first..chosen.len() {
+            let mut rest = chosen.clone();
+            let mut one = rest.remove(k);
+            let null = self.fit(&rest)?;
+            one.drop = (null.deviance - now.deviance).max(0.0);
+            let rivals = self.others(&rest, &null).into_iter();
+            let rivals = rivals.filter(|r| r.p < FALSE_LISTED && may(&r.candidate));
+            let rival = rivals
+                .filter(|r| !r.candidate.is_variant_of(&one.candidate))
+                .max_by(|a, b| score(a).total_cmp(&score(b)));
+            let Some(mut rival) = rival else { continue };
+            let gain = score(&rival) - score(&one);
+            if gain > EXCHANGED && best.as_ref().is_none_or(|b| gain > b.0) {
+                rival.alternatives = vec![(one.candidate.id(), gain)];
+                best = Some((gain, k, rival));
+            }
+        }
+        let Some((_, k, rival)) = best else {
+            return Some(false);
+        };
+        let mut there = chosen.clone();
+        there[k] = rival;
+        let Some(fit) = self.fit(&there) else {
+            return Some(false);
+        };
+        (*chosen, *now) = (there, fit);
+        self.read_again(chosen, now);
+        self.again(chosen, now)?;
+        Some(true)
     }
 
     /// Tests each of the chosen again beside the others: what they have made superfluous goes.
@@ -516,6 +588,10 @@ pub(super) const SEPARATE: f64 = 1e-3;
 
 /// What a coefficient costs.
 pub(super) const COEFFICIENT: f64 = 4.0;
+
+/// Score by which an effect has to be better to take the place of one that was chosen before it, and how often at most.
+const EXCHANGED: f64 = 1.0;
+const EXCHANGES: usize = 4;
 
 /// Score by which a term found from the data has to be better than an effect with a name.
 const PREFERENCE: f64 = 12.0;

@@ -42,6 +42,8 @@ pub struct Candidate {
     pub codes: Codes,
     /// As in [`Followed`].
     pub without_self_heating: bool,
+    /// Coefficients that would be seen at the size of data sheets.
+    pub excited: Vec<usize>,
     /// Coefficients that the experiment shows, but not beside the active ones and the affine parameters.
     pub inseparable: Vec<usize>,
     /// How many choices it is the best of.
@@ -129,6 +131,7 @@ impl Candidate {
             active,
             codes: [None; 3],
             without_self_heating: false,
+            excited: Vec::new(),
             inseparable: Vec::new(),
             choices: 1.0,
             offered: Vec::new(),
@@ -172,6 +175,19 @@ impl Candidate {
         };
         let mut all = e.coefficients.iter();
         all.position(|other| other.axis == own.axis && base(other))
+    }
+
+    /// The excited coefficients that are like one of the active ones, on another axis. What moves one axis moves the others too: their
+    /// coefficients are found with it however small they are, as the intervals of the calibration would be too narrow without.
+    pub(crate) fn siblings(&self) -> Vec<usize> {
+        let Kind::Effect(e) = &self.kind else {
+            return Vec::new();
+        };
+        let like = |a: &usize, b: &usize| e.coefficients[*a].typical == e.coefficients[*b].typical;
+        let new = self.excited.iter().filter(|k| !self.active.contains(k));
+        new.filter(|k| self.active.iter().any(|a| like(a, k)))
+            .copied()
+            .collect()
     }
 
     /// By how much coefficients of `values` beyond the size of data sheets speak against it, in units of the deviance: a size is believed

@@ -61,8 +61,8 @@ pub(super) fn candidates(
             separate(&mut candidate, &(&white - &q * q.tr_mul(&white)));
         }
         let typical = |k: &usize| best[*k] * effect.coefficients[*k].typical > EXCITED;
-        let excited: Vec<usize> = candidate.active.iter().copied().filter(typical).collect();
-        if excited.is_empty() {
+        candidate.excited = candidate.active.iter().copied().filter(typical).collect();
+        if candidate.excited.is_empty() {
             not_seen();
         }
         if !candidate.active.is_empty() {
@@ -71,7 +71,7 @@ pub(super) fn candidates(
                 Some((coefficient.axis?, coefficient.regressor))
             });
             listed.extend(of_axis);
-            all.extend(candidate.variants(rows, &excited));
+            all.extend(candidate.variants(rows));
         }
     }
     let terms: Vec<Vec<Candidate>> = Product::terms()
