@@ -17,6 +17,9 @@ const FIGURES: &str = "The figures before are not quite those of `mimu fit`: res
 pub fn diagnosis_text(d: &DiagnosisResult, all: bool) -> String {
     let mut out = String::new();
     let _ = writeln!(out, "{}: {}: {}", d.device, d.verdict.name(), meaning(d));
+    for u in &d.untestable {
+        wrap(&mut out, &format!("  {}: ", u.sensor), &u.reason);
+    }
     for (name, s) in d.sensors.named() {
         let _ = writeln!(out);
         sensor(&mut out, d, name, s, all);
