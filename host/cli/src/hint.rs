@@ -16,6 +16,7 @@ fn flag(argument: Argument) -> Option<&'static str> {
     Some(match argument {
         Argument::Columns => "--columns",
         Argument::SampleRate => "--rate-hz",
+        Argument::TimeUnit => "--time-unit",
         Argument::Scale => "--scale",
         Argument::Reference => "--reference",
         Argument::Device => "--device",

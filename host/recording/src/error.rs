@@ -39,6 +39,8 @@ pub enum Argument {
     Columns,
     /// Samples a second.
     SampleRate,
+    /// Unit of time stamps.
+    TimeUnit,
     /// Factor of a column.
     Scale,
     /// What is known of the true input.

@@ -4,12 +4,12 @@ use std::path::{Path, PathBuf};
 
 use super::SkippedLines;
 use super::assignment::{ColumnList, Role, Scale};
-use super::counter::Counter;
+use super::counter::{Counter, StampCounter};
 use super::parquet_table::ParquetTable;
 use super::ros::{ImuTopic, is_bag};
 use super::step_labels::StepLabels;
 use super::text_table::{Cells, TextTable};
-use super::time::{Clock, Stamp, Times};
+use super::time::{Clock, Decimal, Stamp, Times};
 use crate::cell::{is_reading, no_reading, no_time};
 use crate::columns::Column;
 use crate::error::{Argument, Error, Result};
@@ -49,6 +49,8 @@ pub(super) struct HowToRead<'a> {
     pub topic: Option<&'a str>,
     /// Sample rate, where it was given or is known.
     pub rate_hz: Option<f64>,
+    /// Unit of the time stamps, where it was given.
+    pub time_unit: Option<Decimal>,
 }
 
 /// A foreign file, positioned at its next row.
@@ -59,6 +61,7 @@ pub(super) struct ForeignFile {
     cells: Cells,
     source: TimeSource,
     counter: Counter,
+    stamps: StampCounter,
     /// The time behind its stamps, once that is known.
     clock: Option<Clock>,
     before: Row,
@@ -153,6 +156,7 @@ impl ForeignFile {
             cells: Cells::default(),
             source,
             counter: Counter::default(),
+            stamps: StampCounter::default(),
             clock: None,
             before: Row::default(),
             labels: StepLabels::default(),
@@ -208,6 +212,11 @@ impl ForeignFile {
         self.counter.wraps
     }
 
+    /// How often its time stamps have begun again at 0, so far.
+    pub fn stamp_wraps(&self) -> u64 {
+        self.stamps.wraps
+    }
+
     /// Share of the file that has been read.
     pub fn progress(&self) -> f64 {
         match &self.table {
@@ -252,7 +261,7 @@ impl ForeignFile {
             return Ok(false);
         };
         row.number = number;
-        row.stamp = self.cells.stamp;
+        row.stamp = self.stamps.next(self.cells.stamp);
         row.t_s = match self.source {
             TimeSource::Stamp => 0.0,
             TimeSource::Sample(cell, rate) => self.counter.next(self.cells.numbers[cell]) / rate,

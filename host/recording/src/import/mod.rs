@@ -184,14 +184,15 @@ impl Import {
         let mut warnings = options.preset_warnings.clone();
         let mut first = ForeignFile::open(&options.files[0], &options.how(0))?;
         let mut time = Vec::new();
-        let mut origin_s = None;
+        let mut first_times: Option<Times> = None;
         let rate_hz = match first.has_time() {
             true => {
-                let times = first_pass::times(&options.files[0], &options.how(0), None)?;
+                let how = options.how(0);
+                let times = first_pass::times(&options.files[0], &how, options.rate_hz, None)?;
                 let rate_hz = times.summary.rate_hz;
                 warnings.extend(options.rate_hz.and_then(|given| other_rate(&times, given)));
-                origin_s = Some(times.origin_s());
                 time.push(times.summary.clone());
+                first_times = Some(times.clone());
                 first = first.with_times(times);
                 rate_hz
             }
@@ -215,7 +216,7 @@ impl Import {
             let mut period_s = 1.0 / rate_hz;
             if file.has_time() {
                 // A sensor of its own, with a rate and delays of its own; the instants are those of one clock.
-                let times = first_pass::times(path, &how, origin_s)?;
+                let times = first_pass::times(path, &how, options.rate_hz, first_times.as_ref())?;
                 period_s = times.period_s();
                 time.push(times.summary.clone());
                 file = file.with_times(times);

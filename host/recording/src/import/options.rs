@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use super::assignment::{ColumnList, Scale};
 use super::foreign::HowToRead;
 use super::preset::{Chosen, PresetUse};
+use super::time::Decimal;
 use crate::manifest::{RawUnit, Reference};
 use crate::separator::Separator;
 use crate::writer::SampleFormat;
@@ -18,8 +19,10 @@ pub struct ImportOptions {
     pub columns: Vec<ColumnList>,
     /// Separator of text files; found out where it is `None`.
     pub separator: Option<Separator>,
-    /// Sample rate in Hz; without it, the inverse of the median time step of the first file.
+    /// Sample rate in Hz: of files without time stamps the rate, of others what decides where their stamps can be read in two ways.
     pub rate_hz: Option<f64>,
+    /// Unit of the time stamps; found out where it is `None`.
+    pub time_unit: Option<Decimal>,
     /// Local gravity in m/s².
     pub gravity_mps2: f64,
     /// Unit of the raw columns, after scaling.
@@ -61,6 +64,7 @@ impl ImportOptions {
             columns: Vec::new(),
             separator: None,
             rate_hz: None,
+            time_unit: None,
             gravity_mps2,
             raw_unit,
             reference,
@@ -114,6 +118,9 @@ impl ImportOptions {
         if let Some(rate) = self.rate_hz {
             option("--rate-hz", rate.to_string());
         }
+        if let Some(unit) = self.time_unit {
+            option("--time-unit", unit.symbol().to_owned());
+        }
         option("--gravity", self.gravity_mps2.to_string());
         option("--raw-unit", self.raw_unit.to_string());
         option("--reference", self.reference.to_string());
@@ -142,6 +149,7 @@ impl ImportOptions {
             scales: &self.scales,
             topic: self.topic.as_deref(),
             rate_hz: self.rate_hz,
+            time_unit: self.time_unit,
         }
     }
 }
