@@ -18,6 +18,7 @@ fn flag(argument: Argument) -> Option<&'static str> {
         Argument::SampleRate => "--rate-hz",
         Argument::TimeUnit => "--time-unit",
         Argument::Scale => "--scale",
+        Argument::Offset => "--offset",
         Argument::Reference => "--reference",
         Argument::Device => "--device",
         Argument::Steps => "--steps",

@@ -43,6 +43,8 @@ pub enum Argument {
     TimeUnit,
     /// Factor of a column.
     Scale,
+    /// What is added to a column.
+    Offset,
     /// What is known of the true input.
     Reference,
     /// Name of the unit.

@@ -36,14 +36,18 @@ pub(super) struct StampCounter {
 }
 
 impl StampCounter {
+    /// Whether there was a stamp that is later than 0.
+    pub fn has_begun(&self) -> bool {
+        self.last.is_some_and(|last| last > 0)
+    }
+
     /// The stamp counted on; `stamp` is that of the next row.
     pub fn next(&mut self, stamp: Stamp) -> Stamp {
         let whole = stamp.whole();
         let last = self.last.replace(whole).unwrap_or(whole);
         let step = |size: i64| whole + size - last;
-        let wrapped = |size: &i64| {
-            last < *size && (1..=NEAR_STEPS * self.step).contains(&step(*size))
-        };
+        let wrapped =
+            |size: &i64| last < *size && (1..=NEAR_STEPS * self.step).contains(&step(*size));
         if whole < last
             && let Some(size) = STAMP_SIZES.into_iter().find(wrapped)
         {

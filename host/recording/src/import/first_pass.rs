@@ -50,6 +50,8 @@ fn read(path: &Path, how: &HowToRead<'_>) -> Result<Stamps> {
         std::mem::swap(&mut row, &mut before);
     }
     stamps.wraps = file.stamp_wraps();
+    // Before anything is said of their times: rows that were left out have none.
+    file.seen.check(&path.display().to_string())?;
     Ok(stamps)
 }
 

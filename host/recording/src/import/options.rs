@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::assignment::{ColumnList, Scale};
+use super::assignment::{ColumnList, Offset, Scale};
 use super::foreign::HowToRead;
 use super::preset::{Chosen, PresetUse};
 use super::time::Decimal;
@@ -31,6 +31,8 @@ pub struct ImportOptions {
     pub reference: Reference,
     /// Factors for columns; several for the same column multiply.
     pub scales: Vec<Scale>,
+    /// What is added to columns after their factors; several for the same column add up.
+    pub offsets: Vec<Offset>,
     /// Topic of bags; without it, the only one with messages of an inertial unit.
     pub topic: Option<String>,
     /// Name of the unit; without it, the name of the recording.
@@ -69,6 +71,7 @@ impl ImportOptions {
             raw_unit,
             reference,
             scales: Vec::new(),
+            offsets: Vec::new(),
             topic: None,
             device: None,
             latitude_deg: None,
@@ -127,6 +130,9 @@ impl ImportOptions {
         for scale in &self.scales {
             option("--scale", scale.to_string());
         }
+        for offset in &self.offsets {
+            option("--offset", offset.to_string());
+        }
         if let Some(topic) = &self.topic {
             option("--topic", topic.clone());
         }
@@ -147,6 +153,7 @@ impl ImportOptions {
             list: self.columns.get(file),
             separator: self.separator,
             scales: &self.scales,
+            offsets: &self.offsets,
             topic: self.topic.as_deref(),
             rate_hz: self.rate_hz,
             time_unit: self.time_unit,

@@ -112,9 +112,9 @@ impl Times {
             (Some(factor), _) => Unit::of_factor(factor),
             // The stamps of both are made by one clock.
             (None, Some(first)) if first.overlaps(&seen) => first.unit,
-            (None, _) => Unit::Decimal(
-                Unit::recognise(&seen).map_err(|both| either(path, &seen, both))?,
-            ),
+            (None, _) => {
+                Unit::Decimal(Unit::recognise(&seen).map_err(|both| either(path, &seen, both))?)
+            }
         };
         let far = || {
             let first = unit.seconds(stamps.first.value);
@@ -125,8 +125,7 @@ impl Times {
         for since in &mut stamps.since_first {
             *since = unit.seconds(*since);
         }
-        let mut regular = Regular::find(&stamps.since_first, known.rate_hz)
-            .map_err(problem)?;
+        let mut regular = Regular::find(&stamps.since_first, known.rate_hz).map_err(problem)?;
         let lasts_s = stamps.since_first.last().copied().unwrap_or_default();
         let longest_gap_s = regular.longest_gap_s(&stamps.since_first);
         regular.start_s += first_s;
@@ -218,7 +217,11 @@ fn either(path: &Path, seen: &Seen<'_>, both: [Decimal; 2]) -> Error {
     let [fine, coarse] = both;
     Error::new(
         format!("{}, column t_s", path.display()),
-        format!("the times may be in {} or in {}", reading(coarse), reading(fine)),
+        format!(
+            "the times may be in {} or in {}",
+            reading(coarse),
+            reading(fine)
+        ),
         format!("say which: {} or {}", coarse.symbol(), fine.symbol()),
     )
     .about(Argument::TimeUnit)

@@ -58,7 +58,9 @@ pub(super) fn read(stamps: &[f64], rate_hz: Option<f64>) -> Steps {
     let Some(period_s) = base_period(stamps) else {
         return Steps::Irregular;
     };
-    match multiples(stamps, period_s) {
+    // Again with the period of all rows: a pause of a thousand periods is counted to less than one.
+    let refined = multiples(stamps, period_s).and_then(|grid| multiples(stamps, grid.period_s));
+    match refined {
         None => Steps::Irregular,
         Some(_) if handed_over(stamps, period_s, rate_hz) => Steps::HandedOver(period_s),
         Some(grid) => Steps::Multiples(grid),
@@ -101,6 +103,7 @@ fn multiples(stamps: &[f64], period_s: f64) -> Option<Grid> {
         pauses: false,
     };
     let (mut odd, mut single, mut near, mut squares) = (0_usize, 0_usize, 0_usize, 0.0);
+    let (mut sum_s, mut periods) = (0.0, 0.0);
     // The first sample of a burst is late now and then, as whatever reads it has other work before it.
     let mut after_pause = true;
     for (i, pair) in stamps.windows(2).enumerate() {
@@ -113,11 +116,14 @@ fn multiples(stamps: &[f64], period_s: f64) -> Option<Grid> {
         if step > PAUSE {
             grid.pauses = true;
         } else if whole >= 1.0 && off <= NEAR {
-            near += 1;
             single += usize::from(whole == 1.0);
-            squares += off * off;
-            grid.jitter.max_s = grid.jitter.max_s.max(off * period_s);
             grid.exact &= off < EXACT;
+            if !after_pause {
+                near += 1;
+                squares += off * off;
+                (sum_s, periods) = (sum_s + pair[1] - pair[0], periods + whole);
+                grid.jitter.max_s = grid.jitter.max_s.max(off * period_s);
+            }
         } else {
             odd += usize::from(!(after_pause && step < 1.0));
             grid.exact = false;
@@ -133,6 +139,9 @@ fn multiples(stamps: &[f64], period_s: f64) -> Option<Grid> {
     let steps = (stamps.len() - 1) as f64;
     if odd as f64 > ODD * steps || (single as f64) < SINGLE * steps {
         return None;
+    }
+    if periods > 0.0 {
+        grid.period_s = sum_s / periods;
     }
     grid.jitter.rms_s = (squares / near.max(1) as f64).sqrt() * period_s;
     if grid.exact {
@@ -168,7 +177,9 @@ fn handed_over(stamps: &[f64], period_s: f64, rate_hz: Option<f64>) -> bool {
     if period_s < FETCHED_S && mean_s > 2.0 * period_s {
         return true;
     }
-    let alike = lasts.iter().filter(|last| (*last - usual).abs() <= 1.5 * longest);
+    let alike = lasts
+        .iter()
+        .filter(|last| (*last - usual).abs() <= 1.5 * longest);
     let steady = lasts.len() >= 4 && alike.count() as f64 >= 0.95 * lasts.len() as f64;
     // Steps of one and two periods that take turns are those of a clock with coarse ticks.
     steady && (period_s <= SAMPLED_S || longest < 2.5 * period_s)

@@ -117,9 +117,14 @@ impl Regular {
 
     /// Stamps that are kept.
     fn of_grid(stamps: &[f64], grid: &grid::Grid) -> Regular {
+        // Behind a pause the samples begin at any instant, and a line through all would take the rounding for a rate.
+        let period_s = match grid.pauses {
+            true => grid.period_s,
+            false => line(stamps, &numbers(stamps.len(), &grid.gaps), grid.period_s).1,
+        };
         Regular {
             start_s: stamps[0],
-            period_s: grid.period_s,
+            period_s,
             gaps: grid.gaps.clone(),
             kept: true,
             jitter: grid.jitter,

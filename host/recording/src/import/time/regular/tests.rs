@@ -120,7 +120,11 @@ fn a_clock_that_wanders_against_the_sensor_makes_no_gaps() {
     let numbers: Vec<u64> = (0..720_000).collect();
     // 100 ppm by turns within an hour: 11 samples at 200 Hz.
     let wander = |n: u64| 0.0573 * (1.0 - (n as f64 / 720_000.0 * std::f64::consts::TAU).cos());
-    let found = Regular::find(&stamps(&numbers, 0.005, |n| wander(n) + 0.002 * random()), None).unwrap();
+    let found = Regular::find(
+        &stamps(&numbers, 0.005, |n| wander(n) + 0.002 * random()),
+        None,
+    )
+    .unwrap();
     assert_eq!(found.gaps, []);
     assert!((found.period_s / 0.005 - 1.0).abs() < 1e-4);
 }
@@ -138,4 +142,43 @@ fn a_clock_that_is_set_back_and_a_file_without_two_times_are_refused() {
     assert_eq!(Regular::find(&once, None).unwrap().gaps, []);
     once[500] = 0.0;
     assert_eq!(Regular::find(&once, None).unwrap().gaps, []);
+}
+
+#[test]
+fn bursts_with_pauses_keep_their_stamps_whatever_the_phase_behind_a_pause() {
+    let mut random = uniform();
+    // 51 samples at 58.3 Hz, then nothing for 1 to 5 s; stamps in whole milliseconds, the first of a burst late by 5.
+    let (period, mut at) = (0.01715, 0.0);
+    let mut all = Vec::new();
+    for _ in 0..60 {
+        for i in 0..51 {
+            let late = if i == 0 { 0.005 } else { 0.0 };
+            all.push(((at + f64::from(i) * period + late) * 1e3_f64).round() / 1e3);
+        }
+        at += 51.0 * period + 1.0 + 4.0 * random();
+    }
+    let found = Regular::find(&all, None).unwrap();
+    assert!(found.kept, "{found:?}");
+    assert_eq!(found.gaps.len(), 59);
+    assert!((found.period_s / period - 1.0).abs() < 2e-4, "{found:?}");
+    let steps = all.windows(2).map(|w| w[1] - w[0]);
+    let missing: f64 = steps.filter(|s| *s > 0.5).map(|s| s / period - 1.0).sum();
+    assert!((found.missing() as f64 - missing).abs() < 10.0, "{missing}");
+}
+
+#[test]
+fn a_buffer_that_is_handed_over_is_no_pause_unless_the_given_rate_is_that_of_the_bursts() {
+    // Ten samples at 100 Hz, handed over 2 ms apart; or ten at 500 Hz with a pause of 80 ms.
+    let numbers: Vec<u64> = (0..5000).collect();
+    let late = |n: u64| (9 - n % 10) as f64 * 0.008;
+    let bursts = stamps(&numbers, 0.01, late);
+    let found = Regular::find(&bursts, None).unwrap();
+    assert!(!found.kept && found.gaps.is_empty(), "{found:?}");
+    assert!((found.period_s / 0.01 - 1.0).abs() < 1e-4, "{found:?}");
+    assert!((found.in_bursts_s.unwrap() / 0.002 - 1.0).abs() < 1e-6);
+    let found = Regular::find(&bursts, Some(100.0)).unwrap();
+    assert!(!found.kept);
+    let found = Regular::find(&bursts, Some(500.0)).unwrap();
+    assert!(found.kept, "{found:?}");
+    assert_eq!((found.gaps.len(), found.missing()), (499, 499 * 40));
 }
