@@ -117,14 +117,7 @@ fn sensor_text(out: &mut String, fit: &FitResult, name: &str, sensor: &SensorFit
         line("held out", None, "not asked for (--holdout blocks=4)");
     }
     line("in sample", Some(sensor.rms), "rms");
-    match sensor.noise_floor {
-        Some(floor) => line("noise floor", Some(floor), "noise-only rms"),
-        None => line(
-            "noise floor",
-            None,
-            "unknown: the means have no standard deviations",
-        ),
-    }
+    line("noise floor", Some(sensor.noise_floor), "noise-only rms");
     if let Some(rms) = sensor.static_rms {
         let rate = readable::error("rad/s");
         let _ = writeln!(out, "  calibrated rate at rest, rms over dwells and axes:");
@@ -144,14 +137,7 @@ fn sensor_text(out: &mut String, fit: &FitResult, name: &str, sensor: &SensorFit
         );
     }
     for (group, scatter) in &sensor.scatter {
-        if scatter.significant.is_none() {
-            let _ = writeln!(
-                out,
-                "  scatter about the fit ({group}): {}, taken for the noise, and in the intervals",
-                readable::error(&scatter.unit).write(scatter.excess_sigma)
-            );
-        }
-        if scatter.significant == Some(true) {
+        if scatter.significant {
             let _ = writeln!(
                 out,
                 "  noise does not explain the residual ({group}): {} more is there, and in the intervals",

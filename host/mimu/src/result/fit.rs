@@ -141,8 +141,8 @@ pub struct SensorFitResult {
     pub rms: f64,
     /// The same of those that were held out; null if none were.
     pub held_out_rms: Option<f64>,
-    /// What noise alone would give, in [`Self::unit`]; null where the noise is unknown.
-    pub noise_floor: Option<f64>,
+    /// What noise alone would give, in [`Self::unit`].
+    pub noise_floor: f64,
     /// SI unit of the figures.
     pub unit: &'static str,
     /// What they are about.
@@ -216,16 +216,16 @@ pub struct SmallAngle {
 /// Whether noise explains residuals.
 #[derive(Debug, Clone, Serialize)]
 pub struct ScatterResult {
-    /// Sum of squares over what noise gives each; null where the noise is unknown.
-    pub chi2: Option<f64>,
+    /// Sum of squares over what noise gives each.
+    pub chi2: f64,
     /// Degrees of freedom.
     pub dof: f64,
     /// Standard deviation of what is there beside noise, in [`Self::unit`].
     pub excess_sigma: f64,
     /// Its unit: SI, or the raw unit.
     pub unit: String,
-    /// Whether noise does not explain them; what is there beside it is then in the intervals. Null where the noise is unknown.
-    pub significant: Option<bool>,
+    /// Whether noise does not explain them; what is there beside it is then in the intervals.
+    pub significant: bool,
 }
 
 /// Residual of a dwell or a turn.
@@ -341,14 +341,13 @@ impl DwellResult {
 
 impl SensorFitResult {
     fn of(fit: &Fit, found: &SensorFit) -> Self {
-        let noise_floor = Some(found.noise_floor()).filter(|floor| !floor.is_nan());
         let scatter = found.estimated.scatter.iter().map(|(group, s)| {
             let result = ScatterResult {
-                chi2: noise_floor.map(|_| s.chi2),
+                chi2: s.chi2,
                 dof: s.dof,
                 excess_sigma: s.excess.sqrt(),
                 unit: excess_unit(fit, found, group),
-                significant: noise_floor.map(|_| s.is_significant()),
+                significant: s.is_significant(),
             };
             (group.clone(), result)
         });
@@ -365,7 +364,7 @@ impl SensorFitResult {
             parameters: parameters(fit.prepared.manifest.raw_unit, found),
             rms: found.rms(),
             held_out_rms: found.held_out_rms(),
-            noise_floor,
+            noise_floor: found.noise_floor(),
             unit: found.figure.unit(found.sensor),
             figure: found.figure,
             dwells: found.dwells,

@@ -470,7 +470,8 @@ impl Import {
                 "import",
                 "the files have no time in common",
                 "check that their times begin at the same instant and are in the same unit",
-            ));
+            )
+            .about(Argument::TimeUnit));
         }
         for file in files {
             let place = file_name(file.path());

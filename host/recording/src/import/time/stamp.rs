@@ -141,8 +141,8 @@ impl Decimal {
 
     /// The unit that the name of a column ends with, as `timestamp_us` and `time [ms]` do.
     fn in_name(name: &str) -> Option<Decimal> {
-        let words = name.split(|c: char| !c.is_alphabetic());
-        match words.filter(|word| !word.is_empty()).next_back()? {
+        let mut words = name.split(|c: char| !c.is_alphabetic());
+        match words.rfind(|word| !word.is_empty())? {
             "s" | "sec" | "seconds" => Some(Decimal::Second),
             "ms" | "msec" | "milliseconds" => Some(Decimal::Millisecond),
             "us" | "\u{b5}s" | "\u{3bc}s" | "usec" | "microseconds" => Some(Decimal::Microsecond),
