@@ -4,7 +4,6 @@ mod agreement;
 mod coverage;
 mod diagnosis;
 mod flaws;
-mod foreign_stamps;
 mod module_circles;
 mod next_experiment;
 mod noise_of_the_bench;

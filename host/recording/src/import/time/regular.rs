@@ -34,6 +34,8 @@ const SET_BACK: f64 = 2.0;
 const WANDER: f64 = 1e-3;
 /// Rounds of rate and gaps; each needs the other.
 const ROUNDS: usize = 6;
+/// Rows of a stretch that the unit of the stamps is recognised by.
+const STRETCH: usize = 64;
 /// Values that a quantile over a long file is taken from.
 const SAMPLED: usize = 20_000;
 /// And from a window.
@@ -168,9 +170,17 @@ impl Regular {
         (self.jitter.max_s > most).then_some(self.jitter.max_s)
     }
 
-    /// The time between stamps to a part in a thousand, in whatever unit they are.
+    /// The time from row to row as it mostly is, in whatever unit the stamps are: the mean over stretches that hold a hand-over or two,
+    /// as the steps between samples that are fetched together say nothing of the rate.
     pub fn step(stamps: &[f64]) -> Option<f64> {
-        first_period(stamps)
+        let shortest = first_period(stamps)?;
+        let rows = STRETCH.min(stamps.len() - 1);
+        let ends = (rows..stamps.len()).step_by(rows);
+        let mut means: Vec<f64> = ends
+            .map(|row| (stamps[row] - stamps[row - rows]) / rows as f64)
+            .collect();
+        let mean = quantile(&mut means, 0.5);
+        Some(if mean > 0.0 { mean } else { shortest })
     }
 
     /// Time without samples in the longest gap of `stamps`, s: a step, less the period that every sample has.
