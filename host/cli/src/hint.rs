@@ -16,7 +16,9 @@ fn flag(argument: Argument) -> Option<&'static str> {
     Some(match argument {
         Argument::Columns => "--columns",
         Argument::SampleRate => "--rate-hz",
+        Argument::TimeUnit => "--time-unit",
         Argument::Scale => "--scale",
+        Argument::Offset => "--offset",
         Argument::Reference => "--reference",
         Argument::Device => "--device",
         Argument::Steps => "--steps",

@@ -39,8 +39,12 @@ pub enum Argument {
     Columns,
     /// Samples a second.
     SampleRate,
+    /// Unit of time stamps.
+    TimeUnit,
     /// Factor of a column.
     Scale,
+    /// What is added to a column.
+    Offset,
     /// What is known of the true input.
     Reference,
     /// Name of the unit.

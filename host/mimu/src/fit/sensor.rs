@@ -54,8 +54,12 @@ impl SensorFit {
         (held().count() > 0).then(|| rms(self.figure, held()))
     }
 
-    /// What [`Self::rms`] would be with noise alone.
+    /// What [`Self::rms`] would be with noise alone. Not a number where the noise is unknown, as that of means without standard deviations:
+    /// a floor of 0 would say that there is none.
     pub fn noise_floor(&self) -> f64 {
+        if self.residuals.iter().all(|r| r.floor == 0.0) {
+            return f64::NAN;
+        }
         rms(
             Figure::GravitySize,
             self.residuals
