@@ -193,12 +193,17 @@ impl Noise {
         let present = |c: &usize| dwells.iter().any(|d| d.raw[*c].n > 0);
         for c in (0..6).filter(present) {
             let name = RAW_COLUMNS[c];
-            let unit = match manifest.raw_unit {
-                RawUnit::Si => Sensor::BOTH[c / 3].unit(),
-                other => &other.to_string(),
-            };
+            let raw = manifest.raw_unit.to_string();
             let mut nodes = Vec::new();
             for channel in file.channel.iter().filter(|k| k.name == name) {
+                // Readings in SI have scale factors too, and a file with them is of the calibrated unit: of 0.51 the noise is twice that
+                // of the readings.
+                let unit = match manifest.raw_unit {
+                    RawUnit::Si if channel.raw_unit.as_ref() != Some(&raw) => {
+                        Sensor::BOTH[c / 3].unit()
+                    }
+                    _ => raw.as_str(),
+                };
                 let model = channel.model_in(unit).map_err(|[found, remedy]| {
                     let problem = format!("it is in {found}, and the readings are in {unit}");
                     Error::new(format!("{}, channel {name}", file.place), problem, remedy)

@@ -2,6 +2,7 @@
 
 use std::ops::RangeInclusive;
 
+use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::floor::{FIRST, Floor, REACH};
@@ -13,7 +14,7 @@ const FALSE_ALARM: f64 = 1e-3;
 /// bend a curve by less than its intervals show.
 const LEAST_RATIO: f64 = 2.0;
 /// Segments of the finest resolution are this part of the series.
-const FINEST: usize = 4;
+pub(super) const FINEST: usize = 4;
 /// Each resolution is so many times coarser than the one before.
 const COARSER: usize = 8;
 /// Samples of the shortest segment.
@@ -157,7 +158,7 @@ impl Search {
             return None;
         }
         let resolutions: Vec<Resolution> = lengths
-            .into_iter()
+            .into_par_iter()
             .map(|length| {
                 let welch = Welch::of(rates, dt_s, length);
                 let floor = Floor::of(&welch.power, welch.dof);
