@@ -11,7 +11,7 @@ use nalgebra::{DMatrix, Vector3};
 
 use mimu_core::compensation::Affine;
 
-use self::pool::{Series, block_s, pooled, ramps, within};
+use self::pool::{Series, block_s, pooled, within};
 use self::wander::{Slow, Span};
 use crate::allan::variance::AllanModel;
 use crate::blocks::{Condensed, Rails};
@@ -19,6 +19,7 @@ use crate::course::Course;
 use crate::dwell::Dwell;
 use crate::noise_file::NoiseFile;
 use crate::quantity::Sensor;
+use crate::ramp::ramps;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{Manifest, RAW_COLUMNS, RawUnit};
 
@@ -127,7 +128,7 @@ impl Noise {
                                     blocks.map(|i| condensed.blocks[*i].raw[c].mean).collect();
                                 Some(Series {
                                     means: course.unfollowed(sensor, &means)?,
-                                    ramps: ramps(d, condensed),
+                                    ramps: ramps(&condensed.blocks[d.blocks.clone()], d.duration_s),
                                 })
                             });
                             pooled(left, block_s(condensed).1)

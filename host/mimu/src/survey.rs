@@ -182,7 +182,12 @@ pub fn survey(
             };
             let as_it_is = as_it_is.transpose()?;
             let integrated = as_it_is.as_ref().unwrap_or(&without_lines);
-            channel.analyse(integrated, &without_lines, estimator.map(|(_, e)| e), &options);
+            channel.analyse(
+                integrated,
+                &without_lines,
+                estimator.map(|(_, e)| e),
+                &options,
+            );
             channel.judge_drift(integrated, heat, &options, &mut warnings);
             if channel.spectrum.remains {
                 warnings.push(format!(

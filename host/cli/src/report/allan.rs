@@ -90,9 +90,7 @@ fn sensor_text(
             rows.push((format!("{}, {}", term.letter(), unit.unit), cells.collect()));
         }
     }
-    let scaled = channels
-        .iter()
-        .filter(|c| c.raw_unit == Some("SI"));
+    let scaled = channels.iter().filter(|c| c.raw_unit == Some("SI"));
     let factors: Vec<String> = scaled
         .filter_map(|c| c.scale_factor)
         .map(significant)

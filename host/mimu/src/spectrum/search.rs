@@ -95,7 +95,10 @@ impl Resolution {
             // What lies within the band before belongs to it, and is not followed out of it again: the slopes of a bump hold thousands.
             let inside = bands.pop_if(|band| bins[0] <= *band.bins.end());
             let next = self.band(level, bins, inside.as_ref());
-            match bands.last_mut().filter(|b| next.bins.start() <= b.bins.end()) {
+            match bands
+                .last_mut()
+                .filter(|b| next.bins.start() <= b.bins.end())
+            {
                 Some(band) => self.join(band, &next),
                 None => bands.push(next),
             }
@@ -118,7 +121,10 @@ impl Resolution {
     /// Whether more of `bins` than a line has are above half of their `peak`.
     fn is_resolved(&self, bins: RangeInclusive<usize>, peak: usize) -> bool {
         let half = 0.5 * self.excess(peak);
-        bins.filter(|b| self.excess(*b) > half).take(RESOLVED).count() >= RESOLVED
+        bins.filter(|b| self.excess(*b) > half)
+            .take(RESOLVED)
+            .count()
+            >= RESOLVED
     }
 
     /// The band around significant bins: as far as the mean of three is above the floor by more than it scatters. `inside`: the band that they
@@ -194,9 +200,7 @@ impl Search {
         }
         let resolutions: Vec<Resolution> = lengths
             .into_par_iter()
-            .map(|length| {
-                Resolution::of(Welch::of(rates, dt_s, length))
-            })
+            .map(|length| Resolution::of(Welch::of(rates, dt_s, length)))
             .collect();
         let bins: usize = resolutions.iter().map(|r| r.welch.power.len()).sum();
         let chance = FALSE_ALARM / bins as f64;

@@ -104,13 +104,7 @@ pub fn set_aside_after(
 }
 
 /// Takes all bands that a search has found off.
-fn remove(
-    rates: &mut [f64],
-    dt_s: f64,
-    search: &Search,
-    confidence: f64,
-    lines: &mut Vec<Line>,
-) {
+fn remove(rates: &mut [f64], dt_s: f64, search: &Search, confidence: f64, lines: &mut Vec<Line>) {
     let all: Vec<Excess> = search
         .bands
         .iter()
@@ -123,7 +117,11 @@ fn remove(
         let (line, sinusoid) = describe(&whole, dt_s, resolution, band, excess, confidence);
         match sinusoid {
             // A band beside that of a strong line finds the same one: what it is without the line, the next search shows.
-            Some(sinusoid) if steady.iter().any(|other| sinusoid.is(other, dt_s, rates.len())) => {
+            Some(sinusoid)
+                if steady
+                    .iter()
+                    .any(|other| sinusoid.is(other, dt_s, rates.len())) =>
+            {
                 continue;
             }
             Some(sinusoid) => steady.push(sinusoid),

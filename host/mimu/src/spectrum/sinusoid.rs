@@ -99,10 +99,7 @@ impl Sinusoid {
             // Phase zero in the middle of the series: the transform of a cosine is then real, that of a sine imaginary.
             let (sin, cos) = (angle * middle).sin_cos();
             let bin = whole.bins[k];
-            let centred = [
-                bin.re * cos - bin.im * sin,
-                bin.re * sin + bin.im * cos,
-            ];
+            let centred = [bin.re * cos - bin.im * sin, bin.re * sin + bin.im * cos];
             let [near, far] = [angle - self.step, angle + self.step].map(|a| kernel(a, n));
             let of_cos = 0.5 * (near[0] + far[0]);
             let of_sin = -0.5 * (near[0] - far[0]);
