@@ -23,6 +23,7 @@ fn flag(argument: Argument) -> Option<&'static str> {
         Argument::Device => "--device",
         Argument::Steps => "--steps",
         Argument::StillFactor => "--still",
+        Argument::AtRest => "--at-rest",
         Argument::Method => "--method",
         Argument::Only => "--only",
         Argument::Stretch => "--from, --to",

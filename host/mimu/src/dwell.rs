@@ -11,6 +11,7 @@ use crate::blocks::{Condensed, Level, Rails, Stretch, pool, quantile};
 use crate::course::{Course, Motion, motion};
 use crate::quantity::{Sensor, plural};
 use crate::rails::{self, longest_run_by_chance};
+use crate::ramp::ramps;
 use crate::rest::{self, Rest};
 use crate::stillness::{self, Detection, Finding, SHORTEST_S, Steps, reference_spans};
 use mimu_recording::error::{Argument, Error, Result};
@@ -196,11 +197,14 @@ impl Dwells {
                 return Err(Error::new("dwells", problem, "have them found").about(Argument::Steps));
             }
             Steps::Given | Steps::AsRecorded => condensed.has_steps,
-            Steps::Found => false,
+            Steps::Found | Steps::AtRest => false,
         };
+        let at_rest = finding.steps == Steps::AtRest;
         let by_hand = manifest.reference == Reference::Gravity;
         let (ranges, detection) = if given {
             (by_step(condensed), None)
+        } else if at_rest {
+            (vec![(None, 0..condensed.blocks.len())], None)
         } else {
             let (mut ranges, detection) =
                 stillness::find(condensed, manifest, finding.still_factor)?;
@@ -259,7 +263,7 @@ impl Dwells {
                 }
             }
         }
-        if !given && by_hand {
+        if !given && by_hand && !at_rest {
             leave_out_turning(&mut list, condensed);
         }
         warn(&list, manifest, &mut warnings);
@@ -366,6 +370,7 @@ fn leave_out_turning(list: &mut [Dwell], condensed: &Condensed) {
         blocks: d.blocks.clone(),
         mean: d.raw.map(|m| m.mean),
         duration_s: d.duration_s,
+        ramps: ramps(&condensed.blocks[d.blocks.clone()], d.duration_s),
     });
     let turning = rest::turning(&rests.collect::<Vec<_>>(), condensed);
     let starts = judged.iter().zip(turning).filter(|(_, turning)| *turning);

@@ -11,7 +11,7 @@ use nalgebra::{DMatrix, Vector3};
 
 use mimu_core::compensation::Affine;
 
-use self::pool::{Series, block_s, pooled, ramps, within};
+use self::pool::{Series, block_s, pooled, within};
 use self::wander::{Slow, Span};
 use crate::allan::variance::AllanModel;
 use crate::blocks::{Condensed, Rails};
@@ -19,6 +19,7 @@ use crate::course::Course;
 use crate::dwell::Dwell;
 use crate::noise_file::NoiseFile;
 use crate::quantity::Sensor;
+use crate::ramp::ramps;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{Manifest, RAW_COLUMNS, RawUnit};
 
@@ -127,7 +128,7 @@ impl Noise {
                                     blocks.map(|i| condensed.blocks[*i].raw[c].mean).collect();
                                 Some(Series {
                                     means: course.unfollowed(sensor, &means)?,
-                                    ramps: ramps(d, condensed),
+                                    ramps: ramps(&condensed.blocks[d.blocks.clone()], d.duration_s),
                                 })
                             });
                             pooled(left, block_s(condensed).1)
@@ -193,12 +194,17 @@ impl Noise {
         let present = |c: &usize| dwells.iter().any(|d| d.raw[*c].n > 0);
         for c in (0..6).filter(present) {
             let name = RAW_COLUMNS[c];
-            let unit = match manifest.raw_unit {
-                RawUnit::Si => Sensor::BOTH[c / 3].unit(),
-                other => &other.to_string(),
-            };
+            let raw = manifest.raw_unit.to_string();
             let mut nodes = Vec::new();
             for channel in file.channel.iter().filter(|k| k.name == name) {
+                // Readings in SI have scale factors too, and a file with them is of the calibrated unit: of 0.51 the noise is twice that
+                // of the readings.
+                let unit = match manifest.raw_unit {
+                    RawUnit::Si if channel.raw_unit.as_ref() != Some(&raw) => {
+                        Sensor::BOTH[c / 3].unit()
+                    }
+                    _ => raw.as_str(),
+                };
                 let model = channel.model_in(unit).map_err(|[found, remedy]| {
                     let problem = format!("it is in {found}, and the readings are in {unit}");
                     Error::new(format!("{}, channel {name}", file.place), problem, remedy)

@@ -53,6 +53,8 @@ pub enum Argument {
     Steps,
     /// Largest variance of a dwell.
     StillFactor,
+    /// Whether the unit lies still throughout.
+    AtRest,
     /// The estimator.
     Method,
     /// Which of the two sensors is calibrated.
