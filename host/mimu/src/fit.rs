@@ -150,9 +150,17 @@ pub fn fit(mut prepared: Prepared, options: Options) -> Result<Fit> {
         Reference::Gravity => fit_gravity(&prepared, options, &mut warnings)?,
     };
     let mut changes = Vec::new();
+    // The gyro is listed first, and where gravity is the only reference depends on the accelerometer.
     for sensor in &mut sensors {
         plausible::check(&prepared, sensor)?;
-        determined::check(&prepared, sensor)?;
+    }
+    let by_size = |s: &&SensorFit| s.figure == Figure::GravitySize;
+    let accel = sensors.iter().find(by_size);
+    let accel = accel.map(|s| s.estimated.triad.clone());
+    for sensor in sensors.iter().rev() {
+        determined::check(&prepared, sensor, accel.as_ref())?;
+    }
+    for sensor in &mut sensors {
         as_came::compare(sensor);
         if let Some(before) = &with_all[sensor.sensor as usize] {
             let raw = prepared.manifest.raw_unit;

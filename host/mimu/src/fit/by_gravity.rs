@@ -202,8 +202,12 @@ impl ByPoses<'_> {
             .collect();
         let rest = self.prepared.rest(accel).into_iter();
         let rest: Vec<Rest> = rest.filter(|o| kept(o.dwell)).collect();
-        if poses.len() + turns.len() * 2 < gravity_size::PARAMETERS + 9 {
-            return gravity_size::estimate(&poses, &variances, self.gravity());
+        // The rest says the gyro's bias; its matrix and the accelerometer have to be in the others.
+        if poses.len() + 2 * turns.len() <= gravity_size::PARAMETERS + 9 {
+            return Err(Failure::Undetermined {
+                parameters: "accelerometer and gyro together".into(),
+                add: "add poses, and turns between them".into(),
+            });
         }
         Together {
             poses: &poses,
@@ -219,18 +223,22 @@ impl ByPoses<'_> {
 
     /// `failure`, naming the faces that no pose had up.
     fn with_faces(&self, failure: Failure) -> Failure {
-        let Failure::Undetermined { parameters, add } = failure else {
-            return failure;
-        };
         let raw: Vec<Vector3<f64>> = self.poses.iter().map(|o| o.raw).collect();
         let unseen = self
             .first_accel()
             .and_then(|guess| faces_not_up(&guess, &raw));
-        let add = match unseen {
-            Some(faces) => format!("{add} (no pose has {faces} up)"),
-            None => add,
-        };
-        Failure::Undetermined { parameters, add }
+        let Some(faces) = unseen else { return failure };
+        match failure {
+            Failure::Undetermined { parameters, add } => Failure::Undetermined {
+                parameters,
+                add: format!("{add} (no pose has {faces} up)"),
+            },
+            // A fit that runs away from a cap of poses has nothing wrong with its columns.
+            Failure::NoSolution(_) => Failure::Undetermined {
+                parameters: "scale factors and biases of the accelerometer".into(),
+                add: format!("add poses with {faces} up, which there are none of, and between"),
+            },
+        }
     }
 }
 

@@ -13,15 +13,15 @@ use crate::quantity::{AXES, Figure, plus_minus};
 use crate::readable;
 use crate::triad::{Angles, Covariance, Triad, slope};
 use mimu_recording::Reference;
-use mimu_recording::error::{Argument, Error, Result};
+use mimu_recording::error::{Argument, Result};
 
 /// Half of the 95 % interval of a scale factor over itself, and of an angle in rad, from which on it is not determined. Data sheets
 /// promise a scale factor to within ten per cent and a mounting to within some degrees: what is known to a fifth only is known
 /// better without the experiment.
 const WIDEST: f64 = 0.2;
 
-/// Refuses a fit in which a scale factor or an angle is not determined.
-pub(super) fn check(prepared: &Prepared, fit: &SensorFit) -> Result<()> {
+/// Refuses a fit in which a scale factor or an angle is not determined. `accel` is the accelerometer where gravity is the only reference.
+pub(super) fn check(prepared: &Prepared, fit: &SensorFit, accel: Option<&Triad>) -> Result<()> {
     let physical = fit.estimated.triad.physical(Angles::Exact);
     let scale_unit = crate::quantity::scale_unit(prepared.manifest.raw_unit, fit.sensor.unit());
     let mut open = Vec::new();
@@ -68,15 +68,20 @@ pub(super) fn check(prepared: &Prepared, fit: &SensorFit) -> Result<()> {
     if open.is_empty() {
         return Ok(());
     }
-    let add = match fit.figure {
-        Figure::GravitySize => match missing_poses(prepared, &fit.estimated.triad) {
-            Some(missing) => format!("{missing}: add them, and hold each pose still"),
-            None => "add poses, each axis up and down and between, and hold each still".into(),
-        },
-        Figure::Direction => "add turns about every axis, with that axis level and slanted, between dwells that are held still".into(),
-        Figure::Input => "add dwells with inputs along every axis, in both directions".to_string(),
+    let poses = accel.and_then(|accel| missing_poses(prepared, accel));
+    let add = match (fit.figure, poses) {
+        (Figure::GravitySize, Some(poses)) => poses,
+        (Figure::GravitySize, None) => {
+            "add poses, each axis up and down and between, and hold each still".into()
+        }
+        // What the accelerometer errs by, whose directions the turns are judged by, is in the intervals of the gyro.
+        (Figure::Direction, Some(poses)) => {
+            format!("{poses}: the accelerometer says where gravity is after each turn")
+        }
+        (Figure::Direction, None) => "add turns about every axis, with that axis level and slanted, between dwells that are held still".into(),
+        (Figure::Input, _) => "add dwells with inputs along every axis, in both directions".into(),
     };
-    let parameters = format!("{} open within 95 %", open.join(", "));
+    let parameters = open.join(", ");
     let failure = Failure::Undetermined { parameters, add };
     let error = prepared.refused(failure, fit.sensor);
     Err(match prepared.manifest.reference {
@@ -90,7 +95,7 @@ const UNSEEN: f64 = 0.01;
 /// Poses that are named at most.
 const NAMED: usize = 4;
 
-/// The faces and edges of the unit that the poses leave the most open, `no pose with -x up`; each is taken as measured before the next
+/// The faces and edges of the unit that the poses leave the most open, in words; each is taken as measured before the next
 /// is sought.
 fn missing_poses(prepared: &Prepared, triad: &Triad) -> Option<String> {
     let g = prepared.manifest.gravity_mps2;
@@ -111,7 +116,12 @@ fn missing_poses(prepared: &Prepared, triad: &Triad) -> Option<String> {
             gain * gain.transpose() / (variance + (0.1 * UNSEEN * g).powi(2));
         covariance -= measured;
     }
-    (!names.is_empty()).then(|| format!("no pose is near {} up", names.join(" up, ")))
+    (!names.is_empty()).then(|| {
+        format!(
+            "add poses with {} up, near which there is none, and hold each still",
+            names.join(", ")
+        )
+    })
 }
 
 /// Faces, then edges, by name.

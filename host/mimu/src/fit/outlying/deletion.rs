@@ -81,9 +81,9 @@ pub(super) fn against_others(
     Some(found)
 }
 
-/// Chance that in a whole recording without outliers anything is left out. With 38 poses this is 5 sigma of the noise, the limit of
-/// suspicion; with thirteen, whose scatter three degrees of freedom say, 16.
-const BY_CHANCE: f64 = 0.002;
+/// Chance that in a whole recording without outliers anything is left out. With 38 poses this is 4.7 sigma, below the limit of
+/// suspicion; with thirteen, whose scatter three degrees of freedom say, 13.
+const BY_CHANCE: f64 = 0.005;
 /// By how many times the standard deviation of a parameter may grow without what is left out. An observation with this much leverage
 /// (0.89) determines the parameter nearly alone, and takes eight ninths of its own error into the fit.
 const GROWS: f64 = 3.0;
