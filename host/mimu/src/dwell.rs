@@ -271,7 +271,11 @@ impl Dwells {
             };
             let error = Error::undetermined("dwells", problem, remedy);
             return Err(match given {
-                true => error,
+                true => error.about(Argument::Steps),
+                false if condensed.has_steps => error
+                    .map(|e| e.remedy += ", or take the dwells of the step column as given")
+                    .about(Argument::StillFactor)
+                    .about(Argument::Steps),
                 false => error.about(Argument::StillFactor),
             });
         }

@@ -106,11 +106,22 @@ pub fn verify(prepared: &Prepared, calibration: &Calibration) -> Result<Verifica
         sensors.push(judged);
     }
     if sensors.is_empty() {
-        return Err(Error::new(
+        let unused = Sensor::BOTH.map(|s| prepared.dwells.unused(s));
+        let reason = unused.iter().find(|u| !u.is_empty());
+        let error = Error::new(
             &prepared.place,
-            "the recording has nothing to judge this calibration by",
+            format!(
+                "the recording has nothing to judge this calibration by{}",
+                reason.map_or("", String::as_str)
+            ),
             "record dwells with a known input, or poses and turns by hand",
-        ));
+        );
+        let mut judged = Sensor::BOTH.into_iter();
+        let judged = judged.find(|s| prepared.dwells.are_judged_not_still(*s));
+        return Err(match judged {
+            Some(sensor) => prepared.with_steps_as_given(error, sensor),
+            None => error,
+        });
     }
     for s in &sensors {
         if s.rms_as_came.is_some_and(|came| s.rms > came) {

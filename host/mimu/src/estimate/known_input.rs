@@ -586,7 +586,7 @@ pub fn inverse_form(observations: &[Observation]) -> Result<Estimated, Failure> 
 /// The classical six positions, as baseline: every axis up and down, or turned both ways. Scale factor
 /// `(u⁺ - u⁻) / (x⁺ - x⁻)` and bias `(u⁺ + u⁻) / 2` of each sensor by itself; misalignments are taken to be zero.
 ///
-/// Two positions leave a sensor's two parameters no residual. But what it reads in the other four says whether its model holds: faces
+/// Two positions leave a sensor's two parameters no residual where none is repeated. But what it reads in the other four says whether its model holds: faces
 /// 4 degrees off level and a misalignment of 2 left 438 mm/s² there, beside a bias of ± 0.15 mg by the noise of the two alone.
 pub fn six_positions(observations: &[Observation]) -> Result<Estimated, Failure> {
     let mut model = Forward {
@@ -597,6 +597,7 @@ pub fn six_positions(observations: &[Observation]) -> Result<Estimated, Failure>
     for axis in 0..3 {
         let mut covariance = Covariance::zeros();
         let mut ends = [(0.0, 0.0, 0.0, 0.0); 2]; // sums of reading, input, variance; number
+        let mut used = Vec::new();
         let along = |o: &&Observation| {
             let size = o.input.norm();
             size > 1e-3 * span(observations)
@@ -608,6 +609,7 @@ pub fn six_positions(observations: &[Observation]) -> Result<Estimated, Failure>
             end.1 += o.input[axis];
             end.2 += o.variance[axis];
             end.3 += 1.0;
+            used.push(o);
         }
         if ends.iter().any(|e| e.3 == 0.0) {
             return Err(Failure::Undetermined {
@@ -623,16 +625,19 @@ pub fn six_positions(observations: &[Observation]) -> Result<Estimated, Failure>
         let scale = (up.0 - down.0) / width;
         model.matrix[(axis, axis)] = scale;
         model.bias[axis] = 0.5 * (up.0 + down.0 - scale * middle);
-        // All positions show what the noise does not.
-        let residuals: Vec<f64> = observations
+        // Repeated positions show what the noise does not; where there are none, those along the other axes do.
+        if used.len() == 2 {
+            used = observations.iter().collect();
+        }
+        let residuals: Vec<f64> = used
             .iter()
             .map(|o| o.raw[axis] - scale * o.input[axis] - model.bias[axis])
             .collect();
-        let variances: Vec<f64> = observations
+        let variances: Vec<f64> = used
             .iter()
             .map(|o| o.variance[axis].max(f64::MIN_POSITIVE))
             .collect();
-        let of_axis = excess_variance(&residuals, &variances, residuals.len() as f64 - 2.0);
+        let of_axis = excess_variance(&residuals, &variances, used.len() as f64 - 2.0);
         down.2 += of_axis.excess / ends[0].3;
         up.2 += of_axis.excess / ends[1].3;
         scatter.push((AXES[axis].to_string(), of_axis));

@@ -6,6 +6,7 @@
 use mimu_core::compensation::Affine;
 use nalgebra::Vector3;
 
+use super::of_temperature::with_temperature;
 use super::sensor::SensorFit;
 use crate::estimate::Failure;
 use crate::prepared::Prepared;
@@ -65,7 +66,7 @@ pub(super) fn check(prepared: &Prepared, fit: &SensorFit, accel: Option<&Triad>)
             }
         }
     }
-    if open.is_empty() {
+    if open.is_empty() || by_temperature(prepared, fit) {
         return Ok(());
     }
     let poses = accel.and_then(|accel| missing_poses(prepared, accel));
@@ -88,6 +89,15 @@ pub(super) fn check(prepared: &Prepared, fit: &SensorFit, accel: Option<&Triad>)
         Reference::Table => error.about(Argument::Only),
         Reference::Gravity => error,
     })
+}
+
+/// Whether the intervals are wide by what a model with temperature in it explains: then that is what a person has to hear, and does.
+fn by_temperature(prepared: &Prepared, fit: &SensorFit) -> bool {
+    let with = match fit.figure {
+        Figure::Input => with_temperature(prepared, fit.sensor, &fit.residuals),
+        Figure::GravitySize | Figure::Direction => None,
+    };
+    with.is_some_and(|with| with.rms < 0.5 * fit.rms())
 }
 
 /// Standard deviation of the magnitude of specific force, over gravity, from which on a direction is not seen.

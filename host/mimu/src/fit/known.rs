@@ -57,7 +57,13 @@ pub(super) fn fit_known(
                 continue;
             }
             Err(failure) => {
-                let mut error = prepared.refused(failure, sensor);
+                // A level pose has a force along an axis and no rate about it: of which the dwells are missing has to be said.
+                let kind = match sensor {
+                    Sensor::Gyro => "with rates",
+                    Sensor::Accel => "with forces",
+                };
+                let error = prepared.refused(failure, sensor);
+                let mut error = error.map(|e| e.remedy = e.remedy.replace("with inputs", kind));
                 if options.method != Method::LeastSquares {
                     error = error.about(Argument::Method);
                 }

@@ -261,3 +261,75 @@ pub(super) fn contradicted(
     }
     Vec::new()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row(error: f64, by: [f64; 2], variance: f64) -> Row {
+        Row {
+            error: Vector3::new(error, 0.0, 0.0),
+            by: DMatrix::from_fn(3, 2, |i, j| if i == 0 { by[j] } else { 0.0 }),
+            variance,
+        }
+    }
+
+    /// Rows of a mean, with the deviations that are given, and of a slope.
+    fn rows(slope: &[(f64, f64)]) -> Vec<Row> {
+        let mean = (0..12).map(|k| row([0.9, -1.1, 1.0, -0.8][k % 4], [1.0, 0.0], 1.0));
+        let slope = slope.iter().map(|(e, v)| row(*e, [1.0, 1.0], *v));
+        mean.chain(slope).collect()
+    }
+
+    #[test]
+    fn what_alone_determines_a_parameter_cannot_be_spared() {
+        let alone = rows(&[(50.0, 1.0)]);
+        let found = contradicted(&alone, alone.len(), 1.0, &[12]);
+        assert!(found.iter().all(|j| !j.can_be_spared()) && found.len() == 1);
+        // Nearly alone: a second one knows the slope ten times worse.
+        let nearly = rows(&[(80.0, 1.0), (0.5, 100.0)]);
+        let found = contradicted(&nearly, nearly.len(), 1.0, &[12]);
+        assert!(
+            found.len() == 1 && !found[0].can_be_spared(),
+            "{:?}",
+            found[0].grows
+        );
+        assert_eq!(found[0].grows.0, 1);
+        // As well as the first: then it can.
+        let both = rows(&[(80.0, 1.0), (0.5, 1.0), (-0.4, 1.0)]);
+        let found = contradicted(&both, both.len(), 1.0, &[12]);
+        assert!(found.len() == 1 && found[0].can_be_spared());
+    }
+
+    #[test]
+    fn few_others_contradict_only_what_is_far_beyond_their_scatter() {
+        // Four rows of a mean and two of another have four degrees of freedom, and scatter by 1: 8 of them are no proof, 40 are.
+        let four = |last: f64| -> Vec<Row> {
+            let errors = [1.0, -1.0, 0.8, -0.8, last];
+            let all = errors.iter().map(|e| row(*e, [1.0, 0.0], 1e-4));
+            // The second parameter is held by rows of its own.
+            let other = [0.01, -0.01].map(|e| row(e, [0.0, 1.0], 1e-4));
+            other.into_iter().chain(all).collect()
+        };
+        let judged = |last: f64| contradicted(&four(last), 7, 1.0, &[6]).len();
+        assert_eq!((judged(8.0), judged(40.0)), (0, 1));
+    }
+
+    #[test]
+    fn the_error_of_a_suspect_is_that_against_a_fit_without_it() {
+        let all = rows(&[(80.0, 1.0), (0.5, 1.0), (-0.4, 1.0)]);
+        let found = contradicted(&all, all.len(), 1.0, &[12]);
+        // The mean of the deviations of the two other slopes.
+        assert!(
+            (found[0].error - (80.0 - 0.05)).abs() < 1e-9,
+            "{}",
+            found[0].error
+        );
+        // Its own variance and that of their mean, scaled by what all of them scatter by.
+        let squares = 3.0 * (0.9f64.powi(2) + 1.1f64.powi(2) + 1.0 + 0.8f64.powi(2));
+        let within = squares + 2.0 * 0.45f64.powi(2);
+        let scale = (within / 12.0).max(1.0);
+        let expected = (80.0 - 0.05) / (1.5 * scale).sqrt();
+        assert!((found[0].sigmas / expected - 1.0).abs() < 1e-9);
+    }
+}
