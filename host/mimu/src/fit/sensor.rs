@@ -38,6 +38,8 @@ pub struct SensorFit {
     pub static_rms: Option<(f64, Option<f64>)>,
     /// How its residuals were held out.
     pub held_out: HoldOut,
+    /// The error of the readings as they came, where they are in SI: what [`Self::rms`] is without a calibration.
+    pub as_came: Option<f64>,
     /// What a person should know.
     pub warnings: Vec<String>,
 }

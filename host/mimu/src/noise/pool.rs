@@ -169,6 +169,7 @@ pub(super) fn pooled(series: impl Iterator<Item = Series>, block_s: f64) -> Chan
         .map(|p| (p.tau_s, p.variance))
         .collect();
     ChannelNoise {
+        known: all.iter().any(|s| s.means.len() > 1),
         model,
         curve: (misfit && known.len() >= 2).then_some(known),
     }
