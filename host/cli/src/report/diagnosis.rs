@@ -31,8 +31,8 @@ fn meaning(d: &DiagnosisResult) -> &'static str {
     }
 }
 
-/// What a person should know of the error figures of a sensor, as sentence fragments. `all`: with the share that is explained.
-fn remarks(s: &SensorDiagnosisResult, all: bool) -> Vec<String> {
+/// What a person should know of the error figures of a sensor, as sentence fragments. `with_share`: also the share that is explained.
+fn remarks(s: &SensorDiagnosisResult, with_share: bool) -> Vec<String> {
     let mut all = Vec::new();
     if !s.held_out_rms_after.is_finite() {
         all.push(
@@ -49,7 +49,7 @@ fn remarks(s: &SensorDiagnosisResult, all: bool) -> Vec<String> {
             readable::error(s.unit).write(s.reference_rms)
         ));
     }
-    if let (Some(share), true) = (s.explained, all) {
+    if let (Some(share), true) = (s.explained, with_share) {
         all.push(format!(
             "{} % of the held-out mean square beyond noise and errors of the reference is explained",
             significant(100.0 * share)
