@@ -31,7 +31,7 @@ pub use design::{comparison_text, design_text, next_text};
 pub use device::{
     counters_text, download_text, info_text, record_text, self_test_text, stream_text, upload_text,
 };
-pub use diagnosis::{diagnosis_page, diagnosis_text, not_in_plan_text};
+pub use diagnosis::{Detail, diagnosis_page, diagnosis_text, not_in_plan_text};
 pub use fit::{dwell_table, fit_text};
 pub use import::import_text;
 pub use page::Made;

@@ -29,7 +29,7 @@ use crate::quantity::AXES;
 use crate::quantity::Sensor;
 use mimu_recording::Reference;
 use prediction::{Prediction, Target, calibrates};
-use recipe::{Course, Experiment, RECIPES};
+use recipe::{Course, Experiment, RECIPES, Recipe};
 
 /// Length of a dwell of the next experiment, s.
 pub const DWELL_S: f64 = 10.0;
@@ -69,11 +69,33 @@ const TURNTABLE: &str = "this needs a turntable";
 /// Nothing of the table of recipes determines it.
 const NO_RECIPE: &str = "no recipe shows it";
 
+/// An effect whose typical size the recording would not have shown, with what would.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NotExcited {
+    /// Public id.
+    pub id: String,
+    /// The experiment in words.
+    pub experiment: String,
+    /// The recipe behind the words; `None` where no recipe shows the effect as well as wanted, so that the words are about it alone.
+    pub recipe: Option<SizedRecipe>,
+}
+
+/// A recipe of one size. Of two that differ in nothing but the size, the larger also shows what the smaller shows.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SizedRecipe {
+    /// The recipe.
+    pub recipe: Recipe,
+    /// What carries the unit.
+    pub fixture: Fixture,
+    /// Its size, a step of the ladder [`Course::sizes`].
+    pub size: f64,
+}
+
 /// What to record next.
 #[derive(Debug, Clone, Default)]
 pub struct Next {
-    /// Effects that the recording could not show, each with the experiment in words.
-    pub not_excited: Vec<(String, String)>,
+    /// Effects that the recording could not show.
+    pub not_excited: Vec<NotExcited>,
     /// Candidates that it could not tell apart.
     pub confused: Vec<Confused>,
     /// What of it this kind of recording can show, for one experiment together.
@@ -266,8 +288,15 @@ pub fn next(diagnosis: &Diagnosis) -> Next {
             .as_ref()
             .and_then(|t| recommended(diagnosis, &setup, t));
         let planned = planned(id, shown.as_ref(), target);
-        let words = shown.map_or_else(|| needs.clone(), |s| s.0);
-        ((id.clone(), words), planned)
+        let (experiment, recipe) =
+            shown.map_or_else(|| (needs.clone(), None), |s| (s.words, s.recipe));
+        let id = id.clone();
+        let not_excited = NotExcited {
+            id,
+            experiment,
+            recipe,
+        };
+        (not_excited, planned)
     });
     let (not_excited, listed): (Vec<_>, Vec<_>) = shown.unzip();
     let pairs = pairs(diagnosis);
@@ -291,23 +320,41 @@ pub fn next(diagnosis: &Diagnosis) -> Next {
 /// `target`, if a recording of the same kind shows it; else that the plan lacks it, and why.
 fn planned(
     id: &str,
-    shown: Option<&(String, bool)>,
+    shown: Option<&Recommended>,
     target: Option<Target>,
 ) -> Result<Target, NotInPlan> {
     let reason = match (shown, target) {
-        (Some((_, true)), Some(target)) => return Ok(target),
-        (Some((_, false)), _) => TURNTABLE,
+        (Some(shown), Some(target)) if shown.same_kind => return Ok(target),
+        (Some(shown), _) if !shown.same_kind => TURNTABLE,
         _ => NO_RECIPE,
     };
     let id = id.into();
     Err(NotInPlan { id, reason })
 }
 
-/// What shows a target, in words, and whether a recording of the same kind does: what cannot be shown by hand may be on a table.
-fn recommended(diagnosis: &Diagnosis, setup: &Setup, target: &Target) -> Option<(String, bool)> {
+/// What shows a target.
+struct Recommended {
+    words: String,
+    /// Whether a recording of the same kind shows it: what cannot be shown by hand may be on a table.
+    same_kind: bool,
+    recipe: Option<SizedRecipe>,
+}
+
+fn recommended(diagnosis: &Diagnosis, setup: &Setup, target: &Target) -> Option<Recommended> {
     let targets = std::slice::from_ref(target);
+    let recipe = |answer: &Answer, fixture| {
+        answer.done().then_some(SizedRecipe {
+            recipe: answer.experiment.recipe,
+            fixture,
+            size: answer.experiment.size,
+        })
+    };
     if let Some(answer) = smallest(setup, targets) {
-        return Some((answer.words(setup), true));
+        return Some(Recommended {
+            words: answer.words(setup),
+            same_kind: true,
+            recipe: recipe(&answer, setup.fixture),
+        });
     }
     if setup.fixture != Fixture::Hand {
         return None;
@@ -315,7 +362,11 @@ fn recommended(diagnosis: &Diagnosis, setup: &Setup, target: &Target) -> Option<
     let table = Setup::of(&diagnosis.after, Some(Fixture::ThreeAxis));
     let answer = smallest(&table, targets)?;
     let words = answer.words(&table);
-    Some((format!("This needs a turntable. {words}"), false))
+    Some(Recommended {
+        words: format!("This needs a turntable. {words}"),
+        same_kind: false,
+        recipe: recipe(&answer, table.fixture),
+    })
 }
 
 /// An accepted effect and another that would do nearly as well.
@@ -361,7 +412,7 @@ impl Pair {
             .and_then(|t| recommended(diagnosis, setup, t));
         let ids = [self.found.id(), self.id.clone()];
         let planned = planned(&ids.join(" or "), shown.as_ref(), target);
-        let experiment = shown.map(|s| s.0).unwrap_or_else(|| {
+        let experiment = shown.map(|s| s.words).unwrap_or_else(|| {
             // Of the two, what no dwell is planned for.
             let words = match (&self.found.kind, effects::by_id(&self.id)) {
                 (_, Some(effect)) => effect.needs,

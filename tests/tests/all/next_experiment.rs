@@ -68,7 +68,7 @@ fn plan(diagnosis: &Diagnosis, targets: &[Target]) -> String {
 fn shown_by_the_next(id: &str, unit: &RigFile, rates_dps: &[f64], seed: u64, truth: [f64; 3]) {
     let first = diagnosed(&first_plan(rates_dps), unit, seed);
     let open: Next = next(&first);
-    let told = open.not_excited.iter().find(|n| n.0 == id);
+    let told = open.not_excited.iter().find(|n| n.id == id);
     assert!(told.is_some(), "{:?} {:?}", found(&first), open.not_excited);
     let target = Target::listed(effects::by_id(id).unwrap());
     let second = diagnosed(&plan(&first, &[target]), unit, seed + 1);

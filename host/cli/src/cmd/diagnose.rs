@@ -43,9 +43,12 @@ pub struct DiagnoseArgs {
     /// Plan of the next experiment to write: what this recording could not show, and what it could not tell apart
     #[arg(long, value_name = "FILE")]
     plan: Option<PathBuf>,
-    /// Print the reason of every effect that was not accepted, however long
+    /// Print everything: each coefficient, the reason of every rejected effect, all residuals, notes and experiments
     #[arg(long)]
     all: bool,
+    /// Print the experiments that would show what this recording could not show, and distinguish what it could not
+    #[arg(long)]
+    next: bool,
     #[command(flatten)]
     still: StillArgs,
     #[command(flatten)]
@@ -190,9 +193,13 @@ pub fn run(args: &DiagnoseArgs) -> Result<()> {
             said += &format!("\n{what}: {}\n", path.display());
         }
     }
+    let detail = report::Detail {
+        all: args.all,
+        next: args.next,
+    };
     print(
         &args.json,
-        &(report::diagnosis_text(&found, args.all) + &said),
+        &(report::diagnosis_text(&found, detail) + &said),
         &found,
         files,
     )

@@ -4,7 +4,7 @@ mod page;
 mod text;
 
 pub use page::diagnosis_page;
-pub use text::{diagnosis_text, not_in_plan_text};
+pub use text::{Detail, diagnosis_text, not_in_plan_text};
 
 use mimu::diagnose::Verdict;
 use mimu::fit::Split;
@@ -23,17 +23,17 @@ fn meaning(d: &DiagnosisResult) -> &'static str {
             "noise, and what the poses leave open of the accelerometer, explain what the affine calibration leaves"
         }
         Verdict::Clean => "noise explains what the affine calibration leaves",
-        Verdict::Explained => "with the effects below, noise explains what is left",
+        Verdict::Explained => "with the effects below, noise explains what remains",
         Verdict::Untestable => "nothing was found, and the recording has too little to judge by",
         Verdict::Unexplained if d.unexplained().next().is_some() => {
-            "something is left that nothing here explains"
+            "something remains that nothing here explains"
         }
         Verdict::Unexplained => "an unlisted alternative model does as well as what was found",
     }
 }
 
-/// What a person should know of the error figures of a sensor, as sentence fragments.
-fn remarks(s: &SensorDiagnosisResult) -> Vec<String> {
+/// What a person should know of the error figures of a sensor, as sentence fragments. `with_share`: also the share that is explained.
+fn remarks(s: &SensorDiagnosisResult, with_share: bool) -> Vec<String> {
     let mut all = Vec::new();
     if !s.held_out_rms_after.is_finite() {
         all.push(
@@ -46,11 +46,11 @@ fn remarks(s: &SensorDiagnosisResult) -> Vec<String> {
     }
     if s.reference_rms > s.noise_floor {
         all.push(format!(
-            "errors of the accelerometer, whose directions of gravity the turns are judged by, may add {} rms to the noise floor",
+            "errors of the accelerometer's directions may add {} rms to the noise floor",
             readable::error(s.unit).write(s.reference_rms)
         ));
     }
-    if let Some(share) = s.explained {
+    if let (Some(share), true) = (s.explained, with_share) {
         all.push(format!(
             "{} % of the held-out mean square beyond noise and errors of the reference is explained",
             significant(100.0 * share)

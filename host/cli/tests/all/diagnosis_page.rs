@@ -48,7 +48,7 @@ fn plan() -> String {
 }
 
 /// Records a unit with white noise, of which `effect` is all that an affine model lacks.
-fn record(folder: &Path, name: &str, effect: &str, seed: u64) {
+pub fn record(folder: &Path, name: &str, effect: &str, seed: u64) {
     let still = "instability_si = [0.0, 0.0, 0.0]\nwalk_si = [0.0, 0.0, 0.0]\n";
     let rig = format!(
         "format = \"mimu-rig/1\"\nearth_rate = false\n[unit.gyro_axes]\n{still}[unit.accel_axes]\n{still}\
@@ -62,11 +62,11 @@ fn record(folder: &Path, name: &str, effect: &str, seed: u64) {
     mimu_rig::record::write(&plan, &truth, seed, &output).unwrap();
 }
 
-fn cubic() -> String {
+pub fn cubic() -> String {
     format!("[[effect]]\nid = \"gyro_scale_cubic\"\ndps_at_300dps = {CUBIC_DPS:?}\n")
 }
 
-fn mimu(folder: &Path, arguments: &[&str]) -> Output {
+pub fn mimu(folder: &Path, arguments: &[&str]) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_mimu"));
     command
         .current_dir(folder)

@@ -5,6 +5,7 @@ mod bad_input;
 mod design_command;
 mod device;
 mod diagnosis_page;
+mod diagnosis_text;
 mod effects;
 mod export_over_temperature;
 mod fuzz;

@@ -12,7 +12,7 @@ use crate::diagnose::rows::Figure as Judged;
 use crate::diagnose::{Diagnosis, SensorDiagnosis, Source, Untestable, Verdict};
 use crate::effects::candidate::Kind;
 use crate::fit::Split;
-use crate::next_experiment::{Confused, Next, NotInPlan};
+use crate::next_experiment::{Confused, Next, NotInPlan, SizedRecipe};
 use crate::quantity::{AXES, Figure, Sensor, significant};
 use crate::verify::Verification;
 
@@ -78,6 +78,12 @@ pub struct AcceptedResult {
     pub held_out_rms_before: f64,
     /// The same with it.
     pub held_out_rms_after: f64,
+    /// Held-out root mean square of the rates at rest without it, rad/s, where the figures are of turns.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub held_out_at_rest_before: Option<f64>,
+    /// The same with it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub held_out_at_rest_after: Option<f64>,
     /// How it was held out.
     pub held_out: Split,
     /// Probability of chance after the whole search.
@@ -164,7 +170,7 @@ pub struct RejectedResult {
     pub reason: String,
 }
 
-/// An effect that the recordings could not show.
+/// An effect whose typical size the recordings would not have shown: that it was not found means nothing.
 #[derive(Debug, Clone, Serialize)]
 pub struct NotExcitedResult {
     /// Public id.
@@ -173,6 +179,9 @@ pub struct NotExcitedResult {
     pub sensor: &'static str,
     /// What would show it.
     pub experiment: String,
+    /// The recipe behind the words.
+    #[serde(skip)]
+    pub recipe: Option<SizedRecipe>,
 }
 
 /// An accepted effect whose physics the recordings do not decide.
@@ -381,11 +390,12 @@ impl DiagnosisResult {
         });
         self.rejected.extend(rejected);
         let ours = |id: &str| decision.not_excited.iter().any(|n| n.0 == id);
-        let not_excited = next.not_excited.iter().filter(|n| ours(&n.0));
-        let not_excited = not_excited.map(|(id, experiment)| NotExcitedResult {
-            id: id.clone(),
+        let not_excited = next.not_excited.iter().filter(|n| ours(&n.id));
+        let not_excited = not_excited.map(|n| NotExcitedResult {
+            id: n.id.clone(),
             sensor: name,
-            experiment: experiment.clone(),
+            experiment: n.experiment.clone(),
+            recipe: n.recipe,
         });
         self.not_excited.extend(not_excited);
         let undecided = decision.undecided.iter().map(|u| UndecidedResult {
@@ -493,6 +503,8 @@ impl AcceptedResult {
             coefficients: coefficients.collect(),
             held_out_rms_before: a.held_out[0],
             held_out_rms_after: a.held_out[1],
+            held_out_at_rest_before: a.held_out_at_rest.map(|r| r[0]),
+            held_out_at_rest_after: a.held_out_at_rest.map(|r| r[1]),
             held_out: a.split,
             chance: a.chosen.p,
             alternatives: a

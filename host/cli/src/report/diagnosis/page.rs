@@ -71,7 +71,8 @@ pub fn diagnosis_page(d: &DiagnosisResult, made: &Made) -> Result<String> {
                 @for s in &sensors { (sensor(d, s)) }
                 h2 { "Tried and not accepted" }
                 (tables::rejected(d))
-                h2 { "Not tested: the experiment does not excite it" }
+                h2 { "Not seen at data-sheet size" }
+                p { "These effects were tried as well. At the size that data sheets give this recording would not show them, so that their absence means nothing." }
                 (tables::not_excited(d))
                 (confused(d))
                 (recorded(d))
@@ -243,11 +244,11 @@ fn effect(d: &DiagnosisResult, s: &Shown, one: &AcceptedResult, panels: &[Panel]
     }
 }
 
-/// What the next recording has to tell apart.
+/// What the next recording has to distinguish.
 fn confused(d: &DiagnosisResult) -> Markup {
     html! {
         @if !d.confused.is_empty() {
-            h2 { "What tells the confused ones apart" }
+            h2 { "What distinguishes the confused ones" }
             dl { @for c in &d.confused {
                 dt { code { (c.ids[0]) } " or " code { (c.ids[1]) } }
                 dd {
@@ -295,7 +296,7 @@ fn method() -> Markup {
             "It is accepted only if the error of dwells that the model has not seen goes down with it, and if no dwell alone "
             "holds more than " (percent(LEVERAGE)) " of what it rests on. "
             "What then scatters beyond the known noise, where chance would do so in " (percent(FALSE_LEFTOVER))
-            " of clean units, is told as left over, and the verdict is unexplained whatever was found besides."
+            " of clean units, is reported as a residual, and the verdict is unexplained whatever was found besides."
         }
     }
 }

@@ -1,62 +1,74 @@
 //! The diagnosis for people.
 
+mod effect;
+mod experiments;
+
 use std::fmt::Write as _;
 
 use super::{meaning, remarks};
-use crate::report::text::{warn, wrap};
+use crate::report::text::wrap;
+use effect::effect;
+pub(super) use experiments::by_experiment;
+use experiments::experiments;
 use mimu::calibration::ConverterTable;
-use mimu::quantity::{p_value, plural, plus_minus, significant};
-use mimu::readable::{self, Readable};
-use mimu::result::diagnosis::{AcceptedResult, DiagnosisResult, SensorDiagnosisResult};
+use mimu::quantity::{plural, plus_minus, significant};
+use mimu::readable;
+use mimu::result::diagnosis::{
+    DiagnosisResult, LeftoverResult, SecondResult, SensorDiagnosisResult,
+};
 
 /// Why its figures are not those of `mimu fit`.
 const FIGURES: &str = "The figures before are not quite those of `mimu fit`: residuals are weighted here by the variance components of \
                        this diagnosis.";
+/// What is reported of residuals that the biases of usual sensors leave.
+pub(super) const USUAL: &str = "the bias of a usual sensor wanders by up to four times the noise of a dwell; --noise, by `mimu allan` \
+                                of the unit at rest, shows whether this one does";
+/// Fewer residuals beyond the affine parameters than this say nothing.
+const FEW: usize = 3;
+/// Residuals of a sensor that the summary lists.
+const LISTED: usize = 3;
 
-/// Result of `mimu diagnose`. `all`: with the whole reason of each effect that was not accepted.
-pub fn diagnosis_text(d: &DiagnosisResult, all: bool) -> String {
+/// How much of a diagnosis is printed.
+#[derive(Debug, Clone, Copy)]
+pub struct Detail {
+    /// Everything, with the reason of each effect that was not accepted.
+    pub all: bool,
+    /// The experiments that would show or distinguish more.
+    pub next: bool,
+}
+
+/// Result of `mimu diagnose`.
+pub fn diagnosis_text(d: &DiagnosisResult, detail: Detail) -> String {
+    let Detail { all, next } = detail;
     let mut out = String::new();
     let _ = writeln!(out, "{}: {}: {}", d.device, d.verdict.name(), meaning(d));
     for u in &d.untestable {
         wrap(&mut out, &format!("  {}: ", u.sensor), &u.reason);
     }
+    let _ = writeln!(out);
+    errors(&mut out, d);
+    let _ = writeln!(out);
     for (name, s) in d.sensors.named() {
-        let _ = writeln!(out);
         sensor(&mut out, d, name, s, all);
     }
-    not_excited(&mut out, d);
-    confused(&mut out, d);
-    if let Some(second) = &d.second {
-        let _ = writeln!(
-            out,
-            "\non {}{}\n  {:<8}{:>16}{:>16}{:>16}",
-            second.recording,
-            match second.fitted_to {
-                true => ", which is the recording that was fitted to",
-                false => ", which nothing was fitted to",
-            },
-            "",
-            "before",
-            "after",
-            "noise floor"
-        );
-        let both = second
-            .before
-            .sensors
-            .named()
-            .zip(second.after.sensors.named());
-        for ((name, before), (_, after)) in both {
-            let figure = readable::error(before.unit);
-            let [x, y, z] = [before.rms, after.rms, after.noise_floor].map(|v| figure.write(v));
-            let _ = writeln!(out, "  {name:<8}{x:>16}{y:>16}{z:>16}");
-        }
+    if all && d.leftover.iter().any(|l| l.usual) {
+        wrap(&mut out, "", USUAL);
     }
     let _ = writeln!(out);
-    wrap(&mut out, "", FIGURES);
-    if !d.warnings.is_empty() {
-        let _ = writeln!(out);
-        warn(&mut out, d.warnings.iter());
+    if all {
+        if let Some(second) = &d.second {
+            on_second(&mut out, second);
+        }
+        wrap(&mut out, "", FIGURES);
+    } else if !d.rejected.is_empty() {
+        let count = plural(d.rejected.len() as u64, "effect");
+        let _ = writeln!(out, "tried and rejected: {count}; --all prints the reasons");
     }
+    match all || next {
+        true => experiments(&mut out, d),
+        false => open(&mut out, d),
+    }
+    warnings(&mut out, &d.warnings, all);
     out
 }
 
@@ -68,26 +80,108 @@ fn shown(s: &SensorDiagnosisResult, value: f64) -> String {
     }
 }
 
-fn sensor(out: &mut String, d: &DiagnosisResult, name: &str, s: &SensorDiagnosisResult, all: bool) {
+/// Errors of all sensors, before and after, in one table.
+fn errors(out: &mut String, d: &DiagnosisResult) {
+    let seconds = d.second.as_ref().map(|s| {
+        let both = s.before.sensors.named().zip(s.after.sensors.named());
+        both.map(|((name, b), (_, a))| (name, b, a))
+            .collect::<Vec<_>>()
+    });
+    let second = |a: &str| match seconds {
+        Some(_) => a.to_string(),
+        None => String::new(),
+    };
+    let heads = [
+        format!(
+            "{:14}{:>18}{:>20}{:>10}{}",
+            "",
+            "in sample",
+            "held out",
+            "noise",
+            second("    second recording")
+        ),
+        format!(
+            "{:14}{:>9}{:>9}{:>11}{:>9}{:>10}{}",
+            "rms error",
+            "before",
+            "after",
+            "before",
+            "after",
+            "floor",
+            second("     before     after")
+        ),
+    ];
+    for head in heads {
+        let _ = writeln!(out, "{head}");
+    }
+    for (name, s) in d.sensors.named() {
+        let unit = readable::error(s.unit);
+        let figure = |v: f64| match v.is_finite() && s.says_anything() {
+            true => significant(v * unit.factor),
+            false => "-".into(),
+        };
+        let _ = write!(
+            out,
+            "{:14}{:>9}{:>9}{:>11}{:>9}{:>10}",
+            format!("{name}, {}", unit.unit),
+            figure(s.rms_before),
+            figure(s.rms_after),
+            figure(s.held_out_rms_before),
+            figure(s.held_out_rms_after),
+            // Known from the noise alone, even where the residuals say nothing.
+            significant(s.noise_floor * unit.factor),
+        );
+        let found = seconds.iter().flatten().find(|(of, ..)| *of == name);
+        if let Some((_, before, after)) = found {
+            let other = readable::error(before.unit);
+            let [b, a] = [before.rms, after.rms].map(|v| significant(v * other.factor));
+            let _ = write!(out, "{b:>11}{a:>10}");
+            if before.unit != s.unit {
+                let _ = write!(out, " {}", other.unit);
+            }
+        }
+        let _ = writeln!(out);
+    }
+    if d.second.as_ref().is_some_and(|s| s.fitted_to) {
+        let _ = writeln!(
+            out,
+            "The second recording is the one that was fitted to, and proves nothing."
+        );
+    }
+}
+
+/// Errors on the second recording, with its noise floor.
+fn on_second(out: &mut String, second: &SecondResult) {
     let _ = writeln!(
         out,
-        "{name} ({}, rms)\n  {:<12}{:>16}{:>16}{:>16}",
-        s.figure.description(),
+        "on {}{}\n  {:<8}{:>16}{:>16}{:>16}",
+        second.recording,
+        match second.fitted_to {
+            true => ", which is the recording that was fitted to",
+            false => ", which nothing was fitted to",
+        },
         "",
         "before",
         "after",
         "noise floor"
     );
-    let floor = readable::error(s.unit).write(s.noise_floor);
-    let both = [
-        ("in sample", s.rms_before, s.rms_after),
-        ("held out", s.held_out_rms_before, s.held_out_rms_after),
-    ];
-    for (label, before, after) in both {
-        let (before, after) = (shown(s, before), shown(s, after));
-        let _ = writeln!(out, "  {label:<12}{before:>16}{after:>16}{floor:>16}");
+    let both = second.before.sensors.named();
+    for ((name, before), (_, after)) in both.zip(second.after.sensors.named()) {
+        let figure = readable::error(before.unit);
+        let [x, y, z] = [before.rms, after.rms, after.noise_floor].map(|v| figure.write(v));
+        let _ = writeln!(out, "  {name:<8}{x:>16}{y:>16}{z:>16}");
     }
-    for remark in remarks(s) {
+    let _ = writeln!(out);
+}
+
+fn sensor(out: &mut String, d: &DiagnosisResult, name: &str, s: &SensorDiagnosisResult, all: bool) {
+    let effects = || d.effects.iter().filter(|a| a.sensor == name);
+    let none = match effects().next() {
+        Some(_) => "",
+        None => ": no effect found",
+    };
+    let _ = writeln!(out, "{name} ({}){none}", s.figure.description());
+    for remark in remarks(s, all) {
         wrap(out, "  ", &remark);
     }
     if s.rows < s.affine_parameters + FEW {
@@ -97,106 +191,50 @@ fn sensor(out: &mut String, d: &DiagnosisResult, name: &str, s: &SensorDiagnosis
             s.rows, s.affine_parameters
         );
     }
-    for a in d.effects.iter().filter(|a| a.sensor == name) {
-        effect(out, s, a);
-    }
-    for u in d.undecided.iter().filter(|u| u.sensor == name) {
-        let law = format!("{} explains it {}", u.law, by_score(u.difference));
-        wrap(out, &format!("  undecided, {}: ", u.id), &law);
-        wrap(out, "    told apart by ", u.experiment);
+    for a in effects() {
+        effect(out, d, s, a, all);
     }
     for note in &s.notes {
-        wrap(out, "  note: ", note);
-    }
-    let leftover = || d.leftover.iter().filter(|l| l.sensor == name);
-    for l in leftover() {
-        let _ = writeln!(
-            out,
-            "  left over, {}: {} rms beyond the noise; goes with {}",
-            l.rows,
-            readable::error(l.unit).write(l.strength),
-            l.against
-        );
-    }
-    if leftover().any(|l| l.usual) {
-        wrap(out, "    ", USUAL);
-    }
-    rejected(out, d, name, all);
-}
-
-/// What was not accepted. Without `all`, of those whose reason takes more than a line the ids only.
-fn rejected(out: &mut String, d: &DiagnosisResult, sensor: &str, all: bool) {
-    let mut longer: Vec<&str> = Vec::new();
-    for r in d.rejected.iter().filter(|r| r.sensor == sensor) {
-        let mut text = String::new();
-        wrap(&mut text, &format!("  - {}: ", r.id), &r.reason);
-        match all || text.lines().count() == 1 {
-            true => out.push_str(&text),
-            false => longer.push(&r.id),
+        // What was found comes before the first semicolon, what to do about it behind.
+        let (found, more) = note.split_once(';').unwrap_or((note, ""));
+        match all || more.is_empty() {
+            true => wrap(out, "  note: ", note),
+            false => wrap(out, "  note: ", &format!("{found} (--all)")),
         }
     }
-    if !longer.is_empty() {
-        let count = plural(longer.len() as u64, "effect");
+    residuals(out, d, name, all);
+    if all {
+        for r in d.rejected.iter().filter(|r| r.sensor == name) {
+            wrap(out, &format!("  - {}: ", r.id), &r.reason);
+        }
+    }
+}
+
+/// What remains beyond the noise. Without `all` residuals that correlate with the same quantity are together, and the first few listed.
+fn residuals(out: &mut String, d: &DiagnosisResult, name: &str, all: bool) {
+    let mut groups: Vec<Vec<&LeftoverResult>> = Vec::new();
+    for l in d.leftover.iter().filter(|l| l.sensor == name) {
+        let same = |g: &&mut Vec<&LeftoverResult>| g[0].against == l.against && g[0].unit == l.unit;
+        match groups.iter_mut().find(same) {
+            Some(group) if !all => group.push(l),
+            _ => groups.push(vec![l]),
+        }
+    }
+    let listed = if all { groups.len() } else { LISTED };
+    for group in groups.iter().take(listed) {
+        let rows: Vec<&str> = group.iter().map(|l| l.rows.as_str()).collect();
+        let largest = group.iter().map(|l| l.strength).fold(0.0, f64::max);
+        let up_to = if group.len() > 1 { "up to " } else { "" };
         let text = format!(
-            "{} (--all prints the reasons, and the page has them)",
-            longer.join(", ")
+            "{up_to}{} rms beyond the noise; correlates with {}",
+            readable::error(group[0].unit).write(largest),
+            group[0].against
         );
-        wrap(out, &format!("  - {count} not accepted: "), &text);
+        wrap(out, &format!("  residual, {}: ", rows.join(", ")), &text);
     }
-}
-
-/// What is said of what is left that usual sensors do.
-pub(super) const USUAL: &str = "by up to four times the noise of a dwell mean the biases of usual sensors wander; `mimu allan` of the \
-                                unit at rest, given as --noise, tells whether this one does";
-
-fn effect(out: &mut String, s: &SensorDiagnosisResult, a: &AcceptedResult) {
-    let _ = writeln!(out, "  + {}: {}", a.id, a.about);
-    let _ = writeln!(
-        out,
-        "    held out {} without it, {} with it; {}",
-        shown(s, a.held_out_rms_before),
-        shown(s, a.held_out_rms_after),
-        p_value(a.chance)
-    );
-    match &a.second {
-        Some(second) if second.shows => {
-            let [x, y] = [second.rms_before, second.rms_after].map(|v| shown(s, v));
-            let _ = writeln!(
-                out,
-                "    second recording {x} without it, {y} with it, its affine parameters its own"
-            );
-        }
-        Some(_) => {
-            let _ = writeln!(
-                out,
-                "    the second recording does not excite it, and can say nothing of it"
-            );
-        }
-        None => {}
-    }
-    for c in &a.coefficients {
-        let Readable { factor, unit } = readable::coefficient(&c.unit);
-        // Twice the standard deviation: with dwells by the dozen Student's factor is within a tenth of it.
-        let both = plus_minus(c.value * factor, 2.0 * c.sigma * factor);
-        let _ = writeln!(out, "    {:<12}{both:>19} {unit}", c.name);
-    }
-    if let Some(form) = &a.form {
-        let (value, interval) = (significant(form.value), form.interval());
-        let _ = writeln!(out, "    {:<12}{value:>12} (95 %: {interval})", form.name);
-    }
-    for c in &a.converters {
-        let _ = writeln!(out, "    {}", converter(c));
-    }
-    for other in a.alternatives.iter().take(SHOWN) {
-        let _ = writeln!(
-            out,
-            "    or {}, {} in score",
-            other.id,
-            by(other.score_worse_by)
-        );
-    }
-    if a.alternatives.len() > SHOWN {
-        let _ = writeln!(out, "    or one of {} more", a.alternatives.len() - SHOWN);
+    if groups.len() > listed {
+        let more: usize = groups[listed..].iter().map(Vec::len).sum();
+        let _ = writeln!(out, "  and {more} more residuals (--all)");
     }
 }
 
@@ -228,74 +266,53 @@ pub(super) fn by_score(worse: f64) -> String {
     format!("{how}, {} in score", by(worse))
 }
 
-/// Fewer residuals beyond the affine parameters than this say nothing.
-const FEW: usize = 3;
-/// Alternatives that are listed.
-const SHOWN: usize = 3;
+/// One line for all that the recordings could not show or distinguish.
+fn open(out: &mut String, d: &DiagnosisResult) {
+    let unseen = d.not_excited.len();
+    let pairs = d.confused.len() + d.undecided.len();
+    let unseen_words = format!(
+        "not seen at data-sheet size: {}",
+        plural(unseen as u64, "effect")
+    );
+    let pairs_words = format!("not distinguished: {}", plural(pairs as u64, "pair"));
+    let what = match (unseen > 0, pairs > 0) {
+        (true, true) => format!("{unseen_words}; {pairs_words}; --next prints the experiments"),
+        (true, false) => {
+            format!("{unseen_words}; --next prints the experiments that would show them")
+        }
+        (false, true) => {
+            format!("{pairs_words}; --next prints the experiments that distinguish them")
+        }
+        (false, false) => return,
+    };
+    let _ = writeln!(out, "{what}");
+}
 
-/// What the recordings could not show, and what would. Recipes that differ in their size only are one: the largest shows them all.
-fn not_excited(out: &mut String, d: &DiagnosisResult) {
-    let mut alike: Vec<(&str, Vec<&str>)> = Vec::new();
-    for (experiment, ids) in by_experiment(d, |_| true) {
-        let same = |e: &str| without_numbers(e) == without_numbers(experiment);
-        match alike.iter_mut().find(|(e, _)| same(e)) {
-            Some((largest, all)) => {
-                all.extend(ids);
-                if first_number(experiment) > first_number(largest) {
-                    *largest = experiment;
-                }
-            }
-            None => alike.push((experiment, ids)),
+/// Warnings. Without `all` the first of each kind, and how many there are.
+fn warnings(out: &mut String, warnings: &[String], all: bool) {
+    let mut kinds: Vec<(&String, u64)> = Vec::new();
+    for warning in warnings {
+        match kinds.iter_mut().find(|(w, _)| kind(w) == kind(warning)) {
+            Some((_, count)) if !all => *count += 1,
+            _ => kinds.push((warning, 1)),
         }
     }
-    if !alike.is_empty() {
-        let _ = writeln!(out);
-    }
-    for (experiment, ids) in alike {
-        wrap(out, "not excited: ", &ids.join(", "));
-        wrap(out, "  ", experiment);
-    }
-}
-
-fn without_numbers(text: &str) -> String {
-    text.chars().filter(|c| !c.is_ascii_digit()).collect()
-}
-
-/// Of a recipe: its dwells, or its minutes.
-fn first_number(text: &str) -> u32 {
-    let digits = text.split(|c: char| !c.is_ascii_digit());
-    digits.filter_map(|d| d.parse().ok()).next().unwrap_or(0)
-}
-
-/// Effects that were not excited, of the sensors that `of` takes, by the experiment that would show them.
-pub(super) fn by_experiment(
-    d: &DiagnosisResult,
-    of: impl Fn(&str) -> bool,
-) -> Vec<(&str, Vec<&str>)> {
-    let mut all: Vec<(&str, Vec<&str>)> = Vec::new();
-    for n in d.not_excited.iter().filter(|n| of(n.sensor)) {
-        match all.iter_mut().find(|(e, _)| *e == n.experiment) {
-            Some((_, ids)) => ids.push(&n.id),
-            None => all.push((&n.experiment, vec![&n.id])),
+    for (warning, count) in kinds {
+        match count {
+            1 => wrap(out, "warning: ", warning),
+            n => wrap(
+                out,
+                "warning: ",
+                &format!("{warning} ({} more of this kind: --all)", n - 1),
+            ),
         }
     }
-    all
 }
 
-fn confused(out: &mut String, d: &DiagnosisResult) {
-    if !d.confused.is_empty() {
-        let _ = writeln!(out);
-    }
-    for c in &d.confused {
-        let _ = writeln!(
-            out,
-            "{} or {} ({} in score)",
-            c.ids[0],
-            c.ids[1],
-            by(c.difference)
-        );
-        wrap(out, "  told apart by ", &c.experiment);
-    }
+/// A warning without its numbers and names of channels.
+fn kind(warning: &str) -> Vec<&str> {
+    let special = |w: &&str| !w.contains('_') && !w.contains(|c: char| c.is_ascii_digit());
+    warning.split(' ').filter(special).collect()
 }
 
 /// What the plan of the next experiment does not show, by the reason.

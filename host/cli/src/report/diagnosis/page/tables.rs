@@ -53,7 +53,7 @@ pub(super) fn errors(sensors: &[Shown]) -> Markup {
             }
         } }
         @for s in sensors {
-            @for remark in remarks(s.figures) { p class="dim" { (spoken(s.name)) ": " (remark) "." } }
+            @for remark in remarks(s.figures, true) { p class="dim" { (spoken(s.name)) ": " (remark) "." } }
         }
     }
 }
@@ -101,7 +101,7 @@ pub(super) fn alternatives(d: &DiagnosisResult, s: &Shown, one: &AcceptedResult)
     let undecided = || d.undecided.iter().filter(|u| u.id == one.id);
     html! {
         @for u in undecided() {
-            p { strong { "Undecided. " } (sentence(u.law)) " explains it " (by_score(u.difference)) ". Told apart by: " (u.experiment) "." }
+            p { strong { "Undecided. " } (sentence(u.law)) " explains it " (by_score(u.difference)) ". Distinguished by: " (u.experiment) "." }
         }
         @if one.alternatives.is_empty() {
             @if undecided().next().is_none() && s.figures.notes.is_empty() {
@@ -132,7 +132,7 @@ fn strength(left: &LeftoverResult) -> Markup {
 pub fn leftover(d: &DiagnosisResult) -> Markup {
     html! {
         div class="scroll" { table {
-            thead { tr { th { "residual" } th class="n" { "rms beyond the noise" } th { "goes with" } } }
+            thead { tr { th { "residual" } th class="n" { "rms beyond the noise" } th { "correlates with" } } }
             tbody { @for left in &d.leftover {
                 tr {
                     td { (spoken(left.sensor)) " " (left.rows) }
@@ -206,13 +206,13 @@ pub fn rejected(d: &DiagnosisResult) -> Markup {
 
 /// What the experiment could not show, by the experiment that would.
 pub fn not_excited(d: &DiagnosisResult) -> Markup {
-    let by_experiment = by_experiment(d, |_| true);
+    let by_experiment = by_experiment(d);
     html! {
         @if by_experiment.is_empty() {
-            p { "Every effect of the library was tested." }
+            p { "Every effect of the library would have been seen at the size that data sheets give." }
         } @else {
             div class="scroll" { table {
-                thead { tr { th { "effect" } th { "what the experiment lacks" } } }
+                thead { tr { th { "effect" } th { "what would show it" } } }
                 tbody { @for (experiment, ids) in by_experiment {
                     tr {
                         td { @for id in ids { code { (id) } (BR) } }

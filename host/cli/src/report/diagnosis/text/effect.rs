@@ -1,0 +1,120 @@
+//! An accepted effect: what it does to the error, its coefficients, and what may be in its place.
+
+use std::fmt::Write as _;
+
+use super::{by, converter, shown};
+use crate::report::text::{COLUMNS, wrap};
+use mimu::quantity::{p_value, plus_minus, significant};
+use mimu::readable::{self, Readable};
+use mimu::result::diagnosis::{
+    AcceptedResult, CoefficientResult, DiagnosisResult, SensorDiagnosisResult,
+};
+
+/// Alternatives that are listed.
+const SHOWN: usize = 3;
+/// Coefficients of one unit that go on one line whatever they are called: an axis each.
+const AXES: usize = 3;
+
+/// `all`: each coefficient on a line of its own.
+pub(super) fn effect(
+    out: &mut String,
+    d: &DiagnosisResult,
+    s: &SensorDiagnosisResult,
+    a: &AcceptedResult,
+    all: bool,
+) {
+    wrap(out, &format!("  + {}: ", a.id), a.about);
+    wrap(out, "    held out ", &errors(s, a));
+    match all {
+        true => {
+            for c in &a.coefficients {
+                let (value, unit) = coefficient(c);
+                let _ = writeln!(out, "    {:<12}{value:>19} {unit}", c.name);
+            }
+        }
+        false => compact(out, &a.coefficients),
+    }
+    if let Some(form) = &a.form {
+        let (value, interval) = (significant(form.value), form.interval());
+        let _ = writeln!(out, "    {} {value} (95 %: {interval})", form.name);
+    }
+    for c in &a.converters {
+        wrap(out, "    ", &converter(c));
+    }
+    alternatives(out, a);
+    for u in d.undecided.iter().filter(|u| u.id == a.id) {
+        let score = by(u.difference);
+        wrap(out, "    or, undecided: ", &format!("{} ({score})", u.law));
+    }
+}
+
+/// `0.549 deg without it, 0.136 deg with it; p < 1e-6`, and the same at rest and on the second recording.
+fn errors(s: &SensorDiagnosisResult, a: &AcceptedResult) -> String {
+    let both = |[without, with]: [String; 2]| format!("{without} without it, {with} with it");
+    let mut text = both([a.held_out_rms_before, a.held_out_rms_after].map(|v| shown(s, v)));
+    if let (Some(before), Some(after)) = (a.held_out_at_rest_before, a.held_out_at_rest_after) {
+        // Of a gyro without a table, whose other figures are angles after a turn.
+        let rate = readable::error("rad/s");
+        text += &format!("; at rest {}", both([before, after].map(|v| rate.write(v))));
+    }
+    match &a.second {
+        Some(second) if second.shows => {
+            let figures = both([second.rms_before, second.rms_after].map(|v| shown(s, v)));
+            text += &format!("; second recording {figures} (affine parameters refitted)");
+        }
+        Some(_) => text += "; the second recording does not excite it",
+        None => {}
+    }
+    format!("{text}; {}", p_value(a.chance))
+}
+
+/// Value with its 95 % interval, and unit.
+fn coefficient(c: &CoefficientResult) -> (String, String) {
+    let Readable { factor, unit } = readable::coefficient(&c.unit);
+    // Twice the standard deviation: with dwells by the dozen Student's factor is within a tenth of it.
+    let value = plus_minus(c.value * factor, 2.0 * c.sigma * factor);
+    (value, unit.into_owned())
+}
+
+/// Coefficients in rows: up to three of one unit on a line, a matrix row by row, others as many as a line holds.
+fn compact(out: &mut String, coefficients: &[CoefficientResult]) {
+    for of_unit in coefficients.chunk_by(|a, b| a.unit == b.unit) {
+        let first = |c: &CoefficientResult| c.name.chars().next();
+        let matrix = of_unit.len() > AXES && of_unit.iter().all(|c| c.name.chars().count() == 2);
+        let rows: Vec<&[CoefficientResult]> = match matrix {
+            true => of_unit.chunk_by(|a, b| first(a) == first(b)).collect(),
+            false => vec![of_unit],
+        };
+        let cells = |row: &[CoefficientResult]| -> Vec<String> {
+            let each = row.iter().map(|c| (c.name.as_str(), coefficient(c).0));
+            each.map(|(name, value)| match value.starts_with('-') {
+                true => format!("{name} {value}"),
+                false => format!("{name}  {value}"),
+            })
+            .collect()
+        };
+        let rows: Vec<Vec<String>> = rows.into_iter().map(cells).collect();
+        let width = rows.iter().flatten().map(|c| c.chars().count()).max();
+        let width = width.unwrap_or(0) + 3;
+        let (_, unit) = coefficient(&of_unit[0]);
+        let fit = (COLUMNS.saturating_sub(4 + unit.chars().count()) / width).max(1);
+        for line in rows.iter().flat_map(|row| row.chunks(fit)) {
+            let line: String = line.iter().map(|c| format!("{c:<width$}")).collect();
+            let _ = writeln!(out, "    {} {unit}", line.trim_end());
+        }
+    }
+}
+
+/// Candidates that would do nearly as well, on one line.
+fn alternatives(out: &mut String, a: &AcceptedResult) {
+    let listed = a.alternatives.iter().take(SHOWN);
+    let mut words: Vec<String> = listed
+        .map(|other| format!("{} ({})", other.id, by(other.score_worse_by)))
+        .collect();
+    if a.alternatives.len() > SHOWN {
+        words.push(format!("one of {} more", a.alternatives.len() - SHOWN));
+    }
+    if !words.is_empty() {
+        wrap(out, "    or, by score: ", &words.join(", "));
+    }
+}

@@ -1,0 +1,58 @@
+//! The experiments that show what the recordings could not show, and distinguish what they could not distinguish.
+
+use std::fmt::Write as _;
+
+use super::by;
+use crate::report::text::wrap;
+use mimu::result::diagnosis::{DiagnosisResult, NotExcitedResult};
+
+/// All experiments.
+pub(super) fn experiments(out: &mut String, d: &DiagnosisResult) {
+    for (shown_by, ids) in by_recipe(d) {
+        wrap(out, "not seen at data-sheet size: ", &ids.join(", "));
+        wrap(out, "  ", &shown_by.experiment);
+    }
+    for c in &d.confused {
+        let [found, other] = &c.ids;
+        let _ = writeln!(out, "{found} or {other} ({} in score)", by(c.difference));
+        wrap(out, "  distinguished by: ", &c.experiment);
+    }
+    for u in &d.undecided {
+        wrap(out, &format!("{} or ", u.id), u.law);
+        wrap(out, "  distinguished by: ", u.experiment);
+    }
+}
+
+/// Effects that were not excited, by recipe. Of one recipe the largest size shows them all.
+fn by_recipe(d: &DiagnosisResult) -> Vec<(&NotExcitedResult, Vec<&str>)> {
+    let mut all: Vec<(&NotExcitedResult, Vec<&str>)> = Vec::new();
+    for n in &d.not_excited {
+        let same = |other: &NotExcitedResult| match (n.recipe, other.recipe) {
+            (Some(a), Some(b)) => (a.recipe, a.fixture) == (b.recipe, b.fixture),
+            _ => n.experiment == other.experiment,
+        };
+        let size = |n: &NotExcitedResult| n.recipe.map_or(0.0, |r| r.size);
+        match all.iter_mut().find(|(other, _)| same(other)) {
+            Some((largest, ids)) => {
+                ids.push(&n.id);
+                if size(n) > size(largest) {
+                    *largest = n;
+                }
+            }
+            None => all.push((n, vec![&n.id])),
+        }
+    }
+    all
+}
+
+/// Effects that were not excited, by the exact words of the experiment that would show them.
+pub(in crate::report::diagnosis) fn by_experiment(d: &DiagnosisResult) -> Vec<(&str, Vec<&str>)> {
+    let mut all: Vec<(&str, Vec<&str>)> = Vec::new();
+    for n in &d.not_excited {
+        match all.iter_mut().find(|(e, _)| *e == n.experiment) {
+            Some((_, ids)) => ids.push(&n.id),
+            None => all.push((&n.experiment, vec![&n.id])),
+        }
+    }
+    all
+}
