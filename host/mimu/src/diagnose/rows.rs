@@ -202,7 +202,7 @@ impl Rows {
     /// themselves, or `None` if they are not.
     ///
     /// The size of a force and the angle of a turn are not linear in the errors of the readings, and effects not in the input that they
-    /// are evaluated at. An accelerometer cubic of 3 % at 1 g came out 14 % too large, ten times its uncertainty, where all of this was
+    /// are evaluated at. An accelerometer cubic of 3 % at 1 g came out 14 % too large, 21 standard deviations, where all of this was
     /// linear about the readings. About readings without the effect, what is neglected is as small as what they still err by.
     pub fn about(mut self, effects: &[Removed], as_read: &Self) -> Option<Self> {
         let pairs = self.conditions.iter_mut().zip(&as_read.conditions);
