@@ -12,15 +12,8 @@ use rayon::prelude::*;
 const G: f64 = 9.806_65;
 const SEEDS: u64 = 8;
 
-/// What one unit came to.
-struct Found {
-    /// Errors of the three coefficients, over their standard deviations.
-    errors: Vec<f64>,
-    /// Mean square of the turns over that of noise and of the errors that the directions of gravity are said to have.
-    turns: f64,
-}
-
-fn found(seed: u64) -> Found {
+/// Mean square of the turns of a unit over that of noise and of the errors that the directions of gravity are said to have.
+fn turns(seed: u64) -> f64 {
     let mut random = Random::new(seed, "cubic");
     let mg: [f64; 3] = std::array::from_fn(|_| {
         let size = 20.0 + random.within(10.0);
@@ -52,29 +45,22 @@ fn found(seed: u64) -> Found {
     assert_eq!(ids, ["accel_scale_cubic"], "seed {seed}");
     assert_eq!(diagnosis.verdict, Verdict::Explained, "seed {seed}");
     let one = &accel.accepted[0];
-    let errors = mg.iter().enumerate().map(|(axis, mg)| {
-        let (truth, sigma) = (mg * 1e-3 / (G * G), one.covariance[(axis, axis)].sqrt());
-        println!(
-            "  {axis}: {mg:.2} mg/g³, found {:.2} ± {:.2}",
-            one.values[axis] * 1e3 * G * G,
-            sigma * 1e3 * G * G
-        );
-        (one.values[axis] - truth) / sigma
-    });
-    Found {
-        errors: errors.collect(),
-        turns: gyro.rms[1].powi(2) / (gyro.noise_floor.powi(2) + gyro.reference_rms.powi(2)),
+    for (axis, mg) in mg.iter().enumerate() {
+        let [value, sigma] = [one.values[axis], one.covariance[(axis, axis)].sqrt()];
+        let [value, sigma] = [value, sigma].map(|v| v * 1e3 * G * G);
+        println!("  {axis}: {mg:.2} mg/g³, found {value:.2} ± {sigma:.2}");
+        // The device evaluates an effect twice. The square of the slope at 1 g, 0.8 % at 3 %, is the share that this leaves, as a seventh
+        // power of the force, and the cube nearest to that has up to twice its size.
+        let left = 2.0 * (3.0 * mg * 1e-3).powi(2) * mg.abs();
+        assert!((value - mg).abs() < 4.0 * sigma + left, "seed {seed}");
     }
+    gyro.rms[1].powi(2) / (gyro.noise_floor.powi(2) + gyro.reference_rms.powi(2))
 }
 
 #[test]
 fn an_accelerometer_cubic_of_one_to_three_per_cent_leaves_a_good_gyro_its_noise() {
-    let all: Vec<Found> = (0..SEEDS).into_par_iter().map(found).collect();
-    let turns = all.iter().map(|f| f.turns).sum::<f64>() / all.len() as f64;
-    let errors: Vec<f64> = all.iter().flat_map(|f| f.errors.clone()).collect();
-    let squares = errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64;
-    println!("turns {turns:.2} of the mean square expected, coefficients {squares:.2}");
-    // 24 coefficients: the mean of their squares is 1 ± 0.29, were they independent.
-    assert!(squares < 2.0, "{errors:.1?}");
-    assert!(turns < 1.5);
+    let all: Vec<f64> = (0..SEEDS).into_par_iter().map(turns).collect();
+    let mean = all.iter().sum::<f64>() / all.len() as f64;
+    println!("turns {mean:.2} of the mean square expected");
+    assert!(mean < 1.5, "{all:.2?}");
 }
