@@ -98,7 +98,7 @@ fn counts(model: AffineFile, per_volt: f64) -> AffineFile {
 }
 
 /// A unit of `grade` with `ids`, sizes drawn over a decade around that of data sheets; its affine models are stated.
-pub(crate) fn unit(ids: &[&'static str], grade: Grade, seed: u64) -> RigFile {
+pub fn unit(ids: &[&'static str], grade: Grade, seed: u64) -> RigFile {
     let mut random = Random::new(seed, "unit");
     let (gyro, accel) = (bench::gyro(&mut random), bench::accel(&mut random));
     let mut file = match grade {
@@ -156,7 +156,7 @@ fn flaw(seed: u64) -> FlawsTruth {
 }
 
 /// 26 to 42 poses in 2 to 4 minutes at 100 Hz.
-pub(crate) fn plan(seed: u64) -> String {
+pub fn plan(seed: u64) -> String {
     let poses = 26 + (Random::new(seed, "poses").uniform() * 17.0) as usize;
     format!(
         "format = \"mimu-plan/1\"\nsample_rate_hz = 100.0\ncarrier = \"hands\"\nlatitude_deg = 48.0\nlead_in_s = 5.0\n\

@@ -16,5 +16,6 @@ mod real_mikoff;
 mod real_xsens;
 mod several_recordings;
 mod stated_noise;
+mod strong_nonlinearity;
 mod temperature;
 mod turning;

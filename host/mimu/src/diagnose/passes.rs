@@ -11,7 +11,7 @@ use nalgebra::Matrix3;
 
 use super::as_written::AsWritten;
 use super::decision::{Decision, decide, noisier};
-use super::rows::{ForceErrors, Free, Rows, Session};
+use super::rows::{Figure, ForceErrors, Free, Rows, Session};
 use crate::effects::removal::{Removed, remove};
 use crate::fit::{Fit, session_bias};
 use crate::prepared::Prepared;
@@ -88,6 +88,28 @@ impl Pass {
     fn stands_before(&self, other: &Self) -> bool {
         let held_out = |pass: &Self| pass.decision.held_out_rms[1];
         !matches!(other.after, Some(Ok(_))) || !(held_out(other) <= held_out(self))
+    }
+
+    /// What its readings err by as a function of their own input, where rows are not linear in them: on a table the input is known.
+    fn about(&self) -> Vec<Removed> {
+        match self.rows.figure {
+            Figure::Input | Figure::Rest => Vec::new(),
+            Figure::Size | Figure::Direction => {
+                let found = self.found.iter().filter(|e| e.is_of_own_input());
+                found.cloned().collect()
+            }
+        }
+    }
+
+    /// Whether `other` has the same effects, and readings without them can be calibrated. Made about what this one found, its figures are
+    /// nearer to what the calibration does, and need not be lower.
+    fn has_effects_of(&self, other: &Self) -> bool {
+        let ids = |pass: &Self| -> Vec<String> {
+            let mut ids: Vec<String> = pass.found.iter().map(|e| e.candidate.id()).collect();
+            ids.sort_unstable();
+            ids
+        };
+        matches!(other.after, Some(Ok(_))) && ids(self) == ids(other)
     }
 
     fn affine(&self, sensor: Sensor) -> Option<Affine<f64>> {
@@ -170,7 +192,7 @@ impl Passes<'_> {
         let sensor = self.sensor;
         let fits = Sensor::BOTH.map(|s| self.now.sensor(s));
         let mut models = fits.map(|f| Some(f?.estimated.triad.inverse));
-        let mut pass = self.pass(models, without)?;
+        let mut pass = self.pass(models, &[], without)?;
         let moves = |models: &[Option<Affine<f64>>; 2], pass: &Pass| {
             let (Some(was), Some(is)) = (models[sensor as usize], pass.affine(sensor)) else {
                 return false;
@@ -183,8 +205,10 @@ impl Passes<'_> {
                 break;
             }
             models[sensor as usize] = pass.affine(sensor);
-            let next = self.pass(models, without)?;
-            if pass.stands_before(&next) {
+            let about = pass.about();
+            let next = self.pass(models, &about, without)?;
+            let closer = !about.is_empty() && pass.has_effects_of(&next);
+            if !closer && pass.stands_before(&next) {
                 break;
             }
             pass = next;
@@ -192,8 +216,40 @@ impl Passes<'_> {
         Ok((pass, strong))
     }
 
-    /// One pass, with `models` of gyro and accelerometer; effects `without`, each with the reason, are not tried.
-    fn pass(&self, models: [Option<Affine<f64>>; 2], without: &[(String, String)]) -> Result<Pass> {
+    /// The rows of `sessions`, linear about their readings without `effects`.
+    fn rows(
+        &self,
+        sessions: &[Session],
+        models: &[Option<Affine<f64>>; 2],
+        effects: &[Removed],
+    ) -> Option<Rows> {
+        let as_read = Rows::of(sessions, self.sensor, self.free)?;
+        if effects.is_empty() {
+            return Some(as_read);
+        }
+        let clean = |s: &Session| remove(s.prepared, s.gyro.as_ref(), s.accel.as_ref(), effects);
+        let clean: Vec<Prepared> = sessions.iter().map(clean).collect::<Option<_>>()?;
+        let pairs = clean.iter().zip(sessions);
+        let sessions: Vec<Session> = pairs
+            .map(
+                |(prepared, s)| match std::ptr::eq(s.prepared, &self.now.prepared) {
+                    true => Session { prepared, ..*s },
+                    false => later_session(prepared, models),
+                },
+            )
+            .collect();
+        let rows = Rows::of(&sessions, self.sensor, self.free)?;
+        Some(rows.about(effects, &as_read).unwrap_or(as_read))
+    }
+
+    /// One pass, with `models` of gyro and accelerometer, linear about readings without the effects `about`; effects `without`, each with
+    /// the reason, are not tried.
+    fn pass(
+        &self,
+        models: [Option<Affine<f64>>; 2],
+        about: &[Removed],
+        without: &[(String, String)],
+    ) -> Result<Pass> {
         let sensor = self.sensor;
         let head = Session {
             forces: self.forces,
@@ -202,8 +258,9 @@ impl Passes<'_> {
         let others = self.later.iter().map(|p| later_session(p, &models));
         let sessions: Vec<Session> = std::iter::once(head).chain(others).collect();
         let (ours, unseen) = sessions.split_at(self.found_in);
-        let rows = Rows::of(ours, sensor, self.free).ok_or_else(|| self.singular())?;
-        let unseen = Rows::of(unseen, sensor, self.free);
+        let rows = self.rows(ours, &models, about);
+        let rows = rows.ok_or_else(|| self.singular())?;
+        let unseen = self.rows(unseen, &models, about);
         let all: Vec<&Prepared> = ours.iter().map(|s| s.prepared).collect();
         let ends = dwell_ends(&all);
         let decide = |without: &[(String, String)]| {

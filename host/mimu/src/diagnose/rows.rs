@@ -27,6 +27,7 @@ use mimu_core::compensation::Affine;
 use nalgebra::{DMatrix, DVector, SMatrix, SymmetricEigen, Vector3};
 
 use crate::effects::quantity::Conditions;
+use crate::effects::removal::Removed;
 use crate::effects::temperature::{Followed, lagged, rank_correlation};
 use crate::estimate::earth::poses;
 pub use forces::ForceErrors;
@@ -195,6 +196,30 @@ impl Rows {
             rows.leave_open(covariance.fixed_view::<9, 9>(0, 0).into_owned());
         }
         Some(rows)
+    }
+
+    /// These rows, of readings that `effects` were taken out of, with what they do put back in; `as_read` are the same rows of the readings
+    /// themselves, or `None` if they are not.
+    ///
+    /// The size of a force and the angle of a turn are not linear in the errors of the readings, and effects not in the input that they
+    /// are evaluated at. An accelerometer cubic of 3 % at 1 g came out 14 % too large, 21 standard deviations, where all of this was
+    /// linear about the readings. About readings without the effect, what is neglected is as small as what they still err by.
+    pub fn about(mut self, effects: &[Removed], as_read: &Self) -> Option<Self> {
+        let pairs = self.conditions.iter_mut().zip(&as_read.conditions);
+        // What a converter does goes by what it put out.
+        pairs.for_each(|(clean, read)| clean.reading = read.reading);
+        let alike = |a: &Row, b: &Row| a.dwells == b.dwells && a.conditions == b.conditions;
+        let same = self.rows.len() == as_read.rows.len()
+            && self
+                .rows
+                .iter()
+                .zip(&as_read.rows)
+                .all(|(a, b)| alike(a, b));
+        for effect in effects {
+            let columns = effect.candidate.columns(&self, effect.parameter);
+            self.y += columns * DVector::from_column_slice(&effect.values);
+        }
+        same.then_some(self)
     }
 
     /// Takes a given matrix for known to within the `covariance` of C by rows only.

@@ -37,6 +37,19 @@ impl Removed {
         }
     }
 
+    /// Whether it is a function of its sensor's own input alone, other than what the converter makes of it.
+    pub fn is_of_own_input(&self) -> bool {
+        let sensor = self.candidate.sensor;
+        let need = match sensor {
+            Sensor::Gyro => Need::Rate,
+            Sensor::Accel => Need::Force,
+        };
+        let regressors = self.candidate.slot_regressors();
+        let mut quantities = regressors.iter().flat_map(|r| r.quantities()).peekable();
+        let any = quantities.peek().is_some();
+        any && quantities.all(|q| q.needs(need, sensor))
+    }
+
     /// Adds its error of the three axes, SI.
     fn add(&self, at: &Conditions, error: &mut Vector3<f64>) {
         self.candidate
