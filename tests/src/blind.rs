@@ -16,7 +16,7 @@ use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
 use mimu::result::diagnosis::DiagnosisResult;
 use mimu::stillness::STILL_FACTOR;
-use mimu_cli::report::{Made, diagnosis_page, diagnosis_text};
+use mimu_cli::report::{Detail, Made, diagnosis_page, diagnosis_text};
 use mimu_rig::random::Random;
 use mimu_rig::rig_file::{EffectFile, RigFile, RigTruth};
 use nalgebra::{DMatrix, DVector};
@@ -235,7 +235,13 @@ pub fn reported(diagnosis: Diagnosis) -> Diagnosis {
         created: "2026-01-01T00:00:00Z".into(),
     };
     let page = diagnosis_page(&report, &made).expect("a page");
-    let text = diagnosis_text(&report, true);
+    let text = diagnosis_text(
+        &report,
+        Detail {
+            all: true,
+            next: true,
+        },
+    );
     let json = serde_json::to_string(&report).expect("JSON");
     for effect in &diagnosis.effects {
         let id = effect.candidate.id();
