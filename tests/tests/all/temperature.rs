@@ -12,7 +12,7 @@ use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
 use mimu::result::diagnosis::DiagnosisResult;
 use mimu::stillness::STILL_FACTOR;
-use mimu_cli::report::{Made, diagnosis_page, diagnosis_text};
+use mimu_cli::report::{Detail, Made, diagnosis_page, diagnosis_text};
 use mimu_recording::Recorded;
 use mimu_rig::random::Random;
 use mimu_rig::rig_file::{EffectFile, RigFile, RigTruth};
@@ -303,7 +303,7 @@ fn the_interval_of_a_lag_is_in_the_json_the_text_and_the_page() {
         created: "2026-01-01T00:00:00Z".into(),
     };
     let interval = form.interval();
-    assert!(diagnosis_text(&result, false).contains(&format!("(95 %: {interval})")));
+    assert!(diagnosis_text(&result, Detail { all: true, next: false }).contains(&format!("(95 %: {interval})")));
     assert!(
         diagnosis_page(&result, &made)
             .expect("a page")
