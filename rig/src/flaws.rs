@@ -19,6 +19,12 @@ pub struct FlawsTruth {
     pub stamp_jitter_s: f64,
     /// So many samples are fetched at once, and stamped at once; 1 is none.
     pub stamp_burst: u32,
+    /// Share of the samples that the recording has lost, each by itself; the time stamps of the others are right.
+    pub lost_share: f64,
+    /// After so many samples the logger pauses and records none; 0 is never.
+    pub pause_after: u32,
+    /// Length of each pause, s, rounded to whole samples.
+    pub pause_s: f64,
     /// So many turns by hand have a violent shake in them.
     pub shake_turns: u32,
     /// Band of the shake, Hz.
@@ -54,6 +60,9 @@ impl Default for FlawsTruth {
         Self {
             stamp_jitter_s: 0.0,
             stamp_burst: 1,
+            lost_share: 0.0,
+            pause_after: 0,
+            pause_s: 1.0,
             shake_turns: 0,
             shake_hz: [4.0, 6.0],
             shake_mrad: 250.0,
@@ -91,6 +100,8 @@ impl FlawsTruth {
                 &[f64::from(self.stamp_burst)],
                 [1.0, 10_000.0],
             ),
+            ("lost_share", &[self.lost_share], [0.0, 0.9]),
+            ("pause_s", &[self.pause_s], [0.0, 3600.0]),
             ("shake_hz", &self.shake_hz, [0.1, 100.0]),
             ("shake_mrad", &[self.shake_mrad], [0.0, 3000.0]),
             ("settle_mrad", &[self.settle_mrad], size),
@@ -128,6 +139,41 @@ pub(crate) fn struck(count: u32, n: usize, random: &mut Random) -> Vec<bool> {
 /// Any direction, all equally likely.
 pub(crate) fn direction(random: &mut Random) -> Vector {
     random.attitude().turn([0.0, 0.0, 1.0])
+}
+
+/// Which samples a recording lacks.
+#[derive(Debug, Clone)]
+pub(crate) struct Lost {
+    share: f64,
+    random: Random,
+    /// Samples between two pauses, and in one; none without pauses.
+    pauses: Option<[usize; 2]>,
+}
+
+impl Lost {
+    /// Of a recording with a sample every `period_s`.
+    pub(crate) fn new(truth: &FlawsTruth, period_s: f64, seed: u64) -> Self {
+        let in_pause = (truth.pause_s / period_s).round() as usize;
+        let between = truth.pause_after as usize;
+        Self {
+            share: truth.lost_share,
+            random: Random::new(seed, "lost samples"),
+            pauses: (between > 0 && in_pause > 0).then_some([between, in_pause]),
+        }
+    }
+
+    /// Whether sample `index` is lacking; to be asked of each in its order.
+    pub(crate) fn lacks(&mut self, index: usize) -> bool {
+        let pauses = |[between, in_pause]: [usize; 2]| index % (between + in_pause) >= between;
+        let lost = self.share > 0.0 && self.random.uniform() < self.share;
+        lost || self.pauses.is_some_and(pauses)
+    }
+
+    /// How many of the first `count` samples there are.
+    pub(crate) fn recorded(&self, count: usize) -> usize {
+        let mut again = self.clone();
+        (0..count).filter(|&index| !again.lacks(index)).count()
+    }
 }
 
 /// Two samples that are fetched together are stamped so far apart, s, or a tenth of a period.

@@ -7,7 +7,7 @@ mod storage;
 use std::path::{Path, PathBuf};
 
 use crate::converter::{Converter, Readings};
-use crate::flaws::Flaws;
+use crate::flaws::{Flaws, Lost};
 use crate::hands::Hands;
 use crate::motion::{Carrier, Instant};
 use crate::plan::{CarriedBy, Plan, Samples};
@@ -33,8 +33,12 @@ pub struct Run<'a> {
     unit: Unit,
     converter: Converter,
     flaws: Flaws,
+    lost: Lost,
     next: usize,
+    /// Samples that are taken.
     count: usize,
+    /// Samples that are still to be recorded.
+    left: usize,
 }
 
 /// Carries out a plan in memory. The same plan, truth and seed give the same samples, bit by bit.
@@ -55,10 +59,14 @@ pub fn samples<'a>(plan: &'a Plan, truth: &RigTruth, seed: u64) -> Result<Run<'a
     plan.check_length(carrier.duration_s())?;
     let period_s = 1.0 / plan.sample_rate_hz;
     let dwells = plan.dwells();
+    // All before the end. The ends of dwells are sums: a rounding error beyond a sample is none.
+    let count = (carrier.duration_s() * plan.sample_rate_hz - 1e-6).ceil() as usize;
+    let lost = Lost::new(&truth.flaws, period_s, seed);
     Ok(Run {
         plan,
-        // All before the end. The ends of dwells are sums: a rounding error beyond a sample is none.
-        count: (carrier.duration_s() * plan.sample_rate_hz - 1e-6).ceil() as usize,
+        count,
+        left: lost.recorded(count),
+        lost,
         carrier,
         unit: Unit::new(&truth.unit, seed, period_s),
         converter: Converter::new(&truth.converter, &truth.unit, seed),
@@ -71,9 +79,25 @@ impl Iterator for Run<'_> {
     type Item = Row;
 
     fn next(&mut self) -> Option<Row> {
-        if self.next == self.count {
-            return None;
+        while self.next < self.count {
+            let lacks = self.lost.lacks(self.next);
+            let row = self.sample();
+            if !lacks {
+                self.left -= 1;
+                return Some(row);
+            }
         }
+        None
+    }
+
+    fn size_hint(&self) -> (usize, Option<usize>) {
+        (self.left, Some(self.left))
+    }
+}
+
+impl Run<'_> {
+    /// Takes the next sample, whether it is recorded or lost.
+    fn sample(&mut self) -> Row {
         // Not by adding up: the thousandth of a second has no exact sum.
         let t_s = self.next as f64 / self.plan.sample_rate_hz;
         let stamp_s = self.flaws.stamp(self.next, t_s);
@@ -84,16 +108,11 @@ impl Iterator for Run<'_> {
         let pins = self.unit.step(&felt, self.plan.chamber_c(t_s));
         let mut readings = self.converter.read(&pins);
         readings.temp_c = self.flaws.thermometer(t_s, readings.temp_c);
-        Some(Row {
+        Row {
             instant,
             stamp_s,
             readings,
-        })
-    }
-
-    fn size_hint(&self) -> (usize, Option<usize>) {
-        let left = self.count - self.next;
-        (left, Some(left))
+        }
     }
 }
 

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
+use mimu::dwell::Keep;
 use mimu::noise_file::NoiseFile;
 use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
@@ -39,6 +40,35 @@ impl StillArgs {
             steps,
         }
     }
+}
+
+#[derive(Args)]
+pub(crate) struct KeepArgs {
+    /// Fit with dwells and turns that the others contradict: `all`, or the numbers of dwells, 3,12
+    ///
+    /// A turn is kept with the dwell that it ends in. Without it, a dwell or turn that errs by far more than the others predict is
+    /// left out, with gravity as the only reference, and named.
+    #[arg(long = "keep", value_name = "all|N,...", value_parser = keep)]
+    keep: Option<Keep>,
+}
+
+impl KeepArgs {
+    /// `prepared` with what may not be left out of it.
+    pub(crate) fn apply(&self, mut prepared: Prepared) -> Prepared {
+        prepared.dwells.keep = self.keep.clone().unwrap_or_default();
+        prepared
+    }
+}
+
+fn keep(text: &str) -> std::result::Result<Keep, String> {
+    if text == "all" {
+        return Ok(Keep::Everything);
+    }
+    let steps: std::result::Result<Vec<i32>, _> =
+        text.split(',').map(|n| n.trim().parse()).collect();
+    steps
+        .map(Keep::Steps)
+        .map_err(|_| "write `all`, or the numbers of dwells with commas between: 3,12".into())
 }
 
 fn still(text: &str) -> std::result::Result<f64, String> {

@@ -21,7 +21,7 @@ mod views;
 
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use cmd::{allan, apply, design, device, diagnose, fit, import, record, thermal, verify, wizard};
 
 /// Calibration of inertial units made of analog MEMS sensors.
@@ -65,7 +65,9 @@ enum Command {
 
 /// Parses the arguments of the process and runs the subcommand; prints an error in one line.
 pub fn run() -> ExitCode {
-    let done = match Cli::parse().command {
+    let matches = Cli::command().get_matches();
+    let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|e| e.exit());
+    let done = match cli.command {
         Command::Wizard(args) => wizard::run(&args),
         Command::Import(args) => import::run(args),
         Command::Fit(args) => fit::run(&args),
@@ -82,10 +84,24 @@ pub fn run() -> ExitCode {
     match done {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("mimu: {}", hint::line(&error));
+            eprintln!("mimu: {}", hint::line(&error, &innermost(&matches)));
             ExitCode::from(1)
         }
     }
+}
+
+/// The subcommand that `matches` are of, with its flags.
+fn innermost(matches: &clap::ArgMatches) -> clap::Command {
+    let mut command = Cli::command();
+    let mut at = matches;
+    while let Some((name, next)) = at.subcommand() {
+        match command.find_subcommand(name) {
+            Some(found) => command = found.clone(),
+            None => break,
+        }
+        at = next;
+    }
+    command
 }
 
 #[cfg(test)]
@@ -94,6 +110,6 @@ mod tests {
 
     #[test]
     fn arguments_are_consistent() {
-        <Cli as clap::CommandFactory>::command().debug_assert();
+        Cli::command().debug_assert();
     }
 }

@@ -134,7 +134,7 @@ impl BiasCubics {
         ));
         cubics
             .remains
-            .extend(linear(&models, &at(settled_c)?, sensor));
+            .extend(linear(&models, &at(settled_c)?, sensor, over.biases_only));
         let lag_s = over.lags_s().map(|lags_s| lags_s[sensor as usize]);
         cubics.remains.push(match lag_s {
             None => Remainder::unknown(LAG, "lag not determined"),
@@ -146,6 +146,9 @@ impl BiasCubics {
                 Remainder::of(LAG, "at 2 K/min", &late.collect::<Result<Vec<_>>>()?)
             }
         });
+        cubics
+            .remains
+            .push(hysteresis(over.hysteresis(sensor), &models, &conversion));
         Ok(Some(cubics))
     }
 
@@ -282,7 +285,12 @@ fn cubic(values: Vec<f64>, range_c: [f64; 2], reference_c: f64) -> [f64; 4] {
 }
 
 /// What scale factors and cross terms leave, against the model where the program is calibrated.
-fn linear(models: &[Forward], settled: &Forward, sensor: Sensor) -> [Remainder; 3] {
+fn linear(
+    models: &[Forward],
+    settled: &Forward,
+    sensor: Sensor,
+    biases_only: bool,
+) -> [Remainder; 3] {
     let input = BiasCubics::input(sensor);
     let gain = settled.matrix.diagonal();
     let across = |matrix: &nalgebra::Matrix3<f64>| {
@@ -302,15 +310,44 @@ fn linear(models: &[Forward], settled: &Forward, sensor: Sensor) -> [Remainder; 
     };
     let scales: Vec<_> = models.iter().map(scale).collect();
     let crosses: Vec<_> = models.iter().map(cross).collect();
+    let over = |source, errors: &[Vector3<f64>]| match biases_only {
+        // C is the same at all temperatures because nobody has seen it at another, which is no error of nothing.
+        true => Remainder::unknown(source, "calibrated at one temperature"),
+        false => Remainder::of(source, condition, errors),
+    };
     [
-        Remainder::of("scale factors over temperature", condition, &scales),
-        Remainder::of("cross terms over temperature", condition, &crosses),
+        over("scale factors over temperature", &scales),
+        over("cross terms over temperature", &crosses),
         Remainder::of(
             "cross terms, constant",
             condition,
             &[across(&settled.matrix)],
         ),
     ]
+}
+
+/// What the biases are off by while it heats or cools: half of what both differ by, `found` with rms and largest of the axes.
+fn hysteresis(
+    found: Option<&[[f64; 3]; 2]>,
+    models: &[Forward],
+    conversion: &Conversion,
+) -> Remainder {
+    const SOURCE: &str = "hysteresis";
+    let (Some([rms, largest]), Some(model)) = (found, models.first()) else {
+        return Remainder::unknown(SOURCE, "heating and cooling share no temperature");
+    };
+    // By the program's scale factors, which may be others than those of the calibration.
+    let half = |sizes: &[f64; 3], k: usize| {
+        0.5 * sizes[k] * (model.matrix[(k, k)] * conversion.si_per_raw[k]).abs()
+    };
+    let squares: f64 = (0..3).map(|k| half(rms, k).powi(2)).sum();
+    let max = (0..3).map(|k| half(largest, k)).fold(0.0, f64::max);
+    Remainder {
+        source: SOURCE,
+        condition: "heating or cooling",
+        rms: Some((squares / 3.0).sqrt()),
+        max: Some(max),
+    }
 }
 
 #[cfg(test)]

@@ -23,6 +23,8 @@ const GAP_SHARE: f64 = 0.02;
 const LOSS_SHARE: f64 = 0.2;
 /// A step this near to a whole number of periods is one.
 const WHOLE: f64 = 0.1;
+/// A longer step, in periods, is a pause of the logger, after which samples may begin at any instant.
+const PAUSE: f64 = 8.0;
 /// After this many rows it is looked at whether blocks condense anything at all: what follows could fill the memory.
 const LOOK_AFTER: u64 = 100_000;
 
@@ -312,7 +314,7 @@ struct Steps {
     regular: u64,
     regular_s: f64,
     longer: u64,
-    /// Of `longer`, those of a whole number of periods.
+    /// Of `longer`, those of a whole number of periods, and pauses.
     whole: u64,
     missing_s: f64,
     shorter: u64,
@@ -447,7 +449,8 @@ impl Condenser {
         if dt > GAP_PERIODS * self.period_s {
             steps.longer += 1;
             let periods = dt / self.period_s;
-            steps.whole += u64::from((periods - periods.round()).abs() < WHOLE);
+            let whole = (periods - periods.round()).abs() < WHOLE;
+            steps.whole += u64::from(whole || periods > PAUSE);
             steps.missing_s += dt - self.period_s;
             steps.first_odd.get_or_insert((row, dt));
             return true;
@@ -536,6 +539,14 @@ impl Condenser {
                     "the time steps do not fit sample_rate_hz = {rate}: the first is {dt:.6} s"
                 ),
                 "correct sample_rate_hz, or the unit of t_s",
+            )
+        } else if odd <= GAP_SHARE {
+            (
+                format!(
+                    "samples are missing in {:.0} % of the time steps at {rate} Hz, so that hardly any motion is without a gap: the first step is {dt:.6} s",
+                    100.0 * share
+                ),
+                "record it without losses, or fill the gaps before it is imported",
             )
         } else {
             (

@@ -187,8 +187,9 @@ pub struct Judged {
     /// On data it had not seen.
     #[serde(default)]
     pub held_out_rms: Option<f64>,
-    /// With noise alone.
-    pub noise_floor: f64,
+    /// With noise alone; absent where the noise is unknown.
+    #[serde(default)]
+    pub noise_floor: Option<f64>,
     /// Dwells used.
     pub dwells: usize,
     /// Condition of the experiment.

@@ -11,6 +11,7 @@ use crate::blocks::{Condensed, Level, Rails, Stretch, pool, quantile};
 use crate::course::{Course, Motion, motion};
 use crate::quantity::{Sensor, plural};
 use crate::rails::{self, longest_run_by_chance};
+use crate::ramp::ramps;
 use crate::rest::{self, Rest};
 use crate::stillness::{self, Detection, Finding, SHORTEST_S, Steps, reference_spans};
 use mimu_recording::error::{Argument, Error, Result};
@@ -161,6 +162,34 @@ pub struct LeftOut {
     pub sigmas: f64,
 }
 
+/// Which dwells, and turns that end in them, a fit uses even where the others contradict them.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub enum Keep {
+    /// None: what the others contradict is left out, and named.
+    #[default]
+    Nothing,
+    /// All.
+    Everything,
+    /// Those of these steps.
+    Steps(Vec<i32>),
+}
+
+impl Keep {
+    /// Whether nothing may be left out.
+    pub fn everything(&self) -> bool {
+        *self == Self::Everything
+    }
+
+    /// Whether the dwell of `step` may not be left out.
+    pub fn keeps(&self, step: i32) -> bool {
+        match self {
+            Self::Nothing => false,
+            Self::Everything => true,
+            Self::Steps(steps) => steps.contains(&step),
+        }
+    }
+}
+
 /// The dwells of a recording and how they were found.
 #[derive(Debug, Clone)]
 pub struct Dwells {
@@ -174,6 +203,8 @@ pub struct Dwells {
     pub longest_run: [f64; 6],
     /// What a fit has left out of it.
     pub left_out: Vec<LeftOut>,
+    /// What a fit may not leave out.
+    pub keep: Keep,
     /// What a person should know.
     pub warnings: Vec<String>,
 }
@@ -187,7 +218,7 @@ impl Dwells {
     ) -> Result<Self> {
         let finding = finding.into();
         let mut warnings = Vec::new();
-        let longest_run = [0, 1, 2, 3, 4, 5]
+        let mut longest_run = [0, 1, 2, 3, 4, 5]
             .map(|c| longest_run_by_chance(condensed, c).unwrap_or(f64::INFINITY));
         let rails = rails::find(condensed, manifest, &mut warnings);
         let given = match finding.steps {
@@ -196,11 +227,14 @@ impl Dwells {
                 return Err(Error::new("dwells", problem, "have them found").about(Argument::Steps));
             }
             Steps::Given | Steps::AsRecorded => condensed.has_steps,
-            Steps::Found => false,
+            Steps::Found | Steps::AtRest => false,
         };
+        let at_rest = finding.steps == Steps::AtRest;
         let by_hand = manifest.reference == Reference::Gravity;
         let (ranges, detection) = if given {
             (by_step(condensed), None)
+        } else if at_rest {
+            (vec![(None, 0..condensed.blocks.len())], None)
         } else {
             let (mut ranges, detection) =
                 stillness::find(condensed, manifest, finding.still_factor)?;
@@ -241,9 +275,18 @@ impl Dwells {
             };
             let error = Error::undetermined("dwells", problem, remedy);
             return Err(match given {
-                true => error,
+                true => error.about(Argument::Steps),
+                false if condensed.has_steps => error
+                    .map(|e| e.remedy += ", or take the dwells of the step column as given")
+                    .about(Argument::StillFactor)
+                    .about(Argument::Steps),
                 false => error.about(Argument::StillFactor),
             });
+        }
+        for (c, longest) in longest_run.iter_mut().enumerate() {
+            if is_coarse(&list, condensed.reading_step[c], c) {
+                *longest = f64::INFINITY;
+            }
         }
         let judged = given && finding.steps != Steps::Given;
         let too_fast = match manifest.reference {
@@ -259,7 +302,7 @@ impl Dwells {
                 }
             }
         }
-        if !given && by_hand {
+        if !given && by_hand && !at_rest {
             leave_out_turning(&mut list, condensed);
         }
         warn(&list, manifest, &mut warnings);
@@ -269,6 +312,7 @@ impl Dwells {
             rails,
             longest_run,
             left_out: Vec::new(),
+            keep: Keep::default(),
             warnings,
         })
     }
@@ -292,6 +336,29 @@ impl Dwells {
             false => format!(" (not used: {})", all.join(", ")),
         }
     }
+}
+
+impl Dwells {
+    /// Whether dwells of the `step` column are not used for `sensor` because they are not still: taking the column as it is would use them.
+    pub fn are_judged_not_still(&self, sensor: Sensor) -> bool {
+        let not_still = |d: &Dwell| d.fault(sensor) == Some(Fault::NotStill);
+        self.detection.is_none() && self.list.iter().any(not_still)
+    }
+}
+
+/// Variance of a reading that changes between two codes, over the square of the step; at most a quarter.
+const TWO_CODES: f64 = 0.3;
+
+/// Whether the `step` of channel `c` is coarser than its noise: where it changes within a dwell at all, it does so between two codes.
+/// Such a channel repeats one value through whole dwells, and is not stuck.
+fn is_coarse(list: &[Dwell], step: Option<f64>, c: usize) -> bool {
+    let Some(step) = step else { return false };
+    let mut changing: Vec<f64> = list
+        .iter()
+        .map(|d| d.raw[c].variance)
+        .filter(|v| *v > 0.0)
+        .collect();
+    quantile(&mut changing, 0.5).is_none_or(|v| v < TWO_CODES * step * step)
 }
 
 fn by_step(condensed: &Condensed) -> Vec<Stretch> {
@@ -366,6 +433,7 @@ fn leave_out_turning(list: &mut [Dwell], condensed: &Condensed) {
         blocks: d.blocks.clone(),
         mean: d.raw.map(|m| m.mean),
         duration_s: d.duration_s,
+        ramps: ramps(&condensed.blocks[d.blocks.clone()], d.duration_s),
     });
     let turning = rest::turning(&rests.collect::<Vec<_>>(), condensed);
     let starts = judged.iter().zip(turning).filter(|(_, turning)| *turning);

@@ -1,7 +1,10 @@
 //! From a recording to a calibration of both triads, judged on what it was not fitted to.
 
+mod as_came;
 mod biases;
 mod by_gravity;
+pub mod change;
+mod determined;
 mod hold_out;
 mod known;
 mod of_temperature;
@@ -90,6 +93,8 @@ pub struct Fit {
     pub options: Options,
     /// Gyro, then accelerometer, as far as there are any.
     pub sensors: Vec<SensorFit>,
+    /// What the dwells and turns that were left out change; empty where none was.
+    pub changes: Vec<change::Change>,
     /// What a person should know of the recording.
     pub warnings: Vec<String>,
 }
@@ -133,9 +138,10 @@ pub fn fit(mut prepared: Prepared, options: Options) -> Result<Fit> {
         )
         .about(Argument::Only));
     }
-    if prepared.manifest.reference == Reference::Gravity {
-        outlying::leave_out(&mut prepared);
-    }
+    let with_all = match prepared.manifest.reference {
+        Reference::Gravity => outlying::leave_out(&mut prepared),
+        Reference::Table => Default::default(),
+    };
     let mut warnings = prepared.condensed.warnings.clone();
     warnings.extend(prepared.dwells.warnings.iter().cloned());
     warnings.extend(without_temperature(&prepared, &Sensor::BOTH));
@@ -143,13 +149,31 @@ pub fn fit(mut prepared: Prepared, options: Options) -> Result<Fit> {
         Reference::Table => fit_known(&prepared, options, &mut warnings)?,
         Reference::Gravity => fit_gravity(&prepared, options, &mut warnings)?,
     };
+    let mut changes = Vec::new();
+    // The gyro is listed first, and where gravity is the only reference depends on the accelerometer.
     for sensor in &mut sensors {
         plausible::check(&prepared, sensor)?;
+    }
+    let by_size = |s: &&SensorFit| s.figure == Figure::GravitySize;
+    let accel = sensors.iter().find(by_size);
+    let accel = accel.map(|s| s.estimated.triad.clone());
+    for sensor in sensors.iter().rev() {
+        determined::check(&prepared, sensor, accel.as_ref())?;
+    }
+    for sensor in &mut sensors {
+        as_came::compare(sensor);
+        if let Some(before) = &with_all[sensor.sensor as usize] {
+            let raw = prepared.manifest.raw_unit;
+            let of_sensor = change::changes(sensor.sensor, raw, before, &sensor.estimated.triad);
+            sensor.warnings.extend(change::described(&of_sensor));
+            changes.extend(of_sensor);
+        }
     }
     Ok(Fit {
         prepared,
         options,
         sensors,
+        changes,
         warnings,
     })
 }
@@ -210,7 +234,9 @@ fn finish(
         });
         of_axis.map(|s| s.1.dof).sum::<f64>()
     };
-    if estimated
+    if estimated.scatter.iter().all(|(_, s)| s.dof < 0.5) {
+        warnings.push(format!("{sensor}: as many parameters as residuals: nothing can be judged, neither the model nor the intervals, which hold the noise within dwells alone"));
+    } else if estimated
         .scatter
         .iter()
         .any(|(name, _)| dof(name.trim_end_matches(" within dwells")) < FEW_DOF)
@@ -234,6 +260,7 @@ fn finish(
         dwells,
         static_rms,
         held_out,
+        as_came: None,
         warnings,
     }
 }

@@ -91,6 +91,7 @@ pub mod pose_means;
 pub mod prepared;
 pub mod quantity;
 pub mod rails;
+mod ramp;
 pub mod readable;
 pub mod reading_step;
 pub mod rest;

@@ -11,14 +11,15 @@ use nalgebra::{DMatrix, Vector3};
 
 use mimu_core::compensation::Affine;
 
-use self::pool::{Series, block_s, pooled, ramps, within};
+use self::pool::{Series, block_s, pooled, within};
 use self::wander::{Slow, Span};
 use crate::allan::variance::AllanModel;
-use crate::blocks::{Condensed, Rails};
+use crate::blocks::{Block, Condensed, Rails, quantile};
 use crate::course::Course;
 use crate::dwell::Dwell;
 use crate::noise_file::NoiseFile;
 use crate::quantity::Sensor;
+use crate::ramp::ramps;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{Manifest, RAW_COLUMNS, RawUnit};
 
@@ -56,6 +57,8 @@ pub struct ChannelNoise {
     /// The Allan variance itself, (averaging time in s, raw units squared), where the model does not fit it: noise that is
     /// filtered, or a vibration.
     pub curve: Option<Vec<(f64, f64)>>,
+    /// Whether any dwell has shown it. If none has, its variance is 0 and means nothing.
+    pub known: bool,
 }
 
 impl ChannelNoise {
@@ -88,8 +91,43 @@ pub struct Noise {
     other: [Option<[f64; 2]>; 6],
     /// From the first dwell to the end of the last, s.
     session: Span,
-    /// Whether the standard deviations of a table of means are all that is known.
-    of_table: bool,
+    /// Of a table of means, whether it gives standard deviations for gyro and accelerometer: all that is known of the noise there.
+    of_table: Option<[bool; 2]>,
+}
+
+/// Rate that counts as rest where the force is not known, rad/s: 0.1 deg/s turns gravity by 3 mm/s² in a dwell of ten seconds.
+const REST_RATE: f64 = 1.7e-3;
+/// Variance of an accelerometer over a dwell, times that which a quarter of the dwells keep below, from which on the unit turned in it.
+const SWINGS: f64 = 25.0;
+/// Angle between the force of a tenth of a second and that of the dwell, rad, from which on the unit turned: 3 degrees, six times
+/// what hands sway by.
+const SWINGS_BY: f64 = 0.05;
+
+/// Which of `dwells` show the noise of the readings: those that stand still, or whose known input explains what the readings do.
+/// A dwell that turns through gravity without a known force does not: its swing of m/s² once made noise floors of 766 and 4000 mm/s².
+fn still<'a>(dwells: &[&'a Dwell], sensor: Sensor) -> Vec<&'a Dwell> {
+    let accel = Sensor::Accel.channels();
+    let limits: Vec<f64> = accel
+        .clone()
+        .map(|c| {
+            let mut all: Vec<f64> = dwells.iter().map(|d| d.raw[c].variance).collect();
+            SWINGS * quantile(&mut all, 0.25).unwrap_or(0.0)
+        })
+        .collect();
+    let swings = |d: &Dwell| {
+        let mut own = accel.clone().zip(&limits);
+        own.any(|(c, limit)| *limit > 0.0 && d.raw[c].variance > *limit)
+    };
+    let stands = |d: &&&Dwell| {
+        let [rate, force] = Sensor::BOTH.map(|s| d.input(s));
+        match (sensor, rate, force) {
+            (Sensor::Accel, _, Some(_)) | (Sensor::Gyro, Some(_), _) => true,
+            (Sensor::Accel, Some(rate), None) => rate.norm() < REST_RATE && !d.moves(Sensor::Gyro),
+            (Sensor::Gyro, None, Some(_)) => !d.moves(Sensor::Accel),
+            (_, None, None) => !swings(d),
+        }
+    };
+    dwells.iter().filter(stands).copied().collect()
 }
 
 /// A noise file whose variance of a mean over 1 s is off by this factor, up or down, is not that of this recording.
@@ -103,10 +141,10 @@ impl Noise {
         for sensor in Sensor::BOTH {
             for c in sensor.channels() {
                 if condensed.has_raw[c] {
-                    let usable = || {
-                        let of_sensor = dwells.iter().filter(|d| d.fault(sensor).is_none());
-                        of_sensor.filter(|d| !d.turn)
-                    };
+                    let of_sensor = dwells.iter().filter(|d| d.fault(sensor).is_none());
+                    let used: Vec<&Dwell> = of_sensor.filter(|d| !d.turn).collect();
+                    let used = still(&used, sensor);
+                    let usable = || used.iter().copied();
                     // What another input does to the reading is no noise either, but a fit does not know it.
                     let none_moves = usable().any(|d| d.moves == [false; 2]);
                     let stand = || {
@@ -127,7 +165,7 @@ impl Noise {
                                     blocks.map(|i| condensed.blocks[*i].raw[c].mean).collect();
                                 Some(Series {
                                     means: course.unfollowed(sensor, &means)?,
-                                    ramps: ramps(d, condensed),
+                                    ramps: ramps(&condensed.blocks[d.blocks.clone()], d.duration_s),
                                 })
                             });
                             pooled(left, block_s(condensed).1)
@@ -145,15 +183,26 @@ impl Noise {
                 dwells.first().map_or(0.0, |d| d.start_s),
                 dwells.last().map_or(0.0, end),
             ],
-            of_table: false,
+            of_table: None,
         }
     }
 
-    /// That of the means of a table: white, by the standard deviation and the number of samples of each.
-    pub fn of_table() -> Self {
+    /// That of the means of a table: white, by the standard deviation and the number of samples of each. `known`: whether the table
+    /// gives any for gyro and accelerometer.
+    pub fn of_table(known: [bool; 2]) -> Self {
         Self {
-            of_table: true,
+            of_table: Some(known),
             ..Self::default()
+        }
+    }
+
+    /// Whether anything shows the noise of `sensor`. If nothing does, its variances are 0 and mean nothing.
+    pub fn is_known(&self, sensor: Sensor) -> bool {
+        match self.of_table {
+            Some(known) => known[sensor as usize],
+            None => sensor
+                .channels()
+                .all(|c| self.stated[c].is_some() || self.channels[c].known),
         }
     }
 
@@ -170,7 +219,7 @@ impl Noise {
 
     /// Whether the variances of the means are known as they are, and not by that of their size.
     pub fn is_by_channel(&self, sensor: Sensor) -> bool {
-        self.of_table || self.is_stated(sensor)
+        self.of_table.is_some() || self.is_stated(sensor)
     }
 
     /// Takes the noise of `file` in place of that within the dwells; a channel whose dwells are not as noisy as the file says
@@ -193,12 +242,17 @@ impl Noise {
         let present = |c: &usize| dwells.iter().any(|d| d.raw[*c].n > 0);
         for c in (0..6).filter(present) {
             let name = RAW_COLUMNS[c];
-            let unit = match manifest.raw_unit {
-                RawUnit::Si => Sensor::BOTH[c / 3].unit(),
-                other => &other.to_string(),
-            };
+            let raw = manifest.raw_unit.to_string();
             let mut nodes = Vec::new();
             for channel in file.channel.iter().filter(|k| k.name == name) {
+                // Readings in SI have scale factors too, and a file with them is of the calibrated unit: of 0.51 the noise is twice that
+                // of the readings.
+                let unit = match manifest.raw_unit {
+                    RawUnit::Si if channel.raw_unit.as_ref() != Some(&raw) => {
+                        Sensor::BOTH[c / 3].unit()
+                    }
+                    _ => raw.as_str(),
+                };
                 let model = channel.model_in(unit).map_err(|[found, remedy]| {
                     let problem = format!("it is in {found}, and the readings are in {unit}");
                     Error::new(format!("{}, channel {name}", file.place), problem, remedy)
@@ -245,12 +299,21 @@ impl Noise {
     /// creeps on its support tilts, which shows in the channels and not in the size.
     pub fn of_size(dwells: &[Dwell], condensed: &Condensed, accel: &Affine<f64>) -> ChannelNoise {
         let from = Sensor::Accel.channels().start;
-        let usable = dwells.iter().filter(|d| d.accel_fault.is_none() && !d.turn);
-        within(usable, condensed, |b| {
+        let force = |b: &Block| {
             let raw = Vector3::from_fn(|i, _| b.raw[from + i].mean);
             let all = (0..3).all(|i| b.raw[from + i].n > 0);
-            all.then(|| accel.apply(&raw).norm())
-        })
+            all.then(|| accel.apply(&raw))
+        };
+        // Of a unit that turns the magnitude changes by what the calibration errs, which is no noise.
+        let turns = |d: &Dwell| {
+            let up = accel.apply(&d.raw_mean(Sensor::Accel)).normalize();
+            let blocks = condensed.blocks[d.blocks.clone()].iter().filter_map(force);
+            let mut across = blocks.map(|f| f.normalize().cross(&up).norm());
+            across.any(|sin| sin > SWINGS_BY)
+        };
+        let usable = dwells.iter().filter(|d| d.accel_fault.is_none() && !d.turn);
+        let still = usable.filter(|d| !turns(d));
+        within(still, condensed, |b| force(b).map(|f| f.norm()))
     }
 
     /// Whether a record at rest says the noise of all channels of `sensor`.
@@ -278,7 +341,7 @@ impl Noise {
     /// of the mean less that of the session.
     pub fn of_mean(&self, sensor: Sensor, dwell: &Dwell) -> Vector3<f64> {
         let from = sensor.channels().start;
-        if self.of_table {
+        if self.of_table.is_some() {
             return Vector3::from_fn(|i, _| {
                 let mean = dwell.raw[from + i];
                 mean.variance / mean.n.max(1) as f64

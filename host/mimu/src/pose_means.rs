@@ -4,7 +4,7 @@
 //! show (stillness, rails, stuck channels). What goes by time is not known: turns, drifts, and how a bias wanders.
 
 use crate::blocks::{Block, Condensed, Level, Moments};
-use crate::dwell::{Dwell, Dwells, Fault, Mean};
+use crate::dwell::{Dwell, Dwells, Fault, Keep, Mean};
 use crate::noise::Noise;
 use crate::prepared::Prepared;
 use crate::quantity::Sensor;
@@ -52,12 +52,15 @@ impl Prepared {
             rails: Default::default(),
             longest_run: [f64::INFINITY; 6],
             left_out: Vec::new(),
+            keep: Keep::default(),
         };
         Ok(Self {
             manifest,
             condensed,
             dwells,
-            noise: Noise::of_table(),
+            noise: Noise::of_table(
+                Sensor::BOTH.map(|s| means.poses.iter().all(|p| knows_noise(p, s))),
+            ),
             place: means.place.clone(),
         })
     }
@@ -133,6 +136,12 @@ fn block(dwell: &Dwell, pose: &PoseMean) -> Block {
     }
 }
 
+/// Whether every mean of `sensor` has its standard deviation.
+fn knows_noise(pose: &PoseMean, sensor: Sensor) -> bool {
+    let mut own = sensor.channels().filter(|&c| !pose.raw[c].is_nan());
+    own.all(|c| !pose.deviation[c].is_nan())
+}
+
 /// What a person should know of the table.
 fn warnings(list: &[Dwell], means: &PoseMeans, has_raw: &[bool; 6]) -> Vec<String> {
     let mut warnings = Vec::new();
@@ -141,15 +150,11 @@ fn warnings(list: &[Dwell], means: &PoseMeans, has_raw: &[bool; 6]) -> Vec<Strin
         if channels().next().is_none() {
             continue;
         }
-        let unknown = |pose: &PoseMean| {
-            let mut own = channels().filter(|&c| !pose.raw[c].is_nan());
-            own.any(|c| pose.deviation[c].is_nan())
-        };
-        warnings.push(match means.poses.iter().any(unknown) {
-            true => format!(
+        warnings.push(match means.poses.iter().all(|p| knows_noise(p, sensor)) {
+            false => format!(
                 "{sensor}: the table has no standard deviations: the scatter about the fit is the only noise, and what noise alone would leave is not known"
             ),
-            false => format!(
+            true => format!(
                 "{sensor}: the noise of a mean is taken to be white, its standard deviation over the root of the number of samples; what else is in the means shows in the scatter about the fit"
             ),
         });

@@ -251,6 +251,28 @@ impl Prepared {
             .collect()
     }
 
+    /// Standard deviations of the same, for people: not a number where nothing shows the noise.
+    pub fn size_floors(&self, accel: &Affine<f64>, poses: &[Observation]) -> Vec<f64> {
+        let by_channel = self.noise.is_by_channel(Sensor::Accel);
+        let known = match by_channel {
+            true => self.noise.is_known(Sensor::Accel),
+            false => Noise::of_size(&self.dwells.list, &self.condensed, accel).known,
+        };
+        let floor = |v: &f64| if known { v.sqrt() } else { f64::NAN };
+        self.size_variances(accel, poses)
+            .iter()
+            .map(floor)
+            .collect()
+    }
+
+    /// `floor`, a figure by the noise of `sensors`; not a number where nothing shows that.
+    pub(crate) fn if_noise_known(&self, sensors: &[Sensor], floor: f64) -> f64 {
+        match sensors.iter().all(|s| self.noise.is_known(*s)) {
+            true => floor,
+            false => f64::NAN,
+        }
+    }
+
     /// Turns between usable dwells, with the directions of gravity by `accel`; also how many could not be used and why.
     pub fn turns(&self, accel: &Affine<f64>) -> (Vec<Turn<'_>>, Vec<String>) {
         let increments = &self.condensed.increments;
@@ -275,9 +297,10 @@ impl Prepared {
                 .find(|l| l.sensor == Sensor::Gyro && [l.from, l.to] == [pair[0], pair[1]]);
             let why = if let Some(left_out) = outlying {
                 Some(format!(
-                    "it ends {} deg off what the other turns predict, {:.0} sigma",
+                    "it ends {} deg off what the other turns predict, {:.0} sigma of that prediction; `--keep {}` fits with it",
                     significant(left_out.error.to_degrees()),
-                    left_out.sigmas
+                    left_out.sigmas,
+                    b.step
                 ))
             } else if pieces.iter().any(|i| !i.whole) {
                 Some("samples are missing".to_string())
@@ -378,10 +401,24 @@ impl Prepared {
     /// A failure of an estimator, with the place and with the dwells that it had to do without.
     pub(crate) fn refused(&self, failure: Failure, sensor: Sensor) -> Error {
         let unused = self.dwells.unused(sensor);
-        failure.into_error(sensor).map(|e| {
+        let undetermined = matches!(failure, Failure::Undetermined { .. });
+        let error = failure.into_error(sensor).map(|e| {
             e.place = format!("{}, {}", self.place, e.place);
             e.problem += &unused;
-        })
+            if undetermined && !unused.is_empty() {
+                e.remedy = format!("mend the dwells that are not used, or {}", e.remedy);
+            }
+        });
+        self.with_steps_as_given(error, sensor)
+    }
+
+    /// `error`, with the remedy that the dwells of the `step` column are taken as they are, where `sensor` lacks some that were judged.
+    pub(crate) fn with_steps_as_given(&self, error: Error, sensor: Sensor) -> Error {
+        if !self.dwells.are_judged_not_still(sensor) {
+            return error;
+        }
+        let remedy = "; or, if the dwells of the step column are right, take them as given";
+        error.map(|e| e.remedy += remedy).about(Argument::Steps)
     }
 }
 

@@ -1,7 +1,7 @@
 //! Channels that do not follow their input: at a rail of the converter, stuck, or dead.
 
 use crate::blocks::{Condensed, Moments, Rails, quantile};
-use crate::quantity::plural;
+use crate::quantity::{plural, significant};
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{Manifest, RAW_COLUMNS};
 
@@ -193,6 +193,33 @@ pub(crate) fn find(
     rails
 }
 
+/// Steps within which a coarse channel stays while the unit rests.
+const AT_REST_STEPS: f64 = 3.0;
+
+/// The step of another channel of the sensor of `c`, where all of them stay within some steps: the unit was at rest and its converter is
+/// coarse.
+fn coarse_step_at_rest(condensed: &Condensed, c: usize) -> Option<f64> {
+    let others = (c / 3 * 3..c / 3 * 3 + 3).filter(|o| *o != c && condensed.has_raw[*o]);
+    let mut largest = None;
+    for o in others {
+        let known = || {
+            condensed
+                .blocks
+                .iter()
+                .map(|b| &b.raw[o])
+                .filter(|m| m.n > 0)
+        };
+        let high = known().map(|m| m.max).fold(f64::NEG_INFINITY, f64::max);
+        let low = known().map(|m| m.min).fold(f64::INFINITY, f64::min);
+        let step = condensed.reading_step[o]?;
+        if high - low > AT_REST_STEPS * step {
+            return None;
+        }
+        largest = Some(step.max(largest.unwrap_or(0.0)));
+    }
+    largest
+}
+
 /// Refuses a recording in which a channel never changes.
 pub fn refuse_dead_channels(condensed: &Condensed, place: &str) -> Result<()> {
     for c in 0..6 {
@@ -212,8 +239,18 @@ pub fn refuse_dead_channels(condensed: &Condensed, place: &str) -> Result<()> {
             ));
         };
         if first.min == first.max && moments.all(|m| m.min == first.min && m.max == first.min) {
+            let column = format!("{place}, column {}", RAW_COLUMNS[c]);
+            if let Some(step) = coarse_step_at_rest(condensed, c) {
+                let problem = format!(
+                    "the channel reads {} throughout, and the unit did not move: the others of the sensor change by single steps of {}, so its noise may be below its step",
+                    first.min,
+                    significant(step)
+                );
+                let remedy = "record turns as well, which tell a coarse channel from a stuck one";
+                return Err(Error::new(column, problem, remedy));
+            }
             return Err(Error::new(
-                format!("{place}, column {}", RAW_COLUMNS[c]),
+                column,
                 format!("the channel is stuck at {} throughout", first.min),
                 "check its wiring, or that the right column was imported",
             ));

@@ -38,10 +38,20 @@ fn usual(deviations: &[f64], condensed: &Condensed, c: usize) -> f64 {
         .max(rounding)
 }
 
-/// The middle half of a stretch, where it is long enough to have ends beside it.
-fn middle(range: &Range<usize>) -> Option<Range<usize>> {
-    let quarter = range.len() / 4;
-    (quarter >= GROUP).then(|| range.start + quarter..range.end - quarter)
+/// Blocks at an end that are looked at, and half of those that they are compared with: twenty seconds. A dwell of an hour drifts.
+const LONGEST_END: usize = 200;
+
+/// What the beginning and the end of a stretch are compared with: its middle half, of a long one the nearest part of it. `None` where it is
+/// too short to have ends.
+fn middles(range: &Range<usize>) -> Option<[Range<usize>; 2]> {
+    let quarter = (range.len() / 4).min(LONGEST_END);
+    let half = (range.len() - 2 * quarter).min(2 * LONGEST_END);
+    (quarter >= GROUP).then(|| {
+        [
+            range.start + quarter..range.start + quarter + half,
+            range.end - quarter - half..range.end - quarter,
+        ]
+    })
 }
 
 /// Means of the groups of `middle`, less that of all of it.
@@ -59,27 +69,38 @@ pub(crate) fn walk_in(stretches: &mut [Stretch], condensed: &Condensed) -> (u64,
     let (mut cut, mut blocks) = (vec![0_usize; stretches.len()], 0);
     let mut ends: Vec<[usize; 2]> = vec![[0; 2]; stretches.len()];
     for c in (0..6).filter(|&c| condensed.has_raw[c]) {
-        let middles: Vec<_> = stretches.iter().map(|(_, r)| middle(r)).collect();
-        let own: Vec<Vec<f64>> = middles
+        let middles: Vec<_> = stretches.iter().map(|(_, r)| middles(r)).collect();
+        let own: Vec<[Vec<f64>; 2]> = middles
             .iter()
-            .map(|m| {
-                m.as_ref()
-                    .map_or(Vec::new(), |m| in_middle(condensed, m, c))
-            })
+            .flatten()
+            .map(|m| m.each_ref().map(|m| in_middle(condensed, m, c)))
             .collect();
-        let pooled = usual(&own.concat(), condensed, c);
+        let all: Vec<f64> = own.iter().flatten().flatten().copied().collect();
+        let pooled = usual(&all, condensed, c);
+        let mut own = own.iter();
         for (k, (_, range)) in stretches.iter().enumerate() {
-            let Some(middle) = &middles[k] else { continue };
-            let rms = (own[k].iter().map(|d| d * d).sum::<f64>() / own[k].len() as f64).sqrt();
-            let limit = AT_ENDS * pooled.max(rms);
-            let level = mean(condensed, middle.clone(), c);
-            let off = |from: usize| (mean(condensed, from..from + GROUP, c) - level).abs() > limit;
-            let first = (range.start..middle.start).find(|i| !off(*i));
-            let last = (middle.end..=range.end - 1)
+            let Some((middles, own)) = middles[k].as_ref().and_then(|m| Some((m, own.next()?)))
+            else {
+                continue;
+            };
+            let [at_first, at_last] = [0, 1].map(|end| {
+                let squares = own[end].iter().map(|d| d * d).sum::<f64>();
+                let rms = (squares / own[end].len() as f64).sqrt();
+                (
+                    mean(condensed, middles[end].clone(), c),
+                    AT_ENDS * pooled.max(rms),
+                )
+            });
+            let off = |from: usize, (level, limit): (f64, f64)| {
+                (mean(condensed, from..from + GROUP, c) - level).abs() > limit
+            };
+            let [inner, outer] = [middles[0].start, middles[1].end];
+            let first = (range.start..inner).find(|i| !off(*i, at_first));
+            let last = (outer..=range.end - 1)
                 .rev()
-                .find(|i| !off(i + 1 - GROUP));
-            let begins = first.unwrap_or(middle.start) - range.start;
-            let stops = range.end - last.map_or(middle.end, |i| i + 1);
+                .find(|i| !off(i + 1 - GROUP, at_last));
+            let begins = first.unwrap_or(inner) - range.start;
+            let stops = range.end - last.map_or(outer, |i| i + 1);
             ends[k] = [ends[k][0].max(begins), ends[k][1].max(stops)];
         }
     }
@@ -128,6 +149,8 @@ pub(crate) struct Rest {
     pub mean: [f64; 6],
     /// Length, s.
     pub duration_s: f64,
+    /// Whether the temperature ramps within it, and biases with it.
+    pub ramps: bool,
 }
 
 /// Which of `dwells`, usable and in order of time, turn evenly and do not rest: their mean rate is none of the others', or the force
@@ -144,7 +167,11 @@ pub(crate) fn turning(dwells: &[Rest], condensed: &Condensed) -> Vec<bool> {
         let scale = usual(off, condensed, c);
         for i in 0..n {
             // A mean over less time has more noise.
-            let longer = (typical_s / dwells[i].duration_s).max(1.0).sqrt();
+            let mut longer = (typical_s / dwells[i].duration_s).max(1.0).sqrt();
+            // A bias that drifts with the temperature goes the further the longer it takes.
+            if dwells[i].ramps {
+                longer *= (dwells[i].duration_s / typical_s).max(1.0);
+            }
             turning[i] |= off[i].abs() > AMONG_DWELLS * longer * scale + trend[i];
         }
     };

@@ -8,8 +8,9 @@
 //! | `welch`      | averaged periodograms, two-sided densities                        |
 //! | `floor`      | local floor of one, from the medians beside each frequency        |
 //! | `search`     | which frequencies stand above it, by more than chance             |
+//! | `transform`  | the whole series by frequency                                     |
 //! | `sinusoid`   | amplitude, phase and frequency of a steady line                   |
-//! | `flatten`    | a band brought down to the floor                                  |
+//! | `flatten`    | bands brought down to the floor                                   |
 //! | `set_aside`  | all of these: a series without its lines, and the lines           |
 //! | `white`      | N from the band in which the spectrum is flat                     |
 
@@ -18,8 +19,9 @@ mod floor;
 mod search;
 mod set_aside;
 mod sinusoid;
+mod transform;
 mod welch;
 mod white;
 
-pub use self::set_aside::{Line, SetAside, set_aside};
+pub use self::set_aside::{Line, SetAside, set_aside, set_aside_after};
 pub use self::white::{White, white_band};

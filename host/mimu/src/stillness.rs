@@ -36,6 +36,8 @@ pub enum Steps {
     Given,
     /// Found by stillness, whatever the column says.
     Found,
+    /// None are looked for: somebody knows that the unit lies still throughout, and all of the recording is one dwell.
+    AtRest,
 }
 
 /// How the dwells are to be found.
@@ -91,7 +93,8 @@ pub(crate) fn find(
         return Err(Error::new("dwells", problem, "record for longer"));
     }
     let channels: Vec<usize> = (0..6).filter(|&c| condensed.has_raw[c]).collect();
-    let windows = windows(blocks, width, &channels);
+    let bursts = manifest.reference == Reference::Gravity && in_bursts(blocks);
+    let windows = windows(blocks, width, &channels, bursts);
     let mut floor = [0.0; 6];
     for &c in &channels {
         let mut of_channel: Vec<f64> = windows
@@ -121,9 +124,9 @@ pub(crate) fn find(
         .channels()
         .filter(|&c| by_hand && condensed.has_raw[c]);
     let rates: Vec<_> = rates
-        .map(|c| (c, rate_at_rest(&at_rest, c, (factor * floor[c]).sqrt())))
+        .map(|c| (c, RateAtRest::of(&at_rest, c, (factor * floor[c]).sqrt())))
         .collect();
-    let turning = |w: &Window| rates.iter().any(|(c, range)| !range.contains(&w.mean[*c]));
+    let turning = |w: &Window| rates.iter().any(|(c, rate)| !rate.has(w, *c));
     let spans = reference_spans(condensed);
     let mut still = vec![false; blocks.len()];
     for (i, window) in windows.iter().enumerate() {
@@ -143,7 +146,7 @@ pub(crate) fn find(
         let open = i < blocks.len()
             && still[i]
             && (start.is_none()
-                || (!blocks[i].after_gap
+                || ((bursts || !blocks[i].after_gap)
                     && same_input(&blocks[i - 1].reference, &blocks[i].reference, &spans)));
         match (open, start) {
             (true, None) => start = Some(i),
@@ -175,14 +178,47 @@ pub(crate) fn find(
     Ok((ranges, detection))
 }
 
-/// Mean and variance of the six raw channels over [`WINDOW_S`].
+/// Samples in so many bursts at least are a way of recording, and no loss of samples.
+const BURSTS: usize = 20;
+/// Longest burst and shortest pause between two, s, of most.
+const BURST_S: f64 = 10.0;
+const PAUSE_S: f64 = 1.0;
+
+/// Whether samples were taken in bursts of some seconds, with pauses. A burst alone may be too short to show that it is still; with
+/// its neighbours it is as long as any.
+fn in_bursts(blocks: &[Block]) -> bool {
+    let starts = (1..blocks.len()).filter(|i| blocks[*i].after_gap);
+    let starts: Vec<usize> = [0].into_iter().chain(starts).collect();
+    let ends = starts[1..].iter().copied().chain([blocks.len()]);
+    let mut lengths: Vec<f64> = starts
+        .iter()
+        .zip(ends)
+        .map(|(from, to)| blocks[to - 1].last_s - blocks[*from].start_s)
+        .collect();
+    let mut pauses: Vec<f64> = starts[1..]
+        .iter()
+        .map(|i| blocks[*i].start_s - blocks[i - 1].last_s)
+        .collect();
+    let median = |values: &mut Vec<f64>| quantile(values, 0.5);
+    starts.len() >= BURSTS
+        && median(&mut lengths).is_some_and(|s| s < BURST_S)
+        && median(&mut pauses).is_some_and(|s| s > PAUSE_S)
+}
+
+/// Mean and variance of the six raw channels over [`WINDOW_S`], and the temperature.
 struct Window {
     mean: [f64; 6],
     variance: [f64; 6],
+    temp_c: f64,
 }
 
-/// The window that begins at each block; `None` where there is a gap in it.
-fn windows(blocks: &[Block], width: usize, channels: &[usize]) -> Vec<Option<Window>> {
+/// The window that begins at each block; `None` where there is a gap in it, unless samples come in bursts.
+fn windows(
+    blocks: &[Block],
+    width: usize,
+    channels: &[usize],
+    bursts: bool,
+) -> Vec<Option<Window>> {
     let window = |window: &[Block]| {
         let (mut mean, mut variance) = ([0.0; 6], [0.0; 6]);
         for &c in channels {
@@ -193,28 +229,96 @@ fn windows(blocks: &[Block], width: usize, channels: &[usize]) -> Vec<Option<Win
                 n => pooled.m2 / f64::from(n - 1),
             };
         }
-        Window { mean, variance }
+        Window {
+            mean,
+            variance,
+            temp_c: window[width / 2].temp_c.mean,
+        }
     };
-    let whole = |w: &[Block]| !w[1..].iter().any(|b| b.after_gap);
+    let whole = |w: &[Block]| bursts || !w[1..].iter().any(|b| b.after_gap);
     blocks
         .windows(width)
         .map(|w| whole(w).then(|| window(w)))
         .collect()
 }
 
-/// Mean readings of channel `c` that a window at rest may have: about the median of the windows that vary little, by
-/// `margin` and by five of their own deviations, which hold a drift of the bias.
+/// Temperatures that differ by less than this, K, over all windows move no bias by more than hands do.
+const LEVELS_FROM_K: f64 = 5.0;
+/// Least width, K, and least number of windows (a minute of them) of the temperatures that have one level: a turn in between is the smaller
+/// part of them.
+const LEVEL_K: f64 = 1.0;
+const LEVEL_WINDOWS: usize = 600;
+/// Deviations of the windows about their level that are still rest.
+const REACH_SIGMAS: f64 = 5.0;
+
+/// Mean readings of a channel that windows at rest have: about the median of those that vary little, by a margin and by five of their own
+/// deviations, which hold a drift of the bias.
 ///
-/// A turn about the vertical does not show in the accelerometer, and a slow one hardly in the variance of the gyro.
-fn rate_at_rest(at_rest: &[&Window], c: usize, margin: f64) -> std::ops::RangeInclusive<f64> {
-    let mut means: Vec<f64> = at_rest.iter().map(|w| w.mean[c]).collect();
-    let Some(middle) = quantile(&mut means, 0.5) else {
-        return f64::NEG_INFINITY..=f64::INFINITY;
-    };
-    let mut deviations: Vec<f64> = means.iter().map(|m| (m - middle).abs()).collect();
-    let sigma = 1.4826 * quantile(&mut deviations, 0.5).unwrap_or(0.0);
-    let reach = margin + 5.0 * sigma;
-    middle - reach..=middle + reach
+/// A turn about the vertical does not show in the accelerometer, and a slow one hardly in the variance of the gyro. A bias that follows the
+/// temperature looks like one; its level is that of the windows of the same temperature, which a turn does not share.
+struct RateAtRest {
+    /// Temperature and median reading, by temperature; a single one without a temperature where that hardly changes.
+    levels: Vec<(f64, f64)>,
+    reach: f64,
+}
+
+impl RateAtRest {
+    fn of(at_rest: &[&Window], c: usize, margin: f64) -> Self {
+        let mut by_temp: Vec<(f64, f64)> = at_rest.iter().map(|w| (w.temp_c, w.mean[c])).collect();
+        by_temp.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let ends = by_temp.first().zip(by_temp.last());
+        let changes = ends.is_some_and(|(a, b)| b.0 - a.0 > LEVELS_FROM_K);
+        let mut bins: Vec<&[(f64, f64)]> = Vec::new();
+        let mut from = 0;
+        for i in 0..by_temp.len() {
+            let full = changes
+                && i - from >= LEVEL_WINDOWS
+                && by_temp[i].0 - by_temp[from].0 >= LEVEL_K
+                && by_temp.len() - i >= LEVEL_WINDOWS;
+            if full {
+                bins.push(&by_temp[from..i]);
+                from = i;
+            }
+        }
+        bins.push(&by_temp[from..]);
+        let level = |bin: &&[(f64, f64)]| {
+            let median = |of: fn(&(f64, f64)) -> f64| {
+                let mut values: Vec<f64> = bin.iter().map(of).collect();
+                quantile(&mut values, 0.5)
+            };
+            Some((median(|w| w.0)?, median(|w| w.1)?))
+        };
+        let mut rate = Self {
+            levels: bins.iter().filter_map(level).collect(),
+            reach: f64::INFINITY,
+        };
+        let mut deviations: Vec<f64> = at_rest
+            .iter()
+            .map(|w| (w.mean[c] - rate.level(w.temp_c)).abs())
+            .collect();
+        let sigma = 1.4826 * quantile(&mut deviations, 0.5).unwrap_or(0.0);
+        rate.reach = margin + REACH_SIGMAS * sigma;
+        rate
+    }
+
+    /// On the straight line between the levels of the nearest temperatures, and on the line through the last two beyond them.
+    fn level(&self, temp_c: f64) -> f64 {
+        let [first, .., last] = self.levels.as_slice() else {
+            return self.levels.first().map_or(0.0, |l| l.1);
+        };
+        if !temp_c.is_finite() {
+            return 0.5 * (first.1 + last.1);
+        }
+        let k = self.levels.partition_point(|l| l.0 < temp_c);
+        let k = k.clamp(1, self.levels.len() - 1);
+        let [(t0, a), (t1, b)] = [self.levels[k - 1], self.levels[k]];
+        a + (b - a) * (temp_c - t0) / (t1 - t0)
+    }
+
+    fn has(&self, window: &Window, c: usize) -> bool {
+        let off = window.mean[c] - self.level(window.temp_c);
+        self.levels.is_empty() || off.abs() <= self.reach
+    }
 }
 
 /// Largest less smallest value of each reference channel in the recording, by sensor.

@@ -1,13 +1,14 @@
 //! The noise of a recording at rest: which stretch of it, and each channel's curve and model.
 //!
-//! One channel at a time, while the next is being read: three hours at 1 kHz are 86 MB a channel.
+//! One channel at a time: three hours at 1 kHz are 86 MB a channel, and the spectrum takes more beside them than the curves do. The next is
+//! read while the curves are computed.
 
 mod columns;
 mod stretch;
 mod suitability;
 
 use std::ops::Range;
-use std::sync::mpsc::sync_channel;
+use std::sync::mpsc::{channel, sync_channel};
 use std::thread;
 
 use self::columns::Columns;
@@ -22,7 +23,7 @@ use crate::allan::units::Unit;
 use crate::allan::{Kind, Point, Spacing};
 use crate::calibration::Calibration;
 use crate::quantity::{Sensor, duration, significant};
-use crate::spectrum::{SetAside, set_aside, white_band};
+use crate::spectrum::{SetAside, set_aside_after};
 use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{Column, RAW_COLUMNS, RawUnit, Recording};
 
@@ -116,10 +117,14 @@ pub fn survey(
     let mut judged = Vec::new();
     let mut estimators: Vec<(usize, Estimator)> = Vec::new();
     let (sender, receiver) = sync_channel(0);
+    let (ask, asked) = channel();
     thread::scope(|scope| -> Result<()> {
         let (indices, units, place, stretch) = (&indices, &units, &place, &stretch);
         let reader = scope.spawn(move || {
             for (i, unit) in indices.iter().zip(units) {
+                if asked.recv().is_err() {
+                    break;
+                }
                 let read = columns.take(Column::Raw(*i)).and_then(|values| {
                     Values::of(values, &stretch.rows, *i, *unit, stretch.period_s, place)
                 });
@@ -129,6 +134,11 @@ pub fn survey(
                 }
             }
         });
+        // Refused only when the reader has broken down, which its end tells.
+        let next = || {
+            let _ = ask.send(());
+        };
+        next();
         for (done, &i) in indices.iter().enumerate() {
             let values = match receiver.recv() {
                 Ok(read) => read?,
@@ -146,8 +156,18 @@ pub fn survey(
                 .and_then(|t| t.against(&values.suitability.levels));
             judged.push((i, values.suitability));
             let mut rates = values.rates;
-            let mut integrated = Integrated::empty(stretch.period_s);
-            integrated.push(&rates)?;
+            let dt_s = stretch.period_s;
+            let integral = |rates: &[f64]| {
+                let mut integrated = Integrated::empty(dt_s);
+                integrated.push(rates).map(|()| integrated)
+            };
+            let mut as_it_is = None;
+            let spectrum = set_aside_after(&mut rates, dt_s, options.confidence, |rates| {
+                as_it_is = Some(integral(rates));
+            });
+            let without_lines = integral(&rates)?;
+            drop(rates);
+            next();
             let mut channel = Channel {
                 name: RAW_COLUMNS[i],
                 sensor: if i < 3 { Sensor::Gyro } else { Sensor::Accel },
@@ -155,13 +175,20 @@ pub fn survey(
                 samples,
                 curve: Vec::new(),
                 hadamard: None,
-                spectrum: set_aside(&mut rates, stretch.period_s, options.confidence),
+                spectrum,
                 without_lines: None,
                 model: None,
                 n_band_hz: None,
             };
-            channel.analyse(&integrated, &rates, estimator.map(|(_, e)| e), &options)?;
-            channel.judge_drift(&integrated, heat, &options, &mut warnings);
+            let as_it_is = as_it_is.transpose()?;
+            let integrated = as_it_is.as_ref().unwrap_or(&without_lines);
+            channel.analyse(
+                integrated,
+                &without_lines,
+                estimator.map(|(_, e)| e),
+                &options,
+            );
+            channel.judge_drift(integrated, heat, &options, &mut warnings);
             if channel.spectrum.remains {
                 warnings.push(format!(
                     "{}: lines that are not steady were set aside, and something still stands above the floor of the spectrum: the coefficients have some of it",
@@ -171,7 +198,7 @@ pub fn survey(
             channels.push(channel);
             progress(0.1 + 0.9 * (done + 1) as f64 / indices.len() as f64);
         }
-        drop(receiver);
+        drop((receiver, ask));
         reader.join().map_err(|_| {
             Error::new(
                 place,
@@ -290,14 +317,14 @@ impl Values {
 }
 
 impl Channel {
-    /// Curve of the channel as it is, and model of it without its lines: `rates` are without them.
+    /// Curve of the channel as it is, and model of it without its lines: of the integrals with and without them.
     fn analyse(
         &mut self,
         integrated: &Integrated,
-        rates: &[f64],
+        without_lines: &Integrated,
         estimator: Option<&Estimator>,
         options: &Options,
-    ) -> Result<()> {
+    ) {
         let step = 1.0 / options.per_decade as f64;
         let mut shown: Vec<usize> = (0..)
             .map(|k| 10f64.powf(f64::from(k) * step).round() as usize)
@@ -308,27 +335,23 @@ impl Channel {
             of.curve(kind, &Spacing::Samples(times.into()), options.confidence)
         };
         self.curve = curve(integrated, options.kind, &shown);
-        let without_lines = match self.spectrum.lines.is_empty() {
-            true => None,
-            false => {
-                let mut of = Integrated::empty(integrated.dt_s());
-                of.push(rates)?;
-                self.without_lines = Some(curve(&of, options.kind, &shown));
-                Some(of)
-            }
-        };
-        let of = without_lines.as_ref().unwrap_or(integrated);
-        let allan = curve(of, Kind::Allan, &allan_factors(self.samples));
-        let hadamard = curve(of, Kind::Hadamard, &hadamard_factors(self.samples));
+        if !self.spectrum.lines.is_empty() {
+            self.without_lines = Some(curve(without_lines, options.kind, &shown));
+        }
+        let allan = curve(without_lines, Kind::Allan, &allan_factors(self.samples));
+        let hadamard = curve(
+            without_lines,
+            Kind::Hadamard,
+            &hadamard_factors(self.samples),
+        );
         let unit = self.unit;
         let words = |term: Term, value: f64| unit.write(term, value);
         self.model = estimator.and_then(|e| e.fit(&allan, &hadamard, words));
-        self.read_white_band(rates, integrated.dt_s(), options.confidence);
-        Ok(())
+        self.read_white_band(integrated.dt_s(), options.confidence);
     }
 
     /// N from the spectrum, where the Allan curve is bent at its short end and the model does not show it, or not as it is.
-    fn read_white_band(&mut self, rates: &[f64], dt_s: f64, confidence: f64) {
+    fn read_white_band(&mut self, dt_s: f64, confidence: f64) {
         let Some(model) = &mut self.model else { return };
         // Of a bump its slopes are left, which are below twice the floor each and move the whole curve.
         let bump = self.spectrum.lines.iter().any(|l| l.width_hz.is_some());
@@ -336,7 +359,7 @@ impl Channel {
         if model.get(Term::N).is_ok() && model.excess.is_none() && !shortened && !bump {
             return;
         }
-        let Some(white) = white_band(rates, dt_s, &self.spectrum.lines, confidence) else {
+        let Some(white) = self.spectrum.white_band(dt_s, confidence) else {
             return;
         };
         let n = &mut model.coefficients[Term::N as usize];

@@ -13,7 +13,7 @@ use crate::quantity::Figure;
 use crate::quantity::Sensor;
 use crate::triad::Forward;
 use mimu_recording::error::{Error, Result};
-use mimu_recording::{Manifest, Reference};
+use mimu_recording::{Manifest, RawUnit, Reference};
 
 /// What a calibration does to one triad of a recording. Figures as in [`Figure`].
 #[derive(Debug, Clone)]
@@ -25,6 +25,8 @@ pub struct SensorVerification {
     /// With one scale factor and one bias for all axes and no misalignment, what a
     /// datasheet would give: the means of the calibration's own.
     pub rms_raw: f64,
+    /// The readings as they came, where they are in SI.
+    pub rms_as_came: Option<f64>,
     /// With the calibration, but with its effects left in; `None` if it has none.
     pub rms_affine: Option<f64>,
     /// With the calibration.
@@ -86,6 +88,7 @@ pub fn verify(prepared: &Prepared, calibration: &Calibration) -> Result<Verifica
             (Some((affine, _)), Some((clean, refused))) => {
                 let judged = SensorVerification {
                     rms_raw: affine.rms_raw,
+                    rms_as_came: affine.rms_as_came,
                     rms_affine: Some(affine.rms),
                     ..clean
                 };
@@ -103,17 +106,35 @@ pub fn verify(prepared: &Prepared, calibration: &Calibration) -> Result<Verifica
         sensors.push(judged);
     }
     if sensors.is_empty() {
-        return Err(Error::new(
+        let unused = Sensor::BOTH.map(|s| prepared.dwells.unused(s));
+        let reason = unused.iter().find(|u| !u.is_empty());
+        let error = Error::new(
             &prepared.place,
-            "the recording has nothing to judge this calibration by",
+            format!(
+                "the recording has nothing to judge this calibration by{}",
+                reason.map_or("", String::as_str)
+            ),
             "record dwells with a known input, or poses and turns by hand",
-        ));
+        );
+        let mut judged = Sensor::BOTH.into_iter();
+        let judged = judged.find(|s| prepared.dwells.are_judged_not_still(*s));
+        return Err(match judged {
+            Some(sensor) => prepared.with_steps_as_given(error, sensor),
+            None => error,
+        });
     }
-    for s in sensors.iter().filter(|s| s.rms > s.rms_raw) {
-        warnings.push(format!(
-            "{}: worse than without calibration: is it that of this unit?",
-            s.sensor
-        ));
+    for s in &sensors {
+        if s.rms_as_came.is_some_and(|came| s.rms > came) {
+            warnings.push(format!(
+                "{}: worse than the readings as they came: is it the calibration of this unit?",
+                s.sensor
+            ));
+        } else if s.rms_as_came.is_none() && s.rms > s.rms_raw {
+            warnings.push(format!(
+                "{}: worse than with its own mean scale factor and mean bias on all three axes and no misalignment: is it the calibration of this unit, in this condition?",
+                s.sensor
+            ));
+        }
     }
     Ok(Verification {
         same_recording,
@@ -201,6 +222,16 @@ pub fn nominal(calibrated: &Affine<f64>) -> Option<Affine<f64>> {
     })
 }
 
+/// Readings as they are.
+const ONE: Affine<f64> = Affine {
+    matrix: Matrix3::new(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0),
+    offset: Vector3::new(0.0, 0.0, 0.0),
+};
+
+fn in_si(prepared: &Prepared) -> bool {
+    prepared.manifest.raw_unit == RawUnit::Si
+}
+
 fn rms(values: &[f64]) -> f64 {
     (values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64).sqrt()
 }
@@ -221,6 +252,7 @@ fn judged(
         sensor,
         figure,
         rms_raw: rms(raw),
+        rms_as_came: None,
         rms_affine: None,
         rms: rms(after),
         max: largest(after),
@@ -245,15 +277,20 @@ fn known(
     let floor: Vec<f64> = observations
         .iter()
         .map(|o| (si_covariance(&calibrated.matrix, &o.variance).trace() / 3.0).sqrt())
+        .map(|floor| prepared.if_noise_known(&[sensor], floor))
         .collect();
     let after = errors(calibrated);
-    judged(
+    let judged = judged(
         sensor,
         Figure::Input,
         &errors(&nominal(calibrated)?),
         &after,
         &floor,
-    )
+    )?;
+    Some(SensorVerification {
+        rms_as_came: in_si(prepared).then(|| rms(&errors(&ONE))),
+        ..judged
+    })
 }
 
 fn size(prepared: &Prepared, calibrated: &Affine<f64>) -> Option<SensorVerification> {
@@ -265,16 +302,19 @@ fn size(prepared: &Prepared, calibrated: &Affine<f64>) -> Option<SensorVerificat
             .map(|o| model.apply(&o.raw).norm() - g)
             .collect()
     };
-    let variances = prepared.size_variances(calibrated, &observations);
-    let floor: Vec<f64> = variances.iter().map(|v| v.sqrt()).collect();
+    let floor = prepared.size_floors(calibrated, &observations);
     let after = errors(calibrated);
-    judged(
+    let judged = judged(
         Sensor::Accel,
         Figure::GravitySize,
         &errors(&nominal(calibrated)?),
         &after,
         &floor,
-    )
+    )?;
+    Some(SensorVerification {
+        rms_as_came: in_si(prepared).then(|| rms(&errors(&ONE))),
+        ..judged
+    })
 }
 
 fn turns(
@@ -293,7 +333,10 @@ fn turns(
             .collect()
     };
     let c2 = gyro.matrix.norm_squared() / 3.0;
-    let floor: Vec<f64> = by_calibration.iter().map(|t| t.floor(c2)).collect();
+    let floor = by_calibration
+        .iter()
+        .map(|t| prepared.if_noise_known(&Sensor::BOTH, t.floor(c2)));
+    let floor: Vec<f64> = floor.collect();
     let after = errors(&by_calibration, gyro);
     let rest: Vec<f64> = prepared
         .rest(accel)
@@ -304,6 +347,7 @@ fn turns(
     let judged = judged(Sensor::Gyro, Figure::Direction, &before, &after, &floor)?;
     Some(SensorVerification {
         static_rms: Some(rms(&rest)),
+        rms_as_came: in_si(prepared).then(|| rms(&errors(&prepared.turns(&ONE).0, &ONE))),
         ..judged
     })
 }

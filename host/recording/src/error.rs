@@ -39,8 +39,12 @@ pub enum Argument {
     Columns,
     /// Samples a second.
     SampleRate,
+    /// Unit of time stamps.
+    TimeUnit,
     /// Factor of a column.
     Scale,
+    /// What is added to a column.
+    Offset,
     /// What is known of the true input.
     Reference,
     /// Name of the unit.
@@ -49,6 +53,8 @@ pub enum Argument {
     Steps,
     /// Largest variance of a dwell.
     StillFactor,
+    /// Whether the unit lies still throughout.
+    AtRest,
     /// The estimator.
     Method,
     /// Which of the two sensors is calibrated.

@@ -32,8 +32,8 @@ pub use batch::Batch;
 pub use columns::{Column, Columns, RAW_COLUMNS, REFERENCE_COLUMNS};
 pub use growing::Growing;
 pub use import::{
-    Chosen, ColumnList, Decimal, ImportOptions, ImportSummary, Inputs, Jitter, PoseMean, PoseMeans,
-    Preset, PresetUse, Role, Scale, SkippedLines, TimeSummary, import, is_bag,
+    Chosen, ColumnList, Decimal, ImportOptions, ImportSummary, Inputs, Jitter, Offset, PoseMean,
+    PoseMeans, Preset, PresetUse, Role, Scale, SkippedLines, TimeSummary, import, is_bag,
 };
 pub use manifest::read_text;
 pub use manifest::{Format, MANIFEST_FILE, Manifest, Rails, RawUnit, Reference, Source};

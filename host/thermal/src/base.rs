@@ -90,7 +90,14 @@ pub fn calibration(fit: &ThermalFit, base: &Calibration, created: &str) -> Resul
     });
     let of = |sensor: usize, temp_c: f64| Some(based[sensor].as_ref()?.inverse(temp_c));
     let nodes = fewest(of, based.each_ref().map(Option::is_some), range_c)?;
-    let temperature = with_lags(&fit.joint, range_c, nodes);
+    let mut temperature = with_lags(&fit.joint, range_c, nodes);
+    // The errors are raw: across the axes C is a hundredth.
+    let hysteresis = |k: usize| {
+        let own = based[k].as_ref()?.model.matrix.diagonal();
+        fit.hysteresis(k, own.into())
+    };
+    temperature.gyro_hysteresis = hysteresis(0);
+    temperature.accel_hysteresis = hysteresis(1);
     let temps: Vec<f64> = temperature.nodes.iter().map(|n| n.temp_c).collect();
     let temp_c = reference_node(&temps).map_or(at_c, |k| temps[k]);
     let triads = based.each_ref().map(|b| b.as_ref()?.triad(temp_c));

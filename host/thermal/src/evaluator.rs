@@ -111,6 +111,21 @@ impl<'a> Evaluator<'a> {
         criterion
     }
 
+    /// For each axis the lag that it wants by itself, of those that were tried, and what its criterion loses at `lag_s`.
+    pub(crate) fn by_axis(&self, lag_s: f64) -> Option<[(f64, f64); 3]> {
+        let tried = || {
+            let each = self.known.iter();
+            each.filter_map(|(lag, fit)| Some((*lag, fit.as_ref()?.by_axis)))
+        };
+        let (_, here) = tried().find(|(lag, _)| *lag == lag_s)?;
+        let best = |axis: usize| {
+            let each = tried().map(|(lag, by_axis)| (lag, by_axis[axis]));
+            each.min_by(|a, b| a.1.total_cmp(&b.1))
+        };
+        let of = |axis: usize| best(axis).map(|(lag, least)| (lag, here[axis] - least));
+        Some([of(0)?, of(1)?, of(2)?])
+    }
+
     /// Noise with the curves at `lag_s`.
     fn learn_noise(&mut self, lag_s: f64, starts: &[Start]) {
         self.known.clear();

@@ -7,6 +7,7 @@ use mimu_recording::error::{Error, Result};
 
 use crate::basis::{CURVATURE_SPAN, Shape};
 use crate::classic::{self, Classic};
+use crate::coverage;
 use crate::extrapolation;
 use crate::joint::{Choice, Joint, estimate};
 use crate::judge::{self, Bin, DwellError, Hysteresis, Judging, rms};
@@ -53,13 +54,19 @@ pub struct Options {
     pub range_c: Option<[f64; 2]>,
 }
 
-/// Whether lag and slope are told apart.
+/// Rms of the errors over that by noise from which on the curves do not describe the readings. A bias that wanders, as all do, reaches 3 to 4
+/// in the means of half a minute.
+const MISFIT: f64 = 10.0;
+
+/// Whether lag and slope are told apart, and the curves describe the readings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verdict {
     /// Heating and cooling, or plateaus, tell them apart.
     Fitted,
     /// They cannot be told apart: the temperature goes one way only.
     OneWay,
+    /// The errors of the dwells that were fitted are far beyond noise.
+    Misfit,
 }
 
 impl Verdict {
@@ -68,6 +75,7 @@ impl Verdict {
         match self {
             Self::Fitted => "fitted",
             Self::OneWay => "one-way",
+            Self::Misfit => "misfit",
         }
     }
 }
@@ -115,6 +123,7 @@ pub fn fit(sessions: Vec<Session>, verify: &[Session], options: Options) -> Resu
         .flat_map(|s| s.warnings.iter().cloned())
         .collect();
     check_verifying(&sessions, verify)?;
+    coverage::check(&sessions, &mut warnings)?;
     let joint = match options.estimator {
         Estimator::Joint => smooth(&sessions, options, &mut warnings)?,
         Estimator::Cubic => {
@@ -132,11 +141,16 @@ pub fn fit(sessions: Vec<Session>, verify: &[Session], options: Options) -> Resu
         warnings.push(WITHOUT_NOISE.into());
     }
     check_range(&joint, options.range_c)?;
+    let judged = [0, 1].map(|k| judge(&sessions, verify, &joint, k));
+    let misfits = |j: &Judged| {
+        let [own, floor] = rms(&j.errors);
+        floor > 0.0 && own > MISFIT * floor
+    };
     let verdict = match joint.one_way {
+        _ if estimated && judged.iter().flatten().any(misfits) => Verdict::Misfit,
         true => Verdict::OneWay,
         false => Verdict::Fitted,
     };
-    let judged = [0, 1].map(|k| judge(&sessions, verify, &joint, k));
     Ok(ThermalFit {
         joint,
         sessions,
@@ -190,6 +204,7 @@ fn of_literature(sessions: &[Session], classic: Classic) -> Result<Joint> {
         profiles: [0, 1].map(|_| Profile::fixed(0.0, 0.0)),
         one_way: is_one_way(sessions, &dies),
         apart: None,
+        contradicted: [None; 2],
         noise: [None, None],
         starts: vec![Start::Settled; sessions.len()],
         warnings: Vec::new(),
@@ -295,12 +310,24 @@ impl Judged {
 }
 
 impl ThermalFit {
+    /// Rms and largest of what heating and cooling differ by, axis by axis, times `si`, as a calibration file holds them.
+    pub(crate) fn hysteresis(&self, sensor: usize, si: [f64; 3]) -> Option<[[f64; 3]; 2]> {
+        let judged = self.judged[sensor].as_ref()?;
+        let all = judged.hysteresis.as_ref()?;
+        let of = |size: fn(&Hysteresis) -> f64| {
+            std::array::from_fn(|k| all.get(k).map_or(0.0, |h| (size(h) * si[k]).abs()))
+        };
+        Some([of(|h| h.rms), of(|h| h.largest)])
+    }
+
     /// The calibration file, made at `created` (RFC 3339).
     ///
     /// # Errors
     /// Curves of biases alone.
     pub fn calibration(&self, created: &str) -> Result<Calibration> {
-        let temperature = nodes::over_temperature(&self.joint)?;
+        let mut temperature = nodes::over_temperature(&self.joint)?;
+        [temperature.gyro_hysteresis, temperature.accel_hysteresis] =
+            [0, 1].map(|k| self.hysteresis(k, [1.0; 3]));
         let temps: Vec<f64> = temperature.nodes.iter().map(|n| n.temp_c).collect();
         let temp_c = reference_node(&temps).map_or(f64::NAN, |k| temps[k]);
         let first = &self.sessions[0];

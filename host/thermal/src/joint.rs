@@ -17,6 +17,12 @@ use crate::thermometer::{Die, Start};
 const SETTLED_S: f64 = 0.5;
 /// Drop in deviance that tells the lags of gyro and accelerometer apart: one degree of freedom at 1 %.
 const TWO_LAGS: f64 = 6.63;
+/// What the axes lose by one lag, in deviance, from which on they contradict each other, and by how much, s, the lags that they want differ
+/// then: five degrees of freedom at 1e-5, as noise that is not quite that of the model makes the deviance larger.
+const CONTRADICT: f64 = 30.0;
+const CONTRADICT_S: f64 = 10.0;
+/// An axis that loses less is content.
+const CONTENT: f64 = 6.63;
 /// Start of the record: so much lag times slope, K, for a lag of a minute makes it worth asking what the die was like.
 const START_OFFSET_K: f64 = 0.2;
 
@@ -48,6 +54,8 @@ pub struct Joint {
     pub one_way: bool,
     /// Drop in deviance by two lags against one, where they are told apart.
     pub apart: Option<f64>,
+    /// Lowest and highest lag, s, that axes of gyro and accelerometer want by themselves, where one lag contradicts them.
+    pub contradicted: [Option<[f64; 2]>; 2],
     /// Noise of the rows.
     pub noise: [Option<[AxisNoise; 3]>; 2],
     /// How each session began.
@@ -60,7 +68,9 @@ impl Joint {
     /// Lag of `sensor` that is applied: given, or determined by the data; none otherwise.
     pub fn lag(&self, sensor: Sensor) -> Option<Lag> {
         let profile = &self.profiles[sensor as usize];
-        let determined = profile.lag.is_determined() && !self.one_way;
+        let determined = profile.lag.is_determined()
+            && !self.one_way
+            && self.contradicted[sensor as usize].is_none();
         (determined || profile.is_given()).then_some(profile.lag)
     }
 
@@ -135,6 +145,10 @@ pub fn estimate(sessions: &[Session], choice: Choice) -> Result<Joint> {
     if moved {
         (profiles, apart) = lags(&mut triads, &starts, choice.lag_s)?;
     }
+    let contradicted = match apart {
+        None => [contradiction(&triads, &profiles[0]); 2],
+        Some(_) => [0, 1].map(|k| contradiction(&triads[k..=k], &profiles[k])),
+    };
     let one_way = profiles.iter().any(|profile| {
         let each = sessions.iter().zip(&starts);
         let die = |(s, start): (&Session, &Start)| s.thermometer.die(profile.lag.value, *start);
@@ -145,6 +159,7 @@ pub fn estimate(sessions: &[Session], choice: Choice) -> Result<Joint> {
         profiles,
         one_way,
         apart,
+        contradicted,
         noise: [None, None],
         starts,
         warnings,
@@ -237,6 +252,23 @@ fn lags(
         }
     }
     Ok(([both.clone(), both], None))
+}
+
+/// Lowest and highest lag that the axes of `triads` want by themselves, if those contradict the one of `profile`. All axes of a die have its
+/// lag: if they do not agree, it is something else that bends them, and what is best for all of them is no lag.
+fn contradiction(triads: &[Option<Evaluator<'_>>], profile: &Profile) -> Option<[f64; 2]> {
+    if profile.is_given() || !profile.lag.is_determined() {
+        return None;
+    }
+    let each = triads.iter().flatten();
+    let axes = each.filter_map(|t| t.by_axis(profile.lag.value)).flatten();
+    let axes: Vec<(f64, f64)> = axes.collect();
+    let lost: f64 = axes.iter().map(|a| a.1).sum();
+    let wanted = axes.iter().filter(|a| a.1 > CONTENT).map(|a| a.0);
+    let [from, to] = wanted.fold([profile.lag.value; 2], |r, lag| {
+        [r[0].min(lag), r[1].max(lag)]
+    });
+    (lost > CONTRADICT && to - from > CONTRADICT_S).then_some([from, to])
 }
 
 fn no_solution(sessions: &[Session]) -> Error {

@@ -186,13 +186,24 @@ pub fn bins(errors: &[DwellError]) -> Vec<Bin> {
 pub struct Hysteresis {
     /// Axis.
     pub axis: &'static str,
-    /// Mean error when heating minus that when cooling, at the same temperatures, SI.
+    /// Mean error when heating minus that when cooling, at the same temperatures, SI. A loop that crosses itself has a small one.
     pub value: f64,
     /// Half of its 95 % interval, SI.
     pub half_width: f64,
-    /// The same as a difference of temperature, K, by the slope of the bias; null where the bias hardly changes.
+    /// Root mean square of the differences over the bins of temperature, SI.
+    pub rms: f64,
+    /// Largest difference of a bin, SI, with its sign.
+    pub largest: f64,
+    /// Half of its 95 % interval, SI.
+    pub largest_half_width: f64,
+    /// Middle of the bin of it, °C of the die.
+    pub largest_at_c: f64,
+    /// [`Self::rms`] as a difference of temperature, K, by the mean slope of the bias; null where the bias is not seen to have one.
     pub kelvin: Option<f64>,
 }
+
+/// Standard deviations by which a bias changes over the range where it has a slope.
+const SLOPE_SIGMAS: f64 = 3.0;
 
 /// Difference between heating and cooling of each axis, over the bins that have both.
 pub fn hysteresis(errors: &[DwellError], curves: &TriadCurves) -> Option<Vec<Hysteresis>> {
@@ -200,7 +211,8 @@ pub fn hysteresis(errors: &[DwellError], curves: &TriadCurves) -> Option<Vec<Hys
     let mut keys: Vec<i64> = errors.iter().map(bin).collect();
     keys.sort_unstable();
     keys.dedup();
-    let (mut sum, mut variance, mut n) = (Vector3::zeros(), 0.0, 0.0);
+    // Middle of a bin, difference, and its variance by noise.
+    let mut bins: Vec<(f64, Vector3<f64>, f64)> = Vec::new();
     for key in keys {
         let mean = |way: i32| {
             let own = errors.iter().filter(|e| bin(e) == key && e.way == way);
@@ -211,32 +223,33 @@ pub fn hysteresis(errors: &[DwellError], curves: &TriadCurves) -> Option<Vec<Hys
             (count > 0.0).then_some((mean, floor))
         };
         if let (Some((up, a)), Some((down, b))) = (mean(1), mean(-1)) {
-            sum += up - down;
-            variance += a + b;
-            n += 1.0;
+            bins.push(((key as f64 + 0.5) * BIN_K, up - down, a + b));
         }
     }
-    if n == 0.0 {
-        return None;
-    }
-    let half_width = 1.96 * (variance / (n * n)).sqrt();
-    let middle = 0.5 * (curves.range_c[0] + curves.range_c[1]);
-    let [model, slope] = curves.forward(middle);
-    Some(
-        (0..3)
-            .map(|k| {
-                let value = sum[k] / n;
-                let by_kelvin = slope.bias[k] / model.matrix.row(k).norm();
-                let known = by_kelvin.abs() > half_width;
-                Hysteresis {
-                    axis: mimu::quantity::AXES[k],
-                    value,
-                    half_width,
-                    kelvin: known.then(|| value / by_kelvin),
-                }
-            })
-            .collect(),
-    )
+    let n = bins.len() as f64;
+    let [from, to] = curves.range_c;
+    let [model, _] = curves.forward(0.5 * (from + to));
+    let (change, covariance) = curves.bias_change(from, to);
+    let of = |k: usize| {
+        let largest = bins
+            .iter()
+            .max_by(|a, b| a.1[k].abs().total_cmp(&b.1[k].abs()))?;
+        let variance: f64 = bins.iter().map(|b| b.2).sum();
+        let rms = (bins.iter().map(|b| b.1[k].powi(2)).sum::<f64>() / n).sqrt();
+        let seen = change[k].abs() > SLOPE_SIGMAS * covariance[(k, k)].max(0.0).sqrt();
+        let by_kelvin = change[k].abs() / (to - from) / model.matrix.row(k).norm();
+        Some(Hysteresis {
+            axis: mimu::quantity::AXES[k],
+            value: bins.iter().map(|b| b.1[k]).sum::<f64>() / n,
+            half_width: 1.96 * variance.sqrt() / n,
+            rms,
+            largest: largest.1[k],
+            largest_half_width: 1.96 * largest.2.sqrt(),
+            largest_at_c: largest.0,
+            kelvin: (seen && by_kelvin > 0.0).then(|| rms / by_kelvin),
+        })
+    };
+    (0..3).map(of).collect()
 }
 
 /// Errors of the dwells of `sensor`, each by curves that had not seen it: four parts of the time in turn, lag, noise and smoothness kept.

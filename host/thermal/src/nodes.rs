@@ -66,6 +66,9 @@ pub fn with_lags(joint: &Joint, range_c: [f64; 2], nodes: Vec<TemperatureNode>) 
         interval_lag_s: interval(lag),
         accel_lag_s: accel.map(|l| l.value),
         interval_accel_lag_s: interval(accel),
+        biases_only: joint.curves.iter().flatten().all(TriadCurves::biases_only),
+        gyro_hysteresis: None,
+        accel_hysteresis: None,
         nodes,
     }
 }

@@ -6,8 +6,9 @@ use mimu::triad::{Angles, Estimate};
 use mimu_recording::RawUnit;
 use serde::Serialize;
 
+use crate::coverage::Coverage;
 use crate::curves::TriadCurves;
-use crate::fit::{ThermalFit, Verdict, range};
+use crate::fit::{ThermalFit, range};
 use crate::judge::{Bin, DwellError, Hysteresis, rms};
 use crate::profile::{Lag, RANGE};
 
@@ -27,7 +28,7 @@ pub struct ThermalResult {
     pub recordings: Vec<RecordingResult>,
     /// How it was estimated.
     pub estimator: &'static str,
-    /// `fitted`, or `one-way` where lag and slope cannot be told apart.
+    /// `fitted`; `one-way` where lag and slope cannot be told apart; `misfit` where the errors of the dwells are far beyond noise.
     pub verdict: &'static str,
     /// Lowest and highest temperature of the dies, °C.
     pub range_c: [f64; 2],
@@ -55,6 +56,8 @@ pub struct RecordingResult {
 pub struct SensorResult {
     /// Unit of the figures: SI, that of the readings where only biases are estimated.
     pub unit: String,
+    /// What of the recordings is used.
+    pub used: Option<Coverage>,
     /// Compensated dwell means minus known input, over dwells and axes, rms; null where the input is not known.
     pub rms: Option<f64>,
     /// The same of data that were held out; null where none were.
@@ -204,6 +207,7 @@ impl SensorResult {
                 true => raw_unit(fit.sessions[0].raw_unit, sensor.unit()),
                 false => sensor.unit().into(),
             },
+            used: Coverage::of(&fit.sessions, sensor),
             rms: figures.map(|f| f[0]),
             held_out_rms: held_out.map(|h| rms(h)[0]),
             held_out_rms_without_session_bias: judged.and_then(|j| j.without_session_bias),
@@ -236,13 +240,18 @@ fn lag(fit: &ThermalFit, sensor: Sensor) -> Result<LagResult, String> {
             None => "this estimator has none".into(),
         });
     }
-    if fit.verdict == Verdict::OneWay {
+    if fit.joint.one_way {
         return Err("the temperature goes one way only: lag and slope cannot be told apart".into());
     }
     if !found.is_determined() {
         return Err(format!(
             "not determined: its 95 % interval, {lower:.0} to {upper:.0} s, is wider than half the range from {:.0} to {:.0} s",
             RANGE[0], RANGE[1]
+        ));
+    }
+    if let Some([from, to]) = fit.joint.contradicted[sensor as usize] {
+        return Err(format!(
+            "not determined: the axes contradict each other, by themselves they want {from:.0} to {to:.0} s, where one lag for all would be {value:.1} s ({lower:.1} to {upper:.1} s)"
         ));
     }
     Ok(LagResult {

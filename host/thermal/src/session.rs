@@ -16,6 +16,8 @@ use crate::thermometer::Thermometer;
 const ROW_S: f64 = 2.5;
 /// Shortest row, s: the rest of a dwell.
 const SHORTEST_S: f64 = 0.5;
+/// Fewest samples of a shorter one, which is all of a burst.
+const FEWEST_IN_BURST: f64 = 4.0;
 /// A change between two dwells is a move if it is larger than so many times that between neighbouring rows, with so many times the largest
 /// drift: being taken for one costs six numbers, and a move that is missed bends the curves.
 const MOVED_SIGMAS: f64 = 6.0;
@@ -42,6 +44,18 @@ pub struct Row {
     pub step: i32,
 }
 
+impl Row {
+    /// Takes the samples of `other` in.
+    fn join(&mut self, other: &Self) {
+        let samples = self.samples + other.samples;
+        let share = other.samples / samples;
+        self.middle_s += share * (other.middle_s - self.middle_s);
+        self.raw += share * (other.raw - self.raw);
+        self.input += share * (other.input - self.input);
+        self.samples = samples;
+    }
+}
+
 /// A recording made ready for curves over temperature.
 #[derive(Debug, Clone)]
 pub struct Session {
@@ -65,6 +79,8 @@ pub struct Session {
     pub thermometer: Thermometer,
     /// Rows of gyro and accelerometer.
     pub rows: [Vec<Row>; 2],
+    /// Samples of the recording.
+    pub samples: f64,
     /// Noise of the six channels at rest, raw, where a noise file states it.
     pub stated: [Option<AllanModel>; 6],
     /// Where the input is not known: times, s, at which the unit was put into another pose.
@@ -106,6 +122,7 @@ impl Session {
             rate_hz: 1.0 / condensed.period_s,
             thermometer,
             rows,
+            samples: condensed.rows as f64,
             stated: std::array::from_fn(|c| prepared.noise.largest_stated(c)),
             moved_s,
             warnings,
@@ -193,8 +210,11 @@ fn rows(prepared: &Prepared, sensor: Sensor) -> Vec<Row> {
 fn of_dwell(prepared: &Prepared, sensor: Sensor, dwell: &Dwell, length_s: f64) -> Vec<Row> {
     let condensed = &prepared.condensed;
     let known = prepared.manifest.reference == Reference::Table;
-    let mut rows = Vec::new();
-    let mut open = Open::default();
+    let mut rows: Vec<Row> = Vec::new();
+    let mut open = Open {
+        after_gap: dwell.blocks.start == 0,
+        ..Open::default()
+    };
     // Two at least, as noise is what they differ by.
     let least = match length_s.is_finite() && dwell.duration_s >= 2.0 * SHORTEST_S {
         true => 2.0,
@@ -205,8 +225,23 @@ fn of_dwell(prepared: &Prepared, sensor: Sensor, dwell: &Dwell, length_s: f64) -
     for block in &condensed.blocks[dwell.blocks.clone()] {
         if open.rows > 0.0 && (open.rows + 0.5 * f64::from(block.rows) > samples || block.after_gap)
         {
-            rows.extend(open.close(condensed, dwell.step));
+            let length = open.rows;
+            let rest = open.rest;
+            match (open.close(condensed, dwell.step, block.after_gap), rest) {
+                (Some(row), _) if !rest || length * condensed.period_s >= SHORTEST_S => {
+                    rows.push(row);
+                }
+                // The end of a burst of 2.9 s, whose first 2.5 s are a row, belongs to that row.
+                (Some(row), true) => {
+                    if let Some(before) = rows.last_mut() {
+                        before.join(&row);
+                    }
+                }
+                _ => {}
+            }
+            open.rest = !block.after_gap;
         }
+        open.after_gap |= block.after_gap;
         let rails = &prepared.dwells.rails;
         let clipped = sensor
             .channels()
@@ -215,13 +250,18 @@ fn of_dwell(prepared: &Prepared, sensor: Sensor, dwell: &Dwell, length_s: f64) -
             open.add(block, sensor, known);
         }
     }
-    rows.extend(open.close(condensed, dwell.step));
+    let whole = !open.rest;
+    rows.extend(open.close(condensed, dwell.step, whole));
     rows
 }
 
 /// Sums of a row that is not closed yet.
 #[derive(Default)]
 struct Open {
+    /// Whether samples are missing before it.
+    after_gap: bool,
+    /// Whether it goes on where a row ended.
+    rest: bool,
     rows: f64,
     time: f64,
     raw: Vector3<f64>,
@@ -242,8 +282,8 @@ impl Open {
         });
     }
 
-    /// The row, unless it is too short or its input is to be known and is not.
-    fn close(&mut self, condensed: &Condensed, step: i32) -> Option<Row> {
+    /// The row, unless it is too short or its input is to be known and is not; `gap`: samples are missing after it.
+    fn close(&mut self, condensed: &Condensed, step: i32, gap: bool) -> Option<Row> {
         let open = std::mem::take(self);
         let known = condensed.has_reference.iter().any(|r| *r);
         let row = Row {
@@ -253,7 +293,8 @@ impl Open {
             input: open.input / open.rows,
             step,
         };
-        let long = open.rows * condensed.period_s >= SHORTEST_S;
+        let burst = (open.after_gap && open.rows >= FEWEST_IN_BURST || open.rest) && gap;
+        let long = open.rows * condensed.period_s >= SHORTEST_S || burst;
         let partly = row.input.iter().any(|x| x.is_finite()) && known;
         let whole = row.input.iter().all(|x| x.is_finite());
         (long && (whole || !partly)).then_some(row)

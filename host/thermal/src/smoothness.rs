@@ -73,6 +73,8 @@ pub struct TriadFit {
     pub smoothness: Smoothness,
     /// Minus twice the logarithm of the likelihood, up to a constant, for comparing lags.
     pub criterion: f64,
+    /// The same of each axis.
+    pub by_axis: [f64; 3],
 }
 
 /// What is penalised, one pair of matrices a kind, and the same without the lines that are free.
@@ -207,11 +209,11 @@ pub fn fixed(
     normals: &[Normal; 3],
     smoothness: &Smoothness,
 ) -> Option<TriadFit> {
-    let mut criterion = 0.0;
+    let mut by_axis = [0.0; 3];
     let mut axes = Vec::with_capacity(3);
     for (axis, normal) in normals.iter().enumerate() {
         let solved = solve(problem, penalties, axis, normal, smoothness)?;
-        criterion += solved.left + solved.determinants - of_lines(problem, axis, normal)?;
+        by_axis[axis] = solved.left + solved.determinants - of_lines(problem, axis, normal)?;
         axes.push(AxisFit {
             coefficients: solved.coefficients,
             covariance: solved.factor.inverse(),
@@ -220,7 +222,8 @@ pub fn fixed(
     Some(TriadFit {
         axes: axes.try_into().ok()?,
         smoothness: *smoothness,
-        criterion,
+        criterion: by_axis.iter().sum(),
+        by_axis,
     })
 }
 

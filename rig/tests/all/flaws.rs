@@ -45,6 +45,31 @@ fn stamps_jitter_and_come_in_bursts_while_the_samples_stay_steady() {
 }
 
 #[test]
+fn a_logger_that_loses_samples_or_pauses_leaves_the_others_as_they_were() {
+    let all = rows("");
+    for (flaws, share) in [
+        ("lost_share = 0.25\n", 0.75),
+        ("pause_after = 51\npause_s = 1.49\n", 51.0 / 200.0),
+    ] {
+        let recorded = rows(flaws);
+        let index = |row: &Row| (100.0 * row.stamp_s).round() as usize;
+        for row in &recorded {
+            assert_eq!(*row, all[index(row)], "{flaws}");
+        }
+        let left = recorded.len() as f64 / all.len() as f64;
+        assert!((left - share).abs() < 0.03, "{flaws}{left}");
+        let steps = recorded.windows(2).map(|w| index(&w[1]) - index(&w[0]));
+        let longest = steps.max().unwrap();
+        let expected = if flaws.contains("pause") {
+            150..151
+        } else {
+            4..20
+        };
+        assert!(expected.contains(&longest), "{flaws}{longest}");
+    }
+}
+
+#[test]
 fn a_violent_shake_clips_a_few_samples_at_the_rails_of_the_converter() {
     let clipped = |rows: &[Row]| {
         let at_rail = |u: &f64| *u == 32767.0 || *u == -32768.0;

@@ -3,6 +3,7 @@
 mod agreement;
 mod coverage;
 mod diagnosis;
+mod few_poses;
 mod flaws;
 mod joint;
 mod module_circles;

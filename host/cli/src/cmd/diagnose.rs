@@ -13,7 +13,7 @@ use mimu::verify::verify;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::result_file::stage;
 
-use crate::arguments::{JsonArgs, NoiseArgs, StillArgs};
+use crate::arguments::{JsonArgs, KeepArgs, NoiseArgs, StillArgs};
 use crate::output::print;
 use crate::reading::read;
 
@@ -52,6 +52,8 @@ pub struct DiagnoseArgs {
     #[command(flatten)]
     still: StillArgs,
     #[command(flatten)]
+    keep: KeepArgs,
+    #[command(flatten)]
     noise: NoiseArgs,
     #[command(flatten)]
     json: JsonArgs,
@@ -73,7 +75,7 @@ pub fn run(args: &DiagnoseArgs) -> Result<()> {
     let inputs = [args.noise.file.as_deref(), args.calibration.as_deref()];
     let open = |path: &PathBuf| {
         let prepared = read(path, args.still.finding(), &outputs, &inputs)?;
-        args.noise.state(prepared)
+        Ok(args.keep.apply(args.noise.state(prepared)?))
     };
     let given = match &args.calibration {
         Some(path) => Some(Calibration::read(path)?),

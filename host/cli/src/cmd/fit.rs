@@ -10,7 +10,7 @@ use mimu_recording::Reference;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::result_file::stage;
 
-use crate::arguments::{JsonArgs, NoiseArgs, SensorArg, StillArgs};
+use crate::arguments::{JsonArgs, KeepArgs, NoiseArgs, SensorArg, StillArgs};
 use crate::output::print;
 use crate::reading::read_for_fit;
 use crate::report;
@@ -30,6 +30,8 @@ pub(crate) struct FitArgs {
     only: Option<SensorArg>,
     #[command(flatten)]
     still: StillArgs,
+    #[command(flatten)]
+    keep: KeepArgs,
     #[command(flatten)]
     noise: NoiseArgs,
     /// List the dwells
@@ -79,7 +81,7 @@ pub(crate) fn run(args: &FitArgs) -> Result<()> {
     let outputs = [args.output.as_deref(), args.json.file()];
     let inputs = [args.noise.file.as_deref()];
     let prepared = read_for_fit(&args.recording, args.still.finding(), &outputs, &inputs)?;
-    let prepared = args.noise.state(prepared)?;
+    let prepared = args.keep.apply(args.noise.state(prepared)?);
     if args.method.is_some() && prepared.manifest.reference == Reference::Gravity {
         return Err(Error::new(
             args.recording.display(),

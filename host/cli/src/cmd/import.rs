@@ -7,8 +7,8 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use mimu::quantity::normal_gravity;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{
-    ColumnList, ImportOptions, Preset, RawUnit, Reference, SampleFormat, Scale, Separator, import,
-    is_bag,
+    ColumnList, Decimal, ImportOptions, Offset, Preset, RawUnit, Reference, SampleFormat, Scale,
+    Separator, import, is_bag,
 };
 
 use crate::arguments::JsonArgs;
@@ -35,9 +35,13 @@ pub(crate) struct ImportArgs {
     /// sample (`accel_x_sd`), numbers of samples (`averaged`, `accel_x_averaged`), inputs (ref_ columns) and names (`step`)
     #[arg(long)]
     means: bool,
-    /// Sample rate, Hz, of files without a time column; of others it is the rate of their time stamps, which this one checks
+    /// Sample rate, Hz, of files without a time column. Of others it is the rate of their time stamps, which this one checks;
+    /// it decides where stamps in bursts can be read in two ways
     #[arg(long, allow_negative_numbers = true)]
     rate_hz: Option<f64>,
+    /// Unit of the time stamps: s, ms, us or ns; found out without it, and asked for where two are possible
+    #[arg(long, value_name = "UNIT")]
+    time_unit: Option<Decimal>,
     /// Local gravity, m/s²; without it, normal gravity at sea level of --latitude, or 9.80665 and a warning
     #[arg(long, allow_negative_numbers = true)]
     gravity: Option<f64>,
@@ -53,6 +57,9 @@ pub(crate) struct ImportArgs {
     /// Factor for a column, or for gyro or accel: `gyro=0.0174533`
     #[arg(long, value_name = "COLUMN=FACTOR")]
     scale: Vec<Scale>,
+    /// What is added to a column after its factor: `temp_c=36.53`
+    #[arg(long, value_name = "COLUMN=VALUE", allow_hyphen_values = true)]
+    offset: Vec<Offset>,
     /// Name of the unit; without it, the name of the recording
     #[arg(long)]
     device: Option<String>,
@@ -117,6 +124,8 @@ pub(crate) fn run(args: ImportArgs) -> Result<()> {
         separator: args.separator,
         rate_hz: args.rate_hz,
         scales: args.scale,
+        offsets: args.offset,
+        time_unit: args.time_unit,
         device: args.device,
         latitude_deg: args.latitude,
         inputs: args.inputs,
@@ -142,9 +151,12 @@ pub(crate) fn run(args: ImportArgs) -> Result<()> {
     })?;
     bar.finish_and_clear();
     summary.warnings.extend(assumed);
-    if summary.sample_rate_hz < SLOW_HZ {
+    let recognised = summary.time.first().filter(|time| time.recognised);
+    if let Some(unit) = recognised.and_then(|time| time.unit)
+        && summary.sample_rate_hz < SLOW_HZ
+    {
         summary.warnings.push(format!(
-            "{} Hz is slow for an inertial unit: if the times are in milliseconds, import with --scale t_s=0.001",
+            "{} Hz is slow for an inertial unit: if the times are not in {unit}, give their unit (--time-unit)",
             summary.sample_rate_hz
         ));
     }

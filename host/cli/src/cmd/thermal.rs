@@ -7,7 +7,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand, ValueEnum};
 use mimu::calibration::Calibration;
-use mimu::stillness::Finding;
+use mimu::stillness::{Finding, Steps};
 use mimu_recording::error::Result;
 use mimu_recording::result_file::stage;
 use mimu_thermal::base;
@@ -65,6 +65,9 @@ struct FitArgs {
     noise: NoiseArgs,
     #[command(flatten)]
     still: StillArgs,
+    /// The unit lay still throughout, whatever its biases do: no turning is looked for, and no sample is left out for it
+    #[arg(long, conflicts_with_all = ["steps", "still"])]
+    at_rest: bool,
     /// Calibration file to write
     #[arg(short, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -157,7 +160,11 @@ fn run_fit(args: &FitArgs) -> Result<()> {
     };
     let all = |list: &[PathBuf]| -> Result<Vec<Session>> {
         let each = list.iter();
-        each.map(|d| session(d, args.still.finding())).collect()
+        let mut finding = args.still.finding();
+        if args.at_rest {
+            finding.steps = Steps::AtRest;
+        }
+        each.map(|d| session(d, finding)).collect()
     };
     let (sessions, verify) = (all(&args.recordings)?, all(&args.verify)?);
     let options = Options {

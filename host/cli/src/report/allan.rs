@@ -90,6 +90,11 @@ fn sensor_text(
             rows.push((format!("{}, {}", term.letter(), unit.unit), cells.collect()));
         }
     }
+    let scaled = channels.iter().filter(|c| c.raw_unit == Some("SI"));
+    let factors: Vec<String> = scaled
+        .filter_map(|c| c.scale_factor)
+        .map(significant)
+        .collect();
     let dwell = |c: &&ChannelResult| match (c.useful_average_s, &c.model) {
         (Some(s), _) => duration(s),
         (None, Some(model)) => format!("over {}", duration(model.range_s[1])),
@@ -100,6 +105,13 @@ fn sensor_text(
         channels.iter().map(dwell).collect(),
     ));
     write_rows(out, &rows);
+    if !factors.is_empty() {
+        let _ = writeln!(
+            out,
+            "  of the calibrated unit: that of the readings divided by the scale factors {}",
+            factors.join(", ")
+        );
+    }
     curve_text(out, channels);
     lines_text(out, channels);
     reasons(out, channels);
@@ -146,12 +158,19 @@ fn frequency(hz: f64, resolution_hz: f64) -> String {
 /// One point of a curve: averaging time, deviation, ends of its interval, sigma of independent clusters.
 type Point = [f64; 5];
 
-/// The point of a curve nearest to a time, if there is one within 5 %.
+/// A time may be this far outside of a curve and still have a nearest point, as a logarithm.
+const OUTSIDE: f64 = 0.05;
+
+/// The point of a curve nearest to a time, if the curve reaches it. Averaging times are whole samples: at 180 Hz none is within 10 % of
+/// 0.1 s, and the nearest is the one to show.
 fn near(time_s: f64, [tau, deviation, lower, upper, sigma]: [&[f64]; 5]) -> Option<Point> {
-    let distance = |t: &f64| (t / time_s).ln().abs();
+    let distance = |t: &f64| (t / time_s).ln();
+    if distance(tau.first()?) > OUTSIDE || distance(tau.last()?) < -OUTSIDE {
+        return None;
+    }
     let each = tau.iter().enumerate();
-    let (i, t) = each.min_by(|a, b| distance(a.1).total_cmp(&distance(b.1)))?;
-    (distance(t) < 0.05).then(|| [*t, deviation[i], lower[i], upper[i], sigma[i]])
+    let (i, t) = each.min_by(|a, b| distance(a.1).abs().total_cmp(&distance(b.1).abs()))?;
+    Some([*t, deviation[i], lower[i], upper[i], sigma[i]])
 }
 
 /// The curve at one time a decade, with the bounds and beside them what fang (7) gives, which is one sigma.

@@ -24,6 +24,7 @@ fn meaning(d: &DiagnosisResult) -> &'static str {
         }
         Verdict::Clean => "noise explains what the affine calibration leaves",
         Verdict::Explained => "with the effects below, noise explains what remains",
+        Verdict::Untestable => "nothing was found, and the recording has too little to judge by",
         Verdict::Unexplained if d.unexplained().next().is_some() => {
             "something remains that nothing here explains"
         }

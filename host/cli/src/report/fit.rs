@@ -117,7 +117,17 @@ fn sensor_text(out: &mut String, fit: &FitResult, name: &str, sensor: &SensorFit
         line("held out", None, "not asked for (--holdout blocks=4)");
     }
     line("in sample", Some(sensor.rms), "rms");
-    line("noise floor", Some(sensor.noise_floor), "noise-only rms");
+    match sensor.noise_floor.is_finite() {
+        true => line("noise floor", Some(sensor.noise_floor), "noise-only rms"),
+        false => line("noise floor", None, "unknown: no dwell shows it"),
+    }
+    if let Some(came) = sensor.as_they_came_rms {
+        line(
+            "as it came",
+            Some(came),
+            "rms of the readings without a calibration",
+        );
+    }
     if let Some(rms) = sensor.static_rms {
         let rate = readable::error("rad/s");
         let _ = writeln!(out, "  calibrated rate at rest, rms over dwells and axes:");

@@ -59,6 +59,7 @@ pub fn import_text(summary: &ImportSummary) -> String {
             "row",
             "interpolated from another file",
         ),
+        (summary.padding, "row", "left out: all readings are 0"),
         (summary.empty_cells, "raw cell", "empty"),
     ];
     for (n, noun, what) in counts {
@@ -80,22 +81,33 @@ fn time_text(time: &TimeSummary) -> String {
     if time.origin_s != 0 {
         let _ = write!(out, " counted from {} s", time.origin_s);
     }
-    let _ = write!(out, ", {} Hz; ", time.rate_hz);
-    if time.stamps_kept {
-        out += "the stamps are kept";
-    } else {
-        let [rms, max] = [time.jitter.rms_s, time.jitter.max_s].map(|s| significant(1e3 * s));
-        let _ = write!(
+    let lasts = significant(time.lasts_s);
+    let _ = write!(out, ", {} Hz for {lasts} s; ", time.rate_hz);
+    let [rms, max] = [time.jitter.rms_s, time.jitter.max_s].map(|s| significant(1e3 * s));
+    let _ = match (time.stamps_kept, time.jitter.max_s > 0.0) {
+        (true, false) => write!(out, "the stamps are kept"),
+        (true, true) => write!(
+            out,
+            "the stamps are kept, as their steps are multiples of one period to {rms} ms rms, {max} ms at most"
+        ),
+        (false, _) => write!(
             out,
             "the stamps are off by {rms} ms rms, {max} ms at most, and the time is that of the count of samples"
-        );
-    }
+        ),
+    };
     if time.gaps > 0 {
         let _ = write!(
             out,
-            "; {} in {}",
+            "; {} in {}, the longest of {} s",
             plural(time.missing, "missing sample"),
-            plural(time.gaps, "gap")
+            plural(time.gaps, "gap"),
+            significant(time.longest_gap_s)
+        );
+    }
+    if let Some(rate) = time.rate_in_bursts_hz {
+        let _ = write!(
+            out,
+            "; if the samples themselves come in bursts with pauses, give the rate in the bursts: --rate-hz {rate}"
         );
     }
     if time.repeated_rows > 0 {

@@ -16,6 +16,10 @@ pub(super) const SHOWN: usize = 5;
 pub(super) const VERDICT_ONE_WAY: &str = "the temperature goes one way only: lag and slope cannot be told apart, and the intervals are those of \
      any lag. A whole cycle, heating and cooling, tells them apart.";
 
+/// What the verdict `misfit` means.
+pub(super) const VERDICT_MISFIT: &str = "the errors that remain are far beyond noise: something other than temperature and lag moves the readings, and the \
+     intervals do not hold it.";
+
 /// Result of `mimu thermal fit`.
 pub fn thermal_text(result: &ThermalResult) -> String {
     let mut out = String::new();
@@ -36,6 +40,9 @@ pub fn thermal_text(result: &ThermalResult) -> String {
     if result.verdict == "one-way" {
         wrap(&mut out, "", VERDICT_ONE_WAY);
     }
+    if result.verdict == "misfit" {
+        wrap(&mut out, "", VERDICT_MISFIT);
+    }
     for (name, sensor) in result.sensors.named() {
         let _ = writeln!(out);
         sensor_text(&mut out, name, sensor);
@@ -51,6 +58,9 @@ pub fn thermal_text(result: &ThermalResult) -> String {
 fn sensor_text(out: &mut String, name: &str, sensor: &SensorResult) {
     let unit = readable::error(&sensor.unit);
     let _ = writeln!(out, "{name}");
+    if let Some(used) = &sensor.used {
+        let _ = writeln!(out, "  used: {}", used.words());
+    }
     match (&sensor.lag_s, &sensor.lag_reason) {
         (Some(lag), _) => {
             let _ = writeln!(
@@ -78,15 +88,19 @@ fn sensor_text(out: &mut String, name: &str, sensor: &SensorResult) {
     }
     bins_text(out, sensor);
     for h in sensor.hysteresis.iter().flatten() {
-        let value = plus_minus(h.value * unit.factor, h.half_width * unit.factor);
+        let [mean, largest] = [(h.value, h.half_width), (h.largest, h.largest_half_width)]
+            .map(|(value, half)| plus_minus(value * unit.factor, half * unit.factor));
         let kelvin = match h.kelvin {
-            Some(k) => format!(", {} K", significant(k)),
+            Some(k) => format!(" ({} K)", significant(k)),
             None => String::new(),
         };
         let _ = writeln!(
             out,
-            "  hysteresis {}: heating minus cooling {value} {}{kelvin}",
-            h.axis, unit.unit
+            "  hysteresis {}, {}: rms {}{kelvin}, largest {largest} at {:.0} °C, heating minus cooling on average {mean}",
+            h.axis,
+            unit.unit,
+            significant(h.rms * unit.factor),
+            h.largest_at_c,
         );
     }
 }

@@ -7,7 +7,7 @@ use mimu_thermal::judge::{Bin, Hysteresis};
 use mimu_thermal::result::{CurveResult, SensorResult, ThermalResult};
 
 use super::page::{Made, number, page, spoken, written};
-use super::thermal::{SHOWN, VERDICT_ONE_WAY, physical};
+use super::thermal::{SHOWN, VERDICT_MISFIT, VERDICT_ONE_WAY, physical};
 use super::thermal_plot;
 
 /// The page of a fit.
@@ -17,6 +17,7 @@ pub fn thermal_page(result: &ThermalResult, made: &Made) -> String {
         h2 { "Errors and lag" }
         (errors(result))
         @for (name, sensor) in result.sensors.named() {
+            @if let Some(used) = &sensor.used { p { (spoken(name)) " uses " (used.words()) "." } }
             @if let Some(what) = sensor.inseparable { p { (spoken(name)) ", inseparable: " (what) "." } }
         }
         h2 { "Curves" }
@@ -50,6 +51,7 @@ fn head(result: &ThermalResult, made: &Made) -> Markup {
         p class={ "verdict " @if result.verdict == "fitted" { "explained" } @else { "unexplained" } } {
             strong { (result.verdict) } ": dies at " (written(&format!("{from:.1}"))) " to " (written(&format!("{to:.1}"))) " °C. "
             @if result.verdict == "fitted" { "Heating and cooling, or plateaus, tell the lag of the dies from the slopes of the curves." }
+            @else if result.verdict == "misfit" { (VERDICT_MISFIT) }
             @else { (VERDICT_ONE_WAY) }
         }
         dl {
@@ -112,13 +114,16 @@ fn hysteresis(sensor: &SensorResult, all: &[Hysteresis]) -> Markup {
     html! {
         div class="scroll" { table {
             caption { "Hysteresis: what heating and cooling differ by after the lag, which is reported and not fitted" }
-            thead { tr { th { "axis" } th class="n" { "heating minus cooling, " (unit.unit) } th class="n" { "as a temperature, K" } } }
+            thead { tr { th { "axis" } th class="n" { "rms, " (unit.unit) } th class="n" { "as a temperature, K" } th class="n" { "largest, " (unit.unit) } th class="n" { "at, °C" } th class="n" { "heating minus cooling on average, " (unit.unit) } } }
             tbody {
                 @for h in all {
                     tr {
                         td { (h.axis) }
-                        td class="n" { data value=(h.value) { (written(&plus_minus(h.value * unit.factor, h.half_width * unit.factor))) } }
+                        td class="n" { (number(h.rms, unit.factor, "")) }
                         td class="n" { (number(h.kelvin.unwrap_or(f64::NAN), 1.0, "")) }
+                        td class="n" { data value=(h.largest) { (written(&plus_minus(h.largest * unit.factor, h.largest_half_width * unit.factor))) } }
+                        td class="n" { (written(&format!("{:.0}", h.largest_at_c))) }
+                        td class="n" { data value=(h.value) { (written(&plus_minus(h.value * unit.factor, h.half_width * unit.factor))) } }
                     }
                 }
             }

@@ -13,12 +13,15 @@ pub fn verify_text(verification: &VerifyResult) -> String {
     let _ = writeln!(
         out,
         "{:<7}{:>14}{:>14}{:>14}{:>14}{:>12}",
-        "", "uncalibrated", "calibrated", "largest", "noise floor", "over"
+        "", "one scale", "calibrated", "largest", "noise floor", "over"
     );
     for (name, s) in verification.sensors.named() {
         let figure = readable::error(s.unit);
         let [raw, rms, max, floor] =
-            [s.rms_raw, s.rms, s.max, s.noise_floor].map(|v| figure.write(v));
+            [s.rms_raw, s.rms, s.max, s.noise_floor].map(|v| match v.is_finite() {
+                true => figure.write(v),
+                false => "unknown".into(),
+            });
         let noun = if s.unit == "rad" { "turns" } else { "dwells" };
         let over = format!("{} {noun}", s.count);
         let _ = writeln!(
@@ -26,6 +29,7 @@ pub fn verify_text(verification: &VerifyResult) -> String {
             "{name:<7}{raw:>14}{rms:>14}{max:>14}{floor:>14}{over:>12}"
         );
         let below = [
+            ("as it came", s.rms_as_they_came.map(|v| figure.write(v))),
             ("effects left in", s.rms_affine.map(|v| figure.write(v))),
             (
                 "at rest",
@@ -41,6 +45,9 @@ pub fn verify_text(verification: &VerifyResult) -> String {
     for (name, s) in verification.sensors.named() {
         let _ = writeln!(out, "{name}: {}, rms", s.figure.description());
     }
+    out.push_str(
+        "one scale: the means of the calibration's scale factors and of its biases on all three axes, no misalignment\n",
+    );
     warn(&mut out, verification.warnings.iter());
     out
 }

@@ -442,6 +442,27 @@ fn the_sway_of_the_bench_is_found_in_both_level_axes_with_its_size() {
 }
 
 #[test]
+fn at_a_rate_that_has_no_power_of_ten_the_nearest_averaging_times_are_printed() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut rows = at_rest(20_000);
+    for (k, row) in rows.iter_mut().enumerate() {
+        row[0] = k as f64 / 180.0;
+    }
+    write(folder.path(), &rows);
+    let manifest = folder.path().join("r/recording.toml");
+    let text = std::fs::read_to_string(&manifest).unwrap();
+    std::fs::write(&manifest, text.replace("100.0", "180.0")).unwrap();
+    let text = done(folder.path(), "allan r");
+    // 2, 20, 200 and 2000 samples.
+    for time in ["  0.0111 s", "  0.111 s", "  1.11 s", "  8.83 s"] {
+        let rows = text
+            .lines()
+            .filter(|l| l.trim_start().starts_with(time.trim()));
+        assert_eq!(rows.count(), 2, "{time}: {text}");
+    }
+}
+
+#[test]
 fn readings_in_volts_become_si_by_the_calibration_of_the_unit() {
     let folder = tempfile::tempdir().unwrap();
     let plan = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../rig/plans/table.toml");
@@ -475,6 +496,46 @@ fn readings_in_volts_become_si_by_the_calibration_of_the_unit() {
     one_noise_file_serves_all(folder.path());
     let error = refused(folder.path(), "export --kalibr imu.yaml --noise cal.toml");
     assert!(error.contains("cal.toml, line"), "{error}");
+}
+
+/// A driver's SI may be off: the scale factors of the calibration are then not 1, and the noise of the readings is not that of the unit.
+#[test]
+fn noise_of_readings_in_si_is_the_same_for_a_fit_with_and_without_a_calibration() {
+    let folder = tempfile::tempdir().unwrap();
+    let plan = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../rig/plans/table.toml");
+    let plan = Plan::read(&plan).unwrap();
+    let truth = RigTruth::resolve(&RigFile::default(), 5).unwrap();
+    let output = mimu_rig::record::Output::new(&folder.path().join("r"), &plan).unwrap();
+    mimu_rig::record::write(&plan, &truth, 5, &output).unwrap();
+    let manifest = folder.path().join("r/recording.toml");
+    let text = std::fs::read_to_string(&manifest).unwrap();
+    let si = text.replace("raw_unit = \"V\"", "raw_unit = \"SI\"");
+    assert_ne!(si, text);
+    std::fs::write(&manifest, si).unwrap();
+    done(folder.path(), "fit r -o cal.toml");
+    done(folder.path(), "allan r --step 2 -o raw.toml");
+    let text = done(
+        folder.path(),
+        "allan r --step 2 --calibration cal.toml -o both.toml",
+    );
+    assert!(
+        text.contains("of the calibrated unit: that of the readings divided by the scale factors"),
+        "{text}"
+    );
+    let n = |name: &str| {
+        let file = NoiseFile::read(&folder.path().join(name)).unwrap();
+        let channel = file.channel[0].clone();
+        (channel.n.unwrap().value, channel.scale_factor)
+    };
+    let ((raw, none), (unit, scale)) = (n("raw.toml"), n("both.toml"));
+    assert!(none.is_none() && (unit * scale.unwrap() / raw - 1.0).abs() < 1e-9);
+    for command in ["fit r", "verify r --calibration cal.toml"] {
+        let [raw, both] = ["raw", "both"].map(|n| {
+            let text = done(folder.path(), &format!("{command} --noise {n}.toml"));
+            text.replace(&format!("{n}.toml"), "the file")
+        });
+        assert_eq!(raw, both, "{command}");
+    }
 }
 
 /// With a calibration the file serves those who read volts as that without one does, and those who need SI as well.

@@ -142,6 +142,9 @@ fn calibrations(folder: &Path) {
         interval_lag_s: Some([19.0, 21.0]),
         accel_lag_s: Some(LAGS_S[1]),
         interval_accel_lag_s: Some([7.0, 9.0]),
+        biases_only: false,
+        gyro_hysteresis: None,
+        accel_hysteresis: None,
         nodes: (0..7).map(|k| node(10.0 * f64::from(k) - 5.0)).collect(),
     });
     std::fs::write(folder.join("curves.toml"), calibration.to_toml()).unwrap();

@@ -180,6 +180,36 @@ fn a_rest_ramp_upon_poses_at_room_temperature_halves_the_error_of_a_sweep_and_is
     let exported: Value = serde_json::from_str(&exported).unwrap();
     assert_eq!(exported["program"], "px4");
     assert!(folder.join("thermal.params").exists());
+    for sensor in exported["sensors"].as_array().unwrap() {
+        let remains = |source: &str| {
+            let all = sensor["remains"].as_array().unwrap();
+            let found = all.iter().find(|r| r["source"] == source);
+            found.unwrap_or_else(|| panic!("{source}: {all:?}")).clone()
+        };
+        // Nobody has seen a scale factor at another temperature.
+        for unknown in [
+            "scale factors over temperature",
+            "cross terms over temperature",
+        ] {
+            assert!(remains(unknown)["rms"].is_null(), "{}", remains(unknown));
+        }
+        assert!(remains("cross terms, constant")["rms"].as_f64().unwrap() > 0.0);
+        let hysteresis = remains("hysteresis");
+        let name = sensor["sensor"].as_str().unwrap();
+        let largest = fitted["sensors"][name]["hysteresis"]
+            .as_array()
+            .unwrap()
+            .iter();
+        let largest = largest.map(|h| h["largest"].as_f64().unwrap().abs());
+        // Readings in volts: what is left in SI is half of the difference by the program's scale factor, which is that of the calibration.
+        let factors = sensor["conversion"]["si_per_raw"].as_array().unwrap();
+        let known = largest
+            .zip(factors)
+            .map(|(raw, f)| 0.5 * raw * f.as_f64().unwrap().abs());
+        let known = known.fold(0.0, f64::max);
+        let ratio = hysteresis["max"].as_f64().unwrap() / known;
+        assert!((ratio - 1.0).abs() < 0.05, "{name}: {ratio}");
+    }
 
     let refused = mimu(folder, "thermal fit sweep --base room.toml -o never.toml");
     let told = String::from_utf8_lossy(&refused.stderr).into_owned();

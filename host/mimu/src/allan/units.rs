@@ -31,7 +31,7 @@ impl Unit {
         Self {
             name: sensor.unit(),
             per_raw: 1.0 / scale_factor,
-            scaled_from: (raw != RawUnit::Si).then(|| Self::raw(raw).name),
+            scaled_from: Some(Self::raw(raw).name),
         }
     }
 

@@ -115,6 +115,9 @@ fn over_temperature(kept: &Kept) -> Option<OverTemperature> {
         interval_lag_s: None,
         accel_lag_s: kept.accel_lag_s.map(f64::from),
         interval_accel_lag_s: None,
+        biases_only: false,
+        gyro_hysteresis: None,
+        accel_hysteresis: None,
         nodes: nodes.collect(),
     })
 }

@@ -67,7 +67,7 @@ impl Calibration {
                 unit: figure.unit(sensor).into(),
                 rms: rounded(found.rms, FIGURE_DIGITS),
                 held_out_rms: found.held_out_rms.map(|r| rounded(r, FIGURE_DIGITS)),
-                noise_floor: rounded(found.noise_floor, FIGURE_DIGITS),
+                noise_floor: Some(rounded(found.noise_floor, FIGURE_DIGITS)),
                 dwells: found.dwells,
                 condition: rounded(found.condition, 5),
             };

@@ -84,7 +84,9 @@ fn table(fit: &Fit, found: &SensorFit) -> TriadTable {
         unit: found.figure.unit(found.sensor).into(),
         rms: rounded(found.rms(), FIGURE_DIGITS),
         held_out_rms: found.held_out_rms().map(|r| rounded(r, FIGURE_DIGITS)),
-        noise_floor: rounded(found.noise_floor(), FIGURE_DIGITS),
+        noise_floor: Some(found.noise_floor())
+            .filter(|floor| !floor.is_nan())
+            .map(|floor| rounded(floor, FIGURE_DIGITS)),
         dwells: found.dwells,
         condition: rounded(found.estimated.condition, SIGMA_DIGITS + 1),
     };

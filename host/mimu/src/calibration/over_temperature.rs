@@ -33,6 +33,16 @@ pub struct OverTemperature {
     /// Bounds of it with 95 %, s.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub interval_accel_lag_s: Option<[f64; 2]>,
+    /// Whether only the biases were followed over temperature, and C is that of one temperature.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub biases_only: bool,
+    /// What heating and cooling differ by in the biases of the gyro after the lag, axis by axis, rad/s: rms over the range, and the largest.
+    /// `None`: not known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gyro_hysteresis: Option<[[f64; 3]; 2]>,
+    /// The same of the accelerometer, m/s².
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub accel_hysteresis: Option<[[f64; 3]; 2]>,
     /// One to sixteen, the coldest first.
     #[serde(rename = "node", default)]
     pub nodes: Vec<TemperatureNode>,
@@ -163,6 +173,11 @@ impl OverTemperature {
         if let Some(problem) = self.problem_of_lags() {
             return refuse("", problem);
         }
+        let all = [self.gyro_hysteresis, self.accel_hysteresis];
+        let sizes = all.iter().flatten().flatten().flatten();
+        if let Some(size) = sizes.copied().find(|h| !(*h >= 0.0 && h.is_finite())) {
+            return refuse("", format!("a hysteresis is {size}, and has to be a size"));
+        }
         if self.nodes.is_empty() || self.nodes.len() > NODES {
             let problem = format!(
                 "it has {} nodes, and there have to be 1 to {NODES}",
@@ -186,6 +201,14 @@ impl OverTemperature {
             }
         }
         Ok(())
+    }
+
+    /// What heating and cooling differ by in the biases of `sensor`, axis by axis, SI: rms and largest; `None` if it is not known.
+    pub fn hysteresis(&self, sensor: Sensor) -> Option<&[[f64; 3]; 2]> {
+        match sensor {
+            Sensor::Gyro => self.gyro_hysteresis.as_ref(),
+            Sensor::Accel => self.accel_hysteresis.as_ref(),
+        }
     }
 
     /// Lags of the dies of gyro and accelerometer, s; `None` if they are not determined.

@@ -58,8 +58,8 @@ impl AsWritten<'_> {
             let mut rest = lasting.clone();
             rest.remove(k);
             let removed: Vec<Removed> = rest.iter().map(|a| Removed::from(*a)).collect();
-            let [gyro, accel] = Sensor::BOTH
-                .map(|s| Some(self.before.sensor(s)?.estimated.triad.inverse));
+            let [gyro, accel] =
+                Sensor::BOTH.map(|s| Some(self.before.sensor(s)?.estimated.triad.inverse));
             let first = &self.before.prepared;
             let clean = remove(first, gyro.as_ref(), accel.as_ref(), &removed)?;
             let fit = (self.calibrate)(clean).ok()?;

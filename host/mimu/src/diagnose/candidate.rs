@@ -11,6 +11,9 @@ use crate::effects::quantity::Conditions;
 /// Step of the logarithm of a parameter for a central difference, whose error is a millionth of the derivative: far above rounding.
 const STEP: f64 = 1e-3;
 
+/// Bits of a code, from the first down, that are tried together at first: of more the sum is nearly the reading, as all of them add up to it.
+const FIRST_BITS: usize = 4;
+
 impl Candidate {
     /// An effect in `rows`; `None` where it goes by codes that the steps of the readings would have to say, and they have none.
     pub fn effect_in(effect: &'static Effect, rows: &Rows) -> Option<Self> {
@@ -26,7 +29,7 @@ impl Candidate {
     /// The candidates that it is tried as. The search goes on from the best of these, and adds or drops [offered](Self::offered)
     /// coefficients.
     ///
-    /// Of the bits of a code each by itself, and all from the first down to each. Of other effects the coefficients that are [excited](Self::excited), and
+    /// Of the bits of a code each by itself, and the first few together. Of other effects the coefficients that are [excited](Self::excited), and
     /// all that the rows can tell; both with the coefficients that are specific to the recording, and without. A thermal effect is tried
     /// with and without the thermometer's self-heating.
     pub fn variants(mut self, rows: &Rows) -> Vec<Self> {
@@ -38,7 +41,7 @@ impl Candidate {
         if self.reads_code() {
             let offered = &self.offered;
             let alone = offered.iter().map(|bit| vec![*bit]);
-            let down = (2..=offered.len()).map(|k| offered[..k].to_vec());
+            let down = (2..=offered.len().min(FIRST_BITS)).map(|k| offered[..k].to_vec());
             return alone.chain(down).map(|bits| with(&self, bits)).collect();
         }
         self.offered.extend(self.of_recording());

@@ -212,7 +212,8 @@ pub fn decide(
     let usual = judge.usual;
     let mut suggested = Vec::new();
     loop {
-        let ids = |all: &[Chosen]| -> Vec<String> { all.iter().map(|c| c.candidate.id()).collect() };
+        let ids =
+            |all: &[Chosen]| -> Vec<String> { all.iter().map(|c| c.candidate.id()).collect() };
         let mut failed_any = false;
         // What does not hold out goes, the one with the smallest drop in deviance first.
         while let Some(failed) = judge.first_to_fail(&kept, &with)? {
@@ -267,7 +268,9 @@ pub fn decide(
             judge.held(&kept, &with, split),
         ];
         let held = both.each_ref().map(|h| h.as_ref().map(|h| rms(rows, h)));
-        let at_rest = both.each_ref().map(|h| h.as_ref().and_then(|h| rms_at_rest(rows, h)));
+        let at_rest = both
+            .each_ref()
+            .map(|h| h.as_ref().and_then(|h| rms_at_rest(rows, h)));
         accepted.push(Accepted {
             chosen: one.clone(),
             split,

@@ -33,9 +33,10 @@ use serde::Serialize;
 
 use crate::calibration::Calibration;
 use crate::effects::removal::{Removed, removable, remove_within};
+use crate::estimate::least_squares::POORLY_DETERMINED;
 use crate::fit::{Fit, Options, fit, fit_biases, without_temperature};
 use crate::prepared::Prepared;
-use crate::quantity::Sensor;
+use crate::quantity::{Sensor, significant};
 use crate::triad::{Part, Triad};
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{RawUnit, Reference};
@@ -50,6 +51,8 @@ pub enum Verdict {
     Explained,
     /// Something is left that nothing explains, or a law that is on no list explains it as well as the effect found.
     Unexplained,
+    /// Nothing was found, and a sensor had too little to judge it by: see [`Diagnosis::untestable`].
+    Untestable,
 }
 
 impl Verdict {
@@ -59,6 +62,70 @@ impl Verdict {
             Self::Clean => "clean",
             Self::Explained => "explained",
             Self::Unexplained => "unexplained",
+            Self::Untestable => "untestable",
+        }
+    }
+}
+
+/// Why a recording cannot show whether a sensor errs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Untestable {
+    /// So few residuals for so many affine parameters.
+    Residuals(usize, usize),
+    /// No part of the recording can be held out: the rest does not determine the calibration.
+    NothingHeldOut,
+    /// Condition of the fit: the poses leave some sums of parameters all but open.
+    Condition(f64),
+    /// Errors of the accelerometer's directions of gravity, by which the turns are judged, over the noise of the turns.
+    Reference(f64),
+}
+
+impl std::fmt::Display for Untestable {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        match self {
+            Self::Residuals(rows, parameters) => write!(
+                f,
+                "{rows} residuals for {parameters} affine parameters leave nothing to judge by; record more poses"
+            ),
+            Self::NothingHeldOut => f.write_str(
+                "without any part of the recording the rest does not determine the calibration; record each pose twice",
+            ),
+            Self::Condition(condition) => write!(
+                f,
+                "the poses leave some parameters all but open (condition {condition:.0}); record poses that differ more"
+            ),
+            Self::Reference(times) => write!(
+                f,
+                "the accelerometer's directions of gravity, by which its turns are judged, are uncertain by {} times the noise of the turns; \
+                 record more poses",
+                significant(*times)
+            ),
+        }
+    }
+}
+
+/// Fewest residuals beyond the affine parameters that can show anything.
+const FEWEST: usize = 3;
+/// Errors of the reference over the noise from which on they hide what a turn could show: 1.1 in a published session of 38 poses by hand.
+const HIDDEN: f64 = 10.0;
+
+impl SensorDiagnosis {
+    /// Why the recording cannot show whether the sensor errs, if so; `fit` is the one before.
+    fn untestable(&self, fit: &Fit, matrix_given: bool) -> Option<Untestable> {
+        let decision = &self.decision;
+        let [rows, parameters] = decision.rows;
+        let condition = fit
+            .sensor(self.sensor)
+            .map_or(1.0, |f| f.estimated.condition);
+        let reference = decision.reference_rms / decision.noise_floor;
+        match () {
+            () if rows < parameters + FEWEST => Some(Untestable::Residuals(rows, parameters)),
+            () if !decision.held_out_rms[1].is_finite() => Some(Untestable::NothingHeldOut),
+            () if condition > POORLY_DETERMINED && !matrix_given => {
+                Some(Untestable::Condition(condition))
+            }
+            () if reference > HIDDEN => Some(Untestable::Reference(reference)),
+            () => None,
         }
     }
 }
@@ -89,6 +156,8 @@ pub struct Diagnosis {
     pub effects: Vec<Removed>,
     /// What it amounts to.
     pub verdict: Verdict,
+    /// Sensors that the recordings cannot judge, with the reason.
+    pub untestable: Vec<(Sensor, Untestable)>,
     /// The recordings that effects were found in, the first first.
     pub sources: Vec<Source>,
 }
@@ -358,8 +427,11 @@ pub fn diagnose(recordings: Recordings, options: Options) -> Result<Diagnosis> {
     with_temperature(&mut now, &sensors);
     let open = |d: &Decision| d.unexplained().next().is_some() || !d.undecided.is_empty();
     let left = sensors.iter().any(|s| open(&s.decision));
+    let of = |s: &SensorDiagnosis| Some((s.sensor, s.untestable(&before, held.is_some())?));
+    let untestable: Vec<(Sensor, Untestable)> = sensors.iter().filter_map(of).collect();
     let verdict = match (left, effects.is_empty()) {
         (true, _) => Verdict::Unexplained,
+        (false, true) if !untestable.is_empty() => Verdict::Untestable,
         (false, true) => Verdict::Clean,
         (false, false) => Verdict::Explained,
     };
@@ -369,6 +441,7 @@ pub fn diagnose(recordings: Recordings, options: Options) -> Result<Diagnosis> {
         sensors,
         effects,
         verdict,
+        untestable,
         sources,
     })
 }

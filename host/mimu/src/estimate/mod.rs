@@ -6,6 +6,7 @@
 //! | [`moving_input`]  | table     | the same least squares where inputs move within dwells     |
 //! | [`gravity_size`]  | gravity   | accelerometer from the magnitude of gravity over many poses   |
 //! | [`rotation`]      | gravity   | gyro from the turns between dwells                       |
+//! | [`with_turns`]    | gravity   | accelerometer from magnitudes and turns together         |
 //! | [`turn`]          | gravity   | one turn, and where a calibration carries gravity in it   |
 //! | [`chains`]        | gravity   | dwells that turns connect one to the next                 |
 //! | [`earth`]         | gravity   | what the turning Earth adds to it                         |
@@ -19,6 +20,7 @@ pub mod least_squares;
 pub mod moving_input;
 pub mod rotation;
 pub mod turn;
+pub mod with_turns;
 
 use nalgebra::Vector3;
 

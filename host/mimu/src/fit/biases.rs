@@ -88,7 +88,7 @@ pub fn fit_biases(
                 within: false,
                 value,
                 held_out: None,
-                floor: floor.sqrt(),
+                floor: prepared.if_noise_known(&[sensor], floor.sqrt()),
             }
         });
         let figure = match by_size {
@@ -121,6 +121,7 @@ pub fn fit_biases(
         prepared,
         options,
         sensors,
+        changes: Vec::new(),
         warnings,
     })
 }

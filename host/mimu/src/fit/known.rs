@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 use super::hold_out::{HeldOut, Split, determined};
 use super::sensor::{Residual, SensorFit, typical};
-use super::{Method, Options, finish, refuse_wrong_gravity};
+use super::{Method, Options, as_came, finish, refuse_wrong_gravity};
 use crate::estimate::{Observation, known_input, moving_input};
 use crate::prepared::{Prepared, si_covariance};
 use crate::quantity::{Figure, Sensor, plural};
@@ -57,7 +57,13 @@ pub(super) fn fit_known(
                 continue;
             }
             Err(failure) => {
-                let mut error = prepared.refused(failure, sensor);
+                // A level pose has a force along an axis and no rate about it: of which the dwells are missing has to be said.
+                let kind = match sensor {
+                    Sensor::Gyro => "with rates",
+                    Sensor::Accel => "with forces",
+                };
+                let error = prepared.refused(failure, sensor);
+                let mut error = error.map(|e| e.remedy = e.remedy.replace("with inputs", kind));
                 if options.method != Method::LeastSquares {
                     error = error.about(Argument::Method);
                 }
@@ -100,7 +106,10 @@ pub(super) fn fit_known(
                 within: *bias == 0.0,
                 value: estimated.error(o, *bias),
                 held_out: None,
-                floor: (si_covariance(&matrix, &o.variance).trace() / 3.0).sqrt(),
+                floor: prepared.if_noise_known(
+                    &[sensor],
+                    (si_covariance(&matrix, &o.variance).trace() / 3.0).sqrt(),
+                ),
             })
             .collect();
         let n = observations.len();
@@ -132,7 +141,7 @@ pub(super) fn fit_known(
             let refit = held_out.without(part_of(held_out.split, o.dwell));
             residual.held_out = refit.map(|refit| refit.error(o, *bias));
         }
-        sensors.push(finish(
+        let mut fit = finish(
             sensor,
             estimated,
             Figure::Input,
@@ -140,14 +149,22 @@ pub(super) fn fit_known(
             n,
             None,
             held_out.into(),
-        ));
+        );
+        fit.as_came = as_came::inputs(prepared, all.iter().map(|(o, _)| *o));
+        sensors.push(fit);
     }
     if sensors.is_empty() {
-        return Err(Error::new(
+        let error = Error::new(
             &prepared.place,
             missing.join(", "),
             "give dwells of a second and more their inputs in the ref_ columns, or set reference = \"gravity\" where there is no table",
-        ));
+        );
+        let judged = Sensor::BOTH.into_iter().filter(wanted);
+        let mut judged = judged.filter(|s| prepared.dwells.are_judged_not_still(*s));
+        return Err(match judged.next() {
+            Some(sensor) => prepared.with_steps_as_given(error, sensor),
+            None => error,
+        });
     }
     warnings.extend(missing);
     Ok(sensors)

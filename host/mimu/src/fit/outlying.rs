@@ -1,18 +1,23 @@
 //! Dwells and turns that err by far more than the others predict, left out before anything is concluded from them.
 //!
 //! One turn in which samples were lost, or one dwell against a soft cushion, bends all parameters, and its error then passes for an
-//! effect. Each is compared with what the others predict of it: residuals of a robust fit (iteratively reweighted, with Cauchy's weights) about the
-//! least-squares one, enlarged by the leverage as deletion residuals are.
+//! effect. A robust fit (iteratively reweighted, with Cauchy's weights) names suspects; a suspect is left out if the fit of the others
+//! contradicts it, by its studentised deletion residual, and determines without it what it determines with it ([`deletion`]).
+
+mod deletion;
 
 use mimu_core::compensation::Affine;
-use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+use nalgebra::{DMatrix, Vector3};
 
+use super::by_gravity::POOR_POSES;
 use crate::blocks::quantile;
-use crate::dwell::{Fault, LeftOut};
+use crate::dwell::{Dwells, Fault, LeftOut};
 use crate::estimate::turn::{Turn, direction_error};
 use crate::estimate::{Estimated, Observation, gravity_size, rotation};
 use crate::prepared::{Prepared, si_covariance};
-use crate::quantity::{Sensor, significant};
+use crate::quantity::{AXES, Sensor, significant};
+use crate::triad::Triad;
+use deletion::{Judged, Row, against_others, contradicted};
 
 /// Standard deviations, by the noise or by the scatter of the others where that is more, from which on something is outlying.
 const SIGMAS: f64 = 5.0;
@@ -25,72 +30,6 @@ const NEAR: f64 = 0.9;
 /// Standard deviations from which on a pose near the same axis errs as well: then both show an effect.
 const WITNESS: f64 = 3.0;
 
-/// Something judged: its error, the derivatives of that by the parameters, and the variance by noise.
-struct Row {
-    error: Vector3<f64>,
-    by: DMatrix<f64>,
-    variance: f64,
-}
-
-/// Error and standard deviations of each of the first `judged` rows against the prediction of the others; `dimensions` is the
-/// number of components that their errors have.
-fn against_others(rows: &[Row], judged: usize, dimensions: f64) -> Option<Vec<(f64, f64)>> {
-    let parameters = rows.first()?.by.ncols();
-    let mut weights: Vec<f64> = vec![1.0; rows.len()];
-    // Median of the size of one, or two, normal components.
-    let median = if dimensions < 1.5 { 0.6745 } else { 1.1774 };
-    let mut found = Vec::new();
-    for _ in 0..20 {
-        let mut normal = DMatrix::zeros(parameters, parameters);
-        let mut right = DVector::zeros(parameters);
-        for (row, weight) in rows.iter().zip(&weights) {
-            let weight = weight / row.variance;
-            normal += row.by.tr_mul(&row.by) * weight;
-            right += row.by.tr_mul(&row.error) * weight;
-        }
-        let scale = normal.diagonal().map(|d| d.sqrt().max(f64::MIN_POSITIVE));
-        let scaled = DMatrix::from_fn(parameters, parameters, |i, j| {
-            normal[(i, j)] / (scale[i] * scale[j])
-        });
-        // The decomposition never ends on what is not a number.
-        if scaled.iter().any(|x| !x.is_finite()) {
-            return None;
-        }
-        let inverse = scaled.pseudo_inverse(1e-12).ok()?;
-        let inverse = DMatrix::from_fn(parameters, parameters, |i, j| {
-            inverse[(i, j)] / (scale[i] * scale[j])
-        });
-        let step = &inverse * right;
-        let all = rows.iter().zip(&weights).map(|(row, weight)| {
-            let left = row.error - &row.by * &step;
-            let hat = &row.by * &inverse * row.by.transpose() * (weight / row.variance);
-            let free = Matrix3::from_fn(|i, j| f64::from(u8::from(i == j)) - hat[(i, j)]);
-            let inverse = free.try_inverse().unwrap_or_else(Matrix3::identity);
-            // What nothing else determines is predicted by nothing.
-            let inverse = match inverse.trace() < 100.0 {
-                true => inverse,
-                false => Matrix3::identity(),
-            };
-            let left = inverse * Vector3::new(left[0], left[1], left[2]);
-            let variance = row.variance * inverse.trace() / 3.0;
-            (left.norm(), left.norm() / variance.sqrt())
-        });
-        found = all.collect();
-        let typical = |part: &[(f64, f64)]| {
-            let mut sizes: Vec<f64> = part.iter().map(|f| f.1).collect();
-            quantile(&mut sizes, 0.5).unwrap_or(0.0)
-        };
-        // What is judged, and what only holds the parameters as well, may have more than its noise.
-        let scales = [&found[..judged], &found[judged..]].map(|p| (typical(p) / median).max(1.0));
-        for (k, (f, weight)) in found.iter_mut().zip(&mut weights).enumerate() {
-            f.1 /= scales[usize::from(k >= judged)];
-            *weight = 1.0 / (1.0 + (f.1 / 2.4).powi(2)) / scales[usize::from(k >= judged)].powi(2);
-        }
-    }
-    found.truncate(judged);
-    Some(found)
-}
-
 /// The outlying ones, worst first, at most `most`.
 fn outlying(found: &[(f64, f64)], most: usize) -> Vec<usize> {
     let mut sigmas: Vec<f64> = found.iter().map(|f| f.1).collect();
@@ -102,47 +41,106 @@ fn outlying(found: &[(f64, f64)], most: usize) -> Vec<usize> {
     all
 }
 
+/// Triads of gyro and accelerometer with everything in them, where something was left out.
+pub(super) type WithAll = [Option<Triad>; 2];
+
 /// Marks what is outlying in a recording with gravity as its only reference, dwells first. They keep their places in the list of
-/// dwells, and whoever asks for observations or turns afterwards gets neither.
-pub(super) fn leave_out(prepared: &mut Prepared) {
-    if !prepared.has(Sensor::Accel) {
-        return;
+/// dwells, and whoever asks for observations or turns afterwards gets neither. The answer is what would have been fitted with them.
+pub(super) fn leave_out(prepared: &mut Prepared) -> WithAll {
+    let mut with_all = WithAll::default();
+    if !prepared.has(Sensor::Accel) || prepared.dwells.keep.everything() {
+        return with_all;
     }
     let poses = prepared.observations(Sensor::Accel);
     // Of fewer, none may be left out.
     if poses.len() < ONE_IN {
-        return;
+        return with_all;
     }
     let g = prepared.manifest.gravity_mps2;
-    let Some(accel) = fit_poses(prepared, &poses, g) else {
-        return;
+    let accel = fit_poses(prepared, &poses, g);
+    // Where the poses hardly determine the accelerometer, they contradict nothing.
+    let Some(accel) = accel.filter(|a| a.condition <= POOR_POSES) else {
+        return with_all;
     };
     let model = accel.triad.inverse;
-    for (i, (error, sigmas)) in outlying_poses(prepared, &poses, &model) {
-        let dwell = &mut prepared.dwells.list[poses[i].dwell];
-        dwell.accel_fault = Some(Fault::Outlying);
-        let step = dwell.step;
-        prepared.dwells.warnings.push(format!(
-            "dwell {step} is not used for the accelerometer: its magnitude of specific force is {} mm/s² off what the other dwells predict, {sigmas:.0} sigma",
-            significant(1e3 * error)
+    let found = outlying_poses(prepared, &poses, &model);
+    for judged in found {
+        let index = poses[judged.row].dwell;
+        let Dwells {
+            list,
+            warnings,
+            left_out,
+            keep,
+            ..
+        } = &mut prepared.dwells;
+        let step = list[index].step;
+        if keep.keeps(step) {
+            continue;
+        }
+        let off = format!(
+            "its magnitude of specific force is {} mm/s² off what the other dwells predict",
+            significant(1e3 * judged.error)
+        );
+        if !judged.can_be_spared() {
+            warnings.push(format!(
+                "dwell {step} is kept for the accelerometer, though {}: {}, so nothing says whether it is right; repeat its pose",
+                if judged.error.is_finite() { off } else { "it is suspect".into() },
+                needed(ACCEL_PARAMETERS[judged.grows.0], judged.grows.1)
+            ));
+            continue;
+        }
+        warnings.push(format!(
+            "dwell {step} is not used for the accelerometer: {off}, {:.0} sigma of that prediction; `--keep {step}` fits with it",
+            judged.sigmas
         ));
-        prepared.dwells.left_out.push(LeftOut {
+        list[index].accel_fault = Some(Fault::Outlying);
+        left_out.push(LeftOut {
             sensor: Sensor::Accel,
-            from: poses[i].dwell,
-            to: poses[i].dwell,
-            error,
-            sigmas,
+            from: index,
+            to: index,
+            error: judged.error,
+            sigmas: judged.sigmas,
         });
+        with_all[1] = Some(accel.triad.clone());
     }
     if !prepared.has(Sensor::Gyro) {
-        return;
+        return with_all;
     }
     let poses = prepared.observations(Sensor::Accel);
     let Some(accel) = fit_poses(prepared, &poses, g) else {
-        return;
+        return with_all;
     };
-    let found = outlying_turns(prepared, &accel, g);
+    let (found, gyro, warnings) = outlying_turns(prepared, &accel, g);
+    prepared.dwells.warnings.extend(warnings);
+    if !found.is_empty() {
+        with_all[0] = gyro;
+    }
     prepared.dwells.left_out.extend(found);
+    with_all
+}
+
+/// Parameters of the accelerometer that the rows of its poses are derived by.
+const ACCEL_PARAMETERS: [&str; 9] = [
+    "the scale factor of x",
+    "the angle between x and y",
+    "the scale factor of y",
+    "the angle between x and z",
+    "the angle between y and z",
+    "the scale factor of z",
+    "the bias of x",
+    "the bias of y",
+    "the bias of z",
+];
+
+/// What would become of a parameter without an observation.
+fn needed(parameter: &str, grows: f64) -> String {
+    match grows < 1e3 {
+        true => format!(
+            "without it the interval of {parameter} would be {} times as wide",
+            significant(grows)
+        ),
+        false => format!("nothing else determines {parameter}"),
+    }
 }
 
 fn fit_poses(prepared: &Prepared, poses: &[Observation], g: f64) -> Option<Estimated> {
@@ -151,11 +149,7 @@ fn fit_poses(prepared: &Prepared, poses: &[Observation], g: f64) -> Option<Estim
     gravity_size::estimate(poses, &variances, g).ok()
 }
 
-fn outlying_poses(
-    prepared: &Prepared,
-    poses: &[Observation],
-    accel: &Affine<f64>,
-) -> Vec<(usize, (f64, f64))> {
+fn outlying_poses(prepared: &Prepared, poses: &[Observation], accel: &Affine<f64>) -> Vec<Judged> {
     let g = prepared.manifest.gravity_mps2;
     let variances = prepared.size_variances(accel, poses);
     let up: Vec<Vector3<f64>> = poses.iter().map(|o| accel.apply(&o.raw)).collect();
@@ -185,21 +179,26 @@ fn outlying_poses(
         })
     };
     let all = outlying(&found, poses.len() / ONE_IN).into_iter();
-    all.filter(|k| !has_witness(*k))
-        .map(|k| (k, found[k]))
-        .collect()
+    let suspects: Vec<usize> = all.filter(|k| !has_witness(*k)).collect();
+    contradicted(&rows, rows.len(), 1.0, &suspects)
 }
 
-fn outlying_turns(prepared: &Prepared, accel: &Estimated, g: f64) -> Vec<LeftOut> {
+/// The outlying turns, the gyro with all of them, and what is said of those that cannot be spared.
+fn outlying_turns(
+    prepared: &Prepared,
+    accel: &Estimated,
+    g: f64,
+) -> (Vec<LeftOut>, Option<Triad>, Vec<String>) {
+    let none = (Vec::new(), None, Vec::new());
     let model = &accel.triad.inverse;
     let (turns, _) = prepared.turns(model);
     if turns.len() < ONE_IN {
-        return Vec::new();
+        return none;
     }
     let rest = prepared.rest(&accel.triad.inverse);
     let motions = prepared.motions(model);
     let Ok(gyro) = rotation::estimate(&turns, &rest, &accel.triad, &motions, None, g) else {
-        return Vec::new();
+        return none;
     };
     let Affine { matrix, offset } = gyro.triad.inverse;
     let mean_square = matrix.norm_squared() / 3.0;
@@ -222,17 +221,43 @@ fn outlying_turns(prepared: &Prepared, accel: &Estimated, g: f64) -> Vec<LeftOut
         }),
     );
     let Some(found) = against_others(&rows, turns.len(), 2.0) else {
-        return Vec::new();
+        return none;
     };
-    let left_out = |k: usize| LeftOut {
-        sensor: Sensor::Gyro,
-        from: turns[k].from,
-        to: turns[k].to,
-        error: found[k].0,
-        sigmas: found[k].1,
-    };
-    let all = outlying(&found, turns.len() / ONE_IN).into_iter();
-    all.map(left_out).collect()
+    let suspects = outlying(&found, turns.len() / ONE_IN);
+    let step = |dwell: usize| prepared.dwells.list[dwell].step;
+    let (mut left_out, mut warnings) = (Vec::new(), Vec::new());
+    for judged in contradicted(&rows, turns.len(), 2.0, &suspects) {
+        let turn = &turns[judged.row];
+        if prepared.dwells.keep.keeps(step(turn.to)) {
+            continue;
+        }
+        if !judged.can_be_spared() {
+            let (parameter, grows) = judged.grows;
+            let name = match parameter {
+                0..9 => format!(
+                    "C_{}{} of the gyro",
+                    AXES[parameter / 3],
+                    AXES[parameter % 3]
+                ),
+                _ => format!("the bias of gyro {}", AXES[parameter - 9]),
+            };
+            warnings.push(format!(
+                "the turn from dwell {} to {} is kept, though it is suspect: {}; repeat it",
+                step(turn.from),
+                step(turn.to),
+                needed(&name, grows)
+            ));
+            continue;
+        }
+        left_out.push(LeftOut {
+            sensor: Sensor::Gyro,
+            from: turn.from,
+            to: turn.to,
+            error: judged.error,
+            sigmas: judged.sigmas,
+        });
+    }
+    (left_out, Some(gyro.triad), warnings)
 }
 
 /// Derivatives of the direction error of a turn by C (rows first) and o, by differences.

@@ -32,6 +32,7 @@ pub fn check(prepared: &Prepared, fit: &mut SensorFit) -> Result<()> {
         outliers(prepared, fit),
         unit(prepared, fit),
         turned(prepared, fit),
+        off_level(prepared, fit),
     ];
     fit.warnings.extend(found.into_iter().flatten());
     Ok(())
@@ -142,7 +143,8 @@ fn outliers(prepared: &Prepared, fit: &SensorFit) -> Option<String> {
     let median = sorted[sorted.len() / 2].value.norm();
     let off = |r: &&&Residual| {
         let size = r.value.norm();
-        size > OUTLIER * median && size > OUTLIER * r.floor
+        // Where the noise is not known, the median alone decides.
+        size > OUTLIER * median && (r.floor.is_nan() || size > OUTLIER * r.floor)
     };
     let bad: Vec<_> = sorted.iter().filter(off).collect();
     let worst = bad.first()?;
@@ -163,20 +165,41 @@ fn outliers(prepared: &Prepared, fit: &SensorFit) -> Option<String> {
     ))
 }
 
+/// A gain of readings in SI from which on, or below one over it, it is no error of a sensor: parts are within ten per cent.
+const GAIN: f64 = 1.3;
+
 /// What claims to be in SI reads about what it measures.
 fn unit(prepared: &Prepared, fit: &SensorFit) -> Option<String> {
     let matrix = &fit.estimated.triad.forward.matrix;
     let scale = matrix.row_iter().map(|r| r.norm()).sum::<f64>() / 3.0;
-    if prepared.manifest.raw_unit != RawUnit::Si || (0.5..2.0).contains(&scale) {
+    if prepared.manifest.raw_unit != RawUnit::Si || (1.0 / GAIN..GAIN).contains(&scale) {
         return None;
     }
-    let guess = match fit.sensor {
-        Sensor::Gyro if (40.0..80.0).contains(&scale) => ": it is in deg/s",
-        Sensor::Gyro if (0.01..0.03).contains(&scale) => ": the ref_ columns are not in deg/s",
-        _ => "",
+    let near = |factor: f64| (0.8..1.25).contains(&(scale / factor));
+    let degrees = 180.0 / std::f64::consts::PI;
+    let by_turns = fit.figure == Figure::Direction;
+    let cause = match fit.sensor {
+        Sensor::Gyro if near(degrees) => "they are in deg/s, and SI is rad/s",
+        Sensor::Gyro if near(degrees.recip()) && by_turns => {
+            "they were converted from deg/s to rad/s twice"
+        }
+        Sensor::Gyro if near(degrees.recip()) => {
+            "the ref_ columns are not in deg/s, or the readings were converted to rad/s twice"
+        }
+        // Over the turns the gyro is integrated: stamps that run twice as fast halve the scale factor.
+        Sensor::Gyro if by_turns && (0.1..10.0).contains(&scale) => {
+            "time base or unit? If the stamps or the sample rate are off by this factor, so is every angle that the gyro is integrated to"
+        }
+        Sensor::Accel if near(1.0 / prepared.manifest.gravity_mps2) => {
+            "they are in g, and SI is m/s²"
+        }
+        Sensor::Accel if near(prepared.manifest.gravity_mps2) => {
+            "they were multiplied by gravity twice"
+        }
+        _ => "unit, or range setting of the part?",
     };
     Some(format!(
-        "{}: raw_unit = \"SI\", but the readings are {} times the input{guess}",
+        "{}: raw_unit = \"SI\", but the readings are {} times the input: {cause}",
         fit.sensor,
         significant(scale)
     ))
@@ -203,4 +226,37 @@ fn turned(prepared: &Prepared, fit: &SensorFit) -> Option<String> {
         fit.sensor,
         angle.to_degrees()
     ))
+}
+
+/// Errors across the known force over those along it from which on the force is not where the reference says.
+const ACROSS: f64 = 3.0;
+/// Root mean square angle, rad, below which that is not said: a fifth of a degree, what a good level shows.
+const LEVEL: f64 = 3.5e-3;
+
+/// Known forces that point elsewhere than the reference says. A tilt leaves the size of a force and moves its direction, and so errs
+/// across it; a sensor's own errors lie along it as well.
+fn off_level(prepared: &Prepared, fit: &SensorFit) -> Option<String> {
+    if fit.sensor != Sensor::Accel || fit.figure != Figure::Input {
+        return None;
+    }
+    let (mut along, mut across, mut floor, mut angles, mut n) = (0.0, 0.0, 0.0, 0.0, 0.0);
+    for r in fit.residuals.iter().filter(|r| !r.within) {
+        let force = prepared.dwells.list[r.dwell].input(fit.sensor)?;
+        let up = force.normalize();
+        let part = r.value.dot(&up);
+        let side = r.value.norm_squared() - part * part;
+        along += part * part;
+        across += 0.5 * side;
+        floor += r.floor * r.floor;
+        angles += side / force.norm_squared();
+        n += 1.0;
+    }
+    let angle = (angles / n).sqrt();
+    let beyond = across > ACROSS * ACROSS * along.max(if floor.is_nan() { 0.0 } else { floor });
+    (beyond && angle > LEVEL).then(|| {
+        format!(
+            "accel: the errors lie across the known force and not along it, as if the dwells were off level by {} deg rms: level the faces, or leave the directions out (reference = \"gravity\")",
+            significant(angle.to_degrees())
+        )
+    })
 }

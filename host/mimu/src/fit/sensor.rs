@@ -38,6 +38,8 @@ pub struct SensorFit {
     pub static_rms: Option<(f64, Option<f64>)>,
     /// How its residuals were held out.
     pub held_out: HoldOut,
+    /// The error of the readings as they came, where they are in SI: what [`Self::rms`] is without a calibration.
+    pub as_came: Option<f64>,
     /// What a person should know.
     pub warnings: Vec<String>,
 }
@@ -54,8 +56,12 @@ impl SensorFit {
         (held().count() > 0).then(|| rms(self.figure, held()))
     }
 
-    /// What [`Self::rms`] would be with noise alone.
+    /// What [`Self::rms`] would be with noise alone. Not a number where the noise is unknown, as that of means without standard deviations:
+    /// a floor of 0 would say that there is none.
     pub fn noise_floor(&self) -> f64 {
+        if self.residuals.iter().all(|r| r.floor == 0.0) {
+            return f64::NAN;
+        }
         rms(
             Figure::GravitySize,
             self.residuals

@@ -4,6 +4,7 @@ use super::ChannelNoise;
 use crate::allan::variance::AllanModel;
 use crate::blocks::{Block, Condensed};
 use crate::dwell::Dwell;
+use crate::ramp::ramps;
 
 /// Noise of `value` of the blocks within `dwells`.
 pub(super) fn within<'a>(
@@ -17,7 +18,7 @@ pub(super) fn within<'a>(
         let whole = blocks.filter(|b| b.rows == rows);
         Series {
             means: whole.filter_map(&value).collect(),
-            ramps: ramps(dwell, condensed),
+            ramps: ramps(&condensed.blocks[dwell.blocks.clone()], dwell.duration_s),
         }
     });
     pooled(series, block_s)
@@ -27,39 +28,6 @@ pub(super) fn within<'a>(
 pub(super) fn block_s(condensed: &Condensed) -> (u32, f64) {
     let rows = condensed.blocks.iter().map(|b| b.rows).max().unwrap_or(1);
     (rows, f64::from(rows) * condensed.period_s)
-}
-
-/// Change of the temperature over a dwell, over its standard error, from which on it ramps.
-const RAMPS_SIGMAS: f64 = 5.0;
-/// Least change over a dwell that counts, K: of 0.1 K a bias of 0.1 deg/s/K makes 0.01 deg/s, which is what an analog gyro scatters by within a dwell.
-const RAMPS_C: f64 = 0.1;
-
-/// Whether the temperature ramps within a dwell: by the slope of a line through its blocks, against what they scatter about it.
-pub(super) fn ramps(dwell: &Dwell, condensed: &Condensed) -> bool {
-    let blocks = condensed.blocks[dwell.blocks.clone()].iter();
-    let known: Vec<(f64, f64)> = blocks
-        .filter(|b| b.temp_c.mean.is_finite())
-        .map(|b| (0.5 * (b.start_s + b.last_s), b.temp_c.mean))
-        .collect();
-    let n = known.len() as f64;
-    if n < 4.0 {
-        return false;
-    }
-    let (sum_t, sum_c) = known
-        .iter()
-        .fold((0.0, 0.0), |(a, b), (t, c)| (a + t, b + c));
-    let (mean_t, mean_c) = (sum_t / n, sum_c / n);
-    let centred = || known.iter().map(|(t, c)| (t - mean_t, c - mean_c));
-    let (tt, tc, cc) = centred().fold((0.0, 0.0, 0.0), |(tt, tc, cc), (t, c)| {
-        (tt + t * t, tc + t * c, cc + c * c)
-    });
-    if !(tt > 0.0) {
-        return false;
-    }
-    let slope = tc / tt;
-    let scatter = ((cc - slope * tc).max(0.0) / (n - 2.0)).sqrt();
-    let change = (slope * dwell.duration_s).abs();
-    change > RAMPS_C && slope.abs() * tt.sqrt() > RAMPS_SIGMAS * scatter
 }
 
 /// Means of the blocks of one dwell, one after the other.
@@ -201,6 +169,7 @@ pub(super) fn pooled(series: impl Iterator<Item = Series>, block_s: f64) -> Chan
         .map(|p| (p.tau_s, p.variance))
         .collect();
     ChannelNoise {
+        known: all.iter().any(|s| s.means.len() > 1),
         model,
         curve: (misfit && known.len() >= 2).then_some(known),
     }

@@ -9,7 +9,7 @@ use crate::calibration::ConverterTable;
 use crate::diagnose::decision::{Accepted, Decision};
 use crate::diagnose::picture::Picture;
 use crate::diagnose::rows::Figure as Judged;
-use crate::diagnose::{Diagnosis, SensorDiagnosis, Source, Verdict};
+use crate::diagnose::{Diagnosis, SensorDiagnosis, Source, Untestable, Verdict};
 use crate::effects::candidate::Kind;
 use crate::fit::Split;
 use crate::next_experiment::{Confused, Next, NotInPlan, SizedRecipe};
@@ -33,6 +33,8 @@ pub struct DiagnosisResult {
     pub recordings: Vec<Source>,
     /// What it amounts to.
     pub verdict: Verdict,
+    /// Sensors that the recordings cannot judge.
+    pub untestable: Vec<UntestableResult>,
     /// Accepted effects.
     pub effects: Vec<AcceptedResult>,
     /// Effects that were tried and not accepted.
@@ -292,6 +294,24 @@ pub struct SensorDiagnosisResult {
     pub picture: Option<Picture>,
 }
 
+/// A sensor that the recordings cannot judge.
+#[derive(Debug, Clone, Serialize)]
+pub struct UntestableResult {
+    /// Sensor.
+    pub sensor: &'static str,
+    /// Why, and what to record.
+    pub reason: String,
+}
+
+impl From<&(Sensor, Untestable)> for UntestableResult {
+    fn from((sensor, reason): &(Sensor, Untestable)) -> Self {
+        Self {
+            sensor: sensor.name(),
+            reason: reason.to_string(),
+        }
+    }
+}
+
 impl SensorDiagnosisResult {
     /// Whether there are more residuals than affine parameters: else only rounding is left.
     pub fn says_anything(&self) -> bool {
@@ -325,6 +345,7 @@ impl DiagnosisResult {
             gravity_mps2: prepared.manifest.gravity_mps2,
             recordings: d.sources.clone(),
             verdict: d.verdict,
+            untestable: d.untestable.iter().map(UntestableResult::from).collect(),
             effects: Vec::new(),
             rejected: Vec::new(),
             not_excited: Vec::new(),

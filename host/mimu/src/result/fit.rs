@@ -7,6 +7,7 @@ use serde::Serialize;
 
 use super::{Sensors, TOOL};
 use crate::dwell::Dwell;
+use crate::fit::change::Change;
 use crate::fit::{Fit, Method, SensorFit, Split};
 use crate::prepared::Prepared;
 use crate::quantity::{AXES, Figure, Sensor, inverse_names, raw_unit, scale_unit};
@@ -52,8 +53,27 @@ pub struct FitResult {
     pub dwells: Vec<DwellResult>,
     /// What errs by far more than the others predict, and was left out.
     pub left_out: Vec<LeftOutResult>,
+    /// What that changes: every parameter fitted with everything, and as fitted.
+    pub left_out_changes: Vec<ChangeResult>,
     /// What a person should know.
     pub warnings: Vec<String>,
+}
+
+/// A parameter fitted with everything, and without what was left out.
+#[derive(Debug, Clone, Serialize)]
+pub struct ChangeResult {
+    /// Of which sensor.
+    pub sensor: &'static str,
+    /// Name of the parameter.
+    pub name: String,
+    /// With everything in the fit.
+    pub with_all: f64,
+    /// As fitted.
+    pub value: f64,
+    /// Standard deviation of it.
+    pub sigma: f64,
+    /// Unit of all three.
+    pub unit: String,
 }
 
 /// Times without samples.
@@ -141,8 +161,11 @@ pub struct SensorFitResult {
     pub rms: f64,
     /// The same of those that were held out; null if none were.
     pub held_out_rms: Option<f64>,
-    /// What noise alone would give, in [`Self::unit`].
+    /// What noise alone would give, in [`Self::unit`]; null where the noise is not known.
     pub noise_floor: f64,
+    /// The error of the readings as they came, in [`Self::unit`]; absent where they are not in SI.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub as_they_came_rms: Option<f64>,
     /// SI unit of the figures.
     pub unit: &'static str,
     /// What they are about.
@@ -275,6 +298,7 @@ impl FitResult {
             detection: fit.prepared.dwells.detection.map(Detection::of),
             dwells: DwellResult::list(&fit.prepared),
             left_out: LeftOutResult::list(&fit.prepared),
+            left_out_changes: fit.changes.iter().map(ChangeResult::of).collect(),
             warnings: fit.warnings.iter().chain(of_sensors).cloned().collect(),
         }
     }
@@ -347,7 +371,8 @@ impl SensorFitResult {
                 dof: s.dof,
                 excess_sigma: s.excess.sqrt(),
                 unit: excess_unit(fit, found, group),
-                significant: s.is_significant(),
+                // What nobody knows explains nothing, and leaves nothing unexplained.
+                significant: s.is_significant() && fit.prepared.noise.is_known(found.sensor),
             };
             (group.clone(), result)
         });
@@ -365,6 +390,7 @@ impl SensorFitResult {
             rms: found.rms(),
             held_out_rms: found.held_out_rms(),
             noise_floor: found.noise_floor(),
+            as_they_came_rms: found.as_came,
             unit: found.figure.unit(found.sensor),
             figure: found.figure,
             dwells: found.dwells,
@@ -408,6 +434,19 @@ fn excess_unit(fit: &Fit, found: &SensorFit, group: &str) -> String {
         // Axes of the forward form are in raw units, of the inverse form in SI.
         Figure::Input if fit.options.method == Method::InverseForm => si.into(),
         Figure::Input => raw_unit(fit.prepared.manifest.raw_unit, si),
+    }
+}
+
+impl ChangeResult {
+    fn of(change: &Change) -> Self {
+        Self {
+            sensor: change.sensor.name(),
+            name: change.name.clone(),
+            with_all: change.with_all,
+            value: change.fitted.value,
+            sigma: change.fitted.sigma,
+            unit: change.unit.clone(),
+        }
     }
 }
 

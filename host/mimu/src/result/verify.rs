@@ -20,8 +20,12 @@ pub struct VerifyResult {
 /// Figures of one triad.
 #[derive(Debug, Clone, Serialize)]
 pub struct SensorVerifyResult {
-    /// Without a calibration: one scale factor and one bias for all axes, as a data sheet gives them, in [`Self::unit`].
+    /// With the mean of the calibration's scale factors and of its biases on all three axes and no misalignment, in [`Self::unit`]: fitted
+    /// means in place of a data sheet's.
     pub rms_raw: f64,
+    /// The readings as they came, in [`Self::unit`]; absent where they are not in SI.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rms_as_they_came: Option<f64>,
     /// With the calibration, in [`Self::unit`].
     pub rms: f64,
     /// With the calibration but for its effects, in [`Self::unit`]; absent if it has none.
@@ -29,7 +33,7 @@ pub struct SensorVerifyResult {
     pub rms_affine: Option<f64>,
     /// The largest error with the calibration, in [`Self::unit`].
     pub max: f64,
-    /// What noise alone would give, in [`Self::unit`].
+    /// What noise alone would give, in [`Self::unit`]; null where the noise is not known.
     pub noise_floor: f64,
     /// SI unit of the figures.
     pub unit: &'static str,
@@ -64,6 +68,7 @@ impl SensorVerifyResult {
     fn of(found: &SensorVerification) -> Self {
         Self {
             rms_raw: found.rms_raw,
+            rms_as_they_came: found.rms_as_came,
             rms: found.rms,
             rms_affine: found.rms_affine,
             max: found.max,

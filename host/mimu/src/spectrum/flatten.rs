@@ -1,38 +1,52 @@
-//! A band of a series brought down to the floor of its spectrum.
+//! Bands of a series brought down to the floor of its spectrum.
 
-use realfft::RealFftPlanner;
 use realfft::num_complex::Complex;
 
-/// Takes off `rates` the share `1 - gain` of every frequency (Hz) between both ends; elsewhere they stay as they are.
+use super::transform::Transform;
+
+/// A band that is brought down.
+pub(super) struct Cut<'a> {
+    /// Its ends, Hz.
+    pub ends_hz: [f64; 2],
+    /// Factor on the amplitude at a frequency (Hz).
+    pub gain: Box<dyn Fn(f64) -> f64 + 'a>,
+}
+
+/// Takes off `rates` the share `1 - gain` of every frequency within the bands of `cuts`; elsewhere they stay as they are.
 ///
 /// The phases are kept, and so of a bump that rises above the floor what belongs to the floor is still there: a notch would leave a
-/// hole in the noise.
-pub(super) fn flatten(rates: &mut [f64], dt_s: f64, ends_hz: [f64; 2], gain: impl Fn(f64) -> f64) {
-    let n = rates.len();
-    let mut planner = RealFftPlanner::new();
-    let (forward, inverse) = (planner.plan_fft_forward(n), planner.plan_fft_inverse(n));
-    let mut input = rates.to_vec();
-    // Without the straight line through both ends, which would be a step where the series is joined to itself.
-    let (first, last) = (rates[0], rates[n - 1]);
-    for (i, rate) in input.iter_mut().enumerate() {
-        *rate -= first + (last - first) * i as f64 / (n - 1) as f64;
+/// hole in the noise. All bands at once, as the transforms of the whole series are what it costs.
+pub(super) fn flatten(rates: &mut [f64], dt_s: f64, cuts: &[Cut]) {
+    if cuts.is_empty() {
+        return;
     }
-    let mut bins = forward.make_output_vec();
-    // Refused only for buffers of another length than its own.
-    let _ = forward.process(&mut input, &mut bins);
-    let df_hz = 1.0 / (n as f64 * dt_s);
-    for (k, bin) in bins.iter_mut().enumerate() {
-        let frequency = k as f64 * df_hz;
-        *bin = match (ends_hz[0]..=ends_hz[1]).contains(&frequency) {
-            true => *bin * (1.0 - gain(frequency)) / n as f64,
-            false => Complex::default(),
-        };
+    // Without the straight line through both ends, which would be a step where the series ends.
+    let (first, last) = (rates[0], rates[rates.len() - 1]);
+    let slope = (last - first) / (rates.len() - 1) as f64;
+    let mut off = Transform::of(rates, [first, slope]);
+    let length = off.length as f64;
+    let df_hz = 1.0 / (length * dt_s);
+    let mut ends: Vec<(usize, usize, &Cut)> = cuts
+        .iter()
+        .map(|cut| {
+            let [low, high] = cut.ends_hz.map(|hz| hz / df_hz);
+            let last = off.bins.len() - 1;
+            (low.ceil().max(0.0) as usize, (high as usize).min(last), cut)
+        })
+        .collect();
+    ends.sort_by_key(|(low, ..)| *low);
+    let mut next = 0;
+    for (low, high, cut) in ends {
+        if low > next {
+            off.bins[next..low].fill(Complex::default());
+        }
+        for k in low.max(next)..=high {
+            off.bins[k] *= (1.0 - (cut.gain)(k as f64 * df_hz)) / length;
+        }
+        next = next.max(high + 1);
     }
-    if n.is_multiple_of(2) {
-        bins[n / 2].im = 0.0;
-    }
-    let _ = inverse.process(&mut bins, &mut input);
-    for (rate, off) in rates.iter_mut().zip(&input) {
+    off.bins[next..].fill(Complex::default());
+    for (rate, off) in rates.iter_mut().zip(off.inverse()) {
         *rate -= off;
     }
 }

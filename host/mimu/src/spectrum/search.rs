@@ -2,6 +2,7 @@
 
 use std::ops::RangeInclusive;
 
+use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::floor::{FIRST, Floor, REACH};
@@ -13,7 +14,7 @@ const FALSE_ALARM: f64 = 1e-3;
 /// bend a curve by less than its intervals show.
 const LEAST_RATIO: f64 = 2.0;
 /// Segments of the finest resolution are this part of the series.
-const FINEST: usize = 4;
+pub(super) const FINEST: usize = 4;
 /// Each resolution is so many times coarser than the one before.
 const COARSER: usize = 8;
 /// Samples of the shortest segment.
@@ -41,24 +42,38 @@ pub(super) struct Band {
 pub(super) struct Resolution {
     pub welch: Welch,
     pub floor: Floor,
+    /// [`super::floor::Level::between`] of each bin: a search asks for it again and again.
+    beneath: Vec<f64>,
 }
 
 impl Resolution {
+    fn of(welch: Welch) -> Self {
+        let floor = Floor::of(&welch.power, welch.dof);
+        let between = |bin: usize| floor.at(bin).map_or(f64::INFINITY, |l| l.between);
+        Self {
+            beneath: (0..welch.power.len()).map(between).collect(),
+            welch,
+            floor,
+        }
+    }
+
     /// Density of `bin` above the floor, unit²/Hz; negative below.
     pub fn excess(&self, bin: usize) -> f64 {
-        let floor = self.floor.at(bin).map_or(0.0, |l| l.between);
-        self.welch.power[bin] - floor
+        self.welch.power[bin] - self.beneath[bin]
     }
 
     fn ratio(&self, bin: usize) -> f64 {
-        let floor = self.floor.at(bin).map_or(f64::INFINITY, |l| l.between);
-        self.welch.power[bin] / floor
+        self.welch.power[bin] / self.beneath[bin]
     }
 
     /// Bins that are significant with a probability of `chance` each.
     fn significant(&self, chance: f64) -> Vec<usize> {
         let Welch { power, dof, .. } = &self.welch;
         let stands_out = |bin: &usize| {
+            // No higher than the highest of its levels is the floor between.
+            if !(self.ratio(*bin) > LEAST_RATIO) {
+                return false;
+            }
             let Some(level) = self.floor.at(*bin) else {
                 return false;
             };
@@ -75,25 +90,46 @@ impl Resolution {
 
     fn bands(&self, level: usize, chance: f64) -> Vec<Band> {
         let significant = self.significant(chance);
-        let together = significant.chunk_by(|a, b| b - a <= GAP);
-        let mut bands: Vec<Band> = together.map(|bins| self.band(level, bins)).collect();
-        bands.dedup_by(|next, band| {
-            let same = next.bins.start() <= band.bins.end();
-            if same {
-                let end = *next.bins.end().max(band.bins.end());
-                band.bins = *band.bins.start()..=end;
-                band.resolved |= next.resolved;
-                if self.welch.power[next.peak] > self.welch.power[band.peak] {
-                    band.peak = next.peak;
-                }
+        let mut bands: Vec<Band> = Vec::new();
+        for bins in significant.chunk_by(|a, b| b - a <= GAP) {
+            // What lies within the band before belongs to it, and is not followed out of it again: the slopes of a bump hold thousands.
+            let inside = bands.pop_if(|band| bins[0] <= *band.bins.end());
+            let next = self.band(level, bins, inside.as_ref());
+            match bands
+                .last_mut()
+                .filter(|b| next.bins.start() <= b.bins.end())
+            {
+                Some(band) => self.join(band, &next),
+                None => bands.push(next),
             }
-            same
-        });
+        }
+        for band in &mut bands {
+            band.resolved |= self.is_resolved(band.bins.clone(), band.peak);
+        }
         bands
     }
 
-    /// The band around significant bins: as far as the mean of three is above the floor by more than it scatters.
-    fn band(&self, level: usize, bins: &[usize]) -> Band {
+    fn join(&self, band: &mut Band, next: &Band) {
+        let end = *next.bins.end().max(band.bins.end());
+        band.bins = *band.bins.start()..=end;
+        band.resolved |= next.resolved;
+        if self.welch.power[next.peak] > self.welch.power[band.peak] {
+            band.peak = next.peak;
+        }
+    }
+
+    /// Whether more of `bins` than a line has are above half of their `peak`.
+    fn is_resolved(&self, bins: RangeInclusive<usize>, peak: usize) -> bool {
+        let half = 0.5 * self.excess(peak);
+        bins.filter(|b| self.excess(*b) > half)
+            .take(RESOLVED)
+            .count()
+            >= RESOLVED
+    }
+
+    /// The band around significant bins: as far as the mean of three is above the floor by more than it scatters. `inside`: the band that they
+    /// begin in.
+    fn band(&self, level: usize, bins: &[usize], inside: Option<&Band>) -> Band {
         let last = self.welch.power.len() - 2;
         let power = &self.welch.power;
         let highest = bins.iter().max_by(|a, b| power[**a].total_cmp(&power[**b]));
@@ -107,20 +143,26 @@ impl Resolution {
         let lowest = (peak as f64 / REACH).max(FIRST as f64 / REACH) as usize;
         let highest = ((peak as f64 * REACH) as usize).min(last);
         let (mut from, mut to) = (bins[0], bins[bins.len() - 1]);
-        while from > lowest.max(2) && above(from - 1) {
+        let resolved = self.is_resolved(from..=to, peak);
+        if let Some(band) = inside {
+            (from, to) = (*band.bins.start(), to.max(*band.bins.end()));
+        }
+        while inside.is_none() && from > lowest.max(2) && above(from - 1) {
             from -= 1;
         }
         while to < highest && above(to + 1) {
             to += 1;
         }
-        let half = 0.5 * self.excess(peak);
-        let wide = (from..=to).filter(|b| self.excess(*b) > half).count();
-        Band {
+        let mut band = Band {
             level,
             bins: from..=to,
             peak,
-            resolved: wide >= RESOLVED,
+            resolved,
+        };
+        if let Some(inside) = inside {
+            self.join(&mut band, inside);
         }
+        band
     }
 
     /// Ends of `band`, Hz, from bin border to bin border.
@@ -157,12 +199,8 @@ impl Search {
             return None;
         }
         let resolutions: Vec<Resolution> = lengths
-            .into_iter()
-            .map(|length| {
-                let welch = Welch::of(rates, dt_s, length);
-                let floor = Floor::of(&welch.power, welch.dof);
-                Resolution { welch, floor }
-            })
+            .into_par_iter()
+            .map(|length| Resolution::of(Welch::of(rates, dt_s, length)))
             .collect();
         let bins: usize = resolutions.iter().map(|r| r.welch.power.len()).sum();
         let chance = FALSE_ALARM / bins as f64;

@@ -2,10 +2,12 @@
 
 use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 
-use super::flatten::flatten;
+use super::flatten::{Cut, flatten};
 use super::search::{Band, Resolution, Search, line_width_hz};
-use super::sinusoid::Sinusoid;
-use super::welch::BIN_OVERLAP;
+use super::sinusoid::{Sinusoid, subtract, transform};
+use super::transform::Transform;
+use super::welch::{BIN_OVERLAP, Welch};
+use super::white::{White, of_spectrum};
 
 /// Searches until nothing is found: beside a strong line a weak one is found without it.
 const ROUNDS: usize = 4;
@@ -46,15 +48,37 @@ pub struct SetAside {
     pub searched_hz: Option<[f64; 2]>,
     /// Whether something still stands out, which could not be brought down.
     pub remains: bool,
+    /// Spectrum of what is left, at the finest resolution.
+    finest: Option<Welch>,
+}
+
+impl SetAside {
+    /// [`super::white_band`] of the series that is left, whose samples are `dt_s` apart, without a look at it; `None` too where it was too short
+    /// for a search.
+    pub fn white_band(&self, dt_s: f64, confidence: f64) -> Option<White> {
+        of_spectrum(self.finest.as_ref()?, dt_s, &self.lines, confidence)
+    }
 }
 
 /// Finds the lines and bumps of `rates` (any unit, `dt_s` apart) and takes them off: a steady line as a sinusoid, anything else
 /// by bringing its band down to the floor. Where there are none the series stays as it is, to the bit. Intervals have the
 /// probability `confidence`.
 pub fn set_aside(rates: &mut [f64], dt_s: f64, confidence: f64) -> SetAside {
+    set_aside_after(rates, dt_s, confidence, |_| {})
+}
+
+/// [`set_aside`] that hands `before` the series once, if it is going to be changed.
+pub fn set_aside_after(
+    rates: &mut [f64],
+    dt_s: f64,
+    confidence: f64,
+    before: impl FnOnce(&[f64]),
+) -> SetAside {
     let mut lines: Vec<Line> = Vec::new();
     let mut searched_hz = None;
     let mut remains = false;
+    let mut finest = None;
+    let mut before = Some(before);
     for round in 0..=ROUNDS {
         let Some(search) = Search::of(rates, dt_s) else {
             break;
@@ -62,35 +86,68 @@ pub fn set_aside(rates: &mut [f64], dt_s: f64, confidence: f64) -> SetAside {
         searched_hz = search.searched_hz();
         remains = !search.bands.is_empty();
         if !remains || round == ROUNDS {
+            finest = search.resolutions.into_iter().next_back().map(|r| r.welch);
             break;
         }
-        for band in &search.bands {
-            let resolution = &search.resolutions[band.level];
-            add(
-                &mut lines,
-                remove(rates, dt_s, resolution, band, confidence),
-            );
+        if let Some(before) = before.take() {
+            before(rates);
         }
+        remove(rates, dt_s, &search, confidence, &mut lines);
     }
     lines.sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
     SetAside {
         lines,
         searched_hz,
         remains,
+        finest,
     }
 }
 
-/// Takes one band off.
-fn remove(
-    rates: &mut [f64],
+/// Takes all bands that a search has found off.
+fn remove(rates: &mut [f64], dt_s: f64, search: &Search, confidence: f64, lines: &mut Vec<Line>) {
+    let all: Vec<Excess> = search
+        .bands
+        .iter()
+        .map(|band| Excess::of(&search.resolutions[band.level], band))
+        .collect();
+    let whole = transform(rates);
+    let (mut steady, mut cuts): (Vec<Sinusoid>, Vec<Cut>) = (Vec::new(), Vec::new());
+    for (band, excess) in search.bands.iter().zip(&all) {
+        let resolution = &search.resolutions[band.level];
+        let (line, sinusoid) = describe(&whole, dt_s, resolution, band, excess, confidence);
+        match sinusoid {
+            // A band beside that of a strong line finds the same one: what it is without the line, the next search shows.
+            Some(sinusoid)
+                if steady
+                    .iter()
+                    .any(|other| sinusoid.is(other, dt_s, rates.len())) =>
+            {
+                continue;
+            }
+            Some(sinusoid) => steady.push(sinusoid),
+            None => cuts.push(Cut {
+                ends_hz: line.band_hz,
+                gain: Box::new(|f| excess.gain(f)),
+            }),
+        }
+        add(lines, line);
+    }
+    drop(whole);
+    subtract(&steady, rates);
+    flatten(rates, dt_s, &cuts);
+}
+
+/// What a band is, and the sinusoid that holds most of it, if one does. `whole` is the transform of the series.
+fn describe(
+    whole: &Transform,
     dt_s: f64,
     resolution: &Resolution,
     band: &Band,
+    excess: &Excess,
     confidence: f64,
-) -> Line {
-    let length_s = rates.len() as f64 * dt_s;
+) -> (Line, Option<Sinusoid>) {
+    let length_s = whole.samples as f64 * dt_s;
     let welch = &resolution.welch;
-    let excess = Excess::of(resolution, band);
     let floor = resolution.floor.at(band.peak).map_or(0.0, |l| l.between);
     let mut line = Line {
         frequency_hz: excess.quantile_hz(0.5),
@@ -102,30 +159,27 @@ fn remove(
         band_hz: resolution.ends_hz(band),
     };
     let near_hz = band.peak as f64 * welch.df_hz;
-    let sinusoid = Sinusoid::fit(rates, dt_s, near_hz, 2.0 * welch.df_hz);
+    let sinusoid = Sinusoid::fit(whole, dt_s, near_hz, 2.0 * welch.df_hz);
     // White noise of density S puts the variance 2 S/T into each of both amplitudes.
     let noise = 2.0 * floor / length_s;
     let holds = |s: &Sinusoid| {
         let share = s.power() / excess.power;
         (STEADY..MUCH).contains(&share) && (2.0 * s.power()).sqrt() > CERTAIN * noise.sqrt()
     };
-    match sinusoid.filter(holds) {
-        Some(sinusoid) => {
-            sinusoid.subtract(rates, dt_s);
-            let by_noise = 2.0 * (4.0 / (line.above_floor * welch.dof)).sqrt();
-            if sinusoid.power() > (1.0 - by_noise.max(BESIDE_IT)) * excess.power {
-                line.frequency_hz = sinusoid.frequency_hz;
-                line.width_hz = None;
-                line.rms = (sinusoid.power() - noise).max(0.0).sqrt();
-                let z = Normal::standard().inverse_cdf(0.5 + 0.5 * confidence);
-                // Of the effective value, 1/√2 of the amplitude.
-                let sigma = (0.5 * noise).sqrt();
-                line.interval = [-z, z].map(|z| (line.rms + z * sigma).max(0.0));
-            }
+    let sinusoid = sinusoid.filter(holds);
+    if let Some(sinusoid) = &sinusoid {
+        let by_noise = 2.0 * (4.0 / (line.above_floor * welch.dof)).sqrt();
+        if sinusoid.power() > (1.0 - by_noise.max(BESIDE_IT)) * excess.power {
+            line.frequency_hz = sinusoid.frequency_hz;
+            line.width_hz = None;
+            line.rms = (sinusoid.power() - noise).max(0.0).sqrt();
+            let z = Normal::standard().inverse_cdf(0.5 + 0.5 * confidence);
+            // Of the effective value, 1/√2 of the amplitude.
+            let sigma = (0.5 * noise).sqrt();
+            line.interval = [-z, z].map(|z| (line.rms + z * sigma).max(0.0));
         }
-        None => flatten(rates, dt_s, line.band_hz, |f| excess.gain(f)),
     }
-    line
+    (line, sinusoid)
 }
 
 /// Adds a line; what was found of one in a later round is left of it, and the rest of it was reported then.

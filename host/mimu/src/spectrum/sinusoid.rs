@@ -1,13 +1,18 @@
-//! A steady line: amplitude, phase and frequency by least squares over the whole series.
+//! A steady line: amplitude, phase and frequency by least squares over the bins around it.
+//!
+//! The transform of a sinusoid that is cut off at both ends is known in closed form, so that a few dozen bins of the whole series are all
+//! that a line takes: passes over the series made ten times as many samples cost a hundred times as much. The 32 bins on either side hold
+//! 99.4 % of its power, and of the noise only what is as strong as around the line.
 
-use std::f64::consts::TAU;
+use nalgebra::{Matrix3, Vector3};
+use rayon::prelude::*;
 
-use nalgebra::{Matrix5, Vector5};
+use super::transform::Transform;
 
-/// Blocks that the series is condensed to within the band of a line, for each bin of that band.
-const BLOCKS: f64 = 16.0;
+/// Bins on either side of the highest that are fitted.
+const BESIDE: usize = 32;
 /// Steps of the refinement: from within a tenth of the resolution each squares the error.
-const STEPS: usize = 4;
+const STEPS: usize = 6;
 /// Samples after which a phasor that is turned sample by sample is set anew.
 const PHASOR: usize = 1024;
 
@@ -15,25 +20,64 @@ const PHASOR: usize = 1024;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Sinusoid {
     pub frequency_hz: f64,
+    /// rad a sample.
+    step: f64,
     cos: f64,
     sin: f64,
 }
 
+/// A series as lines are fitted to it: its transform without the straight line that fits best, of which a ramp would be left beside a line of
+/// few periods.
+pub(super) fn transform(rates: &[f64]) -> Transform {
+    let n = rates.len() as f64;
+    let middle = middle(rates.len());
+    let reference = rates[0];
+    let (mut sum, mut along) = (0.0, 0.0);
+    for (i, rate) in rates.iter().enumerate() {
+        sum += rate - reference;
+        along += (rate - reference) * (i as f64 - middle);
+    }
+    let slope = 12.0 * along / (n * (n * n - 1.0)).max(1.0);
+    Transform::of(rates, [reference + sum / n - slope * middle, slope])
+}
+
 impl Sinusoid {
-    /// The one of the most power in `rates` within `half_width_hz` of `near_hz`. `None` where least squares find none in there.
-    pub fn fit(rates: &[f64], dt_s: f64, near_hz: f64, half_width_hz: f64) -> Option<Self> {
-        let start = coarse(rates, dt_s, near_hz, half_width_hz);
+    /// The one of the most power within `half_width_hz` of `near_hz` in the series that `whole` is the [`transform`] of. `None` where least
+    /// squares find none in there.
+    pub fn fit(whole: &Transform, dt_s: f64, near_hz: f64, half_width_hz: f64) -> Option<Self> {
+        let step = whole.step();
+        let df_hz = step / (std::f64::consts::TAU * dt_s);
+        let last = whole.bins.len() - 1;
+        let bin = |hz: f64| ((hz / df_hz).round().max(1.0) as usize).min(last);
+        let within = bin(near_hz - half_width_hz)..=bin(near_hz + half_width_hz);
+        let power = |k: &usize| whole.bins[*k].norm_sqr();
+        let peak = within.max_by(|a, b| power(a).total_cmp(&power(b)))?;
+        // Between the highest bin and the higher of its neighbours, where the ratio of both amplitudes has the line.
+        let of = |k: usize| whole.bins[k.min(last)].norm();
+        let [below, at, above] = [of(peak - 1), of(peak), of(peak + 1)];
+        let start = match above > below {
+            true => peak as f64 + above / (above + at),
+            false => peak as f64 - below / (below + at),
+        };
         let mut line = Self {
-            frequency_hz: start,
+            frequency_hz: 0.0,
+            step: start * step,
             cos: 0.0,
             sin: 0.0,
         };
-        for step in 0..=STEPS {
+        let bins = peak.saturating_sub(BESIDE).max(1)..=(peak + BESIDE).min(last);
+        for round in 0..=STEPS {
             // At first the amplitudes alone: without them there is no slope by frequency.
-            line = line.refine(rates, dt_s, step > 0)?;
+            line = line.refine(whole, bins.clone(), round > 0)?;
         }
+        line.frequency_hz = line.step / step * df_hz;
         let stays = (line.frequency_hz - near_hz).abs() <= half_width_hz;
         (stays && line.cos.is_finite() && line.sin.is_finite()).then_some(line)
+    }
+
+    /// Whether it is `other`, as far as `samples` that are `dt_s` apart tell two lines apart.
+    pub fn is(&self, other: &Self, dt_s: f64, samples: usize) -> bool {
+        (self.frequency_hz - other.frequency_hz).abs() * dt_s * (samples as f64) < 1.0
     }
 
     /// Mean square.
@@ -41,116 +85,87 @@ impl Sinusoid {
         0.5 * (self.cos * self.cos + self.sin * self.sin)
     }
 
-    /// Takes it off the series that it was fitted to.
-    pub fn subtract(&self, rates: &mut [f64], dt_s: f64) {
-        let middle = middle(rates.len());
-        let mut phasor = Phasor::new(TAU * self.frequency_hz * dt_s);
-        for (i, rate) in rates.iter_mut().enumerate() {
-            let (sin, cos) = phasor.at(i, middle);
-            *rate -= self.cos * cos + self.sin * sin;
-        }
-    }
-
-    /// One step of Gauss–Newton on what is left of the series without the line.
-    fn refine(&self, rates: &[f64], dt_s: f64, by_frequency: bool) -> Option<Self> {
-        let middle = middle(rates.len());
-        let half = middle.max(1.0);
-        let mut phasor = Phasor::new(TAU * self.frequency_hz * dt_s);
-        let (mut normal, mut right) = (Matrix5::<f64>::zeros(), Vector5::<f64>::zeros());
-        let reference = rates.first().copied().unwrap_or(0.0);
-        for (i, rate) in rates.iter().enumerate() {
-            let (sin, cos) = phasor.at(i, middle);
-            let along = (i as f64 - middle) / half;
+    /// One step of Gauss–Newton on what is left of the bins without the line.
+    fn refine(
+        &self,
+        whole: &Transform,
+        bins: std::ops::RangeInclusive<usize>,
+        by_frequency: bool,
+    ) -> Option<Self> {
+        let (n, middle) = (whole.samples as f64, middle(whole.samples));
+        let (mut normal, mut right) = (Matrix3::<f64>::zeros(), Vector3::<f64>::zeros());
+        for k in bins {
+            let angle = k as f64 * whole.step();
+            // Phase zero in the middle of the series: the transform of a cosine is then real, that of a sine imaginary.
+            let (sin, cos) = (angle * middle).sin_cos();
+            let bin = whole.bins[k];
+            let centred = [bin.re * cos - bin.im * sin, bin.re * sin + bin.im * cos];
+            let [near, far] = [angle - self.step, angle + self.step].map(|a| kernel(a, n));
+            let of_cos = 0.5 * (near[0] + far[0]);
+            let of_sin = -0.5 * (near[0] - far[0]);
+            // By the frequency, in half-lengths of the series, so that all three columns are of one size.
             let slope = match by_frequency {
-                true => along * (self.sin * cos - self.cos * sin),
-                false => 0.0,
+                true => [
+                    -0.5 * self.cos * (near[1] - far[1]),
+                    0.5 * self.sin * (near[1] + far[1]),
+                ]
+                .map(|s| s / middle),
+                false => [0.0; 2],
             };
-            // The bias and its drift beside it: a mean of a thousand amplitudes is not orthogonal to a broken number of periods.
-            let row = [cos, sin, slope, 1.0, along];
-            let left = rate - reference - self.cos * cos - self.sin * sin;
-            for j in 0..5 {
-                right[j] += row[j] * left;
-                for k in j..5 {
-                    normal[(j, k)] += row[j] * row[k];
-                }
-            }
-        }
-        for j in 0..5 {
-            for k in 0..j {
-                normal[(j, k)] = normal[(k, j)];
+            let left = [
+                centred[0] - self.cos * of_cos,
+                centred[1] - self.sin * of_sin,
+            ];
+            for (row, left) in [
+                (Vector3::new(of_cos, 0.0, slope[0]), left[0]),
+                (Vector3::new(0.0, of_sin, slope[1]), left[1]),
+            ] {
+                normal += row * row.transpose();
+                right += row * left;
             }
         }
         if !by_frequency {
             normal[(2, 2)] = 1.0;
         }
-        let step = normal.cholesky()?.solve(&right);
+        let step = normal.lu().solve(&right)?;
         Some(Self {
             cos: self.cos + step[0],
             sin: self.sin + step[1],
-            frequency_hz: self.frequency_hz + step[2] / (half * dt_s * TAU),
+            step: self.step + step[2] / middle,
+            ..*self
         })
     }
+}
+
+/// Transform of `n` ones about their middle at `angle`, rad a sample, and its derivative: `sin(n a/2) / sin(a/2)`.
+fn kernel(angle: f64, n: f64) -> [f64; 2] {
+    let half = 0.5 * angle;
+    // The series about zero, where both are a quotient of nothing by nothing.
+    if (half * n).abs() < 1e-4 {
+        return [n, -angle * n * (n * n - 1.0) / 12.0];
+    }
+    let ((s, c), (sn, cn)) = (half.sin_cos(), (n * half).sin_cos());
+    [sn / s, 0.5 * (n * cn * s - sn * c) / (s * s)]
 }
 
 fn middle(samples: usize) -> f64 {
     0.5 * (samples as f64 - 1.0)
 }
 
-/// Sine and cosine of evenly spaced angles, turned from one to the next.
-struct Phasor {
-    step: f64,
-    turn: (f64, f64),
-    now: (f64, f64),
-}
-
-impl Phasor {
-    fn new(step: f64) -> Self {
-        Self {
-            step,
-            turn: step.sin_cos(),
-            now: (0.0, 1.0),
-        }
-    }
-
-    /// At sample `i`, which is the one after that of the last call.
-    fn at(&mut self, i: usize, middle: f64) -> (f64, f64) {
-        if i.is_multiple_of(PHASOR) {
-            self.now = ((i as f64 - middle) * self.step).sin_cos();
-        } else {
-            let ((s, c), (ds, dc)) = (self.now, self.turn);
-            self.now = (s * dc + c * ds, c * dc - s * ds);
-        }
-        self.now
-    }
-}
-
-/// Frequency of the most power within `half_width_hz` of `near_hz`, to a sixth of the resolution of the whole series: of the sums of blocks
-/// that were turned back by `near_hz`, which hold everything within a few of their own bins.
-fn coarse(rates: &[f64], dt_s: f64, near_hz: f64, half_width_hz: f64) -> f64 {
-    let block = ((1.0 / (BLOCKS * half_width_hz * dt_s)) as usize).clamp(1, rates.len());
+/// Takes lines off the series that they were fitted to.
+pub(super) fn subtract(lines: &[Sinusoid], rates: &mut [f64]) {
     let middle = middle(rates.len());
-    let mut phasor = Phasor::new(TAU * near_hz * dt_s);
-    let mut sums = vec![(0.0, 0.0); rates.len().div_ceil(block)];
-    let mean = rates.iter().sum::<f64>() / rates.len() as f64;
-    for (i, rate) in rates.iter().enumerate() {
-        let (sin, cos) = phasor.at(i, middle);
-        let sum: &mut (f64, f64) = &mut sums[i / block];
-        sum.0 += (rate - mean) * cos;
-        sum.1 -= (rate - mean) * sin;
-    }
-    let power = |offset_hz: f64| {
-        let angle = -TAU * offset_hz * dt_s * block as f64;
-        let mut total = (0.0, 0.0);
-        for (k, (re, im)) in sums.iter().enumerate() {
-            let (s, c) = (angle * k as f64).sin_cos();
-            total.0 += re * c - im * s;
-            total.1 += re * s + im * c;
+    let parts = rates.par_chunks_mut(PHASOR).enumerate();
+    parts.for_each(|(part, rates)| {
+        for line in lines {
+            // Turned from one sample to the next, and set anew in each part.
+            let start = (part * PHASOR) as f64 - middle;
+            let (mut s, mut c) = (start * line.step).sin_cos();
+            let (ds, dc) = line.step.sin_cos();
+            for rate in &mut *rates {
+                *rate -= line.cos * c + line.sin * s;
+                (s, c) = (s * dc + c * ds, c * dc - s * ds);
+            }
         }
-        total.0 * total.0 + total.1 * total.1
-    };
-    let resolution = 1.0 / (rates.len() as f64 * dt_s);
-    let steps = (half_width_hz / resolution * 3.0).ceil() as i64;
-    let offsets = (-steps..=steps).map(|k| half_width_hz * k as f64 / steps as f64);
-    let best = offsets.max_by(|a, b| power(*a).total_cmp(&power(*b)));
-    near_hz + best.unwrap_or(0.0)
+    });
 }

@@ -13,7 +13,7 @@ pub(super) const BIN_OVERLAP: f64 = 1.0 + 2.0 * (4.0 / 9.0 + 1.0 / 36.0);
 const SEGMENT_OVERLAP: f64 = 1.0 / 36.0;
 
 /// Mean periodogram of segments that overlap by half, each without its mean and behind a Hann window.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub(super) struct Welch {
     /// Distance of the bins, Hz.
     pub df_hz: f64,
@@ -28,10 +28,8 @@ impl Welch {
     pub fn of(rates: &[f64], dt_s: f64, length: usize) -> Self {
         let hop = length / 2;
         let segments = (rates.len() - length) / hop + 1;
-        let window: Vec<f64> = (0..length)
-            .map(|i| 0.5 - 0.5 * (TAU * i as f64 / length as f64).cos())
-            .collect();
         let transform = RealFftPlanner::new().plan_fft_forward(length);
+        let window = Hann::of(length);
         // Two sums whatever the machine has: the same digits everywhere, and two copies of the longest transform at most.
         let sums = |of: std::ops::Range<usize>| {
             let (mut input, mut output) = (transform.make_input_vec(), transform.make_output_vec());
@@ -39,10 +37,7 @@ impl Welch {
             let mut sum = vec![0.0; output.len()];
             for segment in of {
                 let part = &rates[segment * hop..segment * hop + length];
-                let mean = part.iter().sum::<f64>() / length as f64;
-                for ((to, rate), w) in input.iter_mut().zip(part).zip(&window) {
-                    *to = w * (rate - mean);
-                }
+                window.apply(part, &mut input);
                 // Refused only for buffers of another length than its own.
                 let _ = transform.process_with_scratch(&mut input, &mut output, &mut scratch);
                 for (sum, bin) in sum.iter_mut().zip(&output) {
@@ -60,6 +55,41 @@ impl Welch {
             df_hz: 1.0 / (length as f64 * dt_s),
             power: both.map(|(a, b)| density * (a + b)).collect(),
             dof: 2.0 * k / (1.0 + 2.0 * SEGMENT_OVERLAP * (k - 1.0) / k),
+        }
+    }
+}
+
+/// A Hann window that is computed as it goes: kept, it would be as long as the longest segment.
+struct Hann {
+    /// Sine and cosine of a step.
+    step: [f64; 2],
+    length: usize,
+}
+
+/// Samples after which its phase is set anew.
+const TURNED: usize = 512;
+
+impl Hann {
+    fn of(length: usize) -> Self {
+        let (sin, cos) = (TAU / length as f64).sin_cos();
+        Self {
+            step: [sin, cos],
+            length,
+        }
+    }
+
+    /// `part` without its mean and behind the window, into `to`.
+    fn apply(&self, part: &[f64], to: &mut [f64]) {
+        let n = self.length as f64;
+        let mean = part.iter().sum::<f64>() / n;
+        let [ds, dc] = self.step;
+        let chunks = to.chunks_mut(TURNED).zip(part.chunks(TURNED));
+        for (k, (to, part)) in chunks.enumerate() {
+            let (mut s, mut c) = (TAU * (k * TURNED) as f64 / n).sin_cos();
+            for (to, rate) in to.iter_mut().zip(part) {
+                *to = (0.5 - 0.5 * c) * (rate - mean);
+                (s, c) = (s * dc + c * ds, c * dc - s * ds);
+            }
         }
     }
 }

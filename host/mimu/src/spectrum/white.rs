@@ -6,6 +6,7 @@
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 
+use super::search::FINEST;
 use super::set_aside::Line;
 use super::welch::{BIN_OVERLAP, Welch, fast_length};
 
@@ -68,16 +69,26 @@ struct Fitted {
 /// on both sides of each: what is left of a bump's slopes there would pass for flicker noise. `None` where the spectrum is of no such
 /// noise in any band, or too short.
 pub fn white_band(rates: &[f64], dt_s: f64, lines: &[Line], confidence: f64) -> Option<White> {
-    let length = fast_length(rates.len() / 4);
+    let length = fast_length(rates.len() / FINEST);
     if length < SHORTEST {
         return None;
     }
+    of_spectrum(&Welch::of(rates, dt_s, length), dt_s, lines, confidence)
+}
+
+/// [`white_band`] of the spectrum of `rates` in segments of a [`FINEST`]th of them.
+pub(super) fn of_spectrum(
+    welch: &Welch,
+    dt_s: f64,
+    lines: &[Line],
+    confidence: f64,
+) -> Option<White> {
     let beside = |line: &Line| {
         let [low, high] = line.band_hz;
         [2.0 * low - high, 2.0 * high - low]
     };
     let out: Vec<[f64; 2]> = lines.iter().map(beside).collect();
-    let means = means(&Welch::of(rates, dt_s, length), dt_s, &out);
+    let means = means(welch, dt_s, &out);
     let z = Normal::standard().inverse_cdf(0.5 + 0.5 * confidence);
     // The widest band that the terms describe; of two as wide the one that goes down further, where the slow terms are told.
     for less in 0..=means.len().checked_sub(FEWEST)? {

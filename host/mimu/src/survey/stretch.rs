@@ -119,6 +119,7 @@ impl Stretch {
                 "{gaps} of {steps} time steps do not fit sample_rate_hz = {rate_hz}: the first is {:.6} s",
                 t[i] - t[i - 1]
             );
+            let remedy = "record without losing samples; if none are lost, correct sample_rate_hz, or the unit of t_s";
             return Err(Error::new(at(i), problem, remedy));
         }
         let period_s = regular_s / (steps - gaps) as f64;
@@ -153,7 +154,7 @@ impl Stretch {
                 return Err(Error::new(
                     at(i),
                     format!("there are no {FEWEST} samples without a gap"),
-                    remedy,
+                    "record for longer without a pause",
                 ));
             }
         }

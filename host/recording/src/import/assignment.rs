@@ -77,6 +77,17 @@ pub enum ColumnList {
 }
 
 impl ColumnList {
+    /// Name in the header of the column with the time stamps.
+    pub(super) fn name_of_time(&self) -> Option<&str> {
+        let ColumnList::ByName(items) = self else {
+            return None;
+        };
+        let time = items
+            .iter()
+            .find(|(role, _)| *role == Role::Column(Column::Time));
+        time.map(|(_, name)| name.as_str())
+    }
+
     /// Roles that are given out.
     pub fn roles(&self) -> Vec<Role> {
         match self {
@@ -235,6 +246,49 @@ impl FromStr for Scale {
 impl fmt::Display for Scale {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}={}", self.target, self.factor)
+    }
+}
+
+/// What is added to a column after its factor, as in `temp_c=36.53`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Offset {
+    column: Column,
+    value: f64,
+}
+
+impl Offset {
+    /// Sum of the offsets of `column`.
+    pub(super) fn sum(offsets: &[Offset], column: Column) -> f64 {
+        let own = offsets.iter().filter(|offset| offset.column == column);
+        own.map(|offset| offset.value).sum()
+    }
+}
+
+impl FromStr for Offset {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        let parts = text.split_once('=');
+        let column = parts.and_then(|(name, _)| Column::from_name(name.trim()));
+        let column = column.filter(|column| !matches!(column, Column::Time | Column::Step));
+        let value = parts.and_then(|(_, value)| value.trim().parse::<f64>().ok());
+        match (column, value.filter(|value| value.is_finite())) {
+            (Some(column), Some(value)) => Ok(Offset { column, value }),
+            _ => Err(Error::new(
+                "offset",
+                format!(
+                    "{} is no column of numbers and an offset",
+                    shorten(text.as_bytes())
+                ),
+                "write it like temp_c=36.53, one column at a time",
+            )),
+        }
+    }
+}
+
+impl fmt::Display for Offset {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}={}", self.column.name(), self.value)
     }
 }
 

@@ -1,7 +1,12 @@
-//! Running numbers of samples that begin again at 0.
+//! Running numbers of samples, and time stamps, that begin again at 0.
+
+use super::time::Stamp;
 
 /// How many numbers the counters of 16 and of 32 bits have.
 const SIZES: [f64; 2] = [65_536.0, 4_294_967_296.0];
+
+/// How many values the time stamps of microcontrollers have.
+const STAMP_SIZES: [i64; 3] = [1 << 16, 1 << 24, 1 << 32];
 
 /// A number that goes back from within so many of the end to within so many of 0 has begun again: ten seconds at 100 Hz may be lost
 /// there. Anything else that goes back is another recording, or a mistake, and is not counted on.
@@ -14,6 +19,45 @@ pub(super) struct Counter {
     before: f64,
     /// How often it began again.
     pub wraps: u64,
+}
+
+/// A stamp that begins again is at most so many steps after the one before: a second at 100 Hz may be lost there.
+const NEAR_STEPS: i64 = 100;
+
+/// Counts on where time stamps begin again at 0, as those of a microcontroller do: milliseconds in 16 bits after 65.5 s, microseconds in 32
+/// bits after 71.6 min.
+#[derive(Debug, Clone, Default)]
+pub(super) struct StampCounter {
+    last: Option<i64>,
+    step: i64,
+    before: i64,
+    /// How often they began again.
+    pub wraps: u64,
+}
+
+impl StampCounter {
+    /// Whether there was a stamp that is later than 0.
+    pub fn has_begun(&self) -> bool {
+        self.last.is_some_and(|last| last > 0)
+    }
+
+    /// The stamp counted on; `stamp` is that of the next row.
+    pub fn next(&mut self, stamp: Stamp) -> Stamp {
+        let whole = stamp.whole();
+        let last = self.last.replace(whole).unwrap_or(whole);
+        let step = |size: i64| whole + size - last;
+        let wrapped =
+            |size: &i64| last < *size && (1..=NEAR_STEPS * self.step).contains(&step(*size));
+        if whole < last
+            && let Some(size) = STAMP_SIZES.into_iter().find(wrapped)
+        {
+            self.before += size;
+            self.wraps += 1;
+        } else if whole > last {
+            self.step = whole - last;
+        }
+        stamp.plus(self.before)
+    }
 }
 
 impl Counter {
@@ -41,6 +85,23 @@ mod tests {
         assert_eq!(counter.wraps, 1);
         let mut counter = Counter::default();
         assert_eq!([40_000.0, 0.0].map(|n| counter.next(n)), [40_000.0, 0.0]);
+        assert_eq!(counter.wraps, 0);
+    }
+
+    #[test]
+    fn stamps_of_16_24_and_32_bits_go_on_across_their_end_and_a_clock_that_is_set_back_does_not() {
+        for (size, step) in [(1_i64 << 16, 10), (1 << 24, 10_000), (1 << 32, 5_000_000)] {
+            let mut counter = StampCounter::default();
+            let first = size - 25 * step;
+            for i in 0..60 {
+                let stamp = Stamp::from((first + i * step) % size);
+                assert_eq!(counter.next(stamp).whole(), first + i * step);
+            }
+            assert_eq!(counter.wraps, 1);
+        }
+        let mut counter = StampCounter::default();
+        let back = [40_000, 40_010, 40_020, 0, 10].map(|n| counter.next(Stamp::from(n)).whole());
+        assert_eq!(back, [40_000, 40_010, 40_020, 0, 10]);
         assert_eq!(counter.wraps, 0);
     }
 }

@@ -2,20 +2,31 @@
 
 use std::path::Path;
 
-use super::assignment::Scale;
+use super::assignment::{ColumnList, Scale};
 use super::foreign::{ForeignFile, HowToRead, Row};
 use super::ros::is_bag;
-use super::time::{Stamps, Times};
+use super::time::{Known, Stamps, Times};
 use crate::columns::Column;
 use crate::error::Result;
 
-/// The times of the rows of `path`. `origin_s` is that of the file that it is joined to.
+/// The times of the rows of `path`. `rate_hz` is the rate that somebody has given, `joined_to` are the times of the file that it is joined to.
 ///
 /// The stamps are held, 8 bytes a row: 115 MB for four hours at 1 kHz. Whether a sample is missing or late is only seen by what comes
 /// later, and the rate only at the end.
-pub(super) fn times(path: &Path, how: &HowToRead<'_>, origin_s: Option<i64>) -> Result<Times> {
+pub(super) fn times(
+    path: &Path,
+    how: &HowToRead<'_>,
+    rate_hz: Option<f64>,
+    joined_to: Option<&Times>,
+) -> Result<Times> {
     let stamps = read(path, how)?;
-    Times::of(path, stamps, how.time_factor(path), how.rate_hz, origin_s)
+    let known = Known {
+        factor: how.time_factor(path),
+        rate_hz,
+        name: how.list.and_then(ColumnList::name_of_time),
+        joined_to,
+    };
+    Times::of(path, stamps, &known)
 }
 
 fn read(path: &Path, how: &HowToRead<'_>) -> Result<Stamps> {
@@ -38,6 +49,9 @@ fn read(path: &Path, how: &HowToRead<'_>) -> Result<Stamps> {
         stamps.since_first.push(since);
         std::mem::swap(&mut row, &mut before);
     }
+    stamps.wraps = file.stamp_wraps();
+    // Before anything is said of their times: rows that were left out have none.
+    file.seen.check(&path.display().to_string())?;
     Ok(stamps)
 }
 
@@ -49,6 +63,7 @@ impl HowToRead<'_> {
             (false, None) => Some(1.0),
             (false, Some(_)) => None,
         };
-        Scale::given(self.scales, Column::Time).or(own)
+        let unit = self.time_unit.map(|unit| 1.0 / unit.per_second() as f64);
+        unit.or(Scale::given(self.scales, Column::Time)).or(own)
     }
 }

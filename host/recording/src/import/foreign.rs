@@ -3,13 +3,14 @@
 use std::path::{Path, PathBuf};
 
 use super::SkippedLines;
-use super::assignment::{ColumnList, Role, Scale};
-use super::counter::Counter;
+use super::assignment::{ColumnList, Offset, Role, Scale};
+use super::counter::{Counter, StampCounter};
 use super::parquet_table::ParquetTable;
+use super::plausibility::Plausibility;
 use super::ros::{ImuTopic, is_bag};
 use super::step_labels::StepLabels;
 use super::text_table::{Cells, TextTable};
-use super::time::{Clock, Stamp, Times};
+use super::time::{Clock, Decimal, Stamp, Times};
 use crate::cell::{is_reading, no_reading, no_time};
 use crate::columns::Column;
 use crate::error::{Argument, Error, Result};
@@ -45,10 +46,13 @@ pub(super) struct HowToRead<'a> {
     pub list: Option<&'a ColumnList>,
     pub separator: Option<Separator>,
     pub scales: &'a [Scale],
+    pub offsets: &'a [Offset],
     /// Topic of a bag.
     pub topic: Option<&'a str>,
     /// Sample rate, where it was given or is known.
     pub rate_hz: Option<f64>,
+    /// Unit of the time stamps, where it was given.
+    pub time_unit: Option<Decimal>,
 }
 
 /// A foreign file, positioned at its next row.
@@ -59,11 +63,13 @@ pub(super) struct ForeignFile {
     cells: Cells,
     source: TimeSource,
     counter: Counter,
+    stamps: StampCounter,
     /// The time behind its stamps, once that is known.
     clock: Option<Clock>,
     before: Row,
-    /// Position among the cells, column and factor.
-    values: Vec<(usize, Column, f64)>,
+    values: Vec<Cell>,
+    /// What the readings have shown.
+    pub seen: Plausibility,
     has_step: bool,
     pub labels: StepLabels,
     rows: u64,
@@ -74,6 +80,16 @@ enum Table {
     Text(TextTable),
     Parquet(ParquetTable),
     Bag(ImuTopic),
+}
+
+/// A cell that becomes a value of a row.
+#[derive(Debug, Clone, Copy)]
+struct Cell {
+    /// Position among the cells.
+    at: usize,
+    column: Column,
+    factor: f64,
+    offset: f64,
 }
 
 /// Where the time of a row comes from.
@@ -143,16 +159,24 @@ impl ForeignFile {
             .filter_map(|(cell, role)| match role {
                 Role::Sample | Role::Deviation(_) | Role::Averaged(_) => None,
                 Role::Column(Column::Time | Column::Step) => None,
-                Role::Column(column) => Some((cell, *column, Scale::product(how.scales, *column))),
+                Role::Column(column) => Some(Cell {
+                    at: cell,
+                    column: *column,
+                    factor: Scale::product(how.scales, *column),
+                    offset: Offset::sum(how.offsets, *column),
+                }),
             });
+        let values: Vec<Cell> = numbers.collect();
         Ok(ForeignFile {
             path: path.to_owned(),
-            values: numbers.collect(),
+            seen: Plausibility::new(values.iter().map(|cell| cell.column)),
+            values,
             has_step: at(Role::Column(Column::Step)).is_some(),
             table,
             cells: Cells::default(),
             source,
             counter: Counter::default(),
+            stamps: StampCounter::default(),
             clock: None,
             before: Row::default(),
             labels: StepLabels::default(),
@@ -167,7 +191,7 @@ impl ForeignFile {
 
     /// Columns with numbers, in the order of [`Row::values`].
     pub fn columns(&self) -> impl Iterator<Item = Column> + '_ {
-        self.values.iter().map(|(_, column, _)| *column)
+        self.values.iter().map(|cell| cell.column)
     }
 
     /// Whether it says which step a row belongs to.
@@ -208,6 +232,11 @@ impl ForeignFile {
         self.counter.wraps
     }
 
+    /// How often its time stamps have begun again at 0, so far.
+    pub fn stamp_wraps(&self) -> u64 {
+        self.stamps.wraps
+    }
+
     /// Share of the file that has been read.
     pub fn progress(&self) -> f64 {
         match &self.table {
@@ -228,6 +257,14 @@ impl ForeignFile {
             if !self.read(row)? {
                 return Ok(false);
             }
+            let zero_stamp = self.has_time() && row.stamp.value == 0.0;
+            if self
+                .seen
+                .is_padding(row, zero_stamp, self.stamps.has_begun())
+            {
+                continue;
+            }
+            row.stamp = self.stamps.next(row.stamp);
             let Some(clock) = &mut self.clock else {
                 return Ok(true);
             };
@@ -281,14 +318,13 @@ impl ForeignFile {
             })?;
         }
         row.values.clear();
-        for &(cell, column, factor) in &self.values {
-            let value = self.cells.numbers[cell] * factor;
+        for cell in &self.values {
+            let (number_in_file, factor) = (self.cells.numbers[cell.at], cell.factor);
+            let value = number_in_file * factor + cell.offset;
             if !is_reading(value) {
-                let place = format!("{}, column {}", self.place(number), column.name());
-                let problem = format!(
-                    "{:e} times {factor:e} is too large for a reading",
-                    self.cells.numbers[cell]
-                );
+                let place = format!("{}, column {}", self.place(number), cell.column.name());
+                let problem =
+                    format!("{number_in_file:e} times {factor:e} is too large for a reading");
                 return Err(Error::new(place, problem, "correct the cell or the factor"));
             }
             row.values.push(value);

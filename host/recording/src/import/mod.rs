@@ -9,6 +9,7 @@ mod inputs;
 mod join;
 mod options;
 mod parquet_table;
+mod plausibility;
 mod pose_means;
 mod preset;
 mod ros;
@@ -21,7 +22,7 @@ mod time;
 use std::collections::{BTreeSet, HashMap};
 use std::path::Path;
 
-pub use assignment::{ColumnList, Role, Scale};
+pub use assignment::{ColumnList, Offset, Role, Scale};
 pub use inputs::Inputs;
 pub use options::ImportOptions;
 pub use pose_means::{PoseMean, PoseMeans};
@@ -83,6 +84,8 @@ pub struct ImportSummary {
     pub dropped_in_gaps: u64,
     /// Rows with values interpolated from another file.
     pub interpolated: u64,
+    /// Rows left out as padding, as all of their readings are 0.
+    pub padding: u64,
     /// Raw cells that are empty.
     pub empty_cells: u64,
     /// One sentence for each thing that a person should know.
@@ -100,11 +103,39 @@ pub fn import(
     if options.means {
         return pose_means::import_means(options, out);
     }
-    let mut import = Import::open(options)?;
+    // Only when all rows have been read it is known that a sensor has nothing but zeros. That is rare, and worth a second time.
+    let mut left_out = [false; 2];
+    loop {
+        match import_sensors(options, out, &progress, left_out)? {
+            Outcome::Done(summary) => return Ok(*summary),
+            Outcome::NotConnected(sensors) => left_out = sensors,
+        }
+    }
+}
+
+/// What has become of an import.
+enum Outcome {
+    Done(Box<ImportSummary>),
+    /// Nothing was written, as these sensors, gyro and accelerometer, have nothing but zeros.
+    NotConnected([bool; 2]),
+}
+
+/// Imports without the sensors, gyro and accelerometer, that are to be left out.
+fn import_sensors(
+    options: &ImportOptions,
+    out: &Path,
+    progress: &impl Fn(f64),
+    left_out: [bool; 2],
+) -> Result<Outcome> {
+    let mut import = Import::open(options, left_out)?;
     let mut manifest = import.manifest(options, out);
     manifest.check("import")?;
     let mut writer = Writer::create(out, import.columns, options.format, options.replace)?;
-    import.run(&mut writer, &progress)?;
+    import.run(&mut writer, progress)?;
+    let dead = import.dead_sensors();
+    if writer.rows() > 0 && left_out == [false; 2] && dead != left_out {
+        return Ok(Outcome::NotConnected(dead));
+    }
     import.finish_summary(&writer)?;
     for file in options.files.iter().chain(&options.inputs) {
         manifest.sources.push(Source {
@@ -117,7 +148,7 @@ pub fn import(
     }
     manifest.step_labels = std::mem::take(&mut import.first.labels).into_labels();
     import.summary.recording = writer.finish(&manifest)?.display().to_string();
-    Ok(import.summary)
+    Ok(Outcome::Done(Box::new(import.summary)))
 }
 
 fn check(options: &ImportOptions, out: &Path) -> Result<()> {
@@ -150,6 +181,14 @@ fn check(options: &ImportOptions, out: &Path) -> Result<()> {
     Ok(())
 }
 
+/// How often, in words.
+fn times(count: u64) -> String {
+    match count {
+        1 => "once".into(),
+        _ => format!("{count} times"),
+    }
+}
+
 /// What to say where a rate was given and the time stamps have another one.
 fn other_rate(times: &Times, given: f64) -> Option<String> {
     let summary = &times.summary;
@@ -180,18 +219,19 @@ struct Import {
 }
 
 impl Import {
-    fn open(options: &ImportOptions) -> Result<Import> {
+    fn open(options: &ImportOptions, left_out: [bool; 2]) -> Result<Import> {
         let mut warnings = options.preset_warnings.clone();
         let mut first = ForeignFile::open(&options.files[0], &options.how(0))?;
         let mut time = Vec::new();
-        let mut origin_s = None;
+        let mut first_times: Option<Times> = None;
         let rate_hz = match first.has_time() {
             true => {
-                let times = first_pass::times(&options.files[0], &options.how(0), None)?;
+                let how = options.how(0);
+                let times = first_pass::times(&options.files[0], &how, options.rate_hz, None)?;
                 let rate_hz = times.summary.rate_hz;
                 warnings.extend(options.rate_hz.and_then(|given| other_rate(&times, given)));
-                origin_s = Some(times.origin_s());
                 time.push(times.summary.clone());
+                first_times = Some(times.clone());
                 first = first.with_times(times);
                 rate_hz
             }
@@ -215,7 +255,7 @@ impl Import {
             let mut period_s = 1.0 / rate_hz;
             if file.has_time() {
                 // A sensor of its own, with a rate and delays of its own; the instants are those of one clock.
-                let times = first_pass::times(path, &how, origin_s)?;
+                let times = first_pass::times(path, &how, options.rate_hz, first_times.as_ref())?;
                 period_s = times.period_s();
                 time.push(times.summary.clone());
                 file = file.with_times(times);
@@ -232,7 +272,8 @@ impl Import {
             .collect();
         let inputs = options.inputs.as_deref().map(Inputs::read).transpose()?;
         let mut names: Vec<&str> = vec![Column::Time.name()];
-        names.extend(order.iter().map(|column| column.name()));
+        let kept = |column: &&Column| !matches!(column, Column::Raw(c) if left_out[c / 3]);
+        names.extend(order.iter().filter(kept).map(|column| column.name()));
         if first.has_step() {
             names.push(Column::Step.name());
         }
@@ -284,6 +325,7 @@ impl Import {
                 dropped_outside: 0,
                 dropped_in_gaps: 0,
                 interpolated: 0,
+                padding: 0,
                 empty_cells: 0,
                 warnings,
             },
@@ -374,6 +416,9 @@ impl Import {
             batch.step.push(row.step);
         }
         for (column, &value) in self.order.iter().zip(values) {
+            if !self.columns.has(*column) {
+                continue;
+            }
             if matches!(column, Column::Raw(_)) {
                 self.summary.empty_cells += u64::from(value.is_nan());
             }
@@ -399,7 +444,25 @@ impl Import {
         }
     }
 
+    /// Which sensors, gyro and accelerometer, have shown nothing but zeros in the files that have them.
+    fn dead_sensors(&self) -> [bool; 2] {
+        [0, 1].map(|s| self.files().any(|file| file.seen.dead()[s].is_some()))
+    }
+
+    fn files(&self) -> impl Iterator<Item = &ForeignFile> {
+        self.followers.iter().map(|f| &f.file).chain([&self.first])
+    }
+
     fn finish_summary(&mut self, writer: &Writer) -> Result<()> {
+        for file in self.files() {
+            file.seen.check(&file_name(file.path()))?;
+        }
+        let files: Vec<&ForeignFile> = self
+            .followers
+            .iter()
+            .map(|f| &f.file)
+            .chain([&self.first])
+            .collect();
         let summary = &mut self.summary;
         summary.rows = writer.rows();
         if summary.rows == 0 {
@@ -407,18 +470,36 @@ impl Import {
                 "import",
                 "the files have no time in common",
                 "check that their times begin at the same instant and are in the same unit",
-            ));
+            )
+            .about(Argument::TimeUnit));
         }
-        for file in self.followers.iter().map(|f| &f.file).chain([&self.first]) {
+        for file in files {
+            let place = file_name(file.path());
+            summary.warnings.extend(file.seen.warnings(&place));
+            summary.padding += file.seen.padding;
+            let dead = file.seen.dead();
+            for (sensor, rows) in ["gyro", "accel"].iter().zip(dead) {
+                summary.warnings.extend(rows.map(|rows| {
+                    format!(
+                        "{place}: {sensor} is exactly 0 on all axes in all of its {rows} rows: it was not connected, and is left out"
+                    )
+                }));
+            }
+            if file.stamp_wraps() > 0 {
+                summary.warnings.push(format!(
+                    "{place}: the time stamps began again at 0 {}, as counters of 16 to 32 bits do, and were counted on",
+                    times(file.stamp_wraps())
+                ));
+            }
             let skipped = file.skipped();
             summary.skipped.header += skipped.header;
             summary.skipped.comment += skipped.comment;
             summary.skipped.blank += skipped.blank;
             if file.wraps() > 0 {
                 summary.warnings.push(format!(
-                    "{}: the column sample began again at 0 {} times, as counters of 16 and 32 bits do, and was counted on",
+                    "{}: the column sample began again at 0 {}, as counters of 16 and 32 bits do, and was counted on",
                     file.path().display(),
-                    file.wraps()
+                    times(file.wraps())
                 ));
             }
         }

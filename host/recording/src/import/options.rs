@@ -2,9 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use super::assignment::{ColumnList, Scale};
+use super::assignment::{ColumnList, Offset, Scale};
 use super::foreign::HowToRead;
 use super::preset::{Chosen, PresetUse};
+use super::time::Decimal;
 use crate::manifest::{RawUnit, Reference};
 use crate::separator::Separator;
 use crate::writer::SampleFormat;
@@ -18,8 +19,10 @@ pub struct ImportOptions {
     pub columns: Vec<ColumnList>,
     /// Separator of text files; found out where it is `None`.
     pub separator: Option<Separator>,
-    /// Sample rate in Hz; without it, the inverse of the median time step of the first file.
+    /// Sample rate in Hz: of files without time stamps the rate, of others what decides where their stamps can be read in two ways.
     pub rate_hz: Option<f64>,
+    /// Unit of the time stamps; found out where it is `None`.
+    pub time_unit: Option<Decimal>,
     /// Local gravity in m/s².
     pub gravity_mps2: f64,
     /// Unit of the raw columns, after scaling.
@@ -28,6 +31,8 @@ pub struct ImportOptions {
     pub reference: Reference,
     /// Factors for columns; several for the same column multiply.
     pub scales: Vec<Scale>,
+    /// What is added to columns after their factors; several for the same column add up.
+    pub offsets: Vec<Offset>,
     /// Topic of bags; without it, the only one with messages of an inertial unit.
     pub topic: Option<String>,
     /// Name of the unit; without it, the name of the recording.
@@ -61,10 +66,12 @@ impl ImportOptions {
             columns: Vec::new(),
             separator: None,
             rate_hz: None,
+            time_unit: None,
             gravity_mps2,
             raw_unit,
             reference,
             scales: Vec::new(),
+            offsets: Vec::new(),
             topic: None,
             device: None,
             latitude_deg: None,
@@ -114,11 +121,17 @@ impl ImportOptions {
         if let Some(rate) = self.rate_hz {
             option("--rate-hz", rate.to_string());
         }
+        if let Some(unit) = self.time_unit {
+            option("--time-unit", unit.symbol().to_owned());
+        }
         option("--gravity", self.gravity_mps2.to_string());
         option("--raw-unit", self.raw_unit.to_string());
         option("--reference", self.reference.to_string());
         for scale in &self.scales {
             option("--scale", scale.to_string());
+        }
+        for offset in &self.offsets {
+            option("--offset", offset.to_string());
         }
         if let Some(topic) = &self.topic {
             option("--topic", topic.clone());
@@ -140,8 +153,10 @@ impl ImportOptions {
             list: self.columns.get(file),
             separator: self.separator,
             scales: &self.scales,
+            offsets: &self.offsets,
             topic: self.topic.as_deref(),
             rate_hz: self.rate_hz,
+            time_unit: self.time_unit,
         }
     }
 }

@@ -2,8 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use super::assignment::{ColumnList, Role, Scale};
+use super::assignment::{ColumnList, Offset, Role, Scale};
 use super::options::{ImportOptions, file_name};
+use super::plausibility::no_temperature;
 use super::ros::is_bag;
 use super::text_table::{Cells, TextTable};
 use super::{ImportSummary, SkippedLines};
@@ -71,7 +72,7 @@ impl PoseMeans {
             ));
         }
         let path = directory.join(MEANS_FILE);
-        let table = Table::read(&path, None, Some(Separator::Comma), &[])?;
+        let table = Table::read(&path, None, Some(Separator::Comma), (&[], &[]))?;
         if table.poses.iter().any(|pose| !pose.label.is_empty()) {
             manifest.step_labels = table.poses.iter().map(|p| p.label.clone()).collect();
         }
@@ -98,7 +99,7 @@ impl Table {
         path: &Path,
         list: Option<&ColumnList>,
         separator: Option<Separator>,
-        scales: &[Scale],
+        factors: (&[Scale], &[Offset]),
     ) -> Result<Table> {
         let refuse = |problem: String, remedy: &str| {
             Err(Error::new(path.display(), problem, remedy).about(Argument::Columns))
@@ -139,7 +140,7 @@ impl Table {
         let mut poses = Vec::new();
         while let Some(row) = table.next(&mut cells)? {
             let place = table.place(row);
-            poses.push(pose(&roles, &cells, scales, &columns, &place)?);
+            poses.push(pose(&roles, &cells, factors, &columns, &place)?);
         }
         Ok(Table {
             poses,
@@ -153,7 +154,7 @@ impl Table {
 fn pose(
     roles: &[Role],
     cells: &Cells,
-    scales: &[Scale],
+    (scales, offsets): (&[Scale], &[Offset]),
     columns: &Columns,
     place: &str,
 ) -> Result<PoseMean> {
@@ -170,19 +171,26 @@ fn pose(
         Err(Error::new(place, problem, remedy))
     };
     for (&role, &number) in roles.iter().zip(&cells.numbers) {
-        let scaled = |column| number * Scale::product(scales, column);
+        let scaled =
+            |column| number * Scale::product(scales, column) + Offset::sum(offsets, column);
         match role {
             Role::Column(Column::Raw(c)) => pose.raw[c] = scaled(Column::Raw(c)),
             Role::Column(Column::Reference(c)) => {
                 pose.reference[c] = scaled(Column::Reference(c));
             }
-            Role::Column(Column::Temperature) => pose.temp_c = scaled(Column::Temperature),
+            Role::Column(Column::Temperature) => {
+                pose.temp_c = scaled(Column::Temperature);
+                if let Some(remedy) = no_temperature(pose.temp_c) {
+                    let problem = format!("{} is no temperature in °C", pose.temp_c);
+                    return refuse(role, problem, remedy);
+                }
+            }
             Role::Deviation(c) => {
                 if number < 0.0 {
                     let remedy = "a standard deviation is 0 or more; correct the cell";
                     return refuse(role, format!("{number} is negative"), remedy);
                 }
-                pose.deviation[c] = (scaled(Column::Raw(c))).abs();
+                pose.deviation[c] = (number * Scale::product(scales, Column::Raw(c))).abs();
             }
             Role::Averaged(which) => {
                 if number.is_nan() {
@@ -260,7 +268,8 @@ pub(super) fn import_means(options: &ImportOptions, out: &Path) -> Result<Import
         return refuse("a table of means is read from text", "write it as CSV");
     }
     let list = options.columns.first();
-    let table = Table::read(path, list, options.separator, &options.scales)?;
+    let factors = (&options.scales[..], &options.offsets[..]);
+    let table = Table::read(path, list, options.separator, factors)?;
     if options.reference == Reference::Table && table.columns.reference == [false; 6] {
         return Err(Error::new(
             path.display(),
@@ -305,6 +314,7 @@ pub(super) fn import_means(options: &ImportOptions, out: &Path) -> Result<Import
         dropped_outside: 0,
         dropped_in_gaps: 0,
         interpolated: 0,
+        padding: 0,
         empty_cells: raw.map(|c| empty(c).count() as u64).sum(),
         warnings,
     })

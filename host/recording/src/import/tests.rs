@@ -8,6 +8,7 @@ use super::super::{Batch, RawUnit, Recording};
 use super::*;
 
 mod means;
+mod plausibility;
 mod presets;
 mod stamps;
 
@@ -52,6 +53,11 @@ impl Bench {
         )?;
         assert_eq!(summary.rows, all.len() as u64);
         Ok((summary, all, recording.manifest))
+    }
+
+    /// The file `a`, with its columns by name.
+    fn import_one(&self, columns: &str) -> Result<(ImportSummary, Batch, Manifest)> {
+        self.import(&self.options(&["a"], &[columns]))
     }
 
     fn refused(&self, options: &ImportOptions) -> String {
@@ -247,7 +253,7 @@ const GYR: &str = "t_s,gyro_x,gyro_y,gyro_z";
 fn timed(times: &[f64]) -> String {
     times
         .iter()
-        .map(|t| format!("{t:?} {} 0 1\n", 2.0 * t))
+        .map(|t| format!("{t:?} {} 3 1\n", 2.0 * t))
         .collect()
 }
 
@@ -305,8 +311,8 @@ fn an_interpolation_does_not_bridge_a_long_gap() {
     assert_eq!((summary.dropped_in_gaps, summary.rows), (4, 36));
 }
 
-const SESSION: &str = "part,n,x,y,z\nx_a,0,1,0,0\nx_a,1,1,0,0\nx_rot,2,0,0,0\nx_rot,3,0,0,0\n\
-    x_rot,4,0,0,0\nx_rot,5,0,0,0\n,6,0,0,0\nx_a,7,1,0,0\ny_a,8,0,1,0\n";
+const SESSION: &str = "part,n,x,y,z\nx_a,0,1,0,0\nx_a,1,1,0,0\nx_rot,2,0,0,1\nx_rot,3,0,0,1\n\
+    x_rot,4,0,0,1\nx_rot,5,0,0,1\n,6,0,0,1\nx_a,7,1,0,0\ny_a,8,0,1,0\n";
 
 #[test]
 fn labelled_steps_get_numbers_and_the_known_inputs_of_their_steps() {
@@ -393,7 +399,7 @@ fn a_source_inside_the_recording_to_replace_is_not_deleted() {
 
 #[test]
 fn options_that_contradict_each_other_are_refused() {
-    let bench = Bench::new(&[("a", "0 1 2 3\n1 1 2 3\n"), ("b", "0 1 2 3\n1 1 2 3\n")]);
+    let bench = Bench::new(&[("a", "0 1 2 3\n0.1 1 2 3\n"), ("b", "0 1 2 3\n0.1 1 2 3\n")]);
     let error = bench.refused(&bench.options(&["a", "b"], &[ACC]));
     assert!(error.contains("2 files and 1 lists"), "{error}");
     let error = bench.refused(&bench.options(&["a", "b"], &[ACC, ACC]));

@@ -2,6 +2,7 @@
 
 mod at_rest;
 mod base;
+mod coverage;
 mod estimates;
 mod judged;
 mod plan;

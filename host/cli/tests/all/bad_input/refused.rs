@@ -157,7 +157,7 @@ fn what_cannot_be_right_is_refused_in_one_line_and_leaves_no_file() {
             "no rates about z",
             || on_table_at(&[-90.0, 0.0, 90.0], &[0, 1]),
             |_| {},
-            &["gyro", "P_xz", "inputs along z"],
+            &["gyro", "P_xz", "rates along z"],
         ),
         (
             "all inputs equal",

@@ -189,7 +189,10 @@ impl<'a> Acceptance<'a> {
             let columns = self.search.model(chosen);
             let dof = self.rows.y.len() as f64 - columns.ncols() as f64;
             let fitted = variance.fit_at(&columns, &variance.none())?;
-            Some((fitted.chi2 / dof, ChiSquared::new(dof).ok()?.cdf(fitted.chi2)))
+            Some((
+                fitted.chi2 / dof,
+                ChiSquared::new(dof).ok()?.cdf(fitted.chi2),
+            ))
         });
         let ((before, _), (after, by_chance)) = (without?, with?);
         (after < BELOW_NOISE * before.min(1.0) && by_chance < FITS_NOISE).then(|| {

@@ -105,7 +105,9 @@ pub(super) fn parts_helped(sums: [&[f64; BLOCKS]; 2], coefficients: usize) -> [u
     let each = || sums[0].iter().zip(sums[1]);
     [
         each().filter(|(without, with)| with < without).count(),
-        each().filter(|(without, with)| **with > *without + by_noise).count(),
+        each()
+            .filter(|(without, with)| **with > *without + by_noise)
+            .count(),
     ]
 }
 

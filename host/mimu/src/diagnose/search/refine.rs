@@ -39,7 +39,9 @@ impl Beside<'_> {
     fn fit(&self, columns: DMatrix<f64>, start: &Components) -> Option<With> {
         let both = beside(&self.model, &unit_columns(&columns));
         let fitted = self.search.variance.fit(&both, start, By::Likelihood)?;
-        let own = fitted.coefficients.rows(self.model.ncols(), columns.ncols());
+        let own = fitted
+            .coefficients
+            .rows(self.model.ncols(), columns.ncols());
         let each = own.iter().zip(columns.column_iter());
         Some(With {
             values: each.map(|(v, c)| v / c.norm()).collect(),
@@ -107,7 +109,11 @@ impl Beside<'_> {
     pub fn bits(&self, from: &Candidate) -> Option<(Candidate, With)> {
         let conditions = self.search.freed(&self.model, self.null);
         let all = self.search.bits(from, &conditions)?;
-        let first = self.fit(from.columns_of(&all), &self.null.components)?;
+        let columns = from.columns_of(&all);
+        if !self.is_clear(&columns) {
+            return None;
+        }
+        let first = self.fit(columns, &self.null.components)?;
         self.choice(from, &all, first)
     }
 

@@ -75,3 +75,138 @@ fn two_sensors_with_clocks_of_their_own_are_joined_in_regular_time() {
         assert!((t - regular).abs() < 1e-6);
     }
 }
+
+/// Rows of a gyro with these stamps, as they are written.
+fn stamped(stamps: impl IntoIterator<Item = u64>) -> String {
+    let row = |(i, stamp): (usize, u64)| format!("{stamp} {} 2 3\n", i % 7);
+    stamps.into_iter().enumerate().map(row).collect()
+}
+
+#[test]
+fn a_slow_log_is_asked_for_its_unit_and_not_made_a_thousand_times_as_fast() {
+    for (step, coarse, fine) in [
+        (
+            500_000,
+            "microseconds (2 Hz for 199 s)",
+            "nanoseconds (2000 Hz for 0.199 s)",
+        ),
+        (
+            1_000_000,
+            "microseconds (1 Hz for 398 s)",
+            "nanoseconds (1000 Hz for 0.398 s)",
+        ),
+        (
+            1000,
+            "milliseconds (1 Hz for 398 s)",
+            "microseconds (1000 Hz for 0.398 s)",
+        ),
+    ] {
+        let text = stamped((0..399).map(|i| 97_000_000 + step * i + 7 * i % 5));
+        let bench = Bench::new(&[("a", &text)]);
+        let mut options = bench.options(&["a"], &[GYR]);
+        let error = bench.refused(&options);
+        assert!(error.contains(coarse) && error.contains(fine), "{error}");
+        options.time_unit = Some("us".parse().unwrap());
+        let (summary, _, manifest) = bench.import(&options).unwrap();
+        assert!((summary.sample_rate_hz * step as f64 / 1e6 - 1.0).abs() < 1e-4);
+        assert!(
+            manifest
+                .imported_with
+                .windows(2)
+                .any(|w| w == ["--time-unit", "us"])
+        );
+        options.time_unit = None;
+        options.rate_hz = Some(1e6 / step as f64);
+        let given = bench.import(&options).unwrap().0;
+        assert_eq!(given.time[0].unit, Some(Decimal::Microsecond));
+    }
+    // The name of the column says it as well.
+    let text = format!(
+        "time_us;x;y;z\n{}",
+        stamped((0..399).map(|i| 500_000 * i)).replace(' ', ";")
+    );
+    let (summary, ..) = Bench::new(&[("a", &text)])
+        .import_one("t_s=time_us,gyro_x=x,gyro_y=y,gyro_z=z")
+        .unwrap();
+    assert_eq!(summary.sample_rate_hz, 2.0);
+}
+
+#[test]
+fn a_second_file_of_another_rate_has_the_unit_of_the_first_where_their_times_overlap() {
+    // 100 Hz and 1 Hz in microseconds: by itself the second may be 1 kHz in nanoseconds.
+    let gyro = stamped((0..3000).map(|i| 60_000_000 + 10_000 * i));
+    let accel = stamped((0..31).map(|i| 60_000_000 + 1_000_000 * i));
+    let bench = Bench::new(&[("g", &gyro), ("a", &accel)]);
+    let (summary, batch, _) = bench
+        .import(&bench.options(&["g", "a"], &[GYR, ACC]))
+        .unwrap();
+    let units: Vec<_> = summary.time.iter().map(|time| time.unit).collect();
+    assert_eq!(units, [Some(Decimal::Microsecond); 2]);
+    assert_eq!((summary.time[1].rate_hz, batch.len()), (1.0, 3000));
+}
+
+#[test]
+fn counters_of_16_and_32_bits_that_begin_again_are_counted_on_and_reported() {
+    for (size, step, rate) in [(1_u64 << 16, 10, 100.0), (1 << 32, 5000, 200.0)] {
+        let text = stamped((0..2000).map(|i| (size - 777 * step + step * i) % size));
+        let bench = Bench::new(&[("a", &text)]);
+        let (summary, batch, _) = bench.import(&bench.options(&["a"], &[GYR])).unwrap();
+        assert_eq!((summary.sample_rate_hz, summary.time[0].wraps), (rate, 1));
+        assert!(
+            summary
+                .warnings
+                .iter()
+                .any(|w| w.contains("began again at 0 once"))
+        );
+        let steps = batch.t_s.windows(2).map(|w| w[1] - w[0]);
+        assert!(steps.into_iter().all(|dt| (dt * rate - 1.0).abs() < 1e-6));
+    }
+}
+
+#[test]
+fn steps_of_one_and_two_periods_are_lost_samples_and_the_stamps_stay_as_they_are() {
+    // A quarter is lost without any order: 4 and 8 ms, now and then 12.
+    let mut state = 7_u64;
+    let mut kept = |_: &u64| {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1);
+        state >> 62 != 0
+    };
+    let numbers: Vec<u64> = (0..6000)
+        .filter(|i| *i == 0 || *i == 5999 || kept(i))
+        .collect();
+    let text = stamped(numbers.iter().map(|i| 4000 * i));
+    let bench = Bench::new(&[("a", &text)]);
+    let (summary, batch, _) = bench.import(&bench.options(&["a"], &[GYR])).unwrap();
+    let time = &summary.time[0];
+    assert_eq!(time.rate_hz, 250.0);
+    assert_eq!(time.missing, 6000 - numbers.len() as u64);
+    assert!(time.stamps_kept && time.missing > 1300, "{time:?}");
+    let expected: Vec<f64> = numbers.iter().map(|i| *i as f64 * 0.004).collect();
+    assert!(
+        batch
+            .t_s
+            .iter()
+            .zip(&expected)
+            .all(|(a, b)| (a - b).abs() < 1e-9)
+    );
+}
+
+#[test]
+fn a_clock_that_is_set_back_by_less_than_a_second_is_refused_with_its_row() {
+    let stamp = |i: u64| 1_000_000 + 10_000 * i + 37 * i % 50 - if i >= 1500 { 50_000 } else { 0 };
+    let bench = Bench::new(&[("a", &stamped((0..3000).map(stamp)))]);
+    let error = bench.refused(&bench.options(&["a"], &[GYR]));
+    assert!(error.contains("data row 1501"), "{error}");
+}
+
+#[test]
+fn stamps_that_neither_their_steps_nor_the_count_explain_are_refused_and_not_smeared() {
+    // Every seventh row of a part is there twice, with other readings.
+    let stamps =
+        (0..3000).flat_map(|i| vec![10_000 * i; if i < 1500 && i % 7 == 0 { 2 } else { 1 }]);
+    let bench = Bench::new(&[("a", &stamped(stamps))]);
+    let error = bench.refused(&bench.options(&["a"], &[GYR]));
+    assert!(error.contains("off the count of samples"), "{error}");
+}

@@ -5,7 +5,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::regular::{Gap, Irregular, Jitter, Regular};
-use super::stamp::{Decimal, Stamp, Unit};
+use super::stamp::{Decimal, Seen, Stamp, Unit};
 use crate::error::{Argument, Error, Result};
 
 /// From so many seconds on, stamps count from the first whole second: later ones lose digits of the steps between samples.
@@ -32,6 +32,14 @@ pub struct TimeSummary {
     pub gaps: u64,
     /// Samples missing in them.
     pub missing: u64,
+    /// Time without samples of the longest gap, s.
+    pub longest_gap_s: f64,
+    /// Time from the first row to the last, s.
+    pub lasts_s: f64,
+    /// How often the stamps began again at 0 and were counted on.
+    pub wraps: u64,
+    /// Rate within the bursts that stamps come in, Hz: that of the sensor if it pauses between them.
+    pub rate_in_bursts_hz: Option<f64>,
     /// Rows left out because they repeat the row before, its stamp included.
     pub repeated_rows: u64,
 }
@@ -56,18 +64,26 @@ pub(in super::super) struct Stamps {
     pub repeats: Vec<usize>,
     /// Rows with the stamp of the row before, and other values.
     pub shared: u64,
+    /// How often they began again at 0.
+    pub wraps: u64,
+}
+
+/// What is known of the time of a file beside its stamps.
+#[derive(Debug, Clone, Copy, Default)]
+pub(in super::super) struct Known<'a> {
+    /// Seconds in the unit of the stamps.
+    pub factor: Option<f64>,
+    /// Rate that somebody has given, Hz.
+    pub rate_hz: Option<f64>,
+    /// Name of the column in the file.
+    pub name: Option<&'a str>,
+    /// The times of the file that it is joined to.
+    pub joined_to: Option<&'a Times>,
 }
 
 impl Times {
-    /// Of the stamps of `path`, which are in units of `given` seconds if that is known; `rate_hz` helps to find out where it is not.
-    /// `origin_s` is that of the file that it is joined to.
-    pub fn of(
-        path: &Path,
-        mut stamps: Stamps,
-        given: Option<f64>,
-        rate_hz: Option<f64>,
-        origin_s: Option<i64>,
-    ) -> Result<Times> {
+    /// Of the stamps of `path`.
+    pub fn of(path: &Path, mut stamps: Stamps, known: &Known<'_>) -> Result<Times> {
         // A logger that is faster than its sensor writes readings twice. Bursts of a sensor at rest may look like it, but have equal stamps
         // with other readings as well.
         let drops_repeats = stamps.shared == 0 && !stamps.repeats.is_empty();
@@ -84,21 +100,34 @@ impl Times {
             });
         }
         let problem = |irregular| refused(path, irregular);
-        let coarse = Regular::step(&stamps.since_first).ok_or_else(|| problem(Irregular::Short))?;
-        let unit = match given {
-            Some(factor) => Unit::of_factor(factor),
-            None => Unit::Decimal(Unit::recognise(stamps.first.value, coarse, rate_hz)),
+        let step = Regular::step(&stamps.since_first).ok_or_else(|| problem(Irregular::Short))?;
+        let seen = Seen {
+            first: stamps.first.value,
+            step,
+            lasts: stamps.since_first.last().copied().unwrap_or_default(),
+            rate_hz: known.rate_hz,
+            name: known.name,
+        };
+        let unit = match (known.factor, known.joined_to) {
+            (Some(factor), _) => Unit::of_factor(factor),
+            // The stamps of both are made by one clock.
+            (None, Some(first)) if first.overlaps(&seen) => first.unit,
+            (None, _) => {
+                Unit::Decimal(Unit::recognise(&seen).map_err(|both| either(path, &seen, both))?)
+            }
         };
         let far = || {
             let first = unit.seconds(stamps.first.value);
             if first.abs() < FAR_S { 0 } else { first as i64 }
         };
-        let origin_s = origin_s.unwrap_or_else(far);
+        let origin_s = known.joined_to.map_or_else(far, |first| first.origin_s);
         let first_s = unit.seconds(stamps.first.since(unit.whole(origin_s)));
         for since in &mut stamps.since_first {
             *since = unit.seconds(*since);
         }
-        let mut regular = Regular::find(&stamps.since_first).map_err(problem)?;
+        let mut regular = Regular::find(&stamps.since_first, known.rate_hz).map_err(problem)?;
+        let lasts_s = stamps.since_first.last().copied().unwrap_or_default();
+        let longest_gap_s = regular.longest_gap_s(&stamps.since_first);
         regular.start_s += first_s;
         let summary = TimeSummary {
             file: path
@@ -110,13 +139,17 @@ impl Times {
                 Unit::Decimal(unit) => Some(unit),
                 Unit::Other(_) => None,
             },
-            recognised: given.is_none(),
+            recognised: known.factor.is_none(),
             origin_s,
             rate_hz: tidy(1.0 / regular.period_s),
-            stamps_kept: regular.exact,
+            stamps_kept: regular.kept,
             jitter: regular.jitter,
             gaps: regular.gaps.len() as u64,
             missing: regular.missing(),
+            longest_gap_s,
+            lasts_s,
+            wraps: stamps.wraps,
+            rate_in_bursts_hz: regular.in_bursts_s.map(|period| tidy(1.0 / period)),
             repeated_rows: repeated_rows as u64,
         };
         Ok(Times {
@@ -128,9 +161,12 @@ impl Times {
         })
     }
 
-    /// Instant that was subtracted, s.
-    pub fn origin_s(&self) -> i64 {
-        self.origin_s
+    /// Whether stamps in the same unit are at times of this file.
+    fn overlaps(&self, seen: &Seen<'_>) -> bool {
+        let begins = self.unit.seconds(seen.first) - self.origin_s as f64;
+        let ends = begins + self.unit.seconds(seen.lasts);
+        let start = self.regular.start_s;
+        begins < start + self.summary.lasts_s && ends > start
     }
 
     /// Time between samples, s.
@@ -148,16 +184,53 @@ fn refused(path: &Path, irregular: Irregular) -> Error {
     match irregular {
         Irregular::Short => Error::new(
             path.display(),
-            "the rate cannot be told from the times of fewer than two rows",
+            "the rate cannot be found from the times of fewer than two rows",
             "give it, and skip the time column",
         )
         .about(Argument::SampleRate),
         Irregular::SetBack(row) => Error::new(
             format!("{}, data row {}, column t_s", path.display(), row + 1),
             "the time goes back, and stays behind",
-            "import the parts as recordings of their own, or sort the rows by time",
+            "import the parts before and from that row as recordings of their own, or sort the rows by time",
         ),
+        Irregular::OffTheCount(off_s) => Error::new(
+            format!("{}, column t_s", path.display()),
+            format!(
+                "the times are up to {off_s:.3} s off the count of samples, which no late hand-over explains, and their steps are no multiples of one period"
+            ),
+            "remove rows that are there twice and stamps that are wrong; if every sample is there, skip the time column and give the rate",
+        )
+        .about(Argument::SampleRate),
     }
+}
+
+/// The refusal of stamps that are in one of two units, the finer one first.
+fn either(path: &Path, seen: &Seen<'_>, both: [Decimal; 2]) -> Error {
+    let reading = |unit: Decimal| {
+        let per_second = unit.per_second() as f64;
+        format!(
+            "{unit} ({} Hz for {} s)",
+            three_digits(per_second / seen.step),
+            three_digits(seen.lasts / per_second)
+        )
+    };
+    let [fine, coarse] = both;
+    Error::new(
+        format!("{}, column t_s", path.display()),
+        format!(
+            "the times may be in {} or in {}",
+            reading(coarse),
+            reading(fine)
+        ),
+        format!("say which: {} or {}", coarse.symbol(), fine.symbol()),
+    )
+    .about(Argument::TimeUnit)
+}
+
+/// A number with three digits.
+fn three_digits(value: f64) -> String {
+    let rounded: f64 = format!("{value:.2e}").parse().unwrap_or(value);
+    rounded.to_string()
 }
 
 /// Gives each row of a file its time.
@@ -194,7 +267,7 @@ impl Clock {
         } = &self.times;
         let row = self.row;
         self.row += 1;
-        if regular.exact {
+        if regular.kept {
             return unit.seconds(stamp.since(unit.whole(*origin_s)));
         }
         if let Some(Gap { missing, .. }) = regular.gaps.get(self.next_gap).filter(|g| g.row == row)

@@ -1,6 +1,7 @@
 //! The time of foreign rows: the unit of their stamps, and the regular time behind them.
 
 mod clock;
+mod grid;
 mod regular;
 mod stamp;
 
@@ -8,5 +9,5 @@ pub use clock::TimeSummary;
 pub use regular::Jitter;
 pub use stamp::Decimal;
 
-pub(super) use clock::{Clock, Stamps, Times};
+pub(super) use clock::{Clock, Known, Stamps, Times};
 pub(super) use stamp::Stamp;

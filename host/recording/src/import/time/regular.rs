@@ -10,10 +10,10 @@
 
 use serde::Serialize;
 
+use super::grid::{self, Steps};
+
 /// A step that is longer than this many periods may hide missing samples.
 const LONG: f64 = 1.25;
-/// Steps this near to the period, in periods, are those of exact stamps.
-const EXACT: f64 = 0.02;
 /// Low quantile of lateness that two windows are compared by: delays only make stamps late, and single early ones are outvoted.
 const QUANTILE: f64 = 0.25;
 /// Samples in a window, at least and at most.
@@ -21,15 +21,21 @@ const WINDOW: std::ops::RangeInclusive<usize> = 8..=2048;
 /// Samples in a window for each period of jitter.
 const WINDOW_PER_JITTER: f64 = 48.0;
 /// A stall that is caught up within this time is jitter, s.
-const STALL_S: f64 = 5.0;
+pub(super) const STALL_S: f64 = 5.0;
 /// Share of later samples that may come back to the time before a gap.
 const BACK: f64 = 0.25;
 /// Missing samples that windows show, at least; single ones are told from jitter as long as it varies by less.
 const SMALLEST_GAP: f64 = 0.6;
 /// Standard deviations of the difference of two windows that a gap has to exceed.
 const SIGMAS: f64 = 6.0;
+/// A clock that is set back by more than so many periods is noticed.
+const SET_BACK: f64 = 2.0;
+/// A clock that wanders is off by less than this share of the time.
+const WANDER: f64 = 1e-3;
 /// Rounds of rate and gaps; each needs the other.
 const ROUNDS: usize = 6;
+/// Rows of a stretch that the unit of the stamps is recognised by.
+const STRETCH: usize = 64;
 /// Values that a quantile over a long file is taken from.
 const SAMPLED: usize = 20_000;
 /// And from a window.
@@ -62,10 +68,12 @@ pub(in super::super) struct Regular {
     pub period_s: f64,
     /// In the order of their rows.
     pub gaps: Vec<Gap>,
-    /// Whether the stamps are as good as this, and better kept.
-    pub exact: bool,
-    /// What is left of the stamps.
+    /// Whether the stamps are good, and are kept; then the regular time is not used.
+    pub kept: bool,
+    /// What is left of the stamps; of those that are kept, what is left of their steps.
     pub jitter: Jitter,
+    /// Period within the bursts that stamps come in, s, where it may be that of the sensor and the rest gaps.
+    pub in_bursts_s: Option<f64>,
 }
 
 /// What keeps stamps from having a regular time.
@@ -75,15 +83,59 @@ pub(in super::super) enum Irregular {
     Short,
     /// The clock is set back for good before that row.
     SetBack(usize),
+    /// The stamps are off the count of samples by so much, s, and no late hand-over explains it.
+    OffTheCount(f64),
 }
 
 impl Regular {
-    /// The regular time behind `stamps`, s.
-    pub fn find(stamps: &[f64]) -> Result<Regular, Irregular> {
-        let mut period_s = first_period(stamps).ok_or(Irregular::Short)?;
+    /// The time behind `stamps`, s. `rate_hz`, where it is known, decides whether bursts are a hand-over or the samples have pauses.
+    pub fn find(stamps: &[f64], rate_hz: Option<f64>) -> Result<Regular, Irregular> {
+        let period_s = first_period(stamps).ok_or(Irregular::Short)?;
         if let Some(row) = set_back(stamps, period_s) {
             return Err(Irregular::SetBack(row));
         }
+        let steps = grid::read(stamps, rate_hz);
+        if let Steps::Multiples(grid) = &steps
+            && grid.exact
+        {
+            return Ok(Self::of_grid(stamps, grid));
+        }
+        let mut counted = Self::by_count(stamps, period_s);
+        match steps {
+            // Jitter of less than a period about the count is rounding, which the count takes out.
+            Steps::Multiples(grid) if grid.pauses || counted.jitter.max_s > grid.period_s => {
+                return Ok(Self::of_grid(stamps, &grid));
+            }
+            Steps::HandedOver(period_s) if period_s < 0.5 * counted.period_s => {
+                counted.in_bursts_s = Some(period_s);
+            }
+            _ => {}
+        }
+        match counted.unexplained(stamps) {
+            Some(off_s) => Err(Irregular::OffTheCount(off_s)),
+            None => Ok(counted),
+        }
+    }
+
+    /// Stamps that are kept.
+    fn of_grid(stamps: &[f64], grid: &grid::Grid) -> Regular {
+        // Behind a pause the samples begin at any instant, and a line through all would take the rounding for a rate.
+        let period_s = match grid.pauses {
+            true => grid.period_s,
+            false => line(stamps, &numbers(stamps.len(), &grid.gaps), grid.period_s).1,
+        };
+        Regular {
+            start_s: stamps[0],
+            period_s,
+            gaps: grid.gaps.clone(),
+            kept: true,
+            jitter: grid.jitter,
+            in_bursts_s: None,
+        }
+    }
+
+    /// The regular time by the count of samples, which are about `period_s` apart.
+    fn by_count(stamps: &[f64], mut period_s: f64) -> Regular {
         let mut gaps = Vec::new();
         let mut start_s = stamps[0];
         for _ in 0..ROUNDS {
@@ -97,29 +149,50 @@ impl Regular {
                 break;
             }
         }
-        let exact = stamps.windows(2).all(|pair| {
-            let step = (pair[1] - pair[0]) / period_s;
-            (step - 1.0).abs() < EXACT || step > 2.0 - EXACT
-        });
-        if exact {
-            gaps = exact_gaps(stamps, period_s);
-        }
         let mut regular = Regular {
             start_s,
             period_s,
             gaps,
-            exact,
+            kept: false,
             jitter: Jitter::default(),
+            in_bursts_s: None,
         };
-        if !exact {
-            regular.jitter = jitter(stamps, &regular);
-        }
-        Ok(regular)
+        regular.jitter = jitter(stamps, &regular);
+        regular
     }
 
-    /// The time between stamps to a part in a thousand, in whatever unit they are.
+    /// By how much stamps are off the count, s, if that is more than what hands samples over late and clocks that wander explain.
+    fn unexplained(&self, stamps: &[f64]) -> Option<f64> {
+        let steps = stamps.windows(2).map(|pair| pair[1] - pair[0]);
+        let longest = steps.fold(0.0, f64::max);
+        let span = stamps[stamps.len() - 1] - stamps[0];
+        let most = (2.0 * self.period_s).max(1.5 * longest).max(WANDER * span);
+        (self.jitter.max_s > most).then_some(self.jitter.max_s)
+    }
+
+    /// The time from row to row as it mostly is, in whatever unit the stamps are: the mean over stretches that hold a hand-over or two,
+    /// as the steps between samples that are fetched together say nothing of the rate.
     pub fn step(stamps: &[f64]) -> Option<f64> {
-        first_period(stamps)
+        let shortest = first_period(stamps)?;
+        let rows = STRETCH.min(stamps.len() - 1);
+        let ends = (rows..stamps.len()).step_by(rows);
+        let mut means: Vec<f64> = ends
+            .map(|row| (stamps[row] - stamps[row - rows]) / rows as f64)
+            .collect();
+        let mean = quantile(&mut means, 0.5);
+        Some(if mean > 0.0 { mean } else { shortest })
+    }
+
+    /// Time without samples in the longest gap of `stamps`, s: a step, less the period that every sample has.
+    pub fn longest_gap_s(&self, stamps: &[f64]) -> f64 {
+        let lasts = |gap: &Gap| match self.kept {
+            true => {
+                let row = gap.row as usize;
+                stamps[row] - stamps[row - 1] - self.period_s
+            }
+            false => gap.missing as f64 * self.period_s,
+        };
+        self.gaps.iter().map(lasts).fold(0.0, f64::max)
     }
 
     /// How many samples are missing.
@@ -156,7 +229,7 @@ fn numbers(rows: usize, gaps: &[Gap]) -> Vec<u64> {
 }
 
 /// The `share` quantile of some values; reorders them.
-fn quantile(values: &mut [f64], share: f64) -> f64 {
+pub(super) fn quantile(values: &mut [f64], share: f64) -> f64 {
     let at = ((values.len() - 1) as f64 * share) as usize;
     *values.select_nth_unstable_by(at, f64::total_cmp).1
 }
@@ -201,30 +274,29 @@ fn first_period(stamps: &[f64]) -> Option<f64> {
     best.map(|(_, period)| period).or_else(whole)
 }
 
-/// First row from which the clock is behind by more than a second for good.
+/// First row from which the clock is behind for good: by more than a second, or by more than jitter explains.
+///
+/// Stamps that are late for a while come back at once or soon, and never fall behind the stamps before the delay.
 fn set_back(stamps: &[f64], period: f64) -> Option<usize> {
     const AROUND: usize = 16;
     let behind = (20.0 * period).max(1.0);
+    let late = Lateness { stamps, period };
+    let drop = SET_BACK.max(8.0 * late.width());
     (1..stamps.len()).find(|&k| {
-        stamps[k] < stamps[k - 1] - behind && {
-            let mut before = stamps[k.saturating_sub(AROUND)..k].to_vec();
-            let mut after = stamps[k..stamps.len().min(k + AROUND)].to_vec();
+        let step = stamps[k] - stamps[k - 1];
+        let (from, to) = (k.saturating_sub(AROUND), stamps.len().min(k + AROUND));
+        let far = || {
+            let mut before = stamps[from..k].to_vec();
+            let mut after = stamps[k..to].to_vec();
             quantile(&mut after, 0.5) < quantile(&mut before, 0.5) - 0.5 * behind
-        }
+        };
+        let stays = || {
+            let off = late.quantile(k..to, AROUND, 0.5) - late.quantile(from..k, AROUND, 0.5);
+            off < -drop && off < 0.5 * step / period
+        };
+        let enough = k - from == AROUND && to - k == AROUND;
+        step < -behind && far() || enough && step < -period && stays()
     })
-}
-
-/// Gaps of stamps that are exact: each long step.
-fn exact_gaps(stamps: &[f64], period: f64) -> Vec<Gap> {
-    let steps = stamps.windows(2).enumerate();
-    let gap = |(i, pair): (usize, &[f64])| {
-        let missing = ((pair[1] - pair[0]) / period).round() as u64;
-        (missing > 1).then_some(Gap {
-            row: i as u64 + 1,
-            missing: missing - 1,
-        })
-    };
-    steps.filter_map(gap).collect()
 }
 
 /// How late stamps are, in periods, before anything is known of gaps.

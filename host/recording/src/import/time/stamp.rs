@@ -1,8 +1,12 @@
 //! Time stamps as a file has them, and the unit that they are in.
 
 use std::fmt;
+use std::str::FromStr;
 
 use serde::Serialize;
+
+use crate::cell::shorten;
+use crate::error::Error;
 
 /// A time stamp in the unit of its file.
 ///
@@ -82,6 +86,18 @@ impl Stamp {
         }
     }
 
+    /// The stamp `whole` later.
+    pub fn plus(self, whole: i64) -> Self {
+        match whole {
+            0 => self,
+            _ => Self {
+                value: self.value + whole as f64,
+                whole: self.whole.saturating_add(whole),
+                ..self
+            },
+        }
+    }
+
     /// Its whole part, towards zero.
     pub fn whole(&self) -> i64 {
         self.whole
@@ -123,6 +139,28 @@ impl Decimal {
         Decimal::Nanosecond,
     ];
 
+    /// The unit that the name of a column ends with, as `timestamp_us` and `time [ms]` do.
+    fn in_name(name: &str) -> Option<Decimal> {
+        let mut words = name.split(|c: char| !c.is_alphabetic());
+        match words.rfind(|word| !word.is_empty())? {
+            "s" | "sec" | "seconds" => Some(Decimal::Second),
+            "ms" | "msec" | "milliseconds" => Some(Decimal::Millisecond),
+            "us" | "\u{b5}s" | "\u{3bc}s" | "usec" | "microseconds" => Some(Decimal::Microsecond),
+            "ns" | "nsec" | "nanoseconds" => Some(Decimal::Nanosecond),
+            _ => None,
+        }
+    }
+
+    /// Its symbol, as it is written on the command line.
+    pub fn symbol(self) -> &'static str {
+        match self {
+            Decimal::Second => "s",
+            Decimal::Millisecond => "ms",
+            Decimal::Microsecond => "us",
+            Decimal::Nanosecond => "ns",
+        }
+    }
+
     /// How many make a second.
     pub fn per_second(self) -> i64 {
         match self {
@@ -131,6 +169,19 @@ impl Decimal {
             Decimal::Microsecond => 1_000_000,
             Decimal::Nanosecond => 1_000_000_000,
         }
+    }
+}
+
+impl FromStr for Decimal {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self, Error> {
+        let text = if text == "µs" { "us" } else { text };
+        let known = Decimal::ALL.into_iter().find(|unit| unit.symbol() == text);
+        known.ok_or_else(|| {
+            let problem = format!("{} is no unit of time stamps", shorten(text.as_bytes()));
+            Error::new("unit of the times", problem, "give s, ms, us or ns")
+        })
     }
 }
 
@@ -148,6 +199,30 @@ impl fmt::Display for Decimal {
 /// Seconds since 1970 from 2001 on: nothing else that is counted in seconds is as large.
 const EPOCH_S: std::ops::Range<f64> = 1e9..4.1e9;
 
+/// Rates of inertial units, Hz: from the slowest topic of a flight log to a gyro at 8 kHz.
+const RATES_HZ: std::ops::Range<f64> = 0.8..9000.0;
+
+/// No log is slower than this, Hz. So 2e9 microseconds since a start, 100 Hz, are no seconds since 1970.
+const SLOWEST_HZ: f64 = 0.01;
+
+/// Nobody records for longer, s: of two units that are possible the coarser one is not, if it makes the recording longer than a week.
+const LONGEST_S: f64 = 7.0 * 86_400.0;
+
+/// What is known of stamps whose unit is looked for, in that unit.
+#[derive(Debug, Clone, Copy, Default)]
+pub(in super::super) struct Seen<'a> {
+    /// The first of them.
+    pub first: f64,
+    /// Time from row to row, as it mostly is.
+    pub step: f64,
+    /// Time from the first to the last.
+    pub lasts: f64,
+    /// Rate, where somebody has given it, Hz.
+    pub rate_hz: Option<f64>,
+    /// Name of the column in the file.
+    pub name: Option<&'a str>,
+}
+
 impl Unit {
     /// That in which one is `factor` seconds.
     pub fn of_factor(factor: f64) -> Unit {
@@ -156,27 +231,43 @@ impl Unit {
         known.map_or(Unit::Other(factor), Unit::Decimal)
     }
 
-    /// The unit of stamps that begin with `first` and are `step` apart, at a rate near `rate_hz` if that is known.
+    /// The unit of stamps that `seen` describes, or the two that it may be, the finer one first.
     ///
-    /// By the size of an epoch; by the rate; else by the step: below 1 it is seconds, as clocks of other units count whole numbers,
-    /// and the others are what makes the rate one from 5 Hz to 5 kHz.
-    pub fn recognise(first: f64, step: f64, rate_hz: Option<f64>) -> Decimal {
-        let epoch = |unit: &Decimal| EPOCH_S.contains(&(first / unit.per_second() as f64));
-        if let Some(unit) = Decimal::ALL.into_iter().find(epoch) {
-            return unit;
+    /// By the size of an epoch, by the rate if that is known, else by what makes the rate a plausible one. Two units differ by a factor of
+    /// 1000, so that a log of 2 Hz in microseconds looks like one of 2 kHz in nanoseconds; then the name of the column may say which it is.
+    pub fn recognise(seen: &Seen<'_>) -> Result<Decimal, [Decimal; 2]> {
+        let rate = |unit: &Decimal| unit.per_second() as f64 / seen.step;
+        let epoch = |unit: &Decimal| {
+            EPOCH_S.contains(&(seen.first / unit.per_second() as f64)) && rate(unit) > SLOWEST_HZ
+        };
+        let mut epochs = Decimal::ALL.into_iter().filter(epoch);
+        if let Some(unit) = epochs.find(|unit| rate(unit) < RATES_HZ.end) {
+            return Ok(unit);
         }
-        if let Some(rate) = rate_hz {
-            let off = |unit: &Decimal| (unit.per_second() as f64 / step / rate).ln().abs();
+        if let Some(rate_hz) = seen.rate_hz {
+            let off = |unit: &Decimal| (rate(unit) / rate_hz).ln().abs();
             let nearest = Decimal::ALL
                 .into_iter()
                 .min_by(|a, b| off(a).total_cmp(&off(b)));
-            return nearest.unwrap_or(Decimal::Second);
+            return Ok(nearest.unwrap_or(Decimal::Second));
         }
-        match step {
-            ..1.0 => Decimal::Second,
-            1.0..200.0 => Decimal::Millisecond,
-            200.0..2e5 => Decimal::Microsecond,
-            _ => Decimal::Nanosecond,
+        let possible = |unit: &Decimal| RATES_HZ.contains(&rate(unit));
+        let all: Vec<Decimal> = Decimal::ALL.into_iter().filter(possible).collect();
+        let coarse_lasts_s = |unit: &Decimal| seen.lasts / unit.per_second() as f64;
+        match all[..] {
+            [unit] => Ok(unit),
+            [coarse, fine] if coarse_lasts_s(&coarse) > LONGEST_S => Ok(fine),
+            [coarse, fine] => {
+                let named = seen.name.and_then(Decimal::in_name);
+                let named = named.filter(|unit| all.contains(unit));
+                named.ok_or([fine, coarse])
+            }
+            _ => Ok(match seen.step {
+                ..1.0 => Decimal::Second,
+                1.0..200.0 => Decimal::Millisecond,
+                200.0..2e5 => Decimal::Microsecond,
+                _ => Decimal::Nanosecond,
+            }),
         }
     }
 
@@ -213,24 +304,75 @@ mod tests {
         assert_eq!(stamp("1.5e3").since(1000), 500.0);
     }
 
+    fn seen(first: f64, step: f64) -> Seen<'static> {
+        Seen {
+            first,
+            step,
+            lasts: 2000.0 * step,
+            ..Seen::default()
+        }
+    }
+
     #[test]
-    fn units_are_told_by_an_epoch_the_rate_or_the_step() {
+    fn units_are_recognised_by_an_epoch_the_rate_or_the_step() {
         use Decimal::*;
-        for (first, step, rate, unit) in [
+        for (first, step, rate_hz, unit) in [
             (1.7e9, 0.005, None, Second),
             (1.7e12, 5.0, None, Millisecond),
+            (1.7e12, 1.0, None, Millisecond),
             (1.7e15, 5e3, None, Microsecond),
+            (1.7e15, 1e6, None, Microsecond),
             (1.7e18, 5e6, None, Nanosecond),
             (0.0, 0.01, None, Second),
+            (0.0, 0.1, None, Second),
             (12.0, 10.2, None, Millisecond),
+            (12.0, 100.0, None, Millisecond),
             (12.0, 5000.0, None, Microsecond),
             (12.0, 2.5e6, None, Nanosecond),
             (0.0, 1.0, Some(1.0), Second),
+            (0.0, 1.0, Some(1000.0), Millisecond),
             (0.0, 100.0, Some(10_000.0), Microsecond),
+            // Half an hour after the start of a microcontroller, and two seconds after that of a computer.
+            (1.8e9, 10_000.0, None, Microsecond),
+            (1.8e9, 5e6, None, Nanosecond),
         ] {
-            assert_eq!(Unit::recognise(first, step, rate), unit, "{first} {step}");
+            let seen = Seen {
+                rate_hz,
+                ..seen(first, step)
+            };
+            assert_eq!(Unit::recognise(&seen), Ok(unit), "{first} {step}");
         }
         assert_eq!(Unit::of_factor(0.001), Unit::Decimal(Millisecond));
         assert_eq!(Unit::of_factor(3.05e-5), Unit::Other(3.05e-5));
+    }
+
+    #[test]
+    fn two_units_remain_where_both_make_a_plausible_rate_unless_the_column_or_a_week_says_which() {
+        use Decimal::*;
+        for (step, both) in [
+            (1.0, [Millisecond, Second]),
+            (0.5, [Millisecond, Second]),
+            (500.0, [Microsecond, Millisecond]),
+            (1000.0, [Microsecond, Millisecond]),
+            (5e5, [Nanosecond, Microsecond]),
+            (1e6, [Nanosecond, Microsecond]),
+        ] {
+            assert_eq!(Unit::recognise(&seen(97.0, step)), Err(both), "{step}");
+            for (name, unit) in [("timestamp_us", Microsecond), ("Time [ms]", Millisecond)] {
+                let named = Seen {
+                    name: Some(name),
+                    ..seen(97.0, step)
+                };
+                let known = both.contains(&unit);
+                let expected = if known { Ok(unit) } else { Err(both) };
+                assert_eq!(Unit::recognise(&named), expected, "{step} {name}");
+            }
+            let long = Seen {
+                lasts: 1e6 * step,
+                ..seen(97.0, step)
+            };
+            let weeks = 1e6 * step / both[1].per_second() as f64 > LONGEST_S;
+            assert_eq!(Unit::recognise(&long).is_ok(), weeks, "{step}");
+        }
     }
 }

@@ -1,0 +1,285 @@
+//! Accelerometer calibration from the magnitude of gravity and from the turns between the poses together.
+//!
+//! Where the poses leave an end of an axis unseen, the magnitude alone hardly determines that axis ([`super::gravity_size`]): ten poses
+//! of a fixture ended in a scale factor of 6.0 ± 9.1. But the gyro carries the direction of gravity from pose to pose, and a direction
+//! that the accelerometer measures wrongly does not meet it. Here C and o of the accelerometer (nine parameters, as in
+//! [`super::gravity_size`]) and C and o of the gyro (twelve) are fitted to the magnitudes, the turns and the readings at rest at once.
+//!
+//! Only the accelerometer is returned. The gyro that [`super::rotation`] fits beside it is the one of the joint minimum, and with the
+//! covariance of this accelerometer carried on has the covariance of the joint fit: that is the inverse of a matrix of blocks.
+//! Errors of the gyro's model go into the accelerometer this way, so it is not used where the magnitude alone will do.
+
+use mimu_core::compensation::Affine;
+use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, Vector3};
+
+use super::least_squares::{Linearized, excess_variance, minimize};
+use super::turn::{Centred, Rest, Turn, across, between, by_forces, integrate};
+use super::{Estimated, Failure, Observation};
+use crate::triad::{Covariance, Part, Triad};
+
+/// Parameters: six of C and three of o of the accelerometer, then nine of C and three of o of the gyro.
+const ACCEL: usize = 9;
+const ALL: usize = ACCEL + 12;
+
+/// Row and column of the six elements of the accelerometer's C.
+const LOWER: [(usize, usize); 6] = [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2)];
+
+/// What is fitted together.
+pub struct Together<'a> {
+    /// Poses.
+    pub poses: &'a [Observation],
+    /// Variances of their magnitudes by noise, (m/s²)².
+    pub variances: &'a [f64],
+    /// Turns between them; of their forces only the raw readings count.
+    pub turns: &'a [Turn<'a>],
+    /// Readings of the gyro at rest.
+    pub rest: &'a [Rest],
+    /// First guess of the accelerometer.
+    pub accel: Affine<f64>,
+    /// First guess of the gyro.
+    pub gyro: Affine<f64>,
+    /// Magnitude of gravity, m/s².
+    pub gravity: f64,
+}
+
+/// Both models at some parameters.
+struct Models {
+    /// Of the readings that the first guess makes of order one: `f = g (C v + o)`.
+    accel: Affine<f64>,
+    gyro: Affine<f64>,
+}
+
+impl Together<'_> {
+    /// Fits both; the accelerometer.
+    pub fn estimate(&self) -> Result<Estimated, Failure> {
+        let g = self.gravity;
+        let at_rest =
+            self.rest.iter().map(|o| o.raw).sum::<Vector3<f64>>() / self.rest.len().max(1) as f64;
+        let unit = self.gyro.matrix.norm() / 3f64.sqrt();
+        let pieces: Vec<Vec<Centred>> = self
+            .turns
+            .iter()
+            .map(|t| {
+                t.increments
+                    .iter()
+                    .map(|i| Centred::new(i, &at_rest))
+                    .collect()
+            })
+            .collect();
+        let unpack = |p: &DVector<f64>| {
+            let mut c = Matrix3::zeros();
+            for (k, place) in LOWER.iter().enumerate() {
+                c[*place] = p[k];
+            }
+            Models {
+                accel: Affine {
+                    matrix: c,
+                    offset: Vector3::new(p[6], p[7], p[8]),
+                },
+                gyro: Affine {
+                    matrix: Matrix3::from_fn(|i, j| unit * p[ACCEL + 3 * i + j]),
+                    offset: Vector3::new(p[18], p[19], p[20]),
+                },
+            }
+        };
+        let order_one = |raw: &Vector3<f64>| self.accel.apply(raw) / g;
+        let rows = [self.poses.len(), 2 * self.turns.len(), 3 * self.rest.len()];
+        let from = [0, rows[0], rows[0] + rows[1]];
+        // Residuals without weights: of gravity, rad, rad/s.
+        let linearize = |p: &DVector<f64>| {
+            let Models { accel, gyro } = unpack(p);
+            let mut r = DVector::zeros(rows.iter().sum());
+            let mut j = DMatrix::zeros(r.len(), ALL);
+            for (row, o) in self.poses.iter().enumerate() {
+                let v = order_one(&o.raw);
+                let f = accel.apply(&v);
+                let up = f.normalize();
+                r[row] = f.norm() - 1.0;
+                by_accel(&mut j, row, &up, &v);
+            }
+            for (t, turn) in self.turns.iter().enumerate() {
+                let v = turn.raw.map(|raw| order_one(&raw));
+                let turn = Turn {
+                    before: accel.apply(&v[0]),
+                    after: accel.apply(&v[1]),
+                    ..*turn
+                };
+                let (after, by) = integrate(&pieces[t], &gyro.matrix, &gyro.offset, true);
+                let measured = turn.after.normalize();
+                let error = between(&(after * turn.before.normalize()), &measured);
+                for (k, e) in across(&measured).iter().enumerate() {
+                    let row = from[1] + 2 * t + k;
+                    r[row] = e.dot(&error);
+                    for (side, v) in by_forces(&turn, &after, e).iter().zip(&v) {
+                        by_accel(&mut j, row, side, v);
+                    }
+                    for (column, by) in by.iter().enumerate() {
+                        let slope = by.transpose() * e;
+                        for i in 0..3 {
+                            match column {
+                                0..3 => j[(row, ACCEL + 3 * i + column)] = unit * slope[i],
+                                _ => j[(row, 18 + i)] = slope[i],
+                            }
+                        }
+                    }
+                }
+            }
+            for (s, o) in self.rest.iter().enumerate() {
+                let u = o.raw - at_rest;
+                let rate = gyro.apply(&u) - o.rate;
+                for i in 0..3 {
+                    let row = from[2] + 3 * s + i;
+                    r[row] = rate[i];
+                    for k in 0..3 {
+                        j[(row, ACCEL + 3 * i + k)] = unit * u[k];
+                    }
+                    j[(row, 18 + i)] = 1.0;
+                }
+            }
+            (r, j)
+        };
+        let known = |p: &DVector<f64>| -> Vec<f64> {
+            let c = unpack(p).gyro.matrix;
+            let squared = c.component_mul(&c);
+            let mean = squared.sum() / 3.0;
+            let poses = self.variances.iter().map(|v| v / (g * g));
+            let turns = self
+                .turns
+                .iter()
+                .flat_map(|t| [t.variance(mean) + t.earth_variance; 2]);
+            let rest = self.rest.iter().flat_map(|o| {
+                let v = squared * o.variance + o.rate_variance;
+                [v.x, v.y, v.z]
+            });
+            poses
+                .chain(turns)
+                .chain(rest)
+                .map(|v| v.max(1e-20))
+                .collect()
+        };
+        let mut p = DVector::zeros(ALL);
+        for k in [0, 2, 5] {
+            p[k] = 1.0;
+        }
+        for i in 0..3 {
+            for k in 0..3 {
+                p[ACCEL + 3 * i + k] = self.gyro.matrix[(i, k)] / unit;
+            }
+        }
+        let start = self.gyro.apply(&at_rest);
+        for i in 0..3 {
+            p[18 + i] = start[i];
+        }
+        let lost = || {
+            Failure::NoSolution("the fit to the magnitudes and the turns does not converge".into())
+        };
+        // The first weights: 5 milli-g, half a degree, and what the dwells scatter by.
+        let (r, _) = linearize(&p);
+        let at_rest_variance = r.rows(from[2], rows[2]).norm_squared() / rows[2].max(1) as f64;
+        let mut groups = [0, 1, 2].map(|_| excess_variance(&[], &[], 0.0));
+        for (group, first) in groups.iter_mut().zip([2.5e-5, 7.6e-5, at_rest_variance]) {
+            group.excess = first;
+        }
+        let mut first_chi2 = None;
+        let mut last = None;
+        for _ in 0..30 {
+            let variances = known(&p);
+            let group = |k: usize| usize::from(k >= from[1]) + usize::from(k >= from[2]);
+            let weights: Vec<f64> = variances
+                .iter()
+                .enumerate()
+                .map(|(k, v)| (v + groups[group(k)].excess).sqrt().recip())
+                .collect();
+            let weigh = |(mut r, mut j): (DVector<f64>, DMatrix<f64>)| {
+                for (k, weight) in weights.iter().enumerate() {
+                    r[k] *= weight;
+                    let mut row = j.row_mut(k);
+                    row *= *weight;
+                }
+                Linearized {
+                    residuals: r,
+                    jacobian: j,
+                }
+            };
+            let here;
+            (p, here) = minimize(p, |p| weigh(linearize(p))).ok_or_else(lost)?;
+            let covariance = (here.jacobian.transpose() * &here.jacobian)
+                .try_inverse()
+                .ok_or_else(|| Failure::NoSolution("the normal matrix is singular".into()))?;
+            let before = groups.map(|s| s.excess);
+            for (g, scatter) in groups.iter_mut().enumerate() {
+                let j = here.jacobian.rows(from[g], rows[g]);
+                let taken = (j * &covariance).component_mul(&j).sum();
+                let own = from[g]..from[g] + rows[g];
+                let residuals: Vec<f64> = own
+                    .clone()
+                    .map(|k| here.residuals[k] / weights[k])
+                    .collect();
+                *scatter = excess_variance(&residuals, &variances[own], rows[g] as f64 - taken);
+            }
+            first_chi2.get_or_insert(groups[0].chi2);
+            let settled = (0..3).all(|g| (groups[g].excess - before[g]).abs() <= 1e-3 * before[g]);
+            last = Some((here, covariance));
+            if settled {
+                break;
+            }
+        }
+        let (here, covariance) = last.ok_or_else(lost)?;
+        let c = unpack(&p).accel.matrix;
+        if (0..3).any(|k| !(c[(k, k)] > 0.0)) {
+            return Err(lost());
+        }
+        // Of the accelerometer's parameters, whose columns have one unit; the gyro's are whatever they are.
+        let own = covariance.view((0, 0), (ACCEL, ACCEL)).into_owned();
+        let eigen = own.symmetric_eigenvalues();
+        let condition = (eigen.max() / eigen.min()).sqrt();
+        let mut change = SMatrix::<f64, 12, 9>::zeros();
+        let Affine { matrix, offset } = self.accel;
+        for (k, (row, column)) in LOWER.iter().enumerate() {
+            for m in 0..3 {
+                change[(3 * row + m, k)] += matrix[(*column, m)];
+            }
+            change[(9 + row, k)] += offset[*column];
+        }
+        for k in 0..3 {
+            change[(9 + k, 6 + k)] = g;
+        }
+        let parts = (0..3).map(|g| {
+            let j = here.jacobian.rows(from[g], rows[g]);
+            let own = &covariance * (j.transpose() * j) * &covariance;
+            let nine = SMatrix::<f64, 9, 9>::from_fn(|i, j| own[(i, j)]);
+            let covariance: Covariance = change * nine * change.transpose();
+            Part {
+                covariance,
+                dof: groups[g].variance_dof(),
+            }
+        });
+        let found = unpack(&p).accel;
+        let inverse = Affine {
+            matrix: found.matrix * matrix,
+            offset: found.matrix * offset + found.offset * g,
+        };
+        let triad = Triad::from_inverse(inverse, parts.collect())
+            .ok_or_else(|| Failure::NoSolution("C is singular".into()))?;
+        let mut magnitude = groups[0];
+        magnitude.excess *= g * g;
+        magnitude.chi2 = first_chi2.unwrap_or(magnitude.chi2);
+        Ok(Estimated {
+            triad,
+            scatter: vec![("magnitude of specific force".into(), magnitude)],
+            condition,
+            delays: None,
+            notes: vec!["the poses alone hardly determine it: the turns between them, which the gyro measures, are used as well".into()],
+        })
+    }
+}
+
+/// Adds to `row` of a Jacobian what a component of the force, `side`, owes to C and o of the accelerometer at the reading `v`.
+fn by_accel(j: &mut DMatrix<f64>, row: usize, side: &Vector3<f64>, v: &Vector3<f64>) {
+    for (k, (i, column)) in LOWER.iter().enumerate() {
+        j[(row, k)] += side[*i] * v[*column];
+    }
+    for i in 0..3 {
+        j[(row, 6 + i)] += side[i];
+    }
+}

@@ -1,0 +1,72 @@
+//! The readings as they came, judged like a calibration.
+//!
+//! Where a unit gives SI, somebody has calibrated it already, and the figure to beat is that of its readings. Ten poses by hand once
+//! ended in a calibration that turned gravity 1.65 degrees off, in sample, where the readings themselves were 0.44 degrees off.
+
+use mimu_core::compensation::Affine;
+use nalgebra::{Matrix3, Vector3};
+
+use super::sensor::{SensorFit, rms};
+use crate::estimate::Observation;
+use crate::estimate::turn::{Turn, direction_error};
+use crate::prepared::Prepared;
+use crate::quantity::{Figure, significant};
+use mimu_recording::RawUnit;
+
+/// Error of readings in SI whose inputs are known.
+pub(super) fn inputs<'a>(
+    prepared: &Prepared,
+    observations: impl Iterator<Item = &'a Observation>,
+) -> Option<f64> {
+    in_si(prepared).then(|| rms(Figure::Input, observations.map(|o| o.raw - o.input)))
+}
+
+/// Error of the magnitudes of specific force as they came.
+pub(super) fn magnitudes(prepared: &Prepared, poses: &[Observation]) -> Option<f64> {
+    let g = prepared.manifest.gravity_mps2;
+    let errors = poses
+        .iter()
+        .map(|o| Vector3::new(o.raw.norm() - g, 0.0, 0.0));
+    in_si(prepared).then(|| rms(Figure::GravitySize, errors))
+}
+
+/// Error of the directions after turns, gyro and accelerometer both as they came.
+pub(super) fn directions(prepared: &Prepared, turns: &[Turn]) -> Option<f64> {
+    let gyro = Affine {
+        matrix: Matrix3::identity(),
+        offset: Vector3::zeros(),
+    };
+    let errors = turns.iter().map(|turn| {
+        let [before, after] = turn.raw;
+        let turn = Turn {
+            before,
+            after,
+            ..*turn
+        };
+        direction_error(&turn, &gyro)
+    });
+    in_si(prepared).then(|| rms(Figure::Direction, errors))
+}
+
+fn in_si(prepared: &Prepared) -> bool {
+    prepared.manifest.raw_unit == RawUnit::Si
+}
+
+/// Warns of a calibration that does no better than the readings as they came.
+pub(super) fn compare(fit: &mut SensorFit) {
+    let Some(came) = fit.as_came else { return };
+    let (calibrated, how) = match fit.held_out_rms() {
+        Some(held) => (held, "on data that it was not fitted to"),
+        None => (fit.rms(), "in sample"),
+    };
+    if calibrated < came {
+        return;
+    }
+    let (factor, unit) = fit.figure.readable(fit.sensor);
+    fit.warnings.push(format!(
+        "{}: the readings as they came err by {} {unit}, and calibrated by {} {unit} {how}: this calibration is no better than none",
+        fit.sensor,
+        significant(came * factor),
+        significant(calibrated * factor)
+    ));
+}

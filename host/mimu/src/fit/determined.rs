@@ -1,0 +1,185 @@
+//! Refuses parameters that the data leave open, by the width of their intervals.
+//!
+//! A condition says how unevenly an experiment determines its parameters, and not whether it does: noise and misfit decide that. A scale
+//! factor of 6.0 ± 9.1 came from a design whose condition of 1464 was only warned of.
+
+use mimu_core::compensation::Affine;
+use nalgebra::Vector3;
+
+use super::of_temperature::with_temperature;
+use super::sensor::SensorFit;
+use crate::estimate::Failure;
+use crate::prepared::Prepared;
+use crate::quantity::{AXES, Figure, plus_minus};
+use crate::readable;
+use crate::triad::{Angles, Covariance, Triad, slope};
+use mimu_recording::Reference;
+use mimu_recording::error::{Argument, Result};
+
+/// Half of the 95 % interval of a scale factor over itself, and of an angle in rad, from which on it is not determined. Data sheets
+/// promise a scale factor to within ten per cent and a mounting to within some degrees: what is known to a fifth only is known
+/// better without the experiment.
+const WIDEST: f64 = 0.2;
+
+/// Refuses a fit in which a scale factor or an angle is not determined. `accel` is the accelerometer where gravity is the only reference.
+pub(super) fn check(prepared: &Prepared, fit: &SensorFit, accel: Option<&Triad>) -> Result<()> {
+    let physical = fit.estimated.triad.physical(Angles::Exact);
+    let scale_unit = crate::quantity::scale_unit(prepared.manifest.raw_unit, fit.sensor.unit());
+    let mut open = Vec::new();
+    let mut shown = |name: String, value: f64, half: f64, unit: &str| {
+        let shown = readable::parameter(unit);
+        let unit = match shown.unit.is_empty() {
+            true => String::new(),
+            false => format!(" {}", shown.unit),
+        };
+        open.push(format!(
+            "{name} ({}{unit})",
+            plus_minus(value * shown.factor, half * shown.factor)
+        ));
+    };
+    for (axis, e) in AXES.iter().zip(physical.scale) {
+        if !(e.interval <= WIDEST * e.value.abs()) {
+            shown(
+                format!("scale factor {axis}"),
+                e.value,
+                e.interval,
+                &scale_unit,
+            );
+        }
+    }
+    let pairs = ["yz", "zy", "zx"];
+    for (pair, e) in pairs.iter().zip(physical.non_orthogonality) {
+        if !(e.interval <= WIDEST) {
+            shown(
+                format!("non-orthogonality {pair}"),
+                e.value,
+                e.interval,
+                "rad",
+            );
+        }
+    }
+    // The accelerometer's own axes are the frame where gravity is the only reference.
+    if fit.figure != Figure::GravitySize {
+        for (axis, e) in AXES.iter().zip(physical.misalignment) {
+            if !(e.interval <= WIDEST) {
+                shown(format!("misalignment {axis}"), e.value, e.interval, "rad");
+            }
+        }
+    }
+    if open.is_empty() || by_temperature(prepared, fit) {
+        return Ok(());
+    }
+    let poses = accel.and_then(|accel| missing_poses(prepared, accel));
+    let add = match (fit.figure, poses) {
+        (Figure::GravitySize, Some(poses)) => poses,
+        (Figure::GravitySize, None) => {
+            "add poses, each axis up and down and between, and hold each still".into()
+        }
+        // What the accelerometer errs by, whose directions the turns are judged by, is in the intervals of the gyro.
+        (Figure::Direction, Some(poses)) => {
+            format!("{poses}: the accelerometer says where gravity is after each turn")
+        }
+        (Figure::Direction, None) => "add turns about every axis, with that axis level and slanted, between dwells that are held still".into(),
+        (Figure::Input, _) => "add dwells with inputs along every axis, in both directions".into(),
+    };
+    let parameters = open.join(", ");
+    let failure = Failure::Undetermined { parameters, add };
+    let error = prepared.refused(failure, fit.sensor);
+    Err(match prepared.manifest.reference {
+        Reference::Table => error.about(Argument::Only),
+        Reference::Gravity => error,
+    })
+}
+
+/// Whether the intervals are wide by what a model with temperature in it explains: then that is what a person has to hear, and does.
+fn by_temperature(prepared: &Prepared, fit: &SensorFit) -> bool {
+    let with = match fit.figure {
+        Figure::Input => with_temperature(prepared, fit.sensor, &fit.residuals),
+        Figure::GravitySize | Figure::Direction => None,
+    };
+    with.is_some_and(|with| with.rms < 0.5 * fit.rms())
+}
+
+/// Standard deviation of the magnitude of specific force, over gravity, from which on a direction is not seen.
+const UNSEEN: f64 = 0.01;
+/// Poses that are named at most.
+const NAMED: usize = 4;
+
+/// The faces and edges of the unit that the poses leave the most open, in words; each is taken as measured before the next
+/// is sought.
+fn missing_poses(prepared: &Prepared, triad: &Triad) -> Option<String> {
+    let g = prepared.manifest.gravity_mps2;
+    let mut covariance = triad.inverse_covariance;
+    let mut names: Vec<String> = Vec::new();
+    while names.len() < NAMED {
+        let candidates = directions().into_iter().map(|(name, up)| {
+            let by = slope(&up, &triad.forward.apply(&(up * g)));
+            ((by.transpose() * covariance * by)[0], name, by)
+        });
+        let (variance, name, by) = candidates.max_by(|a, b| a.0.total_cmp(&b.0))?;
+        if !(variance.sqrt() > UNSEEN * g) || names.contains(&name) {
+            break;
+        }
+        names.push(name);
+        let gain = covariance * by;
+        let measured: Covariance =
+            gain * gain.transpose() / (variance + (0.1 * UNSEEN * g).powi(2));
+        covariance -= measured;
+    }
+    (!names.is_empty()).then(|| {
+        format!(
+            "add poses with {} up, near which there is none, and hold each still",
+            names.join(", ")
+        )
+    })
+}
+
+/// Faces, then edges, by name.
+fn directions() -> Vec<(String, Vector3<f64>)> {
+    let mut all = Vec::new();
+    for count in [1, 2] {
+        for code in 0..27 {
+            let up = Vector3::new(code / 9 - 1, code / 3 % 3 - 1, code % 3 - 1);
+            if up.iter().filter(|c| **c != 0).count() != count {
+                continue;
+            }
+            let signed = (0..3).filter(|k| up[*k] != 0);
+            let name: String = signed
+                .map(|k| format!("{}{}", if up[k] > 0 { "+" } else { "-" }, AXES[k]))
+                .collect();
+            all.push((name, up.map(f64::from).normalize()));
+        }
+    }
+    all
+}
+
+/// The faces that no pose has up, to within 45 degrees, by a first guess of the accelerometer: `-x, +z`. `None` where all have been.
+pub(super) fn faces_not_up(guess: &Affine<f64>, raw: &[Vector3<f64>]) -> Option<String> {
+    let faces = directions().into_iter().take(6);
+    let unseen = faces.filter(|(_, face)| {
+        let near = |u: &&Vector3<f64>| guess.apply(u).normalize().dot(face) > 0.7;
+        !raw.iter().any(|u| near(&u))
+    });
+    let names: Vec<String> = unseen.map(|(name, _)| name).collect();
+    (!names.is_empty()).then(|| names.join(", "))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_face_that_was_never_up_is_named() {
+        let one = Affine {
+            matrix: nalgebra::Matrix3::identity(),
+            offset: Vector3::zeros(),
+        };
+        let raw: Vec<Vector3<f64>> = directions()
+            .into_iter()
+            .filter(|(name, _)| !name.contains("-x"))
+            .map(|(_, up)| up * 9.8)
+            .collect();
+        assert_eq!(faces_not_up(&one, &raw).as_deref(), Some("-x"));
+        assert_eq!(directions().len(), 18);
+    }
+}

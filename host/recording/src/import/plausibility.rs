@@ -1,0 +1,199 @@
+//! Readings that no sensor makes: zeros that only fill a row, and temperatures that are none.
+
+use super::foreign::Row;
+use crate::columns::Column;
+use crate::columns::RAW_COLUMNS;
+use crate::error::{Argument, Error, Result};
+
+/// What silicon and the chambers around it reach, °C.
+const USUAL_C: std::ops::RangeInclusive<f64> = -100.0..=200.0;
+/// What can be a temperature in °C at all: from absolute zero. Counts of a converter are mostly beyond.
+const POSSIBLE_C: std::ops::RangeInclusive<f64> = -273.15..=1000.0;
+/// What to do about a column that is not in °C.
+const CONVERT: &str = "convert it to degrees Celsius (counts of an MPU-6050 or MPU-9150: a factor of 0.00294118 and an offset of 36.53), or skip the column";
+
+/// What to do where `c` cannot be a temperature in °C.
+pub(super) fn no_temperature(c: f64) -> Option<&'static str> {
+    (!c.is_nan() && !POSSIBLE_C.contains(&c)).then_some(CONVERT)
+}
+
+/// What the readings of a file have shown.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Plausibility {
+    /// Of both sensors: places among the values of a row, and channels.
+    sensors: [Vec<(usize, usize)>; 2],
+    temperature: Option<usize>,
+    /// Rows that were left out, as all readings are 0.
+    pub padding: u64,
+    /// Rows in which only the accelerometer has zeros.
+    empty_accel: u64,
+    /// Whether a value other than 0 was seen, of each of the six channels.
+    alive: [bool; 6],
+    rows: u64,
+    temperatures: u64,
+    lowest_c: f64,
+    highest_c: f64,
+    impossible: u64,
+    /// Row and value of the first temperature that is impossible.
+    first_impossible: Option<(u64, f64)>,
+}
+
+impl Plausibility {
+    /// Of a file with these columns.
+    pub fn new(columns: impl Iterator<Item = Column>) -> Self {
+        let mut all = Plausibility {
+            lowest_c: f64::INFINITY,
+            highest_c: f64::NEG_INFINITY,
+            ..Plausibility::default()
+        };
+        for (place, column) in columns.enumerate() {
+            match column {
+                Column::Raw(c) => all.sensors[c / 3].push((place, c)),
+                Column::Temperature => all.temperature = Some(place),
+                _ => {}
+            }
+        }
+        all
+    }
+
+    /// Whether `row` is no reading: padding of a buffer, or a time at which nothing was connected. Looks at its temperature as well.
+    ///
+    /// An accelerometer whose three axes are exactly 0 has measured nothing, as gravity is always there. A gyro at rest may well read 0, so that
+    /// by itself it is taken for padding only where the time stamp is 0 too, after others that are not.
+    pub fn is_padding(&mut self, row: &mut Row, zero_stamp: bool, begun: bool) -> bool {
+        let zero =
+            |sensor: &[(usize, usize)]| sensor.iter().all(|(place, _)| row.values[*place] == 0.0);
+        let [gyro, accel] = &self.sensors;
+        let no_force = accel.len() == 3 && zero(accel);
+        let padding = match accel.is_empty() {
+            false => no_force && zero(gyro),
+            true => gyro.len() == 3 && zero(gyro) && zero_stamp && begun,
+        };
+        if padding {
+            self.padding += 1;
+            return true;
+        }
+        if no_force {
+            self.empty_accel += 1;
+            for (place, _) in accel {
+                row.values[*place] = f64::NAN;
+            }
+        }
+        for &(place, channel) in self.sensors.iter().flatten() {
+            let value = row.values[place];
+            self.alive[channel] |= value != 0.0 && !value.is_nan();
+        }
+        self.rows += 1;
+        if let Some(place) = self.temperature {
+            row.values[place] = self.temperature(row.values[place], row.number);
+        }
+        false
+    }
+
+    /// The temperature `c` of a row, or not a number where it is impossible.
+    fn temperature(&mut self, c: f64, number: u64) -> f64 {
+        if c.is_nan() {
+            return c;
+        }
+        self.temperatures += 1;
+        if !POSSIBLE_C.contains(&c) {
+            self.impossible += 1;
+            self.first_impossible.get_or_insert((number, c));
+            return f64::NAN;
+        }
+        self.lowest_c = self.lowest_c.min(c);
+        self.highest_c = self.highest_c.max(c);
+        c
+    }
+
+    /// Which sensors, gyro and accelerometer, have shown nothing but 0, and in how many rows.
+    pub fn dead(&self) -> [Option<u64>; 2] {
+        [0, 1].map(|s| {
+            let all = &self.sensors[s];
+            let dead = !all.is_empty() && all.iter().all(|(_, c)| !self.alive[*c]);
+            (dead && self.rows > 0).then_some(self.rows)
+        })
+    }
+
+    /// Refuses a file at `place` of which nothing is left, or whose temperatures are none.
+    pub fn check(&self, place: &str) -> Result<()> {
+        if self.rows == 0 && self.padding > 0 {
+            return Err(Error::new(
+                place,
+                format!("the readings are 0 in all of its {}", rows(self.padding)),
+                "check that the right columns were named, and that the sensor was connected",
+            )
+            .about(Argument::Columns));
+        }
+        if let Some((row, c)) = self.first_impossible
+            && 2 * self.impossible > self.temperatures
+        {
+            return Err(Error::new(
+                format!("{place}, column temp_c"),
+                format!(
+                    "{} of {} values are no temperatures in °C, the first is {c} in row {row}",
+                    self.impossible, self.temperatures
+                ),
+                CONVERT,
+            )
+            .about(Argument::Scale)
+            .about(Argument::Offset));
+        }
+        Ok(())
+    }
+
+    /// One sentence for each thing that was left out or looks wrong; `place` is the file.
+    pub fn warnings(&self, place: &str) -> Vec<String> {
+        let mut warnings = Vec::new();
+        if self.padding > 0 {
+            warnings.push(format!(
+                "{place}: {} left out as padding: all readings are exactly 0",
+                rows(self.padding)
+            ));
+        }
+        if self.empty_accel > 0 && self.dead()[1].is_none() {
+            warnings.push(format!(
+                "{place}: in {} the accelerometer reads exactly 0 on all axes, which is no reading: its cells are left empty",
+                rows(self.empty_accel)
+            ));
+        }
+        for (s, sensor) in self.sensors.iter().enumerate() {
+            if self.rows == 0 || self.dead()[s].is_some() {
+                continue;
+            }
+            for (_, c) in sensor.iter().filter(|(_, c)| !self.alive[*c]) {
+                warnings.push(format!(
+                    "{place}: {} is 0 in all of its {}: it looks like a channel that is not connected",
+                    RAW_COLUMNS[*c],
+                    rows(self.rows)
+                ));
+            }
+        }
+        if let Some((row, c)) = self.first_impossible {
+            warnings.push(format!(
+                "{place}, column temp_c: {} of {} values are no temperatures in °C and are left empty, the first is {c} in row {row}",
+                self.impossible, self.temperatures
+            ));
+        }
+        let range = [self.lowest_c, self.highest_c];
+        if range[0] <= range[1] && !range.iter().all(|c| USUAL_C.contains(c)) {
+            let [low, high] = range;
+            let kelvin = if low > 200.0 && high < 400.0 {
+                "; kelvins need an offset of -273.15"
+            } else {
+                ""
+            };
+            warnings.push(format!(
+                "{place}, column temp_c: {low} to {high} °C is not where sensors work: {CONVERT}{kelvin}"
+            ));
+        }
+        warnings
+    }
+}
+
+fn rows(count: u64) -> String {
+    match count {
+        1 => "1 row".into(),
+        _ => format!("{count} rows"),
+    }
+}

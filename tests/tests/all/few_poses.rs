@@ -1,0 +1,421 @@
+//! Sessions as people make them: thirteen poses, ten on a fixture, six faces; with a dwell that was knocked, or right and alone.
+
+use mimu::dwell::Keep;
+use mimu::fit::{Fit, Method, Options, fit};
+use mimu::prepared::Prepared;
+use mimu::quantity::Sensor;
+use mimu::stillness::{Finding, STILL_FACTOR, Steps};
+use mimu_recording::error::Error;
+use mimu_recording::{Batch, Manifest, RawUnit, Reference};
+use mimu_rig::located::Source;
+use mimu_rig::plan::Plan;
+use mimu_rig::record::samples;
+use mimu_rig::rig_file::{RigFile, RigTruth};
+
+const THIRTEEN: &str = include_str!("../../../rig/plans/thirteen.toml");
+const FIXTURE: &str = include_str!("../../../rig/plans/fixture.toml");
+
+/// A digital part without wander, so that its null is the bias of the session.
+const QUIET: &str = "format = \"mimu-rig/1\"\n[unit]\ngyro = \"MPU6050-gyro\"\naccel = \"MPU6050-accel\"\n\
+    [unit.gyro_axes]\ninstability_si = [0.0, 0.0, 0.0]\nwalk_si = [0.0, 0.0, 0.0]\n\
+    [unit.accel_axes]\ninstability_si = [0.0, 0.0, 0.0]\nwalk_si = [0.0, 0.0, 0.0]\n[thermal]\non_before_s = inf\n";
+
+/// The same part with a package that remembers which way it was last stressed: what dwells scatter by beside their noise.
+const STRESSED: &str = "format = \"mimu-rig/1\"\n[unit]\ngyro = \"MPU6050-gyro\"\naccel = \"MPU6050-accel\"\n\
+    [thermal]\non_before_s = inf\n[[effect]]\nid = \"x_accel_stress_hysteresis\"\nmg = [1.0, 1.0, 1.0]\nplay_g = 0.3\n";
+
+/// A recording in memory, and what is true of it.
+struct Session {
+    manifest: Manifest,
+    samples: Batch,
+    truth: RigTruth,
+}
+
+impl Session {
+    fn of(plan: &str, rig: &str, seed: u64) -> Self {
+        let plan = Plan::parse(Source::new("plan", plan)).expect("a plan");
+        let file = RigFile::parse(&Source::new("rig", rig)).expect("a rig file");
+        let truth = RigTruth::resolve(&file, seed).expect("a rig");
+        let mut batch = Batch::default();
+        for row in samples(&plan, &truth, seed).expect("a run") {
+            batch.t_s.push(row.stamp_s);
+            let all = row.readings.gyro.iter().chain(&row.readings.accel);
+            for (column, value) in batch.raw.iter_mut().zip(all) {
+                column.push(*value);
+            }
+        }
+        let (rate, gravity) = (plan.sample_rate_hz, plan.place.gravity);
+        let mut manifest = Manifest::new(
+            "unit-007",
+            rate,
+            gravity,
+            RawUnit::Count,
+            Reference::Gravity,
+        );
+        manifest.latitude_deg = Some(48.0);
+        Self {
+            manifest,
+            samples: batch,
+            truth,
+        }
+    }
+
+    fn prepared(&self) -> Prepared {
+        Prepared::of(self.manifest.clone(), &self.samples, STILL_FACTOR).expect("readable")
+    }
+
+    fn fit(&self) -> Result<Fit, Error> {
+        fit(self.prepared(), Options::default())
+    }
+
+    /// Adds a force along gravity, m/s², during one dwell.
+    fn knock(&mut self, dwell: usize, force_mps2: f64) {
+        let found = self.prepared().dwells.list[dwell].clone();
+        let end = (found.first_row + found.rows) as usize + 30;
+        let rows = found.first_row as usize - 30..end.min(self.samples.len());
+        let share = force_mps2 / self.manifest.gravity_mps2;
+        for axis in 0..3 {
+            let null = self.truth.unit.accel.axes[axis].null;
+            let add = share * (found.raw[3 + axis].mean - null);
+            for value in &mut self.samples.raw[3 + axis][rows.clone()] {
+                *value = (*value + add).round();
+            }
+        }
+    }
+
+    /// Readings in SI, by what is true of the part but for its misalignments.
+    fn in_si(mut self) -> Self {
+        self.manifest.raw_unit = RawUnit::Si;
+        let axes = self
+            .truth
+            .unit
+            .gyro
+            .axes
+            .iter()
+            .chain(&self.truth.unit.accel.axes);
+        for (column, axis) in self.samples.raw.iter_mut().zip(axes) {
+            for value in column {
+                *value = (*value - axis.null) / axis.sensitivity;
+            }
+        }
+        self
+    }
+
+    /// How many of the accelerometer's scale factors and biases `fit` has within its intervals, and how many there are.
+    fn inside(&self, fit: &Fit) -> [u32; 2] {
+        let found = fit.sensor(Sensor::Accel).expect("recorded");
+        let physical = found.estimated.triad.physical(mimu::triad::Angles::Exact);
+        let held = self
+            .truth
+            .unit
+            .accel
+            .axes
+            .iter()
+            .enumerate()
+            .map(|(k, axis)| {
+                let of = [
+                    (physical.scale[k], axis.sensitivity),
+                    (physical.bias[k], axis.null),
+                ];
+                of.iter()
+                    .filter(|(e, truth)| (e.value - truth).abs() <= e.interval)
+                    .count() as u32
+            });
+        [held.sum(), 6]
+    }
+}
+
+#[test]
+fn a_right_dwell_that_the_few_others_happen_not_to_predict_is_kept() {
+    // Of 120 sessions these are the four in which one used to be left out, as 5 to 21 sigma off.
+    for seed in [34, 64, 84, 116] {
+        let session = Session::of(THIRTEEN, STRESSED, seed);
+        let found = session.fit().expect("thirteen poses");
+        let left_out = &found.prepared.dwells.left_out;
+        let poses = left_out.iter().filter(|l| l.sensor == Sensor::Accel);
+        assert_eq!(poses.count(), 0, "seed {seed}: {left_out:?}");
+    }
+}
+
+#[test]
+fn a_knocked_dwell_is_left_out_and_what_that_changes_is_said_unless_it_is_to_be_kept() {
+    let mut session = Session::of(THIRTEEN, QUIET, 2);
+    session.knock(3, 0.3);
+    let found = session.fit().expect("thirteen poses");
+    let left_out = &found.prepared.dwells.left_out;
+    assert_eq!(left_out.len(), 1, "{left_out:?}");
+    assert_eq!(left_out[0].from, 3);
+    // The force that was added, to what its prediction is uncertain by.
+    assert!((left_out[0].error - 0.3).abs() < 0.05, "{left_out:?}");
+    let [held, all] = session.inside(&found);
+    assert!(held + 1 >= all, "{held} of {all}");
+    let said = found.sensors.iter().flat_map(|s| &s.warnings);
+    let said: Vec<&String> = said.chain(&found.warnings).collect();
+    assert!(
+        said.iter()
+            .any(|w| w.contains("dwell 3 is not used") && w.contains("--keep 3"))
+    );
+    assert!(said.iter().any(|w| w.contains("what was left out changes")));
+    let moved = found
+        .changes
+        .iter()
+        .filter(|c| (c.with_all - c.fitted.value).abs() > c.fitted.interval);
+    assert!(moved.count() > 3);
+
+    for keep in [Keep::Everything, Keep::Steps(vec![3])] {
+        let mut prepared = session.prepared();
+        prepared.dwells.keep = keep;
+        let kept = fit(prepared, Options::default()).expect("thirteen poses");
+        assert!(kept.prepared.dwells.left_out.is_empty() && kept.changes.is_empty());
+        assert!(kept.sensor(Sensor::Accel).expect("recorded").rms() > 0.03);
+    }
+}
+
+#[test]
+fn the_only_dwell_at_its_end_of_an_axis_is_kept_however_wrong() {
+    // Without the last pose little tells the bias of x from its scale factor.
+    for force in [0.1, 0.5] {
+        let mut session = Session::of(THIRTEEN, QUIET, 5);
+        session.knock(12, force);
+        let found = session.fit().expect("thirteen poses");
+        let left_out = &found.prepared.dwells.left_out;
+        assert!(
+            left_out.iter().all(|l| l.sensor == Sensor::Gyro),
+            "{left_out:?}"
+        );
+    }
+}
+
+#[test]
+fn the_turns_between_ten_poses_of_a_fixture_determine_what_their_magnitudes_leave_open() {
+    let (mut held, mut all) = (0, 0);
+    for seed in 1..=8 {
+        let session = Session::of(FIXTURE, QUIET, seed);
+        // Two have a dwell split by a knock and too few turns for it.
+        let Ok(found) = session.fit() else { continue };
+        let accel = found.sensor(Sensor::Accel).expect("recorded");
+        let z = accel
+            .estimated
+            .triad
+            .physical(mimu::triad::Angles::Exact)
+            .scale[2];
+        // By magnitudes alone it is 2 to 3 %, and that by the noise alone.
+        assert!(z.interval < 0.008 * z.value, "seed {seed}: {z:?}");
+        let [inside, count] = session.inside(&found);
+        held += inside;
+        all += count;
+    }
+    println!("{held} of {all}");
+    assert!(all >= 36 && 10 * held >= 9 * all, "{held} of {all}");
+}
+
+#[test]
+fn a_scale_factor_that_the_poses_leave_open_is_refused_with_the_pose_that_is_missing() {
+    // Without a gyro there are no turns to help, and of a tip by 12 degrees the intervals are wider than the scale factor.
+    let mut session = Session::of(&FIXTURE.replace("0.577", "0.21"), QUIET, 3);
+    for column in &mut session.samples.raw[..3] {
+        column.clear();
+    }
+    let refused = session.fit().expect_err("a cap of poses").to_string();
+    assert!(
+        refused.contains("undetermined") && refused.contains("-z"),
+        "{refused}"
+    );
+    assert!(!refused.contains("wrong columns"), "{refused}");
+}
+
+#[test]
+fn readings_in_si_are_judged_as_they_came_beside_every_fit() {
+    let session = Session::of(FIXTURE, QUIET, 1).in_si();
+    let found = session.fit().expect("ten poses");
+    for sensor in &found.sensors {
+        let came = sensor.as_came.expect("in SI");
+        let better = sensor.held_out_rms().unwrap_or(sensor.rms()) < came;
+        let warned = sensor
+            .warnings
+            .iter()
+            .any(|w| w.contains("no better than none"));
+        assert_eq!(better, !warned, "{}: {came}", sensor.sensor);
+    }
+    // What the readings err by, of the samples themselves: misalignments do not change the magnitude at a face.
+    let accel = found.sensor(Sensor::Accel).expect("recorded");
+    let dwells = &found.prepared.dwells.list;
+    let squares = accel.residuals.iter().map(|r| {
+        let size = dwells[r.dwell].raw_mean(Sensor::Accel).norm();
+        (size - session.manifest.gravity_mps2).powi(2)
+    });
+    let rms = (squares.sum::<f64>() / accel.residuals.len() as f64).sqrt();
+    assert!((accel.as_came.expect("in SI") / rms - 1.0).abs() < 1e-12);
+}
+
+#[test]
+fn a_clock_that_runs_twice_as_fast_is_asked_about() {
+    let mut session = Session::of(THIRTEEN, QUIET, 1).in_si();
+    for t in &mut session.samples.t_s {
+        *t *= 0.5;
+    }
+    session.manifest.sample_rate_hz *= 2.0;
+    let found = session.fit().expect("thirteen poses");
+    let gyro = found.sensor(Sensor::Gyro).expect("recorded");
+    let said = gyro.warnings.iter().find(|w| w.contains("time base"));
+    assert!(
+        said.is_some_and(|w| w.contains("0.5")),
+        "{:?}",
+        gyro.warnings
+    );
+}
+
+#[test]
+fn a_channel_whose_step_is_coarser_than_its_noise_is_not_stuck() {
+    let mut session = Session::of(THIRTEEN, QUIET, 4);
+    // 0.3 deg/s a step, where the noise of a sample is 0.03.
+    for value in session.samples.raw[..3].iter_mut().flatten() {
+        *value = (*value / 20.0).round() * 20.0;
+    }
+    let prepared = session.prepared();
+    let faults: Vec<String> = prepared
+        .dwells
+        .list
+        .iter()
+        .filter_map(|d| d.gyro_fault)
+        .map(|f| f.to_string())
+        .collect();
+    assert!(!faults.iter().any(|f| f.contains("stuck")), "{faults:?}");
+    let found = session.fit().expect("thirteen poses");
+    assert!(
+        !found.warnings.iter().any(|w| w.contains("stuck")),
+        "{:?}",
+        found.warnings
+    );
+}
+
+/// Faces at rest, and turns through gravity of which only the rate is known.
+fn turning_through_gravity() -> (Manifest, Batch) {
+    let mut plan =
+        String::from("format = \"mimu-plan/1\"\nsample_rate_hz = 100.0\ncarrier = \"table\"\n");
+    let mut step = |up: [i32; 3], spin: f64| {
+        plan += &format!("[[step]]\nup = {up:?}\nspin_dps = {spin:?}\ndwell_s = 4.0\n");
+    };
+    for up in [
+        [1, 0, 0],
+        [-1, 0, 0],
+        [0, 1, 0],
+        [0, -1, 0],
+        [0, 0, 1],
+        [0, 0, -1],
+        [1, 1, 1],
+    ] {
+        step(up, 0.0);
+    }
+    for spin in [-180.0, -60.0, 60.0, 180.0] {
+        step([1, 0, 0], spin);
+    }
+    let plan = Plan::parse(Source::new("plan", &plan)).expect("a plan");
+    let file = RigFile::parse(&Source::new("rig", QUIET)).expect("a rig file");
+    let truth = RigTruth::resolve(&file, 3).expect("a rig");
+    let mut batch = Batch::default();
+    for row in samples(&plan, &truth, 3).expect("a run") {
+        batch.t_s.push(row.stamp_s);
+        let step = row.instant.step.map_or(-1, |s| s as i32);
+        batch.step.push(step);
+        let all = row.readings.gyro.iter().chain(&row.readings.accel);
+        for (column, value) in batch.raw.iter_mut().zip(all) {
+            column.push(*value);
+        }
+        let turns = step >= 7;
+        for k in 0..3 {
+            let [rate, force] = [row.instant.stated_rate, row.instant.stated_force]
+                .map(|known| known.expect("a table knows")[k]);
+            batch.reference[k].push(rate.to_degrees());
+            batch.reference[3 + k].push(if turns { f64::NAN } else { force });
+        }
+    }
+    let gravity = plan.place.gravity;
+    let manifest = Manifest::new("unit", 100.0, gravity, RawUnit::Count, Reference::Table);
+    (manifest, batch)
+}
+
+#[test]
+fn a_dwell_that_turns_through_gravity_without_a_known_force_is_no_noise() {
+    let (manifest, batch) = turning_through_gravity();
+    let finding = Finding {
+        still_factor: STILL_FACTOR,
+        steps: Steps::Given,
+    };
+    let prepared = Prepared::of(manifest, &batch, finding).expect("readable");
+    let options = Options {
+        only: Some(Sensor::Accel),
+        ..Options::default()
+    };
+    let found = fit(prepared, options).expect("seven poses");
+    let accel = found.sensor(Sensor::Accel).expect("recorded");
+    // 400 µg/√Hz over four seconds are 1 mm/s²; the swing of gravity made it 1.5 m/s².
+    assert!(accel.noise_floor() < 5e-3, "{}", accel.noise_floor());
+
+    let (manifest, mut batch) = turning_through_gravity();
+    for (k, step) in batch.step.iter_mut().enumerate() {
+        if batch.reference[3][k].is_finite() && *step >= 0 {
+            *step = -1;
+        }
+    }
+    let turns_only = Prepared::of(manifest, &batch, finding).expect("readable");
+    assert!(!turns_only.noise.is_known(Sensor::Accel) && turns_only.noise.is_known(Sensor::Gyro));
+}
+
+#[test]
+fn six_positions_off_level_have_intervals_as_wide_as_their_misfit() {
+    let faces = [
+        [1.0, 0.0, 0.0],
+        [-1.0, 0.0, 0.0],
+        [0.0, 1.0, 0.0],
+        [0.0, -1.0, 0.0],
+        [0.0, 0.0, 1.0],
+        [0.0, 0.0, -1.0],
+    ];
+    let mut plan = String::from(
+        "format = \"mimu-plan/1\"\nsample_rate_hz = 100.0\ncarrier = \"hands\"\nlatitude_deg = 48.0\n",
+    );
+    for up in faces {
+        plan += &format!("[[step]]\nup = {up:?}\ndwell_s = 4.0\n");
+    }
+    // By hand, a few degrees off; whoever levels them believes they are level.
+    let mut session = Session::of(&plan, QUIET, 3);
+    let found = session.prepared();
+    session.manifest.reference = Reference::Table;
+    let n = session.samples.len();
+    session.samples.step = vec![-1; n];
+    session.samples.reference = [(); 6].map(|()| vec![f64::NAN; n]);
+    for (k, dwell) in found.dwells.list.iter().enumerate() {
+        for row in dwell.first_row as usize..(dwell.first_row + dwell.rows) as usize {
+            session.samples.step[row] = k as i32;
+            for axis in 0..3 {
+                session.samples.reference[3 + axis][row] =
+                    faces[k][axis] * session.manifest.gravity_mps2;
+            }
+        }
+    }
+    let options = Options {
+        method: Method::SixPositions,
+        only: Some(Sensor::Accel),
+        ..Options::default()
+    };
+    let found = fit(session.prepared(), options).expect("six faces");
+    let accel = found.sensor(Sensor::Accel).expect("recorded");
+    let physical = accel.estimated.triad.physical(mimu::triad::Angles::Exact);
+    let mean = physical.scale.iter().map(|s| s.value).sum::<f64>() / 3.0;
+    let half = physical
+        .bias
+        .iter()
+        .map(|b| b.interval / mean)
+        .fold(0.0, f64::max);
+    assert!(
+        half > 0.5 * accel.rms(),
+        "± {half} m/s² beside {} m/s²",
+        accel.rms()
+    );
+    assert!(
+        accel.warnings.iter().any(|w| w.contains("off level")),
+        "{:?}",
+        accel.warnings
+    );
+}
