@@ -46,7 +46,7 @@ fn remarks(s: &SensorDiagnosisResult, with_share: bool) -> Vec<String> {
     }
     if s.reference_rms > s.noise_floor {
         all.push(format!(
-            "the accelerometer gives gravity's direction, and its errors may add {} rms to the noise floor",
+            "errors of the accelerometer's directions may add {} rms to the noise floor",
             readable::error(s.unit).write(s.reference_rms)
         ));
     }

@@ -49,7 +49,7 @@ pub fn diagnosis_text(d: &DiagnosisResult, detail: Detail) -> String {
     for (name, s) in d.sensors.named() {
         sensor(&mut out, d, name, s, all);
     }
-    if d.leftover.iter().any(|l| l.usual) {
+    if all && d.leftover.iter().any(|l| l.usual) {
         wrap(&mut out, "", USUAL);
     }
     let _ = writeln!(out);
