@@ -55,10 +55,7 @@ fn a_diagnosis_takes_at_most_25_lines_without_all() {
         // What the short form counts, the others print.
         let next = run(&["diagnose", name, "--next"]);
         let not_seen = ids("not_excited");
-        let counted = format!(
-            "not seen at data-sheet size: {} effect",
-            not_seen.len()
-        );
+        let counted = format!("not seen at data-sheet size: {} effect", not_seen.len());
         assert_eq!(short.contains(&counted), !not_seen.is_empty(), "{short}");
         for id in not_seen {
             assert!(next.contains(&id), "{name}: {id} is in no experiment");
