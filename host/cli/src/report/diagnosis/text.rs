@@ -23,8 +23,6 @@ const FIGURES: &str = "The figures before are not quite those of `mimu fit`: res
 /// What is reported of residuals that the biases of usual sensors leave.
 pub(super) const USUAL: &str = "the bias of a usual sensor wanders by up to four times the noise of a dwell; --noise, by `mimu allan` \
                                 of the unit at rest, shows whether this one does";
-/// Fewer residuals beyond the affine parameters than this say nothing.
-const FEW: usize = 3;
 /// Residuals of a sensor that the summary lists.
 const LISTED: usize = 3;
 
@@ -183,13 +181,6 @@ fn sensor(out: &mut String, d: &DiagnosisResult, name: &str, s: &SensorDiagnosis
     let _ = writeln!(out, "{name} ({}){none}", s.figure.description());
     for remark in remarks(s, all) {
         wrap(out, "  ", &remark);
-    }
-    if s.rows < s.affine_parameters + FEW {
-        let _ = writeln!(
-            out,
-            "  {} residuals for {} affine parameters: nothing can be found in them, and nothing refuted",
-            s.rows, s.affine_parameters
-        );
     }
     for a in effects() {
         effect(out, d, s, a, all);
