@@ -303,7 +303,16 @@ fn the_interval_of_a_lag_is_in_the_json_the_text_and_the_page() {
         created: "2026-01-01T00:00:00Z".into(),
     };
     let interval = form.interval();
-    assert!(diagnosis_text(&result, Detail { all: true, next: false }).contains(&format!("(95 %: {interval})")));
+    assert!(
+        diagnosis_text(
+            &result,
+            Detail {
+                all: true,
+                next: false
+            }
+        )
+        .contains(&format!("(95 %: {interval})"))
+    );
     assert!(
         diagnosis_page(&result, &made)
             .expect("a page")

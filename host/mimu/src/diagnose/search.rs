@@ -339,7 +339,7 @@ impl<'a> Search<'a> {
                 (candidate, parameter, with, whole)
             }
         };
-        candidate.choices = candidate.choices_of_coefficients() * candidate.choices;
+        candidate.choices *= candidate.choices_of_coefficients();
         let p = chance(&candidate, &with).min(whole);
         Some(Chosen {
             unlikely: candidate.unlikely(&with.values),

@@ -226,7 +226,7 @@ fn errors_far_beyond_the_noise_are_no_fit() {
     let desk = Desk {
         temp_c: there_and_back,
         added: |t| {
-            let jump = if (t / 180.0) as u64 % 2 == 0 {
+            let jump = if ((t / 180.0) as u64).is_multiple_of(2) {
                 0.3
             } else {
                 -0.3
