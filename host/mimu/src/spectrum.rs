@@ -16,6 +16,7 @@
 
 mod flatten;
 mod floor;
+mod line;
 mod search;
 mod set_aside;
 mod sinusoid;
@@ -23,5 +24,6 @@ mod transform;
 mod welch;
 mod white;
 
-pub use self::set_aside::{Line, SetAside, set_aside, set_aside_after};
+pub use self::line::Line;
+pub use self::set_aside::{SetAside, set_aside, set_aside_after};
 pub use self::white::{White, white_band};

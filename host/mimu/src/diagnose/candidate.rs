@@ -33,6 +33,10 @@ impl Candidate {
     /// all that the rows can tell; both with the coefficients that are specific to the recording, and without. A thermal effect is tried
     /// with and without the thermometer's self-heating.
     pub fn variants(mut self, rows: &Rows) -> Vec<Self> {
+        // Bits that would not be seen at the size of data sheets are offered where none would be: among many nothings one is always near.
+        if self.reads_code() && !self.excited.is_empty() {
+            self.active.clone_from(&self.excited);
+        }
         self.offered.clone_from(&self.active);
         let with = |one: &Self, active: Vec<usize>| Self {
             active,
@@ -91,11 +95,15 @@ impl Candidate {
         })
     }
 
-    /// How many choices of coefficients its own is one of: any number of the offered is as likely, and of one number any choice.
+    /// How many choices of coefficients its own is one of: of bits any, and of other coefficients any number of the offered is as likely, and
+    /// of one number any choice.
     pub fn choices_of_coefficients(&self) -> f64 {
         let (n, k) = (self.offered.len(), self.active.len());
         if n < 2 {
             return 1.0;
+        }
+        if self.reads_code() {
+            return (n as f64).exp2();
         }
         let ratios = (0..k.min(n - k)).map(|i| (n - i) as f64 / (i + 1) as f64);
         n as f64 * ratios.product::<f64>()

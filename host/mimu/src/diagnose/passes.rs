@@ -12,6 +12,7 @@ use nalgebra::Matrix3;
 use super::as_written::AsWritten;
 use super::decision::{Decision, decide, noisier};
 use super::rows::{Figure, ForceErrors, Free, Rows, Session};
+use super::search::Chosen;
 use crate::effects::removal::{Removed, remove};
 use crate::fit::{Fit, session_bias};
 use crate::prepared::Prepared;
@@ -282,17 +283,20 @@ impl Passes<'_> {
         let mut decision = decide(without)?;
         let mut found = removed(&decision);
         let mut after = (!found.is_empty()).then(|| clean(&found));
-        // Bits of a code that are nearly one another's sum can lead the readings away: such a code is no explanation, and no reason to
-        // refuse the recording either.
-        let codes = found.iter().filter(|f| f.candidate.reads_code());
-        let codes: Vec<String> = codes.map(|f| f.candidate.id()).collect();
-        if let Some(Err(error)) = &after
-            && !codes.is_empty()
-        {
+        // Bits of a code that are nearly one another's sum, and coefficients of a size that no sensor has, can lead the readings away: such an
+        // effect is no explanation, and no reason to refuse the recording either.
+        let mut without = without.to_vec();
+        while let Some(Err(error)) = &after {
+            let accepted = decision.accepted.iter().map(|a| &a.chosen);
+            let strangest = accepted.max_by(|a, b| {
+                let of = |c: &Chosen| (c.candidate.reads_code(), c.unlikely);
+                let (a, b) = (of(a), of(b));
+                a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))
+            });
+            let Some(strangest) = strangest else { break };
             let problem = &error.refused().problem;
             let why = format!("readings without it cannot be calibrated: {problem}");
-            let mut without = without.to_vec();
-            without.extend(codes.into_iter().map(|id| (id, why.clone())));
+            without.push((strangest.candidate.id(), why));
             decision = decide(&without)?;
             found = removed(&decision);
             after = (!found.is_empty()).then(|| clean(&found));

@@ -575,11 +575,15 @@ fn score(c: &Chosen) -> f64 {
         Kind::Term(_, product) => f64::from(product.order()),
         _ => 0.0,
     };
-    c.drop - COEFFICIENT * coefficients - order - c.unlikely
+    c.drop - price(&c.candidate) * coefficients - order - c.unlikely
 }
 
 /// An effect whose coefficient of the size of a data sheet would not be this many sigmas is not excited.
 pub(super) const EXCITED: f64 = 3.0;
+
+/// A coefficient of this many times the size of data sheets is the largest that is looked for: what would not be seen even at that size is
+/// not determined. In a temperature that is constant to a millikelvin, or at rates that are rounding, any coefficient fits.
+pub(super) const LARGEST: f64 = 1e4;
 
 /// Part of a column that the others of its effect have to leave of it. At rest in gravity the squares of the force add up to a constant but
 /// for some 1e-4, by which the magnitude of a measured force scatters; at 1e-2 the line and the bend of a thermal bias over a narrow range
@@ -588,6 +592,15 @@ pub(super) const SEPARATE: f64 = 1e-3;
 
 /// What a coefficient costs.
 pub(super) const COEFFICIENT: f64 = 4.0;
+
+/// The same of a candidate. Where no bit of a code would be seen at the size of data sheets, the search is among up to 36, and the best of
+/// so many nothings is worth 7.
+fn price(candidate: &Candidate) -> f64 {
+    match candidate.reads_code() && candidate.excited.is_empty() {
+        true => COEFFICIENT + 2.0 * (candidate.offered.len().max(1) as f64).ln(),
+        false => COEFFICIENT,
+    }
+}
 
 /// Score by which an effect has to be better to take the place of one that was chosen before it, and how often at most.
 const EXCHANGED: f64 = 1.0;

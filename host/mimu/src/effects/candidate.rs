@@ -179,7 +179,7 @@ impl Candidate {
 
     /// The excited coefficients that are like one of the active ones, on another axis. What moves one axis moves the others too: their
     /// coefficients are found with it however small they are, as the intervals of the calibration would be too narrow without.
-    pub(crate) fn siblings(&self) -> Vec<usize> {
+    pub fn siblings(&self) -> Vec<usize> {
         let Kind::Effect(e) = &self.kind else {
             return Vec::new();
         };
@@ -191,14 +191,14 @@ impl Candidate {
     }
 
     /// By how much coefficients of `values` beyond the size of data sheets speak against it, in units of the deviance: a size is believed
-    /// to be log-normal, and each factor of ten is one sigma.
+    /// to be log-normal, and a factor of ten is two sigmas.
     pub(crate) fn unlikely(&self, values: &[f64]) -> f64 {
         let Kind::Effect(e) = &self.kind else {
             return 0.0;
         };
         let each = self.active.iter().zip(values).map(|(k, value)| {
             let ratio = value.abs() / e.coefficients[*k].typical;
-            ratio.log10().max(0.0).powi(2)
+            (2.0 * ratio.log10().max(0.0)).powi(2)
         });
         each.sum()
     }
@@ -326,6 +326,20 @@ impl Candidate {
             }
             _ => all,
         }
+    }
+
+    /// Of errors by the code, with the values of its active coefficients: the scale factor that its bits add up to, where each is worth half of
+    /// the one before; the largest of its converters.
+    pub(crate) fn share_of_scale(&self, values: &[f64]) -> f64 {
+        let weight = |bit: usize| 0.5_f64.powi(bit as i32);
+        let all: f64 = (0..BITS).map(|bit| weight(bit).powi(2)).sum();
+        let mut sums = [0.0; 4];
+        for (k, value) in self.active.iter().zip(values) {
+            sums[k / BITS] += value * weight(k % BITS) / all;
+        }
+        let [common, own @ ..] = sums;
+        let each = own.map(|own| (common + own).abs());
+        each.into_iter().fold(0.0, f64::max)
     }
 
     /// Name and unit of each of its active coefficients.

@@ -236,7 +236,9 @@ impl ByPoses<'_> {
             // A fit that runs away from a cap of poses has nothing wrong with its columns.
             Failure::NoSolution(_) => Failure::Undetermined {
                 parameters: "scale factors and biases of the accelerometer".into(),
-                add: format!("add poses with {faces} up, which there are none of, and between"),
+                add: format!(
+                    "add poses with {faces} up, which there are none of, and between; if there were such poses, look for wrong columns"
+                ),
             },
         }
     }

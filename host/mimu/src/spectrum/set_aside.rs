@@ -3,6 +3,7 @@
 use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 
 use super::flatten::{Cut, flatten};
+use super::line::Line;
 use super::search::{Band, Resolution, Search, line_width_hz};
 use super::sinusoid::{Sinusoid, subtract, transform};
 use super::transform::Transform;
@@ -19,25 +20,6 @@ const MUCH: f64 = 2.0;
 const BESIDE_IT: f64 = 0.1;
 /// Standard deviations of its amplitude by which a sinusoid exceeds what the noise has.
 const CERTAIN: f64 = 4.0;
-
-/// What stands above the floor of a spectrum.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Line {
-    /// Frequency, Hz: of a bump, that with half of its power below.
-    pub frequency_hz: f64,
-    /// Band that holds the middle half of its power, Hz; `None` for a steady sinusoid, which is narrower than the record can tell.
-    pub width_hz: Option<f64>,
-    /// Effective value, unit of the series; of a bump, within [`Line::band_hz`].
-    pub rms: f64,
-    /// Ends of the confidence interval of it.
-    pub interval: [f64; 2],
-    /// Highest density over that of the floor, at the resolution of [`Line::resolution_hz`].
-    pub above_floor: f64,
-    /// Noise bandwidth of the spectrum that it was found in, Hz: a steady line stands the higher the finer it is.
-    pub resolution_hz: f64,
-    /// Band within which it was set aside, Hz.
-    pub band_hz: [f64; 2],
-}
 
 /// A series without its lines.
 #[derive(Debug, Clone, PartialEq)]

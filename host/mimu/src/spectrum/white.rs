@@ -6,8 +6,8 @@
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 
+use super::line::Line;
 use super::search::FINEST;
-use super::set_aside::Line;
 use super::welch::{BIN_OVERLAP, Welch, fast_length};
 
 /// Means of the spectrum in an octave.

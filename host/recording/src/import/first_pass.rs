@@ -3,8 +3,9 @@
 use std::path::Path;
 
 use super::assignment::{ColumnList, Scale};
-use super::foreign::{ForeignFile, HowToRead, Row};
+use super::foreign::{ForeignFile, HowToRead};
 use super::ros::is_bag;
+use super::row::Row;
 use super::time::{Known, Stamps, Times};
 use crate::columns::Column;
 use crate::error::Result;

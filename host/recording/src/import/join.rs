@@ -1,6 +1,7 @@
 //! Joining a later file onto the times of the first one.
 
-use super::foreign::{ForeignFile, Row};
+use super::foreign::ForeignFile;
+use super::row::Row;
 use crate::error::{Error, Result};
 
 /// Two stamps nearer than this part of a sample period are the same instant.

@@ -13,6 +13,7 @@ mod plausibility;
 mod pose_means;
 mod preset;
 mod ros;
+mod row;
 mod step_labels;
 #[cfg(test)]
 mod tests;
@@ -30,9 +31,10 @@ pub use preset::{Chosen, Preset, PresetUse};
 pub use ros::is_bag;
 pub use time::{Decimal, Jitter, TimeSummary};
 
-use foreign::{ForeignFile, HowToRead, Row};
+use foreign::{ForeignFile, HowToRead};
 use join::{Follower, Joined, check_order};
 use options::file_name;
+use row::Row;
 use serde::Serialize;
 use time::Times;
 

@@ -1,6 +1,6 @@
 //! Readings that no sensor makes: zeros that only fill a row, and temperatures that are none.
 
-use super::foreign::Row;
+use super::row::Row;
 use crate::columns::Column;
 use crate::columns::RAW_COLUMNS;
 use crate::error::{Argument, Error, Result};

@@ -55,7 +55,7 @@ fn what_only_its_owner_can_judge_is_a_warning() {
                 scale(s, "accel", 1.0 / 1640.0);
                 scale(s, "gyro", 180.0 / PI / 5000.0);
             },
-            &["gyro: raw_unit = \"SI\"", "it is in deg/s"],
+            &["gyro: raw_unit = \"SI\"", "they are in deg/s"],
         ),
         (
             "counts for SI",

@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use crate::diagnose::rows::Rows;
-use crate::diagnose::search::{EXCITED, SEPARATE, Search};
+use crate::diagnose::search::{EXCITED, LARGEST, SEPARATE, Search};
 use crate::effects;
 use crate::effects::candidate::{Candidate, Kind};
 use crate::effects::regressor::{Product, Regressor};
@@ -55,13 +55,14 @@ pub(super) fn candidates(
                 }
             }
         }
-        candidate.active.retain(|k| best[*k] > 0.0);
+        let sigmas = |k: &usize| best[*k] * effect.coefficients[*k].typical;
+        candidate.active.retain(|k| sigmas(k) > EXCITED / LARGEST);
         if !candidate.reads_code() && candidate.parameter().is_none() {
             let white = whitener.whiten(&candidate.columns(rows, 0.0));
             separate(&mut candidate, &(&white - &q * q.tr_mul(&white)));
         }
-        let typical = |k: &usize| best[*k] * effect.coefficients[*k].typical > EXCITED;
-        candidate.excited = candidate.active.iter().copied().filter(typical).collect();
+        let shown = |k: &usize| sigmas(k) > EXCITED;
+        candidate.excited = candidate.active.iter().copied().filter(shown).collect();
         if candidate.excited.is_empty() {
             not_seen();
         }

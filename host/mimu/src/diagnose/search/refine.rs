@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use super::{COEFFICIENT, Columns, Search, beside, independent_of, unit_columns};
+use super::{Columns, Search, beside, independent_of, price, unit_columns};
 use crate::diagnose::variance::{By, Components, Fitted};
 use crate::effects::candidate::Candidate;
 use crate::effects::effect::NonlinearParameter;
@@ -14,9 +14,11 @@ pub(super) struct Beside<'a> {
     pub null: &'a Fitted,
 }
 
-/// Sine of the least angle between a code and what the affine parameters span. The first four bits have one of 0.06 to a straight line, as
-/// they leave a sixteenth of the range; five have 0.03.
-const CLEAR: f64 = 0.05;
+/// Share of the scale factor that the bits of a code may add up to.
+///
+/// All bits together are the reading, which the scale factor is the coefficient of: a fit that takes the reading away with nine bits leaves a
+/// unit that reads nothing, whatever its input, and no residual. Bits of data sheets have 2e-4.
+const OF_SCALE: f64 = 0.1;
 
 /// A candidate beside it.
 #[derive(Clone)]
@@ -30,8 +32,8 @@ pub(super) struct With {
 }
 
 impl With {
-    fn score(&self) -> f64 {
-        self.drop - COEFFICIENT * self.columns.ncols() as f64
+    fn score(&self, candidate: &Candidate) -> f64 {
+        self.drop - price(candidate) * self.columns.ncols() as f64
     }
 }
 
@@ -109,12 +111,9 @@ impl Beside<'_> {
     pub fn bits(&self, from: &Candidate) -> Option<(Candidate, With)> {
         let conditions = self.search.freed(&self.model, self.null);
         let all = self.search.bits(from, &conditions)?;
-        let columns = from.columns_of(&all);
-        if !self.is_clear(&columns) {
-            return None;
-        }
-        let first = self.fit(columns, &self.null.components)?;
-        self.choice(from, &all, first)
+        let first = self.fit(from.columns_of(&all), &self.null.components)?;
+        let found = self.choice(from, &all, first)?;
+        (found.0.share_of_scale(&found.1.values) < OF_SCALE).then_some(found)
     }
 
     /// Another effect with the best choice of its coefficients at a value of its nonlinear parameter, from `start` on.
@@ -149,35 +148,17 @@ impl Beside<'_> {
                 // By the noise so far: by its own it could only be better.
                 let both = beside(&self.model, &unit_columns(&columns));
                 let fitted = self.search.variance.fit_at(&both, &best.1.components)?;
-                let score = -fitted.deviance - COEFFICIENT * other.active.len() as f64;
+                let score = -fitted.deviance - price(&other) * other.active.len() as f64;
                 Some((other, score))
             });
-            let mut toggled: Vec<(Candidate, f64)> = toggled.collect();
-            toggled.sort_by(|a, b| b.1.total_cmp(&a.1));
-            let clear = |c: &Candidate| !c.reads_code() || self.is_clear(&c.columns_of(all));
-            let Some((other, _)) = toggled.into_iter().find(|t| clear(&t.0)) else {
+            let Some((other, _)) = toggled.max_by(|a, b| a.1.total_cmp(&b.1)) else {
                 return Some(best);
             };
             let with = self.fit(other.columns_of(all), &best.1.components)?;
-            if with.score() <= best.1.score() {
+            if with.score(&other) <= best.1.score(&best.0) {
                 return Some(best);
             }
             best = (other, with);
         }
-    }
-
-    /// Whether no sum of `columns` is nearly one of the affine columns.
-    ///
-    /// All bits of a code together are the reading, which the scale factor is the coefficient of: a fit that takes it away with nine bits
-    /// leaves a unit that reads nothing, whatever its input, and no residual.
-    fn is_clear(&self, columns: &DMatrix<f64>) -> bool {
-        let variance = &self.search.variance;
-        let Some(whitener) = variance.whitener(&self.null.components) else {
-            return false;
-        };
-        let affine = whitener.whiten(&self.search.basis).qr().q();
-        let own = whitener.whiten(&unit_columns(columns)).qr().q();
-        let cosine = affine.tr_mul(&own).singular_values().max();
-        1.0 - cosine * cosine > CLEAR * CLEAR
     }
 }

@@ -4,7 +4,8 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use super::regular::{Gap, Irregular, Jitter, Regular};
+use super::gap::{Gap, Jitter};
+use super::regular::{Irregular, Regular};
 use super::stamp::{Decimal, Seen, Stamp, Unit};
 use crate::error::{Argument, Error, Result};
 

@@ -3,7 +3,7 @@
 //! Loggers that lose samples, or that record in bursts with pauses, write stamps that need no mending. A line through the count of
 //! samples would smear what is missing over all of them: a flight log with steps of 4 and 8 ms became 188.5 Hz with stamps off by 17 ms.
 
-use super::regular::{Gap, Jitter, STALL_S, quantile};
+use super::gap::{Gap, Jitter, STALL_S, quantile};
 
 /// How far a step may be from a multiple of the period, in periods. Stamps in ms of a sensor at 60 Hz are off by 0.06, and stamps of
 /// samples that were handed over late by much more.

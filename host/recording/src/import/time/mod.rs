@@ -1,12 +1,13 @@
 //! The time of foreign rows: the unit of their stamps, and the regular time behind them.
 
 mod clock;
+mod gap;
 mod grid;
 mod regular;
 mod stamp;
 
 pub use clock::TimeSummary;
-pub use regular::Jitter;
+pub use gap::Jitter;
 pub use stamp::Decimal;
 
 pub(super) use clock::{Clock, Known, Stamps, Times};

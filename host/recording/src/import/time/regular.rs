@@ -8,8 +8,7 @@
 //! can be known of them is known there: what their unit is, and whether rows are repeated. A recording says when its samples were taken, so that
 //! whatever reads one agrees on its gaps; and what our own device has recorded has exact stamps, which nothing should touch.
 
-use serde::Serialize;
-
+use super::gap::{Gap, Jitter, STALL_S, quantile};
 use super::grid::{self, Steps};
 
 /// A step that is longer than this many periods may hide missing samples.
@@ -20,8 +19,6 @@ const QUANTILE: f64 = 0.25;
 const WINDOW: std::ops::RangeInclusive<usize> = 8..=2048;
 /// Samples in a window for each period of jitter.
 const WINDOW_PER_JITTER: f64 = 48.0;
-/// A stall that is caught up within this time is jitter, s.
-pub(super) const STALL_S: f64 = 5.0;
 /// Share of later samples that may come back to the time before a gap.
 const BACK: f64 = 0.25;
 /// Missing samples that windows show, at least; single ones are told from jitter as long as it varies by less.
@@ -40,24 +37,6 @@ const STRETCH: usize = 64;
 const SAMPLED: usize = 20_000;
 /// And from a window.
 const MOST: usize = 512;
-
-/// Samples that never came.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in super::super) struct Gap {
-    /// Row that comes after them, from 0.
-    pub row: u64,
-    /// How many they are.
-    pub missing: u64,
-}
-
-/// How far stamps are from the regular time, s.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
-pub struct Jitter {
-    /// Root of the mean square.
-    pub rms_s: f64,
-    /// Largest.
-    pub max_s: f64,
-}
 
 /// Regular times of the rows of a file.
 #[derive(Debug, Clone, PartialEq)]
@@ -226,12 +205,6 @@ fn numbers(rows: usize, gaps: &[Gap]) -> Vec<u64> {
         row + missing
     };
     (0..rows as u64).map(number).collect()
-}
-
-/// The `share` quantile of some values; reorders them.
-pub(super) fn quantile(values: &mut [f64], share: f64) -> f64 {
-    let at = ((values.len() - 1) as f64 * share) as usize;
-    *values.select_nth_unstable_by(at, f64::total_cmp).1
 }
 
 /// The time between samples by the stamps alone, to a part in a thousand.
