@@ -201,7 +201,7 @@ fn a_quadratic_of_five_per_cent_on_a_table_comes_alone_and_at_its_size() {
     }
 }
 
-/// A drift of data sheets would not be seen in three minutes, and is no candidate; these two units drift by a little more.
+/// A drift of data sheets would not be seen in three minutes; these units drift by a little more.
 #[test]
 fn what_describes_a_weak_drift_by_hand_is_named_with_the_drift() {
     for (id, seed) in [("accel_bias_drift", 18), ("gyro_bias_drift", 10)] {

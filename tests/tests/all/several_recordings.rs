@@ -173,7 +173,7 @@ fn a_chamber_that_only_cools_cannot_tell_temperature_from_time() {
             || id.contains("time")
             || id.contains("warm")
     };
-    assert!(!gyro.accepted.is_empty());
+    assert!(!gyro.accepted.is_empty(), "{:?}", gyro.rejected);
     for a in &gyro.accepted {
         assert!(of_slow(&a.chosen.candidate.id()));
     }

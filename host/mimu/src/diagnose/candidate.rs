@@ -29,8 +29,8 @@ impl Candidate {
     /// The candidates that it is tried as. The search goes on from the best of these, and adds or drops [offered](Self::offered)
     /// coefficients.
     ///
-    /// Of the bits of a code each by itself, and the first few together. Of other effects the coefficients that are [excited](Self::excited), and
-    /// all that the rows can tell; both with the coefficients that are specific to the recording, and without. A thermal effect is tried
+    /// Of the bits of a code each by itself, and the first few together. Of other effects the coefficients that are [excited](Self::excited),
+    /// all that the rows can tell, and each by itself; with the coefficients that are specific to the recording, and without. A thermal effect is tried
     /// with and without the thermometer's self-heating.
     pub fn variants(mut self, rows: &Rows) -> Vec<Self> {
         // Bits that would not be seen at the size of data sheets are offered where none would be: among many nothings one is always near.
@@ -52,6 +52,12 @@ impl Candidate {
         let mut all = vec![self.clone()];
         if !self.excited.is_empty() && self.excited.len() < self.active.len() {
             all.push(with(&self, self.excited.clone()));
+        }
+        // Each by itself, as a product found from the data would be.
+        if self.active.len() > 1 {
+            let alone = self.active.iter().filter(|k| self.rests_on(**k).is_none());
+            let alone: Vec<Self> = alone.map(|k| with(&self, vec![*k])).collect();
+            all.extend(alone);
         }
         for k in 0..all.len() {
             let mut whole = all[k].clone();

@@ -211,10 +211,14 @@ pub fn decide(
     let judge = Acceptance::new(&search, unseen, &null);
     let usual = judge.usual;
     let mut suggested = Vec::new();
+    // Ids that failed, in order: what failed beside another that failed later is tried once more without it.
+    let mut failures: Vec<String> = Vec::new();
     loop {
         let ids =
             |all: &[Chosen]| -> Vec<String> { all.iter().map(|c| c.candidate.id()).collect() };
         let mut failed_any = false;
+        // Judged is what would be written.
+        search.complete(&mut kept, &mut with);
         // What does not hold out goes, the one with the smallest drop in deviance first.
         while let Some(failed) = judge.first_to_fail(&kept, &with)? {
             failed_any = true;
@@ -226,6 +230,8 @@ pub fn decide(
             {
                 not_excited.push((effect.id.into(), effect.needs.into()));
             }
+            failures.push(candidate.id());
+            rejected.retain(|r| r.0 != candidate.id());
             rejected.push((candidate.id(), failed.why));
             with = search.fit(&kept)?;
         }
@@ -238,14 +244,18 @@ pub fn decide(
         // What a suggestion or a rejected effect had explained, another effect with a name may explain as well. An accelerometer's warm-up of
         // p < 1e-6 was reported as not significant, since what had taken its place in the search was rejected afterwards.
         let more = search.beside(kept.clone(), |c| {
-            c.is_listed() && !rejected.iter().any(|r| r.0 == c.id())
+            let id = c.id();
+            let times = failures.iter().filter(|f| **f == id).count();
+            let beside_others = times == 1 && failures.last() != Some(&id);
+            let tried = without.iter().any(|w| w.0 == id) || times > 0;
+            c.is_listed() && (!tried || beside_others)
         })?;
         if ids(&more.chosen) == ids(&kept) {
             break;
         }
         (kept, with) = (more.chosen, more.fit);
     }
-    search.complete(&mut kept, &mut with);
+    rejected.retain(|r| kept.iter().all(|k| k.candidate.id() != r.0));
     nonlinear::refine(&search, &mut kept, &mut with);
     others_in_time(&search, &mut kept, &with);
     let one_at_these_inputs = together(&search, &mut kept, &with);

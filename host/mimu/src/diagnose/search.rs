@@ -250,21 +250,48 @@ impl<'a> Search<'a> {
         self.by_dwell.conditions_without(&left)
     }
 
-    /// Adds the [siblings](Candidate::siblings) of the coefficients of each chosen effect, where the rows determine them.
+    /// Adds the [siblings](Candidate::siblings) of the coefficients of each chosen effect, as far as the rows would show them at the size of data
+    /// sheets beside all others.
     pub fn complete(&self, chosen: &mut [Chosen], now: &mut Fitted) {
         for k in 0..chosen.len() {
             let before = chosen[k].clone();
-            let more = before.candidate.siblings();
-            if before.candidate.reads_code() || more.is_empty() {
+            let Kind::Effect(effect) = before.candidate.kind else {
+                continue;
+            };
+            let mut more = before.candidate.siblings();
+            if before.candidate.reads_code() {
                 continue;
             }
-            let one = &mut chosen[k];
-            one.candidate.active.extend(more);
-            one.candidate.active.sort_unstable();
-            one.columns = one.candidate.columns(self.rows, one.parameter);
-            match self.fit(chosen) {
-                Some(fit) => *now = fit,
-                None => chosen[k] = before,
+            let first: usize = chosen[..k].iter().map(|c| c.columns.ncols()).sum();
+            while !more.is_empty() {
+                let one = &mut chosen[k];
+                one.candidate.active = [&before.candidate.active[..], &more[..]].concat();
+                one.candidate.active.sort_unstable();
+                one.columns = one.candidate.columns(self.rows, one.parameter);
+                let active = one.candidate.active.clone();
+                let fit = self.fit(chosen);
+                let open = fit.as_ref().map(|fit| {
+                    let sigma = |at: usize| {
+                        let place = self.basis.ncols() + first + at;
+                        fit.covariance[(place, place)].sqrt()
+                    };
+                    let ratio = |k: &usize| {
+                        let at = active.binary_search(k).unwrap_or(0);
+                        EXCITED * sigma(at) / effect.coefficients[*k].typical
+                    };
+                    let each = more.iter().map(|k| (*k, ratio(k)));
+                    each.filter(|e| !(e.1 < 1.0))
+                        .max_by(|a, b| a.1.total_cmp(&b.1))
+                });
+                match (fit, open) {
+                    (Some(fit), Some(None)) => {
+                        *now = fit;
+                        break;
+                    }
+                    (Some(_), Some(Some((worst, _)))) => more.retain(|k| *k != worst),
+                    _ => more.clear(),
+                }
+                chosen[k] = before.clone();
             }
         }
     }

@@ -95,7 +95,12 @@ pub(super) fn fit_gravity(
             of: &part_of,
             accel_without: &without,
         };
-        sensors.extend(fit_turns(prepared, &accel, &parts, warnings)?);
+        let turns = fit_turns(prepared, &accel, &parts, warnings);
+        // An accelerometer that only the turns determined, and turns that determine no gyro: what is wrong is in the poses.
+        if let (Err(_), Some(_), Err(failure)) = (&turns, &with_turns, by_poses.alone()) {
+            return Err(prepared.refused(by_poses.with_faces(failure), Sensor::Accel));
+        }
+        sensors.extend(turns?);
     }
     let mut fit = finish(
         Sensor::Accel,
@@ -219,6 +224,11 @@ impl ByPoses<'_> {
             gravity: self.gravity(),
         }
         .estimate()
+    }
+
+    /// The accelerometer by the magnitude of gravity in its poses.
+    fn alone(&self) -> Outcome<Estimated> {
+        gravity_size::estimate(self.poses, self.variances, self.gravity())
     }
 
     /// `failure`, naming the faces that no pose had up.

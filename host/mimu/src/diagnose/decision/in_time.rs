@@ -1,8 +1,7 @@
 //! Effects of time and temperature that do as well as an accepted one.
 //!
-//! The search lists with an effect the finalists that would have done nearly as well. A drift of the size of data sheets is not seen in three
-//! minutes, and is then no candidate; one of twice that size is, and an exponential warm-up describes it: of sixty units by hand with a drift of
-//! about the noise five were reported to warm up, and to do nothing else.
+//! The search lists with an effect the finalists that would have done nearly as well when it was found. What is found later, and the refined
+//! parameters, change how well the others do.
 
 use nalgebra::DMatrix;
 
