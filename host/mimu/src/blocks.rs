@@ -543,10 +543,10 @@ impl Condenser {
         } else if odd <= GAP_SHARE {
             (
                 format!(
-                    "samples are missing in {:.0} % of the time steps at {rate} Hz, so that hardly any motion is without a gap: the first step is {dt:.6} s",
+                    "samples are missing in {:.0} % of the time steps at {rate} Hz, or the rate is mixed: the first such step is {dt:.6} s, and hardly any motion is without one",
                     100.0 * share
                 ),
-                "record it without losses, or fill the gaps before it is imported",
+                "record it without losses, or resample to one rate",
             )
         } else {
             (

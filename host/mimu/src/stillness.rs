@@ -180,11 +180,12 @@ pub(crate) fn find(
 
 /// Samples in so many bursts at least are a way of recording, and no loss of samples.
 const BURSTS: usize = 20;
-/// Longest burst and shortest pause between two, s, of most.
-const BURST_S: f64 = 10.0;
+/// Longest burst and shortest pause between two, s, of most. Longer bursts show by themselves that they are still, and are dwells: taken
+/// together, 25 bursts of 5 s in a chamber that cools were four dwells whose noise was their drift.
+const BURST_S: f64 = 2.0;
 const PAUSE_S: f64 = 1.0;
 
-/// Whether samples were taken in bursts of some seconds, with pauses. A burst alone may be too short to show that it is still; with
+/// Whether samples were taken in short bursts, with pauses. A burst alone may be too short to show that it is still; with
 /// its neighbours it is as long as any.
 fn in_bursts(blocks: &[Block]) -> bool {
     let starts = (1..blocks.len()).filter(|i| blocks[*i].after_gap);

@@ -88,6 +88,10 @@ impl Candidate {
                 active.retain(|k| self.rests_on(*k) != Some(coefficient));
             }
             Err(at) => {
+                // What is specific to the recording is a variant by itself: it is all or none.
+                if self.of_recording().contains(&coefficient) {
+                    return None;
+                }
                 let base = self.rests_on(coefficient);
                 if base.is_some_and(|base| active.binary_search(&base).is_err()) {
                     return None;

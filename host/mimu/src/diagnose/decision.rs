@@ -213,6 +213,8 @@ pub fn decide(
     let mut suggested = Vec::new();
     // Ids that failed, in order: what failed beside another that failed later is tried once more without it.
     let mut failures: Vec<String> = Vec::new();
+    // Ids that passed: beside suggestions, which take up what would otherwise hide an effect from dwells that are held out.
+    let mut passed: Vec<String> = Vec::new();
     loop {
         let ids =
             |all: &[Chosen]| -> Vec<String> { all.iter().map(|c| c.candidate.id()).collect() };
@@ -220,7 +222,7 @@ pub fn decide(
         // Judged is what would be written.
         search.complete(&mut kept, &mut with);
         // What does not hold out goes, the one with the smallest drop in deviance first.
-        while let Some(failed) = judge.first_to_fail(&kept, &with)? {
+        while let Some(failed) = judge.first_to_fail(&kept, &with, &passed)? {
             failed_any = true;
             let candidate = kept.remove(failed.at).candidate;
             // More dwells may prove it: it is asked for in the next experiment.
@@ -235,6 +237,7 @@ pub fn decide(
             rejected.push((candidate.id(), failed.why));
             with = search.fit(&kept)?;
         }
+        passed = ids(&kept);
         let set_aside = judge.suggestions(&mut kept, &with, accept);
         if set_aside.is_empty() && !failed_any {
             break;

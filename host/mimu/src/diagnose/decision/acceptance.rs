@@ -111,12 +111,18 @@ impl<'a> Acceptance<'a> {
         }
     }
 
-    /// The last of the `kept` that is not accepted; the outer `None` where a model is singular.
-    pub fn first_to_fail(&self, kept: &[Chosen], with: &Fitted) -> Option<Option<Failed>> {
+    /// The last of the `kept` that is not accepted, but for those with an id of the `passed`; the outer `None` where a model is singular.
+    pub fn first_to_fail(
+        &self,
+        kept: &[Chosen],
+        with: &Fitted,
+        passed: &[String],
+    ) -> Option<Option<Failed>> {
         let seconds = self.elsewhere(kept, &shares(self.search, kept, with));
         let (weights, split) = self.common(kept, with);
         let with_all = self.held(kept, with, split);
-        for at in (0..kept.len()).rev() {
+        let open = |at: &usize| !passed.contains(&kept[*at].candidate.id());
+        for at in (0..kept.len()).rev().filter(open) {
             let mut rest = kept.to_vec();
             rest.remove(at);
             let without = self.search.fit(&rest)?;

@@ -31,12 +31,6 @@ pub(super) struct With {
     components: Components,
 }
 
-impl With {
-    fn score(&self, candidate: &Candidate) -> f64 {
-        self.drop - price(candidate) * self.columns.ncols() as f64
-    }
-}
-
 impl Beside<'_> {
     fn fit(&self, columns: DMatrix<f64>, start: &Components) -> Option<With> {
         let both = beside(&self.model, &unit_columns(&columns));
@@ -138,6 +132,12 @@ impl Beside<'_> {
         start: With,
     ) -> Option<(Candidate, With)> {
         let mut best = (from.clone(), start);
+        // The fewer rows are left, the more a coefficient of nothing takes out of them (Akaike's correction for few rows).
+        let (rows, model) = (self.search.rows.y.len() as f64, self.model.ncols() as f64);
+        let cost = |c: &Candidate| {
+            let count = c.active.len() as f64;
+            price(c) * count * rows / (rows - model - count - 1.0).max(0.1)
+        };
         loop {
             let toggled = from.offered.iter().filter_map(|&coefficient| {
                 let other = best.0.toggled(coefficient)?;
@@ -148,14 +148,14 @@ impl Beside<'_> {
                 // By the noise so far: by its own it could only be better.
                 let both = beside(&self.model, &unit_columns(&columns));
                 let fitted = self.search.variance.fit_at(&both, &best.1.components)?;
-                let score = -fitted.deviance - price(&other) * other.active.len() as f64;
+                let score = -fitted.deviance - cost(&other);
                 Some((other, score))
             });
             let Some((other, _)) = toggled.max_by(|a, b| a.1.total_cmp(&b.1)) else {
                 return Some(best);
             };
             let with = self.fit(other.columns_of(all), &best.1.components)?;
-            if with.score(&other) <= best.1.score(&best.0) {
+            if with.drop - cost(&other) <= best.1.drop - cost(&best.0) {
                 return Some(best);
             }
             best = (other, with);
