@@ -19,7 +19,7 @@ pub struct FlawsTruth {
     pub stamp_jitter_s: f64,
     /// So many samples are fetched at once, and stamped at once; 1 is none.
     pub stamp_burst: u32,
-    /// Share of the samples that the recording has lost, each by itself; the time stamps of the others are right.
+    /// Share of the samples that the recording has lost, drawn one at a time; the time stamps of the others are right.
     pub lost_share: f64,
     /// After so many samples the logger pauses and records none; 0 is never.
     pub pause_after: u32,

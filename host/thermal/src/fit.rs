@@ -58,7 +58,7 @@ pub struct Options {
 /// in the means of half a minute.
 const MISFIT: f64 = 10.0;
 
-/// Whether lag and slope are told apart, and the curves describe the readings.
+/// Whether the recording distinguishes lag and slope, and the curves describe the readings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verdict {
     /// Heating and cooling, or plateaus, tell them apart.

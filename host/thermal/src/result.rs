@@ -28,7 +28,7 @@ pub struct ThermalResult {
     pub recordings: Vec<RecordingResult>,
     /// How it was estimated.
     pub estimator: &'static str,
-    /// `fitted`; `one-way` where lag and slope cannot be told apart; `misfit` where the errors of the dwells are far beyond noise.
+    /// `fitted`; `one-way` where the recording cannot distinguish lag and slope; `misfit` where the errors of the dwells are far beyond noise.
     pub verdict: &'static str,
     /// Lowest and highest temperature of the dies, °C.
     pub range_c: [f64; 2],

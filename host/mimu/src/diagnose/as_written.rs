@@ -50,7 +50,7 @@ impl AsWritten<'_> {
         let worse = self.others.iter().find_map(|recording| {
             let (figure, before) = self.error(recording, self.before, &[])?;
             let (_, after) = self.error(recording, after, &all)?;
-            // An error that is not finite is no better.
+            // A file whose error is not finite counts as worse.
             (!(after <= WORSE * before)).then_some((recording, figure, [before, after]))
         });
         let (recording, figure, both) = worse?;

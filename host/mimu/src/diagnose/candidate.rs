@@ -30,7 +30,7 @@ impl Candidate {
     /// coefficients.
     ///
     /// Of the bits of a code each by itself, and the first few together. Of other effects the coefficients that are [excited](Self::excited),
-    /// all that the rows can tell, and each by itself; with the coefficients that are specific to the recording, and without. A thermal effect is tried
+    /// all that the rows can tell, and each alone; with the coefficients that are specific to the recording, and without. A thermal effect is tried
     /// with and without the thermometer's self-heating.
     pub fn variants(mut self, rows: &Rows) -> Vec<Self> {
         // Bits that would not be seen at the size of data sheets are offered where none would be: among many nothings one is always near.
@@ -53,7 +53,7 @@ impl Candidate {
         if !self.excited.is_empty() && self.excited.len() < self.active.len() {
             all.push(with(&self, self.excited.clone()));
         }
-        // Each by itself, as a product found from the data would be.
+        // Each alone, as a product found from the data would be.
         if self.active.len() > 1 {
             let alone = self.active.iter().filter(|k| self.rests_on(**k).is_none());
             let alone: Vec<Self> = alone.map(|k| with(&self, vec![*k])).collect();
@@ -88,7 +88,7 @@ impl Candidate {
                 active.retain(|k| self.rests_on(*k) != Some(coefficient));
             }
             Err(at) => {
-                // What is specific to the recording is a variant by itself: it is all or none.
+                // `variants` adds the coefficients that are specific to the recording, all of them together.
                 if self.of_recording().contains(&coefficient) {
                     return None;
                 }

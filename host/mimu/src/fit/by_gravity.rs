@@ -247,7 +247,7 @@ impl ByPoses<'_> {
             Failure::NoSolution(_) => Failure::Undetermined {
                 parameters: "scale factors and biases of the accelerometer".into(),
                 add: format!(
-                    "add poses with {faces} up, which there are none of, and between; if there were such poses, look for wrong columns"
+                    "add poses with {faces} up, which no pose shows, and between; if such poses were recorded, look for wrong columns"
                 ),
             },
         }

@@ -165,7 +165,7 @@ fn outliers(prepared: &Prepared, fit: &SensorFit) -> Option<String> {
     ))
 }
 
-/// A gain of readings in SI from which on, or below one over it, it is no error of a sensor: parts are within ten per cent.
+/// Readings in SI with a gain beyond this, or below its inverse, have a wrong unit or time base: sensors are within ten per cent.
 const GAIN: f64 = 1.3;
 
 /// What claims to be in SI reads about what it measures.

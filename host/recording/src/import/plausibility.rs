@@ -56,7 +56,7 @@ impl Plausibility {
         all
     }
 
-    /// Whether `row` is no reading: padding of a buffer, or a time at which nothing was connected. Looks at its temperature as well.
+    /// Whether `row` is padding: of a buffer, or of a time at which nothing was connected. Looks at its temperature as well.
     ///
     /// An accelerometer whose three axes are exactly 0 has measured nothing, as gravity is always there. A gyro at rest may well read 0, so that
     /// by itself it is taken for padding only where the time stamp is 0 too, after others that are not.

@@ -307,7 +307,7 @@ mod tests {
         let four = |last: f64| -> Vec<Row> {
             let errors = [1.0, -1.0, 0.8, -0.8, last];
             let all = errors.iter().map(|e| row(*e, [1.0, 0.0], 1e-4));
-            // The second parameter is held by rows of its own.
+            // Other rows determine the second parameter.
             let other = [0.01, -0.01].map(|e| row(e, [0.0, 1.0], 1e-4));
             other.into_iter().chain(all).collect()
         };
