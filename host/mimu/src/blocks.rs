@@ -8,6 +8,7 @@
 use crate::increment::{Increment, Integrator};
 use crate::quantity::plural;
 use crate::reading_step::StepFinder;
+use crate::signed_low_byte;
 use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{Batch, Column, RAW_COLUMNS, Recording};
 
@@ -231,6 +232,8 @@ pub struct Condensed {
     pub rows: u64,
     /// Step that the readings of each raw channel are multiples of, raw; `None` where they are not in steps.
     pub reading_step: [Option<f64>; 6],
+    /// Of each raw channel: pairs of samples that show a [low byte taken for a signed number](crate::signed_low_byte).
+    pub signed_low_byte: [Option<u64>; 6],
     /// Which of the six raw channels the recording has.
     pub has_raw: [bool; 6],
     /// Which of the six reference channels the recording has.
@@ -305,6 +308,7 @@ struct Condenser {
     integrator: Option<Integrator>,
     steps: Steps,
     reading_steps: [StepFinder; 6],
+    signed_low_bytes: [signed_low_byte::Finder; 6],
     out: Condensed,
 }
 
@@ -335,11 +339,13 @@ impl Condenser {
             integrator: integrate.then(|| Integrator::new(period_s)),
             steps: Steps::default(),
             reading_steps: Default::default(),
+            signed_low_bytes: Default::default(),
             out: Condensed {
                 blocks: Vec::new(),
                 increments: Vec::new(),
                 rows: 0,
                 reading_step: [None; 6],
+                signed_low_byte: [None; 6],
                 has_raw: [false; 6],
                 has_reference: [false; 6],
                 has_steps: false,
@@ -499,6 +505,7 @@ impl Condenser {
             if !column.is_empty() {
                 raw[c] = Moments::of(column);
                 self.reading_steps[c].push(column);
+                self.signed_low_bytes[c].push(column);
                 self.out.missing[c] += column.len() as u64 - u64::from(raw[c].n);
             }
         }
@@ -624,6 +631,7 @@ impl Condenser {
             out.increments.extend(integrator.take());
         }
         out.reading_step = self.reading_steps.map(StepFinder::find);
+        out.signed_low_byte = self.signed_low_bytes.map(|finder| finder.find());
         Ok(self.out)
     }
 }

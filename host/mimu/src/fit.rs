@@ -138,6 +138,7 @@ pub fn fit(mut prepared: Prepared, options: Options) -> Result<Fit> {
         )
         .about(Argument::Only));
     }
+    plausible::check_readings(&prepared)?;
     let with_all = match prepared.manifest.reference {
         Reference::Gravity => outlying::leave_out(&mut prepared),
         Reference::Table => Default::default(),

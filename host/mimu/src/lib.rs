@@ -7,6 +7,7 @@
 //! | [`rails`], [`stillness`], [`rest`], [`dwell`] | which samples and which stretches can be averaged           |
 //! | `course`, `contrast` | a known input that moves within a dwell, and what the dwell then shows beside its mean |
 //! | [`reading_step`] | the step that readings are multiples of                                       |
+//! | [`signed_low_byte`] | a firmware that takes the low byte of a reading for a signed number        |
 //! | [`noise`]       | how well a dwell mean is known                                                |
 //! | [`prepared`]    | all of these for one recording                                                |
 //! | [`pose_means`]  | the same of a table of means, without samples                                 |
@@ -96,6 +97,7 @@ pub mod readable;
 pub mod reading_step;
 pub mod rest;
 pub mod result;
+pub mod signed_low_byte;
 pub mod spectrum;
 pub mod stillness;
 pub mod survey;

@@ -35,6 +35,7 @@ impl Prepared {
             increments: Vec::new(),
             rows: means.poses.len() as u64,
             reading_step: [None; 6],
+            signed_low_byte: [None; 6],
             has_raw,
             has_reference: means.columns.reference,
             has_steps: true,

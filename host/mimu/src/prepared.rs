@@ -235,6 +235,13 @@ impl Prepared {
         self.manifest.power_on_s.unwrap_or_else(first)
     }
 
+    /// Middle of its dwells, s: what is found without regard to time belongs to it.
+    pub fn middle_s(&self) -> f64 {
+        let each = self.dwells.list.iter();
+        let sum: f64 = each.map(|d| d.start_s + 0.5 * d.duration_s).sum();
+        sum / self.dwells.list.len().max(1) as f64
+    }
+
     /// Variances of the size of specific force over each of `poses` by noise, (m/s²)².
     pub fn size_variances(&self, accel: &Affine<f64>, poses: &[Observation]) -> Vec<f64> {
         if self.noise.is_by_channel(Sensor::Accel) {

@@ -119,15 +119,13 @@ fn a_diagnosis_that_accepted_thermal_effects_does_not_say_that_the_model_has_no_
     assert!(said(&none)[0].ends_with("and the model has no temperature in it"));
 }
 
-/// Cubics of bias and scale factor, and dies behind the thermometer by 150 s, from -20 to 70 °C and back.
-///
-/// Does not hold at present: the lag is found, and rejected, as blocks of the ramp that are held out err by 0.268 deg/s with it and 0.256 without.
+/// Cubics of bias and scale factor, and dies behind the thermometer by 150 s, from -20 to 70 °C and back: 43 rounds take 6000 s. 20 rounds
+/// show the way up only, on which a lag is a bias, and the held-out blocks reject it.
 #[test]
-#[ignore = "known failure: a lag beside cubics of temperature is rejected by the blocks that are held out"]
 fn what_is_found_from_the_data_does_not_keep_out_a_lag_and_what_is_significant_is_rejected_with_a_reason()
  {
     let ramp = plan(
-        20,
+        43,
         10.0,
         &[
             [0.0, -20.0],

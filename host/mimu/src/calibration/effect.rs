@@ -320,7 +320,7 @@ impl EffectTable {
 /// The candidate of an id, with all of its coefficients.
 pub(super) fn candidate(id: &str) -> Option<Candidate> {
     let Some(term) = id.strip_prefix("term:") else {
-        let effect = effects::by_id(id).filter(|e| e.is_error())?;
+        let effect = effects::by_id(id).filter(|e| e.is_error() && !e.is_of_session())?;
         return Some(Candidate::new(effect.sensor, Kind::Effect(effect)));
     };
     let (of, product) = term.split_once('~')?;

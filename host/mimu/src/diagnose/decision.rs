@@ -69,8 +69,8 @@ pub struct Accepted {
     pub split: Split,
     /// What it does to the second recording, if there is one that can be judged by.
     pub second: Option<Second>,
-    /// Whether it is an error of the unit, which a calibration holds: what goes by the time since power-on is one of the recording alone
-    /// where nobody knows when that was.
+    /// Whether it is an error of the unit, which a calibration holds. A drift is specific to the session, and so is all that depends on the
+    /// time since power-on where nobody knows when that was.
     pub of_unit: bool,
 }
 
@@ -303,7 +303,7 @@ pub fn decide(
                 [Some(without), Some(with)] => Some([without, with]),
                 _ => None,
             },
-            of_unit: one.candidate.is_error(),
+            of_unit: one.candidate.is_error() && !one.candidate.is_of_session(),
         });
         from += count;
     }
@@ -453,6 +453,14 @@ fn notes(rows: &Rows, chosen: &[Chosen]) -> Vec<String> {
     notes.extend(inputs.map(|c| {
         format!(
             "{}: the unit is right to read it; the calibration is found without it, and nothing takes it out of readings",
+            c.candidate.id()
+        )
+    }));
+    let sessions = chosen.iter().filter(|c| c.candidate.is_of_session());
+    notes.extend(sessions.map(|c| {
+        format!(
+            "{}: specific to this session, as nobody knows how far it goes on: no calibration holds it, and the biases are those of the \
+             middle of the session",
             c.candidate.id()
         )
     }));

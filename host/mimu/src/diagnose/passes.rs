@@ -270,8 +270,14 @@ impl Passes<'_> {
         };
         let clean = |found: &[Removed]| -> Result<(Fit, Vec<Prepared>)> {
             let lasting: Vec<Removed> = found.iter().map(Removed::lasting).collect();
+            let of_unit = lasting.iter().filter(|e| !e.candidate.is_of_session());
+            let of_unit: Vec<Removed> = of_unit.cloned().collect();
             let clean = |(k, s): (usize, &Session)| {
-                let effects = if k == 0 { found } else { &lasting };
+                let effects = match k {
+                    0 => found,
+                    k if k < self.found_in => &lasting,
+                    _ => &of_unit,
+                };
                 remove(s.prepared, s.gyro.as_ref(), s.accel.as_ref(), effects)
                     .ok_or_else(|| self.singular())
             };

@@ -244,6 +244,11 @@ impl Candidate {
         }
     }
 
+    /// Whether it is specific to a session.
+    pub fn is_of_session(&self) -> bool {
+        matches!(self.kind, Kind::Effect(e) if e.is_of_session())
+    }
+
     /// It and the values of its active coefficients without those that are of a recording alone.
     pub fn lasting(&self, values: &[f64]) -> (Self, Vec<f64>) {
         let Kind::Effect(e) = &self.kind else {

@@ -147,7 +147,7 @@ pub(super) const fn times(first: Quantity, second: Quantity) -> Regressor {
 /// How the device removes an effect.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum OnDevice {
-    /// Not at all: it is no error.
+    /// Not at all: it is no error, or specific to a session.
     Never,
     /// From the raw reading, by its code.
     ByCode,
@@ -161,6 +161,12 @@ impl Effect {
     /// Whether the readings err by it; else it is something that they should show.
     pub fn is_error(&self) -> bool {
         self.coefficients.iter().all(|c| c.scope != Scope::Place)
+    }
+
+    /// Whether it is specific to a session: it is found and reported, and no calibration holds it.
+    pub fn is_of_session(&self) -> bool {
+        let of_session = |c: &Coefficient| c.regressor.quantities() == [Quantity::SessionTime];
+        self.coefficients.iter().all(of_session)
     }
 
     /// Whether its errors are a function of the converter's code.
@@ -177,7 +183,7 @@ impl Effect {
     /// How the device removes it: what cannot be folded runs with every sample.
     pub fn on_device(&self) -> OnDevice {
         match self {
-            e if !e.is_error() => OnDevice::Never,
+            e if !e.is_error() || e.is_of_session() => OnDevice::Never,
             e if e.reads_code() => OnDevice::ByCode,
             e if e.of_unit().all(|c| c.regressor.folds(e.sensor)) => OnDevice::Folded,
             _ => OnDevice::EverySample,
@@ -219,6 +225,7 @@ impl Effect {
             _ => units.join(", "),
         };
         let device = match self.on_device() {
+            OnDevice::Never if self.is_error() => "never: it is specific to a session",
             OnDevice::Never => "never: it is no error",
             OnDevice::ByCode => "with every sample, by the code",
             OnDevice::EverySample => "with every sample",

@@ -21,6 +21,8 @@ pub struct Conditions {
     pub t_s: f64,
     /// The same since power-on, as the device counts it; since the recording began where nobody knows.
     pub on_s: f64,
+    /// The same since the middle of the dwells of the recording.
+    pub from_middle_s: f64,
     /// Length of the stretch, s.
     pub duration_s: f64,
     /// Rate, rad/s.
@@ -111,6 +113,8 @@ pub enum Quantity {
     TemperatureRate,
     /// Time since power-on, or since the recording began where nobody knows, s.
     Time,
+    /// Time since the middle of the dwells of a recording, s: a coefficient of it is specific to the session.
+    SessionTime,
     /// Temperature behind a lag, which is the nonlinear parameter of the effect, minus the temperature, K.
     TemperatureLag,
     /// Time since the first recording began, s; infinite in the others.
@@ -144,6 +148,7 @@ impl Quantity {
             Self::Temperature => at.temperature_offset,
             Self::TemperatureRate => (at.temperature_offset - at.lagged_temperature) / RATE_LAG_S,
             Self::Time => at.on_s,
+            Self::SessionTime => at.from_middle_s,
             Self::TemperatureLag => at.lagged_temperature - at.temperature_offset,
             Self::RecordingTime => match at.session {
                 0 => at.t_s,
@@ -167,6 +172,7 @@ impl Quantity {
                 at.lagged_temperature = at.temperature_offset - value * RATE_LAG_S;
             }
             Self::Time => at.on_s = value,
+            Self::SessionTime => at.from_middle_s = value,
             Self::TemperatureLag => at.lagged_temperature = at.temperature_offset + value,
             Self::RecordingTime => at.t_s = value,
             Self::Input => at.sensed[axis] = value,
@@ -209,6 +215,7 @@ impl Quantity {
             Self::Temperature
                 | Self::TemperatureRate
                 | Self::Time
+                | Self::SessionTime
                 | Self::TemperatureLag
                 | Self::RecordingTime
         )
@@ -254,7 +261,7 @@ impl Quantity {
             Self::AngularAcceleration(_) => "rad/s^2",
             Self::Temperature | Self::TemperatureLag => "K",
             Self::TemperatureRate => "K/s",
-            Self::Time | Self::RecordingTime => "s",
+            Self::Time | Self::SessionTime | Self::RecordingTime => "s",
             Self::Up => "1",
         }
     }
@@ -267,7 +274,7 @@ impl Quantity {
             Self::Force(i) => format!("f_{}", AXES[i]),
             Self::Temperature => "ΔT".into(),
             Self::TemperatureRate => "dT/dt".into(),
-            Self::Time => "t".into(),
+            Self::Time | Self::SessionTime => "t".into(),
             Self::TemperatureLag => "(T behind a lag - T)".into(),
             Self::RecordingTime => "t in the first recording".into(),
             Self::Input => format!("s_{own}"),
@@ -289,7 +296,7 @@ impl Quantity {
             Self::Force(i) => format!("force {}", AXES[i]),
             Self::Temperature => "temperature".into(),
             Self::TemperatureRate => "rate of change of the temperature".into(),
-            Self::Time => "time".into(),
+            Self::Time | Self::SessionTime => "time".into(),
             Self::TemperatureLag => "lagged temperature minus temperature".into(),
             Self::RecordingTime => "time in the first recording".into(),
             Self::Input => along(axis),
@@ -305,7 +312,7 @@ impl Quantity {
         const DPS: (f64, &str) = (180.0 / std::f64::consts::PI, "deg/s");
         const IN_G: (f64, &str) = (1.0 / 9.80665, "g");
         match (self, sensor) {
-            (Self::Time | Self::RecordingTime, _) => (1.0 / 60.0, "min"),
+            (Self::Time | Self::SessionTime | Self::RecordingTime, _) => (1.0 / 60.0, "min"),
             (Self::Rate(_) | Self::RateMagnitude, _) => DPS,
             (Self::Force(_), _) => IN_G,
             (Self::Input | Self::InputAlong(_), Sensor::Gyro) => DPS,

@@ -269,6 +269,8 @@ impl Regressor {
         let of_body = |product: &Product| {
             let parts = product.parts().map(|(q, p)| match q {
                 Quantity::Input => (along, p),
+                // They differ by a bias.
+                Quantity::SessionTime => (Quantity::Time, p),
                 q => (q, p),
             });
             let mut all: Vec<(Quantity, u8)> = parts.collect();

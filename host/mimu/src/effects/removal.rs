@@ -231,6 +231,7 @@ fn of_sensor(
     let (direction, scale, _) = directions(model)?;
     let blocks = &prepared.condensed.blocks;
     let t0_s = blocks.first()?.start_s;
+    let middle_s = prepared.middle_s();
     // Before the first temperature it is that one, as a lag begins there on the device too; without any the reference, as there.
     let warm = offsets(blocks);
     let first = warm.iter().map(|w| w.1).find(|w| w.is_finite());
@@ -272,6 +273,7 @@ fn of_sensor(
         session: 0,
         t_s: t_s - t0_s,
         on_s: t_s - prepared.power_on_s(),
+        from_middle_s: t_s - middle_s,
         duration_s: f64::from(blocks[at].rows) * prepared.condensed.period_s,
         rate,
         force,

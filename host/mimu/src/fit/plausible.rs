@@ -12,7 +12,7 @@ use crate::quantity::Sensor;
 use crate::quantity::plural;
 use crate::quantity::significant;
 use mimu_recording::error::{Error, Result};
-use mimu_recording::{RawUnit, Reference};
+use mimu_recording::{RAW_COLUMNS, RawUnit, Reference};
 
 /// Error of a fit over the spread of its inputs from which on the readings do not follow the inputs. Swapped
 /// sensors are beyond one; the worst table is a hundred times below.
@@ -23,6 +23,25 @@ const OUTLIER: f64 = 10.0;
 const OUTLIER_COUNT: usize = 6;
 /// Axes turned by more than this, degrees, are more than a careless mounting.
 const TURNED_DEG: f64 = 20.0;
+
+/// Refuses readings that a firmware put together wrongly: their errors of 256 counts are no effect of a sensor.
+pub fn check_readings(prepared: &Prepared) -> Result<()> {
+    let faults = &prepared.condensed.signed_low_byte;
+    let found = (0..6).filter(|c| faults[*c].is_some());
+    let names: Vec<&str> = found.map(|c| RAW_COLUMNS[c]).collect();
+    let pairs: u64 = faults.iter().flatten().sum();
+    if names.is_empty() {
+        return Ok(());
+    }
+    Err(Error::new(
+        &prepared.place,
+        format!(
+            "{}: readings whose low byte is 128 or more are 256 counts low, as {pairs} jumps between neighbouring samples show: the firmware takes the low byte for a signed number",
+            names.join(", ")
+        ),
+        "mend the firmware; to mend this log, add 256 to every such reading and import it again",
+    ))
+}
 
 /// Refuses or adds warnings to the fit of one sensor.
 pub fn check(prepared: &Prepared, fit: &mut SensorFit) -> Result<()> {

@@ -153,6 +153,7 @@ fn apart_from_bias(mut candidate: Candidate) -> Candidate {
             session: 0,
             t_s: time_s,
             on_s: time_s,
+            from_middle_s: time_s,
             duration_s: 1.0,
             rate,
             force,

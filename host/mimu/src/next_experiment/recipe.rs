@@ -252,6 +252,7 @@ impl Experiment {
                 reading: Reading::NONE,
                 t_s,
                 on_s: t_s,
+                from_middle_s: t_s,
                 duration_s: self.dwell_s,
                 rate,
                 force,

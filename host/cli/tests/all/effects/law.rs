@@ -72,6 +72,7 @@ fn every_effect_is_evaluated_by_the_device_as_its_data_say() {
                 session: 0,
                 t_s: first_s + step_s,
                 on_s: first_s + step_s,
+                from_middle_s: first_s + step_s,
                 duration_s: 1.0,
                 rate: samples[1].gyro,
                 force: samples[1].accel,

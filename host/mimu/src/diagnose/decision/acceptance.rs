@@ -92,10 +92,11 @@ impl<'a> Acceptance<'a> {
         (shares, split)
     }
 
-    /// What each of the `kept`, with these coefficients, does to the second recording.
+    /// What each of the `kept`, with these coefficients, does to the second recording. Of what is specific to a session that says nothing.
     pub fn elsewhere(&self, kept: &[Chosen], values: &[DVector<f64>]) -> Vec<Option<Second>> {
         let each = kept.iter().zip(values);
         let given: Vec<Removed> = each
+            .filter(|(c, _)| !c.candidate.is_of_session())
             .map(|(c, values)| {
                 let (candidate, values) = c.candidate.lasting(values.as_slice());
                 Removed {
@@ -105,10 +106,16 @@ impl<'a> Acceptance<'a> {
                 }
             })
             .collect();
-        match self.unseen.and_then(|u| second(u, &given)) {
-            Some(all) => all.into_iter().map(Some).collect(),
-            None => vec![None; kept.len()],
-        }
+        let mut found = self
+            .unseen
+            .and_then(|u| second(u, &given))
+            .into_iter()
+            .flatten();
+        let each = kept.iter().map(|c| match c.candidate.is_of_session() {
+            true => None,
+            false => found.next(),
+        });
+        each.collect()
     }
 
     /// The last of the `kept` that is not accepted, but for those with an id of the `passed`; the outer `None` where a model is singular.

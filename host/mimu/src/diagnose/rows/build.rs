@@ -48,6 +48,7 @@ pub(super) struct Builder<'a> {
     /// Whether the recording has the other sensor too: the table may know its input, but no device could remove what goes by it.
     pub other_measured: bool,
     pub t0_s: f64,
+    pub middle_s: f64,
     pub warm: Vec<(f64, f64)>,
     pub rows: Vec<Row>,
     pub conditions: Vec<Conditions>,
@@ -106,6 +107,7 @@ impl<'a> Builder<'a> {
                 Sensor::Accel => session.gyro.is_some(),
             },
             t0_s: blocks.first()?.start_s,
+            middle_s: prepared.middle_s(),
             warm: offsets(blocks),
             rows: Vec::new(),
             conditions: Vec::new(),
@@ -133,6 +135,7 @@ impl Builder<'_> {
             session: 0,
             t_s: t_s - self.t0_s,
             on_s: t_s - self.prepared.power_on_s(),
+            from_middle_s: t_s - self.middle_s,
             duration_s,
             rate,
             force,
