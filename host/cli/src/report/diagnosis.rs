@@ -18,11 +18,19 @@ const OPEN: f64 = 3.0;
 /// What the verdict means, as a sentence fragment.
 fn meaning(d: &DiagnosisResult) -> &'static str {
     let open = |s: &SensorDiagnosisResult| s.reference_rms > OPEN * s.noise_floor;
+    // Reported below, and not judged.
+    let usual = d.leftover.iter().any(|l| l.usual);
     match d.verdict {
         Verdict::Clean if d.sensors.named().any(|(_, s)| open(s)) => {
             "noise, and what the poses leave open of the accelerometer, explain what the affine calibration leaves"
         }
+        Verdict::Clean if usual => {
+            "noise, and biases that wander no more than usual, explain what the affine calibration leaves"
+        }
         Verdict::Clean => "noise explains what the affine calibration leaves",
+        Verdict::Explained if usual => {
+            "with the effects below, noise and biases that wander no more than usual explain what remains"
+        }
         Verdict::Explained => "with the effects below, noise explains what remains",
         Verdict::Untestable => "nothing was found, and the recording has too little to judge by",
         Verdict::Unexplained if d.unexplained().next().is_some() => {

@@ -130,6 +130,7 @@ fn verdict(d: &DiagnosisResult) -> Markup {
         strong { (d.verdict.name()) } ": " (meaning(d)) (if unexplained { ": " } else { "." })
         @for (n, (name, _)) in left().enumerate() { @if n > 0 { ";" } " " (tables::leftover_words(d, name)) }
         @if unexplained { "." }
+        @for u in &d.untestable { " The " (spoken(u.sensor)) ": " (u.reason) "." }
         @for (name, s) in d.sensors.named() {
             @let ours: Vec<&AcceptedResult> = d.effects.iter().filter(|a| a.sensor == name).collect();
             @let shown = |value: f64| tables::figure_of(s, value);
@@ -222,8 +223,15 @@ fn effect(d: &DiagnosisResult, s: &Shown, one: &AcceptedResult, panels: &[Panel]
         h3 { code { (one.id) } }
         p {
             (sentence(one.about)) ". Held-out error " (number(one.held_out_rms_before, factor, &unit)) " without it, "
-            (number(one.held_out_rms_after, factor, &unit)) " with it, beside the others; " (chance(one.chance))
+            (number(one.held_out_rms_after, factor, &unit)) " with it, beside the others; "
+            @if let (Some(before), Some(after)) = (one.held_out_at_rest_before, one.held_out_at_rest_after) {
+                @let rate = readable::error("rad/s");
+                "of the rates at rest " (number(before, rate.factor, &rate.unit)) " without it, "
+                (number(after, rate.factor, &rate.unit)) " with it; "
+            }
+            (chance(one.chance))
             " after the whole search."
+            @if !one.of_unit { " No calibration holds it." }
         }
         (tables::coefficients(one))
         figure {
