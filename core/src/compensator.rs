@@ -11,7 +11,7 @@
 
 use nalgebra::{RealField, convert};
 
-use crate::compensation::Sample;
+use crate::compensation::{Compensation, Sample};
 use crate::die::{self, DieLag};
 use crate::effects::{self, Effects, REFERENCE_C};
 use crate::table::{self, Place, Table};
@@ -46,6 +46,11 @@ impl<T: RealField + Copy, const ROOM: usize> State<T, ROOM> {
     /// thermometer.
     pub fn dies_c(&self) -> Option<[T; 2]> {
         self.dies_c
+    }
+
+    /// Inverse models at the last [`Compensator::follow`], raw to SI.
+    pub fn models(&self) -> &Compensation<T> {
+        &self.model.model
     }
 
     /// See [`effects::State::long_after_power_on`].
@@ -126,13 +131,20 @@ impl<T: RealField + Copy, const NODES: usize, const ROOM: usize> Compensator<T, 
     /// A raw sample in SI. To be called with every sample in turn, and [`State::gap`] where some are missing.
     #[inline]
     pub fn apply(&self, state: &mut State<T, ROOM>, raw: &Sample<T>) -> Sample<T> {
-        let model = &state.model.model;
         match &self.effects {
-            Some(all) => {
-                let raw = all.without_code_errors(raw);
-                all.remove(&mut state.effects, &model.apply(&raw))
-            }
-            None => model.apply(raw),
+            Some(all) => self.apply_clean(state, &all.without_code_errors(raw)),
+            None => state.model.model.apply(raw),
+        }
+    }
+
+    /// The same of a reading that is free of the errors of the converters' codes: for somebody who takes them out with more care than a device
+    /// has the time for.
+    #[inline]
+    pub fn apply_clean(&self, state: &mut State<T, ROOM>, clean: &Sample<T>) -> Sample<T> {
+        let input = state.model.model.apply(clean);
+        match &self.effects {
+            Some(all) => all.remove(&mut state.effects, &input),
+            None => input,
         }
     }
 }

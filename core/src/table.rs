@@ -150,6 +150,15 @@ impl<T: RealField + Copy, const N: usize> Table<T, N> {
         Ok(table)
     }
 
+    /// One model at all temperatures, listed at this one, °C.
+    pub fn constant(temp_c: T, model: Compensation<T>) -> Self {
+        Self {
+            first: Node::constant(temp_c, model),
+            others: Vec::new(),
+            range_c: None,
+        }
+    }
+
     /// The same nodes, found from dies of these temperatures, °C.
     pub fn with_range(mut self, range_c: [T; 2]) -> Result<Self, Refused> {
         let [from, to] = range_c;
