@@ -104,6 +104,8 @@ impl ReadNorFlash for Flash {
         if at.checked_add(bytes.len()).is_none_or(|end| end > LENGTH) {
             return Err(Error::Range);
         }
+        // A load from a bank that is busy would hold the processor until it is not (RM0433 4.3.8).
+        idle()?;
         let mut rest = bytes;
         while !rest.is_empty() {
             let word = read_word(at / WORD)?;
