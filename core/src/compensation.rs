@@ -66,21 +66,22 @@ impl<T: RealField + Copy> Affine<T> {
             return Err(Implausible::NotFinite);
         }
         let [least, most] = SCALE_RANGE.map(convert::<f64, T>);
-        let mut unit = self.matrix;
-        for mut column in unit.column_iter_mut() {
+        let mut unit = [Vector3::zeros(); 3];
+        for (unit, column) in unit.iter_mut().zip(self.matrix.data.0) {
+            let column = Vector3::from(column);
             // By its largest entry first, whose square may be no number of single precision.
             let largest = column.amax();
             if !(largest >= least * convert(0.5) && largest <= most) {
                 return Err(Implausible::Scale);
             }
-            column /= largest;
+            let column = column / largest;
             let length = column.norm();
             if !(largest * length >= least && largest * length <= most) {
                 return Err(Implausible::Scale);
             }
-            column /= length;
+            *unit = column / length;
         }
-        let [x, y, z] = [0, 1, 2].map(|i| unit.column(i).into_owned());
+        let [x, y, z] = unit;
         if !(x.dot(&y.cross(&z)).abs() >= convert(LEAST_VOLUME)) {
             return Err(Implausible::Singular);
         }
@@ -89,8 +90,9 @@ impl<T: RealField + Copy> Affine<T> {
             return Err(Implausible::Offset);
         }
         let Some(slope) = slope else { return Ok(()) };
-        let mut columns = self.matrix.column_iter().zip(slope.matrix.column_iter());
-        let steep = columns.any(|(of, slope)| slope.amax() > of.amax());
+        let mut columns = self.matrix.data.0.into_iter().zip(slope.matrix.data.0);
+        let steep =
+            columns.any(|(of, slope)| Vector3::from(slope).amax() > Vector3::from(of).amax());
         match steep || slope.offset.amax() > most_offset {
             true => Err(Implausible::Slope),
             false => Ok(()),
