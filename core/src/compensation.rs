@@ -1,6 +1,16 @@
 //! Compensation of raw readings: the inverse model.
 
-use nalgebra::{Matrix3, RealField, Vector3};
+use nalgebra::{Matrix3, RealField, Vector3, convert};
+
+/// Lengths that a column of C may have, SI per raw unit: what one raw unit of a sensor is worth. A converter of 32 bits over 250 deg/s has
+/// 2e-9 rad/s; a gyro of 30 000 deg/s read in volts has 200 rad/s.
+pub const SCALE_RANGE: [f64; 2] = [1e-12, 1e4];
+
+/// Largest entry of o, SI: full scale of the most insensitive sensors is below 1e4 rad/s and 1e6 m/s².
+pub const MOST_OFFSET: f64 = 1e6;
+
+/// Smallest volume of the three columns of C at unit length; 1 at right angles. Two sensors 0.06° apart make this.
+pub const LEAST_VOLUME: f64 = 1e-3;
 
 /// Inverse model of one triad, raw to SI.
 ///
@@ -33,7 +43,62 @@ pub struct Affine<T: RealField> {
     pub offset: Vector3<T>,
 }
 
+/// What is wrong with an inverse model, whatever unit it is of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Implausible {
+    /// An entry is not a finite number.
+    NotFinite,
+    /// A column of C has a length outside [`SCALE_RANGE`], SI per raw unit.
+    Scale,
+    /// C is singular: its columns make less than [`LEAST_VOLUME`].
+    Singular,
+    /// An entry of o is beyond [`MOST_OFFSET`], SI.
+    Offset,
+    /// Within a kelvin the largest entry of a column of C changes by more than itself, or o by more than [`MOST_OFFSET`].
+    Slope,
+}
+
 impl<T: RealField + Copy> Affine<T> {
+    /// Refuses what no sensor is. `slope`: derivative of the model by the temperature, per kelvin.
+    pub fn check(&self, slope: Option<&Self>) -> Result<(), Implausible> {
+        let finite = |of: &Self| of.matrix.iter().chain(&of.offset).all(T::is_finite);
+        if !finite(self) || !slope.is_none_or(finite) {
+            return Err(Implausible::NotFinite);
+        }
+        let [least, most] = SCALE_RANGE.map(convert::<f64, T>);
+        let mut unit = [Vector3::zeros(); 3];
+        for (unit, column) in unit.iter_mut().zip(self.matrix.data.0) {
+            let column = Vector3::from(column);
+            // By its largest entry first, whose square may be no number of single precision.
+            let largest = column.amax();
+            if !(largest >= least * convert(0.5) && largest <= most) {
+                return Err(Implausible::Scale);
+            }
+            let column = column / largest;
+            let length = column.norm();
+            if !(largest * length >= least && largest * length <= most) {
+                return Err(Implausible::Scale);
+            }
+            *unit = column / length;
+        }
+        let [x, y, z] = unit;
+        if !(x.dot(&y.cross(&z)).abs() >= convert(LEAST_VOLUME)) {
+            return Err(Implausible::Singular);
+        }
+        let most_offset: T = convert(MOST_OFFSET);
+        if self.offset.amax() > most_offset {
+            return Err(Implausible::Offset);
+        }
+        let Some(slope) = slope else { return Ok(()) };
+        let mut columns = self.matrix.data.0.into_iter().zip(slope.matrix.data.0);
+        let steep =
+            columns.any(|(of, slope)| Vector3::from(slope).amax() > Vector3::from(of).amax());
+        match steep || slope.offset.amax() > most_offset {
+            true => Err(Implausible::Slope),
+            false => Ok(()),
+        }
+    }
+
     /// SI input in the body frame from the raw reading `u`. Not a number in, not a number out.
     #[inline]
     pub fn apply(&self, raw: &Vector3<T>) -> Vector3<T> {

@@ -23,6 +23,9 @@ pub const RATE_SHARE: f64 = 0.25;
 /// Lags that a calibration may have, s.
 pub const LAG_RANGE_S: [f64; 2] = [-120.0, 600.0];
 
+/// Shortest lag or lead that is not none, s: a sample at 1 kHz. The thermometer is read by the batch, 20 ms, and nothing shorter is followed.
+pub const LEAST_LAG_S: f64 = 1e-3;
+
 /// The lag between thermometer and dies: immutable, for any number of streams.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DieLag<T> {
@@ -60,13 +63,15 @@ impl<T: RealField + Copy> DieLag<T> {
         Self { lag_s: T::zero() }
     }
 
-    /// Of so many seconds; `None` outside [`LAG_RANGE_S`].
+    /// Of so many seconds; `None` outside [`LAG_RANGE_S`], and below [`LEAST_LAG_S`] unless it is 0.
     pub fn new(lag_s: T) -> Option<Self> {
         let [least, most] = LAG_RANGE_S.map(convert::<f64, T>);
-        (lag_s >= least && lag_s <= most).then_some(Self { lag_s })
+        let shortest: T = convert(LEAST_LAG_S);
+        let followed = lag_s == T::zero() || lag_s.abs() >= shortest;
+        (followed && lag_s >= least && lag_s <= most).then_some(Self { lag_s })
     }
 
-    /// Of gyro and accelerometer by their lags, s; none where these are not known or outside [`LAG_RANGE_S`].
+    /// Of gyro and accelerometer by their lags, s; none where these are not known or [`Self::new`] refuses them.
     pub fn of_triads(lags_s: Option<[T; 2]>) -> [Self; 2] {
         let known = |lag_s| Self::new(lag_s).unwrap_or_else(Self::none);
         lags_s.map_or_else(|| [Self::none(); 2], |lags_s| lags_s.map(known))

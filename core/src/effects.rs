@@ -35,7 +35,7 @@ use triad::{Memory, Triad, put};
 
 pub use code::FARTHEST_ZERO;
 pub use directions::Directions;
-pub use effect::{Effect, Refused, Sensor, Variable};
+pub use effect::{Effect, Refused, Sensor, TIME_CONSTANT_RANGE_S, Variable};
 
 /// Temperature that temperature offsets count from, °C.
 pub const REFERENCE_C: f64 = 25.0;
@@ -83,8 +83,8 @@ pub struct State<T: RealField, const N: usize> {
     lost: T,
     /// What decays after power-on is gone.
     settled: bool,
-    /// The last temperature above the reference that was a number, °C.
-    temperature_offset: Option<T>,
+    /// The last temperature that was a number, °C: as it was read, since what effects see of it is theirs.
+    read_c: Option<T>,
     /// The temperature lagged by [`RATE_LAG_S`], minus itself, °C.
     rate_lag: T,
     gyro: Memory<T, N>,
@@ -108,7 +108,7 @@ impl<T: RealField + Copy, const N: usize> State<T, N> {
             time: T::zero(),
             lost: T::zero(),
             settled: false,
-            temperature_offset: None,
+            read_c: None,
             rate_lag: T::zero(),
             gyro: Memory::none(),
             accel: Memory::none(),
@@ -122,6 +122,46 @@ impl<T: RealField + Copy, const N: usize> State<T, N> {
             settled: true,
             ..self
         }
+    }
+
+    /// Follows time and temperature as [`Effects::slow`] does, where there are no effects: so that both are known to the effects of a later
+    /// calibration.
+    pub fn pass(&mut self, dt_s: T, temp_c: T) {
+        self.follow(dt_s, temp_c, None);
+    }
+
+    /// Time and temperature, of which effects see what is within `seen_c`; the step of time that was one, and that of what is seen.
+    fn follow(&mut self, dt_s: T, temp_c: T, seen_c: Option<[T; 2]>) -> [T; 2] {
+        let dt = match dt_s > T::zero() && dt_s.is_finite() {
+            true => dt_s,
+            false => T::zero(),
+        };
+        // Compensated (Kahan): of steps of 0.1 s each single precision loses seconds within hours.
+        let step = dt - self.lost;
+        let time = self.time + step;
+        self.lost = (time - self.time) - step;
+        self.time = time;
+
+        let offset = |temp_c: T| {
+            let seen = match seen_c {
+                Some([least, most]) => temp_c.max(least).min(most),
+                None => temp_c,
+            };
+            seen - convert(REFERENCE_C)
+        };
+        let before = self.read_c.map(offset);
+        if temp_c.is_finite() {
+            self.read_c = Some(temp_c);
+        }
+        let temperature_offset = self.read_c.map_or(T::zero(), offset);
+        let risen = temperature_offset - before.unwrap_or(temperature_offset);
+        let rate_lag: T = convert(RATE_LAG_S);
+        self.rate_lag = lagged(self.rate_lag, dt, risen, rate_lag);
+        let [.., temperature, rate, since] = &mut self.at.values;
+        *temperature = temperature_offset;
+        *rate = -self.rate_lag / rate_lag;
+        *since = time;
+        [dt, risen]
     }
 
     /// The next sample does not follow the one before: samples are missing. Time and temperature go on; the angular acceleration of
@@ -170,41 +210,29 @@ impl<T: RealField + Copy, const N: usize> Effects<T, N> {
         triad.push(&effect.kind)
     }
 
+    /// Takes over the state of a stream that other effects, or none, were removed from until now. Time, temperature and its rate go on, and so does each
+    /// lagged temperature that one of the new effects needs too: it is a function of the temperature alone, whatever the coefficients.
+    /// One of another time constant begins at the temperature of the next call of [`Self::slow`]. The errors of the sample before are those of the
+    /// old effects, and forgotten.
+    pub fn take_over(&self, before: Option<&Self>, state: &mut State<T, N>) {
+        let (gyro, accel) = (state.gyro, state.accel);
+        let known = |lag_s: T| {
+            let before = before?;
+            let mut all = (before.gyro.lags(&gyro)).chain(before.accel.lags(&accel));
+            let same = all.find(|(other_s, _)| *other_s == lag_s);
+            same.map(|(_, lag)| lag)
+        };
+        state.gyro = self.gyro.memory(known);
+        state.accel = self.accel.memory(known);
+        state.previous = None;
+    }
+
     /// Follows temperature, °C, and time, s since the call before or since power-on: some times a second is enough.
     ///
     /// The temperature is that of the thermometer, as effects are found by it: one of them is the lag of the dies behind it. One that is
     /// not a number is that of before; as long as there was none, the reference. A step of time that is not positive is none.
     pub fn slow(&self, state: &mut State<T, N>, dt_s: T, temp_c: T) {
-        let dt = match dt_s > T::zero() && dt_s.is_finite() {
-            true => dt_s,
-            false => T::zero(),
-        };
-        // Compensated (Kahan): of steps of 0.1 s each single precision loses seconds within hours.
-        let step = dt - state.lost;
-        let time = state.time + step;
-        state.lost = (time - state.time) - step;
-        state.time = time;
-
-        let temp_c = match (temp_c.is_finite(), self.seen_c) {
-            (true, Some([least, most])) => temp_c.max(least).min(most),
-            _ => temp_c,
-        };
-        let before = state.temperature_offset;
-        let temperature_offset = match temp_c.is_finite() {
-            true => temp_c - convert(REFERENCE_C),
-            false => before.unwrap_or(T::zero()),
-        };
-        if temp_c.is_finite() {
-            state.temperature_offset = Some(temperature_offset);
-        }
-        let risen = temperature_offset - before.unwrap_or(temperature_offset);
-        let rate_lag: T = convert(RATE_LAG_S);
-        state.rate_lag = lagged(state.rate_lag, dt, risen, rate_lag);
-        let [.., temperature, rate, since] = &mut state.at.values;
-        *temperature = temperature_offset;
-        *rate = -state.rate_lag / rate_lag;
-        *since = time;
-
+        let [dt, risen] = state.follow(dt_s, temp_c, self.seen_c);
         let (at, settled) = (&state.at, state.settled);
         self.gyro.slow(&mut state.gyro, dt, risen, settled, at);
         self.accel.slow(&mut state.accel, dt, risen, settled, at);

@@ -8,6 +8,7 @@
 //! | [`kalman`]       | bank of three four-state Kalman filters fed one scalar at a time  |
 //! | [`table`]        | inverse models at several temperatures, and curves between them   |
 //! | [`die`]          | temperature of the dies from that of the thermometer              |
+//! | [`compensator`]  | all of these in their order: raw readings and a temperature in, SI out |
 //! | [`single`]       | what runs with every sample, in single precision                   |
 //! | [`stored`]       | all of this as bytes, for the device to keep                       |
 //! | [`wire`]         | messages between device and host, and their frames                 |
@@ -18,6 +19,7 @@
 #![no_std]
 
 pub mod compensation;
+pub mod compensator;
 pub mod die;
 pub mod effects;
 pub mod kalman;

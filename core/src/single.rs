@@ -1,14 +1,25 @@
 //! What runs with every sample, in single precision and compiled here.
 //!
 //! Generic code is compiled, and inlined, where it is used. These have names of their own in every image, by which their instructions
-//! can be counted.
+//! can be counted: [`apply`] is what the firmware calls, the others are its parts by themselves.
 
 use nalgebra::Vector3;
 
 use crate::compensation::{Compensation, Sample};
+use crate::compensator::{self, Compensator};
 use crate::effects::{Effects, State};
 use crate::kalman::{Bank, Rejected};
-use crate::stored::ROOM;
+use crate::stored::{NODES, ROOM};
+
+/// [`Compensator::apply`].
+#[inline(never)]
+pub fn apply(
+    compensator: &Compensator<f32, NODES, ROOM>,
+    state: &mut compensator::State<f32, ROOM>,
+    raw: &Sample<f32>,
+) -> Sample<f32> {
+    compensator.apply(state, raw)
+}
 
 /// [`Compensation::apply`].
 #[inline(never)]

@@ -25,9 +25,13 @@
 //!
 //! [`Variable`]: crate::effects::Variable
 //!
-//! Version 5 has one lag, of the dies of both, and 4 bytes less for it. Version 4 has two zeros in place of thermometer and bits, an origin of 52 bytes without the time of a trim, no range, no lag, and nodes of
-//! 100 bytes without derivatives. What an earlier firmware computed with it stays: straight lines between the nodes, the end nodes held
-//! outside. No derivatives could stand for these lines, as they bend at each node. Version 3 is version 4 without an origin.
+//! Another version is not read: the calibration has to be uploaded again from its file.
+//!
+//! What no unit can have is refused, wherever the bytes come from: C and o beyond [`Affine::check`], temperatures beyond
+//! [`TEMPERATURE_RANGE_C`](crate::table::TEMPERATURE_RANGE_C), lags and time constants beyond those of [`DieLag`] and of
+//! [`Effect`](crate::effects::Effect), bits that say something of a later version.
+//!
+//! [`Affine::check`]: crate::compensation::Affine::check
 //!
 //! Raw is volts at the sensor, as in [`RawBatch`](crate::wire::RawBatch). The noise of biases and the sigmas of the parameters are not
 //! here: the device has no use for them.
@@ -42,9 +46,10 @@ use crc::{CRC_32_ISO_HDLC, CRC_64_XZ, Crc, NoTable};
 use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
 
+use crate::compensator::Compensator;
 use crate::die::DieLag;
 use crate::effects::{self, Directions, Effects};
-use crate::table::{Node, Table};
+use crate::table::Node;
 use bytes::{Reader, Writer};
 
 pub use bytes::TooLong;
@@ -53,10 +58,8 @@ pub use origin::Origin;
 pub use record::Record;
 pub use trim::trim;
 
-/// Version of the layout that is written.
+/// Version of the layout: the only one that is read.
 pub const VERSION: u16 = 6;
-/// The oldest that is read.
-pub const OLDEST: u16 = 3;
 /// Most temperature nodes.
 pub const NODES: usize = 16;
 /// Most effects of a triad that run with every sample, and as many that do not.
@@ -66,10 +69,6 @@ pub const MAX_LENGTH: usize = 5888;
 
 const MAGIC: [u8; 4] = *b"mimc";
 const HEADER: usize = 12;
-/// The first version whose nodes have derivatives.
-const CURVES: u16 = 5;
-/// The first version with a lag for each triad.
-const TWO_LAGS: u16 = 6;
 const CHECK: usize = 4;
 /// Where the length stands.
 const LENGTH_AT: usize = 6;
@@ -89,12 +88,10 @@ pub fn hash(bytes: &[u8]) -> u64 {
 pub struct Stored {
     /// Where it comes from.
     pub origin: Origin,
-    /// Compensation over the temperature of the dies.
-    pub table: Table<f32, NODES>,
+    /// What it does to a sample.
+    pub compensator: Compensator<f32, NODES, ROOM>,
     /// Lags of the dies of gyro and accelerometer behind the thermometer, s, if they are known; otherwise none is applied.
     pub lags_s: Option<[f32; 2]>,
-    /// What the affine model lacks; `None` if there are none, so that no sample pays for it.
-    pub effects: Option<Effects<f32, ROOM>>,
     /// How many records of effects: errors by the code have one for each converter.
     pub effect_count: u8,
 }
@@ -113,12 +110,12 @@ pub enum Refused {
     },
     /// The CRC does not hold.
     Check,
-    /// A node is not finite or not warmer than the one before, or there are none or too many.
+    /// A node has numbers that no sensor has, or is not warmer than the one before, or there are none or too many.
     Node {
         /// Which, from 0.
         at: u8,
     },
-    /// C of the gyro or of the accelerometer is singular.
+    /// C of the gyro or of the accelerometer that the effects were found with is singular.
     Singular,
     /// An effect that this build does not know.
     EffectUnknown {
@@ -137,13 +134,8 @@ pub enum Refused {
     },
     /// The range is not one of temperatures, a lag is none that dies have, or the thermometer is one that this build does not know.
     Temperature,
-}
-
-impl Stored {
-    /// The lags between the thermometer and the dies of gyro and accelerometer.
-    pub fn lags(&self) -> [DieLag<f32>; 2] {
-        DieLag::of_triads(self.lags_s)
-    }
+    /// Bits of the header are set that this build does not know.
+    Header,
 }
 
 /// Writes a calibration to the beginning of `out`; returns its length. `found_with`: C of the gyro and of the accelerometer that the
@@ -206,7 +198,7 @@ pub fn read(
         return Err(Refused::NotACalibration);
     }
     let version = from.u16().ok_or(Refused::Length)?;
-    if !(OLDEST..=VERSION).contains(&version) {
+    if version != VERSION {
         return Err(Refused::Version { found: version });
     }
     let length = from.u16().ok_or(Refused::Length)?;
@@ -219,25 +211,16 @@ pub fn read(
     }
     let mut from = Reader(body.get(LENGTH_AT + 2..).ok_or(Refused::Length)?);
     let [nodes, effects, thermometer, known] = from.bytes().ok_or(Refused::Length)?;
-    let origin = match version {
-        OLDEST => Some(Origin::UNKNOWN),
-        _ => Origin::read(&mut from, version >= CURVES),
-    };
-    let origin = origin.ok_or(Refused::Length)?;
+    let origin = Origin::read(&mut from).ok_or(Refused::Length)?;
     let gyro = directions(&mut from).ok_or(Refused::Length)?;
     let accel = directions(&mut from).ok_or(Refused::Length)?;
     let head = curves::Head {
         nodes,
         thermometer,
         known,
-        two_lags: version >= TWO_LAGS,
     };
-    let (table, lags_s) = match version >= CURVES {
-        true => curves::read(&mut from, head, node)?,
-        false => (curves::read_straight(&mut from, nodes, node)?, None),
-    };
-    let sum = |of: &Directions<f32>| of.sensed.iter().chain(&of.to_body).sum::<f32>();
-    if !(sum(&gyro) + sum(&accel)).is_finite() {
+    let (table, lags_s) = curves::read(&mut from, head, node)?;
+    if !gyro.are_inverse() || !accel.are_inverse() {
         return Err(Refused::Singular);
     }
     let none = Effects::of(gyro, accel).within(table.limits());
@@ -245,9 +228,12 @@ pub fn read(
     match from.0.is_empty() {
         true => Ok(Stored {
             origin,
-            table,
+            compensator: Compensator {
+                table,
+                lags: DieLag::of_triads(lags_s),
+                effects: (effects > 0).then_some(all),
+            },
             lags_s,
-            effects: (effects > 0).then_some(all),
             effect_count: effects,
         }),
         false => Err(Refused::Length),

@@ -23,6 +23,15 @@ use crate::effects::REFERENCE_C;
 
 pub use crate::die::BEYOND_C;
 
+/// Temperatures that a calibration may be for, °C: wider than any part that is sold works in.
+pub const TEMPERATURE_RANGE_C: [f64; 2] = [-100.0, 250.0];
+
+/// Whether a calibration may be for this temperature, °C.
+pub fn is_temperature<T: RealField + Copy>(temp_c: T) -> bool {
+    let [least, most] = TEMPERATURE_RANGE_C.map(convert::<f64, T>);
+    temp_c >= least && temp_c <= most
+}
+
 /// Inverse models of a unit at one temperature, and how they change with it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Node<T: RealField> {
@@ -80,23 +89,12 @@ pub enum Refused {
     Range,
 }
 
-/// What stands between two nodes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Curve {
-    /// Cubic Hermite pieces.
-    Hermite,
-    /// Straight lines, without slopes: nodes as they were before there were any. No slopes could stand for them, as a line bends at a
-    /// node and a node has one slope.
-    Linear,
-}
-
 /// Nodes in the order of their temperatures: immutable, for any number of streams.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Table<T: RealField, const N: usize> {
     /// Apart, because there always is one.
     first: Node<T>,
     others: Vec<Node<T>, N>,
-    curve: Curve,
     /// Dies' temperatures that the nodes were found from, °C.
     range_c: Option<[T; 2]>,
 }
@@ -133,7 +131,6 @@ impl<T: RealField + Copy, const N: usize> Table<T, N> {
         let mut table = Self {
             first,
             others: Vec::new(),
-            curve: Curve::Hermite,
             range_c: None,
         };
         for node in nodes {
@@ -153,14 +150,13 @@ impl<T: RealField + Copy, const N: usize> Table<T, N> {
         Ok(table)
     }
 
-    /// The same nodes with straight lines between them, held outside; slopes are not looked at. For nodes from before there were slopes.
-    pub fn with_straight_lines(mut self) -> Self {
-        let others = self.others.iter_mut();
-        for node in core::iter::once(&mut self.first).chain(others) {
-            *node = Node::constant(node.temp_c, node.model);
+    /// One model at all temperatures, listed at this one, °C.
+    pub fn constant(temp_c: T, model: Compensation<T>) -> Self {
+        Self {
+            first: Node::constant(temp_c, model),
+            others: Vec::new(),
+            range_c: None,
         }
-        self.curve = Curve::Linear;
-        self
     }
 
     /// The same nodes, found from dies of these temperatures, °C.
@@ -176,11 +172,6 @@ impl<T: RealField + Copy, const N: usize> Table<T, N> {
     /// Dies' temperatures that the nodes were found from, °C.
     pub fn range_c(&self) -> Option<[T; 2]> {
         self.range_c
-    }
-
-    /// Whether straight lines stand between the nodes.
-    pub fn is_straight(&self) -> bool {
-        self.curve == Curve::Linear
     }
 
     /// The temperatures that the calibration is for, °C: those that it was found from, and of several nodes none outside them. `None`: a
@@ -236,7 +227,7 @@ impl<T: RealField + Copy, const N: usize> Table<T, N> {
                 break;
             }
             if temp_c <= high.temp_c {
-                return self.between(low, high, temp_c, of);
+                return Self::between(low, high, temp_c, of);
             }
             low = high;
         }
@@ -251,7 +242,6 @@ impl<T: RealField + Copy, const N: usize> Table<T, N> {
 
     /// The four weights of a piece are 1 and three zeros at either end, so that a node has its own numbers to the last bit.
     fn between(
-        &self,
         low: &Node<T>,
         high: &Node<T>,
         temp_c: T,
@@ -260,15 +250,12 @@ impl<T: RealField + Copy, const N: usize> Table<T, N> {
         let (one, width) = (T::one(), high.temp_c - low.temp_c);
         let w = (temp_c - low.temp_c) / width;
         let rest = one - w;
-        let [a, b, c, d] = match self.curve {
-            Curve::Linear => [rest, w, T::zero(), T::zero()],
-            Curve::Hermite => [
-                (one + w + w) * rest * rest,
-                (one + rest + rest) * w * w,
-                w * rest * rest * width,
-                -w * w * rest * width,
-            ],
-        };
+        let [a, b, c, d] = [
+            (one + w + w) * rest * rest,
+            (one + rest + rest) * w * w,
+            w * rest * rest * width,
+            -w * w * rest * width,
+        ];
         let (u, v) = (of(&low.model), of(&high.model));
         let (du, dv) = (of(&low.slope), of(&high.slope));
         Affine {

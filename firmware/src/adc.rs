@@ -33,6 +33,7 @@ use embassy_time::{Duration, Instant, with_deadline};
 use crate::board::{ADC_HZ, Irqs, SAMPLING_HALF_CYCLES, SCANS, Sensors};
 use crate::channels::{CHANNELS, Channels};
 use crate::design_parameters::SAMPLE_HZ;
+use crate::front_end::{Factors, LINEARITY_WORDS};
 
 /// Conversions in one sample.
 const BLOCK: usize = SCANS * CHANNELS;
@@ -107,12 +108,14 @@ pub struct Converter {
     _adc: Adc<'static, ADC1>,
     dma: Peri<'static, DMA1_CH0>,
     ring: &'static mut [u16; RING],
+    factors: Option<Factors>,
     first_start: Option<Instant>,
     next_number: u32,
 }
 
 impl Converter {
-    /// Powers up, calibrates and configures. Takes 42 ms, nearly all of it calibration.
+    /// Powers up, calibrates and configures. Takes 42 ms, nearly all of it calibration; half of that with factors that were `kept`, which
+    /// then stand in place of its own.
     ///
     /// `ring` must be where DMA1 reaches it, which is all RAM of `memory.x`; the data cache stays off, as after reset, so what the
     /// controller writes there is what is read.
@@ -120,7 +123,7 @@ impl Converter {
     /// # Panics
     ///
     /// On silicon older than revision V.
-    pub fn new(sensors: Sensors, ring: &'static mut [u16; RING]) -> Self {
+    pub fn new(sensors: Sensors, ring: &'static mut [u16; RING], kept: Option<Factors>) -> Self {
         let revision = pac::DBGMCU.idc().read().rev_id();
         defmt::assert!(
             revision > LAST_REVISION_WITHOUT_DIVIDER,
@@ -129,15 +132,21 @@ impl Converter {
         );
 
         let adc = Adc::new(sensors.adc);
-        calibrate_at_boost();
+        let factors = calibrate_at_boost(kept);
         configure_scan(sensors.pins.map(|pin| pin.get_hw_channel()));
         Self {
             _adc: adc,
             dma: sensors.dma,
             ring,
+            factors,
             first_start: None,
             next_number: 0,
         }
+    }
+
+    /// Its calibration factors, to be kept with what is calibrated by it; `None` if it does not let them be read.
+    pub fn factors(&self) -> Option<Factors> {
+        self.factors
     }
 
     /// Starts sampling. The stream ends at its first [`Fault`]; drop it and start another.
@@ -255,21 +264,96 @@ impl Drop for Stream<'_> {
     }
 }
 
-/// Calibrates once more, with the bias current that the converter will run at.
+/// Calibrates once more, with the bias current that the converter will run at, or has it use the factors that were kept; the factors.
 ///
 /// [`Adc::new`] chooses the current by the kernel clock (which it logs as the converter's) and does
 /// not know of the fixed divider behind it. It took the next higher one and calibrated with that.
-fn calibrate_at_boost() {
+fn calibrate_at_boost(kept: Option<Factors>) -> Option<Factors> {
+    disable();
+    pac::ADC1.cr().modify(|w| w.set_boost(BOOST));
+    if let Some(factors) = kept {
+        enable();
+        if write(&factors).is_some() {
+            return Some(factors);
+        }
+        disable();
+    }
+    measure();
+    enable();
+    // Written back at once: whether a word that was read is still in use, the manual does not say.
+    let found = read().filter(|factors| write(factors).is_some());
+    if found.is_none() {
+        // Some words may have been read and not written back: once more, and left alone.
+        disable();
+        measure();
+        enable();
+    }
+    found
+}
+
+fn disable() {
     let adc = pac::ADC1;
     adc.cr().modify(|w| w.set_addis(true));
     while adc.cr().read().aden() {}
-    adc.cr().modify(|w| w.set_boost(BOOST));
-    // Offset and linearity, single-ended: Adc::new has left both selected.
-    adc.cr().modify(|w| w.set_adcal(true));
-    while adc.cr().read().adcal() {}
+}
+
+fn enable() {
+    let adc = pac::ADC1;
     adc.isr().write(|w| w.set_adrdy(true));
     adc.cr().modify(|w| w.set_aden(true));
     while !adc.isr().read().adrdy() {}
+}
+
+/// Offset and linearity, single-ended: [`Adc::new`] has left both selected.
+fn measure() {
+    let adc = pac::ADC1;
+    adc.cr().modify(|w| w.set_adcal(true));
+    while adc.cr().read().adcal() {}
+}
+
+/// Looks at the flag of a linearity word before it is taken for stuck. The word moves within some cycles of the converter's clock, 0.13 µs each; a
+/// look takes some 0.1 µs.
+const LOOKS: u32 = 10_000;
+
+/// Sets or clears LINCALRDYW of a word, 0 to 5 (RM0433 25.6.3, bits 22 to 27), which has the word written or read; `None` if the flag does not
+/// follow.
+fn hand_over(word: usize, ready: bool) -> Option<()> {
+    let (adc, bit) = (pac::ADC1, 1 << (22 + word));
+    let is = |cr: u32| cr & bit != 0;
+    adc.cr().modify(|w| match ready {
+        true => w.0 |= bit,
+        false => w.0 &= !bit,
+    });
+    let mut looks = 0..LOOKS;
+    looks.find(|_| is(adc.cr().read().0) == ready).map(|_| ())
+}
+
+/// The factors in use (RM0433 25.4.8): the converter is on and does not convert.
+fn read() -> Option<Factors> {
+    let adc = pac::ADC1;
+    let mut factors = Factors {
+        offset: adc.calfact().read().calfact_s(),
+        linearity: [0; LINEARITY_WORDS],
+    };
+    // From the last word, as the maker's own library does.
+    for (word, factor) in factors.linearity.iter_mut().enumerate().rev() {
+        hand_over(word, false)?;
+        *factor = adc.calfact2().read().lincalfact();
+    }
+    Some(factors)
+}
+
+/// Has the converter use these.
+fn write(factors: &Factors) -> Option<()> {
+    let adc = pac::ADC1;
+    adc.calfact().modify(|w| w.set_calfact_s(factors.offset));
+    for (word, factor) in factors.linearity.iter().enumerate().rev() {
+        // A flag that is set already would not move the word.
+        hand_over(word, false)?;
+        adc.calfact2().write(|w| w.set_lincalfact(*factor));
+        hand_over(word, true)?;
+    }
+    Some(())
 }
 
 /// Sequence, sampling times, input switches and repetition, by the number that the converter's input of each channel has.

@@ -15,6 +15,7 @@ use crate::bank::Bank;
 use crate::board::{self, SelfTestPins};
 use crate::design_parameters::SAMPLE_HZ;
 use crate::flash::{self, Flash};
+use crate::front_end::FrontEnd;
 use crate::link::{FrameSender, Input, send};
 use crate::pipeline::{Pipeline, Shared, Streams};
 use crate::restart::Before;
@@ -32,6 +33,8 @@ pub struct Commands<'a> {
     pub tally: &'a Tally,
     /// Where calibrations are kept.
     pub slots: Slots<Flash>,
+    /// What the next one is tied to.
+    pub front_end: FrontEnd,
     /// One on its way.
     pub upload: Upload<'a>,
     /// Of the calibration in use.
@@ -53,7 +56,7 @@ pub fn info(length: u32, hash: u64, stored: &Stored) -> StoredInfo {
     StoredInfo {
         length,
         hash,
-        nodes: stored.table.len() as u8,
+        nodes: stored.compensator.table.len() as u8,
         effects: stored.effect_count,
         unit_id: stored.origin.unit_id.unwrap_or_default(),
         created_s: stored.origin.created_s.unwrap_or_default(),
@@ -199,12 +202,14 @@ impl Commands<'_> {
     async fn commit(&mut self) -> Result<(), Refusal> {
         self.upload.check(&uid())?;
         let bytes = self.upload.bytes();
+        let before = self.front_end.pins_c;
+        self.front_end.pins_c = (self.pipeline).lock(|p| p.borrow().slow().pins_to_keep(before));
         let storing = |on| {
             let set = |p: &RefCell<Pipeline>| p.borrow_mut().flag(flags::STORING, on);
             self.pipeline.lock(set);
         };
         storing(true);
-        let kept = self.slots.store(bytes).await;
+        let kept = self.slots.store(bytes, &self.front_end).await;
         storing(false);
         kept.map_err(|_| Refusal::FlashFailed)?;
         self.use_stored()?;

@@ -82,6 +82,19 @@ impl Slow {
         temp_c: Lag::NEW,
     };
 
+    /// Before the first sample of TEMP pins that stood there beside each other, °C, when the calibration was stored.
+    pub const fn of_pins(pins_c: [f32; 3]) -> Self {
+        Self {
+            thermometer: Thermometer::of_pins(pins_c),
+            ..Self::NEW
+        }
+    }
+
+    /// Where the TEMP pins stand beside each other, °C, to be kept with a calibration; `before`: as it was kept until now.
+    pub fn pins_to_keep(&self, before: Option<[f32; 3]>) -> Option<[f32; 3]> {
+        self.thermometer.to_keep(before)
+    }
+
     /// Takes in `count` samples: totals of the sums of the reference and of the three temperatures.
     pub fn update(&mut self, reference: u32, temperatures: [u32; 3], count: u32) {
         if count == 0 {

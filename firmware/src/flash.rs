@@ -15,7 +15,7 @@ use core::sync::atomic::{AtomicU32, Ordering};
 
 use cortex_m::peripheral::SCB;
 use embassy_stm32::pac;
-use embassy_time::Timer;
+use embassy_time::{Duration, Instant, Timer};
 use embedded_storage_async::nor_flash::{
     ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash,
 };
@@ -56,6 +56,8 @@ pub enum Error {
     Refused(u32),
     /// A word has more than one wrong bit.
     Uncorrectable,
+    /// An operation does not end, or one from before has not.
+    Stalled,
 }
 
 impl NorFlashError for Error {
@@ -102,6 +104,8 @@ impl ReadNorFlash for Flash {
         if at.checked_add(bytes.len()).is_none_or(|end| end > LENGTH) {
             return Err(Error::Range);
         }
+        // A load from a bank that is busy would hold the processor until it is not (RM0433 4.3.8).
+        idle()?;
         let mut rest = bytes;
         while !rest.is_empty() {
             let word = read_word(at / WORD)?;
@@ -130,6 +134,7 @@ impl NorFlash for Flash {
         if !whole || from > to || to > LENGTH {
             return Err(Error::Range);
         }
+        idle()?;
         let _unlocked = Unlocked::new();
         for sector in &CALIBRATION_SECTORS[from / SECTOR..to / SECTOR] {
             let bank = pac::FLASH.bank(1);
@@ -139,7 +144,7 @@ impl NorFlash for Flash {
             });
             bank.cr().modify(|w| w.set_start(true));
             // About a second; looked at a hundred times.
-            let done = finished(10_000).await;
+            let done = finished(10_000, ERASE_US).await;
             bank.cr().modify(|w| w.set_ser(false));
             done?;
         }
@@ -156,6 +161,7 @@ impl NorFlash for Flash {
         {
             return Err(Error::Range);
         }
+        idle()?;
         let _unlocked = Unlocked::new();
         let bank = pac::FLASH.bank(1);
         for (k, word) in bytes.as_chunks::<WORD>().0.iter().enumerate() {
@@ -173,7 +179,7 @@ impl NorFlash for Flash {
             }
             cortex_m::asm::dsb();
             // Some 0.1 ms.
-            let done = finished(50).await;
+            let done = finished(50, WRITE_US).await;
             bank.cr().modify(|w| w.set_pg(false));
             done?;
         }
@@ -217,10 +223,29 @@ fn clear_flags() {
     });
 }
 
-/// Waits until the queue is empty, looking every `pause_us`.
-async fn finished(pause_us: u64) -> Result<(), Error> {
+/// Most that erasing a sector takes, µs: 4 s whatever the parallelism (DS12110, table 140), and a quarter more. The host waits for 15 s.
+const ERASE_US: u64 = 5_000_000;
+
+/// Most that programming a word takes, µs: 0.6 ms in that table; nothing else waits for it.
+const WRITE_US: u64 = 10_000;
+
+/// Refuses to begin while an operation runs that did not end in its time: its outcome is not known, and another behind it would wait as well.
+fn idle() -> Result<(), Error> {
+    match pac::FLASH.bank(1).sr().read().qw() {
+        true => Err(Error::Stalled),
+        false => Ok(()),
+    }
+}
+
+/// Waits until the queue is empty, looking every `pause_us`, for `most_us` at most: samples go on meanwhile and feed the watchdog, so that
+/// nothing else would end it.
+async fn finished(pause_us: u64, most_us: u64) -> Result<(), Error> {
     let bank = pac::FLASH.bank(1);
+    let until = Instant::now() + Duration::from_micros(most_us);
     while bank.sr().read().qw() {
+        if Instant::now() > until {
+            return Err(Error::Stalled);
+        }
         Timer::after_micros(pause_us).await;
     }
     let sr = bank.sr().read();

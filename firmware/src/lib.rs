@@ -7,6 +7,7 @@
 //! | [`channels`]          | the channels of a sample, and their order in a scan              |
 //! | [`convert`]           | sums of converter codes, and what they stand for                 |
 //! | [`temperature`]       | which of the gyros' TEMP pins count                              |
+//! | [`front_end`]         | what a calibration is tied to: the converter's factors, the TEMP pins' offsets |
 //! | [`pipeline`]          | what happens to a sample: compensation, batches, Kalman banks    |
 //! | [`bank`]              | a Kalman bank that is given its input and fed from the stream     |
 //! | [`upload`]            | a calibration on its way to the device                           |
@@ -34,6 +35,7 @@ pub mod convert;
 pub mod design_parameters;
 #[cfg(target_os = "none")]
 pub mod flash;
+pub mod front_end;
 #[cfg(target_os = "none")]
 pub mod link;
 pub mod pipeline;

@@ -52,12 +52,14 @@ async fn main(spawner: Spawner) {
     let before = &*BEFORE.init(restart::take());
     let board = Board::start();
     let stored = STORED.take();
-    let slots = Slots::open(Flash::new(), stored).await;
+    let mut slots = Slots::open(Flash::new(), stored).await;
+    let mut front_end = slots.front_end().await.unwrap_or_default();
     let supply = Supply::new(board.supply);
-    let converter = Converter::new(board.sensors, SCANS.take());
+    let converter = Converter::new(board.sensors, SCANS.take(), front_end.converter);
+    front_end.converter = converter.factors();
     // Sampling begins within some milliseconds.
     let powered_for_ms = powered_for_ms(before);
-    let (pipeline, in_use) = pipeline(slots.in_use(), stored, powered_for_ms);
+    let (pipeline, in_use) = pipeline(slots.in_use(), stored, powered_for_ms, front_end.pins_c);
     let (events, events_out) = queue_of_events();
     let (replies, replies_out) = queue_of_replies();
     #[cfg(not(feature = "usb"))]
@@ -79,6 +81,7 @@ async fn main(spawner: Spawner) {
         pipeline,
         tally: &TALLY,
         slots,
+        front_end,
         upload: Upload::new(stored),
         stored: in_use,
         self_test: board.self_test,
@@ -176,10 +179,17 @@ fn pipeline(
     in_use: Option<(u32, u64)>,
     bytes: &[u8],
     powered_for_ms: Option<u32>,
+    pins_c: Option<[f32; 3]>,
 ) -> (&'static Shared, Option<StoredInfo>) {
     static PIPELINE: StaticCell<Shared> = StaticCell::new();
     let pipeline = PIPELINE.init_with(|| Mutex::new(RefCell::new(Pipeline::new())));
-    pipeline.lock(|p| p.borrow_mut().powered_for(powered_for_ms));
+    pipeline.lock(|p| {
+        let mut p = p.borrow_mut();
+        p.powered_for(powered_for_ms);
+        if let Some(pins_c) = pins_c {
+            p.pins_stand(pins_c);
+        }
+    });
     let info = in_use.and_then(|(length, hash)| {
         let stored = stored::decode(bytes).ok()?;
         let info = info(length, hash, &stored);

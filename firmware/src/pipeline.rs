@@ -62,6 +62,10 @@ struct Measurement {
 struct Batch {
     streams: Streams,
     head: BatchHead,
+    /// Whether it ends before the next sample: a new calibration begins a new batch.
+    closed: bool,
+    /// Temperatures of the dies that it is compensated at, see [`Calibrated::dies_c`].
+    dies_c: (f32, Option<f32>),
     gyro_volts: f32,
     gyro_temps_c: [f32; 3],
     raw: Vec<[u8; RAW_BYTES], BATCH>,
@@ -114,6 +118,8 @@ impl Pipeline {
                     temp_c: 0.0,
                     flags: 0,
                 },
+                closed: false,
+                dies_c: (0.0, None),
                 gyro_volts: 0.0,
                 gyro_temps_c: [0.0; 3],
                 raw: Vec::new(),
@@ -144,10 +150,19 @@ impl Pipeline {
         self.flag(flags::POWER_ON_UNKNOWN, ms.is_none());
     }
 
-    /// Compensates by this from the next batch on.
+    /// Compensates by this from the next batch on, which begins with the next sample: none is compensated before the calibration has followed
+    /// the present temperature. The state of the one before goes on, see [`Compensator::take_over`](mimu_core::compensator::Compensator::take_over).
     pub fn calibrate(&mut self, stored: Stored) {
-        let before = self.calibrated.as_ref();
-        self.calibrated = Some(Calibrated::new(stored, self.powered_for_ms, before));
+        match &mut self.calibrated {
+            Some(calibrated) => calibrated.replace(stored),
+            none => *none = Some(Calibrated::new(stored, self.powered_for_ms)),
+        }
+        self.batch.closed = true;
+    }
+
+    /// Where the TEMP pins stand beside each other, °C, as it is kept. To be called before the first sample.
+    pub fn pins_stand(&mut self, pins_c: [f32; 3]) {
+        self.slow = Slow::of_pins(pins_c);
     }
 
     /// What moves slowly.
@@ -225,6 +240,9 @@ impl Pipeline {
                 calibrated.gap();
             }
         }
+        if self.batch.closed {
+            self.end_batch(send);
+        }
         if self.batch.raw.is_empty() {
             self.begin_batch(number, channels);
         }
@@ -290,8 +308,9 @@ impl Pipeline {
                 .update(channels.reference, channels.temperature, 1);
         }
         let temp_c = self.slow.temp_c();
-        let known = self.slow.has_known_temperature();
+        let thermometer_c = self.slow.has_known_temperature().then_some(temp_c);
         let batch = &mut self.batch;
+        batch.closed = false;
         batch.streams = self.streams;
         batch.compensated.clear();
         batch.gyro_volts = self.slow.gyro_volts();
@@ -306,9 +325,10 @@ impl Pipeline {
             flags: self.slow.flags(),
         };
         if let Some(calibrated) = &mut self.calibrated {
-            if calibrated.follow(number, temp_c, known) != Place::Inside {
+            if calibrated.follow(number, thermometer_c) != Place::Inside {
                 batch.head.flags |= flags::OUTSIDE_NODES;
             }
+            batch.dies_c = calibrated.dies_c(temp_c);
         } else {
             batch.streams.compensated = false;
         }
@@ -334,8 +354,8 @@ impl Pipeline {
             });
             dropped += u32::from(!send(&Message::Event(event)));
         }
-        if let (true, Some(calibrated)) = (streams.compensated, &self.calibrated) {
-            let (gyro_c, accel_c) = calibrated.dies_c();
+        if streams.compensated {
+            let (gyro_c, accel_c) = batch.dies_c;
             let event = Event::Compensated(CompensatedBatch {
                 head: BatchHead {
                     temp_c: gyro_c,

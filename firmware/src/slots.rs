@@ -2,8 +2,8 @@
 //!
 //! # Why it cannot be half done
 //!
-//! Each sector is a slot: a word that says what follows, and the calibration. A new one goes to the slot that is not in use:
-//! it is erased, the calibration is written and read back, and last the word in front is written, in a single programming operation, with
+//! Each sector is a slot: a word that says what follows, two of what the calibration is tied to ([`FrontEnd`]), and the calibration. A new one goes to the slot that is not in use:
+//! it is erased, all but the first word is written and read back, and last the word in front is written, in a single programming operation, with
 //! the next generation and a CRC of itself. Before that word is whole the slot does not count; from then on it is the younger one.
 //! The slot in use is not touched until the next calibration.
 //!
@@ -20,10 +20,15 @@ use heapless::Vec;
 use mimu_core::stored::{self, MAX_LENGTH, hash};
 use mimu_core::wire::Slot;
 
+use crate::front_end::{FRONT_END_WORDS, FrontEnd};
+
 /// Size of a word of the flash memory, bytes: programmed once between erases, and whole (RM0433 4.3.9).
 pub const WORD: usize = 32;
 
-const MAGIC: [u8; 4] = *b"slot";
+const MAGIC: [u8; 4] = *b"slt2";
+
+/// Where the calibration stands in a slot, bytes.
+const BODY: usize = WORD * (1 + FRONT_END_WORDS);
 
 /// What the word in front of a calibration says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -84,7 +89,7 @@ impl<F: NorFlash> Slots<F> {
 
     /// Looks for calibrations. `buffer` holds the one in use afterwards.
     pub async fn open(flash: F, buffer: &mut Vec<u8, MAX_LENGTH>) -> Self {
-        const { assert!(F::WRITE_SIZE == WORD && MAX_LENGTH + WORD <= F::ERASE_SIZE) };
+        const { assert!(F::WRITE_SIZE == WORD && MAX_LENGTH + BODY <= F::ERASE_SIZE) };
         let mut slots = Self {
             flash,
             state: [Slot::Empty; 2],
@@ -130,12 +135,21 @@ impl<F: NorFlash> Slots<F> {
         let InUse { slot, front } = self.in_use?;
         let end = offset.checked_add(bytes.len())?;
         let within = end <= front.length as usize;
-        (within && self.read(slot, WORD + offset, bytes).await).then_some(())
+        (within && self.read(slot, BODY + offset, bytes).await).then_some(())
     }
 
-    /// Stores a calibration. When this returns, or the supply fails on the way, either it is the one in use, whole, or the one before
+    /// What the calibration in use is tied to; `None` if there is none, or it cannot be read: the calibration is then used as it is, with a
+    /// front end that calibrates itself.
+    pub async fn front_end(&mut self) -> Option<FrontEnd> {
+        let InUse { slot, .. } = self.in_use?;
+        let mut words = [[0; WORD]; FRONT_END_WORDS];
+        let read = self.read(slot, WORD, words.as_flattened_mut()).await;
+        read.then(|| FrontEnd::from_words(&words)).flatten()
+    }
+
+    /// Stores a calibration and what it is tied to. When this returns, or the supply fails on the way, either it is the one in use, whole, or the one before
     /// is. The one in use is not written again: a sector lives for 10 000 erases.
-    pub async fn store(&mut self, bytes: &[u8]) -> Result<(), Failed> {
+    pub async fn store(&mut self, bytes: &[u8], front_end: &FrontEnd) -> Result<(), Failed> {
         if self.holds(bytes).await {
             return Ok(());
         }
@@ -155,10 +169,13 @@ impl<F: NorFlash> Slots<F> {
         let from = slot * Self::SECTOR;
         let erased = self.flash.erase(from as u32, (from + Self::SECTOR) as u32);
         erased.await.map_err(|_| Failed)?;
+        for (k, word) in front_end.to_words().iter().enumerate() {
+            self.write(slot, WORD * (k + 1), word).await?;
+        }
         for (k, part) in bytes.chunks(WORD).enumerate() {
             let mut word = [0xff; WORD];
             word[..part.len()].copy_from_slice(part);
-            self.write(slot, WORD * (k + 1), &word).await?;
+            self.write(slot, BODY + WORD * k, &word).await?;
         }
         self.write(slot, 0, &front.to_word()).await?;
         let generation = front.generation;
@@ -179,7 +196,7 @@ impl<F: NorFlash> Slots<F> {
         for (k, part) in bytes.chunks(WORD).enumerate() {
             let mut word = [0; WORD];
             let kept = &mut word[..part.len()];
-            if !self.read(slot, WORD * (k + 1), kept).await || kept != part {
+            if !self.read(slot, BODY + WORD * k, kept).await || kept != part {
                 return false;
             }
         }
@@ -208,7 +225,7 @@ impl<F: NorFlash> Slots<F> {
         buffer: &mut Vec<u8, MAX_LENGTH>,
     ) -> bool {
         buffer.clear();
-        buffer.resize(length as usize, 0).is_ok() && self.read(slot, WORD, buffer).await
+        buffer.resize(length as usize, 0).is_ok() && self.read(slot, BODY, buffer).await
     }
 
     async fn look(

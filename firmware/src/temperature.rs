@@ -1,7 +1,8 @@
 //! The thermometer: the gyros' TEMP pins, of which some may be wrong.
 //!
 //! Where each pin stands beside the others is learnt while it counts: their references differ by as much as 12 °C. Their common temperature is
-//! the mean of the pins minus these offsets, so that a pin that is lost takes nothing but itself out of it: the temperature makes no step.
+//! the mean of the pins minus these offsets, so that a pin that is lost takes nothing but itself out of it: the temperature makes no step. The
+//! offsets are kept with a calibration, so that a pin that is open when the power comes takes nothing else with it either.
 //!
 //! A pin counts as long as it is in the range of a working gyro, agrees with another one, makes no step that no die can make, and stays where
 //! it stands beside the others. One that left comes back when it is there again. When all have left at once, the last good temperature
@@ -30,8 +31,8 @@ struct Pin {
 #[derive(Clone, Copy, Debug)]
 pub struct Thermometer {
     pins: [Pin; 3],
-    /// Common temperature of those that counted last, °C, and how long ago that was, s.
-    together_c: f32,
+    /// Common temperature of those that counted last, °C, if any has, and how long ago that was, s.
+    together_c: Option<f32>,
     since_s: f32,
 }
 
@@ -44,9 +45,33 @@ impl Thermometer {
             learnt_s: 0.0,
             counts: false,
         }; 3],
-        together_c: 0.0,
+        together_c: None,
         since_s: 0.0,
     };
+
+    /// Before the first reading of pins that stood there beside each other, °C.
+    pub const fn of_pins(pins_c: [f32; 3]) -> Self {
+        let mut new = Self::NEW;
+        let mut i = 0;
+        // A constant function has no other loop.
+        while i < 3 {
+            new.pins[i].offset_c = Some(pins_c[i]);
+            new.pins[i].learnt_s = GYRO_TEMPERATURE_BEGINNING_S;
+            i += 1;
+        }
+        new
+    }
+
+    /// Where the pins stand beside each other, °C, once all three have counted for their beginning. While one is open or shorted it is as it was
+    /// `before`. Where one is in the range of a gyro and does not count, the pins are others than before, and nothing is known.
+    pub fn to_keep(&self, before: Option<[f32; 3]>) -> Option<[f32; 3]> {
+        let learnt = |pin: &Pin| pin.learnt_s >= GYRO_TEMPERATURE_BEGINNING_S;
+        if self.pins.iter().all(|pin| pin.counts && learnt(pin)) {
+            return Some(self.pins.map(|pin| pin.offset_c.unwrap_or(0.0)));
+        }
+        let disagrees = |pin: &Pin| !pin.counts && in_range(pin.read_c);
+        before.filter(|_| !self.pins.iter().any(disagrees))
+    }
 
     /// Which pins count.
     pub fn that_count(&self) -> [bool; 3] {
@@ -63,7 +88,7 @@ impl Thermometer {
             plausible[i] && pin.counts && step_c <= GYRO_TEMPERATURE_STEP_C
         });
         let counts: [bool; 3] =
-            core::array::from_fn(|i| plausible[i] && self.may_be(i, pins_c, steady));
+            core::array::from_fn(|i| plausible[i] && self.may_be(i, pins_c, plausible, steady));
         // A pin that has never counted has no offset yet, and takes its own from the others.
         let known = core::array::from_fn(|i| counts[i] && self.pins[i].offset_c.is_some());
         let together_c = self
@@ -75,14 +100,14 @@ impl Thermometer {
                 pin.learn(pins_c[i] - together_c, seconds);
             }
         }
-        if let Some(together_c) = together_c {
+        if together_c.is_some() {
             (self.together_c, self.since_s) = (together_c, 0.0);
         }
         together_c
     }
 
     /// Whether a pin may be right, by what was before and by the others that are steady.
-    fn may_be(&self, i: usize, pins_c: [f32; 3], steady: [bool; 3]) -> bool {
+    fn may_be(&self, i: usize, pins_c: [f32; 3], plausible: [bool; 3], steady: [bool; 3]) -> bool {
         let pin = &self.pins[i];
         let Some(offset_c) = pin.offset_c else {
             return true;
@@ -93,11 +118,22 @@ impl Thermometer {
             (true, None) => steady[i],
             (true, Some(others_c)) => steady[i] && away(others_c) <= GYRO_TEMPERATURE_DEPARTURE_C,
             (false, Some(others_c)) => away(others_c) <= GYRO_TEMPERATURE_STEP_C,
-            // The dies may have gone so far since.
-            (false, None) => {
-                let gone_c = GYRO_TEMPERATURE_RATE_C_PER_S * self.since_s;
-                away(self.together_c) <= GYRO_TEMPERATURE_STEP_C + gone_c
-            }
+            (false, None) => match self.together_c {
+                // The dies may have gone so far since.
+                Some(together_c) => {
+                    let gone_c = GYRO_TEMPERATURE_RATE_C_PER_S * self.since_s;
+                    away(together_c) <= GYRO_TEMPERATURE_STEP_C + gone_c
+                }
+                // The first reading of pins whose offsets were kept: one that stands where it did beside another, or is the only one.
+                None => {
+                    let mut others = (0..3).filter(|&j| j != i && plausible[j]).peekable();
+                    others.peek().is_none()
+                        || others.any(|j| {
+                            let other_c = pins_c[j] - self.pins[j].offset_c.unwrap_or(0.0);
+                            away(other_c) <= GYRO_TEMPERATURE_DEPARTURE_C
+                        })
+                }
+            },
         }
     }
 
@@ -131,14 +167,19 @@ impl Pin {
 /// One may if it is in the range of a working gyro, and agrees with another such pin or is the only one. Of two that disagree neither
 /// may: which of them is wrong cannot be known, and a mean of both is wrong for certain.
 fn plausible(pins_c: [f32; 3]) -> [bool; 3] {
-    let [least, most] = GYRO_TEMPERATURE_RANGE_C;
-    let in_range = pins_c.map(|c| (least..=most).contains(&c));
+    let in_range = pins_c.map(in_range);
     core::array::from_fn(|i| {
         let mut others = (0..3).filter(|&j| j != i && in_range[j]).peekable();
         let alone = others.peek().is_none();
         let agrees = others.any(|j| (pins_c[i] - pins_c[j]).abs() <= GYRO_TEMPERATURE_SPREAD_C);
         in_range[i] && (alone || agrees)
     })
+}
+
+/// Whether a working gyro can be at it, °C.
+fn in_range(temp_c: f32) -> bool {
+    let [least, most] = GYRO_TEMPERATURE_RANGE_C;
+    (least..=most).contains(&temp_c)
 }
 
 #[cfg(test)]
@@ -196,6 +237,61 @@ mod tests {
             let lost = (100..400).contains(&k);
             assert_eq!(thermometer.that_count(), [!lost, true, true], "{k}");
         }
+    }
+
+    #[test]
+    fn a_pin_that_is_open_when_the_power_comes_moves_nothing_where_the_offsets_were_kept() {
+        let kept = learnt(30.0).to_keep(None).expect("all three count");
+        for (kept, apart) in kept.iter().zip(APART_C) {
+            assert!((kept - apart).abs() < 0.01, "{kept}");
+        }
+        for open in 0..3 {
+            for wrong_c in [-272.6, 322.6] {
+                let mut thermometer = Thermometer::of_pins(kept);
+                let mut read = pins(40.0);
+                read[open] = wrong_c;
+                for _ in 0..1000 {
+                    let found = thermometer.take(read, BATCH_S).unwrap();
+                    assert!((found - 40.0).abs() < 0.02, "{open}: {found}");
+                    let counts = [0, 1, 2].map(|pin| pin != open);
+                    assert_eq!(thermometer.that_count(), counts);
+                }
+                // As before, while it is open.
+                assert_eq!(thermometer.to_keep(Some(kept)), Some(kept));
+                // And comes back without a step.
+                let found = thermometer.take(pins(40.0), BATCH_S).unwrap();
+                assert!((found - 40.0).abs() < 0.02, "{open}: {found}");
+                assert_eq!(thermometer.that_count(), [true; 3]);
+            }
+        }
+    }
+
+    #[test]
+    fn a_pin_that_stands_elsewhere_than_was_kept_does_not_count_from_the_first_reading_on() {
+        let mut thermometer = Thermometer::of_pins(APART_C);
+        let mut read = pins(20.0);
+        // Within what two references may differ by, and 6 °C from where it stood.
+        read[2] += 6.0;
+        for _ in 0..100 {
+            let found = thermometer.take(read, BATCH_S).unwrap();
+            assert!((found - 20.0).abs() < 0.02, "{found}");
+            assert_eq!(thermometer.that_count(), [true, true, false]);
+        }
+        // Another gyro has been soldered in: with the next calibration nothing is kept, and the next start learns anew.
+        assert_eq!(thermometer.to_keep(Some(APART_C)), None);
+    }
+
+    #[test]
+    fn nothing_is_kept_before_it_is_learnt() {
+        let mut thermometer = Thermometer::NEW;
+        for _ in 0..499 {
+            thermometer.take(pins(20.0), BATCH_S);
+            assert_eq!(thermometer.to_keep(None), None);
+        }
+        for _ in 0..2 {
+            thermometer.take(pins(20.0), BATCH_S);
+        }
+        assert!(thermometer.to_keep(None).is_some());
     }
 
     #[test]

@@ -49,7 +49,7 @@ awk '
             if (name ~ /^_R[A-Za-z0-9_]*4core3str8converts9from_utf8$/) continue
             print "no-panic check: " from[name] " leads to " name; bad = 1
         }
-        if (functions < 26) { print "no-panic check: only " functions + 0 " functions in the assembly: the check looks at nothing"; bad = 1 }
+        if (functions < 27) { print "no-panic check: only " functions + 0 " functions in the assembly: the check looks at nothing"; bad = 1 }
         if (bad) exit 1
         print "no-panic check: " functions " functions of mimu-core, " last " reached, no path to a panic"
     }' "${asm[@]}" >&2

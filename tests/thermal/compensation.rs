@@ -7,7 +7,6 @@ use std::path::Path;
 
 use mimu::quantity::Sensor;
 use mimu_core::compensation::Sample;
-use mimu_core::die;
 use mimu_core::stored::Stored;
 use mimu_device::Image;
 use mimu_rig::located::Source;
@@ -157,8 +156,8 @@ fn test(file: &RigFile, stored: &Stored, k: usize) -> Outcome {
     file.table.axes = 3;
     let truth = RigTruth::resolve(&file, 1).expect("a rig");
     let plan = Plan::parse(Source::new("plan", plan(k, HOUR_S))).expect("a plan");
-    let (lags, mut dies) = (stored.lags(), [die::State::new(); 2]);
-    let mut model = stored.table.state();
+    let compensator = &stored.compensator;
+    let mut state = compensator.state(RATE_HZ as f32);
     let mut warm = f64::NAN;
     let mut sums = [[0.0; 3]; 2];
     let mut second = ([0.0; 3], 0);
@@ -171,11 +170,8 @@ fn test(file: &RigFile, stored: &Stored, k: usize) -> Outcome {
         let temp_c = row.readings.temp_c;
         if n.is_multiple_of(FOLLOW) {
             let dt_s = FOLLOW as f32 / RATE_HZ as f32;
-            let follow = |k: usize, die| lags[k].follow(die, dt_s, temp_c as f32);
-            let [gyro, accel] = &mut dies;
-            if let (Some(gyro_c), Some(accel_c)) = (follow(0, gyro), follow(1, accel)) {
-                stored.table.follow(&mut model, [gyro_c, accel_c]);
-            }
+            let read_c = Some(temp_c as f32).filter(|c| c.is_finite());
+            compensator.follow(&mut state, dt_s, read_c);
         }
         warm = if warm.is_nan() {
             temp_c
@@ -190,7 +186,7 @@ fn test(file: &RigFile, stored: &Stored, k: usize) -> Outcome {
             gyro: volts(row.readings.gyro),
             accel: volts(row.readings.accel),
         };
-        let out = model.model.apply(&raw);
+        let out = state.models().apply(&raw);
         let motion = &row.instant.motion;
         let (input, read, out) = match sensor {
             0 => (motion.rate[axis], row.readings.gyro[axis], out.gyro[axis]),

@@ -38,6 +38,10 @@ pub enum Variable {
     Time,
 }
 
+/// Time constants that an effect may have, s: from a sample at 1 kHz to four months. Outside, its decay or its lag is a constant within
+/// any session.
+pub const TIME_CONSTANT_RANGE_S: [f64; 2] = [1e-3, 1e7];
+
 /// Why an effect is refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Refused {
@@ -48,8 +52,8 @@ pub enum Refused {
         /// How many (a term: at most).
         needed: usize,
     },
-    /// A coefficient is not a finite number, a nonlinear constant or a weight is missing, not wanted or not positive, or there is no such
-    /// axis.
+    /// A coefficient is not a finite number, a nonlinear constant is missing, not wanted or outside
+    /// [`TIME_CONSTANT_RANGE_S`], a weight is not positive, or there is no such axis.
     Value,
     /// There is no room for one more, or an axis has a code already.
     Full,
@@ -96,7 +100,8 @@ impl<T: RealField + Copy> Effect<T> {
         let nonlinear = match (law.nonlinear, nonlinear) {
             (Nonlinear::None, None) => T::one(),
             (Nonlinear::TimeConstant | Nonlinear::Lag, Some(value))
-                if value > T::zero() && value.is_finite() =>
+                if value >= convert(TIME_CONSTANT_RANGE_S[0])
+                    && value <= convert(TIME_CONSTANT_RANGE_S[1]) =>
             {
                 value
             }

@@ -88,6 +88,35 @@ impl<T: RealField + Copy, const N: usize> Triad<T, N> {
         Ok(())
     }
 
+    /// The lagged temperatures in a memory, minus the temperature, °C, each behind its time constant, s.
+    pub fn lags<'a>(&'a self, memory: &'a Memory<T, N>) -> impl Iterator<Item = (T, T)> + 'a {
+        let all = self.slow.iter().zip(&memory.lags);
+        all.filter_map(|(effect, lag)| match effect {
+            Slowly::Law {
+                nonlinear,
+                lags: true,
+                ..
+            } => Some((*nonlinear, *lag)),
+            _ => None,
+        })
+    }
+
+    /// A memory of nothing but the lagged temperatures that are known, by their time constants, s.
+    pub fn memory(&self, known: impl Fn(T) -> Option<T>) -> Memory<T, N> {
+        let mut memory = Memory::none();
+        for (effect, lag) in self.slow.iter().zip(&mut memory.lags) {
+            if let Slowly::Law {
+                nonlinear,
+                lags: true,
+                ..
+            } = effect
+            {
+                *lag = known(*nonlinear).unwrap_or(T::zero());
+            }
+        }
+        memory
+    }
+
     /// Folds the slow effects; the slow variables of the conditions are set.
     pub fn slow(
         &self,

@@ -71,8 +71,6 @@ pub(super) struct Head {
     pub thermometer: u8,
     /// Bits of what is known.
     pub known: u8,
-    /// Whether each triad has a lag of its own, and not both the same one.
-    pub two_lags: bool,
 }
 
 /// Range and lags as a table and what [`Curves::lags_s`] was, and the nodes.
@@ -82,16 +80,19 @@ pub(super) fn read(
     show: impl FnMut(&Node<f32>),
 ) -> Result<(Table<f32, NODES>, Option<[f32; 2]>), Refused> {
     let mut number = || from.f32().ok_or(Refused::Length);
-    let (range_c, first_s) = ([number()?, number()?], number()?);
-    let second_s = match head.two_lags {
-        true => number()?,
-        false => first_s,
-    };
-    let lags_s = [first_s, second_s];
-    let table = read_nodes(from, head.nodes, true, show)?;
+    let range_c = [number()?, number()?];
+    let lags_s = [number()?, number()?];
+    let table = read_nodes(from, head.nodes, show)?;
+    if head.known & !(RANGE_KNOWN | LAGS_KNOWN) != 0 {
+        return Err(Refused::Header);
+    }
     let known = |bit: u8| head.known & bit != 0;
     let no_lags = lags_s.iter().any(|lag_s| DieLag::new(*lag_s).is_none());
-    if head.thermometer != TEMP_PINS || known(LAGS_KNOWN) && no_lags {
+    let no_range = !range_c.into_iter().all(table::is_temperature);
+    if head.thermometer != TEMP_PINS
+        || known(LAGS_KNOWN) && no_lags
+        || known(RANGE_KNOWN) && no_range
+    {
         return Err(Refused::Temperature);
     }
     let table = match known(RANGE_KNOWN) {
@@ -103,30 +104,26 @@ pub(super) fn read(
     Ok((table, known(LAGS_KNOWN).then_some(lags_s)))
 }
 
-/// Nodes of a version without derivatives.
-pub(super) fn read_straight(
-    from: &mut Reader<'_>,
-    nodes: u8,
-    show: impl FnMut(&Node<f32>),
-) -> Result<Table<f32, NODES>, Refused> {
-    Ok(read_nodes(from, nodes, false, show)?.with_straight_lines())
-}
-
 fn read_nodes(
     from: &mut Reader<'_>,
     count: u8,
-    slopes: bool,
     mut show: impl FnMut(&Node<f32>),
 ) -> Result<Table<f32, NODES>, Refused> {
-    let mut short = false;
-    let read = (0..count).map_while(|_| {
-        let node = node(from, slopes);
+    let (mut short, mut wrong) = (false, None);
+    let read = (0..count).map_while(|at| {
+        let node = node(from);
         short |= node.is_none();
+        if node.as_ref().is_some_and(|node| !is_plausible(node)) {
+            wrong = wrong.or(Some(at));
+        }
         node.inspect(&mut show)
     });
     let table = Table::new(read);
     if short {
         return Err(Refused::Length);
+    }
+    if let Some(at) = wrong {
+        return Err(Refused::Node { at });
     }
     table.map_err(|refused| match refused {
         table::Refused::Count => Refused::Node { at: count },
@@ -135,17 +132,23 @@ fn read_nodes(
     })
 }
 
-fn node(from: &mut Reader<'_>, slopes: bool) -> Option<Node<f32>> {
-    let temp_c = from.f32()?;
-    let model = compensation(from)?;
-    match slopes {
-        true => Some(Node {
-            temp_c,
-            model,
-            slope: compensation(from)?,
-        }),
-        false => Some(Node::constant(temp_c, model)),
-    }
+fn is_plausible(node: &Node<f32>) -> bool {
+    let Node {
+        temp_c,
+        model,
+        slope,
+    } = node;
+    table::is_temperature(*temp_c)
+        && model.gyro.check(Some(&slope.gyro)).is_ok()
+        && model.accel.check(Some(&slope.accel)).is_ok()
+}
+
+fn node(from: &mut Reader<'_>) -> Option<Node<f32>> {
+    Some(Node {
+        temp_c: from.f32()?,
+        model: compensation(from)?,
+        slope: compensation(from)?,
+    })
 }
 
 fn compensation(from: &mut Reader<'_>) -> Option<Compensation<f32>> {

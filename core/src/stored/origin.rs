@@ -31,15 +31,11 @@ impl Origin {
         to.bytes(&self.trimmed_s.unwrap_or_default().to_le_bytes())
     }
 
-    /// `trims`: the version says when offsets were trimmed.
-    pub(super) fn read(from: &mut Reader<'_>, trims: bool) -> Option<Self> {
+    pub(super) fn read(from: &mut Reader<'_>) -> Option<Self> {
         let unit_id = from.bytes()?;
         let created_s = u64::from_le_bytes(from.bytes()?);
         let samples_sha256 = from.bytes()?;
-        let trimmed_s = match trims {
-            true => u64::from_le_bytes(from.bytes()?),
-            false => 0,
-        };
+        let trimmed_s = u64::from_le_bytes(from.bytes()?);
         Some(Self {
             unit_id: Some(unit_id).filter(|id| *id != [0; 12]),
             created_s: Some(created_s).filter(|s| *s != 0),

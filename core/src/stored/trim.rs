@@ -1,12 +1,12 @@
 //! Offsets of a stored calibration set anew, everything else kept.
 
 use super::bytes::Reader;
-use super::{CHECK, CRC, CURVES, HEADER, LENGTH_AT, Refused, TWO_LAGS, decode};
+use super::{CHECK, CRC, HEADER, Refused, decode};
 
 /// Where the time of the trim stands.
 const TRIMMED_AT: usize = HEADER + 52;
-/// Where range and lags stand: behind the origin and the directions. The first node stands behind them.
-const RANGE_AT: usize = HEADER + 60 + 144;
+/// Where the first node stands: behind the origin, the directions, range and lags.
+const NODES_AT: usize = HEADER + 60 + 144 + 16;
 const NODE: usize = 196;
 /// Where o of the gyro and o of the accelerometer stand in a node.
 const OFFSETS_AT: [usize; 2] = [4 + 36, 4 + 48 + 36];
@@ -15,21 +15,15 @@ const OFFSETS_AT: [usize; 2] = [4 + 36, 4 + 48 + 36];
 /// seconds since 1970. Origin, effects and all else stay as they are, bit by bit.
 ///
 /// # Errors
-/// Why the bytes are no calibration, before or after; of a layout whose nodes have no derivatives it is that version.
+/// Why the bytes are no calibration, before or after.
 pub fn trim(bytes: &mut [u8], add: [[f32; 3]; 2], trimmed_s: u64) -> Result<(), Refused> {
     decode(bytes)?;
-    let mut head = Reader(bytes.get(LENGTH_AT - 2..).ok_or(Refused::Length)?);
-    let found = head.u16().ok_or(Refused::Length)?;
-    if found < CURVES {
-        return Err(Refused::Version { found });
-    }
     let nodes = usize::from(*bytes.get(HEADER - 4).ok_or(Refused::Length)?);
-    let nodes_at = RANGE_AT + if found < TWO_LAGS { 12 } else { 16 };
     put(bytes, TRIMMED_AT, &trimmed_s.to_le_bytes())?;
     for node in 0..nodes {
         for (triad, at) in add.iter().zip(OFFSETS_AT) {
             for (axis, add) in triad.iter().enumerate() {
-                let at = nodes_at + NODE * node + at + 4 * axis;
+                let at = NODES_AT + NODE * node + at + 4 * axis;
                 let mut from = Reader(bytes.get(at..).ok_or(Refused::Length)?);
                 let offset = from.f32().ok_or(Refused::Length)?;
                 put(bytes, at, &(offset + add).to_le_bytes())?;

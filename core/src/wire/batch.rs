@@ -5,8 +5,10 @@ use serde::{Deserialize, Serialize};
 
 use super::extensible;
 use crate::compensation::Sample;
+use crate::effects::REFERENCE_C;
 
-/// Most samples of a batch. Fewer come where a sample is missing, since those of a batch are consecutive.
+/// Most samples of a batch. Fewer come where a sample is missing, since those of a batch are consecutive, and before the first sample of a new
+/// calibration.
 ///
 /// Twenty: 20 ms of delay, and 46 bytes of everything else are 11 % of a raw frame.
 pub const BATCH: usize = 20;
@@ -63,6 +65,14 @@ pub struct BatchHead {
     pub temp_c: f32,
     /// [`flags`].
     pub flags: u16,
+}
+
+impl BatchHead {
+    /// The thermometer of a raw batch, °C; `None` where it has had no reading yet: 25 °C stands in for it, beside the flag.
+    pub fn thermometer_c(&self) -> Option<f32> {
+        let none = self.flags & flags::NO_TEMPERATURE != 0 && self.temp_c == REFERENCE_C as f32;
+        (!none).then_some(self.temp_c)
+    }
 }
 
 /// Raw readings.

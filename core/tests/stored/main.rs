@@ -8,7 +8,7 @@ use mimu_core::single;
 use mimu_core::stored::{
     Curves, MAX_LENGTH, NODES, Origin, ROOM, Record, Refused, decode, encode, hash, read, trim,
 };
-use mimu_core::table::{Node, Place};
+use mimu_core::table::Node;
 use nalgebra::{Matrix3, Vector3};
 use proptest::prelude::*;
 
@@ -186,11 +186,17 @@ fn the_layout_is_that_of_the_table_in_the_documentation() {
     expected.extend(crc32(&expected).to_le_bytes());
     assert_eq!(all, &expected[..]);
     let stored = decode(all).unwrap();
-    assert_eq!((stored.table.len(), stored.effect_count), (1, 4));
+    assert_eq!(
+        (stored.compensator.table.len(), stored.effect_count),
+        (1, 4)
+    );
     assert_eq!(stored.origin, origin);
-    assert_eq!(stored.table.range_c(), Some([-10.5, 60.25]));
+    assert_eq!(stored.compensator.table.range_c(), Some([-10.5, 60.25]));
     assert_eq!(stored.lags_s, Some([61.5, -4.25]));
-    assert_eq!(stored.lags().map(|lag| lag.lag_s()), [61.5, -4.25]);
+    assert_eq!(
+        stored.compensator.lags.map(|lag| lag.lag_s()),
+        [61.5, -4.25]
+    );
     // 384 of 256 codes to 1.65 V are bits 0 and -1, and 255 are bits -1 to -8; half a code more, so that no error turns any.
     let right = Vector3::new(384.5, 0.5, 255.5) * (1.65 / 256.0);
     let read = Sample {
@@ -198,131 +204,15 @@ fn the_layout_is_that_of_the_table_in_the_documentation() {
         // 2.25 V at the converter of the third axis, whose second bit is of 1 V and not set; and 1.25 V, where it is.
         accel: Vector3::new(2.475, 0.0, 1.0),
     };
-    let clean = single::without_code_errors(stored.effects.as_ref().unwrap(), &read);
+    let clean = single::without_code_errors(stored.compensator.effects.as_ref().unwrap(), &read);
     assert_eq!(clean.accel, read.accel);
     assert!((clean.gyro - right).amax() < 1e-6, "{}", clean.gyro);
     let set = Sample {
         accel: Vector3::new(2.475, 0.0, 0.0),
         ..read
     };
-    let clean = single::without_code_errors(stored.effects.as_ref().unwrap(), &set);
+    let clean = single::without_code_errors(stored.compensator.effects.as_ref().unwrap(), &set);
     assert_eq!(clean.accel, Vector3::new(2.475, 0.0, 0.004));
-}
-
-/// The same nodes without slopes as version 4 has them: an origin of 52 bytes, neither range nor lag, nodes of 100 bytes, its own number.
-fn of_version_4(bytes: &[u8]) -> Vec<u8> {
-    let nodes = usize::from(bytes[8]);
-    let directions = 12 + 60;
-    let from = directions + 144 + 16;
-    let end = from + 196 * nodes;
-    let mut older = [&bytes[..64], &bytes[directions..directions + 144]].concat();
-    for node in bytes[from..end].chunks(196) {
-        older.extend(&node[..100]);
-    }
-    older.extend(&bytes[end..]);
-    (older[4], older[10], older[11]) = (4, 0, 0);
-    let length = older.len() as u16;
-    older[6..8].copy_from_slice(&length.to_le_bytes());
-    resealed(older)
-}
-
-/// The same as version 3 has it: no origin, and its own number.
-fn of_version_3(bytes: &[u8]) -> Vec<u8> {
-    let bytes = of_version_4(bytes);
-    let mut older = [&bytes[..12], &bytes[64..]].concat();
-    older[4] = 3;
-    let length = older.len() as u16;
-    older[6..8].copy_from_slice(&length.to_le_bytes());
-    resealed(older)
-}
-
-#[test]
-fn a_calibration_of_version_3_is_read_as_one_of_no_unit() {
-    let nodes = [node(0.0, &regular()), node(50.0, &regular())];
-    let effects = [Record::Named {
-        id: "gyro_warm_up",
-        coefficients: &[1.0, 2.0, 3.0],
-        nonlinear: Some(60.0),
-    }];
-    let older = decode(&of_version_3(&bytes(&nodes, &effects))).unwrap();
-    assert_eq!(older.origin, Origin::UNKNOWN);
-    assert_eq!((older.table.len(), older.effect_count), (2, 1));
-    let mut oldest = of_version_3(&bytes(&nodes, &effects));
-    oldest[4] = 2;
-    let refused = decode(&resealed(oldest)).err();
-    assert_eq!(refused, Some(Refused::Version { found: 2 }));
-}
-
-/// What an earlier firmware computed: lines between the nodes, and the end nodes outside.
-#[test]
-fn nodes_of_version_4_stay_straight_and_are_held_outside() {
-    let low = regular();
-    let (middle, high) = (low.map(|v| 2.0 * v), low.map(|v| v - 1.0));
-    let nodes = [node(0.0, &low), node(20.0, &middle), node(50.0, &high)];
-    let older = decode(&of_version_4(&bytes(&nodes, &[]))).unwrap();
-    assert!(older.table.is_straight());
-    assert_eq!((older.lags_s, older.table.range_c()), (None, None));
-    let mut state = older.table.state();
-    for (temp_c, low, high, weight, place) in [
-        (-30.0, &low, &low, 0.0, Place::Below),
-        (-0.1, &low, &low, 0.0, Place::Below),
-        (5.0, &low, &middle, 0.25, Place::Inside),
-        (20.0, &middle, &middle, 0.0, Place::Inside),
-        (35.0, &middle, &high, 0.5, Place::Inside),
-        (51.0, &high, &high, 0.0, Place::Above),
-    ] {
-        older.table.follow(&mut state, [temp_c; 2]);
-        for (found, (low, high)) in numbers_of(&state.model).iter().zip(low.iter().zip(high)) {
-            let expected = low * (1.0 - weight) + high * weight;
-            assert_eq!(*found, expected, "{temp_c}");
-        }
-        assert_eq!(state.place, place, "{temp_c}");
-    }
-}
-
-/// Bytes that a firmware of layout 4 has kept; they never change. Its nodes are from 24 to 39 °C.
-#[test]
-fn a_calibration_that_is_kept_in_flash_since_layout_4_is_read() {
-    let bytes = include_bytes!("../layouts/4.calibration");
-    assert_eq!(&bytes[..6], b"mimc\x04\x00");
-    let older = decode(bytes).unwrap();
-    assert!(older.table.is_straight());
-    assert_eq!((older.table.len(), older.effect_count), (16, 0));
-    assert_eq!(older.table.limits(), Some([24.0, 39.0]));
-    // C of the gyro and of the next node in the first number, as they stand in the bytes; halfway between.
-    let at = |node: usize| {
-        let from = 12 + 52 + 144 + 100 * node + 4;
-        f32::from_le_bytes(bytes[from..from + 4].try_into().unwrap())
-    };
-    let mut state = older.table.state();
-    older.table.follow(&mut state, [30.5; 2]);
-    let expected = at(6) * 0.5 + at(7) * 0.5;
-    assert_eq!(state.model.gyro.matrix[(0, 0)], expected);
-}
-
-/// Bytes that a firmware of layout 5 has kept, of one lag for both triads; they never change.
-#[test]
-fn a_calibration_that_is_kept_in_flash_since_layout_5_is_read_and_trimmed() {
-    let bytes = include_bytes!("../layouts/5.calibration");
-    assert_eq!(&bytes[..6], b"mimc\x05\x00");
-    let older = decode(bytes).unwrap();
-    assert_eq!((older.table.len(), older.effect_count), (1, 4));
-    assert_eq!(older.lags_s, Some([61.5; 2]));
-    assert_eq!(older.table.range_c(), Some([-10.5, 60.25]));
-    let node_of = |bytes: &[u8]| {
-        let mut nodes = Vec::new();
-        read(bytes, |node| nodes.push(*node), |_| {}).unwrap();
-        nodes[0]
-    };
-    let slopes: [f32; 24] = std::array::from_fn(|k| -0.001 * k as f32);
-    assert_eq!(node_of(bytes), sloping(25.0, &regular(), &slopes));
-    let mut trimmed = *bytes;
-    trim(&mut trimmed, [[0.5, 0.0, 0.0], [0.0, 0.0, 0.25]], 7).unwrap();
-    let mut expected = node_of(bytes);
-    expected.model.gyro.offset.x += 0.5;
-    expected.model.accel.offset.z += 0.25;
-    assert_eq!(node_of(&trimmed), expected);
-    assert_eq!(decode(&trimmed).unwrap().lags_s, Some([61.5; 2]));
 }
 
 #[test]
@@ -364,9 +254,6 @@ fn a_trim_moves_the_curves_as_they_are_and_nothing_else() {
         assert!((node.model.gyro.offset - was.model.gyro.offset).amax() < 1e-6);
         assert!((node.model.accel.offset - was.model.accel.offset).amax() < 1e-6);
     }
-    let mut older = of_version_4(&before);
-    let refused = trim(&mut older, add, 1).err();
-    assert_eq!(refused, Some(Refused::Version { found: 4 }));
     assert_eq!(
         trim(&mut after, [[f32::NAN; 3]; 2], 1).err(),
         Some(Refused::Node { at: 0 })
@@ -400,6 +287,101 @@ fn a_range_a_lag_or_a_thermometer_that_makes_no_sense_is_refused() {
     let mut later = bytes(&one, &[]);
     later[10] = 1;
     assert_eq!(decode(&resealed(later)).err(), no);
+}
+
+/// Whoever made them: a program that does not check what it uploads, or a bit of a header of a later version.
+#[test]
+fn numbers_that_no_unit_has_are_refused_by_their_node() {
+    let [good, other] = [node(0.0, &regular()), node(50.0, &regular())];
+    let refused = |second: Node<f32>| decode(&bytes(&[good, second], &[])).err();
+    let at_1 = Some(Refused::Node { at: 1 });
+    assert_eq!(refused(other), None);
+    for temp_c in [1e30, 251.0] {
+        assert_eq!(refused(Node { temp_c, ..other }), at_1, "{temp_c}");
+    }
+    let cold = Node {
+        temp_c: -101.0,
+        ..good
+    };
+    assert_eq!(
+        decode(&bytes(&[cold, other], &[])).err(),
+        Some(Refused::Node { at: 0 })
+    );
+    let mut alike = Matrix3::from_diagonal_element(3.5);
+    // Sensors y and z 0.03° apart.
+    alike.set_column(2, &Vector3::new(0.0, 3.5, 0.002));
+    let mut one_dead = Matrix3::from_diagonal_element(3.5);
+    one_dead[(2, 2)] = 0.0;
+    for matrix in [
+        Matrix3::zeros(),
+        Matrix3::repeat(1.0),
+        Matrix3::from_diagonal_element(1e38),
+        Matrix3::from_diagonal_element(1.1e4),
+        Matrix3::from_diagonal_element(1e-13),
+        Matrix3::from_diagonal_element(f32::MIN_POSITIVE / 4.0),
+        alike,
+        one_dead,
+    ] {
+        for triad in 0..2 {
+            let mut bad = other;
+            [&mut bad.model.gyro, &mut bad.model.accel][triad].matrix = matrix;
+            assert_eq!(refused(bad), at_1, "{matrix}");
+        }
+    }
+    let mut bad = other;
+    bad.model.accel.offset.y = 1e7;
+    assert_eq!(refused(bad), at_1);
+    let mut bad = other;
+    bad.slope.gyro.matrix[(0, 0)] = 4.0;
+    assert_eq!(refused(bad), at_1);
+    // As oblique and as far apart in scale as can be believed.
+    let mut odd = other;
+    odd.model.gyro.matrix = Matrix3::new(1e-9, 0.0, 0.0, 0.0, 200.0, 140.0, 0.0, 0.0, 0.3);
+    assert_eq!(refused(odd), None);
+}
+
+#[test]
+fn bits_of_a_later_version_and_lags_that_nothing_follows_are_refused() {
+    let one = [node(25.0, &regular())];
+    for bit in 2..8 {
+        let mut later = bytes(&one, &[]);
+        later[11] |= 1 << bit;
+        assert_eq!(
+            decode(&resealed(later)).err(),
+            Some(Refused::Header),
+            "{bit}"
+        );
+    }
+    let lag = |lag_s| {
+        let curves = Curves {
+            lags_s: Some([0.0, lag_s]),
+            ..Curves::of(&one)
+        };
+        decode(&with_curves(&curves, &[])).err()
+    };
+    for lag_s in [1e-30, -1e-30, 9e-4] {
+        assert_eq!(lag(lag_s), Some(Refused::Temperature), "{lag_s}");
+    }
+    assert_eq!((lag(0.0), lag(1e-3), lag(-1e-3)), (None, None, None));
+    for (constant, refused) in [
+        (1e-30, true),
+        (-60.0, true),
+        (1e8, true),
+        (f32::INFINITY, true),
+        (60.0, false),
+    ] {
+        let effect = Record::Named {
+            id: "gyro_thermal_lag",
+            coefficients: &[1e-3; 3],
+            nonlinear: Some(constant),
+        };
+        let expected = refused.then_some(Refused::EffectValue { at: 0 });
+        assert_eq!(
+            decode(&bytes(&one, &[effect])).err(),
+            expected,
+            "{constant}"
+        );
+    }
 }
 
 #[test]

@@ -49,6 +49,16 @@ const PLL2_MULTIPLIER: u32 = 99;
 /// PLL2 output P, the converter's kernel clock: 15.84 MHz, twice the cycles of a sample in a millisecond.
 const PLL2_P: u32 = 50;
 
+/// PLL3: VCO at 480 MHz, for the part's own USB.
+const PLL3_MULTIPLIER: u32 = 60;
+
+/// PLL3 output Q: 48 MHz exactly, by the same crystal as all else.
+///
+/// Not the part's 48 MHz oscillator, which is off by up to some percent of its own where USB takes 0.25 % (USB 2.0, 7.1.11). It would have to be
+/// trimmed by the frames of the bus, which takes CRS with the right source: SYNCSRC 0, USB2, for the pins that the connector is on. The HAL's
+/// switch for it selects USB1, and its default trims by nothing. PLL1 has no 48 MHz in its 800 MHz, nor has PLL2 in 792.
+const PLL3_Q: u32 = 10;
+
 /// Clock of the converter, Hz: 7.92 MHz. Silicon from revision V on halves the kernel clock before the converter sees it (RM0433
 /// 25.4.3, figure 136).
 pub const ADC_HZ: u32 = HSE_HZ / PLL_PREDIVIDER * PLL2_MULTIPLIER / PLL2_P / 2;
@@ -71,7 +81,11 @@ const _: () = {
     assert!(
         reference * PLL2_MULTIPLIER > 420_000_000 && reference * PLL2_MULTIPLIER <= 960_000_000
     );
+    assert!(
+        reference * PLL3_MULTIPLIER > 420_000_000 && reference * PLL3_MULTIPLIER <= 960_000_000
+    );
     assert!(reference * PLL1_MULTIPLIER / PLL1_P == 400_000_000);
+    assert!(reference * PLL3_MULTIPLIER == 48_000_000 * PLL3_Q);
 };
 
 // ---- Sampling ----------------------------------------------------------------------------------
@@ -224,6 +238,7 @@ mod parts {
             // Its counter still holds what is left of the 512 ms.
             watchdog.pet();
             // Was on for `clocks` only.
+            #[cfg(not(feature = "usb"))]
             pac::RCC.cr().modify(|w| w.set_pllon(2, false));
             let low = |pin: Peri<'static, AnyPin>| Output::new(pin, Level::Low, Speed::Low);
             Self {
@@ -294,14 +309,17 @@ mod parts {
         });
         config.rcc.pll1 = Some(pll(PLL1_MULTIPLIER, PLL1_P));
         config.rcc.pll2 = Some(pll(PLL2_MULTIPLIER, PLL2_P));
-        // A PLL that is left out is switched off by a write of zeros to the register that it shares
+        // Also without USB. A PLL that is left out is switched off by a write of zeros to the register that it shares
         // with the running ones, whose fields must not be written then (RM0433 8.7.11). The hardware
-        // ignores them, but nothing should rely on it: so the third is started, without outputs, and
-        // stopped after.
+        // ignores them, but nothing should rely on it: so the third is started as USB needs it, and stopped after if there is none.
         config.rcc.pll3 = Some(Pll {
             divp: None,
-            ..pll(PLL2_MULTIPLIER, PLL2_P)
+            divq: Some(PllDiv::from_bits(PLL3_Q as u8 - 1)),
+            ..pll(PLL3_MULTIPLIER, PLL2_P)
         });
+        config.rcc.mux.usbsel = mux::Usbsel::PLL3_Q;
+        // Nothing is clocked by it; the default starts it.
+        config.rcc.hsi48 = None;
         // Nothing needs a calendar; the default resets the backup domain to choose a clock for one.
         config.rcc.ls = LsConfig::off();
         config.rcc.sys = Sysclk::PLL1_P;
@@ -312,12 +330,6 @@ mod parts {
         config.rcc.apb2_pre = APBPrescaler::DIV2;
         config.rcc.apb3_pre = APBPrescaler::DIV2;
         config.rcc.apb4_pre = APBPrescaler::DIV2;
-        #[cfg(feature = "usb")]
-        {
-            // 48 MHz from the oscillator that USB trims by itself: no PLL makes them beside the others.
-            config.rcc.hsi48 = Some(Default::default());
-            config.rcc.mux.usbsel = mux::Usbsel::HSI48;
-        }
         // The default source as well, but the sample rate hangs on it.
         config.rcc.mux.adcsel = mux::Adcsel::PLL2_P;
         config

@@ -10,6 +10,7 @@ use mimu_core::table::Node;
 use mimu_core::wire::Prior;
 use nalgebra::Matrix3;
 
+mod exchange;
 mod temperature;
 
 use super::*;
@@ -74,18 +75,23 @@ fn calibration(effects: &[Record<'_>]) -> Stored {
 
 /// The same of dies that follow with these lags, of gyro and accelerometer, found between 0 and 50 °C.
 fn with_lags(effects: &[Record<'_>], lags_s: Option<[f32; 2]>) -> Stored {
+    times(1.0, effects, lags_s)
+}
+
+/// The same, this many times as large.
+fn times(times: f32, effects: &[Record<'_>], lags_s: Option<[f32; 2]>) -> Stored {
     let node = |temp_c, gain: f32| {
         let affine = Affine {
-            matrix: Matrix3::from_diagonal_element(gain),
-            offset: Vector3::repeat(-gain),
+            matrix: Matrix3::from_diagonal_element(times * gain),
+            offset: Vector3::repeat(-times * gain),
         };
         let model = Compensation {
             gyro: affine,
             accel: affine,
         };
         let slope = Affine {
-            matrix: Matrix3::from_diagonal_element(2.0 / 70.0),
-            offset: Vector3::repeat(-2.0 / 70.0),
+            matrix: Matrix3::from_diagonal_element(times * 2.0 / 70.0),
+            offset: Vector3::repeat(-times * 2.0 / 70.0),
         };
         Node {
             temp_c,

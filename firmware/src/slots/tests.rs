@@ -13,6 +13,7 @@ use mimu_core::table::Node;
 use nalgebra::{Matrix3, Vector3};
 
 use super::*;
+use crate::front_end::Factors;
 
 /// What a word holds.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,6 +37,15 @@ impl NorFlashError for Error {
     }
 }
 
+/// What the tests' calibrations are tied to.
+const FRONT_END: FrontEnd = FrontEnd {
+    converter: Some(Factors {
+        offset: 0x123,
+        linearity: [1, 2, 3, 4, 5, 6],
+    }),
+    pins_c: Some([1.0, -3.0, 2.0]),
+};
+
 /// Words of the two sectors; only the first `USED` of each are kept, as many as a calibration takes.
 #[derive(Clone)]
 struct Memory {
@@ -49,7 +59,7 @@ struct Memory {
 }
 
 const SECTOR: usize = 128 * 1024;
-const USED: usize = 1 + MAX_LENGTH / WORD;
+const USED: usize = BODY / WORD + MAX_LENGTH / WORD;
 const PER_SECTOR: usize = SECTOR / WORD;
 
 impl Memory {
@@ -195,7 +205,7 @@ fn store(memory: &mut Memory, bytes: &[u8], left: usize, tear: u8) -> bool {
     memory.tear = tear;
     let mut buffer = heapless::Vec::new();
     let mut slots = block_on(Slots::open(memory.clone(), &mut buffer));
-    let stored = block_on(slots.store(bytes)).is_ok();
+    let stored = block_on(slots.store(bytes, &FRONT_END)).is_ok();
     *memory = slots.flash;
     stored
 }
@@ -232,12 +242,12 @@ fn the_calibration_in_use_is_not_written_again_unless_it_is_damaged() {
     let mut buffer = heapless::Vec::new();
     let mut slots = block_on(Slots::open(memory, &mut buffer));
     let InUse { slot, .. } = slots.in_use.unwrap();
-    let Cell::Written(word) = &mut slots.flash.cells[slot * USED + 2] else {
+    let Cell::Written(word) = &mut slots.flash.cells[slot * USED + BODY / WORD + 1] else {
         panic!()
     };
     word[5] ^= 1;
     let done = slots.flash.done;
-    assert_eq!(block_on(slots.store(&one)), Ok(()));
+    assert_eq!(block_on(slots.store(&one, &FRONT_END)), Ok(()));
     assert!(slots.flash.done > done);
     assert_eq!(found(&slots.flash).0.as_ref(), Some(&one));
 }
@@ -245,8 +255,8 @@ fn the_calibration_in_use_is_not_written_again_unless_it_is_damaged() {
 #[test]
 fn wherever_the_supply_fails_the_old_or_the_new_one_is_whole() {
     let (old, new, third) = (calibration(1, 3), calibration(2, 5), calibration(3, 4));
-    // Erase, the words, and the word in front.
-    let operations = 1 + new.len().div_ceil(WORD) + 1;
+    // Erase, the words of the front end, those of the calibration, and the word in front.
+    let operations = 1 + FRONT_END_WORDS + new.len().div_ceil(WORD) + 1;
     for older in 0..=2 {
         let mut before = Memory::new();
         for k in (0..older).rev() {
@@ -281,7 +291,7 @@ fn damage_is_told_and_the_other_one_is_used() {
     assert!(store(&mut memory, &old, usize::MAX, 0));
     assert!(store(&mut memory, &new, usize::MAX, 0));
     let whole = |generation| Slot::Whole { generation };
-    for word in 0..=new.len().div_ceil(WORD) {
+    for word in (0..BODY / WORD + new.len().div_ceil(WORD)).filter(|word| !(1..=2).contains(word)) {
         for bit in [0, 77, 255] {
             let mut memory = memory.clone();
             let Cell::Written(bytes) = &mut memory.cells[USED + word] else {
@@ -290,7 +300,7 @@ fn damage_is_told_and_the_other_one_is_used() {
             bytes[bit / 8] ^= 1 << (bit % 8);
             let (in_use, slots) = found(&memory);
             // Behind the end of the calibration nothing is looked at.
-            if word * WORD + bit / 8 >= WORD + new.len() {
+            if word * WORD + bit / 8 >= BODY + new.len() {
                 assert_eq!((in_use, slots), (Some(new.clone()), [whole(1), whole(2)]));
                 continue;
             }
@@ -306,4 +316,33 @@ fn damage_is_told_and_the_other_one_is_used() {
         memory.cells[USED + word] = Cell::Torn(None);
         assert_eq!(found(&memory).0.as_ref(), Some(&old));
     }
+}
+
+#[test]
+fn what_a_calibration_is_tied_to_is_kept_with_it_and_its_damage_leaves_the_calibration() {
+    let front_end = |memory: &Memory| {
+        let mut buffer = heapless::Vec::new();
+        let mut slots = block_on(Slots::open(memory.clone(), &mut buffer));
+        block_on(slots.front_end())
+    };
+    let mut memory = Memory::new();
+    assert_eq!(front_end(&memory), None);
+    let (one, other) = (calibration(1, 2), calibration(2, 2));
+    assert!(store(&mut memory, &one, usize::MAX, 0));
+    assert_eq!(front_end(&memory), Some(FRONT_END));
+    for word in 1..=FRONT_END_WORDS {
+        let mut damaged = memory.clone();
+        damaged.cells[word] = Cell::Torn(None);
+        assert_eq!(front_end(&damaged), None);
+        assert_eq!(found(&damaged).0.as_ref(), Some(&one));
+    }
+    // Of the one in use, not of the one before.
+    let mut buffer = heapless::Vec::new();
+    let mut slots = block_on(Slots::open(memory, &mut buffer));
+    let tied = FrontEnd {
+        pins_c: None,
+        ..FRONT_END
+    };
+    assert_eq!(block_on(slots.store(&other, &tied)), Ok(()));
+    assert_eq!(front_end(&slots.flash), Some(tied));
 }

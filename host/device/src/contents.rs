@@ -127,13 +127,10 @@ pub fn contents(bytes: &[u8]) -> std::result::Result<Contents, stored::Refused> 
         direction: "raw to SI",
         raw_unit: "V",
         frame: "body",
-        range_c: stored.table.range_c(),
+        range_c: stored.compensator.table.range_c(),
         lag_s,
         accel_lag_s,
-        between_nodes: match stored.table.is_straight() {
-            true => "straight",
-            false => "cubic",
-        },
+        between_nodes: "cubic",
         nodes,
         effects,
     })
@@ -142,7 +139,7 @@ pub fn contents(bytes: &[u8]) -> std::result::Result<Contents, stored::Refused> 
 /// The calibration file of `bytes` that [`contents`] has read, of the unit of this name; `place` is where they come from.
 ///
 /// # Errors
-/// Several temperature nodes of a layout without derivatives: the lines between them bend at each node, and no calibration file has such.
+/// Bytes that the device would refuse.
 pub fn calibration(bytes: &[u8], device: &str, place: &str) -> Result<Calibration> {
     let (mut nodes, mut effects) = (Vec::new(), Vec::new());
     let stored = stored::read(
@@ -154,14 +151,6 @@ pub fn calibration(bytes: &[u8], device: &str, place: &str) -> Result<Calibratio
         let problem = format!("it cannot be used: {}", unusable(&refused));
         Error::device(place, problem, "upload a calibration again")
     })?;
-    if stored.table.is_straight() && nodes.len() > 1 {
-        let problem = format!(
-            "it keeps {} temperature nodes with straight lines between them, which no calibration file has",
-            nodes.len()
-        );
-        let remedy = "fetch the bytes: --bytes FILE";
-        return Err(Error::device(place, problem, remedy));
-    }
     let origin = stored.origin;
     let (lag_s, accel_lag_s) = lags(stored.lags_s);
     let kept = Kept {
@@ -171,7 +160,7 @@ pub fn calibration(bytes: &[u8], device: &str, place: &str) -> Result<Calibratio
         trimmed: origin.trimmed_s.and_then(origin::date),
         sha256: origin.samples_sha256.as_ref().map(origin::digits),
         nodes,
-        range_c: stored.table.range_c(),
+        range_c: stored.compensator.table.range_c(),
         lag_s,
         accel_lag_s,
         effects,

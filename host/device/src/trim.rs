@@ -4,7 +4,7 @@
 use std::time::Duration;
 
 use mimu_core::compensation::Sample;
-use mimu_core::stored::{self, OLDEST, Refused, VERSION};
+use mimu_core::stored::{self, Refused};
 use serde::Serialize;
 
 use super::image::Image;
@@ -184,14 +184,7 @@ fn check_size(
 }
 
 fn refuse(session: &Session, refused: &Refused) -> Error {
-    let problem = match refused {
-        Refused::Version { found } if (OLDEST..VERSION).contains(found) => {
-            format!(
-                "the device keeps its calibration in layout {found}, which has no place for the time of a trim"
-            )
-        }
-        other => format!("its calibration cannot be trimmed: {}", unusable(other)),
-    };
+    let problem = format!("its calibration cannot be trimmed: {}", unusable(refused));
     let remedy = "upload the calibration file again, then trim";
     Error::device(session.port(), problem, remedy)
 }

@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::{Serialize, Serializer};
 
-use mimu_core::stored::{OLDEST, Refused, VERSION};
+use mimu_core::stored::{Refused, VERSION};
 use mimu_core::wire::{
     Capabilities, Compatibility, EFFECTS, Greeting, MAGIC, PROTOCOL, Slot, Start, Version,
     compatibility,
@@ -314,21 +314,20 @@ pub fn unusable(refused: &Refused) -> String {
         Refused::NotACalibration => "they do not begin as a calibration does".into(),
         Refused::Length => "their length is not the one that they state".into(),
         Refused::Version { found } => {
-            format!(
-                "their layout is of version {found}, and this program reads {OLDEST} to {VERSION}"
-            )
+            format!("their layout is of version {found}, and this program reads {VERSION}")
         }
         Refused::Check => "their CRC does not hold".into(),
         Refused::Node { at } => format!(
-            "temperature node {at} is not finite, or not warmer than the one before, or one too many"
+            "temperature node {at} has numbers that no sensor has, or is not warmer than the one before, or one too many"
         ),
-        Refused::Singular => "C is singular".into(),
+        Refused::Singular => "the C that its effects were found with is singular".into(),
         Refused::EffectUnknown { at } => format!("effect {at} is not known"),
         Refused::EffectValue { at } => format!("effect {at} has numbers that make no sense"),
         Refused::EffectsFull { at } => format!("there is no room for effect {at}"),
         Refused::Temperature => {
             "the range of its temperatures, its lag or its thermometer makes no sense".into()
         }
+        Refused::Header => "their header has bits of a later version".into(),
     }
 }
 

@@ -1,17 +1,18 @@
 //! A recording compensated by a calibration, sample by sample.
 //!
-//! The affine model and the removal of effects are those of `core`, in double precision: what the device streams is what this writes.
+//! By the compensator of `core`, in double precision: what the device streams is what this writes.
 
 use std::path::Path;
 
-use mimu_core::compensation::{Affine, Sample};
-use mimu_core::effects::{Effects, State};
+use mimu_core::compensation::{Affine, Compensation, Sample};
+use mimu_core::compensator::{Compensator, State};
+use mimu_core::stored::NODES;
 use nalgebra::{Matrix3, Vector3};
 use serde::Serialize;
 
 use crate::blocks::{Condensed, Rails};
-use crate::calibration::{Calibration, Curves};
-use crate::die_temperature::{WITHOUT_TEMPERATURE, of_triads, outside};
+use crate::calibration::{Calibration, compensator};
+use crate::die_temperature::{WITHOUT_TEMPERATURE, outside};
 use crate::effects::quantity::Need;
 use crate::quantity::Sensor;
 use crate::rails::find;
@@ -104,7 +105,7 @@ pub fn apply(
     let condensed = Condensed::read(recording, false, |share| progress(0.5 * share))?;
     warnings.extend(condensed.warnings.iter().cloned());
     warnings.extend(outside(calibration, &condensed.blocks));
-    let mut compensator = Compensator::new(
+    let mut batches = Batches::new(
         calibration,
         &condensed,
         manifest,
@@ -115,11 +116,11 @@ pub fn apply(
     let mut writer = Writer::create(out, columns, format, replace)?;
     recording.for_each_batch(
         |share| progress(0.5 + 0.5 * share),
-        |batch| writer.write(&compensator.batch(batch)),
+        |batch| writer.write(&batches.batch(batch)),
     )?;
     let rows = writer.rows();
     let written = writer.finish(&compensated(manifest, recording, &condensed.sha256))?;
-    let counts = compensator.counts;
+    let counts = batches.counts;
     let of = |sensor: Sensor| has[sensor as usize].then_some(counts[sensor as usize]);
     Ok(Applied {
         format: "mimu-apply/1",
@@ -131,7 +132,7 @@ pub fn apply(
         },
         gaps: condensed.gaps.0,
         missing_s: condensed.gaps.1,
-        effects: compensator.ids,
+        effects: batches.ids,
         warnings,
     })
 }
@@ -151,29 +152,25 @@ fn compensated(manifest: &Manifest, recording: &Recording, sha256: &str) -> Mani
     out
 }
 
-/// A stretch of samples over which temperature and time stand still for the effects.
+/// A stretch of samples over which temperature and time stand still for the calibration.
 struct Slow {
     first_row: u64,
     middle_s: f64,
-    temp_c: f64,
-    /// Of the dies of gyro and accelerometer, if the calibration has curves.
-    dies_c: Option<[f64; 2]>,
+    temp_c: Option<f64>,
 }
 
 /// Compensates batches of samples in their order.
-struct Compensator {
-    models: [Affine<f64>; 2],
-    curves: Option<Curves>,
-    has: [bool; 2],
-    effects: Effects<f64, ROOM>,
-    ids: Vec<String>,
+struct Batches {
+    compensator: Compensator<f64, NODES, ROOM>,
     state: State<f64, ROOM>,
+    has: [bool; 2],
+    ids: Vec<String>,
     rails: [Rails; 6],
     period_s: f64,
     /// In their order, and those that have been reached.
     slow: Vec<Slow>,
     reached: usize,
-    /// When the effects were last told the time; at first, when the power came.
+    /// When the calibration was last told the time; at first, when the power came.
     told_s: f64,
     last_s: f64,
     /// Last whole reading of each triad: what the other one's effects are a function of where it has none.
@@ -181,7 +178,7 @@ struct Compensator {
     counts: [AppliedSensor; 2],
 }
 
-impl Compensator {
+impl Batches {
     fn new(
         calibration: &Calibration,
         condensed: &Condensed,
@@ -210,28 +207,30 @@ impl Compensator {
         }
         // Before the first temperature it is that one, as for a fit.
         let mut temp_c = first_temp_c.unwrap_or(f64::NAN);
-        let curves = calibration.curves();
-        let dies_c = curves.as_ref().and_then(|of| of_triads(blocks, of));
-        if curves.is_some() && dies_c.is_none() {
-            warnings.push(WITHOUT_TEMPERATURE.into());
-        }
-        let slow = blocks.iter().enumerate().map(|(at, block)| {
+        let slow = blocks.iter().map(|block| {
             if block.temp_c.mean.is_finite() {
                 temp_c = block.temp_c.mean;
             }
             Slow {
                 first_row: block.first_row,
                 middle_s: 0.5 * (block.start_s + block.last_s),
-                temp_c,
-                dies_c: dies_c.as_ref().map(|[gyro, accel]| [gyro[at], accel[at]]),
+                temp_c: Some(temp_c).filter(|c| c.is_finite()),
             }
         });
+        let slow = slow.collect();
+        let curves = calibration.curves();
+        if curves.is_some() && first_temp_c.is_none() {
+            warnings.push(WITHOUT_TEMPERATURE.into());
+        }
+        let curves = curves.filter(|_| first_temp_c.is_some());
         let first_s = blocks.first().map_or(0.0, |block| block.start_s);
         let none = Affine {
             matrix: Matrix3::identity(),
             offset: Vector3::zeros(),
         };
-        let models = Sensor::BOTH.map(|s| calibration.inverse(s).unwrap_or(none));
+        let [gyro, accel] = Sensor::BOTH.map(|s| calibration.inverse(s).unwrap_or(none));
+        let effects = calibration.effects_of_models(&[gyro, accel])?;
+        let compensator = compensator(calibration, Compensation { gyro, accel }, curves, effects);
         let first = |channel: usize| {
             let means = blocks.iter().map(|block| block.raw[channel]);
             means
@@ -241,20 +240,18 @@ impl Compensator {
                 .unwrap_or(0.0)
         };
         Ok(Self {
-            models,
-            curves: curves.clone(),
+            state: compensator.state(1.0 / condensed.period_s),
+            compensator,
             has,
-            effects: calibration.effects_of_models(&models)?,
             ids: calibration
                 .effects()
                 .iter()
                 .filter(|e| has[e.candidate.sensor as usize])
                 .map(|e| e.candidate.id())
                 .collect(),
-            state: State::new(1.0 / condensed.period_s),
             rails: find(condensed, manifest, warnings),
             period_s: condensed.period_s,
-            slow: slow.collect(),
+            slow,
             reached: 0,
             told_s: manifest.power_on_s.unwrap_or(first_s),
             last_s: first_s,
@@ -295,17 +292,11 @@ impl Compensator {
         out
     }
 
-    /// Tells the effects time and temperature of the block that `row` is in, and takes the models of that temperature.
+    /// Follows time and temperature to the block that `row` is in.
     fn follow(&mut self, row: u64) {
         while let Some(slow) = self.slow.get(self.reached).filter(|s| s.first_row <= row) {
             let dt_s = slow.middle_s - self.told_s;
-            self.effects.slow(&mut self.state, dt_s, slow.temp_c);
-            if let (Some(curves), Some(dies_c)) = (&self.curves, slow.dies_c) {
-                for (sensor, model) in Sensor::BOTH.into_iter().zip(&mut self.models) {
-                    let at = curves.inverse(sensor, dies_c[sensor as usize]);
-                    *model = at.unwrap_or(*model);
-                }
-            }
+            self.compensator.follow(&mut self.state, dt_s, slow.temp_c);
             self.told_s = slow.middle_s;
             self.reached += 1;
         }
@@ -338,11 +329,7 @@ impl Compensator {
 
     fn clean(&mut self) -> Sample<f64> {
         let [gyro, accel] = self.held;
-        let raw = self.effects.without_code_errors(&Sample { gyro, accel });
-        let si = Sample {
-            gyro: self.models[0].apply(&raw.gyro),
-            accel: self.models[1].apply(&raw.accel),
-        };
-        self.effects.remove(&mut self.state, &si)
+        self.compensator
+            .apply(&mut self.state, &Sample { gyro, accel })
     }
 }

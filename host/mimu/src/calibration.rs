@@ -11,7 +11,7 @@ mod over_temperature;
 pub use effect::{CoefficientTable, ConverterTable, EffectTable, FormTable};
 pub use kept::Kept;
 pub use of_curves::{CurvesOfUnit, TriadOfCurves};
-pub use on_device::{NO_SENSE, OnDevice, What};
+pub use on_device::{NO_SENSE, OnDevice, What, compensator};
 pub use over_temperature::{Curves, NodeTable, OverTemperature, TemperatureNode, reference_node};
 
 use std::path::Path;

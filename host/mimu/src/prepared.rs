@@ -94,8 +94,11 @@ impl Prepared {
                 "write the t_s at which the power came to recording.toml, or leave the key out";
             return Err(Error::new(place, problem, remedy));
         }
-        let dwells = Dwells::find(&condensed, &manifest, finding)
+        let mut dwells = Dwells::find(&condensed, &manifest, finding)
             .map_err(|e| e.map(|e| e.place = format!("{place}, {}", e.place)))?;
+        let at = manifest.latitude_deg;
+        let gravity = at.and_then(|at| implausible_gravity(manifest.gravity_mps2, at));
+        dwells.warnings.extend(gravity);
         let noise = Noise::within(&dwells.list, &condensed, &dwells.rails);
         Ok(Self {
             manifest,

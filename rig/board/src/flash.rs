@@ -107,6 +107,8 @@ pub(crate) struct Watched {
     flash: Flash,
     banks: [Bank; 2],
     landed: Vec<(u64, u64)>,
+    /// No operation ends any more.
+    pub(crate) stuck: bool,
 }
 
 impl Watched {
@@ -115,6 +117,7 @@ impl Watched {
             flash: Flash::new(),
             banks: Default::default(),
             landed: Vec::new(),
+            stuck: false,
         }
     }
 
@@ -277,6 +280,10 @@ impl Device for Watched {
         registers: &mut RegisterFile,
         context: &mut DeviceContext<'_>,
     ) {
+        // The event is the end of an operation.
+        if self.stuck {
+            return;
+        }
         self.flash.on_event(event, registers, context);
     }
 

@@ -32,6 +32,7 @@ enum Command {
 
 /// Run the firmware on an emulated board and print the path of its serial port.
 ///
+/// The place is that of the plan, without a plan latitude 30.5° with gravity 9.793 m/s², and is printed at the start.
 /// The port is a pseudo-terminal in raw mode; its speed does not matter. The unit is carried through the plan from
 /// the moment that the board is switched on, and stays where the plan ends; or it is moved by commands, with --control.
 /// Runs until it is interrupted.
@@ -163,6 +164,11 @@ impl Serve {
             None => None,
         };
         served.start()?;
+        // A host that calibrates by another gravity finds scale factors that are wrong by the ratio, and nothing that says so.
+        eprintln!(
+            "mimu-board: gravity here is {:.5} m/s², at latitude {}°: give the host the same (--gravity, --latitude)",
+            plan.place.gravity, plan.place.latitude_deg
+        );
         println!("{}", served.path().display());
         if let Some(address) = control {
             println!("control: {address}");

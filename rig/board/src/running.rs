@@ -225,6 +225,11 @@ impl Board {
         self.with(|s| s.session.board_mut().part.sampler.stopped = true)
     }
 
+    /// Has the flash interface hang for good: what it is asked to program or to erase never ends.
+    pub fn stop_flash(&mut self) -> Result<(), String> {
+        self.with(|s| s.session.board_mut().part.flash.stuck = true)
+    }
+
     /// Reads a register of a peripheral without the firmware noticing.
     ///
     /// Errors: besides, an address where no register is.

@@ -6,11 +6,12 @@
 #![no_std]
 
 use mimu_core::compensation::{Affine, Compensation, Sample};
+use mimu_core::compensator::{self, Compensator};
 use mimu_core::die::{self, DieLag};
 use mimu_core::effects::{Directions, Effect, Effects, Refused, Sensor, State, Variable};
 use mimu_core::kalman::{Bank, Filter, Innovation, Rejected};
 use mimu_core::single;
-use mimu_core::stored::{self, Curves, Origin, Record, Stored, TooLong};
+use mimu_core::stored::{self, Curves, NODES, Origin, ROOM, Record, Stored, TooLong};
 use mimu_core::table::{self, Node, Table};
 use mimu_core::wire::{
     Call, CompensatedBatch, Decoder, EncodeError, MAX_FRAME, Message, RawBatch, Sums,
@@ -165,14 +166,14 @@ pub fn table_follow(table: &Table<f32, 16>, dies_c: [f32; 2]) -> table::State<f3
     state
 }
 
-/// [`Table::with_straight_lines`], [`Table::with_range`] and [`Effects::within`].
+/// [`Table::with_range`] and [`Effects::within`].
 #[inline(never)]
 pub fn table_within(
     table: Table<f32, 16>,
     range_c: [f32; 2],
     effects: Effects<f32, 8>,
 ) -> Result<(Table<f32, 16>, Effects<f32, 8>), table::Refused> {
-    let table = table.with_straight_lines().with_range(range_c)?;
+    let table = table.with_range(range_c)?;
     let effects = effects.within(table.limits());
     Ok((table, effects))
 }
@@ -265,19 +266,37 @@ pub fn wire_effects() -> u32 {
     effects_of_this_build()
 }
 
-/// What a device does with every sample: sums to volts, compensation at the temperature of the batch, effects, bytes of both
-/// streams.
+/// [`Compensator::state`], [`Compensator::take_over`], [`Compensator::follow`] and the rest of its state, as a device goes on with another
+/// calibration.
+#[inline(never)]
+pub fn compensator_follow(
+    now: &Compensator<f32, NODES, ROOM>,
+    before: &Compensator<f32, NODES, ROOM>,
+    dt_s: f32,
+    thermometer_c: Option<f32>,
+) -> (
+    compensator::State<f32, ROOM>,
+    Option<[f32; 2]>,
+    table::Place,
+) {
+    let mut state = before.state(1000.0).long_after_power_on();
+    before.follow(&mut state, dt_s, thermometer_c);
+    now.take_over(before, &mut state);
+    state.gap();
+    let place = now.follow(&mut state, dt_s, thermometer_c);
+    (state, state.dies_c(), place)
+}
+
+/// What a device does with every sample: sums to volts, all of the calibration at the temperature of the batch, bytes of both streams.
 #[inline(never)]
 pub fn sample_path(
     sums: &Sums,
     scale: [f32; 2],
-    at: &table::State<f32>,
-    effects: &Effects<f32, 8>,
-    state: &mut State<f32, 8>,
+    compensator: &Compensator<f32, NODES, ROOM>,
+    state: &mut compensator::State<f32, ROOM>,
 ) -> ([u8; 18], [u8; 24]) {
     let [gyro, accel] = scale;
-    let raw = single::without_code_errors(effects, &volts(sums, gyro, accel));
-    let sample = single::remove(effects, state, &single::compensate(&at.model, &raw));
+    let sample = single::apply(compensator, state, &volts(sums, gyro, accel));
     (RawBatch::pack(sums), CompensatedBatch::pack(&sample))
 }
 

@@ -3,7 +3,7 @@
 use super::*;
 
 /// Sums of TEMP pins at this temperature, in a sample of the nominal reference.
-fn at_temperature(sums: &mut Channels<u32>, temp_c: f64) {
+pub(super) fn at_temperature(sums: &mut Channels<u32>, temp_c: f64) {
     let volts = 2.5 + (temp_c - 25.0) * 0.0084;
     let sum = (volts / 2.5 * f64::from(NOMINAL_REFERENCE)).round() as u32;
     sums.temperature = [sum; 3];

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
-use mimu::quantity::normal_gravity;
+use mimu::quantity::{implausible_gravity, normal_gravity};
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{
     ColumnList, Decimal, ImportOptions, Offset, Preset, RawUnit, Reference, SampleFormat, Scale,
@@ -100,7 +100,10 @@ const SLOW_HZ: f64 = 5.0;
 
 pub(crate) fn run(args: ImportArgs) -> Result<()> {
     let (gravity, assumed) = match (args.gravity, args.latitude) {
-        (Some(gravity), _) => (gravity, None),
+        (Some(gravity), latitude) => (
+            gravity,
+            latitude.and_then(|at| implausible_gravity(gravity, at)),
+        ),
         (None, Some(latitude)) => (normal_gravity(latitude), None),
         (None, None) if args.reference == Reference::Table => (9.80665, None),
         (None, None) => (9.80665, Some("gravity is taken to be 9.80665 m/s²; it ranges from 9.78 at the equator to 9.83 at the poles, and every scale factor of the accelerometer with it: give --gravity or --latitude".to_string())),

@@ -17,7 +17,7 @@ use mimu_recording::{Inputs, SampleFormat};
 use crate::arguments::JsonArgs;
 use crate::cmd::device::{PortArgs, duration, interruption};
 use crate::output::{check_outputs, print, progress};
-use mimu::quantity::normal_gravity;
+use mimu::quantity::{implausible_gravity, normal_gravity};
 
 /// What every recording of a device has, whoever moves the unit.
 #[derive(Args)]
@@ -58,7 +58,13 @@ impl RecordingArgs {
             Some(_) => None,
         };
         match (self.gravity.or(of_plan), self.latitude_deg(plan)) {
-            (Some(gravity), _) => gravity,
+            (Some(gravity), latitude) => {
+                let warning = latitude.and_then(|at| implausible_gravity(gravity, at));
+                if let Some(warning) = warning {
+                    eprintln!("warning: {warning}");
+                }
+                gravity
+            }
             (None, Some(latitude)) => normal_gravity(latitude),
             (None, None) => {
                 eprintln!(

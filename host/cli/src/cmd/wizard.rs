@@ -4,7 +4,7 @@ use std::io::{IsTerminal as _, Write};
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use mimu::quantity::normal_gravity;
+use mimu::quantity::{implausible_gravity, normal_gravity};
 use mimu::readable::STANDARD_GRAVITY;
 use mimu::result::diagnosis::DiagnosisResult;
 use mimu_device::record::Plan;
@@ -219,6 +219,11 @@ impl WizardArgs {
                 planned(&plan, fixture, gravity.unwrap_or(STANDARD_GRAVITY), path)?
             }
         };
+        if let (Some(gravity), Some(at)) = (gravity, latitude_deg)
+            && let Some(warning) = implausible_gravity(gravity, at)
+        {
+            eprintln!("warning: {warning}");
+        }
         let Some(gravity_mps2) = gravity else {
             let problem = "local gravity is not known, and every scale factor of the accelerometer goes by it";
             return Err(Error::new(

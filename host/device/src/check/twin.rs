@@ -1,18 +1,17 @@
 //! The PC's side of the comparison.
 
-use mimu_core::compensation::{Affine, Sample};
+use mimu_core::compensation::{Affine, Compensation, Sample};
+use mimu_core::compensator::{Compensator, State};
 use mimu_core::die::{self, DieLag};
-use mimu_core::effects;
 use mimu_core::single;
-use mimu_core::stored::{ROOM, Stored};
-use mimu_core::table;
+use mimu_core::stored::{NODES, ROOM};
 use mimu_core::wire::BatchHead;
-use nalgebra::Vector3;
+use nalgebra::{RealField, Vector3};
 
 use super::Checked;
 use crate::heard::Samples;
 use crate::image::Image;
-use mimu::calibration::{Calibration, Curves};
+use mimu::calibration::{Calibration, compensator};
 use mimu::quantity::Sensor;
 use mimu_recording::error::{Error, Result};
 
@@ -20,18 +19,19 @@ use mimu_recording::error::{Error, Result};
 /// reading 0, which is up to 64 weights where the reading is of one.
 const TURN: f64 = 64.0 * f32::EPSILON as f64;
 
+/// A compensator with the state of its stream.
+struct Running<T: RealField> {
+    compensator: Compensator<T, NODES, ROOM>,
+    state: State<T, ROOM>,
+}
+
 /// The PC's side, twice: as the device computes, and in double precision from the file.
 pub(super) struct Twin {
     rate_hz: u32,
-    stored: Stored,
-    model: table::State<f32>,
-    single: effects::State<f32, ROOM>,
-    affine: [Affine<f64>; 2],
-    curves: Option<Curves>,
-    lags: [DieLag<f32>; 2],
+    single: Running<f32>,
+    double: Running<f64>,
+    on_curves: bool,
     dies: Option<[die::State<f32>; 2]>,
-    effects: effects::Effects<f64, ROOM>,
-    double: effects::State<f64, ROOM>,
     /// Number of the first sample of the batch before; time since power-on is counted by it, as on the device.
     followed: u32,
     /// Of the sample that would come next.
@@ -52,25 +52,27 @@ impl Twin {
             let missing = || Error::device(place, "a sensor is missing", "calibrate both sensors");
             calibration.inverse(sensor).ok_or_else(missing)
         };
-        let (mut single, mut double) = (
-            effects::State::new(rate_hz as f32),
-            effects::State::new(f64::from(rate_hz)),
-        );
+        let models = Compensation {
+            gyro: model(Sensor::Gyro)?,
+            accel: model(Sensor::Accel)?,
+        };
+        let curves = calibration.curves();
+        let on_curves = curves.is_some();
+        let effects = calibration.core_effects()?;
+        let of_file = compensator(calibration, models, curves, effects);
+        let mut single = Running::new(stored.compensator, rate_hz as f32);
+        let mut double = Running::new(of_file, f64::from(rate_hz));
         if powered_for_ms.is_none() {
-            (single, double) = (single.long_after_power_on(), double.long_after_power_on());
+            single.state = single.state.long_after_power_on();
+            double.state = double.state.long_after_power_on();
         }
         let before = u64::from(powered_for_ms.unwrap_or_default()) * u64::from(rate_hz) / 1000;
         Ok(Self {
             rate_hz,
-            model: stored.table.state(),
             single,
-            lags: stored.lags(),
-            dies: None,
-            curves: calibration.curves(),
-            stored,
-            affine: [model(Sensor::Gyro)?, model(Sensor::Accel)?],
-            effects: calibration.core_effects()?,
             double,
+            on_curves,
+            dies: None,
             followed: 0_u32.wrapping_sub(before as u32),
             next: None,
         })
@@ -82,16 +84,16 @@ impl Twin {
         let first = self.next != Some(head.first);
         let dies_c = device.dies_c.unwrap_or([device.head.temp_c; 2]);
         self.follow_dies(head, dies_c, first, found);
-        self.follow(head);
+        self.follow(head, dies_c);
         if first {
-            self.single.gap();
-            self.double.gap();
+            self.single.state.gap();
+            self.double.state.gap();
         }
         for (k, (raw, device)) in raw.values.iter().zip(&device.values).enumerate() {
-            let single = self.single(raw);
+            let single = self.single.apply(raw);
             let (double, bounds) = self.double(raw);
             // The angular acceleration of a sample is its difference to the one before, which is not known of the first.
-            if first && k == 0 && self.stored.effects.is_some() {
+            if first && k == 0 && self.single.compensator.effects.is_some() {
                 continue;
             }
             found.samples += 1;
@@ -105,8 +107,7 @@ impl Twin {
         self.next = Some(head.first.wrapping_add(raw.values.len() as u32));
     }
 
-    /// Takes the models of the temperatures of the dies that the device says it has used, and compares them with that of the thermometer
-    /// behind their lags. What was before the comparison is in the temperatures of its first batch.
+    /// Compares the temperatures of the dies that the device says it has used with that of the thermometer behind their lags. What was before the comparison is in the temperatures of its first batch.
     fn follow_dies(
         &mut self,
         head: &BatchHead,
@@ -118,9 +119,10 @@ impl Twin {
         if first {
             self.dies = None;
         }
+        let lags = &self.single.compensator.lags;
         match &mut self.dies {
             Some(states) => {
-                for ((lag, state), die_c) in self.lags.iter().zip(states).zip(dies_c) {
+                for ((lag, state), die_c) in lags.iter().zip(states).zip(dies_c) {
                     if *lag == DieLag::none() {
                         continue;
                     }
@@ -132,7 +134,7 @@ impl Twin {
                 }
             }
             None => {
-                self.dies = Some([0, 1].map(|k| self.lags[k].state_of(head.temp_c, dies_c[k])));
+                self.dies = Some([0, 1].map(|k| lags[k].state_of(head.temp_c, dies_c[k])));
             }
         }
         let [mut low, mut high] = found.die_range_c.unwrap_or([dies_c[0]; 2]);
@@ -140,56 +142,38 @@ impl Twin {
             (low, high) = (low.min(die_c), high.max(die_c));
         }
         found.die_range_c = Some([low, high]);
-        self.stored.table.follow(&mut self.model, dies_c);
-        if let Some(curves) = &self.curves {
-            for ((sensor, model), die_c) in
-                Sensor::BOTH.into_iter().zip(&mut self.affine).zip(dies_c)
-            {
-                let at = curves.inverse(sensor, f64::from(die_c));
-                *model = at.unwrap_or(*model);
-            }
-        }
     }
 
-    fn follow(&mut self, head: &BatchHead) {
+    /// Follows time and temperature, at the temperatures of the dies that the device has used.
+    fn follow(&mut self, head: &BatchHead, dies_c: [f32; 2]) {
         let passed = head.first.wrapping_sub(self.followed);
         self.followed = head.first;
-        if let Some(all) = &self.stored.effects {
-            // By the same operation as the firmware, which is what decides the last digit.
-            let dt_s = passed as f32 / self.rate_hz as f32;
-            all.slow(&mut self.single, dt_s, head.temp_c);
-        }
-        let (dt_s, temp_c) = (
-            f64::from(passed) / f64::from(self.rate_hz),
-            f64::from(head.temp_c),
-        );
-        self.effects.slow(&mut self.double, dt_s, temp_c);
-    }
-
-    /// As the device computes.
-    fn single(&mut self, raw: &Sample<f32>) -> Sample<f32> {
-        let model = &self.model.model;
-        match &self.stored.effects {
-            Some(all) => {
-                let raw = single::without_code_errors(all, raw);
-                all.remove(&mut self.single, &model.apply(&raw))
-            }
-            None => model.apply(raw),
-        }
+        let thermometer_c = head.thermometer_c();
+        let Running { compensator, state } = &mut self.single;
+        // By the same operation as the firmware, which is what decides the last digit.
+        let dt_s = passed as f32 / self.rate_hz as f32;
+        compensator.follow_at(state, dt_s, thermometer_c, Some(dies_c));
+        let Running { compensator, state } = &mut self.double;
+        let dt_s = f64::from(passed) / f64::from(self.rate_hz);
+        let dies_c = Some(dies_c.map(f64::from));
+        compensator.follow_at(state, dt_s, thermometer_c.map(f64::from), dies_c);
     }
 
     /// Readings without errors by the code, in double precision. Within rounding of a turn either side is right, and a bit's error apart: the
     /// one that single precision takes.
     fn without_code_errors(&self, raw: &Sample<f32>) -> [Vector3<f64>; 2] {
         let exact = [raw.gyro, raw.accel].map(|u| u.map(f64::from));
-        let Some(stored) = &self.stored.effects else {
+        let (Some(stored), Some(file)) = (
+            &self.single.compensator.effects,
+            &self.double.compensator.effects,
+        ) else {
             return exact;
         };
         let single = single::without_code_errors(stored, raw);
         let single = [single.gyro, single.accel].map(|u| u.map(f64::from));
         let beside = |by: f64| {
             let [gyro, accel] = exact.map(|u| u * (1.0 + by));
-            let clean = self.effects.without_code_errors(&Sample { gyro, accel });
+            let clean = file.without_code_errors(&Sample { gyro, accel });
             [exact[0] - gyro + clean.gyro, exact[1] - accel + clean.accel]
         };
         let sides = [0.0, TURN, -TURN].map(beside);
@@ -205,13 +189,28 @@ impl Twin {
 
     /// In double precision, with what rounding can make of it.
     fn double(&mut self, raw: &Sample<f32>) -> (Sample<f64>, [Vector3<f64>; 2]) {
-        let raw = self.without_code_errors(raw);
-        let [gyro, accel] = [0, 1].map(|i| self.affine[i].apply(&raw[i]));
+        let [gyro, accel] = self.without_code_errors(raw);
         // On a curve each number is itself a sum of four terms.
-        let times = if self.curves.is_some() { 2.0 } else { 1.0 };
-        let bounds = [0, 1].map(|i| rounding(&self.affine[i], &raw[i]) * times);
-        let sample = Sample { gyro, accel };
-        (self.effects.remove(&mut self.double, &sample), bounds)
+        let times = if self.on_curves { 2.0 } else { 1.0 };
+        let Running { compensator, state } = &mut self.double;
+        let models = state.models();
+        let bounds = [(&models.gyro, &gyro), (&models.accel, &accel)];
+        let bounds = bounds.map(|(model, raw)| rounding(model, raw) * times);
+        let sample = compensator.apply_clean(state, &Sample { gyro, accel });
+        (sample, bounds)
+    }
+}
+
+impl<T: RealField + Copy> Running<T> {
+    fn new(compensator: Compensator<T, NODES, ROOM>, rate_hz: T) -> Self {
+        Self {
+            state: compensator.state(rate_hz),
+            compensator,
+        }
+    }
+
+    fn apply(&mut self, raw: &Sample<T>) -> Sample<T> {
+        self.compensator.apply(&mut self.state, raw)
     }
 }
 

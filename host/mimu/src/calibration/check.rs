@@ -1,5 +1,7 @@
 //! What a calibration file has to be to be applied.
 
+use mimu_core::compensation::{Affine, Implausible, MOST_OFFSET, SCALE_RANGE};
+use mimu_core::table::{TEMPERATURE_RANGE_C, is_temperature};
 use nalgebra::{Matrix3, Vector3};
 
 use super::{
@@ -60,12 +62,11 @@ impl Calibration {
                 ));
             }
             let inverse = self.inverse(sensor);
-            let Some(forward) = inverse.as_ref().and_then(Forward::of) else {
-                return Err(Error::new(
-                    place,
-                    "C is singular",
-                    "fit the recording again",
-                ));
+            let problem = inverse.as_ref().and_then(|model| implausible(model, None));
+            let forward = inverse.as_ref().and_then(Forward::of);
+            let (None, Some(forward)) = (&problem, forward) else {
+                let problem = problem.unwrap_or_else(|| SINGULAR.into());
+                return Err(Error::new(place, problem, "fit the recording again"));
             };
             check_both_ways(table, &forward, &place)?;
         }
@@ -111,13 +112,21 @@ impl Calibration {
     }
 
     fn check_temperatures(&self, place: &str) -> Result<()> {
+        let refuse = |problem: String| {
+            let place = format!("{place}, [recording]");
+            Err(Error::new(place, problem, "fit the recording again"))
+        };
+        let [least, most] = TEMPERATURE_RANGE_C;
         if let Some([from, to]) = self.recording.temp_range_c
-            && !(from.is_finite() && to.is_finite() && from <= to)
+            && !(is_temperature(from) && is_temperature(to) && from <= to)
         {
-            return Err(Error::new(
-                format!("{place}, [recording]"),
-                format!("temp_range_c is [{from}, {to}], and has to rise"),
-                "fit the recording again",
+            return refuse(format!(
+                "temp_range_c is [{from}, {to}], and has to rise, within {least} and {most} °C"
+            ));
+        }
+        if let Some(temp_c) = self.recording.temp_c.filter(|t| !is_temperature(*t)) {
+            return refuse(format!(
+                "temp_c is {temp_c}, and has to be from {least} to {most} °C"
             ));
         }
         match &self.temperature {
@@ -142,6 +151,24 @@ impl TriadTable {
         let missing = all.iter().find(|(_, there)| !*there)?;
         Some((there.0, missing.0))
     }
+}
+
+const SINGULAR: &str = "C is singular";
+
+/// What no sensor is, by the limits that the device has too; `slope`: derivative by the temperature, per kelvin.
+pub(super) fn implausible(model: &Affine<f64>, slope: Option<&Affine<f64>>) -> Option<String> {
+    Some(match model.check(slope).err()? {
+        Implausible::NotFinite => "C, o or a slope has an entry that is not a number".into(),
+        Implausible::Scale => {
+            let [least, most] = SCALE_RANGE;
+            format!("a column of C is not from {least:e} to {most:e} SI per raw unit long")
+        }
+        Implausible::Singular => SINGULAR.into(),
+        Implausible::Offset => format!("o is beyond {MOST_OFFSET:e} SI"),
+        Implausible::Slope => {
+            "within a kelvin, C would change by more than itself, or o beyond all sizes".into()
+        }
+    })
 }
 
 /// Refuses a file in which the two directions of the calibration disagree: one of them was edited.

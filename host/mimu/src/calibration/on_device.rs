@@ -1,14 +1,19 @@
 //! Effects in the words of the device: the bytes that it stores and what the PC compares it with are both made of these.
 
 use mimu_core::RealField;
-use mimu_core::compensation::Affine;
+use mimu_core::compensation::{Affine, Compensation};
+use mimu_core::compensator::Compensator;
+use mimu_core::die::DieLag;
 use mimu_core::effects::{
-    Effect as DeviceEffect, Effects, Refused, Sensor as DeviceSensor, Variable as DeviceVariable,
+    Effect as DeviceEffect, Effects, REFERENCE_C, Refused, Sensor as DeviceSensor,
+    Variable as DeviceVariable,
 };
+use mimu_core::stored::NODES;
+use mimu_core::table::Table;
 use mimu_core::wire::EFFECTS;
 use nalgebra::convert;
 
-use super::Calibration;
+use super::{Calibration, Curves};
 use crate::effects::candidate::{Kind, OfConverter};
 use crate::effects::converter::BITS;
 use crate::effects::quantity::Quantity;
@@ -149,6 +154,25 @@ fn variable(of: Quantity) -> Option<DeviceVariable> {
         Quantity::Time => Device::Time,
         _ => return None,
     })
+}
+
+/// A calibration as `core` runs it: on these curves, or with this model at all temperatures.
+pub fn compensator<const N: usize>(
+    calibration: &Calibration,
+    model: Compensation<f64>,
+    curves: Option<Curves>,
+    effects: Effects<f64, N>,
+) -> Compensator<f64, NODES, N> {
+    let (table, lags) = match curves {
+        Some(curves) => (curves.table().clone(), Sensor::BOTH.map(|s| *curves.lag(s))),
+        None => (Table::constant(REFERENCE_C, model), [DieLag::none(); 2]),
+    };
+    let any = !calibration.effects().is_empty();
+    Compensator {
+        table,
+        lags,
+        effects: any.then_some(effects),
+    }
 }
 
 /// The effects of a calibration as the device removes them; one that `core` lacks is refused by its id.

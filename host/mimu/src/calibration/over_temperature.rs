@@ -2,16 +2,16 @@
 //! thermometer and dies.
 
 use mimu_core::compensation::{Affine, Compensation};
-use mimu_core::die::{DieLag, LAG_RANGE_S};
+use mimu_core::die::{DieLag, LAG_RANGE_S, LEAST_LAG_S};
 use mimu_core::effects::REFERENCE_C;
 use mimu_core::stored::NODES;
-use mimu_core::table::{Node, Table};
+use mimu_core::table::{Node, TEMPERATURE_RANGE_C, Table, is_temperature};
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
 use super::Calibration;
+use super::check::implausible;
 use crate::quantity::Sensor;
-use crate::triad::Forward;
 use mimu_recording::error::{Error, Result};
 
 /// `[temperature]` of a calibration file.
@@ -117,25 +117,13 @@ impl NodeTable {
     }
 
     /// What is wrong with it.
-    fn problem(&self) -> Option<&'static str> {
-        let finite = |matrix: &[[f64; 3]; 3], vector: &[f64; 3]| {
-            let mut all = matrix.iter().flatten().chain(vector);
-            all.all(|x| x.is_finite())
-        };
-        let positive = |mut all: std::iter::Flatten<std::slice::Iter<'_, [f64; 3]>>| {
-            all.all(|x| x.is_finite() && *x >= 0.0)
-        };
-        if !finite(&self.C, &self.o) || !finite(&self.slope_C, &self.slope_o) {
-            return Some("C, o or a slope has an entry that is not a number");
+    fn problem(&self) -> Option<String> {
+        let positive = |x: &f64| x.is_finite() && *x >= 0.0;
+        let sigma_c = self.sigma_C.iter().flatten().flatten();
+        if !sigma_c.chain(self.sigma_o.iter().flatten()).all(positive) {
+            return Some("sigma_C or sigma_o has an entry that is no standard deviation".into());
         }
-        let sigmas = self.sigma_C.iter().flatten().chain(&self.sigma_o);
-        if sigmas.copied().any(|row| !positive([row].iter().flatten())) {
-            return Some("sigma_C or sigma_o has an entry that is no standard deviation");
-        }
-        if Forward::of(&self.model()).is_none() {
-            return Some("C is singular");
-        }
-        None
+        implausible(&self.model(), Some(&self.slope()))
     }
 }
 
@@ -166,8 +154,10 @@ impl OverTemperature {
             ))
         };
         let [from, to] = self.range_c;
-        if !(from.is_finite() && to.is_finite() && from <= to) {
-            let problem = format!("range_c is [{from}, {to}], and has to rise");
+        let [least, most] = TEMPERATURE_RANGE_C;
+        if !(is_temperature(from) && is_temperature(to) && from <= to) {
+            let problem =
+                format!("range_c is [{from}, {to}], and has to rise, within {least} and {most} °C");
             return refuse("", problem);
         }
         if let Some(problem) = self.problem_of_lags() {
@@ -228,8 +218,8 @@ impl OverTemperature {
         ];
         lags.into_iter()
             .find_map(|(name, lag_s, interval)| match (lag_s, interval) {
-                (Some(lag_s), _) if !(least..=most).contains(&lag_s) => Some(format!(
-                    "{name} is {lag_s}, and has to be from {least} to {most}"
+                (Some(lag_s), _) if DieLag::new(lag_s).is_none() => Some(format!(
+                    "{name} is {lag_s}, and has to be from {least} to {most}, and 0 or at least {LEAST_LAG_S}"
                 )),
                 (None, Some(_)) => Some(format!("interval_{name} is there and {name} is not")),
                 (_, Some([lower, upper])) if !(lower <= upper) => Some(format!(
@@ -247,8 +237,11 @@ impl OverTemperature {
         has: [bool; 2],
     ) -> Option<String> {
         let temp_c = node.temp_c;
-        if !temp_c.is_finite() {
-            return Some(format!("temp_c is {temp_c}"));
+        if !is_temperature(temp_c) {
+            let [least, most] = TEMPERATURE_RANGE_C;
+            return Some(format!(
+                "temp_c is {temp_c}, and has to be from {least} to {most} °C"
+            ));
         }
         if let Some(before) = before.filter(|before| temp_c <= *before) {
             return Some(format!(

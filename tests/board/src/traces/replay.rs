@@ -3,13 +3,13 @@
 use std::collections::BTreeMap;
 
 use mimu_core::compensation::Sample;
-use mimu_core::effects;
+use mimu_core::compensator::State;
 use mimu_core::kalman::Bank;
+use mimu_core::single;
 use mimu_core::stored::{self, ROOM};
 use mimu_core::wire::{
     BATCH, BatchHead, Decoder, Event, KalmanState, MAX_FRAME, Message, Triad, encode,
 };
-use mimu_core::{single, table};
 use nalgebra::Vector3;
 
 use super::{INPUTS, NOISE, SPANS, Trace};
@@ -31,8 +31,7 @@ pub struct Replayed {
 pub fn replay(trace: &Trace) -> Result<Replayed, String> {
     let stored = stored::decode(&trace.calibration).map_err(|e| format!("calibration: {e:?}"))?;
     let mut twin = Twin {
-        model: stored.table.state(),
-        effects: effects::State::new(1000.0),
+        state: stored.compensator.state(1000.0),
         slow_at: None,
         powered_for_ms: 0,
         next: None,
@@ -108,9 +107,8 @@ fn same_bytes(message: &Message<'_>, bytes: &[u8]) -> Result<(), String> {
 /// The device's side, in single precision.
 struct Twin {
     stored: stored::Stored,
-    model: table::State<f32>,
-    effects: effects::State<f32, ROOM>,
-    /// Number of the sample at which the slow effects were followed last.
+    state: State<f32, ROOM>,
+    /// Number of the sample at which it was followed last.
     slow_at: Option<u32>,
     /// At sample 0.
     powered_for_ms: u32,
@@ -130,18 +128,13 @@ impl Twin {
         raw: &[Sample<f32>],
         device: &[Sample<f32>],
     ) -> Result<usize, String> {
-        self.stored.table.follow(&mut self.model, dies_c);
-        self.follow(head);
+        self.follow(head, dies_c);
         let mut compared = 0;
         for (k, (raw, device)) in raw.iter().zip(device).enumerate() {
-            let effects = self.stored.effects.as_ref();
-            let read = effects.map_or(*raw, |all| single::without_code_errors(all, raw));
-            let mut sample = single::compensate(&self.model.model, &read);
-            if let Some(all) = effects {
-                sample = single::remove(all, &mut self.effects, &sample);
-                if k < SETTLED && self.next != Some(head.first) {
-                    continue;
-                }
+            let sample = single::apply(&self.stored.compensator, &mut self.state, raw);
+            let effects = self.stored.compensator.effects.is_some();
+            if effects && k < SETTLED && self.next != Some(head.first) {
+                continue;
             }
             let bits = |s: &Sample<f32>| [s.gyro, s.accel].map(|v| v.map(f32::to_bits));
             if bits(&sample) != bits(device) {
@@ -157,16 +150,15 @@ impl Twin {
     }
 
     /// As the firmware does, from the start on: batch after batch, since the time is a sum.
-    fn follow(&mut self, head: &BatchHead) {
-        let Some(all) = &self.stored.effects else {
-            return;
-        };
+    fn follow(&mut self, head: &BatchHead, dies_c: [f32; 2]) {
         let mut at = self.slow_at.map_or(0, |last| last + BATCH as u32);
         loop {
             let passed = self
                 .slow_at
                 .map_or(self.powered_for_ms, |before| at - before);
-            all.slow(&mut self.effects, passed as f32 / 1000.0, head.temp_c);
+            let (dt_s, thermometer_c) = (passed as f32 / 1000.0, head.thermometer_c());
+            let compensator = &self.stored.compensator;
+            compensator.follow_at(&mut self.state, dt_s, thermometer_c, Some(dies_c));
             self.slow_at = Some(at);
             if at >= head.first {
                 break;

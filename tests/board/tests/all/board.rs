@@ -2,7 +2,7 @@
 //! emulator says of how it uses the part.
 
 use mimu_board::running::Board;
-use mimu_board::schematic::{Volts, WIRING};
+use mimu_board::schematic::{HSE_HZ, Volts, WIRING};
 use mimu_board_tests::{MS, STARTED, image, still};
 
 /// Registers of DMA1's first stream (RM0433 15.5): what is left of the round, and where it writes.
@@ -114,4 +114,32 @@ fn after_the_reset_pin_and_after_a_power_cut_it_samples_again_in_step() {
     assert_eq!(causes, ["Pin", "PowerOn"]);
     assert!(board.register(LEFT).unwrap() <= 40);
     assert_eq!(board.findings().unwrap().broken, [""; 0]);
+}
+
+/// Registers of RCC (RM0433 8.7): oscillators; sources, dividers and multipliers of the PLLs; the source of USB's clock.
+const RCC: u64 = 0x5802_4400;
+
+/// The third PLL is set as USB needs it in every image, and stopped in this one: full speed takes 48 MHz within 0.25 % (USB 2.0, 7.1.11), which the
+/// part's own oscillator does not have untrimmed.
+#[test]
+fn the_clock_of_usb_is_48_mhz_of_the_debuggers_crystal() {
+    let mut board = still(Volts::GROUND);
+    board.run_to(STARTED).unwrap();
+    let mut field = |offset: u64, low: u32, bits: u32| {
+        let register = board.register(RCC + offset).unwrap();
+        (register >> low) & ((1 << bits) - 1)
+    };
+    // PLLSRC: HSE. USBSEL: PLL3 Q.
+    assert_eq!((field(0x28, 0, 2), field(0x54, 20, 2)), (2, 2));
+    let reference = HSE_HZ / field(0x28, 20, 6);
+    // PLL3RGE and PLL3VCOSEL: an input of 8 to 16 MHz, the wide VCO, which runs at 192 to 836 MHz.
+    assert_eq!((field(0x2c, 10, 2), field(0x2c, 9, 1)), (3, 0));
+    assert!((8_000_000..=16_000_000).contains(&reference));
+    let vco = reference * (field(0x40, 0, 9) + 1);
+    assert!((192_000_000..=836_000_000).contains(&vco), "{vco}");
+    // DIVQ3EN; no fraction is added.
+    assert_eq!((field(0x2c, 23, 1), field(0x2c, 8, 1)), (1, 0));
+    assert_eq!(vco / (field(0x40, 16, 7) + 1), 48_000_000);
+    // Neither it nor the untrimmed oscillator runs for nothing here.
+    assert_eq!((field(0, 28, 1), field(0, 12, 1)), (0, 0));
 }

@@ -3,6 +3,7 @@
 mod board;
 mod budget;
 mod control;
+mod front_end;
 mod power;
 mod restart;
 mod serial;

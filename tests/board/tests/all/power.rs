@@ -412,3 +412,29 @@ fn a_bit_that_flips_in_the_stored_calibration_is_noticed() {
     };
     assert_eq!(found, Some(hash), "the flips were taken back");
 }
+
+/// Samples go on and feed the watchdog while a sector is erased, so that nothing but a limit ends it.
+#[test]
+fn flash_that_hangs_is_reported_and_the_old_calibration_stays_in_use() {
+    let old = calibration(7, 3.5);
+    let mut device = with_old(&old);
+    device.upload(&calibration(16, 3.6));
+    device.board.stop_flash().unwrap();
+    let began = device.board.standing().ns;
+    let failed = Answer::Refused(Refusal::FlashFailed);
+    assert_eq!(device.ask(Request::UploadCommit), failed);
+    // The longest that the data sheet has for a sector is 4 s (DS12110, table 140); the host waits for 15.
+    let took = device.board.standing().ns - began;
+    assert!((4_000 * MS..8_000 * MS).contains(&took), "{took} ns");
+    // It is refused at once as long as the operation has not ended, and nothing was restarted.
+    let began = device.board.standing().ns;
+    assert_eq!(device.ask(Request::UploadCommit), failed);
+    assert!(device.board.standing().ns - began < 100 * MS);
+    let Answer::Greeting { hash, start } = device.ask(Request::Hello) else {
+        panic!("no greeting");
+    };
+    assert_eq!(
+        (hash, start.as_str()),
+        (Some(stored::hash(&old)), "PowerOn")
+    );
+}

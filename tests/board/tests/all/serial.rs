@@ -11,7 +11,7 @@ use mimu_core::wire::{Request, SelfTest, checks, flags};
 use mimu_rig::plan::Plan;
 use mimu_rig::rig_file::{RigFile, RigTruth};
 
-const STREAM: Request<'_> = Request::Stream {
+pub const STREAM: Request<'_> = Request::Stream {
     raw: true,
     compensated: false,
 };
@@ -129,7 +129,7 @@ fn a_unit_of_the_usual_parts_that_lies_still_passes_the_self_test() {
 }
 
 /// Pins of a unit at rest and 25 °C, at this supply of the converter, V.
-fn at_rest(rail: f64) -> Volts {
+pub fn at_rest(rail: f64) -> Volts {
     let mut volts = Volts {
         rail,
         ..Volts::GROUND

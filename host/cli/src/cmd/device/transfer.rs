@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use crate::report;
 use clap::Args;
 use mimu::calibration::Calibration;
-use mimu_core::stored::{OLDEST, Refused};
+use mimu_core::stored::{Refused, VERSION};
 use mimu_device::{
     DeviceResult, Image, calibration, contents, download, outside_now, unit_name, unusable, upload,
 };
@@ -84,7 +84,7 @@ pub fn run_download(args: &DownloadArgs) -> Result<()> {
             unusable(&refused)
         );
         let remedy = match refused {
-            Refused::Version { found } if found < OLDEST => {
+            Refused::Version { found } if found < VERSION => {
                 "upload the calibration file again: the device keeps the numbers in an older layout"
             }
             Refused::Version { .. } => "update mimu on this computer",

@@ -115,22 +115,22 @@ fn a_file_with_half_of_its_uncertainty_is_refused() {
     refused.refused(&["unit_id", "\"12\" is no number of a unit", "24 hexadecimal"]);
 }
 
-/// A calibration that a firmware of layout 4 has stored, of 16 nodes with straight lines between them.
+/// A calibration of an earlier layout, which no program reads any more.
 #[test]
-fn several_nodes_of_an_earlier_layout_are_fetched_as_bytes_only() {
-    let bytes = include_bytes!("../../../../../core/tests/layouts/4.calibration").to_vec();
+fn a_calibration_of_an_earlier_layout_is_refused_with_what_to_do() {
     let place = Place::new();
+    let file = of_unit(&place, &unit());
+    let peer = Peer::new(Script::default());
+    device(&place, &peer, &["upload", &file]);
+    let mut bytes = peer.seen.lock().unwrap().stored.clone().unwrap();
+    bytes[4] = 5;
     let peer = Peer::new(Script {
-        stored: Some(bytes.clone()),
+        stored: Some(bytes),
         ..Script::default()
     });
-    let file = ["download", "-o", "cal.toml", "--bytes", "cal.bin"];
-    let straight = "16 temperature nodes with straight lines";
-    device(&place, &peer, &file).refused(&[straight, "--bytes FILE"]);
-    assert!(!place.path("cal.bin").exists() && !place.path("cal.toml").exists());
-    let only_bytes = device(&place, &peer, &["download", "--bytes", "cal.bin"]);
-    assert_eq!(only_bytes.status, Some(0), "{}", only_bytes.stderr);
-    assert_eq!(std::fs::read(place.path("cal.bin")).unwrap(), bytes);
+    let again = "upload the calibration file again";
+    device(&place, &peer, &["download", "--bytes", "cal.bin"]).refused(&["version 5", again]);
+    assert!(!place.path("cal.bin").exists());
 }
 
 /// The calibration file of the unit with three nodes over temperature.

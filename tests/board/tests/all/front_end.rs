@@ -1,0 +1,139 @@
+//! What a calibration is tied to: the converter's calibration factors, and where the TEMP pins stand beside each other. The layout in flash is
+//! written out here.
+
+use mimu_board::flash::SECTOR;
+use mimu_board::front::Front;
+use mimu_board::schematic::{DIVIDER_RATIO, Net, Volts, WIRING};
+use mimu_board_tests::conversation::{Answer, Conversation};
+use mimu_board_tests::{MS, STARTED, still};
+use mimu_core::stored::hash;
+use mimu_core::wire::{Request, flags};
+
+use super::power::calibration;
+use super::serial::{STREAM, at_rest};
+
+/// Registers of ADC1 (RM0433 25.6): calibration factors of the offset and of the linearity.
+const CALFACT: u64 = 0x4002_20c4;
+const CALFACT2: u64 = 0x4002_20c8;
+
+/// Where the first slot is in bank 2, and the two words of flash in it that this is about.
+const SLOT: usize = 6 * SECTOR as usize;
+const KEPT: std::ops::Range<usize> = SLOT + 32..SLOT + 96;
+
+/// Bits of what is kept.
+const CONVERTER: u32 = 1;
+const PINS: u32 = 2;
+
+fn stores(device: &mut Conversation, bytes: &[u8]) {
+    device.upload(bytes);
+    assert_eq!(device.ask(Request::UploadCommit), Answer::Done);
+}
+
+/// Takes the supply away and gives it back, with these words of flash in the place of those that are there.
+fn powered_again(device: &mut Conversation, kept: Option<&[u8]>) -> Option<u64> {
+    let mut store = device.board.store().unwrap();
+    if let Some(kept) = kept {
+        store[KEPT].copy_from_slice(kept);
+    }
+    device.board.cut_supply(1).unwrap();
+    device.run_for(MS);
+    device.board.set_store(store).unwrap();
+    device.board.restore_supply().unwrap();
+    match device.greeting() {
+        Answer::Greeting { hash, .. } => hash,
+        other => panic!("{other:?}"),
+    }
+}
+
+/// The converter's factors are what the maker's reference manual has software save and write back (RM0433 25.4.8).
+#[test]
+fn the_converter_goes_on_with_the_factors_that_were_kept_with_the_calibration() {
+    let bytes = calibration(2, 3.5);
+    let mut device = Conversation::new(still(at_rest(3.3)));
+    device.greeting();
+    device.run_for(STARTED);
+    stores(&mut device, &bytes);
+    let kept = device.board.store().unwrap()[KEPT].to_vec();
+    let known = u32::from_le_bytes(kept[..4].try_into().unwrap());
+    // Of the pins nothing is learnt yet.
+    assert_eq!(known, CONVERTER);
+
+    // Factors as a real converter has them; those of the emulated one are zero.
+    let factors: [u32; 7] = [0x5a3, 0x2aaa_aaaa, 0x1555_5555, 7, 8, 9, 0x155];
+    let mut words = [0; 64];
+    let numbers = [CONVERTER].into_iter().chain(factors);
+    for (to, number) in words.chunks_mut(4).zip(numbers) {
+        to.copy_from_slice(&number.to_le_bytes());
+    }
+    let check = hash(&words[..56]);
+    words[56..].copy_from_slice(&check.to_le_bytes());
+    assert_eq!(powered_again(&mut device, Some(&words)), Some(hash(&bytes)));
+    device.run_for(STARTED);
+    assert_eq!(device.board.register(CALFACT).unwrap(), 0x5a3);
+    // The last word that is written is the first one.
+    assert_eq!(device.board.register(CALFACT2).unwrap(), 0x2aaa_aaaa);
+    // And they are kept with the next calibration too, in the other slot.
+    stores(&mut device, &calibration(3, 3.5));
+    let store = device.board.store().unwrap();
+    let other = SECTOR as usize + KEPT.start..SECTOR as usize + KEPT.end;
+    assert_eq!(store[other], words);
+
+    // A word that is not whole: the calibration is used all the same, by a converter that calibrates itself.
+    let mut device = Conversation::new(still(at_rest(3.3)));
+    device.greeting();
+    device.run_for(STARTED);
+    stores(&mut device, &bytes);
+    words[9] ^= 1;
+    assert_eq!(powered_again(&mut device, Some(&words)), Some(hash(&bytes)));
+    device.run_for(STARTED);
+    assert_eq!(device.board.register(CALFACT).unwrap(), 0);
+}
+
+/// A unit at rest at this temperature, whose gyros' references differ: its pins stand 6, -1 and -5 °C beside their mean.
+fn at(temp_c: f64) -> Volts {
+    let mut volts = at_rest(3.3);
+    for (axis, apart_c) in [6.0, -1.0, -5.0].into_iter().enumerate() {
+        let (_, _, input) = wire(axis);
+        volts.input[input] = (2.5 + 0.0084 * (temp_c + apart_c - 25.0)) * DIVIDER_RATIO;
+    }
+    volts
+}
+
+fn wire(axis: usize) -> (Net, &'static str, usize) {
+    let found = WIRING
+        .iter()
+        .find(|(net, ..)| *net == Net::Temperature(axis));
+    *found.expect("it is wired")
+}
+
+#[test]
+fn a_temperature_pin_that_is_open_at_power_on_moves_the_temperature_by_nothing() {
+    let mut device = Conversation::new(still(at(30.0)));
+    device.greeting();
+    // They are learnt over ten seconds.
+    device.run_for(STARTED + 10_100 * MS);
+    stores(&mut device, &calibration(2, 3.5));
+    let kept = &device.board.store().unwrap()[KEPT];
+    assert_eq!(
+        u32::from_le_bytes(kept[..4].try_into().unwrap()),
+        CONVERTER | PINS
+    );
+    for (at, apart_c) in [(32, 6.0_f32), (36, -1.0), (40, -5.0)] {
+        let found = f32::from_le_bytes(kept[at..at + 4].try_into().unwrap());
+        assert!((found - apart_c).abs() < 0.1, "{found}");
+    }
+    // Days later it is warmer, and the first pin is open, which without its offset moved the mean by -3 °C.
+    let mut open = at(40.0);
+    open.input[wire(0).2] = 0.0;
+    device.board.set_front(Front::Still(open)).unwrap();
+    powered_again(&mut device, None);
+    device.run_for(STARTED);
+    assert_eq!(device.ask(STREAM), Answer::Done);
+    device.run_for(1000 * MS);
+    let (head, _) = device.last.expect("a batch");
+    assert_eq!(
+        head.flags & flags::TEMPERATURE_LEFT_OUT[0],
+        flags::TEMPERATURE_LEFT_OUT[0]
+    );
+    assert!((head.temp_c - 40.0).abs() < 0.2, "{}", head.temp_c);
+}
