@@ -10,7 +10,7 @@ use mimu_recording::{MANIFEST_FILE, PoseMeans, Recording};
 use crate::output::{check_outputs, progress};
 
 /// A recording of samples or of means; see [`read`].
-pub(crate) fn read_for_fit(
+pub(crate) fn read_samples_or_means(
     directory: &Path,
     finding: Finding,
     outputs: &[Option<&Path>],

@@ -63,6 +63,13 @@ pub fn verify(prepared: &Prepared, calibration: &Calibration) -> Result<Verifica
         warnings.push("this is the recording that the calibration was made from: the figures say nothing about new data".into());
     }
     warnings.extend(outside(calibration, &prepared.condensed.blocks));
+    if manifest.means && !calibration.effects().is_empty() {
+        return Err(Error::new(
+            &prepared.place,
+            "the calibration has effects, and means of poses do not show what these do to the samples",
+            "verify it by a recording of samples",
+        ));
+    }
     let cleaned = without_effects(prepared, calibration)?;
     let curves = calibration.curves();
     let at_one = |p: &Prepared| at_one_temperature(p, calibration, curves.as_ref()?);
@@ -191,6 +198,8 @@ fn judge(
     let judged = match (prepared.manifest.reference, sensor) {
         (Reference::Table, _) => known(prepared, sensor, &inverse),
         (Reference::Gravity, Sensor::Accel) => size(prepared, &inverse),
+        // Between the means of poses nothing says how the unit turned.
+        (Reference::Gravity, Sensor::Gyro) if prepared.manifest.means => None,
         (Reference::Gravity, Sensor::Gyro) => {
             let accel = calibration.inverse(Sensor::Accel)?;
             turns(prepared, &inverse, &accel, &mut warnings)

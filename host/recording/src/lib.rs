@@ -33,7 +33,7 @@ pub use columns::{Column, Columns, RAW_COLUMNS, REFERENCE_COLUMNS};
 pub use growing::Growing;
 pub use import::{
     Chosen, ColumnList, Decimal, ImportOptions, ImportSummary, Inputs, Jitter, Offset, PoseMean,
-    PoseMeans, Preset, PresetUse, Role, Scale, SkippedLines, TimeSummary, import, is_bag,
+    PoseMeans, Preset, PresetUse, Role, Rounds, Scale, SkippedLines, TimeSummary, import, is_bag,
 };
 pub use manifest::read_text;
 pub use manifest::{Format, MANIFEST_FILE, Manifest, Rails, RawUnit, Reference, Source};

@@ -152,7 +152,7 @@ pub struct Manifest {
     /// It was not ended: what records it was killed, or is still at it. Its last row may be cut, and is left out then.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub unfinished: bool,
-    /// Instead of samples there are means, one row for each pose: only a fit can use them.
+    /// Instead of samples there are means, one row for each pose: only a fit and a verification can use them.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub means: bool,
     /// Text label of step i, where the source named its steps.

@@ -68,8 +68,8 @@ impl Recording {
         if manifest.means {
             return Err(Error::new(
                 directory.display(),
-                "it holds the means of poses, which only a fit can use: everything else needs samples",
-                "run mimu fit, or import a recording of samples",
+                "it holds the means of poses, which fit and verify can use: everything else needs samples",
+                "run mimu fit or mimu verify, or import a recording of samples",
             ));
         }
         let csv = directory.join("samples.csv");

@@ -12,7 +12,7 @@ use mimu_recording::result_file::stage;
 
 use crate::arguments::{JsonArgs, KeepArgs, NoiseArgs, SensorArg, StillArgs};
 use crate::output::print;
-use crate::reading::read_for_fit;
+use crate::reading::read_samples_or_means;
 use crate::report;
 
 #[derive(Args)]
@@ -80,7 +80,7 @@ pub(crate) fn run(args: &FitArgs) -> Result<()> {
     };
     let outputs = [args.output.as_deref(), args.json.file()];
     let inputs = [args.noise.file.as_deref()];
-    let prepared = read_for_fit(&args.recording, args.still.finding(), &outputs, &inputs)?;
+    let prepared = read_samples_or_means(&args.recording, args.still.finding(), &outputs, &inputs)?;
     let prepared = args.keep.apply(args.noise.state(prepared)?);
     if args.method.is_some() && prepared.manifest.reference == Reference::Gravity {
         return Err(Error::new(

@@ -35,6 +35,9 @@ pub(crate) struct ImportArgs {
     /// sample (`accel_x_sd`), numbers of samples (`averaged`, `accel_x_averaged`), inputs (ref_ columns) and names (`step`)
     #[arg(long)]
     means: bool,
+    /// The files follow one another, as those of six faces: each is a step with the name of its file, and one list of columns serves all
+    #[arg(long, conflicts_with = "means")]
+    sequence: bool,
     /// Sample rate, Hz, of files without a time column. Of others it is the rate of their time stamps, which this one checks;
     /// it decides where stamps in bursts can be read in two ways
     #[arg(long, allow_negative_numbers = true)]
@@ -133,6 +136,7 @@ pub(crate) fn run(args: ImportArgs) -> Result<()> {
         latitude_deg: args.latitude,
         inputs: args.inputs,
         means: args.means,
+        sequence: args.sequence,
         format: args.format,
         replace: args.replace,
         ..ImportOptions::new(args.files, gravity, raw_unit, args.reference)

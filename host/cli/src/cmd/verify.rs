@@ -10,12 +10,12 @@ use mimu_recording::error::Result;
 
 use crate::arguments::{JsonArgs, NoiseArgs, StillArgs};
 use crate::output::print;
-use crate::reading::read;
+use crate::reading::read_samples_or_means;
 use crate::report;
 
 #[derive(Args)]
 pub(crate) struct VerifyArgs {
-    /// Directory of the recording
+    /// Directory of the recording, of samples or of means
     recording: PathBuf,
     /// Calibration file
     #[arg(long, value_name = "FILE")]
@@ -31,7 +31,7 @@ pub(crate) struct VerifyArgs {
 pub(crate) fn run(args: &VerifyArgs) -> Result<()> {
     let calibration = Calibration::read(&args.calibration)?;
     let outputs = [args.json.file()];
-    let prepared = read(
+    let prepared = read_samples_or_means(
         &args.recording,
         args.still.finding(),
         &outputs,

@@ -85,6 +85,10 @@ fn time_text(time: &TimeSummary) -> String {
     let _ = write!(out, ", {} Hz for {lasts} s; ", time.rate_hz);
     let [rms, max] = [time.jitter.rms_s, time.jitter.max_s].map(|s| significant(1e3 * s));
     let _ = match (time.stamps_kept, time.jitter.max_s > 0.0) {
+        (true, _) if time.polled.is_some() => write!(
+            out,
+            "the stamps are kept, as those of a loop that reads once a round"
+        ),
         (true, false) => write!(out, "the stamps are kept"),
         (true, true) => write!(
             out,

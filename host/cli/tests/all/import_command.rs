@@ -106,7 +106,7 @@ fn means(with_noise: bool) -> String {
 }
 
 #[test]
-fn a_table_of_means_is_fitted_and_everything_that_needs_samples_refuses_it() {
+fn a_table_of_means_is_fitted_and_verified_and_everything_that_needs_samples_refuses_it() {
     for with_noise in [true, false] {
         let folder = tempfile::tempdir().unwrap();
         let folder = folder.path();
@@ -140,8 +140,29 @@ fn a_table_of_means_is_fitted_and_everything_that_needs_samples_refuses_it() {
         };
         assert!((value("scale", "y") / 800.0 - 1.0).abs() < 2e-4);
         assert!((value("bias", "x") - 50.0).abs() < 1.0);
+        // Other poses of a unit whose x has shifted by 8 counts since: 10 mm/s² along x, and 1/√3 of that on the corners.
+        let corner = |signs: [f64; 3]| {
+            let raw = signs.map(|s| s * 800.0 * 9.81 / 3_f64.sqrt());
+            format!("{:.3},{:.3},{:.3}\n", raw[0] + 58.0, raw[1], raw[2])
+        };
+        let mut corners = String::from("accel_x,accel_y,accel_z\n");
+        for code in 0..8 {
+            corners += &corner([1, 2, 4].map(|bit| if code & bit == 0 { 1.0 } else { -1.0 }));
+        }
+        std::fs::write(folder.join("corners.csv"), corners).unwrap();
+        right(
+            folder,
+            "import corners.csv --means --raw-unit count --reference gravity --gravity 9.81 --replace -o corners",
+        );
+        let json = right(folder, "verify corners --calibration cal.toml --json -");
+        let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+        let rms = json["sensors"]["accel"]["rms"].as_f64().unwrap();
+        let expected = 8.0 / 800.0 / 3_f64.sqrt();
+        assert!(
+            (rms / expected - 1.0).abs() < 0.2,
+            "{rms} and not {expected}"
+        );
         for command in [
-            "verify poses --calibration cal.toml",
             "diagnose poses",
             "allan poses",
             "apply poses --calibration cal.toml -o out",
@@ -153,4 +174,62 @@ fn a_table_of_means_is_fitted_and_everything_that_needs_samples_refuses_it() {
             );
         }
     }
+}
+
+/// Numbers from -0.5 to 0.5, evenly distributed.
+fn noise() -> impl FnMut() -> f64 {
+    let mut state = 5_u64;
+    move || {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+    }
+}
+
+/// A gyro that rests for 20 s before each of three turns of 360 degrees, and whose bias is another one each time.
+#[test]
+fn rests_between_turns_of_known_angle_show_the_noise_and_are_no_outliers() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let (mut noise, mut log) = (noise(), String::from("step,x,y,z\n"));
+    for axis in 0..3 {
+        let bias = [0.03, -0.05, 0.11][axis];
+        for (rows, rate) in [(2000, 0.0), (500, 72.0)] {
+            let step = 2 * axis + usize::from(rate != 0.0);
+            for _ in 0..rows {
+                // Even from -0.5 to 0.5: a standard deviation of 0.289 deg/s.
+                let mut read = [0; 3].map(|_| bias + noise());
+                read[axis] += 1.01 * rate;
+                writeln!(log, "{step},{:.5},{:.5},{:.5}", read[0], read[1], read[2]).unwrap();
+            }
+        }
+    }
+    std::fs::write(folder.join("log.csv"), log).unwrap();
+    std::fs::write(
+        folder.join("inputs.csv"),
+        "step,turn_x_deg,turn_y_deg,turn_z_deg\n0,0,0,0\n1,360,0,0\n2,0,0,0\n3,0,360,0\n4,0,0,0\n5,0,0,360\n",
+    )
+    .unwrap();
+    right(
+        folder,
+        "import log.csv --columns step,gyro_x,gyro_y,gyro_z --scale gyro=0.01745329252 --rate-hz 100 --raw-unit SI --reference table --inputs inputs.csv --gravity 9.81 -o turns",
+    );
+    let json = right(folder, "fit turns --json -");
+    let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+    let floor = json["sensors"]["gyro"]["noise_floor"].as_f64();
+    let floor = floor.expect("rests of 20 s show the noise").to_degrees();
+    // Of the means of 2000 and of 500 samples, as often each.
+    let expected = 0.289 * (0.5 * (1.0 / 2000.0 + 1.0 / 500.0_f64)).sqrt();
+    assert!(
+        (floor / expected - 1.0).abs() < 0.2,
+        "{floor} and not {expected}"
+    );
+    let text = right(folder, "fit turns");
+    // The three turns are fitted exactly, and the rests differ by their biases: neither is far from the others.
+    assert!(!text.contains("times the median"), "{text}");
+    assert!(
+        text.contains("noise does not explain the residual"),
+        "{text}"
+    );
 }

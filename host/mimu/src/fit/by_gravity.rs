@@ -3,7 +3,7 @@
 use mimu_core::compensation::Affine;
 use nalgebra::Vector3;
 
-use super::determined::faces_not_up;
+use super::determined::{faces_not_up, unseen_poses};
 use super::hold_out::{HeldOut, Split, determined};
 use super::sensor::{Residual, SensorFit, rms, typical};
 use super::{Options, as_came, finish, refuse_wrong_gravity};
@@ -102,6 +102,7 @@ pub(super) fn fit_gravity(
         }
         sensors.extend(turns?);
     }
+    let unseen = unseen_poses(g, &accel.triad, typical);
     let mut fit = finish(
         Sensor::Accel,
         accel,
@@ -112,6 +113,7 @@ pub(super) fn fit_gravity(
         held_out.into(),
     );
     fit.as_came = as_came::magnitudes(prepared, &poses);
+    fit.warnings.extend(unseen);
     sensors.push(fit);
     Ok(sensors)
 }

@@ -32,6 +32,19 @@ const BINARY: [(&[u8], &str, &str); 8] = [
     (b"\xfe\xff", "UTF-16 text", "save it as UTF-8"),
 ];
 
+/// A line without the bytes of 0 before and after it.
+///
+/// A file system that keeps room for a file fills it with zeros, and a serial port hands over some before its first byte: a log whose supply
+/// was cut ends with them, or begins. Between the characters of a line they are those of UTF-16, or of binary numbers.
+pub(super) fn without_zeros(line: &[u8]) -> &[u8] {
+    let from = line.iter().position(|byte| *byte != 0);
+    let to = line.iter().rposition(|byte| !matches!(byte, 0 | b'\r'));
+    match (from, to) {
+        (Some(from), Some(to)) if from <= to => &line[from..=to],
+        _ => &[],
+    }
+}
+
 /// Refuses what is no text, by its first bytes.
 pub(super) fn refuse_binary(path: &Path, head: &[u8]) -> Result<()> {
     for (signature, kind, remedy) in BINARY {
@@ -43,7 +56,8 @@ pub(super) fn refuse_binary(path: &Path, head: &[u8]) -> Result<()> {
             ));
         }
     }
-    if head.contains(&0) {
+    let mut lines = head.split(|byte| *byte == b'\n');
+    if lines.any(|line| without_zeros(line).contains(&0)) {
         let problem = "this is a binary file of an unknown kind";
         return Err(Error::new(
             path.display(),

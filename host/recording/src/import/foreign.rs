@@ -195,6 +195,14 @@ impl ForeignFile {
         }
     }
 
+    /// Bytes of 0 around its lines, so far.
+    pub fn zero_bytes(&self) -> u64 {
+        match &self.table {
+            Table::Text(table) => table.zero_bytes,
+            Table::Parquet(_) | Table::Bag(_) => 0,
+        }
+    }
+
     /// What was ignored.
     pub fn warnings(&self) -> &[String] {
         match &self.table {

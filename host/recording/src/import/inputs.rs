@@ -223,7 +223,12 @@ impl Inputs {
             .map_or_else(|| number.to_string(), str::to_owned);
         let step = self.steps.get_mut(&key)?;
         step.used = true;
-        if step.turn_deg.iter().any(|turn| !turn.is_nan()) {
+        // A turn by 0 about every axis is rest: taken for a turn, 20 s at rest showed no noise, and the intervals had none.
+        if step
+            .turn_deg
+            .iter()
+            .any(|turn| !turn.is_nan() && *turn != 0.0)
+        {
             self.turns.insert(number);
         }
         let mut input = step.input;
@@ -278,6 +283,18 @@ mod tests {
         assert_eq!(inputs.input(1, &labels, 4.0).unwrap()[5], -9.81);
         assert_eq!(inputs.unused(), None);
         assert!(inputs.input(2, &labels, 4.0).is_none());
+    }
+
+    #[test]
+    fn a_step_that_turns_by_no_angle_is_rest() {
+        let mut inputs = parse("step,turn_x_deg,turn_y_deg\nrest,0,0\nx_rot,360,0\n").unwrap();
+        let mut labels = StepLabels::default();
+        for (number, label) in ["rest", "x_rot"].into_iter().enumerate() {
+            labels.number(label.as_bytes()).unwrap();
+            let rate = inputs.input(number as i32, &labels, 4.0).unwrap();
+            assert_eq!(rate[..2], [[0.0, 0.0], [90.0, 0.0]][number]);
+        }
+        assert_eq!(inputs.turns.into_iter().collect::<Vec<i32>>(), [1]);
     }
 
     #[test]

@@ -12,8 +12,10 @@ mod parquet_table;
 mod plausibility;
 mod pose_means;
 mod preset;
+mod resample;
 mod ros;
 mod row;
+mod sequence;
 mod step_labels;
 #[cfg(test)]
 mod tests;
@@ -29,12 +31,14 @@ pub use options::ImportOptions;
 pub use pose_means::{PoseMean, PoseMeans};
 pub use preset::{Chosen, Preset, PresetUse};
 pub use ros::is_bag;
-pub use time::{Decimal, Jitter, TimeSummary};
+pub use time::{Decimal, Jitter, Rounds, TimeSummary};
 
 use foreign::{ForeignFile, HowToRead};
 use join::{Follower, Joined, check_order};
 use options::file_name;
+use resample::Resampler;
 use row::Row;
+use sequence::Place;
 use serde::Serialize;
 use time::Times;
 
@@ -105,6 +109,9 @@ pub fn import(
     if options.means {
         return pose_means::import_means(options, out);
     }
+    if options.sequence {
+        return sequence::import_sequence(options, out, progress);
+    }
     // Only when all rows have been read it is known that a sensor has nothing but zeros. That is rare, and worth a second time.
     let mut left_out = [false; 2];
     loop {
@@ -159,7 +166,8 @@ fn check(options: &ImportOptions, out: &Path) -> Result<()> {
     if files == 0 {
         return refuse("no file is given".to_owned(), "name the files to import");
     }
-    if lists != 0 && lists != files {
+    let one_for_all = options.sequence && lists == 1;
+    if lists != 0 && lists != files && !one_for_all {
         return refuse(
             format!("there are {files} files and {lists} lists of columns"),
             "give one list of columns for each file, in their order",
@@ -204,9 +212,21 @@ fn other_rate(times: &Times, given: f64) -> Option<String> {
     })
 }
 
+/// Reads the next row of `file`, at regular times where there is a `resampler`; `false` at the end.
+fn next(file: &mut ForeignFile, resampler: Option<&mut Resampler>, row: &mut Row) -> Result<bool> {
+    match resampler {
+        Some(resampler) => resampler.next(file, row),
+        None => file.next(row),
+    }
+}
+
 /// An import under way.
 struct Import {
     first: ForeignFile,
+    /// Gives the rows of the first file regular times, if a loop took them at irregular ones.
+    resampler: Option<Resampler>,
+    /// Where the first file stands in a sequence of them.
+    place: Option<Place>,
     followers: Vec<Follower>,
     rate_hz: f64,
     columns: Columns,
@@ -242,6 +262,8 @@ impl Import {
                 Error::new("import", "the rate is not known", "give it").about(Argument::SampleRate)
             })?,
         };
+        let polled = first_times.as_ref().filter(|t| t.summary.polled.is_some());
+        let resampler = polled.map(|times| Resampler::new(times.period_s()));
         let mut followers = Vec::new();
         for (index, path) in options.files.iter().enumerate().skip(1) {
             let how = HowToRead {
@@ -276,7 +298,7 @@ impl Import {
         let mut names: Vec<&str> = vec![Column::Time.name()];
         let kept = |column: &&Column| !matches!(column, Column::Raw(c) if left_out[c / 3]);
         names.extend(order.iter().filter(kept).map(|column| column.name()));
-        if first.has_step() {
+        if first.has_step() || options.sequence {
             names.push(Column::Step.name());
         }
         let given = inputs.as_ref().map_or([false; 6], |inputs| inputs.columns);
@@ -286,7 +308,7 @@ impl Import {
         names.extend(given);
         // The same rules as for a recording's header: nothing twice, all axes of a sensor.
         let columns = Layout::from_names(&names, "import, all columns together")?.columns;
-        if inputs.is_some() && !first.has_step() {
+        if inputs.is_some() && !first.has_step() && !options.sequence {
             let problem = "a table of inputs is given, and no column is step";
             return Err(Error::new(
                 "import",
@@ -333,6 +355,8 @@ impl Import {
             },
             inputs,
             first,
+            resampler,
+            place: None,
             followers,
         };
         if import
@@ -340,16 +364,21 @@ impl Import {
             .as_ref()
             .is_some_and(|inputs| inputs.has_turns)
         {
-            import.count_steps(&options.how(0))?;
+            import.count_steps(&options.how(0), first_times)?;
         }
         Ok(import)
     }
 
     /// First pass: the duration of a step is known only when all of it has been seen.
-    fn count_steps(&mut self, how: &HowToRead<'_>) -> Result<()> {
+    fn count_steps(&mut self, how: &HowToRead<'_>, times: Option<Times>) -> Result<()> {
         let mut file = ForeignFile::open(self.first.path(), how)?;
+        let resampled = self.resampler.is_some();
+        if let Some(times) = times.filter(|_| resampled) {
+            file = file.with_times(times);
+        }
+        let mut resampler = resampled.then(|| Resampler::new(1.0 / self.rate_hz));
         let mut row = Row::default();
-        while file.next(&mut row)? {
+        while next(&mut file, resampler.as_mut(), &mut row)? {
             *self.step_rows.entry(row.step).or_default() += 1;
         }
         Ok(())
@@ -374,9 +403,12 @@ impl Import {
         let mut values = Vec::new();
         let mut batch = Batch::default();
         let mut last_t_s = f64::NEG_INFINITY;
-        while self.first.next(&mut row)? {
+        while next(&mut self.first, self.resampler.as_mut(), &mut row)? {
             check_order(&self.first, &row, last_t_s)?;
             last_t_s = row.t_s;
+            if let Some(place) = &mut self.place {
+                place.put(&mut row);
+            }
             values.clear();
             values.extend_from_slice(&row.values);
             if self.join(row.t_s, &mut values)? {
@@ -487,6 +519,12 @@ impl Import {
                     )
                 }));
             }
+            if file.zero_bytes() > 0 {
+                summary.warnings.push(format!(
+                    "{place}: {} bytes of 0 before and after its lines were left out, as room that was kept and not written",
+                    file.zero_bytes()
+                ));
+            }
             if file.stamp_wraps() > 0 {
                 summary.warnings.push(format!(
                     "{place}: the time stamps began again at 0 {}, as counters of 16 to 32 bits do, and were counted on",
@@ -504,6 +542,15 @@ impl Import {
                     times(file.wraps())
                 ));
             }
+        }
+        for time in &summary.time {
+            let Some(rounds) = &time.polled else { continue };
+            let [shortest, longest] =
+                [rounds.shortest_s, rounds.longest_s].map(|s| format!("{:.3}", 1e3 * s));
+            summary.warnings.push(format!(
+                "{}: a loop read the unit at irregular times, {shortest} to {longest} ms apart; the readings are interpolated between them, which lowers their white noise; let a timer of the board or the sensor's own FIFO pace them",
+                time.file
+            ));
         }
         if summary.interpolated > 0 {
             summary.warnings.push(format!(
@@ -525,7 +572,10 @@ impl Import {
                     "the inputs of {count} steps are not known: {names}"
                 ));
             }
-            summary.warnings.extend(inputs.unused());
+            // Of a sequence that is known when all of it has been read.
+            if self.place.is_none() {
+                summary.warnings.extend(inputs.unused());
+            }
         }
         Ok(())
     }

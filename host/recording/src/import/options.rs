@@ -41,6 +41,8 @@ pub struct ImportOptions {
     pub latitude_deg: Option<f64>,
     /// Table of the known input of each step.
     pub inputs: Option<PathBuf>,
+    /// Whether the files follow one another, each a step with the name of its file, in place of being joined on their times.
+    pub sequence: bool,
     /// Whether the rows are means over a pose or a step each, and no samples.
     pub means: bool,
     /// What a preset has said of the files; see [`ImportOptions::with_preset`].
@@ -76,6 +78,7 @@ impl ImportOptions {
             device: None,
             latitude_deg: None,
             inputs: None,
+            sequence: false,
             means: false,
             preset: None,
             preset_warnings: Vec::new(),
@@ -104,6 +107,9 @@ impl ImportOptions {
         let mut arguments: Vec<String> = self.files.iter().map(|file| file_name(file)).collect();
         if self.means {
             arguments.push("--means".to_owned());
+        }
+        if self.sequence {
+            arguments.push("--sequence".to_owned());
         }
         let mut option = |name: &str, value: String| {
             arguments.push(name.to_owned());

@@ -52,6 +52,15 @@ impl StepLabels {
         Ok(number)
     }
 
+    /// Of steps that are named beforehand.
+    pub fn of(labels: Vec<String>) -> Self {
+        Self {
+            numeric: Some(false),
+            labels,
+            numbers: HashMap::new(),
+        }
+    }
+
     /// Label of step `number`, where it has one.
     pub fn label(&self, number: i32) -> Option<&str> {
         let index = usize::try_from(number).ok()?;

@@ -10,6 +10,7 @@ use super::*;
 mod means;
 mod plausibility;
 mod presets;
+mod sequence;
 mod stamps;
 
 /// A folder with foreign files, and the recording that comes of them.
@@ -101,6 +102,22 @@ fn metadata_headers_comments_and_blank_lines_are_skipped_and_counted() {
             .all(|argument| !argument.contains('/'))
     );
     assert_eq!(manifest.imported_with[..2], ["a.txt", "--columns"]);
+}
+
+#[test]
+fn bytes_of_zero_around_lines_are_room_that_was_kept_and_within_them_no_text() {
+    // A serial port hands over some between two headers, and a card keeps room behind the last row.
+    let zeros = "\0".repeat(600);
+    let room = "\0".repeat(3 << 20);
+    let text = format!("ax,ay,az\r\n{zeros}ax,ay,az\r\n1,2,3\r\n4,5,6\r\n{room}");
+    let (summary, batch, _) = one(&text, "accel_x=ax,accel_y=ay,accel_z=az").unwrap();
+    assert_eq!(batch.raw[3], [1.0, 4.0]);
+    assert_eq!(summary.skipped.header, 2);
+    let bytes = format!("{} bytes of 0", zeros.len() + room.len());
+    assert!(summary.warnings[0].contains(&bytes), "{summary:?}");
+    let wide: String = "1,2,3\n".chars().flat_map(|c| [c, '\0']).collect();
+    let error = one_refused(&wide, "accel_x,accel_y,accel_z");
+    assert!(error.contains("a binary file"), "{error}");
 }
 
 #[test]
@@ -235,7 +252,7 @@ fn binary_files_are_refused_with_what_to_do() {
         (b"\x89HDF\r\n\x1a\n", "HDF5"),
         (b"\x1f\x8b\x08", "gunzip"),
         (b"\xff\xfe1\0", "UTF-16"),
-        (b"1,2,3\n\0\0", "binary"),
+        (b"1,2\0\x07,3\n", "binary"),
     ] {
         let bench = Bench::new(&[]);
         std::fs::write(bench.path("a.mat"), bytes).unwrap();

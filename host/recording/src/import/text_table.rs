@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::SkippedLines;
 use super::assignment::{ColumnList, Role};
-use super::binary::refuse_binary;
+use super::binary::{refuse_binary, without_zeros};
 use super::time::Stamp;
 use crate::cell::{self, Refusal, shorten};
 use crate::columns::Column;
@@ -49,6 +49,8 @@ pub(super) struct TextTable {
     length: u64,
     record: csv::ByteRecord,
     pub skipped: SkippedLines,
+    /// Bytes of 0 around the lines, which were left out.
+    pub zero_bytes: u64,
     pub warnings: Vec<String>,
 }
 
@@ -90,7 +92,7 @@ impl TextTable {
         };
         let lines: Vec<&[u8]> = whole_lines
             .split(|&byte| byte == b'\n')
-            .map(|line| line.strip_suffix(b"\r").unwrap_or(line))
+            .map(without_zeros)
             .collect();
         let separator = separator.unwrap_or_else(|| {
             let shown: Vec<&[u8]> = lines
@@ -113,6 +115,7 @@ impl TextTable {
             length,
             record: csv::ByteRecord::new(),
             skipped: SkippedLines::default(),
+            zero_bytes: 0,
             warnings: Vec::new(),
         };
         table.find_rows(&lines, list)?;
@@ -148,11 +151,15 @@ impl TextTable {
             if read == 0 {
                 return Ok(None);
             }
-            self.line_number += 1;
             self.bytes += read as u64;
-            let number = self.line_number;
             let ended = self.line.pop_if(|last| *last == b'\n').is_some();
-            self.line.pop_if(|last| *last == b'\r');
+            self.leave_out_zeros();
+            // Room that was kept for a file has no ends of lines.
+            if !ended && self.line.is_empty() {
+                continue;
+            }
+            self.line_number += 1;
+            let number = self.line_number;
             if !ended && read as u64 == LONGEST_LINE {
                 let problem = "the line is longer than 1 MiB";
                 let remedy = "give a text file with one row a line";
@@ -184,6 +191,15 @@ impl TextTable {
                 }
             }
         }
+    }
+
+    /// Leaves out the bytes of 0 around the line, and the carriage return at its end.
+    fn leave_out_zeros(&mut self) {
+        if memchr::memchr(0, &self.line).is_some() {
+            self.zero_bytes += self.line.iter().filter(|byte| **byte == 0).count() as u64;
+            self.line = without_zeros(&self.line).to_vec();
+        }
+        self.line.pop_if(|last| *last == b'\r');
     }
 
     /// Number in a cell; where commas do not separate cells, one of them is a decimal point.

@@ -210,3 +210,77 @@ fn stamps_that_neither_their_steps_nor_the_count_explain_are_refused_and_not_sme
     let error = bench.refused(&bench.options(&["a"], &[GYR]));
     assert!(error.contains("off the count of samples"), "{error}");
 }
+
+#[test]
+fn readings_of_a_loop_are_interpolated_to_its_usual_round() {
+    let mut state = 9_u32;
+    let mut random = || {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        f64::from(state >> 8) / f64::from(1 << 24)
+    };
+    // Rounds of 70 to 90 ms, one in thirty with a card that takes 120 ms more, and one pause of 5 s. The reading is the time itself.
+    let (mut t_ms, mut text, mut stamps) = (0.0_f64, String::from("t_ms,wx,wy,wz\n"), Vec::new());
+    for row in 0..3000 {
+        let whole = t_ms.round();
+        stamps.push(whole / 1e3);
+        text += &format!("{whole},{},2,3\n", whole / 1e3);
+        let card = if random() < 1.0 / 30.0 { 120.0 } else { 0.0 };
+        let pause = if row == 1500 { 5000.0 } else { 0.0 };
+        t_ms += 70.0 + 20.0 * random() + card + pause;
+    }
+    let bench = Bench::new(&[("a", &text)]);
+    let list = "t_s=t_ms,gyro_x=wx,gyro_y=wy,gyro_z=wz";
+    let (summary, batch, manifest) = bench.import_one(list).unwrap();
+    let time = &summary.time[0];
+    let rounds = time.polled.unwrap();
+    assert!((rounds.usual_s - 0.0805).abs() < 0.002, "{time:?}");
+    assert!(time.stamps_kept && time.gaps == 1, "{time:?}");
+    assert!((manifest.sample_rate_hz * rounds.usual_s - 1.0).abs() < 1e-6);
+    // Where the unit was read the time is right wherever it is asked for, and the pause is no reading.
+    let off = batch
+        .t_s
+        .iter()
+        .zip(&batch.raw[0])
+        .map(|(t, x)| (t - x).abs());
+    assert!(off.fold(0.0, f64::max) < 1e-9);
+    let pause = [stamps[1500], stamps[1501]];
+    assert!(batch.t_s.iter().all(|t| *t <= pause[0] || *t >= pause[1]));
+    let steps = batch.t_s.windows(2).map(|w| w[1] - w[0]);
+    let regular = steps
+        .filter(|s| (s / rounds.usual_s - 1.0).abs() < 1e-6)
+        .count();
+    assert_eq!(regular, batch.len() - 2, "all but the pause");
+    assert!(
+        summary
+            .warnings
+            .iter()
+            .any(|w| w.contains("a loop read the unit")),
+        "{summary:?}"
+    );
+}
+
+#[test]
+fn turns_of_a_loop_last_by_its_stamps() {
+    // Step 1 has 200 readings, half of which wait for a card for 7 to 13 ms.
+    let (mut t_ms, mut text) = (0_u32, String::from("t_ms,s,wx,wy,wz\n"));
+    for row in 0..1000_u32 {
+        let slow = (400..600).contains(&row);
+        text += &format!("{t_ms},{},0.1,2,3\n", u8::from(slow));
+        t_ms += 20 + row * 7 % 3;
+        t_ms += if slow && row % 2 == 0 {
+            7 + row / 2 % 7
+        } else {
+            0
+        };
+    }
+    let bench = Bench::new(&[("a", &text), ("i", "step,turn_x_deg\n0,\n1,360\n")]);
+    let list = "t_s=t_ms,step=s,gyro_x=wx,gyro_y=wy,gyro_z=wz";
+    let mut options = bench.options(&["a"], &[list]);
+    options.inputs = Some(bench.path("i"));
+    options.reference = Reference::Table;
+    let (summary, batch, _) = bench.import(&options).unwrap();
+    assert!(summary.time[0].polled.is_some(), "{summary:?}");
+    let rate = batch.reference[0].iter().find(|r| !r.is_nan()).unwrap();
+    // 200 rounds of 21 ms and 100 waits of 10 ms.
+    assert!((rate / (360.0 / 5.2) - 1.0).abs() < 0.01, "{rate}");
+}

@@ -5,6 +5,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::gap::{Gap, Jitter};
+use super::polled::Rounds;
 use super::regular::{Irregular, Regular};
 use super::stamp::{Decimal, Seen, Stamp, Unit};
 use crate::error::{Argument, Error, Result};
@@ -43,6 +44,8 @@ pub struct TimeSummary {
     pub rate_in_bursts_hz: Option<f64>,
     /// Rows left out because they repeat the row before, its stamp included.
     pub repeated_rows: u64,
+    /// Rounds of the loop that read the unit at irregular times, where one did; the readings are then interpolated to the usual one.
+    pub polled: Option<Rounds>,
 }
 
 /// The times of a file's rows.
@@ -152,6 +155,7 @@ impl Times {
             wraps: stamps.wraps,
             rate_in_bursts_hz: regular.in_bursts_s.map(|period| tidy(1.0 / period)),
             repeated_rows: repeated_rows as u64,
+            polled: regular.polled,
         };
         Ok(Times {
             unit,

@@ -3,12 +3,15 @@
 mod clock;
 mod gap;
 mod grid;
+mod polled;
 mod regular;
 mod stamp;
 
 pub use clock::TimeSummary;
 pub use gap::Jitter;
+pub use polled::Rounds;
 pub use stamp::Decimal;
 
 pub(super) use clock::{Clock, Known, Stamps, Times};
+pub(super) use polled::LONGEST;
 pub(super) use stamp::Stamp;

@@ -10,6 +10,7 @@
 
 use super::gap::{Gap, Jitter, STALL_S, quantile};
 use super::grid::{self, Steps};
+use super::polled::{self, Rounds};
 
 /// A step that is longer than this many periods may hide missing samples.
 const LONG: f64 = 1.25;
@@ -27,6 +28,8 @@ const SMALLEST_GAP: f64 = 0.6;
 const SIGMAS: f64 = 6.0;
 /// A clock that is set back by more than so many periods is noticed.
 const SET_BACK: f64 = 2.0;
+/// Stamps that are off the count by less than so many periods are those of samples that are handed over one by one.
+const LATE: f64 = 2.0;
 /// A clock that wanders is off by less than this share of the time.
 const WANDER: f64 = 1e-3;
 /// Rounds of rate and gaps; each needs the other.
@@ -49,6 +52,9 @@ pub(in super::super) struct Regular {
     pub gaps: Vec<Gap>,
     /// Whether the stamps are good, and are kept; then the regular time is not used.
     pub kept: bool,
+    /// Whether a loop has read the unit once a round, however long that took: the stamps are then the times of the readings, and
+    /// `period_s` is the usual round.
+    pub polled: Option<Rounds>,
     /// What is left of the stamps; of those that are kept, what is left of their steps.
     pub jitter: Jitter,
     /// Period within the bursts that stamps come in, s, where it may be that of the sensor and the rest gaps.
@@ -90,9 +96,28 @@ impl Regular {
             }
             _ => {}
         }
+        // A loop that pauses once has stamps as far off the count as a stall would, without its samples that come at once afterwards.
+        if counted.jitter.max_s > LATE * counted.period_s
+            && let Some(rounds) = polled::rounds(stamps)
+        {
+            return Ok(Self::of_rounds(stamps, rounds));
+        }
         match counted.unexplained(stamps) {
             Some(off_s) => Err(Irregular::OffTheCount(off_s)),
             None => Ok(counted),
+        }
+    }
+
+    /// Stamps of a loop, which are kept.
+    fn of_rounds(stamps: &[f64], rounds: Rounds) -> Regular {
+        Regular {
+            start_s: stamps[0],
+            period_s: rounds.usual_s,
+            gaps: polled::gaps(stamps, &rounds),
+            kept: true,
+            jitter: Jitter::default(),
+            in_bursts_s: None,
+            polled: Some(rounds),
         }
     }
 
@@ -110,6 +135,7 @@ impl Regular {
             kept: true,
             jitter: grid.jitter,
             in_bursts_s: None,
+            polled: None,
         }
     }
 
@@ -135,6 +161,7 @@ impl Regular {
             kept: false,
             jitter: Jitter::default(),
             in_bursts_s: None,
+            polled: None,
         };
         regular.jitter = jitter(stamps, &regular);
         regular
@@ -145,7 +172,7 @@ impl Regular {
         let steps = stamps.windows(2).map(|pair| pair[1] - pair[0]);
         let longest = steps.fold(0.0, f64::max);
         let span = stamps[stamps.len() - 1] - stamps[0];
-        let most = (2.0 * self.period_s).max(1.5 * longest).max(WANDER * span);
+        let most = (LATE * self.period_s).max(1.5 * longest).max(WANDER * span);
         (self.jitter.max_s > most).then_some(self.jitter.max_s)
     }
 

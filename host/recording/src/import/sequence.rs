@@ -1,0 +1,201 @@
+//! Files that follow one another: one for each pose or rate, as people record six faces.
+//!
+//! Each file is a step, labelled with its name. Their clocks may begin anew: what a file says of when it was begun is believed if it is
+//! after the file before, and else it begins [`PAUSE_S`] later. No turn is known between them.
+
+use std::collections::BTreeSet;
+use std::path::Path;
+
+use super::inputs::Inputs;
+use super::options::file_name;
+use super::row::Row;
+use super::step_labels::StepLabels;
+use super::{Import, ImportOptions, ImportSummary};
+use crate::columns::Columns;
+use crate::digest;
+use crate::error::{Argument, Error, Result};
+use crate::manifest::{Manifest, Source};
+use crate::writer::Writer;
+
+/// Time between two files of which nobody knows it, s: a gap that no turn is integrated across.
+const PAUSE_S: f64 = 10.0;
+/// Rates of two files may differ by this share: a loop that is paced by its own work is not as fast each time.
+const ALIKE: f64 = 0.02;
+
+/// Where a file stands in a sequence.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Place {
+    step: i32,
+    /// What its times are behind those of the first file by, s.
+    behind_s: f64,
+    /// Time of the last row before it, s.
+    after_s: f64,
+    /// What is added to its times, once its first row has been seen.
+    offset_s: Option<f64>,
+    last_s: f64,
+}
+
+impl Place {
+    /// Gives a row of the file its step, and its time among those of the others.
+    pub fn put(&mut self, row: &mut Row) {
+        let (after_s, behind_s) = (self.after_s, self.behind_s);
+        let offset_s = *self
+            .offset_s
+            .get_or_insert_with(|| match behind_s + row.t_s > after_s {
+                true => behind_s,
+                false => after_s + PAUSE_S - row.t_s,
+            });
+        row.t_s += offset_s;
+        row.step = self.step;
+        self.last_s = row.t_s;
+    }
+}
+
+/// Imports the files of `options` one after the other.
+pub(super) fn import_sequence(
+    options: &ImportOptions,
+    out: &Path,
+    progress: impl Fn(f64),
+) -> Result<ImportSummary> {
+    let labels = labels(options)?;
+    let mut inputs: Option<Inputs> = None;
+    let mut open: Option<(Writer, Manifest, ImportSummary, Columns)> = None;
+    let (mut origin_s, mut after_s) = (0, f64::NEG_INFINITY);
+    let count = options.files.len() as f64;
+    for (step, path) in options.files.iter().enumerate() {
+        let list = options.columns.get(step).or(options.columns.first());
+        let one = ImportOptions {
+            files: vec![path.clone()],
+            columns: list.cloned().into_iter().collect(),
+            preset_warnings: Vec::new(),
+            ..options.clone()
+        };
+        let mut import = Import::open(&one, [false; 2])?;
+        if import.first.has_step() {
+            let problem = "it has a column step, and in a sequence each file is a step";
+            let remedy = "skip the column, or import the file by itself";
+            return Err(Error::new(path.display(), problem, remedy).about(Argument::Columns));
+        }
+        // What of the table is used is known when all files have been read.
+        import.inputs = inputs.take().or(import.inputs);
+        import.first.labels = StepLabels::of(labels.clone());
+        let begun_s = import.summary.time.first().map_or(0, |time| time.origin_s);
+        if step == 0 {
+            origin_s = begun_s;
+        }
+        import.place = Some(Place {
+            step: step as i32,
+            behind_s: (begun_s - origin_s) as f64,
+            after_s,
+            offset_s: None,
+            last_s: after_s,
+        });
+        // Every row of the file is of its step.
+        if let Some(rows) = import.step_rows.remove(&-1) {
+            import.step_rows.insert(step as i32, rows);
+        }
+        let (writer, manifest, summary, columns) = match &mut open {
+            Some(open) => open,
+            None => {
+                let mut manifest = import.manifest(options, out);
+                manifest.check("import")?;
+                manifest.step_labels = labels.clone();
+                let writer = Writer::create(out, import.columns, options.format, options.replace)?;
+                let mut summary = import.summary.clone();
+                (summary.time, summary.warnings) = (Vec::new(), options.preset_warnings.clone());
+                open.insert((writer, manifest, summary, import.columns))
+            }
+        };
+        if import.columns != *columns {
+            let problem = format!(
+                "its columns are not those of {}",
+                file_name(&options.files[0])
+            );
+            return Err(Error::new(
+                path.display(),
+                problem,
+                "give each file its list of columns",
+            )
+            .about(Argument::Columns));
+        }
+        if (import.rate_hz / manifest.sample_rate_hz - 1.0).abs() > ALIKE {
+            let problem = format!(
+                "its rate is {} Hz, and that of {} is {} Hz",
+                import.rate_hz,
+                file_name(&options.files[0]),
+                manifest.sample_rate_hz
+            );
+            let remedy = "import files of one rate as a sequence";
+            return Err(Error::new(path.display(), problem, remedy));
+        }
+        import.run(writer, &|share: f64| {
+            progress((step as f64 + share) / count)
+        })?;
+        import.finish_summary(writer)?;
+        if let Some(sensor) = import.dead_sensors().iter().position(|dead| *dead) {
+            let sensor = ["gyro", "accel"][sensor];
+            let problem = format!("{sensor} is exactly 0 throughout: it was not connected");
+            return Err(Error::new(
+                path.display(),
+                problem,
+                "leave the file out, or skip the columns",
+            ));
+        }
+        after_s = import.place.map_or(after_s, |place| place.last_s);
+        manifest.sources.push(source(path)?);
+        add(summary, import.summary);
+        inputs = import.inputs;
+        if let Some(inputs) = &inputs {
+            manifest.turn_steps = inputs.turns.iter().copied().collect();
+        }
+    }
+    let Some((writer, mut manifest, mut summary, _)) = open else {
+        return Err(Error::new(
+            "import",
+            "no file is given",
+            "name the files to import",
+        ));
+    };
+    if let Some(file) = &options.inputs {
+        manifest.sources.push(source(file)?);
+    }
+    let unused = inputs.as_ref().and_then(Inputs::unused);
+    summary.warnings.extend(unused);
+    summary.rows = writer.rows();
+    summary.recording = writer.finish(&manifest)?.display().to_string();
+    Ok(summary)
+}
+
+fn source(path: &Path) -> Result<Source> {
+    Ok(Source {
+        file: file_name(path),
+        sha256: digest::sha256(path)?,
+    })
+}
+
+/// Labels of the steps: the names of the files, without what they end with.
+fn labels(options: &ImportOptions) -> Result<Vec<String>> {
+    let stem = |path: &std::path::PathBuf| {
+        let stem = path.file_stem().unwrap_or(path.as_os_str());
+        stem.to_string_lossy().into_owned()
+    };
+    let labels: Vec<String> = options.files.iter().map(stem).collect();
+    let mut seen = BTreeSet::new();
+    if let Some(twice) = labels.iter().find(|label| !seen.insert(label.as_str())) {
+        let problem = format!("two files are named {twice}, and the names are those of the steps");
+        return Err(Error::new("import", problem, "give them different names"));
+    }
+    Ok(labels)
+}
+
+/// Adds what was seen of a file to what was seen of those before.
+fn add(all: &mut ImportSummary, one: ImportSummary) {
+    all.time.extend(one.time);
+    all.warnings.extend(one.warnings);
+    all.skipped.header += one.skipped.header;
+    all.skipped.comment += one.skipped.comment;
+    all.skipped.blank += one.skipped.blank;
+    all.interpolated += one.interpolated;
+    all.padding += one.padding;
+    all.empty_cells += one.empty_cells;
+}
