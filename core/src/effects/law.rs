@@ -119,9 +119,6 @@ impl<T: RealField + Copy> Law<T> {
         Self::fast("scale_asymmetry", 3, scale_asymmetry),
         Self::fast("cross_axis_product", 9, cross_axis_product),
         Self::fast("size_effect", 9, size_effect),
-        Self::slow("bias_drift", 3, Nonlinear::None, |c, _, at, e| {
-            e.bias += each(c) * at.time;
-        }),
         Self::slow(
             "warm_up",
             3,

@@ -106,8 +106,6 @@ pub const EFFECTS: &[&str] = &[
     "accel_scale_cubic",
     "accel_cross_axis_product",
     "accel_size_effect",
-    "gyro_bias_drift",
-    "accel_bias_drift",
     "gyro_warm_up",
     "accel_warm_up",
     "gyro_thermal_bias",
@@ -124,7 +122,7 @@ pub const EFFECTS: &[&str] = &[
 ];
 
 /// Bits of those that are no effects by name, but [`Effect::code`].
-const CODES: u32 = 0b11 << 20;
+const CODES: u32 = 0b11 << 18;
 
 /// The bits of the effects that this build removes: those by name are found by asking for each, so that they cannot be out of date.
 pub fn effects_of_this_build() -> u32 {

@@ -304,9 +304,10 @@ fn bias<const N: usize>(effects: &Effects<f64, N>, state: &mut State<f64, N>) ->
 fn drift_of_ten_hours_is_removed_to_the_last_digits_of_single_precision() {
     let drift = [1e-7_f32, -2e-7, 3e-7];
     let mut effects = Effects::<f32, 8>::new(&si(), &si()).unwrap();
-    effects
-        .push(Effect::named("gyro_bias_drift", &drift, None).unwrap())
-        .unwrap();
+    for (axis, coefficient) in drift.into_iter().enumerate() {
+        let term = Effect::term(Sensor::Gyro, axis, coefficient, &[Variable::Time]);
+        effects.push(term.unwrap()).unwrap();
+    }
     let mut state = State::new(1000.0);
     for _ in 0..360_000 {
         effects.slow(&mut state, 0.1, 25.0);
@@ -342,8 +343,10 @@ fn a_warm_up_is_half_as_large_after_each_half_life() {
 #[test]
 fn long_after_power_on_a_warm_up_is_over_and_a_drift_counts_from_the_beginning() {
     let warm_up = Effect::named("accel_warm_up", &[0.04, 0.0, -0.08], Some(100.0)).unwrap();
-    let drift = Effect::named("accel_bias_drift", &[1e-5, 0.0, 2e-5], None).unwrap();
-    let effects = with(&[warm_up, drift], &si());
+    let drift = |axis, coefficient| {
+        Effect::term(Sensor::Accel, axis, coefficient, &[Variable::Time]).unwrap()
+    };
+    let effects = with(&[warm_up, drift(0, 1e-5), drift(2, 2e-5)], &si());
     let mut state = State::new(1000.0).long_after_power_on();
     effects.slow(&mut state, 0.0, f64::NAN);
     assert_eq!(bias(&effects, &mut state), Vector3::zeros());
@@ -459,7 +462,7 @@ fn what_cannot_be_removed_is_refused() {
         Refused::Value
     );
     assert_eq!(
-        refused("gyro_bias_drift", &[0.0; 3], Some(9.0)),
+        refused("gyro_scale_cubic", &[0.0; 3], Some(9.0)),
         Refused::Value
     );
     let term = |axis, v: &[Variable]| Effect::term(Sensor::Accel, axis, 1.0, v).unwrap_err();
@@ -487,7 +490,6 @@ macro_rules! all_at_once {
             ("accel_scale_cubic", 3, 1e-4),
             ("accel_cross_axis_product", 9, 1e-3),
             ("accel_size_effect", 9, 1e-2),
-            ("gyro_bias_drift", 3, 1e-6),
             ("accel_warm_up", 3, 1e-1),
             ("gyro_thermal_bias", 6, 1e-4),
             ("accel_thermal_scale", 3, 1e-3),

@@ -207,7 +207,12 @@ fn with_effects() -> Vec<u8> {
             &[4e-3, 1e-3, -2e-3, 0.0, 3e-3, 1e-3, -1e-3, 2e-3, 4e-3],
             None,
         ),
-        named("accel_bias_drift", &[1e-5, -2e-5, 3e-5], None),
+        Record::Term {
+            sensor: Sensor::Accel,
+            axis: 0,
+            coefficient: 1e-5,
+            variables: &[Variable::Time],
+        },
         Record::Term {
             sensor: Sensor::Accel,
             axis: 1,

@@ -13,6 +13,9 @@ use mimu_recording::RawUnit;
 
 use super::unit::{SAG, fitted, named, prepared, record, table};
 
+/// Of a warm-up.
+const TIME_CONSTANT_S: f64 = 1200.0;
+
 /// A recording, and its calibration with effects, given by id and the value of all coefficients.
 fn unit(effects: &[(&str, f64, usize)]) -> (Prepared, Calibration) {
     let folder = tempfile::tempdir().unwrap();
@@ -22,7 +25,11 @@ fn unit(effects: &[(&str, f64, usize)]) -> (Prepared, Calibration) {
         .iter()
         .map(|(id, value, count)| {
             let mut removed: Removed = named(id, &vec![*value; *count]);
-            removed.parameter = if id.ends_with("lag") { 60.0 } else { 0.0 };
+            removed.parameter = match *id {
+                "gyro_warm_up" => TIME_CONSTANT_S,
+                id if id.ends_with("lag") => 60.0,
+                _ => 0.0,
+            };
             table(&removed)
         })
         .collect();
@@ -122,19 +129,23 @@ fn beyond_the_temperatures_of_the_calibration_an_effect_is_held_as_on_the_device
 
 #[test]
 fn what_goes_by_time_is_counted_from_power_on() {
-    const DRIFT: f64 = 1e-6;
-    let (mut from, calibration) = unit(&[("gyro_bias_drift", DRIFT, 3)]);
+    const WARM_UP: f64 = 1e-3;
+    let (mut from, calibration) = unit(&[("gyro_warm_up", WARM_UP, 3)]);
     let begun = removed(&from, &calibration);
-    from.manifest.power_on_s = Some(from.condensed.blocks[0].start_s - 600.0);
+    let first_s = from.condensed.blocks[0].start_s;
+    from.manifest.power_on_s = Some(first_s - 600.0);
     let on = removed(&from, &calibration);
     let inverse = calibration.inverse(Sensor::Gyro).unwrap();
     for (a, b) in begun.dwells.list.iter().zip(&on.dwells.list) {
-        let more =
-            inverse.apply(&a.raw_mean(Sensor::Gyro)) - inverse.apply(&b.raw_mean(Sensor::Gyro));
+        let less =
+            inverse.apply(&b.raw_mean(Sensor::Gyro)) - inverse.apply(&a.raw_mean(Sensor::Gyro));
+        let settled = |s: f64| WARM_UP * (-s / TIME_CONSTANT_S).exp();
+        let s = a.start_s + 0.5 * a.duration_s - first_s;
+        let expected = settled(s) - settled(s + 600.0);
         // Along the sensors' own directions, a few degrees from the body's.
         assert!(
-            more.iter().all(|m| (m / (600.0 * DRIFT) - 1.0).abs() < 0.1),
-            "{more}"
+            less.iter().all(|m| (m / expected - 1.0).abs() < 0.1),
+            "{less} {expected}"
         );
     }
 }
@@ -178,7 +189,7 @@ fn a_given_calibration_has_to_fit_the_recording() {
 
 #[test]
 fn a_single_dwell_beside_a_given_calibration_leaves_nothing_to_find() {
-    let (from, calibration) = unit(&[("gyro_bias_drift", 1e-6, 3)]);
+    let (from, calibration) = unit(&[("gyro_warm_up", 1e-3, 3)]);
     let mut one = from;
     one.dwells.list.truncate(1);
     let recordings = Recordings {

@@ -14,6 +14,7 @@ use mimu::calibration::{Calibration, EffectTable};
 use mimu::effects;
 use mimu::effects::candidate::{Candidate, Kind};
 use mimu::effects::converter::Converter;
+use mimu::effects::effect::OnDevice;
 use mimu::effects::quantity::Quantity;
 use mimu::effects::regressor::Product;
 use mimu::effects::removal::{Removed, remove};
@@ -28,7 +29,7 @@ use unit::{BIT_0_V, CUBIC, SAG, THERMAL, fitted, named, record, removed, table};
 /// All that is known by name, some of it with some of its coefficients only, and three terms; ten times what data sheets say.
 fn every_effect() -> Vec<Removed> {
     let mut all: Vec<Removed> = effects::all()
-        .filter(|effect| effect.is_error())
+        .filter(|effect| effect.on_device() != OnDevice::Never)
         .enumerate()
         .map(|(n, effect)| {
             let mut candidate = Candidate::new(effect.sensor, Kind::Effect(effect));

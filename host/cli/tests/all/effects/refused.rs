@@ -124,8 +124,12 @@ fn more_effects_than_the_device_has_room_for_are_refused_by_name() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("recording");
     record(&path, false, true);
-    let effects = ["gyro_bias_drift", "accel_bias_drift", "gyro_thermal_scale"]
-        .map(|id| table(&named(id, &[1e-7; 3])));
+    let effects = [
+        "gyro_scale_cubic",
+        "accel_scale_cubic",
+        "gyro_scale_quadratic",
+    ]
+    .map(|id| table(&named(id, &[1e-7; 3])));
     let text = Calibration::of(&fitted(&path), &effects, "2026-01-01T00:00:00Z")
         .unwrap()
         .to_toml();
@@ -136,7 +140,7 @@ fn more_effects_than_the_device_has_room_for_are_refused_by_name() {
         .unwrap_err()
         .to_string();
     assert!(
-        refusal.contains("gyro_thermal_scale") && refusal.contains("at most 1"),
+        refusal.contains("gyro_scale_quadratic") && refusal.contains("at most 1"),
         "{refusal}"
     );
 }
