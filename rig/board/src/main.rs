@@ -163,6 +163,11 @@ impl Serve {
             None => None,
         };
         served.start()?;
+        // Whoever calibrates by gravity has to know it: a latitude of 45 degrees for 30.5 bends every scale factor by 1300 ppm.
+        eprintln!(
+            "mimu-board: gravity {} m/s², latitude {} degrees, where the board stands",
+            plan.place.gravity, plan.place.latitude_deg
+        );
         println!("{}", served.path().display());
         if let Some(address) = control {
             println!("control: {address}");
