@@ -41,4 +41,4 @@ pub use thermal_plan::thermal_plan_text;
 pub(crate) use thermal_record::{thermal_progress, thermal_record_text};
 pub use trim::trim_text;
 pub use verify::verify_text;
-pub(crate) use wizard::{wizard_lines, wizard_question, wizard_text};
+pub(crate) use wizard::{wizard_lines, wizard_text};

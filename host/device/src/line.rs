@@ -12,6 +12,9 @@ use mimu_recording::error::{Error, Result};
 
 /// Times that a call is made: a garbled frame is lost, either way, and every call may be repeated.
 pub(super) const ATTEMPTS: u32 = 4;
+/// Wait for an answer behind a frame that was garbled: longer than the 1 to 4 s that a sector takes to be erased, of the 15 that a commit is
+/// waited for otherwise.
+const GARBLED: Duration = Duration::from_millis(4500);
 /// Most that is waiting to be looked at: a minute of both streams. Beyond, somebody has forgotten to look.
 const WAITING: usize = 6000;
 
@@ -57,10 +60,17 @@ impl Line {
             let length = encode(&call, &mut frame)
                 .map_err(|e| Error::device(self.port.name(), e, "report this"))?;
             self.port.write(&frame[..length])?;
-            let until = Instant::now() + wait;
+            let mut until = Instant::now() + wait;
+            let garbled = self.ear.count().garbled;
+            let mut was_garbled = false;
             while Instant::now() < until {
                 if let Some(answer) = self.listen(Some(id))? {
                     return Ok(Some(answer));
+                }
+                // That may have been the answer, and a call may be repeated.
+                if !was_garbled && self.ear.count().garbled > garbled {
+                    was_garbled = true;
+                    until = until.min(Instant::now() + GARBLED);
                 }
             }
         }

@@ -22,6 +22,8 @@ const STEP_FACTOR: f64 = 25.0;
 /// Part of the variance of block means that the known input of a dwell may leave: errors of a tenth of the input are a diagnosis's to
 /// find; a reference of another dwell leaves all of it.
 const UNFOLLOWED: f64 = 0.02;
+/// Rate below which an accelerometer beside the axis feels nothing of it, rad/s (10 deg/s): 10 mm make 0.3 mm/s² of it.
+const SLOW: f64 = 0.175;
 /// Share of clipped samples from which on a mean is refused: below, it moves by less than a tenth
 /// of a standard deviation of one sample.
 const CLIPPED_SHARE: f64 = 0.01;
@@ -39,6 +41,8 @@ pub enum Fault {
     Turning,
     /// It errs by far more than the others predict.
     Outlying,
+    /// It turns about an axis that the accelerometer may be beside of.
+    Spinning,
     /// Samples of the channel (0..6) lie at a rail.
     Saturated(usize),
     /// The channel (0..6) repeats one value.
@@ -55,6 +59,7 @@ impl fmt::Display for Fault {
             Self::TooFast => f.write_str("moved too fast"),
             Self::Turning => f.write_str("turning"),
             Self::Outlying => f.write_str("outlying"),
+            Self::Spinning => f.write_str("spinning"),
             Self::Saturated(c) => write!(f, "{} saturated", RAW_COLUMNS[c]),
             Self::Stuck(c) => write!(f, "{} stuck", RAW_COLUMNS[c]),
             Self::Missing(c) => write!(f, "{} missing", RAW_COLUMNS[c]),
@@ -115,6 +120,12 @@ impl Dwell {
             Sensor::Gyro => self.gyro_fault,
             Sensor::Accel => self.accel_fault,
         }
+    }
+
+    /// Whether a table turns the unit in it so fast that an accelerometer beside the axis would show it.
+    pub fn spins(&self) -> bool {
+        self.input(Sensor::Gyro)
+            .is_some_and(|rate| rate.norm() > SLOW)
     }
 
     /// Whether the known input of `sensor` moves within it: then its mean is not all that it shows.

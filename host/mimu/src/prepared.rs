@@ -6,7 +6,7 @@ use nalgebra::{Matrix3, Vector3};
 use crate::blocks::Condensed;
 use crate::contrast::{Contrast, contrasts};
 use crate::course::Course;
-use crate::dwell::{Dwell, Dwells};
+use crate::dwell::{Dwell, Dwells, Fault};
 use crate::estimate::earth::Earth;
 use crate::estimate::turn::{Motion, Rest, Turn};
 use crate::estimate::{Failure, Observation};
@@ -123,6 +123,18 @@ impl Prepared {
     /// Whether the recording has the channels of `sensor`.
     pub fn has(&self, sensor: Sensor) -> bool {
         sensor.channels().all(|c| self.condensed.has_raw[c])
+    }
+
+    /// Without the dwells of the accelerometer in which a table turns it, if it has others: where it is beside the axis they have a
+    /// centripetal force that no reference says.
+    pub fn accel_at_rest(mut self) -> Self {
+        let usable = |d: &Dwell| d.accel_fault.is_none() && d.input(Sensor::Accel).is_some();
+        if self.dwells.list.iter().any(|d| usable(d) && !d.spins()) {
+            for dwell in self.dwells.list.iter_mut().filter(|d| d.spins()) {
+                dwell.accel_fault.get_or_insert(Fault::Spinning);
+            }
+        }
+        self
     }
 
     /// Usable dwells of `sensor`; where there is a table, those with a known input.

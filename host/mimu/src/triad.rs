@@ -198,6 +198,25 @@ impl Triad {
         })
     }
 
+    /// With axes that the frame may be turned against by small angles of this standard deviation, rad, about each: how a unit is mounted on a
+    /// table no dwell shows, and it turns gyro and accelerometer alike.
+    pub fn mounted(mut self, sigma_rad: f64) -> Self {
+        let mut covariance = Covariance::zeros();
+        for axis in 0..3 {
+            let turned = self.forward.matrix * Vector3::ith(axis, sigma_rad).cross_matrix();
+            let by = vector(&turned, &Vector3::zeros());
+            covariance += by * by.transpose();
+        }
+        self.forward_parts.push(Part {
+            covariance,
+            dof: f64::INFINITY,
+        });
+        self.forward_covariance += covariance;
+        let j = inversion_jacobian(&self.inverse.matrix, &self.inverse.offset);
+        self.inverse_covariance += j * covariance * j.transpose();
+        self
+    }
+
     /// What the covariance of C and o is the sum of.
     pub fn inverse_parts(&self) -> Vec<Part> {
         let j = inversion_jacobian(&self.inverse.matrix, &self.inverse.offset);

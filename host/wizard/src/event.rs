@@ -131,6 +131,13 @@ pub enum Event {
         /// What.
         words: String,
     },
+    /// Something is asked, to be answered by yes or no.
+    Question {
+        /// `power-cycled`, `store-effects`, `store-rough`, `go-on`.
+        question: &'static str,
+        /// In a sentence.
+        words: String,
+    },
 }
 
 impl Event {
@@ -151,7 +158,8 @@ impl Event {
             | Self::Phase { .. }
             | Self::Step { .. }
             | Self::Redo { .. }
-            | Self::Note { .. } => None,
+            | Self::Note { .. }
+            | Self::Question { .. } => None,
         }
     }
 }
@@ -228,8 +236,36 @@ pub enum Question {
     PowerCycled,
     /// Store the calibration with the effects that were found.
     StoreEffects(String),
-    /// A self-test failed: go on all the same.
+    /// Store a calibration that errs by many times the noise, as this says.
+    StoreRough(String),
+    /// Something is wrong, as this says: go on all the same.
     GoOn(String),
+}
+
+impl Question {
+    /// Its name in [`Event::Question`].
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::PowerCycled => "power-cycled",
+            Self::StoreEffects(_) => "store-effects",
+            Self::StoreRough(_) => "store-rough",
+            Self::GoOn(_) => "go-on",
+        }
+    }
+
+    /// As a sentence.
+    pub fn words(&self) -> String {
+        match self {
+            Self::PowerCycled => {
+                "unplug the board, plug it in again, and say yes; no leaves that out".into()
+            }
+            Self::StoreEffects(effects) => {
+                format!("verify and store the calibration with {effects}?")
+            }
+            Self::StoreRough(why) => format!("{why}; store it all the same?"),
+            Self::GoOn(why) => format!("{why}; go on all the same?"),
+        }
+    }
 }
 
 /// Shows a session to somebody, and hears what they want.

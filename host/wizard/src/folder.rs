@@ -20,6 +20,7 @@ use mimu_recording::error::{Error, Result};
 use mimu_recording::{
     Batch, Columns, Growing, MANIFEST_FILE, Manifest, Recording, Restart, SampleFormat,
 };
+use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use crate::bank::ByDevice;
@@ -61,6 +62,9 @@ pub enum Entry {
         number: i32,
         /// What it was.
         step: Step,
+        /// The direction that a person was asked for, where the unit was turned after that.
+        #[serde(default)]
+        asked: Option<[f64; 3]>,
         /// Time of its first sample, s.
         from_s: f64,
         /// Rows of the recording after it.
@@ -89,10 +93,24 @@ pub enum Entry {
         /// What happened.
         why: String,
     },
-    /// The calibration was made, and verified.
+    /// A calibration was made from a recording and those before; made again it has the same date, and is the same to the last byte.
+    Made {
+        /// The last of them.
+        part: Part,
+        /// When, RFC 3339.
+        created: String,
+    },
+    /// The calibration was verified.
     Verified {
         /// Whether it passed.
         passed: bool,
+    },
+    /// What still errs was looked for.
+    Diagnosed {
+        /// What it amounts to.
+        verdict: String,
+        /// The effects.
+        effects: Vec<String>,
     },
     /// A calibration was stored on the device.
     Stored {
@@ -231,6 +249,42 @@ impl Folder {
             }
         }
         all
+    }
+
+    /// The poses of a recording that a person turned the unit to: what was asked for, and what came.
+    pub fn shown(&self, of: Part) -> Vec<[Vector3<f64>; 2]> {
+        let shown = self.entries.iter().filter_map(|entry| match entry {
+            Entry::Dwell {
+                part,
+                step,
+                asked: Some(asked),
+                ..
+            } if *part == of => Some([Vector3::from(*asked), step.up()]),
+            _ => None,
+        });
+        shown.collect()
+    }
+
+    /// When the calibration from this recording was made first; `now` if that is now.
+    pub fn created(&mut self, of: Part, now: impl FnOnce() -> String) -> Result<String> {
+        let before = self.entries.iter().find_map(|entry| match entry {
+            Entry::Made { part, created } if *part == of => Some(created.clone()),
+            _ => None,
+        });
+        if let Some(created) = before {
+            return Ok(created);
+        }
+        let created = now();
+        self.add(Entry::Made {
+            part: of,
+            created: created.clone(),
+        })?;
+        Ok(created)
+    }
+
+    /// Whether all was done.
+    pub fn is_done(&self) -> bool {
+        self.entries.last() == Some(&Entry::Done)
     }
 
     /// Numbers of the dwells that do not count.

@@ -12,6 +12,7 @@
 //! | [`refit`] | the calibration so far, every parameter beside its target |
 //! | [`folder`] | the journal and the recordings, from which a killed session goes on |
 //! | [`one`] | one of the units: its dwells, had or thrown away |
+//! | [`axes`] | whether the axes are those that their names say |
 //! | [`bank`] | the device's own Kalman filters beside it |
 //! | [`drive`] | what turns and warms the unit: a person, or a table and a chamber that take text commands |
 //! | [`carry_out`] | a procedure over temperature: chamber and table led through a plan, and one recording of it |
@@ -19,8 +20,10 @@
 //! | [`wizard`] | which step comes next, and who has had it |
 //! | [`store`] | into the device, back, and over a loss of the supply |
 //! | [`verdict`] | whether a calibration keeps what it promises |
+//! | [`resumed`] | what a session that goes on keeps |
 //! | [`session`] | all of it, in order |
 
+pub mod axes;
 pub mod bank;
 pub mod carry_out;
 pub mod device;
@@ -31,6 +34,7 @@ pub mod one;
 pub mod procedure;
 pub mod refit;
 pub mod regular;
+pub mod resumed;
 pub mod session;
 pub mod source;
 pub mod station;

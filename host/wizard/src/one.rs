@@ -11,8 +11,10 @@ use mimu_recording::error::{Error, Result};
 use mimu_recording::{Batch, Columns, Manifest, Recorded};
 use nalgebra::Vector3;
 
-use self::conditions::{motion_limits, rate_limit_dps};
+pub use self::conditions::WRONG_POSE;
+use self::conditions::{Turns, motion_limits, rate_limit_dps};
 use self::rows::{cut, known, shorten};
+use crate::axes;
 use crate::bank::DeviceBanks;
 use crate::event::{Event, UnitStanding};
 use crate::folder::{Entry, Folder, Part, Taking, append};
@@ -32,6 +34,14 @@ const KEPT_S: f64 = 120.0;
 
 /// From this many targets on a half-width tells nothing of where up is: 20 mrad.
 const KNOWN: f64 = 20.0;
+
+/// Half-widths of the angles of axes from which on they are known well enough to say that they are another's, µrad (6 degrees).
+const AXES_KNOWN: f64 = 1e5;
+
+/// A fit that is refused so many times in a row, from so many dwells on, for another reason than that dwells lack, will not come about.
+const REFUSED: u32 = 4;
+/// See [`REFUSED`].
+const REFUSED_FROM: i32 = 10;
 
 /// A dwell that runs.
 #[derive(Debug, Clone, Copy)]
@@ -86,6 +96,15 @@ pub struct One {
     /// When the power came, on the clock of the recordings, s.
     power_on_s: Option<f64>,
     dwell: Option<Dwell>,
+    /// Whether it was turned since the step was asked for.
+    moved: bool,
+    /// Why the dwells so far will not become a calibration.
+    hopeless: Option<Error>,
+    /// Samples that are missing since the last dwell, and what came of the turns so far.
+    turn_missing: u64,
+    turns: Turns,
+    /// Fits in a row that were refused, for another reason than that dwells lack.
+    refused: u32,
     seen: Option<Seen>,
     part: Part,
     number: i32,
@@ -114,6 +133,11 @@ impl One {
             next: None,
             power_on_s: None,
             dwell: None,
+            moved: false,
+            hopeless: None,
+            turn_missing: 0,
+            turns: Turns::default(),
+            refused: 0,
             seen: None,
             part: Part::Calibration,
             number: 0,
@@ -248,8 +272,9 @@ impl One {
         self.next = Some(chunk.tick + chunk.values.len() as u64);
         self.power_on_s = chunk.power_on_s;
         self.standing.lost += missing;
-        if let Some(dwell) = &mut self.dwell {
-            dwell.missing += missing;
+        match &mut self.dwell {
+            Some(dwell) => dwell.missing += missing,
+            None => self.turn_missing += missing,
         }
         if let Some(taking) = &mut self.taking {
             taking.missing(missing);
@@ -309,9 +334,12 @@ impl One {
     ) -> Result<()> {
         let asked = round.asked;
         let rate_hz = self.station.unit.rate_hz;
+        self.check_unit(seen, asked)?;
         let up = self.up(seen, asked);
         let running = self.dwell.map(|d| d.step);
         let wanted = running.unwrap_or(*step);
+        let limits = motion_limits(wanted.rate_dps);
+        self.moved |= (0..2).any(|k| seen.motion[k] > limits[k]);
         let found = match self.waits(seen, asked, &wanted, round.busy) {
             Some(why) => Err(why),
             None => self.pose(&up, round, &wanted, running.is_none()),
@@ -358,7 +386,7 @@ impl One {
                 let left = (to + guard).saturating_sub(seen.tick);
                 self.standing.left_s = Some(left as f64 / rate_hz);
                 if left == 0 {
-                    self.accept(dwell, to, seen, asked, tell)?;
+                    self.accept(dwell, to, seen, round, tell)?;
                 }
             }
         }
@@ -407,9 +435,10 @@ impl One {
         dwell: Dwell,
         to: u64,
         seen: &Seen,
-        asked: &Asked,
+        round: &Round<'_>,
         tell: &mut Vec<Event>,
     ) -> Result<()> {
+        let asked = round.asked;
         let rate_hz = self.station.unit.rate_hz;
         self.check_temperature(seen, asked)?;
         if let Some(banks) = &mut self.banks {
@@ -448,6 +477,10 @@ impl One {
             part: self.part,
             number,
             step: dwell.step,
+            asked: round
+                .step
+                .filter(|_| self.moved && round.any_order)
+                .map(|s| s.up),
             from_s,
             rows,
             bytes,
@@ -462,14 +495,37 @@ impl One {
             step: dwell.step,
             words: dwell.step.words(),
         });
+        let missing = std::mem::take(&mut self.turn_missing);
+        if asked.fixture != Fixture::Table && number > 0 {
+            self.count_turn(missing, tell)?;
+        }
         if self.part == Part::Calibration {
             self.refit(asked);
+            self.check_hope()?;
             tell.push(Event::Progress {
                 unit: self.name(),
                 progress: self.progress.clone(),
             });
         }
         Ok(())
+    }
+
+    /// Refuses to go on where more dwells do not help.
+    fn check_hope(&self) -> Result<()> {
+        match &self.hopeless {
+            Some(error) => Err(error.clone()),
+            None => Ok(()),
+        }
+    }
+
+    /// Why the poses say that the accelerometer's axes are not those that their names say.
+    pub fn mirrored(&self, asked: &Asked) -> Option<String> {
+        axes::mirrored(&self.folder.shown(self.part), asked.fixture.tolerance_deg())
+    }
+
+    /// A step is asked for.
+    pub fn asked_for(&mut self) {
+        (self.done, self.moved, self.standing.waiting) = (false, false, None);
     }
 
     fn check_temperature(&self, seen: &Seen, asked: &Asked) -> Result<()> {
@@ -493,6 +549,16 @@ impl One {
         let taking = self.taking.as_ref()?;
         let fitted = calibrate(taking.manifest(), &taking.samples, 0);
         self.progress = progress(&fitted, &asked.targets);
+        self.refused = match &fitted {
+            Err(error) if !matches!(error, Error::Undetermined(_)) => self.refused + 1,
+            _ => 0,
+        };
+        if let (Err(error), true) = (
+            &fitted,
+            self.number >= REFUSED_FROM && self.refused >= REFUSED,
+        ) {
+            self.hopeless = Some(error.clone());
+        }
         let fitted = fitted.ok()?;
         // A calibration that is open by degrees tells up no better than a data sheet.
         let known = self
@@ -500,6 +566,11 @@ impl One {
             .sensors
             .iter()
             .all(|s| s.aims.iter().all(|a| a.half_width < KNOWN * a.target));
+        let turned = self.progress.sensors.iter().flat_map(|s| &s.aims);
+        let mut angles = turned.filter(|a| a.parameter == "angles");
+        let known_angles = angles.all(|a| a.half_width < AXES_KNOWN);
+        let apart = known_angles.then(|| axes::frames_apart(&fitted)).flatten();
+        self.hopeless = apart.map(|why| Error::device(self.name(), why, axes::REMEDY));
         if let (true, [Some(gyro), Some(accel)]) = (known, Sensor::BOTH.map(|s| fitted.sensor(s))) {
             self.nominal = Some([gyro, accel].map(|s| s.estimated.triad.inverse));
         }

@@ -6,6 +6,7 @@ use mimu::design::model::{Model, Setting, Terms};
 use mimu::design::reach::{Fixture as Reached, Rates, Reach};
 use mimu::design::refinement::Region as _;
 use mimu::design::tour::randomised;
+use mimu::quantity::normal_gravity;
 use mimu_recording::Reference;
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
@@ -33,6 +34,15 @@ impl Fixture {
         }
     }
 
+    /// Its name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Table => "table",
+            Self::Cube => "cube",
+            Self::Hands => "hands",
+        }
+    }
+
     /// How far from a direction a pose may be and still be it, degrees. Without a calibration the null of an MMA7260QT may be off by 0.2 g,
     /// which is 12 degrees, and its axes by some more; faces, edges and corners are 35 degrees apart at least.
     pub fn tolerance_deg(self) -> f64 {
@@ -46,6 +56,9 @@ impl Fixture {
 /// What is asked of a session; kept with it, so that it goes on as it was begun.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Asked {
+    /// Columns and unit of a board that writes lines of text.
+    #[serde(default)]
+    pub text: Option<String>,
     /// What carries the unit.
     pub fixture: Fixture,
     /// Local gravity, m/s².
@@ -72,9 +85,27 @@ pub struct Asked {
     pub most_drift_c: f64,
     /// Half-widths of the 95 % intervals that are wanted.
     pub targets: Targets,
+    /// How far the unit's axes may be turned on a table: half-width of the 95 % interval of each angle, degrees.
+    #[serde(default)]
+    pub mounting_deg: f64,
     /// Whether the calibration is what the device's own Kalman filters estimate; on a table only.
     #[serde(default)]
     pub by_device: bool,
+}
+
+impl Asked {
+    /// What gravity is taken to be, and what that does: no reading shows that it is another.
+    pub fn gravity_words(&self) -> String {
+        let normal = self.latitude_deg.map(normal_gravity);
+        let source = match normal == Some(self.gravity_mps2) {
+            true => "normal gravity at sea level; 1000 m higher it is 315 ppm less",
+            false => "as given",
+        };
+        format!(
+            "gravity is taken to be {:.4} m/s² ({source}): each ppm that it is off is a ppm of every scale factor of the accelerometer, in no interval",
+            self.gravity_mps2
+        )
+    }
 }
 
 /// Half-widths of 95 % intervals that are wanted.
@@ -212,12 +243,13 @@ pub type Missed = [bool; 2];
 /// The step that brings most information beside `done`, for the sensors that need it.
 pub fn next_step(asked: &Asked, done: &[Step], missed: Missed) -> Step {
     let candidates = match asked.fixture {
-        Fixture::Table => first_steps(
-            Fixture::Table,
-            asked.dwell_s,
-            asked.largest_rate_dps,
-            done.len() as u64,
-        ),
+        Fixture::Table => {
+            let seed = done.len() as u64;
+            let mut all = first_steps(Fixture::Table, asked.dwell_s, asked.largest_rate_dps, seed);
+            let [faces, ..] = directions();
+            all.extend(faces.into_iter().map(|up| Step::at_rest(up, asked.dwell_s)));
+            all
+        }
         fixture => {
             let [faces, edges, corners] = directions();
             let ups = match fixture {
@@ -232,18 +264,21 @@ pub fn next_step(asked: &Asked, done: &[Step], missed: Missed) -> Step {
     let terms = Terms::default();
     let mut models = Vec::new();
     if missed[1] || missed == [false; 2] {
-        models.push(Model::accel(reference, &terms));
+        models.push((true, Model::accel(reference, &terms)));
     }
     if missed[0] && reference == Reference::Table {
         let span = Vector3::repeat(asked.largest_rate_dps.to_radians());
-        models.push(Model::gyro(&terms, span));
+        models.push((false, Model::gyro(&terms, span)));
     }
-    let reaches = models.into_iter().map(|model| Reach {
-        model,
-        fixture: Reached::Hand,
-        rates: Rates::Any,
+    let reaches = models.into_iter().map(|(of_accel, model)| {
+        let reach = Reach {
+            model,
+            fixture: Reached::Hand,
+            rates: Rates::Any,
+        };
+        (of_accel, reach)
     });
-    let reaches: Vec<Reach> = reaches.collect();
+    let reaches: Vec<(bool, Reach)> = reaches.collect();
     let setting = |s: &Step| Setting {
         up: s.up(),
         rate: s.rate_dps.to_radians(),
@@ -256,7 +291,10 @@ pub fn next_step(asked: &Asked, done: &[Step], missed: Missed) -> Step {
     let last = had.last().map(|s| s.up);
     let gain = |candidate: &Step| {
         let with = [had.as_slice(), &[setting(candidate)]].concat();
-        let of = |reach: &Reach| {
+        let of = |(of_accel, reach): &(bool, Reach)| {
+            // A table that turns shows an accelerometer beside its axis another force than gravity.
+            let tells = |s: &&Setting| !*of_accel || s.rate.abs() < AT_REST;
+            let with: Vec<Setting> = with.iter().filter(tells).copied().collect();
             let rows = reach.rows(&with);
             // A whisper of everything, so that what is not determined yet can be compared too.
             let all = (0..rows.len()).map(|i| (i, 1.0));
@@ -283,6 +321,8 @@ pub fn next_step(asked: &Asked, done: &[Step], missed: Missed) -> Step {
     best.map_or(Step::at_rest(Vector3::z(), asked.dwell_s), |b| *b.1)
 }
 
+/// Rate below which a dwell on a table tells of the accelerometer, rad/s: see [`mimu::dwell::Dwell::spins`].
+const AT_REST: f64 = 0.175;
 /// What a pose that was not had yet is worth beside its information, in logarithms of a determinant: as much as one more of ten dwells.
 const NEW_POSE: f64 = 1.0;
 
@@ -357,6 +397,27 @@ pub fn verification(
 mod tests {
     use super::*;
 
+    fn asked(fixture: Fixture) -> Asked {
+        Asked {
+            text: None,
+            fixture,
+            gravity_mps2: 9.8,
+            latitude_deg: None,
+            dwell_s: 3.0,
+            largest_rate_dps: 0.0,
+            steps: Vec::new(),
+            by_targets: true,
+            most_dwells: 40,
+            patience_s: 60.0,
+            verification: Vec::new(),
+            warm_c_per_min: None,
+            most_drift_c: 5.0,
+            targets: Targets::default(),
+            mounting_deg: 0.0,
+            by_device: false,
+        }
+    }
+
     #[test]
     fn neighbouring_poses_by_hand_are_a_quarter_turn_apart_and_more() {
         for fixture in [Fixture::Hands, Fixture::Cube] {
@@ -382,26 +443,20 @@ mod tests {
     }
 
     #[test]
+    fn an_accelerometer_that_misses_its_target_on_a_table_is_shown_at_rest() {
+        let mut asked = asked(Fixture::Table);
+        asked.largest_rate_dps = 250.0;
+        let done = first_steps(Fixture::Table, 3.0, 250.0, 1);
+        assert_eq!(next_step(&asked, &done, [false, true]).rate_dps, 0.0);
+        assert_ne!(next_step(&asked, &done, [true, false]).rate_dps, 0.0);
+    }
+
+    #[test]
     fn a_direction_that_was_missed_is_the_next() {
         let mut done = first_steps(Fixture::Hands, 3.0, 0.0, 1);
         // Nothing has ever shown the side of -x.
         done.retain(|s| s.up[0] > -0.3);
-        let asked = Asked {
-            fixture: Fixture::Hands,
-            gravity_mps2: 9.8,
-            latitude_deg: None,
-            dwell_s: 3.0,
-            largest_rate_dps: 0.0,
-            steps: Vec::new(),
-            by_targets: true,
-            most_dwells: 40,
-            patience_s: 60.0,
-            verification: Vec::new(),
-            warm_c_per_min: None,
-            most_drift_c: 5.0,
-            targets: Targets::default(),
-            by_device: false,
-        };
+        let asked = asked(Fixture::Hands);
         let next = next_step(&asked, &done, [false, true]);
         assert!(next.up[0] < -0.5, "{next:?}");
     }

@@ -2,24 +2,24 @@
 
 use std::path::{Path, PathBuf};
 
-use mimu::calibration::{Calibration, EffectTable};
-use mimu::diagnose::{Recordings, diagnose};
+use mimu::calibration::Calibration;
 use mimu::fit::{Fit, Options, fit};
-use mimu::next_experiment;
 use mimu::prepared::Prepared;
 use mimu::result::diagnosis::DiagnosisResult;
-use mimu_recording::error::Result;
+use mimu_recording::error::{Error, Result};
 use mimu_recording::result_file::stage;
 use serde::Serialize;
 
+use crate::axes;
 use crate::drive::Driver;
 use crate::event::{Event, Question, View};
 use crate::folder::{Begun, Entry, Folder, Part};
 use crate::one::One;
-use crate::procedure::{Asked, verification};
+use crate::procedure::{Asked, Fixture};
+use crate::refit;
+use crate::resumed::resumed;
 use crate::source::Opener;
 use crate::station::Station;
-use crate::step::Step;
 use crate::verdict::{Judged, judge, prepared};
 use crate::wizard::{Ended, Wizard};
 
@@ -63,7 +63,7 @@ pub struct UnitOutcome {
     /// The affine calibration, in poses that were not used.
     pub verified: Option<Judged>,
     /// Verdict of the diagnosis.
-    pub verdict: Option<&'static str>,
+    pub verdict: Option<String>,
     /// Effects that were found.
     pub effects: Vec<String>,
     /// The calibration with the effects, in a third set of poses.
@@ -76,7 +76,7 @@ pub struct UnitOutcome {
     pub notes: Vec<String>,
 }
 
-/// Carries out a session. `asked` counts where it is begun; one that goes on keeps what it was begun with.
+/// Carries out a session; one that goes on is what it was begun with ([`resumed`]).
 pub fn run(
     asked: Asked,
     wanted: Vec<Wanted>,
@@ -86,11 +86,15 @@ pub fn run(
 ) -> Result<Outcome> {
     let mut units = Vec::new();
     let mut kept = asked;
+    let finished = wanted.iter().map(|w| finished(&w.folder, &kept));
+    if let Some(units) = finished.collect::<Result<Option<Vec<_>>>>()? {
+        return Ok(Outcome::of(units, false));
+    }
     for Wanted { opener, folder } in wanted {
         let begun = Folder::begun(&folder)?;
         let (opened, station) = match &begun {
             Some(begun) => {
-                kept = begun.asked.clone();
+                kept = resumed(&begun.asked, &kept, &folder)?;
                 let opened = Folder::open(&folder)?;
                 let next = One::first_tick(&opened, begun.rate_hz);
                 let station = Station::open(opener, next, Some(&begun.unit_id))?;
@@ -127,12 +131,52 @@ pub fn run(
     let ended = ended?;
     stopped?;
     let outcomes = session.outcomes();
-    Ok(Outcome {
-        format: "mimu-wizard/1",
-        tool: concat!("mimu ", env!("CARGO_PKG_VERSION")),
-        cancelled: ended == Ended::Cancelled,
-        units: outcomes,
-    })
+    Ok(Outcome::of(outcomes, ended == Ended::Cancelled))
+}
+
+impl Outcome {
+    fn of(units: Vec<UnitOutcome>, cancelled: bool) -> Self {
+        Self {
+            format: "mimu-wizard/1",
+            tool: concat!("mimu ", env!("CARGO_PKG_VERSION")),
+            cancelled,
+            units,
+        }
+    }
+}
+
+/// What the session in a folder has come to, if it is finished: then nothing is done any more.
+fn finished(path: &Path, now: &Asked) -> Result<Option<UnitOutcome>> {
+    let Some(begun) = Folder::begun(path)? else {
+        return Ok(None);
+    };
+    let folder = Folder::open(path)?;
+    if !folder.is_done() {
+        return Ok(None);
+    }
+    resumed(&begun.asked, now, path)?;
+    let existing = |name: &str| {
+        Some(folder.file(name))
+            .filter(|p| p.exists())
+            .map(|p| p.display().to_string())
+    };
+    let found = folder.entries().iter().rev().find_map(|e| match e {
+        Entry::Diagnosed { verdict, effects } => Some((verdict.clone(), effects.clone())),
+        _ => None,
+    });
+    let (verdict, effects) = found.unzip();
+    Ok(Some(UnitOutcome {
+        unit: begun.unit_id,
+        folder: path.display().to_string(),
+        dwells: folder.dwells(Part::Calibration).len(),
+        thrown: folder.thrown(),
+        verdict,
+        effects: effects.unwrap_or_default(),
+        stored: existing(WITH_EFFECTS).or(existing(PLAIN)),
+        page: existing("diagnosis.html"),
+        notes: vec!["the session was finished before, and nothing was done now; another begins with another -o".into()],
+        ..UnitOutcome::default()
+    }))
 }
 
 struct Whole<'a> {
@@ -141,11 +185,26 @@ struct Whole<'a> {
     page: Page<'a>,
 }
 
-/// What the diagnosis of a unit has brought.
-struct Found {
+/// The calibration of a unit without effects.
+struct Plain {
     calibration: Calibration,
-    fit: Fit,
-    effects: Vec<String>,
+    fitted: Fit,
+    /// What it was judged by.
+    other: Prepared,
+    /// Why a person has to agree before it is stored.
+    rough: Option<String>,
+}
+
+/// The files of the calibrations.
+const PLAIN: &str = "calibration.toml";
+const WITH_EFFECTS: &str = "with-effects.toml";
+
+/// Puts into the intervals how far the unit's axes may be turned on the table: 95 % of each angle within `half_width_deg`.
+fn mounted(fitted: &mut Fit, half_width_deg: f64) {
+    for sensor in &mut fitted.sensors {
+        let triad = sensor.estimated.triad.clone();
+        sensor.estimated.triad = triad.mounted(half_width_deg.to_radians() / 1.96);
+    }
 }
 
 macro_rules! or_cancelled {
@@ -156,9 +215,13 @@ macro_rules! or_cancelled {
     };
 }
 
+mod effects;
+
 impl Whole<'_> {
     fn carry_out(&mut self) -> Result<Ended> {
         let wizard = &mut self.wizard;
+        let words = wizard.asked.gravity_words();
+        wizard.tell(Event::Note { words });
         let limit = wizard.asked.warm_c_per_min;
         let words = match limit {
             Some(limit) => format!(
@@ -173,14 +236,26 @@ impl Whole<'_> {
         wizard.begin_phase("calibration", format!("{} dwells are planned", steps.len()));
         or_cancelled!(wizard.dwells(Part::Calibration, &steps));
         self.finish()?;
+        let by_table = self.wizard.asked.fixture == Fixture::Table;
         let mut fits = Vec::new();
         for unit in &self.wizard.units {
-            let directory = unit.folder.file(Part::Calibration.name());
-            fits.push(fit(prepared(&directory)?, Options::default())?);
+            let first = prepared(&unit.folder.file(Part::Calibration.name()))?;
+            let options =
+                refit::options(first.manifest.reference, Options::default().holdout_blocks);
+            let fitted = fit(first, options)?;
+            if let Some(why) = axes::frames_apart(&fitted) {
+                return Err(Error::device(unit.name(), why, axes::REMEDY));
+            }
+            fits.push(fitted);
         }
         if self.wizard.asked.by_device {
             for (k, fitted) in fits.iter_mut().enumerate() {
                 self.take_from_device(k, fitted)?;
+            }
+        }
+        if by_table {
+            for fitted in &mut fits {
+                mounted(fitted, self.wizard.asked.mounting_deg);
             }
         }
         let wizard = &mut self.wizard;
@@ -191,29 +266,67 @@ impl Whole<'_> {
         self.finish()?;
         self.wizard
             .begin_phase("store", "what was verified is stored".into());
-        let mut judging = Vec::new();
-        for (k, fitted) in fits.iter().enumerate() {
-            let calibration = Calibration::of(fitted, &[], &now())?;
+        let mut plain = Vec::new();
+        for (k, fitted) in fits.into_iter().enumerate() {
+            let created = self.wizard.units[k]
+                .folder
+                .created(Part::Verification, now)?;
+            let calibration = Calibration::of(&fitted, &[], &created)?;
             let other = prepared(&self.file(k, Part::Verification.name()))?;
-            let passed = self.judged(k, &other, &calibration, fitted, Part::Verification)?;
-            judging.push(other);
-            if passed {
-                let place = self.write(k, "calibration.toml", &calibration)?;
-                or_cancelled!(self.wizard.store(k, &calibration, &place));
-                self.outcomes[k].stored = Some(place);
+            let judged = self.judged(k, &other, &calibration, &fitted, Part::Verification)?;
+            let rough = judged.rough().filter(|_| judged.passed());
+            match &rough {
+                Some(why) => {
+                    let words = format!("{why}: what errs is looked for before anything is stored");
+                    self.wizard.tell(Event::Note { words });
+                }
+                None if judged.passed() => or_cancelled!(self.store(k, PLAIN, &calibration)),
+                None => {}
             }
+            plain.push(Plain {
+                calibration,
+                fitted,
+                other,
+                rough,
+            });
         }
         self.wizard
             .begin_phase("diagnosis", "what still errs".into());
         let mut found = Vec::new();
-        for (k, other) in judging.into_iter().enumerate() {
-            found.push(self.diagnose(k, other)?);
+        for (k, plain) in plain.iter().enumerate() {
+            found.push(self.diagnose(k, plain)?);
         }
-        if found.iter().all(Option::is_none) {
-            self.wizard.journal(&Entry::Done)?;
-            return Ok(Ended::Done);
+        if found.iter().any(Option::is_some) {
+            or_cancelled!(self.with_effects(&plain, found));
         }
-        self.with_effects(found)
+        for (k, plain) in plain.iter().enumerate() {
+            let Some(why) = plain
+                .rough
+                .clone()
+                .filter(|_| self.outcomes[k].stored.is_none())
+            else {
+                continue;
+            };
+            match self.wizard.ask(&Question::StoreRough(why.clone()))? {
+                None => return Ok(Ended::Cancelled),
+                Some(true) => or_cancelled!(self.store(k, PLAIN, &plain.calibration)),
+                Some(false) => self.outcomes[k].notes.push(format!("not stored: {why}")),
+            }
+        }
+        self.wizard.journal(&Entry::Done)?;
+        Ok(Ended::Done)
+    }
+
+    /// Writes a calibration and stores it on unit `k`.
+    fn store(&mut self, k: usize, name: &str, calibration: &Calibration) -> Result<Ended> {
+        let path = self.file(k, name);
+        stage(&path, calibration.to_toml())?.publish()?;
+        let place = path.display().to_string();
+        let ended = self.wizard.store(k, calibration, &place)?;
+        if ended == Ended::Done {
+            self.outcomes[k].stored = Some(place);
+        }
+        Ok(ended)
     }
 
     /// Puts the estimate of the device's own filters in the place of the fit, if they have had all dwells.
@@ -250,12 +363,6 @@ impl Whole<'_> {
         self.wizard.units[k].folder.file(name)
     }
 
-    fn write(&self, k: usize, name: &str, calibration: &Calibration) -> Result<String> {
-        let path = self.file(k, name);
-        stage(&path, calibration.to_toml())?.publish()?;
-        Ok(path.display().to_string())
-    }
-
     fn finish(&mut self) -> Result<()> {
         for unit in &mut self.wizard.units {
             if let Some(taking) = unit.taking.take() {
@@ -265,7 +372,7 @@ impl Whole<'_> {
         Ok(())
     }
 
-    /// Judges a calibration by a recording, and tells; whether it may be stored.
+    /// Judges a calibration by a recording, and tells.
     fn judged(
         &mut self,
         k: usize,
@@ -273,7 +380,7 @@ impl Whole<'_> {
         calibration: &Calibration,
         fitted: &Fit,
         part: Part,
-    ) -> Result<bool> {
+    ) -> Result<Judged> {
         let judged = judge(by, calibration, Some(fitted))?;
         let passed = judged.passed();
         let unit = &mut self.wizard.units[k];
@@ -287,120 +394,11 @@ impl Whole<'_> {
             Part::Confirmation => outcome.confirmed = Some(judged.clone()),
             _ => outcome.verified = Some(judged.clone()),
         }
-        self.wizard.tell(Event::Verified { unit: name, judged });
-        Ok(passed)
-    }
-
-    /// What still errs, and the calibration with it, if that is anything that can be stored.
-    fn diagnose(&mut self, k: usize, other: Prepared) -> Result<Option<Found>> {
-        let name = self.wizard.units[k].name();
-        let first = prepared(&self.file(k, Part::Calibration.name()))?;
-        let mut diagnosis = diagnose(
-            Recordings {
-                second: Some(other.clone()),
-                ..Recordings::from(first)
-            },
-            Options {
-                holdout_blocks: 0,
-                ..Options::default()
-            },
-        )?;
-        let accepted = diagnosis.sensors.iter().flat_map(|s| &s.decision.accepted);
-        let tables: Vec<EffectTable> = accepted
-            .filter(|a| a.of_unit)
-            .map(EffectTable::from)
-            .collect();
-        let made = Calibration::of(&diagnosis.after, &tables, &now())?;
-        let before = Calibration::of(&diagnosis.before, &[], &now())?;
-        let both = (
-            mimu::verify::verify(&other, &before),
-            mimu::verify::verify(&other, &made),
-        );
-        let judged = match both {
-            (Ok(before), Ok(after)) => Some([before, after]),
-            (Err(refusal), _) | (_, Err(refusal)) => {
-                diagnosis.after.warnings.push(refusal.to_string());
-                None
-            }
-        };
-        let next = next_experiment::next(&diagnosis);
-        let judged = judged.as_ref().map(|both| ("verification", both));
-        let result = DiagnosisResult::of(&diagnosis, &next, judged);
-        let page = self.file(k, "diagnosis.html");
-        let folder = self.wizard.units[k].folder.path.clone();
-        stage(&page, (self.page)(&result, &folder)?)?.publish()?;
-        let effects: Vec<String> = made.effects().iter().map(|e| e.candidate.id()).collect();
-        let outcome = &mut self.outcomes[k];
-        let verdict = diagnosis.verdict.name();
-        outcome.verdict = Some(verdict);
-        outcome.effects.clone_from(&effects);
-        outcome.page = Some(page.display().to_string());
-        self.wizard.tell(Event::Diagnosed {
+        self.wizard.tell(Event::Verified {
             unit: name,
-            verdict,
-            effects: effects.clone(),
-            page: page.display().to_string(),
+            judged: judged.clone(),
         });
-        Ok((!effects.is_empty()).then_some(Found {
-            calibration: made,
-            fit: diagnosis.after,
-            effects,
-        }))
-    }
-
-    /// The calibrations with effects: offered, judged in a third set of poses, and stored.
-    fn with_effects(&mut self, found: Vec<Option<Found>>) -> Result<Ended> {
-        let names: Vec<String> = found
-            .iter()
-            .flatten()
-            .flat_map(|f| f.effects.clone())
-            .collect();
-        let question = Question::StoreEffects(names.join(", "));
-        match self.wizard.ask(&question)? {
-            None => return Ok(Ended::Cancelled),
-            Some(false) => {
-                self.wizard.journal(&Entry::Done)?;
-                return Ok(Ended::Done);
-            }
-            Some(true) => {}
-        }
-        let asked = &self.wizard.asked;
-        let used: Vec<Step> = asked
-            .steps
-            .iter()
-            .chain(&asked.verification)
-            .copied()
-            .collect();
-        let steps = verification(asked.fixture, &used, asked.dwell_s, asked.largest_rate_dps);
-        let words = format!(
-            "{} poses that were not used, for the calibration with {}",
-            steps.len(),
-            names.join(", ")
-        );
-        self.wizard.begin_phase("confirmation", words);
-        or_cancelled!(self.wizard.dwells(Part::Confirmation, &steps));
-        self.finish()?;
-        for (k, found) in found.into_iter().enumerate() {
-            let Some(found) = found else { continue };
-            let by = prepared(&self.file(k, Part::Confirmation.name()))?;
-            let passed = self.judged(k, &by, &found.calibration, &found.fit, Part::Confirmation)?;
-            let better = self.outcomes[k]
-                .confirmed
-                .as_ref()
-                .is_some_and(|judged| judged.sensors.iter().any(|s| s.after < s.affine));
-            if passed && better {
-                let place = self.write(k, "with-effects.toml", &found.calibration)?;
-                or_cancelled!(self.wizard.store(k, &found.calibration, &place));
-                self.outcomes[k].stored = Some(place);
-            } else if passed {
-                let note =
-                    "the effects do no better in new poses: the calibration without them stays"
-                        .into();
-                self.outcomes[k].notes.push(note);
-            }
-        }
-        self.wizard.journal(&Entry::Done)?;
-        Ok(Ended::Done)
+        Ok(judged)
     }
 
     fn outcomes(&self) -> Vec<UnitOutcome> {

@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use mimu::calibration::Calibration;
-use mimu_device::{Image, check, download, self_test, upload};
+use mimu_device::{Image, Session, Started, Stream, check, download, self_test, stream, upload};
 use mimu_recording::error::{Error, Result};
 
 use crate::event::{Event, Question};
@@ -14,6 +14,24 @@ use crate::wizard::{Ended, Wizard};
 const BACK: Duration = Duration::from_secs(60);
 /// Length of the comparison of the device's compensation with the PC's.
 const COMPARED: Duration = Duration::from_secs(1);
+/// Length of the raw stream that says how many samples there were since the start.
+const GLANCE: Duration = Duration::from_millis(50);
+
+/// For how long the device has had its supply, s; `None` if it started by anything but power-on since, or does not know.
+fn powered(session: &mut Session) -> Result<Option<f64>> {
+    let who = session.hello()?;
+    let before_ms = who.powered_for_ms.filter(|_| who.start == Started::PowerOn);
+    let rate_hz = f64::from(who.sample_rate_hz);
+    let seen = stream(
+        session,
+        Stream::Raw,
+        Some(GLANCE),
+        || false,
+        |_, _, _| Ok(()),
+    )?;
+    let samples = f64::from(seen.first.unwrap_or(0));
+    Ok(before_ms.map(|ms| f64::from(ms) / 1000.0 + samples / rate_hz))
+}
 
 impl Wizard<'_> {
     /// Has the sensors deflected electrically, and keeps a copy of what the device holds.
@@ -98,14 +116,43 @@ impl Wizard<'_> {
             hash: shown.clone(),
             effects,
         })?;
-        let cycled = match self.driver.power_cycle()? {
-            true => Some(true),
-            false => self.ask(&Question::PowerCycled)?,
+        let kept = loop {
+            let on_s = self.units[k].station.with(powered)?;
+            let since = Instant::now();
+            let driven = self.driver.power_cycle()?;
+            let cycled = match driven {
+                true => Some(true),
+                false => self.ask(&Question::PowerCycled)?,
+            };
+            let Some(cycled) = cycled else {
+                return Ok(Ended::Cancelled);
+            };
+            self.wait_for(k, hash)?;
+            if !cycled {
+                break "not tried with the supply off".to_string();
+            }
+            let now_s = self.units[k].station.with(powered)?;
+            match (now_s, driven) {
+                // It has its supply for less long than before, or than since the question.
+                (Some(now_s), _)
+                    if on_s.is_none_or(|on_s| now_s < on_s)
+                        || now_s < since.elapsed().as_secs_f64() =>
+                {
+                    break format!(
+                        "kept over a loss of the supply (power-on, {now_s:.1} s before)"
+                    );
+                }
+                (_, true) => {
+                    break "not proven to be kept over a loss of the supply: the driver turned it off and on, and the device did not start by power-on since".into();
+                }
+                (_, false) => {
+                    let words = format!(
+                        "{name}: it has not lost its supply since the question; another supply may keep it on"
+                    );
+                    self.tell(Event::Note { words });
+                }
+            }
         };
-        let Some(cycled) = cycled else {
-            return Ok(Ended::Cancelled);
-        };
-        self.wait_for(k, hash)?;
         let (given, file) = (calibration.clone(), place.to_owned());
         let unit = &self.units[k];
         let checked = unit
@@ -116,10 +163,6 @@ impl Wizard<'_> {
             let remedy = "update device and program to the same version";
             return Err(Error::device(name, problem, remedy));
         }
-        let kept = match cycled {
-            true => "kept over a loss of the supply",
-            false => "not tried with the supply off",
-        };
         self.tell(Event::Stored {
             unit: name,
             hash: shown,

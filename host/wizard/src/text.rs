@@ -22,6 +22,13 @@ const POLL: Duration = Duration::from_millis(5);
 const NOTHING: Duration = Duration::from_secs(5);
 /// Silence after which the port is opened again: one that was unplugged need not say so.
 const SILENCE: Duration = Duration::from_secs(5);
+/// So long the board's clock is compared with the computer's before its rate is believed: lines that waited in a buffer are then few
+/// beside those that came at their time.
+const COMPARED: Duration = Duration::from_secs(2);
+/// Departure of the two that is worth a word: crystals and ceramic resonators are within 0.5 %.
+const CLOCK_SHARE: f64 = 0.05;
+/// A factor between the two that no replay of a recording has, and that a wrong unit has: 1000 or a million.
+const WRONG_UNIT: f64 = 100.0;
 /// Lines that are not data are told of when there are so many more by this factor.
 const TOLD_AGAIN: u64 = 10;
 
@@ -95,6 +102,10 @@ pub struct TextSource {
     heard: Instant,
     /// Lines whose time cannot be that are among those refused.
     garbled: u64,
+    /// Times of lines by the board's clock and by the computer's, s, until the two are compared.
+    clocks: Vec<[f64; 2]>,
+    /// How many times as fast as the computer's the board's clock goes, once they are.
+    clock_factor: Option<f64>,
     ready: VecDeque<Heard>,
     /// Number of lines that are not data at which they are told of next.
     tell_at: u64,
@@ -125,6 +136,8 @@ impl TextSource {
             began: now,
             heard: now,
             garbled: 0,
+            clocks: Vec::new(),
+            clock_factor: None,
             ready: VecDeque::new(),
             tell_at: 1,
         };
@@ -136,6 +149,7 @@ impl TextSource {
     fn find_rate(&mut self, patience: Duration) -> Result<()> {
         while self.regular.rate_hz().is_none() || self.lines.count() == 0 {
             self.take()?;
+            self.check_clock()?;
             if self.heard.elapsed() < patience {
                 continue;
             }
@@ -163,10 +177,44 @@ impl TextSource {
             format!("{}: lines of text, {}", self.port, self.lines.description()),
             format!("{rate_hz:.2} samples a second, {clock}"),
         ];
+        if let Some(factor) = self.clock_factor.filter(|f| (f - 1.0).abs() > CLOCK_SHARE) {
+            self.unit.told.push(format!(
+                "the board's clock goes {factor:.3} times as fast as this computer's, and every rate of the gyro errs by that: unless this is a replay, check what the board writes"
+            ));
+        }
         self.unit.told.extend(self.lines.others_in_words());
         self.unit.told.extend(self.lines.refused_in_words());
         self.tell_at = TOLD_AGAIN * self.lines.refused().max(1);
         Ok(())
+    }
+
+    /// Compares the board's clock with the computer's, once enough of both has passed.
+    ///
+    /// Errors: one goes so much faster that the unit of the column is another.
+    fn check_clock(&mut self) -> Result<()> {
+        let spent = self.clocks.last().zip(self.clocks.first());
+        let spent_s = spent.map_or(0.0, |(last, first)| last[1] - first[1]);
+        if self.clock_factor.is_some() || spent_s < COMPARED.as_secs_f64() || self.clocks.len() < 8
+        {
+            return Ok(());
+        }
+        // A garbled time is in few of the pairs, and leaves the median alone.
+        let later = &self.clocks[self.clocks.len() / 2..];
+        let both = self.clocks.iter().zip(later);
+        let mut factors: Vec<f64> = both.map(|(a, b)| (b[0] - a[0]) / (b[1] - a[1])).collect();
+        factors.sort_by(f64::total_cmp);
+        let factor = factors[factors.len() / 2];
+        (self.clock_factor, self.clocks) = (Some(factor), Vec::new());
+        if (1.0 / WRONG_UNIT..WRONG_UNIT).contains(&factor) {
+            return Ok(());
+        }
+        let problem = format!(
+            "its clock goes {} times as fast as this computer's, as if its column were {}",
+            mimu::quantity::significant(factor),
+            self.lines.clock_in_words(factor)
+        );
+        let remedy = "name the column t_us, t_ms or t_s by what the board writes, or `-` to have the lines timed by this computer";
+        Err(Error::device(&self.port, problem, remedy))
     }
 
     fn nothing_fits(&self) -> Error {
@@ -204,6 +252,9 @@ impl TextSource {
         for reading in self.lines.take(&bytes[..count]) {
             self.heard = Instant::now();
             let Reading { raw, temp_c, t_s } = reading;
+            if let (Some(t_s), None) = (t_s, self.clock_factor) {
+                self.clocks.push([t_s, arrived_s]);
+            }
             let timed = Timed {
                 t_s: t_s.unwrap_or(arrived_s),
                 raw,
@@ -407,6 +458,53 @@ mod tests {
         assert_eq!(notes, ["its clock has gone back"]);
         assert!(samples.windows(2).all(|p| p[1].0 > p[0].0));
         assert!(samples.len() > 2300, "{}", samples.len());
+    }
+
+    /// A board that writes ten lines in a tenth of a second, for three seconds.
+    fn paced(columns: &str, unit_s: f64) -> Result<TextSource> {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let port = format!("tcp://{}", listener.local_addr().unwrap());
+        std::thread::spawn(move || {
+            let mut line = listener.accept().unwrap().0;
+            for k in 0..300 {
+                // One of them is garbled.
+                let t = if k == 1 {
+                    9e9
+                } else {
+                    (0.01 * f64::from(k) / unit_s).round()
+                };
+                if writeln!(line, "{t},0,0,4096,1,2,3").is_err() {
+                    return;
+                }
+                if k % 10 == 9 {
+                    std::thread::sleep(Duration::from_millis(100));
+                }
+            }
+        });
+        let text = Text {
+            port,
+            baud: 115_200,
+            columns: Columns::parse(columns).unwrap(),
+            raw_unit: RawUnit::Count,
+            name: None,
+        };
+        TextOpener::new(text, None).open(0)
+    }
+
+    #[test]
+    fn stamps_in_another_unit_are_refused_within_seconds_with_the_column_that_they_are() {
+        for (names, unit_s, is) in [("t_ms", 1e-6, "t_us"), ("t_us", 1e-3, "t_ms")] {
+            let began = Instant::now();
+            let error = paced(&CLOCKED.replace("t_us", names), unit_s)
+                .err()
+                .unwrap();
+            let error = error.to_string();
+            assert!(
+                error.contains(&format!("as if its column were {is}")),
+                "{error}"
+            );
+            assert!(began.elapsed() < Duration::from_secs(4));
+        }
     }
 
     #[test]

@@ -8,6 +8,8 @@ use mimu_recording::error::{Error, Result};
 
 /// Longest line, bytes; a board that writes none of them as long as this with ten numbers.
 const LONGEST: usize = 400;
+/// Largest reading: counts have 32 bits at most, and a number that was garbled to more (`1.4e99`) would end the fit of all others.
+const LARGEST: f64 = BITS;
 /// So many lines that are not data are kept to be shown.
 const SHOWN: usize = 3;
 
@@ -208,6 +210,7 @@ impl Lines {
         };
         for (column, number) in self.columns.columns.iter().zip(numbers) {
             match column {
+                Column::Channel(_) | Column::Temperature if number.abs() > LARGEST => return None,
                 Column::Channel(c) => reading.raw[*c] = *number,
                 Column::Temperature => reading.temp_c = *number,
                 Column::Skipped => {}
@@ -274,6 +277,21 @@ impl Lines {
     /// Whether the board has a clock of its own.
     pub fn has_clock(&self) -> bool {
         self.columns.has_clock()
+    }
+
+    /// What the clock column would be, if time by it were to go `factor` times more slowly.
+    pub fn clock_in_words(&self, factor: f64) -> String {
+        let unit = self.columns.columns.iter().find_map(|c| match c {
+            Column::Clock { unit_s, .. } => Some(unit_s / factor),
+            _ => None,
+        });
+        let unit = unit.unwrap_or(f64::NAN);
+        let known = [("t_us", 1e-6), ("t_ms", 1e-3), ("t_s", 1.0)];
+        let near = |is: &&(&str, f64)| (0.2..5.0).contains(&(is.1 / unit));
+        known.iter().find(near).map_or_else(
+            || format!("in units of {} s", mimu::quantity::significant(unit)),
+            |(name, _)| (*name).into(),
+        )
     }
 
     /// What a line of data is.
@@ -350,6 +368,13 @@ mod tests {
         assert_eq!((readings.len(), lines.refused()), (2, 5));
         let words = lines.refused_in_words().unwrap();
         assert_eq!(words, "5 of 7 lines are not data, the first \"MPU6050 OK\"");
+    }
+
+    #[test]
+    fn a_reading_that_no_converter_gives_is_no_data() {
+        let text = "1,2,3,4,5,6\n1,2,1.4e99,4,5,6\n1,2,-4294967296,4,5,6\n1,2,4294967297,4,5,6\n";
+        let (readings, lines) = read(SIX, text);
+        assert_eq!((readings.len(), lines.refused()), (2, 2));
     }
 
     #[test]

@@ -16,6 +16,10 @@ pub const CLEAN: f64 = 1.3;
 /// What was held out promises; twice of it and of the noise is no chance any more with six dwells and more.
 const BROKEN: f64 = 2.0;
 
+/// A calibration that errs by more than this many noise floors, and leaves more than this share of what a data sheet leaves, is no
+/// calibration for good: what was held out of it errs as much, so that it cannot show it.
+const ROUGH: (f64, f64) = (5.0, 0.05);
+
 /// The figures of one sensor.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SensorJudged {
@@ -80,6 +84,25 @@ impl SensorJudged {
     }
 }
 
+impl SensorJudged {
+    /// What a person has to agree to before it is stored: an error that the model lacks.
+    fn rough(&self) -> Option<String> {
+        let rough = self.after > ROUGH.0 * self.floor && self.after > ROUGH.1 * self.before;
+        rough.then(|| {
+            let shown = |si: f64| mimu::quantity::significant(si);
+            format!(
+                "{}: {} errs by {} {} in poses that were not used, {:.1} times the noise, where a data sheet leaves {}",
+                self.sensor,
+                self.figure,
+                shown(self.after),
+                self.unit,
+                self.after / self.floor,
+                shown(self.before)
+            )
+        })
+    }
+}
+
 /// A calibration judged by the verification.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Judged {
@@ -97,6 +120,23 @@ impl Judged {
         self.broken.is_empty() && !self.sensors.is_empty()
     }
 
+    /// Why a person has to agree before it is stored.
+    pub fn rough(&self) -> Option<String> {
+        let rough: Vec<String> = self
+            .sensors
+            .iter()
+            .filter_map(SensorJudged::rough)
+            .collect();
+        (!rough.is_empty()).then(|| rough.join(", "))
+    }
+
+    /// Whether no sensor does worse than in `other`, and one does better.
+    pub fn beats(&self, other: &Self) -> bool {
+        let both = || self.sensors.iter().zip(&other.sensors);
+        both().all(|(a, b)| a.sensor == b.sensor && a.after <= b.after)
+            && both().any(|(a, b)| a.after < b.after)
+    }
+
     /// Whether noise explains what is left.
     pub fn clean(&self) -> bool {
         self.sensors.iter().all(|s| s.after <= CLEAN * s.floor)
@@ -108,8 +148,18 @@ pub fn prepared(directory: &Path) -> Result<Prepared> {
     Prepared::read(&Recording::open(directory)?, STILL_FACTOR, |_| {})
 }
 
-/// Judges a calibration by the recording of the verification; `promised` is the fit that it was made by.
+/// Judges a calibration by the recording of the verification; `promised` is the fit that it was made by. On a table the accelerometer is
+/// judged at rest.
 pub fn judge(by: &Prepared, calibration: &Calibration, promised: Option<&Fit>) -> Result<Judged> {
+    judged(&by.clone().accel_at_rest(), calibration, promised)
+}
+
+/// The same by all dwells, where two calibrations are compared.
+pub fn judge_all(by: &Prepared, calibration: &Calibration) -> Result<Judged> {
+    judged(by, calibration, None)
+}
+
+fn judged(by: &Prepared, calibration: &Calibration, promised: Option<&Fit>) -> Result<Judged> {
     let found = verify(by, calibration)?;
     let of = |s: &SensorVerification| {
         let fitted = promised.and_then(|f| f.sensor(s.sensor));

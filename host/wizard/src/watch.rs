@@ -18,6 +18,10 @@ const TREND_LEAST_S: f64 = 15.0;
 /// What the gyro is allowed beyond a still accelerometer by hand: see the stillness of recordings, where hands tremble in angle.
 const GYRO_TREMOR: f64 = 30.0;
 
+/// Squares of a change from one pose to another, over that of the reading at rest (and a hundred times its noise), that no gyro has which is
+/// held still; and over the noise, that every accelerometer has.
+const EXCHANGED: (f64, f64) = (0.1, 100.0);
+
 /// Moments of the six channels.
 #[derive(Debug, Clone, Copy, Default)]
 struct Moments {
@@ -50,6 +54,39 @@ impl Moments {
     }
 }
 
+/// What is known of the codes of a channel.
+#[derive(Debug, Clone, Copy, Default)]
+struct Codes {
+    last: Option<f64>,
+    /// Smallest change so far; none where there was no change.
+    step: Option<f64>,
+    /// Whether the first second had one value: a step larger than the noise, or a broken wire.
+    coarse: Option<bool>,
+}
+
+impl Codes {
+    fn add(&mut self, value: f64) {
+        let change = self.last.map_or(0.0, |last| (value - last).abs());
+        if change > 0.0 {
+            self.step = Some(self.step.map_or(change, |step| step.min(change)));
+        }
+        self.last = Some(value);
+    }
+
+    /// Whether a second of one value is none of a coarse step. `moved`: the unit was turned since.
+    fn is_stuck(&self, moved: bool) -> bool {
+        self.coarse != Some(true) || moved && self.step.is_none()
+    }
+
+    /// Variance that a coarse step hides.
+    fn hidden(&self) -> f64 {
+        match (self.coarse, self.step) {
+            (Some(true), Some(step)) => step * step / 12.0,
+            _ => 0.0,
+        }
+    }
+}
+
 /// A tenth of a second.
 #[derive(Debug, Clone, Copy, Default)]
 struct Block {
@@ -75,8 +112,10 @@ pub struct Seen {
     pub temp_c: f64,
     /// °C/min over the last minute, once there is enough of it.
     pub trend: Option<f64>,
-    /// The first channel that has one value only.
+    /// The first channel that has one value only, and once had more or is turned.
     pub stuck: Option<usize>,
+    /// Whether the gyro's readings follow the pose and the accelerometer's do not, as if one were taken for the other.
+    pub exchanged: bool,
 }
 
 /// The samples of one unit, condensed as they come.
@@ -90,8 +129,11 @@ pub struct Watch {
     next: Option<u64>,
     /// Variance of one sample in the quietest second so far, raw.
     floor: Option<[f64; 6]>,
-    /// Mean reading of the gyro at rest, and the sum of its variances in that second, once two seconds in a row have agreed on it.
-    rest: Option<([f64; 3], f64)>,
+    /// Mean readings at rest, and the sum of the gyro's variances in that second, once two seconds in a row have agreed on it.
+    rest: Option<([f64; 6], f64)>,
+    codes: [Codes; 6],
+    /// Whether it has moved since it may be turned.
+    moved: bool,
     /// The seconds that ended within the last one: means and variances of the gyro.
     before: VecDeque<[[f64; 3]; 2]>,
     /// Whether the unit may be turned by now.
@@ -111,6 +153,8 @@ impl Watch {
             next: None,
             floor: None,
             rest: None,
+            codes: [Codes::default(); 6],
+            moved: false,
             before: VecDeque::new(),
             begun: false,
             temperatures: VecDeque::new(),
@@ -134,6 +178,9 @@ impl Watch {
         let mut seen = None;
         for (k, row) in (1..).zip(&chunk.values) {
             self.open.moments.add(row);
+            for (codes, value) in self.codes.iter_mut().zip(row) {
+                codes.add(*value);
+            }
             self.open.saturated |= chunk.saturated;
             if self.open.moments.count >= self.block_rows {
                 self.window.push_back(std::mem::take(&mut self.open));
@@ -175,8 +222,9 @@ impl Watch {
 
     /// Looks whether a second of the gyro (mean and variance of each axis) is rest: as that before it, which a table that slows down is not.
     /// A table may say that it stands while samples of its turning are still on their way.
-    fn find_rest(&mut self, second: [[f64; 2]; 3]) {
-        let (mean, variance) = (second.map(|s| s[0]), second.map(|s| s[1]));
+    fn find_rest(&mut self, means: [f64; 6], variances: [f64; 6]) {
+        let first = |of: [f64; 6]| [of[0], of[1], of[2]];
+        let (mean, variance) = (first(means), first(variances));
         let whole = (WINDOW_S / BLOCK_S).round() as usize;
         let agrees = |[mean_0, variance_0]: &[[f64; 3]; 2]| {
             (0..3).all(|c| {
@@ -188,7 +236,7 @@ impl Watch {
         let agreed = self.before.len() == whole && self.before.front().is_some_and(agrees);
         let sum = variance.iter().sum();
         if agreed && self.rest.is_none_or(|(_, quietest)| sum <= quietest) {
-            self.rest = Some((mean, sum));
+            self.rest = Some((means, sum));
         }
         if self.before.len() == whole {
             self.before.pop_front();
@@ -234,12 +282,18 @@ impl Watch {
             saturated |= block.saturated;
             missing += block.missing;
         }
-        let variance = all.squares.map(|s| s / (all.count - 1.0));
-        let stuck = (0..6).find(|c| variance[*c] == 0.0);
+        let own = all.squares.map(|s| s / (all.count - 1.0));
+        for (codes, own) in self.codes.iter_mut().zip(&own) {
+            codes.coarse.get_or_insert(*own == 0.0);
+        }
+        let (codes, moved) = (self.codes, self.moved);
+        let stuck = (0..6).find(|&c| own[c] == 0.0 && codes[c].is_stuck(moved));
+        // A mean is known to no less than what a step hides.
+        let variance: [f64; 6] = std::array::from_fn(|c| own[c].max(codes[c].hidden()));
         if stuck.is_none() && !saturated {
             // Before anything was to turn: a steady rate is as quiet as rest.
             if !self.begun {
-                self.find_rest([0, 1, 2].map(|c| [all.mean[c], variance[c]]));
+                self.find_rest(all.mean, variance);
             }
             let floor = self.floor.get_or_insert(variance);
             for c in 0..6 {
@@ -247,13 +301,28 @@ impl Watch {
             }
         }
         let floor = self.floor.unwrap_or(variance);
+        let floor: [f64; 6] = std::array::from_fn(|c| floor[c].max(codes[c].hidden()));
         let motion = Sensor::BOTH.map(|sensor| {
             let allowed = match sensor {
                 Sensor::Gyro if self.by_hand => GYRO_TREMOR * STILL_FACTOR,
                 _ => STILL_FACTOR,
             };
+            // Of a constant 0 / 0, which is still.
             let ratio = |c: usize| (variance[c] / (allowed * floor[c])).sqrt();
             sensor.channels().map(ratio).fold(0.0, f64::max)
+        });
+        self.moved |= self.begun && motion.iter().any(|m| *m > 1.0);
+        let exchanged = self.rest.is_some_and(|(rest, _)| {
+            let of = |sensor: Sensor, squares: &dyn Fn(usize) -> f64| {
+                sensor.channels().map(squares).sum::<f64>()
+            };
+            let changed = |sensor| of(sensor, &|c| (all.mean[c] - rest[c]).powi(2));
+            let size = |sensor| of(sensor, &|c| rest[c] * rest[c]);
+            let noise = |sensor| of(sensor, &|c| floor[c]);
+            self.by_hand
+                && changed(Sensor::Gyro)
+                    > EXCHANGED.0 * size(Sensor::Gyro).max(1e4 * noise(Sensor::Gyro))
+                && changed(Sensor::Accel) < EXCHANGED.1 * noise(Sensor::Accel)
         });
         Seen {
             tick,
@@ -264,12 +333,13 @@ impl Watch {
             temp_c,
             trend: self.trend(),
             stuck,
+            exchanged,
         }
     }
 
     /// Rate of a second against that of rest, rad/s, by `gyro`, raw to SI.
     pub fn rate(&self, seen: &Seen, gyro: &Affine<f64>) -> Vector3<f64> {
-        let rest = self.rest.map_or([0.0; 3], |r| r.0);
+        let rest = self.rest.map_or([0.0; 6], |r| r.0);
         gyro.matrix * Vector3::from_fn(|c, _| seen.mean[c] - rest[c])
     }
 
@@ -377,6 +447,60 @@ mod tests {
             (last.unwrap().trend.unwrap() - 1.0).abs() < 1e-6,
             "{last:?}"
         );
+    }
+
+    /// A second and a half at rest of a board whose noise is less than its step, at `level`.
+    fn coarse(watch: &mut Watch, tick: u64, level: [f64; 6]) -> Option<Seen> {
+        let mut one = chunk(tick, 150, 0.0, 0.0);
+        one.values.fill(level);
+        watch.take(&one)
+    }
+
+    #[test]
+    fn a_board_whose_step_is_coarser_than_its_noise_comes_to_rest_and_a_dead_channel_does_not_turn()
+    {
+        let mut watch = Watch::new(100.0, true);
+        coarse(&mut watch, 0, [1.0, 2.0, 0.0, 3.0, 0.0, 250.0]);
+        let seen = coarse(&mut watch, 150, [1.0, 2.0, 0.0, 3.0, 0.0, 250.0]).unwrap();
+        assert!(watch.knows_rest() && seen.stuck.is_none(), "{seen:?}");
+        watch.begin();
+        // Turned, and held again: all but gyro z, whose wire is broken, have changed.
+        for k in 0..10 {
+            let turning = 20.0 * f64::from(k % 3);
+            coarse(
+                &mut watch,
+                300 + 15 * k as u64,
+                [
+                    turning,
+                    2.0 + turning,
+                    0.0,
+                    turning,
+                    turning,
+                    250.0 - turning,
+                ],
+            );
+        }
+        let seen = coarse(&mut watch, 3000, [1.0, 2.0, 0.0, 251.0, 2.0, 4.0]).unwrap();
+        assert_eq!(seen.stuck, Some(2), "{seen:?}");
+        assert!(
+            seen.motion.iter().all(|m| *m <= 1.0) && !seen.exchanged,
+            "{seen:?}"
+        );
+    }
+
+    #[test]
+    fn a_gyro_that_reads_the_pose_is_an_accelerometer() {
+        let mut watch = Watch::new(1000.0, true);
+        let mut at = |watch: &mut Watch, tick: u64, gyro: [f64; 3]| {
+            let mut one = chunk(tick, 2500, 0.0, 0.01);
+            for row in &mut one.values {
+                (row[0], row[1], row[2]) = (gyro[0] + row[0], gyro[1] + row[1], gyro[2] + row[2]);
+            }
+            watch.take(&one).unwrap()
+        };
+        assert!(!at(&mut watch, 0, [0.1, 0.2, 9.8]).exchanged);
+        watch.begin();
+        assert!(at(&mut watch, 5000, [9.8, 0.1, 0.2]).exchanged);
     }
 
     #[test]

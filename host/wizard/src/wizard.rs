@@ -4,10 +4,11 @@ use std::time::{Duration, Instant};
 
 use mimu_recording::error::{Error, Result};
 
+use crate::axes;
 use crate::drive::Driver;
 use crate::event::{Event, Question, Standing, View, Wish};
 use crate::folder::{Entry, Part};
-use crate::one::{One, Round};
+use crate::one::{One, Round, WRONG_POSE};
 use crate::procedure::{Asked, Fixture, next_step};
 use crate::step::Step;
 
@@ -17,6 +18,9 @@ const SHOWN: Duration = Duration::from_millis(100);
 const IDLE: Duration = Duration::from_millis(4);
 /// Longest wait for a unit to say anything, or for a table's interlock.
 const SILENT: Duration = Duration::from_secs(30);
+
+/// So long a pose that is another may stand where no person turns the unit: it will not become that which was asked for.
+const WRONG: Duration = Duration::from_secs(10);
 
 /// How a phase ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -41,9 +45,13 @@ pub struct Wizard<'a> {
     pub phase: &'static str,
     shown: Instant,
     queue: Vec<Step>,
+    /// Those in whose place a person had another pose: they come after the others.
+    later: Vec<Step>,
     planned: usize,
     current: Option<Step>,
     zero_s: Option<u64>,
+    /// Whether the person knows that poses come otherwise than they are asked for.
+    axes_agreed: bool,
 }
 
 /// How a step ended.
@@ -70,9 +78,11 @@ impl<'a> Wizard<'a> {
             phase: "start",
             shown: Instant::now(),
             queue: Vec::new(),
+            later: Vec::new(),
             planned: 0,
             current: None,
             zero_s: None,
+            axes_agreed: false,
         }
     }
 
@@ -201,7 +211,7 @@ impl<'a> Wizard<'a> {
             }
         }
         self.planned = steps.len();
-        self.queue = self.left(part, steps);
+        (self.queue, self.later) = (self.left(part, steps), Vec::new());
         loop {
             let Some(step) = self.choose(part) else {
                 self.driver.stop()?;
@@ -222,8 +232,11 @@ impl<'a> Wizard<'a> {
                 words: step.words(),
             });
             match self.step(&step)? {
-                // A person may have had another pose than was asked for: that one is off the list then, and this one is not.
-                Stepped::Had if self.driver.is_person() => self.queue = self.left(part, steps),
+                Stepped::Had if self.driver.is_person() => {
+                    if self.goes_on(part, steps, &step)? == Ended::Cancelled {
+                        return Ok(Ended::Cancelled);
+                    }
+                }
                 Stepped::Had => {}
                 Stepped::Cancelled => {
                     self.driver.stop()?;
@@ -235,6 +248,42 @@ impl<'a> Wizard<'a> {
                     self.queue.insert(0, other);
                 }
             }
+        }
+    }
+
+    /// What is left where a person may have had another pose than the `step` that was asked for: that one is off the list then, and this
+    /// one comes later. Poses that all come otherwise in the same way end the session, unless the person knows better.
+    fn goes_on(&mut self, part: Part, steps: &[Step], step: &Step) -> Result<Ended> {
+        self.queue = self.left(part, steps);
+        self.queue.sort_by_key(|s| self.later.contains(s));
+        let limit = self.asked.fixture.tolerance_deg();
+        let last = self.units.first().and_then(|u| u.folder.dwells(part).pop());
+        let other = last.filter(|(_, had)| had.up().angle(&step.up()).to_degrees() > limit);
+        let Some((_, had)) = other else {
+            return Ok(Ended::Done);
+        };
+        self.later.push(*step);
+        self.queue.sort_by_key(|s| self.later.contains(s));
+        let words = format!(
+            "that was {}, and {} was asked for: it comes later",
+            had.words(),
+            step.words()
+        );
+        self.tell(Event::Note { words });
+        let mirrored = self
+            .units
+            .iter()
+            .find_map(|u| Some((u.name(), u.mirrored(&self.asked)?)));
+        let Some((name, why)) = mirrored.filter(|_| !self.axes_agreed) else {
+            return Ok(Ended::Done);
+        };
+        match self.ask(&Question::GoOn(format!("{name}: {why}")))? {
+            Some(true) => {
+                self.axes_agreed = true;
+                Ok(Ended::Done)
+            }
+            Some(false) => Err(Error::device(name, why, axes::REMEDY)),
+            None => Ok(Ended::Cancelled),
         }
     }
 
@@ -284,7 +333,7 @@ impl<'a> Wizard<'a> {
 
     fn step(&mut self, step: &Step) -> Result<Stepped> {
         for unit in &mut self.units {
-            (unit.done, unit.standing.waiting) = (false, None);
+            unit.asked_for();
         }
         let mut since = Instant::now();
         let mut told = false;
@@ -306,6 +355,7 @@ impl<'a> Wizard<'a> {
         }
         self.driver.go(step)?;
         since = Instant::now();
+        let mut stood = since;
         loop {
             let busy = self.driver.busy()?;
             match self.round(Some(step), busy)? {
@@ -327,7 +377,19 @@ impl<'a> Wizard<'a> {
             if self.units.iter().all(|u| u.done) {
                 return Ok(Stepped::Had);
             }
-            if since.elapsed().as_secs_f64() > self.asked.patience_s && !self.driver.is_person() {
+            let wrong = |u: &One| {
+                u.done
+                    || u.standing
+                        .waiting
+                        .as_ref()
+                        .is_some_and(|w| w.starts_with(WRONG_POSE))
+            };
+            if busy || !self.units.iter().all(wrong) {
+                stood = Instant::now();
+            }
+            let out_of_patience =
+                since.elapsed().as_secs_f64() > self.asked.patience_s || stood.elapsed() > WRONG;
+            if out_of_patience && !self.driver.is_person() {
                 let why = self.units.iter().filter(|u| !u.done);
                 let why = why.filter_map(|u| u.standing.waiting.clone()).next();
                 let problem = format!(
@@ -335,7 +397,12 @@ impl<'a> Wizard<'a> {
                     step.words(),
                     why.unwrap_or_else(|| "the dwell is broken off again and again".into())
                 );
-                let remedy = "mend it and run the same command: the session goes on";
+                let remedy = match stood.elapsed() > WRONG {
+                    true => {
+                        "check the axes of the driver file, and wiring, signs and order of the accelerometer's axes"
+                    }
+                    false => "mend it and run the same command: the session goes on",
+                };
                 return Err(Error::device("session", problem, remedy));
             }
         }
@@ -354,6 +421,10 @@ impl<'a> Wizard<'a> {
 
     /// Asks, and listens to the units meanwhile. `None`: it was cancelled.
     pub fn ask(&mut self, question: &Question) -> Result<Option<bool>> {
+        self.tell(Event::Question {
+            question: question.name(),
+            words: question.words(),
+        });
         loop {
             if let Some(answer) = self.view.ask(question) {
                 return Ok(Some(answer));

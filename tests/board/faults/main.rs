@@ -3,7 +3,10 @@
 //!
 //! `faults [NAME ...]`: all of them without names.
 
+mod mistakes;
 mod session;
+mod stored;
+mod text;
 
 use std::path::Path;
 use std::process::ExitCode;
@@ -35,12 +38,33 @@ const ALL: &[(&str, Scenario)] = &[
     ("any-order", any_order),
     ("hands", hands),
     ("hands-fixed", hands_fixed),
+    ("z-inverted", mistakes::board_z_inverted),
+    ("gyro-swapped", mistakes::board_gyro_swapped),
+    ("table-z-inv", mistakes::table_z_inverted),
+    ("changed-flag", mistakes::changed_flag),
+    ("early-yes", mistakes::early_yes),
+    ("table-250", mistakes::table_250),
+    ("text", mistakes::text_nothing),
+    ("text-z-inv", mistakes::text_z_inverted),
+    ("text-negated", mistakes::text_negated),
+    ("text-x-y", mistakes::text_x_for_y),
+    ("text-gyro-x-y", mistakes::text_gyro_swapped),
+    ("text-in-g", mistakes::text_in_g),
+    ("text-us-as-ms", mistakes::text_us_for_ms),
+    ("text-ms-as-us", mistakes::text_ms_for_us),
+    ("text-dropped", mistakes::text_dropped),
+    ("text-garbled", mistakes::text_garbled),
+    ("text-coarse", mistakes::text_coarse),
+    ("text-columns", mistakes::text_columns_swapped),
+    ("text-cubic", mistakes::text_cubic),
+    ("text-again", mistakes::text_again),
+    ("text-units", mistakes::text_units),
 ];
 
 fn main() -> ExitCode {
     let names: Vec<String> = std::env::args().skip(1).collect();
     println!(
-        "{:12} {:>6} {:>7} {:>6} {:>6} {:>6}  outcome",
+        "{:14} {:>6} {:>7} {:>6} {:>6} {:>6}  outcome",
         "fault", "s", "unit s", "dwells", "thrown", "broken"
     );
     let mut wrong = 0;
@@ -58,7 +82,7 @@ fn main() -> ExitCode {
         match scenario(folder.path()) {
             Ok(ended) => wrong += usize::from(!report(name, &ended)),
             Err(problem) => {
-                println!("{name:12} {problem}");
+                println!("{name:14} {problem}");
                 wrong += 1;
             }
         }
@@ -80,11 +104,11 @@ fn report(name: &str, ended: &Ended) -> bool {
         (None, None) => format!("nothing stored; {}", ended.verdict),
     };
     println!(
-        "{name:12} {:6.0} {:7.0} {:6} {:6} {:6}  {outcome}",
+        "{name:14} {:6.0} {:7.0} {:6} {:6} {:6}  {outcome}",
         ended.seconds, ended.recorded_s, ended.dwells, ended.thrown, ended.interrupted
     );
     for note in &ended.notes {
-        println!("{:12} note: {note}", "");
+        println!("{:14} note: {note}", "");
     }
     let right = |e: [f64; 2]| e[0] < RIGHT[0] && e[1] < RIGHT[1];
     ended.stored.is_none_or(right)

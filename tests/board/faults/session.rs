@@ -1,5 +1,7 @@
 //! A session of `mimu wizard` beside a commanded board, and what has come of it.
 
+use std::io::Write as _;
+use std::ops::{Deref, DerefMut};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
@@ -8,6 +10,8 @@ use mimu_board::commanded::Commanded;
 use mimu_rig::rig_file::{RigFile, RigTruth};
 use mimu_rig::table::TableTruth;
 use serde_json::Value;
+
+use crate::stored::{Truth, errors};
 
 /// Longest a session may take by the wall's clock.
 const LONGEST: Duration = Duration::from_secs(900);
@@ -27,14 +31,47 @@ pub fn unit(seed: u64, fixture: &str) -> Result<RigTruth, String> {
     RigTruth::resolve(&file, seed)
 }
 
-/// A session with everything that belongs to it.
-pub struct Sitting {
-    pub board: Commanded,
-    pub truth: RigTruth,
-    folder: PathBuf,
-    arguments: Vec<String>,
+/// The same on a table with the flaws of a good one, the board beside its axes, on an Earth that turns.
+pub fn on_real_table(seed: u64) -> Result<RigTruth, String> {
+    let mut file = unit(seed, "table")?.file;
+    file.earth_rate = Some(true);
+    file.table = TableTruth::default();
+    RigTruth::resolve(&file, seed)
+}
+
+/// The command, which may be run more than once.
+pub struct Run {
+    pub folder: PathBuf,
+    /// As `--port` is given it.
+    pub port: String,
+    /// As `--gravity` is given it.
+    pub gravity: String,
+    /// Whether all questions are answered beforehand; else they are by what is typed.
+    pub yes: bool,
+    pub arguments: Vec<String>,
+    truth: Truth,
     child: Option<Child>,
     began: Instant,
+}
+
+/// A session beside a board of ours.
+pub struct Sitting {
+    pub board: Commanded,
+    run: Run,
+}
+
+impl Deref for Sitting {
+    type Target = Run;
+
+    fn deref(&self) -> &Run {
+        &self.run
+    }
+}
+
+impl DerefMut for Sitting {
+    fn deref_mut(&mut self) -> &mut Run {
+        &mut self.run
+    }
 }
 
 /// What has become of a session.
@@ -56,23 +93,49 @@ pub struct Ended {
 impl Sitting {
     /// A board on a fixture, and no command yet.
     pub fn new(fixture: &str, seed: u64, folder: &Path, more: &[&str]) -> Result<Self, String> {
-        let truth = unit(seed, fixture)?;
+        Self::with(fixture, &unit(seed, fixture)?, seed, folder, more)
+    }
+
+    /// The same with a unit that is wired otherwise.
+    pub fn with(
+        fixture: &str,
+        truth: &RigTruth,
+        seed: u64,
+        folder: &Path,
+        more: &[&str],
+    ) -> Result<Self, String> {
         let mut unit_id = [0; 12];
         unit_id[4..].copy_from_slice(&seed.to_be_bytes());
         let image = mimu_board_tests::image();
-        let board = Commanded::start(&image, fixture, &truth, seed, unit_id, folder)?;
+        let board = Commanded::start(&image, fixture, truth, seed, unit_id, folder)?;
         let driver = include_str!("../demo/turntable.toml");
         let driver = driver.replace("HOST:PORT", &board.address().to_string());
         std::fs::write(folder.join("driver.toml"), driver).map_err(|e| e.to_string())?;
-        let arguments = more.iter().map(|a| a.to_string()).collect();
+        let by_hand = more.iter().any(|a| *a == "hands");
         Ok(Self {
             board,
-            truth,
+            run: Run::new(folder, "port", Truth::of(truth, by_hand)?, more),
+        })
+    }
+
+    /// Waits for the end.
+    pub fn end(self) -> Result<Ended, String> {
+        self.run.end()
+    }
+}
+
+impl Run {
+    pub fn new(folder: &Path, port: &str, truth: Truth, more: &[&str]) -> Self {
+        Self {
             folder: folder.to_owned(),
-            arguments,
+            port: port.into(),
+            gravity: "9.793".into(),
+            yes: true,
+            arguments: more.iter().map(|a| a.to_string()).collect(),
+            truth,
             child: None,
             began: Instant::now(),
-        })
+        }
     }
 
     /// Starts the command, or starts it again.
@@ -86,17 +149,81 @@ impl Sitting {
         let errors = std::fs::File::create(self.folder.join("error.txt"));
         let child = Command::new(here.with_file_name("mimu"))
             .current_dir(&self.folder)
-            .args(["wizard", "-o", "session", "--port", "port"])
-            .args(["--gravity", "9.793", "--warm-up", "0", "--yes"])
+            .args(["wizard", "-o", "session", "--port", &self.port])
+            .args(["--gravity", &self.gravity, "--warm-up", "0"])
             .args(["--events", "events.jsonl", "--json", "outcome.json"])
+            .args(self.yes.then_some("--yes"))
             .args(&self.arguments)
-            .stdin(Stdio::null())
+            .stdin(if self.yes {
+                Stdio::null()
+            } else {
+                Stdio::piped()
+            })
             .stdout(log)
             .stderr(errors.map_err(|e| e.to_string())?)
             .spawn()
             .map_err(|e| format!("mimu: {e}; build it beside this program"))?;
         self.child = Some(child);
         Ok(())
+    }
+
+    /// Types a line.
+    pub fn type_line(&mut self, line: &str) -> Result<(), String> {
+        let input = self.child.as_mut().and_then(|c| c.stdin.as_mut());
+        let written = input
+            .ok_or("nobody reads what is typed")?
+            .write_all(format!("{line}\n").as_bytes());
+        written.map_err(|e| e.to_string())
+    }
+
+    /// Ends the command by a signal, as Ctrl-C does; how long it took, s.
+    pub fn interrupt(&mut self) -> Result<f64, String> {
+        let child = self.child.as_mut().ok_or("no command runs")?;
+        let signal = Command::new("kill")
+            .args(["-TERM", &child.id().to_string()])
+            .status();
+        signal.map_err(|e| e.to_string())?;
+        let since = Instant::now();
+        child.wait().map_err(|e| e.to_string())?;
+        Ok(since.elapsed().as_secs_f64())
+    }
+
+    /// What it is compared with.
+    pub fn truth(&self) -> &Truth {
+        &self.truth
+    }
+
+    /// The errors of the calibration that is stored now, in words.
+    pub fn first_stored(&self) -> Result<String, String> {
+        let [gyro, accel] = errors(&self.folder.join("session/calibration.toml"), &self.truth)?;
+        let s = self.began.elapsed().as_secs_f64();
+        Ok(format!(
+            "errs by {gyro:.4} deg/s and {accel:.3} mg, after {} dwells and {s:.0} s",
+            self.told("dwell")
+        ))
+    }
+
+    /// Why it waited last.
+    pub fn last_waiting(&self) -> String {
+        let text = std::fs::read_to_string(self.folder.join("events.jsonl")).unwrap_or_default();
+        let last = text
+            .lines()
+            .rfind(|l| l.starts_with("{\"event\":\"waiting\""))
+            .unwrap_or_default();
+        let event: Value = serde_json::from_str(last).unwrap_or_default();
+        event["why"].as_str().unwrap_or_default().to_owned()
+    }
+
+    /// The words of the last event of a kind.
+    pub fn last_words(&self, event: &str) -> String {
+        let text = std::fs::read_to_string(self.folder.join("events.jsonl")).unwrap_or_default();
+        let wanted = format!("{{\"event\":\"{event}\"");
+        let last = text
+            .lines()
+            .rfind(|l| l.starts_with(&wanted))
+            .unwrap_or_default();
+        let event: Value = serde_json::from_str(last).unwrap_or_default();
+        event["words"].as_str().unwrap_or_default().to_owned()
     }
 
     /// How many events of a kind the running command has told.
@@ -160,10 +287,7 @@ impl Sitting {
         let outcome: Value = serde_json::from_str(&read("outcome.json")).unwrap_or_default();
         let found = &outcome["units"][0];
         let stored = match found["stored"].as_str() {
-            Some(file) => {
-                let by_hand = self.arguments.iter().any(|a| a == "hands");
-                Some(errors(&self.folder.join(file), &self.truth, by_hand)?)
-            }
+            Some(file) => Some(errors(&self.folder.join(file), &self.truth)?),
             None => None,
         };
         let text = |v: &Value| v.as_str().unwrap_or_default().to_owned();
@@ -180,70 +304,4 @@ impl Sitting {
             notes: notes.collect(),
         })
     }
-}
-
-/// The axes that a calibration by hand is given in, by rows: x along the accelerometer's x, and the xy plane through its y.
-fn own_axes(accel: &[[f64; 3]; 3]) -> [[f64; 3]; 3] {
-    let dot = |a: [f64; 3], b: [f64; 3]| a.iter().zip(&b).map(|(a, b)| a * b).sum::<f64>();
-    let unit = |a: [f64; 3]| a.map(|v| v / dot(a, a).sqrt());
-    let x = unit(accel[0]);
-    let along = dot(accel[1], x);
-    let y = unit([0, 1, 2].map(|i| accel[1][i] - along * x[i]));
-    let z = [0, 1, 2].map(|i| x[(i + 1) % 3] * y[(i + 2) % 3] - x[(i + 2) % 3] * y[(i + 1) % 3]);
-    [x, y, z]
-}
-
-/// Largest errors of a calibration file over inputs of full size along each axis, and none: deg/s, mg.
-fn errors(file: &Path, truth: &RigTruth, by_hand: bool) -> Result<[f64; 2], String> {
-    let text = std::fs::read_to_string(file).map_err(|e| format!("{}: {e}", file.display()))?;
-    let table: toml::Table = text
-        .parse()
-        .map_err(|e| format!("{}: {e}", file.display()))?;
-    let unit = &truth.file.unit;
-    let pins = unit
-        .gyro_reference_v
-        .ok_or("the unit has no reference pins")?;
-    let affine = [("gyro", &unit.gyro_affine), ("accel", &unit.accel_affine)];
-    let body = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-    let axes = match (by_hand, &unit.accel_affine) {
-        (true, Some(accel)) => own_axes(&accel.matrix),
-        _ => body,
-    };
-    let mut worst = [0.0_f64; 2];
-    for (k, (name, forward)) in affine.into_iter().enumerate() {
-        let forward = forward.as_ref().ok_or("the unit has no affine model")?;
-        let number = |v: &toml::Value| v.as_float().unwrap_or(f64::NAN);
-        let list = |v: &toml::Value| -> Vec<f64> {
-            v.as_array().into_iter().flatten().map(number).collect()
-        };
-        let c: Vec<Vec<f64>> = table[name]["C"]
-            .as_array()
-            .into_iter()
-            .flatten()
-            .map(list)
-            .collect();
-        let o = list(&table[name]["o"]);
-        // The firmware reads the gyros against the first one's reference pin, as if that were nominal.
-        let ratio = [2.5 / pins[0], 1.0][k];
-        let size = [60f64.to_radians(), 9.793][k];
-        for axis in 0..3 {
-            for sign in [1.0, -1.0, 0.0] {
-                let input: [f64; 3] =
-                    std::array::from_fn(|i| if i == axis { sign * size } else { 0.0 });
-                // In the body's axes, which the unit's truth is given in.
-                let turned: [f64; 3] =
-                    std::array::from_fn(|j| (0..3).map(|k| axes[k][j] * input[k]).sum());
-                let raw: [f64; 3] = std::array::from_fn(|i| {
-                    let sum: f64 = (0..3).map(|j| forward.matrix[i][j] * turned[j]).sum();
-                    ratio * (sum + forward.bias[i])
-                });
-                let error = (0..3).map(|i| {
-                    let sum: f64 = (0..3).map(|j| c[i][j] * raw[j]).sum();
-                    (sum + o[i] - input[i]).powi(2)
-                });
-                worst[k] = worst[k].max(error.sum::<f64>().sqrt());
-            }
-        }
-    }
-    Ok([worst[0].to_degrees(), worst[1] * 1e3 / 9.80665])
 }

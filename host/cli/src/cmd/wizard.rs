@@ -2,6 +2,9 @@
 
 use std::io::{IsTerminal as _, Write};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 
 use clap::{Args, ValueEnum};
 use mimu::quantity::{implausible_gravity, normal_gravity};
@@ -69,6 +72,9 @@ pub(crate) struct WizardArgs {
     /// Plan of `mimu design` to begin with; without it one is made
     #[arg(long, value_name = "PLAN")]
     plan: Option<PathBuf>,
+    /// How well the unit's axes are lined up with the table's, degrees: 95 % of each angle; no dwell shows it, and it goes into the intervals
+    #[arg(long, value_name = "DEG", default_value_t = 0.02, value_parser = |t: &str| number(t, 0.0, 10.0))]
+    mounting: f64,
     /// Whose estimate becomes the calibration; the other is compared with it
     #[arg(long, value_enum, default_value = "pc")]
     by: By,
@@ -125,6 +131,12 @@ fn raw_unit(text: &str) -> std::result::Result<RawUnit, String> {
 }
 
 impl TextArgs {
+    /// What the lines are, if there are any.
+    fn words(&self) -> Option<String> {
+        let names = self.text.as_ref()?;
+        Some(format!("{names} in {}", self.raw_unit))
+    }
+
     /// Opens the board at this port, once for each time that it is called.
     fn opener(&self, names: &str, port: &str, k: Option<usize>, folder: &Path) -> Result<Opener> {
         let numbered = |name: &String| k.map_or_else(|| name.clone(), |k| format!("{name}-{k}"));
@@ -232,7 +244,18 @@ impl WizardArgs {
                 "give --gravity, or --latitude",
             ));
         };
+        // A session whose recordings cannot be read is refused before anybody turns the unit.
+        let mut manifest = Manifest::new(
+            "unit",
+            100.0,
+            gravity_mps2,
+            RawUnit::Count,
+            fixture.reference(),
+        );
+        manifest.latitude_deg = latitude_deg;
+        manifest.check("wizard")?;
         Ok(Asked {
+            text: self.text.words(),
             fixture,
             gravity_mps2,
             latitude_deg,
@@ -246,6 +269,7 @@ impl WizardArgs {
             warm_c_per_min: (self.warm_up > 0.0).then_some(self.warm_up),
             most_drift_c: self.drift,
             targets: self.targets()?,
+            mounting_deg: self.mounting,
             by_device: self.by == By::Device,
         })
     }
@@ -324,6 +348,28 @@ fn planned(plan: &Plan, fixture: Fixture, gravity_mps2: f64, path: &Path) -> Res
     Ok(steps)
 }
 
+/// Longest that a session may take to end once that is asked for.
+const ENDS: Duration = Duration::from_millis(900);
+
+/// Ends the program where the session does not hear that it is to end: a port that says nothing and a diagnosis take half a minute. What
+/// counts is on the disk, and a device that is cut off while it stores keeps a whole calibration.
+fn end_in_time(stop: Arc<AtomicBool>, on_screen: bool) -> Result<()> {
+    let watch = move || {
+        while !stop.load(Ordering::Relaxed) {
+            std::thread::sleep(ENDS / 20);
+        }
+        std::thread::sleep(ENDS);
+        if on_screen {
+            ratatui::restore();
+        }
+        eprintln!("ended; the same command goes on from here");
+        std::process::exit(130);
+    };
+    let begun = std::thread::Builder::new().name("end".into()).spawn(watch);
+    begun.map_err(|error| Error::new("wizard", error, "close other programs"))?;
+    Ok(())
+}
+
 pub(crate) fn run(args: &WizardArgs) -> Result<()> {
     check_outputs(&[args.json.file()], &[])?;
     let asked = args.asked()?;
@@ -341,6 +387,7 @@ pub(crate) fn run(args: &WizardArgs) -> Result<()> {
     let beforehand = match args.yes {
         true => Beforehand {
             store_effects: Some(true),
+            store_rough: Some(false),
             go_on: Some(false),
             power_cycle: Some(false),
         },
@@ -356,7 +403,9 @@ pub(crate) fn run(args: &WizardArgs) -> Result<()> {
     };
     let stop = interruption()?;
     let quiet = args.json.is_standard_output();
-    let mut view: Box<dyn View> = match !args.plain && !to_output && !quiet && Screen::fits() {
+    let on_screen = !args.plain && !to_output && !quiet && Screen::fits();
+    end_in_time(stop.clone(), on_screen)?;
+    let mut view: Box<dyn View> = match on_screen {
         true => Box::new(Screen::new(stop, beforehand, events)?),
         false => {
             let mut lines = Lines::new(Typed::new(stop)?, beforehand);

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use mimu::quantity::{Figure, minutes, plural, significant};
-use mimu_wizard::event::{Event, Question};
+use mimu_wizard::event::Event;
 use mimu_wizard::folder::Part;
 use mimu_wizard::refit::Progress;
 use mimu_wizard::session::{Outcome, UnitOutcome};
@@ -61,13 +61,18 @@ pub(crate) fn wizard_lines(event: &Event) -> Vec<String> {
             ]
         }
         Event::Note { words } => vec![format!("    {words}")],
+        // The view asks, and waits for the answer.
+        Event::Question { .. } => Vec::new(),
     }
 }
 
 /// The half-widths of a calibration beside their targets, in one line.
 pub(crate) fn progress_line(progress: &Progress) -> String {
     if progress.sensors.is_empty() {
-        return "done; not determined yet".into();
+        return match &progress.not_yet {
+            Some(why) => format!("done; not determined yet: {why}"),
+            None => "done; not determined yet".into(),
+        };
     }
     let mut text = String::from("done;");
     for sensor in &progress.sensors {
@@ -89,19 +94,6 @@ pub(crate) fn progress_line(progress: &Progress) -> String {
     }
     text.pop();
     text
-}
-
-/// A question as a sentence.
-pub(crate) fn wizard_question(question: &Question) -> String {
-    match question {
-        Question::PowerCycled => {
-            "unplug the board, plug it in again, and say yes; no leaves that out".into()
-        }
-        Question::StoreEffects(effects) => {
-            format!("verify and store the calibration with {effects}?")
-        }
-        Question::GoOn(why) => format!("{why}; go on all the same?"),
-    }
 }
 
 fn judged_lines(judged: &Judged) -> Vec<String> {
@@ -175,7 +167,7 @@ fn unit_text(unit: &UnitOutcome, text: &mut String) {
     for line in judged.into_iter().flat_map(judged_lines) {
         let _ = writeln!(text, "{line}");
     }
-    if let Some(verdict) = unit.verdict {
+    if let Some(verdict) = &unit.verdict {
         let effects = match unit.effects.as_slice() {
             [] => "no effect".into(),
             effects => effects.join(", "),

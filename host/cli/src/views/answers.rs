@@ -1,9 +1,10 @@
 //! What a person types while a session runs, and what was answered beforehand on the command line.
 
+use std::collections::VecDeque;
 use std::io::BufRead as _;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, channel};
+use std::sync::mpsc::{Receiver, TryRecvError, channel};
 
 use mimu_recording::error::{Error, Result};
 use mimu_wizard::event::{Question, Wish};
@@ -13,7 +14,9 @@ use mimu_wizard::event::{Question, Wish};
 pub(crate) struct Beforehand {
     /// Effects that are found are stored, or not.
     pub store_effects: Option<bool>,
-    /// A failed self-test is gone on from, or not.
+    /// A calibration that errs by many times the noise is stored, or not.
+    pub store_rough: Option<bool>,
+    /// What is wrong, as a failed self-test, is gone on from, or not.
     pub go_on: Option<bool>,
     /// The supply is turned off and on by hand, or not.
     pub power_cycle: Option<bool>,
@@ -25,6 +28,7 @@ impl Beforehand {
         match question {
             Question::PowerCycled => self.power_cycle,
             Question::StoreEffects(_) => self.store_effects,
+            Question::StoreRough(_) => self.store_rough,
             Question::GoOn(_) => self.go_on,
         }
     }
@@ -34,7 +38,9 @@ impl Beforehand {
 pub(crate) struct Typed {
     lines: Receiver<String>,
     stop: Arc<AtomicBool>,
-    /// A line that was looked at as a wish and is an answer.
+    wishes: VecDeque<Wish>,
+    /// Whether a question waits for its answer, and the answer once it is typed.
+    asked: bool,
     answer: Option<bool>,
     ended: bool,
 }
@@ -57,6 +63,8 @@ impl Typed {
         Ok(Self {
             lines,
             stop,
+            wishes: VecDeque::new(),
+            asked: false,
             answer: None,
             ended: false,
         })
@@ -67,20 +75,41 @@ impl Typed {
         if self.stop.load(Ordering::Relaxed) {
             return Some(Wish::Cancel);
         }
-        let line = match self.lines.try_recv() {
-            Ok(line) => line,
-            Err(std::sync::mpsc::TryRecvError::Disconnected) => {
-                self.ended = true;
-                return None;
+        self.read();
+        self.wishes.pop_front()
+    }
+
+    /// A question is asked: what was typed before is no answer to it.
+    pub(crate) fn begin_question(&mut self) {
+        self.read();
+        (self.asked, self.answer) = (true, None);
+    }
+
+    fn read(&mut self) {
+        loop {
+            match self.lines.try_recv() {
+                Ok(line) => self.take(&line),
+                Err(TryRecvError::Disconnected) => {
+                    self.ended = true;
+                    return;
+                }
+                Err(TryRecvError::Empty) => return,
             }
-            Err(_) => return None,
-        };
+        }
+    }
+
+    fn take(&mut self, line: &str) {
         let mut words = line.split_whitespace();
-        match (words.next()?, words.next()) {
+        let Some(first) = words.next() else { return };
+        let wish = match (first, words.next()) {
             ("q" | "quit" | "cancel", None) => Some(Wish::Cancel),
             ("s" | "skip", None) => Some(Wish::Skip),
             ("r" | "redo", None) => Some(Wish::RedoLast),
             ("r" | "redo", Some(number)) => number.parse().ok().map(Wish::Redo),
+            ("y" | "yes" | "n" | "no", None) if !self.asked => {
+                eprintln!("nothing is asked now: an answer counts after its question");
+                None
+            }
             ("y" | "yes", None) => {
                 self.answer = Some(true);
                 None
@@ -93,11 +122,14 @@ impl Typed {
                 eprintln!("type redo, redo N, skip, quit, yes or no");
                 None
             }
-        }
+        };
+        self.wishes.extend(wish);
     }
 
     /// The answer to a question, once it is there. Where nobody can type any more it is no.
     pub(crate) fn answer(&mut self) -> Option<bool> {
-        self.answer.take().or(self.ended.then_some(false))
+        let answer = self.answer.take().or(self.ended.then_some(false));
+        self.asked &= answer.is_none();
+        answer
     }
 }

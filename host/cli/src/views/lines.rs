@@ -100,10 +100,8 @@ impl View for Lines {
         }
         if self.asked.as_ref() != Some(question) {
             self.asked = Some(question.clone());
-            self.say(&format!(
-                "{} (yes or no)",
-                report::wizard_question(question)
-            ));
+            self.typed.begin_question();
+            self.say(&format!("{} (yes or no)", question.words()));
         }
         let answer = self.typed.answer();
         if answer.is_some() {

@@ -97,10 +97,10 @@ impl Screen {
         };
         let (tell, keys) = channel();
         let ended = Arc::new(AtomicBool::new(false));
-        let end = ended.clone();
+        let (end, stopped) = (ended.clone(), stop.clone());
         let keyboard = std::thread::Builder::new()
             .name("keyboard".into())
-            .spawn(move || listen(&tell, &end))
+            .spawn(move || listen(&tell, &end, &stopped))
             .map_err(failed)?;
         Ok(Self {
             taken,
@@ -118,7 +118,7 @@ impl Screen {
     }
 
     fn draw(&mut self) {
-        let question = self.question.as_ref().map(report::wizard_question);
+        let question = self.question.as_ref().map(Question::words);
         let shown = Shown {
             standing: &self.standing,
             log: &self.log,
@@ -205,10 +205,8 @@ impl View for Screen {
     }
 }
 
-/// Takes keys until the end. A second wish for the end while nobody hears the first one ends the program: a diagnosis takes half a
-/// minute, and the terminal sends no signal in the state that it is in.
-fn listen(tell: &Sender<Key>, end: &AtomicBool) {
-    let mut cancelled = 0;
+/// Takes keys until the end. The terminal sends no signal for Ctrl-C in the state that it is in, so that the end is asked for here.
+fn listen(tell: &Sender<Key>, end: &AtomicBool, stop: &AtomicBool) {
     while !end.load(Ordering::Relaxed) {
         match keys::poll(POLL) {
             Ok(true) => {}
@@ -221,17 +219,12 @@ fn listen(tell: &Sender<Key>, end: &AtomicBool) {
         if key.kind != KeyEventKind::Press {
             continue;
         }
-        let control_c =
-            key.code == KeyCode::Char('c') && key.modifiers.contains(KeyModifiers::CONTROL);
-        cancelled += u32::from(control_c);
-        if cancelled == 2 {
-            ratatui::restore();
-            eprintln!("ended; the same command goes on from here");
-            std::process::exit(130);
-        }
         let Some(key) = Key::of(key.code, key.modifiers) else {
             continue;
         };
+        if key == Key::Cancel {
+            stop.store(true, Ordering::Relaxed);
+        }
         if tell.send(key).is_err() {
             return;
         }

@@ -1,10 +1,10 @@
 //! Both triads under a known input: on a table, or in steps of known rate and force.
 
-use nalgebra::Vector3;
+use nalgebra::{DMatrix, Vector3};
 
 use super::hold_out::{HeldOut, Split, determined};
 use super::sensor::{Residual, SensorFit, typical};
-use super::{Method, Options, as_came, finish, refuse_wrong_gravity};
+use super::{Method, Options, as_came, finish, lever_arm, refuse_wrong_gravity};
 use crate::estimate::{Observation, known_input, moving_input};
 use crate::prepared::{Prepared, si_covariance};
 use crate::quantity::{Figure, Sensor, plural};
@@ -30,19 +30,40 @@ pub(super) fn fit_known(
         }
         refuse_wrong_gravity(prepared, sensor, &observations)?;
         let wander = prepared.noise.wander(sensor, &prepared.dwells.list);
-        let wander = wander.as_ref();
         let within = prepared.within_dwells(sensor);
-        let estimate = |o: &[Observation], within: &[Observation]| match (options.method, sensor) {
-            (Method::LeastSquares, _) if !within.is_empty() => {
-                moving_input::least_squares(o, within, wander)
+        let by =
+            |o: &[Observation], within: &[Observation], wander: Option<&[DMatrix<f64>; 3]>| match (
+                options.method,
+                sensor,
+            ) {
+                (Method::LeastSquares, _) if !within.is_empty() => {
+                    moving_input::least_squares(o, within, wander)
+                }
+                (Method::LeastSquares, _) => known_input::least_squares(o, wander),
+                (Method::Kalman, _) => known_input::kalman(o, wander),
+                (Method::InverseForm, Sensor::Gyro) => known_input::opposite_rates(o),
+                (Method::InverseForm, Sensor::Accel) => known_input::inverse_form(o),
+                (Method::SixPositions, _) => known_input::six_positions(o),
+            };
+        let dwells = &prepared.dwells.list;
+        let off_axis = sensor == Sensor::Accel && options.lever_arm_m > 0.0;
+        let lever = match by(&observations, &within, wander.as_ref()) {
+            Ok(first) if off_axis => {
+                let forward = first.triad.forward.matrix;
+                Some(lever_arm::covariance(dwells, &forward, options.lever_arm_m))
             }
-            (Method::LeastSquares, _) => known_input::least_squares(o, wander),
-            (Method::Kalman, _) => known_input::kalman(o, wander),
-            (Method::InverseForm, Sensor::Gyro) => known_input::opposite_rates(o),
-            (Method::InverseForm, Sensor::Accel) => known_input::inverse_form(o),
-            (Method::SixPositions, _) => known_input::six_positions(o),
+            _ => None,
         };
-        let estimated = match estimate(&observations, &within) {
+        let weighed = match &lever {
+            Some(lever) => lever_arm::widened(&observations, lever),
+            None => observations.clone(),
+        };
+        let shared = match (wander, lever) {
+            (Some(wander), Some(lever)) => Some([0, 1, 2].map(|k| &wander[k] + &lever[k])),
+            (wander, lever) => wander.or(lever),
+        };
+        let estimate = |o: &[Observation], within: &[Observation]| by(o, within, shared.as_ref());
+        let estimated = match estimate(&weighed, &within) {
             Ok(estimated) => estimated,
             // A level cube tells nothing of the gyro, and a rate table not much of the accelerometer.
             Err(_)
@@ -125,7 +146,7 @@ pub(super) fn fit_known(
             let kept = |all: &[Observation]| -> Vec<Observation> {
                 all.iter().filter(|o| !of_part(o)).copied().collect()
             };
-            let refit = estimate(&kept(&observations), &kept(&within))?;
+            let refit = estimate(&kept(&weighed), &kept(&within))?;
             let open = all.iter().filter(|(o, _)| of_part(o)).map(|(o, bias)| {
                 let axis = |k: usize| {
                     let mut by = slope(&Vector3::ith(k, 1.0), &o.raw);
@@ -140,6 +161,11 @@ pub(super) fn fit_known(
         for (residual, (o, bias)) in residuals.iter_mut().zip(&all) {
             let refit = held_out.without(part_of(held_out.split, o.dwell));
             residual.held_out = refit.map(|refit| refit.error(o, *bias));
+        }
+        // Where the arm acts its force is no error of the sensor.
+        let at_rest = |r: &Residual| !dwells[r.dwell].spins();
+        if off_axis && residuals.iter().any(at_rest) {
+            residuals.retain(at_rest);
         }
         let mut fit = finish(
             sensor,

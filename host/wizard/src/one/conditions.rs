@@ -1,10 +1,13 @@
 //! What has to hold for a dwell to run: samples come, the unit is as still or as steady as it can be, and its pose and rate are those of
 //! a step.
 
-use mimu::quantity::Sensor;
+use mimu::quantity::{Sensor, significant};
+use mimu_recording::RawUnit;
+use mimu_recording::error::{Error, Result};
 use nalgebra::Vector3;
 
 use super::{One, Round};
+use crate::event::Event;
 use crate::procedure::{Asked, Fixture, SAME_POSE_DEG};
 use crate::step::{Step, words};
 use crate::watch::Seen;
@@ -15,6 +18,13 @@ const LOST_SHARE: [f64; 2] = [0.5, 0.1];
 const RATE_SHARE: f64 = 0.2;
 /// The same of any rate, deg/s: noise and what the null has moved by.
 const RATE_DPS: f64 = 2.0;
+
+/// Readings in SI whose size at rest is off gravity by more than this factor are in another unit.
+const NEAR: f64 = 1.6;
+/// So many turns in a row, and more than half of all, without their samples are no chance: the gyro is not calibrated so.
+const LOST_IN_A_ROW: u32 = 4;
+/// What the reason begins with where the pose is another than that which was asked for.
+pub const WRONG_POSE: &str = "wrong pose";
 
 impl One {
     /// Why no dwell can run now.
@@ -42,6 +52,9 @@ impl One {
         }
         if seen.saturated {
             return Some("a reading is at the end of its range".into());
+        }
+        if seen.exchanged && !self.station.unit.is_device {
+            return Some("the gyro's readings follow the pose and the accelerometer's do not: are ax,ay,az and gx,gy,gz exchanged in --text?".into());
         }
         let turning = step.rate_dps != 0.0;
         let limits = motion_limits(step.rate_dps);
@@ -123,12 +136,86 @@ impl One {
         }
         let lies = words(up);
         Err(match again {
-            true => format!("pose had already ({lies}): turn it on"),
+            true => format!(
+                "pose had already ({lies}): turn it on, to {}",
+                words(&step.up())
+            ),
             false => format!(
-                "wrong pose: {lies}, {:.0} degrees off what is wanted",
+                "{WRONG_POSE}: {lies}, {:.0} degrees off what is wanted",
                 off(step)
             ),
         })
+    }
+}
+
+impl One {
+    /// Refuses readings in SI that are none.
+    pub(super) fn check_unit(&self, seen: &Seen, asked: &Asked) -> Result<()> {
+        let size = Vector3::from_fn(|k, _| seen.mean[3 + k]).norm();
+        let share = size / asked.gravity_mps2;
+        if self.station.unit.raw_unit != RawUnit::Si || (1.0 / NEAR..NEAR).contains(&share) {
+            return Ok(());
+        }
+        let cause = match share * asked.gravity_mps2 {
+            g if (1.0 / NEAR..NEAR).contains(&g) => ", as if it were in g",
+            _ => "",
+        };
+        let problem = format!(
+            "the accelerometer reads {} at rest{cause}, and gravity is {} m/s²",
+            significant(size),
+            asked.gravity_mps2
+        );
+        let remedy = "give --raw-unit count, which takes readings in any unit";
+        Err(Error::device(self.name(), problem, remedy))
+    }
+
+    /// Counts turns whose samples are not whole, which do nothing for the gyro; `missing`: of the one before the dwell that was had.
+    pub(super) fn count_turn(&mut self, missing: u64, tell: &mut Vec<Event>) -> Result<()> {
+        let lost = missing > 0;
+        self.turns = self.turns.with(lost);
+        if !lost {
+            return Ok(());
+        }
+        let words = format!(
+            "{}: the turn to it is of no use for the gyro: {missing} samples are missing in it",
+            self.name()
+        );
+        tell.push(Event::Note { words });
+        let Turns {
+            all,
+            lost,
+            in_a_row,
+        } = self.turns;
+        if in_a_row < LOST_IN_A_ROW || 2 * lost <= all {
+            return Ok(());
+        }
+        let share = self.standing.lost as f64 / (self.standing.lost + self.standing.samples) as f64;
+        let problem = format!(
+            "in {lost} of {all} turns samples are missing ({} % of all), and the gyro is calibrated by turns that are whole",
+            significant(100.0 * share)
+        );
+        let remedy =
+            "have the board write fewer or shorter lines, or raise its --baud; check the cable";
+        Err(Error::device(self.name(), problem, remedy))
+    }
+}
+
+/// Turns between dwells by hand.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Turns {
+    all: u32,
+    /// In which samples are missing.
+    lost: u32,
+    in_a_row: u32,
+}
+
+impl Turns {
+    fn with(self, lost: bool) -> Self {
+        Self {
+            all: self.all + 1,
+            lost: self.lost + u32::from(lost),
+            in_a_row: if lost { self.in_a_row + 1 } else { 0 },
+        }
     }
 }
 

@@ -1,0 +1,61 @@
+//! What a session that goes on keeps of what it was begun with, and what may be given otherwise.
+
+use std::path::Path;
+
+use mimu_recording::error::{Error, Result};
+
+use crate::procedure::Asked;
+
+/// What dwells were made by: another value would leave those that there are wrong.
+fn kept(asked: &Asked) -> [(&'static str, String); 7] {
+    let or_none = |given: Option<String>| given.unwrap_or_else(|| "none".into());
+    let by = if asked.by_device { "device" } else { "pc" };
+    [
+        ("--fixture", asked.fixture.name().into()),
+        ("gravity", format!("{} m/s²", asked.gravity_mps2)),
+        (
+            "--latitude",
+            or_none(asked.latitude_deg.map(|l| l.to_string())),
+        ),
+        ("--dwell", format!("{} s", asked.dwell_s)),
+        ("--rate", format!("{} deg/s", asked.largest_rate_dps)),
+        ("--by", by.into()),
+        ("--text", or_none(asked.text.clone())),
+    ]
+}
+
+/// What goes on in the folder at `place`: as it was `begun`, with what `now` may say otherwise (when to end, what to wait for).
+///
+/// Errors: the dwells that there are were made by something else; each difference is named.
+pub fn resumed(begun: &Asked, now: &Asked, place: &Path) -> Result<Asked> {
+    let failed = |e: serde_json::Error| Error::new(place.display(), e, "report this");
+    // Numbers as the file gives them.
+    let now: Asked =
+        serde_json::from_str(&serde_json::to_string(now).map_err(failed)?).map_err(failed)?;
+    let both = kept(begun).into_iter().zip(kept(&now));
+    let mut differ: Vec<String> = both
+        .filter(|(begun, now)| begun != now)
+        .map(|((name, begun), (_, now))| format!("{name} was {begun} and is {now}"))
+        .collect();
+    if differ.is_empty() && begun.steps != now.steps {
+        differ.push("the planned poses are others (--plan, --seed)".into());
+    }
+    if !differ.is_empty() {
+        let problem = format!(
+            "the session was begun with something else: {}",
+            differ.join(", ")
+        );
+        let remedy = "give what it was begun with, or another folder with -o";
+        return Err(Error::new(place.display(), problem, remedy));
+    }
+    Ok(Asked {
+        by_targets: now.by_targets,
+        most_dwells: now.most_dwells,
+        patience_s: now.patience_s,
+        warm_c_per_min: now.warm_c_per_min,
+        most_drift_c: now.most_drift_c,
+        targets: now.targets,
+        mounting_deg: now.mounting_deg,
+        ..begun.clone()
+    })
+}

@@ -1,0 +1,174 @@
+//! What still errs, and the calibration with it: found, offered, judged in a third set of poses, stored.
+
+use mimu::calibration::{Calibration, EffectTable};
+use mimu::diagnose::{Recordings, diagnose};
+use mimu::fit::{Fit, Options};
+use mimu::next_experiment;
+use mimu::result::diagnosis::DiagnosisResult;
+use mimu_recording::Reference;
+use mimu_recording::error::Result;
+use mimu_recording::result_file::stage;
+
+use super::{Plain, WITH_EFFECTS, Whole, mounted, now};
+use crate::event::{Event, Question};
+use crate::folder::{Entry, Part};
+use crate::procedure::verification;
+use crate::step::Step;
+use crate::verdict::{judge_all, prepared};
+use crate::wizard::Ended;
+
+/// What the diagnosis of a unit has brought.
+pub(super) struct Found {
+    calibration: Calibration,
+    fitted: Fit,
+    effects: Vec<String>,
+}
+
+impl Whole<'_> {
+    /// What still errs, and the calibration with it, if that is anything that can be stored.
+    pub(super) fn diagnose(&mut self, k: usize, plain: &Plain) -> Result<Option<Found>> {
+        let other = &plain.other;
+        let name = self.wizard.units[k].name();
+        let first = prepared(&self.file(k, Part::Calibration.name()))?;
+        let mut diagnosis = diagnose(
+            Recordings {
+                second: Some(other.clone()),
+                ..Recordings::from(first)
+            },
+            Options {
+                holdout_blocks: 0,
+                ..Options::default()
+            },
+        )?;
+        let accepted = diagnosis.sensors.iter().flat_map(|s| &s.decision.accepted);
+        let tables: Vec<EffectTable> = accepted
+            .filter(|a| a.of_unit)
+            .map(EffectTable::from)
+            .collect();
+        // On a table a sensor without effects stays as it is: the fit before knows of the force of a board beside the axis.
+        let mut fitted = diagnosis.after.clone();
+        if other.manifest.reference == Reference::Table {
+            mounted(&mut fitted, self.wizard.asked.mounting_deg);
+            for sensor in &mut fitted.sensors {
+                let is = |t: &EffectTable| t.sensor == sensor.sensor.name();
+                if let (false, Some(plain)) =
+                    (tables.iter().any(is), plain.fitted.sensor(sensor.sensor))
+                {
+                    *sensor = plain.clone();
+                }
+            }
+        }
+        let created = self.wizard.units[k]
+            .folder
+            .created(Part::Confirmation, now)?;
+        let made = Calibration::of(&fitted, &tables, &created)?;
+        let both = (
+            mimu::verify::verify(other, &plain.calibration),
+            mimu::verify::verify(other, &made),
+        );
+        let judged = match both {
+            (Ok(before), Ok(after)) => Some([before, after]),
+            (Err(refusal), _) | (_, Err(refusal)) => {
+                diagnosis.after.warnings.push(refusal.to_string());
+                None
+            }
+        };
+        let next = next_experiment::next(&diagnosis);
+        let judged = judged.as_ref().map(|both| ("verification", both));
+        let result = DiagnosisResult::of(&diagnosis, &next, judged);
+        let page = self.file(k, "diagnosis.html");
+        let folder = self.wizard.units[k].folder.path.clone();
+        stage(&page, (self.page)(&result, &folder)?)?.publish()?;
+        let effects: Vec<String> = made.effects().iter().map(|e| e.candidate.id()).collect();
+        let outcome = &mut self.outcomes[k];
+        let verdict = diagnosis.verdict.name();
+        outcome.verdict = Some(verdict.into());
+        outcome.effects.clone_from(&effects);
+        outcome.page = Some(page.display().to_string());
+        let diagnosed = Entry::Diagnosed {
+            verdict: verdict.into(),
+            effects: effects.clone(),
+        };
+        self.wizard.units[k].folder.add(diagnosed)?;
+        self.wizard.tell(Event::Diagnosed {
+            unit: name,
+            verdict,
+            effects: effects.clone(),
+            page: page.display().to_string(),
+        });
+        Ok((!effects.is_empty()).then_some(Found {
+            calibration: made,
+            fitted,
+            effects,
+        }))
+    }
+
+    /// The calibrations with effects: offered, judged in a third set of poses, and stored.
+    pub(super) fn with_effects(
+        &mut self,
+        plain: &[Plain],
+        found: Vec<Option<Found>>,
+    ) -> Result<Ended> {
+        let names: Vec<String> = found
+            .iter()
+            .flatten()
+            .flat_map(|f| f.effects.clone())
+            .collect();
+        let question = Question::StoreEffects(names.join(", "));
+        match self.wizard.ask(&question)? {
+            None => return Ok(Ended::Cancelled),
+            Some(false) => return Ok(Ended::Done),
+            Some(true) => {}
+        }
+        let asked = &self.wizard.asked;
+        let used: Vec<Step> = asked
+            .steps
+            .iter()
+            .chain(&asked.verification)
+            .copied()
+            .collect();
+        let steps = verification(asked.fixture, &used, asked.dwell_s, asked.largest_rate_dps);
+        let words = format!(
+            "{} poses that were not used, for the calibration with {}",
+            steps.len(),
+            names.join(", ")
+        );
+        self.wizard.begin_phase("confirmation", words);
+        or_cancelled!(self.wizard.dwells(Part::Confirmation, &steps));
+        self.finish()?;
+        for ((k, found), plain) in (0..).zip(found).zip(plain) {
+            let Some(found) = found else { continue };
+            let by = prepared(&self.file(k, Part::Confirmation.name()))?;
+            let judged = self.judged(
+                k,
+                &by,
+                &found.calibration,
+                &found.fitted,
+                Part::Confirmation,
+            )?;
+            if !judged.passed() {
+                continue;
+            }
+            // By all dwells: an effect may be one of those in which the table turns.
+            let [with, without] =
+                [&found.calibration, &plain.calibration].map(|c| judge_all(&by, c));
+            if !with?.beats(&without?) {
+                let note = "the effects do not do better in new poses for all sensors: they are not stored";
+                self.outcomes[k].notes.push(note.into());
+                continue;
+            }
+            if let Some(why) = judged.rough() {
+                match self.wizard.ask(&Question::StoreRough(why.clone()))? {
+                    None => return Ok(Ended::Cancelled),
+                    Some(true) => {}
+                    Some(false) => {
+                        self.outcomes[k].notes.push(format!("not stored: {why}"));
+                        continue;
+                    }
+                }
+            }
+            or_cancelled!(self.store(k, WITH_EFFECTS, &found.calibration));
+        }
+        Ok(Ended::Done)
+    }
+}

@@ -1,0 +1,177 @@
+//! What a calibration file says beside what the unit is. Shares nothing with the program that wrote it.
+
+use std::path::Path;
+
+use mimu_rig::rig_file::RigTruth;
+
+type Matrix = [[f64; 3]; 3];
+type Vector = [f64; 3];
+
+/// Forward model of a triad: raw per SI and raw; rows are sensors, columns the body's axes.
+#[derive(Clone, Copy, Debug)]
+pub struct Forward {
+    pub matrix: Matrix,
+    pub bias: Vector,
+}
+
+/// What a unit is: gyro, accelerometer, and whether its calibration has the accelerometer's own axes, as by hand.
+#[derive(Clone, Copy, Debug)]
+pub struct Truth {
+    pub triads: [Forward; 2],
+    pub by_hand: bool,
+}
+
+/// Full inputs: 60 deg/s and gravity.
+const SIZES: [f64; 2] = [60.0 / 57.295_779_513, 9.793];
+
+fn dot(a: Vector, b: Vector) -> f64 {
+    a.iter().zip(&b).map(|(a, b)| a * b).sum()
+}
+
+fn times(m: &Matrix, v: Vector) -> Vector {
+    m.map(|row| dot(row, v))
+}
+
+fn cross(a: Vector, b: Vector) -> Vector {
+    [0, 1, 2].map(|i| a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3])
+}
+
+fn inverse(m: &Matrix) -> Matrix {
+    let columns = [0, 1, 2].map(|k| cross(m[(k + 1) % 3], m[(k + 2) % 3]));
+    let determinant = dot(m[0], columns[0]);
+    [0, 1, 2].map(|i| [0, 1, 2].map(|j| columns[j][i] / determinant))
+}
+
+/// The axes that a calibration by hand is given in, by rows: x along the accelerometer's x, and the xy plane through its y.
+fn own_axes(accel: &Matrix) -> Matrix {
+    let unit = |a: Vector| a.map(|v| v / dot(a, a).sqrt());
+    let x = unit(accel[0]);
+    let along = dot(accel[1], x);
+    let y = unit([0, 1, 2].map(|i| accel[1][i] - along * x[i]));
+    [x, y, cross(x, y)]
+}
+
+impl Truth {
+    /// Of the bench's unit.
+    pub fn of(truth: &RigTruth, by_hand: bool) -> Result<Self, String> {
+        let unit = &truth.file.unit;
+        let pins = unit
+            .gyro_reference_v
+            .ok_or("the unit has no reference pins")?;
+        // The firmware reads the gyros against the first one's reference pin, as if that were nominal.
+        let ratios = [2.5 / pins[0], 1.0];
+        let affine = [&unit.gyro_affine, &unit.accel_affine];
+        let mut triads = [Forward {
+            matrix: [[0.0; 3]; 3],
+            bias: [0.0; 3],
+        }; 2];
+        for ((to, from), ratio) in triads.iter_mut().zip(affine).zip(ratios) {
+            let from = from.as_ref().ok_or("the unit has no affine model")?;
+            to.matrix = from.matrix.map(|row| row.map(|m| ratio * m));
+            to.bias = from.bias.map(|b| ratio * b);
+        }
+        Ok(Self { triads, by_hand })
+    }
+
+    /// Rows: axes of the calibration, in the body's.
+    fn axes(&self) -> Matrix {
+        match self.by_hand {
+            true => own_axes(&self.triads[1].matrix),
+            false => [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+        }
+    }
+}
+
+struct Table {
+    c: Matrix,
+    o: Vector,
+    half: Option<(Matrix, Vector)>,
+}
+
+fn read(file: &Path) -> Result<[Table; 2], String> {
+    let text = std::fs::read_to_string(file).map_err(|e| format!("{}: {e}", file.display()))?;
+    let table: toml::Table = text
+        .parse()
+        .map_err(|e| format!("{}: {e}", file.display()))?;
+    let number = |v: &toml::Value| {
+        v.as_float()
+            .or(v.as_integer().map(|i| i as f64))
+            .unwrap_or(f64::NAN)
+    };
+    let vector = |v: &toml::Value| -> Option<Vector> {
+        let all: Vec<f64> = v.as_array()?.iter().map(number).collect();
+        all.try_into().ok()
+    };
+    let matrix = |v: &toml::Value| -> Option<Matrix> {
+        let rows: Option<Vec<Vector>> = v.as_array()?.iter().map(vector).collect();
+        rows?.try_into().ok()
+    };
+    let of = |name: &str| {
+        let table = table.get(name)?;
+        let half = table
+            .get("interval_C")
+            .and_then(matrix)
+            .zip(table.get("interval_o").and_then(vector));
+        Some(Table {
+            c: matrix(table.get("C")?)?,
+            o: vector(table.get("o")?)?,
+            half,
+        })
+    };
+    let both = of("gyro")
+        .zip(of("accel"))
+        .map(|(gyro, accel)| [gyro, accel]);
+    both.ok_or_else(|| format!("{}: no matrices", file.display()))
+}
+
+/// Largest errors of a calibration file over inputs of full size along each axis, and none: deg/s, mg.
+pub fn errors(file: &Path, truth: &Truth) -> Result<[f64; 2], String> {
+    let tables = read(file)?;
+    let axes = truth.axes();
+    let mut worst = [0.0_f64; 2];
+    for ((worst, table), (triad, size)) in worst
+        .iter_mut()
+        .zip(&tables)
+        .zip(truth.triads.iter().zip(SIZES))
+    {
+        for axis in 0..3 {
+            for sign in [1.0, -1.0, 0.0] {
+                let input: Vector =
+                    std::array::from_fn(|i| if i == axis { sign * size } else { 0.0 });
+                // In the body's axes, which the unit's truth is given in.
+                let body: Vector =
+                    std::array::from_fn(|j| (0..3).map(|k| axes[k][j] * input[k]).sum());
+                let raw = times(&triad.matrix, body);
+                let raw: Vector = std::array::from_fn(|i| raw[i] + triad.bias[i]);
+                let found = times(&table.c, raw);
+                let error = (0..3).map(|i| (found[i] + table.o[i] - input[i]).powi(2));
+                *worst = worst.max(error.sum::<f64>().sqrt());
+            }
+        }
+    }
+    Ok([worst[0].to_degrees(), worst[1] * 1e3 / 9.80665])
+}
+
+/// How far each parameter of a calibration file is from the truth, in halves of its 95 % interval: gyro and accelerometer, C by rows and o.
+/// What is zero by the choice of axes is left out.
+pub fn half_widths(file: &Path, truth: &Truth) -> Result<[Vec<f64>; 2], String> {
+    let tables = read(file)?;
+    let axes = truth.axes();
+    let mut all = [Vec::new(), Vec::new()];
+    for (k, table) in tables.iter().enumerate() {
+        let (half_c, half_o) = table.half.ok_or("the file has no intervals")?;
+        let from_raw = inverse(&truth.triads[k].matrix);
+        let columns = [0, 1, 2].map(|j| times(&axes, [0, 1, 2].map(|i| from_raw[i][j])));
+        let bias = truth.triads[k].bias;
+        for i in 0..3 {
+            for j in 0..3 {
+                if k == 0 || !truth.by_hand || j <= i {
+                    all[k].push((table.c[i][j] - columns[j][i]).abs() / half_c[i][j]);
+                }
+            }
+            let o: f64 = -(0..3).map(|j| columns[j][i] * bias[j]).sum::<f64>();
+            all[k].push((table.o[i] - o).abs() / half_o[i]);
+        }
+    }
+    Ok(all)
+}
