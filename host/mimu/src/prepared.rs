@@ -12,7 +12,7 @@ use crate::estimate::turn::{Motion, Rest, Turn};
 use crate::estimate::{Failure, Observation};
 use crate::noise::Noise;
 use crate::noise_file::NoiseFile;
-use crate::quantity::{Sensor, significant};
+use crate::quantity::{Sensor, implausible_gravity, significant};
 use crate::rails::refuse_dead_channels;
 use crate::stillness::Finding;
 use mimu_recording::error::{Argument, Error, Result};
