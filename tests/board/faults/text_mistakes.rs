@@ -173,11 +173,11 @@ pub fn text_cubic(folder: &Path) -> Result<Ended, String> {
 
 /// A finished session, run again.
 pub fn text_again(folder: &Path) -> Result<Ended, String> {
-    let (writing, mut run) = text(folder, 44, TextBoard::new(44), &TEXT)?;
+    let (_writing, mut run) = text(folder, 44, TextBoard::new(44), &TEXT)?;
     run.wait_for(|_| false)?;
     let read = || std::fs::read(folder.join("session/calibration.toml")).map_err(|e| e.to_string());
     let before = read()?;
-    drop(writing);
+    std::thread::sleep(Duration::from_secs(2));
     run.run()?;
     let mut ended = run.end()?;
     let same = if read()? == before {
