@@ -53,9 +53,6 @@ pub struct Options {
     pub still_factor: f64,
     /// Calibrate this triad only. Without a table the gyro needs the accelerometer, which is then calibrated as well.
     pub only: Option<Sensor>,
-    /// How far the accelerometer may be from the axes of a table, m, one standard deviation; 0: on the axes. Least squares and the Kalman bank
-    /// then know of the centripetal force, and judge the accelerometer by the dwells at rest, if there are any.
-    pub lever_arm_m: f64,
 }
 
 impl Method {
@@ -78,7 +75,6 @@ impl Default for Options {
             holdout_blocks: 4,
             still_factor: STILL_FACTOR,
             only: None,
-            lever_arm_m: 0.0,
         }
     }
 }

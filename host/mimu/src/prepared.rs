@@ -31,6 +31,8 @@ pub struct Prepared {
     pub noise: Noise,
     /// Path of the samples, for messages.
     pub place: String,
+    /// See [`Prepared::beside_axis`].
+    pub(crate) lever_arm_m: f64,
 }
 
 impl Prepared {
@@ -106,6 +108,7 @@ impl Prepared {
             dwells,
             noise,
             place,
+            lever_arm_m: 0.0,
         })
     }
 
@@ -123,6 +126,13 @@ impl Prepared {
     /// Whether the recording has the channels of `sensor`.
     pub fn has(&self, sensor: Sensor) -> bool {
         sensor.channels().all(|c| self.condensed.has_raw[c])
+    }
+
+    /// With an accelerometer that may be beside the axis of a table by `sigma_m`, m, one standard deviation. Least squares and the Kalman bank then
+    /// know of the centripetal force, and judge the accelerometer by the dwells at rest, if there are any.
+    pub fn beside_axis(mut self, sigma_m: f64) -> Self {
+        self.lever_arm_m = sigma_m;
+        self
     }
 
     /// Without the dwells of the accelerometer in which a table turns it, if it has others: where it is beside the axis they have a

@@ -7,7 +7,7 @@ use mimu::readable::STANDARD_GRAVITY;
 use mimu::stillness::STILL_FACTOR;
 use mimu::triad::{Angles, Estimate};
 use mimu_recording::error::Result;
-use mimu_recording::{Batch, Manifest, Reference};
+use mimu_recording::{Batch, Manifest};
 use serde::Serialize;
 
 use crate::procedure::{Missed, Targets};
@@ -64,24 +64,16 @@ impl Progress {
 
 /// The calibration from the dwells so far. `holdout_blocks` as in [`Options`].
 pub fn calibrate(manifest: &Manifest, samples: &Batch, holdout_blocks: usize) -> Result<Fit> {
-    fit(
-        Prepared::of(manifest.clone(), samples, STILL_FACTOR)?,
-        options(manifest.reference, holdout_blocks),
-    )
+    let options = Options {
+        holdout_blocks,
+        ..Options::default()
+    };
+    let prepared = Prepared::of(manifest.clone(), samples, STILL_FACTOR)?;
+    fit(prepared.beside_axis(LEVER_ARM_M), options)
 }
 
 /// How far a board's sensors may be from the axes of a table, m, one standard deviation: 3 to 5 mm are usual.
-const LEVER_ARM_M: f64 = 0.01;
-
-/// How the calibration is fitted.
-pub fn options(reference: Reference, holdout_blocks: usize) -> Options {
-    let by_table = reference == Reference::Table;
-    Options {
-        holdout_blocks,
-        lever_arm_m: if by_table { LEVER_ARM_M } else { 0.0 },
-        ..Options::default()
-    }
-}
+pub const LEVER_ARM_M: f64 = 0.01;
 
 /// How far each parameter is from its target.
 pub fn progress(fitted: &Result<Fit>, targets: &Targets) -> Progress {

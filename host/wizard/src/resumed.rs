@@ -59,3 +59,61 @@ pub fn resumed(begun: &Asked, now: &Asked, place: &Path) -> Result<Asked> {
         ..begun.clone()
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::procedure::{Fixture, Targets, first_steps};
+
+    fn asked() -> Asked {
+        Asked {
+            text: None,
+            fixture: Fixture::Hands,
+            gravity_mps2: 9.71,
+            latitude_deg: Some(48.1),
+            dwell_s: 4.0,
+            largest_rate_dps: 100.0,
+            steps: first_steps(Fixture::Hands, 4.0, 100.0, 1),
+            by_targets: true,
+            most_dwells: 60,
+            patience_s: 120.0,
+            verification: Vec::new(),
+            warm_c_per_min: None,
+            most_drift_c: 5.0,
+            targets: Targets::default(),
+            mounting_deg: 0.02,
+            by_device: false,
+        }
+    }
+
+    #[test]
+    fn what_dwells_were_made_by_is_refused_with_each_difference_and_the_rest_is_taken() {
+        let place = Path::new("session");
+        let now = Asked {
+            gravity_mps2: 9.81,
+            text: Some("ax,ay,az,gx,gy,gz in count".into()),
+            ..asked()
+        };
+        let error = resumed(&asked(), &now, place).unwrap_err().to_string();
+        for says in [
+            "gravity was 9.71 m/s² and is 9.81 m/s²",
+            "--text was none and is ax,ay,az,gx,gy,gz in count",
+        ] {
+            assert!(error.contains(says), "{error}");
+        }
+        assert!(!error.contains("--fixture"), "{error}");
+        let now = Asked {
+            steps: first_steps(Fixture::Hands, 4.0, 100.0, 1)[1..].to_vec(),
+            ..asked()
+        };
+        let error = resumed(&asked(), &now, place).unwrap_err().to_string();
+        assert!(error.contains("--seed"), "{error}");
+        let now = Asked {
+            most_dwells: 20,
+            patience_s: 7.0,
+            ..asked()
+        };
+        let kept = resumed(&asked(), &now, place).unwrap();
+        assert_eq!((kept.most_dwells, kept.patience_s), (20, 7.0));
+    }
+}

@@ -16,7 +16,7 @@ use crate::event::{Event, Question, View};
 use crate::folder::{Begun, Entry, Folder, Part};
 use crate::one::One;
 use crate::procedure::{Asked, Fixture};
-use crate::refit;
+use crate::refit::LEVER_ARM_M;
 use crate::resumed::resumed;
 use crate::source::Opener;
 use crate::station::Station;
@@ -240,9 +240,7 @@ impl Whole<'_> {
         let mut fits = Vec::new();
         for unit in &self.wizard.units {
             let first = prepared(&unit.folder.file(Part::Calibration.name()))?;
-            let options =
-                refit::options(first.manifest.reference, Options::default().holdout_blocks);
-            let fitted = fit(first, options)?;
+            let fitted = fit(first.beside_axis(LEVER_ARM_M), Options::default())?;
             if let Some(why) = axes::frames_apart(&fitted) {
                 return Err(Error::device(unit.name(), why, axes::REMEDY));
             }

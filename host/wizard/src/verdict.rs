@@ -181,3 +181,47 @@ fn judged(by: &Prepared, calibration: &Calibration, promised: Option<&Fit>) -> R
         warnings: found.warnings,
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn judged(gyro: f64, accel: f64, promised: f64) -> Judged {
+        let of = |sensor, after, floor, before| SensorJudged {
+            sensor,
+            figure: "error",
+            unit: "SI",
+            before,
+            affine: after,
+            after,
+            floor,
+            promised: Some(promised),
+            count: 6,
+        };
+        let sensors = vec![
+            of(Sensor::Gyro, gyro, 1e-4, 2e-2),
+            of(Sensor::Accel, accel, 6e-3, 0.6),
+        ];
+        Judged {
+            broken: sensors.iter().filter_map(SensorJudged::broken).collect(),
+            sensors,
+            warnings: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn a_promise_as_large_as_the_error_does_not_make_a_calibration_good() {
+        // 17 mg, 28 times the noise, and as much was held out.
+        let cubic = judged(1.2e-4, 0.167, 0.167);
+        assert!(cubic.passed() && cubic.rough().is_some_and(|why| why.starts_with("accel")));
+        assert_eq!(judged(1.2e-4, 8e-3, 7e-3).rough(), None);
+    }
+
+    #[test]
+    fn effects_may_not_make_one_sensor_better_and_the_other_worse() {
+        let without = judged(5e-4, 8e-3, 7e-3);
+        assert!(judged(1.2e-4, 8e-3, 7e-3).beats(&without));
+        assert!(!judged(1.2e-4, 8.1e-3, 7e-3).beats(&without));
+        assert!(!judged(5e-4, 8e-3, 7e-3).beats(&without));
+    }
+}

@@ -61,7 +61,9 @@ struct Codes {
     /// Smallest change so far; none where there was no change.
     step: Option<f64>,
     /// Whether the first second had one value: a step larger than the noise, or a broken wire.
-    coarse: Option<bool>,
+    constant: Option<bool>,
+    /// Variance of the quietest second that had more than one value.
+    quietest: Option<f64>,
 }
 
 impl Codes {
@@ -73,17 +75,30 @@ impl Codes {
         self.last = Some(value);
     }
 
+    /// Takes in the variance of a second.
+    fn judge(&mut self, variance: f64) {
+        self.constant.get_or_insert(variance == 0.0);
+        if variance > 0.0 {
+            self.quietest = Some(self.quietest.map_or(variance, |least| least.min(variance)));
+        }
+    }
+
+    /// Whether its step is larger than its noise, so that it may have one value for a second. A channel whose noise is half a step is constant for
+    /// a hundred samples once in 1e16 seconds.
+    fn is_coarse(&self) -> bool {
+        let hides = |(step, variance): (f64, f64)| variance < step * step / 3.0;
+        self.constant == Some(true) || self.step.zip(self.quietest).is_some_and(hides)
+    }
+
     /// Whether a second of one value is none of a coarse step. `moved`: the unit was turned since.
     fn is_stuck(&self, moved: bool) -> bool {
-        self.coarse != Some(true) || moved && self.step.is_none()
+        !self.is_coarse() || moved && self.step.is_none()
     }
 
     /// Variance that a coarse step hides.
     fn hidden(&self) -> f64 {
-        match (self.coarse, self.step) {
-            (Some(true), Some(step)) => step * step / 12.0,
-            _ => 0.0,
-        }
+        let step = self.step.filter(|_| self.is_coarse());
+        step.map_or(0.0, |step| step * step / 12.0)
     }
 }
 
@@ -284,7 +299,7 @@ impl Watch {
         }
         let own = all.squares.map(|s| s / (all.count - 1.0));
         for (codes, own) in self.codes.iter_mut().zip(&own) {
-            codes.coarse.get_or_insert(*own == 0.0);
+            codes.judge(*own);
         }
         let (codes, moved) = (self.codes, self.moved);
         let stuck = (0..6).find(|&c| own[c] == 0.0 && codes[c].is_stuck(moved));

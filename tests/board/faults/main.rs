@@ -4,16 +4,19 @@
 //! `faults [NAME ...]`: all of them without names.
 
 mod mistakes;
+mod run;
 mod session;
 mod stored;
 mod text;
+mod text_mistakes;
 
 use std::path::Path;
 use std::process::ExitCode;
 use std::time::Duration;
 
 use mimu_board::commanded::Commanded;
-use session::{Ended, Sitting, unit};
+use run::Ended;
+use session::{Sitting, unit};
 
 /// Errors above these are a wrong calibration: several times what dwells of a second leave. deg/s, mg.
 const RIGHT: [f64; 2] = [0.3, 3.0];
@@ -44,21 +47,21 @@ const ALL: &[(&str, Scenario)] = &[
     ("changed-flag", mistakes::changed_flag),
     ("early-yes", mistakes::early_yes),
     ("table-250", mistakes::table_250),
-    ("text", mistakes::text_nothing),
-    ("text-z-inv", mistakes::text_z_inverted),
-    ("text-negated", mistakes::text_negated),
-    ("text-x-y", mistakes::text_x_for_y),
-    ("text-gyro-x-y", mistakes::text_gyro_swapped),
-    ("text-in-g", mistakes::text_in_g),
-    ("text-us-as-ms", mistakes::text_us_for_ms),
-    ("text-ms-as-us", mistakes::text_ms_for_us),
-    ("text-dropped", mistakes::text_dropped),
-    ("text-garbled", mistakes::text_garbled),
-    ("text-coarse", mistakes::text_coarse),
-    ("text-columns", mistakes::text_columns_swapped),
-    ("text-cubic", mistakes::text_cubic),
-    ("text-again", mistakes::text_again),
-    ("text-units", mistakes::text_units),
+    ("text", text_mistakes::text_nothing),
+    ("text-z-inv", text_mistakes::text_z_inverted),
+    ("text-negated", text_mistakes::text_negated),
+    ("text-x-y", text_mistakes::text_x_for_y),
+    ("text-gyro-x-y", text_mistakes::text_gyro_swapped),
+    ("text-in-g", text_mistakes::text_in_g),
+    ("text-us-as-ms", text_mistakes::text_us_for_ms),
+    ("text-ms-as-us", text_mistakes::text_ms_for_us),
+    ("text-dropped", text_mistakes::text_dropped),
+    ("text-garbled", text_mistakes::text_garbled),
+    ("text-coarse", text_mistakes::text_coarse),
+    ("text-columns", text_mistakes::text_columns_swapped),
+    ("text-cubic", text_mistakes::text_cubic),
+    ("text-again", text_mistakes::text_again),
+    ("text-units", text_mistakes::text_units),
 ];
 
 fn main() -> ExitCode {

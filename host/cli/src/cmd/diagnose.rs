@@ -61,7 +61,6 @@ pub struct DiagnoseArgs {
 
 pub fn run(args: &DiagnoseArgs) -> Result<()> {
     let options = Options {
-        lever_arm_m: 0.0,
         method: Method::LeastSquares,
         holdout_blocks: 0,
         still_factor: args.still.factor,

@@ -68,7 +68,6 @@ fn holdout(text: &str) -> std::result::Result<usize, String> {
 
 pub(crate) fn run(args: &FitArgs) -> Result<()> {
     let options = Options {
-        lever_arm_m: 0.0,
         method: match args.method {
             None | Some(MethodArg::LeastSquares) => Method::LeastSquares,
             Some(MethodArg::Kalman) => Method::Kalman,

@@ -133,3 +133,33 @@ impl Typed {
         answer
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_answer_counts_after_its_question_only() {
+        let (tell, lines) = channel();
+        let mut typed = Typed {
+            lines,
+            stop: Arc::default(),
+            wishes: VecDeque::new(),
+            asked: false,
+            answer: None,
+            ended: false,
+        };
+        let say = |line: &str| tell.send(line.into()).unwrap();
+        say("yes");
+        say("skip");
+        typed.begin_question();
+        assert_eq!((typed.wish(), typed.answer()), (Some(Wish::Skip), None));
+        say("yes");
+        assert_eq!((typed.wish(), typed.answer()), (None, Some(true)));
+        // The next question begins anew.
+        say("no");
+        assert_eq!((typed.wish(), typed.answer()), (None, None));
+        typed.begin_question();
+        assert_eq!((typed.wish(), typed.answer()), (None, None));
+    }
+}

@@ -46,11 +46,15 @@ pub(super) fn fit_known(
                 (Method::SixPositions, _) => known_input::six_positions(o),
             };
         let dwells = &prepared.dwells.list;
-        let off_axis = sensor == Sensor::Accel && options.lever_arm_m > 0.0;
+        let off_axis = sensor == Sensor::Accel && prepared.lever_arm_m > 0.0;
         let lever = match by(&observations, &within, wander.as_ref()) {
             Ok(first) if off_axis => {
                 let forward = first.triad.forward.matrix;
-                Some(lever_arm::covariance(dwells, &forward, options.lever_arm_m))
+                Some(lever_arm::covariance(
+                    dwells,
+                    &forward,
+                    prepared.lever_arm_m,
+                ))
             }
             _ => None,
         };

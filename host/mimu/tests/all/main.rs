@@ -4,6 +4,7 @@ mod allan_model;
 mod allan_vectors;
 mod design;
 mod held_out;
+mod lever_arm;
 mod moving_input;
 mod over_temperature;
 mod spectrum;

@@ -30,7 +30,7 @@ impl Whole<'_> {
         let other = &plain.other;
         let name = self.wizard.units[k].name();
         let first = prepared(&self.file(k, Part::Calibration.name()))?;
-        let mut diagnosis = diagnose(
+        let diagnosed = diagnose(
             Recordings {
                 second: Some(other.clone()),
                 ..Recordings::from(first)
@@ -39,7 +39,17 @@ impl Whole<'_> {
                 holdout_blocks: 0,
                 ..Options::default()
             },
-        )?;
+        );
+        // What is stored is judged already: a recording that cannot be diagnosed does not undo it.
+        let mut diagnosis = match diagnosed {
+            Ok(diagnosis) => diagnosis,
+            Err(why) => {
+                let words = format!("not diagnosed: {why}");
+                self.outcomes[k].notes.push(words.clone());
+                self.wizard.tell(Event::Note { words });
+                return Ok(None);
+            }
+        };
         let accepted = diagnosis.sensors.iter().flat_map(|s| &s.decision.accepted);
         let tables: Vec<EffectTable> = accepted
             .filter(|a| a.of_unit)

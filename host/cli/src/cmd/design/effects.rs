@@ -139,7 +139,6 @@ fn after(path: &Path, args: &DesignArgs) -> Result<Fit> {
         _ => prepared,
     };
     let options = Options {
-        lever_arm_m: 0.0,
         method: Method::LeastSquares,
         holdout_blocks: 0,
         still_factor: STILL_FACTOR,

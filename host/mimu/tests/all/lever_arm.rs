@@ -1,0 +1,122 @@
+//! An accelerometer beside the axis of a table, against physics written here: the force that no reference says bends no parameter, and the
+//! intervals hold the truth.
+
+use mimu::quantity::Sensor;
+use mimu::stillness::STILL_FACTOR;
+use mimu::{Fit, Manifest, Options, Prepared, RawUnit, Reference, Samples, fit};
+
+const G: f64 = 9.8;
+const RATE_HZ: f64 = 50.0;
+const MATRIX: [[f64; 3]; 3] = [
+    [0.99, -0.015, 0.02],
+    [0.012, 1.03, -0.007],
+    [0.003, 0.021, 0.98],
+];
+const BIAS: [f64; 3] = [0.3, -0.2, 0.1];
+
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a.iter().zip(&b).map(|(a, b)| a * b).sum()
+}
+
+/// Dwells of two seconds: all faces turned both ways at 250 deg/s, and corners at rest. `arm`: from the axis to the sensor, m.
+fn recording(arm: [f64; 3], seed: u64) -> Samples {
+    let mut state = seed;
+    let mut noise = || {
+        let mut uniform = || {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1_u64 << 53) as f64
+        };
+        (0..12).map(|_| uniform()).sum::<f64>() - 6.0
+    };
+    let mut steps = Vec::new();
+    for axis in 0..3 {
+        for sign in [1.0, -1.0] {
+            let up = [0, 1, 2].map(|i| if i == axis { sign } else { 0.0 });
+            steps.extend([(up, 250.0), (up, -250.0)]);
+        }
+    }
+    for k in 0..8 {
+        let up = [0, 1, 2].map(|i| (1.0 - 2.0 * f64::from(k >> i & 1)) / 3f64.sqrt());
+        steps.push((up, 0.0));
+    }
+    let mut samples = Samples::default();
+    for (number, (up, rate_dps)) in (0..).zip(steps) {
+        for _ in 0..(2.0 * RATE_HZ) as usize {
+            let rate = up.map(|u: f64| (u * rate_dps).to_radians());
+            let squared = dot(rate, rate);
+            let along = dot(rate, arm);
+            // Up against gravity, and towards the axis: w (w r) - w² r.
+            let force: [f64; 3] =
+                std::array::from_fn(|i| G * up[i] + rate[i] * along - squared * arm[i]);
+            samples.t_s.push(samples.t_s.len() as f64 / RATE_HZ);
+            samples.step.push(number);
+            samples.temp_c.push(25.0);
+            for i in 0..3 {
+                samples.raw[i].push(rate[i] + 2e-3 * noise());
+                samples.raw[3 + i].push(dot(MATRIX[i], force) + BIAS[i] + 0.02 * noise());
+                samples.reference[i].push(up[i] * rate_dps);
+                samples.reference[3 + i].push(G * up[i]);
+            }
+        }
+    }
+    samples
+}
+
+fn fitted(samples: &Samples, sigma_m: f64) -> Fit {
+    let manifest = Manifest::new("u", RATE_HZ, G, RawUnit::Si, Reference::Table);
+    let prepared = Prepared::of(manifest, samples, STILL_FACTOR).unwrap();
+    fit(prepared.beside_axis(sigma_m), Options::default()).unwrap()
+}
+
+/// Largest error of a forward parameter, in halves of its interval, and of a bias, m/s².
+fn off(fit: &Fit) -> (f64, f64) {
+    let triad = &fit.sensor(Sensor::Accel).unwrap().estimated.triad;
+    let truth = [MATRIX.concat(), BIAS.to_vec()].concat();
+    let both = triad.forward_estimates().into_iter().zip(truth);
+    both.enumerate()
+        .fold((0.0, 0.0), |(worst, bias), (k, (found, truth))| {
+            let error = (found.value - truth).abs();
+            let bias = if k < 9 { bias } else { f64::max(bias, error) };
+            (f64::max(worst, error / found.interval), bias)
+        })
+}
+
+#[test]
+fn a_board_five_millimetres_beside_the_axis_is_calibrated_as_well_as_one_on_it() {
+    let (mut outside, mut bias) = (0, [0.0, 0.0]);
+    for seed in 1..=20 {
+        let samples = recording([4e-3, -3e-3, 1e-3], seed);
+        let [plain, known] = [0.0, 0.01].map(|sigma_m| fitted(&samples, sigma_m));
+        let (worst, with) = off(&known);
+        outside += u32::from(worst > 1.5);
+        bias[0] += off(&plain).1 / 20.0;
+        bias[1] += with / 20.0;
+        // What the arm does is no error of the sensor.
+        assert!(known.sensor(Sensor::Accel).unwrap().rms() < 5e-3);
+        assert!(plain.sensor(Sensor::Accel).unwrap().rms() > 0.02);
+    }
+    println!(
+        "bias off by {bias:?} m/s² without and with the arm; {outside} of 20 beyond 1.5 intervals"
+    );
+    assert!(bias[1] < 3e-3 && bias[0] > 5.0 * bias[1], "{bias:?}");
+    assert!(outside <= 3, "{outside}");
+}
+
+#[test]
+fn a_mounting_that_is_known_to_an_angle_widens_what_it_turns_and_no_bias() {
+    let fit = fitted(&recording([0.0; 3], 1), 0.0);
+    let triad = fit.sensor(Sensor::Accel).unwrap().estimated.triad.clone();
+    let wider = triad.clone().mounted(1e-2).forward_estimates();
+    let (yaw, row) = (1e-2_f64, MATRIX[0]);
+    // Turned by an angle about z, the frame's x and y of the first sensor become these.
+    let turned = [
+        row[0] * yaw.cos() + row[1] * yaw.sin(),
+        row[1] * yaw.cos() - row[0] * yaw.sin(),
+    ];
+    assert!((turned[1] - row[1]).abs() < 1.1 * wider[1].sigma && wider[1].sigma < 1.1e-2);
+    for (before, after) in triad.forward_estimates().iter().zip(&wider).skip(9) {
+        assert_eq!(before.sigma, after.sigma);
+    }
+}
