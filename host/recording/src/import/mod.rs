@@ -546,7 +546,7 @@ impl Import {
         for time in &summary.time {
             let Some(rounds) = &time.polled else { continue };
             let [shortest, longest] =
-                [rounds.shortest_s, rounds.longest_s].map(|s| format!("{:.3}", 1e3 * s));
+                [rounds.shortest_s, rounds.longest_s].map(|s| format!("{:.1}", 1e3 * s));
             summary.warnings.push(format!(
                 "{}: a loop read the unit at irregular times, {shortest} to {longest} ms apart; the readings are interpolated between them, which lowers their white noise; let a timer of the board or the sensor's own FIFO pace them",
                 time.file
