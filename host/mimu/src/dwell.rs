@@ -13,7 +13,9 @@ use crate::quantity::{Sensor, plural};
 use crate::rails::{self, longest_run_by_chance};
 use crate::ramp::ramps;
 use crate::rest::{self, Rest};
+use crate::slow_turns::{self, Reading};
 use crate::stillness::{self, Detection, Finding, SHORTEST_S, Steps, reference_spans};
+use crate::unit_in_si;
 use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{Manifest, RAW_COLUMNS, Reference};
 
@@ -102,6 +104,8 @@ pub struct Dwell {
     pub turn: bool,
     /// Whether the known input of gyro and accelerometer moves within it.
     pub moves: [bool; 2],
+    /// Whether the gyro reads what no bias explains, as in a slow turn about the vertical: then it is no rest, and still a pose.
+    pub turns_slowly: bool,
     /// Why it is not used for the gyro, if so.
     pub gyro_fault: Option<Fault>,
     /// Why it is not used for the accelerometer, if so.
@@ -304,8 +308,10 @@ impl Dwells {
         }
         if !given && by_hand && !at_rest {
             leave_out_turning(&mut list, condensed);
+            warnings.extend(mark_slow_turns(&mut list));
         }
         warn(&list, manifest, &mut warnings);
+        warnings.extend(unit_in_si::at_rest(&list, manifest));
         Ok(Self {
             list,
             detection,
@@ -420,6 +426,7 @@ fn dwell(condensed: &Condensed, step: i32, range: Range<usize>, rails: &[Rails; 
         temp_c: average(|b, _| b.temp_c, 0),
         turn: false,
         moves: [false; 2],
+        turns_slowly: false,
         gyro_fault: None,
         accel_fault: None,
     }
@@ -442,6 +449,38 @@ fn leave_out_turning(list: &mut [Dwell], condensed: &Condensed) {
         dwell.gyro_fault = Some(Fault::Turning);
         dwell.accel_fault = Some(Fault::Turning);
     }
+}
+
+/// Marks the dwells that are no rest of the gyro, though they are poses of the accelerometer; what to say of them.
+fn mark_slow_turns(list: &mut [Dwell]) -> Option<String> {
+    let usable = |d: &&mut Dwell| Sensor::BOTH.iter().all(|s| d.fault(*s).is_none());
+    let mut usable: Vec<&mut Dwell> = list.iter_mut().filter(usable).collect();
+    let complete = usable.iter().all(|d| d.raw.iter().all(|m| m.n > 0));
+    if !complete {
+        return None;
+    }
+    let reading = |d: &&mut Dwell| Reading {
+        mean: d.raw.map(|m| m.mean),
+        duration_s: d.duration_s,
+    };
+    let readings: Vec<Reading> = usable.iter().map(reading).collect();
+    let slow = slow_turns::find(&readings);
+    for (dwell, slow) in usable.iter_mut().zip(slow) {
+        dwell.turns_slowly = slow;
+    }
+    let steps: Vec<String> = usable
+        .iter()
+        .filter(|d| d.turns_slowly)
+        .map(|d| d.step.to_string())
+        .collect();
+    let count = steps.len() as u64;
+    (count > 0).then(|| {
+        format!(
+            "{} ({}) not taken for rests of the gyro, only for poses: the others and the g-sensitivity do not explain what it reads there, a slow turn about the vertical would (--keep)",
+            plural(count, "dwell"),
+            steps.join(", ")
+        )
+    })
 }
 
 /// Finds the dwells whose known inputs move, and those where one moves too fast.

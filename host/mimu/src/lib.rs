@@ -96,11 +96,13 @@ pub mod readable;
 pub mod reading_step;
 pub mod rest;
 pub mod result;
+mod slow_turns;
 pub mod spectrum;
 pub mod stillness;
 pub mod survey;
 mod toml_layout;
 pub mod triad;
+mod unit_in_si;
 pub mod verify;
 
 pub use calibration::Calibration;

@@ -79,6 +79,8 @@ pub enum Argument {
     Preset,
     /// Whether rows are means, and no samples.
     Means,
+    /// How many rows that cannot be read are left out.
+    SkipBroken,
 }
 
 /// Result with [`Error`].

@@ -315,6 +315,7 @@ pub(super) fn import_means(options: &ImportOptions, out: &Path) -> Result<Import
         dropped_in_gaps: 0,
         interpolated: 0,
         padding: 0,
+        broken_rows: Vec::new(),
         empty_cells: raw.map(|c| empty(c).count() as u64).sum(),
         warnings,
     })

@@ -4,12 +4,15 @@ use std::path::{Path, PathBuf};
 
 use proptest::prelude::*;
 
-use super::super::{Batch, RawUnit, Recording};
+use super::super::{Batch, Manifest, RawUnit, Recording, Reference};
 use super::*;
+use crate::error::Argument;
 
+mod broken;
 mod means;
 mod plausibility;
 mod presets;
+mod sources;
 mod stamps;
 
 /// A folder with foreign files, and the recording that comes of them.
