@@ -169,20 +169,19 @@ impl Unreadable {
             error,
         })
     }
+
+    /// As an error that ends the reading. No conversion: it would make `?` ambiguous in every crate above.
+    pub fn into_error(self) -> Error {
+        match self {
+            Self::Row(row) => row.error,
+            Self::File(error) => error,
+        }
+    }
 }
 
 impl From<Error> for Unreadable {
     fn from(error: Error) -> Self {
         Self::File(error)
-    }
-}
-
-impl From<Unreadable> for Error {
-    fn from(unreadable: Unreadable) -> Self {
-        match unreadable {
-            Unreadable::Row(row) => row.error,
-            Unreadable::File(error) => error,
-        }
     }
 }
 

@@ -337,7 +337,7 @@ impl Layout {
         let row = match table.next(&mut cells) {
             // Whoever reads all rows says so.
             Err(Unreadable::Row(_)) => return Ok(list),
-            row => row?,
+            row => row.map_err(Unreadable::into_error)?,
         };
         if row.is_some() && self.columns.contains("t_s") && cells.stamp.value.is_nan() {
             let problem = "the column of the time is there, and empty";
