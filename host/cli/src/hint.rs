@@ -21,13 +21,14 @@ const OF_THE_IMPORT: [&str; 10] = [
 pub(crate) fn line(error: &Error, command: &clap::Command) -> String {
     let arguments = &error.refused().arguments;
     let named = |flag: &'static str| {
-        let long = flag.split(',').next()?.trim_start_matches('-');
+        let long = flag.split([',', ' ']).next()?.trim_start_matches('-');
         let has = command.get_arguments().any(|a| a.get_long() == Some(long));
         match has {
             true => Some(flag.to_string()),
-            false => OF_THE_IMPORT
-                .contains(&flag)
-                .then(|| format!("mimu import {flag}")),
+            false if OF_THE_IMPORT.contains(&flag) => Some(format!("mimu import {flag}")),
+            // A diagnosis is of both sensors; one of them alone is a fit's.
+            false if flag == "--only" => Some(format!("mimu fit {flag}")),
+            false => None,
         }
     };
     let flags: Vec<String> = arguments
@@ -50,7 +51,8 @@ fn flag(argument: Argument) -> Option<&'static str> {
         Argument::Offset => "--offset",
         Argument::Reference => "--reference",
         Argument::Device => "--device",
-        Argument::Steps => "--steps",
+        Argument::StepsGiven => "--steps given",
+        Argument::StepsFound => "--steps found",
         Argument::StillFactor => "--still",
         Argument::AtRest => "--at-rest",
         Argument::Method => "--method",
@@ -95,14 +97,17 @@ mod tests {
     }
 
     #[test]
-    fn a_flag_that_the_command_lacks_is_not_named_unless_it_is_one_of_the_import() {
+    fn a_flag_that_the_command_lacks_is_named_with_the_command_that_has_it_or_not_at_all() {
         let lacks = clap::Command::new("diagnose");
-        for other in [Argument::Only, Argument::AtRest, Argument::Stretch] {
+        for other in [Argument::AtRest, Argument::Stretch, Argument::StepsGiven] {
             let error = Error::new("REC, accel", "too few dwells", "add some").about(other);
             assert_eq!(line(&error, &lacks), "REC, accel: too few dwells; add some");
         }
         let error = Error::new("REC", "another rate", "give it").about(Argument::SampleRate);
         let said = "REC: another rate; give it (mimu import --rate-hz)";
+        assert_eq!(line(&error, &lacks), said);
+        let error = Error::new("REC", "no rates", "fit the accel alone").about(Argument::Only);
+        let said = "REC: no rates; fit the accel alone (mimu fit --only)";
         assert_eq!(line(&error, &lacks), said);
     }
 }

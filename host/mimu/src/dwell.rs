@@ -228,7 +228,9 @@ impl Dwells {
         let given = match finding.steps {
             Steps::Given if !condensed.has_steps => {
                 let problem = "the dwells are to be those of the column step, and there is none";
-                return Err(Error::new("dwells", problem, "have them found").about(Argument::Steps));
+                return Err(
+                    Error::new("dwells", problem, "have them found").about(Argument::StepsFound)
+                );
             }
             Steps::Given | Steps::AsRecorded => condensed.has_steps,
             Steps::Found | Steps::AtRest => false,
@@ -279,11 +281,11 @@ impl Dwells {
             };
             let error = Error::undetermined("dwells", problem, remedy);
             return Err(match given {
-                true => error.about(Argument::Steps),
+                true => error.about(Argument::StepsFound),
                 false if condensed.has_steps => error
                     .map(|e| e.remedy += ", or take the dwells of the step column as given")
                     .about(Argument::StillFactor)
-                    .about(Argument::Steps),
+                    .about(Argument::StepsGiven),
                 false => error.about(Argument::StillFactor),
             });
         }
@@ -476,7 +478,7 @@ fn mark_slow_turns(list: &mut [Dwell]) -> Option<String> {
     let count = steps.len() as u64;
     (count > 0).then(|| {
         format!(
-            "{} ({}) not taken for rests of the gyro, only for poses: the others and the g-sensitivity do not explain what it reads there, a slow turn about the vertical would (--keep)",
+            "{} ({}) not used as a rest of the gyro, only as a pose: what it reads there is explained neither by its bias in the others nor by g-sensitivity, as in a slow turn about the vertical",
             plural(count, "dwell"),
             steps.join(", ")
         )

@@ -423,7 +423,9 @@ impl Prepared {
             return error;
         }
         let remedy = "; or, if the dwells of the step column are right, take them as given";
-        error.map(|e| e.remedy += remedy).about(Argument::Steps)
+        error
+            .map(|e| e.remedy += remedy)
+            .about(Argument::StepsGiven)
     }
 }
 

@@ -23,6 +23,8 @@ const WINDOW_PER_JITTER: f64 = 48.0;
 const BACK: f64 = 0.25;
 /// Missing samples that windows show, at least; single ones are told from jitter as long as it varies by less.
 const SMALLEST_GAP: f64 = 0.6;
+/// Share of a burst that is handed over within which missing samples cannot be told: windows begin and end within a burst.
+const HIDDEN: f64 = 0.1;
 /// Standard deviations of the difference of two windows that a gap has to exceed.
 const SIGMAS: f64 = 6.0;
 /// A clock that is set back by more than so many periods is noticed.
@@ -80,11 +82,13 @@ impl Regular {
             return Ok(Self::of_grid(stamps, grid));
         }
         // The steps within a burst of 32 samples are alike, and anything but the period.
-        let period_s = match steps {
-            Steps::HandedOver { mean_s, .. } => mean_s,
-            _ => period_s,
+        let (period_s, burst) = match steps {
+            Steps::HandedOver {
+                mean_s, apart_s, ..
+            } => (mean_s, apart_s / mean_s),
+            _ => (period_s, 0.0),
         };
-        let mut counted = Self::by_count(stamps, period_s);
+        let mut counted = Self::by_count(stamps, period_s, HIDDEN * burst);
         match steps {
             // Jitter of less than a period about the count is rounding, which the count takes out.
             Steps::Multiples(grid) if grid.pauses || counted.jitter.max_s > grid.period_s => {
@@ -118,17 +122,17 @@ impl Regular {
         }
     }
 
-    /// The regular time by the count of samples, which are about `period_s` apart.
+    /// The regular time by the count of samples, which are about `period_s` apart; a gap is of more than `hidden` samples.
     ///
     /// Each gap too many makes the rate too high, and so explains itself: from a period that was 800 ppm off, bursts of 20 samples at 100 Hz
     /// settled with 5 gaps. The line through all stamps as if nothing were missing is another beginning; what leaves the smaller jitter is taken.
-    fn by_count(stamps: &[f64], period_s: f64) -> Regular {
-        let found = Self::settle(stamps, period_s);
+    fn by_count(stamps: &[f64], period_s: f64, hidden: f64) -> Regular {
+        let found = Self::settle(stamps, period_s, hidden);
         if found.gaps.is_empty() {
             return found;
         }
         let (_, whole_s) = line(stamps, &numbers(stamps.len(), &[]), period_s);
-        let other = Self::settle(stamps, whole_s);
+        let other = Self::settle(stamps, whole_s, hidden);
         match other.jitter.rms_s < found.jitter.rms_s {
             true => other,
             false => found,
@@ -136,11 +140,11 @@ impl Regular {
     }
 
     /// Rate and gaps, each from the other, beginning with `period_s`.
-    fn settle(stamps: &[f64], mut period_s: f64) -> Regular {
+    fn settle(stamps: &[f64], mut period_s: f64, hidden: f64) -> Regular {
         let mut gaps = Vec::new();
         let mut start_s = stamps[0];
         for _ in 0..ROUNDS {
-            let found = find_gaps(stamps, period_s);
+            let found = find_gaps(stamps, period_s, hidden);
             let numbers = numbers(stamps.len(), &found);
             let before = period_s;
             (start_s, period_s) = line(stamps, &numbers, before);
@@ -406,11 +410,11 @@ impl Lateness<'_> {
 /// A gap begins with a long step, and the stamps after it stay late by whole samples; of jitter they come back. What comes is judged
 /// by a low quantile over as many samples as the jitter asks for, which the next gap does not reach, and then by whether a share
 /// comes back within the longest stall.
-fn find_gaps(stamps: &[f64], period: f64) -> Vec<Gap> {
+fn find_gaps(stamps: &[f64], period: f64, hidden: f64) -> Vec<Gap> {
     let late = Lateness { stamps, period };
     let window =
         ((WINDOW_PER_JITTER * late.width()) as usize).clamp(*WINDOW.start(), *WINDOW.end());
-    let least = SMALLEST_GAP.max(SIGMAS * late.noise(window));
+    let least = SMALLEST_GAP.max(SIGMAS * late.noise(window)).max(hidden);
     let stall = ((STALL_S / period) as usize).clamp(8 * window, 1 << 20);
     let mut gaps: Vec<Gap> = Vec::new();
     let mut level = 0_u64;
