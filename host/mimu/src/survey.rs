@@ -200,6 +200,7 @@ pub fn survey(
                     channel.name
                 ));
             }
+            channel.spectrum = channel.spectrum.without_spectrum();
             channels.push(channel);
             progress(0.1 + 0.9 * (done + 1) as f64 / indices.len() as f64);
         }
