@@ -48,10 +48,10 @@ pub fn check_alike(sessions: &[Session]) -> Result<()> {
     Ok(())
 }
 
-/// What `sessions` show of the temperature, each for itself: after every power-on, and with gravity in every pose, the biases are others, and
-/// what they do over temperature is seen within such a stretch only.
+/// What `sessions` show of the temperature, each for itself: after every power-on the biases are others, and what they do over
+/// temperature is seen within a session only.
 pub struct Spans {
-    /// Lowest and highest temperature of each stretch that a bias belongs to, °C, by the lower end.
+    /// Lowest and highest temperature of each session, °C, by the lower end.
     stretches: Vec<[f64; 2]>,
 }
 
@@ -64,15 +64,17 @@ fn widen(range: &mut [f64; 2], t: f64) {
 impl Spans {
     /// Of the rows of `sessions`.
     pub fn of(sessions: &[Session]) -> Self {
-        let mut stretches = Vec::new();
-        for session in sessions {
-            let mut poses = vec![NOWHERE; session.moved_s.len() + 1];
-            for row in session.rows.iter().flatten() {
-                let (t, _) = session.thermometer.at(row.middle_s);
-                widen(&mut poses[session.poses_before(row.middle_s)], t);
-            }
-            stretches.extend(poses.into_iter().filter(|range| range[0] <= range[1]));
-        }
+        let mut stretches: Vec<[f64; 2]> = sessions
+            .iter()
+            .map(|session| {
+                let mut range = NOWHERE;
+                for row in session.rows.iter().flatten() {
+                    widen(&mut range, session.thermometer.at(row.middle_s).0);
+                }
+                range
+            })
+            .filter(|range| range[0] <= range[1])
+            .collect();
         stretches.sort_by(|a, b| a[0].total_cmp(&b[0]));
         Self { stretches }
     }
@@ -86,7 +88,7 @@ impl Spans {
         range
     }
 
-    /// The widest stretch, °C.
+    /// The widest of a session, °C.
     fn widest(&self) -> [f64; 2] {
         let span = |range: &&[f64; 2]| range[1] - range[0];
         let widest = self
@@ -96,7 +98,7 @@ impl Spans {
         widest.copied().unwrap_or([f64::NAN; 2])
     }
 
-    /// Temperatures between two stretches that no stretch crosses, °C.
+    /// Temperatures between two sessions that no session crosses, °C.
     fn gaps(&self) -> Vec<[f64; 2]> {
         let mut gaps = Vec::new();
         let mut reached = f64::INFINITY;
@@ -113,7 +115,7 @@ impl Spans {
         gaps
     }
 
-    /// Refuses recordings in which no stretch shows a slope: by what the column has, what of it is used, and what a single stretch has.
+    /// Refuses recordings in which no session shows a slope: by what the column has, what of it is used, and what a single session has.
     pub fn check(&self, sessions: &[Session], warnings: &mut Vec<String>) -> Result<()> {
         let words = |[low, high]: [f64; 2]| match low <= high {
             true => format!("{} K ({low:.1} to {high:.1} °C)", significant(high - low)),
@@ -134,7 +136,7 @@ impl Spans {
         let (problem, remedy, declare) = if shows(widest) {
             for [low, high] in self.gaps() {
                 warnings.push(format!(
-                    "no recording crosses {low:.1} to {high:.1} °C: what the biases do in between is drawn from one power-on, or pose, to another, \
+                    "no recording crosses {low:.1} to {high:.1} °C: what the biases do in between is drawn from one power-on to another, \
                      and the intervals hold nothing of how well they repeat"
                 ));
             }
@@ -142,11 +144,11 @@ impl Spans {
         } else if shows(used) {
             (
                 format!(
-                    "its dwells span {}, and no more than {} from one power-on, or one pose, to the next, each of which has biases of its own: {needs}",
+                    "its dwells span {}, and no more than {} within one recording, each of which has biases of its own: {needs}",
                     words(used),
                     words(widest)
                 ),
-                "heat or cool the unit in one recording, without switching it off or moving it",
+                "heat or cool the unit in one recording, without switching it off",
                 false,
             )
         } else if shows(column) {
