@@ -2,24 +2,39 @@
 
 use mimu_recording::error::{Argument, Error};
 
-/// Flags that are a remedy only on the command that refused. The others belong to the import, which the remedy names.
-const OF_THE_COMMAND: [&str; 4] = ["--steps", "--still", "--method", "--only"];
+/// Flags of the import, which are a remedy after any command that reads a recording. Others are one only on the command that refused.
+const OF_THE_IMPORT: [&str; 10] = [
+    "--columns",
+    "--rate-hz",
+    "--time-unit",
+    "--scale",
+    "--offset",
+    "--reference",
+    "--topic",
+    "--preset",
+    "--means",
+    "--skip-broken",
+];
 
 /// The error in one line, with those flags of `command` that set what it is about. The same refusal comes from several commands, and a
 /// flag that the one at hand lacks is no remedy.
 pub(crate) fn line(error: &Error, command: &clap::Command) -> String {
     let arguments = &error.refused().arguments;
-    let has = |flag: &&str| {
-        if !OF_THE_COMMAND.contains(flag) {
-            return true;
+    let named = |flag: &'static str| {
+        let long = flag.split([',', ' ']).next()?.trim_start_matches('-');
+        let has = command.get_arguments().any(|a| a.get_long() == Some(long));
+        match has {
+            true => Some(flag.to_string()),
+            false if OF_THE_IMPORT.contains(&flag) => Some(format!("mimu import {flag}")),
+            // A diagnosis is of both sensors; one of them alone is a fit's.
+            false if flag == "--only" => Some(format!("mimu fit {flag}")),
+            false => None,
         }
-        let long = flag.trim_start_matches('-');
-        command.get_arguments().any(|a| a.get_long() == Some(long))
     };
-    let flags: Vec<&str> = arguments
+    let flags: Vec<String> = arguments
         .iter()
-        .filter_map(|s| flag(*s))
-        .filter(has)
+        .filter_map(|argument| flag(*argument))
+        .filter_map(named)
         .collect();
     match flags.is_empty() {
         true => error.to_string(),
@@ -36,7 +51,8 @@ fn flag(argument: Argument) -> Option<&'static str> {
         Argument::Offset => "--offset",
         Argument::Reference => "--reference",
         Argument::Device => "--device",
-        Argument::Steps => "--steps",
+        Argument::StepsGiven => "--steps given",
+        Argument::StepsFound => "--steps found",
         Argument::StillFactor => "--still",
         Argument::AtRest => "--at-rest",
         Argument::Method => "--method",
@@ -51,6 +67,7 @@ fn flag(argument: Argument) -> Option<&'static str> {
         Argument::Topic => "--topic",
         Argument::Preset => "--preset",
         Argument::Means => "--means",
+        Argument::SkipBroken => "--skip-broken",
         // An argument that this version of the command has no flag for.
         _ => return None,
     })
@@ -80,9 +97,17 @@ mod tests {
     }
 
     #[test]
-    fn a_flag_that_the_command_lacks_is_not_named() {
-        let error = Error::new("REC, accel", "too few dwells", "add some").about(Argument::Only);
+    fn a_flag_that_the_command_lacks_is_named_with_the_command_that_has_it_or_not_at_all() {
         let lacks = clap::Command::new("diagnose");
-        assert_eq!(line(&error, &lacks), "REC, accel: too few dwells; add some");
+        for other in [Argument::AtRest, Argument::Stretch, Argument::StepsGiven] {
+            let error = Error::new("REC, accel", "too few dwells", "add some").about(other);
+            assert_eq!(line(&error, &lacks), "REC, accel: too few dwells; add some");
+        }
+        let error = Error::new("REC", "another rate", "give it").about(Argument::SampleRate);
+        let said = "REC: another rate; give it (mimu import --rate-hz)";
+        assert_eq!(line(&error, &lacks), said);
+        let error = Error::new("REC", "no rates", "fit the accel alone").about(Argument::Only);
+        let said = "REC: no rates; fit the accel alone (mimu fit --only)";
+        assert_eq!(line(&error, &lacks), said);
     }
 }

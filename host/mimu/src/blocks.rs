@@ -6,11 +6,11 @@
 //! end, so a block also carries what is needed to take clipped samples out of its sums later.
 
 use crate::increment::{Increment, Integrator};
-use crate::quantity::plural;
+use crate::quantity::{Sensor, plural};
 use crate::reading_step::StepFinder;
 use crate::signed_low_byte;
 use mimu_recording::error::{Argument, Error, Result};
-use mimu_recording::{Batch, Column, RAW_COLUMNS, Recording};
+use mimu_recording::{Batch, Column, HeldReadings, RAW_COLUMNS, Recording};
 
 /// Length of a block, s. A tenth of the shortest dwell that is worth having; ten samples at 100 Hz.
 const BLOCK_S: f64 = 0.1;
@@ -309,6 +309,7 @@ struct Condenser {
     steps: Steps,
     reading_steps: [StepFinder; 6],
     signed_low_bytes: [signed_low_byte::Finder; 6],
+    held: [HeldReadings; 2],
     out: Condensed,
 }
 
@@ -340,6 +341,7 @@ impl Condenser {
             steps: Steps::default(),
             reading_steps: Default::default(),
             signed_low_bytes: Default::default(),
+            held: Default::default(),
             out: Condensed {
                 blocks: Vec::new(),
                 increments: Vec::new(),
@@ -397,6 +399,10 @@ impl Condenser {
             if let Some(integrator) = &mut self.integrator {
                 let u = [0, 1, 2].map(|c| batch.raw[c].get(i).copied().unwrap_or(f64::NAN));
                 self.out.increments.extend(integrator.push(t, u, gap));
+            }
+            for (sensor, held) in self.held.iter_mut().enumerate() {
+                let reading = |axis: usize| batch.raw[3 * sensor + axis].get(i).copied();
+                held.push([0, 1, 2].map(|axis| reading(axis).unwrap_or(f64::NAN)));
             }
             self.last = Some((t, step));
         }
@@ -626,6 +632,11 @@ impl Condenser {
                     RAW_COLUMNS[c]
                 ));
             }
+        }
+        for (sensor, held) in Sensor::BOTH.iter().zip(&self.held) {
+            let held = held.found();
+            out.warnings
+                .extend(held.map(|held| held.words(&sensor.to_string(), 1.0 / period)));
         }
         if let Some(integrator) = &mut self.integrator {
             out.increments.extend(integrator.take());

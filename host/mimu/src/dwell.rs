@@ -13,7 +13,9 @@ use crate::quantity::{Sensor, plural};
 use crate::rails::{self, longest_run_by_chance};
 use crate::ramp::ramps;
 use crate::rest::{self, Rest};
+use crate::slow_turns::{self, Reading};
 use crate::stillness::{self, Detection, Finding, SHORTEST_S, Steps, reference_spans};
+use crate::unit_in_si;
 use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{Manifest, RAW_COLUMNS, Reference};
 
@@ -107,6 +109,8 @@ pub struct Dwell {
     pub turn: bool,
     /// Whether the known input of gyro and accelerometer moves within it.
     pub moves: [bool; 2],
+    /// Whether the gyro reads what no bias explains, as in a slow turn about the vertical: then it is no rest, and still a pose.
+    pub turns_slowly: bool,
     /// Why it is not used for the gyro, if so.
     pub gyro_fault: Option<Fault>,
     /// Why it is not used for the accelerometer, if so.
@@ -235,7 +239,9 @@ impl Dwells {
         let given = match finding.steps {
             Steps::Given if !condensed.has_steps => {
                 let problem = "the dwells are to be those of the column step, and there is none";
-                return Err(Error::new("dwells", problem, "have them found").about(Argument::Steps));
+                return Err(
+                    Error::new("dwells", problem, "have them found").about(Argument::StepsFound)
+                );
             }
             Steps::Given | Steps::AsRecorded => condensed.has_steps,
             Steps::Found | Steps::AtRest => false,
@@ -286,11 +292,11 @@ impl Dwells {
             };
             let error = Error::undetermined("dwells", problem, remedy);
             return Err(match given {
-                true => error.about(Argument::Steps),
+                true => error.about(Argument::StepsFound),
                 false if condensed.has_steps => error
                     .map(|e| e.remedy += ", or take the dwells of the step column as given")
                     .about(Argument::StillFactor)
-                    .about(Argument::Steps),
+                    .about(Argument::StepsGiven),
                 false => error.about(Argument::StillFactor),
             });
         }
@@ -315,8 +321,10 @@ impl Dwells {
         }
         if !given && by_hand && !at_rest {
             leave_out_turning(&mut list, condensed);
+            warnings.extend(mark_slow_turns(&mut list));
         }
         warn(&list, manifest, &mut warnings);
+        warnings.extend(unit_in_si::at_rest(&list, manifest));
         Ok(Self {
             list,
             detection,
@@ -431,6 +439,7 @@ fn dwell(condensed: &Condensed, step: i32, range: Range<usize>, rails: &[Rails; 
         temp_c: average(|b, _| b.temp_c, 0),
         turn: false,
         moves: [false; 2],
+        turns_slowly: false,
         gyro_fault: None,
         accel_fault: None,
     }
@@ -453,6 +462,38 @@ fn leave_out_turning(list: &mut [Dwell], condensed: &Condensed) {
         dwell.gyro_fault = Some(Fault::Turning);
         dwell.accel_fault = Some(Fault::Turning);
     }
+}
+
+/// Marks the dwells that are no rest of the gyro, though they are poses of the accelerometer; what to say of them.
+fn mark_slow_turns(list: &mut [Dwell]) -> Option<String> {
+    let usable = |d: &&mut Dwell| Sensor::BOTH.iter().all(|s| d.fault(*s).is_none());
+    let mut usable: Vec<&mut Dwell> = list.iter_mut().filter(usable).collect();
+    let complete = usable.iter().all(|d| d.raw.iter().all(|m| m.n > 0));
+    if !complete {
+        return None;
+    }
+    let reading = |d: &&mut Dwell| Reading {
+        mean: d.raw.map(|m| m.mean),
+        duration_s: d.duration_s,
+    };
+    let readings: Vec<Reading> = usable.iter().map(reading).collect();
+    let slow = slow_turns::find(&readings);
+    for (dwell, slow) in usable.iter_mut().zip(slow) {
+        dwell.turns_slowly = slow;
+    }
+    let steps: Vec<String> = usable
+        .iter()
+        .filter(|d| d.turns_slowly)
+        .map(|d| d.step.to_string())
+        .collect();
+    let count = steps.len() as u64;
+    (count > 0).then(|| {
+        format!(
+            "{} ({}) not used as a rest of the gyro, only as a pose: what it reads there is explained neither by its bias in the others nor by g-sensitivity, as in a slow turn about the vertical",
+            plural(count, "dwell"),
+            steps.join(", ")
+        )
+    })
 }
 
 /// Finds the dwells whose known inputs move, and those where one moves too fast.

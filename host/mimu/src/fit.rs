@@ -1,6 +1,6 @@
 //! From a recording to a calibration of both triads, judged on what it was not fitted to.
 
-mod as_came;
+pub(crate) mod as_came;
 mod biases;
 mod by_gravity;
 pub mod change;

@@ -98,11 +98,13 @@ pub mod reading_step;
 pub mod rest;
 pub mod result;
 pub mod signed_low_byte;
+mod slow_turns;
 pub mod spectrum;
 pub mod stillness;
 pub mod survey;
 mod toml_layout;
 pub mod triad;
+mod unit_in_si;
 pub mod verify;
 
 pub use calibration::Calibration;

@@ -109,6 +109,7 @@ fn dwell(i: usize, pose: &PoseMean, period_s: f64, has_raw: &[bool; 6]) -> Dwell
         temp_c: pose.temp_c,
         turn: false,
         moves: [false; 2],
+        turns_slowly: false,
     }
 }
 

@@ -250,8 +250,13 @@ impl Prepared {
                 rate_variance: earth.variance(&up),
             }
         };
-        let observations = self.observations(Sensor::Gyro);
-        observations.into_iter().map(rest).collect()
+        let observations = self.observations(Sensor::Gyro).into_iter();
+        let dwells = &self.dwells;
+        let rests = |o: &Observation| {
+            let dwell = &dwells.list[o.dwell];
+            !dwell.turns_slowly || dwells.keep.keeps(dwell.step)
+        };
+        observations.filter(rests).map(rest).collect()
     }
 
     /// When the power came, on the clock of the recording, s: what the manifest says, or the first sample.
@@ -450,7 +455,9 @@ impl Prepared {
             return error;
         }
         let remedy = "; or, if the dwells of the step column are right, take them as given";
-        error.map(|e| e.remedy += remedy).about(Argument::Steps)
+        error
+            .map(|e| e.remedy += remedy)
+            .about(Argument::StepsGiven)
     }
 }
 

@@ -114,7 +114,7 @@ pub(crate) fn walk_in(stretches: &mut [Stretch], condensed: &Condensed) -> (u64,
 
 /// What a value is expected to be by its neighbours in time, and how far a trend may take it from there. Medians of three on each side, so that
 /// one more that strays misleads neither.
-fn expected(values: &[f64], i: usize) -> (f64, f64) {
+pub(crate) fn expected(values: &[f64], i: usize) -> (f64, f64) {
     let median = |range: Range<usize>| {
         let mut values = values[range].to_vec();
         quantile(&mut values, 0.5).unwrap_or(f64::NAN)

@@ -4,17 +4,19 @@
 //! read while the curves are computed.
 
 mod columns;
+mod masking;
 mod stretch;
 mod suitability;
+mod values;
 
-use std::ops::Range;
 use std::sync::mpsc::{channel, sync_channel};
 use std::thread;
 
 use self::columns::Columns;
+pub use self::masking::Masked;
 pub use self::stretch::Part;
-use self::stretch::{FEWEST, Stretch, temperature};
-use self::suitability::{Suitability, suitability};
+use self::stretch::{Stretch, temperature};
+use self::values::Values;
 use crate::allan::deviation::Integrated;
 use crate::allan::model::{
     Coefficient, Estimator, NoiseModel, Term, allan_factors, hadamard_factors,
@@ -24,6 +26,7 @@ use crate::allan::{Kind, Point, Spacing};
 use crate::calibration::Calibration;
 use crate::quantity::{Sensor, duration, significant};
 use crate::spectrum::{SetAside, set_aside_after};
+use crate::unit_in_si::of_sizes;
 use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{Column, RAW_COLUMNS, RawUnit, Recording};
 
@@ -51,6 +54,8 @@ pub struct Channel {
     pub unit: Unit,
     /// Samples that it was computed from.
     pub samples: usize,
+    /// Short disturbances that were masked.
+    pub masked: Option<Masked>,
     /// Deviation over averaging time.
     pub curve: Vec<Point>,
     /// Hadamard deviation, where a drift asks for it.
@@ -125,9 +130,9 @@ pub fn survey(
                 if asked.recv().is_err() {
                     break;
                 }
-                let read = columns.take(Column::Raw(*i)).and_then(|values| {
-                    Values::of(values, &stretch.rows, *i, *unit, stretch.period_s, place)
-                });
+                let read = columns
+                    .take(Column::Raw(*i))
+                    .and_then(|values| Values::of(values, stretch, options.part, *i, *unit, place));
                 // Refused only when the receiver has given up.
                 if sender.send(read).is_err() {
                     break;
@@ -144,7 +149,7 @@ pub fn survey(
                 Ok(read) => read?,
                 Err(_) => break,
             };
-            warnings.extend(values.warning);
+            warnings.extend(values.warnings);
             let samples = values.rates.len();
             if !estimators.iter().any(|(n, _)| *n == samples) {
                 let new = Estimator::new(samples, stretch.period_s, options.confidence);
@@ -157,22 +162,19 @@ pub fn survey(
             judged.push((i, values.suitability));
             let mut rates = values.rates;
             let dt_s = stretch.period_s;
-            let integral = |rates: &[f64]| {
-                let mut integrated = Integrated::empty(dt_s);
-                integrated.push(rates).map(|()| integrated)
-            };
+            // Kept are its curves, and not the integral, which is as long as the series.
             let mut as_it_is = None;
             let spectrum = set_aside_after(&mut rates, dt_s, options.confidence, |rates| {
-                as_it_is = Some(integral(rates));
+                as_it_is = Some(AsItIs::of(rates, dt_s, &options));
             });
-            let without_lines = integral(&rates)?;
-            drop(rates);
+            let without_lines = Integrated::new(rates, dt_s)?;
             next();
             let mut channel = Channel {
                 name: RAW_COLUMNS[i],
                 sensor: if i < 3 { Sensor::Gyro } else { Sensor::Accel },
                 unit: units[done],
                 samples,
+                masked: values.masked,
                 curve: Vec::new(),
                 hadamard: None,
                 spectrum,
@@ -181,20 +183,24 @@ pub fn survey(
                 n_band_hz: None,
             };
             let as_it_is = as_it_is.transpose()?;
-            let integrated = as_it_is.as_ref().unwrap_or(&without_lines);
             channel.analyse(
-                integrated,
+                as_it_is.as_ref(),
                 &without_lines,
                 estimator.map(|(_, e)| e),
                 &options,
             );
-            channel.judge_drift(integrated, heat, &options, &mut warnings);
+            let hadamard = || match as_it_is {
+                Some(curves) => curves.hadamard,
+                None => hadamard(&without_lines, &options),
+            };
+            channel.judge_drift(hadamard, heat, &options, &mut warnings);
             if channel.spectrum.remains {
                 warnings.push(format!(
                     "{}: lines that are not steady were set aside, and something still stands above the floor of the spectrum: the coefficients have some of it",
                     channel.name
                 ));
             }
+            channel.spectrum = channel.spectrum.without_spectrum();
             channels.push(channel);
             progress(0.1 + 0.9 * (done + 1) as f64 / indices.len() as f64);
         }
@@ -207,6 +213,13 @@ pub fn survey(
             )
         })
     })?;
+    let sizes = Sensor::BOTH.map(|sensor| {
+        let of_sensor = judged.iter().filter(|(i, _)| sensor.channels().contains(i));
+        let levels: Vec<f64> = of_sensor.map(|(_, seen)| seen.level()).collect();
+        let square = levels.iter().map(|level| level * level).sum::<f64>();
+        (levels.len() == 3).then(|| square.sqrt())
+    });
+    warnings.extend(of_sizes(sizes, &recording.manifest));
     suitability::refuse_motion(&judged, &stretch, options.part, &place, &mut warnings)?;
     Ok(Survey {
         recording: recording.directory.display().to_string(),
@@ -259,84 +272,60 @@ fn units(
     indices.iter().map(unit).collect()
 }
 
-/// One channel as it is computed with.
-struct Values {
-    rates: Vec<f64>,
-    suitability: Suitability,
-    warning: Option<String>,
+/// Curves of a channel with its lines.
+struct AsItIs {
+    curve: Vec<Point>,
+    hadamard: Vec<Point>,
 }
 
-impl Values {
-    /// The samples of `rows` in `unit`, checked; of a channel with empty cells the longest stretch without.
-    fn of(
-        mut values: Vec<f64>,
-        rows: &Range<usize>,
-        i: usize,
-        unit: Unit,
-        period_s: f64,
-        place: &str,
-    ) -> Result<Self> {
-        let place = format!("{place}, column {}", RAW_COLUMNS[i]);
-        values.truncate(rows.end);
-        values.drain(..rows.start);
-        let (mut warning, mut from) = (None, 0);
-        if let Some(first) = values.iter().position(|u| !u.is_finite()) {
-            let whole = stretch::longest(values.len(), |k| values[k].is_finite());
-            let row = rows.start + first + 1;
-            if whole.len() < FEWEST {
-                return Err(Error::new(
-                    format!("{place}, data row {row}"),
-                    format!("the cell is empty, and there are no {FEWEST} samples in a row"),
-                    "record again, or choose a stretch",
-                )
-                .about(Argument::Stretch));
-            }
-            warning = Some(format!(
-                "{}: empty cells, the first in data row {row}; the longest stretch without is used: {} from data row {}",
-                RAW_COLUMNS[i],
-                duration(whole.len() as f64 * period_s),
-                rows.start + whole.start + 1
-            ));
-            from = whole.start;
-            values.truncate(whole.end);
-            values.drain(..from);
-        }
-        let mut suitability = suitability(&values, period_s, &place)?;
-        if warning.is_some() {
-            suitability.begin_later(from);
-        }
-        for u in &mut values {
-            *u *= unit.per_raw;
-        }
+impl AsItIs {
+    fn of(rates: &[f64], dt_s: f64, options: &Options) -> Result<Self> {
+        let mut integrated = Integrated::empty(dt_s);
+        integrated.push(rates)?;
+        let times = Spacing::Samples(shown(rates.len(), options));
         Ok(Self {
-            rates: values,
-            suitability,
-            warning,
+            curve: integrated.curve(options.kind, &times, options.confidence),
+            hadamard: hadamard(&integrated, options),
         })
     }
 }
 
+/// Averaging times that are shown, in samples.
+fn shown(samples: usize, options: &Options) -> Vec<usize> {
+    let step = 1.0 / options.per_decade as f64;
+    let mut shown: Vec<usize> = (0..)
+        .map(|k| 10f64.powf(f64::from(k) * step).round() as usize)
+        .take_while(|m| 2 * m <= samples)
+        .collect();
+    shown.dedup();
+    shown
+}
+
+/// Hadamard deviation at the times that are shown.
+fn hadamard(integrated: &Integrated, options: &Options) -> Vec<Point> {
+    let times = Spacing::Samples(shown(integrated.samples(), options));
+    integrated.curve(Kind::Hadamard, &times, options.confidence)
+}
+
 impl Channel {
-    /// Curve of the channel as it is, and model of it without its lines: of the integrals with and without them.
+    /// Curve of the channel as it is, and model of it without its lines: of the curves with them, where there are any, and the integral without.
     fn analyse(
         &mut self,
-        integrated: &Integrated,
+        as_it_is: Option<&AsItIs>,
         without_lines: &Integrated,
         estimator: Option<&Estimator>,
         options: &Options,
     ) {
-        let step = 1.0 / options.per_decade as f64;
-        let mut shown: Vec<usize> = (0..)
-            .map(|k| 10f64.powf(f64::from(k) * step).round() as usize)
-            .take_while(|m| 2 * m <= self.samples)
-            .collect();
-        shown.dedup();
         let curve = |of: &Integrated, kind, times: &[usize]| {
             of.curve(kind, &Spacing::Samples(times.into()), options.confidence)
         };
-        self.curve = curve(integrated, options.kind, &shown);
-        if !self.spectrum.lines.is_empty() {
-            self.without_lines = Some(curve(without_lines, options.kind, &shown));
+        let own = curve(without_lines, options.kind, &shown(self.samples, options));
+        match as_it_is {
+            Some(with_lines) => {
+                self.curve.clone_from(&with_lines.curve);
+                self.without_lines = Some(own);
+            }
+            None => self.curve = own,
         }
         let allan = curve(without_lines, Kind::Allan, &allan_factors(self.samples));
         let hadamard = curve(
@@ -347,7 +336,7 @@ impl Channel {
         let unit = self.unit;
         let words = |term: Term, value: f64| unit.write(term, value);
         self.model = estimator.and_then(|e| e.fit(&allan, &hadamard, words));
-        self.read_white_band(integrated.dt_s(), options.confidence);
+        self.read_white_band(without_lines.dt_s(), options.confidence);
     }
 
     /// N from the spectrum, where the Allan curve is bent at its short end and the model does not show it, or not as it is.
@@ -388,7 +377,7 @@ impl Channel {
     /// Warns where the long end is a drift's, and adds what the Hadamard deviation shows without it.
     fn judge_drift(
         &mut self,
-        integrated: &Integrated,
+        hadamard: impl FnOnce() -> Vec<Point>,
         heat: Option<(f64, f64)>,
         options: &Options,
         warnings: &mut Vec<String>,
@@ -414,8 +403,7 @@ impl Channel {
             (None, None) => return,
         }
         if options.kind != Kind::Hadamard {
-            let spacing = Spacing::Samples(self.curve.iter().map(|p| p.m).collect());
-            self.hadamard = Some(integrated.curve(Kind::Hadamard, &spacing, options.confidence));
+            self.hadamard = Some(hadamard());
         }
     }
 }

@@ -7,11 +7,13 @@ use crate::calibration::Calibration;
 use crate::die_temperature::{WITHOUT_TEMPERATURE, at_one_temperature, outside};
 use crate::effects::removal::{removable, remove_within};
 use crate::estimate::turn::{Turn, direction_error};
+use crate::fit::as_came::{errors, exceeds};
 use crate::fit::refuse_wrong_gravity;
 use crate::prepared::{Prepared, si_covariance};
 use crate::quantity::Figure;
-use crate::quantity::Sensor;
+use crate::quantity::{Sensor, plural};
 use crate::triad::Forward;
+use crate::unit_in_si::restless;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{Manifest, RawUnit, Reference};
 
@@ -130,18 +132,36 @@ pub fn verify(prepared: &Prepared, calibration: &Calibration) -> Result<Verifica
             None => error,
         });
     }
+    let at_rest = sensors.iter().filter_map(|s| s.static_rms);
+    warnings.extend(at_rest.filter_map(restless));
     for s in &sensors {
-        if s.rms_as_came.is_some_and(|came| s.rms > came) {
-            warnings.push(format!(
-                "{}: worse than the readings as they came: is it the calibration of this unit?",
-                s.sensor
-            ));
-        } else if s.rms_as_came.is_none() && s.rms > s.rms_raw {
-            warnings.push(format!(
-                "{}: worse than with its own mean scale factor and mean bias on all three axes and no misalignment: is it the calibration of this unit, in this condition?",
-                s.sensor
-            ));
+        let (other, what, question) = match s.rms_as_came {
+            Some(came) => (came, "the readings as they came", "this unit"),
+            None => (
+                s.rms_raw,
+                "its own mean scale factor and mean bias on all three axes and no misalignment",
+                "this unit, in this condition",
+            ),
+        };
+        if !(s.rms > other) {
+            continue;
         }
+        let noun = if s.figure == Figure::Direction {
+            "turn"
+        } else {
+            "dwell"
+        };
+        warnings.push(match exceeds(s.rms, other, errors(s.figure, s.count)) {
+            true => format!(
+                "{}: worse than with {what}: is it the calibration of {question}?",
+                s.sensor
+            ),
+            false => format!(
+                "{}: {} do not tell whether it is better than {what}: record more",
+                s.sensor,
+                plural(s.count as u64, noun)
+            ),
+        });
     }
     Ok(Verification {
         same_recording,

@@ -49,8 +49,10 @@ pub enum Argument {
     Reference,
     /// Name of the unit.
     Device,
-    /// Where the dwells are taken from.
-    Steps,
+    /// The dwells of the step column as they are.
+    StepsGiven,
+    /// Dwells that are found, whatever the step column says.
+    StepsFound,
     /// Largest variance of a dwell.
     StillFactor,
     /// Whether the unit lies still throughout.
@@ -79,6 +81,8 @@ pub enum Argument {
     Preset,
     /// Whether rows are means, and no samples.
     Means,
+    /// How many rows that cannot be read are left out.
+    SkipBroken,
 }
 
 /// Result with [`Error`].

@@ -14,6 +14,7 @@ mod csv_file;
 mod csv_writer;
 mod digest;
 mod growing;
+mod held;
 mod import;
 mod in_order;
 mod manifest;
@@ -31,9 +32,11 @@ mod writer;
 pub use batch::Batch;
 pub use columns::{Column, Columns, RAW_COLUMNS, REFERENCE_COLUMNS};
 pub use growing::Growing;
+pub use held::{Held, HeldReadings};
 pub use import::{
-    Chosen, ColumnList, Decimal, ImportOptions, ImportSummary, Inputs, Jitter, Offset, PoseMean,
-    PoseMeans, Preset, PresetUse, Role, Rounds, Scale, SkippedLines, TimeSummary, import, is_bag,
+    BrokenKind, BrokenLimit, BrokenRows, Chosen, ColumnList, Decimal, ImportOptions, ImportSummary,
+    Inputs, Jitter, Offset, PoseMean, PoseMeans, Preset, PresetUse, Role, Rounds, Scale,
+    SkippedLines, TimeSummary, import, is_bag,
 };
 pub use manifest::read_text;
 pub use manifest::{Format, MANIFEST_FILE, Manifest, Rails, RawUnit, Reference, Source};

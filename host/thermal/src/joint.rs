@@ -10,7 +10,7 @@ use crate::path::is_one_way;
 use crate::profile::{LAGS, Lag, Profile};
 use crate::regression::AxisNoise;
 use crate::session::Session;
-use crate::suitability::{check_alike, check_span, check_speed};
+use crate::suitability::{Spans, check_alike, check_speed};
 use crate::thermometer::{Die, Start};
 
 /// A best lag farther than this, s, from that which the smoothness was found at has it found anew.
@@ -89,17 +89,6 @@ impl Joint {
     }
 }
 
-/// Temperatures of the thermometer over all rows of `sessions`.
-fn measured_range(sessions: &[Session]) -> [f64; 2] {
-    let temps = sessions.iter().flat_map(|s| {
-        let rows = s.rows.iter().flatten();
-        rows.map(|r| s.thermometer.at(r.middle_s).0)
-    });
-    temps.fold([f64::INFINITY, f64::NEG_INFINITY], |r, t| {
-        [r[0].min(t), r[1].max(t)]
-    })
-}
-
 /// Estimates all curves, and the lag unless it is given.
 ///
 /// # Errors
@@ -107,15 +96,16 @@ fn measured_range(sessions: &[Session]) -> [f64; 2] {
 /// lag.
 pub fn estimate(sessions: &[Session], choice: Choice) -> Result<Joint> {
     check_alike(sessions)?;
-    let range = measured_range(sessions);
+    let mut warnings = Vec::new();
+    let spans = Spans::of(sessions);
+    spans.check(sessions, &mut warnings)?;
+    let range = spans.range();
     let span = range[1] - range[0];
-    check_span(sessions, span)?;
     let shape = match (choice.shape, Shape::allowed(span)) {
         (_, Shape::Constant) | (Shape::Constant, _) => Shape::Constant,
         (_, Shape::Line) | (Shape::Line, _) => Shape::Line,
         (other, _) => other,
     };
-    let mut warnings = Vec::new();
     if shape != choice.shape {
         warnings.push(format!(
             "the recordings span {} K: curves are straight lines, as curvature needs 20 K",

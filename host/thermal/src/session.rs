@@ -85,6 +85,8 @@ pub struct Session {
     pub stated: [Option<AllanModel>; 6],
     /// Where the input is not known: times, s, at which the unit was put into another pose.
     pub moved_s: Vec<f64>,
+    /// Why samples are not in the rows, in words.
+    pub unused: String,
     /// What a person should know.
     pub warnings: Vec<String>,
 }
@@ -125,6 +127,7 @@ impl Session {
             samples: condensed.rows as f64,
             stated: std::array::from_fn(|c| prepared.noise.largest_stated(c)),
             moved_s,
+            unused: unused(prepared),
             warnings,
         })
     }
@@ -171,6 +174,19 @@ fn moves_warning(moved_s: &[f64]) -> Option<String> {
     Some(format!(
         "the unit was moved {times}, first at {first:.0} s: each pose has six bias offsets of its own, as gravity adds to them"
     ))
+}
+
+/// Why samples of `prepared` are in no row.
+fn unused(prepared: &Prepared) -> String {
+    let dwells = &prepared.dwells;
+    let within: u64 = dwells.list.iter().map(|d| d.rows).sum();
+    let outside = 1.0 - within as f64 / prepared.condensed.rows.max(1) as f64;
+    let sensor = Sensor::BOTH.into_iter().find(|s| prepared.has(*s));
+    format!(
+        "{:.1} % of the samples lie in no dwell{}",
+        100.0 * outside,
+        sensor.map_or_else(String::new, |sensor| dwells.unused(sensor))
+    )
 }
 
 /// Rows of all dwells that `sensor` can use.

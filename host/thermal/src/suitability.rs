@@ -1,7 +1,7 @@
 //! Recordings that no curves can be estimated from: what is wrong with them, and what to do.
 
 use mimu::quantity::{duration, significant};
-use mimu_recording::error::{Error, Result};
+use mimu_recording::error::{Argument, Error, Result};
 
 use crate::basis::SLOPE_SPAN;
 use crate::path::fastest;
@@ -10,6 +10,9 @@ use crate::session::Session;
 
 /// The die may lag behind by this share of the range at most; beyond, a first-order lag that is a tenth off shifts curves by kelvins.
 const BEHIND_SHARE: f64 = 0.25;
+
+/// Temperatures farther apart than this, K, are not neighbours: what biases do over them is a curve's to say, and no noise's.
+const GAP_K: f64 = 3.0;
 
 /// Refuses recordings of two units, or of different readings.
 pub fn check_alike(sessions: &[Session]) -> Result<()> {
@@ -45,21 +48,133 @@ pub fn check_alike(sessions: &[Session]) -> Result<()> {
     Ok(())
 }
 
-/// Refuses a span that shows no slope.
-pub fn check_span(sessions: &[Session], span: f64) -> Result<()> {
-    if span >= SLOPE_SPAN {
-        return Ok(());
+/// What `sessions` show of the temperature, each for itself: after every power-on the biases are others, and what they do over
+/// temperature is seen within a session only.
+pub struct Spans {
+    /// Lowest and highest temperature of each session, °C, by the lower end.
+    stretches: Vec<[f64; 2]>,
+}
+
+const NOWHERE: [f64; 2] = [f64::INFINITY, f64::NEG_INFINITY];
+
+fn widen(range: &mut [f64; 2], t: f64) {
+    *range = [range[0].min(t), range[1].max(t)];
+}
+
+impl Spans {
+    /// Of the rows of `sessions`.
+    pub fn of(sessions: &[Session]) -> Self {
+        let mut stretches: Vec<[f64; 2]> = sessions
+            .iter()
+            .map(|session| {
+                let mut range = NOWHERE;
+                for row in session.rows.iter().flatten() {
+                    widen(&mut range, session.thermometer.at(row.middle_s).0);
+                }
+                range
+            })
+            .filter(|range| range[0] <= range[1])
+            .collect();
+        stretches.sort_by(|a, b| a[0].total_cmp(&b[0]));
+        Self { stretches }
     }
-    let problem = format!(
-        "the temperature spans {} K only: a slope needs {SLOPE_SPAN} K, curvature 20 K",
-        significant(span.max(0.0))
-    );
-    let remedy = "heat or cool the unit further, or use `mimu fit`, which is for one temperature";
-    Err(Error::undetermined(
-        format!("{}, temp_c", sessions[0].place),
-        problem,
-        remedy,
-    ))
+
+    /// Lowest and highest temperature of all, °C.
+    pub fn range(&self) -> [f64; 2] {
+        let mut range = NOWHERE;
+        for t in self.stretches.iter().flatten() {
+            widen(&mut range, *t);
+        }
+        range
+    }
+
+    /// The widest of a session, °C.
+    fn widest(&self) -> [f64; 2] {
+        let span = |range: &&[f64; 2]| range[1] - range[0];
+        let widest = self
+            .stretches
+            .iter()
+            .max_by(|a, b| span(a).total_cmp(&span(b)));
+        widest.copied().unwrap_or([f64::NAN; 2])
+    }
+
+    /// Temperatures between two sessions that no session crosses, °C.
+    fn gaps(&self) -> Vec<[f64; 2]> {
+        let mut gaps = Vec::new();
+        let mut reached = f64::INFINITY;
+        for [low, high] in &self.stretches {
+            if low - reached > GAP_K {
+                gaps.push([reached, *low]);
+            }
+            reached = if reached.is_finite() {
+                reached.max(*high)
+            } else {
+                *high
+            };
+        }
+        gaps
+    }
+
+    /// Refuses recordings in which no session shows a slope: by what the column has, what of it is used, and what a single session has.
+    pub fn check(&self, sessions: &[Session], warnings: &mut Vec<String>) -> Result<()> {
+        let words = |[low, high]: [f64; 2]| match low <= high {
+            true => format!("{} K ({low:.1} to {high:.1} °C)", significant(high - low)),
+            false => "nothing".to_string(),
+        };
+        let mut column = NOWHERE;
+        for thermometer in sessions.iter().map(|s| &s.thermometer) {
+            for second in 0..=thermometer.duration_s() as u64 {
+                widen(
+                    &mut column,
+                    thermometer.at(thermometer.start_s() + second as f64).0,
+                );
+            }
+        }
+        let (used, widest) = (self.range(), self.widest());
+        let shows = |[low, high]: [f64; 2]| high - low >= SLOPE_SPAN;
+        let needs = format!("a slope needs {SLOPE_SPAN} K, curvature 20 K");
+        let (problem, remedy, declare) = if shows(widest) {
+            for [low, high] in self.gaps() {
+                warnings.push(format!(
+                    "no recording crosses {low:.1} to {high:.1} °C: what the biases do in between is drawn from one power-on to another, \
+                     and the intervals hold nothing of how well they repeat"
+                ));
+            }
+            return Ok(());
+        } else if shows(used) {
+            (
+                format!(
+                    "its dwells span {}, and no more than {} within one recording, each of which has biases of its own: {needs}",
+                    words(used),
+                    words(widest)
+                ),
+                "heat or cool the unit in one recording, without switching it off",
+                false,
+            )
+        } else if shows(column) {
+            (
+                format!(
+                    "the column spans {}, and the dwells that are used {}, as {}: {needs}",
+                    words(column),
+                    words(used),
+                    sessions[0].unused
+                ),
+                "hold the unit still at more temperatures, or declare that it was",
+                true,
+            )
+        } else {
+            (
+                format!("the column spans {} only: {needs}", words(column)),
+                "heat or cool the unit further, or use `mimu fit`, which is for one temperature",
+                false,
+            )
+        };
+        let error = Error::undetermined(format!("{}, temp_c", sessions[0].place), problem, remedy);
+        Err(match declare {
+            true => error.about(Argument::AtRest).about(Argument::StillFactor),
+            false => error,
+        })
+    }
 }
 
 /// Refuses a ramp in which the die is so far behind that a first-order lag decides everything.

@@ -2,7 +2,7 @@
 
 use mimu::blocks::{Block, Condensed};
 use mimu::quantity::{duration, significant};
-use mimu_recording::error::{Error, Result};
+use mimu_recording::error::{Argument, Error, Result};
 
 /// Spacing of the series, s. A die's lag is tens of seconds.
 const STEP_S: f64 = 1.0;
@@ -20,6 +20,21 @@ const SMALLEST_JUMP: f64 = 0.5;
 const POWERED_UP_S: f64 = 60.0;
 /// A jump is this many times what all but one second in two hundred change by.
 const JUMP_FACTOR: f64 = 12.0;
+
+/// What can be a temperature in °C at all, from absolute zero: counts of a converter are mostly beyond.
+const POSSIBLE_C: std::ops::RangeInclusive<f64> = -273.15..=1000.0;
+
+/// Refuses temperatures that are none, at their times.
+fn check_possible(known: &[(f64, f64)], place: &str) -> Result<()> {
+    let Some((t, c)) = known.iter().find(|(_, c)| !POSSIBLE_C.contains(c)) else {
+        return Ok(());
+    };
+    let problem = format!("{c} at {t:.1} s is no temperature in °C");
+    let remedy = "import the readings again, with a factor and an offset for temp_c";
+    Err(Error::new(place, problem, remedy)
+        .about(Argument::Scale)
+        .about(Argument::Offset))
+}
 
 /// Temperatures of the thermometer in even steps of time, with their slope.
 #[derive(Debug, Clone)]
@@ -50,6 +65,7 @@ impl Thermometer {
         if known.is_empty() {
             return Err(missing(&place, "there is no temperature"));
         }
+        check_possible(&known, &place)?;
         check_gaps(&condensed.blocks, &place)?;
         check_stuck(&known, &place)?;
         let mut series = Self::evenly(&known, first.start_s, last.last_s);

@@ -7,8 +7,8 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use mimu::quantity::{implausible_gravity, normal_gravity};
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{
-    ColumnList, Decimal, ImportOptions, Offset, Preset, RawUnit, Reference, SampleFormat, Scale,
-    Separator, import, is_bag,
+    BrokenLimit, ColumnList, Decimal, ImportOptions, Offset, Preset, RawUnit, Reference,
+    SampleFormat, Scale, Separator, import, is_bag,
 };
 
 use crate::arguments::JsonArgs;
@@ -78,6 +78,9 @@ pub(crate) struct ImportArgs {
     /// Separator of text files: comma, semicolon, tab or space; found out without it
     #[arg(long)]
     separator: Option<Separator>,
+    /// Leave out rows that cannot be read: so many (`=20`), or a share of each file (`=2%`); 1 % of it where neither is given
+    #[arg(long, value_name = "LIMIT", num_args = 0..=1, require_equals = true, default_missing_value = "1%", conflicts_with = "means")]
+    skip_broken: Option<BrokenLimit>,
     /// Format of the samples: parquet or csv
     #[arg(long, default_value = "parquet")]
     format: SampleFormat,
@@ -137,6 +140,7 @@ pub(crate) fn run(args: ImportArgs) -> Result<()> {
         inputs: args.inputs,
         means: args.means,
         sequence: args.sequence,
+        skip_broken: args.skip_broken.unwrap_or_default(),
         format: args.format,
         replace: args.replace,
         ..ImportOptions::new(args.files, gravity, raw_unit, args.reference)

@@ -67,6 +67,12 @@ pub fn import_text(summary: &ImportSummary) -> String {
             let _ = writeln!(out, "  {} {what}", plural(n, noun));
         }
     }
+    for broken in &summary.broken_rows {
+        let _ = writeln!(out, "  {}: left out: {broken}", broken.file);
+        for kind in &broken.kinds {
+            let _ = writeln!(out, "    {}", kind.example);
+        }
+    }
     warn(&mut out, summary.warnings.iter());
     out
 }

@@ -310,6 +310,70 @@ fn what_is_not_at_rest_or_not_alive_is_refused_with_its_place() {
 }
 
 #[test]
+fn a_short_knock_is_masked_and_counted_and_leaves_the_coefficients_as_they_are() {
+    let folder = tempfile::tempdir().unwrap();
+    let still = at_rest(60_000);
+    let mut knocked = still.clone();
+    for row in &mut knocked[31_230..31_236] {
+        row[1..].iter_mut().for_each(|u| *u += 100.0 * N);
+    }
+    let json = |rows: &[[f64; 7]]| -> serde_json::Value {
+        write(folder.path(), rows);
+        serde_json::from_str(&done(folder.path(), "allan r --json -")).unwrap()
+    };
+    let (before, after) = (json(&still), json(&knocked));
+    for (a, b) in before["channels"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .zip(after["channels"].as_array().unwrap())
+    {
+        assert_eq!(a["masked_samples"], 0);
+        // Two windows of a second: the one with the knock, and that in which the mean comes back.
+        assert_eq!(b["masked_samples"], 200, "{b}");
+        let n = |c: &serde_json::Value| c["n"]["value"].as_f64().unwrap();
+        assert!((n(b) / n(a) - 1.0).abs() < 0.01, "{} {}", n(a), n(b));
+    }
+    let said = after["warnings"].to_string();
+    assert!(
+        said.contains(
+            "gyro_x: 200 samples, 0.333 % of the time, are disturbed, first at 312.0 s: masked"
+        ),
+        "{said}"
+    );
+    // One that leaves the unit in another pose is none that passes.
+    for row in &mut knocked[31_236..] {
+        row[4] += 50.0 * N;
+    }
+    write(folder.path(), &knocked);
+    let error = refused(folder.path(), "allan r");
+    assert!(
+        error.contains("2 of 600 windows of 1.00 s, 0.333 % of the time"),
+        "{error}"
+    );
+}
+
+#[test]
+fn readings_in_si_that_are_none_are_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut rows = at_rest(6000);
+    for row in &mut rows {
+        row[1] += 1.5;
+        row[6] -= 7.35;
+    }
+    write(folder.path(), &rows);
+    let text = done(folder.path(), "allan r");
+    assert!(
+        text.contains("no bias is as large: the unit turns evenly"),
+        "{text}"
+    );
+    assert!(
+        text.contains("accel: raw_unit = \"SI\", but the readings are 0.250 times"),
+        "{text}"
+    );
+}
+
+#[test]
 fn the_longest_stretch_without_a_gap_or_an_empty_cell_is_used_and_told_of() {
     let folder = tempfile::tempdir().unwrap();
     let mut rows = at_rest(6000);

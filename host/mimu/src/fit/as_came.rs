@@ -12,6 +12,7 @@ use crate::estimate::turn::{Turn, direction_error};
 use crate::prepared::Prepared;
 use crate::quantity::{Figure, significant};
 use mimu_recording::RawUnit;
+use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 /// Error of readings in SI whose inputs are known.
 pub(super) fn inputs<'a>(
@@ -63,10 +64,51 @@ pub(super) fn compare(fit: &mut SensorFit) {
         return;
     }
     let (factor, unit) = fit.figure.readable(fit.sensor);
+    let count = fit.residuals.len();
+    let verdict = match exceeds(calibrated, came, errors(fit.figure, count)) {
+        true => "this calibration is no better than none".to_string(),
+        false => format!("{count} errors do not tell whether this calibration is better than none"),
+    };
     fit.warnings.push(format!(
-        "{}: the readings as they came err by {} {unit}, and calibrated by {} {unit} {how}: this calibration is no better than none",
+        "{}: the readings as they came err by {} {unit}, and calibrated by {} {unit} {how}: {verdict}",
         fit.sensor,
         significant(came * factor),
         significant(calibrated * factor)
     ));
+}
+
+/// Probability that what is said to be larger is so by chance.
+const BY_CHANCE: f64 = 0.025;
+
+/// Numbers that `count` errors of a figure are.
+pub(crate) fn errors(figure: Figure, count: usize) -> usize {
+    count
+        * match figure {
+            Figure::Input => 3,
+            Figure::Direction => 2,
+            Figure::GravitySize => 1,
+        }
+}
+
+/// Whether an rms is larger than another one of as many `errors`, and not by chance: the ratio of two variances. Three errors that are 3.6
+/// times as large show nothing. Errors of the same dwells are alike, which makes the test a careful one.
+pub(crate) fn exceeds(rms: f64, other: f64, errors: usize) -> bool {
+    let dof = errors as f64;
+    let by_chance = FisherSnedecor::new(dof, dof).map_or(1.0, |f| f.sf((rms / other).powi(2)));
+    rms > other && by_chance < BY_CHANCE
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_few_errors_say_is_no_comparison() {
+        // The 97.5 % quantiles of F: 15.44 for 3 and 3, 1.75 for 50 and 50.
+        assert!(!exceeds(3.63, 1.0, 3));
+        assert!(exceeds(3.94, 1.0, 3));
+        assert!(!exceeds(1.32, 1.0, 50));
+        assert!(exceeds(1.33, 1.0, 50));
+        assert!(!exceeds(1.0, 3.0, 50));
+    }
 }

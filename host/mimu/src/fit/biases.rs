@@ -107,6 +107,15 @@ pub fn fit_biases(
             HoldOut::none(),
         ));
     }
+    let without_inputs = prepared.manifest.reference == Reference::Table
+        && prepared.condensed.has_reference == [false; 6];
+    if sensors.is_empty() && without_inputs {
+        return Err(Error::new(
+            &prepared.place,
+            "the reference is a table, and no dwell has a known input",
+            "give dwells of a second and more their inputs in the ref_ columns, or set reference = \"gravity\" where there is no table",
+        ));
+    }
     if sensors.is_empty() {
         return Err(Error::new(
             &prepared.place,

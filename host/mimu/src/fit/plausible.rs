@@ -11,6 +11,7 @@ use crate::quantity::Figure;
 use crate::quantity::Sensor;
 use crate::quantity::plural;
 use crate::quantity::significant;
+use crate::unit_in_si::{restless, wrong_gain};
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{RAW_COLUMNS, RawUnit, Reference};
 
@@ -53,6 +54,7 @@ pub fn check(prepared: &Prepared, fit: &mut SensorFit) -> Result<()> {
         refuse_unrelated(prepared, fit)?,
         outliers(prepared, fit),
         unit(prepared, fit),
+        rests(fit),
         turned(prepared, fit),
         off_level(prepared, fit),
     ];
@@ -189,44 +191,26 @@ fn outliers(prepared: &Prepared, fit: &SensorFit) -> Option<String> {
     ))
 }
 
-/// Readings in SI with a gain beyond this, or below its inverse, have a wrong unit or time base: sensors are within ten per cent.
-const GAIN: f64 = 1.3;
-
 /// What claims to be in SI reads about what it measures.
 fn unit(prepared: &Prepared, fit: &SensorFit) -> Option<String> {
     let matrix = &fit.estimated.triad.forward.matrix;
     let scale = matrix.row_iter().map(|r| r.norm()).sum::<f64>() / 3.0;
-    if prepared.manifest.raw_unit != RawUnit::Si || (1.0 / GAIN..GAIN).contains(&scale) {
+    // Of the magnitude at rest the dwells have said it.
+    let told = fit.figure == Figure::GravitySize;
+    if prepared.manifest.raw_unit != RawUnit::Si || told {
         return None;
     }
-    let near = |factor: f64| (0.8..1.25).contains(&(scale / factor));
-    let degrees = 180.0 / std::f64::consts::PI;
-    let by_turns = fit.figure == Figure::Direction;
-    let cause = match fit.sensor {
-        Sensor::Gyro if near(degrees) => "they are in deg/s, and SI is rad/s",
-        Sensor::Gyro if near(degrees.recip()) && by_turns => {
-            "they were converted from deg/s to rad/s twice"
-        }
-        Sensor::Gyro if near(degrees.recip()) => {
-            "the ref_ columns are not in deg/s, or the readings were converted to rad/s twice"
-        }
-        // Over the turns the gyro is integrated: stamps that run twice as fast halve the scale factor.
-        Sensor::Gyro if by_turns && (0.1..10.0).contains(&scale) => {
-            "time base or unit? If the stamps or the sample rate are off by this factor, so is every angle that the gyro is integrated to"
-        }
-        Sensor::Accel if near(1.0 / prepared.manifest.gravity_mps2) => {
-            "they are in g, and SI is m/s²"
-        }
-        Sensor::Accel if near(prepared.manifest.gravity_mps2) => {
-            "they were multiplied by gravity twice"
-        }
-        _ => "unit, or range setting of the part?",
-    };
-    Some(format!(
-        "{}: raw_unit = \"SI\", but the readings are {} times the input: {cause}",
+    wrong_gain(
         fit.sensor,
-        significant(scale)
-    ))
+        scale,
+        prepared.manifest.gravity_mps2,
+        fit.figure,
+    )
+}
+
+/// Rests of a gyro that are none.
+fn rests(fit: &SensorFit) -> Option<String> {
+    fit.static_rms.and_then(|(rms, _)| restless(rms))
 }
 
 /// How the axes lie to those that they are referred to.

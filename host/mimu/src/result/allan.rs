@@ -76,6 +76,8 @@ pub struct ChannelResult {
     pub scale_factor: Option<f64>,
     /// Samples that it was computed from.
     pub samples: usize,
+    /// Samples of these that were disturbed for a short time, and are masked.
+    pub masked_samples: usize,
     /// Averaging times, s.
     pub tau_s: Vec<f64>,
     /// Deviations.
@@ -262,6 +264,7 @@ impl ChannelResult {
             raw_unit: channel.unit.scaled_from,
             scale_factor: channel.unit.scaled_from.map(|_| 1.0 / channel.unit.per_raw),
             samples: channel.samples,
+            masked_samples: channel.masked.map_or(0, |masked| masked.samples),
             tau_s: column(|p| p.tau_s),
             adev: column(|p| p.deviation),
             lower: column(|p| p.lower),

@@ -2,7 +2,7 @@
 
 use super::stretch::{FEWEST, Part, Stretch, longest, segments};
 use crate::blocks::quantile;
-use crate::quantity::duration;
+use crate::quantity::{duration, significant};
 use crate::stillness::{STILL_FACTOR, WINDOW_S};
 use mimu_recording::RAW_COLUMNS;
 use mimu_recording::error::{Argument, Error, Result};
@@ -11,18 +11,30 @@ use mimu_recording::error::{Argument, Error, Result};
 #[derive(Debug, Clone)]
 pub(super) struct Suitability {
     /// Samples in a window.
-    window: usize,
+    pub window: usize,
     /// Whether each window is disturbed.
-    moving: Vec<bool>,
+    pub moving: Vec<bool>,
+    /// Mean of each window, raw.
+    pub means: Vec<f64>,
+    /// Largest step between the means of two quiet windows, raw.
+    pub reach: f64,
     /// Means of equal parts of the stretch, raw.
     pub levels: Vec<f64>,
 }
 
 impl Suitability {
+    /// Mean of the windows, raw.
+    pub fn level(&self) -> f64 {
+        let known = self.means.iter().filter(|mean| mean.is_finite());
+        known.clone().sum::<f64>() / known.count() as f64
+    }
+
     /// Of a channel that begins `samples` later than the stretch: nothing is known before, and its means are of other times
     /// than the temperature's.
     pub fn begin_later(&mut self, samples: usize) {
-        self.moving.splice(0..0, vec![false; samples / self.window]);
+        let windows = samples / self.window;
+        self.moving.splice(0..0, vec![false; windows]);
+        self.means.splice(0..0, vec![f64::NAN; windows]);
         self.levels.clear();
     }
 }
@@ -117,6 +129,8 @@ pub(super) fn suitability(raw: &[f64], period_s: f64, place: &str) -> Result<Sui
     Ok(Suitability {
         window,
         moving,
+        means,
+        reach,
         levels: segments(raw),
     })
 }
@@ -149,8 +163,9 @@ pub(super) fn refuse_motion(
     let time = |k: usize| stretch.span_s[0] + k as f64 * window_s;
     let count = (0..windows).filter(|k| moves(*k)).count();
     let problem = format!(
-        "the unit moves, or something shakes it, in {:.1} % of the time, first at {:.1} s ({name})",
-        100.0 * count as f64 / windows as f64,
+        "the unit moves, or something shakes it, in {count} of {windows} windows of {}, {} % of the time, first at {:.1} s ({name})",
+        duration(window_s),
+        significant(100.0 * count as f64 / windows as f64),
         time(first)
     );
     if part != Part::Whole {

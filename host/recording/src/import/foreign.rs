@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::SkippedLines;
 use super::assignment::{ColumnList, Offset, Role, Scale};
+use super::broken::{BrokenLimit, BrokenTally, Fault, Unreadable};
 use super::counter::{Counter, StampCounter};
 use super::parquet_table::ParquetTable;
 use super::plausibility::Plausibility;
@@ -12,7 +13,7 @@ use super::row::Row;
 use super::step_labels::StepLabels;
 use super::text_table::{Cells, TextTable};
 use super::time::{Clock, Decimal, Times};
-use crate::cell::{is_reading, no_reading, no_time};
+use crate::cell::{Refusal, is_reading, no_reading, no_time};
 use crate::columns::Column;
 use crate::error::{Argument, Error, Result};
 use crate::separator::Separator;
@@ -30,6 +31,8 @@ pub(super) struct HowToRead<'a> {
     pub rate_hz: Option<f64>,
     /// Unit of the time stamps, where it was given.
     pub time_unit: Option<Decimal>,
+    /// How many broken rows may be left out.
+    pub skip_broken: BrokenLimit,
 }
 
 /// A foreign file, positioned at its next row.
@@ -49,7 +52,8 @@ pub(super) struct ForeignFile {
     pub seen: Plausibility,
     has_step: bool,
     pub labels: StepLabels,
-    rows: u64,
+    /// Rows so far, and those that could not be read.
+    pub broken: BrokenTally,
 }
 
 #[derive(Debug)]
@@ -157,7 +161,7 @@ impl ForeignFile {
             clock: None,
             before: Row::default(),
             labels: StepLabels::default(),
-            rows: 0,
+            broken: BrokenTally::new(how.skip_broken),
         })
     }
 
@@ -169,6 +173,15 @@ impl ForeignFile {
     /// Columns with numbers, in the order of [`Row::values`].
     pub fn columns(&self) -> impl Iterator<Item = Column> + '_ {
         self.values.iter().map(|cell| cell.column)
+    }
+
+    /// Rows a second; not a number before its times are known.
+    pub fn rate_hz(&self) -> f64 {
+        match (&self.clock, self.source) {
+            (Some(clock), _) => clock.times().summary.rate_hz,
+            (None, TimeSource::Sample(_, rate) | TimeSource::Rows(rate)) => rate,
+            (None, TimeSource::Stamp) => f64::NAN,
+        }
     }
 
     /// Whether it says which step a row belongs to.
@@ -236,11 +249,22 @@ impl ForeignFile {
         format!("{}, row {number}", self.path.display())
     }
 
-    /// Reads the next row; `false` at the end.
+    /// Reads the next row; `false` at the end. Broken rows are passed over; at the end more of them than may be left out are refused, so that
+    /// a person hears of all kinds at once.
     pub fn next(&mut self, row: &mut Row) -> Result<bool> {
         loop {
-            if !self.read(row)? {
-                return Ok(false);
+            match self.read(row) {
+                Ok(true) => self.broken.rows += 1,
+                Ok(false) => {
+                    self.broken.check()?;
+                    return Ok(false);
+                }
+                Err(Unreadable::Row(broken)) => {
+                    self.broken.rows += 1;
+                    self.broken.add(broken)?;
+                    continue;
+                }
+                Err(Unreadable::File(error)) => return Err(error),
             }
             let zero_stamp = self.has_time() && row.stamp.value == 0.0;
             if self
@@ -264,7 +288,7 @@ impl ForeignFile {
         }
     }
 
-    fn read(&mut self, row: &mut Row) -> Result<bool> {
+    fn read(&mut self, row: &mut Row) -> std::result::Result<bool, Unreadable> {
         let number = match &mut self.table {
             Table::Text(table) => table.next(&mut self.cells)?,
             Table::Parquet(table) => table.next(&mut self.cells)?,
@@ -273,48 +297,55 @@ impl ForeignFile {
         let Some(number) = number else {
             return Ok(false);
         };
-        row.number = number;
-        row.stamp = self.cells.stamp;
-        row.t_s = match self.source {
-            TimeSource::Stamp => 0.0,
-            TimeSource::Sample(cell, rate) => self.counter.next(self.cells.numbers[cell]) / rate,
-            TimeSource::Rows(rate) => self.rows as f64 / rate,
-        };
+        let at = |path: &Path| format!("{}, row {number}", path.display());
         let time = match self.source {
-            TimeSource::Stamp => row.stamp.value,
-            _ => row.t_s,
+            TimeSource::Stamp => self.cells.stamp.value,
+            TimeSource::Sample(cell, rate) => self.cells.numbers[cell] / rate,
+            // A broken row was a sample as well, and took its time.
+            TimeSource::Rows(rate) => self.broken.rows as f64 / rate,
         };
         if time.is_nan() || !is_reading(time) {
             let refusal = match time.is_nan() {
                 true => no_time(),
                 false => no_reading(time, &format!("a time of {time:e}")),
             };
-            return Err(Error::new(
-                self.place(number),
-                refusal.problem,
-                refusal.remedy,
+            return Err(Unreadable::row(
+                number,
+                Fault::Time,
+                at(&self.path),
+                refusal,
             ));
-        }
-        row.step = -1;
-        if self.has_step {
-            row.step = self.labels.number(&self.cells.step).map_err(|refusal| {
-                let place = format!("{}, column step", self.place(number));
-                Error::new(place, refusal.problem, refusal.remedy)
-            })?;
         }
         row.values.clear();
         for cell in &self.values {
             let (number_in_file, factor) = (self.cells.numbers[cell.at], cell.factor);
             let value = number_in_file * factor + cell.offset;
             if !is_reading(value) {
-                let place = format!("{}, column {}", self.place(number), cell.column.name());
-                let problem =
-                    format!("{number_in_file:e} times {factor:e} is too large for a reading");
-                return Err(Error::new(place, problem, "correct the cell or the factor"));
+                let place = format!("{}, column {}", at(&self.path), cell.column.name());
+                let refusal = Refusal {
+                    problem: format!(
+                        "{number_in_file:e} times {factor:e} is too large for a reading"
+                    ),
+                    remedy: "correct the cell or the factor",
+                };
+                return Err(Unreadable::row(number, Fault::Reading, place, refusal));
             }
             row.values.push(value);
         }
-        self.rows += 1;
+        row.step = -1;
+        if self.has_step {
+            row.step = self.labels.number(&self.cells.step).map_err(|refusal| {
+                let place = format!("{}, column step", at(&self.path));
+                Unreadable::row(number, Fault::Step, place, refusal)
+            })?;
+        }
+        row.number = number;
+        row.stamp = self.cells.stamp;
+        row.t_s = match self.source {
+            TimeSource::Stamp => 0.0,
+            TimeSource::Sample(cell, rate) => self.counter.next(self.cells.numbers[cell]) / rate,
+            TimeSource::Rows(_) => time,
+        };
         Ok(true)
     }
 }

@@ -3,10 +3,12 @@
 use std::path::{Path, PathBuf};
 
 use super::assignment::{ColumnList, Offset, Scale};
+use super::broken::BrokenLimit;
 use super::foreign::HowToRead;
 use super::preset::{Chosen, PresetUse};
 use super::time::Decimal;
-use crate::manifest::{RawUnit, Reference};
+use crate::error::{Argument, Error, Result};
+use crate::manifest::{RawUnit, Reference, check_gravity, check_rate};
 use crate::separator::Separator;
 use crate::writer::SampleFormat;
 
@@ -43,6 +45,8 @@ pub struct ImportOptions {
     pub inputs: Option<PathBuf>,
     /// Whether the files follow one another, each a step with the name of its file, in place of being joined on their times.
     pub sequence: bool,
+    /// How many rows that cannot be read may be left out.
+    pub skip_broken: BrokenLimit,
     /// Whether the rows are means over a pose or a step each, and no samples.
     pub means: bool,
     /// What a preset has said of the files; see [`ImportOptions::with_preset`].
@@ -79,6 +83,7 @@ impl ImportOptions {
             latitude_deg: None,
             inputs: None,
             sequence: false,
+            skip_broken: BrokenLimit::None,
             means: false,
             preset: None,
             preset_warnings: Vec::new(),
@@ -99,6 +104,38 @@ impl ImportOptions {
         self.preset = Some(chosen.used);
         self.preset_warnings = chosen.warnings;
         self
+    }
+
+    /// Refuses options that contradict each other, or a recording at `out` that one of the files lies in.
+    pub(super) fn check(&self, out: &Path) -> Result<()> {
+        let refuse = |problem: String, remedy: &str| Err(Error::new("import", problem, remedy));
+        let (files, lists) = (self.files.len(), self.columns.len());
+        if files == 0 {
+            return refuse("no file is given".to_owned(), "name the files to import");
+        }
+        let one_for_all = self.sequence && lists == 1;
+        if lists != 0 && lists != files && !one_for_all {
+            return refuse(
+                format!("there are {files} files and {lists} lists of columns"),
+                "give one list of columns for each file, in their order",
+            );
+        }
+        if let Some(rate) = self.rate_hz {
+            check_rate(rate, "import, sample_rate_hz")
+                .map_err(|e| e.about(Argument::SampleRate))?;
+        }
+        check_gravity(self.gravity_mps2, "import, gravity")?;
+        // A source inside the recording that is to be replaced would be deleted with it.
+        for file in self.files.iter().chain(&self.inputs) {
+            let (Ok(file), Ok(out)) = (file.canonicalize(), out.canonicalize()) else {
+                continue;
+            };
+            if file.starts_with(&out) {
+                let problem = format!("{} lies in the recording to write", file.display());
+                return refuse(problem, "choose another name for the recording");
+            }
+        }
+        Ok(())
     }
 
     /// The options as arguments of `mimu import`, for the manifest. File names only: where the
@@ -139,6 +176,13 @@ impl ImportOptions {
         for offset in &self.offsets {
             option("--offset", offset.to_string());
         }
+        if self.skip_broken != BrokenLimit::None {
+            arguments.push(format!("--skip-broken={}", self.skip_broken));
+        }
+        let mut option = |name: &str, value: String| {
+            arguments.push(name.to_owned());
+            arguments.push(value);
+        };
         if let Some(topic) = &self.topic {
             option("--topic", topic.clone());
         }
@@ -163,6 +207,7 @@ impl ImportOptions {
             topic: self.topic.as_deref(),
             rate_hz: self.rate_hz,
             time_unit: self.time_unit,
+            skip_broken: self.skip_broken,
         }
     }
 }

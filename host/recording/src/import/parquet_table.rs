@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use parquet::data_type::ByteArray;
 
 use super::assignment::{ColumnList, Role};
+use super::broken::{Fault, Unreadable};
 use super::text_table::Cells;
 use super::time::Stamp;
 use crate::cell::{is_reading, no_reading};
@@ -142,7 +143,7 @@ impl ParquetTable {
     }
 
     /// Reads the next row into `cells` and returns its number from 1, or `None` at the end.
-    pub fn next(&mut self, cells: &mut Cells) -> Result<Option<u64>> {
+    pub fn next(&mut self, cells: &mut Cells) -> std::result::Result<Option<u64>, Unreadable> {
         if self.row == self.rows {
             return Ok(None);
         }
@@ -151,22 +152,25 @@ impl ParquetTable {
         }
         cells.numbers.clear();
         cells.step.clear();
+        let at = self.at;
+        self.at += 1;
+        self.row += 1;
         for column in &self.columns {
             let step = column.role == Role::Column(Column::Step);
             if column.leaf.is_text() {
-                cells.step.extend_from_slice(column.texts[self.at].data());
+                cells.step.extend_from_slice(column.texts[at].data());
                 cells.numbers.push(f64::NAN);
                 continue;
             }
-            let value = column.values[self.at];
+            let value = column.values[at];
             if !is_reading(value) {
-                let (path, row) = (self.path.display(), self.row + 1);
+                let (path, row) = (self.path.display(), self.row);
                 let place = format!("{path}, row {row}, column {}", column.name);
                 let refusal = no_reading(value, &format!("{value:e}"));
-                return Err(Error::new(place, refusal.problem, refusal.remedy));
+                return Err(Unreadable::row(row, Fault::Reading, place, refusal));
             }
             if column.role == Role::Column(Column::Time) {
-                let whole = column.wholes.get(self.at).copied().flatten();
+                let whole = column.wholes.get(at).copied().flatten();
                 cells.stamp = whole.map_or_else(|| Stamp::from(value), Stamp::from);
             }
             if step {
@@ -174,8 +178,6 @@ impl ParquetTable {
             }
             cells.numbers.push(value);
         }
-        self.at += 1;
-        self.row += 1;
         Ok(Some(self.row))
     }
 

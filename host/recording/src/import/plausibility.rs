@@ -1,9 +1,11 @@
-//! Readings that no sensor makes: zeros that only fill a row, and temperatures that are none.
+//! Readings that no sensor makes: zeros that only fill a row, temperatures that are none, readings that are held or of two sources.
 
 use super::row::Row;
+use super::two_sources::TwoSources;
 use crate::columns::Column;
 use crate::columns::RAW_COLUMNS;
 use crate::error::{Argument, Error, Result};
+use crate::held::HeldReadings;
 
 /// What silicon and the chambers around it reach, °C.
 const USUAL_C: std::ops::RangeInclusive<f64> = -100.0..=200.0;
@@ -18,7 +20,7 @@ pub(super) fn no_temperature(c: f64) -> Option<&'static str> {
 }
 
 /// What the readings of a file have shown.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub(super) struct Plausibility {
     /// Of both sensors: places among the values of a row, and channels.
     sensors: [Vec<(usize, usize)>; 2],
@@ -30,6 +32,9 @@ pub(super) struct Plausibility {
     /// Whether a value other than 0 was seen, of each of the six channels.
     alive: [bool; 6],
     rows: u64,
+    /// Of both sensors.
+    held: [HeldReadings; 2],
+    two_sources: TwoSources,
     temperatures: u64,
     lowest_c: f64,
     highest_c: f64,
@@ -41,19 +46,31 @@ pub(super) struct Plausibility {
 impl Plausibility {
     /// Of a file with these columns.
     pub fn new(columns: impl Iterator<Item = Column>) -> Self {
-        let mut all = Plausibility {
-            lowest_c: f64::INFINITY,
-            highest_c: f64::NEG_INFINITY,
-            ..Plausibility::default()
-        };
+        let mut sensors: [Vec<(usize, usize)>; 2] = Default::default();
+        let mut temperature = None;
         for (place, column) in columns.enumerate() {
             match column {
-                Column::Raw(c) => all.sensors[c / 3].push((place, c)),
-                Column::Temperature => all.temperature = Some(place),
+                Column::Raw(c) => sensors[c / 3].push((place, c)),
+                Column::Temperature => temperature = Some(place),
                 _ => {}
             }
         }
-        all
+        let channels = sensors.iter().flatten().copied();
+        Plausibility {
+            two_sources: TwoSources::new(channels),
+            sensors,
+            temperature,
+            padding: 0,
+            empty_accel: 0,
+            alive: [false; 6],
+            rows: 0,
+            held: Default::default(),
+            temperatures: 0,
+            lowest_c: f64::INFINITY,
+            highest_c: f64::NEG_INFINITY,
+            impossible: 0,
+            first_impossible: None,
+        }
     }
 
     /// Whether `row` is padding: of a buffer, or of a time at which nothing was connected. Looks at its temperature as well.
@@ -83,6 +100,12 @@ impl Plausibility {
             let value = row.values[place];
             self.alive[channel] |= value != 0.0 && !value.is_nan();
         }
+        for (sensor, held) in self.sensors.iter().zip(&mut self.held) {
+            if let [x, y, z] = sensor[..] {
+                held.push([x, y, z].map(|(place, _)| row.values[place]));
+            }
+        }
+        self.two_sources.push(row);
         self.rows += 1;
         if let Some(place) = self.temperature {
             row.values[place] = self.temperature(row.values[place], row.number);
@@ -125,6 +148,7 @@ impl Plausibility {
             )
             .about(Argument::Columns));
         }
+        self.two_sources.check(place)?;
         if let Some((row, c)) = self.first_impossible
             && 2 * self.impossible > self.temperatures
         {
@@ -142,9 +166,19 @@ impl Plausibility {
         Ok(())
     }
 
-    /// One sentence for each thing that was left out or looks wrong; `place` is the file.
-    pub fn warnings(&self, place: &str) -> Vec<String> {
+    /// What to say of an accelerometer whose readings are to be in m/s².
+    pub fn wrong_unit(&self, place: &str, gravity_mps2: f64) -> Option<String> {
+        self.two_sources.wrong_unit(place, gravity_mps2)
+    }
+
+    /// One sentence for each thing that was left out or looks wrong; `place` is the file, whose rows come at `rate_hz`.
+    pub fn warnings(&self, place: &str, rate_hz: f64) -> Vec<String> {
         let mut warnings = Vec::new();
+        for (sensor, held) in ["gyro", "accel"].iter().zip(&self.held) {
+            let held = held.found().map(|held| held.words(sensor, rate_hz));
+            warnings.extend(held.map(|words| format!("{place}: {words}")));
+        }
+        warnings.extend(self.two_sources.warning(place));
         if self.padding > 0 {
             warnings.push(format!(
                 "{place}: {} left out as padding: all readings are exactly 0",

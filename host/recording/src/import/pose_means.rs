@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::assignment::{ColumnList, Offset, Role, Scale};
+use super::broken::Unreadable;
 use super::options::{ImportOptions, file_name};
 use super::plausibility::no_temperature;
 use super::ros::is_bag;
@@ -138,7 +139,7 @@ impl Table {
         let columns = Layout::from_names(&names, &path.display().to_string())?.columns;
         let mut cells = Cells::default();
         let mut poses = Vec::new();
-        while let Some(row) = table.next(&mut cells)? {
+        while let Some(row) = table.next(&mut cells).map_err(Unreadable::into_error)? {
             let place = table.place(row);
             poses.push(pose(&roles, &cells, factors, &columns, &place)?);
         }
@@ -315,6 +316,7 @@ pub(super) fn import_means(options: &ImportOptions, out: &Path) -> Result<Import
         dropped_in_gaps: 0,
         interpolated: 0,
         padding: 0,
+        broken_rows: Vec::new(),
         empty_cells: raw.map(|c| empty(c).count() as u64).sum(),
         warnings,
     })

@@ -12,6 +12,7 @@ use std::str::FromStr;
 use serde::Serialize;
 
 use super::assignment::{ColumnList, Scale};
+use super::broken::Unreadable;
 use super::ros::is_bag;
 use super::text_table::{Cells, TextTable};
 use crate::cell::shorten;
@@ -333,7 +334,11 @@ impl Layout {
     ) -> Result<ColumnList> {
         let mut table = TextTable::open(path, Some(&list), separator)?;
         let mut cells = Cells::default();
-        let row = table.next(&mut cells)?;
+        let row = match table.next(&mut cells) {
+            // Whoever reads all rows says so.
+            Err(Unreadable::Row(_)) => return Ok(list),
+            row => row.map_err(Unreadable::into_error)?,
+        };
         if row.is_some() && self.columns.contains("t_s") && cells.stamp.value.is_nan() {
             let problem = "the column of the time is there, and empty";
             let remedy = "say what the columns are without it, and the rate";

@@ -20,6 +20,18 @@ pub(super) struct Resampler {
     around: Option<[Row; 2]>,
 }
 
+/// Reads the next row of `file`, at regular times where there is a `resampler`; `false` at the end.
+pub(super) fn next(
+    file: &mut ForeignFile,
+    resampler: Option<&mut Resampler>,
+    row: &mut Row,
+) -> Result<bool> {
+    match resampler {
+        Some(resampler) => resampler.next(file, row),
+        None => file.next(row),
+    }
+}
+
 impl Resampler {
     /// At times `period_s` apart, from the first row on.
     pub fn new(period_s: f64) -> Self {

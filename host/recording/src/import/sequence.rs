@@ -6,11 +6,12 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use super::inputs::Inputs;
+use super::joined::JoinedFiles;
 use super::options::file_name;
 use super::row::Row;
+use super::step_inputs::StepInputs;
 use super::step_labels::StepLabels;
-use super::{Import, ImportOptions, ImportSummary};
+use super::{ImportOptions, ImportSummary};
 use crate::columns::Columns;
 use crate::digest;
 use crate::error::{Argument, Error, Result};
@@ -58,7 +59,7 @@ pub(super) fn import_sequence(
     progress: impl Fn(f64),
 ) -> Result<ImportSummary> {
     let labels = labels(options)?;
-    let mut inputs: Option<Inputs> = None;
+    let mut inputs: Option<StepInputs> = None;
     let mut open: Option<(Writer, Manifest, ImportSummary, Columns)> = None;
     let (mut origin_s, mut after_s) = (0, f64::NEG_INFINITY);
     let count = options.files.len() as f64;
@@ -70,14 +71,15 @@ pub(super) fn import_sequence(
             preset_warnings: Vec::new(),
             ..options.clone()
         };
-        let mut import = Import::open(&one, [false; 2])?;
+        let mut import = JoinedFiles::open(&one, [false; 2])?;
         if import.first.has_step() {
             let problem = "it has a column step, and in a sequence each file is a step";
             let remedy = "skip the column, or import the file by itself";
             return Err(Error::new(path.display(), problem, remedy).about(Argument::Columns));
         }
         // What of the table is used is known when all files have been read.
-        import.inputs = inputs.take().or(import.inputs);
+        let own = import.inputs.take();
+        import.inputs = own.map(|own| own.of_step(step as i32, inputs.take()));
         import.first.labels = StepLabels::of(labels.clone());
         let begun_s = import.summary.time.first().map_or(0, |time| time.origin_s);
         if step == 0 {
@@ -90,10 +92,6 @@ pub(super) fn import_sequence(
             offset_s: None,
             last_s: after_s,
         });
-        // Every row of the file is of its step.
-        if let Some(rows) = import.step_rows.remove(&-1) {
-            import.step_rows.insert(step as i32, rows);
-        }
         let (writer, manifest, summary, columns) = match &mut open {
             Some(open) => open,
             None => {
@@ -131,7 +129,7 @@ pub(super) fn import_sequence(
         import.run(writer, &|share: f64| {
             progress((step as f64 + share) / count)
         })?;
-        import.finish_summary(writer)?;
+        import.finish_summary(writer.rows(), manifest)?;
         if let Some(sensor) = import.dead_sensors().iter().position(|dead| *dead) {
             let sensor = ["gyro", "accel"][sensor];
             let problem = format!("{sensor} is exactly 0 throughout: it was not connected");
@@ -146,7 +144,7 @@ pub(super) fn import_sequence(
         add(summary, import.summary);
         inputs = import.inputs;
         if let Some(inputs) = &inputs {
-            manifest.turn_steps = inputs.turns.iter().copied().collect();
+            manifest.turn_steps = inputs.turns().collect();
         }
     }
     let Some((writer, mut manifest, mut summary, _)) = open else {
@@ -159,7 +157,7 @@ pub(super) fn import_sequence(
     if let Some(file) = &options.inputs {
         manifest.sources.push(source(file)?);
     }
-    let unused = inputs.as_ref().and_then(Inputs::unused);
+    let unused = inputs.as_ref().and_then(StepInputs::unused);
     summary.warnings.extend(unused);
     summary.rows = writer.rows();
     summary.recording = writer.finish(&manifest)?.display().to_string();
@@ -195,6 +193,7 @@ fn add(all: &mut ImportSummary, one: ImportSummary) {
     all.skipped.header += one.skipped.header;
     all.skipped.comment += one.skipped.comment;
     all.skipped.blank += one.skipped.blank;
+    all.broken_rows.extend(one.broken_rows);
     all.interpolated += one.interpolated;
     all.padding += one.padding;
     all.empty_cells += one.empty_cells;

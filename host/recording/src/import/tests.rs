@@ -4,13 +4,16 @@ use std::path::{Path, PathBuf};
 
 use proptest::prelude::*;
 
-use super::super::{Batch, RawUnit, Recording};
+use super::super::{Batch, Manifest, RawUnit, Recording, Reference};
 use super::*;
+use crate::error::Argument;
 
+mod broken;
 mod means;
 mod plausibility;
 mod presets;
 mod sequence;
+mod sources;
 mod stamps;
 
 /// A folder with foreign files, and the recording that comes of them.

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use super::SkippedLines;
 use super::assignment::{ColumnList, Role};
 use super::binary::{refuse_binary, without_zeros};
+use super::broken::{Fault, Unreadable};
 use super::time::Stamp;
 use crate::cell::{self, Refusal, shorten};
 use crate::columns::Column;
@@ -141,7 +142,7 @@ impl TextTable {
     }
 
     /// Reads the next row into `cells` and returns its line, or `None` at the end.
-    pub fn next(&mut self, cells: &mut Cells) -> Result<Option<u64>> {
+    pub fn next(&mut self, cells: &mut Cells) -> std::result::Result<Option<u64>, Unreadable> {
         loop {
             self.line.clear();
             let read = (&mut self.reader)
@@ -163,7 +164,7 @@ impl TextTable {
             if !ended && read as u64 == LONGEST_LINE {
                 let problem = "the line is longer than 1 MiB";
                 let remedy = "give a text file with one row a line";
-                return Err(Error::new(self.place(number), problem, remedy));
+                return Err(Error::new(self.place(number), problem, remedy).into());
             }
             if number < self.first_row {
                 // Looked at and counted when the file was opened.
@@ -180,11 +181,8 @@ impl TextTable {
                         continue;
                     }
                     if let Some(refusal) = self.misfit(&self.record, ended) {
-                        return Err(Error::new(
-                            self.place(number),
-                            refusal.problem,
-                            refusal.remedy,
-                        ));
+                        let place = self.place(number);
+                        return Err(Unreadable::row(number, Fault::Width, place, refusal));
                     }
                     self.parse(number, cells)?;
                     return Ok(Some(number));
@@ -215,7 +213,7 @@ impl TextTable {
         cell::number(cell)
     }
 
-    fn parse(&self, line: u64, cells: &mut Cells) -> Result<()> {
+    fn parse(&self, line: u64, cells: &mut Cells) -> std::result::Result<(), Unreadable> {
         cells.numbers.clear();
         cells.step.clear();
         for &(position, role) in &self.wanted {
@@ -227,7 +225,7 @@ impl TextTable {
             }
             let number = self.number(cell).map_err(|refusal| {
                 let place = format!("{}, column {}", self.place(line), role.name());
-                Error::new(place, refusal.problem, refusal.remedy)
+                Unreadable::row(line, Fault::Reading, place, refusal)
             })?;
             if role == Role::Column(Column::Time) {
                 cells.stamp = Stamp::in_cell(cell, number);
@@ -310,17 +308,11 @@ impl TextTable {
             } else if let Some(refusal) = self.misfit(&record, true) {
                 last_misfit = Some((number, refusal.problem));
             } else {
-                match self.looks_like(&record) {
-                    Look::Row => {
-                        self.first_row = number;
-                        return Ok(());
-                    }
-                    Look::BrokenRow(role, refusal) => {
-                        let place = format!("{}, column {}", self.place(number), role.name());
-                        return Err(Error::new(place, refusal.problem, refusal.remedy));
-                    }
-                    Look::Words => last_misfit = Some((number, "it holds words".to_owned())),
+                if self.is_row(&record) {
+                    self.first_row = number;
+                    return Ok(());
                 }
+                last_misfit = Some((number, "it holds words".to_owned()));
             }
             self.skipped.header += 1;
         }
@@ -421,29 +413,21 @@ impl TextTable {
         Ok(())
     }
 
-    /// Whether a line of the right width is a row, a row with a mistake, or words above the data.
-    fn looks_like(&self, record: &csv::ByteRecord) -> Look {
-        let mut numbers = 0;
-        let mut mistakes = 0;
-        let mut first_mistake = None;
-        for &(position, role) in &self.wanted {
-            if role == Role::Column(Column::Step) {
-                continue;
-            }
-            match self.number(&record[position]) {
-                Ok(value) => numbers += usize::from(!value.is_nan()),
-                Err(refusal) => {
-                    mistakes += 1;
-                    first_mistake.get_or_insert((role, refusal));
-                }
+    /// Whether a line of the right width is a row, and not words above the data: more of its cells are numbers than are not. Skipping a
+    /// row with a mistake as a header would lose it without a word.
+    fn is_row(&self, record: &csv::ByteRecord) -> bool {
+        let numbers = self
+            .wanted
+            .iter()
+            .filter(|(_, role)| *role != Role::Column(Column::Step));
+        let (mut right, mut wrong) = (0, 0);
+        for (position, _) in numbers {
+            match self.number(&record[*position]) {
+                Ok(value) => right += usize::from(!value.is_nan()),
+                Err(_) => wrong += 1,
             }
         }
-        match first_mistake {
-            None if numbers > 0 => Look::Row,
-            // Skipping this as a header would lose a row without a word.
-            Some((role, refusal)) if numbers > mistakes => Look::BrokenRow(role, refusal),
-            _ => Look::Words,
-        }
+        right > wrong
     }
 }
 
@@ -462,10 +446,4 @@ fn matches(list: Option<&ColumnList>, names: &[String]) -> usize {
         }
         _ => 0,
     }
-}
-
-enum Look {
-    Row,
-    BrokenRow(Role, Refusal),
-    Words,
 }

@@ -61,6 +61,57 @@ fn a_span_that_shows_no_slope_is_refused_with_what_is_needed() {
 }
 
 #[test]
+fn a_column_that_spans_more_than_the_dwells_is_refused_with_both_spans_and_what_is_left_out() {
+    // Dwells in the first three minutes of a ramp of 80 K; behind them every row is in transit.
+    let said = refusal(|_, samples| samples.step[1800..].fill(-1));
+    assert!(said.contains("the column spans 80"), "{said}");
+    assert!(said.contains("the dwells that are used 5."), "{said}");
+    assert!(
+        said.contains("92.5 % of the samples lie in no dwell"),
+        "{said}"
+    );
+}
+
+/// Two soaks that stay within 0.4 K, at 13 and at 47 °C, and nothing in between.
+fn soaks() -> [(Manifest, Samples); 2] {
+    [13.0, 47.0].map(|at| {
+        let soak = Experiment {
+            corners: vec![(0.0, at - 0.2), (2400.0, at + 0.2)],
+            ..Experiment::ramp(60.0, false)
+        };
+        soak.record(at as u64)
+    })
+}
+
+#[test]
+fn soaks_of_one_temperature_each_determine_no_bias_in_between_and_are_refused_together() {
+    let sessions = soaks().map(|soak| session(soak).unwrap());
+    let said = estimate(&sessions, Choice::JOINT).unwrap_err().to_string();
+    assert!(said.contains("its dwells span 34."), "{said}");
+    assert!(
+        said.contains("no more than 0.4") && said.contains("biases of its own"),
+        "{said}"
+    );
+}
+
+#[test]
+fn temperatures_that_no_recording_crosses_are_said() {
+    let [_, warm] = soaks();
+    let cold = Experiment {
+        corners: vec![(0.0, -10.0), (2400.0, 20.0), (4800.0, -10.0)],
+        ..Experiment::ramp(60.0, false)
+    };
+    let sessions = [session(cold.record(5)).unwrap(), session(warm).unwrap()];
+    let joint = estimate(&sessions, Choice::JOINT).unwrap();
+    let said = joint
+        .warnings
+        .iter()
+        .find(|w| w.contains("no recording crosses"));
+    let said = said.expect("the gap is said");
+    assert!(said.contains("to 46.8 °C"), "{said}");
+}
+
+#[test]
 fn two_units_have_two_sets_of_curves() {
     let [first, mut second] = [1, 2].map(|seed| Experiment::ramp(60.0, false).record(seed));
     second.0.device = "another".into();

@@ -38,14 +38,37 @@ impl Integrated {
         }
     }
 
-    /// Integrates rates (any unit) that are `dt_s` apart. A caller that does not hold them anyway needs less than
-    /// half of the memory with [`Self::push`].
+    /// Integrates rates (any unit) that are `dt_s` apart, in their place: three hours at 1 kHz are 86 MB once.
     ///
     /// # Errors
     /// The first rate that is not a finite number.
-    pub fn new(rates: Vec<f64>, dt_s: f64) -> Result<Self> {
+    pub fn new(mut rates: Vec<f64>, dt_s: f64) -> Result<Self> {
         let mut integrated = Self::empty(dt_s);
-        integrated.push(&rates)?;
+        if rates.is_empty() {
+            return Ok(integrated);
+        }
+        integrated.refuse_not_finite(&rates)?;
+        let reference = mean(&rates);
+        let sums = chunk_sums(&rates, reference);
+        let end = &mut integrated.end;
+        let starts: Vec<f64> = sums.into_iter().map(|part| end.add(part)).collect();
+        let last = end.add(0.0);
+        rates
+            .par_chunks_mut(CHUNK)
+            .zip(starts)
+            .for_each(|(chunk, start)| {
+                let mut since_start = 0.0;
+                for x in chunk {
+                    let rate = *x;
+                    *x = start + since_start;
+                    since_start += rate - reference;
+                }
+            });
+        // One more than there are rates, and no more: a vector that grows by itself doubles.
+        rates.reserve_exact(1);
+        rates.push(last);
+        integrated.x = rates;
+        integrated.reference = Some(reference);
         Ok(integrated)
     }
 
@@ -55,12 +78,12 @@ impl Integrated {
     /// The first rate that is not a finite number; nothing of the slice is then taken in.
     pub fn push(&mut self, rates: &[f64]) -> Result<()> {
         self.refuse_not_finite(rates)?;
-        let mean = || chunk_sums(rates, 0.0).into_iter().sum::<f64>() / rates.len() as f64;
         let reference = match self.reference {
             Some(reference) => reference,
             None if rates.is_empty() => return Ok(()),
-            None => *self.reference.insert(mean()),
+            None => *self.reference.insert(mean(rates)),
         };
+        self.x.reserve(rates.len());
         for rates in rates.chunks(SLICE) {
             let sums = chunk_sums(rates, reference);
             let starts: Vec<f64> = sums.into_iter().map(|part| self.end.add(part)).collect();
@@ -101,6 +124,11 @@ impl Integrated {
         &self.x
     }
 
+    /// Rates that it is of.
+    pub(crate) fn samples(&self) -> usize {
+        self.x.len() - 1
+    }
+
     /// Sample period, s.
     pub fn dt_s(&self) -> f64 {
         self.dt_s
@@ -139,6 +167,11 @@ impl Integrated {
             "choose a stretch without gaps",
         ))
     }
+}
+
+/// About the mean of `rates`, which rounding moves by parts in 1e12.
+fn mean(rates: &[f64]) -> f64 {
+    chunk_sums(rates, 0.0).into_iter().sum::<f64>() / rates.len() as f64
 }
 
 /// Sums of chunks of the rates less a reference.

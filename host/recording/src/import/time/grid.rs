@@ -47,8 +47,15 @@ pub(super) struct Grid {
 pub(super) enum Steps {
     /// As multiples of a period.
     Multiples(Grid),
-    /// As those of a hand-over of samples, which a buffer has kept, though they are multiples of this period, s.
-    HandedOver(f64),
+    /// As those of a hand-over of samples, which a buffer has kept, though they are multiples of a period.
+    HandedOver {
+        /// That period, s.
+        within_s: f64,
+        /// Time between samples as it mostly is over several hand-overs, s.
+        mean_s: f64,
+        /// Time between two hand-overs, s: that which one in twenty exceeds.
+        apart_s: f64,
+    },
     /// As neither.
     Irregular,
 }
@@ -62,8 +69,14 @@ pub(super) fn read(stamps: &[f64], rate_hz: Option<f64>) -> Steps {
     let refined = multiples(stamps, period_s).and_then(|grid| multiples(stamps, grid.period_s));
     match refined {
         None => Steps::Irregular,
-        Some(_) if handed_over(stamps, period_s, rate_hz) => Steps::HandedOver(period_s),
-        Some(grid) => Steps::Multiples(grid),
+        Some(grid) => match handed_over(stamps, period_s, rate_hz) {
+            Some([mean_s, apart_s]) => Steps::HandedOver {
+                within_s: period_s,
+                mean_s,
+                apart_s,
+            },
+            None => Steps::Multiples(grid),
+        },
     }
 }
 
@@ -150,16 +163,16 @@ fn multiples(stamps: &[f64], period_s: f64) -> Option<Grid> {
     Some(grid)
 }
 
-/// Whether long steps are those between two hand-overs of samples that were taken steadily, and nothing is missing.
+/// The mean time between samples and that between hand-overs, s, if long steps are those between two hand-overs of samples that were taken steadily, and nothing is missing.
 ///
 /// Then any stretch of so many samples lasts as long as any other, but for one hand-over, however many come at once. Where
 /// samples are lost or the logger pauses, it does not, or the samples of a burst are as far apart as only a sensor takes them.
-fn handed_over(stamps: &[f64], period_s: f64, rate_hz: Option<f64>) -> bool {
+fn handed_over(stamps: &[f64], period_s: f64, rate_hz: Option<f64>) -> Option<[f64; 2]> {
     let steps = || stamps.windows(2).map(|pair| pair[1] - pair[0]);
     let mut long: Vec<f64> = steps().filter(|s| *s > 1.5 * period_s).collect();
     let rows = stamps.len() - 1;
     if long.len() < 2 {
-        return false;
+        return None;
     }
     let longest = quantile(&mut long, 0.95);
     let window = (IN_WINDOW * rows / long.len()).clamp(1, rows);
@@ -169,18 +182,18 @@ fn handed_over(stamps: &[f64], period_s: f64, rate_hz: Option<f64>) -> bool {
     let mean_s = usual / window as f64;
     if let Some(rate) = rate_hz {
         let off = |period: f64| (rate * period).ln().abs();
-        return off(mean_s) < off(period_s);
+        return (off(mean_s) < off(period_s)).then_some([mean_s, longest]);
     }
     if longest > STALL_S {
-        return false;
+        return None;
     }
     if period_s < FETCHED_S && mean_s > 2.0 * period_s {
-        return true;
+        return Some([mean_s, longest]);
     }
     let alike = lasts
         .iter()
         .filter(|last| (*last - usual).abs() <= 1.5 * longest);
     let steady = lasts.len() >= 4 && alike.count() as f64 >= 0.95 * lasts.len() as f64;
     // Steps of one and two periods that take turns are those of a clock with coarse ticks.
-    steady && (period_s <= SAMPLED_S || longest < 2.5 * period_s)
+    (steady && (period_s <= SAMPLED_S || longest < 2.5 * period_s)).then_some([mean_s, longest])
 }

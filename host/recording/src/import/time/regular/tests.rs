@@ -182,3 +182,34 @@ fn a_buffer_that_is_handed_over_is_no_pause_unless_the_given_rate_is_that_of_the
     assert!(found.kept, "{found:?}");
     assert_eq!((found.gaps.len(), found.missing()), (499, 499 * 40));
 }
+
+#[test]
+fn bursts_of_any_length_have_the_rate_of_the_sensor_and_no_gaps_but_those_of_samples_lost() {
+    let mut random = uniform();
+    for burst in [10_u64, 20, 32, 40, 100] {
+        for within_s in [0.0001, 0.0003, 0.0005, 0.0011, 0.002, 0.003] {
+            for jitter_s in [0.0, 0.002, 0.02] {
+                let case = (burst, within_s, jitter_s);
+                let delays: Vec<f64> = (0..=6000 / burst).map(|_| jitter_s * random()).collect();
+                let late = |n: u64| {
+                    let after = (n % burst) as f64;
+                    let waits = (burst - 1) as f64 - after;
+                    waits * 0.01 + after * within_s + delays[(n / burst) as usize]
+                };
+                let all: Vec<u64> = (0..6000).collect();
+                let found = Regular::find(&stamps(&all, 0.01, late), None).unwrap();
+                assert!(!found.kept && found.gaps.is_empty(), "{case:?} {found:?}");
+                let off = found.period_s / 0.01 - 1.0;
+                assert!(off.abs() < 1e-4, "{case:?} {found:?}");
+                // Three bursts are lost.
+                let lost = 10 * burst..13 * burst;
+                let kept: Vec<u64> = all.into_iter().filter(|n| !lost.contains(n)).collect();
+                let found = Regular::find(&stamps(&kept, 0.01, late), None).unwrap();
+                // To a twentieth of a burst and what the hand-overs are late by: jitter hides as much.
+                let off = found.missing().abs_diff(3 * burst) as f64;
+                let hidden = (burst / 20) as f64 + (jitter_s / 0.01).ceil();
+                assert!(off <= hidden, "{case:?} {found:?}");
+            }
+        }
+    }
+}

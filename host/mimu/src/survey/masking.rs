@@ -1,0 +1,74 @@
+//! Short disturbances of a channel at rest, which are masked: a door, a step on the floor, a few samples of a bus that failed.
+
+use super::suitability::Suitability;
+
+/// Largest share of a channel that is masked. What is put in its place has the noise of the neighbours, so that N and B are off by about this
+/// share; more of it is a unit that was not at rest.
+const MOST: f64 = 0.01;
+
+/// What was masked of a channel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Masked {
+    /// Samples that others were put in place of.
+    pub samples: usize,
+    /// Share of all samples of the channel.
+    pub share: f64,
+    /// Time of the first from the beginning of the channel, s.
+    pub first_s: f64,
+}
+
+/// Puts into the disturbed windows of `raw` (samples `period_s` apart) what the quiet windows before them hold, moved onto the line between
+/// the levels on both sides: straight lines alone would take noise away.
+///
+/// `None`, and nothing is changed, where nothing is disturbed, where it is too much, or where the level does not come back: a unit that was
+/// put down in another way.
+pub(super) fn mask(raw: &mut [f64], seen: &mut Suitability, period_s: f64) -> Option<Masked> {
+    let window = seen.window;
+    let runs = runs(&seen.moving);
+    let windows = runs.iter().map(|run| run.len()).sum::<usize>();
+    let share = windows as f64 / seen.moving.len().max(1) as f64;
+    if windows == 0 || share > MOST {
+        return None;
+    }
+    let quiet =
+        |from: usize, to: usize| to <= seen.moving.len() && !seen.moving[from..to].contains(&true);
+    // As many quiet windows before each run as it has itself, and one behind it at least.
+    for run in &runs {
+        let before = run.start.checked_sub(run.len())?;
+        let returns = (seen.means.get(run.end)? - seen.means[run.start - 1]).abs();
+        let as_far = seen.reach * ((run.len() + 1) as f64).sqrt();
+        if !quiet(before, run.start) || !quiet(run.end, run.end + 1) || returns > as_far {
+            return None;
+        }
+    }
+    for run in &runs {
+        let (from, length) = (run.start * window, run.len() * window);
+        let (level, next) = (seen.means[run.start - 1], seen.means[run.end]);
+        let (before, at) = raw.split_at_mut(from);
+        let noise = &before[from - length..];
+        for (i, (put, quiet)) in at.iter_mut().zip(noise).enumerate() {
+            let k = run.start - run.len() + i / window;
+            let along = (i as f64 + 0.5) / length as f64;
+            *put = quiet - seen.means[k] + level + along * (next - level);
+        }
+        seen.moving[run.clone()].fill(false);
+    }
+    let first = runs.first()?.start * window;
+    Some(Masked {
+        samples: windows * window,
+        share,
+        first_s: first as f64 * period_s,
+    })
+}
+
+/// The runs of disturbed windows.
+fn runs(moving: &[bool]) -> Vec<std::ops::Range<usize>> {
+    let mut runs: Vec<std::ops::Range<usize>> = Vec::new();
+    for (k, _) in moving.iter().enumerate().filter(|(_, moving)| **moving) {
+        match runs.last_mut().filter(|run| run.end == k) {
+            Some(run) => run.end = k + 1,
+            None => runs.push(k..k + 1),
+        }
+    }
+    runs
+}

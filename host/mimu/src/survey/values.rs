@@ -1,0 +1,84 @@
+//! The samples of a channel as they are computed with: a stretch without a gap, checked, short disturbances masked.
+
+use super::masking::{Masked, mask};
+use super::stretch::{FEWEST, Part, Stretch, longest};
+use super::suitability::{Suitability, suitability};
+use crate::allan::units::Unit;
+use crate::quantity::{duration, plural, significant};
+use mimu_recording::RAW_COLUMNS;
+use mimu_recording::error::{Argument, Error, Result};
+
+/// One channel as it is computed with.
+pub(super) struct Values {
+    pub rates: Vec<f64>,
+    pub suitability: Suitability,
+    pub masked: Option<Masked>,
+    /// What a person should know.
+    pub warnings: Vec<String>,
+}
+
+impl Values {
+    /// The samples of `stretch` in `unit`, checked; of a channel with empty cells the longest stretch without. A `part` that was chosen by hand is
+    /// taken as it is; otherwise short disturbances are masked.
+    pub fn of(
+        mut values: Vec<f64>,
+        stretch: &Stretch,
+        part: Part,
+        i: usize,
+        unit: Unit,
+        place: &str,
+    ) -> Result<Self> {
+        let (rows, period_s) = (&stretch.rows, stretch.period_s);
+        let place = format!("{place}, column {}", RAW_COLUMNS[i]);
+        values.truncate(rows.end);
+        values.drain(..rows.start);
+        let (mut warnings, mut from) = (Vec::new(), 0);
+        if let Some(first) = values.iter().position(|u| !u.is_finite()) {
+            let whole = longest(values.len(), |k| values[k].is_finite());
+            let row = rows.start + first + 1;
+            if whole.len() < FEWEST {
+                return Err(Error::new(
+                    format!("{place}, data row {row}"),
+                    format!("the cell is empty, and there are no {FEWEST} samples in a row"),
+                    "record again, or choose a stretch",
+                )
+                .about(Argument::Stretch));
+            }
+            warnings.push(format!(
+                "{}: empty cells, the first in data row {row}; the longest stretch without is used: {} from data row {}",
+                RAW_COLUMNS[i],
+                duration(whole.len() as f64 * period_s),
+                rows.start + whole.start + 1
+            ));
+            from = whole.start;
+            values.truncate(whole.end);
+            values.drain(..from);
+        }
+        let mut suitability = suitability(&values, period_s, &place)?;
+        let masked = match part {
+            Part::Whole => mask(&mut values, &mut suitability, period_s),
+            _ => None,
+        };
+        warnings.extend(masked.map(|masked| {
+            format!(
+                "{}: {}, {} % of the time, are disturbed, first at {:.1} s: masked",
+                RAW_COLUMNS[i],
+                plural(masked.samples as u64, "sample"),
+                significant(100.0 * masked.share),
+                stretch.span_s[0] + from as f64 * period_s + masked.first_s
+            )
+        }));
+        if from > 0 {
+            suitability.begin_later(from);
+        }
+        for u in &mut values {
+            *u *= unit.per_raw;
+        }
+        Ok(Self {
+            rates: values,
+            suitability,
+            masked,
+            warnings,
+        })
+    }
+}

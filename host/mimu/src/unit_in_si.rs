@@ -1,0 +1,105 @@
+//! Whether readings that claim to be in SI are: what they are at rest, and over known inputs, against what they measure.
+
+use mimu_recording::{Manifest, RawUnit, Reference};
+
+use crate::blocks::quantile;
+use crate::dwell::Dwell;
+use crate::quantity::{Figure, Sensor, significant};
+
+/// Readings in SI with a gain beyond this, or below its inverse, have a wrong unit or time base: sensors are within ten per cent.
+const GAIN: f64 = 1.3;
+/// No gyro's bias is larger, rad/s: 40 deg/s, twice what the data sheet of an MPU-6050 allows.
+const LARGEST_BIAS: f64 = 0.7;
+
+fn degrees(rate: f64) -> String {
+    significant(rate.abs().to_degrees())
+}
+
+/// What to say of readings that are `scale` times their input, and are to be in SI; `by_turns` where a gyro is judged by the angles that it is
+/// integrated to.
+pub(crate) fn wrong_gain(
+    sensor: Sensor,
+    scale: f64,
+    gravity_mps2: f64,
+    figure: Figure,
+) -> Option<String> {
+    if (1.0 / GAIN..GAIN).contains(&scale) {
+        return None;
+    }
+    let near = |factor: f64| (0.8..1.25).contains(&(scale / factor));
+    let degrees = 180.0 / std::f64::consts::PI;
+    let by_turns = figure == Figure::Direction;
+    let cause = match sensor {
+        Sensor::Gyro if near(degrees) => "they are in deg/s, and SI is rad/s",
+        Sensor::Gyro if near(degrees.recip()) && by_turns => {
+            "they were converted from deg/s to rad/s twice"
+        }
+        Sensor::Gyro if near(degrees.recip()) => {
+            "the ref_ columns are not in deg/s, or the readings were converted to rad/s twice"
+        }
+        // Over the turns the gyro is integrated: stamps that run twice as fast halve the scale factor.
+        Sensor::Gyro if by_turns && (0.1..10.0).contains(&scale) => {
+            "time base or unit? If the stamps or the sample rate are off by this factor, so is every angle that the gyro is integrated to"
+        }
+        Sensor::Accel if near(1.0 / gravity_mps2) => "they are in g, and SI is m/s²",
+        Sensor::Accel if near(1000.0 / gravity_mps2) => "they are in mg, and SI is m/s²",
+        Sensor::Accel if near(gravity_mps2) => "they were multiplied by gravity twice",
+        _ => "unit, or range setting of the part?",
+    };
+    Some(format!(
+        "{sensor}: raw_unit = \"SI\", but the readings are {} times the input: {cause}",
+        significant(scale)
+    ))
+}
+
+/// What to say of dwells at rest whose readings are to be in SI. Of inputs that are known a fit says it.
+pub(crate) fn at_rest(list: &[Dwell], manifest: &Manifest) -> Vec<String> {
+    if manifest.reference == Reference::Table {
+        return Vec::new();
+    }
+    let usual = |sensor: Sensor| {
+        let usable = list.iter().filter(|d| d.fault(sensor).is_none());
+        let sizes = usable.map(|d| d.raw_mean(sensor).norm());
+        let mut sizes: Vec<f64> = sizes.filter(|size| *size > 0.0).collect();
+        quantile(&mut sizes, 0.5)
+    };
+    of_sizes(Sensor::BOTH.map(usual), manifest)
+}
+
+/// What to say of readings of this size at rest, of gyro and accelerometer, that are to be in SI.
+pub(crate) fn of_sizes([rate, force]: [Option<f64>; 2], manifest: &Manifest) -> Vec<String> {
+    if manifest.raw_unit != RawUnit::Si {
+        return Vec::new();
+    }
+    let gravity = manifest.gravity_mps2;
+    let force = force
+        .and_then(|size| wrong_gain(Sensor::Accel, size / gravity, gravity, Figure::GravitySize));
+    let rate = rate.filter(|rate| *rate > LARGEST_BIAS);
+    force
+        .into_iter()
+        .chain(rate.map(turns_throughout))
+        .collect()
+}
+
+/// What to say of a gyro that reads `rate`, rad/s, where it is to be at rest.
+fn turns_throughout(rate: f64) -> String {
+    format!(
+        "gyro: at rest it reads {} deg/s, and no bias is as large: the unit turns evenly, or the readings are in deg/s",
+        degrees(rate)
+    )
+}
+
+/// Scatter of the calibrated rate at rest, rad/s, that no bias and no g-sensitivity reaches: 2 deg/s.
+const RESTLESS: f64 = 0.035;
+
+/// What to say of dwells whose calibrated rates are `rms` about rest. A fit by turns knows the scale factor, of readings in counts as well: how
+/// large a bias is it cannot judge, as the null of a converter is anywhere, but from dwell to dwell a bias stays what it is.
+pub(crate) fn restless(rms: f64) -> Option<String> {
+    (rms > RESTLESS).then(|| {
+        format!(
+            "gyro: from dwell to dwell the calibrated rate at rest differs by {} deg/s rms, as no bias does: in some that were taken for rest the \
+             unit turned evenly, about the vertical where the accelerometer shows nothing; leave these out",
+            degrees(rms)
+        )
+    })
+}

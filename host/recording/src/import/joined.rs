@@ -1,0 +1,306 @@
+//! Several files as one recording: each row of the first with what the others have at that time.
+
+use std::path::Path;
+
+use super::first_pass;
+use super::foreign::{ForeignFile, HowToRead};
+use super::join::{Follower, Joined, check_order};
+use super::options::{ImportOptions, file_name};
+use super::resample::{self, Resampler};
+use super::row::Row;
+use super::sequence::Place;
+use super::step_inputs::StepInputs;
+use super::summary::ImportSummary;
+use super::time::{TimeSummary, Times};
+use crate::batch::Batch;
+use crate::columns::{Column, Columns, Layout};
+use crate::error::{Argument, Error, Result};
+use crate::manifest::{Manifest, RawUnit, Reference};
+use crate::writer::Writer;
+
+/// Rows that are written at a time.
+const BATCH: usize = 1 << 14;
+
+/// What to say where a rate was given and the time stamps have another one.
+fn other_rate(times: &Times, given: f64) -> Option<String> {
+    let summary = &times.summary;
+    let off = given / summary.rate_hz - 1.0;
+    (off.abs() > 1e-3).then(|| {
+        format!(
+            "{}: the rate of the time stamps is {} Hz, and not the {given} Hz that were given: the stamps are believed; to go by \
+             the rate instead, skip the time column",
+            summary.file, summary.rate_hz
+        )
+    })
+}
+
+/// Files that are read side by side, on the times of the first.
+pub(super) struct JoinedFiles {
+    pub first: ForeignFile,
+    /// Gives the rows of the first file regular times, if a loop took them at irregular ones.
+    resampler: Option<Resampler>,
+    /// Where the first file stands in a sequence of them.
+    pub place: Option<Place>,
+    followers: Vec<Follower>,
+    pub rate_hz: f64,
+    pub columns: Columns,
+    /// Column of each value, in the order in which the files give them.
+    order: Vec<Column>,
+    pub inputs: Option<StepInputs>,
+    pub summary: ImportSummary,
+}
+
+impl JoinedFiles {
+    /// Opens the files of `options` and finds their times and columns; `left_out` are sensors, gyro and accelerometer, that are not wanted.
+    pub fn open(options: &ImportOptions, left_out: [bool; 2]) -> Result<Self> {
+        let mut warnings = options.preset_warnings.clone();
+        let mut first = ForeignFile::open(&options.files[0], &options.how(0))?;
+        let mut time = Vec::new();
+        let mut first_times: Option<Times> = None;
+        let rate_hz = match first.has_time() {
+            true => {
+                let how = options.how(0);
+                let times = first_pass::times(&options.files[0], &how, options.rate_hz, None)?;
+                let rate_hz = times.summary.rate_hz;
+                warnings.extend(options.rate_hz.and_then(|given| other_rate(&times, given)));
+                time.push(times.summary.clone());
+                first_times = Some(times.clone());
+                first = first.with_times(times);
+                rate_hz
+            }
+            // Opening has refused this already: without a time column the rate is needed.
+            false => options.rate_hz.ok_or_else(|| {
+                Error::new("import", "the rate is not known", "give it").about(Argument::SampleRate)
+            })?,
+        };
+        let polled = first_times.as_ref().filter(|t| t.summary.polled.is_some());
+        let resampler = polled.map(|times| Resampler::new(times.period_s()));
+        let mut followers = Vec::new();
+        for (index, path) in options.files.iter().enumerate().skip(1) {
+            let how = HowToRead {
+                rate_hz: options.rate_hz.or(Some(rate_hz)),
+                ..options.how(index)
+            };
+            let mut file = ForeignFile::open(path, &how)?;
+            if file.has_step() {
+                let problem = "the column step is not in the first file";
+                let remedy = "name the file with the steps first";
+                return Err(Error::new(path.display(), problem, remedy));
+            }
+            let mut period_s = 1.0 / rate_hz;
+            if file.has_time() {
+                // A sensor of its own, with a rate and delays of its own; the instants are those of one clock.
+                let times = first_pass::times(path, &how, options.rate_hz, first_times.as_ref())?;
+                period_s = times.period_s();
+                time.push(times.summary.clone());
+                file = file.with_times(times);
+            }
+            followers.push(Follower::new(file, period_s, 1.0 / rate_hz));
+        }
+        let order: Vec<Column> = first
+            .columns()
+            .chain(
+                followers
+                    .iter()
+                    .flat_map(|follower| follower.file.columns()),
+            )
+            .collect();
+        let mut inputs = options
+            .inputs
+            .as_deref()
+            .map(StepInputs::read)
+            .transpose()?;
+        let mut names: Vec<&str> = vec![Column::Time.name()];
+        let kept = |column: &&Column| !matches!(column, Column::Raw(c) if left_out[c / 3]);
+        names.extend(order.iter().filter(kept).map(|column| column.name()));
+        if first.has_step() || options.sequence {
+            names.push(Column::Step.name());
+        }
+        let given = inputs.as_ref().map_or([false; 6], StepInputs::columns);
+        let given = (0..6)
+            .filter(|&i| given[i])
+            .map(|i| Column::Reference(i).name());
+        names.extend(given);
+        // The same rules as for a recording's header: nothing twice, all axes of a sensor.
+        let columns = Layout::from_names(&names, "import, all columns together")?.columns;
+        if inputs.is_some() && !first.has_step() && !options.sequence {
+            let problem = "a table of inputs is given, and no column is step";
+            return Err(Error::new(
+                "import",
+                problem,
+                "name the column with the steps",
+            ));
+        }
+        if options.reference == Reference::Table && columns.reference == [false; 6] {
+            return Err(Error::new(
+                "import, reference",
+                "the reference is to be the table, and there is no ref_ column",
+                "add the ref_ columns or a table of inputs, or say that the reference is gravity",
+            )
+            .about(Argument::Reference));
+        }
+        for file in followers
+            .iter()
+            .map(|follower| &follower.file)
+            .chain([&first])
+        {
+            warnings.extend_from_slice(file.warnings());
+        }
+        if let Some(inputs) = &mut inputs {
+            let irregular = first_times.filter(|_| resampler.is_some());
+            inputs.count_rows(&options.files[0], &options.how(0), irregular)?;
+        }
+        Ok(Self {
+            summary: ImportSummary {
+                format: "mimu-import/1",
+                preset: options.preset.clone(),
+                sample_rate_hz: rate_hz,
+                time,
+                warnings,
+                ..ImportSummary::default()
+            },
+            rate_hz,
+            columns,
+            order,
+            inputs,
+            first,
+            resampler,
+            place: None,
+            followers,
+        })
+    }
+
+    /// The manifest of the recording at `out`, but for its sources and steps.
+    pub fn manifest(&self, options: &ImportOptions, out: &Path) -> Manifest {
+        let device = options.device.clone().unwrap_or_else(|| file_name(out));
+        let mut manifest = Manifest::new(
+            device,
+            self.rate_hz,
+            options.gravity_mps2,
+            options.raw_unit,
+            options.reference,
+        );
+        manifest.latitude_deg = options.latitude_deg;
+        manifest.imported_with = options.arguments();
+        manifest
+    }
+
+    /// Reads all rows, and hands them to `writer`.
+    pub fn run(&mut self, writer: &mut Writer, progress: &impl Fn(f64)) -> Result<()> {
+        let mut row = Row::default();
+        let mut values = Vec::new();
+        let mut batch = Batch::default();
+        let mut last_t_s = f64::NEG_INFINITY;
+        while resample::next(&mut self.first, self.resampler.as_mut(), &mut row)? {
+            check_order(&self.first, &row, last_t_s)?;
+            last_t_s = row.t_s;
+            if let Some(place) = &mut self.place {
+                place.put(&mut row);
+            }
+            values.clear();
+            values.extend_from_slice(&row.values);
+            if self.join(row.t_s, &mut values)? {
+                self.push(&row, &values, &mut batch);
+            }
+            if batch.len() == BATCH {
+                writer.write(&batch)?;
+                batch.clear();
+                progress(self.first.progress());
+            }
+        }
+        writer.write(&batch)?;
+        progress(1.0);
+        Ok(())
+    }
+
+    /// Appends what the other files have at that time; `false` where the row is to be dropped.
+    fn join(&mut self, t_s: f64, values: &mut Vec<f64>) -> Result<bool> {
+        let mut worst = Joined::Exactly;
+        for follower in &mut self.followers {
+            match follower.values_at(t_s, values)? {
+                Joined::Exactly => {}
+                Joined::Interpolated if worst != Joined::Exactly => {}
+                other => worst = other,
+            }
+        }
+        match worst {
+            Joined::Exactly => return Ok(true),
+            Joined::Interpolated => self.summary.interpolated += 1,
+            Joined::Outside => self.summary.dropped_outside += 1,
+            Joined::Gap => self.summary.dropped_in_gaps += 1,
+        }
+        Ok(worst == Joined::Interpolated)
+    }
+
+    fn push(&mut self, row: &Row, values: &[f64], batch: &mut Batch) {
+        batch.t_s.push(row.t_s);
+        if self.columns.step {
+            batch.step.push(row.step);
+        }
+        for (column, &value) in self.order.iter().zip(values) {
+            if !self.columns.has(*column) {
+                continue;
+            }
+            if matches!(column, Column::Raw(_)) {
+                self.summary.empty_cells += u64::from(value.is_nan());
+            }
+            if let Some(target) = batch.values_mut(*column) {
+                target.push(value);
+            }
+        }
+        if let Some(inputs) = &mut self.inputs {
+            inputs.push(row.step, &self.first.labels, self.rate_hz, batch);
+        }
+    }
+
+    /// Which sensors, gyro and accelerometer, have shown nothing but zeros in the files that have them.
+    pub fn dead_sensors(&self) -> [bool; 2] {
+        [0, 1].map(|s| self.files().any(|file| file.seen.dead()[s].is_some()))
+    }
+
+    fn files(&self) -> impl Iterator<Item = &ForeignFile> {
+        self.followers.iter().map(|f| &f.file).chain([&self.first])
+    }
+
+    /// Counts and warnings of all files, once they have been read and `rows` written.
+    pub fn finish_summary(&mut self, rows: u64, manifest: &Manifest) -> Result<()> {
+        for file in self.files() {
+            file.seen.check(&file_name(file.path()))?;
+        }
+        if rows == 0 {
+            return Err(Error::new(
+                "import",
+                "the files have no time in common",
+                "check that their times begin at the same instant and are in the same unit",
+            )
+            .about(Argument::TimeUnit));
+        }
+        let summary = &mut self.summary;
+        summary.rows = rows;
+        let followers = self.followers.iter().map(|f| &f.file);
+        for file in followers.chain([&self.first]) {
+            summary.add(file);
+            if manifest.raw_unit == RawUnit::Si {
+                let place = file_name(file.path());
+                let warning = file.seen.wrong_unit(&place, manifest.gravity_mps2);
+                summary.warnings.extend(warning);
+            }
+        }
+        let of_loops = summary.time.iter().filter_map(TimeSummary::of_loop);
+        summary.warnings.extend(of_loops.collect::<Vec<_>>());
+        if summary.interpolated > 0 {
+            summary.warnings.push(format!(
+                "{} rows were interpolated between the times of another file, which lowers the white noise of its columns",
+                summary.interpolated
+            ));
+        }
+        if let Some(inputs) = &self.inputs {
+            summary.warnings.extend(inputs.unknown(&self.first.labels));
+            // Of a sequence that is known when all of it has been read.
+            if self.place.is_none() {
+                summary.warnings.extend(inputs.unused());
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,88 @@
+//! Rows that cannot be read: refused all at once, or left out and counted.
+
+use super::*;
+
+const NAMES: &str = "t_s,gyro_x,gyro_y,gyro_z";
+
+/// Two hundred rows at 100 Hz, some of them broken.
+fn log(broken: &[(usize, &str)]) -> String {
+    let row = |i: usize| match broken.iter().find(|(row, _)| *row == i) {
+        Some((_, text)) => format!("{text}\n"),
+        None => format!("{:.2},{},{},{}\n", i as f64 / 100.0, i % 7, i % 5, i % 3),
+    };
+    format!("{NAMES}\n") + &(0..200).map(row).collect::<String>()
+}
+
+const BROKEN: [(usize, &str); 5] = [
+    (10, "0.10,1,x7f,0"),
+    (11, "0.11,1,2"),
+    (50, "0.50,inf,2,1"),
+    (90, ",1,2,3"),
+    (150, "1.5,1,2,3,4"),
+];
+
+fn limited(text: &str, limit: &str) -> Result<(ImportSummary, Batch, Manifest)> {
+    let bench = Bench::new(&[("a.txt", text)]);
+    let mut options = bench.options(&["a.txt"], &[NAMES]);
+    options.skip_broken = limit.parse()?;
+    bench.import(&options)
+}
+
+#[test]
+fn all_kinds_of_broken_rows_are_named_at_once_and_the_option_that_leaves_them_out() {
+    let error = one(&log(&BROKEN), NAMES).unwrap_err();
+    let text = error.to_string();
+    assert!(text.contains("a.txt, row 12, column gyro_y"), "{text}");
+    assert!(text.contains("5 of 200 rows are broken"), "{text}");
+    for kind in [
+        "2 with a cell that is no reading (rows 12, 52)",
+        "2 with another number of cells (rows 13, 152)",
+        "1 with no time (row 92)",
+    ] {
+        assert!(text.contains(kind), "{text}");
+    }
+    assert_eq!(error.refused().arguments, [Argument::SkipBroken]);
+}
+
+#[test]
+fn broken_rows_are_left_out_counted_and_listed_up_to_a_limit() {
+    let (summary, batch, _) = limited(&log(&BROKEN), "3%").unwrap();
+    let [broken] = &summary.broken_rows[..] else {
+        panic!("{summary:?}");
+    };
+    assert_eq!((broken.rows, broken.of, summary.rows), (5, 200, 195));
+    assert_eq!(broken.kinds[0].first_rows, [12, 52]);
+    assert!(broken.kinds[0].example.contains("x7f"), "{broken:?}");
+    // Nothing else moves: what is missing is a gap.
+    assert_eq!(summary.time[0].missing, 5);
+    assert!((batch.t_s[194] - 1.99).abs() < 1e-9);
+    assert!(limited(&log(&BROKEN), "5").is_ok());
+    for limit in ["4", "2%", "0"] {
+        let error = limited(&log(&BROKEN), limit).unwrap_err().to_string();
+        assert!(error.contains("5 of 200 rows are broken"), "{error}");
+        assert!(error.contains("may be left out"), "{error}");
+    }
+    for wrong in ["", "-1", "60%", "x", "5 %%"] {
+        assert!(limited(&log(&[]), wrong).is_err(), "{wrong}");
+    }
+}
+
+#[test]
+fn a_broken_row_of_a_file_without_times_takes_its_time() {
+    let text: String = (0..100)
+        .map(|i| {
+            if i == 40 {
+                "1;2\n".into()
+            } else {
+                format!("{i};2;{}\n", i % 9)
+            }
+        })
+        .collect();
+    let bench = Bench::new(&[("a.txt", &text)]);
+    let mut options = bench.options(&["a.txt"], &["gyro_x,gyro_y,gyro_z"]);
+    options.rate_hz = Some(100.0);
+    options.skip_broken = BrokenLimit::Rows(1);
+    let (summary, batch, _) = bench.import(&options).unwrap();
+    assert_eq!(summary.rows, 99);
+    assert_eq!((batch.t_s[39], batch.t_s[40]), (0.39, 0.41));
+}

@@ -1,0 +1,106 @@
+//! Readings that are held, interleaved, or in another unit than was said.
+
+use super::*;
+
+const BOTH: &str = "t_s,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z";
+
+/// Uniform from -1 to 1, by row and channel.
+fn noise(i: usize, c: usize) -> f64 {
+    let mut state = (i * 6 + c + 1) as u64;
+    state = state.wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    state ^= state >> 32;
+    state = state.wrapping_mul(0xd6e8_feb8_6659_fd93);
+    (state >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+}
+
+fn log(rows: usize, reading: impl Fn(usize) -> [f64; 6]) -> String {
+    let row = |i: usize| {
+        let cells = reading(i).map(|cell| format!("{cell:.5}")).join(" ");
+        format!("{} {cells}\n", 10 * i)
+    };
+    (0..rows).map(row).collect()
+}
+
+fn at_rest(i: usize) -> [f64; 6] {
+    let n = |c: usize| 0.02 * noise(i, c);
+    [n(0), n(1), n(2), 0.3 + n(3), n(4), 9.8 + n(5)]
+}
+
+fn warned(summary: &ImportSummary, words: &str) -> bool {
+    summary.warnings.iter().any(|w| w.contains(words))
+}
+
+#[test]
+fn a_sensor_that_is_logged_faster_than_it_updates_is_said_with_its_rate() {
+    let slow = log(2000, |i| {
+        let [x, y, z, ..] = at_rest(i);
+        let [.., a, b, c] = at_rest(i / 4);
+        [x, y, z, a, b, c]
+    });
+    let (summary, ..) = one(&slow, BOTH).unwrap();
+    assert!(
+        warned(&summary, "the accel repeats its reading"),
+        "{summary:?}"
+    );
+    assert!(
+        warned(&summary, "at 25.0 Hz where the log has 100.0 Hz"),
+        "{summary:?}"
+    );
+    assert!(!warned(&summary, "the gyro repeats"), "{summary:?}");
+}
+
+#[test]
+fn rows_of_two_devices_or_units_that_take_turns_are_refused() {
+    let units = |i: usize| match i % 2 {
+        0 => at_rest(i),
+        _ => at_rest(i).map(|u| 100.0 * u),
+    };
+    let devices = |i: usize| {
+        let [x, y, z, a, b, c] = at_rest(i);
+        match noise(i, 6) > 0.0 {
+            true => [x, y, z, a, b, c],
+            false => [x, y, z, c, a, b],
+        }
+    };
+    for mixed in [log(1000, units), log(1000, devices)] {
+        let error = one_refused(&mixed, BOTH);
+        assert!(error.contains("take turns"), "{error}");
+    }
+    let (summary, ..) = one(&log(1000, at_rest), BOTH).unwrap();
+    assert!(summary.warnings.is_empty(), "{summary:?}");
+}
+
+#[test]
+fn a_unit_that_changes_within_the_file_is_said_with_its_row() {
+    let changes = log(1000, |i| match i {
+        0..700 => at_rest(i),
+        _ => at_rest(i).map(|u| u * 1670.0),
+    });
+    let (summary, ..) = one(&changes, BOTH).unwrap();
+    assert!(
+        warned(&summary, "300 of 1000 of them, first in row 701"),
+        "{summary:?}"
+    );
+}
+
+#[test]
+fn forces_in_si_that_are_not_of_the_size_of_gravity_are_said() {
+    for (factor, wrong) in [
+        (1.0, false),
+        (0.25, true),
+        (1.0 / 9.81, true),
+        (101.9, true),
+        (1.1, false),
+    ] {
+        let text = log(500, |i| at_rest(i).map(|u| factor * u));
+        let bench = Bench::new(&[("a.txt", &text)]);
+        let mut options = bench.options(&["a.txt"], &[BOTH]);
+        options.raw_unit = RawUnit::Si;
+        let (summary, ..) = bench.import(&options).unwrap();
+        assert_eq!(
+            warned(&summary, "unit or scale?"),
+            wrong,
+            "{factor} {summary:?}"
+        );
+    }
+}

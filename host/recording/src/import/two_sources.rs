@@ -1,0 +1,181 @@
+//! Rows of two devices, or readings in two units, in the columns of one file.
+
+use super::row::Row;
+use crate::columns::RAW_COLUMNS;
+use crate::error::{Error, Result};
+
+/// Rows at the beginning in which it is looked for rows that take turns.
+const WATCHED: usize = 20_000;
+/// A leap, and what is back from one, in units of the change over two rows.
+const LEAP: f64 = 8.0;
+const BACK: f64 = 4.0;
+/// Share of rows that leap away and back at least, where sources take turns in any order. One in four does with every other row by chance.
+const LEAPING: f64 = 0.1;
+/// Rows that show it.
+const FEWEST: usize = 100;
+
+/// Width of a class of the size of specific force, in octaves: a quarter.
+const CLASSES_PER_OCTAVE: f64 = 4.0;
+const CLASSES: usize = 800;
+/// Classes without force that part two units: an octave. The smaller part has this share of all rows at least, and of it this share may lie
+/// between them.
+const APART: usize = 4;
+const SMALLER: f64 = 0.01;
+const BETWEEN: f64 = 0.01;
+/// Sizes over gravity that are those of an accelerometer in m/s²: a class is a fifth wide, and bias and scale factor are some per cent.
+const UNIT_GAIN: std::ops::Range<f64> = 0.67..1.5;
+/// And the factor between the middles of both.
+const FACTOR: f64 = 3.0;
+
+/// Watches the readings of a file, row by row.
+#[derive(Debug, Clone)]
+pub(super) struct TwoSources {
+    /// Places of the channels among the values of a row, and their first readings.
+    channels: Vec<(usize, usize, Vec<f64>)>,
+    /// Places of the accelerometer.
+    accel: Vec<usize>,
+    /// Rows by the size of the specific force, and the first of each class.
+    sizes: Vec<(u64, u64)>,
+}
+
+impl TwoSources {
+    /// Of a file in which these channels have these places.
+    pub fn new(channels: impl Iterator<Item = (usize, usize)>) -> Self {
+        let channels: Vec<_> = channels.map(|(place, c)| (place, c, Vec::new())).collect();
+        let accel = channels.iter().filter(|(_, c, _)| *c >= 3);
+        Self {
+            accel: accel.map(|(place, ..)| *place).collect(),
+            sizes: vec![(0, 0); CLASSES],
+            channels,
+        }
+    }
+
+    /// The next row.
+    pub fn push(&mut self, row: &Row) {
+        for (place, _, first) in &mut self.channels {
+            if first.len() < WATCHED {
+                first.push(row.values[*place]);
+            }
+        }
+        if self.accel.len() == 3 {
+            let squares = self.accel.iter().map(|place| row.values[*place].powi(2));
+            let octaves = 0.5 * squares.sum::<f64>().log2();
+            if octaves.is_finite() {
+                let class = (octaves * CLASSES_PER_OCTAVE) as i64 + CLASSES as i64 / 2;
+                let (rows, first) = &mut self.sizes[class.clamp(0, CLASSES as i64 - 1) as usize];
+                if *rows == 0 {
+                    *first = row.number;
+                }
+                *rows += 1;
+            }
+        }
+    }
+
+    /// Refuses a file in which the readings leap to and fro.
+    pub fn check(&self, place: &str) -> Result<()> {
+        for (_, c, first) in &self.channels {
+            let Some(share) = leaping(first) else {
+                continue;
+            };
+            let problem = format!(
+                "in {:.0} % of the rows the reading leaps away and is back in the next one: rows of two devices, or readings in two units, take turns",
+                100.0 * share
+            );
+            let remedy =
+                "write the rows of each into a file of its own, and import them one by one";
+            return Err(Error::new(
+                format!("{place}, column {}", RAW_COLUMNS[*c]),
+                problem,
+                remedy,
+            ));
+        }
+        Ok(())
+    }
+
+    /// What to say of specific forces that claim to be in m/s², where most are of another size than `gravity_mps2`.
+    pub fn wrong_unit(&self, place: &str, gravity_mps2: f64) -> Option<String> {
+        let most = (0..CLASSES).max_by_key(|class| self.sizes[*class].0)?;
+        let usual = size(most);
+        let known = self.sizes[most].0 > 0 && !UNIT_GAIN.contains(&(usual / gravity_mps2));
+        known.then(|| {
+            format!(
+                "{place}: the specific force is about {usual:.3} in most rows, where gravity is {gravity_mps2} m/s²: unit or scale? Readings in g \
+                 need the factor accel=9.80665, in mg accel=0.00980665 (--scale), counts another unit (--raw-unit)"
+            )
+        })
+    }
+
+    /// What to say where the accelerometer has two sizes.
+    pub fn warning(&self, place: &str) -> Option<String> {
+        let all: u64 = self.sizes.iter().map(|(rows, _)| rows).sum();
+        let middle = |classes: std::ops::Range<usize>| {
+            let most = classes.max_by_key(|class| self.sizes[*class].0)?;
+            Some(size(most))
+        };
+        let count = |classes: std::ops::Range<usize>| -> u64 {
+            self.sizes[classes].iter().map(|(rows, _)| rows).sum()
+        };
+        for gap in 0..CLASSES - APART {
+            let (below, above) = (0..gap, gap + APART..CLASSES);
+            let few = count(below.clone()).min(count(above.clone()));
+            let between = count(gap..gap + APART);
+            if (few as f64) < SMALLER * all as f64
+                || few == 0
+                || between as f64 > BETWEEN * few as f64
+            {
+                continue;
+            }
+            let (Some(low), Some(high)) = (middle(below.clone()), middle(above.clone())) else {
+                continue;
+            };
+            if high < FACTOR * low {
+                continue;
+            }
+            let fewer = if count(below.clone()) == few {
+                below
+            } else {
+                above
+            };
+            let first = fewer
+                .filter(|class| self.sizes[*class].0 > 0)
+                .map(|class| self.sizes[class].1)
+                .min();
+            return Some(format!(
+                "{place}: the specific force is about {low:.3} in some rows and about {high:.3} in others, {few} of {all} of them, first in row {}: \
+                 readings in two units, or of two devices",
+                first.unwrap_or_default()
+            ));
+        }
+        None
+    }
+}
+
+/// Middle of a class of sizes.
+fn size(class: usize) -> f64 {
+    ((class as f64 + 0.5 - CLASSES as f64 / 2.0) / CLASSES_PER_OCTAVE).exp2()
+}
+
+/// Share of readings that leap away and back, if it is large.
+fn leaping(readings: &[f64]) -> Option<f64> {
+    let mut over_two: Vec<f64> = readings
+        .windows(3)
+        .map(|w| (w[2] - w[0]).abs())
+        .filter(|change| change.is_finite())
+        .collect();
+    if over_two.len() < FEWEST {
+        return None;
+    }
+    let at = over_two.len() / 4;
+    // A quarter: where two sources take turns in any order, half of all pairs are of one of them.
+    let quarter = *over_two.select_nth_unstable_by(at, f64::total_cmp).1;
+    let nonzero = over_two.iter().copied().filter(|change| *change > 0.0);
+    let step = nonzero.fold(f64::INFINITY, f64::min);
+    let unit = (2.0 * quarter).max(step);
+    let leaps = readings.windows(3).filter(|w| {
+        (w[1] - w[0]).abs() > LEAP * unit
+            && (w[1] - w[2]).abs() > LEAP * unit
+            && (w[2] - w[0]).abs() <= BACK * unit
+    });
+    let share = leaps.count() as f64 / over_two.len() as f64;
+    (share >= LEAPING).then_some(share)
+}
