@@ -506,7 +506,7 @@ mod tests {
     #[test]
     fn a_gyro_that_reads_the_pose_is_an_accelerometer() {
         let mut watch = Watch::new(1000.0, true);
-        let mut at = |watch: &mut Watch, tick: u64, gyro: [f64; 3]| {
+        let at = |watch: &mut Watch, tick: u64, gyro: [f64; 3]| {
             let mut one = chunk(tick, 2500, 0.0, 0.01);
             for row in &mut one.values {
                 (row[0], row[1], row[2]) = (gyro[0] + row[0], gyro[1] + row[1], gyro[2] + row[2]);

@@ -300,6 +300,8 @@ fn any_order(folder: &Path) -> Result<Ended, String> {
             }
         }
     }
+    // Who turns the unit during its self-test ends the session.
+    sitting.wait_for(|s| s.told("step") > 0)?;
     let mut next = 0;
     while next < 4 * poses.len() {
         let had = sitting.told("dwell");
