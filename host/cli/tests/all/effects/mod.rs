@@ -148,7 +148,7 @@ fn every_effect_goes_into_the_bytes_of_a_device() {
         let image = Image::new(&calibration, "cal.toml").unwrap();
         let stored = image.stored().unwrap();
         assert_eq!(image.effects, [id.as_str()]);
-        let single = stored.effects.expect("one");
+        let single = stored.compensator.effects.expect("one");
         let double: Effects<f64, 8> = calibration.core_effects().unwrap();
         let (mut of_single, mut of_double) = (State::new(10.0), State::new(10.0));
         let (mut most, mut beside) = (0.0_f64, 0);

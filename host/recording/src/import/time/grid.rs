@@ -27,6 +27,8 @@ const FETCHED_S: f64 = 1e-3;
 const SAMPLED_S: f64 = 4e-3;
 /// Long steps in a window that has to last as long as the others if stamps are those of a hand-over.
 const IN_WINDOW: usize = 16;
+/// Windows of which one may last longer than the others.
+const FEW_WINDOWS: usize = 8;
 
 /// Stamps that are kept.
 #[derive(Debug, Clone, PartialEq)]
@@ -193,7 +195,10 @@ fn handed_over(stamps: &[f64], period_s: f64, rate_hz: Option<f64>) -> Option<[f
     let alike = lasts
         .iter()
         .filter(|last| (*last - usual).abs() <= 1.5 * longest);
-    let steady = lasts.len() >= 4 && alike.count() as f64 >= 0.95 * lasts.len() as f64;
+    // A hand-over that was lost makes one window longer, and of few windows one is more than the share.
+    let odd = lasts.len() - alike.count();
+    let few = usize::from(lasts.len() >= FEW_WINDOWS);
+    let steady = lasts.len() >= 4 && odd <= few.max(lasts.len() / 20);
     // Steps of one and two periods that take turns are those of a clock with coarse ticks.
     (steady && (period_s <= SAMPLED_S || longest < 2.5 * period_s)).then_some([mean_s, longest])
 }

@@ -26,6 +26,8 @@ const BACK: f64 = 0.25;
 const SMALLEST_GAP: f64 = 0.6;
 /// Share of a burst that is handed over within which missing samples cannot be told: windows begin and end within a burst.
 const HIDDEN: f64 = 0.1;
+/// Bursts that a rate is taken from, at least.
+const FEWEST_BURSTS: usize = 8;
 /// Standard deviations of the difference of two windows that a gap has to exceed.
 const SIGMAS: f64 = 6.0;
 /// A clock that is set back by more than so many periods is noticed.
@@ -95,6 +97,9 @@ impl Regular {
             _ => (period_s, 0.0),
         };
         let mut counted = Self::by_count(stamps, period_s, HIDDEN * burst);
+        if let Steps::HandedOver { apart_s, .. } = steps {
+            counted.by_last_of_bursts(stamps, apart_s);
+        }
         match steps {
             // Jitter of less than a period about the count is rounding, which the count takes out.
             Steps::Multiples(grid) if grid.pauses || counted.jitter.max_s > grid.period_s => {
@@ -191,6 +196,37 @@ impl Regular {
         };
         regular.jitter = jitter(stamps, &regular);
         regular
+    }
+
+    /// Takes the rate, and how much is missing in each gap, from the last samples of bursts that are about `apart_s` apart: they have not
+    /// waited.
+    ///
+    /// A line through all stamps leans by the lateness of half a burst at either end: 275 ppm in a minute of bursts of a second.
+    fn by_last_of_bursts(&mut self, stamps: &[f64], apart_s: f64) {
+        let is_last = |row: &usize| stamps[row + 1] - stamps[*row] > 0.5 * apart_s;
+        let last: Vec<usize> = (0..stamps.len() - 1).filter(is_last).collect();
+        if last.len() < FEWEST_BURSTS {
+            return;
+        }
+        let lasts = |pair: &[usize]| stamps[pair[1]] - stamps[pair[0]];
+        let rows = |pair: &[usize]| (pair[1] - pair[0]) as f64;
+        let mut periods: Vec<f64> = last.windows(2).map(|p| lasts(p) / rows(p)).collect();
+        let usual_s = quantile(&mut periods, 0.5);
+        for gap in &mut self.gaps {
+            let after = last.partition_point(|row| (*row as u64) < gap.row);
+            if let Some(pair) = after.checked_sub(1).and_then(|k| last.get(k..k + 2)) {
+                gap.missing = (lasts(pair) / usual_s - rows(pair)).round().max(0.0) as u64;
+            }
+        }
+        self.gaps.retain(|gap| gap.missing > 0);
+        let numbers = numbers(stamps.len(), &self.gaps);
+        let at: Vec<f64> = last.iter().map(|row| stamps[*row]).collect();
+        let of: Vec<u64> = last.iter().map(|row| numbers[*row]).collect();
+        let (_, period_s) = line(&at, &of, self.period_s);
+        let middle = numbers.iter().sum::<u64>() as f64 / numbers.len() as f64;
+        self.start_s += (self.period_s - period_s) * middle;
+        self.period_s = period_s;
+        self.jitter = jitter(stamps, self);
     }
 
     /// By how much stamps are off the count, s, if that is more than what hands samples over late and clocks that wander explain.

@@ -21,7 +21,7 @@ impl Device {
             StoredInfo {
                 length: bytes.len() as u32,
                 hash: stored::hash(bytes),
-                nodes: decoded.table.len() as u8,
+                nodes: decoded.compensator.table.len() as u8,
                 effects: decoded.effect_count,
                 unit_id: decoded.origin.unit_id.unwrap_or_default(),
                 created_s: decoded.origin.created_s.unwrap_or_default(),

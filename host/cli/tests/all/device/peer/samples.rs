@@ -90,9 +90,9 @@ impl Device {
         let (mut raw, mut compensated) = (Vec::new(), Vec::new());
         let mut model = None;
         if let Some(c) = &mut self.calibrated {
-            let mut state = c.stored.table.state();
-            c.stored.table.follow(&mut state, [TEMP_C; 2]);
-            if let Some(all) = &c.stored.effects {
+            let mut state = c.stored.compensator.table.state();
+            c.stored.compensator.table.follow(&mut state, [TEMP_C; 2]);
+            if let Some(all) = &c.stored.compensator.effects {
                 let dt_s = first.wrapping_sub(c.followed) as f32 / 1000.0;
                 all.slow(&mut c.effects, dt_s, TEMP_C);
                 c.followed = first;
@@ -109,7 +109,7 @@ impl Device {
             let reading = volts(&sums, GYRO_VOLTS, ACCEL_VOLTS);
             if let (Some(c), Some(model)) = (&mut self.calibrated, &model) {
                 let mut sample = model.apply(&reading);
-                if let Some(all) = &c.stored.effects {
+                if let Some(all) = &c.stored.compensator.effects {
                     sample = all.remove(&mut c.effects, &sample);
                 }
                 sample.gyro.x += self.script.bent;
