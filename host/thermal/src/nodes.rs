@@ -5,6 +5,7 @@ use mimu::calibration::{NodeTable, OverTemperature, TemperatureNode};
 use mimu::quantity::Sensor;
 use mimu::triad::Forward;
 use mimu_core::compensation::Affine;
+use mimu_core::die::LEAST_LAG_S;
 use mimu_recording::error::{Error, Result};
 
 use crate::curves::TriadCurves;
@@ -60,11 +61,16 @@ pub fn with_lags(joint: &Joint, range_c: [f64; 2], nodes: Vec<TemperatureNode>) 
     let lag = of(Sensor::Gyro);
     let accel = of(Sensor::Accel).filter(|_| joint.apart.is_some());
     let interval = |lag: Option<Lag>| lag.filter(|_| !given).map(|l| [l.lower, l.upper]);
+    // The device follows nothing shorter than a sample.
+    let followed = |lag: Lag| match lag.value.abs() < LEAST_LAG_S {
+        true => 0.0,
+        false => lag.value,
+    };
     OverTemperature {
         range_c,
-        lag_s: lag.map(|l| l.value),
+        lag_s: lag.map(followed),
         interval_lag_s: interval(lag),
-        accel_lag_s: accel.map(|l| l.value),
+        accel_lag_s: accel.map(followed),
         interval_accel_lag_s: interval(accel),
         biases_only: joint.curves.iter().flatten().all(TriadCurves::biases_only),
         gyro_hysteresis: None,

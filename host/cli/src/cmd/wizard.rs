@@ -350,15 +350,17 @@ fn planned(plan: &Plan, fixture: Fixture, gravity_mps2: f64, path: &Path) -> Res
 
 /// Longest that a session may take to end once that is asked for.
 const ENDS: Duration = Duration::from_millis(900);
+/// The same where it leads a table, which it stops before it ends.
+const TABLE_STOPS: Duration = Duration::from_secs(15);
 
 /// Ends the program where the session does not hear that it is to end: a port that says nothing and a diagnosis take half a minute. What
 /// counts is on the disk, and a device that is cut off while it stores keeps a whole calibration.
-fn end_in_time(stop: Arc<AtomicBool>, on_screen: bool) -> Result<()> {
+fn end_in_time(stop: Arc<AtomicBool>, ends: Duration, on_screen: bool) -> Result<()> {
     let watch = move || {
         while !stop.load(Ordering::Relaxed) {
             std::thread::sleep(ENDS / 20);
         }
-        std::thread::sleep(ENDS);
+        std::thread::sleep(ends);
         if on_screen {
             ratatui::restore();
         }
@@ -404,7 +406,11 @@ pub(crate) fn run(args: &WizardArgs) -> Result<()> {
     let stop = interruption()?;
     let quiet = args.json.is_standard_output();
     let on_screen = !args.plain && !to_output && !quiet && Screen::fits();
-    end_in_time(stop.clone(), on_screen)?;
+    let ends = match args.drivers.is_empty() {
+        true => ENDS,
+        false => TABLE_STOPS,
+    };
+    end_in_time(stop.clone(), ends, on_screen)?;
     let mut view: Box<dyn View> = match on_screen {
         true => Box::new(Screen::new(stop, beforehand, events)?),
         false => {

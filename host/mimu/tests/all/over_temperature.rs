@@ -152,7 +152,7 @@ fn what_cannot_be_applied_is_refused_and_a_bad_node_is_named_by_its_number() {
         (text_with(range, ""), &["0 nodes"]),
         (
             text_with(range, &singular),
-            &["node 2", "[gyro]", "singular"],
+            &["node 2", "[gyro]", "a column of C"],
         ),
         (text_with("range_c = [50.0, 0.0]", &nodes[0]), &["range_c"]),
         (

@@ -17,14 +17,17 @@ impl Device {
     pub(super) fn greeting(&mut self, id: u16) {
         let held = self.seen.lock().unwrap().stored.clone();
         let stored = held.as_ref().map(|bytes| {
-            let decoded = stored::decode(bytes).unwrap();
+            // One of another layout is kept by firmware of another version.
+            let decoded = stored::decode(bytes).ok();
+            let of = |number: fn(&stored::Stored) -> u8| decoded.as_ref().map_or(1, number);
+            let origin = decoded.as_ref().map(|d| &d.origin);
             StoredInfo {
                 length: bytes.len() as u32,
                 hash: stored::hash(bytes),
-                nodes: decoded.compensator.table.len() as u8,
-                effects: decoded.effect_count,
-                unit_id: decoded.origin.unit_id.unwrap_or_default(),
-                created_s: decoded.origin.created_s.unwrap_or_default(),
+                nodes: of(|d| d.compensator.table.len() as u8),
+                effects: of(|d| d.effect_count),
+                unit_id: origin.and_then(|o| o.unit_id).unwrap_or_default(),
+                created_s: origin.and_then(|o| o.created_s).unwrap_or_default(),
             }
         });
         let first = match stored {
