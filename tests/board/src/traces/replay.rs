@@ -149,13 +149,14 @@ impl Twin {
         Ok(compared)
     }
 
-    /// As the firmware does, from the start on: batch after batch, since the time is a sum.
+    /// As the firmware does: batch after batch, since the time is a sum. Batches begin where the calibration came.
     fn follow(&mut self, head: &BatchHead, dies_c: [f32; 2]) {
-        let mut at = self.slow_at.map_or(0, |last| last + BATCH as u32);
+        let begins = head.first % BATCH as u32;
+        let mut at = self.slow_at.map_or(begins, |last| last + BATCH as u32);
         loop {
             let passed = self
                 .slow_at
-                .map_or(self.powered_for_ms, |before| at - before);
+                .map_or(self.powered_for_ms + at, |before| at - before);
             let (dt_s, thermometer_c) = (passed as f32 / 1000.0, head.thermometer_c());
             let compensator = &self.stored.compensator;
             compensator.follow_at(&mut self.state, dt_s, thermometer_c, Some(dies_c));
