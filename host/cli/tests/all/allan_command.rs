@@ -314,8 +314,9 @@ fn a_short_knock_is_masked_and_counted_and_leaves_the_coefficients_as_they_are()
     let folder = tempfile::tempdir().unwrap();
     let still = at_rest(60_000);
     let mut knocked = still.clone();
+    // 100 standard deviations of a sample, for 60 ms.
     for row in &mut knocked[31_230..31_236] {
-        row[1..].iter_mut().for_each(|u| *u += 100.0 * N);
+        row[1..].iter_mut().for_each(|u| *u += 1000.0 * N);
     }
     let json = |rows: &[[f64; 7]]| -> serde_json::Value {
         write(folder.path(), rows);

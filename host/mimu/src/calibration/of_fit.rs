@@ -1,5 +1,6 @@
 //! The calibration that a fit gives.
 
+use mimu_core::table::is_temperature;
 use nalgebra::{Matrix3, Vector3};
 
 use super::{
@@ -24,7 +25,8 @@ impl Calibration {
     pub fn of(fit: &Fit, effects: &[EffectTable], created: &str) -> Result<Self> {
         let manifest = &fit.prepared.manifest;
         let dwells = fit.prepared.dwells.list.iter();
-        let temperatures: Vec<f64> = dwells.map(|d| d.temp_c).filter(|t| t.is_finite()).collect();
+        let temperatures = dwells.map(|d| d.temp_c).filter(|t| is_temperature(*t));
+        let temperatures: Vec<f64> = temperatures.collect();
         let mean = temperatures.iter().sum::<f64>() / temperatures.len() as f64;
         let triad = |sensor| fit.sensor(sensor).map(|found| table(fit, found));
         let calibration = Self {

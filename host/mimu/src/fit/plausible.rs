@@ -71,10 +71,12 @@ pub fn check_numbers(fit: &SensorFit) -> Result<()> {
         .chain(&triad.forward.bias)
         .chain(&triad.inverse_covariance)
         .chain(&triad.forward_covariance);
-    if numbers.into_iter().all(|x| x.is_finite()) && fit.rms().is_finite() {
-        return Ok(());
-    }
-    let seen = "the fit ends in something that is not a number".to_string();
+    let numbers = numbers.into_iter().all(|x| x.is_finite()) && fit.rms().is_finite();
+    let seen = match (numbers, triad.inverse.check(None)) {
+        (true, Ok(())) => return Ok(()),
+        (true, Err(_)) => "the fit ends in a scale factor or a bias that no sensor has".to_string(),
+        (false, _) => "the fit ends in something that is not a number".to_string(),
+    };
     Err(Failure::NoSolution(seen).into_error(fit.sensor))
 }
 

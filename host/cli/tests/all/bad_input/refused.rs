@@ -212,7 +212,7 @@ fn what_cannot_be_right_is_refused_in_one_line_and_leaves_no_file() {
             &[
                 "raw_unit = \"SI\"",
                 "in g",
-                "the factor accel=9.80665 (--scale)",
+                "the factor accel=9.80665 (mimu import --scale)",
             ],
         ),
         (
