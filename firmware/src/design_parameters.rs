@@ -179,3 +179,8 @@ pub const SAMPLE_HZ: u32 = 1_000;
 /// Time constant of the filter of temperature and reference, s. The noise of one sample of the reference, some 50 ppm of it, would
 /// be 0.02 deg/s of every gyro at once; over a second it is 1.5 ppm. Both move with the temperature of a board, over minutes.
 pub const SLOW_S: f32 = 1.0;
+
+// ---- Flash -------------------------------------------------------------------------------------
+
+/// Size of a word of the flash memory, bytes: programmed once between erases, and whole (RM0433 4.3.9).
+pub const FLASH_WORD: usize = 32;

@@ -21,7 +21,7 @@ use embedded_storage_async::nor_flash::{
 };
 
 use crate::board::CALIBRATION_SECTORS;
-use crate::slots::WORD;
+use crate::design_parameters::FLASH_WORD as WORD;
 
 /// Size of a sector, bytes: what is erased.
 const SECTOR: usize = 128 * 1024;

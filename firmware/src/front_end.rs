@@ -13,7 +13,7 @@
 
 use mimu_core::stored::hash;
 
-use crate::slots::WORD;
+use crate::design_parameters::FLASH_WORD as WORD;
 
 /// Words of the converter's linearity factor (RM0433 25.4.8).
 pub const LINEARITY_WORDS: usize = 6;

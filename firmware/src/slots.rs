@@ -20,10 +20,8 @@ use heapless::Vec;
 use mimu_core::stored::{self, MAX_LENGTH, hash};
 use mimu_core::wire::Slot;
 
+use crate::design_parameters::FLASH_WORD as WORD;
 use crate::front_end::{FRONT_END_WORDS, FrontEnd};
-
-/// Size of a word of the flash memory, bytes: programmed once between erases, and whole (RM0433 4.3.9).
-pub const WORD: usize = 32;
 
 const MAGIC: [u8; 4] = *b"slt2";
 

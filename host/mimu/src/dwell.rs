@@ -15,7 +15,6 @@ use crate::ramp::ramps;
 use crate::rest::{self, Rest};
 use crate::slow_turns::{self, Reading};
 use crate::stillness::{self, Detection, Finding, SHORTEST_S, Steps, reference_spans};
-use crate::unit_in_si;
 use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{Manifest, RAW_COLUMNS, Reference};
 
@@ -324,7 +323,6 @@ impl Dwells {
             warnings.extend(mark_slow_turns(&mut list));
         }
         warn(&list, manifest, &mut warnings);
-        warnings.extend(unit_in_si::at_rest(&list, manifest));
         Ok(Self {
             list,
             detection,

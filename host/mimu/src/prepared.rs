@@ -15,6 +15,7 @@ use crate::noise_file::NoiseFile;
 use crate::quantity::{Sensor, implausible_gravity, significant};
 use crate::rails::refuse_dead_channels;
 use crate::stillness::Finding;
+use crate::unit_in_si;
 use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{Batch, Manifest, Recording, Reference};
 
@@ -101,6 +102,8 @@ impl Prepared {
         let at = manifest.latitude_deg;
         let gravity = at.and_then(|at| implausible_gravity(manifest.gravity_mps2, at));
         dwells.warnings.extend(gravity);
+        let in_si = unit_in_si::at_rest(&dwells.list, &manifest);
+        dwells.warnings.extend(in_si);
         let noise = Noise::within(&dwells.list, &condensed, &dwells.rails);
         Ok(Self {
             manifest,

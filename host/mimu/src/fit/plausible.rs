@@ -59,7 +59,14 @@ pub fn check(prepared: &Prepared, fit: &mut SensorFit) -> Result<()> {
         off_level(prepared, fit),
     ];
     fit.warnings.extend(found.into_iter().flatten());
-    Ok(())
+    // By the limits of the device, and last: why it is so has a better word above.
+    match fit.estimated.triad.inverse.check(None) {
+        Ok(()) => Ok(()),
+        Err(_) => {
+            let seen = "the fit ends in a scale factor or a bias that no sensor has".to_string();
+            Err(Failure::NoSolution(seen).into_error(fit.sensor))
+        }
+    }
 }
 
 /// Refuses a fit that ends in something that is not a number.
@@ -71,12 +78,10 @@ pub fn check_numbers(fit: &SensorFit) -> Result<()> {
         .chain(&triad.forward.bias)
         .chain(&triad.inverse_covariance)
         .chain(&triad.forward_covariance);
-    let numbers = numbers.into_iter().all(|x| x.is_finite()) && fit.rms().is_finite();
-    let seen = match (numbers, triad.inverse.check(None)) {
-        (true, Ok(())) => return Ok(()),
-        (true, Err(_)) => "the fit ends in a scale factor or a bias that no sensor has".to_string(),
-        (false, _) => "the fit ends in something that is not a number".to_string(),
-    };
+    if numbers.into_iter().all(|x| x.is_finite()) && fit.rms().is_finite() {
+        return Ok(());
+    }
+    let seen = "the fit ends in something that is not a number".to_string();
     Err(Failure::NoSolution(seen).into_error(fit.sensor))
 }
 

@@ -11,6 +11,7 @@ mod join;
 mod joined;
 mod options;
 mod parquet_table;
+mod place;
 mod plausibility;
 mod pose_means;
 mod preset;

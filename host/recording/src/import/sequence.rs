@@ -1,14 +1,14 @@
 //! Files that follow one another: one for each pose or rate, as people record six faces.
 //!
 //! Each file is a step, labelled with its name. Their clocks may begin anew: what a file says of when it was begun is believed if it is
-//! after the file before, and else it begins [`PAUSE_S`] later. No turn is known between them.
+//! after the file before, and else it begins [`PAUSE_S`](super::place::PAUSE_S) later. No turn is known between them.
 
 use std::collections::BTreeSet;
 use std::path::Path;
 
 use super::joined::JoinedFiles;
 use super::options::file_name;
-use super::row::Row;
+use super::place::Place;
 use super::step_inputs::StepInputs;
 use super::step_labels::StepLabels;
 use super::{ImportOptions, ImportSummary};
@@ -18,39 +18,8 @@ use crate::error::{Argument, Error, Result};
 use crate::manifest::{Manifest, Source};
 use crate::writer::Writer;
 
-/// Time between two files of which nobody knows it, s: a gap that no turn is integrated across.
-const PAUSE_S: f64 = 10.0;
 /// Rates of two files may differ by this share: a loop that is paced by its own work is not as fast each time.
 const ALIKE: f64 = 0.02;
-
-/// Where a file stands in a sequence.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Place {
-    step: i32,
-    /// What its times are behind those of the first file by, s.
-    behind_s: f64,
-    /// Time of the last row before it, s.
-    after_s: f64,
-    /// What is added to its times, once its first row has been seen.
-    offset_s: Option<f64>,
-    last_s: f64,
-}
-
-impl Place {
-    /// Gives a row of the file its step, and its time among those of the others.
-    pub fn put(&mut self, row: &mut Row) {
-        let (after_s, behind_s) = (self.after_s, self.behind_s);
-        let offset_s = *self
-            .offset_s
-            .get_or_insert_with(|| match behind_s + row.t_s > after_s {
-                true => behind_s,
-                false => after_s + PAUSE_S - row.t_s,
-            });
-        row.t_s += offset_s;
-        row.step = self.step;
-        self.last_s = row.t_s;
-    }
-}
 
 /// Imports the files of `options` one after the other.
 pub(super) fn import_sequence(
@@ -85,13 +54,8 @@ pub(super) fn import_sequence(
         if step == 0 {
             origin_s = begun_s;
         }
-        import.place = Some(Place {
-            step: step as i32,
-            behind_s: (begun_s - origin_s) as f64,
-            after_s,
-            offset_s: None,
-            last_s: after_s,
-        });
+        let behind_s = (begun_s - origin_s) as f64;
+        import.place = Some(Place::new(step as i32, behind_s, after_s));
         let (writer, manifest, summary, columns) = match &mut open {
             Some(open) => open,
             None => {
@@ -139,7 +103,7 @@ pub(super) fn import_sequence(
                 "leave the file out, or skip the columns",
             ));
         }
-        after_s = import.place.map_or(after_s, |place| place.last_s);
+        after_s = import.place.map_or(after_s, |place| place.last_s());
         manifest.sources.push(source(path)?);
         add(summary, import.summary);
         inputs = import.inputs;
