@@ -217,7 +217,7 @@ fn asked(events: &Path) -> (usize, Option<Vector>) {
         .filter(|l| l.starts_with("{\"event\":\"step\""));
     let last = steps
         .clone()
-        .last()
+        .next_back()
         .and_then(|l| serde_json::from_str::<Value>(l).ok());
     let up = last.and_then(|e| {
         let all: Vec<f64> = e["step"]["up"]

@@ -40,7 +40,7 @@ impl Place {
         let (after_s, behind_s) = (self.after_s, self.behind_s);
         let offset_s = *self
             .offset_s
-            .get_or_insert_with(|| match behind_s + row.t_s > after_s {
+            .get_or_insert(match behind_s + row.t_s > after_s {
                 true => behind_s,
                 false => after_s + PAUSE_S - row.t_s,
             });
