@@ -15,6 +15,7 @@ mod real_ferraris;
 mod real_mikoff;
 mod real_xsens;
 mod several_recordings;
+mod signed_low_byte;
 mod stated_noise;
 mod strong_nonlinearity;
 mod temperature;

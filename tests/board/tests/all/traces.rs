@@ -24,8 +24,8 @@ fn core_computes_what_the_device_has_computed() {
 fn a_last_bit_that_changes_is_noticed() {
     for name in ["by-hand", "effects"] {
         let mut trace = Trace::read(name);
-        // C of the gyro in the first node: behind the header, the origin, the directions of both triads and the temperature.
-        let at = 12 + 52 + 2 * 72 + 4;
+        // C of the gyro in the first node: behind the header, the origin, the directions of both triads, range and lags, and the temperature.
+        let at = 12 + 60 + 2 * 72 + 16 + 4;
         trace.calibration[at] ^= 1;
         let end = trace.calibration.len() - 4;
         let crc = crc(&trace.calibration[..end]);
