@@ -8,10 +8,13 @@
 /// Values of a byte.
 const BYTE: f64 = 256.0;
 /// Fewer pairs of samples between which the error came or went prove nothing.
-const FEWEST: u64 = 20;
+const FEWEST: u64 = 12;
 /// Of all such pairs the fault brings nearly all nearer to each other when it is undone. Where it is absent, none of a quiet signal,
 /// and half of those of noise above a byte.
 const SHARE: f64 = 0.9;
+/// Counts from sample to sample beside such a pair from which on the signal moves too fast for it to say anything: of turns by hand at 100 Hz
+/// a step may be as long as a byte.
+const FAST: f64 = 64.0;
 
 /// What a reading is without the fault.
 pub fn undone(reading: f64) -> f64 {
@@ -24,7 +27,9 @@ pub fn undone(reading: f64) -> f64 {
 /// Takes the samples of a channel in a stream.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Finder {
-    /// Pairs of neighbours of which one has a low byte of 128 or more, and the other has not.
+    /// Up to three samples before the next one.
+    before: Vec<f64>,
+    /// Pairs of neighbours, in a signal that moves slowly, of which one has a low byte of 128 or more, and the other has not.
     pairs: u64,
     /// Those that are nearer to each other when the fault is undone.
     nearer: u64,
@@ -34,17 +39,27 @@ pub(crate) struct Finder {
 impl Finder {
     /// Looks at the samples of a block.
     pub fn push(&mut self, samples: &[f64]) {
-        for pair in samples.windows(2) {
-            let [a, b] = [pair[0], pair[1]];
-            if !(a.is_finite() && b.is_finite()) {
+        for &sample in samples {
+            if !sample.is_finite() {
+                self.before.clear();
                 continue;
             }
-            self.fractions |= a.fract() != 0.0;
-            let [free_a, free_b] = [a, b].map(undone);
-            if (free_a == a) != (free_b == b) {
-                self.pairs += 1;
-                self.nearer += u64::from((free_b - free_a).abs() < (b - a).abs());
+            self.fractions |= sample.fract() != 0.0;
+            if let [a, b, c] = self.before[..] {
+                self.look([a, b, c, sample]);
+                self.before.remove(0);
             }
+            self.before.push(sample);
+        }
+    }
+
+    /// Looks at the pair in the middle of four samples.
+    fn look(&mut self, [a, b, c, d]: [f64; 4]) {
+        let is_low = |v: f64| undone(v) != v;
+        let slow = |v: f64, w: f64| is_low(v) == is_low(w) && (w - v).abs() < FAST;
+        if is_low(b) != is_low(c) && slow(a, b) && slow(c, d) {
+            self.pairs += 1;
+            self.nearer += u64::from((undone(c) - undone(b)).abs() < (c - b).abs());
         }
     }
 
@@ -94,6 +109,22 @@ mod tests {
             let undone: Vec<f64> = read.iter().map(|r| undone(*r)).collect();
             assert_eq!(undone, signal);
         }
+    }
+
+    #[test]
+    fn it_is_found_in_turns_whose_steps_are_as_long_as_a_byte() {
+        // Turns of a second at 100 Hz, of up to 60 deg/s, with rests between them.
+        let turn = |k: i32| match k % 400 {
+            k @ 0..100 => 3930.0 * (1.0 - (f64::from(k) * 0.02 * std::f64::consts::PI).cos()),
+            _ => 0.0,
+        };
+        let noise = signal(8.0);
+        let turns = (0..4000).zip(&noise);
+        let turns: Vec<f64> = turns
+            .map(|(k, v)| (turn(k) - 580.0 + 0.01 * v).round())
+            .collect();
+        assert!(found(&read(&turns)).is_some());
+        assert_eq!(found(&turns), None);
     }
 
     #[test]
