@@ -23,6 +23,19 @@ pub(crate) fn wrong_gain(
     gravity_mps2: f64,
     figure: Figure,
 ) -> Option<String> {
+    said_of(sensor, "the readings are", scale, gravity_mps2, figure)
+}
+
+/// Of readings at rest: with their biases, so that the scale factors of a fit differ from it.
+const AT_REST: &str = "at rest the readings, biases included, are about";
+
+fn said_of(
+    sensor: Sensor,
+    what: &str,
+    scale: f64,
+    gravity_mps2: f64,
+    figure: Figure,
+) -> Option<String> {
     if (1.0 / GAIN..GAIN).contains(&scale) {
         return None;
     }
@@ -47,7 +60,7 @@ pub(crate) fn wrong_gain(
         _ => "unit, or range setting of the part?",
     };
     Some(format!(
-        "{sensor}: raw_unit = \"SI\", but the readings are {} times the input: {cause}",
+        "{sensor}: raw_unit = \"SI\", but {what} {} times the input: {cause}",
         significant(scale)
     ))
 }
@@ -72,8 +85,15 @@ pub(crate) fn of_sizes([rate, force]: [Option<f64>; 2], manifest: &Manifest) -> 
         return Vec::new();
     }
     let gravity = manifest.gravity_mps2;
-    let force = force
-        .and_then(|size| wrong_gain(Sensor::Accel, size / gravity, gravity, Figure::GravitySize));
+    let force = force.and_then(|size| {
+        said_of(
+            Sensor::Accel,
+            AT_REST,
+            size / gravity,
+            gravity,
+            Figure::GravitySize,
+        )
+    });
     let rate = rate.filter(|rate| *rate > LARGEST_BIAS);
     force
         .into_iter()

@@ -369,7 +369,7 @@ fn readings_in_si_that_are_none_are_said() {
         "{text}"
     );
     assert!(
-        text.contains("accel: raw_unit = \"SI\", but the readings are 0.250 times"),
+        text.contains("accel: raw_unit = \"SI\", but at rest the readings, biases included, are about 0.250 times the input"),
         "{text}"
     );
 }

@@ -202,9 +202,7 @@ fn outliers(prepared: &Prepared, fit: &SensorFit) -> Option<String> {
 fn unit(prepared: &Prepared, fit: &SensorFit) -> Option<String> {
     let matrix = &fit.estimated.triad.forward.matrix;
     let scale = matrix.row_iter().map(|r| r.norm()).sum::<f64>() / 3.0;
-    // Of the magnitude at rest the dwells have said it.
-    let told = fit.figure == Figure::GravitySize;
-    if prepared.manifest.raw_unit != RawUnit::Si || told {
+    if prepared.manifest.raw_unit != RawUnit::Si {
         return None;
     }
     wrong_gain(

@@ -61,7 +61,7 @@ fn what_only_its_owner_can_judge_is_a_warning() {
             "counts for SI",
             by_hand,
             |s| s.set("raw_unit", "\"SI\""),
-            &["accel: raw_unit = \"SI\"", "1640 times"],
+            &["accel: raw_unit = \"SI\"", "1632 times"],
         ),
         (
             "nothing but poses on the table",
