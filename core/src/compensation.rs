@@ -58,6 +58,28 @@ pub enum Implausible {
     Slope,
 }
 
+impl core::fmt::Display for Implausible {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::NotFinite => f.write_str("C, o or a slope has an entry that is not a number"),
+            Self::Scale => {
+                let [least, most] = SCALE_RANGE;
+                write!(
+                    f,
+                    "a column of C is not from {least:e} to {most:e} SI per raw unit long"
+                )
+            }
+            Self::Singular => f.write_str("C is singular"),
+            Self::Offset => write!(f, "o is beyond {MOST_OFFSET:e} SI"),
+            Self::Slope => f.write_str(
+                "within a kelvin, C would change by more than itself, or o beyond all sizes",
+            ),
+        }
+    }
+}
+
+impl core::error::Error for Implausible {}
+
 impl<T: RealField + Copy> Affine<T> {
     /// Refuses what no sensor is. `slope`: derivative of the model by the temperature, per kelvin.
     pub fn check(&self, slope: Option<&Self>) -> Result<(), Implausible> {

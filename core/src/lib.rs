@@ -18,6 +18,10 @@
 //! types: a calibration is immutable and serves any number of streams.
 #![no_std]
 
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
 pub mod compensation;
 pub mod compensator;
 pub mod die;

@@ -138,6 +138,34 @@ pub enum Refused {
     Header,
 }
 
+impl core::fmt::Display for Refused {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::NotACalibration => f.write_str("the bytes do not begin as a calibration does"),
+            Self::Length => f.write_str("the bytes are not as many as they say"),
+            Self::Version { found } => write!(
+                f,
+                "the layout has version {found}, and this program reads {VERSION}"
+            ),
+            Self::Check => f.write_str("the CRC is wrong"),
+            Self::Node { at } => write!(
+                f,
+                "temperature node {at} has numbers that no sensor has, is not warmer than the one before, or is one too many"
+            ),
+            Self::Singular => f.write_str("the C that the effects were found with is singular"),
+            Self::EffectUnknown { at } => write!(f, "effect {at} is unknown"),
+            Self::EffectValue { at } => write!(f, "effect {at} has an impossible coefficient"),
+            Self::EffectsFull { at } => write!(f, "there is no room for effect {at}"),
+            Self::Temperature => {
+                f.write_str("the temperature range, a lag or the thermometer is impossible")
+            }
+            Self::Header => f.write_str("the header has bits of a later version"),
+        }
+    }
+}
+
+impl core::error::Error for Refused {}
+
 /// Writes a calibration to the beginning of `out`; returns its length. `found_with`: C of the gyro and of the accelerometer that the
 /// effects were found with. What is written is not judged; [`decode`] does that.
 pub fn encode(

@@ -89,6 +89,23 @@ pub enum Refused {
     Range,
 }
 
+impl core::fmt::Display for Refused {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Count => f.write_str("there is no temperature node, or there are too many"),
+            Self::Order(at) => write!(f, "temperature node {at} is not warmer than the one before"),
+            Self::NotFinite(at) => {
+                write!(f, "temperature node {at} has an entry that is not a number")
+            }
+            Self::Range => {
+                f.write_str("the temperature range has no numbers, or ends before it begins")
+            }
+        }
+    }
+}
+
+impl core::error::Error for Refused {}
+
 /// Nodes in the order of their temperatures: immutable, for any number of streams.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Table<T: RealField, const N: usize> {

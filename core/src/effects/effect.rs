@@ -59,6 +59,21 @@ pub enum Refused {
     Full,
 }
 
+impl core::fmt::Display for Refused {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Unknown => f.write_str("no effect of this name can be removed here"),
+            Self::Count { needed } => write!(f, "the effect takes {needed} numbers"),
+            Self::Value => {
+                f.write_str("the effect has an impossible coefficient or nonlinear parameter")
+            }
+            Self::Full => f.write_str("there is no room for one more effect"),
+        }
+    }
+}
+
+impl core::error::Error for Refused {}
+
 /// An effect with its numbers.
 #[derive(Debug, Clone, Copy)]
 pub struct Effect<T: RealField> {

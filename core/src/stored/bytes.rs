@@ -6,6 +6,14 @@ use nalgebra::Matrix3;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TooLong;
 
+impl core::fmt::Display for TooLong {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str("the calibration is longer than there is room for")
+    }
+}
+
+impl core::error::Error for TooLong {}
+
 /// The bytes that are still to be read. Everything is `None` once they end.
 pub(super) struct Reader<'a>(pub &'a [u8]);
 

@@ -7,7 +7,7 @@ use mimu_core::table::Node;
 use serde::Serialize;
 
 use super::origin;
-use super::who::{Hash, unusable};
+use super::who::Hash;
 use mimu::calibration::{Calibration, Kept, OnDevice, What};
 use mimu::quantity::{self, AXES};
 use mimu_recording::error::{Error, Result};
@@ -148,7 +148,7 @@ pub fn calibration(bytes: &[u8], device: &str, place: &str) -> Result<Calibratio
         |record| effects.push(on_device(record)),
     );
     let stored = stored.map_err(|refused| {
-        let problem = format!("it cannot be used: {}", unusable(&refused));
+        let problem = format!("it cannot be used: {}", refused);
         Error::device(place, problem, "upload a calibration again")
     })?;
     let origin = stored.origin;

@@ -8,7 +8,7 @@ use mimu_core::wire::Capabilities;
 use nalgebra::{Matrix3, Vector3};
 
 use super::origin;
-use super::who::{Hash, Who, unusable};
+use super::who::{Hash, Who};
 use mimu::calibration::{Calibration, NO_SENSE, OnDevice, OverTemperature, What, reference_node};
 use mimu::quantity::Sensor;
 use mimu_recording::RawUnit;
@@ -72,7 +72,7 @@ impl Image {
         // What would be refused over there is refused here, and by its name.
         check_room(&effects, ROOM, place)?;
         stored::decode(&bytes).map_err(|refused| {
-            let problem = format!("the device could not use it: {}", unusable(&refused));
+            let problem = format!("the device could not use it: {}", refused);
             Error::new(place, problem, "fit the recording again")
         })?;
         Ok(Self {

@@ -52,4 +52,4 @@ pub use session::{Session, refused};
 pub use stream::{Moments, Stream, Streamed, stream};
 pub use trim::{Pose, SHORTEST_TRIM_S, Trimmed, TrimmedTriad, trim};
 pub use upload::{Uploaded, download, outside_now, upload};
-pub use who::{Hash, Held, Room, Started, Who, unit_name, unusable};
+pub use who::{Hash, Held, Room, Started, Who, unit_name};

@@ -8,7 +8,7 @@ use super::heard::{Answer, Event, LineCount};
 use super::line::{ATTEMPTS, Line};
 use super::origin;
 use super::port::{Port, ports};
-use super::who::{Who, unusable};
+use super::who::Who;
 use mimu_recording::error::{Argument, Error, Result};
 
 /// Longest wait for an answer that needs no work: a frame takes 5 ms, and one of samples may be before it. With the times that a call
@@ -243,10 +243,7 @@ pub fn refused(port: &str, purpose: &str, refusal: &Refusal) -> Error {
             "upload again",
         ),
         Refusal::NotUsable(reason) => (
-            format!(
-                "the bytes are no calibration that it can use: {}",
-                unusable(reason)
-            ),
+            format!("the bytes are no calibration that it can use: {}", reason),
             "update device and program to the same version",
         ),
         Refusal::FlashFailed => (

@@ -11,7 +11,7 @@ use super::image::Image;
 use super::session::Session;
 use super::stream::{Stream, Streamed, stream};
 use super::upload::{download, upload};
-use super::who::{Hash, unusable};
+use super::who::Hash;
 use mimu::quantity::{AXES, Sensor};
 use mimu_recording::error::{Error, Result};
 
@@ -184,7 +184,7 @@ fn check_size(
 }
 
 fn refuse(session: &Session, refused: &Refused) -> Error {
-    let problem = format!("its calibration cannot be trimmed: {}", unusable(refused));
+    let problem = format!("its calibration cannot be trimmed: {}", refused);
     let remedy = "upload the calibration file again, then trim";
     Error::device(session.port(), problem, remedy)
 }

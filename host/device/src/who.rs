@@ -4,7 +4,6 @@ use std::fmt;
 
 use serde::{Serialize, Serializer};
 
-use mimu_core::stored::{Refused, VERSION};
 use mimu_core::wire::{
     Capabilities, Compatibility, EFFECTS, Greeting, MAGIC, PROTOCOL, Slot, Start, Version,
     compatibility,
@@ -308,29 +307,6 @@ pub fn unit_name(unit_id: &str) -> String {
     format!("mimu-{unit_id}")
 }
 
-/// Why bytes are not a calibration, in words.
-pub fn unusable(refused: &Refused) -> String {
-    match refused {
-        Refused::NotACalibration => "they do not begin as a calibration does".into(),
-        Refused::Length => "their length is not the one that they state".into(),
-        Refused::Version { found } => {
-            format!("their layout is of version {found}, and this program reads {VERSION}")
-        }
-        Refused::Check => "their CRC does not hold".into(),
-        Refused::Node { at } => format!(
-            "temperature node {at} has numbers that no sensor has, or is not warmer than the one before, or one too many"
-        ),
-        Refused::Singular => "the C that its effects were found with is singular".into(),
-        Refused::EffectUnknown { at } => format!("effect {at} is not known"),
-        Refused::EffectValue { at } => format!("effect {at} has numbers that make no sense"),
-        Refused::EffectsFull { at } => format!("there is no room for effect {at}"),
-        Refused::Temperature => {
-            "the range of its temperatures, its lag or its thermometer makes no sense".into()
-        }
-        Refused::Header => "their header has bits of a later version".into(),
-    }
-}
-
 /// What is in a place for a calibration, in words.
 fn slot(slot: &Slot) -> String {
     match slot {
@@ -339,6 +315,6 @@ fn slot(slot: &Slot) -> String {
         Slot::Unfinished => "unfinished: its writing, or its erasing, was cut off".into(),
         Slot::Damaged => "damaged: it was whole once".into(),
         Slot::NotKnown => "something that this program does not know".into(),
-        Slot::NotUsable(refused) => format!("whole, and not usable: {}", unusable(refused)),
+        Slot::NotUsable(refused) => format!("whole, and not usable: {}", refused),
     }
 }

@@ -287,6 +287,20 @@ pub fn compensator_follow(
     (state, state.dies_c(), place)
 }
 
+#[rustfmt::skip]
+#[path = "../../../core/examples/stream/calibrate.rs"]
+mod readme;
+
+/// The program of the README of mimu-core.
+#[inline(never)]
+pub fn readme_program(
+    calibration: &[u8],
+    samples: &[([f32; 3], [f32; 3], f32)],
+    out: &mut dyn FnMut(Sample<f32>, table::Place),
+) -> Result<(), stored::Refused> {
+    readme::calibrate(calibration, 1000.0, samples.iter().copied(), out)
+}
+
 /// What a device does with every sample: sums to volts, all of the calibration at the temperature of the batch, bytes of both streams.
 #[inline(never)]
 pub fn sample_path(

@@ -8,6 +8,7 @@ use clap::{ArgGroup, Args};
 use mimu::bias_cubic::KnownConversion;
 use mimu::calibration::Calibration;
 use mimu::noise_file::NoiseFile;
+use mimu_device::Image;
 use mimu_recording::error::Result;
 use mimu_recording::result_file::stage;
 use serde::Serialize;
@@ -17,7 +18,7 @@ use crate::cmd::design::number;
 use crate::output::{check_outputs, print};
 
 #[derive(Args)]
-#[command(group(ArgGroup::new("to").required(true).args(["kalibr", "px4", "ardupilot"])))]
+#[command(group(ArgGroup::new("to").required(true).args(["kalibr", "px4", "ardupilot", "core"])))]
 pub struct ExportArgs {
     /// Kalibr's imu.yaml to write, from --noise
     #[arg(
@@ -43,10 +44,18 @@ pub struct ExportArgs {
         conflicts_with = "noise"
     )]
     ardupilot: Option<PathBuf>,
+    /// Bytes to write for programs with mimu-core: those of --calibration that a device stores
+    #[arg(
+        long,
+        value_name = "FILE",
+        requires = "calibration",
+        conflicts_with = "noise"
+    )]
+    core: Option<PathBuf>,
     /// Noise file, by `mimu allan -o`
     #[arg(long, value_name = "FILE")]
     noise: Option<PathBuf>,
-    /// Calibration over temperature, by `mimu thermal fit -o`
+    /// Calibration; for PX4 and ArduPilot one over temperature, by `mimu thermal fit -o`
     #[arg(long, value_name = "FILE")]
     calibration: Option<PathBuf>,
     /// Topic of Kalibr's messages
@@ -128,13 +137,46 @@ struct ExportResult {
 }
 
 pub fn run(args: &ExportArgs) -> Result<()> {
-    match (&args.kalibr, &args.px4, &args.ardupilot) {
+    match (&args.kalibr, &args.px4, &args.ardupilot, &args.core) {
         (Some(path), ..) => noise(args, path),
-        (_, Some(path), _) => parameters(args, Autopilot::Px4, path),
-        (_, _, Some(path)) => parameters(args, Autopilot::ArduPilot, path),
+        (_, Some(path), ..) => parameters(args, Autopilot::Px4, path),
+        (_, _, Some(path), _) => parameters(args, Autopilot::ArduPilot, path),
+        (_, _, _, Some(path)) => stored(args, path),
         // One of them is required.
         _ => Ok(()),
     }
+}
+
+/// What was written for mimu-core.
+#[derive(Serialize)]
+struct StoredResult {
+    format: &'static str,
+    core: String,
+    bytes: usize,
+    hash: String,
+    effects: Vec<String>,
+    warnings: Vec<String>,
+}
+
+fn stored(args: &ExportArgs, path: &Path) -> Result<()> {
+    let from = args.calibration.as_deref().unwrap_or(Path::new(""));
+    check_outputs(&[Some(path), args.json.file()], &[from])?;
+    let image = Image::new(&Calibration::read(from)?, &from.display().to_string())?;
+    let result = StoredResult {
+        format: "mimu-export/1",
+        core: path.display().to_string(),
+        bytes: image.bytes.len(),
+        hash: image.hash.to_string(),
+        effects: image.effects,
+        warnings: image.warnings,
+    };
+    let mut text: String = result
+        .warnings
+        .iter()
+        .map(|w| format!("warning: {w}\n"))
+        .collect();
+    text += &format!("{} bytes for mimu-core: {}\n", result.bytes, result.core);
+    print(&args.json, &text, &result, Some(stage(path, image.bytes)?))
 }
 
 fn noise(args: &ExportArgs, path: &Path) -> Result<()> {

@@ -1,6 +1,6 @@
 //! What a calibration file has to be to be applied.
 
-use mimu_core::compensation::{Affine, Implausible, MOST_OFFSET, SCALE_RANGE};
+use mimu_core::compensation::{Affine, Implausible};
 use mimu_core::table::{TEMPERATURE_RANGE_C, is_temperature};
 use nalgebra::{Matrix3, Vector3};
 
@@ -65,7 +65,7 @@ impl Calibration {
             let problem = inverse.as_ref().and_then(|model| implausible(model, None));
             let forward = inverse.as_ref().and_then(Forward::of);
             let (None, Some(forward)) = (&problem, forward) else {
-                let problem = problem.unwrap_or_else(|| SINGULAR.into());
+                let problem = problem.unwrap_or_else(|| Implausible::Singular.to_string());
                 return Err(Error::new(place, problem, "fit the recording again"));
             };
             check_both_ways(table, &forward, &place)?;
@@ -153,22 +153,9 @@ impl TriadTable {
     }
 }
 
-const SINGULAR: &str = "C is singular";
-
 /// What no sensor is, by the limits that the device has too; `slope`: derivative by the temperature, per kelvin.
 pub(super) fn implausible(model: &Affine<f64>, slope: Option<&Affine<f64>>) -> Option<String> {
-    Some(match model.check(slope).err()? {
-        Implausible::NotFinite => "C, o or a slope has an entry that is not a number".into(),
-        Implausible::Scale => {
-            let [least, most] = SCALE_RANGE;
-            format!("a column of C is not from {least:e} to {most:e} SI per raw unit long")
-        }
-        Implausible::Singular => SINGULAR.into(),
-        Implausible::Offset => format!("o is beyond {MOST_OFFSET:e} SI"),
-        Implausible::Slope => {
-            "within a kelvin, C would change by more than itself, or o beyond all sizes".into()
-        }
-    })
+    model.check(slope).err().map(|problem| problem.to_string())
 }
 
 /// Refuses a file in which the two directions of the calibration disagree: one of them was edited.

@@ -7,7 +7,7 @@ use clap::Args;
 use mimu::calibration::Calibration;
 use mimu_core::stored::{Refused, VERSION};
 use mimu_device::{
-    DeviceResult, Image, calibration, contents, download, outside_now, unit_name, unusable, upload,
+    DeviceResult, Image, calibration, contents, download, outside_now, unit_name, upload,
 };
 use mimu_recording::error::{Error, Result};
 use mimu_recording::result_file::stage;
@@ -79,10 +79,7 @@ pub fn run_download(args: &DownloadArgs) -> Result<()> {
     let bytes = download(&mut session)?;
     let port = session.port();
     let mut contents = contents(&bytes).map_err(|refused| {
-        let problem = format!(
-            "this program cannot read what it stores: {}",
-            unusable(&refused)
-        );
+        let problem = format!("this program cannot read what it stores: {}", refused);
         let remedy = match refused {
             Refused::Version { found } if found < VERSION => {
                 "upload the calibration file again: the device keeps the numbers in an older layout"

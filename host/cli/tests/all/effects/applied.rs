@@ -10,7 +10,7 @@ use super::unit::{
     CUBIC, DWELLS, NOISE, RATE_HZ, SAG, THERMAL, fitted, forward, named, record, table,
 };
 
-fn read(folder: &Path) -> (Recording, Batch) {
+pub fn read(folder: &Path) -> (Recording, Batch) {
     let recording = Recording::open(folder).unwrap();
     let mut all = Batch::default();
     let collect = |batch: &Batch| {

@@ -2,6 +2,7 @@
 
 mod applied;
 mod codes;
+mod core_program;
 mod gaps;
 mod kept;
 mod law;
