@@ -11,7 +11,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, SVector, Vector3};
 
 use super::chains::Chains;
 use super::least_squares::{Linearized, Observability, Scatter, excess_variance, minimize};
-use super::turn::{Centred, Motion, Rest, Turn, across, between, by_forces, integrate};
+use super::turn::{Motion, Rest, Rotations, Turn, across, between, by_forces};
 use super::{Estimated, Failure};
 use crate::quantity::AXES;
 use crate::triad::{Covariance, Part, Triad};
@@ -87,15 +87,7 @@ pub fn estimate(
     };
     // Parameters of order one: C in units of its own size, o about the reading at rest.
     let unit = first.norm() / 3f64.sqrt();
-    let pieces: Vec<Vec<Centred>> = turns
-        .iter()
-        .map(|t| {
-            t.increments
-                .iter()
-                .map(|i| Centred::new(i, &at_rest))
-                .collect()
-        })
-        .collect();
+    let rotations = Rotations::new(turns, &at_rest);
     let directions: Vec<_> = turns
         .iter()
         .map(|t| (t.before.normalize(), t.after.normalize()))
@@ -114,7 +106,7 @@ pub fn estimate(
         let (c, o) = unpack(p);
         let mut r = DVector::zeros(n_turns + n_rest);
         let mut j = DMatrix::zeros(n_turns + n_rest, all);
-        let turned: Vec<_> = pieces.iter().map(|p| integrate(p, &c, &o, true)).collect();
+        let turned = rotations.at(&c, &o);
         let level = chains.level(turns, turned.iter().map(|t| t.0));
         for (t, (after, by)) in turned.iter().enumerate() {
             let (before, measured) = &directions[t];
@@ -187,8 +179,7 @@ pub fn estimate(
     let by_accelerometer = |p: &DVector<f64>| {
         let (c, o) = unpack(p);
         let mut by = DMatrix::zeros(n_turns, 12);
-        for (t, (turn, pieces)) in turns.iter().zip(&pieces).enumerate() {
-            let (after, _) = integrate(pieces, &c, &o, false);
+        for (t, (turn, (after, _))) in turns.iter().zip(rotations.at(&c, &o)).enumerate() {
             let (_, measured) = &directions[t];
             for (k, e) in across(measured).iter().enumerate() {
                 for (side, raw) in by_forces(turn, &after, e).into_iter().zip(turn.raw) {

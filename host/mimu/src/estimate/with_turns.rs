@@ -13,7 +13,7 @@ use mimu_core::compensation::Affine;
 use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, Vector3};
 
 use super::least_squares::{Linearized, excess_variance, minimize};
-use super::turn::{Centred, Rest, Turn, across, between, by_forces, integrate};
+use super::turn::{Rest, Rotations, Turn, across, between, by_forces};
 use super::{Estimated, Failure, Observation};
 use crate::triad::{Covariance, Part, Triad};
 
@@ -56,16 +56,7 @@ impl Together<'_> {
         let at_rest =
             self.rest.iter().map(|o| o.raw).sum::<Vector3<f64>>() / self.rest.len().max(1) as f64;
         let unit = self.gyro.matrix.norm() / 3f64.sqrt();
-        let pieces: Vec<Vec<Centred>> = self
-            .turns
-            .iter()
-            .map(|t| {
-                t.increments
-                    .iter()
-                    .map(|i| Centred::new(i, &at_rest))
-                    .collect()
-            })
-            .collect();
+        let rotations = Rotations::new(self.turns, &at_rest);
         let unpack = |p: &DVector<f64>| {
             let mut c = Matrix3::zeros();
             for (k, place) in LOWER.iter().enumerate() {
@@ -97,14 +88,14 @@ impl Together<'_> {
                 r[row] = f.norm() - 1.0;
                 by_accel(&mut j, row, &up, &v);
             }
-            for (t, turn) in self.turns.iter().enumerate() {
+            let turned = rotations.at(&gyro.matrix, &gyro.offset);
+            for (t, (turn, (after, by))) in self.turns.iter().zip(turned).enumerate() {
                 let v = turn.raw.map(|raw| order_one(&raw));
                 let turn = Turn {
                     before: accel.apply(&v[0]),
                     after: accel.apply(&v[1]),
                     ..*turn
                 };
-                let (after, by) = integrate(&pieces[t], &gyro.matrix, &gyro.offset, true);
                 let measured = turn.after.normalize();
                 let error = between(&(after * turn.before.normalize()), &measured);
                 for (k, e) in across(&measured).iter().enumerate() {
