@@ -2,6 +2,8 @@
 
 use nalgebra::{Matrix3, RealField, Vector3, convert};
 
+use crate::PerSensor;
+
 /// Lengths that a column of C may have, SI per raw unit: what one raw unit of a sensor is worth. A converter of 32 bits over 250 deg/s has
 /// 2e-9 rad/s; a gyro of 30 000 deg/s read in volts has 200 rad/s.
 pub const SCALE_RANGE: [f64; 2] = [1e-12, 1e4];
@@ -128,23 +130,11 @@ impl<T: RealField + Copy> Affine<T> {
     }
 }
 
-/// Inverse models of both triads of an inertial unit, raw to SI.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Compensation<T: RealField> {
-    /// Gyro triad, raw to rad/s.
-    pub gyro: Affine<T>,
-    /// Accelerometer triad, raw to m/s².
-    pub accel: Affine<T>,
-}
+/// Inverse models of both triads of an inertial unit: gyro, raw to rad/s, accelerometer, raw to m/s².
+pub type Compensation<T> = PerSensor<Affine<T>>;
 
-/// One sample of an inertial unit, raw or SI as the context says.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Sample<T: RealField> {
-    /// Gyro x, y, z.
-    pub gyro: Vector3<T>,
-    /// Accelerometer x, y, z.
-    pub accel: Vector3<T>,
-}
+/// One sample of an inertial unit, gyro x, y, z and accelerometer x, y, z: raw or SI as the context says.
+pub type Sample<T> = PerSensor<Vector3<T>>;
 
 impl<T: RealField + Copy> Compensation<T> {
     /// SI sample (rad/s, m/s²) in the body frame from a raw one.

@@ -11,6 +11,7 @@
 
 use nalgebra::{RealField, convert};
 
+use crate::PerSensor;
 use crate::compensation::{Compensation, Sample};
 use crate::die::{self, DieLag};
 use crate::effects::{self, Effects, REFERENCE_C};
@@ -21,8 +22,8 @@ use crate::table::{self, Place, Table};
 pub struct Compensator<T: RealField, const NODES: usize, const ROOM: usize> {
     /// Compensation over the temperature of the dies.
     pub table: Table<T, NODES>,
-    /// Lags of the dies of gyro and accelerometer behind the thermometer.
-    pub lags: [DieLag<T>; 2],
+    /// Lags of the dies behind the thermometer.
+    pub lags: PerSensor<DieLag<T>>,
     /// What the affine model lacks; `None` if there is nothing, so that no sample pays for it.
     pub effects: Option<Effects<T, ROOM>>,
 }
@@ -30,8 +31,8 @@ pub struct Compensator<T: RealField, const NODES: usize, const ROOM: usize> {
 /// What a [`Compensator`] remembers of one stream.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct State<T: RealField, const ROOM: usize> {
-    dies: [die::State<T>; 2],
-    dies_c: Option<[T; 2]>,
+    dies: PerSensor<die::State<T>>,
+    dies_c: Option<PerSensor<T>>,
     model: table::State<T>,
     effects: effects::State<T, ROOM>,
 }
@@ -42,9 +43,8 @@ impl<T: RealField + Copy, const ROOM: usize> State<T, ROOM> {
         self.effects.gap();
     }
 
-    /// Temperatures of the dies of gyro and accelerometer at the last [`Compensator::follow`], °C; `None` before the first reading of the
-    /// thermometer.
-    pub fn dies_c(&self) -> Option<[T; 2]> {
+    /// Temperatures of the dies at the last [`Compensator::follow`], °C; `None` before the first reading of the thermometer.
+    pub fn dies_c(&self) -> Option<PerSensor<T>> {
         self.dies_c
     }
 
@@ -66,7 +66,7 @@ impl<T: RealField + Copy, const NODES: usize, const ROOM: usize> Compensator<T, 
     /// The state of a stream which begins at power-on, of so many samples a second.
     pub fn state(&self, sample_rate_hz: T) -> State<T, ROOM> {
         State {
-            dies: [die::State::new(); 2],
+            dies: PerSensor::both(die::State::new()),
             dies_c: None,
             model: self.table.state(),
             effects: effects::State::new(sample_rate_hz),
@@ -77,10 +77,10 @@ impl<T: RealField + Copy, const NODES: usize, const ROOM: usize> Compensator<T, 
     /// the dies and of the effects that both calibrations have: the unit does not know that it has another calibration. To be followed by
     /// [`Self::follow`] before the next sample, which brings the models of the new one.
     pub fn take_over(&self, before: &Self, state: &mut State<T, ROOM>) {
-        let known = before.lags.iter().zip(state.dies);
+        let known = before.lags.zip(state.dies);
         state.dies = self.lags.map(|lag| {
-            let mut same = known.clone().filter(|(other, _)| **other == lag);
-            same.next().map_or(die::State::new(), |(_, die)| die)
+            let mut same = known.into_iter().filter(|(_, (other, _))| *other == lag);
+            same.next().map_or(die::State::new(), |(_, (_, die))| die)
         });
         // Without effects nothing is remembered but time and temperature.
         state.effects.gap();
@@ -96,17 +96,9 @@ impl<T: RealField + Copy, const NODES: usize, const ROOM: usize> Compensator<T, 
     pub fn follow(&self, state: &mut State<T, ROOM>, dt_s: T, thermometer_c: Option<T>) -> Place {
         // No number is no reading.
         let read_c = thermometer_c.unwrap_or(T::zero() / T::zero());
-        let [gyro, accel] = &self.lags;
-        let [gyro_die, accel_die] = &mut state.dies;
-        let dies_c = [
-            gyro.follow(gyro_die, dt_s, read_c),
-            accel.follow(accel_die, dt_s, read_c),
-        ];
-        let dies_c = match dies_c {
-            [Some(gyro_c), Some(accel_c)] => Some([gyro_c, accel_c]),
-            _ => None,
-        };
-        self.follow_at(state, dt_s, thermometer_c, dies_c)
+        let dies = self.lags.as_ref().zip(state.dies.as_mut());
+        let dies_c = dies.map(|(lag, die)| lag.follow(die, dt_s, read_c));
+        self.follow_at(state, dt_s, thermometer_c, dies_c.transpose())
     }
 
     /// The same where somebody else knows the temperatures of the dies, °C: the device reports them.
@@ -115,10 +107,10 @@ impl<T: RealField + Copy, const NODES: usize, const ROOM: usize> Compensator<T, 
         state: &mut State<T, ROOM>,
         dt_s: T,
         thermometer_c: Option<T>,
-        dies_c: Option<[T; 2]>,
+        dies_c: Option<PerSensor<T>>,
     ) -> Place {
         state.dies_c = dies_c;
-        let at = dies_c.unwrap_or([convert(REFERENCE_C); 2]);
+        let at = dies_c.unwrap_or(PerSensor::both(convert(REFERENCE_C)));
         self.table.follow(&mut state.model, at);
         let read_c = thermometer_c.unwrap_or(T::zero() / T::zero());
         match &self.effects {

@@ -13,6 +13,8 @@
 
 use nalgebra::{RealField, convert};
 
+use crate::PerSensor;
+
 /// So far outside the temperatures that a calibration is for its curves go on along their slope, K; farther out they are held.
 pub const BEYOND_C: f64 = 5.0;
 
@@ -71,10 +73,10 @@ impl<T: RealField + Copy> DieLag<T> {
         (followed && lag_s >= least && lag_s <= most).then_some(Self { lag_s })
     }
 
-    /// Of gyro and accelerometer by their lags, s; none where these are not known or [`Self::new`] refuses them.
-    pub fn of_triads(lags_s: Option<[T; 2]>) -> [Self; 2] {
+    /// Of both triads by their lags, s; none where these are not known or [`Self::new`] refuses them.
+    pub fn of_triads(lags_s: Option<PerSensor<T>>) -> PerSensor<Self> {
         let known = |lag_s| Self::new(lag_s).unwrap_or_else(Self::none);
-        lags_s.map_or_else(|| [Self::none(); 2], |lags_s| lags_s.map(known))
+        lags_s.map_or_else(|| PerSensor::both(Self::none()), |lags_s| lags_s.map(known))
     }
 
     /// Seconds by which the dies follow the thermometer; negative: lead.

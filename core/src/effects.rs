@@ -18,7 +18,7 @@
 //!
 //! Errors of the converter are another matter: they are functions of the raw reading, whatever that stands for, and are taken out of it
 //! before it is compensated, by [`Effects::without_code_errors`]. They are those of an axis, which may have a converter to itself, and are
-//! made by [`Effect::code`].
+//! made by [`DeviceEffect::code`].
 
 mod code;
 mod directions;
@@ -28,14 +28,15 @@ mod triad;
 
 use nalgebra::{RealField, Vector3, convert};
 
-use crate::compensation::{Affine, Sample};
+use crate::compensation::{Compensation, Sample};
 use crate::die::{BEYOND_C, lagged};
+use crate::{PerSensor, Sensor};
 use law::Conditions;
 use triad::{Memory, Triad, put};
 
 pub use code::FARTHEST_ZERO;
 pub use directions::Directions;
-pub use effect::{Effect, Refused, Sensor, TIME_CONSTANT_RANGE_S, Variable};
+pub use effect::{Converter, DeviceEffect, Refused, TIME_CONSTANT_RANGE_S, Variable};
 
 /// Temperature that temperature offsets count from, °C.
 pub const REFERENCE_C: f64 = 25.0;
@@ -46,16 +47,17 @@ pub const RATE_LAG_S: f64 = 30.0;
 /// not.
 ///
 /// ```
+/// # use mimu_core::PerSensor;
 /// # use mimu_core::compensation::{Affine, Sample};
-/// # use mimu_core::effects::{Effect, Effects, State};
+/// # use mimu_core::effects::{DeviceEffect, Effects, State};
 /// # use nalgebra::{Matrix3, Vector3};
 /// // A gyro of which 1 g along z is read as 0.2 deg/s about x, at rest. Its readings are in SI already.
 /// let si = Affine { matrix: Matrix3::identity(), offset: Vector3::zeros() };
 /// let g = 9.80665;
 /// let sag = 0.2_f64.to_radians();
-/// let mut effects = Effects::<f64, 8>::new(&si, &si).unwrap();
+/// let mut effects = Effects::<f64, 8>::new(&PerSensor::both(si)).unwrap();
 /// let matrix = [0.0, 0.0, sag / g, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
-/// effects.push(Effect::named("gyro_g_sensitivity", &matrix, None).unwrap()).unwrap();
+/// effects.push(DeviceEffect::named("gyro_g_sensitivity", &matrix, None).unwrap()).unwrap();
 /// let mut state = State::new(1000.0);
 /// let read = Sample { gyro: Vector3::new(sag, 0.0, 0.0), accel: Vector3::new(0.0, 0.0, g) };
 /// let clean = effects.remove(&mut state, &read);
@@ -64,8 +66,7 @@ pub const RATE_LAG_S: f64 = 30.0;
 /// ```
 #[derive(Debug, Clone)]
 pub struct Effects<T: RealField, const N: usize> {
-    gyro: Triad<T, N>,
-    accel: Triad<T, N>,
+    triads: PerSensor<Triad<T, N>>,
     /// Temperatures that the effects see, °C.
     seen_c: Option<[T; 2]>,
 }
@@ -87,8 +88,7 @@ pub struct State<T: RealField, const N: usize> {
     read_c: Option<T>,
     /// The temperature lagged by [`RATE_LAG_S`], minus itself, °C.
     rate_lag: T,
-    gyro: Memory<T, N>,
-    accel: Memory<T, N>,
+    triads: PerSensor<Memory<T, N>>,
 }
 
 impl<T: RealField + Copy, const N: usize> State<T, N> {
@@ -110,8 +110,7 @@ impl<T: RealField + Copy, const N: usize> State<T, N> {
             settled: false,
             read_c: None,
             rate_lag: T::zero(),
-            gyro: Memory::none(),
-            accel: Memory::none(),
+            triads: PerSensor::both(Memory::none()),
         }
     }
 
@@ -168,27 +167,23 @@ impl<T: RealField + Copy, const N: usize> State<T, N> {
     /// that sample is not known, and taken for none.
     pub fn gap(&mut self) {
         self.previous = None;
-        self.gyro.gap();
-        self.accel.gap();
+        self.triads.gyro.gap();
+        self.triads.accel.gap();
     }
 }
 
 impl<T: RealField + Copy, const N: usize> Effects<T, N> {
     /// No effects yet, of a unit with these inverse models, raw to SI. `None` if one of them is singular. For the PC, as
     /// [`Directions::of`].
-    pub fn new(gyro: &Affine<f64>, accel: &Affine<f64>) -> Option<Self> {
-        let (gyro, accel) = (
-            Directions::of(&gyro.matrix)?,
-            Directions::of(&accel.matrix)?,
-        );
-        Some(Self::of(gyro, accel))
+    pub fn new(models: &Compensation<f64>) -> Option<Self> {
+        let directions = models.map(|model| Directions::of(&model.matrix));
+        Some(Self::of(directions.transpose()?))
     }
 
     /// No effects yet, of a unit whose sensors look there.
-    pub fn of(gyro: Directions<T>, accel: Directions<T>) -> Self {
+    pub fn of(directions: PerSensor<Directions<T>>) -> Self {
         Self {
-            gyro: Triad::new(gyro),
-            accel: Triad::new(accel),
+            triads: directions.map(Triad::new),
             seen_c: None,
         }
     }
@@ -202,12 +197,8 @@ impl<T: RealField + Copy, const N: usize> Effects<T, N> {
     }
 
     /// Adds one.
-    pub fn push(&mut self, effect: Effect<T>) -> Result<(), Refused> {
-        let triad = match effect.sensor {
-            Sensor::Gyro => &mut self.gyro,
-            Sensor::Accel => &mut self.accel,
-        };
-        triad.push(&effect.kind)
+    pub fn push(&mut self, effect: DeviceEffect<T>) -> Result<(), Refused> {
+        self.triads[effect.sensor].push(&effect.kind())
     }
 
     /// Takes over the state of a stream that other effects, or none, were removed from until now. Time, temperature and its rate go on, and so does each
@@ -215,15 +206,14 @@ impl<T: RealField + Copy, const N: usize> Effects<T, N> {
     /// One of another time constant begins at the temperature of the next call of [`Self::slow`]. The errors of the sample before are those of the
     /// old effects, and forgotten.
     pub fn take_over(&self, before: Option<&Self>, state: &mut State<T, N>) {
-        let (gyro, accel) = (state.gyro, state.accel);
+        let PerSensor { gyro, accel } = state.triads;
         let known = |lag_s: T| {
-            let before = before?;
+            let before = &before?.triads;
             let mut all = (before.gyro.lags(&gyro)).chain(before.accel.lags(&accel));
             let same = all.find(|(other_s, _)| *other_s == lag_s);
             same.map(|(_, lag)| lag)
         };
-        state.gyro = self.gyro.memory(known);
-        state.accel = self.accel.memory(known);
+        state.triads = self.triads.as_ref().map(|triad| triad.memory(known));
         state.previous = None;
     }
 
@@ -234,16 +224,17 @@ impl<T: RealField + Copy, const N: usize> Effects<T, N> {
     pub fn slow(&self, state: &mut State<T, N>, dt_s: T, temp_c: T) {
         let [dt, risen] = state.follow(dt_s, temp_c, self.seen_c);
         let (at, settled) = (&state.at, state.settled);
-        self.gyro.slow(&mut state.gyro, dt, risen, settled, at);
-        self.accel.slow(&mut state.accel, dt, risen, settled, at);
+        let triads = &mut state.triads;
+        (self.triads.gyro).slow(&mut triads.gyro, dt, risen, settled, at);
+        (self.triads.accel).slow(&mut triads.accel, dt, risen, settled, at);
     }
 
     /// Raw readings without the errors of the converters' codes: to be compensated in place of those that were read.
     #[inline]
     pub fn without_code_errors(&self, raw: &Sample<T>) -> Sample<T> {
         Sample {
-            gyro: self.gyro.without_code_errors(&raw.gyro),
-            accel: self.accel.without_code_errors(&raw.accel),
+            gyro: self.triads.gyro.without_code_errors(&raw.gyro),
+            accel: self.triads.accel.without_code_errors(&raw.accel),
         }
     }
 
@@ -259,11 +250,10 @@ impl<T: RealField + Copy, const N: usize> Effects<T, N> {
         let per_s = state.sample_rate_hz;
         at.angular_acceleration = (rate - before) * per_s;
         state.previous = Some(*rate);
+        let (ours, memory) = (&self.triads, &mut state.triads);
         Sample {
-            gyro: self.gyro.remove(&mut state.gyro, Sensor::Gyro, rate, at),
-            accel: self
-                .accel
-                .remove(&mut state.accel, Sensor::Accel, force, at),
+            gyro: (ours.gyro).remove(&mut memory.gyro, Sensor::Gyro, rate, at),
+            accel: (ours.accel).remove(&mut memory.accel, Sensor::Accel, force, at),
         }
     }
 }

@@ -3,6 +3,7 @@
 //!
 //! | module           | what it is                                                        |
 //! |------------------|-------------------------------------------------------------------|
+//! | [`Sensor`], [`PerSensor`] | the two triads, and what there is of each                   |
 //! | [`compensation`] | inverse model, raw to SI: `x = C u + o` for gyro and accelerometer |
 //! | [`effects`]      | what the affine model lacks, removed sample by sample              |
 //! | [`kalman`]       | bank of three four-state Kalman filters fed one scalar at a time  |
@@ -27,9 +28,11 @@ pub mod compensator;
 pub mod die;
 pub mod effects;
 pub mod kalman;
+mod sensor;
 pub mod single;
 pub mod stored;
 pub mod table;
 pub mod wire;
 
 pub use nalgebra::RealField;
+pub use sensor::{PerSensor, Sensor, UnknownSensor};

@@ -29,7 +29,7 @@
 //!
 //! What no unit can have is refused, wherever the bytes come from: C and o beyond [`Affine::check`], temperatures beyond
 //! [`TEMPERATURE_RANGE_C`](crate::table::TEMPERATURE_RANGE_C), lags and time constants beyond those of [`DieLag`] and of
-//! [`Effect`](crate::effects::Effect), bits that say something of a later version.
+//! [`DeviceEffect`], bits that say something of a later version.
 //!
 //! [`Affine::check`]: crate::compensation::Affine::check
 //!
@@ -38,24 +38,24 @@
 
 mod bytes;
 mod curves;
+mod effect;
 mod origin;
-mod record;
 mod trim;
 
 use crc::{CRC_32_ISO_HDLC, CRC_64_XZ, Crc, NoTable};
 use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
 
+use crate::PerSensor;
 use crate::compensator::Compensator;
 use crate::die::DieLag;
-use crate::effects::{self, Directions, Effects};
+use crate::effects::{self, DeviceEffect, Directions, Effects};
 use crate::table::Node;
 use bytes::{Reader, Writer};
 
 pub use bytes::TooLong;
 pub use curves::Curves;
 pub use origin::Origin;
-pub use record::Record;
 pub use trim::trim;
 
 /// Version of the layout: the only one that is read.
@@ -90,9 +90,9 @@ pub struct Stored {
     pub origin: Origin,
     /// What it does to a sample.
     pub compensator: Compensator<f32, NODES, ROOM>,
-    /// Lags of the dies of gyro and accelerometer behind the thermometer, s, if they are known; otherwise none is applied.
-    pub lags_s: Option<[f32; 2]>,
-    /// How many records of effects: errors by the code have one for each converter.
+    /// Lags of the dies behind the thermometer, s, if they are known; otherwise none is applied.
+    pub lags_s: Option<PerSensor<f32>>,
+    /// How many effects: errors by the code are one for each converter.
     pub effect_count: u8,
 }
 
@@ -166,13 +166,13 @@ impl core::fmt::Display for Refused {
 
 impl core::error::Error for Refused {}
 
-/// Writes a calibration to the beginning of `out`; returns its length. `found_with`: C of the gyro and of the accelerometer that the
-/// effects were found with. What is written is not judged; [`decode`] does that.
+/// Writes a calibration to the beginning of `out`; returns its length. `found_with`: C that the effects were found with. [`decode`] judges what
+/// is written, not this.
 pub fn encode(
     origin: &Origin,
-    found_with: [&Matrix3<f32>; 2],
+    found_with: PerSensor<&Matrix3<f32>>,
     curves: &Curves<'_>,
-    effects: &[Record<'_>],
+    effects: &[DeviceEffect<f32>],
     out: &mut [u8],
 ) -> Result<usize, TooLong> {
     let count = |n: usize| u8::try_from(n).map_err(|_| TooLong);
@@ -183,7 +183,7 @@ pub fn encode(
     to.bytes(&[count(curves.nodes.len())?, count(effects.len())?])?;
     to.bytes(&[curves::TEMP_PINS, curves.known()])?;
     origin.write(&mut to)?;
-    for matrix in found_with {
+    for (_, matrix) in found_with {
         // The device inverts nothing, so a singular matrix is marked by what is no number.
         let nothing = Matrix3::repeat(f32::NAN);
         let none = Directions {
@@ -197,7 +197,7 @@ pub fn encode(
     curves.write(&mut to)?;
     effects
         .iter()
-        .try_for_each(|effect| effect.write(&mut to))?;
+        .try_for_each(|one| effect::write(one, &mut to))?;
     let length = to.length() + CHECK;
     let length_bytes = u16::try_from(length).map_err(|_| TooLong)?.to_le_bytes();
     if length > MAX_LENGTH {
@@ -219,7 +219,7 @@ pub fn decode(bytes: &[u8]) -> Result<Stored, Refused> {
 pub fn read(
     bytes: &[u8],
     node: impl FnMut(&Node<f32>),
-    record: impl FnMut(&Record<'_>),
+    show: impl FnMut(&DeviceEffect<f32>),
 ) -> Result<Stored, Refused> {
     let mut from = Reader(bytes);
     if from.bytes::<4>() != Some(MAGIC) {
@@ -240,19 +240,19 @@ pub fn read(
     let mut from = Reader(body.get(LENGTH_AT + 2..).ok_or(Refused::Length)?);
     let [nodes, effects, thermometer, known] = from.bytes().ok_or(Refused::Length)?;
     let origin = Origin::read(&mut from).ok_or(Refused::Length)?;
-    let gyro = directions(&mut from).ok_or(Refused::Length)?;
-    let accel = directions(&mut from).ok_or(Refused::Length)?;
+    let both = PerSensor::from_fn(|_| directions(&mut from)).transpose();
+    let both = both.ok_or(Refused::Length)?;
     let head = curves::Head {
         nodes,
         thermometer,
         known,
     };
     let (table, lags_s) = curves::read(&mut from, head, node)?;
-    if !gyro.are_inverse() || !accel.are_inverse() {
+    if !both.gyro.are_inverse() || !both.accel.are_inverse() {
         return Err(Refused::Singular);
     }
-    let none = Effects::of(gyro, accel).within(table.limits());
-    let all = read_effects(&mut from, effects, none, record)?;
+    let none = Effects::of(both).within(table.limits());
+    let all = read_effects(&mut from, effects, none, show)?;
     match from.0.is_empty() {
         true => Ok(Stored {
             origin,
@@ -272,11 +272,12 @@ fn read_effects(
     from: &mut Reader<'_>,
     count: u8,
     mut all: Effects<f32, ROOM>,
-    mut show: impl FnMut(&Record<'_>),
+    mut show: impl FnMut(&DeviceEffect<f32>),
 ) -> Result<Effects<f32, ROOM>, Refused> {
     for at in 0..count {
-        let effect = record::read(from, &mut show).ok_or(Refused::Length)?;
+        let effect = effect::read(from).ok_or(Refused::Length)?;
         effect
+            .inspect(&mut show)
             .and_then(|effect| all.push(effect))
             .map_err(|refused| match refused {
                 effects::Refused::Unknown => Refused::EffectUnknown { at },

@@ -18,6 +18,7 @@
 use heapless::Vec;
 use nalgebra::{RealField, convert};
 
+use crate::PerSensor;
 use crate::compensation::{Affine, Compensation};
 use crate::effects::REFERENCE_C;
 
@@ -68,11 +69,8 @@ impl<T: RealField + Copy> Node<T> {
                 .chain(a.offset.iter())
                 .all(|v| v.is_finite())
         };
-        self.temp_c.is_finite()
-            && affine(&self.model.gyro)
-            && affine(&self.model.accel)
-            && affine(&self.slope.gyro)
-            && affine(&self.slope.accel)
+        let both = |of: &Compensation<T>| affine(&of.gyro) && affine(&of.accel);
+        self.temp_c.is_finite() && both(&self.model) && both(&self.slope)
     }
 }
 
@@ -204,12 +202,12 @@ impl<T: RealField + Copy, const N: usize> Table<T, N> {
 
     /// The state of a stream whose temperature is not known yet: that of [`REFERENCE_C`].
     pub fn state(&self) -> State<T> {
-        self.at([convert(REFERENCE_C); 2])
+        self.at(PerSensor::both(convert(REFERENCE_C)))
     }
 
-    /// Follows the temperatures of the dies of gyro and accelerometer, °C. If one is not a number, nothing changes.
-    pub fn follow(&self, state: &mut State<T>, dies_c: [T; 2]) {
-        if dies_c.iter().all(|die_c| die_c.is_finite()) {
+    /// Follows the temperatures of the dies, °C. If one is not a number, nothing changes.
+    pub fn follow(&self, state: &mut State<T>, dies_c: PerSensor<T>) {
+        if dies_c.gyro.is_finite() && dies_c.accel.is_finite() {
             *state = self.at(dies_c);
         }
     }
@@ -224,7 +222,11 @@ impl<T: RealField + Copy, const N: usize> Table<T, N> {
         false
     }
 
-    fn at(&self, [gyro_c, accel_c]: [T; 2]) -> State<T> {
+    fn at(&self, dies_c: PerSensor<T>) -> State<T> {
+        let PerSensor {
+            gyro: gyro_c,
+            accel: accel_c,
+        } = dies_c;
         let place = match self.limits() {
             Some([from, _]) if gyro_c < from || accel_c < from => Place::Below,
             Some([_, to]) if gyro_c > to || accel_c > to => Place::Above,

@@ -38,5 +38,5 @@ pub use greeting::{
 };
 pub use message::{
     CHUNK, Call, Counters, Event, KalmanAxis, KalmanState, Message, Prior, Refusal, Reply, Request,
-    SelfTest, Triad, checks,
+    SelfTest, checks,
 };

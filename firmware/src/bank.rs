@@ -1,8 +1,9 @@
 //! A Kalman bank of `core` that is given its input and fed from the stream.
 
+use mimu_core::Sensor;
 use mimu_core::kalman::{self, Filter};
 use mimu_core::single;
-use mimu_core::wire::{KalmanAxis, KalmanState, Prior, Triad};
+use mimu_core::wire::{KalmanAxis, KalmanState, Prior};
 use nalgebra::Vector3;
 
 /// Samples between two reports of a state: five a second.
@@ -11,7 +12,7 @@ const REPORT: u32 = 200;
 /// A bank that runs.
 #[derive(Clone, Copy, Debug)]
 pub struct Bank {
-    triad: Triad,
+    sensor: Sensor,
     noise: Vector3<f32>,
     filters: kalman::Bank<f32>,
     /// Filters and updates to go back to.
@@ -26,7 +27,7 @@ pub struct Bank {
 
 impl Bank {
     /// A bank as the host wants it; `None` if a number is not finite or a variance not positive.
-    pub fn new(triad: Triad, noise: [f32; 3], prior: Prior) -> Option<Self> {
+    pub fn new(sensor: Sensor, noise: [f32; 3], prior: Prior) -> Option<Self> {
         let positive = |v: &f32| *v > 0.0 && v.is_finite();
         let noise_is = noise.iter().all(positive);
         let noise = Vector3::from(noise);
@@ -45,7 +46,7 @@ impl Bank {
             }
         };
         noise_is.then_some(Self {
-            triad,
+            sensor,
             noise,
             kept: (filters, 0),
             filters,
@@ -104,7 +105,7 @@ impl Bank {
     /// As it is now.
     pub fn state(&self) -> KalmanState {
         KalmanState {
-            triad: self.triad,
+            sensor: self.sensor,
             last: self.last,
             updates: self.updates,
             rejected: self.rejected,

@@ -5,10 +5,11 @@ use core::sync::atomic::{AtomicU32, Ordering};
 
 use embassy_stm32::uid::uid;
 use embassy_time::Instant;
+use mimu_core::Sensor;
 use mimu_core::stored::{self, MAX_LENGTH, NODES, ROOM, Stored};
 use mimu_core::wire::{
     CHUNK, Call, Capabilities, Counters, Decoder, Greeting, MAGIC, Message, PROTOCOL, Prior,
-    Refusal, Reply, Request, StoredInfo, Triad, effects_of_this_build, flags,
+    Refusal, Reply, Request, StoredInfo, effects_of_this_build, flags,
 };
 
 use crate::bank::Bank;
@@ -159,19 +160,19 @@ impl Commands<'_> {
             } => self.upload.begin(length, hash, other_unit)?,
             Request::UploadChunk { offset, bytes } => self.upload.chunk(offset, bytes)?,
             Request::KalmanStart {
-                triad,
+                sensor,
                 noise,
                 prior,
-            } => self.start_bank(triad, noise, prior)?,
-            Request::KalmanInput { triad, input } => {
-                if !self.with_bank(triad, |bank| bank.set_input(input))? {
+            } => self.start_bank(sensor, noise, prior)?,
+            Request::KalmanInput { sensor, input } => {
+                if !self.with_bank(sensor, |bank| bank.set_input(input))? {
                     return Err(Refusal::BadNumber);
                 }
             }
-            Request::KalmanKeep { triad } => self.with_bank(triad, Bank::keep)?,
-            Request::KalmanBack { triad } => self.with_bank(triad, Bank::back)?,
-            Request::KalmanEnd { triad } => {
-                let bank = pipeline.lock(|p| p.borrow_mut().banks[triad as usize].take());
+            Request::KalmanKeep { sensor } => self.with_bank(sensor, Bank::keep)?,
+            Request::KalmanBack { sensor } => self.with_bank(sensor, Bank::back)?,
+            Request::KalmanEnd { sensor } => {
+                let bank = pipeline.lock(|p| p.borrow_mut().banks[sensor].take());
                 let bank = bank.ok_or(Refusal::NoBank)?;
                 return Ok(Reply::Kalman(bank.state()));
             }
@@ -181,20 +182,20 @@ impl Commands<'_> {
         Ok(Reply::Done)
     }
 
-    fn start_bank(&mut self, triad: Triad, noise: [f32; 3], prior: Prior) -> Result<(), Refusal> {
-        let bank = Bank::new(triad, noise, prior).ok_or(Refusal::BadNumber)?;
+    fn start_bank(&mut self, sensor: Sensor, noise: [f32; 3], prior: Prior) -> Result<(), Refusal> {
+        let bank = Bank::new(sensor, noise, prior).ok_or(Refusal::BadNumber)?;
         self.pipeline
-            .lock(|p| p.borrow_mut().banks[triad as usize] = Some(bank));
+            .lock(|p| p.borrow_mut().banks[sensor] = Some(bank));
         Ok(())
     }
 
     fn with_bank<T>(
         &self,
-        triad: Triad,
+        sensor: Sensor,
         errand: impl FnOnce(&mut Bank) -> T,
     ) -> Result<T, Refusal> {
         self.pipeline.lock(|p| {
-            let bank = &mut p.borrow_mut().banks[triad as usize];
+            let bank = &mut p.borrow_mut().banks[sensor];
             bank.as_mut().map(errand).ok_or(Refusal::NoBank)
         })
     }

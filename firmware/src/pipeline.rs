@@ -10,12 +10,13 @@ use core::cell::RefCell;
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::NoopRawMutex;
 use heapless::Vec;
+use mimu_core::PerSensor;
 use mimu_core::compensation::Sample;
 use mimu_core::stored::Stored;
 use mimu_core::table::Place;
 use mimu_core::wire::{
     BATCH, BatchHead, COMPENSATED_BYTES, CompensatedBatch, Event, Message, RAW_BYTES, RawBatch,
-    Sums, Triad, flags, volts,
+    Sums, flags, volts,
 };
 use nalgebra::Vector3;
 
@@ -91,7 +92,7 @@ pub struct Pipeline {
     losses: Losses,
     measurement: Option<Measurement>,
     /// Banks of the gyros and of the accelerometers.
-    pub banks: [Option<Bank>; 2],
+    pub banks: PerSensor<Option<Bank>>,
 }
 
 impl Default for Pipeline {
@@ -139,7 +140,10 @@ impl Pipeline {
                 batches: 0,
             },
             measurement: None,
-            banks: [None; 2],
+            banks: PerSensor {
+                gyro: None,
+                accel: None,
+            },
         }
     }
 
@@ -233,7 +237,8 @@ impl Pipeline {
         if lost > 0 {
             self.end_batch(send);
             self.losses.samples = self.losses.samples.wrapping_add(lost);
-            for bank in self.banks.iter_mut().flatten() {
+            for bank in [&mut self.banks.gyro, &mut self.banks.accel] {
+                let Some(bank) = bank else { continue };
                 bank.skip(lost);
             }
             if let Some(calibrated) = &mut self.calibrated {
@@ -289,12 +294,8 @@ impl Pipeline {
             m.total.accel += raw.accel;
             m.count += 1;
         }
-        for (bank, triad) in self.banks.iter_mut().zip([Triad::Gyro, Triad::Accel]) {
+        for (_, (bank, reading)) in self.banks.as_mut().zip(raw.as_ref()) {
             let Some(bank) = bank else { continue };
-            let reading = match triad {
-                Triad::Gyro => &raw.gyro,
-                Triad::Accel => &raw.accel,
-            };
             if bank.offer(number, reading) {
                 // One that finds no room is followed by the next, which says more.
                 send(&Message::Event(Event::Kalman(bank.state())));

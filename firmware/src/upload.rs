@@ -103,6 +103,7 @@ impl<'a> Upload<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use mimu_core::PerSensor;
     use mimu_core::compensation::{Affine, Compensation};
     use mimu_core::stored::{Curves, Origin};
     use mimu_core::table::Node;
@@ -135,7 +136,7 @@ mod tests {
                 ..Origin::UNKNOWN
             };
             let mut bytes = [0; MAX_LENGTH];
-            let matrices = [&affine.matrix, &affine.matrix];
+            let matrices = PerSensor::both(&affine.matrix);
             let length = stored::encode(&origin, matrices, &curves, &[], &mut bytes).unwrap();
             let bytes = &bytes[..length];
             let mut received = Vec::new();

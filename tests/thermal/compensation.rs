@@ -58,7 +58,8 @@ pub fn run(folder: Option<&Path>) {
             range_c: None,
         };
         let found = fit(vec![recorded], &[], options).expect("it is fitted");
-        let [gyro, accel] = found.joint.profiles.each_ref().map(|p| p.lag.value);
+        let lags_s = found.joint.profiles.as_ref().map(|p| p.lag.value);
+        let (gyro, accel) = (lags_s.gyro, lags_s.accel);
         let calibration = found
             .calibration("2026-01-01T00:00:00Z")
             .expect("it has scale factors");

@@ -139,7 +139,7 @@ fn errors(joint: &Joint, soak: &Joint, how: Model, truth: &Session) -> Errors {
     for sensor in [0, 1] {
         let lag = joint.applied_s(Sensor::BOTH[sensor]);
         let die = truth.thermometer.die(lag, joint.starts[0]);
-        let rows = &truth.rows[sensor];
+        let rows = &truth.rows[Sensor::BOTH[sensor]];
         let errors = rows.iter().map(|row| {
             let model = inverse(joint, soak, how, sensor, die.at(row.middle_s));
             (row.step % STEPS, model.apply(&row.raw) - row.input)
@@ -163,10 +163,12 @@ fn errors(joint: &Joint, soak: &Joint, how: Model, truth: &Session) -> Errors {
 
 fn inverse(joint: &Joint, soak: &Joint, how: Model, sensor: usize, die_c: f64) -> Affine<f64> {
     let at = |joint: &Joint, temp_c: f64| {
-        let curves = joint.curves[sensor].as_ref().expect("both were recorded");
+        let curves = joint.curves[Sensor::BOTH[sensor]]
+            .as_ref()
+            .expect("both were recorded");
         curves.forward(temp_c)[0]
     };
-    let [low, high] = soak.curves[sensor]
+    let [low, high] = soak.curves[Sensor::BOTH[sensor]]
         .as_ref()
         .expect("both were recorded")
         .range_c;

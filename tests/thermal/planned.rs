@@ -70,7 +70,9 @@ pub fn run(runs: u64) {
         let bias = [180.0 / std::f64::consts::PI * 3600.0, 1e6 / 9.80665][sensor];
         for at in &prediction.at {
             let model = |joint: &Joint| {
-                let curves = joint.curves[sensor].as_ref().expect("recorded");
+                let curves = joint.curves[Sensor::BOTH[sensor]]
+                    .as_ref()
+                    .expect("recorded");
                 curves.forward(at.temp_c)[0]
             };
             let numbers = |joint: &Joint| -> SVector<f64, 12> {

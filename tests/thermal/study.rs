@@ -1,6 +1,7 @@
 //! Many runs of one experiment, and what is left of them.
 
 use mimu::prepared::Prepared;
+use mimu::quantity::{PerSensor, Sensor};
 use mimu::stillness::STILL_FACTOR;
 use mimu_thermal::curves::TriadCurves;
 use mimu_thermal::joint::{Choice, Joint, estimate};
@@ -95,7 +96,7 @@ impl Study {
     }
 
     fn judge(&self, joint: &Joint) -> Outcome {
-        let (lag, true_lag) = (joint.profiles[0].lag, self.experiment.lag_s);
+        let (lag, true_lag) = (joint.profiles.gyro.lag, self.experiment.lag_s);
         Outcome {
             errors: Errors::of(&joint.curves),
             lag: lag.value,
@@ -133,11 +134,13 @@ impl Study {
 
 impl Errors {
     /// Of the curves of gyro and accelerometer.
-    pub fn of(found: &[Option<TriadCurves>; 2]) -> Self {
+    pub fn of(found: &PerSensor<Option<TriadCurves>>) -> Self {
         let mut squared = [Vec::new(), Vec::new()];
         let mut inside = [Vec::new(), Vec::new()];
         for sensor in 0..2 {
-            let curves = found[sensor].as_ref().expect("both were recorded");
+            let curves = found[Sensor::BOTH[sensor]]
+                .as_ref()
+                .expect("both were recorded");
             for t in temps() {
                 let (matrix, bias) = truth(sensor, t);
                 let [found, _] = curves.forward(t);

@@ -148,9 +148,7 @@ fn at_rest(file: &RigFile, seed: u64) -> [Option<AllanModel>; 6] {
 fn judged(found: &ThermalFit, recorded: &Session, file: &RigFile, seed: u64) -> Outcome {
     let mut numbers: [Vec<[f64; 3]>; 6] = Default::default();
     for sensor in Sensor::BOTH {
-        let curves = found.joint.curves[sensor as usize]
-            .as_ref()
-            .expect("recorded");
+        let curves = found.joint.curves[sensor].as_ref().expect("recorded");
         let planned = planned(recorded, file, sensor);
         for (temp_c, truth) in probes(file, sensor, seed) {
             if !(curves.range_c[0]..=curves.range_c[1]).contains(&temp_c) {
@@ -193,7 +191,8 @@ fn judged(found: &ThermalFit, recorded: &Session, file: &RigFile, seed: u64) -> 
         .filter(|(n, _)| wrong(n))
         .map(|(_, name)| name);
     let bad: Vec<&str> = bad.collect();
-    let [gyro, accel] = found.joint.profiles.each_ref().map(|p| p.lag.value);
+    let lags_s = found.joint.profiles.as_ref().map(|p| p.lag.value);
+    let (gyro, accel) = (lags_s.gyro, lags_s.accel);
     Outcome {
         verdict: format!(
             "{}, lags {gyro:.1}, {accel:.1} s, {}",
@@ -228,7 +227,7 @@ fn probes(file: &RigFile, sensor: Sensor, seed: u64) -> Vec<At> {
         let probe = session(&plan, &still, seed);
         // At a rate the accelerometer feels how far it is from the axes of the table, which no reference has in it.
         let felt = |r: &&Row| sensor == Sensor::Gyro || r.step % 2 == 0;
-        let rows: Vec<&Row> = probe.rows[sensor as usize].iter().filter(felt).collect();
+        let rows: Vec<&Row> = probe.rows[sensor].iter().filter(felt).collect();
         let (mut gram, mut with) = (Matrix4::zeros(), Matrix4x3::zeros());
         for r in &rows {
             let x = r.input.push(1.0);
@@ -247,7 +246,7 @@ fn probes(file: &RigFile, sensor: Sensor, seed: u64) -> Vec<At> {
 /// the gain; infinite where it is singular.
 fn planned(recorded: &Session, file: &RigFile, sensor: Sensor) -> impl Fn(usize, f64) -> f64 {
     let temp = |r: &Row| recorded.thermometer.at(r.middle_s).0;
-    let dies: Vec<f64> = recorded.rows[sensor as usize].iter().map(temp).collect();
+    let dies: Vec<f64> = recorded.rows[sensor].iter().map(temp).collect();
     let range = dies
         .iter()
         .fold([f64::INFINITY, f64::NEG_INFINITY], |r, t| {

@@ -1,20 +1,15 @@
-//! One effect, with its numbers.
+//! One effect with its numbers: what a device stores, lists and removes.
+
+use core::fmt;
 
 use nalgebra::{RealField, convert};
+use serde::ser::{Serialize, SerializeStruct, Serializer};
 
 use super::code::{BITS, FARTHEST_ZERO};
 use super::law::{COEFFICIENTS, Evaluation, FACTORS, Fast, Law, Nonlinear, Slowly, term};
+use crate::Sensor;
 
-/// Triad whose readings err.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Sensor {
-    /// Gyro; errors in rad/s.
-    Gyro,
-    /// Accelerometer; errors in m/s².
-    Accel,
-}
-
-/// A quantity that a [term](Effect::term) is a product of.
+/// A quantity that a [term](DeviceEffect::term) is a product of. Its number is that of the stored layout.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Variable {
@@ -36,6 +31,36 @@ pub enum Variable {
     TemperatureRate,
     /// Time since power-on, s.
     Time,
+}
+
+impl Variable {
+    /// All of them.
+    pub const ALL: [Self; 9] = [
+        Self::RateX,
+        Self::RateY,
+        Self::RateZ,
+        Self::ForceX,
+        Self::ForceY,
+        Self::ForceZ,
+        Self::Temperature,
+        Self::TemperatureRate,
+        Self::Time,
+    ];
+
+    /// As in the id of a term.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::RateX => "rate_x",
+            Self::RateY => "rate_y",
+            Self::RateZ => "rate_z",
+            Self::ForceX => "force_x",
+            Self::ForceY => "force_y",
+            Self::ForceZ => "force_z",
+            Self::Temperature => "temp",
+            Self::TemperatureRate => "temp_rate",
+            Self::Time => "time",
+        }
+    }
 }
 
 /// Time constants that an effect may have, s: from a sample at 1 kHz to four months. Outside, its decay or its lag is a constant within
@@ -74,21 +99,30 @@ impl core::fmt::Display for Refused {
 
 impl core::error::Error for Refused {}
 
-/// An effect with its numbers.
-#[derive(Debug, Clone, Copy)]
-pub struct Effect<T: RealField> {
+/// An effect with its numbers, as a device takes it: there is none of numbers that it would refuse.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DeviceEffect<T: RealField> {
     pub(super) sensor: Sensor,
-    pub(super) kind: Kind<T>,
+    numbers: Numbers<T>,
 }
 
-/// How an effect is removed.
-#[derive(Debug, Clone, Copy)]
-pub(super) enum Kind<T: RealField> {
-    Fast(Fast<T>),
-    Slow(Slowly<T>),
+/// The numbers of an effect by its kind.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Numbers<T: RealField> {
+    Named {
+        law: &'static Law<T>,
+        /// Those that the law has not are 0.
+        coefficients: [T; COEFFICIENTS],
+        nonlinear: Option<T>,
+    },
+    Term {
+        axis: u8,
+        coefficient: T,
+        variables: [Option<Variable>; FACTORS],
+    },
     Code {
-        /// Whose readings err.
-        axes: [bool; 3],
+        /// Whose readings err; `None`: all three alike.
+        axis: Option<u8>,
         /// In units of the weight of bit 0.
         errors: [T; BITS],
         /// Of bit 0, raw.
@@ -98,7 +132,42 @@ pub(super) enum Kind<T: RealField> {
     },
 }
 
-impl<T: RealField + Copy> Effect<T> {
+/// How an effect is removed.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Kind<'a, T: RealField> {
+    Fast(Fast<T>),
+    Slow(Slowly<T>),
+    Code {
+        /// Whose readings err.
+        axes: [bool; 3],
+        errors: &'a [T; BITS],
+        weight: T,
+        zero: T,
+    },
+}
+
+/// Names of the axes.
+const AXES: [&str; 3] = ["x", "y", "z"];
+
+/// The converter that a code is of.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Converter<T> {
+    /// Axis that it reads; `None`: all three.
+    pub axis: Option<usize>,
+    /// Weight of bit 0, raw.
+    pub weight: T,
+    /// Reading of code 0, raw.
+    pub zero: T,
+}
+
+impl<T> Converter<T> {
+    /// Names of the axes that it reads.
+    pub fn axes(&self) -> &'static str {
+        self.axis.map_or("xyz", axis_name)
+    }
+}
+
+impl<T: RealField + Copy> DeviceEffect<T> {
     /// The effect of a public id like `gyro_scale_cubic`, with all of its coefficients (SI, those of a matrix by rows) and the
     /// nonlinear constant of one that has any: a time constant, s.
     pub fn named(id: &str, coefficients: &[T], nonlinear: Option<T>) -> Result<Self, Refused> {
@@ -107,18 +176,18 @@ impl<T: RealField + Copy> Effect<T> {
             (_, Some(name)) => (Sensor::Accel, name),
             _ => return Err(Refused::Unknown),
         };
-        let law = Law::<T>::named(name).ok_or(Refused::Unknown)?;
+        let law: &'static Law<T> = Law::named(name).ok_or(Refused::Unknown)?;
         if coefficients.len() != law.coefficients {
             let needed = law.coefficients;
             return Err(Refused::Count { needed });
         }
         let nonlinear = match (law.nonlinear, nonlinear) {
-            (Nonlinear::None, None) => T::one(),
+            (Nonlinear::None, None) => None,
             (Nonlinear::TimeConstant | Nonlinear::Lag, Some(value))
                 if value >= convert(TIME_CONSTANT_RANGE_S[0])
                     && value <= convert(TIME_CONSTANT_RANGE_S[1]) =>
             {
-                value
+                Some(value)
             }
             _ => return Err(Refused::Value),
         };
@@ -129,20 +198,14 @@ impl<T: RealField + Copy> Effect<T> {
             }
             *all = *coefficient;
         }
-        let kind = match law.evaluation {
-            Evaluation::Fast(law) => Kind::Fast(Fast {
+        Ok(Self {
+            sensor,
+            numbers: Numbers::Named {
                 law,
                 coefficients: all,
-                factors: [0; 3],
-            }),
-            Evaluation::Slow(run) => Kind::Slow(Slowly::Law {
-                law: run,
-                coefficients: all,
                 nonlinear,
-                lags: law.nonlinear == Nonlinear::Lag,
-            }),
-        };
-        Ok(Self { sensor, kind })
+            },
+        })
     }
 
     /// `coefficient` times the product of one to three variables, in the error of one axis (0 to 2); SI.
@@ -156,27 +219,21 @@ impl<T: RealField + Copy> Effect<T> {
         if variables.is_empty() || variables.len() > needed {
             return Err(Refused::Count { needed });
         }
-        let mut coefficients = [T::zero(); COEFFICIENTS];
-        let [x, y, z, ..] = &mut coefficients;
-        match [x, y, z].into_iter().nth(axis) {
-            Some(along) if coefficient.is_finite() => *along = coefficient,
-            _ => return Err(Refused::Value),
+        if axis >= 3 || !coefficient.is_finite() {
+            return Err(Refused::Value);
         }
-        let mut factors = [0; FACTORS];
-        for (factor, variable) in factors.iter_mut().zip(variables) {
-            *factor = *variable as u8;
+        let mut all = [None; FACTORS];
+        for (one, variable) in all.iter_mut().zip(variables) {
+            *one = Some(*variable);
         }
-        let term = Fast {
-            law: term,
-            coefficients,
-            factors,
-        };
-        let slow = |v: &Variable| *v as u8 >= Variable::Temperature as u8;
-        let kind = match variables.iter().all(slow) {
-            true => Kind::Slow(Slowly::Term(term)),
-            false => Kind::Fast(term),
-        };
-        Ok(Self { sensor, kind })
+        Ok(Self {
+            sensor,
+            numbers: Numbers::Term {
+                axis: axis as u8,
+                coefficient,
+                variables: all,
+            },
+        })
     }
 
     /// Errors of a converter by the bits of its code, of one axis (0 to 2), or of all three alike.
@@ -189,12 +246,13 @@ impl<T: RealField + Copy> Effect<T> {
     ///
     /// ```
     /// # use mimu_core::compensation::Sample;
-    /// # use mimu_core::effects::{Directions, Effect, Effects, Sensor};
+    /// # use mimu_core::effects::{DeviceEffect, Directions, Effects};
+    /// # use mimu_core::{PerSensor, Sensor};
     /// # use nalgebra::{Matrix3, Vector3};
     /// // Bit 0 of a converter of ±2.5 V is worth 2.5 V, and 1 mV more than that.
-    /// let code = Effect::code(Sensor::Gyro, Some(2), &[4e-4, 0., 0., 0., 0., 0., 0., 0., 0.], 2.5, -2.5).unwrap();
+    /// let code = DeviceEffect::code(Sensor::Gyro, Some(2), &[4e-4, 0., 0., 0., 0., 0., 0., 0., 0.], 2.5, -2.5).unwrap();
     /// let directions = Directions { sensed: Matrix3::identity(), to_body: Matrix3::identity() };
-    /// let mut effects = Effects::<f64, 8>::of(directions, directions);
+    /// let mut effects = Effects::<f64, 8>::of(PerSensor::both(directions));
     /// effects.push(code).unwrap();
     /// let read = Sample { gyro: Vector3::new(0.5, 0.5, 0.5), accel: Vector3::repeat(1.7) };
     /// let clean = effects.without_code_errors(&read);
@@ -208,30 +266,200 @@ impl<T: RealField + Copy> Effect<T> {
         weight: T,
         zero: T,
     ) -> Result<Self, Refused> {
-        let axes = match axis {
-            None => [true; 3],
-            Some(axis) => [0, 1, 2].map(|i| i == axis),
-        };
         // What is not finite in single precision is not in this one, or becomes it in the tables.
         let codes = convert::<_, T>(256.0) / weight;
         let most = errors.iter().fold(T::zero(), |sum, e| sum + e.abs()) * weight;
         let finite = [weight, codes, most].iter().all(T::is_finite);
         let near = zero.abs() <= convert::<_, T>(FARTHEST_ZERO) * weight;
-        if !(finite && near && weight > T::zero() && axes.contains(&true)) {
+        let axis_known = axis.is_none_or(|axis| axis < 3);
+        if !(finite && near && weight > T::zero() && axis_known) {
             return Err(Refused::Value);
         }
-        let errors = *errors;
-        let kind = Kind::Code {
-            axes,
-            errors,
-            weight,
-            zero,
-        };
-        Ok(Self { sensor, kind })
+        Ok(Self {
+            sensor,
+            numbers: Numbers::Code {
+                axis: axis.map(|axis| axis as u8),
+                errors: *errors,
+                weight,
+                zero,
+            },
+        })
+    }
+
+    /// Triad whose readings err.
+    pub fn sensor(&self) -> Sensor {
+        self.sensor
+    }
+
+    /// Name of the law of a named effect, which behind that of the sensor is its id.
+    pub(crate) fn law(&self) -> Option<&'static str> {
+        match self.numbers {
+            Numbers::Named { law, .. } => Some(law.name),
+            _ => None,
+        }
+    }
+
+    /// Its coefficients: all of a named effect, the one of a term, the errors of the nine bits of a code.
+    pub fn coefficients(&self) -> &[T] {
+        match &self.numbers {
+            Numbers::Named {
+                law, coefficients, ..
+            } => coefficients.get(..law.coefficients).unwrap_or(coefficients),
+            Numbers::Term { coefficient, .. } => core::slice::from_ref(coefficient),
+            Numbers::Code { errors, .. } => errors,
+        }
+    }
+
+    /// Nonlinear constant of a named effect that has one: a time constant, s.
+    pub fn nonlinear(&self) -> Option<T> {
+        match self.numbers {
+            Numbers::Named { nonlinear, .. } => nonlinear,
+            _ => None,
+        }
+    }
+
+    /// Of a code: its converter.
+    pub fn converter(&self) -> Option<Converter<T>> {
+        match self.numbers {
+            Numbers::Code {
+                axis, weight, zero, ..
+            } => Some(Converter {
+                axis: axis.map(usize::from),
+                weight,
+                zero,
+            }),
+            _ => None,
+        }
+    }
+
+    /// Of a term: its axis and its variables.
+    pub fn product(&self) -> Option<(usize, impl Iterator<Item = Variable> + Clone)> {
+        match self.numbers {
+            Numbers::Term {
+                axis, variables, ..
+            } => Some((usize::from(axis), variables.into_iter().flatten())),
+            _ => None,
+        }
     }
 
     /// Whether it moves with temperature and time only, so that no sample pays for it.
     pub fn is_slow(&self) -> bool {
-        matches!(self.kind, Kind::Slow(_))
+        matches!(self.kind(), Kind::Slow(_))
+    }
+
+    /// How it is removed.
+    pub(super) fn kind(&self) -> Kind<'_, T> {
+        match &self.numbers {
+            Numbers::Named {
+                law,
+                coefficients,
+                nonlinear,
+            } => match law.evaluation {
+                Evaluation::Fast(law) => Kind::Fast(Fast {
+                    law,
+                    coefficients: *coefficients,
+                    factors: [0; FACTORS],
+                }),
+                Evaluation::Slow(run) => Kind::Slow(Slowly::Law {
+                    law: run,
+                    coefficients: *coefficients,
+                    nonlinear: nonlinear.unwrap_or(T::one()),
+                    lags: law.nonlinear == Nonlinear::Lag,
+                }),
+            },
+            Numbers::Term {
+                axis,
+                coefficient,
+                variables,
+            } => {
+                let mut coefficients = [T::zero(); COEFFICIENTS];
+                if let Some(along) = coefficients.get_mut(usize::from(*axis)) {
+                    *along = *coefficient;
+                }
+                let term = Fast {
+                    law: term,
+                    coefficients,
+                    factors: variables.map(|v| v.map_or(0, |v| v as u8)),
+                };
+                let slow = |v: &Variable| *v as u8 >= Variable::Temperature as u8;
+                match variables.iter().flatten().all(slow) {
+                    true => Kind::Slow(Slowly::Term(term)),
+                    false => Kind::Fast(term),
+                }
+            }
+            Numbers::Code {
+                axis,
+                errors,
+                weight,
+                zero,
+            } => Kind::Code {
+                axes: [0, 1, 2].map(|i| axis.is_none_or(|axis| axis == i)),
+                errors,
+                weight: *weight,
+                zero: *zero,
+            },
+        }
+    }
+}
+
+/// The public id: of a term in the form `term:accel_y~rate_x*force_y^2`.
+impl<T: RealField + Copy> fmt::Display for DeviceEffect<T> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let sensor = self.sensor;
+        match &self.numbers {
+            Numbers::Named { law, .. } => write!(f, "{sensor}_{}", law.name),
+            Numbers::Code { .. } => write!(f, "{sensor}_readout_code"),
+            Numbers::Term {
+                axis, variables, ..
+            } => {
+                write!(f, "term:{sensor}_{}", axis_name(usize::from(*axis)))?;
+                let mut sign = '~';
+                for same in variables.chunk_by(|a, b| a == b) {
+                    let [Some(variable), ..] = same else { continue };
+                    write!(f, "{sign}{}", variable.name())?;
+                    if same.len() > 1 {
+                        write!(f, "^{}", same.len())?;
+                    }
+                    sign = '*';
+                }
+                Ok(())
+            }
+        }
+    }
+}
+
+fn axis_name(axis: usize) -> &'static str {
+    AXES.get(axis).copied().unwrap_or("?")
+}
+
+/// For people and programs: what is stored of it, each number as it is.
+impl<T: RealField + Copy + Serialize> Serialize for DeviceEffect<T> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut all = serializer.serialize_struct("DeviceEffect", 4)?;
+        all.serialize_field("id", &Text(self))?;
+        all.serialize_field("coefficients", self.coefficients())?;
+        all.serialize_field("time_constant_s", &self.nonlinear())?;
+        all.serialize_field("converter", &self.converter())?;
+        all.end()
+    }
+}
+
+/// Raw in V, as on a device.
+impl<T: Serialize> Serialize for Converter<T> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut all = serializer.serialize_struct("Converter", 3)?;
+        all.serialize_field("axes", self.axes())?;
+        all.serialize_field("weight_of_bit_0_v", &self.weight)?;
+        all.serialize_field("reading_of_code_0_v", &self.zero)?;
+        all.end()
+    }
+}
+
+/// As text.
+struct Text<T>(T);
+
+impl<T: fmt::Display> Serialize for Text<T> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(&self.0)
     }
 }

@@ -103,6 +103,13 @@ pub(super) struct Law<T: RealField> {
     pub evaluation: Evaluation<T>,
 }
 
+/// A name has one row.
+impl<T: RealField> PartialEq for Law<T> {
+    fn eq(&self, other: &Self) -> bool {
+        self.name == other.name
+    }
+}
+
 impl<T: RealField + Copy> Law<T> {
     /// The row of this name.
     pub fn named(name: &str) -> Option<&'static Self> {

@@ -5,8 +5,9 @@ use nalgebra::{Matrix3, RealField, Vector3};
 
 use super::code::Code;
 use super::directions::Directions;
-use super::effect::{Kind, Refused, Sensor};
+use super::effect::{Kind, Refused};
 use super::law::{Ambient, Conditions, Fast, Slow, Slowly, Values};
+use crate::Sensor;
 use crate::die::lagged;
 
 /// Evaluations of a sample that none goes before.
@@ -62,7 +63,7 @@ impl<T: RealField + Copy, const N: usize> Triad<T, N> {
         }
     }
 
-    pub fn push(&mut self, effect: &Kind<T>) -> Result<(), Refused> {
+    pub fn push(&mut self, effect: &Kind<'_, T>) -> Result<(), Refused> {
         match effect {
             Kind::Code {
                 axes,

@@ -4,6 +4,7 @@ use nalgebra::Vector3;
 
 use super::bytes::{Reader, TooLong, Writer};
 use super::{NODES, Refused};
+use crate::PerSensor;
 use crate::compensation::{Affine, Compensation};
 use crate::die::DieLag;
 use crate::table::{self, Node, Table};
@@ -20,8 +21,8 @@ pub struct Curves<'a> {
     pub nodes: &'a [Node<f32>],
     /// Dies' temperatures that they were found from, °C.
     pub range_c: Option<[f32; 2]>,
-    /// Lags of the dies of gyro and accelerometer behind the thermometer, s; negative: they lead.
-    pub lags_s: Option<[f32; 2]>,
+    /// Lags of the dies behind the thermometer, s; negative: they lead.
+    pub lags_s: Option<PerSensor<f32>>,
 }
 
 impl<'a> Curves<'a> {
@@ -41,10 +42,10 @@ impl<'a> Curves<'a> {
     }
 
     pub(super) fn write(&self, to: &mut Writer<'_>) -> Result<(), TooLong> {
-        for pair in [self.range_c, self.lags_s] {
-            let [first, second] = pair.unwrap_or_default();
-            to.f32(first)?;
-            to.f32(second)?;
+        let lags_s = self.lags_s.unwrap_or_default();
+        let range_c = self.range_c.unwrap_or_default();
+        for value in range_c.into_iter().chain([lags_s.gyro, lags_s.accel]) {
+            to.f32(value)?;
         }
         for node in self.nodes {
             to.f32(node.temp_c)?;
@@ -78,16 +79,16 @@ pub(super) fn read(
     from: &mut Reader<'_>,
     head: Head,
     show: impl FnMut(&Node<f32>),
-) -> Result<(Table<f32, NODES>, Option<[f32; 2]>), Refused> {
+) -> Result<(Table<f32, NODES>, Option<PerSensor<f32>>), Refused> {
     let mut number = || from.f32().ok_or(Refused::Length);
     let range_c = [number()?, number()?];
-    let lags_s = [number()?, number()?];
+    let lags_s = PerSensor::from([number()?, number()?]);
     let table = read_nodes(from, head.nodes, show)?;
     if head.known & !(RANGE_KNOWN | LAGS_KNOWN) != 0 {
         return Err(Refused::Header);
     }
     let known = |bit: u8| head.known & bit != 0;
-    let no_lags = lags_s.iter().any(|lag_s| DieLag::new(*lag_s).is_none());
+    let no_lags = lags_s.map(DieLag::new).transpose().is_none();
     let no_range = !range_c.into_iter().all(table::is_temperature);
     if head.thermometer != TEMP_PINS
         || known(LAGS_KNOWN) && no_lags

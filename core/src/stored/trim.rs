@@ -2,6 +2,7 @@
 
 use super::bytes::Reader;
 use super::{CHECK, CRC, HEADER, Refused, decode};
+use crate::PerSensor;
 
 /// Where the time of the trim stands.
 const TRIMMED_AT: usize = HEADER + 52;
@@ -9,19 +10,22 @@ const TRIMMED_AT: usize = HEADER + 52;
 const NODES_AT: usize = HEADER + 60 + 144 + 16;
 const NODE: usize = 196;
 /// Where o of the gyro and o of the accelerometer stand in a node.
-const OFFSETS_AT: [usize; 2] = [4 + 36, 4 + 48 + 36];
+const OFFSETS_AT: PerSensor<usize> = PerSensor {
+    gyro: 4 + 36,
+    accel: 4 + 48 + 36,
+};
 
 /// Adds to o of the gyro (rad/s) and of the accelerometer (m/s²) of every node, so that the curves move as they are, and writes when that was, UTC
 /// seconds since 1970. Origin, effects and all else stay as they are, bit by bit.
 ///
 /// # Errors
 /// Why the bytes are no calibration, before or after.
-pub fn trim(bytes: &mut [u8], add: [[f32; 3]; 2], trimmed_s: u64) -> Result<(), Refused> {
+pub fn trim(bytes: &mut [u8], add: PerSensor<[f32; 3]>, trimmed_s: u64) -> Result<(), Refused> {
     decode(bytes)?;
     let nodes = usize::from(*bytes.get(HEADER - 4).ok_or(Refused::Length)?);
     put(bytes, TRIMMED_AT, &trimmed_s.to_le_bytes())?;
     for node in 0..nodes {
-        for (triad, at) in add.iter().zip(OFFSETS_AT) {
+        for (_, (triad, at)) in add.zip(OFFSETS_AT) {
             for (axis, add) in triad.iter().enumerate() {
                 let at = NODES_AT + NODE * node + at + 4 * axis;
                 let mut from = Reader(bytes.get(at..).ok_or(Refused::Length)?);

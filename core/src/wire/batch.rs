@@ -4,6 +4,7 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use super::extensible;
+use crate::PerSensor;
 use crate::compensation::Sample;
 use crate::effects::REFERENCE_C;
 
@@ -41,14 +42,8 @@ pub mod flags {
     pub const POWER_ON_UNKNOWN: u16 = 1 << 9;
 }
 
-/// Sums of the converter's codes over the scans of a sample, so that averaging loses nothing.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Sums {
-    /// Gyro x, y, z.
-    pub gyro: [u32; 3],
-    /// Accelerometer x, y, z.
-    pub accel: [u32; 3],
-}
+/// Sums of the converter's codes of x, y, z over the scans of a sample, so that averaging loses nothing.
+pub type Sums = PerSensor<[u32; 3]>;
 
 /// What holds for all samples of a batch.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -178,10 +173,11 @@ impl<'a> CompensatedBatch<'a> {
             && (1..=BATCH).contains(&(self.samples.len() / COMPENSATED_BYTES))
     }
 
-    /// Temperatures of the dies of gyro and accelerometer, °C.
-    pub fn dies_c(&self) -> [f32; 2] {
-        let gyro_c = self.head.temp_c;
-        [gyro_c, self.accel_die_c.unwrap_or(gyro_c)]
+    /// Temperatures of the dies, °C.
+    pub fn dies_c(&self) -> PerSensor<f32> {
+        let gyro = self.head.temp_c;
+        let accel = self.accel_die_c.unwrap_or(gyro);
+        PerSensor { gyro, accel }
     }
 
     /// Numbers and values of the samples, rad/s and m/s² in the body frame, in order.

@@ -4,7 +4,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::extensible;
-use crate::effects::{Effect, Refused};
+use crate::effects::{DeviceEffect, Refused};
 use crate::stored;
 
 /// First bytes of every greeting.
@@ -121,13 +121,18 @@ pub const EFFECTS: &[&str] = &[
     "gyro_g_squared",
 ];
 
-/// Bits of those that are no effects by name, but [`Effect::code`].
+/// Bits of those that are no effects by name, but [`DeviceEffect::code`].
 const CODES: u32 = 0b11 << 18;
 
 /// The bits of the effects that this build removes: those by name are found by asking for each, so that they cannot be out of date.
 pub fn effects_of_this_build() -> u32 {
     // None takes no numbers at all, so that a known one is refused for their count.
-    let known = |id| !matches!(Effect::<f32>::named(id, &[], None), Err(Refused::Unknown));
+    let known = |id| {
+        !matches!(
+            DeviceEffect::<f32>::named(id, &[], None),
+            Err(Refused::Unknown)
+        )
+    };
     let bits = EFFECTS.iter().enumerate();
     bits.fold(CODES, |bits, (bit, id)| bits | u32::from(known(id)) << bit)
 }

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::batch::{CompensatedBatch, RawBatch};
 use super::greeting::Greeting;
+use crate::Sensor;
 
 /// Most bytes of a stored calibration in one message, either way.
 pub const CHUNK: usize = 256;
@@ -69,7 +70,7 @@ pub enum Request<'a> {
     /// Start the Kalman bank of a triad anew; it takes in no sample before its input is known. → [`Reply::Done`]
     KalmanStart {
         /// Of the sensors.
-        triad: Triad,
+        sensor: Sensor,
         /// Variances of single readings of the sensors x, y, z, V².
         noise: [f32; 3],
         /// What is known before.
@@ -78,7 +79,7 @@ pub enum Request<'a> {
     /// From the next sample on this is what the triad senses, until the next such request. → [`Reply::Done`]
     KalmanInput {
         /// Of the sensors.
-        triad: Triad,
+        sensor: Sensor,
         /// True input in the body frame: rate, rad/s, or specific force (at rest it points up), m/s². `None`: unknown, as while the
         /// table moves; no sample is taken in.
         input: Option<[f32; 3]>,
@@ -86,18 +87,18 @@ pub enum Request<'a> {
     /// Stop the bank. → [`Reply::Kalman`], the last state.
     KalmanEnd {
         /// Of the sensors.
-        triad: Triad,
+        sensor: Sensor,
     },
     /// Keep what the bank knows now, for [`Request::KalmanBack`]. → [`Reply::Done`]
     KalmanKeep {
         /// Of the sensors.
-        triad: Triad,
+        sensor: Sensor,
     },
     /// Know again what was kept, or what the bank began with; the input is unknown from now on. What came in between is forgotten, as of a
     /// dwell in which the unit moved. → [`Reply::Done`]
     KalmanBack {
         /// Of the sensors.
-        triad: Triad,
+        sensor: Sensor,
     },
 }
 
@@ -213,15 +214,6 @@ pub enum Refusal {
     NotKnown,
 }
 
-/// Three sensors.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Triad {
-    /// Gyros; inputs in rad/s.
-    Gyro,
-    /// Accelerometers; inputs in m/s².
-    Accel,
-}
-
 /// What a Kalman bank knows before the first sample.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Prior {
@@ -243,7 +235,7 @@ pub enum Prior {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct KalmanState {
     /// Of the sensors.
-    pub triad: Triad,
+    pub sensor: Sensor,
     /// Number of the last sample that was offered to it, by [`BatchHead::first`](super::BatchHead::first).
     pub last: u32,
     /// Samples taken in.

@@ -1,18 +1,15 @@
 //! Errors by the code of a converter.
 
 use mimu_core::compensation::Sample;
-use mimu_core::effects::{Effect, Effects, FARTHEST_ZERO, Refused, Sensor};
+use mimu_core::effects::{DeviceEffect, Effects, FARTHEST_ZERO, Refused};
+use mimu_core::{PerSensor, Sensor};
 use nalgebra::Vector3;
 
 use super::{Eight, Mounted, si, with};
 
 /// A sample in which this triad reads `own`.
 fn of(sensor: Sensor, own: Vector3<f64>, other: Vector3<f64>) -> Sample<f64> {
-    let (gyro, accel) = match sensor {
-        Sensor::Gyro => (own, other),
-        Sensor::Accel => (other, own),
-    };
-    Sample { gyro, accel }
+    PerSensor::from_fn(|s| if s == sensor { own } else { other })
 }
 
 #[test]
@@ -25,7 +22,7 @@ fn a_converter_with_wrong_weights_reads_as_one_with_right_ones() {
     ];
     let weight = 32768.0 * code_v;
     for sensor in [Sensor::Gyro, Sensor::Accel] {
-        let effect = Effect::code(sensor, None, &errors, weight, 0.0).unwrap();
+        let effect = DeviceEffect::code(sensor, None, &errors, weight, 0.0).unwrap();
         let effects = with(&[effect], &unit.inverse());
         let (mut wrong, mut largest, all) = (0, 0.0_f64, 20_000);
         for k in 0..all {
@@ -77,7 +74,7 @@ fn converters_of_their_own_whose_readings_have_a_bias_subtracted_read_as_right_o
         // In no order of axes.
         let effects = [2, 0, 1].map(|axis: usize| {
             let (volts, less, errors) = &converters[axis];
-            Effect::code(sensor, Some(axis), errors, volts / 2.0, -less).unwrap()
+            DeviceEffect::code(sensor, Some(axis), errors, volts / 2.0, -less).unwrap()
         });
         let effects = with(&effects, &si());
         let (mut wrong, mut err) = ([0; 3], [0; 3]);
@@ -124,7 +121,7 @@ fn readings_above_a_missing_range_of_codes_move_down_by_it() {
     let step = |axis, at: f64| {
         let mut errors = [0.0; 9];
         errors[0] = missing / weight;
-        Effect::code(Sensor::Accel, axis, &errors, weight, at - weight).unwrap()
+        DeviceEffect::code(Sensor::Accel, axis, &errors, weight, at - weight).unwrap()
     };
     let each = with(&[0, 1, 2].map(|i| step(Some(i), steps[i])), &si());
     let alone = with(&[step(Some(1), steps[1])], &si());
@@ -186,7 +183,8 @@ fn whether_a_second_look_is_kept_is_asked_of_each_axis() {
     // than those below it.
     let small = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.4, 1.5, 0.2].map(|e| e / 256.0);
     let large = [0.0, 0.3, 0.0, 0.0, 0.0, 0.0, 5.0, 0.0, 0.0].map(|e| e / 256.0);
-    let code = |axis, errors| Effect::code(Sensor::Gyro, Some(axis), errors, 256.0, 0.0).unwrap();
+    let code =
+        |axis, errors| DeviceEffect::code(Sensor::Gyro, Some(axis), errors, 256.0, 0.0).unwrap();
     let effects = with(&[code(0, &large), code(1, &small)], &si());
     // 128.1 read as 128 has an error of 0.3, without which it would be 127 and have one of 5: kept is the first. A 3.8 with bits of 2
     // and 1 is read as 5.5, whose bits of 4 and 1 err by 1.6; without that it is a 3 again, and has lost 1.7.
@@ -200,8 +198,8 @@ fn whether_a_second_look_is_kept_is_asked_of_each_axis() {
 fn what_has_no_code_is_the_same_to_the_last_bit_and_what_is_no_reading_does_no_harm() {
     let errors = [1e-3, -2e-3, 3e-3, -4e-3, 5e-3, -6e-3, 7e-3, -8e-3, 9e-3];
     let most: f32 = errors.iter().map(|e: &f32| e.abs()).sum::<f32>() * 1.65;
-    let mut effects = Effects::<f32, 8>::new(&si(), &si()).unwrap();
-    let code = Effect::code(Sensor::Gyro, Some(1), &errors, 1.65, -0.3).unwrap();
+    let mut effects = Effects::<f32, 8>::new(&PerSensor::both(si())).unwrap();
+    let code = DeviceEffect::code(Sensor::Gyro, Some(1), &errors, 1.65, -0.3).unwrap();
     effects.push(code).unwrap();
     let odd = [
         0.0,
@@ -241,7 +239,7 @@ fn what_has_no_code_is_the_same_to_the_last_bit_and_what_is_no_reading_does_no_h
 fn a_code_that_cannot_be_removed_is_refused() {
     let errors = [1e-3; 9];
     let code = |axis, errors: &[f64; 9], weight, zero| {
-        Effect::code(Sensor::Gyro, axis, errors, weight, zero)
+        DeviceEffect::code(Sensor::Gyro, axis, errors, weight, zero)
     };
     let (none, last) = (f64::NAN, f64::INFINITY);
     for axis in [None, Some(0), Some(2)] {
@@ -263,7 +261,8 @@ fn a_code_that_cannot_be_removed_is_refused() {
         }
     }
     // Finite, and not what becomes of them in single precision.
-    let single = |error, weight| Effect::code(Sensor::Gyro, None, &[error; 9], weight, 0.0_f32);
+    let single =
+        |error, weight| DeviceEffect::code(Sensor::Gyro, None, &[error; 9], weight, 0.0_f32);
     for (error, weight) in [(1e-3, 1e-37), (1e20, 1e20), (1e38, 1.0)] {
         assert_eq!(single(error, weight).err(), Some(Refused::Value));
     }
@@ -276,7 +275,7 @@ fn a_code_that_cannot_be_removed_is_refused() {
 
     // A converter for each axis of each triad, and what is refused leaves those that there are as they were.
     let rank = |axis, size: f64| {
-        Effect::code(
+        DeviceEffect::code(
             Sensor::Gyro,
             axis,
             &[size, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
@@ -298,7 +297,7 @@ fn a_code_that_cannot_be_removed_is_refused() {
         assert_eq!(effects.push(rank(axis, 0.125).unwrap()), result);
         assert_eq!(removed(&effects), Vector3::from(after));
     }
-    let other = Effect::code(Sensor::Accel, None, &errors, 1.0, 0.0).unwrap();
+    let other = DeviceEffect::code(Sensor::Accel, None, &errors, 1.0, 0.0).unwrap();
     assert_eq!(effects.push(other), Ok(()));
     assert_eq!(effects.push(other), Err(Refused::Full));
 }
@@ -307,7 +306,7 @@ fn a_code_that_cannot_be_removed_is_refused() {
 fn codes_repeat_below_the_zero_as_they_do_above() {
     let errors = [0.25, 0.0, 0.03, 0.0, 0.0, 0.0, 0.0, 0.0, 0.002];
     let effects = with(
-        &[Effect::code(Sensor::Accel, None, &errors, 1.0, 5.0).unwrap()],
+        &[DeviceEffect::code(Sensor::Accel, None, &errors, 1.0, 5.0).unwrap()],
         &si(),
     );
     let removed = |u: f64| {

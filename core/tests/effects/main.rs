@@ -6,8 +6,9 @@ use std::f64::consts::TAU;
 
 use mimu_core::compensation::{Affine, Sample};
 use mimu_core::effects::{
-    Effect, Effects, RATE_LAG_S, REFERENCE_C, Refused, Sensor, State, Variable,
+    DeviceEffect, Effects, RATE_LAG_S, REFERENCE_C, Refused, State, Variable,
 };
+use mimu_core::{PerSensor, Sensor};
 use nalgebra::{Matrix3, Rotation3, Unit, Vector3};
 use proptest::prelude::*;
 
@@ -66,16 +67,16 @@ fn si() -> Affine<f64> {
     }
 }
 
-fn with(effects: &[Effect<f64>], inverse: &Affine<f64>) -> Eight {
-    let mut all = Eight::new(inverse, inverse).unwrap();
+fn with(effects: &[DeviceEffect<f64>], inverse: &Affine<f64>) -> Eight {
+    let mut all = Eight::new(&PerSensor::both(*inverse)).unwrap();
     for effect in effects {
         all.push(*effect).unwrap();
     }
     all
 }
 
-fn named(id: &str, coefficients: &[f64]) -> Effect<f64> {
-    Effect::named(id, coefficients, None).unwrap()
+fn named(id: &str, coefficients: &[f64]) -> DeviceEffect<f64> {
+    DeviceEffect::named(id, coefficients, None).unwrap()
 }
 
 /// What is left, at most, of an error of sensor inputs `error(sensed)` on a crooked triad by an effect of that triad.
@@ -164,7 +165,7 @@ fn bent_responses_become_straight() {
 /// and whose input is `x(t)`, 1000 times a second.
 fn left_of_a_stream(
     sensor: &str,
-    effects: &[Effect<f64>],
+    effects: &[DeviceEffect<f64>],
     x: impl Fn(f64) -> Vector3<f64>,
     error: impl Fn(&Vector3<f64>) -> Vector3<f64>,
 ) -> (f64, f64) {
@@ -303,9 +304,9 @@ fn bias<const N: usize>(effects: &Effects<f64, N>, state: &mut State<f64, N>) ->
 #[test]
 fn drift_of_ten_hours_is_removed_to_the_last_digits_of_single_precision() {
     let drift = [1e-7_f32, -2e-7, 3e-7];
-    let mut effects = Effects::<f32, 8>::new(&si(), &si()).unwrap();
+    let mut effects = Effects::<f32, 8>::new(&PerSensor::both(si())).unwrap();
     for (axis, coefficient) in drift.into_iter().enumerate() {
-        let term = Effect::term(Sensor::Gyro, axis, coefficient, &[Variable::Time]);
+        let term = DeviceEffect::term(Sensor::Gyro, axis, coefficient, &[Variable::Time]);
         effects.push(term.unwrap()).unwrap();
     }
     let mut state = State::new(1000.0);
@@ -328,7 +329,7 @@ fn drift_of_ten_hours_is_removed_to_the_last_digits_of_single_precision() {
 
 #[test]
 fn a_warm_up_is_half_as_large_after_each_half_life() {
-    let warm_up = Effect::named("accel_warm_up", &[0.04, 0.0, -0.08], Some(100.0)).unwrap();
+    let warm_up = DeviceEffect::named("accel_warm_up", &[0.04, 0.0, -0.08], Some(100.0)).unwrap();
     let effects = with(&[warm_up], &si());
     let mut state = State::new(1000.0);
     effects.slow(&mut state, 0.0, f64::NAN);
@@ -342,9 +343,9 @@ fn a_warm_up_is_half_as_large_after_each_half_life() {
 
 #[test]
 fn long_after_power_on_a_warm_up_is_over_and_a_drift_counts_from_the_beginning() {
-    let warm_up = Effect::named("accel_warm_up", &[0.04, 0.0, -0.08], Some(100.0)).unwrap();
+    let warm_up = DeviceEffect::named("accel_warm_up", &[0.04, 0.0, -0.08], Some(100.0)).unwrap();
     let drift = |axis, coefficient| {
-        Effect::term(Sensor::Accel, axis, coefficient, &[Variable::Time]).unwrap()
+        DeviceEffect::term(Sensor::Accel, axis, coefficient, &[Variable::Time]).unwrap()
     };
     let effects = with(&[warm_up, drift(0, 1e-5), drift(2, 2e-5)], &si());
     let mut state = State::new(1000.0).long_after_power_on();
@@ -397,7 +398,7 @@ fn thermal_errors_are_those_of_a_sensor_at_that_temperature() {
 #[test]
 fn a_late_die_lags_behind_a_ramp_by_slope_times_lag() {
     let lag_s = 120.0;
-    let effect = Effect::named("gyro_thermal_lag", &[1e-3, 0.0, -2e-3], Some(lag_s)).unwrap();
+    let effect = DeviceEffect::named("gyro_thermal_lag", &[1e-3, 0.0, -2e-3], Some(lag_s)).unwrap();
     let effects = with(&[effect], &si());
     let slope = 0.05; // 3 °C a minute
     for dt in [0.1, 1.0, 17.0] {
@@ -418,7 +419,7 @@ fn a_late_die_lags_behind_a_ramp_by_slope_times_lag() {
 #[test]
 fn terms_are_products_of_what_they_name() {
     use Variable::{ForceY, RateX, Temperature, TemperatureRate, Time};
-    let term = |axis, c, v: &[Variable]| Effect::term(Sensor::Gyro, axis, c, v).unwrap();
+    let term = |axis, c, v: &[Variable]| DeviceEffect::term(Sensor::Gyro, axis, c, v).unwrap();
     let cubic = term(0, 2.0, &[RateX, ForceY, ForceY]);
     let warm = term(1, 0.5, &[Temperature, Time]);
     let rising = term(2, 10.0, &[TemperatureRate]);
@@ -441,7 +442,7 @@ fn terms_are_products_of_what_they_name() {
 
 #[test]
 fn what_cannot_be_removed_is_refused() {
-    let refused = |id, c: &[f64], form| Effect::named(id, c, form).unwrap_err();
+    let refused = |id, c: &[f64], form| DeviceEffect::named(id, c, form).unwrap_err();
     assert_eq!(refused("gyro_magnetic", &[0.0; 3], None), Refused::Unknown);
     assert_eq!(refused("earth_rate", &[0.0; 3], None), Refused::Unknown);
     assert_eq!(
@@ -465,11 +466,11 @@ fn what_cannot_be_removed_is_refused() {
         refused("gyro_scale_cubic", &[0.0; 3], Some(9.0)),
         Refused::Value
     );
-    let term = |axis, v: &[Variable]| Effect::term(Sensor::Accel, axis, 1.0, v).unwrap_err();
+    let term = |axis, v: &[Variable]| DeviceEffect::term(Sensor::Accel, axis, 1.0, v).unwrap_err();
     assert_eq!(term(3, &[Variable::Time]), Refused::Value);
     assert_eq!(term(0, &[]), Refused::Count { needed: 3 });
     assert_eq!(term(0, &[Variable::Time; 4]), Refused::Count { needed: 3 });
-    let mut two = Effects::<f64, 2>::new(&si(), &si()).unwrap();
+    let mut two = Effects::<f64, 2>::new(&PerSensor::both(si())).unwrap();
     let fast = named("gyro_scale_cubic", &[0.0; 3]);
     let slow = named("gyro_thermal_scale", &[0.0; 3]);
     let pushed = [fast, fast, fast, slow, slow, slow].map(|e| two.push(e).is_ok());
@@ -480,7 +481,7 @@ fn what_cannot_be_removed_is_refused() {
 macro_rules! all_at_once {
     ($t:ty, $c:expr, $inputs:expr, $temp_c:expr) => {{
         let unit = Mounted::crooked().inverse();
-        let mut effects = Effects::<$t, 8>::new(&unit, &unit).unwrap();
+        let mut effects = Effects::<$t, 8>::new(&PerSensor::both(unit)).unwrap();
         let ids = [
             ("gyro_g_sensitivity", 9, 1e-3),
             ("gyro_scale_quadratic", 3, 1e-3),
@@ -499,10 +500,12 @@ macro_rules! all_at_once {
         for (id, count, size) in ids {
             let c: Vec<$t> = (0..count).map(|k| ($c[k] * size) as $t).collect();
             let form = matches!(id, "accel_warm_up" | "accel_thermal_lag").then_some(60.0);
-            effects.push(Effect::named(id, &c, form).unwrap()).unwrap();
+            effects
+                .push(DeviceEffect::named(id, &c, form).unwrap())
+                .unwrap();
         }
         use Variable::{ForceX, RateX, Temperature};
-        let term = Effect::term(
+        let term = DeviceEffect::term(
             Sensor::Accel,
             1,
             (1e-3 * $c[0]) as $t,

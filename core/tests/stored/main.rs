@@ -3,12 +3,13 @@
 mod table;
 
 use mimu_core::compensation::{Affine, Compensation, Sample};
-use mimu_core::effects::{Sensor, Variable};
+use mimu_core::effects::{self, DeviceEffect, Variable};
 use mimu_core::single;
 use mimu_core::stored::{
-    Curves, MAX_LENGTH, NODES, Origin, ROOM, Record, Refused, decode, encode, hash, read, trim,
+    Curves, MAX_LENGTH, NODES, Origin, ROOM, Refused, decode, encode, hash, read, trim,
 };
 use mimu_core::table::Node;
+use mimu_core::{PerSensor, Sensor};
 use nalgebra::{Matrix3, Vector3};
 use proptest::prelude::*;
 
@@ -59,14 +60,14 @@ fn regular() -> [f32; 24] {
     })
 }
 
-fn bytes(nodes: &[Node<f32>], effects: &[Record<'_>]) -> Vec<u8> {
+fn bytes(nodes: &[Node<f32>], effects: &[DeviceEffect<f32>]) -> Vec<u8> {
     with_curves(&Curves::of(nodes), effects)
 }
 
-fn with_curves(curves: &Curves<'_>, effects: &[Record<'_>]) -> Vec<u8> {
+fn with_curves(curves: &Curves<'_>, effects: &[DeviceEffect<f32>]) -> Vec<u8> {
     let mut out = [0; MAX_LENGTH];
     let matrix = Matrix3::from_diagonal_element(3.5);
-    let matrices = [&matrix, &matrix];
+    let matrices = PerSensor::both(&matrix);
     let length = encode(&Origin::UNKNOWN, matrices, curves, effects, &mut out).unwrap();
     out[..length].to_vec()
 }
@@ -90,32 +91,24 @@ fn resealed(mut bytes: Vec<u8>) -> Vec<u8> {
 #[test]
 fn the_layout_is_that_of_the_table_in_the_documentation() {
     let effects = [
-        Record::Named {
-            id: "gyro_warm_up",
-            coefficients: &[1.0, 2.0, 3.0],
-            nonlinear: Some(60.0),
-        },
-        Record::Term {
-            sensor: Sensor::Accel,
-            axis: 1,
-            coefficient: -2.0,
-            variables: &[Variable::RateX, Variable::ForceY],
-        },
-        Record::Code {
-            sensor: Sensor::Gyro,
-            axis: None,
-            weight: 1.65,
-            zero: 0.0,
-            errors: &[0.001, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -0.0005],
-        },
-        Record::Code {
-            sensor: Sensor::Accel,
-            axis: Some(2),
-            weight: 2.0,
-            zero: -1.25,
-            errors: &[0.0, -0.002, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
-        },
-    ];
+        DeviceEffect::named("gyro_warm_up", &[1.0, 2.0, 3.0], Some(60.0)),
+        DeviceEffect::term(Sensor::Accel, 1, -2.0, &[Variable::RateX, Variable::ForceY]),
+        DeviceEffect::code(
+            Sensor::Gyro,
+            None,
+            &[0.001, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -0.0005],
+            1.65,
+            0.0,
+        ),
+        DeviceEffect::code(
+            Sensor::Accel,
+            Some(2),
+            &[0.0, -0.002, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+            2.0,
+            -1.25,
+        ),
+    ]
+    .map(Result::unwrap);
     // Sensors that look along -y, x and z, 2, 4 and 0.5 V per unit; and C of a gyro that looks along y, -x and z.
     let accel = Matrix3::new(0.0, 0.25, 0.0, -0.5, 0.0, 0.0, 0.0, 0.0, 2.0);
     let gyro = Matrix3::new(0.0, -2.0, 0.0, 4.0, 0.0, 0.0, 0.0, 0.0, 0.5);
@@ -125,7 +118,7 @@ fn the_layout_is_that_of_the_table_in_the_documentation() {
     let curves = Curves {
         nodes: &one,
         range_c: Some([-10.5, 60.25]),
-        lags_s: Some([61.5, -4.25]),
+        lags_s: Some([61.5, -4.25].into()),
     };
     let origin = Origin {
         unit_id: Some([1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12]),
@@ -135,7 +128,17 @@ fn the_layout_is_that_of_the_table_in_the_documentation() {
         // A day later.
         trimmed_s: Some(0x6957_0a80),
     };
-    let length = encode(&origin, [&gyro, &accel], &curves, &effects, &mut all).unwrap();
+    let length = encode(
+        &origin,
+        PerSensor {
+            gyro: &gyro,
+            accel: &accel,
+        },
+        &curves,
+        &effects,
+        &mut all,
+    )
+    .unwrap();
     let all = &all[..length];
     let mut expected = b"mimc\x06\x00".to_vec();
     expected.extend((all.len() as u16).to_le_bytes());
@@ -192,10 +195,10 @@ fn the_layout_is_that_of_the_table_in_the_documentation() {
     );
     assert_eq!(stored.origin, origin);
     assert_eq!(stored.compensator.table.range_c(), Some([-10.5, 60.25]));
-    assert_eq!(stored.lags_s, Some([61.5, -4.25]));
+    assert_eq!(stored.lags_s, Some([61.5, -4.25].into()));
     assert_eq!(
         stored.compensator.lags.map(|lag| lag.lag_s()),
-        [61.5, -4.25]
+        PerSensor::from([61.5, -4.25])
     );
     // 384 of 256 codes to 1.65 V are bits 0 and -1, and 255 are bits -1 to -8; half a code more, so that no error turns any.
     let right = Vector3::new(384.5, 0.5, 255.5) * (1.65 / 256.0);
@@ -217,28 +220,24 @@ fn the_layout_is_that_of_the_table_in_the_documentation() {
 
 #[test]
 fn a_trim_moves_the_curves_as_they_are_and_nothing_else() {
-    let named = Record::Named {
-        id: "gyro_scale_cubic",
-        coefficients: &[1e-3; 3],
-        nonlinear: None,
-    };
+    let named = DeviceEffect::named("gyro_scale_cubic", &[1e-3; 3], None).unwrap();
     let curves = Curves {
         nodes: &two_nodes(),
         range_c: Some([1.0, 49.0]),
-        lags_s: Some([-20.0, 30.0]),
+        lags_s: Some([-20.0, 30.0].into()),
     };
     let before = with_curves(&curves, &[named]);
     let (mut after, mut nodes) = (before.clone(), Vec::new());
-    let add = [[0.01, -0.02, 0.03], [0.5, 0.25, -0.125]];
+    let add = PerSensor {
+        gyro: [0.01, -0.02, 0.03],
+        accel: [0.5, 0.25, -0.125],
+    };
     trim(&mut after, add, 0x6957_0a80).unwrap();
     let stored = read(&after, |node| nodes.push(*node), |_| {}).unwrap();
     assert_eq!(stored.origin.trimmed_s, Some(0x6957_0a80));
     for (node, was) in nodes.iter().zip(two_nodes()) {
         let mut expected = was;
-        for (triad, add) in [&mut expected.model.gyro, &mut expected.model.accel]
-            .into_iter()
-            .zip(add)
-        {
+        for (_, (triad, add)) in expected.model.as_mut().zip(add) {
             triad.offset += Vector3::from(add);
         }
         assert_eq!(*node, expected);
@@ -255,7 +254,7 @@ fn a_trim_moves_the_curves_as_they_are_and_nothing_else() {
         assert!((node.model.accel.offset - was.model.accel.offset).amax() < 1e-6);
     }
     assert_eq!(
-        trim(&mut after, [[f32::NAN; 3]; 2], 1).err(),
+        trim(&mut after, PerSensor::both([f32::NAN; 3]), 1).err(),
         Some(Refused::Node { at: 0 })
     );
 }
@@ -274,14 +273,20 @@ fn a_range_a_lag_or_a_thermometer_that_makes_no_sense_is_refused() {
         decode(&with_curves(&curves, &[])).err()
     };
     let no = Some(Refused::Temperature);
-    assert_eq!(refused(Some([10.0, 40.0]), Some([-120.0, 0.0])), None);
-    assert_eq!(refused(Some([10.0, 10.0]), Some([600.0; 2])), None);
+    assert_eq!(
+        refused(Some([10.0, 40.0]), Some([-120.0, 0.0].into())),
+        None
+    );
+    assert_eq!(
+        refused(Some([10.0, 10.0]), Some(PerSensor::both(600.0))),
+        None
+    );
     assert_eq!(refused(Some([40.0, 10.0]), None), no);
     assert_eq!(refused(Some([f32::NAN, 10.0]), None), no);
     assert_eq!(refused(Some([0.0, f32::INFINITY]), None), no);
     for lag_s in [-121.0, 601.0, f32::NAN] {
         for lags_s in [[lag_s, 0.0], [0.0, lag_s]] {
-            assert_eq!(refused(None, Some(lags_s)), no, "{lag_s}");
+            assert_eq!(refused(None, Some(lags_s.into())), no, "{lag_s}");
         }
     }
     let mut later = bytes(&one, &[]);
@@ -354,7 +359,7 @@ fn bits_of_a_later_version_and_lags_that_nothing_follows_are_refused() {
     }
     let lag = |lag_s| {
         let curves = Curves {
-            lags_s: Some([0.0, lag_s]),
+            lags_s: Some([0.0, lag_s].into()),
             ..Curves::of(&one)
         };
         decode(&with_curves(&curves, &[])).err()
@@ -370,17 +375,17 @@ fn bits_of_a_later_version_and_lags_that_nothing_follows_are_refused() {
         (f32::INFINITY, true),
         (60.0, false),
     ] {
-        let effect = Record::Named {
-            id: "gyro_thermal_lag",
-            coefficients: &[1e-3; 3],
-            nonlinear: Some(constant),
-        };
-        let expected = refused.then_some(Refused::EffectValue { at: 0 });
+        let effect = |constant| DeviceEffect::named("gyro_thermal_lag", &[1e-3; 3], Some(constant));
         assert_eq!(
-            decode(&bytes(&one, &[effect])).err(),
-            expected,
-            "{constant}"
+            effect(constant).err(),
+            refused.then_some(effects::Refused::Value)
         );
+        // The same from bytes: the constant is the last number before the check.
+        let mut all = bytes(&one, &[effect(60.0).unwrap()]);
+        let at = all.len() - 8;
+        all[at..at + 4].copy_from_slice(&constant.to_le_bytes());
+        let expected = refused.then_some(Refused::EffectValue { at: 0 });
+        assert_eq!(decode(&resealed(all)).err(), expected, "{constant}");
     }
 }
 
@@ -393,20 +398,20 @@ fn what_is_not_known_of_an_origin_is_zero() {
 
 #[test]
 fn a_code_of_no_axis_is_not_one_of_all() {
-    let code = |axis| Record::Code {
-        sensor: Sensor::Accel,
-        axis,
-        weight: 1.0,
-        zero: 0.0,
-        errors: &[0.0; 9],
-    };
-    let refused = |all: &[Record<'_>]| decode(&bytes(&[node(0.0, &regular())], all)).err();
+    let code = |axis| DeviceEffect::code(Sensor::Accel, axis, &[0.0; 9], 1.0, 0.0).unwrap();
+    let refused = |all: &[DeviceEffect<f32>]| decode(&bytes(&[node(0.0, &regular())], all)).err();
     assert_eq!(refused(&[code(None)]), None);
     let three = [0, 1, 2].map(|axis| code(Some(axis)));
     assert_eq!(refused(&three), None);
+    // From bytes an axis of 3 is all of them; behind it stand eleven numbers and the check.
     for axis in 3..=u8::MAX {
-        let at = Some(Refused::EffectValue { at: 0 });
-        assert_eq!(refused(&[code(Some(axis))]), at, "{axis}");
+        let mut all = bytes(&[node(0.0, &regular())], &[code(Some(1))]);
+        let at = all.len() - 4 - 4 * 11 - 1;
+        all[at] = axis;
+        let expected = (axis > 3).then_some(Refused::EffectValue { at: 0 });
+        assert_eq!(decode(&resealed(all)).err(), expected, "{axis}");
+        let made = DeviceEffect::code(Sensor::Accel, Some(axis.into()), &[0.0; 9], 1.0, 0.0);
+        assert_eq!(made.err(), Some(effects::Refused::Value), "{axis}");
     }
     let full = Some(Refused::EffectsFull { at: 1 });
     assert_eq!(refused(&[code(None), code(Some(1))]), full);
@@ -416,11 +421,7 @@ fn a_code_of_no_axis_is_not_one_of_all() {
 #[test]
 fn everything_at_its_longest_has_room() {
     let nodes: Vec<_> = (0..NODES).map(|k| node(k as f32, &regular())).collect();
-    let named = |id, coefficients| Record::Named {
-        id,
-        coefficients,
-        nonlinear: None,
-    };
+    let named = |id, coefficients: &[f32]| DeviceEffect::named(id, coefficients, None).unwrap();
     let mut all = Vec::new();
     for (fast, slow) in [
         ("gyro_cross_axis_product", "gyro_thermal_misalignment"),
@@ -430,13 +431,10 @@ fn everything_at_its_longest_has_room() {
         all.extend([named(slow, &[0.0; 6]); ROOM]);
     }
     for sensor in [Sensor::Gyro, Sensor::Accel] {
-        all.extend([0, 1, 2].map(|axis| Record::Code {
-            sensor,
-            axis: Some(axis),
-            weight: 1.0,
-            zero: 0.0,
-            errors: &[0.0; 9],
-        }));
+        all.extend(
+            [0, 1, 2]
+                .map(|axis| DeviceEffect::code(sensor, Some(axis), &[0.0; 9], 1.0, 0.0).unwrap()),
+        );
     }
     let stored = decode(&bytes(&nodes, &all)).unwrap();
     assert_eq!(stored.effect_count, 2 * (2 * ROOM as u8 + 3));
@@ -486,7 +484,7 @@ fn every_refusal_has_its_name() {
     let mut out = [0; MAX_LENGTH];
     let length = encode(
         &Origin::UNKNOWN,
-        [&flat, &flat],
+        PerSensor::both(&flat),
         &Curves::of(&[node(0.0, &regular())]),
         &[],
         &mut out,
@@ -494,21 +492,29 @@ fn every_refusal_has_its_name() {
     .unwrap();
     assert_eq!(refused(&out[..length]), Some(Refused::Singular));
 
-    let named = |id, coefficients| Record::Named {
-        id,
-        coefficients,
-        nonlinear: None,
-    };
     let one = [node(0.0, &regular())];
-    let effects = |all: &[Record<'_>]| refused(&bytes(&one, all));
-    let known = named("gyro_scale_cubic", &[0.0; 3]);
-    let unknown = named("gyro_of_the_future", &[0.0; 3]);
+    let effects = |all: &[DeviceEffect<f32>]| refused(&bytes(&one, all));
+    let known = DeviceEffect::named("gyro_scale_cubic", &[0.0; 3], None).unwrap();
+    let two = bytes(&one, &[known, known]);
+    let mut unknown = two.clone();
+    // The last letter of the second id, before its count and four numbers.
+    let at = two.len() - 4 - 4 * 4 - 2;
+    unknown[at] = b'x';
     assert_eq!(
-        effects(&[known, unknown]),
+        refused(&resealed(unknown)),
         Some(Refused::EffectUnknown { at: 1 })
     );
-    let short = named("gyro_scale_cubic", &[0.0; 2]);
-    assert_eq!(effects(&[short]), Some(Refused::EffectValue { at: 0 }));
+    // Two coefficients and a constant, where there have to be three.
+    let mut short = bytes(&one, &[known]);
+    let at = short.len() - 4 - 4 * 4 - 1;
+    short[at] = 2;
+    short.drain(at + 1..at + 5);
+    let length = short.len() as u16;
+    short[6..8].copy_from_slice(&length.to_le_bytes());
+    assert_eq!(
+        refused(&resealed(short)),
+        Some(Refused::EffectValue { at: 0 })
+    );
     let eight = [known; 8];
     assert_eq!(effects(&eight), None);
     let nine = [known; 9];
@@ -539,8 +545,8 @@ proptest! {
     /// Whatever the bytes are, they are refused or make a calibration; the check is made to hold, or nothing would get past it.
     #[test]
     fn no_bytes_are_too_bad_to_be_refused(noise in prop::collection::vec(any::<u8>(), 0..600), at in 12..360_usize) {
-        let named = Record::Named { id: "gyro_scale_cubic", coefficients: &[0.0; 3], nonlinear: None };
-        let code = Record::Code { sensor: Sensor::Gyro, axis: Some(1), weight: 1.0, zero: 0.0, errors: &[0.0; 9] };
+        let named = DeviceEffect::named("gyro_scale_cubic", &[0.0; 3], None).unwrap();
+        let code = DeviceEffect::code(Sensor::Gyro, Some(1), &[0.0; 9], 1.0, 0.0).unwrap();
         let mut all = bytes(&[node(0.0, &regular())], &[named, code]);
         for (place, byte) in all.iter_mut().skip(at).zip(&noise) {
             *place = *byte;

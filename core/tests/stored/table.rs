@@ -1,5 +1,6 @@
 //! Curves between nodes, and beyond them, against cubics and lines in double precision.
 
+use mimu_core::PerSensor;
 use mimu_core::compensation::Sample;
 use mimu_core::single;
 use mimu_core::table::{BEYOND_C, Place, Table};
@@ -26,14 +27,14 @@ fn outside_the_nodes_the_end_slope_goes_on_for_five_kelvin_and_is_then_held() {
         (55.0, &high, -1.0, Place::Above),
         (99.0, &high, -1.0, Place::Above),
     ] {
-        table.follow(&mut state, [temp_c; 2]);
+        table.follow(&mut state, PerSensor::both(temp_c));
         for (found, end) in numbers_of(&state.model).iter().zip(ends) {
             assert!((found - (end + grown)).abs() < 3e-6, "{temp_c}");
         }
         assert_eq!(state.place, place, "{temp_c}");
     }
     for lost in [[f32::NAN; 2], [20.0, f32::NAN], [f32::NAN, 20.0]] {
-        table.follow(&mut state, lost);
+        table.follow(&mut state, lost.into());
         assert_eq!(state.place, Place::Above, "as before");
     }
     // One triad outside is outside, and either is on its own curve.
@@ -43,11 +44,11 @@ fn outside_the_nodes_the_end_slope_goes_on_for_five_kelvin_and_is_then_held() {
         ([20.0, -1.0], Place::Below),
         ([20.0, 30.0], Place::Inside),
     ] {
-        table.follow(&mut state, dies_c);
+        table.follow(&mut state, dies_c.into());
         assert_eq!(state.place, place, "{dies_c:?}");
         let (mut gyro, mut accel) = (table.state(), table.state());
-        table.follow(&mut gyro, [dies_c[0]; 2]);
-        table.follow(&mut accel, [dies_c[1]; 2]);
+        table.follow(&mut gyro, PerSensor::both(dies_c[0]));
+        table.follow(&mut accel, PerSensor::both(dies_c[1]));
         assert_eq!(state.model.gyro, gyro.model.gyro);
         assert_eq!(state.model.accel, accel.model.accel);
     }
@@ -61,7 +62,7 @@ fn a_single_node_is_for_all_temperatures_unless_its_range_is_known() {
     let table = Table::<f32, 16>::new([one]).unwrap();
     let place = |table: &Table<f32, 16>, temp_c| {
         let mut state = table.state();
-        table.follow(&mut state, [temp_c; 2]);
+        table.follow(&mut state, PerSensor::both(temp_c));
         state.place
     };
     assert_eq!(table.limits(), None);
@@ -126,7 +127,7 @@ proptest! {
         let (first, last) = (temps[0], temps[temps.len() - 1]);
         let wanted = (first + at * (last - first + 20.0)) as f32;
         let mut state = single.state();
-        single.follow(&mut state, [wanted; 2]);
+        single.follow(&mut state, PerSensor::both(wanted));
         let found = numbers_of(&state.model);
         let t = f64::from(wanted);
         let end = if t < first { 0 } else { nodes.len() - 1 };

@@ -1,6 +1,6 @@
 //! Frames: what is sent arrives, what is garbled is counted, and the next frame arrives again.
 
-use mimu_core::effects::Effect;
+use mimu_core::effects::DeviceEffect;
 use mimu_core::wire::{
     BATCH, BatchHead, COMPENSATED_BYTES, Call, Compatibility, CompensatedBatch, Decoder, EFFECTS,
     Event, Greeting, MAGIC, MAX_FRAME, MAX_PAYLOAD, Message, PROTOCOL, RAW_BYTES, RawBatch,
@@ -141,7 +141,7 @@ fn older_newer_and_foreign_devices_are_told_apart() {
 #[test]
 fn every_effect_in_the_list_is_one_that_this_build_removes() {
     assert_eq!(effects_of_this_build(), (1 << EFFECTS.len()) - 1);
-    let unknown = Effect::<f32>::named("gyro_no_such_thing", &[], None);
+    let unknown = DeviceEffect::<f32>::named("gyro_no_such_thing", &[], None);
     assert_eq!(unknown.unwrap_err(), mimu_core::effects::Refused::Unknown);
 }
 

@@ -260,7 +260,7 @@ fn a_compensated_batch_is_read_whatever_follows_its_samples() {
             panic!("{message:?}");
         };
         assert!(batch.is_whole());
-        assert_eq!((batch.head.first, batch.dies_c()), (5, dies_c));
+        assert_eq!((batch.head.first, batch.dies_c()), (5, dies_c.into()));
     }
     // What ends within the samples is none.
     let message = mimu_core::wire::Frame(&before[..20]).message();

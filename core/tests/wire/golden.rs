@@ -1,11 +1,12 @@
 //! The bytes of every message, written out by hand from the specification of postcard: a variant is its number, integers above
 //! 127 are varints, `f32` are little end first (1.0 is `0000803f`, -2.0 is `000000c0`, 0.5 is `0000003f`), text has its length in front.
 
+use mimu_core::Sensor;
 use mimu_core::stored;
 use mimu_core::wire::{
     BatchHead, Call, Capabilities, CompensatedBatch, Counters, Event, Frame, Greeting, KalmanAxis,
     KalmanState, MAGIC, Message, Prior, RawBatch, Refusal, Reply, Request, SelfTest, Slot, Start,
-    StoredInfo, Sums, Triad, Version, checks, flags,
+    StoredInfo, Sums, Version, checks, flags,
 };
 use serde::{Deserialize, Serialize};
 
@@ -69,7 +70,7 @@ fn requests() {
     let noise = [1.0, -2.0, 0.5];
     request(
         Request::KalmanStart {
-            triad: Triad::Gyro,
+            sensor: Sensor::Gyro,
             noise,
             prior: Prior::Diffuse { span: 1.0 },
         },
@@ -78,7 +79,7 @@ fn requests() {
     let row = "0000803f 000000c0 0000003f 00000000";
     request(
         Request::KalmanStart {
-            triad: Triad::Accel,
+            sensor: Sensor::Accel,
             noise,
             prior: Prior::Known {
                 mean: [[1.0, -2.0, 0.5, 0.0]; 3],
@@ -93,22 +94,22 @@ fn requests() {
     );
     request(
         Request::KalmanInput {
-            triad: Triad::Accel,
+            sensor: Sensor::Accel,
             input: Some([1.0, -2.0, 0.5]),
         },
         "0b 01 01 0000803f 000000c0 0000003f",
     );
     request(
         Request::KalmanInput {
-            triad: Triad::Gyro,
+            sensor: Sensor::Gyro,
             input: None,
         },
         "0b 00 00",
     );
-    let triad = Triad::Gyro;
-    request(Request::KalmanEnd { triad }, "0c 00");
-    request(Request::KalmanKeep { triad }, "0d 00");
-    request(Request::KalmanBack { triad }, "0e 00");
+    let sensor = Sensor::Gyro;
+    request(Request::KalmanEnd { sensor }, "0c 00");
+    request(Request::KalmanKeep { sensor }, "0d 00");
+    request(Request::KalmanBack { sensor }, "0e 00");
 }
 
 fn greeting<'a>(start: Start<'a>, stored: Option<StoredInfo>, slots: [Slot; 2]) -> Message<'a> {
@@ -253,7 +254,7 @@ fn kalman() -> KalmanState {
         covariance: [0.5; 10],
     };
     KalmanState {
-        triad: Triad::Accel,
+        sensor: Sensor::Accel,
         last: 300,
         updates: 128,
         rejected: 2,

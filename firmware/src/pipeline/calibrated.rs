@@ -1,5 +1,6 @@
 //! The calibration in use: at a temperature once for every batch, and on a sample a thousand times a second.
 
+use mimu_core::PerSensor;
 use mimu_core::compensation::Sample;
 use mimu_core::compensator::{Compensator, State};
 use mimu_core::single;
@@ -48,9 +49,10 @@ impl Calibrated {
     /// Temperature of the gyros' dies at the beginning of the batch, °C, and that of the accelerometer's, if it has a lag of its own; `temp_c`
     /// stands in for both before there was one.
     pub fn dies_c(&self, temp_c: f32) -> (f32, Option<f32>) {
-        let [gyro_c, accel_c] = self.state.dies_c().unwrap_or([temp_c; 2]);
-        let [gyro, accel] = &self.compensator.lags;
-        (gyro_c, (gyro != accel).then_some(accel_c))
+        let dies_c = self.state.dies_c().unwrap_or(PerSensor::both(temp_c));
+        let lags = &self.compensator.lags;
+        let apart = lags.gyro != lags.accel;
+        (dies_c.gyro, apart.then_some(dies_c.accel))
     }
 
     /// Follows temperature and time to the beginning of a batch.

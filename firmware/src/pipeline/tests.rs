@@ -3,9 +3,10 @@
 extern crate std;
 use std::vec::Vec;
 
+use mimu_core::Sensor;
 use mimu_core::compensation::{Affine, Compensation};
-use mimu_core::effects::Sensor;
-use mimu_core::stored::{self, Curves, Record};
+use mimu_core::effects::DeviceEffect;
+use mimu_core::stored::{self, Curves};
 use mimu_core::table::Node;
 use mimu_core::wire::Prior;
 use nalgebra::Matrix3;
@@ -20,7 +21,7 @@ use crate::convert::NOMINAL_REFERENCE;
 #[derive(Debug, PartialEq)]
 enum Sent {
     Raw(BatchHead, f32, Vec<(u32, Sums)>),
-    Compensated(BatchHead, Vec<(u32, Sample<f32>)>, [f32; 2]),
+    Compensated(BatchHead, Vec<(u32, Sample<f32>)>, PerSensor<f32>),
     Kalman(u32),
 }
 
@@ -69,17 +70,17 @@ fn both() -> Streams {
 }
 
 /// Compensation that doubles from -10 °C to 60 °C, where 25 °C is in the middle.
-fn calibration(effects: &[Record<'_>]) -> Stored {
+fn calibration(effects: &[DeviceEffect<f32>]) -> Stored {
     with_lags(effects, None)
 }
 
 /// The same of dies that follow with these lags, of gyro and accelerometer, found between 0 and 50 °C.
-fn with_lags(effects: &[Record<'_>], lags_s: Option<[f32; 2]>) -> Stored {
+fn with_lags(effects: &[DeviceEffect<f32>], lags_s: Option<PerSensor<f32>>) -> Stored {
     times(1.0, effects, lags_s)
 }
 
 /// The same, this many times as large.
-fn times(times: f32, effects: &[Record<'_>], lags_s: Option<[f32; 2]>) -> Stored {
+fn times(times: f32, effects: &[DeviceEffect<f32>], lags_s: Option<PerSensor<f32>>) -> Stored {
     let node = |temp_c, gain: f32| {
         let affine = Affine {
             matrix: Matrix3::from_diagonal_element(times * gain),
@@ -107,7 +108,7 @@ fn times(times: f32, effects: &[Record<'_>], lags_s: Option<[f32; 2]>) -> Stored
     let nodes = [node(-10.0, 2.0), node(60.0, 4.0)];
     let length = stored::encode(
         &stored::Origin::UNKNOWN,
-        [&one, &one],
+        PerSensor::both(&one),
         &Curves {
             nodes: &nodes,
             range_c: Some([0.0, 50.0]),
@@ -212,13 +213,7 @@ fn errors_of_the_code_are_taken_out_of_the_reading_before_its_temperature_matter
     let (half, eighth) = (2e-4, -1e-4);
     let mut errors = [0.0; 9];
     (errors[0], errors[2]) = (half as f32, eighth as f32);
-    let code = Record::Code {
-        sensor: Sensor::Accel,
-        axis: None,
-        weight: weight as f32,
-        zero: 0.0,
-        errors: &errors,
-    };
+    let code = DeviceEffect::code(Sensor::Accel, None, &errors, weight as f32, 0.0).unwrap();
     let mut pipeline = Pipeline::new();
     pipeline.calibrate(calibration(&[code]));
     pipeline.stream(both());
@@ -356,14 +351,10 @@ fn an_open_temperature_pin_is_flagged_and_compensation_goes_by_the_two_others() 
 #[test]
 fn a_warm_up_goes_by_the_time_since_power_on_and_is_over_where_that_is_unknown() {
     let coefficients = [0.5, -0.3, 0.2];
-    let warm_up = Record::Named {
-        id: "gyro_warm_up",
-        coefficients: &coefficients,
-        nonlinear: Some(100.0),
-    };
+    let warm_up = DeviceEffect::named("gyro_warm_up", &coefficients, Some(100.0)).unwrap();
     // What is left of it in the first sample.
     let left = |powered_for_ms| {
-        let mut of = [None, Some(&warm_up)].map(|warm_up: Option<&Record<'_>>| {
+        let mut of = [None, Some(&warm_up)].map(|warm_up: Option<&DeviceEffect<f32>>| {
             let mut pipeline = Pipeline::new();
             pipeline.powered_for(powered_for_ms);
             pipeline.calibrate(calibration(warm_up.map_or(&[], core::slice::from_ref)));
@@ -391,15 +382,15 @@ fn a_warm_up_goes_by_the_time_since_power_on_and_is_over_where_that_is_unknown()
 #[test]
 fn a_bank_reports_five_times_a_second_and_takes_only_what_is_known() {
     let mut pipeline = Pipeline::new();
-    let bank = Bank::new(Triad::Gyro, [1e-6; 3], Prior::Diffuse { span: 1.0 });
-    pipeline.banks[0] = bank;
+    let bank = Bank::new(Sensor::Gyro, [1e-6; 3], Prior::Diffuse { span: 1.0 });
+    pipeline.banks.gyro = bank;
     let sent = run(&mut pipeline, 0..500);
     assert_eq!(sent, [Sent::Kalman(0), Sent::Kalman(0)]);
-    let bank = pipeline.banks[0].as_mut().unwrap();
+    let bank = pipeline.banks.gyro.as_mut().unwrap();
     assert!(!bank.set_input(Some([f32::NAN, 0.0, 0.0])));
     assert!(bank.set_input(Some([0.0; 3])));
     run(&mut pipeline, 503..1000);
-    let state = pipeline.banks[0].as_ref().unwrap().state();
+    let state = pipeline.banks.gyro.as_ref().unwrap().state();
     assert_eq!((state.updates, state.skipped), (497, 503));
     // The mean of the readings, about which the bias is to be.
     let mean: f64 = (503..1000)

@@ -169,7 +169,7 @@ fn calibration(k: u8, nodes: usize) -> Vec<u8> {
         .map(|n| Node::constant(n as f32, model))
         .collect();
     let mut bytes = vec![0; MAX_LENGTH];
-    let found_with = [&affine.matrix, &affine.matrix];
+    let found_with = mimu_core::PerSensor::both(&affine.matrix);
     let length = stored::encode(
         &stored::Origin::UNKNOWN,
         found_with,

@@ -1,15 +1,15 @@
 //! What stands in a stored calibration: nodes and effects as [`mimu_core::stored`] reads them, for people, and as a calibration file.
 
 use mimu_core::compensation::Affine;
-use mimu_core::effects::{Sensor, Variable};
-use mimu_core::stored::{self, Record};
+use mimu_core::effects::DeviceEffect;
+use mimu_core::stored;
 use mimu_core::table::Node;
 use serde::Serialize;
 
 use super::origin;
 use super::who::Hash;
-use mimu::calibration::{Calibration, Kept, OnDevice, What};
-use mimu::quantity::{self, AXES};
+use mimu::calibration::{Calibration, Kept};
+use mimu::quantity::{PerSensor, Sensor};
 use mimu_recording::error::{Error, Result};
 
 /// A stored calibration, number by number: the result of `mimu device download`.
@@ -50,7 +50,7 @@ pub struct Contents {
     /// Temperature nodes, the coldest first.
     pub nodes: Vec<NodeContents>,
     /// What the affine model lacks.
-    pub effects: Vec<EffectContents>,
+    pub effects: Vec<DeviceEffect<f32>>,
 }
 
 /// A temperature node.
@@ -80,37 +80,13 @@ pub struct Inverse {
     pub unit: &'static str,
 }
 
-/// An effect, SI.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct EffectContents {
-    /// Public id; of a term in the form `term:accel_y~rate_x*force_y`.
-    pub id: String,
-    /// All of its coefficients.
-    pub coefficients: Vec<f32>,
-    /// Time constant, s, of an effect that has one.
-    pub time_constant_s: Option<f32>,
-    /// Of errors by the code.
-    pub converter: Option<ConverterContents>,
-}
-
-/// A converter.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct ConverterContents {
-    /// Axes that it reads: x, y, z or xyz.
-    pub axes: &'static str,
-    /// Weight of its first bit, V.
-    pub weight_of_bit_0_v: f32,
-    /// Reading of its code 0, V.
-    pub reading_of_code_0_v: f32,
-}
-
 /// What stands in `bytes`. Refused where the device would refuse it.
 pub fn contents(bytes: &[u8]) -> std::result::Result<Contents, stored::Refused> {
     let (mut nodes, mut effects) = (Vec::new(), Vec::new());
     let stored = stored::read(
         bytes,
         |stored| nodes.push(node(stored)),
-        |record| effects.push(effect(record)),
+        |effect| effects.push(*effect),
     )?;
     let origin = stored.origin;
     let (lag_s, accel_lag_s) = lags(stored.lags_s);
@@ -145,14 +121,13 @@ pub fn calibration(bytes: &[u8], device: &str, place: &str) -> Result<Calibratio
     let stored = stored::read(
         bytes,
         |node| nodes.push(*node),
-        |record| effects.push(on_device(record)),
+        |effect| effects.push(*effect),
     );
     let stored = stored.map_err(|refused| {
         let problem = format!("it cannot be used: {}", refused);
         Error::device(place, problem, "upload a calibration again")
     })?;
     let origin = stored.origin;
-    let (lag_s, accel_lag_s) = lags(stored.lags_s);
     let kept = Kept {
         device: device.to_owned(),
         unit_id: origin.unit_id.as_ref().map(origin::digits),
@@ -161,150 +136,29 @@ pub fn calibration(bytes: &[u8], device: &str, place: &str) -> Result<Calibratio
         sha256: origin.samples_sha256.as_ref().map(origin::digits),
         nodes,
         range_c: stored.compensator.table.range_c(),
-        lag_s,
-        accel_lag_s,
+        lags_s: stored.lags_s,
         effects,
     };
     Calibration::kept(&kept, place)
 }
 
 /// The lag of the gyros' dies, and that of the accelerometer's if it is another, s.
-fn lags(stored: Option<[f32; 2]>) -> (Option<f32>, Option<f32>) {
-    match stored {
-        Some([gyro_s, accel_s]) => (Some(gyro_s), (gyro_s != accel_s).then_some(accel_s)),
-        None => (None, None),
-    }
-}
-
-/// An effect in the words that it was uploaded with.
-fn on_device(record: &Record<'_>) -> OnDevice<f32> {
-    match *record {
-        Record::Named {
-            id,
-            coefficients,
-            nonlinear,
-        } => OnDevice {
-            id: id.to_owned(),
-            sensor: match id.starts_with("gyro") {
-                true => Sensor::Gyro,
-                false => Sensor::Accel,
-            },
-            what: What::Named {
-                coefficients: coefficients.to_vec(),
-                form: nonlinear,
-            },
-        },
-        Record::Term {
-            sensor,
-            axis,
-            coefficient,
-            variables,
-        } => OnDevice {
-            id: effect(record).id,
-            sensor,
-            what: What::Term {
-                axis: usize::from(axis),
-                coefficient,
-                variables: variables.to_vec(),
-            },
-        },
-        Record::Code {
-            sensor,
-            axis,
-            weight,
-            zero,
-            errors,
-        } => OnDevice {
-            id: effect(record).id,
-            sensor,
-            what: What::Code {
-                axis: axis.map(usize::from),
-                errors: *errors,
-                weight,
-                zero,
-            },
-        },
-    }
+fn lags(stored: Option<PerSensor<f32>>) -> (Option<f32>, Option<f32>) {
+    let apart = stored.filter(|lags_s| lags_s.gyro != lags_s.accel);
+    (stored.map(|s| s.gyro), apart.map(|s| s.accel))
 }
 
 fn node(node: &Node<f32>) -> NodeContents {
-    let inverse = |model: &Affine<f32>, sensor: quantity::Sensor| Inverse {
+    let inverse = |model: &Affine<f32>, sensor: Sensor| Inverse {
         C: std::array::from_fn(|i| std::array::from_fn(|j| model.matrix[(i, j)])),
         o: model.offset.into(),
         unit: sensor.unit(),
     };
     NodeContents {
         temp_c: node.temp_c,
-        gyro: inverse(&node.model.gyro, quantity::Sensor::Gyro),
-        accel: inverse(&node.model.accel, quantity::Sensor::Accel),
-        gyro_slope: inverse(&node.slope.gyro, quantity::Sensor::Gyro),
-        accel_slope: inverse(&node.slope.accel, quantity::Sensor::Accel),
-    }
-}
-
-/// Public id of an effect.
-pub(super) fn id(record: &Record<'_>) -> String {
-    effect(record).id
-}
-
-fn effect(record: &Record<'_>) -> EffectContents {
-    let axis_name = |axis: u8| AXES.get(usize::from(axis)).copied().unwrap_or("?");
-    let (id, coefficients) = match record {
-        Record::Named {
-            id, coefficients, ..
-        } => ((*id).to_owned(), coefficients.to_vec()),
-        Record::Term {
-            sensor,
-            axis,
-            coefficient,
-            variables,
-        } => {
-            let names: Vec<&str> = variables.iter().map(|v| variable(*v)).collect();
-            let (sensor, axis) = (triad(*sensor), axis_name(*axis));
-            let id = format!("term:{sensor}_{axis}~{}", names.join("*"));
-            (id, vec![*coefficient])
-        }
-        Record::Code { sensor, errors, .. } => {
-            (format!("{}_readout_code", triad(*sensor)), errors.to_vec())
-        }
-    };
-    EffectContents {
-        id,
-        coefficients,
-        time_constant_s: match record {
-            Record::Named { nonlinear, .. } => *nonlinear,
-            _ => None,
-        },
-        converter: match record {
-            Record::Code {
-                axis, weight, zero, ..
-            } => Some(ConverterContents {
-                axes: axis.map_or("xyz", axis_name),
-                weight_of_bit_0_v: *weight,
-                reading_of_code_0_v: *zero,
-            }),
-            _ => None,
-        },
-    }
-}
-
-fn triad(sensor: Sensor) -> &'static str {
-    match sensor {
-        Sensor::Gyro => "gyro",
-        Sensor::Accel => "accel",
-    }
-}
-
-fn variable(variable: Variable) -> &'static str {
-    match variable {
-        Variable::RateX => "rate_x",
-        Variable::RateY => "rate_y",
-        Variable::RateZ => "rate_z",
-        Variable::ForceX => "force_x",
-        Variable::ForceY => "force_y",
-        Variable::ForceZ => "force_z",
-        Variable::Temperature => "temp",
-        Variable::TemperatureRate => "temp_rate",
-        Variable::Time => "time",
+        gyro: inverse(&node.model.gyro, Sensor::Gyro),
+        accel: inverse(&node.model.accel, Sensor::Accel),
+        gyro_slope: inverse(&node.slope.gyro, Sensor::Gyro),
+        accel_slope: inverse(&node.slope.accel, Sensor::Accel),
     }
 }

@@ -42,8 +42,8 @@ pub struct Samples {
     pub head: BatchHead,
     /// Temperatures by the TEMP pins of gyro x, y, z, °C; of raw readings only.
     pub gyro_temps_c: Option<[f32; 3]>,
-    /// Temperatures of the dies of gyro and accelerometer, °C; of compensated samples only.
-    pub dies_c: Option<[f32; 2]>,
+    /// Temperatures of the dies, °C; of compensated samples only.
+    pub dies_c: Option<mimu_core::PerSensor<f32>>,
     /// One after the other, the first of the number [`BatchHead::first`].
     pub values: Vec<Sample<f32>>,
 }

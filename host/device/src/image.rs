@@ -1,16 +1,16 @@
 //! A calibration file as the bytes that the device stores, and what stands in the way of it.
 
 use mimu_core::compensation::{Affine, Compensation};
-use mimu_core::effects::{REFERENCE_C, Sensor as DeviceSensor};
-use mimu_core::stored::{self, Curves, MAX_LENGTH, NODES, Origin, ROOM, Record, Stored};
+use mimu_core::effects::{DeviceEffect, REFERENCE_C};
+use mimu_core::stored::{self, Curves, MAX_LENGTH, NODES, Origin, ROOM, Stored};
 use mimu_core::table::Node;
 use mimu_core::wire::Capabilities;
 use nalgebra::{Matrix3, Vector3};
 
 use super::origin;
 use super::who::{Hash, Who};
-use mimu::calibration::{Calibration, NO_SENSE, OnDevice, OverTemperature, What, reference_node};
-use mimu::quantity::Sensor;
+use mimu::calibration::{Calibration, NotOnDevice, OverTemperature, on_device, reference_node};
+use mimu::quantity::{PerSensor, Sensor};
 use mimu_recording::RawUnit;
 use mimu_recording::error::{Argument, Error, Result};
 
@@ -35,17 +35,14 @@ impl Image {
     /// The image of a calibration; `place` is its file. Refused: raw readings in anything but volts, which are what the device measures,
     /// one triad alone, and effects that no device removes.
     pub fn new(calibration: &Calibration, place: &str) -> Result<Self> {
-        let models = [Sensor::Gyro, Sensor::Accel].map(|sensor| model(calibration, sensor, place));
-        let [gyro, accel] = models;
         let model = Compensation {
-            gyro: gyro?,
-            accel: accel?,
+            gyro: model(calibration, Sensor::Gyro, place)?,
+            accel: model(calibration, Sensor::Accel, place)?,
         };
         let mut warnings = Vec::new();
         let nodes = nodes(calibration, model, place, &mut warnings);
         let origin = origin::of(calibration, place, &mut warnings);
-        let effects = on_device(calibration, place)?;
-        let records: Vec<Record<'_>> = effects.iter().map(record).collect();
+        let effects = effects_of(calibration, place)?;
         let node_temp_c: Vec<f32> = nodes.iter().map(|node| node.temp_c).collect();
         let temperature = calibration.temperature.as_ref();
         let range_c = match temperature {
@@ -61,9 +58,9 @@ impl Image {
         };
         let temperatures: Vec<f64> = node_temp_c.iter().map(|t| f64::from(*t)).collect();
         let reference = reference_node(&temperatures).map_or(model, |at| nodes[at].model);
-        let found_with = [&reference.gyro.matrix, &reference.accel.matrix];
+        let found_with = reference.as_ref().map(|model| &model.matrix);
         let mut bytes = vec![0; MAX_LENGTH];
-        let length = stored::encode(&origin, found_with, &curves, &records, &mut bytes);
+        let length = stored::encode(&origin, found_with, &curves, &effects, &mut bytes);
         let length = length.map_err(|_| {
             let problem = format!("it is longer than the {MAX_LENGTH} bytes that a device stores");
             Error::new(place, problem, "use fewer effects")
@@ -95,7 +92,7 @@ impl Image {
         let stored = stored::read(
             &bytes,
             |node| node_temp_c.push(node.temp_c),
-            |record| effects.push(super::contents::id(record)),
+            |effect| effects.push(effect.to_string()),
         )?;
         Ok(Self {
             hash: Hash(stored::hash(&bytes)),
@@ -154,7 +151,7 @@ impl Image {
                 return refuse(at(), problem);
             }
         }
-        let effects = on_device(calibration, place)?;
+        let effects = effects_of(calibration, place)?;
         check_room(&effects, usize::from(who.room.effects), place)?;
         let (nodes, room) = (
             self.node_temp_c.len(),
@@ -242,66 +239,29 @@ fn model(calibration: &Calibration, sensor: Sensor, place: &str) -> Result<Affin
 }
 
 /// The effects of a calibration in the words of the device; refused by name is one that no device removes.
-fn on_device(calibration: &Calibration, place: &str) -> Result<Vec<OnDevice<f32>>> {
+fn effects_of(calibration: &Calibration, place: &str) -> Result<Vec<DeviceEffect<f32>>> {
     let parts = calibration.effects().iter().map(|removed| {
-        OnDevice::of(removed).map_err(|why| {
+        on_device(removed).map_err(|why| {
             let at = format!("{place}, [[effect]] {}", removed.candidate.id());
-            Error::new(at, why, "use the calibration without it, on the PC alone")
+            let remedy = match why {
+                NotOnDevice::Numbers => "diagnose the recording again",
+                _ => "use the calibration without it, on the PC alone",
+            };
+            Error::new(at, why.to_string(), remedy)
         })
     });
     Ok(parts.collect::<Result<Vec<_>>>()?.concat())
 }
 
-/// As it is stored.
-fn record(effect: &OnDevice<f32>) -> Record<'_> {
-    let sensor = effect.sensor;
-    match &effect.what {
-        What::Named { coefficients, form } => Record::Named {
-            id: &effect.id,
-            coefficients,
-            nonlinear: *form,
-        },
-        What::Code {
-            axis,
-            errors,
-            weight,
-            zero,
-        } => Record::Code {
-            sensor,
-            axis: axis.map(|axis| axis as u8),
-            weight: *weight,
-            zero: *zero,
-            errors,
-        },
-        What::Term {
-            axis,
-            coefficient,
-            variables,
-        } => Record::Term {
-            sensor,
-            axis: *axis as u8,
-            coefficient: *coefficient,
-            variables,
-        },
-    }
-}
-
 /// Refuses the first effect that has no room among `room` of its triad and kind: with every sample, or with temperature and time only.
-fn check_room(effects: &[OnDevice<f32>], room: usize, place: &str) -> Result<()> {
-    let mut taken = [[0; 2]; 2];
-    for effect in effects {
-        let at = format!("{place}, [[effect]] {}", effect.id);
-        let Ok(compiled) = effect.effect() else {
-            return Err(Error::new(at, NO_SENSE, "diagnose the recording again"));
-        };
-        // Of these each axis has room for one, and a file that has two for an axis was refused.
-        if matches!(effect.what, What::Code { .. }) {
-            continue;
-        }
-        let triad = usize::from(effect.sensor == DeviceSensor::Accel);
-        let count = &mut taken[triad][usize::from(compiled.is_slow())];
+fn check_room(effects: &[DeviceEffect<f32>], room: usize, place: &str) -> Result<()> {
+    let mut taken = PerSensor::both([0; 2]);
+    // Of errors by the code each axis has room for one, and a file that has two for an axis was refused.
+    for effect in effects.iter().filter(|e| e.converter().is_none()) {
+        let count = &mut taken[effect.sensor()][usize::from(effect.is_slow())];
         *count += 1;
         if *count > room {
+            let at = format!("{place}, [[effect]] {effect}");
             let problem = format!("the device has room for {room} effects of a kind and triad");
             return Err(Error::new(at, problem, "use the calibration without it"));
         }

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use mimu_core::compensation::Sample;
 use mimu_core::kalman::{Bank, STATES};
-use mimu_core::wire::{Capabilities, KalmanState, Prior, Request, Triad};
+use mimu_core::wire::{Capabilities, KalmanState, Prior, Request};
 use nalgebra::Vector3;
 use serde::Serialize;
 
@@ -27,7 +27,7 @@ const SILENCE: Duration = Duration::from_secs(3);
 #[derive(Debug, Clone, PartialEq)]
 pub struct KalmanPlan {
     /// Which sensors.
-    pub triad: Triad,
+    pub sensor: Sensor,
     /// True inputs one after the other: rad/s or m/s² in the body frame (specific force at rest points up).
     pub inputs: Vec<[f32; 3]>,
     /// How long each.
@@ -132,7 +132,7 @@ pub fn kalman(
             "flash newer firmware",
         ));
     }
-    let (triad, each) = (plan.triad, plan.each.max(SHORTEST));
+    let (sensor, each) = (plan.sensor, plan.each.max(SHORTEST));
     let mut log = Log {
         samples: BTreeMap::new(),
         reports: Vec::new(),
@@ -153,15 +153,15 @@ pub fn kalman(
         // A stream begins with a batch, an input with a sample: those in between would be missing here.
         let before = log.samples.len();
         while log.samples.len() == before {
-            log.listen(session, triad)?;
+            log.listen(session, sensor)?;
         }
         if at == 0 {
             if noise.is_none() {
                 while log.samples.len() < NOISE_SAMPLES {
-                    log.listen(session, triad)?;
+                    log.listen(session, sensor)?;
                 }
             }
-            let noise = *noise.get_or_insert_with(|| variances(&log.samples, triad));
+            let noise = *noise.get_or_insert_with(|| variances(&log.samples, sensor));
             let span = plan
                 .inputs
                 .as_flattened()
@@ -171,27 +171,27 @@ pub fn kalman(
             let span = if span > 0.0 { span } else { 1.0 };
             let prior = Prior::Diffuse { span };
             let start = Request::KalmanStart {
-                triad,
+                sensor,
                 noise,
                 prior,
             };
             session.done(start, "to start a Kalman bank")?;
         }
-        let set = |input| Request::KalmanInput { triad, input };
+        let set = |input| Request::KalmanInput { sensor, input };
         session.done(set(Some(*input)), "to take an input")?;
         // By the device's time, as everything here.
         let (from, wanted) = (log.samples.len(), (each.as_secs_f64() * rate_hz) as usize);
         while log.samples.len() < from + wanted {
-            log.listen(session, triad)?;
+            log.listen(session, sensor)?;
             let share = (log.samples.len() - from) as f64 / wanted as f64;
             progress((at as f64 + share.min(1.0)) / plan.inputs.len() as f64);
         }
         session.done(set(None), "to take no input")?;
-        ends.push(log.settled(session, triad)?);
+        ends.push(log.settled(session, sensor)?);
         session.done(Request::Stop, "to stop streaming")?;
     }
     let purpose = "to end a Kalman bank";
-    let end = session.call(Request::KalmanEnd { triad }, purpose, PATIENCE)?;
+    let end = session.call(Request::KalmanEnd { sensor }, purpose, PATIENCE)?;
     let Answer::Kalman(last) = end else {
         return Err(session.unexpected(purpose));
     };
@@ -200,9 +200,9 @@ pub fn kalman(
     let host = replay(session.port(), plan, &noise, &inputs, &log.samples)?;
     let device = estimates(&last);
     let distance_sigma = distances(&device, &host);
-    let (sensor, scale, input_unit) = match triad {
-        Triad::Gyro => (Sensor::Gyro, "V/(rad/s)", "rad/s"),
-        Triad::Accel => (Sensor::Accel, "V/(m/s²)", "m/s²"),
+    let (scale, input_unit) = match sensor {
+        Sensor::Gyro => ("V/(rad/s)", "rad/s"),
+        Sensor::Accel => ("V/(m/s²)", "m/s²"),
     };
     Ok(KalmanRun {
         triad: sensor,
@@ -229,14 +229,14 @@ pub fn kalman(
 }
 
 impl Log {
-    fn listen(&mut self, session: &mut Session, triad: Triad) -> Result<()> {
+    fn listen(&mut self, session: &mut Session, sensor: Sensor) -> Result<()> {
         match session.event()? {
             Some(Event::Raw(batch)) => {
                 let numbers = (0..).map(|k| batch.head.first.wrapping_add(k));
                 self.samples.extend(numbers.zip(batch.values));
                 self.heard = Instant::now();
             }
-            Some(Event::Kalman(state)) if state.triad == triad => self.reports.push(*state),
+            Some(Event::Kalman(state)) if state.sensor == sensor => self.reports.push(*state),
             Some(Event::Started(_)) => {
                 let remedy = "run it again; `mimu device info` says why it restarted";
                 return Err(Error::device(
@@ -260,10 +260,10 @@ impl Log {
     }
 
     /// Listens until two reports in turn have taken in as many samples; how many.
-    fn settled(&mut self, session: &mut Session, triad: Triad) -> Result<u32> {
+    fn settled(&mut self, session: &mut Session, sensor: Sensor) -> Result<u32> {
         let (from, since) = (self.reports.len(), Instant::now());
         loop {
-            self.listen(session, triad)?;
+            self.listen(session, sensor)?;
             if let [.., a, b] = &self.reports[from..]
                 && a.updates == b.updates
             {
@@ -329,7 +329,7 @@ fn replay(
                 missing += 1;
                 continue;
             };
-            let reading = reading(sample, plan.triad).map(f64::from);
+            let reading = sample[plan.sensor].map(f64::from);
             // What the device rejects, a number that is none, is rejected here as well.
             let _ = bank.update(&input, &reading, &noise);
         }
@@ -348,19 +348,9 @@ fn replay(
     }))
 }
 
-fn reading(sample: &Sample<f32>, triad: Triad) -> Vector3<f32> {
-    match triad {
-        Triad::Gyro => sample.gyro,
-        Triad::Accel => sample.accel,
-    }
-}
-
 /// Variances of single readings from the differences of neighbours, V²: what is slower than a sample does not count.
-fn variances(samples: &BTreeMap<u32, Sample<f32>>, triad: Triad) -> [f32; 3] {
-    let readings: Vec<_> = samples
-        .values()
-        .map(|s| reading(s, triad).map(f64::from))
-        .collect();
+fn variances(samples: &BTreeMap<u32, Sample<f32>>, sensor: Sensor) -> [f32; 3] {
+    let readings: Vec<_> = samples.values().map(|s| s[sensor].map(f64::from)).collect();
     let squares: Vector3<f64> = readings
         .windows(2)
         .map(|pair| (pair[1] - pair[0]).map(|d| 0.5 * d * d))

@@ -38,9 +38,7 @@ mod upload;
 mod who;
 
 pub use check::{Checked, Difference, check, rounding, ulps};
-pub use contents::{
-    Contents, ConverterContents, EffectContents, Inverse, NodeContents, calibration, contents,
-};
+pub use contents::{Contents, Inverse, NodeContents, calibration, contents};
 pub use flagged::Flagged;
 pub use heard::{Answer, Ear, Event, Heard, LineCount, Samples};
 pub use image::{Image, remembers};

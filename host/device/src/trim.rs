@@ -12,7 +12,7 @@ use super::session::Session;
 use super::stream::{Stream, Streamed, stream};
 use super::upload::{download, upload};
 use super::who::Hash;
-use mimu::quantity::{AXES, Sensor};
+use mimu::quantity::{AXES, PerSensor, Sensor};
 use mimu_recording::error::{Error, Result};
 
 /// Length of the stretches whose means are compared, s: their scatter is what is left of the noise, whatever its spectrum is within them.
@@ -21,10 +21,16 @@ const STRETCH_S: f64 = 0.5;
 pub const SHORTEST_TRIM_S: f64 = 8.0 * STRETCH_S;
 /// Most that the means of stretches scatter by, and differ between the halves, while the unit lies still: 0.5 deg/s, where a gyro's noise makes
 /// 0.1, and 0.1 m/s², a tilt by 0.6 degrees, where the accelerometer's makes 0.004.
-const STILL: [f64; 2] = [0.0087, 0.1];
+const STILL: PerSensor<f64> = PerSensor {
+    gyro: 0.0087,
+    accel: 0.1,
+};
 /// Most that is trimmed: 10 deg/s and 2 m/s². Biases do not drift so far within the sensors' range of temperature; a unit that turns steadily about
 /// the vertical, and one in another pose than the one that was given, look like it.
-const MOST: [f64; 2] = [0.175, 2.0];
+const MOST: PerSensor<f64> = PerSensor {
+    gyro: 0.175,
+    accel: 2.0,
+};
 
 /// What is known of the state of the unit while it lies still.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -57,10 +63,9 @@ pub struct TrimmedTriad {
 /// How a trim went: the result of `mimu device trim`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Trimmed {
-    /// Gyro.
-    pub gyro: TrimmedTriad,
-    /// Accelerometer.
-    pub accel: TrimmedTriad,
+    /// The triads.
+    #[serde(flatten)]
+    pub triads: PerSensor<TrimmedTriad>,
     /// Temperature of the dies, °C, that it was done at. The curves move by the same everywhere.
     pub temp_c: f64,
     /// Averaged before and after, s each.
@@ -72,6 +77,9 @@ pub struct Trimmed {
     /// One sentence for each thing that a person should know.
     pub warnings: Vec<String>,
 }
+
+/// Mean errors of the axes of a triad, and their standard deviations.
+type Means = ([f64; 3], [f64; 3]);
 
 /// Means of stretches of the compensated stream.
 struct Average {
@@ -93,18 +101,21 @@ pub fn trim(
     let mut bytes = download(session)?;
     let held = Hash(stored::hash(&bytes));
     // Refused before the time is spent: the numbers do not matter.
-    stored::trim(&mut bytes.clone(), [[0.0; 3]; 2], trimmed_s)
+    stored::trim(&mut bytes.clone(), PerSensor::default(), trimmed_s)
         .map_err(|refused| refuse(session, &refused))?;
     let before = average(session, duration, |share| progress(0.45 * share))?;
     if let Some(motion) = before.motion() {
         let remedy = "let it lie still and trim again; the calibration is as it was";
         return Err(Error::device(session.port(), motion, remedy));
     }
-    let input = [Some([0.0; 3]), pose.force_mps2];
+    let input = PerSensor {
+        gyro: Some([0.0; 3]),
+        accel: pose.force_mps2,
+    };
     let errors = before.errors(input);
     check_size(session, &errors, input)?;
-    let add = [0, 1].map(|i| match input[i] {
-        Some(_) => errors[i].0.map(|error| -error as f32),
+    let add = errors.zip(input).map(|((error, _), input)| match input {
+        Some(_) => error.map(|error| -error as f32),
         None => [0.0; 3],
     });
     stored::trim(&mut bytes, add, trimmed_s).map_err(|refused| refuse(session, &refused))?;
@@ -113,21 +124,17 @@ pub fn trim(
     upload(session, &image, true, |share| progress(0.45 + 0.1 * share))?;
     let after = average(session, duration, |share| progress(0.55 + 0.45 * share))?;
     let left = after.errors(input);
-    let triad = |sensor: Sensor| {
-        let i = sensor as usize;
-        TrimmedTriad {
-            trimmed: input[i].is_some(),
-            before: errors[i].0,
-            sigma_before: errors[i].1,
-            after: left[i].0,
-            sigma_after: left[i].1,
-            added: add[i],
-            unit: sensor.unit(),
-        }
+    let triad = |sensor: Sensor| TrimmedTriad {
+        trimmed: input[sensor].is_some(),
+        before: errors[sensor].0,
+        sigma_before: errors[sensor].1,
+        after: left[sensor].0,
+        sigma_after: left[sensor].1,
+        added: add[sensor],
+        unit: sensor.unit(),
     };
     Ok(Trimmed {
-        gyro: triad(Sensor::Gyro),
-        accel: triad(Sensor::Accel),
+        triads: PerSensor::from_fn(triad),
         temp_c: before.summary.temp_c,
         averaged_s: duration.as_secs_f64(),
         before: held,
@@ -154,19 +161,19 @@ fn warnings(before: &Average, after: &Average) -> Vec<String> {
 /// Refuses a trim that no drift explains.
 fn check_size(
     session: &Session,
-    errors: &[([f64; 3], [f64; 3]); 2],
-    input: [Option<[f64; 3]>; 2],
+    errors: &PerSensor<Means>,
+    input: PerSensor<Option<[f64; 3]>>,
 ) -> Result<()> {
-    for sensor in Sensor::BOTH {
-        let (i, unit) = (sensor as usize, sensor.unit());
-        if input[i].is_none() {
+    for (sensor, (error, _)) in errors.iter() {
+        let unit = sensor.unit();
+        if input[sensor].is_none() {
             continue;
         }
-        for (axis, error) in AXES.iter().zip(errors[i].0) {
-            if !(error.abs() <= MOST[i]) {
+        for (axis, error) in AXES.iter().zip(error) {
+            if !(error.abs() <= MOST[sensor]) {
                 let problem = format!(
                     "{sensor} {axis} is off by {error:.3} {unit}, and a drift is at most {} {unit}",
-                    MOST[i]
+                    MOST[sensor]
                 );
                 let remedy = match sensor {
                     Sensor::Gyro => {
@@ -207,10 +214,7 @@ fn average(session: &mut Session, duration: Duration, progress: impl Fn(f64)) ->
             taken += 1;
             if count == stretch {
                 let n = count as f64;
-                means.push(Sample {
-                    gyro: sum.gyro / n,
-                    accel: sum.accel / n,
-                });
+                means.push(sum.map(|sum| sum / n));
                 (sum, count) = (zero(), 0);
                 progress(taken as f64 / wanted);
             }
@@ -221,26 +225,23 @@ fn average(session: &mut Session, duration: Duration, progress: impl Fn(f64)) ->
 }
 
 fn zero() -> Sample<f64> {
-    Sample {
-        gyro: nalgebra::Vector3::zeros(),
-        accel: nalgebra::Vector3::zeros(),
-    }
+    Sample::both(nalgebra::Vector3::zeros())
 }
 
 impl Average {
-    /// Mean errors of gyro and accelerometer against these inputs, and their standard deviations.
-    fn errors(&self, input: [Option<[f64; 3]>; 2]) -> [([f64; 3], [f64; 3]); 2] {
-        let values = |i: usize, axis: usize| {
+    /// Errors against these inputs.
+    fn errors(&self, input: PerSensor<Option<[f64; 3]>>) -> PerSensor<Means> {
+        let values = |sensor: Sensor, axis: usize| {
             let means = self.means.iter();
-            means.map(move |m| [m.gyro, m.accel][i][axis])
+            means.map(move |m| m[sensor][axis])
         };
-        [0, 1].map(|i| {
+        PerSensor::from_fn(|sensor| {
             let (mut error, mut sigma) = ([0.0; 3], [0.0; 3]);
             for axis in 0..3 {
                 let n = self.means.len() as f64;
-                let mean = values(i, axis).sum::<f64>() / n;
-                let squares: f64 = values(i, axis).map(|v| (v - mean).powi(2)).sum();
-                error[axis] = mean - input[i].unwrap_or_default()[axis];
+                let mean = values(sensor, axis).sum::<f64>() / n;
+                let squares: f64 = values(sensor, axis).map(|v| (v - mean).powi(2)).sum();
+                error[axis] = mean - input[sensor].unwrap_or_default()[axis];
                 sigma[axis] = (squares / (n - 1.0).max(1.0) / n).sqrt();
             }
             (error, sigma)
@@ -251,19 +252,15 @@ impl Average {
     fn motion(&self) -> Option<String> {
         let mean = |of: &[f64]| of.iter().sum::<f64>() / of.len().max(1) as f64;
         for sensor in Sensor::BOTH {
-            let (i, unit) = (sensor as usize, sensor.unit());
+            let unit = sensor.unit();
             for (axis, name) in AXES.iter().enumerate() {
-                let all: Vec<f64> = self
-                    .means
-                    .iter()
-                    .map(|m| [m.gyro, m.accel][i][axis])
-                    .collect();
+                let all: Vec<f64> = self.means.iter().map(|m| m[sensor][axis]).collect();
                 let (first, second) = all.split_at(all.len() / 2);
                 let apart = mean(second) - mean(first);
                 let middle = mean(&all);
                 let squares: Vec<f64> = all.iter().map(|v| (v - middle).powi(2)).collect();
                 let scatter = mean(&squares).sqrt();
-                if !(apart.abs() <= STILL[i] && scatter <= STILL[i]) {
+                if !(apart.abs() <= STILL[sensor] && scatter <= STILL[sensor]) {
                     return Some(format!(
                         "the unit moved: {sensor} {name} scattered by {scatter:.4} {unit}, and changed by {apart:.4} {unit}"
                     ));
@@ -294,7 +291,9 @@ mod tests {
             (off, Vector3::new(0.1, -0.1, 9.9))
         }));
         assert_eq!(found.motion(), None);
-        let [(gyro, sigma), (accel, none)] = found.errors([Some([0.0; 3]), Some([0.0, 0.0, 9.8])]);
+        let input = [[0.0; 3], [0.0, 0.0, 9.8]].map(Some);
+        let errors = found.errors(input.into());
+        let ((gyro, sigma), (accel, none)) = (errors.gyro, errors.accel);
         // 16 values of ±1 have a standard deviation of sqrt(16/15), and their mean one of that over 4.
         let expected = 0.001 * (16.0_f64 / 15.0).sqrt() / 4.0;
         for axis in 0..3 {

@@ -14,9 +14,9 @@ use crate::blocks::{Condensed, Rails};
 use crate::calibration::{Calibration, compensator};
 use crate::die_temperature::{WITHOUT_TEMPERATURE, outside};
 use crate::effects::quantity::Need;
-use crate::quantity::Sensor;
+use crate::quantity::{PerSensor, Sensor};
 use crate::rails::find;
-use crate::result::Sensors;
+use crate::result::present;
 use crate::verify::check_unit;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{Batch, Columns, Manifest, RawUnit, Recording, SampleFormat, Source, Writer};
@@ -36,7 +36,8 @@ pub struct Applied {
     /// Rows written: as many as there were.
     pub rows: u64,
     /// Sensors that were compensated.
-    pub sensors: Sensors<AppliedSensor>,
+    #[serde(serialize_with = "present")]
+    pub sensors: PerSensor<Option<AppliedSensor>>,
     /// Gaps, which are kept as they are.
     pub gaps: u64,
     /// Time missing in them, s.
@@ -84,8 +85,11 @@ pub fn apply(
         accel: recording.columns.accel && calibration.accel.is_some(),
         ..recording.columns
     };
-    let has = [columns.gyro, columns.accel];
-    if has == [false; 2] {
+    let has = PerSensor {
+        gyro: columns.gyro,
+        accel: columns.accel,
+    };
+    if has == PerSensor::both(false) {
         let problem = "it has no sensor that the calibration is for";
         return Err(Error::new(
             place,
@@ -93,9 +97,12 @@ pub fn apply(
             "calibrate the sensor that it has",
         ));
     }
-    for sensor in Sensor::BOTH {
-        let recorded = [recording.columns.gyro, recording.columns.accel][sensor as usize];
-        if recorded && !has[sensor as usize] {
+    let recorded = PerSensor {
+        gyro: recording.columns.gyro,
+        accel: recording.columns.accel,
+    };
+    for (sensor, (recorded, has)) in recorded.zip(has) {
+        if recorded && !has {
             warnings.push(format!(
                 "the calibration is not for the {sensor}: its columns are left out"
             ));
@@ -121,15 +128,11 @@ pub fn apply(
     let rows = writer.rows();
     let written = writer.finish(&compensated(manifest, recording, &condensed.sha256))?;
     let counts = batches.counts;
-    let of = |sensor: Sensor| has[sensor as usize].then_some(counts[sensor as usize]);
     Ok(Applied {
         format: "mimu-apply/1",
         recording: written.display().to_string(),
         rows,
-        sensors: Sensors {
-            gyro: of(Sensor::Gyro),
-            accel: of(Sensor::Accel),
-        },
+        sensors: PerSensor::from_fn(|sensor| has[sensor].then_some(counts[sensor])),
         gaps: condensed.gaps.0,
         missing_s: condensed.gaps.1,
         effects: batches.ids,
@@ -163,7 +166,7 @@ struct Slow {
 struct Batches {
     compensator: Compensator<f64, NODES, ROOM>,
     state: State<f64, ROOM>,
-    has: [bool; 2],
+    has: PerSensor<bool>,
     ids: Vec<String>,
     rails: [Rails; 6],
     period_s: f64,
@@ -174,8 +177,8 @@ struct Batches {
     told_s: f64,
     last_s: f64,
     /// Last whole reading of each triad: what the other one's effects are a function of where it has none.
-    held: [Vector3<f64>; 2],
-    counts: [AppliedSensor; 2],
+    held: Sample<f64>,
+    counts: PerSensor<AppliedSensor>,
 }
 
 impl Batches {
@@ -183,7 +186,7 @@ impl Batches {
         calibration: &Calibration,
         condensed: &Condensed,
         manifest: &Manifest,
-        has: [bool; 2],
+        has: PerSensor<bool>,
         place: &str,
         warnings: &mut Vec<String>,
     ) -> Result<Self> {
@@ -191,10 +194,10 @@ impl Batches {
         let first_temp_c = blocks.iter().map(|b| b.temp_c.mean).find(|t| t.is_finite());
         for effect in calibration.effects() {
             let needs = |need| effect.candidate.needs(need);
-            let lacks = match has[effect.candidate.sensor as usize] {
+            let lacks = match has[effect.candidate.sensor] {
                 false => continue,
-                _ if needs(Need::Rate) && !has[0] => "a calibrated gyro",
-                _ if needs(Need::Force) && !has[1] => "a calibrated accelerometer",
+                _ if needs(Need::Rate) && !has.gyro => "a calibrated gyro",
+                _ if needs(Need::Force) && !has.accel => "a calibrated accelerometer",
                 _ if needs(Need::Temperature) && first_temp_c.is_none() => "temp_c",
                 _ => continue,
             };
@@ -228,9 +231,9 @@ impl Batches {
             matrix: Matrix3::identity(),
             offset: Vector3::zeros(),
         };
-        let [gyro, accel] = Sensor::BOTH.map(|s| calibration.inverse(s).unwrap_or(none));
-        let effects = calibration.effects_of_models(&[gyro, accel])?;
-        let compensator = compensator(calibration, Compensation { gyro, accel }, curves, effects);
+        let models = Compensation::from_fn(|s| calibration.inverse(s).unwrap_or(none));
+        let effects = calibration.effects_of_models(&models)?;
+        let compensator = compensator(calibration, models, curves, effects);
         let first = |channel: usize| {
             let means = blocks.iter().map(|block| block.raw[channel]);
             means
@@ -246,7 +249,7 @@ impl Batches {
             ids: calibration
                 .effects()
                 .iter()
-                .filter(|e| has[e.candidate.sensor as usize])
+                .filter(|e| has[e.candidate.sensor])
                 .map(|e| e.candidate.id())
                 .collect(),
             rails: find(condensed, manifest, warnings),
@@ -255,7 +258,7 @@ impl Batches {
             reached: 0,
             told_s: manifest.power_on_s.unwrap_or(first_s),
             last_s: first_s,
-            held: [0, 3].map(|from| Vector3::from_fn(|i, _| first(from + i))),
+            held: Sample::from_fn(|s| Vector3::from_fn(|i, _| first(s.channels().start + i))),
             counts: Default::default(),
         })
     }
@@ -263,7 +266,7 @@ impl Batches {
     fn batch(&mut self, batch: &Batch) -> Batch {
         let mut out = batch.clone();
         for sensor in Sensor::BOTH {
-            if !self.has[sensor as usize] {
+            if !self.has[sensor] {
                 sensor.channels().for_each(|c| out.raw[c].clear());
             }
         }
@@ -274,16 +277,16 @@ impl Batches {
                 self.state.gap();
             }
             self.last_s = t_s;
-            let whole = Sensor::BOTH.map(|sensor| self.take(sensor, batch, row));
-            let clean = self.clean();
-            if whole.contains(&false) {
+            let whole = PerSensor::from_fn(|sensor| self.take(sensor, batch, row));
+            let clean = self.compensator.apply(&mut self.state, &self.held);
+            if whole != PerSensor::both(true) {
                 // What is held for a sample is no reading that a difference could be taken of.
                 self.state.gap();
             }
-            for (sensor, input) in Sensor::BOTH.into_iter().zip([clean.gyro, clean.accel]) {
+            for (sensor, input) in clean {
                 for (axis, c) in sensor.channels().enumerate() {
                     if let Some(cell) = out.raw[c].get_mut(row) {
-                        let known = whole[sensor as usize];
+                        let known = whole[sensor];
                         *cell = if known { input[axis] } else { f64::NAN };
                     }
                 }
@@ -304,7 +307,7 @@ impl Batches {
 
     /// Takes in what a triad reads; whether all of it is there.
     fn take(&mut self, sensor: Sensor, batch: &Batch, row: usize) -> bool {
-        if !self.has[sensor as usize] {
+        if !self.has[sensor] {
             return true;
         }
         let from = sensor.channels().start;
@@ -314,7 +317,7 @@ impl Batches {
             low.is_some_and(|rail| raw[i] <= rail) || high.is_some_and(|rail| raw[i] >= rail)
         };
         let clipped = (0..3).any(clipped);
-        let counts = &mut self.counts[sensor as usize];
+        let counts = &mut self.counts[sensor];
         if raw.iter().any(|u| !u.is_finite()) {
             counts.empty += 1;
             return false;
@@ -323,13 +326,7 @@ impl Batches {
             counts.clipped += 1;
             return false;
         }
-        self.held[sensor as usize] = raw;
+        self.held[sensor] = raw;
         true
-    }
-
-    fn clean(&mut self) -> Sample<f64> {
-        let [gyro, accel] = self.held;
-        self.compensator
-            .apply(&mut self.state, &Sample { gyro, accel })
     }
 }

@@ -135,7 +135,7 @@ impl BiasCubics {
         cubics
             .remains
             .extend(linear(&models, &at(settled_c)?, sensor, over.biases_only));
-        let lag_s = over.lags_s().map(|lags_s| lags_s[sensor as usize]);
+        let lag_s = over.lags_s().map(|lags_s| lags_s[sensor]);
         cubics.remains.push(match lag_s {
             None => Remainder::unknown(LAG, "lag not determined"),
             Some(lag_s) => {
@@ -146,9 +146,11 @@ impl BiasCubics {
                 Remainder::of(LAG, "at 2 K/min", &late.collect::<Result<Vec<_>>>()?)
             }
         });
-        cubics
-            .remains
-            .push(hysteresis(over.hysteresis(sensor), &models, &conversion));
+        cubics.remains.push(hysteresis(
+            over.dies[sensor].hysteresis.as_ref(),
+            &models,
+            &conversion,
+        ));
         Ok(Some(cubics))
     }
 

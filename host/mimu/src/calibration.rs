@@ -11,13 +11,15 @@ mod over_temperature;
 pub use effect::{CoefficientTable, ConverterTable, EffectTable, FormTable};
 pub use kept::Kept;
 pub use of_curves::{CurvesOfUnit, TriadOfCurves};
-pub use on_device::{NO_SENSE, OnDevice, What, compensator};
-pub use over_temperature::{Curves, NodeTable, OverTemperature, TemperatureNode, reference_node};
+pub use on_device::{NotOnDevice, compensator, on_device};
+pub use over_temperature::{
+    Curves, DieTable, NodeTable, OverTemperature, TemperatureNode, reference_node,
+};
 
 use std::path::Path;
 
 use mimu_core::RealField;
-use mimu_core::compensation::Affine;
+use mimu_core::compensation::{Affine, Compensation};
 use mimu_core::effects::Effects;
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
@@ -55,8 +57,8 @@ const HEADER_OF_CURVES: &str = "\
 # [gyro] and [accel] hold at recording.temp_c. Over temperature C and o follow the nodes of [temperature], by the temperature of the dies:
 # between two nodes, h apart, with w from 0 to 1, a number p and its slope s are
 #   (1+2w)(1-w)^2 p0 + w^2(3-2w) p1 + h w(1-w)^2 s0 - h w^2(1-w) s1;
-# outside they go on along the slope for 5 kelvin, and are held from there on. The dies follow the thermometer with lag_s, and where
-# there is an accel_lag_s, that of the accelerometer with it.
+# outside they go on along the slope for 5 kelvin, and are held from there on. The dies of a triad follow the thermometer with the lag_s of
+# [temperature.dies].
 ";
 
 const HEADER_OF_KEPT: &str = "\
@@ -296,7 +298,7 @@ impl Calibration {
     /// The same where a sensor that is not calibrated has a stand-in among `models`.
     pub(crate) fn effects_of_models<T: RealField + Copy, const N: usize>(
         &self,
-        models: &[Affine<f64>; 2],
+        models: &Compensation<f64>,
     ) -> Result<Effects<T, N>> {
         on_device::effects_of_models(self, models)
     }

@@ -8,7 +8,7 @@ use nalgebra::{Matrix3, Vector3};
 use crate::blocks::Block;
 use crate::calibration::{Calibration, Curves};
 use crate::prepared::Prepared;
-use crate::quantity::Sensor;
+use crate::quantity::{PerSensor, Sensor};
 
 /// Warning on a recording without a temperature.
 pub const WITHOUT_TEMPERATURE: &str =
@@ -33,10 +33,10 @@ pub fn of_blocks(blocks: &[Block], lag: &DieLag<f64>) -> Option<Vec<f64>> {
     Some(each.collect())
 }
 
-/// The same of the dies of gyro and accelerometer, by the lags of a calibration.
-pub fn of_triads(blocks: &[Block], curves: &Curves) -> Option<[Vec<f64>; 2]> {
-    let [gyro, accel] = Sensor::BOTH.map(|sensor| of_blocks(blocks, curves.lag(sensor)));
-    Some([gyro?, accel?])
+/// The same of both triads, by the lags of a calibration.
+pub fn of_triads(blocks: &[Block], curves: &Curves) -> Option<PerSensor<Vec<f64>>> {
+    let lags = curves.lags().as_ref();
+    lags.map(|lag| of_blocks(blocks, lag)).transpose()
 }
 
 /// A sentence on the samples of a recording at temperatures that a calibration is not for; `None` if there are none, or if what it
@@ -49,7 +49,10 @@ pub fn outside(calibration: &Calibration, blocks: &[Block]) -> Option<String> {
     let (temperatures, [from, to], margin_c) = match &curves {
         Some(curves) => (of_triads(blocks, curves)?, curves.table().limits()?, 0.0),
         None => (
-            [of_blocks(blocks, &DieLag::none())?, Vec::new()],
+            PerSensor {
+                gyro: of_blocks(blocks, &DieLag::none())?,
+                accel: Vec::new(),
+            },
             calibration.recording.temp_range_c?,
             BEYOND_C,
         ),
@@ -59,7 +62,7 @@ pub fn outside(calibration: &Calibration, blocks: &[Block]) -> Option<String> {
     for (at, block) in blocks.iter().enumerate() {
         let rows = u64::from(block.rows);
         all += rows;
-        let each = temperatures.iter().filter_map(|t| t.get(at));
+        let each = temperatures.iter().filter_map(|(_, t)| t.get(at));
         let off = each.map(|t| away(*t)).fold(0.0, f64::max);
         if off > margin_c {
             count += rows;
@@ -99,7 +102,7 @@ pub fn at_one_temperature(
         };
         let back = model.matrix.try_inverse()?;
         let from = sensor.channels().start;
-        let moved: Vec<Affine<f64>> = temperatures[sensor as usize]
+        let moved: Vec<Affine<f64>> = temperatures[sensor]
             .iter()
             .filter_map(|t| {
                 let at = curves.inverse(sensor, *t)?;

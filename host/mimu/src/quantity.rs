@@ -1,58 +1,12 @@
 //! Sensors, axes, units, and how numbers are written: in one place, for messages, files and everything that people read.
 
-use std::fmt;
-use std::ops::Range;
-
 use mimu_recording::RawUnit;
 use serde::Serialize;
 
+pub use mimu_core::{PerSensor, Sensor};
+
 /// Names of the axes.
 pub const AXES: [&str; 3] = ["x", "y", "z"];
-
-/// A sensor triad.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Sensor {
-    /// Gyro triad.
-    Gyro,
-    /// Accelerometer triad.
-    Accel,
-}
-
-impl Sensor {
-    /// Both triads.
-    pub const BOTH: [Self; 2] = [Self::Gyro, Self::Accel];
-
-    /// Its three channels among the six.
-    pub fn channels(self) -> Range<usize> {
-        match self {
-            Self::Gyro => 0..3,
-            Self::Accel => 3..6,
-        }
-    }
-
-    /// `gyro` or `accel`, as in files.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Gyro => "gyro",
-            Self::Accel => "accel",
-        }
-    }
-
-    /// SI unit of its input.
-    pub fn unit(self) -> &'static str {
-        match self {
-            Self::Gyro => "rad/s",
-            Self::Accel => "m/s^2",
-        }
-    }
-}
-
-impl fmt::Display for Sensor {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
-    }
-}
 
 /// What an error figure is about; a file has [`Figure::description`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

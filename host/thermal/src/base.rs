@@ -6,7 +6,7 @@
 //! gravity in the pose of the recording is counted as bias, which is wrong in other poses by up to twice that.
 
 use mimu::calibration::{Calibration, reference_node};
-use mimu::quantity::Sensor;
+use mimu::quantity::{PerSensor, Sensor};
 use mimu::triad::{Covariance, Part, Triad};
 use mimu_core::compensation::Affine;
 use mimu_recording::error::{Error, Result};
@@ -74,33 +74,31 @@ impl Based<'_> {
 pub fn calibration(fit: &ThermalFit, base: &Calibration, created: &str) -> Result<Calibration> {
     let at_c = check(fit, base)?;
     let range_c = range(&fit.joint);
-    let based = Sensor::BOTH.map(|sensor| {
+    let based = PerSensor::from_fn(|sensor| {
         let table = base.table(sensor)?;
         let mut sigma = [0.0; 12];
         let known = table.sigma_C.iter().flatten().flatten();
         let known = known.chain(table.sigma_o.iter().flatten());
         sigma.iter_mut().zip(known).for_each(|(s, k)| *s = *k);
         Some(Based {
-            curves: fit.joint.curves[sensor as usize].as_ref()?,
+            curves: fit.joint.curves[sensor].as_ref()?,
             model: base.inverse(sensor)?,
             sigma,
             covariance: base.covariance(sensor)?,
             at_c: at_c.clamp(range_c[0], range_c[1]),
         })
     });
-    let of = |sensor: usize, temp_c: f64| Some(based[sensor].as_ref()?.inverse(temp_c));
-    let nodes = fewest(of, based.each_ref().map(Option::is_some), range_c)?;
+    let of = |sensor: Sensor, temp_c: f64| Some(based[sensor].as_ref()?.inverse(temp_c));
+    let nodes = fewest(of, based.as_ref().map(Option::is_some), range_c)?;
     let mut temperature = with_lags(&fit.joint, range_c, nodes);
     // The errors are raw: across the axes C is a hundredth.
-    let hysteresis = |k: usize| {
-        let own = based[k].as_ref()?.model.matrix.diagonal();
-        fit.hysteresis(k, own.into())
-    };
-    temperature.gyro_hysteresis = hysteresis(0);
-    temperature.accel_hysteresis = hysteresis(1);
+    for (sensor, based) in based.present() {
+        let own = based.model.matrix.diagonal();
+        temperature.dies[sensor].hysteresis = fit.hysteresis(sensor, own.into());
+    }
     let temps: Vec<f64> = temperature.nodes.iter().map(|n| n.temp_c).collect();
     let temp_c = reference_node(&temps).map_or(at_c, |k| temps[k]);
-    let triads = based.each_ref().map(|b| b.as_ref()?.triad(temp_c));
+    let triads = based.as_ref().map(|b| b.as_ref()?.triad(temp_c));
     base.with_curves(temperature, temp_c, triads, created)
 }
 
@@ -108,7 +106,7 @@ pub fn calibration(fit: &ThermalFit, base: &Calibration, created: &str) -> Resul
 fn check(fit: &ThermalFit, base: &Calibration) -> Result<f64> {
     let first = &fit.sessions[0];
     let refuse = |problem: String, remedy: &str| Err(Error::new("--base", problem, remedy));
-    if fit.joint.curves.iter().flatten().any(|c| !c.biases_only()) {
+    if fit.joint.recorded().any(|c| !c.biases_only()) {
         let problem = "the recordings have known inputs, which determine all parameters".into();
         return refuse(problem, "leave --base out");
     }
@@ -149,7 +147,7 @@ fn check(fit: &ThermalFit, base: &Calibration) -> Result<f64> {
     }
     if Sensor::BOTH
         .iter()
-        .all(|s| base.table(*s).is_none() || fit.joint.curves[*s as usize].is_none())
+        .all(|s| base.table(*s).is_none() || fit.joint.curves[*s].is_none())
     {
         let problem = "it has none of the sensors of the recording".into();
         return refuse(problem, "give the calibration of the same unit");

@@ -53,7 +53,7 @@ pub fn estimate(
     sensor: Sensor,
     classic: Classic,
 ) -> Result<Option<TriadCurves>> {
-    let rows = |s: &Session| s.rows[sensor as usize].len();
+    let rows = |s: &Session| s.rows[sensor].len();
     if sessions.iter().map(rows).sum::<usize>() == 0 {
         return Ok(None);
     }
@@ -102,7 +102,7 @@ fn mean_temperature(session: &Session, rows: &[&Row]) -> f64 {
 
 fn by_temperature(session: &Session, sensor: Sensor) -> Vec<Vec<&Row>> {
     let bin = |r: &Row| (session.thermometer.at(r.middle_s).0 / NODE_K).floor() as i64;
-    let mut rows: Vec<&Row> = session.rows[sensor as usize].iter().collect();
+    let mut rows: Vec<&Row> = session.rows[sensor].iter().collect();
     rows.sort_by_key(|r| bin(r));
     rows.chunk_by(|a, b| bin(a) == bin(b))
         .map(<[_]>::to_vec)
@@ -112,7 +112,7 @@ fn by_temperature(session: &Session, sensor: Sensor) -> Vec<Vec<&Row>> {
 /// Stretches in which the temperature stands, whether it has settled or not.
 fn plateaus(session: &Session, sensor: Sensor) -> Vec<Vec<&Row>> {
     let fastest = fastest(session);
-    let rows = session.rows[sensor as usize].iter();
+    let rows = session.rows[sensor].iter();
     let still: Vec<&Row> = rows
         .filter(|r| stands(session, fastest, r.middle_s))
         .collect();
@@ -130,7 +130,7 @@ fn along(v: &Vector3<f64>) -> Option<(usize, bool)> {
 fn cycles(session: &Session, sensor: Sensor) -> Vec<Vec<&Row>> {
     let mut out = Vec::new();
     let mut open: Vec<&Row> = Vec::new();
-    for dwell in session.rows[sensor as usize].chunk_by(|a, b| a.step == b.step) {
+    for dwell in session.rows[sensor].chunk_by(|a, b| a.step == b.step) {
         open.extend(dwell);
         let complete = match sensor {
             Sensor::Gyro => gyro_of_cycle(&open).is_some(),

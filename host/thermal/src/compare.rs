@@ -90,7 +90,10 @@ pub fn compare(a: &Calibration, b: &Calibration) -> Result<Comparison> {
     Ok(Comparison {
         format: "mimu-thermal-comparison/1",
         range_c,
-        lags_s: [a, b].map(|c| c.temperature.as_ref().and_then(|t| t.lags_s())),
+        lags_s: [a, b].map(|c| {
+            let lags_s = c.temperature.as_ref()?.lags_s()?;
+            Some([lags_s.gyro, lags_s.accel])
+        }),
         curves: curves.collect(),
         warnings,
     })

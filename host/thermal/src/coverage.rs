@@ -41,7 +41,7 @@ impl Coverage {
         let (mut recorded_c, mut used_c) = (none, none);
         let widen = |range: &mut [f64; 2], t: f64| *range = [range[0].min(t), range[1].max(t)];
         for session in sessions {
-            let rows = &session.rows[sensor as usize];
+            let rows = &session.rows[sensor];
             let thermometer = &session.thermometer;
             all += session.samples;
             taken += rows.iter().map(|r| r.samples).sum::<f64>();

@@ -35,7 +35,7 @@ impl<'a> Evaluator<'a> {
         sensor: Sensor,
         shape: Shape,
     ) -> Result<Option<Self>> {
-        let rows = sessions.iter().map(|s| s.rows[sensor as usize].len());
+        let rows = sessions.iter().map(|s| s.rows[sensor].len());
         if rows.sum::<usize>() == 0 {
             return Ok(None);
         }
@@ -217,7 +217,7 @@ fn range_of_rows(sessions: &[Session], sensor: Sensor) -> [f64; 2] {
     let mut range = [f64::INFINITY, f64::NEG_INFINITY];
     for session in sessions {
         let led = session.thermometer.die(LAGS[0], Start::Settled);
-        for row in &session.rows[sensor as usize] {
+        for row in &session.rows[sensor] {
             let (temp_c, _) = session.thermometer.at(row.middle_s);
             for t in [temp_c, led.at(row.middle_s)] {
                 range = [range[0].min(t), range[1].max(t)];

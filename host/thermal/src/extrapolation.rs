@@ -16,13 +16,13 @@ pub fn compare(sessions: &[Session], lag_s: Option<f64>) -> Option<[f64; 2]> {
     let mut first = sessions.to_vec();
     for session in &mut first {
         let to = split(session);
-        for rows in &mut session.rows {
+        for (_, rows) in session.rows.as_mut() {
             rows.retain(|r| r.middle_s < to);
         }
     }
     let miss = |shape| {
         let joint = estimate(&first, Choice { shape, lag_s }).ok()?;
-        let own = joint.curves.iter().flatten();
+        let own = joint.recorded();
         let same = own.map(|c| c.problem().basis(crate::regression::Kind::Bias).shape());
         // A span too short for curvature has fitted lines twice.
         let rich = shape == Shape::Line || same.into_iter().all(|s| s == shape);
@@ -38,15 +38,15 @@ fn last_third(
 ) -> Option<f64> {
     let (mut sum, mut n) = (0.0, 0.0);
     for sensor in Sensor::BOTH {
-        let Some(curves) = joint.curves[sensor as usize].as_ref() else {
+        let Some(curves) = joint.curves[sensor].as_ref() else {
             continue;
         };
         let dies = joint.dies(sessions, sensor);
-        let noise = joint.noise[sensor as usize]?;
+        let noise = joint.noise[sensor]?;
         let problem = curves.problem();
         for (k, session) in sessions.iter().enumerate() {
             let offset = curves.session_offset(k);
-            let rows = session.rows[sensor as usize].iter();
+            let rows = session.rows[sensor].iter();
             for row in rows.filter(|r| r.middle_s >= split(session)) {
                 let [model, _] = curves.forward(dies[k].at(row.middle_s));
                 let input = match problem.biases_only {

@@ -1,7 +1,7 @@
 //! `mimu thermal fit` from memory: curves by one of the estimators, judged.
 
 use mimu::calibration::{Calibration, CurvesOfUnit, TriadOfCurves, reference_node};
-use mimu::quantity::{Sensor, significant};
+use mimu::quantity::{PerSensor, Sensor, significant};
 use mimu_recording::Reference;
 use mimu_recording::error::{Error, Result};
 
@@ -106,8 +106,8 @@ pub struct ThermalFit {
     pub options: Options,
     /// Whether lag and slope are told apart.
     pub verdict: Verdict,
-    /// Figures of gyro and accelerometer: SI, raw where only biases are estimated.
-    pub judged: [Option<Judged>; 2],
+    /// Figures of the triads: SI, raw where only biases are estimated.
+    pub judged: PerSensor<Option<Judged>>,
     /// What a person should know.
     pub warnings: Vec<String>,
 }
@@ -141,13 +141,13 @@ pub fn fit(sessions: Vec<Session>, verify: &[Session], options: Options) -> Resu
         warnings.push(WITHOUT_NOISE.into());
     }
     check_range(&joint, options.range_c)?;
-    let judged = [0, 1].map(|k| judge(&sessions, verify, &joint, k));
+    let judged = PerSensor::from_fn(|sensor| judge(&sessions, verify, &joint, sensor));
     let misfits = |j: &Judged| {
         let [own, floor] = rms(&j.errors);
         floor > 0.0 && own > MISFIT * floor
     };
     let verdict = match joint.one_way {
-        _ if estimated && judged.iter().flatten().any(misfits) => Verdict::Misfit,
+        _ if estimated && judged.present().any(|(_, j)| misfits(j)) => Verdict::Misfit,
         true => Verdict::OneWay,
         false => Verdict::Fitted,
     };
@@ -188,24 +188,24 @@ fn smooth(sessions: &[Session], options: Options, warnings: &mut Vec<String>) ->
 }
 
 fn of_literature(sessions: &[Session], classic: Classic) -> Result<Joint> {
-    let mut curves = Vec::new();
+    let mut curves = PerSensor::default();
     for sensor in Sensor::BOTH {
         if sessions.iter().any(|s| s.reference == Reference::Gravity) {
             let problem = format!("the estimator {} needs known inputs", classic.name());
             let remedy = "use --estimator joint, or record with a table";
             return Err(Error::new(&sessions[0].place, problem, remedy));
         }
-        curves.push(classic::estimate(sessions, sensor, classic)?);
+        curves[sensor] = classic::estimate(sessions, sensor, classic)?;
     }
     let settled = |s: &Session| s.thermometer.die(0.0, Start::Settled);
     let dies: Vec<Die> = sessions.iter().map(settled).collect();
     Ok(Joint {
-        curves: curves.try_into().unwrap_or([None, None]),
-        profiles: [0, 1].map(|_| Profile::fixed(0.0, 0.0)),
+        curves,
+        profiles: PerSensor::both(Profile::fixed(0.0, 0.0)),
         one_way: is_one_way(sessions, &dies),
         apart: None,
-        contradicted: [None; 2],
-        noise: [None, None],
+        contradicted: PerSensor::default(),
+        noise: PerSensor::default(),
         starts: vec![Start::Settled; sessions.len()],
         warnings: Vec::new(),
     })
@@ -245,15 +245,19 @@ fn check_range(joint: &Joint, wanted: Option<[f64; 2]>) -> Result<()> {
 
 /// Temperatures of the dies, °C.
 pub fn range(joint: &Joint) -> [f64; 2] {
-    let all = joint.curves.iter().flatten().map(|c| c.range_c);
+    let all = joint.recorded().map(|c| c.range_c);
     all.fold([f64::INFINITY, f64::NEG_INFINITY], |r, c| {
         [r[0].min(c[0]), r[1].max(c[1])]
     })
 }
 
-fn judge(sessions: &[Session], verify: &[Session], joint: &Joint, k: usize) -> Option<Judged> {
-    let sensor = Sensor::BOTH[k];
-    let curves = joint.curves[k].as_ref()?;
+fn judge(
+    sessions: &[Session],
+    verify: &[Session],
+    joint: &Joint,
+    sensor: Sensor,
+) -> Option<Judged> {
+    let curves = joint.curves[sensor].as_ref()?;
     let dies = joint.dies(sessions, sensor);
     let lag = joint.applied_s(sensor);
     let unseen = verify
@@ -274,7 +278,9 @@ fn judge(sessions: &[Session], verify: &[Session], joint: &Joint, k: usize) -> O
         .collect();
     let mut without = None;
     let held_out = match verify {
-        [] => joint.noise[k].and_then(|noise| judge::held_out(sessions, joint, sensor, &noise)),
+        [] => {
+            joint.noise[sensor].and_then(|noise| judge::held_out(sessions, joint, sensor, &noise))
+        }
         _ => {
             let mut all = Vec::new();
             let mut centred = Vec::new();
@@ -311,7 +317,7 @@ impl Judged {
 
 impl ThermalFit {
     /// Rms and largest of what heating and cooling differ by, axis by axis, times `si`, as a calibration file holds them.
-    pub(crate) fn hysteresis(&self, sensor: usize, si: [f64; 3]) -> Option<[[f64; 3]; 2]> {
+    pub(crate) fn hysteresis(&self, sensor: Sensor, si: [f64; 3]) -> Option<[[f64; 3]; 2]> {
         let judged = self.judged[sensor].as_ref()?;
         let all = judged.hysteresis.as_ref()?;
         let of = |size: fn(&Hysteresis) -> f64| {
@@ -326,14 +332,15 @@ impl ThermalFit {
     /// Curves of biases alone.
     pub fn calibration(&self, created: &str) -> Result<Calibration> {
         let mut temperature = nodes::over_temperature(&self.joint)?;
-        [temperature.gyro_hysteresis, temperature.accel_hysteresis] =
-            [0, 1].map(|k| self.hysteresis(k, [1.0; 3]));
+        for (sensor, dies) in temperature.dies.as_mut() {
+            dies.hysteresis = self.hysteresis(sensor, [1.0; 3]);
+        }
         let temps: Vec<f64> = temperature.nodes.iter().map(|n| n.temp_c).collect();
         let temp_c = reference_node(&temps).map_or(f64::NAN, |k| temps[k]);
         let first = &self.sessions[0];
-        let triads = [0, 1].map(|k| {
-            let curves = self.joint.curves[k].as_ref()?;
-            let judged = self.judged[k].as_ref()?;
+        let triads = PerSensor::from_fn(|sensor| {
+            let curves = self.joint.curves[sensor].as_ref()?;
+            let judged = self.judged[sensor].as_ref()?;
             let [own, floor] = rms(&judged.errors);
             Some(TriadOfCurves {
                 triad: curves.triad(temp_c)?,

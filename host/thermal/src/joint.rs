@@ -1,6 +1,6 @@
 //! The joint estimate of all curves and of the lag.
 
-use mimu::quantity::{Sensor, significant};
+use mimu::quantity::{PerSensor, Sensor, significant};
 use mimu_recording::error::{Error, Result};
 
 use crate::basis::Shape;
@@ -46,18 +46,18 @@ impl Choice {
 /// Curves of both triads and the lags of their dies.
 #[derive(Debug, Clone)]
 pub struct Joint {
-    /// Curves of gyro and accelerometer; none of a triad that was not recorded.
-    pub curves: [Option<TriadCurves>; 2],
-    /// Likelihoods of the lags of gyro and accelerometer: that of both together, unless the data tell the two apart.
-    pub profiles: [Profile; 2],
+    /// Curves; none of a triad that was not recorded.
+    pub curves: PerSensor<Option<TriadCurves>>,
+    /// Likelihoods of the lags: that of both together, unless the data tell the two apart.
+    pub profiles: PerSensor<Profile>,
     /// Whether the temperature goes one way only, so that lag and slope cannot be told apart.
     pub one_way: bool,
     /// Drop in deviance by two lags against one, where they are told apart.
     pub apart: Option<f64>,
-    /// Lowest and highest lag, s, that axes of gyro and accelerometer want by themselves, where one lag contradicts them.
-    pub contradicted: [Option<[f64; 2]>; 2],
+    /// Lowest and highest lag, s, that axes want by themselves, where one lag contradicts them.
+    pub contradicted: PerSensor<Option<[f64; 2]>>,
     /// Noise of the rows.
-    pub noise: [Option<[AxisNoise; 3]>; 2],
+    pub noise: PerSensor<Option<[AxisNoise; 3]>>,
     /// How each session began.
     pub starts: Vec<Start>,
     /// What a person should know.
@@ -65,12 +65,16 @@ pub struct Joint {
 }
 
 impl Joint {
+    /// Curves of the triads that were recorded.
+    pub fn recorded(&self) -> impl Iterator<Item = &TriadCurves> {
+        self.curves.present().map(|(_, curves)| curves)
+    }
+
     /// Lag of `sensor` that is applied: given, or determined by the data; none otherwise.
     pub fn lag(&self, sensor: Sensor) -> Option<Lag> {
-        let profile = &self.profiles[sensor as usize];
-        let determined = profile.lag.is_determined()
-            && !self.one_way
-            && self.contradicted[sensor as usize].is_none();
+        let profile = &self.profiles[sensor];
+        let determined =
+            profile.lag.is_determined() && !self.one_way && self.contradicted[sensor].is_none();
         (determined || profile.is_given()).then_some(profile.lag)
     }
 
@@ -112,10 +116,8 @@ pub fn estimate(sessions: &[Session], choice: Choice) -> Result<Joint> {
             significant(span)
         ));
     }
-    let mut triads = Vec::new();
-    for sensor in Sensor::BOTH {
-        triads.push(Evaluator::new(sessions, sensor, shape)?);
-    }
+    let evaluator = |sensor| Evaluator::new(sessions, sensor, shape);
+    let mut triads = [evaluator(Sensor::Gyro)?, evaluator(Sensor::Accel)?];
     let mut starts = vec![Start::Settled; sessions.len()];
     let rough = rough_lag(&mut triads, &mut starts, sessions, choice.lag_s)?;
     for triad in triads.iter_mut().flatten() {
@@ -139,36 +141,36 @@ pub fn estimate(sessions: &[Session], choice: Choice) -> Result<Joint> {
         None => [contradiction(&triads, &profiles[0]); 2],
         Some(_) => [0, 1].map(|k| contradiction(&triads[k..=k], &profiles[k])),
     };
-    let one_way = profiles.iter().any(|profile| {
+    let profiles = PerSensor::from(profiles);
+    let one_way = profiles.iter().any(|(_, profile)| {
         let each = sessions.iter().zip(&starts);
         let die = |(s, start): (&Session, &Start)| s.thermometer.die(profile.lag.value, *start);
         is_one_way(sessions, &each.map(die).collect::<Vec<Die>>())
     });
     let mut joint = Joint {
-        curves: [None, None],
+        curves: PerSensor::default(),
         profiles,
         one_way,
         apart,
-        contradicted,
-        noise: [None, None],
+        contradicted: contradicted.into(),
+        noise: PerSensor::default(),
         starts,
         warnings,
     };
-    for profile in &joint.profiles {
+    for (_, profile) in joint.profiles.iter() {
         check_speed(sessions, &profile.lag, span)?;
     }
-    let [gyro, accel] = <[_; 2]>::try_from(triads).unwrap_or([None, None]);
-    for (k, triad) in [gyro, accel].into_iter().enumerate() {
+    for (sensor, triad) in PerSensor::from(triads) {
         let Some(triad) = triad else { continue };
-        let dies = joint.dies(sessions, Sensor::BOTH[k]);
+        let dies = joint.dies(sessions, sensor);
         let rows = triad.problem.rows.iter();
         let temps = rows.map(|r| dies[r.session].at(r.middle_s));
         let range_c = temps.fold([f64::INFINITY, f64::NEG_INFINITY], |r, t| {
             [r[0].min(t), r[1].max(t)]
         });
-        joint.noise[k] = Some(triad.noise);
-        let (profile, lag) = (&joint.profiles[k], joint.lag(Sensor::BOTH[k]));
-        joint.curves[k] = Some(triad.curves(profile, lag, &joint.starts, range_c));
+        joint.noise[sensor] = Some(triad.noise);
+        let (profile, lag) = (&joint.profiles[sensor], joint.lag(sensor));
+        joint.curves[sensor] = Some(triad.curves(profile, lag, &joint.starts, range_c));
     }
     Ok(joint)
 }

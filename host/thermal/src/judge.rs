@@ -68,7 +68,7 @@ impl Judging<'_> {
     fn errors_of(&self, used: impl Fn(usize) -> bool) -> Vec<DwellError> {
         let Self { session, die, .. } = self;
         let at_rest = self.curves.biases_only();
-        let all = session.rows[self.sensor as usize].iter().enumerate();
+        let all = session.rows[self.sensor].iter().enumerate();
         let rows: Vec<(&Row, Vector3<f64>)> = all
             .filter(|(k, r)| used(*k) && (at_rest || r.input.iter().all(|x| x.is_finite())))
             .filter_map(|(_, r)| {
@@ -259,7 +259,7 @@ pub fn held_out(
     sensor: Sensor,
     noise: &[AxisNoise; 3],
 ) -> Option<Vec<DwellError>> {
-    let curves = joint.curves[sensor as usize].as_ref()?;
+    let curves = joint.curves[sensor].as_ref()?;
     let problem = curves.problem();
     let dies = joint.dies(sessions, sensor);
     let temps: Vec<f64> = problem
@@ -284,7 +284,7 @@ pub fn held_out(
         let fit = fixed(problem, &penalties, &normals, &smoothness)?;
         let part_curves = TriadCurves::of_one(problem.clone(), fit, curves.range_c);
         for (k, session) in sessions.iter().enumerate() {
-            let rows = &session.rows[sensor as usize];
+            let rows = &session.rows[sensor];
             let judging = Judging {
                 recording: k,
                 session,

@@ -1,8 +1,8 @@
 //! The nodes of a calibration file: inverse models and their derivatives at temperatures of the dies, between which a device follows
 //! cubic Hermite pieces.
 
-use mimu::calibration::{NodeTable, OverTemperature, TemperatureNode};
-use mimu::quantity::Sensor;
+use mimu::calibration::{DieTable, NodeTable, OverTemperature, TemperatureNode};
+use mimu::quantity::{PerSensor, Sensor};
 use mimu::triad::Forward;
 use mimu_core::compensation::Affine;
 use mimu_core::die::LEAST_LAG_S;
@@ -36,8 +36,9 @@ pub struct Inverse {
 /// # Errors
 /// Curves of biases alone, which are no calibration; a matrix that is singular somewhere.
 pub fn over_temperature(joint: &Joint) -> Result<OverTemperature> {
-    let curves = [0, 1].map(|k| joint.curves[k].as_ref().filter(|c| !c.biases_only()));
-    let ranges = curves.iter().flatten().map(|c| c.range_c);
+    let curves = joint.curves.as_ref();
+    let curves = curves.map(|c| c.as_ref().filter(|c| !c.biases_only()));
+    let ranges = curves.present().map(|(_, c)| c.range_c);
     let range_c = ranges.fold([f64::INFINITY, f64::NEG_INFINITY], |r, c| {
         [r[0].min(c[0]), r[1].max(c[1])]
     });
@@ -48,19 +49,16 @@ pub fn over_temperature(joint: &Joint) -> Result<OverTemperature> {
             "give the unit's calibration at one temperature with --base, fit a recording with a table, or leave -o out",
         ));
     }
-    let of = |sensor: usize, temp_c: f64| with_sigma(curves[sensor]?, temp_c);
+    let of = |sensor: Sensor, temp_c: f64| with_sigma(curves[sensor]?, temp_c);
     let has = curves.map(|c| c.is_some());
     Ok(with_lags(joint, range_c, fewest(of, has, range_c)?))
 }
 
 /// `nodes` with the range and the lags of `joint`.
 pub fn with_lags(joint: &Joint, range_c: [f64; 2], nodes: Vec<TemperatureNode>) -> OverTemperature {
-    let given = joint.profiles[0].is_given();
+    let given = joint.profiles.gyro.is_given();
     // A lag that is given as none is none.
     let of = |sensor: Sensor| joint.lag(sensor).filter(|l| !given || l.value != 0.0);
-    let lag = of(Sensor::Gyro);
-    let accel = of(Sensor::Accel).filter(|_| joint.apart.is_some());
-    let interval = |lag: Option<Lag>| lag.filter(|_| !given).map(|l| [l.lower, l.upper]);
     // The device follows nothing shorter than a sample.
     let followed = |lag: Lag| match lag.value.abs() < LEAST_LAG_S {
         true => 0.0,
@@ -68,31 +66,33 @@ pub fn with_lags(joint: &Joint, range_c: [f64; 2], nodes: Vec<TemperatureNode>) 
     };
     OverTemperature {
         range_c,
-        lag_s: lag.map(followed),
-        interval_lag_s: interval(lag),
-        accel_lag_s: accel.map(followed),
-        interval_accel_lag_s: interval(accel),
-        biases_only: joint.curves.iter().flatten().all(TriadCurves::biases_only),
-        gyro_hysteresis: None,
-        accel_hysteresis: None,
+        biases_only: joint.recorded().all(TriadCurves::biases_only),
+        dies: PerSensor::from_fn(|sensor| {
+            let lag = of(sensor);
+            DieTable {
+                lag_s: lag.map(followed),
+                interval_lag_s: lag.filter(|_| !given).map(|l| [l.lower, l.upper]),
+                hysteresis: None,
+            }
+        }),
         nodes,
     }
 }
 
 /// As few nodes, evenly over the range, as keep the Hermite error of C and o below a twentieth of their standard deviations, or sixteen.
-/// `of`: the model of the gyro (0) or the accelerometer (1) at a temperature of the dies, for those that it `has`.
+/// `of`: the model of a sensor at a temperature of the dies, for those that it `has`.
 ///
 /// # Errors
 /// A matrix that is singular somewhere.
 pub fn fewest(
-    of: impl Fn(usize, f64) -> Option<Inverse>,
-    has: [bool; 2],
+    of: impl Fn(Sensor, f64) -> Option<Inverse>,
+    has: PerSensor<bool>,
     range_c: [f64; 2],
 ) -> Result<Vec<TemperatureNode>> {
-    let at = |k: usize, temp_c: f64| {
-        of(k, temp_c).ok_or_else(|| {
+    let at = |sensor: Sensor, temp_c: f64| {
+        of(sensor, temp_c).ok_or_else(|| {
             Error::undetermined(
-                Sensor::BOTH[k],
+                sensor,
                 format!("its scale factors vanish at {temp_c:.1} °C"),
                 "excite every axis at all temperatures",
             )
@@ -109,18 +109,18 @@ pub fn fewest(
 }
 
 fn nodes(
-    at: &impl Fn(usize, f64) -> Result<Inverse>,
-    has: [bool; 2],
+    at: &impl Fn(Sensor, f64) -> Result<Inverse>,
+    has: PerSensor<bool>,
     [from, to]: [f64; 2],
     count: usize,
 ) -> Result<Vec<TemperatureNode>> {
     let node = |k: usize| {
         let temp_c = from + (to - from) * k as f64 / (count - 1) as f64;
-        let table = |k: usize| has[k].then(|| at(k, temp_c).map(table)).transpose();
+        let table = |s: Sensor| has[s].then(|| at(s, temp_c).map(table)).transpose();
         Ok(TemperatureNode {
             temp_c,
-            gyro: table(0)?,
-            accel: table(1)?,
+            gyro: table(Sensor::Gyro)?,
+            accel: table(Sensor::Accel)?,
         })
     };
     (0..count).map(node).collect()
@@ -162,7 +162,7 @@ fn table(at: Inverse) -> NodeTable {
 
 /// Largest error of the Hermite pieces between `nodes`, over the standard deviation of each number.
 fn hermite_error(
-    at: &impl Fn(usize, f64) -> Result<Inverse>,
+    at: &impl Fn(Sensor, f64) -> Result<Inverse>,
     nodes: &[TemperatureNode],
 ) -> Result<f64> {
     let mut worst = 0f64;
@@ -174,7 +174,7 @@ fn hermite_error(
             for sensor in Sensor::BOTH {
                 let ends = [pair[0].table(sensor), pair[1].table(sensor)];
                 let [Some(a), Some(b)] = ends else { continue };
-                let at = at(sensor as usize, temp_c)?;
+                let at = at(sensor, temp_c)?;
                 let piece = hermite(a, b, h, w);
                 for k in 0..12 {
                     let exact = match k {

@@ -100,7 +100,7 @@ impl Problem {
     ) -> Result<Self> {
         let (mut rows, mut offsets) = (Vec::new(), 0);
         for (k, session) in sessions.iter().enumerate() {
-            rows.extend(session.rows[sensor as usize].iter().map(|r| ProblemRow {
+            rows.extend(session.rows[sensor].iter().map(|r| ProblemRow {
                 session: k,
                 offset: offsets + session.poses_before(r.middle_s),
                 middle_s: r.middle_s,

@@ -1,7 +1,7 @@
 //! `mimu-thermal/1`: what a fit over temperature found. SI and raw units throughout; what is not a number is null.
 
-use mimu::quantity::{AXES, Sensor, inverse_names, raw_unit, scale_unit};
-use mimu::result::Sensors;
+use mimu::quantity::{AXES, PerSensor, Sensor, inverse_names, raw_unit, scale_unit};
+use mimu::result::present;
 use mimu::triad::{Angles, Estimate};
 use mimu_recording::RawUnit;
 use serde::Serialize;
@@ -33,7 +33,8 @@ pub struct ThermalResult {
     /// Lowest and highest temperature of the dies, °C.
     pub range_c: [f64; 2],
     /// Figures of the triads.
-    pub sensors: Sensors<SensorResult>,
+    #[serde(serialize_with = "present")]
+    pub sensors: PerSensor<Option<SensorResult>>,
     /// All parameters over the temperature of the die.
     pub curves: Vec<CurveResult>,
     /// What a person should know.
@@ -148,7 +149,7 @@ impl ThermalResult {
     pub fn of(fit: &ThermalFit) -> Self {
         let raw = fit.sessions[0].raw_unit;
         let curves = Sensor::BOTH.into_iter().flat_map(|sensor| {
-            let found = fit.joint.curves[sensor as usize].as_ref();
+            let found = fit.joint.curves[sensor].as_ref();
             found.map(|c| curves_of(c, sensor, raw)).unwrap_or_default()
         });
         let of = |sensor| SensorResult::of(fit, sensor);
@@ -160,10 +161,7 @@ impl ThermalResult {
             estimator: fit.options.estimator.name(),
             verdict: fit.verdict.name(),
             range_c: range(&fit.joint),
-            sensors: Sensors {
-                gyro: of(Sensor::Gyro),
-                accel: of(Sensor::Accel),
-            },
+            sensors: PerSensor::from_fn(of),
             curves: curves.collect(),
             warnings: fit.warnings.clone(),
         }
@@ -180,7 +178,7 @@ fn recordings(fit: &ThermalFit) -> Vec<RecordingResult> {
     each.map(|(k, s)| {
         let mut bias_offset_raw = [0.0; 6];
         for sensor in Sensor::BOTH {
-            if let Some(curves) = &fit.joint.curves[sensor as usize] {
+            if let Some(curves) = &fit.joint.curves[sensor] {
                 let offset = curves.session_offset(k);
                 bias_offset_raw[sensor.channels()].copy_from_slice(offset.as_slice());
             }
@@ -196,8 +194,8 @@ fn recordings(fit: &ThermalFit) -> Vec<RecordingResult> {
 
 impl SensorResult {
     fn of(fit: &ThermalFit, sensor: Sensor) -> Option<Self> {
-        let curves = fit.joint.curves[sensor as usize].as_ref()?;
-        let judged = fit.judged[sensor as usize].as_ref();
+        let curves = fit.joint.curves[sensor].as_ref()?;
+        let judged = fit.judged[sensor].as_ref();
         let figures = judged.map(|j| rms(&j.errors));
         let held_out = judged.and_then(|j| j.held_out.as_ref());
         let lag = lag(fit, sensor);
@@ -227,7 +225,7 @@ impl SensorResult {
 
 /// The lag of `sensor`, or why there is none.
 fn lag(fit: &ThermalFit, sensor: Sensor) -> Result<LagResult, String> {
-    let profile = &fit.joint.profiles[sensor as usize];
+    let profile = &fit.joint.profiles[sensor];
     let found = profile.lag;
     let Lag {
         value,
@@ -249,7 +247,7 @@ fn lag(fit: &ThermalFit, sensor: Sensor) -> Result<LagResult, String> {
             RANGE[0], RANGE[1]
         ));
     }
-    if let Some([from, to]) = fit.joint.contradicted[sensor as usize] {
+    if let Some([from, to]) = fit.joint.contradicted[sensor] {
         return Err(format!(
             "not determined: the axes contradict each other, by themselves they want {from:.0} to {to:.0} s, where one lag for all would be {value:.1} s ({lower:.1} to {upper:.1} s)"
         ));

@@ -4,7 +4,7 @@ use mimu::allan::variance::AllanModel;
 use mimu::blocks::{Block, Condensed};
 use mimu::dwell::Dwell;
 use mimu::prepared::Prepared;
-use mimu::quantity::{Sensor, plural};
+use mimu::quantity::{PerSensor, Sensor, plural};
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{RawUnit, Reference};
 use nalgebra::Vector3;
@@ -78,7 +78,7 @@ pub struct Session {
     /// The thermometer.
     pub thermometer: Thermometer,
     /// Rows of gyro and accelerometer.
-    pub rows: [Vec<Row>; 2],
+    pub rows: PerSensor<Vec<Row>>,
     /// Samples of the recording.
     pub samples: f64,
     /// Noise of the six channels at rest, raw, where a noise file states it.
@@ -107,9 +107,9 @@ impl Session {
         let thermometer = Thermometer::of(condensed, manifest.power_on_s, &prepared.place)?;
         let mut warnings = condensed.warnings.clone();
         warnings.extend(prepared.dwells.warnings.iter().cloned());
-        let rows = Sensor::BOTH.map(|sensor| rows(prepared, sensor));
+        let rows = PerSensor::from_fn(|sensor| rows(prepared, sensor));
         let moved_s = match manifest.reference {
-            Reference::Gravity => moves(&rows[Sensor::Accel as usize]),
+            Reference::Gravity => moves(&rows[Sensor::Accel]),
             _ => Vec::new(),
         };
         warnings.extend(moves_warning(&moved_s));

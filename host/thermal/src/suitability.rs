@@ -68,7 +68,7 @@ impl Spans {
             .iter()
             .map(|session| {
                 let mut range = NOWHERE;
-                for row in session.rows.iter().flatten() {
+                for row in session.rows.iter().flat_map(|(_, rows)| rows) {
                     widen(&mut range, session.thermometer.at(row.middle_s).0);
                 }
                 range

@@ -1,9 +1,9 @@
 //! The device's own Kalman filters beside the session: told each dwell's input while it lasts, taken back where a dwell is thrown away.
 
 use mimu::fit::Fit;
-use mimu::quantity::{AXES, Sensor};
+use mimu::quantity::{AXES, PerSensor, Sensor};
 use mimu::triad::{Forward, Triad};
-use mimu_core::wire::{KalmanState, Prior, Request, Triad as Which};
+use mimu_core::wire::{KalmanState, Prior, Request};
 use mimu_device::{Answer, Session};
 use mimu_recording::error::{Error, Result};
 use nalgebra::{Matrix3, Vector3};
@@ -18,19 +18,14 @@ const PATIENCE: Duration = Duration::from_secs(1);
 /// made of the same dwells and not of the same samples, as the device begins when a dwell is recognised, half a second later: of short dwells
 /// they are nearly independent, and then the largest of 24 differences exceeds 6 once in a thousand sessions.
 const MOST_APART: f64 = 6.0;
-const BOTH: [Which; 2] = [Which::Gyro, Which::Accel];
 
 /// `[b, P1, P2, P3]` of the sensors x, y, z of a triad, SI to raw: V, and V per rad/s or per m/s².
 type Rows = [[f64; 4]; 3];
 
 /// What the device's filters have estimated.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct ByDevice {
-    /// Gyro.
-    pub gyro: Rows,
-    /// Accelerometer.
-    pub accel: Rows,
-}
+#[serde(transparent)]
+pub struct ByDevice(PerSensor<Rows>);
 
 /// The two banks of a device.
 #[derive(Debug, Clone, Default)]
@@ -60,7 +55,7 @@ impl DeviceBanks {
         let noise = noise.map(|v| v as f32);
         let input = input.map(|v| v as f32);
         let told = station.aside(move |session| {
-            for (k, triad) in BOTH.into_iter().enumerate() {
+            for (k, sensor) in Sensor::BOTH.into_iter().enumerate() {
                 let three = |of: &[f32; 6]| [0, 1, 2].map(|i| of[3 * k + i]);
                 if begin {
                     let prior = Prior::Diffuse {
@@ -70,16 +65,16 @@ impl DeviceBanks {
                     done(
                         session,
                         Request::KalmanStart {
-                            triad,
+                            sensor,
                             noise,
                             prior,
                         },
                     )?;
                 } else if spoiled {
-                    done(session, Request::KalmanBack { triad })?;
+                    done(session, Request::KalmanBack { sensor })?;
                 }
                 let input = Some(three(&input));
-                done(session, Request::KalmanInput { triad, input })?;
+                done(session, Request::KalmanInput { sensor, input })?;
             }
             Ok(())
         });
@@ -94,11 +89,18 @@ impl DeviceBanks {
             return;
         }
         let told = station.aside(|session| {
-            for triad in BOTH {
-                done(session, Request::KalmanInput { triad, input: None })?;
+            for sensor in Sensor::BOTH {
+                done(
+                    session,
+                    Request::KalmanInput {
+                        sensor,
+                        input: None,
+                    },
+                )?;
             }
-            BOTH.into_iter()
-                .try_for_each(|triad| done(session, Request::KalmanKeep { triad }))
+            Sensor::BOTH
+                .into_iter()
+                .try_for_each(|sensor| done(session, Request::KalmanKeep { sensor }))
         });
         self.spoiled = told.is_err();
         self.heed(told);
@@ -110,8 +112,9 @@ impl DeviceBanks {
             return;
         }
         let told = station.aside(|session| {
-            BOTH.into_iter()
-                .try_for_each(|triad| done(session, Request::KalmanBack { triad }))
+            Sensor::BOTH
+                .into_iter()
+                .try_for_each(|sensor| done(session, Request::KalmanBack { sensor }))
         });
         // A line that is lost is found again, and then it is done.
         self.spoiled = told.is_err();
@@ -141,19 +144,18 @@ impl DeviceBanks {
         self.runs = false;
         let spoiled = self.spoiled;
         let ended = station.aside(move |session| {
-            let mut rows = [[[0.0; 4]; 3]; 2];
-            for (rows, triad) in rows.iter_mut().zip(BOTH) {
+            let mut all = PerSensor::<Rows>::default();
+            for (sensor, rows) in all.as_mut() {
                 if spoiled {
-                    done(session, Request::KalmanBack { triad })?;
+                    done(session, Request::KalmanBack { sensor })?;
                 }
-                let end = Request::KalmanEnd { triad };
+                let end = Request::KalmanEnd { sensor };
                 match session.call(end, "for its estimate", PATIENCE)? {
                     Answer::Kalman(state) => *rows = rows_of(&state),
                     _ => return Err(session.unexpected("for its estimate")),
                 }
             }
-            let [gyro, accel] = rows;
-            Ok(ByDevice { gyro, accel })
+            Ok(ByDevice(all))
         });
         ended.map_err(|e| e.to_string())
     }
@@ -169,10 +171,7 @@ fn rows_of(state: &KalmanState) -> Rows {
 
 impl ByDevice {
     fn forward(&self, sensor: Sensor) -> Forward {
-        let rows = match sensor {
-            Sensor::Gyro => &self.gyro,
-            Sensor::Accel => &self.accel,
-        };
+        let rows = &self.0[sensor];
         Forward {
             matrix: Matrix3::from_fn(|i, j| rows[i][1 + j]),
             bias: Vector3::from_fn(|i, _| rows[i][0]),

@@ -12,7 +12,7 @@ use mimu_board::running::Board;
 use mimu_board::schematic::Volts;
 use mimu_board_tests::conversation::{Answer, Conversation};
 use mimu_board_tests::{MS, STARTED, built, image, still};
-use mimu_core::effects::Effect;
+use mimu_core::effects::DeviceEffect;
 use mimu_core::wire::{EFFECTS, Request};
 
 /// Cycles of the core in a millisecond.
@@ -33,7 +33,7 @@ const EACH: &str = "effect_instructions";
 /// Effects that run with every sample, and a term, as `tests/counted` runs them.
 fn effects() -> impl Iterator<Item = &'static str> {
     let runs = |id: &&str| {
-        let of = |count: usize| Effect::<f32>::named(id, &[1e-4; 9][..count], None);
+        let of = |count: usize| DeviceEffect::<f32>::named(id, &[1e-4; 9][..count], None);
         of(9).or(of(3)).is_ok_and(|effect| !effect.is_slow())
     };
     EFFECTS.iter().copied().filter(runs).chain(["term"])

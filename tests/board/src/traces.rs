@@ -16,10 +16,11 @@ use mimu_board::front::Front;
 use mimu_board::running::Board;
 use mimu_board::schematic::Volts;
 use mimu_core::compensation::{Affine, Compensation};
-use mimu_core::effects::{Sensor, Variable};
-use mimu_core::stored::{self, Curves, Record};
+use mimu_core::effects::{DeviceEffect, Variable};
+use mimu_core::stored::{self, Curves};
 use mimu_core::table::Node;
-use mimu_core::wire::{BATCH, Prior, Request, Triad};
+use mimu_core::wire::{BATCH, Prior, Request};
+use mimu_core::{PerSensor, Sensor};
 use mimu_rig::located::Source;
 use mimu_rig::plan::Plan;
 use mimu_rig::rig_file::{RigFile, RigTruth};
@@ -136,7 +137,7 @@ fn model(warmth: f64) -> Compensation<f32> {
     }
 }
 
-fn stored(temps: &[f64], lags_s: Option<[f32; 2]>, records: &[Record<'_>]) -> Vec<u8> {
+fn stored(temps: &[f64], lags_s: Option<PerSensor<f32>>, effects: &[DeviceEffect<f32>]) -> Vec<u8> {
     let slope = |before: &Affine<f32>, after: &Affine<f32>| Affine {
         matrix: after.matrix - before.matrix,
         offset: after.offset - before.offset,
@@ -160,7 +161,7 @@ fn stored(temps: &[f64], lags_s: Option<[f32; 2]>, records: &[Record<'_>]) -> Ve
     let nodes: Vec<_> = temps.iter().map(node).collect();
     let found_with = model(0.0);
     let mut bytes = vec![0; stored::MAX_LENGTH];
-    let matrices = [&found_with.gyro.matrix, &found_with.accel.matrix];
+    let matrices = found_with.as_ref().map(|model| &model.matrix);
     let length = stored::encode(
         &stored::Origin::UNKNOWN,
         matrices,
@@ -168,7 +169,7 @@ fn stored(temps: &[f64], lags_s: Option<[f32; 2]>, records: &[Record<'_>]) -> Ve
             lags_s,
             ..Curves::of(&nodes)
         },
-        records,
+        effects,
         &mut bytes,
     )
     .expect("there is room");
@@ -182,59 +183,45 @@ fn affine() -> Vec<u8> {
 
 fn nodes() -> Vec<u8> {
     let temps: Vec<f64> = (0..16).map(|k| 24.0 + f64::from(k)).collect();
-    stored(&temps, Some([5.0, 9.0]), &[])
+    stored(&temps, Some([5.0, 9.0].into()), &[])
 }
 
 /// One of every kind of law. Without lags, whose state when the stream begins is not on the line, and without the warm-up, whose
 /// exponential is the PC's library's here, and may differ from the device's in the last bit.
 fn with_effects() -> Vec<u8> {
-    let named = |id, coefficients, form| Record::Named {
-        id,
-        coefficients,
-        nonlinear: form,
-    };
-    let records = [
-        named(
+    let effects = [
+        DeviceEffect::named(
             "gyro_g_sensitivity",
             &[2e-4, 0.0, 1e-4, 0.0, -3e-4, 0.0, 5e-5, 0.0, 2e-4],
             None,
         ),
-        named("gyro_scale_cubic", &[1e-3, -2e-3, 1e-3], None),
-        named("gyro_thermal_bias", &[1e-4; 6], None),
-        named("accel_scale_quadratic", &[2e-4, 1e-4, -3e-4], None),
-        named(
+        DeviceEffect::named("gyro_scale_cubic", &[1e-3, -2e-3, 1e-3], None),
+        DeviceEffect::named("gyro_thermal_bias", &[1e-4; 6], None),
+        DeviceEffect::named("accel_scale_quadratic", &[2e-4, 1e-4, -3e-4], None),
+        DeviceEffect::named(
             "accel_size_effect",
             &[4e-3, 1e-3, -2e-3, 0.0, 3e-3, 1e-3, -1e-3, 2e-3, 4e-3],
             None,
         ),
-        Record::Term {
-            sensor: Sensor::Accel,
-            axis: 0,
-            coefficient: 1e-5,
-            variables: &[Variable::Time],
-        },
-        Record::Term {
-            sensor: Sensor::Accel,
-            axis: 1,
-            coefficient: 1e-3,
-            variables: &[Variable::RateX, Variable::ForceY],
-        },
-        Record::Code {
-            sensor: Sensor::Gyro,
-            axis: None,
-            weight: 1.65,
-            zero: 0.0,
-            errors: &[2e-4, -1e-4, 2e-4, 1e-4, -2e-4, 1e-4, -1e-4, 2e-4, 1e-4],
-        },
-        Record::Code {
-            sensor: Sensor::Accel,
-            axis: Some(2),
-            weight: 1.1,
-            zero: -0.31,
-            errors: &[3e-4, 0.0, -2e-4, 0.0, 1e-4, 0.0, 0.0, 0.0, 2e-4],
-        },
-    ];
-    stored(&[20.0, 30.0, 40.0], None, &records)
+        DeviceEffect::term(Sensor::Accel, 0, 1e-5, &[Variable::Time]),
+        DeviceEffect::term(Sensor::Accel, 1, 1e-3, &[Variable::RateX, Variable::ForceY]),
+        DeviceEffect::code(
+            Sensor::Gyro,
+            None,
+            &[2e-4, -1e-4, 2e-4, 1e-4, -2e-4, 1e-4, -1e-4, 2e-4, 1e-4],
+            1.65,
+            0.0,
+        ),
+        DeviceEffect::code(
+            Sensor::Accel,
+            Some(2),
+            &[3e-4, 0.0, -2e-4, 0.0, 1e-4, 0.0, 0.0, 0.0, 2e-4],
+            1.1,
+            -0.31,
+        ),
+    ]
+    .map(|effect| effect.expect("its numbers make sense"));
+    stored(&[20.0, 30.0, 40.0], None, &effects)
 }
 
 /// A trace.
@@ -324,17 +311,17 @@ impl Step {
 fn start_banks(device: &mut Conversation) {
     // A batch before the first sample that a bank takes in.
     device.run_for(2 * BATCH as u64 * MS);
-    for (i, triad) in [Triad::Gyro, Triad::Accel].into_iter().enumerate() {
+    for (i, sensor) in Sensor::BOTH.into_iter().enumerate() {
         let prior = Prior::Diffuse { span: SPANS[i] };
         let start = Request::KalmanStart {
-            triad,
+            sensor,
             noise: NOISE,
             prior,
         };
         assert_eq!(device.ask(start), Answer::Done);
         let input = Some(INPUTS[i]);
         assert_eq!(
-            device.ask(Request::KalmanInput { triad, input }),
+            device.ask(Request::KalmanInput { sensor, input }),
             Answer::Done
         );
     }

@@ -7,12 +7,14 @@
 
 use core::hint::black_box;
 
+use mimu_core::PerSensor;
 use mimu_core::compensation::{Affine, Compensation, Sample};
-use mimu_core::effects::{Directions, Effect, Effects, Refused, Sensor, State, Variable};
+use mimu_core::effects::{DeviceEffect, Directions, Effects, Refused, State, Variable};
 use mimu_core::kalman::Bank;
 use mimu_core::single;
 use mimu_core::stored::ROOM;
 use mimu_core::wire::EFFECTS;
+use mimu_core::{PerSensor, Sensor};
 use nalgebra::{Matrix3, Vector3};
 use panic_halt as _;
 
@@ -65,7 +67,7 @@ fn main() -> ! {
         sensed: Matrix3::identity(),
         to_body: Matrix3::identity(),
     };
-    let none = || black_box(Effects::of(directions, directions));
+    let none = || black_box(Effects::of(PerSensor::both(directions)));
     let remove = |all: &Effects<f32, ROOM>| {
         let mut state = State::new(1000.0);
         // The first sample is evaluated twice.
@@ -73,9 +75,10 @@ fn main() -> ! {
         between(|| single::remove(all, &mut state, &si));
     };
     remove(&none());
-    let term = Effect::term(Sensor::Gyro, 1, 1e-3, &TERM);
+    let term = DeviceEffect::term(Sensor::Gyro, 1, 1e-3, &TERM);
     // Those that run with every sample.
-    let fast = |effect: &Result<Effect<f32>, Refused>| matches!(effect, Ok(e) if !e.is_slow());
+    let fast =
+        |effect: &Result<DeviceEffect<f32>, Refused>| matches!(effect, Ok(e) if !e.is_slow());
     let named = EFFECTS.iter().map(|id| named(id)).filter(fast);
     for effect in named.chain([term]) {
         let mut all = none();
@@ -99,7 +102,9 @@ fn main() -> ! {
         for axis in axes {
             // Of each axis its own.
             let weight = 1.65 + 0.1 * axis as f32;
-            if let Ok(code) = Effect::code(sensor, Some(axis), &[1e-4; 9], weight, 0.01 * weight) {
+            if let Ok(code) =
+                DeviceEffect::code(sensor, Some(axis), &[1e-4; 9], weight, 0.01 * weight)
+            {
                 let _ = all.push(code);
             }
         }
@@ -113,9 +118,9 @@ fn main() -> ! {
 /// Variables of a term, as many as there can be.
 const TERM: [Variable; 3] = [Variable::RateX, Variable::ForceY, Variable::ForceZ];
 
-fn named(id: &str) -> Result<Effect<f32>, Refused> {
-    match Effect::named(id, &[1e-4; 9], None) {
-        Err(Refused::Count { .. }) => Effect::named(id, &[1e-4; 3], None),
+fn named(id: &str) -> Result<DeviceEffect<f32>, Refused> {
+    match DeviceEffect::named(id, &[1e-4; 9], None) {
+        Err(Refused::Count { .. }) => DeviceEffect::named(id, &[1e-4; 3], None),
         other => other,
     }
 }

@@ -8,15 +8,16 @@
 use mimu_core::compensation::{Affine, Compensation, Sample};
 use mimu_core::compensator::{self, Compensator};
 use mimu_core::die::{self, DieLag};
-use mimu_core::effects::{Directions, Effect, Effects, Refused, Sensor, State, Variable};
+use mimu_core::effects::{DeviceEffect, Directions, Effects, Refused, State, Variable};
 use mimu_core::kalman::{Bank, Filter, Innovation, Rejected};
 use mimu_core::single;
-use mimu_core::stored::{self, Curves, NODES, Origin, ROOM, Record, Stored, TooLong};
+use mimu_core::stored::{self, Curves, NODES, Origin, ROOM, Stored, TooLong};
 use mimu_core::table::{self, Node, Table};
 use mimu_core::wire::{
     Call, CompensatedBatch, Decoder, EncodeError, MAX_FRAME, Message, RawBatch, Sums,
     effects_of_this_build, encode, volts,
 };
+use mimu_core::{PerSensor, Sensor};
 use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
 
 /// [`Affine::apply`].
@@ -31,28 +32,28 @@ pub fn compensation(model: &Compensation<f32>, raw: &Sample<f32>) -> Sample<f32>
     model.apply(raw)
 }
 
-/// [`Effect::named`]: with it all that the table of effects refers to.
+/// [`DeviceEffect::named`]: with it all that the table of effects refers to.
 #[inline(never)]
 pub fn effect_named(
     id: &str,
     coefficients: &[f32],
     form: Option<f32>,
-) -> Result<Effect<f32>, Refused> {
-    Effect::named(id, coefficients, form)
+) -> Result<DeviceEffect<f32>, Refused> {
+    DeviceEffect::named(id, coefficients, form)
 }
 
-/// [`Effect::term`].
+/// [`DeviceEffect::term`].
 #[inline(never)]
 pub fn effect_term(
     sensor: Sensor,
     axis: usize,
     coefficient: f32,
     variables: &[Variable],
-) -> Result<Effect<f32>, Refused> {
-    Effect::term(sensor, axis, coefficient, variables)
+) -> Result<DeviceEffect<f32>, Refused> {
+    DeviceEffect::term(sensor, axis, coefficient, variables)
 }
 
-/// [`Effect::code`].
+/// [`DeviceEffect::code`].
 #[inline(never)]
 pub fn effect_code(
     sensor: Sensor,
@@ -60,13 +61,16 @@ pub fn effect_code(
     errors: &[f32; 9],
     weight: f32,
     zero: f32,
-) -> Result<Effect<f32>, Refused> {
-    Effect::code(sensor, axis, errors, weight, zero)
+) -> Result<DeviceEffect<f32>, Refused> {
+    DeviceEffect::code(sensor, axis, errors, weight, zero)
 }
 
 /// [`Effects::push`].
 #[inline(never)]
-pub fn effects_push(effects: &mut Effects<f32, 8>, effect: Effect<f32>) -> Result<(), Refused> {
+pub fn effects_push(
+    effects: &mut Effects<f32, 8>,
+    effect: DeviceEffect<f32>,
+) -> Result<(), Refused> {
     effects.push(effect)
 }
 
@@ -140,16 +144,15 @@ pub fn bank_update(
 
 /// [`Effects::new`].
 #[inline(never)]
-pub fn effects_new(gyro: &Affine<f64>, accel: &Affine<f64>) -> Option<Effects<f32, 8>> {
-    Effects::new(gyro, accel)
+pub fn effects_new(models: &Compensation<f64>) -> Option<Effects<f32, 8>> {
+    Effects::new(models)
 }
 
 /// [`Effects::of`], which the device calls when it is given a calibration, and [`State::gap`].
 #[inline(never)]
-pub fn effects_of(of: [Directions<f32>; 2], state: &mut State<f32, 8>) -> Effects<f32, 8> {
-    let [gyro, accel] = of;
+pub fn effects_of(of: PerSensor<Directions<f32>>, state: &mut State<f32, 8>) -> Effects<f32, 8> {
     state.gap();
-    Effects::of(gyro, accel)
+    Effects::of(of)
 }
 
 /// [`Table::new`].
@@ -160,7 +163,7 @@ pub fn table_new(nodes: &[Node<f32>]) -> Result<Table<f32, 16>, table::Refused> 
 
 /// [`Table::state`] and [`Table::follow`].
 #[inline(never)]
-pub fn table_follow(table: &Table<f32, 16>, dies_c: [f32; 2]) -> table::State<f32> {
+pub fn table_follow(table: &Table<f32, 16>, dies_c: PerSensor<f32>) -> table::State<f32> {
     let mut state = table.state();
     table.follow(&mut state, dies_c);
     state
@@ -191,9 +194,9 @@ pub fn die_follow(lag_s: f32, dt_s: f32, readings_c: [f32; 2]) -> Option<f32> {
 #[inline(never)]
 pub fn stored_encode(
     origin: &Origin,
-    found_with: [&Matrix3<f32>; 2],
+    found_with: PerSensor<&Matrix3<f32>>,
     curves: &Curves<'_>,
-    effects: &[Record<'_>],
+    effects: &[DeviceEffect<f32>],
     out: &mut [u8],
 ) -> Result<usize, TooLong> {
     stored::encode(origin, found_with, curves, effects, out)
@@ -209,7 +212,7 @@ pub fn stored_decode(bytes: &[u8]) -> (u64, Result<Stored, stored::Refused>) {
 #[inline(never)]
 pub fn stored_trim(
     bytes: &mut [u8],
-    add: [[f32; 3]; 2],
+    add: PerSensor<[f32; 3]>,
     trimmed_s: u64,
 ) -> Result<(), stored::Refused> {
     stored::trim(bytes, add, trimmed_s)
@@ -276,7 +279,7 @@ pub fn compensator_follow(
     thermometer_c: Option<f32>,
 ) -> (
     compensator::State<f32, ROOM>,
-    Option<[f32; 2]>,
+    Option<PerSensor<f32>>,
     table::Place,
 ) {
     let mut state = before.state(1000.0).long_after_power_on();

@@ -4,12 +4,9 @@ use super::temperature::at_temperature;
 use super::*;
 
 /// 0.1 deg/s of the gyro for each kelvin that a die with a lag of a minute is behind.
-const COEFFICIENTS: [f32; 3] = [1.745e-3; 3];
-const LAG: Record<'_> = Record::Named {
-    id: "gyro_thermal_lag",
-    coefficients: &COEFFICIENTS,
-    nonlinear: Some(60.0),
-};
+fn lag() -> DeviceEffect<f32> {
+    DeviceEffect::named("gyro_thermal_lag", &[1.745e-3; 3], Some(60.0)).unwrap()
+}
 
 /// Compensated samples of pipelines in which the TEMP pins read `temp_c`, where that is a number, and else are open. `before` is called with
 /// the number of each sample, before it is taken.
@@ -52,11 +49,11 @@ fn streaming(stored: Stored) -> Pipeline {
 fn effects_begin_with_the_first_reading_of_the_thermometer() {
     // Open at power-on for two seconds; the dies have been at 45 °C for long.
     let late = |number| if number < 2_000 { f64::NAN } else { 45.0 };
-    let run = |effects: &[Record<'_>]| {
+    let run = |effects: &[DeviceEffect<f32>]| {
         let mut pipeline = streaming(calibration(effects));
         compensated(&mut pipeline, 0..10_000, late, |_, _| ())
     };
-    let (with, without) = (run(&[LAG]), run(&[]));
+    let (with, without) = (run(&[lag()]), run(&[]));
     assert_eq!(with.len(), without.len());
     for ((number, with, _), (_, without, _)) in with.iter().zip(&without) {
         // The filtered temperature is within 0.01 K of its first value, which makes 2e-5 rad/s.
@@ -108,14 +105,10 @@ fn a_new_calibration_begins_with_the_next_sample_at_the_present_temperature() {
 fn lags_of_dies_and_effects_go_on_under_a_new_calibration() {
     // Hot air from 25 to 55 °C; the dies follow by 40 s, the effect by a minute.
     let ramp = |number: u32| 25.0 + (0.5 * f64::from(number) / 1000.0).min(30.0);
-    let one = || with_lags(&[LAG], Some([40.0, 40.0]));
+    let one = || with_lags(&[lag()], Some(PerSensor::both(40.0)));
     // The same beside another effect, whose place in the list is before it.
-    let warm_up = Record::Named {
-        id: "gyro_warm_up",
-        coefficients: &[0.0; 3],
-        nonlinear: Some(100.0),
-    };
-    let two = || with_lags(&[warm_up, LAG], Some([40.0, 40.0]));
+    let warm_up = DeviceEffect::named("gyro_warm_up", &[0.0; 3], Some(100.0)).unwrap();
+    let two = || with_lags(&[warm_up, lag()], Some(PerSensor::both(40.0)));
     let whole = compensated(&mut streaming(one()), 0..90_000, ramp, |_, _| ());
     let mut exchanged = streaming(one());
     let exchanged = compensated(&mut exchanged, 0..90_000, ramp, |number, pipeline| {

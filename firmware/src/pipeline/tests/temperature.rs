@@ -21,7 +21,10 @@ fn on_the_ramp(lag_s: f64, t: f64) -> f64 {
 fn compensation_follows_the_dies_of_each_triad_and_the_raw_stream_the_thermometer() {
     for lags_s in [[40.0, 40.0], [-20.0, -20.0], [40.0, -20.0], [-20.0, 40.0]] {
         let mut pipeline = Pipeline::new();
-        pipeline.calibrate(with_lags(&[], Some(lags_s.map(|s| s as f32))));
+        pipeline.calibrate(with_lags(
+            &[],
+            Some(PerSensor::from(lags_s).map(|s| s as f32)),
+        ));
         pipeline.stream(both());
         // 25 °C, and from 5 s on 0.1 °C/s.
         let at = |number: u32| 25.0 + 0.1 * (f64::from(number) / 1000.0 - 5.0).max(0.0);
@@ -41,8 +44,8 @@ fn compensation_follows_the_dies_of_each_triad_and_the_raw_stream_the_thermomete
                         // The filter of the thermometer is behind by its second.
                         let filtered = t - 1.0 + (-t).exp();
                         assert!((thermometer - 25.0 - 0.1 * filtered).abs() < 0.01);
-                        assert_eq!(head.temp_c, dies_c[0]);
-                        let dies_c = dies_c.map(f64::from);
+                        assert_eq!(head.temp_c, dies_c.gyro);
+                        let dies_c = [dies_c.gyro, dies_c.accel].map(f64::from);
                         for ((worst, die_c), lag_s) in worst.iter_mut().zip(dies_c).zip(lags_s) {
                             *worst = worst.max((die_c - on_the_ramp(lag_s, t)).abs());
                         }
@@ -95,7 +98,7 @@ fn samples_outside_the_range_are_flagged_from_the_first_degree_on() {
 #[test]
 fn without_a_thermometer_the_last_good_temperature_is_used_and_flagged() {
     let mut pipeline = Pipeline::new();
-    pipeline.calibrate(with_lags(&[], Some([40.0; 2])));
+    pipeline.calibrate(with_lags(&[], Some(PerSensor::both(40.0))));
     pipeline.stream(both());
     let mut last = None;
     for number in 0..30_000 {
@@ -117,7 +120,7 @@ fn without_a_thermometer_the_last_good_temperature_is_used_and_flagged() {
     assert_ne!(head.flags & flags::NO_TEMPERATURE, 0);
     // And without any the lag does not begin at what stands in for it.
     let mut pipeline = Pipeline::new();
-    pipeline.calibrate(with_lags(&[], Some([40.0; 2])));
+    pipeline.calibrate(with_lags(&[], Some(PerSensor::both(40.0))));
     pipeline.stream(both());
     let mut heads = Vec::new();
     for number in 0..4_000 {

@@ -190,22 +190,19 @@ pub fn download_text(result: &DeviceResult<Contents>) -> String {
         }
     }
     for effect in &found.effects {
-        let numbers: Vec<String> = effect
-            .coefficients
-            .iter()
-            .map(|c| format!("{c:e}"))
-            .collect();
-        line!(out, "\neffect {}: {}", effect.id, numbers.join(", "));
-        if let Some(time) = effect.time_constant_s {
+        let numbers = effect.coefficients().iter().map(|c| format!("{c:e}"));
+        let numbers: Vec<String> = numbers.collect();
+        line!(out, "\neffect {effect}: {}", numbers.join(", "));
+        if let Some(time) = effect.nonlinear() {
             line!(out, "  time constant {time} s");
         }
-        if let Some(converter) = &effect.converter {
+        if let Some(converter) = effect.converter() {
             line!(
                 out,
                 "  converter of {}: bit 0 is worth {} V, code 0 reads {} V",
-                converter.axes,
-                converter.weight_of_bit_0_v,
-                converter.reading_of_code_0_v
+                converter.axes(),
+                converter.weight,
+                converter.zero
             );
         }
     }

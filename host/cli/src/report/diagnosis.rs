@@ -21,7 +21,7 @@ fn meaning(d: &DiagnosisResult) -> &'static str {
     // Reported below, and not judged.
     let usual = d.leftover.iter().any(|l| l.usual);
     match d.verdict {
-        Verdict::Clean if d.sensors.named().any(|(_, s)| open(s)) => {
+        Verdict::Clean if d.sensors.present().any(|(_, s)| open(s)) => {
             "noise, and what the poses leave open of the accelerometer, explain what the affine calibration leaves"
         }
         Verdict::Clean if usual => {

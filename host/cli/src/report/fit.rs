@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use mimu::fit::Split;
-use mimu::quantity::{plural, plus_minus, significant};
+use mimu::quantity::{Sensor, plural, plus_minus, significant};
 use mimu::readable;
 use mimu::result::fit::{DwellResult, FitResult, Parameter, SensorFitResult};
 use mimu_recording::Reference;
@@ -24,7 +24,7 @@ pub fn fit_text(fit: &FitResult) -> String {
     } else {
         recorded(&mut out, fit);
     }
-    for (name, sensor) in fit.sensors.named() {
+    for (name, sensor) in fit.sensors.present() {
         let _ = writeln!(out);
         sensor_text(&mut out, fit, name, sensor);
     }
@@ -74,7 +74,7 @@ fn recorded(out: &mut String, fit: &FitResult) {
 /// Half of a 95 % interval in sigmas.
 const INTERVAL: f64 = 1.96;
 
-fn sensor_text(out: &mut String, fit: &FitResult, name: &str, sensor: &SensorFitResult) {
+fn sensor_text(out: &mut String, fit: &FitResult, name: Sensor, sensor: &SensorFitResult) {
     let dwells = plural(sensor.dwells as u64, "dwell");
     let used = match sensor.unit {
         "rad" => format!(
@@ -159,9 +159,9 @@ fn sensor_text(out: &mut String, fit: &FitResult, name: &str, sensor: &SensorFit
 }
 
 /// The physical quantities by axis.
-fn parameters_text(out: &mut String, fit: &FitResult, name: &str, sensor: &SensorFitResult) {
+fn parameters_text(out: &mut String, fit: &FitResult, name: Sensor, sensor: &SensorFitResult) {
     // The accelerometer's own axes are the frame then.
-    let by_choice = fit.reference == Reference::Gravity && name == "accel";
+    let by_choice = fit.reference == Reference::Gravity && name == Sensor::Accel;
     let kinds = [
         ("scale", "scale factor"),
         ("bias", "bias"),

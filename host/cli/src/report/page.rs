@@ -3,7 +3,7 @@
 //! It is XML too, so that any parser reads it. A number in it is a `data` element whose value is that of the JSON.
 
 use maud::{Markup, PreEscaped, html};
-use mimu::quantity::significant;
+use mimu::quantity::{Sensor, significant};
 
 use super::svg::raised;
 
@@ -57,9 +57,9 @@ pub fn written(text: &str) -> String {
 }
 
 /// Names of sensors in sentences.
-pub fn spoken(sensor: &str) -> &str {
+pub fn spoken(sensor: Sensor) -> &'static str {
     match sensor {
-        "accel" => "accelerometer",
-        other => other,
+        Sensor::Gyro => "gyro",
+        Sensor::Accel => "accelerometer",
     }
 }

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use mimu::quantity::{plus_minus, significant};
+use mimu::quantity::{Sensor, plus_minus, significant};
 use mimu::readable;
 use mimu_thermal::compare::Comparison;
 use mimu_thermal::result::{CurveResult, SensorResult, ThermalResult};
@@ -43,7 +43,7 @@ pub fn thermal_text(result: &ThermalResult) -> String {
     if result.verdict == "misfit" {
         wrap(&mut out, "", VERDICT_MISFIT);
     }
-    for (name, sensor) in result.sensors.named() {
+    for (name, sensor) in result.sensors.present() {
         let _ = writeln!(out);
         sensor_text(&mut out, name, sensor);
         curves_text(&mut out, name, result);
@@ -55,7 +55,7 @@ pub fn thermal_text(result: &ThermalResult) -> String {
     out
 }
 
-fn sensor_text(out: &mut String, name: &str, sensor: &SensorResult) {
+fn sensor_text(out: &mut String, name: Sensor, sensor: &SensorResult) {
     let unit = readable::error(&sensor.unit);
     let _ = writeln!(out, "{name}");
     if let Some(used) = &sensor.used {
@@ -132,16 +132,16 @@ fn bins_text(out: &mut String, sensor: &SensorResult) {
 }
 
 /// Whether a curve is one of `sensor`'s that people know: not of C and o.
-pub(super) fn physical(curve: &CurveResult, sensor: &str) -> bool {
+pub(super) fn physical(curve: &CurveResult, sensor: Sensor) -> bool {
     let rest = curve
         .name
-        .trim_start_matches(sensor)
+        .trim_start_matches(sensor.name())
         .trim_start_matches('_');
-    curve.sensor.name() == sensor && !rest.starts_with("C_") && !rest.starts_with("o_")
+    curve.sensor == sensor && !rest.starts_with("C_") && !rest.starts_with("o_")
 }
 
 /// Physical parameters at some temperatures; JSON has the inverse model too, and more temperatures.
-fn curves_text(out: &mut String, name: &str, result: &ThermalResult) {
+fn curves_text(out: &mut String, name: Sensor, result: &ThermalResult) {
     let curves: Vec<&CurveResult> = result.curves.iter().filter(|c| physical(c, name)).collect();
     let Some(first) = curves.first() else {
         return;
@@ -155,7 +155,10 @@ fn curves_text(out: &mut String, name: &str, result: &ThermalResult) {
     let _ = writeln!(out);
     for curve in curves {
         let unit = readable::parameter(&curve.unit);
-        let label = curve.name.trim_start_matches(name).trim_start_matches('_');
+        let label = curve
+            .name
+            .trim_start_matches(name.name())
+            .trim_start_matches('_');
         let _ = write!(out, "  {:<34}", format!("{label}, {}", unit.unit));
         for &k in &shown {
             let half = 0.5 * (curve.upper[k] - curve.lower[k]) * unit.factor;

@@ -1,7 +1,7 @@
 //! A fit over temperature as a page.
 
 use maud::{Markup, PreEscaped, html};
-use mimu::quantity::plus_minus;
+use mimu::quantity::{Sensor, plus_minus};
 use mimu::readable;
 use mimu_thermal::judge::{Bin, Hysteresis};
 use mimu_thermal::result::{CurveResult, SensorResult, ThermalResult};
@@ -16,7 +16,7 @@ pub fn thermal_page(result: &ThermalResult, made: &Made) -> String {
         (head(result, made))
         h2 { "Errors and lag" }
         (errors(result))
-        @for (name, sensor) in result.sensors.named() {
+        @for (name, sensor) in result.sensors.present() {
             @if let Some(used) = &sensor.used { p { (spoken(name)) " uses " (used.words()) "." } }
             @if let Some(what) = sensor.inseparable { p { (spoken(name)) ", inseparable: " (what) "." } }
         }
@@ -28,7 +28,7 @@ pub fn thermal_page(result: &ThermalResult, made: &Made) -> String {
                  temperature rises and falls, each axis over temperature, and over time; a dashed line is where the next recording begins."
             }
         }
-        @for (name, sensor) in result.sensors.named() {
+        @for (name, sensor) in result.sensors.present() {
             h2 class="sensor" { (spoken(name)) }
             @if !sensor.bins.is_empty() { (bins(sensor)) }
             @if let Some(all) = &sensor.hysteresis { (hysteresis(sensor, all)) }
@@ -72,7 +72,7 @@ fn errors(result: &ThermalResult) -> Markup {
                 th { "sensor" } th class="n" { "in sample" } th class="n" { "held out" } th class="n" { "noise alone" } th { "lag" }
             } }
             tbody {
-                @for (name, sensor) in result.sensors.named() {
+                @for (name, sensor) in result.sensors.present() {
                     @let unit = readable::error(&sensor.unit);
                     @let cell = |v: Option<f64>| html! { td class="n" { (number(v.unwrap_or(f64::NAN), unit.factor, &unit.unit)) } };
                     tr {
@@ -131,7 +131,7 @@ fn hysteresis(sensor: &SensorResult, all: &[Hysteresis]) -> Markup {
     }
 }
 
-fn curves(result: &ThermalResult, name: &str) -> Markup {
+fn curves(result: &ThermalResult, name: Sensor) -> Markup {
     let found: Vec<&CurveResult> = result.curves.iter().filter(|c| physical(c, name)).collect();
     let Some(first) = found.first() else {
         return html! {};
@@ -148,7 +148,7 @@ fn curves(result: &ThermalResult, name: &str) -> Markup {
             tbody {
                 @for curve in found {
                     @let unit = readable::parameter(&curve.unit);
-                    @let label = curve.name.trim_start_matches(name).trim_start_matches('_');
+                    @let label = curve.name.trim_start_matches(name.name()).trim_start_matches('_');
                     tr {
                         td { (label) ", " (unit.unit) }
                         @for k in &shown {

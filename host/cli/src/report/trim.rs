@@ -21,8 +21,8 @@ pub fn trim_text(result: &DeviceResult<Trimmed>) -> String {
     );
     // rad/s as deg/s, and m/s² as mg.
     let triads = [
-        ("gyro", &found.gyro, 1_f64.to_degrees(), "deg/s"),
-        ("accel", &found.accel, 1000.0 / 9.80665, "mg"),
+        ("gyro", &found.triads.gyro, 1_f64.to_degrees(), "deg/s"),
+        ("accel", &found.triads.accel, 1000.0 / 9.80665, "mg"),
     ];
     for (name, triad, factor, unit) in triads {
         for (i, axis) in AXES.iter().enumerate() {
@@ -41,7 +41,7 @@ pub fn trim_text(result: &DeviceResult<Trimmed>) -> String {
             let _ = writeln!(out, "{:<9}{line}", format!("{name} {axis}"));
         }
     }
-    if !found.accel.trimmed {
+    if !found.triads.accel.trimmed {
         let _ = writeln!(
             out,
             "the accelerometer keeps its offsets, as its pose is not given: --up +z --gravity 9.81"

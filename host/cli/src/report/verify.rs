@@ -15,7 +15,7 @@ pub fn verify_text(verification: &VerifyResult) -> String {
         "{:<7}{:>14}{:>14}{:>14}{:>14}{:>12}",
         "", "one scale", "calibrated", "largest", "noise floor", "over"
     );
-    for (name, s) in verification.sensors.named() {
+    for (name, s) in verification.sensors.present() {
         let figure = readable::error(s.unit);
         let [raw, rms, max, floor] =
             [s.rms_raw, s.rms, s.max, s.noise_floor].map(|v| match v.is_finite() {
@@ -42,7 +42,7 @@ pub fn verify_text(verification: &VerifyResult) -> String {
             }
         }
     }
-    for (name, s) in verification.sensors.named() {
+    for (name, s) in verification.sensors.present() {
         let _ = writeln!(out, "{name}: {}, rms", s.figure.description());
     }
     out.push_str(

@@ -1,10 +1,11 @@
 //! `mimu verify` and `mimu apply` with a calibration over temperature, on a unit whose forward model is written out here: cubics of the
 //! temperature of dies that follow the thermometer late.
 
+use mimu::quantity::PerSensor;
 use std::fmt::Write as _;
 use std::path::Path;
 
-use mimu::calibration::{Calibration, NodeTable, OverTemperature, TemperatureNode};
+use mimu::calibration::{Calibration, DieTable, NodeTable, OverTemperature, TemperatureNode};
 use mimu::fit::{Method, Options, fit};
 use mimu::prepared::Prepared;
 use mimu::stillness::STILL_FACTOR;
@@ -138,13 +139,12 @@ fn calibrations(folder: &Path) {
     calibration.format = Calibration::format_of(true).into();
     calibration.temperature = Some(OverTemperature {
         range_c: [10.0, 40.0],
-        lag_s: Some(LAGS_S[0]),
-        interval_lag_s: Some([19.0, 21.0]),
-        accel_lag_s: Some(LAGS_S[1]),
-        interval_accel_lag_s: Some([7.0, 9.0]),
         biases_only: false,
-        gyro_hysteresis: None,
-        accel_hysteresis: None,
+        dies: PerSensor::from(LAGS_S).map(|lag_s| DieTable {
+            lag_s: Some(lag_s),
+            interval_lag_s: Some([lag_s - 1.0, lag_s + 1.0]),
+            hysteresis: None,
+        }),
         nodes: (0..7).map(|k| node(10.0 * f64::from(k) - 5.0)).collect(),
     });
     std::fs::write(folder.join("curves.toml"), calibration.to_toml()).unwrap();

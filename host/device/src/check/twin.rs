@@ -12,7 +12,7 @@ use super::Checked;
 use crate::heard::Samples;
 use crate::image::Image;
 use mimu::calibration::{Calibration, compensator};
-use mimu::quantity::Sensor;
+use mimu::quantity::{PerSensor, Sensor};
 use mimu_recording::error::{Error, Result};
 
 /// Part of a reading that single precision may be off by at the turn of a bit: a reading, its product, and the sum with the code at
@@ -31,7 +31,7 @@ pub(super) struct Twin {
     single: Running<f32>,
     double: Running<f64>,
     on_curves: bool,
-    dies: Option<[die::State<f32>; 2]>,
+    dies: Option<PerSensor<die::State<f32>>>,
     /// Number of the first sample of the batch before; time since power-on is counted by it, as on the device.
     followed: u32,
     /// Of the sample that would come next.
@@ -82,7 +82,7 @@ impl Twin {
     pub fn compare(&mut self, raw: &Samples, device: &Samples, found: &mut Checked) {
         let head = &raw.head;
         let first = self.next != Some(head.first);
-        let dies_c = device.dies_c.unwrap_or([device.head.temp_c; 2]);
+        let dies_c = device.dies_c.unwrap_or(PerSensor::both(device.head.temp_c));
         self.follow_dies(head, dies_c, first, found);
         self.follow(head, dies_c);
         if first {
@@ -99,10 +99,10 @@ impl Twin {
             found.samples += 1;
             found
                 .gyro
-                .note(&device.gyro, &single.gyro, &double.gyro, &bounds[0]);
+                .note(&device.gyro, &single.gyro, &double.gyro, &bounds.gyro);
             found
                 .accel
-                .note(&device.accel, &single.accel, &double.accel, &bounds[1]);
+                .note(&device.accel, &single.accel, &double.accel, &bounds.accel);
         }
         self.next = Some(head.first.wrapping_add(raw.values.len() as u32));
     }
@@ -111,7 +111,7 @@ impl Twin {
     fn follow_dies(
         &mut self,
         head: &BatchHead,
-        dies_c: [f32; 2],
+        dies_c: PerSensor<f32>,
         first: bool,
         found: &mut Checked,
     ) {
@@ -122,7 +122,8 @@ impl Twin {
         let lags = &self.single.compensator.lags;
         match &mut self.dies {
             Some(states) => {
-                for ((lag, state), die_c) in lags.iter().zip(states).zip(dies_c) {
+                for (sensor, lag) in lags.iter() {
+                    let (state, die_c) = (&mut states[sensor], dies_c[sensor]);
                     if *lag == DieLag::none() {
                         continue;
                     }
@@ -134,18 +135,19 @@ impl Twin {
                 }
             }
             None => {
-                self.dies = Some([0, 1].map(|k| lags[k].state_of(head.temp_c, dies_c[k])));
+                let known = lags.zip(dies_c);
+                self.dies = Some(known.map(|(lag, die_c)| lag.state_of(head.temp_c, die_c)));
             }
         }
-        let [mut low, mut high] = found.die_range_c.unwrap_or([dies_c[0]; 2]);
-        for die_c in dies_c {
+        let [mut low, mut high] = found.die_range_c.unwrap_or([dies_c.gyro; 2]);
+        for (_, die_c) in dies_c {
             (low, high) = (low.min(die_c), high.max(die_c));
         }
         found.die_range_c = Some([low, high]);
     }
 
     /// Follows time and temperature, at the temperatures of the dies that the device has used.
-    fn follow(&mut self, head: &BatchHead, dies_c: [f32; 2]) {
+    fn follow(&mut self, head: &BatchHead, dies_c: PerSensor<f32>) {
         let passed = head.first.wrapping_sub(self.followed);
         self.followed = head.first;
         let thermometer_c = head.thermometer_c();
@@ -161,8 +163,8 @@ impl Twin {
 
     /// Readings without errors by the code, in double precision. Within rounding of a turn either side is right, and a bit's error apart: the
     /// one that single precision takes.
-    fn without_code_errors(&self, raw: &Sample<f32>) -> [Vector3<f64>; 2] {
-        let exact = [raw.gyro, raw.accel].map(|u| u.map(f64::from));
+    fn without_code_errors(&self, raw: &Sample<f32>) -> Sample<f64> {
+        let exact = raw.map(|u| u.map(f64::from));
         let (Some(stored), Some(file)) = (
             &self.single.compensator.effects,
             &self.double.compensator.effects,
@@ -170,33 +172,31 @@ impl Twin {
             return exact;
         };
         let single = single::without_code_errors(stored, raw);
-        let single = [single.gyro, single.accel].map(|u| u.map(f64::from));
+        let single = single.map(|u| u.map(f64::from));
         let beside = |by: f64| {
-            let [gyro, accel] = exact.map(|u| u * (1.0 + by));
-            let clean = file.without_code_errors(&Sample { gyro, accel });
-            [exact[0] - gyro + clean.gyro, exact[1] - accel + clean.accel]
+            let moved = exact.map(|u| u * (1.0 + by));
+            let clean = file.without_code_errors(&moved);
+            Sample::from_fn(|s| exact[s] - moved[s] + clean[s])
         };
         let sides = [0.0, TURN, -TURN].map(beside);
-        [0, 1].map(|triad| {
+        Sample::from_fn(|s| {
             Vector3::from_fn(|axis, _| {
-                let off =
-                    |side: &[Vector3<f64>; 2]| (side[triad][axis] - single[triad][axis]).abs();
+                let off = |side: &Sample<f64>| (side[s][axis] - single[s][axis]).abs();
                 let nearest = sides.iter().min_by(|a, b| off(a).total_cmp(&off(b)));
-                nearest.map_or(f64::NAN, |side| side[triad][axis])
+                nearest.map_or(f64::NAN, |side| side[s][axis])
             })
         })
     }
 
     /// In double precision, with what rounding can make of it.
-    fn double(&mut self, raw: &Sample<f32>) -> (Sample<f64>, [Vector3<f64>; 2]) {
-        let [gyro, accel] = self.without_code_errors(raw);
+    fn double(&mut self, raw: &Sample<f32>) -> (Sample<f64>, Sample<f64>) {
+        let clean = self.without_code_errors(raw);
         // On a curve each number is itself a sum of four terms.
         let times = if self.on_curves { 2.0 } else { 1.0 };
         let Running { compensator, state } = &mut self.double;
-        let models = state.models();
-        let bounds = [(&models.gyro, &gyro), (&models.accel, &accel)];
-        let bounds = bounds.map(|(model, raw)| rounding(model, raw) * times);
-        let sample = compensator.apply_clean(state, &Sample { gyro, accel });
+        let of = state.models().as_ref().zip(clean.as_ref());
+        let bounds = of.map(|(model, raw)| rounding(model, raw) * times);
+        let sample = compensator.apply_clean(state, &clean);
         (sample, bounds)
     }
 }

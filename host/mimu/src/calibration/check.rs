@@ -7,7 +7,7 @@ use nalgebra::{Matrix3, Vector3};
 use super::{
     Calibration, FORMAT, FORMAT_OF_CURVES, FORMULA, INVERSE_DIRECTION, TriadTable, effect,
 };
-use crate::quantity::Sensor;
+use crate::quantity::{PerSensor, Sensor};
 use crate::triad::Forward;
 use mimu_recording::error::{Error, Result};
 
@@ -131,7 +131,10 @@ impl Calibration {
         }
         match &self.temperature {
             None => Ok(()),
-            Some(all) => all.check(place, [self.gyro.is_some(), self.accel.is_some()]),
+            Some(all) => {
+                let has = PerSensor::from_fn(|sensor| self.table(sensor).is_some());
+                all.check(place, has)
+            }
         }
     }
 }

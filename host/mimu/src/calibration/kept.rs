@@ -1,23 +1,23 @@
 //! The calibration that a device keeps, as a file again.
 
 use mimu_core::compensation::Affine;
-use mimu_core::effects::{Sensor as DeviceSensor, Variable};
+use mimu_core::effects::{DeviceEffect, Variable};
 use mimu_core::table::Node;
 use nalgebra::{Matrix3, Vector3};
 
 use super::effect::{DIRECTION, FORMULA as FORMULA_OF_EFFECTS, candidate};
 use super::of_fit::{forward_table, physical_table};
 use super::{
-    Calibration, CoefficientTable, ConverterTable, EffectTable, FORMULA, FormTable,
-    INVERSE_DIRECTION, NodeTable, OnDevice, Origin, OverTemperature, TemperatureNode, TriadTable,
-    What, reference_node,
+    Calibration, CoefficientTable, ConverterTable, DieTable, EffectTable, FORMULA, FormTable,
+    INVERSE_DIRECTION, NodeTable, Origin, OverTemperature, TemperatureNode, TriadTable,
+    reference_node,
 };
 use crate::effects::candidate::Candidate;
-use crate::effects::converter::{BITS, Converter};
+use crate::effects::converter::Converter;
 use crate::effects::quantity::Quantity;
 use crate::effects::readout;
 use crate::effects::regressor::Product;
-use crate::quantity::{AXES, Sensor};
+use crate::quantity::{AXES, PerSensor, Sensor};
 use crate::triad::{Angles, Triad};
 use mimu_recording::RawUnit;
 use mimu_recording::error::{Error, Result};
@@ -39,12 +39,10 @@ pub struct Kept {
     pub nodes: Vec<Node<f32>>,
     /// As in [`OverTemperature::range_c`], of one node as in [`Origin::temp_range_c`].
     pub range_c: Option<[f32; 2]>,
-    /// As in [`OverTemperature::lag_s`].
-    pub lag_s: Option<f32>,
-    /// As in [`OverTemperature::accel_lag_s`].
-    pub accel_lag_s: Option<f32>,
+    /// As in [`OverTemperature::lags_s`].
+    pub lags_s: Option<PerSensor<f32>>,
     /// What they lack. Converters of the axes of a triad are parts of one effect.
-    pub effects: Vec<OnDevice<f32>>,
+    pub effects: Vec<DeviceEffect<f32>>,
 }
 
 impl Calibration {
@@ -90,7 +88,7 @@ impl Calibration {
 /// The nodes, unless there is one that does not change with temperature and no lag, which is a calibration at one temperature.
 fn over_temperature(kept: &Kept) -> Option<OverTemperature> {
     let plain = |node: &Node<f32>| *node == Node::constant(node.temp_c, node.model);
-    if let ([node], None) = (kept.nodes.as_slice(), kept.lag_s)
+    if let ([node], None) = (kept.nodes.as_slice(), kept.lags_s)
         && plain(node)
     {
         return None;
@@ -111,13 +109,11 @@ fn over_temperature(kept: &Kept) -> Option<OverTemperature> {
     });
     Some(OverTemperature {
         range_c: kept.range_c.unwrap_or(ends).map(f64::from),
-        lag_s: kept.lag_s.map(f64::from),
-        interval_lag_s: None,
-        accel_lag_s: kept.accel_lag_s.map(f64::from),
-        interval_accel_lag_s: None,
         biases_only: false,
-        gyro_hysteresis: None,
-        accel_hysteresis: None,
+        dies: PerSensor::from_fn(|sensor| DieTable {
+            lag_s: kept.lags_s.map(|lags_s| f64::from(lags_s[sensor])),
+            ..DieTable::default()
+        }),
         nodes: nodes.collect(),
     })
 }
@@ -161,11 +157,11 @@ fn exact(vector: &Vector3<f64>) -> [f64; 3] {
     (*vector).into()
 }
 
-fn effect_tables(parts: &[OnDevice<f32>], place: &str) -> Result<Vec<EffectTable>> {
+fn effect_tables(parts: &[DeviceEffect<f32>], place: &str) -> Result<Vec<EffectTable>> {
     let mut all: Vec<EffectTable> = Vec::new();
     for part in parts {
         let unknown = || {
-            let problem = format!("it keeps the effect {:?}, which is not known here", part.id);
+            let problem = format!("it keeps the effect \"{part}\", which is not known here");
             Error::new(place, problem, "update mimu on this computer")
         };
         let table = effect_table(part).ok_or_else(unknown)?;
@@ -181,44 +177,33 @@ fn effect_tables(parts: &[OnDevice<f32>], place: &str) -> Result<Vec<EffectTable
     Ok(all)
 }
 
-fn effect_table(part: &OnDevice<f32>) -> Option<EffectTable> {
-    let of = match &part.what {
-        What::Term {
-            axis, variables, ..
-        } => candidate(&term_id(part.sensor, *axis, variables)?)?,
-        _ => candidate(&part.id)?,
+fn effect_table(part: &DeviceEffect<f32>) -> Option<EffectTable> {
+    let of = match part.product() {
+        Some((axis, variables)) => candidate(&term_id(part.sensor(), axis, variables)?)?,
+        None => candidate(&part.to_string())?,
     };
-    let (mut form, mut converters) = (None, Vec::new());
-    let values: Vec<(usize, f32)> = match &part.what {
-        What::Named {
-            coefficients,
-            form: value,
-        } => {
-            form = of.parameter().zip(*value).map(|(p, value)| FormTable {
-                name: p.name.into(),
-                value: f64::from(value),
-            });
-            // What was not determined is zero there, and stays out of the file.
-            let all = || coefficients.iter().copied().enumerate();
-            match all().any(|(_, c)| c != 0.0) {
-                true => all().filter(|(_, c)| *c != 0.0).collect(),
-                false => all().collect(),
-            }
-        }
-        What::Code {
-            axis,
-            errors,
-            weight,
-            zero,
-        } => {
-            let converter = Converter::of(f64::from(*weight), f64::from(*zero));
+    let form = of.parameter().zip(part.nonlinear());
+    let form = form.map(|(p, value)| FormTable {
+        name: p.name.into(),
+        value: f64::from(value),
+    });
+    let mut converters = Vec::new();
+    let all = part.coefficients().iter().copied();
+    let values: Vec<(usize, f32)> = match part.converter() {
+        Some(of) => {
+            let axis = of.axis;
+            let converter = Converter::of(f64::from(of.weight), f64::from(of.zero));
             let codes =
                 std::array::from_fn(|i| axis.is_none_or(|axis| axis == i).then_some(converter));
             converters = ConverterTable::of(&codes);
             let first = axis.map_or(0, readout::first_of);
-            (first..first + BITS).zip(errors.iter().copied()).collect()
+            (first..).zip(all).collect()
         }
-        What::Term { coefficient, .. } => vec![(0, *coefficient)],
+        // What was not determined is zero there, and stays out of the file.
+        None => match part.coefficients().iter().any(|c| *c != 0.0) {
+            true => all.enumerate().filter(|(_, c)| *c != 0.0).collect(),
+            false => all.enumerate().collect(),
+        },
     };
     let active: Vec<usize> = values.iter().map(|v| v.0).collect();
     if !active.iter().all(|k| of.active.contains(k)) {
@@ -249,12 +234,12 @@ fn effect_table(part: &OnDevice<f32>) -> Option<EffectTable> {
 }
 
 /// Public id of a term.
-fn term_id(sensor: DeviceSensor, axis: usize, variables: &[Variable]) -> Option<String> {
-    let sensor = match sensor {
-        DeviceSensor::Gyro => Sensor::Gyro,
-        DeviceSensor::Accel => Sensor::Accel,
-    };
-    let quantities: Vec<Quantity> = variables.iter().map(|v| quantity(*v)).collect();
+fn term_id(
+    sensor: Sensor,
+    axis: usize,
+    variables: impl Iterator<Item = Variable>,
+) -> Option<String> {
+    let quantities: Vec<Quantity> = variables.map(quantity).collect();
     let product = Product::term(&quantities)?;
     Some(format!(
         "term:{sensor}_{}~{}",

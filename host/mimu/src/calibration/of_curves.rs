@@ -2,7 +2,7 @@
 
 use super::of_fit::triad_table;
 use super::{Calibration, Judged, Origin, OverTemperature};
-use crate::quantity::{Figure, Sensor, rounded};
+use crate::quantity::{Figure, PerSensor, Sensor, rounded};
 use crate::triad::Triad;
 use mimu_recording::error::Result;
 use mimu_recording::{RawUnit, Reference};
@@ -46,8 +46,8 @@ pub struct CurvesOfUnit {
     pub gravity_mps2: f64,
     /// Temperature of the dies that `triads` are for, °C.
     pub temp_c: f64,
-    /// Gyro and accelerometer at that temperature.
-    pub triads: [Option<TriadOfCurves>; 2],
+    /// The triads at that temperature.
+    pub triads: PerSensor<Option<TriadOfCurves>>,
     /// The models at all temperatures.
     pub temperature: OverTemperature,
 }
@@ -59,7 +59,7 @@ impl Calibration {
     /// Curves that cannot be applied, as where C is singular at a node.
     pub fn of_curves(unit: CurvesOfUnit, created: &str) -> Result<Self> {
         let table = |sensor: Sensor| {
-            let found = unit.triads[sensor as usize].as_ref()?;
+            let found = unit.triads[sensor].as_ref()?;
             let figure = Figure::Input;
             let judged = Judged {
                 estimator: found.estimator.into(),
@@ -113,12 +113,15 @@ impl Calibration {
         &self,
         temperature: OverTemperature,
         temp_c: f64,
-        triads: [Option<Triad>; 2],
+        triads: PerSensor<Option<Triad>>,
         created: &str,
     ) -> Result<Self> {
         let mut all = self.clone();
-        let tables = [&mut all.gyro, &mut all.accel];
-        for ((sensor, table), triad) in Sensor::BOTH.into_iter().zip(tables).zip(&triads) {
+        let tables = PerSensor {
+            gyro: &mut all.gyro,
+            accel: &mut all.accel,
+        };
+        for (sensor, (table, triad)) in tables.zip(triads.as_ref()) {
             if let (Some(kept), Some(triad)) = (table, triad)
                 && let Some(judged) = kept.judged.take()
             {

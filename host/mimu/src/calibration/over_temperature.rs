@@ -1,7 +1,7 @@
 //! Calibration over temperature in a calibration file: nodes with derivatives, the range that they were found from, and the lag between
 //! thermometer and dies.
 
-use mimu_core::compensation::{Affine, Compensation};
+use mimu_core::compensation::Affine;
 use mimu_core::die::{DieLag, LAG_RANGE_S, LEAST_LAG_S};
 use mimu_core::effects::REFERENCE_C;
 use mimu_core::stored::NODES;
@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use super::Calibration;
 use super::check::implausible;
-use crate::quantity::Sensor;
+use crate::quantity::{PerSensor, Sensor};
 use mimu_recording::error::{Error, Result};
 
 /// `[temperature]` of a calibration file.
@@ -20,32 +20,35 @@ use mimu_recording::error::{Error, Result};
 pub struct OverTemperature {
     /// Dies' temperatures in the recordings that it was fitted to, °C.
     pub range_c: [f64; 2],
-    /// Lag of the dies behind the thermometer, s; negative: they lead. `None`: not determined, and none is applied. Where there is an
-    /// [`Self::accel_lag_s`] too, that of the gyro's dies.
+    /// Whether only the biases were followed over temperature, and C is that of one temperature.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub biases_only: bool,
+    /// What is known of the dies of each triad.
+    #[serde(default, skip_serializing_if = "nothing")]
+    pub dies: PerSensor<DieTable>,
+    /// One to sixteen, the coldest first.
+    #[serde(rename = "node", default)]
+    pub nodes: Vec<TemperatureNode>,
+}
+
+/// What is known of the dies of a triad: nothing, by default.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DieTable {
+    /// Lag behind the thermometer, s; negative: they lead. `None`: not determined, and none is applied.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub lag_s: Option<f64>,
     /// Bounds of it with 95 %, s.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub interval_lag_s: Option<[f64; 2]>,
-    /// Lag of the accelerometer's die, s, where it is told apart from that of the gyro's.
+    /// What heating and cooling differ by in the biases after the lag, axis by axis, SI: rms over the range, and the largest. `None`: not
+    /// known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub accel_lag_s: Option<f64>,
-    /// Bounds of it with 95 %, s.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub interval_accel_lag_s: Option<[f64; 2]>,
-    /// Whether only the biases were followed over temperature, and C is that of one temperature.
-    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
-    pub biases_only: bool,
-    /// What heating and cooling differ by in the biases of the gyro after the lag, axis by axis, rad/s: rms over the range, and the largest.
-    /// `None`: not known.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub gyro_hysteresis: Option<[[f64; 3]; 2]>,
-    /// The same of the accelerometer, m/s².
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub accel_hysteresis: Option<[[f64; 3]; 2]>,
-    /// One to sixteen, the coldest first.
-    #[serde(rename = "node", default)]
-    pub nodes: Vec<TemperatureNode>,
+    pub hysteresis: Option<[[f64; 3]; 2]>,
+}
+
+fn nothing(dies: &PerSensor<DieTable>) -> bool {
+    *dies == PerSensor::default()
 }
 
 /// Inverse models at one temperature of the dies.
@@ -87,8 +90,8 @@ pub struct NodeTable {
 #[derive(Debug, Clone)]
 pub struct Curves {
     table: Table<f64, NODES>,
-    lags: [DieLag<f64>; 2],
-    has: [bool; 2],
+    lags: PerSensor<DieLag<f64>>,
+    has: PerSensor<bool>,
 }
 
 /// Of nodes of these temperatures, °C, the one that stands for a calibration where one model has to: nearest to the temperature that
@@ -144,7 +147,7 @@ impl OverTemperature {
     }
 
     /// Refuses what cannot be applied; a bad node is named by its number, from 1. `has`: the sensors of the calibration.
-    pub(super) fn check(&self, place: &str, has: [bool; 2]) -> Result<()> {
+    pub(super) fn check(&self, place: &str, has: PerSensor<bool>) -> Result<()> {
         const AGAIN: &str = "fit the recordings over temperature again";
         let refuse = |what: &str, problem: String| {
             Err(Error::new(
@@ -163,7 +166,7 @@ impl OverTemperature {
         if let Some(problem) = self.problem_of_lags() {
             return refuse("", problem);
         }
-        let all = [self.gyro_hysteresis, self.accel_hysteresis];
+        let all = [self.dies.gyro.hysteresis, self.dies.accel.hysteresis];
         let sizes = all.iter().flatten().flatten().flatten();
         if let Some(size) = sizes.copied().find(|h| !(*h >= 0.0 && h.is_finite())) {
             return refuse("", format!("a hysteresis is {size}, and has to be a size"));
@@ -193,40 +196,28 @@ impl OverTemperature {
         Ok(())
     }
 
-    /// What heating and cooling differ by in the biases of `sensor`, axis by axis, SI: rms and largest; `None` if it is not known.
-    pub fn hysteresis(&self, sensor: Sensor) -> Option<&[[f64; 3]; 2]> {
-        match sensor {
-            Sensor::Gyro => self.gyro_hysteresis.as_ref(),
-            Sensor::Accel => self.accel_hysteresis.as_ref(),
-        }
-    }
-
-    /// Lags of the dies of gyro and accelerometer, s; `None` if they are not determined.
-    pub fn lags_s(&self) -> Option<[f64; 2]> {
-        self.lag_s
-            .map(|lag_s| [lag_s, self.accel_lag_s.unwrap_or(lag_s)])
+    /// Lags of the dies, s; `None` if none is determined. One that is not, where the other is, is applied as none.
+    pub fn lags_s(&self) -> Option<PerSensor<f64>> {
+        let lags_s = self.dies.map(|dies| dies.lag_s);
+        let known = lags_s.present().next().is_some();
+        known.then(|| lags_s.map(|lag_s| lag_s.unwrap_or(0.0)))
     }
 
     fn problem_of_lags(&self) -> Option<String> {
-        if self.accel_lag_s.is_some() && self.lag_s.is_none() {
-            return Some("accel_lag_s is there and lag_s is not".into());
-        }
         let [least, most] = LAG_RANGE_S;
-        let lags = [
-            ("lag_s", self.lag_s, self.interval_lag_s),
-            ("accel_lag_s", self.accel_lag_s, self.interval_accel_lag_s),
-        ];
-        lags.into_iter()
-            .find_map(|(name, lag_s, interval)| match (lag_s, interval) {
-                (Some(lag_s), _) if DieLag::new(lag_s).is_none() => Some(format!(
-                    "{name} is {lag_s}, and has to be from {least} to {most}, and 0 or at least {LEAST_LAG_S}"
-                )),
-                (None, Some(_)) => Some(format!("interval_{name} is there and {name} is not")),
-                (_, Some([lower, upper])) if !(lower <= upper) => Some(format!(
-                    "interval_{name} is [{lower}, {upper}], and has to rise"
-                )),
-                _ => None,
-            })
+        self.dies.into_iter().find_map(|(sensor, dies)| {
+            let problem = match (dies.lag_s, dies.interval_lag_s) {
+                (Some(lag_s), _) if DieLag::new(lag_s).is_none() => format!(
+                    "lag_s is {lag_s}, and has to be from {least} to {most}, and 0 or at least {LEAST_LAG_S}"
+                ),
+                (None, Some(_)) => "interval_lag_s is there and lag_s is not".into(),
+                (_, Some([lower, upper])) if !(lower <= upper) => {
+                    format!("interval_lag_s is [{lower}, {upper}], and has to rise")
+                }
+                _ => return None,
+            };
+            Some(format!("dies.{sensor}: {problem}"))
+        })
     }
 
     /// What is wrong with a node behind one of the temperature `before`.
@@ -234,7 +225,7 @@ impl OverTemperature {
         &self,
         node: &TemperatureNode,
         before: Option<f64>,
-        has: [bool; 2],
+        has: PerSensor<bool>,
     ) -> Option<String> {
         let temp_c = node.temp_c;
         if !is_temperature(temp_c) {
@@ -249,7 +240,7 @@ impl OverTemperature {
             ));
         }
         for sensor in Sensor::BOTH {
-            match (node.table(sensor), has[sensor as usize]) {
+            match (node.table(sensor), has[sensor]) {
                 (Some(_), false) => {
                     return Some(format!("it has [{sensor}], and the calibration has none"));
                 }
@@ -276,20 +267,17 @@ impl Curves {
             matrix: Matrix3::zeros(),
             offset: Vector3::zeros(),
         };
-        let constant = Sensor::BOTH.map(|sensor| calibration.inverse(sensor));
+        let constant = PerSensor::from_fn(|sensor| calibration.inverse(sensor));
         let nodes = temperature.nodes.iter().map(|node| {
             let of = |sensor: Sensor| match node.table(sensor) {
                 Some(table) => (table.model(), table.slope()),
-                None => (constant[sensor as usize].unwrap_or(none), none),
+                None => (constant[sensor].unwrap_or(none), none),
             };
-            let [(gyro, gyro_slope), (accel, accel_slope)] = Sensor::BOTH.map(of);
+            let both = PerSensor::from_fn(of);
             Node {
                 temp_c: node.temp_c,
-                model: Compensation { gyro, accel },
-                slope: Compensation {
-                    gyro: gyro_slope,
-                    accel: accel_slope,
-                },
+                model: both.map(|(model, _)| model),
+                slope: both.map(|(_, slope)| slope),
             }
         });
         let table = Table::new(nodes).ok()?;
@@ -303,16 +291,13 @@ impl Curves {
     /// The inverse model of `sensor` at this temperature of the dies, °C, raw to SI.
     pub fn inverse(&self, sensor: Sensor, die_c: f64) -> Option<Affine<f64>> {
         let mut state = self.table.state();
-        self.table.follow(&mut state, [die_c; 2]);
-        self.has[sensor as usize].then_some(match sensor {
-            Sensor::Gyro => state.model.gyro,
-            Sensor::Accel => state.model.accel,
-        })
+        self.table.follow(&mut state, PerSensor::both(die_c));
+        self.has[sensor].then_some(state.model[sensor])
     }
 
-    /// The lag of the dies of `sensor` behind the thermometer.
-    pub fn lag(&self, sensor: Sensor) -> &DieLag<f64> {
-        &self.lags[sensor as usize]
+    /// Lags of the dies behind the thermometer.
+    pub fn lags(&self) -> &PerSensor<DieLag<f64>> {
+        &self.lags
     }
 
     /// The same nodes for the device's arithmetic in double precision.

@@ -52,7 +52,7 @@ pub fn by_id(id: &str) -> Option<&'static Effect> {
 
 #[cfg(test)]
 mod tests {
-    use mimu_core::effects::Effect as OfCore;
+    use mimu_core::effects::DeviceEffect;
 
     use super::effect::{OnDevice, Scope};
     use super::*;
@@ -81,7 +81,7 @@ mod tests {
         for effect in all() {
             let numbers = vec![1e-3; effect.of_unit().count()];
             let parameter = effect.parameter.map(|p| p.from);
-            let of_core = OfCore::<f64>::named(effect.id, &numbers, parameter);
+            let of_core = DeviceEffect::<f64>::named(effect.id, &numbers, parameter);
             match effect.on_device() {
                 OnDevice::Never | OnDevice::ByCode => assert!(of_core.is_err(), "{}", effect.id),
                 how => {

@@ -4,7 +4,7 @@ use mimu_recording::Reference;
 use serde::Serialize;
 
 use super::verify::VerifyResult;
-use super::{Sensors, TOOL};
+use super::{TOOL, present};
 use crate::calibration::ConverterTable;
 use crate::diagnose::decision::{Accepted, Decision};
 use crate::diagnose::picture::Picture;
@@ -13,7 +13,7 @@ use crate::diagnose::{Diagnosis, SensorDiagnosis, Source, Untestable, Verdict};
 use crate::effects::candidate::Kind;
 use crate::fit::Split;
 use crate::next_experiment::{Confused, Next, NotInPlan, SizedRecipe};
-use crate::quantity::{AXES, Figure, Sensor, significant};
+use crate::quantity::{AXES, Figure, PerSensor, Sensor, significant};
 use crate::verify::Verification;
 
 /// Result of a diagnosis.
@@ -46,7 +46,8 @@ pub struct DiagnosisResult {
     /// What of `not_excited` and `confused` the plan of the next experiment (`--plan`) does not show.
     pub not_in_plan: Vec<NotInPlan>,
     /// Error figures.
-    pub sensors: Sensors<SensorDiagnosisResult>,
+    #[serde(serialize_with = "present")]
+    pub sensors: PerSensor<Option<SensorDiagnosisResult>>,
     /// Accepted effects whose physics the recordings do not decide.
     pub undecided: Vec<UndecidedResult>,
     /// Scatter beyond the known noise that nothing explains.
@@ -66,7 +67,7 @@ pub struct AcceptedResult {
     /// Public id.
     pub id: String,
     /// Whose readings err.
-    pub sensor: &'static str,
+    pub sensor: Sensor,
     /// Physics in a line.
     pub about: &'static str,
     /// Whether it is an error of the unit, which the calibration holds; else something that it should read, or an error whose time since
@@ -165,7 +166,7 @@ pub struct RejectedResult {
     /// Public id.
     pub id: String,
     /// Whose readings would err.
-    pub sensor: &'static str,
+    pub sensor: Sensor,
     /// Why not.
     pub reason: String,
 }
@@ -176,7 +177,7 @@ pub struct NotExcitedResult {
     /// Public id.
     pub id: String,
     /// Whose readings would err.
-    pub sensor: &'static str,
+    pub sensor: Sensor,
     /// What would show it.
     pub experiment: String,
     /// The recipe behind the words.
@@ -190,7 +191,7 @@ pub struct UndecidedResult {
     /// Public id of the effect.
     pub id: String,
     /// Whose readings err.
-    pub sensor: &'static str,
+    pub sensor: Sensor,
     /// The unlisted alternative model.
     pub law: &'static str,
     /// By how much its score is worse; negative where it is better.
@@ -203,7 +204,7 @@ pub struct UndecidedResult {
 #[derive(Debug, Clone, Serialize)]
 pub struct LeftoverResult {
     /// Whose.
-    pub sensor: &'static str,
+    pub sensor: Sensor,
     /// Axis, if it is of one.
     pub axis: Option<&'static str>,
     /// Which residuals: an axis, turns.
@@ -298,7 +299,7 @@ pub struct SensorDiagnosisResult {
 #[derive(Debug, Clone, Serialize)]
 pub struct UntestableResult {
     /// Sensor.
-    pub sensor: &'static str,
+    pub sensor: Sensor,
     /// Why, and what to record.
     pub reason: String,
 }
@@ -306,7 +307,7 @@ pub struct UntestableResult {
 impl From<&(Sensor, Untestable)> for UntestableResult {
     fn from((sensor, reason): &(Sensor, Untestable)) -> Self {
         Self {
-            sensor: sensor.name(),
+            sensor: *sensor,
             reason: reason.to_string(),
         }
     }
@@ -351,10 +352,7 @@ impl DiagnosisResult {
             not_excited: Vec::new(),
             confused: next.confused.clone(),
             not_in_plan: next.not_in_plan.clone(),
-            sensors: Sensors {
-                gyro: of_sensor(Sensor::Gyro),
-                accel: of_sensor(Sensor::Accel),
-            },
+            sensors: PerSensor::from_fn(of_sensor),
             undecided: Vec::new(),
             leftover: Vec::new(),
             left_out: LeftOutResult {
@@ -379,13 +377,12 @@ impl DiagnosisResult {
     }
 
     fn add(&mut self, sensor: Sensor, decision: &Decision, next: &Next) {
-        let name = sensor.name();
         let accepted = decision.accepted.iter();
         self.effects
             .extend(accepted.map(|a| AcceptedResult::of(sensor, a)));
         let rejected = decision.rejected.iter().map(|(id, reason)| RejectedResult {
             id: id.clone(),
-            sensor: name,
+            sensor,
             reason: reason.clone(),
         });
         self.rejected.extend(rejected);
@@ -393,14 +390,14 @@ impl DiagnosisResult {
         let not_excited = next.not_excited.iter().filter(|n| ours(&n.id));
         let not_excited = not_excited.map(|n| NotExcitedResult {
             id: n.id.clone(),
-            sensor: name,
+            sensor,
             experiment: n.experiment.clone(),
             recipe: n.recipe,
         });
         self.not_excited.extend(not_excited);
         let undecided = decision.undecided.iter().map(|u| UndecidedResult {
             id: u.id.clone(),
-            sensor: name,
+            sensor,
             law: u.law,
             difference: u.worse,
             experiment: u.settled_by,
@@ -412,7 +409,7 @@ impl DiagnosisResult {
                 false => Figure::Input,
             };
             LeftoverResult {
-                sensor: name,
+                sensor,
                 axis: l.axis.map(|a| AXES[a]),
                 rows: l.stratum.clone(),
                 against: l.against.clone(),
@@ -497,7 +494,7 @@ impl AcceptedResult {
                 });
         Self {
             id: candidate.id(),
-            sensor: sensor.name(),
+            sensor,
             about: candidate.about(),
             of_unit: a.of_unit,
             coefficients: coefficients.collect(),

@@ -5,12 +5,12 @@ use std::collections::BTreeMap;
 use mimu_recording::{RawUnit, Reference};
 use serde::Serialize;
 
-use super::{Sensors, TOOL};
+use super::{TOOL, present};
 use crate::dwell::Dwell;
 use crate::fit::change::Change;
 use crate::fit::{Fit, Method, SensorFit, Split};
 use crate::prepared::Prepared;
-use crate::quantity::{AXES, Figure, Sensor, inverse_names, raw_unit, scale_unit};
+use crate::quantity::{AXES, Figure, PerSensor, Sensor, inverse_names, raw_unit, scale_unit};
 use crate::stillness;
 use crate::triad::{Angles, Estimate};
 
@@ -46,7 +46,8 @@ pub struct FitResult {
     /// Contiguous blocks that were left out in turn.
     pub holdout_blocks: usize,
     /// Its triads.
-    pub sensors: Sensors<SensorFitResult>,
+    #[serde(serialize_with = "present")]
+    pub sensors: PerSensor<Option<SensorFitResult>>,
     /// How the dwells were found; null where the `step` column says.
     pub detection: Option<Detection>,
     /// All dwells, used or not.
@@ -63,7 +64,7 @@ pub struct FitResult {
 #[derive(Debug, Clone, Serialize)]
 pub struct ChangeResult {
     /// Of which sensor.
-    pub sensor: &'static str,
+    pub sensor: Sensor,
     /// Name of the parameter.
     pub name: String,
     /// With everything in the fit.
@@ -106,7 +107,7 @@ pub struct Detection {
 #[derive(Debug, Clone, Serialize)]
 pub struct LeftOutResult {
     /// Of which sensor.
-    pub sensor: &'static str,
+    pub sensor: Sensor,
     /// Step of the dwell, or of that in which the turn begins.
     pub from_step: i32,
     /// Step of the dwell, or of that in which the turn ends.
@@ -291,10 +292,7 @@ impl FitResult {
             },
             duplicates: condensed.duplicates,
             holdout_blocks: fit.options.holdout_blocks,
-            sensors: Sensors {
-                gyro: of(Sensor::Gyro),
-                accel: of(Sensor::Accel),
-            },
+            sensors: PerSensor::from_fn(of),
             detection: fit.prepared.dwells.detection.map(Detection::of),
             dwells: DwellResult::list(&fit.prepared),
             left_out: LeftOutResult::list(&fit.prepared),
@@ -321,7 +319,7 @@ impl LeftOutResult {
     fn list(prepared: &Prepared) -> Vec<Self> {
         let dwells = &prepared.dwells;
         let left_out = dwells.left_out.iter().map(|l| Self {
-            sensor: l.sensor.name(),
+            sensor: l.sensor,
             from_step: dwells.list[l.from].step,
             to_step: dwells.list[l.to].step,
             error: l.error,
@@ -440,7 +438,7 @@ fn excess_unit(fit: &Fit, found: &SensorFit, group: &str) -> String {
 impl ChangeResult {
     fn of(change: &Change) -> Self {
         Self {
-            sensor: change.sensor.name(),
+            sensor: change.sensor,
             name: change.name.clone(),
             with_all: change.with_all,
             value: change.fitted.value,

@@ -9,26 +9,16 @@ pub mod fit;
 pub mod next_experiment;
 pub mod verify;
 
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
-/// Something for each sensor that there is.
-#[derive(Debug, Clone, Serialize)]
-pub struct Sensors<T> {
-    /// Of the gyro.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub gyro: Option<T>,
-    /// Of the accelerometer.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub accel: Option<T>,
-}
+use crate::quantity::PerSensor;
 
-impl<T> Sensors<T> {
-    /// Those that there are with their names, the gyro first.
-    pub fn named(&self) -> impl Iterator<Item = (&'static str, &T)> {
-        let gyro = self.gyro.as_ref().map(|s| ("gyro", s));
-        let accel = self.accel.as_ref().map(|s| ("accel", s));
-        gyro.into_iter().chain(accel)
-    }
+/// Serialises what there is for each sensor: one that is absent has no key.
+pub fn present<T: Serialize, S: Serializer>(
+    sensors: &PerSensor<Option<T>>,
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
+    serializer.collect_map(sensors.present())
 }
 
 /// Program and version that a result is from.

@@ -2,8 +2,8 @@
 
 use serde::Serialize;
 
-use super::Sensors;
-use crate::quantity::{Figure, Sensor};
+use super::present;
+use crate::quantity::{Figure, PerSensor, Sensor};
 use crate::verify::{SensorVerification, Verification};
 
 /// Result of a verification.
@@ -12,7 +12,8 @@ pub struct VerifyResult {
     /// `mimu-verify/1`.
     pub format: &'static str,
     /// Its figures.
-    pub sensors: Sensors<SensorVerifyResult>,
+    #[serde(serialize_with = "present")]
+    pub sensors: PerSensor<Option<SensorVerifyResult>>,
     /// What a person should know.
     pub warnings: Vec<String>,
 }
@@ -55,10 +56,7 @@ impl VerifyResult {
         };
         Self {
             format: "mimu-verify/1",
-            sensors: Sensors {
-                gyro: of(Sensor::Gyro),
-                accel: of(Sensor::Accel),
-            },
+            sensors: PerSensor::from_fn(of),
             warnings: verification.warnings.clone(),
         }
     }

@@ -56,7 +56,7 @@ fn a_rest_ramp_gives_a_calibration_over_temperature_that_is_as_good_as_its_inter
     let curves = Calibration::parse(&curves.to_toml(), "again").unwrap();
     assert_eq!(curves.format, "mimu-calibration/2");
     let over = curves.temperature.as_ref().unwrap();
-    let lag = over.lag_s.unwrap();
+    let lag = over.dies.gyro.lag_s.unwrap();
     assert!((lag - 60.0).abs() < 6.0, "{lag} s");
     for sensor in Sensor::BOTH {
         let (with, without) = (errors(&curves, sensor), errors(&base, sensor));

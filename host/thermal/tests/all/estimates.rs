@@ -11,7 +11,7 @@ const TEMPS: [f64; 8] = [-4.0, 6.0, 16.0, 26.0, 36.0, 46.0, 56.0, 66.0];
 
 /// Error and standard deviation of the twelve numbers of `sensor` at `temp_c`, over the gain.
 fn errors(joint: &Joint, sensor: usize, temp_c: f64) -> [(f64, f64); 12] {
-    let curves = joint.curves[sensor].as_ref().unwrap();
+    let curves = joint.curves[Sensor::BOTH[sensor]].as_ref().unwrap();
     let (matrix, bias) = truth(sensor, temp_c);
     let [found, _] = curves.forward(temp_c);
     let error =
@@ -115,7 +115,7 @@ fn a_further_session_has_its_own_biases_and_the_same_curves() {
     ];
     let joint = estimate(&sessions, Choice::JOINT).unwrap();
     for (sensor, tolerance) in [(0, 1e-4), (1, 4e-4)] {
-        let curves = joint.curves[sensor].as_ref().unwrap();
+        let curves = joint.curves[Sensor::BOTH[sensor]].as_ref().unwrap();
         let offset = curves.session_offset(1) / GAIN[sensor];
         for axis in 0..3 {
             let error = offset[axis] - second.offset[sensor];
@@ -137,7 +137,7 @@ fn biases_that_wander_widen_the_intervals_of_the_biases() {
     let [still, walk] =
         [still, walk].map(|e| estimate(&[session(e.record(7)).unwrap()], Choice::JOINT).unwrap());
     for sensor in 0..2 {
-        let wander = walk.noise[sensor].unwrap();
+        let wander = walk.noise[Sensor::BOTH[sensor]].unwrap();
         assert!(
             wander.iter().filter(|n| n.wander > 0.0).count() >= 2,
             "{wander:?}"
@@ -187,7 +187,7 @@ fn a_derivative_is_that_of_the_curve() {
         Choice::JOINT,
     )
     .unwrap();
-    let curves = joint.curves[0].as_ref().unwrap();
+    let curves = joint.curves.gyro.as_ref().unwrap();
     let [[below, _], [_, slope], [above, _]] = [19.99, 20.0, 20.01].map(|t| curves.forward(t));
     let numeric = (above.matrix - below.matrix) / 0.02;
     assert!((numeric - slope.matrix).norm() < 1e-6 * slope.matrix.norm().max(1e-9) + 1e-10);

@@ -67,7 +67,7 @@ fn a_whole_cycle_is_fitted_and_its_file_compensates_the_unit_at_all_temperatures
     let file = Calibration::parse(&text, "cal.toml").unwrap();
     let temperature = file.temperature.as_ref().unwrap();
     assert!(temperature.nodes.len() <= 16);
-    assert!((temperature.lag_s.unwrap() - 60.0).abs() < 5.0);
+    assert!((temperature.dies.gyro.lag_s.unwrap() - 60.0).abs() < 5.0);
     for temp_c in [-4.0, 7.3, 31.0, 55.5, 66.0] {
         // Bias and 10 deg/s with 0.04 % of scale factor; 1 g with 40 µg and 40 ppm.
         let rate = Vector3::new(0.1, -0.1, 0.1);
@@ -83,7 +83,7 @@ fn the_files_pieces_between_nodes_are_the_curves() {
     let whole = fitted(&Experiment::ramp(60.0, true), 12, JOINT);
     let file = whole.calibration("2026-01-01T00:00:00Z").unwrap();
     for sensor in Sensor::BOTH {
-        let curves = whole.joint.curves[sensor as usize].as_ref().unwrap();
+        let curves = whole.joint.curves[sensor].as_ref().unwrap();
         for k in 0..40 {
             let temp_c = -8.0 + 1.9 * f64::from(k);
             let triad = curves.triad(temp_c).unwrap();
@@ -111,11 +111,11 @@ fn half_a_cycle_is_one_way_and_has_no_lag() {
     let gyro = result.sensors.gyro.unwrap();
     assert!(gyro.lag_s.is_none() && gyro.lag_reason.unwrap().contains("one way"));
     let file = half.calibration("2026-01-01T00:00:00Z").unwrap();
-    assert!(file.temperature.unwrap().lag_s.is_none());
+    assert!(file.temperature.unwrap().lags_s().is_none());
     // Without a lag the curves are those that suit the ramp by its thermometer; how far dies may be off it is in their intervals.
     let mut normal = 0.0;
     for sensor in [0, 1] {
-        let curves = half.joint.curves[sensor].as_ref().unwrap();
+        let curves = half.joint.curves[Sensor::BOTH[sensor]].as_ref().unwrap();
         let covariance = curves.covariance(40.0);
         let (_, bias) = truth(sensor, 40.0);
         let [model, _] = curves.forward(40.0);
@@ -126,7 +126,7 @@ fn half_a_cycle_is_one_way_and_has_no_lag() {
     }
     assert!(normal < 4.0, "{normal}");
     for sensor in Sensor::BOTH {
-        let judged = half.judged[sensor as usize].as_ref().unwrap();
+        let judged = half.judged[sensor].as_ref().unwrap();
         let [own, floor] = rms(&judged.errors);
         assert!(own < 1.5 * floor, "{sensor}: {own} {floor}");
     }
@@ -138,8 +138,10 @@ fn half_a_cycle_is_one_way_and_has_no_lag() {
     let known = fitted(&Experiment::ramp(60.0, false), 13, known);
     let file = known.calibration("2026-01-01T00:00:00Z").unwrap();
     let temperature = file.temperature.unwrap();
-    assert_eq!(temperature.lag_s, Some(60.0));
-    assert_eq!(temperature.interval_lag_s, None);
+    for (_, dies) in temperature.dies {
+        assert_eq!(dies.lag_s, Some(60.0));
+        assert_eq!(dies.interval_lag_s, None);
+    }
 }
 
 #[test]
@@ -153,7 +155,7 @@ fn a_sweep_at_another_rate_judges_and_shows_the_bias_of_its_session() {
     let verify = [session(slow.record(15)).unwrap()];
     let judged = fit(sessions, &verify, JOINT).unwrap();
     for (sensor, offset) in [(0, 0.001), (1, 0.02)] {
-        let found = judged.judged[sensor].as_ref().unwrap();
+        let found = judged.judged[Sensor::BOTH[sensor]].as_ref().unwrap();
         let [raw, floor] = rms(found.held_out.as_ref().unwrap());
         assert!((raw / offset - 1.0).abs() < 0.15, "{sensor}: {raw}");
         let without = found.without_session_bias.unwrap();
@@ -170,7 +172,7 @@ fn the_ramp_of_niu_and_independent_nodes_are_worse_than_the_joint_estimate() {
     let bias_error = |estimator| {
         let options = Options { estimator, ..JOINT };
         let found = fitted(&experiment, 16, options);
-        let curves = found.joint.curves[1].as_ref().unwrap();
+        let curves = found.joint.curves.accel.as_ref().unwrap();
         let squares = (0..15).map(|k| {
             let t = -4.0 + 5.0 * f64::from(k);
             let [model, _] = curves.forward(t);
@@ -208,7 +210,7 @@ fn a_soak_finds_all_parameters_and_as_printed_only_scale_factors_and_biases() {
         },
     );
     assert_eq!(ThermalResult::of(&full).verdict, "fitted");
-    let curves = full.joint.curves[1].as_ref().unwrap();
+    let curves = full.joint.curves.accel.as_ref().unwrap();
     for t in [0.0, 30.0, 60.0] {
         let [model, _] = curves.forward(t);
         let (matrix, bias) = truth(1, t);

@@ -1,5 +1,6 @@
 //! A soak: the temperature stands, is measured, and goes on at once.
 
+use mimu::quantity::Sensor;
 use mimu_thermal::classic::Classic;
 use mimu_thermal::fit::{Estimator, Options, fit};
 use nalgebra::Matrix3;
@@ -19,7 +20,7 @@ fn the_end_of_a_soak_is_a_plateau_though_the_next_ramp_follows_at_once() {
     };
     let found = fit(vec![recording], &[], options).unwrap();
     for sensor in [0, 1] {
-        let curves = found.joint.curves[sensor].as_ref().unwrap();
+        let curves = found.joint.curves[Sensor::BOTH[sensor]].as_ref().unwrap();
         let [low, high] = curves.range_c;
         assert!((low + 10.0).abs() < 0.1 && (high - 70.0).abs() < 0.1);
         for temp_c in [-10.0, 30.0, 70.0] {

@@ -7,9 +7,8 @@ use mimu_core::compensator::State;
 use mimu_core::kalman::Bank;
 use mimu_core::single;
 use mimu_core::stored::{self, ROOM};
-use mimu_core::wire::{
-    BATCH, BatchHead, Decoder, Event, KalmanState, MAX_FRAME, Message, Triad, encode,
-};
+use mimu_core::wire::{BATCH, BatchHead, Decoder, Event, KalmanState, MAX_FRAME, Message, encode};
+use mimu_core::{PerSensor, Sensor};
 use nalgebra::Vector3;
 
 use super::{INPUTS, NOISE, SPANS, Trace};
@@ -124,7 +123,7 @@ impl Twin {
     fn compare(
         &mut self,
         head: &BatchHead,
-        dies_c: [f32; 2],
+        dies_c: PerSensor<f32>,
         raw: &[Sample<f32>],
         device: &[Sample<f32>],
     ) -> Result<usize, String> {
@@ -150,7 +149,7 @@ impl Twin {
     }
 
     /// As the firmware does: batch after batch, since the time is a sum. Batches begin where the calibration came.
-    fn follow(&mut self, head: &BatchHead, dies_c: [f32; 2]) {
+    fn follow(&mut self, head: &BatchHead, dies_c: PerSensor<f32>) {
         let begins = head.first % BATCH as u32;
         let mut at = self.slow_at.map_or(begins, |last| last + BATCH as u32);
         loop {
@@ -174,9 +173,9 @@ fn same_report(device: &KalmanState, samples: &BTreeMap<u32, Sample<f32>>) -> Re
     if device.updates == 0 {
         return Ok(false);
     }
-    let (i, what) = match device.triad {
-        Triad::Gyro => (0, "gyro"),
-        Triad::Accel => (1, "accel"),
+    let (i, what) = match device.sensor {
+        Sensor::Gyro => (0, "gyro"),
+        Sensor::Accel => (1, "accel"),
     };
     let (noise, input) = (Vector3::from(NOISE), Vector3::from(INPUTS[i]));
     let mut bank = Bank::<f32>::diffuse(&noise, SPANS[i]);

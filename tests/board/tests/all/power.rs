@@ -8,6 +8,7 @@ use mimu_board::schematic::Volts;
 use mimu_board::serve::{Pace, Served};
 use mimu_board_tests::conversation::{Answer, Conversation};
 use mimu_board_tests::{MS, still};
+use mimu_core::PerSensor;
 use mimu_core::compensation::{Affine, Compensation};
 use mimu_core::stored::{self, Curves};
 use mimu_core::table::Node;
@@ -36,7 +37,7 @@ fn calibration_of(origin: &stored::Origin, nodes: u32, scale: f32) -> Vec<u8> {
     let nodes: Vec<_> = (0..nodes).map(node).collect();
     let found_with = Matrix3::identity();
     let mut bytes = vec![0; stored::MAX_LENGTH];
-    let (matrices, curves) = ([&found_with, &found_with], Curves::of(&nodes));
+    let (matrices, curves) = (PerSensor::both(&found_with), Curves::of(&nodes));
     let length = stored::encode(origin, matrices, &curves, &[], &mut bytes).unwrap();
     bytes.truncate(length);
     bytes

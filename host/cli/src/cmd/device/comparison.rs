@@ -7,7 +7,7 @@ use std::time::Duration;
 use crate::report;
 use clap::Args;
 use mimu::calibration::Calibration;
-use mimu_core::wire::Triad;
+use mimu::quantity::Sensor;
 use mimu_device::{DeviceResult, KalmanPlan, SHORTEST, check, kalman};
 use mimu_recording::error::{Error, Result};
 
@@ -87,11 +87,11 @@ pub fn run_check(args: &CheckArgs) -> Result<()> {
 
 pub fn run_kalman(args: &KalmanArgs) -> Result<()> {
     check_outputs(&[args.json.file()], &[])?;
-    let (triad, inputs) = match args.rate_dps.is_empty() {
-        true => (Triad::Accel, args.force_mps2.clone()),
+    let (sensor, inputs) = match args.rate_dps.is_empty() {
+        true => (Sensor::Accel, args.force_mps2.clone()),
         false => {
             let si = |dps: &[f32; 3]| dps.map(|d| f64::from(d).to_radians() as f32);
-            (Triad::Gyro, args.rate_dps.iter().map(si).collect())
+            (Sensor::Gyro, args.rate_dps.iter().map(si).collect())
         }
     };
     if args.each < SHORTEST {
@@ -102,7 +102,7 @@ pub fn run_kalman(args: &KalmanArgs) -> Result<()> {
         ));
     }
     let plan = KalmanPlan {
-        triad,
+        sensor,
         inputs,
         each: args.each,
         noise: args.noise_v2,
@@ -111,9 +111,9 @@ pub fn run_kalman(args: &KalmanArgs) -> Result<()> {
     let asks = std::io::stdin().is_terminal();
     let apply = |input: &[f32; 3]| {
         if asks {
-            let unit = match triad {
-                Triad::Gyro => "rad/s",
-                Triad::Accel => "m/s²",
+            let unit = match sensor {
+                Sensor::Gyro => "rad/s",
+                Sensor::Accel => "m/s²",
             };
             eprint!(
                 "apply {}, {}, {} {unit}, then press Enter: ",

@@ -10,7 +10,7 @@ use super::text::{USUAL, by};
 use mimu::diagnose::decision::{FALSE_LEFTOVER, LEVERAGE};
 use mimu::diagnose::picture::{Against, Omnibus, Panel, Picture};
 use mimu::diagnose::search::{FALSE_FOUND, FALSE_LISTED};
-use mimu::quantity::Figure;
+use mimu::quantity::{Figure, Sensor};
 use mimu::readable;
 use mimu::result::diagnosis::{AcceptedResult, DiagnosisResult, SensorDiagnosisResult};
 use mimu_recording::Reference;
@@ -21,7 +21,7 @@ use tables::chance;
 
 /// One sensor's figures and what is drawn of them.
 struct Shown<'a> {
-    name: &'static str,
+    name: Sensor,
     figures: &'a SensorDiagnosisResult,
     picture: &'a Picture,
 }
@@ -30,7 +30,7 @@ struct Shown<'a> {
 pub fn diagnosis_page(d: &DiagnosisResult, made: &Made) -> Result<String> {
     let sensors: Option<Vec<Shown>> = d
         .sensors
-        .named()
+        .present()
         .map(|(name, figures)| {
             let picture = figures.picture.as_ref()?;
             Some(Shown {
@@ -90,7 +90,7 @@ fn head(d: &DiagnosisResult, made: &Made) -> Markup {
     };
     let counts: Vec<String> = d
         .sensors
-        .named()
+        .present()
         .map(|(name, s)| {
             let what = if s.figure == Figure::Direction {
                 "turns"
@@ -123,7 +123,7 @@ fn verdict(d: &DiagnosisResult) -> Markup {
     let unexplained = d.unexplained().next().is_some();
     let left = || {
         d.sensors
-            .named()
+            .present()
             .filter(|(name, _)| d.unexplained().any(|l| l.sensor == *name))
     };
     html! {
@@ -131,7 +131,7 @@ fn verdict(d: &DiagnosisResult) -> Markup {
         @for (n, (name, _)) in left().enumerate() { @if n > 0 { ";" } " " (tables::leftover_words(d, name)) }
         @if unexplained { "." }
         @for u in &d.untestable { " The " (spoken(u.sensor)) ": " (u.reason) "." }
-        @for (name, s) in d.sensors.named() {
+        @for (name, s) in d.sensors.present() {
             @let ours: Vec<&AcceptedResult> = d.effects.iter().filter(|a| a.sensor == name).collect();
             @let shown = |value: f64| tables::figure_of(s, value);
             @if ours.is_empty() {
@@ -274,7 +274,7 @@ fn recorded(d: &DiagnosisResult) -> Markup {
         h2 { "The recording: masked, gaps, warnings" }
         dl {
             dt { "Dwells" } dd {
-                @for (n, (name, s)) in d.sensors.named().enumerate() {
+                @for (n, (name, s)) in d.sensors.present().enumerate() {
                     @if n > 0 { "; " }
                     (name) ": " (s.dwells_used) " used of " (s.dwells) (s.not_used)
                 }

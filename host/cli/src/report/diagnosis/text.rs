@@ -11,7 +11,7 @@ use effect::effect;
 pub(super) use experiments::by_experiment;
 use experiments::experiments;
 use mimu::calibration::ConverterTable;
-use mimu::quantity::{plural, plus_minus, significant};
+use mimu::quantity::{Sensor, plural, plus_minus, significant};
 use mimu::readable;
 use mimu::result::diagnosis::{
     DiagnosisResult, LeftoverResult, SecondResult, SensorDiagnosisResult,
@@ -46,7 +46,7 @@ pub fn diagnosis_text(d: &DiagnosisResult, detail: Detail) -> String {
     let _ = writeln!(out);
     errors(&mut out, d);
     let _ = writeln!(out);
-    for (name, s) in d.sensors.named() {
+    for (name, s) in d.sensors.present() {
         sensor(&mut out, d, name, s, all);
     }
     if all && d.leftover.iter().any(|l| l.usual) {
@@ -81,7 +81,7 @@ fn shown(s: &SensorDiagnosisResult, value: f64) -> String {
 /// Errors of all sensors, before and after, in one table.
 fn errors(out: &mut String, d: &DiagnosisResult) {
     let seconds = d.second.as_ref().map(|s| {
-        let both = s.before.sensors.named().zip(s.after.sensors.named());
+        let both = s.before.sensors.present().zip(s.after.sensors.present());
         both.map(|((name, b), (_, a))| (name, b, a))
             .collect::<Vec<_>>()
     });
@@ -112,7 +112,7 @@ fn errors(out: &mut String, d: &DiagnosisResult) {
     for head in heads {
         let _ = writeln!(out, "{head}");
     }
-    for (name, s) in d.sensors.named() {
+    for (name, s) in d.sensors.present() {
         let unit = readable::error(s.unit);
         let figure = |v: f64| match v.is_finite() && s.says_anything() {
             true => significant(v * unit.factor),
@@ -163,8 +163,8 @@ fn on_second(out: &mut String, second: &SecondResult) {
         "after",
         "noise floor"
     );
-    let both = second.before.sensors.named();
-    for ((name, before), (_, after)) in both.zip(second.after.sensors.named()) {
+    let both = second.before.sensors.present();
+    for ((name, before), (_, after)) in both.zip(second.after.sensors.present()) {
         let figure = readable::error(before.unit);
         let [x, y, z] = [before.rms, after.rms, after.noise_floor].map(|v| figure.write(v));
         let _ = writeln!(out, "  {name:<8}{x:>16}{y:>16}{z:>16}");
@@ -172,7 +172,13 @@ fn on_second(out: &mut String, second: &SecondResult) {
     let _ = writeln!(out);
 }
 
-fn sensor(out: &mut String, d: &DiagnosisResult, name: &str, s: &SensorDiagnosisResult, all: bool) {
+fn sensor(
+    out: &mut String,
+    d: &DiagnosisResult,
+    name: Sensor,
+    s: &SensorDiagnosisResult,
+    all: bool,
+) {
     let effects = || d.effects.iter().filter(|a| a.sensor == name);
     let none = match effects().next() {
         Some(_) => "",
@@ -202,7 +208,7 @@ fn sensor(out: &mut String, d: &DiagnosisResult, name: &str, s: &SensorDiagnosis
 }
 
 /// What remains beyond the noise. Without `all` residuals that correlate with the same quantity are together, and the first few listed.
-fn residuals(out: &mut String, d: &DiagnosisResult, name: &str, all: bool) {
+fn residuals(out: &mut String, d: &DiagnosisResult, name: Sensor, all: bool) {
     let mut groups: Vec<Vec<&LeftoverResult>> = Vec::new();
     for l in d.leftover.iter().filter(|l| l.sensor == name) {
         let same = |g: &&mut Vec<&LeftoverResult>| g[0].against == l.against && g[0].unit == l.unit;

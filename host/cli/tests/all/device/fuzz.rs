@@ -6,13 +6,14 @@
 //! ```
 
 use mimu_core::compensation::{Affine, Compensation};
-use mimu_core::effects::{Sensor, Variable};
-use mimu_core::stored::{self, Record};
+use mimu_core::effects::{DeviceEffect, Variable};
+use mimu_core::stored;
 use mimu_core::table::Node;
 use mimu_core::wire::{
     BatchHead, Counters, Event as WireEvent, MAX_FRAME, Message, RAW_BYTES, RawBatch, Refusal,
     Reply, encode,
 };
+use mimu_core::{PerSensor, Sensor};
 
 use mimu_device::{Answer, Ear, Event, Heard, contents};
 use nalgebra::{Matrix3, Vector3};
@@ -171,26 +172,18 @@ fn image() -> Vec<u8> {
         accel: affine,
     };
     let nodes = [10.0, 30.0].map(|temp_c| Node::constant(temp_c, model));
-    let records = [
-        Record::Named {
-            id: "gyro_warm_up",
-            coefficients: &[0.1, 0.2, 0.3],
-            nonlinear: Some(60.0),
-        },
-        Record::Term {
-            sensor: Sensor::Accel,
-            axis: 1,
-            coefficient: 0.5,
-            variables: &[Variable::RateX, Variable::ForceY],
-        },
-    ];
+    let effects = [
+        DeviceEffect::named("gyro_warm_up", &[0.1, 0.2, 0.3], Some(60.0)),
+        DeviceEffect::term(Sensor::Accel, 1, 0.5, &[Variable::RateX, Variable::ForceY]),
+    ]
+    .map(Result::unwrap);
     let mut bytes = vec![0; 1024];
-    let matrices = [&affine.matrix, &affine.matrix];
+    let matrices = PerSensor::both(&affine.matrix);
     let length = stored::encode(
         &stored::Origin::UNKNOWN,
         matrices,
         &stored::Curves::of(&nodes),
-        &records,
+        &effects,
         &mut bytes,
     )
     .unwrap();
@@ -203,7 +196,7 @@ fn damage_that_the_crc_does_not_see_makes_no_reader_of_a_stored_calibration_fail
     let seed = environment("MIMU_FUZZ_SEED", 1);
     let (whole, mut readable) = (image(), 0);
     assert_eq!(
-        contents(&whole).unwrap().effects[1].id,
+        contents(&whole).unwrap().effects[1].to_string(),
         "term:accel_y~rate_x*force_y"
     );
     let cases = environment("MIMU_FUZZ_CASES", 40_000);

@@ -151,7 +151,7 @@ fn over_temperature(place: &Place) -> String {
     };
     let nodes = [node(-10.0, 3.4), node(24.0, 3.5), node(60.0, 3.7)].concat();
     let curves = format!(
-        "[temperature]\nrange_c = [-9.5, 59.0]\nlag_s = 61.2\naccel_lag_s = -12.5\n{nodes}"
+        "[temperature]\nrange_c = [-9.5, 59.0]\ndies.gyro.lag_s = 61.2\ndies.accel.lag_s = -12.5\n{nodes}"
     );
     let text = text.replace("mimu-calibration/1", "mimu-calibration/2");
     let path = place.path("curves.toml");

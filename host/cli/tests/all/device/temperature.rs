@@ -47,7 +47,7 @@ fn offset(models: &Forward, temp_c: f64) -> [Vector3<f64>; 2] {
 fn curves(models: &Forward) -> String {
     let plain = text_of(models, "V", "").replace("calibration/1", "calibration/2");
     let mut out = format!(
-        "{plain}\n[temperature]\nrange_c = [10.0, 60.0]\nlag_s = {:?}\naccel_lag_s = 4.0\n",
+        "{plain}\n[temperature]\nrange_c = [10.0, 60.0]\ndies.gyro.lag_s = {:?}\ndies.accel.lag_s = 4.0\n",
         -FILTER_S
     );
     let rows = |m: &Matrix3<f64>| {

@@ -7,7 +7,7 @@ use mimu::effects::quantity::{Conditions, REFERENCE_C, Reading};
 use mimu::effects::temperature::lagged;
 use mimu::quantity::Sensor;
 use mimu_core::compensation::Sample;
-use mimu_core::effects::{Directions, Effect, Effects, State};
+use mimu_core::effects::{DeviceEffect, Directions, Effects, State};
 use nalgebra::{Matrix3, Vector3};
 
 /// Effects smaller than this drown in the rounding of the readings, rad/s or m/s².
@@ -43,9 +43,9 @@ fn every_effect_is_evaluated_by_the_device_as_its_data_say() {
             let size =
                 |c: &effects::effect::Coefficient, r: f64| SMALL * c.typical * (1.5 + 0.5 * r);
             let values: Vec<f64> = effect.of_unit().map(|c| size(c, random(seed))).collect();
-            let mut device = Effects::<f64, 8>::of(directions, directions);
+            let mut device = Effects::<f64, 8>::of(mimu_core::PerSensor::both(directions));
             device
-                .push(Effect::named(effect.id, &values, parameter).unwrap())
+                .push(DeviceEffect::named(effect.id, &values, parameter).unwrap())
                 .unwrap();
 
             // Two samples, a second apart, at two temperatures.

@@ -6,7 +6,7 @@ use super::{Shown, sentence};
 use crate::report::diagnosis::remarks;
 use crate::report::diagnosis::text::{by_experiment, by_score, converter};
 use crate::report::page::{number, spoken, written};
-use mimu::quantity::{Figure, p_value, significant};
+use mimu::quantity::{Figure, Sensor, p_value, significant};
 use mimu::readable;
 use mimu::result::diagnosis::{
     AcceptedResult, DiagnosisResult, LeftoverResult, SecondResult, SensorDiagnosisResult,
@@ -145,7 +145,7 @@ pub fn leftover(d: &DiagnosisResult) -> Markup {
 }
 
 /// What is left of a sensor, in words: where, and the largest; what it goes with stands in the table.
-pub fn leftover_words(d: &DiagnosisResult, sensor: &str) -> Markup {
+pub fn leftover_words(d: &DiagnosisResult, sensor: Sensor) -> Markup {
     let all: Vec<&LeftoverResult> = d.unexplained().filter(|l| l.sensor == sensor).collect();
     // Turns are in another unit than the rest.
     let of_unit = |turns: bool| -> Vec<&LeftoverResult> {
@@ -174,7 +174,7 @@ pub fn second(both: &SecondResult) -> Markup {
             thead { tr {
                 th { "sensor" } th class="n" { "before" } th class="n" { "after" } th class="n" { "noise floor" } th class="n" { "dwells or turns" }
             } }
-            tbody { @for ((name, b), (_, a)) in both.before.sensors.named().zip(both.after.sensors.named()) {
+            tbody { @for ((name, b), (_, a)) in both.before.sensors.present().zip(both.after.sensors.present()) {
                 @let readable::Readable { factor, unit } = readable::error(b.unit);
                 tr {
                     td { (spoken(name)) (BR) span class="dim" { (b.figure.description()) } }

@@ -192,18 +192,18 @@ impl Device {
                 self.seen.lock().unwrap().stored = Some(received);
             }
             Request::KalmanStart {
-                triad,
+                sensor,
                 noise,
                 prior: Prior::Diffuse { span },
             } => {
                 let noise = Vector3::from(noise);
-                self.banks[triad as usize] = Some(Running {
+                self.banks[sensor as usize] = Some(Running {
                     filters: Bank::diffuse(&noise, span),
                     noise,
                     input: None,
                     offered: 0,
                     state: KalmanState {
-                        triad,
+                        sensor,
                         last: 0,
                         updates: 0,
                         rejected: 0,
@@ -215,12 +215,14 @@ impl Device {
                     },
                 });
             }
-            Request::KalmanInput { triad, input } => {
-                let bank = self.banks[triad as usize].as_mut().ok_or(Refusal::NoBank)?;
+            Request::KalmanInput { sensor, input } => {
+                let bank = self.banks[sensor as usize]
+                    .as_mut()
+                    .ok_or(Refusal::NoBank)?;
                 bank.input = input.map(Vector3::from);
             }
-            Request::KalmanEnd { triad } => {
-                let bank = self.banks[triad as usize].take().ok_or(Refusal::NoBank)?;
+            Request::KalmanEnd { sensor } => {
+                let bank = self.banks[sensor as usize].take().ok_or(Refusal::NoBank)?;
                 return Ok(Reply::Kalman(bank.state()));
             }
             Request::ResetCounters => {}

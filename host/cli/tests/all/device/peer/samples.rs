@@ -91,7 +91,10 @@ impl Device {
         let mut model = None;
         if let Some(c) = &mut self.calibrated {
             let mut state = c.stored.compensator.table.state();
-            c.stored.compensator.table.follow(&mut state, [TEMP_C; 2]);
+            c.stored
+                .compensator
+                .table
+                .follow(&mut state, mimu_core::PerSensor::both(TEMP_C));
             if let Some(all) = &c.stored.compensator.effects {
                 let dt_s = first.wrapping_sub(c.followed) as f32 / 1000.0;
                 all.slow(&mut c.effects, dt_s, TEMP_C);
