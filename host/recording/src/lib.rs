@@ -18,6 +18,7 @@ mod held;
 mod import;
 mod in_order;
 mod manifest;
+mod parents;
 mod parquet_file;
 mod parquet_writer;
 mod reader;
@@ -40,6 +41,7 @@ pub use import::{
 };
 pub use manifest::read_text;
 pub use manifest::{Format, MANIFEST_FILE, Manifest, Rails, RawUnit, Reference, Source};
+pub use parents::Parents;
 pub use reader::{ReadSummary, Recording};
 pub use recorded::{Recorded, Restart};
 pub use separator::Separator;
