@@ -24,11 +24,12 @@ use crate::allan::model::{
 use crate::allan::units::Unit;
 use crate::allan::{Kind, Point, Spacing};
 use crate::calibration::Calibration;
+use crate::no_temperature;
 use crate::quantity::{Sensor, duration, significant};
 use crate::spectrum::{SetAside, set_aside_after};
 use crate::unit_in_si::of_sizes;
 use mimu_recording::error::{Argument, Error, Result};
-use mimu_recording::{Column, RAW_COLUMNS, RawUnit, Recording};
+use mimu_recording::{Column, NoTemperatures, RAW_COLUMNS, RawUnit, Recording};
 
 /// What to compute.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -120,7 +121,14 @@ pub fn survey(
     let mut warnings = recording.warnings.clone();
     let stretch = Stretch::find(&mut columns, recording, options.part, &place, &mut warnings)?;
     let temp_c = match recording.columns.temp_c {
-        true => temperature(&columns.take(Column::Temperature)?, &stretch.rows),
+        true => {
+            let mut temp_c = columns.take(Column::Temperature)?;
+            let mut none = NoTemperatures::default();
+            let times = (0..).map(|k| stretch.span_s[0] + f64::from(k) * stretch.period_s);
+            no_temperature::leave_empty(&mut temp_c[stretch.rows.clone()], times, &mut none);
+            warnings.extend(no_temperature::warning(&none));
+            temperature(&temp_c, &stretch.rows)
+        }
         false => None,
     };
     let mut channels = Vec::new();

@@ -18,6 +18,7 @@ mod held;
 mod import;
 mod in_order;
 mod manifest;
+mod no_temperature;
 mod parents;
 mod parquet_file;
 mod parquet_writer;
@@ -41,6 +42,7 @@ pub use import::{
 };
 pub use manifest::read_text;
 pub use manifest::{Format, MANIFEST_FILE, Manifest, Rails, RawUnit, Reference, Source};
+pub use no_temperature::NoTemperatures;
 pub use parents::Parents;
 pub use reader::{ReadSummary, Recording};
 pub use recorded::{Recorded, Restart};
