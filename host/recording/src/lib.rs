@@ -6,6 +6,7 @@
 
 pub mod error;
 pub mod result_file;
+pub mod signed_low_byte;
 
 mod batch;
 mod cell;

@@ -12,7 +12,7 @@ use crate::quantity::Sensor;
 use crate::quantity::plural;
 use crate::quantity::significant;
 use crate::unit_in_si::{restless, wrong_gain};
-use mimu_recording::error::{Error, Result};
+use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{RAW_COLUMNS, RawUnit, Reference};
 
 /// Error of a fit over the spread of its inputs from which on the readings do not follow the inputs. Swapped
@@ -43,8 +43,9 @@ pub fn check_readings(prepared: &Prepared) -> Result<()> {
             "{}: readings whose low byte is 128 or more are 256 counts low, as {pairs} jumps between neighbouring samples show: the firmware takes the low byte for a signed number",
             names.join(", ")
         ),
-        "mend the firmware; to mend this log, add 256 to every such reading and import it again",
-    ))
+        "mend the firmware, and for this log import it again with these readings mended",
+    )
+    .about(Argument::SignedLowByte))
 }
 
 /// Refuses or adds warnings to the fit of one sensor.
