@@ -3,7 +3,7 @@
 use mimu_recording::error::{Argument, Error};
 
 /// Flags of the import, which are a remedy after any command that reads a recording. Others are one only on the command that refused.
-const OF_THE_IMPORT: [&str; 10] = [
+const OF_THE_IMPORT: [&str; 11] = [
     "--columns",
     "--rate-hz",
     "--time-unit",
@@ -14,6 +14,7 @@ const OF_THE_IMPORT: [&str; 10] = [
     "--preset",
     "--means",
     "--skip-broken",
+    "--signed-low-byte",
 ];
 
 /// The error in one line, with those flags of `command` that set what it is about. The same refusal comes from several commands, and a
@@ -68,6 +69,7 @@ fn flag(argument: Argument) -> Option<&'static str> {
         Argument::Preset => "--preset",
         Argument::Means => "--means",
         Argument::SkipBroken => "--skip-broken",
+        Argument::SignedLowByte => "--signed-low-byte",
         // An argument that this version of the command has no flag for.
         _ => return None,
     })

@@ -6,11 +6,12 @@
 //! end, so a block also carries what is needed to take clipped samples out of its sums later.
 
 use crate::increment::{Increment, Integrator};
+use crate::no_temperature;
 use crate::quantity::{Sensor, plural};
 use crate::reading_step::StepFinder;
 use crate::signed_low_byte;
 use mimu_recording::error::{Argument, Error, Result};
-use mimu_recording::{Batch, Column, HeldReadings, RAW_COLUMNS, Recording};
+use mimu_recording::{Batch, Column, HeldReadings, NoTemperatures, RAW_COLUMNS, Recording};
 
 /// Length of a block, s. A tenth of the shortest dwell that is worth having; ten samples at 100 Hz.
 const BLOCK_S: f64 = 0.1;
@@ -248,6 +249,8 @@ pub struct Condensed {
     pub duplicates: u64,
     /// Samples of each raw channel that are not numbers.
     pub missing: [u64; 6],
+    /// Samples of the thermometer that are no temperatures.
+    pub no_temperatures: NoTemperatures,
     /// SHA-256 of the samples file, hexadecimal.
     pub sha256: String,
     /// What a person should know about this recording.
@@ -355,6 +358,7 @@ impl Condenser {
                 gaps: (0, 0.0),
                 duplicates: 0,
                 missing: [0; 6],
+                no_temperatures: NoTemperatures::default(),
                 sha256: String::new(),
                 warnings: Vec::new(),
             },
@@ -506,6 +510,9 @@ impl Condenser {
         let (Some(&start_s), Some(&last_s)) = (open.t_s.first(), open.t_s.last()) else {
             return;
         };
+        let times = open.t_s.iter().copied();
+        let none = &mut self.out.no_temperatures;
+        no_temperature::leave_empty(&mut open.temp_c, times, none);
         let mut raw = [Moments::default(); 6];
         for (c, column) in open.raw.iter().enumerate() {
             if !column.is_empty() {
@@ -633,6 +640,8 @@ impl Condenser {
                 ));
             }
         }
+        out.warnings
+            .extend(no_temperature::warning(&out.no_temperatures));
         for (sensor, held) in Sensor::BOTH.iter().zip(&self.held) {
             let held = held.found();
             out.warnings

@@ -9,6 +9,7 @@ mod hold_out;
 mod known;
 mod lever_arm;
 mod of_temperature;
+mod off_level;
 mod outlying;
 pub mod plausible;
 mod sensor;

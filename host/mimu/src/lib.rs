@@ -3,6 +3,7 @@
 //! | in order of use | what                                                                          |
 //! |-----------------|-------------------------------------------------------------------------------|
 //! | [`quantity`]    | sensors, axes, SI units, and how numbers are written                         |
+//! | `no_temperature` | samples of the thermometer that are no temperatures                      |
 //! | [`blocks`], [`increment`] | one pass over the samples condenses them to 0.1 s blocks and 10 ms integrals |
 //! | [`rails`], [`stillness`], [`rest`], [`dwell`] | which samples and which stretches can be averaged           |
 //! | `course`, `contrast` | a known input that moves within a dwell, and what the dwell then shows beside its mean |
@@ -86,6 +87,7 @@ pub mod estimate;
 pub mod fit;
 pub mod increment;
 pub mod next_experiment;
+mod no_temperature;
 pub mod noise;
 pub mod noise_file;
 pub mod pose_means;

@@ -36,6 +36,7 @@ impl Prepared {
             rows: means.poses.len() as u64,
             reading_step: [None; 6],
             signed_low_byte: [None; 6],
+            no_temperatures: Default::default(),
             has_raw,
             has_reference: means.columns.reference,
             has_steps: true,

@@ -145,6 +145,11 @@ pub fn plural(n: u64, noun: &str) -> String {
     }
 }
 
+/// `value` as a person writes it: a file may hold "-0", which is 0.
+pub fn unsigned_zero(value: f64) -> f64 {
+    value + 0.0
+}
+
 /// Normal gravity at sea level, m/s² (WGS 84, Somigliana), at a latitude in degrees. Local gravity differs by some
 /// 3e-4 m/s², and by 3.1e-6 m/s² for each metre of height.
 pub fn normal_gravity(latitude_deg: f64) -> f64 {

@@ -1,7 +1,7 @@
 //! Channels that do not follow their input: at a rail of the converter, stuck, or dead.
 
 use crate::blocks::{Condensed, Moments, Rails, quantile};
-use crate::quantity::{plural, significant};
+use crate::quantity::{plural, significant, unsigned_zero};
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{Manifest, RAW_COLUMNS};
 
@@ -243,7 +243,7 @@ pub fn refuse_dead_channels(condensed: &Condensed, place: &str) -> Result<()> {
             if let Some(step) = coarse_step_at_rest(condensed, c) {
                 let problem = format!(
                     "the channel reads {} throughout, and the unit did not move: the others of the sensor change by single steps of {}, so its noise may be below its step",
-                    first.min,
+                    unsigned_zero(first.min),
                     significant(step)
                 );
                 let remedy = "record turns as well, which tell a coarse channel from a stuck one";
@@ -251,7 +251,10 @@ pub fn refuse_dead_channels(condensed: &Condensed, place: &str) -> Result<()> {
             }
             return Err(Error::new(
                 column,
-                format!("the channel is stuck at {} throughout", first.min),
+                format!(
+                    "the channel is stuck at {} throughout",
+                    unsigned_zero(first.min)
+                ),
                 "check its wiring, or that the right column was imported",
             ));
         }

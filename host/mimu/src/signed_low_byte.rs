@@ -5,8 +5,8 @@
 //! signal moves by a few. As an effect of a calibration it stays out of reach: the jumps are in the noise of the dwells, from which the share
 //! of the time that a bit is set is found, and its coefficient erred by 40 to 64 counts of 256.
 
-/// Values of a byte.
-const BYTE: f64 = 256.0;
+use mimu_recording::signed_low_byte::undone;
+
 /// Fewer pairs of samples between which the error came or went prove nothing.
 const FEWEST: u64 = 12;
 /// Of all such pairs the fault brings nearly all nearer to each other when it is undone. Where it is absent, none of a quiet signal,
@@ -15,14 +15,6 @@ const SHARE: f64 = 0.9;
 /// Counts from sample to sample beside such a pair from which on the signal moves too fast for it to say anything: of turns by hand at 100 Hz
 /// a step may be as long as a byte.
 const FAST: f64 = 64.0;
-
-/// What a reading is without the fault.
-pub fn undone(reading: f64) -> f64 {
-    match reading.rem_euclid(BYTE) >= 0.5 * BYTE {
-        true => reading + BYTE,
-        false => reading,
-    }
-}
 
 /// Takes the samples of a channel in a stream.
 #[derive(Debug, Clone, Default)]

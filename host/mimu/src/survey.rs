@@ -16,7 +16,7 @@ use self::columns::Columns;
 pub use self::masking::Masked;
 pub use self::stretch::Part;
 use self::stretch::{Stretch, temperature};
-use self::values::Values;
+use self::values::{Read, Values};
 use crate::allan::deviation::Integrated;
 use crate::allan::model::{
     Coefficient, Estimator, NoiseModel, Term, allan_factors, hadamard_factors,
@@ -24,11 +24,12 @@ use crate::allan::model::{
 use crate::allan::units::Unit;
 use crate::allan::{Kind, Point, Spacing};
 use crate::calibration::Calibration;
+use crate::no_temperature;
 use crate::quantity::{Sensor, duration, significant};
 use crate::spectrum::{SetAside, set_aside_after};
 use crate::unit_in_si::of_sizes;
 use mimu_recording::error::{Argument, Error, Result};
-use mimu_recording::{Column, RAW_COLUMNS, RawUnit, Recording};
+use mimu_recording::{Column, NoTemperatures, RAW_COLUMNS, RawUnit, Recording};
 
 /// What to compute.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -52,6 +53,8 @@ pub struct Channel {
     pub sensor: Sensor,
     /// Unit of its deviations.
     pub unit: Unit,
+    /// Why it has no noise: it is the same throughout, and nothing of it is computed.
+    pub dead: Option<String>,
     /// Samples that it was computed from.
     pub samples: usize,
     /// Short disturbances that were masked.
@@ -91,6 +94,9 @@ pub struct Survey {
     pub warnings: Vec<String>,
 }
 
+/// What to do about a channel that never changes.
+const CHECK_WIRING: &str = "check its wiring, or that the right column was imported";
+
 /// Share of the Allan variance at the longest time from which on a ramp is what the curve shows there.
 const RAMP_SHARE: f64 = 0.5;
 
@@ -99,7 +105,7 @@ const RAMP_SHARE: f64 = 0.5;
 /// A channel in volts or counts is divided by the scale factor of its own axis and not mixed with the others into body axes:
 /// noise is the sensor's, and a misalignment of 1 % is 1e-4 of its variance.
 ///
-/// Errors: the stretch is too short, the unit moves, a channel is stuck or constant, time stamps that do not fit the rate.
+/// Errors: the stretch is too short, the unit moves, a channel is stuck for a time or all are throughout, time stamps that do not fit the rate.
 pub fn survey(
     recording: &Recording,
     calibration: Option<&Calibration>,
@@ -115,7 +121,14 @@ pub fn survey(
     let mut warnings = recording.warnings.clone();
     let stretch = Stretch::find(&mut columns, recording, options.part, &place, &mut warnings)?;
     let temp_c = match recording.columns.temp_c {
-        true => temperature(&columns.take(Column::Temperature)?, &stretch.rows),
+        true => {
+            let mut temp_c = columns.take(Column::Temperature)?;
+            let mut none = NoTemperatures::default();
+            let times = (0..).map(|k| stretch.span_s[0] + f64::from(k) * stretch.period_s);
+            no_temperature::leave_empty(&mut temp_c[stretch.rows.clone()], times, &mut none);
+            warnings.extend(no_temperature::warning(&none));
+            temperature(&temp_c, &stretch.rows)
+        }
         false => None,
     };
     let mut channels = Vec::new();
@@ -149,6 +162,18 @@ pub fn survey(
                 Ok(read) => read?,
                 Err(_) => break,
             };
+            let values = match values {
+                Read::Values(values) => values,
+                Read::Dead(why) => {
+                    next();
+                    warnings.push(format!(
+                        "{}: {why}: it has no noise, and a noise file does not have it; {CHECK_WIRING}",
+                        RAW_COLUMNS[i]
+                    ));
+                    channels.push(Channel::dead(i, units[done], why));
+                    continue;
+                }
+            };
             warnings.extend(values.warnings);
             let samples = values.rates.len();
             if !estimators.iter().any(|(n, _)| *n == samples) {
@@ -169,19 +194,9 @@ pub fn survey(
             });
             let without_lines = Integrated::new(rates, dt_s)?;
             next();
-            let mut channel = Channel {
-                name: RAW_COLUMNS[i],
-                sensor: if i < 3 { Sensor::Gyro } else { Sensor::Accel },
-                unit: units[done],
-                samples,
-                masked: values.masked,
-                curve: Vec::new(),
-                hadamard: None,
-                spectrum,
-                without_lines: None,
-                model: None,
-                n_band_hz: None,
-            };
+            let mut channel = Channel::of(i, units[done], samples);
+            channel.masked = values.masked;
+            channel.spectrum = spectrum;
             let as_it_is = as_it_is.transpose()?;
             channel.analyse(
                 as_it_is.as_ref(),
@@ -213,6 +228,19 @@ pub fn survey(
             )
         })
     })?;
+    if let Some(why) = channels.first().and_then(|c| c.dead.as_ref())
+        && judged.is_empty()
+    {
+        let names: Vec<&str> = channels.iter().map(|c| c.name).collect();
+        return Err(Error::new(
+            format!("{place}, columns {}", names.join(", ")),
+            match channels.len() {
+                1 => why.clone(),
+                n => format!("all {n} channels are constant: of the first {why}"),
+            },
+            CHECK_WIRING,
+        ));
+    }
     let sizes = Sensor::BOTH.map(|sensor| {
         let of_sensor = judged.iter().filter(|(i, _)| sensor.channels().contains(i));
         let levels: Vec<f64> = of_sensor.map(|(_, seen)| seen.level()).collect();
@@ -308,6 +336,31 @@ fn hadamard(integrated: &Integrated, options: &Options) -> Vec<Point> {
 }
 
 impl Channel {
+    /// The raw channel `i` before anything is computed of its `samples`.
+    fn of(i: usize, unit: Unit, samples: usize) -> Self {
+        Self {
+            name: RAW_COLUMNS[i],
+            sensor: if i < 3 { Sensor::Gyro } else { Sensor::Accel },
+            unit,
+            dead: None,
+            samples,
+            masked: None,
+            curve: Vec::new(),
+            hadamard: None,
+            spectrum: SetAside::default(),
+            without_lines: None,
+            model: None,
+            n_band_hz: None,
+        }
+    }
+
+    fn dead(i: usize, unit: Unit, why: String) -> Self {
+        Self {
+            dead: Some(why),
+            ..Self::of(i, unit, 0)
+        }
+    }
+
     /// Curve of the channel as it is, and model of it without its lines: of the curves with them, where there are any, and the integral without.
     fn analyse(
         &mut self,

@@ -83,6 +83,8 @@ pub enum Argument {
     Means,
     /// How many rows that cannot be read are left out.
     SkipBroken,
+    /// Of which columns a firmware took the low byte for a signed number.
+    SignedLowByte,
 }
 
 /// Result with [`Error`].

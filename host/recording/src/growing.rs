@@ -15,8 +15,9 @@ use super::batch::Batch;
 use super::columns::Columns;
 use super::csv_writer::CsvWriter;
 use super::manifest::{MANIFEST_FILE, Manifest};
+use super::parents::{Parents, folder};
 use super::reader::Recording;
-use super::staging::{check_target, parent, sync_directory};
+use super::staging::{check_target, sync_directory};
 use super::writer::{SampleFormat, Writer};
 use crate::error::{Error, Result};
 
@@ -43,7 +44,9 @@ struct Disk {
 impl Growing {
     /// Refuses a directory in which none can be begun.
     pub fn check(directory: &Path) -> Result<()> {
-        check_target(directory, None)
+        check_target(directory, None)?;
+        // Only a try: dropped, it leaves nothing.
+        Parents::create(directory).map(drop)
     }
 
     /// Begins a recording in a new directory. Its manifest is written now, and says that it is unfinished.
@@ -51,6 +54,7 @@ impl Growing {
         let place = directory.join(MANIFEST_FILE).display().to_string();
         manifest.check(&place)?;
         check_target(directory, None)?;
+        let _parents = Parents::create(directory)?;
         fs::create_dir_all(directory).map_err(|error| Error::io(directory, &error))?;
         let mut csv = CsvWriter::create(&directory.join(SampleFormat::Csv.file_name()), columns)?;
         csv.flush()?;
@@ -66,7 +70,7 @@ impl Growing {
             unfinished: true,
             ..manifest.clone()
         })?;
-        sync_directory(&parent(directory));
+        sync_directory(folder(directory));
         Ok(growing)
     }
 

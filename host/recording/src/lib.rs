@@ -6,6 +6,7 @@
 
 pub mod error;
 pub mod result_file;
+pub mod signed_low_byte;
 
 mod batch;
 mod cell;
@@ -18,6 +19,8 @@ mod held;
 mod import;
 mod in_order;
 mod manifest;
+mod no_temperature;
+mod parents;
 mod parquet_file;
 mod parquet_writer;
 mod reader;
@@ -40,6 +43,8 @@ pub use import::{
 };
 pub use manifest::read_text;
 pub use manifest::{Format, MANIFEST_FILE, Manifest, Rails, RawUnit, Reference, Source};
+pub use no_temperature::NoTemperatures;
+pub use parents::Parents;
 pub use reader::{ReadSummary, Recording};
 pub use recorded::{Recorded, Restart};
 pub use separator::Separator;

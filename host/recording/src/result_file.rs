@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use tempfile::NamedTempFile;
 
 use crate::error::{Error, Result};
+use crate::parents::{Parents, folder};
 
 /// A result that is written, and has yet to appear under its name.
 #[derive(Debug)]
@@ -13,9 +14,11 @@ pub struct Staged {
     path: PathBuf,
     file: Option<NamedTempFile>,
     content: Vec<u8>,
+    /// Behind the file in this list, so that they are empty when they are dropped without it.
+    _parents: Option<Parents>,
 }
 
-/// Writes `content` beside `path`, so that whatever can fail fails before any file has appeared.
+/// Writes `content` beside `path`, so that whatever can fail fails before any file has appeared. Missing folders of it are made.
 pub fn stage(path: &Path, content: impl Into<Vec<u8>>) -> Result<Staged> {
     let content = content.into();
     let failed = |e: std::io::Error| Error::io(path, &e);
@@ -32,19 +35,13 @@ pub fn stage(path: &Path, content: impl Into<Vec<u8>>) -> Result<Staged> {
                 path,
                 file,
                 content,
+                _parents: None,
             });
         }
         _ => {}
     }
-    let folder = folder(&path);
-    if !folder.is_dir() {
-        return Err(Error::new(
-            path.display(),
-            "its folder does not exist",
-            "create it, or check the path",
-        ));
-    }
-    let mut file = NamedTempFile::new_in(folder).map_err(failed)?;
+    let parents = Parents::create(&path)?;
+    let mut file = NamedTempFile::new_in(folder(&path)).map_err(failed)?;
     file.write_all(&content).map_err(failed)?;
     file.as_file().sync_all().map_err(failed)?;
     // Temporary files are private; a result is for everybody who may read the folder's other files.
@@ -59,6 +56,7 @@ pub fn stage(path: &Path, content: impl Into<Vec<u8>>) -> Result<Staged> {
         path,
         file,
         content,
+        _parents: Some(parents),
     })
 }
 
@@ -77,9 +75,4 @@ impl Staged {
         }
         .map_err(|e| Error::io(&self.path, &e))
     }
-}
-
-fn folder(path: &Path) -> &Path {
-    let parent = path.parent().filter(|p| !p.as_os_str().is_empty());
-    parent.unwrap_or(Path::new("."))
 }

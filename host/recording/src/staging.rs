@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::manifest::MANIFEST_FILE;
 use crate::error::{Argument, Error, Result};
+use crate::parents::{Parents, folder};
 
 /// Files that a recording consists of; only these are ever deleted.
 const OWN_FILES: [&str; 4] = [MANIFEST_FILE, "samples.csv", "samples.parquet", "means.csv"];
@@ -17,17 +18,21 @@ pub(super) struct Staging {
     path: PathBuf,
     target: PathBuf,
     replace: bool,
+    /// Behind the directory in this list, so that it is empty when these are dropped.
+    _parents: Parents,
 }
 
 impl Staging {
     /// Creates the temporary directory, after checking that `target` can be written in the end.
     pub fn create(target: &Path, replace: bool) -> Result<Staging> {
         check_target(target, Some(replace))?;
+        let parents = Parents::create(target)?;
         let path = sibling(target, "new")?;
         Ok(Staging {
             path,
             target: target.to_owned(),
             replace,
+            _parents: parents,
         })
     }
 
@@ -76,7 +81,7 @@ impl Staging {
             }
             return Err(Error::io(&self.target, &error));
         }
-        sync_directory(&parent(&self.target));
+        sync_directory(folder(&self.target));
         if let Some((aside, _)) = old {
             // The new recording stands; what cannot be removed of the old one does no harm.
             let _ = fs::remove_dir_all(aside);
@@ -96,18 +101,7 @@ impl Drop for Staging {
 pub(super) fn check_target(target: &Path, replace: Option<bool>) -> Result<()> {
     let refuse = |problem: &str, remedy: &str| Err(Error::new(target.display(), problem, remedy));
     let metadata = match fs::symlink_metadata(target) {
-        Err(error) if error.kind() == ErrorKind::NotFound => {
-            let parent = parent(target);
-            if parent.is_dir() {
-                return Ok(());
-            }
-            let place = parent.display();
-            return Err(Error::new(
-                place,
-                "there is no such directory",
-                "create it first",
-            ));
-        }
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(()),
         Err(error) => return Err(Error::io(target, &error)),
         Ok(metadata) => metadata,
     };
@@ -140,14 +134,6 @@ pub(super) fn check_target(target: &Path, replace: Option<bool>) -> Result<()> {
     }
 }
 
-pub(super) fn parent(target: &Path) -> PathBuf {
-    match target.parent() {
-        Some(parent) if parent.as_os_str().is_empty() => PathBuf::from("."),
-        Some(parent) => parent.to_owned(),
-        None => PathBuf::from("."),
-    }
-}
-
 /// Creates an empty hidden directory beside `target`.
 fn sibling(target: &Path, purpose: &str) -> Result<PathBuf> {
     let Some(name) = target.file_name() else {
@@ -157,7 +143,7 @@ fn sibling(target: &Path, purpose: &str) -> Result<PathBuf> {
             "give the path of a directory that does not exist yet",
         ));
     };
-    let parent = parent(target);
+    let parent = folder(target);
     for attempt in 0..1000 {
         let mut hidden = std::ffi::OsString::from(".");
         hidden.push(name);
@@ -166,7 +152,7 @@ fn sibling(target: &Path, purpose: &str) -> Result<PathBuf> {
         match fs::create_dir(&path) {
             Ok(()) => return Ok(path),
             Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
-            Err(error) => return Err(Error::io(&parent, &error)),
+            Err(error) => return Err(Error::io(parent, &error)),
         }
     }
     Err(Error::new(

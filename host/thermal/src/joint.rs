@@ -118,12 +118,15 @@ pub fn estimate(sessions: &[Session], choice: Choice) -> Result<Joint> {
     }
     let evaluator = |sensor| Evaluator::new(sessions, sensor, shape);
     let mut triads = [evaluator(Sensor::Gyro)?, evaluator(Sensor::Accel)?];
+    // A bias that jumps while the temperature moves looks like a lag of minutes: then the accelerometer alone tells it.
+    let jumps = sessions.iter().any(|s| !s.bias_jumps.is_empty());
+    let telling = usize::from(jumps && triads[Sensor::Accel as usize].is_some());
     let mut starts = vec![Start::Settled; sessions.len()];
-    let rough = rough_lag(&mut triads, &mut starts, sessions, choice.lag_s)?;
+    let rough = rough_lag(&mut triads[telling..], &mut starts, sessions, choice.lag_s)?;
     for triad in triads.iter_mut().flatten() {
         triad.settle(rough, &starts);
     }
-    let (mut profiles, mut apart) = lags(&mut triads, &starts, choice.lag_s)?;
+    let (mut profiles, mut apart) = lags(&mut triads[telling..], &starts, choice.lag_s)?;
     let mut moved = false;
     for (triad, profile) in triads.iter_mut().zip(&profiles) {
         let lag_s = profile.lag.value;
@@ -135,10 +138,10 @@ pub fn estimate(sessions: &[Session], choice: Choice) -> Result<Joint> {
         }
     }
     if moved {
-        (profiles, apart) = lags(&mut triads, &starts, choice.lag_s)?;
+        (profiles, apart) = lags(&mut triads[telling..], &starts, choice.lag_s)?;
     }
     let contradicted = match apart {
-        None => [contradiction(&triads, &profiles[0]); 2],
+        None => [contradiction(&triads[telling..], &profiles[0]); 2],
         Some(_) => [0, 1].map(|k| contradiction(&triads[k..=k], &profiles[k])),
     };
     let profiles = PerSensor::from(profiles);

@@ -112,7 +112,7 @@ impl Judging<'_> {
     }
 
     fn offset(&self, row: &Row) -> Vector3<f64> {
-        let moves = self.session.poses_before(row.middle_s);
+        let moves = self.session.poses_before(self.sensor, row.middle_s);
         self.curves.pose_offset(self.recording, moves)
     }
 }

@@ -24,6 +24,7 @@
 
 pub mod base;
 pub mod basis;
+pub mod bias_jumps;
 pub mod classic;
 pub mod compare;
 pub mod coverage;

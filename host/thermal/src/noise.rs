@@ -17,6 +17,8 @@ const SINGLE: f64 = 6.0;
 const FLICKER: (usize, f64) = (MOST_PARTS, LONGEST_S);
 /// Variances of the wander over that of a row, in steps of a factor of ten and then of refinement.
 const RATIOS: [f64; 6] = [1e-4, 1e-3, 1e-2, 1e-1, 1.0, 10.0];
+/// Largest ratio that is tried, where the largest of these is the best: a bias that jumps by a hundred times the noise of a row.
+const LARGEST_RATIO: f64 = 1e4;
 /// What wander has to lower the deviance by: two parameters at the price of Akaike's criterion.
 const DEVIANCE: f64 = 4.0;
 
@@ -83,6 +85,13 @@ pub fn estimate(
         for ratio in RATIOS {
             attempt(ratio, correlation_s, parts);
         }
+    }
+    // A bias that jumps goes farther.
+    let mut largest = RATIOS[RATIOS.len() - 1];
+    while attempt(0.0, 1.0, 1).1 >= largest && largest < LARGEST_RATIO {
+        let (_, ratio, correlation_s, parts, _) = attempt(0.0, 1.0, 1);
+        attempt(10.0 * ratio, correlation_s, parts);
+        largest *= 10.0;
     }
     if attempt(0.0, 1.0, 1).1 > 0.0 {
         for factor in [2.5, 1.6, 1.25] {

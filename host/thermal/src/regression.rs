@@ -102,7 +102,7 @@ impl Problem {
         for (k, session) in sessions.iter().enumerate() {
             rows.extend(session.rows[sensor].iter().map(|r| ProblemRow {
                 session: k,
-                offset: offsets + session.poses_before(r.middle_s),
+                offset: offsets + session.poses_before(sensor, r.middle_s),
                 middle_s: r.middle_s,
                 weight: r.samples,
                 input: if biases_only {
@@ -113,7 +113,7 @@ impl Problem {
                 reading: r.raw,
                 step: r.step,
             }));
-            offsets += 1 + session.moved_s.len();
+            offsets += 1 + session.moved_s[sensor as usize].len();
         }
         let samples = rows.iter().map(|r| r.weight).fold(1.0, f64::max);
         rows.iter_mut().for_each(|r| r.weight /= samples);

@@ -9,6 +9,7 @@ use mimu_recording::error::{Error, Result};
 use mimu_recording::{RawUnit, Reference};
 use nalgebra::Vector3;
 
+use crate::bias_jumps::{self, BiasJump};
 use crate::excitation::tells_apart;
 use crate::thermometer::Thermometer;
 
@@ -24,6 +25,9 @@ const MOVED_SIGMAS: f64 = 6.0;
 const MOVED_DRIFTS: f64 = 2.0;
 /// Rows that a drift is taken over: half a minute.
 const DRIFT_ROWS: usize = 12;
+/// A change of the specific force by less than this share of it moves no gyro's bias: of 0.2 deg/s/g, the largest g-sensitivity of data sheets, 0.02 deg/s.
+/// An offset there would take up what is a jump of the bias, and hide it: one of 0.5 deg/s came with a change of the force by 0.05.
+const TILTED: f64 = 0.1;
 /// Slower than this, rad/s, a unit is at rest.
 const RATE: f64 = 0.02;
 /// Longest dwell with a moving input, s, that is taken as one mean.
@@ -83,8 +87,10 @@ pub struct Session {
     pub samples: f64,
     /// Noise of the six channels at rest, raw, where a noise file states it.
     pub stated: [Option<AllanModel>; 6],
-    /// Where the input is not known: times, s, at which the unit was put into another pose.
-    pub moved_s: Vec<f64>,
+    /// Where the input is not known: times, s, at which the unit was put into another pose, as it matters to gyro and accelerometer.
+    pub moved_s: [Vec<f64>; 2],
+    /// Where the input is not known: jumps of the gyro's bias.
+    pub bias_jumps: Vec<BiasJump>,
     /// Why samples are not in the rows, in words.
     pub unused: String,
     /// What a person should know.
@@ -109,10 +115,22 @@ impl Session {
         warnings.extend(prepared.dwells.warnings.iter().cloned());
         let rows = PerSensor::from_fn(|sensor| rows(prepared, sensor));
         let moved_s = match manifest.reference {
-            Reference::Gravity => moves(&rows[Sensor::Accel]),
+            Reference::Gravity => {
+                let moves = moves(&rows[Sensor::Accel]);
+                let turned = moves.iter().filter(|m| m.share > TILTED);
+                [
+                    turned.map(|m| m.at_s).collect(),
+                    moves.iter().map(|m| m.at_s).collect(),
+                ]
+            }
+            _ => [Vec::new(), Vec::new()],
+        };
+        let bias_jumps = match manifest.reference {
+            Reference::Gravity => bias_jumps::find(&rows[Sensor::Gyro], &moved_s[0]),
             _ => Vec::new(),
         };
         warnings.extend(moves_warning(&moved_s));
+        warnings.extend(bias_jumps::warning(&bias_jumps, manifest.raw_unit));
         Ok(Self {
             place: prepared.place.clone(),
             device: manifest.device.clone(),
@@ -127,20 +145,28 @@ impl Session {
             samples: condensed.rows as f64,
             stated: std::array::from_fn(|c| prepared.noise.largest_stated(c)),
             moved_s,
+            bias_jumps,
             unused: unused(prepared),
             warnings,
         })
     }
 
-    /// How often the unit was put into another pose before `t_s`.
-    pub fn poses_before(&self, t_s: f64) -> usize {
-        self.moved_s.partition_point(|moved| *moved < t_s)
+    /// How often the unit was put into another pose before `t_s`, as it matters to `sensor`.
+    pub fn poses_before(&self, sensor: Sensor, t_s: f64) -> usize {
+        self.moved_s[sensor as usize].partition_point(|moved| *moved < t_s)
     }
+}
+
+/// Another pose.
+struct Move {
+    at_s: f64,
+    /// Change of the reading of the accelerometer over its size.
+    share: f64,
 }
 
 /// Times between two dwells at which what the accelerometer shows changes by more than its noise and the drift of the temperature do: the
 /// pose is another one there, and with it what gravity adds to the biases.
-fn moves(rows: &[Row]) -> Vec<f64> {
+fn moves(rows: &[Row]) -> Vec<Move> {
     let within = rows.windows(2).filter(|p| p[0].step == p[1].step);
     let changes: Vec<Vector3<f64>> = within.map(|p| p[1].raw - p[0].raw).collect();
     let rms = |axis: usize| {
@@ -164,15 +190,25 @@ fn moves(rows: &[Row]) -> Vec<f64> {
         (0..3).any(|axis| change[axis] > most[axis])
     });
     moved
-        .map(|p| 0.5 * (p[0].middle_s + p[1].middle_s))
+        .map(|p| Move {
+            at_s: 0.5 * (p[0].middle_s + p[1].middle_s),
+            share: (p[1].raw - p[0].raw).norm() / p[0].raw.norm(),
+        })
         .collect()
 }
 
-fn moves_warning(moved_s: &[f64]) -> Option<String> {
+fn moves_warning([turned_s, moved_s]: &[Vec<f64>; 2]) -> Option<String> {
     let first = moved_s.first()?;
     let times = plural(moved_s.len() as u64, "time");
+    let offsets = match (turned_s.len(), moved_s.len()) {
+        (0, _) => "three bias offsets of the accelerometer".to_string(),
+        (turned, moved) if turned == moved => "six bias offsets of its own".to_string(),
+        (turned, _) => format!(
+            "bias offsets of the accelerometer, and {turned} of them bias offsets of the gyro as well"
+        ),
+    };
     Some(format!(
-        "the unit was moved {times}, first at {first:.0} s: each pose has six bias offsets of its own, as gravity adds to them"
+        "the unit was moved {times}, first at {first:.0} s: each pose has {offsets}, as gravity adds to them"
     ))
 }
 

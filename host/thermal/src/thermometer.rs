@@ -2,6 +2,7 @@
 
 use mimu::blocks::{Block, Condensed};
 use mimu::quantity::{duration, significant};
+use mimu_recording::NoTemperatures;
 use mimu_recording::error::{Argument, Error, Result};
 
 /// Spacing of the series, s. A die's lag is tens of seconds.
@@ -21,15 +22,11 @@ const POWERED_UP_S: f64 = 60.0;
 /// A jump is this many times what all but one second in two hundred change by.
 const JUMP_FACTOR: f64 = 12.0;
 
-/// What can be a temperature in °C at all, from absolute zero: counts of a converter are mostly beyond.
-const POSSIBLE_C: std::ops::RangeInclusive<f64> = -273.15..=1000.0;
-
-/// Refuses temperatures that are none, at their times.
-fn check_possible(known: &[(f64, f64)], place: &str) -> Result<()> {
-    let Some((t, c)) = known.iter().find(|(_, c)| !POSSIBLE_C.contains(c)) else {
+/// Refuses temperatures that are none: curves over the rest would be those of the samples that happen to look like some.
+fn check_possible(found: &NoTemperatures, place: &str) -> Result<()> {
+    let Some(problem) = found.problem() else {
         return Ok(());
     };
-    let problem = format!("{c} at {t:.1} s is no temperature in °C");
     let remedy = "import the readings again, with a factor and an offset for temp_c";
     Err(Error::new(place, problem, remedy)
         .about(Argument::Scale)
@@ -62,10 +59,10 @@ impl Thermometer {
         let (Some(first), Some(last)) = (blocks().next(), blocks().last()) else {
             return Err(missing(&place, "there is none"));
         };
+        check_possible(&condensed.no_temperatures, &place)?;
         if known.is_empty() {
             return Err(missing(&place, "there is no temperature"));
         }
-        check_possible(&known, &place)?;
         check_gaps(&condensed.blocks, &place)?;
         check_stuck(&known, &place)?;
         let mut series = Self::evenly(&known, first.start_s, last.last_s);

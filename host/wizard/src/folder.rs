@@ -175,6 +175,7 @@ impl Folder {
                 "give another folder with -o",
             ));
         }
+        let _parents = mimu_recording::Parents::create(path)?;
         fs::create_dir_all(path).map_err(|e| Error::io(path, &e))?;
         let text = serde_json::to_string_pretty(begun)
             .map_err(|e| Error::new(path.display(), e, "report this"))?;

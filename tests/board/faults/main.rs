@@ -106,9 +106,10 @@ fn report(name: &str, ended: &Ended) -> bool {
         (None, Some(why)) => format!("stopped, nothing stored: {why}"),
         (None, None) => format!("nothing stored; {}", ended.verdict),
     };
+    let recorded = ended.recorded_s.map_or("-".into(), |s| format!("{s:.0}"));
     println!(
-        "{name:14} {:6.0} {:7.0} {:6} {:6} {:6}  {outcome}",
-        ended.seconds, ended.recorded_s, ended.dwells, ended.thrown, ended.interrupted
+        "{name:14} {:6.0} {recorded:>7} {:6} {:6} {:6}  {outcome}",
+        ended.seconds, ended.dwells, ended.thrown, ended.interrupted
     );
     for note in &ended.notes {
         println!("{:14} note: {note}", "");

@@ -30,8 +30,8 @@ pub struct Run {
 /// What has become of a session.
 pub struct Ended {
     pub seconds: f64,
-    /// By the unit's clock, s.
-    pub recorded_s: f64,
+    /// By the unit's clock, s, if anything was recorded.
+    pub recorded_s: Option<f64>,
     pub dwells: u64,
     pub thrown: u64,
     pub interrupted: usize,
@@ -213,7 +213,7 @@ impl Run {
         let notes = found["notes"].as_array().into_iter().flatten().map(text);
         Ok(Ended {
             seconds: self.began.elapsed().as_secs_f64(),
-            recorded_s: found["recorded_s"].as_f64().unwrap_or(f64::NAN),
+            recorded_s: found["recorded_s"].as_f64(),
             dwells: found["dwells"].as_u64().unwrap_or(0),
             thrown: found["thrown"].as_u64().unwrap_or(0),
             interrupted: self.told("interrupted"),

@@ -1,7 +1,10 @@
 //! A firmware on the bench that takes the low byte of a reading for a signed number: its readings are refused, and nobody else's.
 
 use mimu::fit::{Method, Options, fit};
+use mimu::prepared::Prepared;
 use mimu::stillness::STILL_FACTOR;
+use mimu_recording::error::Argument;
+use mimu_recording::{ImportOptions, Recording, import};
 use mimu_rig::located::Source;
 use mimu_rig::rig_file::RigFile;
 use mimu_tests::bench;
@@ -30,7 +33,9 @@ fn readings_whose_low_byte_was_taken_for_a_signed_number_are_refused_by_their_ch
         file.effect.retain(|effect| effect.id == kept);
         assert_eq!(file.effect.len(), 1);
         let recorded = bench::recorded(&bench::hand_plan(20), &file, 3);
-        let refused = fit(recorded, OPTIONS).expect_err(kept).to_string();
+        let error = fit(recorded, OPTIONS).expect_err(kept);
+        assert_eq!(error.refused().arguments, [Argument::SignedLowByte]);
+        let refused = error.to_string();
         assert!(
             refused.contains(named) && refused.contains("low byte") && !refused.contains(sound),
             "{refused}"
@@ -39,4 +44,49 @@ fn readings_whose_low_byte_was_taken_for_a_signed_number_are_refused_by_their_ch
     let mut sound = both;
     sound.effect.clear();
     assert!(fit(bench::recorded(&bench::hand_plan(20), &sound, 3), OPTIONS).is_ok());
+}
+
+#[test]
+fn an_import_that_mends_the_low_byte_gives_the_calibration_of_the_same_unit_without_the_fault() {
+    let faulty = RigFile::parse(&Source::new("rig", RIG)).expect("a rig file");
+    let mut sound = faulty.clone();
+    sound.effect.clear();
+    let plan = bench::hand_plan(20);
+    for seed in 1..=3 {
+        let folder = bench::written(&plan, &faulty, seed);
+        let recording = Recording::open(&folder.path().join("recording")).unwrap();
+        let manifest = &recording.manifest;
+        let mended = |columns: &[&str]| {
+            let mut options = ImportOptions::new(
+                vec![recording.samples.clone()],
+                manifest.gravity_mps2,
+                manifest.raw_unit,
+                manifest.reference,
+            );
+            options.device = Some(manifest.device.clone());
+            options.signed_low_bytes = columns.iter().map(|c| c.parse().unwrap()).collect();
+            options.replace = true;
+            let out = folder.path().join("mended");
+            import(&options, &out, |_| ()).expect("an import");
+            let mended = Recording::open(&out).unwrap();
+            Prepared::read(&mended, STILL_FACTOR, |_| ()).expect("readable")
+        };
+        let right = fit(bench::recorded(&plan, &sound, seed), OPTIONS).expect("a fit");
+        let found = fit(mended(&["gyro", "accel"]), OPTIONS).expect("a fit");
+        for (found, right) in found.sensors.iter().zip(&right.sensors) {
+            let [a, b] = [found, right].map(|s| &s.estimated.triad);
+            assert_eq!(
+                (a.forward, a.inverse),
+                (b.forward, b.inverse),
+                "seed {seed}"
+            );
+            assert_eq!(a.forward_covariance, b.forward_covariance);
+        }
+        // Of a sensor that is not mended the fault stays, and is refused as before.
+        let refused = fit(mended(&["gyro"]), OPTIONS).unwrap_err().to_string();
+        assert!(
+            refused.contains("accel_x") && !refused.contains("gyro"),
+            "{refused}"
+        );
+    }
 }

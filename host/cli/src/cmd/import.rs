@@ -6,6 +6,7 @@ use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use mimu::quantity::{implausible_gravity, normal_gravity};
 use mimu_recording::error::{Error, Result};
+use mimu_recording::signed_low_byte::SignedLowByte;
 use mimu_recording::{
     BrokenLimit, ColumnList, Decimal, ImportOptions, Offset, Preset, RawUnit, Reference,
     SampleFormat, Scale, Separator, import, is_bag,
@@ -63,6 +64,11 @@ pub(crate) struct ImportArgs {
     /// What is added to a column after its factor: `temp_c=36.53`
     #[arg(long, value_name = "COLUMN=VALUE", allow_hyphen_values = true)]
     offset: Vec<Offset>,
+    /// Columns of which the firmware took the low byte for a signed number: gyro, accel or a column; mended exactly, before --scale
+    ///
+    /// `(high << 8) + (int8_t)low` reads 256 counts low where the low byte is 128 or more. The readings have to be whole counts.
+    #[arg(long, value_name = "COLUMN", conflicts_with = "means")]
+    signed_low_byte: Vec<SignedLowByte>,
     /// Name of the unit; without it, the name of the recording
     #[arg(long)]
     device: Option<String>,
@@ -134,6 +140,7 @@ pub(crate) fn run(args: ImportArgs) -> Result<()> {
         rate_hz: args.rate_hz,
         scales: args.scale,
         offsets: args.offset,
+        signed_low_bytes: args.signed_low_byte,
         time_unit: args.time_unit,
         device: args.device,
         latitude_deg: args.latitude,

@@ -12,7 +12,7 @@ use mimu::readable::STANDARD_GRAVITY;
 use mimu::result::diagnosis::DiagnosisResult;
 use mimu_device::record::Plan;
 use mimu_recording::error::{Error, Result};
-use mimu_recording::{Manifest, RawUnit};
+use mimu_recording::{Manifest, Parents, RawUnit};
 use mimu_wizard::device::DeviceSource;
 use mimu_wizard::drive::{Driver, Person, TextDriver, Together};
 use mimu_wizard::event::View;
@@ -398,9 +398,11 @@ pub(crate) fn run(args: &WizardArgs) -> Result<()> {
     let to_output = args.events.as_deref() == Some(Path::new("-"));
     let events: Option<Box<dyn Write>> = match &args.events {
         Some(_) if to_output => Some(Box::new(std::io::stdout())),
-        Some(path) => Some(Box::new(
-            std::fs::File::create(path).map_err(|e| Error::io(path, &e))?,
-        )),
+        Some(path) => {
+            let _parents = Parents::create(path)?;
+            let file = std::fs::File::create(path).map_err(|e| Error::io(path, &e))?;
+            Some(Box::new(file))
+        }
         None => None,
     };
     let stop = interruption()?;

@@ -26,7 +26,11 @@ const CLASSES: [&str; 3] = ["x", "y", "z"];
 
 /// The curves of a single recording as SVG.
 pub fn svg(result: &AllanResult) -> String {
-    let of = |sensor: Sensor| result.channels.iter().filter(move |c| c.sensor() == sensor);
+    let drawn = |c: &&ChannelResult| !c.tau_s.is_empty();
+    let of = |sensor: Sensor| {
+        let ours = result.channels.iter().filter(drawn);
+        ours.filter(move |c| c.sensor() == sensor)
+    };
     let panels: Vec<(Sensor, Vec<&ChannelResult>)> = Sensor::BOTH
         .into_iter()
         .map(|sensor| (sensor, of(sensor).collect()))

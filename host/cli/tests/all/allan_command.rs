@@ -238,7 +238,7 @@ type Spoil = fn(usize, &mut [f64; 7]);
 #[test]
 fn what_is_not_at_rest_or_not_alive_is_refused_with_its_place() {
     let rest = at_rest(6000);
-    let cases: [(&str, Spoil, &[&str]); 6] = [
+    let cases: [(&str, Spoil, &[&str]); 7] = [
         (
             "moving",
             |k, row| {
@@ -267,9 +267,24 @@ fn what_is_not_at_rest_or_not_alive_is_refused_with_its_place() {
             &["accel_y", "stuck at 0.25", "20.00 s"],
         ),
         (
-            "constant",
-            |_, row| row[2] = 1.5,
-            &["gyro_y", "1.5 throughout"],
+            "all constant",
+            |_, row| row[1..].fill(-0.0),
+            &[
+                "gyro_x, gyro_y",
+                "accel_z",
+                "all 6 channels",
+                "is 0 throughout",
+            ],
+        ),
+        (
+            "moving beside a constant one",
+            |k, row| {
+                row[2] = 0.0;
+                if (4000..4300).contains(&k) {
+                    row[1] += (k as f64).sin()
+                }
+            },
+            &["40.0 s", "gyro_x"],
         ),
         ("rate", |_, row| row[0] *= 2.0, &["sample_rate_hz"]),
         (
@@ -307,6 +322,47 @@ fn what_is_not_at_rest_or_not_alive_is_refused_with_its_place() {
         refused(folder.path(), "allan r --from 30 --to 20").contains("30 s is not before 20 s")
     );
     assert!(refused(folder.path(), "allan r --step 2").contains("no column step"));
+}
+
+#[test]
+fn a_dead_channel_is_named_and_the_others_are_as_without_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |rows: &[[f64; 7]]| -> (serde_json::Value, String) {
+        write(folder.path(), rows);
+        let text = done(
+            folder.path(),
+            "allan r -o n.toml --plot n.svg --json n.json",
+        );
+        let json = std::fs::read_to_string(folder.path().join("n.json")).unwrap();
+        (serde_json::from_str(&json).unwrap(), text)
+    };
+    let rows = at_rest(6000);
+    let (whole, _) = run(&rows);
+    for dead in [0, 1, 4] {
+        let mut rows = rows.clone();
+        rows.iter_mut().for_each(|row| row[1 + dead] = -0.0);
+        let (found, text) = run(&rows);
+        let channels = found["channels"].as_array().unwrap();
+        assert_eq!(channels.len(), 6);
+        for (k, channel) in channels.iter().enumerate() {
+            let why = "the channel is 0 throughout";
+            match k == dead {
+                true => {
+                    assert_eq!(channel["n"], serde_json::Value::Null);
+                    assert_eq!(channel["reasons"]["n"], why);
+                    let name = channel["name"].as_str().unwrap();
+                    assert!(
+                        text.contains(&format!("{name}: {why}")) && !text.contains("-0 "),
+                        "{text}"
+                    );
+                    let noise = std::fs::read_to_string(folder.path().join("n.toml")).unwrap();
+                    assert_eq!(noise.matches("[[channel]]").count(), 5, "{noise}");
+                    assert!(!noise.contains(name), "{noise}");
+                }
+                false => assert_eq!(channel, &whole["channels"][k]),
+            }
+        }
+    }
 }
 
 #[test]

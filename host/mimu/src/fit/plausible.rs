@@ -4,15 +4,15 @@
 //! calibration file. What cannot be right is refused; what may be meant is a warning.
 
 use super::of_temperature::with_temperature;
+use super::off_level::off_level;
 use super::sensor::{Residual, SensorFit};
 use crate::estimate::Failure;
 use crate::prepared::Prepared;
 use crate::quantity::Figure;
-use crate::quantity::Sensor;
 use crate::quantity::plural;
 use crate::quantity::significant;
 use crate::unit_in_si::{restless, wrong_gain};
-use mimu_recording::error::{Error, Result};
+use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{RAW_COLUMNS, RawUnit, Reference};
 
 /// Error of a fit over the spread of its inputs from which on the readings do not follow the inputs. Swapped
@@ -43,8 +43,9 @@ pub fn check_readings(prepared: &Prepared) -> Result<()> {
             "{}: readings whose low byte is 128 or more are 256 counts low, as {pairs} jumps between neighbouring samples show: the firmware takes the low byte for a signed number",
             names.join(", ")
         ),
-        "mend the firmware; to mend this log, add 256 to every such reading and import it again",
-    ))
+        "mend the firmware, and for this log import it again with these readings mended",
+    )
+    .about(Argument::SignedLowByte))
 }
 
 /// Refuses or adds warnings to the fit of one sensor.
@@ -239,37 +240,4 @@ fn turned(prepared: &Prepared, fit: &SensorFit) -> Option<String> {
         fit.sensor,
         angle.to_degrees()
     ))
-}
-
-/// Errors across the known force over those along it from which on the force is not where the reference says.
-const ACROSS: f64 = 3.0;
-/// Root mean square angle, rad, below which that is not said: a fifth of a degree, what a good level shows.
-const LEVEL: f64 = 3.5e-3;
-
-/// Known forces that point elsewhere than the reference says. A tilt leaves the size of a force and moves its direction, and so errs
-/// across it; a sensor's own errors lie along it as well.
-fn off_level(prepared: &Prepared, fit: &SensorFit) -> Option<String> {
-    if fit.sensor != Sensor::Accel || fit.figure != Figure::Input {
-        return None;
-    }
-    let (mut along, mut across, mut floor, mut angles, mut n) = (0.0, 0.0, 0.0, 0.0, 0.0);
-    for r in fit.residuals.iter().filter(|r| !r.within) {
-        let force = prepared.dwells.list[r.dwell].input(fit.sensor)?;
-        let up = force.normalize();
-        let part = r.value.dot(&up);
-        let side = r.value.norm_squared() - part * part;
-        along += part * part;
-        across += 0.5 * side;
-        floor += r.floor * r.floor;
-        angles += side / force.norm_squared();
-        n += 1.0;
-    }
-    let angle = (angles / n).sqrt();
-    let beyond = across > ACROSS * ACROSS * along.max(if floor.is_nan() { 0.0 } else { floor });
-    (beyond && angle > LEVEL).then(|| {
-        format!(
-            "accel: the errors lie across the known force and not along it, as if the dwells were off level by {} deg rms: level the faces, or leave the directions out (reference = \"gravity\")",
-            significant(angle.to_degrees())
-        )
-    })
 }

@@ -74,7 +74,7 @@ pub struct ChannelResult {
     /// Scale factor that did, [`Self::raw_unit`] per [`Self::unit`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub scale_factor: Option<f64>,
-    /// Samples that it was computed from.
+    /// Samples that it was computed from; none of a channel that is the same throughout, as [`Self::reasons`] say.
     pub samples: usize,
     /// Samples of these that were disturbed for a short time, and are masked.
     pub masked_samples: usize,
@@ -218,6 +218,8 @@ impl AllanResult {
 
     /// The noise file for the commands that rest on it; `None` without a recording.
     pub fn noise_file(&self) -> Option<NoiseFile> {
+        // What has no noise is not told apart from a channel that nothing was recorded of.
+        let alive = self.channels.iter().filter(|c| c.samples > 0);
         let lengths = self.recordings.iter().map(|r| r.span_s[1] - r.span_s[0]);
         Some(NoiseFile {
             format: NOISE_FORMAT.into(),
@@ -225,7 +227,7 @@ impl AllanResult {
             sample_rate_hz: self.recordings.first()?.sample_rate_hz,
             duration_s: lengths.fold(f64::INFINITY, f64::min),
             confidence: self.confidence?,
-            channel: self.channels.iter().map(ChannelResult::noise).collect(),
+            channel: alive.map(ChannelResult::noise).collect(),
             place: String::new(),
         })
     }
@@ -249,7 +251,7 @@ impl ChannelResult {
                     });
                 }
                 Some(Err(why)) => why,
-                None => TOO_SHORT,
+                None => channel.dead.as_deref().unwrap_or(TOO_SHORT),
             };
             let key = term.letter().to_lowercase();
             reasons.insert(key.clone(), why.to_string());

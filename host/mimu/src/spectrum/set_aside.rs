@@ -22,7 +22,7 @@ const BESIDE_IT: f64 = 0.1;
 const CERTAIN: f64 = 4.0;
 
 /// A series without its lines.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct SetAside {
     /// Lines and bumps by frequency.
     pub lines: Vec<Line>,

@@ -2,7 +2,7 @@
 
 use super::stretch::{FEWEST, Part, Stretch, longest, segments};
 use crate::blocks::quantile;
-use crate::quantity::{duration, significant};
+use crate::quantity::{duration, significant, unsigned_zero};
 use crate::stillness::{STILL_FACTOR, WINDOW_S};
 use mimu_recording::RAW_COLUMNS;
 use mimu_recording::error::{Argument, Error, Result};
@@ -48,20 +48,21 @@ const RUN_LOG_ODDS: f64 = 14.0;
 /// Shorter runs of equal samples are left to the noise of a coarse converter, s.
 const RUN_S: f64 = 0.5;
 
-/// Checks the raw samples of a channel; `place` names it. Refuses one that is constant or stuck.
+/// Why a channel has no noise at all: it is the same throughout. One that sticks for a time is refused, as its samples before and after are
+/// two records.
+pub(super) fn dead(raw: &[f64]) -> Option<String> {
+    let first = raw.first()?;
+    let constant = raw.iter().all(|u| u == first);
+    constant.then(|| format!("the channel is {} throughout", unsigned_zero(*first)))
+}
+
+/// Checks the raw samples of a channel that is not [`dead`]; `place` names it. Refuses one that is stuck.
 pub(super) fn suitability(raw: &[f64], period_s: f64, place: &str) -> Result<Suitability> {
     if raw.len() < FEWEST {
         return Err(Error::new(
             place,
             format!("{} samples are left", raw.len()),
             "record for longer, or choose a longer stretch",
-        ));
-    }
-    if raw.iter().all(|u| *u == raw[0]) {
-        return Err(Error::new(
-            place,
-            format!("the channel is {} throughout", raw[0]),
-            "check its wiring, or that the right column was imported",
         ));
     }
     let window = ((WINDOW_S / period_s).round() as usize)

@@ -2,11 +2,19 @@
 
 use super::masking::{Masked, mask};
 use super::stretch::{FEWEST, Part, Stretch, longest};
-use super::suitability::{Suitability, suitability};
+use super::suitability::{Suitability, dead, suitability};
 use crate::allan::units::Unit;
 use crate::quantity::{duration, plural, significant};
 use mimu_recording::RAW_COLUMNS;
 use mimu_recording::error::{Argument, Error, Result};
+
+/// What a channel is found to be.
+pub(super) enum Read {
+    /// Alive.
+    Values(Values),
+    /// Without noise, and why.
+    Dead(String),
+}
 
 /// One channel as it is computed with.
 pub(super) struct Values {
@@ -27,7 +35,7 @@ impl Values {
         i: usize,
         unit: Unit,
         place: &str,
-    ) -> Result<Self> {
+    ) -> Result<Read> {
         let (rows, period_s) = (&stretch.rows, stretch.period_s);
         let place = format!("{place}, column {}", RAW_COLUMNS[i]);
         values.truncate(rows.end);
@@ -54,6 +62,11 @@ impl Values {
             values.truncate(whole.end);
             values.drain(..from);
         }
+        if values.len() >= FEWEST
+            && let Some(why) = dead(&values)
+        {
+            return Ok(Read::Dead(why));
+        }
         let mut suitability = suitability(&values, period_s, &place)?;
         let masked = match part {
             Part::Whole => mask(&mut values, &mut suitability, period_s),
@@ -74,11 +87,11 @@ impl Values {
         for u in &mut values {
             *u *= unit.per_raw;
         }
-        Ok(Self {
+        Ok(Read::Values(Self {
             rates: values,
             suitability,
             masked,
             warnings,
-        })
+        }))
     }
 }

@@ -6,6 +6,7 @@ mod design;
 mod held_out;
 mod lever_arm;
 mod moving_input;
+mod off_level;
 mod over_temperature;
 mod spectrum;
 mod written_files;

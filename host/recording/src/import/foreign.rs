@@ -17,6 +17,7 @@ use crate::cell::{Refusal, is_reading, no_reading, no_time};
 use crate::columns::Column;
 use crate::error::{Argument, Error, Result};
 use crate::separator::Separator;
+use crate::signed_low_byte::{SignedLowByte, undone};
 
 /// How to read a foreign file.
 #[derive(Debug, Clone)]
@@ -25,6 +26,7 @@ pub(super) struct HowToRead<'a> {
     pub separator: Option<Separator>,
     pub scales: &'a [Scale],
     pub offsets: &'a [Offset],
+    pub signed_low_bytes: &'a [SignedLowByte],
     /// Topic of a bag.
     pub topic: Option<&'a str>,
     /// Sample rate, where it was given or is known.
@@ -71,6 +73,8 @@ struct Cell {
     column: Column,
     factor: f64,
     offset: f64,
+    /// Whether a firmware took its low byte for a signed number.
+    signed_low_byte: bool,
 }
 
 /// Where the time of a row comes from.
@@ -145,6 +149,7 @@ impl ForeignFile {
                     column: *column,
                     factor: Scale::product(how.scales, *column),
                     offset: Offset::sum(how.offsets, *column),
+                    signed_low_byte: how.signed_low_bytes.iter().any(|s| s.applies_to(*column)),
                 }),
             });
         let values: Vec<Cell> = numbers.collect();
@@ -319,7 +324,21 @@ impl ForeignFile {
         row.values.clear();
         for cell in &self.values {
             let (number_in_file, factor) = (self.cells.numbers[cell.at], cell.factor);
-            let value = number_in_file * factor + cell.offset;
+            let reading = match cell.signed_low_byte {
+                true if number_in_file.is_finite() && number_in_file.fract() != 0.0 => {
+                    let place = format!("{}, column {}", at(&self.path), cell.column.name());
+                    let refusal = Refusal {
+                        problem: format!(
+                            "{number_in_file} has a fraction, and two bytes make whole counts"
+                        ),
+                        remedy: "give the log as it was recorded, without factors or means",
+                    };
+                    return Err(Unreadable::row(number, Fault::Reading, place, refusal));
+                }
+                true => undone(number_in_file),
+                false => number_in_file,
+            };
+            let value = reading * factor + cell.offset;
             if !is_reading(value) {
                 let place = format!("{}, column {}", at(&self.path), cell.column.name());
                 let refusal = Refusal {

@@ -10,6 +10,7 @@ use super::time::Decimal;
 use crate::error::{Argument, Error, Result};
 use crate::manifest::{RawUnit, Reference, check_gravity, check_rate};
 use crate::separator::Separator;
+use crate::signed_low_byte::SignedLowByte;
 use crate::writer::SampleFormat;
 
 /// What to import and how.
@@ -35,6 +36,8 @@ pub struct ImportOptions {
     pub scales: Vec<Scale>,
     /// What is added to columns after their factors; several for the same column add up.
     pub offsets: Vec<Offset>,
+    /// Columns of which a firmware took the low byte for a signed number, in whole counts: mended before any factor.
+    pub signed_low_bytes: Vec<SignedLowByte>,
     /// Topic of bags; without it, the only one with messages of an inertial unit.
     pub topic: Option<String>,
     /// Name of the unit; without it, the name of the recording.
@@ -78,6 +81,7 @@ impl ImportOptions {
             reference,
             scales: Vec::new(),
             offsets: Vec::new(),
+            signed_low_bytes: Vec::new(),
             topic: None,
             device: None,
             latitude_deg: None,
@@ -118,6 +122,12 @@ impl ImportOptions {
             return refuse(
                 format!("there are {files} files and {lists} lists of columns"),
                 "give one list of columns for each file, in their order",
+            );
+        }
+        if self.means && !self.signed_low_bytes.is_empty() {
+            return refuse(
+                "a low byte is mended sample by sample, and these are means".to_owned(),
+                "import the samples that they were made of",
             );
         }
         if let Some(rate) = self.rate_hz {
@@ -176,6 +186,9 @@ impl ImportOptions {
         for offset in &self.offsets {
             option("--offset", offset.to_string());
         }
+        for column in &self.signed_low_bytes {
+            option("--signed-low-byte", column.to_string());
+        }
         if self.skip_broken != BrokenLimit::None {
             arguments.push(format!("--skip-broken={}", self.skip_broken));
         }
@@ -204,6 +217,7 @@ impl ImportOptions {
             separator: self.separator,
             scales: &self.scales,
             offsets: &self.offsets,
+            signed_low_bytes: &self.signed_low_bytes,
             topic: self.topic.as_deref(),
             rate_hz: self.rate_hz,
             time_unit: self.time_unit,

@@ -6,6 +6,7 @@ use crate::columns::Column;
 use crate::columns::RAW_COLUMNS;
 use crate::error::{Argument, Error, Result};
 use crate::held::HeldReadings;
+use crate::no_temperature::NoTemperatures;
 
 /// What silicon and the chambers around it reach, °C.
 const USUAL_C: std::ops::RangeInclusive<f64> = -100.0..=200.0;
@@ -35,12 +36,9 @@ pub(super) struct Plausibility {
     /// Of both sensors.
     held: [HeldReadings; 2],
     two_sources: TwoSources,
-    temperatures: u64,
     lowest_c: f64,
     highest_c: f64,
-    impossible: u64,
-    /// Row and value of the first temperature that is impossible.
-    first_impossible: Option<(u64, f64)>,
+    no_temperatures: NoTemperatures,
 }
 
 impl Plausibility {
@@ -65,11 +63,9 @@ impl Plausibility {
             alive: [false; 6],
             rows: 0,
             held: Default::default(),
-            temperatures: 0,
             lowest_c: f64::INFINITY,
             highest_c: f64::NEG_INFINITY,
-            impossible: 0,
-            first_impossible: None,
+            no_temperatures: NoTemperatures::default(),
         }
     }
 
@@ -118,10 +114,10 @@ impl Plausibility {
         if c.is_nan() {
             return c;
         }
-        self.temperatures += 1;
+        self.no_temperatures.of += 1;
         if !POSSIBLE_C.contains(&c) {
-            self.impossible += 1;
-            self.first_impossible.get_or_insert((number, c));
+            let at = || format!("in row {number}");
+            self.no_temperatures.add(c, at);
             return f64::NAN;
         }
         self.lowest_c = self.lowest_c.min(c);
@@ -149,19 +145,14 @@ impl Plausibility {
             .about(Argument::Columns));
         }
         self.two_sources.check(place)?;
-        if let Some((row, c)) = self.first_impossible
-            && 2 * self.impossible > self.temperatures
+        let none = &self.no_temperatures;
+        if let Some(problem) = none.problem()
+            && 2 * none.count > none.of
         {
-            return Err(Error::new(
-                format!("{place}, column temp_c"),
-                format!(
-                    "{} of {} values are no temperatures in °C, the first is {c} in row {row}",
-                    self.impossible, self.temperatures
-                ),
-                CONVERT,
-            )
-            .about(Argument::Scale)
-            .about(Argument::Offset));
+            let place = format!("{place}, column temp_c");
+            return Err(Error::new(place, problem, CONVERT)
+                .about(Argument::Scale)
+                .about(Argument::Offset));
         }
         Ok(())
     }
@@ -203,12 +194,8 @@ impl Plausibility {
                 ));
             }
         }
-        if let Some((row, c)) = self.first_impossible {
-            warnings.push(format!(
-                "{place}, column temp_c: {} of {} values are no temperatures in °C and are left empty, the first is {c} in row {row}",
-                self.impossible, self.temperatures
-            ));
-        }
+        let none = self.no_temperatures.warning();
+        warnings.extend(none.map(|none| format!("{place}, column temp_c: {none}")));
         let range = [self.lowest_c, self.highest_c];
         if range[0] <= range[1] && !range.iter().all(|c| USUAL_C.contains(c)) {
             let [low, high] = range;

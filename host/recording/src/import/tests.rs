@@ -236,7 +236,7 @@ fn a_list_that_does_not_fit_the_file_is_refused() {
             "has 4 cells and 3 are expected",
         ),
         ("1,2\n", "gyro_x,gyro_y,gyro_z", "has 2 cells"),
-        ("words\nonly\n", "gyro_x,gyro_y,gyro_z", "row 2"),
+        ("words\nonly\n", "gyro_x,gyro_y,gyro_z", "row 1"),
         ("", "gyro_x,gyro_y,gyro_z", "no row"),
         ("a,b,c\n1,2,3\n", "gyro_x=a,gyro_y=b,gyro_z=d", "\"d\""),
         ("a,a,c\n1,2,3\n", "gyro_x=a,gyro_y=a,gyro_z=c", "twice"),

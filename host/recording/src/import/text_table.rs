@@ -55,6 +55,15 @@ pub(super) struct TextTable {
     pub warnings: Vec<String>,
 }
 
+/// The line to name where no row fits the list: the first that holds data, or the first of all where none does. A title above the
+/// data has another width than the rows in any file, and says nothing of the list.
+struct Misfit {
+    number: u64,
+    problem: String,
+    /// Whether it holds more numbers than words.
+    data: bool,
+}
+
 /// What a line is, as far as that can be seen without the list of columns.
 enum Kind {
     Blank,
@@ -271,7 +280,7 @@ impl TextTable {
             self.width = items.len();
         }
         let mut record = csv::ByteRecord::new();
-        let mut last_misfit = None;
+        let mut misfit: Option<Misfit> = None;
         for (index, line) in lines.iter().enumerate() {
             let number = index as u64 + 1;
             match kind(line) {
@@ -305,14 +314,23 @@ impl TextTable {
                 if names.is_empty() || matches(list, &here) > matches(list, &names) {
                     names = here;
                 }
-            } else if let Some(refusal) = self.misfit(&record, true) {
-                last_misfit = Some((number, refusal.problem));
             } else {
-                if self.is_row(&record) {
-                    self.first_row = number;
-                    return Ok(());
+                let problem = match self.misfit(&record, true) {
+                    Some(refusal) => refusal.problem,
+                    None if self.is_row(&record) => {
+                        self.first_row = number;
+                        return Ok(());
+                    }
+                    None => "it holds words".to_owned(),
+                };
+                let data = self.are_numbers(&record);
+                if misfit.as_ref().is_none_or(|first| data && !first.data) {
+                    misfit = Some(Misfit {
+                        number,
+                        problem,
+                        data,
+                    });
                 }
-                last_misfit = Some((number, "it holds words".to_owned()));
             }
             self.skipped.header += 1;
         }
@@ -339,9 +357,11 @@ impl TextTable {
             };
             return Err(Error::new(path, problem, remedy));
         }
-        match last_misfit {
-            Some((row, problem)) => Err(Error::new(
-                self.place(row),
+        match misfit {
+            Some(Misfit {
+                number, problem, ..
+            }) => Err(Error::new(
+                self.place(number),
                 format!(
                     "no row fits the list of {} columns ({problem}; separator: {})",
                     self.width, self.separator
@@ -420,9 +440,18 @@ impl TextTable {
             .wanted
             .iter()
             .filter(|(_, role)| *role != Role::Column(Column::Step));
+        self.mostly_numbers(numbers.map(|(position, _)| &record[*position]))
+    }
+
+    /// Whether a line of any width holds data.
+    fn are_numbers(&self, record: &csv::ByteRecord) -> bool {
+        self.mostly_numbers(record.iter())
+    }
+
+    fn mostly_numbers<'a>(&self, cells: impl Iterator<Item = &'a [u8]>) -> bool {
         let (mut right, mut wrong) = (0, 0);
-        for (position, _) in numbers {
-            match self.number(&record[*position]) {
+        for cell in cells {
+            match self.number(cell) {
                 Ok(value) => right += usize::from(!value.is_nan()),
                 Err(_) => wrong += 1,
             }

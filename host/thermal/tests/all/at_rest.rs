@@ -118,6 +118,86 @@ fn a_cold_start_goes_one_way() {
     );
 }
 
+/// A unit in a freezer for half an hour, whose gyro x jumps by 100 and back by 60 times the noise of a row of 2.5 s, as those of one of the recordings
+/// that were judged from outside. `nudge`: what the accelerometer changes by with each, as a share of gravity.
+fn in_freezer(seed: u64, nudge: f64) -> (Manifest, Samples) {
+    let freezer = Experiment {
+        corners: vec![
+            (0.0, 40.0),
+            (300.0, 16.0),
+            (600.0, 9.0),
+            (1000.0, 5.0),
+            (1900.0, 3.6),
+        ],
+        ..Experiment::ramp(0.0, false)
+    };
+    let (manifest, mut samples) = at_rest(&freezer, seed);
+    for k in 0..samples.len() {
+        let [first, second] = [430.0, 523.0].map(|at| f64::from(u8::from(samples.t_s[k] >= at)));
+        samples.raw[0][k] += JUMPS[0] * first + JUMPS[1] * second;
+        samples.raw[4][k] += GAIN[1] * GRAVITY * nudge * (first - 0.2 * second);
+        // Where it is nudged there are dwells, as where stillness finds them.
+        if nudge > 0.0 {
+            samples.step[k] = (first + second) as i32;
+        }
+    }
+    (manifest, samples)
+}
+
+/// Raw.
+const JUMPS: [f64; 2] = [
+    -100.0 * GAIN[0] * WHITE[0] / 1.58,
+    60.0 * GAIN[0] * WHITE[0] / 1.58,
+];
+
+#[test]
+fn jumps_of_a_gyros_bias_at_rest_are_named_and_their_samples_kept_in_intervals_that_hold_them() {
+    for nudge in [0.0, 0.03] {
+        for seed in 1..=3 {
+            let recorded = session(in_freezer(seed, nudge)).unwrap();
+            let [first, second] = recorded.bias_jumps[..] else {
+                panic!("{nudge}, {seed}: {:?}", recorded.bias_jumps);
+            };
+            assert!((first.at_s - 430.0).abs() < 5.0 && (second.at_s - 523.0).abs() < 5.0);
+            for (jump, size) in [first, second].iter().zip(JUMPS) {
+                assert!((jump.change.x / size - 1.0).abs() < 0.1, "{jump:?}, {size}");
+            }
+            // A nudge is no other pose of the gyro.
+            assert!(recorded.moved_s[0].is_empty());
+            assert_eq!(recorded.moved_s[1].is_empty(), nudge == 0.0);
+            let found = fit(vec![recorded], &[], JOINT).unwrap();
+            let result = ThermalResult::of(&found);
+            let said = |w: &String| {
+                w.contains("the gyro's bias jumps 2 times, by ") && w.contains(" V at 430 s")
+            };
+            assert!(result.warnings.iter().any(said), "{:?}", result.warnings);
+            let curve = result.curve("gyro_bias_x").unwrap();
+            let later = truth(0, curve.temp_c[0]).1[0] + JUMPS[0] + JUMPS[1];
+            assert!(
+                (curve.lower[0]..=curve.upper[0]).contains(&later),
+                "{nudge}, {seed}: {later} in {} to {}",
+                curve.lower[0],
+                curve.upper[0]
+            );
+        }
+    }
+}
+
+#[test]
+fn no_jump_is_seen_in_a_bias_that_warms_up_or_wanders() {
+    for seed in 1..=20 {
+        let (manifest, mut samples) = at_rest(&Experiment::ramp(60.0, true), seed);
+        let (mut random, mut walk) = (Random(1000 + seed), 0.0);
+        for k in 0..samples.len() {
+            walk += 0.3 * GAIN[0] * WHITE[0] * random.normal() / RATE_HZ;
+            let power_on = 400.0 * GAIN[0] * WHITE[0] * (-samples.t_s[k] / 60.0).exp();
+            samples.raw[1][k] += walk + power_on;
+        }
+        let recorded = session((manifest, samples)).unwrap();
+        assert_eq!(recorded.bias_jumps, [], "{seed}");
+    }
+}
+
 /// A chamber of the PAN cubesat, cooling only; see the data set's own description. The columns of the temperature are counts.
 #[test]
 fn a_cubesats_gyro_cooled_one_way_has_straight_lines() {

@@ -148,13 +148,18 @@ fn a_place_without_a_recording_is_named() {
 fn an_output_that_cannot_be_written_is_refused_before_anything_appears() {
     let place = Place::with(&by_hand());
     let recording = place.text("rec");
-    let (missing, good) = (place.text("none/x.toml"), place.text("cal.toml"));
+    let (new, good) = (place.text("new/er/x.toml"), place.text("cal.toml"));
+    fs::write(place.path("file"), "").unwrap();
+    let below = place.text("file/x.toml");
     let fit = |arguments: &[&str]| {
         let fixed = ["fit", recording.as_str()];
         mimu(fixed.into_iter().chain(arguments.iter().copied()))
     };
-    fit(&["-o", &missing]).refused(&["none/x.toml", "folder does not exist", "create it"]);
-    fit(&["-o", &good, "--json", &missing]).refused(&["none/x.toml", "folder does not exist"]);
+    fit(&["-o", &below]).refused(&["file/x.toml", "cannot be created: not a directory"]);
+    fit(&["-o", &good, "--json", &below]).refused(&["file/x.toml", "cannot be created"]);
+    // Folders that were made for a result go with it.
+    fit(&["-o", &new, "--json", &below]).refused(&["file/x.toml"]);
+    fit(&["-o", &new, "--method", "kalman"]).refused(&["--method"]);
     fit(&["-o", &recording]).refused(&["rec", "directory"]);
     fit(&["-o", &good, "--json", &good]).refused(&["cal.toml", "another result"]);
     let samples = place.recording().join("samples.csv");
@@ -165,7 +170,74 @@ fn an_output_that_cannot_be_written_is_refused_before_anything_appears() {
     if Path::new("/proc/version").exists() {
         fit(&["-o", "/proc/cal.toml"]).refused(&["/proc/cal.toml"]);
     }
-    assert_eq!(place.names(), ["rec"]);
+    assert_eq!(place.names(), ["file", "rec"]);
+}
+
+#[test]
+fn missing_folders_of_a_result_are_made_by_every_command() {
+    let place = Place::with(&by_hand());
+    let recording = place.text("rec");
+    let calibration = place.text("a/b/cal.toml");
+    let in_new = |path: &str| {
+        let text = place.text(path);
+        assert!(!Path::new(&text).parent().unwrap().exists(), "{path}");
+        text
+    };
+    let made = |arguments: &[&str], files: &[&String]| {
+        let done = mimu(arguments.iter().copied());
+        assert_eq!(done.status, Some(0), "{arguments:?}: {}", done.stderr);
+        for file in files {
+            assert!(Path::new(file).exists(), "{arguments:?}: {file}");
+        }
+    };
+    let json = in_new("c/d/fit.json");
+    in_new("a/b/cal.toml");
+    made(
+        &["fit", &recording, "-o", &calibration, "--json", &json],
+        &[&calibration, &json],
+    );
+    let csv = format!("{recording}/samples.csv");
+    let imported = in_new("e/f/rec");
+    made(
+        &[
+            "import",
+            &csv,
+            "--raw-unit",
+            "V",
+            "--reference",
+            "gravity",
+            "-o",
+            &imported,
+        ],
+        &[&imported],
+    );
+    let applied = in_new("g/h/rec");
+    made(
+        &[
+            "apply",
+            &recording,
+            "--calibration",
+            &calibration,
+            "-o",
+            &applied,
+        ],
+        &[&applied],
+    );
+    let plan = in_new("i/j/plan.toml");
+    made(
+        &[
+            "design",
+            "-n",
+            "9",
+            "--reference",
+            "gravity",
+            "--table",
+            "hand",
+            "-o",
+            &plan,
+        ],
+        &[&plan],
+    );
 }
 
 #[cfg(unix)]
@@ -390,7 +462,7 @@ fn an_import_that_fails_leaves_nothing_behind() {
         mimu(fixed.into_iter().chain(arguments.iter().copied()))
     };
     let inputs = place.text("inputs.csv");
-    let missing = place.text("none/x.json");
+    let below = place.text("word.csv/x.json");
     import("word.csv", &[]).refused(&["word.csv, row 252, column step", "x"]);
     import("good.csv", &["--gravity", "1"]).refused(&["gravity", "looks like g"]);
     import("good.csv", &["--rate-hz", "nan"]).refused(&["not a sample rate", "--rate-hz"]);
@@ -399,7 +471,7 @@ fn an_import_that_fails_leaves_nothing_behind() {
     import("good.csv", &["--latitude", "91"]).refused(&["latitude_deg", "91"]);
     import("good.csv", &["--inputs", &inputs])
         .refused(&["inputs.csv, row 3, column step", "twice"]);
-    import("good.csv", &["--json", &missing]).refused(&["none/x.json", "folder does not exist"]);
+    import("good.csv", &["--json", &below]).refused(&["word.csv/x.json", "cannot be created"]);
     import("bare.csv", &[]).refused(&["bare.csv", "--columns"]);
     import("bare.csv", &["--columns", "gyro_x,gyro_y,gyro_z"]).refused(&["bare.csv", "--rate-hz"]);
     import("nothing.csv", &[]).refused(&["nothing.csv", "no such file"]);

@@ -208,3 +208,40 @@ fn what_can_be_left_out_is_named_and_the_result_is_right() {
         right(&result);
     }
 }
+
+#[test]
+fn temperatures_that_are_none_are_counted_in_the_same_words_by_every_command() {
+    let mut samples = by_hand();
+    samples.names.push("temp_c".into());
+    samples.rows.iter_mut().for_each(|row| row.push(21.0));
+    let dwell = samples.dwells[4].clone();
+    let bad = dwell.start + 20..dwell.start + 50;
+    samples.edit("temp_c", bad.clone(), |_| -7049.0);
+    let time = |row: usize| samples.rows[row][0];
+    let [from, to, first] = [dwell.start, dwell.end - 1, bad.start].map(time);
+    let place = Place::with(&samples);
+    let (recording, calibration) = (place.text("rec"), place.text("cal.toml"));
+    let words = |of: usize| {
+        format!("30 of {of} values are no temperatures in °C, the first is -7049 at {first:.1} s")
+    };
+    let all = samples.rows.len();
+    let warned = |arguments: &[&str], of: usize| {
+        let result = mimu(arguments.iter().chain(&["--json", "-"])).json();
+        let said = format!("temp_c: {}: left empty", words(of));
+        let warnings = result["warnings"].as_array().unwrap();
+        assert!(
+            warnings.iter().any(|w| w.as_str() == Some(&said)),
+            "{arguments:?}: {said} in {warnings:?}"
+        );
+    };
+    warned(&["fit", &recording, "-o", &calibration], all);
+    warned(&["verify", &recording, "--calibration", &calibration], all);
+    warned(&["diagnose", &recording], all);
+    let [from, to] = [from, to].map(|t| t.to_string());
+    warned(
+        &["allan", &recording, "--from", &from, "--to", &to],
+        dwell.len(),
+    );
+    let told = words(all);
+    mimu(["thermal", "fit", &recording]).refused(&["temp_c", &told, "mimu import --scale"]);
+}

@@ -86,3 +86,30 @@ fn a_broken_row_of_a_file_without_times_takes_its_time() {
     assert_eq!(summary.rows, 99);
     assert_eq!((batch.t_s[39], batch.t_s[40]), (0.39, 0.41));
 }
+
+#[test]
+fn where_no_row_fits_the_first_line_of_data_is_named_with_what_is_wrong_with_it() {
+    let rows = "0.01,1,2,3,4\n0.02,1,2,3,4\n0.03,1,2,3\n";
+    for (above, row) in [("", 1), ("Logger 1.2\nt;x;y;z;extra\n\n", 4)] {
+        let error = one(&format!("{above}{rows}"), "t_s,gyro_x,gyro_y,gyro_z,-,-").unwrap_err();
+        let text = error.to_string();
+        assert!(text.contains(&format!("a.txt, row {row}: ")), "{text}");
+        assert!(
+            text.contains("the row has 5 cells and 6 are expected"),
+            "{text}"
+        );
+    }
+    // Where nothing is data, the first of all lines.
+    let error = one("no\ndata,here\n", NAMES).unwrap_err();
+    let text = error.to_string();
+    assert!(
+        text.contains("a.txt, row 1: ") && text.contains("the row has 1 cells"),
+        "{text}"
+    );
+    let error = one("a,b,c,d\nx,y,z,w,v\n", NAMES).unwrap_err();
+    let text = error.to_string();
+    assert!(
+        text.contains("a.txt, row 1: ") && text.contains("it holds words"),
+        "{text}"
+    );
+}

@@ -1,0 +1,43 @@
+//! Samples of the thermometer that are no temperatures in °C are taken for empty cells, and counted.
+
+use mimu_core::table::is_temperature;
+use mimu_recording::NoTemperatures;
+
+/// Leaves empty what is no temperature among `temp_c`, of the times `t_s`, and counts it.
+pub(crate) fn leave_empty(
+    temp_c: &mut [f64],
+    t_s: impl IntoIterator<Item = f64>,
+    found: &mut NoTemperatures,
+) {
+    for (c, t_s) in temp_c.iter_mut().zip(t_s) {
+        found.of += u64::from(c.is_finite());
+        if c.is_finite() && !is_temperature(*c) {
+            found.add(*c, || format!("at {t_s:.1} s"));
+            *c = f64::NAN;
+        }
+    }
+}
+
+/// What a person should know of them.
+pub(crate) fn warning(found: &NoTemperatures) -> Option<String> {
+    Some(format!("temp_c: {}", found.warning()?))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_no_temperature_is_left_empty_and_counted_and_nothing_else() {
+        let mut found = NoTemperatures::default();
+        let mut temp_c = [20.0, -7049.0, f64::NAN, -40.0, 1e5, 85.0];
+        leave_empty(&mut temp_c, (0..6).map(f64::from), &mut found);
+        assert!(temp_c[1].is_nan() && temp_c[2].is_nan() && temp_c[4].is_nan());
+        assert_eq!([temp_c[0], temp_c[3], temp_c[5]], [20.0, -40.0, 85.0]);
+        assert_eq!(
+            warning(&found).unwrap(),
+            "temp_c: 2 of 5 values are no temperatures in °C, the first is -7049 at 1.0 s: left empty"
+        );
+        assert_eq!(warning(&NoTemperatures::default()), None);
+    }
+}

@@ -1,0 +1,87 @@
+//! Two bytes of a reading of which a firmware took the low one for a signed number, `(high << 8) + (int8_t)low`.
+
+use crate::columns::{Column, RAW_COLUMNS};
+use crate::error::{Error, Result};
+
+/// Values of a byte.
+const BYTE: f64 = 256.0;
+/// Largest reading of two bytes.
+const LARGEST: f64 = 32_767.0;
+
+/// What a reading in whole counts is without the fault. A low byte of 128 or more makes it 256 counts low, and is right itself: this is exact.
+pub fn undone(reading: f64) -> f64 {
+    let mended = match reading.rem_euclid(BYTE) >= 0.5 * BYTE {
+        true => reading + BYTE,
+        false => reading,
+    };
+    // Below its smallest number a variable of two bytes goes on at its largest.
+    match mended > LARGEST {
+        true => mended - BYTE * BYTE,
+        false => mended,
+    }
+}
+
+/// Raw channels that an import mends.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SignedLowByte {
+    /// `gyro`, `accel` or the name of a raw column.
+    target: String,
+}
+
+impl SignedLowByte {
+    /// Whether it is the fault of `column`.
+    pub(crate) fn applies_to(&self, column: Column) -> bool {
+        let name = column.name();
+        matches!(column, Column::Raw(_))
+            && (name == self.target || name.split('_').next() == Some(&self.target))
+    }
+}
+
+impl std::str::FromStr for SignedLowByte {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        match text == "gyro" || text == "accel" || RAW_COLUMNS.contains(&text) {
+            true => Ok(Self {
+                target: text.to_owned(),
+            }),
+            false => Err(Error::new(
+                "signed low byte",
+                format!("{} is no raw column", crate::cell::shorten(text.as_bytes())),
+                "write gyro, accel or a single column such as gyro_x",
+            )),
+        }
+    }
+}
+
+impl std::fmt::Display for SignedLowByte {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.target)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_reading_of_two_bytes_is_mended_exactly_in_a_wide_and_in_a_narrow_variable() {
+        for right in i16::MIN..=i16::MAX {
+            let [high, low] = right.to_be_bytes();
+            let wide = i32::from(high as i8) * 256 + i32::from(low as i8);
+            assert_eq!(undone(f64::from(wide)), f64::from(right));
+            assert_eq!(undone(f64::from(wide as i16)), f64::from(right));
+        }
+    }
+
+    #[test]
+    fn what_is_no_raw_column_is_refused() {
+        for text in ["", "mag", "temp_c", "gyro=2", "gyro_"] {
+            assert!(text.parse::<SignedLowByte>().is_err(), "{text}");
+        }
+        let gyro: SignedLowByte = "gyro".parse().unwrap();
+        let reached: Vec<bool> = (0..6).map(|c| gyro.applies_to(Column::Raw(c))).collect();
+        assert_eq!(reached, [true, true, true, false, false, false]);
+        assert!(!gyro.applies_to(Column::Temperature) && !gyro.applies_to(Column::Reference(0)));
+    }
+}
