@@ -157,7 +157,8 @@ pub fn estimate(sessions: &[Session], choice: Choice) -> Result<Joint> {
         starts,
         warnings,
     };
-    for profile in &joint.profiles {
+    // Where lag and slope cannot be told apart, none is applied, and none refuses.
+    for profile in joint.profiles.iter().filter(|_| !one_way) {
         check_speed(sessions, &profile.lag, span)?;
     }
     let [gyro, accel] = <[_; 2]>::try_from(triads).unwrap_or([None, None]);
