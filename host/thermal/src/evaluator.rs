@@ -189,6 +189,10 @@ impl<'a> Evaluator<'a> {
             self.criterion(0.0, starts);
             0.0
         });
+        // Another sensor may have told the lag, and this one seen none of them yet.
+        for (lag, _) in profile.weights.iter().filter(|w| w.1 > 0.0) {
+            self.criterion(*lag, starts);
+        }
         let weight = |lag: f64| {
             let of = profile.weights.iter().find(|w| w.0 == lag);
             of.map_or(0.0, |w| w.1)

@@ -160,7 +160,8 @@ pub fn estimate(sessions: &[Session], choice: Choice) -> Result<Joint> {
         starts,
         warnings,
     };
-    for (_, profile) in joint.profiles.iter() {
+    // Where lag and slope cannot be told apart, none is applied, and none refuses.
+    for (_, profile) in joint.profiles.iter().filter(|_| !one_way) {
         check_speed(sessions, &profile.lag, span)?;
     }
     for (sensor, triad) in PerSensor::from(triads) {
