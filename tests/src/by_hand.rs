@@ -267,7 +267,7 @@ pub(crate) fn case_of(
     });
     let accepted = diagnosis.sensors.iter().flat_map(|s| &s.decision.accepted);
     let found = accepted.map(|a| {
-        let alike = a.chosen.alternatives.iter().map(|(id, _)| id.clone());
+        let alike = a.chosen.alternatives.iter().map(|other| other.id.clone());
         std::iter::once(a.chosen.candidate.id())
             .chain(alike)
             .collect()

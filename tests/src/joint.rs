@@ -4,8 +4,9 @@
 //! another session is compensated by it sample by sample (`mimu apply`), and rate and force are compared with the true ones.
 
 use mimu::apply::apply;
-use mimu::calibration::{Calibration, EffectTable};
+use mimu::calibration::Calibration;
 use mimu::diagnose::{Recordings, diagnose};
+use mimu::effects::fitted::FittedEffect;
 use mimu::fit::fit;
 use mimu::prepared::Prepared;
 use mimu::stillness::STILL_FACTOR;
@@ -398,15 +399,16 @@ fn judge(case: &mut Case) -> Result<()> {
     case.found = accepted
         .clone()
         .map(|a| {
-            let alike = a.chosen.alternatives.iter().map(|(id, _)| id.clone());
+            let alike = a.chosen.alternatives.iter().map(|other| other.id.clone());
             std::iter::once(a.chosen.candidate.id())
                 .chain(alike)
                 .collect()
         })
         .collect();
-    let mut effects: Vec<EffectTable> = Vec::new();
-    for table in accepted.filter(|a| a.of_unit).map(EffectTable::from) {
-        table.join(&mut effects).expect("each is there once");
+    let mut effects: Vec<FittedEffect> = Vec::new();
+    for accepted in accepted.filter(|a| a.of_unit) {
+        let effect = accepted.effect.lasting();
+        effect.join(&mut effects).expect("each is there once");
     }
     let with = written(&Calibration::of(&diagnosis.after, &effects, NOW)?)?;
     let files = [without, with];

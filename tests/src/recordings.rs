@@ -319,14 +319,9 @@ pub fn verdict(fit: &Fit, accel: &Affine<f64>, gyro: &Affine<f64>) -> Result<Ver
         table.o = model.offset.into();
     }
     let verified = mimu::verify::verify(&fit.prepared, &calibration)?;
-    let of = |s| {
-        let found = verified.sensors.iter().find(|v| v.sensor == s);
-        found.expect("both sensors can be judged")
-    };
-    let (accel, gyro) = (
-        of(mimu::quantity::Sensor::Accel),
-        of(mimu::quantity::Sensor::Gyro),
-    );
+    let judged = verified.sensors.transpose();
+    let judged = judged.expect("both sensors can be judged");
+    let (accel, gyro) = (judged.accel, judged.gyro);
     Ok(Verdict {
         size_mps2: accel.rms,
         direction_rad: gyro.rms,

@@ -11,6 +11,8 @@ use crate::table::{self, Node, Table};
 
 /// The thermometer is the mean of the gyros' TEMP pins.
 pub(super) const TEMP_PINS: u8 = 0;
+/// Bytes in front of the first node: range and lags.
+pub(super) const BEFORE_NODES: usize = 8 + 8;
 const RANGE_KNOWN: u8 = 1;
 const LAGS_KNOWN: u8 = 1 << 1;
 

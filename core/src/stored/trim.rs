@@ -1,13 +1,13 @@
 //! Offsets of a stored calibration set anew, everything else kept.
 
 use super::bytes::Reader;
-use super::{CHECK, CRC, HEADER, Refused, decode};
+use super::{CHECK, CRC, HEADER, Refused, curves, decode};
 use crate::PerSensor;
 
 /// Where the time of the trim stands.
 const TRIMMED_AT: usize = HEADER + 52;
-/// Where the first node stands: behind the origin, the directions, range and lags.
-const NODES_AT: usize = HEADER + 60 + 144 + 16;
+/// Where the first node stands: behind the origin, the directions, and what stands in front of the nodes.
+const NODES_AT: usize = HEADER + 60 + 144 + curves::BEFORE_NODES;
 const NODE: usize = 196;
 /// Where o of the gyro and o of the accelerometer stand in a node.
 const OFFSETS_AT: PerSensor<usize> = PerSensor {

@@ -110,9 +110,9 @@ fn times(times: f32, effects: &[DeviceEffect<f32>], lags_s: Option<PerSensor<f32
         &stored::Origin::UNKNOWN,
         PerSensor::both(&one),
         &Curves {
-            nodes: &nodes,
             range_c: Some([0.0, 50.0]),
             lags_s,
+            ..Curves::of(&nodes)
         },
         effects,
         &mut bytes,

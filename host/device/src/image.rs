@@ -9,7 +9,8 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::origin;
 use super::who::{Hash, Who};
-use mimu::calibration::{Calibration, NotOnDevice, OverTemperature, on_device, reference_node};
+use mimu::calibration::{Calibration, OverTemperature, reference_node};
+use mimu::effects::on_device::NotOnDevice;
 use mimu::quantity::{PerSensor, Sensor};
 use mimu_recording::RawUnit;
 use mimu_recording::error::{Argument, Error, Result};
@@ -240,9 +241,9 @@ fn model(calibration: &Calibration, sensor: Sensor, place: &str) -> Result<Affin
 
 /// The effects of a calibration in the words of the device; refused by name is one that no device removes.
 fn effects_of(calibration: &Calibration, place: &str) -> Result<Vec<DeviceEffect<f32>>> {
-    let parts = calibration.effects().iter().map(|removed| {
-        on_device(removed).map_err(|why| {
-            let at = format!("{place}, [[effect]] {}", removed.candidate.id());
+    let parts = calibration.effects().iter().map(|effect| {
+        effect.on_device().map_err(|why| {
+            let at = format!("{place}, [[effect]] {}", effect.id());
             let remedy = match why {
                 NotOnDevice::Numbers => "diagnose the recording again",
                 _ => "use the calibration without it, on the PC alone",

@@ -8,10 +8,9 @@ mod of_fit;
 mod on_device;
 mod over_temperature;
 
-pub use effect::{CoefficientTable, ConverterTable, EffectTable, FormTable};
 pub use kept::Kept;
 pub use of_curves::{CurvesOfUnit, TriadOfCurves};
-pub use on_device::{NotOnDevice, compensator, on_device};
+pub use on_device::compensator;
 pub use over_temperature::{
     Curves, DieTable, NodeTable, OverTemperature, TemperatureNode, reference_node,
 };
@@ -24,7 +23,7 @@ use mimu_core::effects::Effects;
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
-use crate::effects::removal::Removed;
+use crate::effects::fitted::FittedEffect;
 use crate::quantity::Sensor;
 use crate::toml_layout;
 use crate::triad::Covariance;
@@ -98,10 +97,7 @@ pub struct Calibration {
     pub temperature: Option<OverTemperature>,
     /// What the affine models lack.
     #[serde(default, rename = "effect", skip_serializing_if = "Vec::is_empty")]
-    pub effect_tables: Vec<EffectTable>,
-    /// The same as it is taken out.
-    #[serde(skip)]
-    effects: Vec<Removed>,
+    effects: Vec<FittedEffect>,
 }
 
 /// The recording that a calibration was made from.
@@ -269,7 +265,7 @@ impl Calibration {
 
     /// Text of the file, for programs and for people.
     pub fn to_toml(&self) -> String {
-        let effects = match self.effect_tables.is_empty() {
+        let effects = match self.effects.is_empty() {
             true => "",
             false => HEADER_OF_EFFECTS,
         };
@@ -285,7 +281,7 @@ impl Calibration {
     }
 
     /// What the affine models lack.
-    pub fn effects(&self) -> &[Removed] {
+    pub fn effects(&self) -> &[FittedEffect] {
         &self.effects
     }
 

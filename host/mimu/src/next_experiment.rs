@@ -384,12 +384,12 @@ fn pairs(diagnosis: &Diagnosis) -> Vec<Pair> {
     let accepted = diagnosis.sensors.iter().flat_map(|s| &s.decision.accepted);
     let each = accepted.flat_map(|a| {
         let alternatives = a.chosen.alternatives.iter().take(ALTERNATIVES);
-        alternatives.map(|(id, difference)| Pair {
-            found: a.chosen.candidate.clone(),
-            values: a.values.iter().copied().collect(),
-            id: id.clone(),
-            other: by_id(id),
-            difference: *difference,
+        alternatives.map(|other| Pair {
+            found: a.effect.candidate.clone(),
+            values: a.effect.values.clone(),
+            id: other.id.clone(),
+            other: by_id(&other.id),
+            difference: other.score_worse_by,
         })
     });
     each.collect()

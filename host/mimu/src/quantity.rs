@@ -1,12 +1,20 @@
 //! Sensors, axes, units, and how numbers are written: in one place, for messages, files and everything that people read.
 
 use mimu_recording::RawUnit;
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 pub use mimu_core::{PerSensor, Sensor};
 
 /// Names of the axes.
 pub const AXES: [&str; 3] = ["x", "y", "z"];
+
+/// Serialises what there is for each sensor: one that is absent has no key.
+pub fn present<T: Serialize, S: Serializer>(
+    sensors: &PerSensor<Option<T>>,
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
+    serializer.collect_map(sensors.present())
+}
 
 /// What an error figure is about; a file has [`Figure::description`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -20,7 +28,7 @@ pub enum Figure {
 }
 
 impl Serialize for Figure {
-    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.serialize_str(self.description())
     }
 }

@@ -1,5 +1,7 @@
 //! Finding dwells where nobody says where they are: stretches in which no channel varies.
 
+use serde::Serialize;
+
 use crate::blocks::{Block, Condensed, Level, Stretch, pool, quantile};
 use crate::quantity::Sensor;
 use mimu_recording::error::{Error, Result};
@@ -59,9 +61,10 @@ impl From<f64> for Finding {
 }
 
 /// The thresholds that found the dwells.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Detection {
     /// Length of a block, s: ends of dwells are on this grid.
+    #[serde(skip)]
     pub block_s: f64,
     /// Window of the variance, s.
     pub window_s: f64,
@@ -74,6 +77,7 @@ pub struct Detection {
     /// The same in the gyro.
     pub gyro_still_factor: f64,
     /// Standard deviation of one sample in the quietest twentieth of the recording, raw units.
+    #[serde(rename = "floor_raw")]
     pub floor: [f64; 6],
 }
 

@@ -2,6 +2,7 @@
 
 use mimu_core::compensation::Affine;
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
+use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 /// Covariance of twelve parameters, in the order of [`vector`].
@@ -288,7 +289,7 @@ impl Triad {
 }
 
 /// A number with its uncertainty.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Estimate {
     /// Value.
     pub value: f64,

@@ -2,6 +2,7 @@
 
 use mimu_core::compensation::Affine;
 use nalgebra::{Matrix3, Vector3};
+use serde::Serialize;
 
 use crate::calibration::Calibration;
 use crate::die_temperature::{WITHOUT_TEMPERATURE, at_one_temperature, outside};
@@ -11,45 +12,52 @@ use crate::fit::as_came::{errors, exceeds};
 use crate::fit::refuse_wrong_gravity;
 use crate::prepared::{Prepared, si_covariance};
 use crate::quantity::Figure;
-use crate::quantity::{Sensor, plural};
+use crate::quantity::{PerSensor, Sensor, plural, present};
 use crate::triad::Forward;
 use crate::unit_in_si::restless;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{Manifest, RawUnit, Reference};
 
 /// What a calibration does to one triad of a recording. Figures as in [`Figure`].
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize)]
 pub struct SensorVerification {
-    /// Which.
-    pub sensor: Sensor,
-    /// What the figures are about.
-    pub figure: Figure,
-    /// With one scale factor and one bias for all axes and no misalignment, what a
-    /// datasheet would give: the means of the calibration's own.
+    /// With the mean of the calibration's scale factors and of its biases on all three axes and no misalignment, in [`Self::unit`]: fitted
+    /// means in place of a data sheet's.
     pub rms_raw: f64,
-    /// The readings as they came, where they are in SI.
-    pub rms_as_came: Option<f64>,
-    /// With the calibration, but with its effects left in; `None` if it has none.
-    pub rms_affine: Option<f64>,
-    /// With the calibration.
+    /// The readings as they came, in [`Self::unit`]; absent where they are not in SI.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rms_as_they_came: Option<f64>,
+    /// With the calibration, in [`Self::unit`].
     pub rms: f64,
-    /// The largest error with the calibration.
+    /// With the calibration but for its effects, in [`Self::unit`]; absent if it has none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rms_affine: Option<f64>,
+    /// The largest error with the calibration, in [`Self::unit`].
     pub max: f64,
-    /// If noise were all.
+    /// What noise alone would give, in [`Self::unit`]; null where the noise is not known.
     pub noise_floor: f64,
-    /// Compensated gyro dwell means without a table, rad/s.
-    pub static_rms: Option<f64>,
-    /// Number of dwells or turns judged.
+    /// SI unit of the figures.
+    pub unit: &'static str,
+    /// What they are about.
+    pub figure: Figure,
+    /// Dwells or turns judged.
     pub count: usize,
+    /// Compensated gyro dwell means without a table, rad/s; absent with one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub static_rms: Option<f64>,
 }
 
-/// What a calibration does to a recording.
-#[derive(Debug, Clone)]
+/// What a calibration does to a recording: `mimu-verify/1`.
+#[derive(Debug, Clone, Serialize)]
 pub struct Verification {
+    /// `mimu-verify/1`.
+    pub format: &'static str,
     /// Whether it is the recording that the calibration was made from.
+    #[serde(skip)]
     pub same_recording: bool,
-    /// Gyro, then accelerometer, as far as both the calibration and the recording have them.
-    pub sensors: Vec<SensorVerification>,
+    /// The triads, as far as both the calibration and the recording have them.
+    #[serde(serialize_with = "present")]
+    pub sensors: PerSensor<Option<SensorVerification>>,
     /// What a person should know.
     pub warnings: Vec<String>,
 }
@@ -81,7 +89,7 @@ pub fn verify(prepared: &Prepared, calibration: &Calibration) -> Result<Verifica
         warnings.push(WITHOUT_TEMPERATURE.into());
     }
     let prepared = moved.as_ref().unwrap_or(prepared);
-    let mut sensors = Vec::new();
+    let mut sensors = PerSensor::<Option<SensorVerification>>::default();
     for sensor in Sensor::BOTH {
         if calibration.inverse(sensor).is_none() || !prepared.has(sensor) {
             continue;
@@ -97,7 +105,7 @@ pub fn verify(prepared: &Prepared, calibration: &Calibration) -> Result<Verifica
             (Some((affine, _)), Some((clean, refused))) => {
                 let judged = SensorVerification {
                     rms_raw: affine.rms_raw,
-                    rms_as_came: affine.rms_as_came,
+                    rms_as_they_came: affine.rms_as_they_came,
                     rms_affine: Some(affine.rms),
                     ..clean
                 };
@@ -112,9 +120,9 @@ pub fn verify(prepared: &Prepared, calibration: &Calibration) -> Result<Verifica
             }
         };
         warnings.extend(refused);
-        sensors.push(judged);
+        sensors[sensor] = Some(judged);
     }
-    if sensors.is_empty() {
+    if sensors.present().next().is_none() {
         let unused = Sensor::BOTH.map(|s| prepared.dwells.unused(s));
         let reason = unused.iter().find(|u| !u.is_empty());
         let error = Error::new(
@@ -132,10 +140,10 @@ pub fn verify(prepared: &Prepared, calibration: &Calibration) -> Result<Verifica
             None => error,
         });
     }
-    let at_rest = sensors.iter().filter_map(|s| s.static_rms);
+    let at_rest = sensors.present().filter_map(|(_, s)| s.static_rms);
     warnings.extend(at_rest.filter_map(restless));
-    for s in &sensors {
-        let (other, what, question) = match s.rms_as_came {
+    for (sensor, s) in sensors.present() {
+        let (other, what, question) = match s.rms_as_they_came {
             Some(came) => (came, "the readings as they came", "this unit"),
             None => (
                 s.rms_raw,
@@ -152,18 +160,17 @@ pub fn verify(prepared: &Prepared, calibration: &Calibration) -> Result<Verifica
             "dwell"
         };
         warnings.push(match exceeds(s.rms, other, errors(s.figure, s.count)) {
-            true => format!(
-                "{}: worse than with {what}: is it the calibration of {question}?",
-                s.sensor
-            ),
+            true => {
+                format!("{sensor}: worse than with {what}: is it the calibration of {question}?")
+            }
             false => format!(
-                "{}: {} do not tell whether it is better than {what}: record more",
-                s.sensor,
+                "{sensor}: {} do not tell whether it is better than {what}: record more",
                 plural(s.count as u64, noun)
             ),
         });
     }
     Ok(Verification {
+        format: "mimu-verify/1",
         same_recording,
         sensors,
         warnings,
@@ -278,10 +285,10 @@ fn judged(
     floor: &[f64],
 ) -> Option<SensorVerification> {
     (!after.is_empty()).then(|| SensorVerification {
-        sensor,
+        unit: figure.unit(sensor),
         figure,
         rms_raw: rms(raw),
-        rms_as_came: None,
+        rms_as_they_came: None,
         rms_affine: None,
         rms: rms(after),
         max: largest(after),
@@ -317,7 +324,7 @@ fn known(
         &floor,
     )?;
     Some(SensorVerification {
-        rms_as_came: in_si(prepared).then(|| rms(&errors(&ONE))),
+        rms_as_they_came: in_si(prepared).then(|| rms(&errors(&ONE))),
         ..judged
     })
 }
@@ -341,7 +348,7 @@ fn size(prepared: &Prepared, calibrated: &Affine<f64>) -> Option<SensorVerificat
         &floor,
     )?;
     Some(SensorVerification {
-        rms_as_came: in_si(prepared).then(|| rms(&errors(&ONE))),
+        rms_as_they_came: in_si(prepared).then(|| rms(&errors(&ONE))),
         ..judged
     })
 }
@@ -376,7 +383,7 @@ fn turns(
     let judged = judged(Sensor::Gyro, Figure::Direction, &before, &after, &floor)?;
     Some(SensorVerification {
         static_rms: Some(rms(&rest)),
-        rms_as_came: in_si(prepared).then(|| rms(&errors(&prepared.turns(&ONE).0, &ONE))),
+        rms_as_they_came: in_si(prepared).then(|| rms(&errors(&prepared.turns(&ONE).0, &ONE))),
         ..judged
     })
 }

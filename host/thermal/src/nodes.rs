@@ -72,7 +72,7 @@ pub fn with_lags(joint: &Joint, range_c: [f64; 2], nodes: Vec<TemperatureNode>) 
             DieTable {
                 lag_s: lag.map(followed),
                 interval_lag_s: lag.filter(|_| !given).map(|l| [l.lower, l.upper]),
-                hysteresis: None,
+                ..DieTable::default()
             }
         }),
         nodes,

@@ -1,5 +1,7 @@
 //! The lag of the dies by its profile likelihood, and what is averaged over it.
 
+use serde::Serialize;
+
 /// Lags that the search begins with, s: from dies that lead to dies deep inside a potted unit.
 pub const LAGS: [f64; 31] = [
     -120.0, -105.0, -90.0, -75.0, -60.0, -45.0, -30.0, -15.0, 0.0, 15.0, 30.0, 45.0, 60.0, 75.0,
@@ -21,7 +23,7 @@ const REFINEMENTS: usize = 12;
 const GRIDS: usize = 4;
 
 /// A lag with its 95 % interval, s.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Lag {
     /// Most likely.
     pub value: f64,

@@ -1,7 +1,6 @@
 //! `mimu-thermal/1`: what a fit over temperature found. SI and raw units throughout; what is not a number is null.
 
-use mimu::quantity::{AXES, PerSensor, Sensor, inverse_names, raw_unit, scale_unit};
-use mimu::result::present;
+use mimu::quantity::{AXES, PerSensor, Sensor, inverse_names, present, raw_unit, scale_unit};
 use mimu::triad::{Angles, Estimate};
 use mimu_recording::RawUnit;
 use serde::Serialize;
@@ -68,7 +67,7 @@ pub struct SensorResult {
     /// What noise alone would give, the slope over temperature removed; null where the input is not known.
     pub noise_floor: Option<f64>,
     /// Time constant of the die behind the thermometer, s, negative where it leads; null with [`Self::lag_reason`].
-    pub lag_s: Option<LagResult>,
+    pub lag_s: Option<Lag>,
     /// Why there is no lag; null where there is one.
     pub lag_reason: Option<String>,
     /// What is inseparable in the curves of this sensor; null where nothing is.
@@ -112,17 +111,6 @@ impl DwellResult {
             error: dwell.error.into(),
         }
     }
-}
-
-/// A lag with its 95 % interval, s.
-#[derive(Debug, Clone, Copy, Serialize)]
-pub struct LagResult {
-    /// Most likely.
-    pub value: f64,
-    /// Lower end.
-    pub lower: f64,
-    /// Upper end.
-    pub upper: f64,
 }
 
 /// A parameter over temperature.
@@ -224,7 +212,7 @@ impl SensorResult {
 }
 
 /// The lag of `sensor`, or why there is none.
-fn lag(fit: &ThermalFit, sensor: Sensor) -> Result<LagResult, String> {
+fn lag(fit: &ThermalFit, sensor: Sensor) -> Result<Lag, String> {
     let profile = &fit.joint.profiles[sensor];
     let found = profile.lag;
     let Lag {
@@ -252,11 +240,7 @@ fn lag(fit: &ThermalFit, sensor: Sensor) -> Result<LagResult, String> {
             "not determined: the axes contradict each other, by themselves they want {from:.0} to {to:.0} s, where one lag for all would be {value:.1} s ({lower:.1} to {upper:.1} s)"
         ));
     }
-    Ok(LagResult {
-        value,
-        lower,
-        upper,
-    })
+    Ok(found)
 }
 
 /// Curves of one triad.

@@ -44,11 +44,11 @@ pub struct SensorJudged {
 }
 
 impl SensorJudged {
-    fn of(found: &SensorVerification, promised: Option<f64>) -> Self {
+    fn of(sensor: Sensor, found: &SensorVerification, promised: Option<f64>) -> Self {
         Self {
-            sensor: found.sensor,
+            sensor,
             figure: found.figure.description(),
-            unit: found.figure.unit(found.sensor),
+            unit: found.unit,
             before: found.rms_raw,
             affine: found.rms_affine.unwrap_or(found.rms),
             after: found.rms,
@@ -161,11 +161,11 @@ pub fn judge_all(by: &Prepared, calibration: &Calibration) -> Result<Judged> {
 
 fn judged(by: &Prepared, calibration: &Calibration, promised: Option<&Fit>) -> Result<Judged> {
     let found = verify(by, calibration)?;
-    let of = |s: &SensorVerification| {
-        let fitted = promised.and_then(|f| f.sensor(s.sensor));
-        SensorJudged::of(s, fitted.and_then(|f| f.held_out_rms()))
+    let of = |(sensor, s): (Sensor, &SensorVerification)| {
+        let fitted = promised.and_then(|f| f.sensor(sensor));
+        SensorJudged::of(sensor, s, fitted.and_then(|f| f.held_out_rms()))
     };
-    let sensors: Vec<SensorJudged> = found.sensors.iter().map(of).collect();
+    let sensors: Vec<SensorJudged> = found.sensors.present().map(of).collect();
     let mut broken: Vec<String> = sensors.iter().filter_map(SensorJudged::broken).collect();
     for sensor in Sensor::BOTH {
         let judged = sensors.iter().any(|s| s.sensor == sensor);

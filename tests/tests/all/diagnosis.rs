@@ -1,5 +1,6 @@
 //! Diagnosis of units whose truth is known, and of recordings by other people. All of the first is `make blind`.
 
+use mimu::diagnose::search::Alternative;
 use mimu::diagnose::{Diagnosis, Verdict, diagnose};
 use mimu::fit::{Method, Options};
 use mimu::quantity::Sensor;
@@ -126,7 +127,10 @@ fn a_quiet_gyro_reads_the_earth_and_nothing_takes_that_from_it() {
         .iter_mut()
         .flat_map(|s| &mut s.decision.accepted)
     {
-        let other = ("gyro_g_sensitivity".into(), -1.0);
+        let other = Alternative {
+            id: "gyro_g_sensitivity".into(),
+            score_worse_by: -1.0,
+        };
         accepted.chosen.alternatives.push(other);
     }
     let found = reported(found);
@@ -139,7 +143,7 @@ fn a_quiet_gyro_reads_the_earth_and_nothing_takes_that_from_it() {
         panic!("{accepted:?}")
     };
     assert_eq!(earth.chosen.candidate.id(), "earth_rate");
-    let (value, sigma) = (earth.values[0], earth.covariance[(0, 0)].sqrt());
+    let (value, sigma) = (earth.effect.values[0], earth.covariance[(0, 0)].sqrt());
     println!("{value:.3e} +- {sigma:.1e} rad/s about the vertical; true {expected:.3e}");
     assert!((value - expected).abs() < 3.0 * sigma && value > 5.0 * sigma);
     assert!(!earth.chosen.candidate.is_error());
@@ -191,7 +195,7 @@ fn a_quadratic_of_five_per_cent_on_a_table_comes_alone_and_at_its_size() {
             mg_per_g2 * 1e-3 / 9.806_65,
             one.covariance[(axis, axis)].sqrt(),
         );
-        let error = one.values[axis] - truth;
+        let error = one.effect.values[axis] - truth;
         println!(
             "{axis}: {:.2} sigma, {:.2} %",
             error / sigma,

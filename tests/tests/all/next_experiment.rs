@@ -78,7 +78,10 @@ fn shown_by_the_next(id: &str, unit: &RigFile, rates_dps: &[f64], seed: u64, tru
     let names = accepted.chosen.candidate.names();
     for (axis, truth) in ["x", "y", "z"].iter().zip(truth) {
         let k = names.iter().position(|n| n.0 == *axis).expect("an axis");
-        let (value, sigma) = (accepted.values[k], accepted.covariance[(k, k)].sqrt());
+        let (value, sigma) = (
+            accepted.effect.values[k],
+            accepted.covariance[(k, k)].sqrt(),
+        );
         println!("{id} {axis}: {value:e} ± {sigma:e}, {truth:e} in truth");
         assert!(
             (value - truth).abs() < 3.0 * sigma,

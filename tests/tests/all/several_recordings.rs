@@ -101,8 +101,8 @@ fn a_second_recording_bears_an_effect_out_or_refuses_it() {
     assert_eq!(ids(&agrees), ["gyro_g_sensitivity"]);
     let gyro = &agrees.sensors[0].decision;
     let second = gyro.accepted[0].second.expect("judged");
-    assert!(second.shows());
-    assert!(second.rms[1] < second.rms[0] && second.rms[1] < 1.3 * gyro.noise_floor);
+    assert!(second.shows);
+    assert!(second.rms_after < second.rms_before && second.rms_after < 1.3 * gyro.noise_floor);
 
     // What one session alone has, like a fixture that bends, is no property of the unit.
     let mut other = file.clone();

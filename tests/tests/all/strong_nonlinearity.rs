@@ -46,7 +46,7 @@ fn turns(seed: u64) -> f64 {
     assert_eq!(diagnosis.verdict, Verdict::Explained, "seed {seed}");
     let one = &accel.accepted[0];
     for (axis, mg) in mg.iter().enumerate() {
-        let [value, sigma] = [one.values[axis], one.covariance[(axis, axis)].sqrt()];
+        let [value, sigma] = [one.effect.values[axis], one.covariance[(axis, axis)].sqrt()];
         let [value, sigma] = [value, sigma].map(|v| v * 1e3 * G * G);
         println!("  {axis}: {mg:.2} mg/g³, found {value:.2} ± {sigma:.2}");
         // The device evaluates an effect twice. The square of the slope at 1 g, 0.8 % at 3 %, is the share that this leaves, as a seventh

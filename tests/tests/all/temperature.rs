@@ -228,7 +228,7 @@ fn lags(seeds: u64) -> Held {
             continue;
         };
         let true_lag = truth["lag_s"].as_float().expect("a number");
-        let interval = lag.parameter.expect("an interval");
+        let interval = lag.effect.interval.expect("an interval");
         let above = interval.lower.is_none_or(|l| l <= true_lag);
         count(
             &mut held.lags,
@@ -243,7 +243,7 @@ fn lags(seeds: u64) -> Held {
             .filter(|(_, k)| **k < 3)
         {
             let size = truth["dps_per_c"].as_array().expect("a list")[*k].as_float();
-            let error = (lag.values[i] - size.expect("a number").to_radians()).abs();
+            let error = (lag.effect.values[i] - size.expect("a number").to_radians()).abs();
             for (covariance, into) in [
                 (&lag.covariance, &mut held.coefficients),
                 (&lag.conditional, &mut held.conditional),
@@ -292,9 +292,12 @@ fn of_more_units_intervals_of_a_lag_hold_the_truth_in_93_to_97_of_a_hundred() {
 fn the_interval_of_a_lag_is_in_the_json_the_text_and_the_page() {
     let found = diagnosed(lagging(3).1, None);
     let result = DiagnosisResult::of(&found, &next(&found), None);
-    let lag = result.effects.iter().find(|e| e.id == "gyro_thermal_lag");
-    let form = lag.and_then(|l| l.form.as_ref()).expect("a lag");
-    let json = serde_json::to_value(form).expect("JSON");
+    let lag = result
+        .effects
+        .iter()
+        .find(|e| e.effect.id() == "gyro_thermal_lag");
+    let form = lag.and_then(|l| l.effect.form()).expect("a lag");
+    let json = serde_json::to_value(&form).expect("JSON");
     let [lower, upper] = ["lower", "upper"].map(|k| json[k].as_f64().expect("an end"));
     assert!(lower < form.value && form.value < upper, "{json}");
     let made = Made {
@@ -355,7 +358,7 @@ fn what_the_temperature_does_to_bias_and_scale_in_one_pose_is_named_together() {
         let effect = accepted(&found).find(|a| a.chosen.candidate.sensor == Sensor::Accel);
         let effect = effect.expect("an effect");
         let mut named: Vec<String> = vec![effect.chosen.candidate.id()];
-        named.push(effect.chosen.alternatives[0].0.clone());
+        named.push(effect.chosen.alternatives[0].id.clone());
         named.sort_unstable();
         let mut both = [id, other];
         both.sort_unstable();
@@ -381,7 +384,7 @@ fn at_many_poses_what_the_temperature_does_to_bias_and_scale_is_told_apart() {
     let scale = accepted(&found).find(|a| a.chosen.candidate.id() == "accel_thermal_scale");
     let others = &scale.expect("found").chosen.alternatives;
     assert!(
-        others.iter().all(|o| o.0 != "accel_thermal_bias"),
+        others.iter().all(|o| o.id != "accel_thermal_bias"),
         "{others:?}"
     );
 }

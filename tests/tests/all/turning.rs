@@ -1,6 +1,5 @@
 //! Diagnosis of units on a table that turns gravity through them within dwells.
 
-use mimu::calibration::EffectTable;
 use mimu::diagnose::{Diagnosis, diagnose};
 use mimu::fit::Options;
 use mimu::quantity::Sensor;
@@ -48,8 +47,8 @@ fn errors(found: &Diagnosis) -> [Vec<f64>; 2] {
     Sensor::BOTH.map(|sensor| {
         let of = found.sensors.iter().find(|s| s.sensor == sensor);
         let accepted = &of.expect("recorded").decision.accepted;
-        let tables = accepted.iter().map(EffectTable::from);
-        let coefficients = tables.flat_map(|t| t.coefficients);
+        let effects = accepted.iter().map(|a| a.effect.lasting());
+        let coefficients = effects.flat_map(|e| e.coefficients());
         coefficients
             .map(|c| {
                 let at = |k: usize| "xyz".find(&c.name[k..=k]).expect("an axis");

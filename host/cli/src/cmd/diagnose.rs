@@ -4,8 +4,9 @@ use std::path::PathBuf;
 
 use crate::report::{self, Made};
 use clap::Args;
-use mimu::calibration::{Calibration, EffectTable};
+use mimu::calibration::Calibration;
 use mimu::diagnose::{Diagnosis, Recordings, diagnose};
+use mimu::effects::fitted::FittedEffect;
 use mimu::fit::{Method, Options};
 use mimu::next_experiment;
 use mimu::result::diagnosis::DiagnosisResult;
@@ -120,10 +121,10 @@ pub fn run(args: &DiagnoseArgs) -> Result<()> {
         .iter()
         .flat_map(|s| &s.decision.accepted)
         .filter(|a| a.of_unit)
-        .map(EffectTable::from);
+        .map(|a| a.effect.lasting());
     let mut effects = known.clone();
-    for table in found {
-        table.join(&mut effects).map_err(|problem| {
+    for effect in found {
+        effect.join(&mut effects).map_err(|problem| {
             let place = args
                 .calibration
                 .as_ref()
@@ -135,7 +136,7 @@ pub fn run(args: &DiagnoseArgs) -> Result<()> {
     let mut judged = None;
     if let (Some(other), Some(path)) = (second, &args.verify) {
         let by =
-            |fit, effects: &[EffectTable]| verify(&other, &Calibration::of(fit, effects, &now)?);
+            |fit, effects: &[FittedEffect]| verify(&other, &Calibration::of(fit, effects, &now)?);
         let before = by(&diagnosis.before, &known);
         let after = by(&diagnosis.after, &effects);
         let path = path.display();
@@ -206,21 +207,22 @@ pub fn run(args: &DiagnoseArgs) -> Result<()> {
 }
 
 /// The effects that the unit is known to have. Those of a sensor that the recordings lack have no matrix in the new file.
-fn known(given: Option<&Calibration>, diagnosis: &mut Diagnosis) -> Vec<EffectTable> {
+fn known(given: Option<&Calibration>, diagnosis: &mut Diagnosis) -> Vec<FittedEffect> {
     let Some(given) = given else {
         return Vec::new();
     };
     let after = &mut diagnosis.after;
-    let pairs = given.effects().iter().zip(&given.effect_tables);
-    let (kept, lost): (Vec<_>, Vec<_>) =
-        pairs.partition(|(effect, _)| after.sensor(effect.candidate.sensor).is_some());
-    for (effect, table) in lost {
+    let all = given.effects().iter().cloned();
+    let (kept, lost) = all.partition(|effect| after.sensor(effect.sensor()).is_some());
+    let lost: Vec<FittedEffect> = lost;
+    for effect in lost {
         after.warnings.push(format!(
             "{} of the calibration is not in the new one, as the {} is not recorded",
-            table.id, effect.candidate.sensor
+            effect.id(),
+            effect.sensor()
         ));
     }
-    kept.into_iter().map(|(_, table)| table.clone()).collect()
+    kept
 }
 
 /// The command as it was typed, without the path of the program.

@@ -4,7 +4,6 @@ use std::path::PathBuf;
 
 use clap::Args;
 use mimu::calibration::Calibration;
-use mimu::result::verify::VerifyResult;
 use mimu::verify::verify;
 use mimu_recording::error::Result;
 
@@ -38,6 +37,6 @@ pub(crate) fn run(args: &VerifyArgs) -> Result<()> {
         &[Some(&args.calibration), args.noise.file.as_deref()],
     )?;
     let prepared = args.noise.state(prepared)?;
-    let result = VerifyResult::of(&verify(&prepared, &calibration)?);
+    let result = verify(&prepared, &calibration)?;
     print(&args.json, &report::verify_text(&result), &result, None)
 }

@@ -3,12 +3,12 @@
 use std::fmt::Write as _;
 
 use mimu::readable;
-use mimu::result::verify::VerifyResult;
+use mimu::verify::Verification;
 
 use crate::report::text::warn;
 
 /// Result of `mimu verify`.
-pub fn verify_text(verification: &VerifyResult) -> String {
+pub fn verify_text(verification: &Verification) -> String {
     let mut out = String::new();
     let _ = writeln!(
         out,

@@ -143,7 +143,7 @@ fn calibrations(folder: &Path) {
         dies: PerSensor::from(LAGS_S).map(|lag_s| DieTable {
             lag_s: Some(lag_s),
             interval_lag_s: Some([lag_s - 1.0, lag_s + 1.0]),
-            hysteresis: None,
+            ..DieTable::default()
         }),
         nodes: (0..7).map(|k| node(10.0 * f64::from(k) - 5.0)).collect(),
     });

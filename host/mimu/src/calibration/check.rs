@@ -12,8 +12,8 @@ use crate::triad::Forward;
 use mimu_recording::error::{Error, Result};
 
 impl Calibration {
-    /// What can be applied, with its effects as they are removed.
-    pub(super) fn checked(mut self, place: &str) -> Result<Self> {
+    /// What can be applied.
+    pub(super) fn checked(self, place: &str) -> Result<Self> {
         self.check_format(place)?;
         for sensor in Sensor::BOTH {
             let Some(table) = self.table(sensor) else {
@@ -86,7 +86,7 @@ impl Calibration {
                 "fit the recording again",
             ));
         }
-        self.effects = effect::read(&self, place)?;
+        effect::check(&self, place)?;
         Ok(self)
     }
 

@@ -1,23 +1,17 @@
 //! The calibration that a device keeps, as a file again.
 
 use mimu_core::compensation::Affine;
-use mimu_core::effects::{DeviceEffect, Variable};
+use mimu_core::effects::DeviceEffect;
 use mimu_core::table::Node;
 use nalgebra::{Matrix3, Vector3};
 
-use super::effect::{DIRECTION, FORMULA as FORMULA_OF_EFFECTS, candidate};
 use super::of_fit::{forward_table, physical_table};
 use super::{
-    Calibration, CoefficientTable, ConverterTable, DieTable, EffectTable, FORMULA, FormTable,
-    INVERSE_DIRECTION, NodeTable, Origin, OverTemperature, TemperatureNode, TriadTable,
-    reference_node,
+    Calibration, DieTable, FORMULA, INVERSE_DIRECTION, NodeTable, Origin, OverTemperature,
+    TemperatureNode, TriadTable, reference_node,
 };
-use crate::effects::candidate::Candidate;
-use crate::effects::converter::Converter;
-use crate::effects::quantity::Quantity;
-use crate::effects::readout;
-use crate::effects::regressor::Product;
-use crate::quantity::{AXES, PerSensor, Sensor};
+use crate::effects::fitted::FittedEffect;
+use crate::quantity::{PerSensor, Sensor};
 use crate::triad::{Angles, Triad};
 use mimu_recording::RawUnit;
 use mimu_recording::error::{Error, Result};
@@ -57,6 +51,10 @@ impl Calibration {
         let reference = reference_node(&temperatures).map(|at| kept.nodes[at]);
         let empty = || Error::new(place, "it keeps no node", "upload a calibration again");
         let node = reference.ok_or_else(empty)?;
+        let unknown = |effect| {
+            let problem = format!("it keeps the effect \"{effect}\", which is not known here");
+            Error::new(place, problem, "update mimu on this computer")
+        };
         let triad = |model, sensor| triad_table(model, sensor).ok_or_else(singular);
         let temperature = over_temperature(kept);
         let range_c = kept.range_c.map(|range| range.map(f64::from));
@@ -78,8 +76,7 @@ impl Calibration {
             gyro: Some(triad(&node.model.gyro, Sensor::Gyro)?),
             accel: Some(triad(&node.model.accel, Sensor::Accel)?),
             temperature,
-            effect_tables: effect_tables(&kept.effects, place)?,
-            effects: Vec::new(),
+            effects: FittedEffect::kept(&kept.effects).map_err(unknown)?,
         };
         calibration.checked(place)
     }
@@ -155,109 +152,4 @@ fn rows(matrix: &Matrix3<f64>) -> [[f64; 3]; 3] {
 
 fn exact(vector: &Vector3<f64>) -> [f64; 3] {
     (*vector).into()
-}
-
-fn effect_tables(parts: &[DeviceEffect<f32>], place: &str) -> Result<Vec<EffectTable>> {
-    let mut all: Vec<EffectTable> = Vec::new();
-    for part in parts {
-        let unknown = || {
-            let problem = format!("it keeps the effect \"{part}\", which is not known here");
-            Error::new(place, problem, "update mimu on this computer")
-        };
-        let table = effect_table(part).ok_or_else(unknown)?;
-        let converters = !table.converters.is_empty();
-        match all.iter_mut().find(|t| converters && t.id == table.id) {
-            Some(known) => {
-                known.converters.extend(table.converters);
-                known.coefficients.extend(table.coefficients);
-            }
-            None => all.push(table),
-        }
-    }
-    Ok(all)
-}
-
-fn effect_table(part: &DeviceEffect<f32>) -> Option<EffectTable> {
-    let of = match part.product() {
-        Some((axis, variables)) => candidate(&term_id(part.sensor(), axis, variables)?)?,
-        None => candidate(&part.to_string())?,
-    };
-    let form = of.parameter().zip(part.nonlinear());
-    let form = form.map(|(p, value)| FormTable {
-        name: p.name.into(),
-        value: f64::from(value),
-    });
-    let mut converters = Vec::new();
-    let all = part.coefficients().iter().copied();
-    let values: Vec<(usize, f32)> = match part.converter() {
-        Some(of) => {
-            let axis = of.axis;
-            let converter = Converter::of(f64::from(of.weight), f64::from(of.zero));
-            let codes =
-                std::array::from_fn(|i| axis.is_none_or(|axis| axis == i).then_some(converter));
-            converters = ConverterTable::of(&codes);
-            let first = axis.map_or(0, readout::first_of);
-            (first..).zip(all).collect()
-        }
-        // What was not determined is zero there, and stays out of the file.
-        None => match part.coefficients().iter().any(|c| *c != 0.0) {
-            true => all.enumerate().filter(|(_, c)| *c != 0.0).collect(),
-            false => all.enumerate().collect(),
-        },
-    };
-    let active: Vec<usize> = values.iter().map(|v| v.0).collect();
-    if !active.iter().all(|k| of.active.contains(k)) {
-        return None;
-    }
-    let named = Candidate {
-        active,
-        ..of.clone()
-    };
-    let coefficients = named.names().into_iter().zip(&values);
-    Some(EffectTable {
-        id: of.id(),
-        sensor: of.sensor.name().into(),
-        about: of.about().into(),
-        formula: FORMULA_OF_EFFECTS.into(),
-        direction: DIRECTION.into(),
-        form,
-        converters,
-        coefficients: coefficients
-            .map(|((name, unit), (_, value))| CoefficientTable {
-                name,
-                value: f64::from(*value),
-                sigma: None,
-                unit,
-            })
-            .collect(),
-    })
-}
-
-/// Public id of a term.
-fn term_id(
-    sensor: Sensor,
-    axis: usize,
-    variables: impl Iterator<Item = Variable>,
-) -> Option<String> {
-    let quantities: Vec<Quantity> = variables.map(quantity).collect();
-    let product = Product::term(&quantities)?;
-    Some(format!(
-        "term:{sensor}_{}~{}",
-        AXES.get(axis)?,
-        product.name()
-    ))
-}
-
-fn quantity(of: Variable) -> Quantity {
-    match of {
-        Variable::RateX => Quantity::Rate(0),
-        Variable::RateY => Quantity::Rate(1),
-        Variable::RateZ => Quantity::Rate(2),
-        Variable::ForceX => Quantity::Force(0),
-        Variable::ForceY => Quantity::Force(1),
-        Variable::ForceZ => Quantity::Force(2),
-        Variable::Temperature => Quantity::Temperature,
-        Variable::TemperatureRate => Quantity::TemperatureRate,
-        Variable::Time => Quantity::Time,
-    }
 }

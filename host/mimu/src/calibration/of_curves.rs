@@ -97,7 +97,6 @@ impl Calibration {
             },
             gyro: table(Sensor::Gyro),
             accel: table(Sensor::Accel),
-            effect_tables: Vec::new(),
             effects: Vec::new(),
             temperature: Some(unit.temperature),
         };

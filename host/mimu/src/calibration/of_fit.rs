@@ -4,9 +4,10 @@ use mimu_core::table::is_temperature;
 use nalgebra::{Matrix3, Vector3};
 
 use super::{
-    Calibration, EffectTable, FORMAT, FORMULA, ForwardTable, INVERSE_DIRECTION, Judged, Origin,
-    PhysicalTable, TriadTable,
+    Calibration, FORMAT, FORMULA, ForwardTable, INVERSE_DIRECTION, Judged, Origin, PhysicalTable,
+    TriadTable,
 };
+use crate::effects::fitted::FittedEffect;
 use crate::fit::{Fit, SensorFit};
 use crate::quantity::{Sensor, inverse_names, rounded};
 use crate::triad::{Angles, Estimate, Forward, Physical, Triad};
@@ -18,16 +19,20 @@ const SIGMA_DIGITS: usize = 4;
 const FIGURE_DIGITS: usize = 7;
 
 impl Calibration {
-    /// The calibration of `fit`, a fit of readings without `effects`, made at `created` (RFC 3339).
+    /// The calibration of `fit`, a fit of readings without `effects`, of which it holds what lasts, made at `created` (RFC 3339).
     ///
     /// # Errors
     /// An effect that cannot be removed, as when its sensor is not calibrated.
-    pub fn of(fit: &Fit, effects: &[EffectTable], created: &str) -> Result<Self> {
+    pub fn of(fit: &Fit, effects: &[FittedEffect], created: &str) -> Result<Self> {
         let manifest = &fit.prepared.manifest;
         let dwells = fit.prepared.dwells.list.iter();
         let temperatures = dwells.map(|d| d.temp_c).filter(|t| is_temperature(*t));
         let temperatures: Vec<f64> = temperatures.collect();
         let mean = temperatures.iter().sum::<f64>() / temperatures.len() as f64;
+        // As many digits of their standard deviations as the triads have.
+        let lasting = effects
+            .iter()
+            .map(|e| e.lasting().with_digits(SIGMA_DIGITS));
         let triad = |sensor| fit.sensor(sensor).map(|found| table(fit, found));
         let calibration = Self {
             format: FORMAT.into(),
@@ -47,8 +52,7 @@ impl Calibration {
             gyro: triad(Sensor::Gyro),
             accel: triad(Sensor::Accel),
             temperature: None,
-            effect_tables: effects.iter().cloned().map(readable).collect(),
-            effects: Vec::new(),
+            effects: lasting.collect(),
         };
         calibration.checked(&format!("calibration of {:?}", manifest.device))
     }
@@ -59,15 +63,6 @@ fn range(temperatures: &[f64]) -> Option<[f64; 2]> {
     let mut all = temperatures.iter().copied();
     let first = all.next()?;
     Some(all.fold([first; 2], |[a, b], t| [a.min(t), b.max(t)]))
-}
-
-/// An effect with as many digits of its sigmas as the triads have.
-fn readable(mut effect: EffectTable) -> EffectTable {
-    for c in &mut effect.coefficients {
-        c.value += 0.0;
-        c.sigma = c.sigma.map(|sigma| rounded(sigma, SIGMA_DIGITS));
-    }
-    effect
 }
 
 fn table(fit: &Fit, found: &SensorFit) -> TriadTable {

@@ -4,8 +4,9 @@
 //! a file does not: an effect of which the affine part is wrong by a hundred times passes the one and not the other.
 
 use super::decision::{Accepted, Decision};
-use crate::calibration::{Calibration, EffectTable};
-use crate::effects::removal::{Removed, remove};
+use crate::calibration::Calibration;
+use crate::effects::fitted::FittedEffect;
+use crate::effects::removal::remove;
 use crate::fit::Fit;
 use crate::prepared::Prepared;
 use crate::quantity::{Figure, Sensor};
@@ -31,11 +32,11 @@ impl AsWritten<'_> {
         &self,
         recording: &Prepared,
         fit: &Fit,
-        effects: &[EffectTable],
+        effects: &[FittedEffect],
     ) -> Option<(Figure, f64)> {
         let file = Calibration::of(fit, effects, "").ok()?;
         let judged = verify(recording, &file).ok()?;
-        let sensor = judged.sensors.iter().find(|s| s.sensor == self.sensor)?;
+        let sensor = judged.sensors[self.sensor].as_ref()?;
         Some((sensor.figure, sensor.rms))
     }
 
@@ -43,10 +44,10 @@ impl AsWritten<'_> {
     /// `decision`.
     pub fn worst(&self, after: &Fit, decision: &Decision) -> Option<(String, String)> {
         let lasting: Vec<&Accepted> = decision.accepted.iter().filter(|a| a.of_unit).collect();
-        let tables = |of: &[&Accepted]| -> Vec<EffectTable> {
-            of.iter().map(|a| EffectTable::from(*a)).collect()
+        let effects = |of: &[&Accepted]| -> Vec<FittedEffect> {
+            of.iter().map(|a| a.effect.clone()).collect()
         };
-        let all = tables(&lasting);
+        let all = effects(&lasting);
         let worse = self.others.iter().find_map(|recording| {
             let (figure, before) = self.error(recording, self.before, &[])?;
             let (_, after) = self.error(recording, after, &all)?;
@@ -57,13 +58,13 @@ impl AsWritten<'_> {
         let without = |k: usize| {
             let mut rest = lasting.clone();
             rest.remove(k);
-            let removed: Vec<Removed> = rest.iter().map(|a| Removed::from(*a)).collect();
+            let rest = effects(&rest);
             let [gyro, accel] =
                 Sensor::BOTH.map(|s| Some(self.before.sensor(s)?.estimated.triad.inverse));
             let first = &self.before.prepared;
-            let clean = remove(first, gyro.as_ref(), accel.as_ref(), &removed)?;
+            let clean = remove(first, gyro.as_ref(), accel.as_ref(), &rest)?;
             let fit = (self.calibrate)(clean).ok()?;
-            Some(self.error(recording, &fit, &tables(&rest))?.1)
+            Some(self.error(recording, &fit, &rest)?.1)
         };
         let each = (0..lasting.len()).map(|k| (k, without(k).unwrap_or(f64::INFINITY)));
         let (culprit, _) = each.min_by(|a, b| a.1.total_cmp(&b.1))?;

@@ -13,16 +13,17 @@ mod tried;
 mod undecided;
 
 use nalgebra::{DMatrix, DVector};
+use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::rows::Rows;
 use super::search::{Chosen, FALSE_LISTED, Found, MOST, Search, beside};
 use super::variance::Fitted;
-use crate::calibration::EffectTable;
 use crate::effects::candidate::Kind;
+use crate::effects::fitted::FittedEffect;
 use crate::effects::quantity::Quantity;
 use crate::effects::regressor::Product;
-use crate::effects::removal::Removed;
+
 use crate::fit::Split;
 use crate::quantity::p_value;
 use acceptance::Acceptance;
@@ -38,7 +39,7 @@ use hold_out::rms_at_rest;
 pub(super) use hold_out::{held_out, part, rms};
 pub use leftover::{FALSE_LEFTOVER, Leftover};
 pub use model::Model;
-pub use nonlinear::{Interval, Nonlinear};
+pub use nonlinear::Nonlinear;
 pub use second::Second;
 pub use undecided::Undecided;
 
@@ -47,55 +48,40 @@ pub const LEVERAGE: f64 = 0.7;
 /// Probability of chance that an effect may have without the dwell that speaks most for it: else one outlier would have made it.
 const SURVIVES: f64 = 0.01;
 
-/// An accepted effect with its coefficients.
-#[derive(Debug, Clone)]
+/// An accepted effect, and why.
+#[derive(Debug, Clone, Serialize)]
 pub struct Accepted {
-    /// The candidate, its parameter and how it was found.
+    /// The effect.
+    #[serde(flatten)]
+    pub effect: FittedEffect,
+    /// How it was found.
+    #[serde(flatten)]
     pub chosen: Chosen,
-    /// Coefficients, SI, in the order of the candidate's active ones.
-    pub values: DVector<f64>,
-    /// Their covariance, whatever its nonlinear parameter is.
-    pub covariance: DMatrix<f64>,
-    /// The same for the nonlinear parameter found: coefficient and parameter err together, and this is what a curve drawn for one value
-    /// of the parameter is uncertain by.
-    pub conditional: DMatrix<f64>,
-    /// 95 % interval of its nonlinear parameter, if it has one.
-    pub parameter: Option<Interval>,
-    /// Held-out root mean square without it and with it, beside the others.
-    pub held_out: [f64; 2],
-    /// The same of the rows at rest, SI, where the judged rows are turns.
-    pub held_out_at_rest: Option<[f64; 2]>,
-    /// How it was held out.
-    pub split: Split,
-    /// What it does to the second recording, if there is one that can be judged by.
-    pub second: Option<Second>,
     /// Whether it is an error of the unit, which a calibration holds. A drift is specific to the session, and so is all that depends on the
     /// time since power-on where nobody knows when that was.
     pub of_unit: bool,
-}
-
-impl From<&Accepted> for Removed {
-    fn from(accepted: &Accepted) -> Self {
-        Self {
-            candidate: accepted.chosen.candidate.clone(),
-            parameter: accepted.chosen.parameter,
-            values: accepted.values.iter().copied().collect(),
-        }
-    }
-}
-
-impl From<&Accepted> for EffectTable {
-    fn from(accepted: &Accepted) -> Self {
-        let removed = Removed::from(accepted);
-        let sigmas: Vec<f64> = accepted
-            .covariance
-            .diagonal()
-            .map(f64::sqrt)
-            .iter()
-            .copied()
-            .collect();
-        Self::new(&removed, &sigmas)
-    }
+    /// Held-out root mean square without it, beside the others; unit of the sensor's figures.
+    pub held_out_rms_before: f64,
+    /// The same with it.
+    pub held_out_rms_after: f64,
+    /// Held-out root mean square of the rates at rest without it, rad/s, where the figures are of turns.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub held_out_at_rest_before: Option<f64>,
+    /// The same with it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub held_out_at_rest_after: Option<f64>,
+    /// How it was held out.
+    pub held_out: Split,
+    /// What it does to the second recording, if there is one that can be judged by.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub second: Option<Second>,
+    /// Covariance of its coefficients, whatever its nonlinear parameter is.
+    #[serde(skip)]
+    pub covariance: DMatrix<f64>,
+    /// The same for the nonlinear parameter found: coefficient and parameter err together, and this is what a curve drawn for one value
+    /// of the parameter is uncertain by.
+    #[serde(skip)]
+    pub conditional: DMatrix<f64>,
 }
 
 /// What was decided on one sensor.
@@ -284,25 +270,34 @@ pub fn decide(
         let at_rest = both
             .each_ref()
             .map(|h| h.as_ref().and_then(|h| rms_at_rest(rows, h)));
+        let covariance = nonlinear.covariance.view((from, from), (count, count));
+        let [before, after] = held.map(|h| h.unwrap_or(f64::NAN));
+        let (at_rest_before, at_rest_after) = match at_rest {
+            [Some(without), Some(with)] => (Some(without), Some(with)),
+            _ => (None, None),
+        };
         accepted.push(Accepted {
+            effect: FittedEffect {
+                interval: nonlinear.intervals[i],
+                sigmas: covariance.diagonal().iter().map(|v| v.sqrt()).collect(),
+                ..FittedEffect::new(
+                    one.candidate.clone(),
+                    one.parameter,
+                    values[i].iter().copied().collect(),
+                )
+            },
             chosen: one.clone(),
-            split,
-            values: values[i].clone(),
+            held_out: split,
             second: seconds[i],
-            covariance: nonlinear
-                .covariance
-                .view((from, from), (count, count))
-                .into_owned(),
+            covariance: covariance.into_owned(),
             conditional: last
                 .covariance
                 .view((first + from, first + from), (count, count))
                 .into_owned(),
-            parameter: nonlinear.intervals[i],
-            held_out: held.map(|h| h.unwrap_or(f64::NAN)),
-            held_out_at_rest: match at_rest {
-                [Some(without), Some(with)] => Some([without, with]),
-                _ => None,
-            },
+            held_out_rms_before: before,
+            held_out_rms_after: after,
+            held_out_at_rest_before: at_rest_before,
+            held_out_at_rest_after: at_rest_after,
             of_unit: one.candidate.is_error() && !one.candidate.is_of_session(),
         });
         from += count;

@@ -32,7 +32,8 @@ use rows::{ForceErrors, Free, Rows};
 use serde::Serialize;
 
 use crate::calibration::Calibration;
-use crate::effects::removal::{Removed, removable, remove_within};
+use crate::effects::fitted::FittedEffect;
+use crate::effects::removal::{removable, remove_within};
 use crate::estimate::least_squares::POORLY_DETERMINED;
 use crate::fit::{Fit, Options, fit, fit_biases, without_temperature};
 use crate::prepared::Prepared;
@@ -153,7 +154,7 @@ pub struct Diagnosis {
     /// Gyro, then accelerometer, as far as there are any.
     pub sensors: Vec<SensorDiagnosis>,
     /// The effects, as they are taken out.
-    pub effects: Vec<Removed>,
+    pub effects: Vec<FittedEffect>,
     /// What it amounts to.
     pub verdict: Verdict,
     /// Sensors that the recordings cannot judge, with the reason.
@@ -361,7 +362,7 @@ pub fn diagnose(recordings: Recordings, options: Options) -> Result<Diagnosis> {
     let sources = std::iter::once(&recordings.first).chain(&recordings.more);
     let sources = sources.map(Source::from).collect();
     let mut now = before.clone();
-    let mut effects: Vec<Removed> = Vec::new();
+    let mut effects: Vec<FittedEffect> = Vec::new();
     let mut sensors = Vec::new();
     let mut forces: Option<ForceErrors> = None;
     // What the coefficients of effects leave open of the calibration without them.

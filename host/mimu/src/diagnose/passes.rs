@@ -13,7 +13,8 @@ use super::as_written::AsWritten;
 use super::decision::{Decision, decide, noisier};
 use super::rows::{Figure, ForceErrors, Free, Rows, Session};
 use super::search::Chosen;
-use crate::effects::removal::{Removed, remove};
+use crate::effects::fitted::FittedEffect;
+use crate::effects::removal::remove;
 use crate::fit::{Fit, session_bias};
 use crate::prepared::Prepared;
 use crate::quantity::Sensor;
@@ -57,9 +58,9 @@ fn later_session<'a>(prepared: &'a Prepared, models: &[Option<Affine<f64>>; 2]) 
     session(prepared, own)
 }
 
-/// What was accepted, as it is removed.
-fn removed(decision: &Decision) -> Vec<Removed> {
-    decision.accepted.iter().map(Removed::from).collect()
+/// What was accepted.
+fn effects_of(decision: &Decision) -> Vec<FittedEffect> {
+    decision.accepted.iter().map(|a| a.effect.clone()).collect()
 }
 
 /// By what share one affine model differs from another in scale and direction.
@@ -79,7 +80,7 @@ pub(super) struct Pass {
     pub rows: Rows,
     pub decision: Decision,
     /// What was accepted.
-    pub found: Vec<Removed>,
+    pub found: Vec<FittedEffect>,
     /// The fit without it, and the later recordings; `None` where nothing was.
     pub after: Option<Result<(Fit, Vec<Prepared>)>>,
 }
@@ -92,7 +93,7 @@ impl Pass {
     }
 
     /// What its readings err by as a function of their own input, where rows are not linear in them: on a table the input is known.
-    fn about(&self) -> Vec<Removed> {
+    fn about(&self) -> Vec<FittedEffect> {
         match self.rows.figure {
             Figure::Input | Figure::Rest => Vec::new(),
             Figure::Size | Figure::Direction => {
@@ -173,7 +174,7 @@ impl Passes<'_> {
     fn best_without(&self, without: &[(String, String)]) -> Result<Pass> {
         let (mut best, strong) = self.settled(without)?;
         let complex = best.decision.accepted.iter();
-        let complex = complex.filter(|a| strong && a.values.len() > SIMPLE);
+        let complex = complex.filter(|a| strong && a.effect.values.len() > SIMPLE);
         let ids: Vec<String> = complex.map(|a| a.chosen.candidate.id()).collect();
         for id in ids {
             let why = "another effect predicts better, with the calibration that it leaves".into();
@@ -222,7 +223,7 @@ impl Passes<'_> {
         &self,
         sessions: &[Session],
         models: &[Option<Affine<f64>>; 2],
-        effects: &[Removed],
+        effects: &[FittedEffect],
     ) -> Option<Rows> {
         let as_read = Rows::of(sessions, self.sensor, self.free)?;
         if effects.is_empty() {
@@ -248,7 +249,7 @@ impl Passes<'_> {
     fn pass(
         &self,
         models: [Option<Affine<f64>>; 2],
-        about: &[Removed],
+        about: &[FittedEffect],
         without: &[(String, String)],
     ) -> Result<Pass> {
         let sensor = self.sensor;
@@ -268,10 +269,10 @@ impl Passes<'_> {
             decide(&rows, &ends, unseen.as_ref(), without, self.accept)
                 .ok_or_else(|| self.singular())
         };
-        let clean = |found: &[Removed]| -> Result<(Fit, Vec<Prepared>)> {
-            let lasting: Vec<Removed> = found.iter().map(Removed::lasting).collect();
+        let clean = |found: &[FittedEffect]| -> Result<(Fit, Vec<Prepared>)> {
+            let lasting: Vec<FittedEffect> = found.iter().map(FittedEffect::lasting).collect();
             let of_unit = lasting.iter().filter(|e| !e.candidate.is_of_session());
-            let of_unit: Vec<Removed> = of_unit.cloned().collect();
+            let of_unit: Vec<FittedEffect> = of_unit.cloned().collect();
             let clean = |(k, s): (usize, &Session)| {
                 let effects = match k {
                     0 => found,
@@ -287,7 +288,7 @@ impl Passes<'_> {
             Ok(((self.calibrate)(first)?, cleaned))
         };
         let mut decision = decide(without)?;
-        let mut found = removed(&decision);
+        let mut found = effects_of(&decision);
         let mut after = (!found.is_empty()).then(|| clean(&found));
         // Bits of a code that are nearly one another's sum, and coefficients of a size that no sensor has, can lead the readings away: such an
         // effect is no explanation, and no reason to refuse the recording either.
@@ -304,7 +305,7 @@ impl Passes<'_> {
             let why = format!("readings without it cannot be calibrated: {problem}");
             without.push((strangest.candidate.id(), why));
             decision = decide(&without)?;
-            found = removed(&decision);
+            found = effects_of(&decision);
             after = (!found.is_empty()).then(|| clean(&found));
         }
         let noisier = ours.iter().enumerate().flat_map(|(k, s)| {

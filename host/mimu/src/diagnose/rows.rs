@@ -26,8 +26,8 @@ use std::sync::OnceLock;
 use mimu_core::compensation::Affine;
 use nalgebra::{DMatrix, DVector, SMatrix, SymmetricEigen, Vector3};
 
+use crate::effects::fitted::FittedEffect;
 use crate::effects::quantity::Conditions;
-use crate::effects::removal::Removed;
 use crate::effects::temperature::{Followed, lagged, rank_correlation};
 use crate::estimate::earth::poses;
 pub use forces::ForceErrors;
@@ -204,7 +204,7 @@ impl Rows {
     /// The size of a force and the angle of a turn are not linear in the errors of the readings, and effects not in the input that they
     /// are evaluated at. An accelerometer cubic of 3 % at 1 g came out 14 % too large, 21 standard deviations, where all of this was
     /// linear about the readings. About readings without the effect, what is neglected is as small as what they still err by.
-    pub fn about(mut self, effects: &[Removed], as_read: &Self) -> Option<Self> {
+    pub fn about(mut self, effects: &[FittedEffect], as_read: &Self) -> Option<Self> {
         let pairs = self.conditions.iter_mut().zip(&as_read.conditions);
         // What a converter does goes by what it put out.
         pairs.for_each(|(clean, read)| clean.reading = read.reading);

@@ -9,6 +9,7 @@ mod screen;
 
 use nalgebra::DMatrix;
 use rayon::prelude::*;
+use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::rows::Rows;
@@ -30,22 +31,37 @@ const FINALISTS: usize = 8;
 pub const MOST: usize = 5;
 
 /// A candidate as part of a model.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize)]
 pub struct Chosen {
     /// Which.
+    #[serde(skip)]
     pub candidate: Candidate,
     /// Value of its nonlinear constant, 0 if it has none.
+    #[serde(skip)]
     pub parameter: f64,
     /// Its columns.
+    #[serde(skip)]
     pub columns: DMatrix<f64>,
     /// Probability of chance, after the whole search.
+    #[serde(rename = "chance")]
     pub p: f64,
     /// By how much the deviance grows without it.
+    #[serde(skip)]
     pub drop: f64,
     /// By how much the sizes of its coefficients speak against it, in units of the deviance.
+    #[serde(skip)]
     pub unlikely: f64,
-    /// Others that would do nearly as well in its place, and by how much worse their score is.
-    pub alternatives: Vec<(String, f64)>,
+    /// Others that would do nearly as well in its place.
+    pub alternatives: Vec<Alternative>,
+}
+
+/// A candidate that would do nearly as well in the place of another.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Alternative {
+    /// Public id.
+    pub id: String,
+    /// By how much its score is worse.
+    pub score_worse_by: f64,
 }
 
 /// What a search led to.
@@ -494,7 +510,10 @@ impl<'a> Search<'a> {
                 .iter()
                 .filter(|c| c.candidate.id() != best.candidate.id())
                 .filter(|c| score(&best) - score(c) < CONFUSED && significant(c))
-                .map(|c| (c.candidate.id(), score(&best) - score(c)))
+                .map(|c| Alternative {
+                    id: c.candidate.id(),
+                    score_worse_by: score(&best) - score(c),
+                })
                 .collect();
             chosen.push(best);
             let before: Vec<String> = chosen.iter().map(|c| c.candidate.id()).collect();
@@ -542,7 +561,10 @@ impl<'a> Search<'a> {
             let Some(mut rival) = rival else { continue };
             let gain = score(&rival) - score(&one);
             if gain > EXCHANGED && best.as_ref().is_none_or(|b| gain > b.0) {
-                rival.alternatives = vec![(one.candidate.id(), gain)];
+                rival.alternatives = vec![Alternative {
+                    id: one.candidate.id(),
+                    score_worse_by: gain,
+                }];
                 best = Some((gain, k, rival));
             }
         }

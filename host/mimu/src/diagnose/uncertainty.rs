@@ -24,7 +24,11 @@ const RANK: f64 = 1e-9;
 /// quadratic or cubic term, which by hand is nearly a scale factor, held the truth in 84 to 86 % of the cases for 95 %.
 pub fn of_affine(rows: &Rows, decision: &Decision) -> Option<Part> {
     let model = decision.models.last()?;
-    let effects: usize = decision.accepted.iter().map(|a| a.values.len()).sum();
+    let effects: usize = decision
+        .accepted
+        .iter()
+        .map(|a| a.effect.values.len())
+        .sum();
     let first = model.columns.ncols().checked_sub(effects)?;
     if effects == 0 {
         return None;
@@ -72,9 +76,14 @@ pub fn of_forces(session: &Session, sizes: &Rows, decision: &Decision) -> Option
     };
     let accepted: Vec<_> = decision.accepted.iter().map(|a| &a.chosen).collect();
     let mut slopes = Vec::new();
-    for a in decision.accepted.iter().filter(|a| a.parameter.is_some()) {
+    for a in decision
+        .accepted
+        .iter()
+        .filter(|a| a.effect.interval.is_some())
+    {
         let one = &a.chosen;
-        slopes.push(one.candidate.slope(&rows, one.parameter, &a.values));
+        let values = DVector::from_column_slice(&a.effect.values);
+        slopes.push(one.candidate.slope(&rows, one.parameter, &values));
     }
     for one in accepted.iter().filter(|c| !c.candidate.reads_code()) {
         add(&one.candidate, one.parameter, &|_| 0.0);

@@ -4,7 +4,7 @@ use mimu_core::compensation::Affine;
 use mimu_core::die::BEYOND_C;
 use nalgebra::{Matrix3, Vector3};
 
-use super::candidate::Candidate;
+use super::fitted::FittedEffect;
 use super::quantity::{Conditions, Need, Reading};
 use super::temperature::{Followed, lagged, offsets, without_self_heating};
 use crate::blocks::Block;
@@ -15,50 +15,8 @@ use crate::triad::directions;
 use mimu_recording::Reference;
 use mimu_recording::error::{Error, Result};
 
-/// An effect with its numbers.
-#[derive(Debug, Clone)]
-pub struct Removed {
-    /// Which.
-    pub candidate: Candidate,
-    /// Its nonlinear parameter, 0 if it has none.
-    pub parameter: f64,
-    /// Coefficients, SI, in the order of the candidate's active ones.
-    pub values: Vec<f64>,
-}
-
-impl Removed {
-    /// It without what is of the recording that it was found in alone.
-    pub fn lasting(&self) -> Self {
-        let (candidate, values) = self.candidate.lasting(&self.values);
-        Self {
-            candidate,
-            values,
-            parameter: self.parameter,
-        }
-    }
-
-    /// Whether it is a function of its sensor's own input alone, other than what the converter makes of it.
-    pub fn is_of_own_input(&self) -> bool {
-        let sensor = self.candidate.sensor;
-        let need = match sensor {
-            Sensor::Gyro => Need::Rate,
-            Sensor::Accel => Need::Force,
-        };
-        let regressors = self.candidate.slot_regressors();
-        let mut quantities = regressors.iter().flat_map(|r| r.quantities()).peekable();
-        let any = quantities.peek().is_some();
-        any && quantities.all(|q| q.needs(need, sensor))
-    }
-
-    /// Adds its error of the three axes, SI.
-    fn add(&self, at: &Conditions, error: &mut Vector3<f64>) {
-        self.candidate
-            .add_error(at, self.parameter, &self.values, error);
-    }
-}
-
 /// Errors of the axes of the sensor under some conditions, SI. Of effects with a lag these have to come with that lag.
-pub fn errors(effects: &[Removed], conditions: &[Conditions]) -> Vec<Vector3<f64>> {
+pub fn errors(effects: &[FittedEffect], conditions: &[Conditions]) -> Vec<Vector3<f64>> {
     let mut all = vec![Vector3::zeros(); conditions.len()];
     for effect in effects {
         for (error, at) in all.iter_mut().zip(conditions) {
@@ -69,7 +27,7 @@ pub fn errors(effects: &[Removed], conditions: &[Conditions]) -> Vec<Vector3<f64
 }
 
 /// Refuses a recording that lacks what one of `effects` has to be known by where it is to be taken out: channels, or a temperature.
-pub fn removable(prepared: &Prepared, effects: &[Removed]) -> Result<()> {
+pub fn removable(prepared: &Prepared, effects: &[FittedEffect]) -> Result<()> {
     let dwells = &prepared.dwells.list;
     let mut blocks = dwells.iter().enumerate().flat_map(|(i, dwell)| {
         let from = match (prepared.manifest.reference, i.checked_sub(1)) {
@@ -112,11 +70,11 @@ pub fn remove(
     prepared: &Prepared,
     gyro: Option<&Affine<f64>>,
     accel: Option<&Affine<f64>>,
-    effects: &[Removed],
+    effects: &[FittedEffect],
 ) -> Option<Prepared> {
     let mut out = prepared.clone();
     for sensor in Sensor::BOTH {
-        let ours: Vec<&Removed> = effects
+        let ours: Vec<&FittedEffect> = effects
             .iter()
             .filter(|e| e.candidate.sensor == sensor)
             .collect();
@@ -134,7 +92,7 @@ pub fn remove_within(
     prepared: &Prepared,
     gyro: Option<&Affine<f64>>,
     accel: Option<&Affine<f64>>,
-    effects: &[Removed],
+    effects: &[FittedEffect],
     limits_c: Option<[f64; 2]>,
 ) -> Option<Prepared> {
     let Some([from, to]) = limits_c else {
@@ -163,7 +121,7 @@ struct Stretches<'a> {
     /// Sensitive directions by rows, and how errors along them become errors in the body frame.
     direction: Matrix3<f64>,
     to_body: Matrix3<f64>,
-    effects: &'a [&'a Removed],
+    effects: &'a [&'a FittedEffect],
     /// Of each effect that does not go by what the thermometer shows: the temperature and that behind the lag, by block.
     late: Vec<Option<Vec<(f64, f64)>>>,
 }
@@ -224,7 +182,7 @@ fn of_sensor(
     prepared: &Prepared,
     sensor: Sensor,
     models: [Option<&Affine<f64>>; 2],
-    effects: &[&Removed],
+    effects: &[&FittedEffect],
     out: &mut Prepared,
 ) -> Option<()> {
     let model = models[sensor as usize]?;
@@ -328,7 +286,7 @@ fn of_sensor(
 }
 
 /// A dwell without a reading of the other triad is none for this one, if an effect goes by that.
-fn leave_out_unknown(sensor: Sensor, effects: &[&Removed], out: &mut Prepared) {
+fn leave_out_unknown(sensor: Sensor, effects: &[&FittedEffect], out: &mut Prepared) {
     let (other, need) = match sensor {
         Sensor::Gyro => (Sensor::Accel, Need::Force),
         Sensor::Accel => (Sensor::Gyro, Need::Rate),

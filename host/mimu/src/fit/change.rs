@@ -1,13 +1,14 @@
 //! What leaving something out of a fit does to its parameters.
 
 use mimu_recording::RawUnit;
+use serde::Serialize;
 
 use crate::quantity::{AXES, Sensor, plus_minus, raw_unit, scale_unit};
 use crate::readable;
 use crate::triad::{Angles, Estimate, Triad};
 
 /// A parameter fitted with everything, and without what was left out.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Change {
     /// Of which sensor.
     pub sensor: Sensor,
@@ -16,6 +17,7 @@ pub struct Change {
     /// Value with everything in the fit.
     pub with_all: f64,
     /// As fitted.
+    #[serde(flatten)]
     pub fitted: Estimate,
     /// Unit of all.
     pub unit: String,

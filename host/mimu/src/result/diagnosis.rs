@@ -3,17 +3,14 @@
 use mimu_recording::Reference;
 use serde::Serialize;
 
-use super::verify::VerifyResult;
-use super::{TOOL, present};
-use crate::calibration::ConverterTable;
+use super::TOOL;
 use crate::diagnose::decision::{Accepted, Decision};
 use crate::diagnose::picture::Picture;
 use crate::diagnose::rows::Figure as Judged;
 use crate::diagnose::{Diagnosis, SensorDiagnosis, Source, Untestable, Verdict};
-use crate::effects::candidate::Kind;
 use crate::fit::Split;
 use crate::next_experiment::{Confused, Next, NotInPlan, SizedRecipe};
-use crate::quantity::{AXES, Figure, PerSensor, Sensor, significant};
+use crate::quantity::{AXES, Figure, PerSensor, Sensor, present};
 use crate::verify::Verification;
 
 /// Result of a diagnosis.
@@ -36,7 +33,7 @@ pub struct DiagnosisResult {
     /// Sensors that the recordings cannot judge.
     pub untestable: Vec<UntestableResult>,
     /// Accepted effects.
-    pub effects: Vec<AcceptedResult>,
+    pub effects: Vec<Accepted>,
     /// Effects that were tried and not accepted.
     pub rejected: Vec<RejectedResult>,
     /// Effects that the recordings could not show.
@@ -59,105 +56,6 @@ pub struct DiagnosisResult {
     /// The calibration before and after on a recording that nothing was fitted to.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub second: Option<SecondResult>,
-}
-
-/// An accepted effect.
-#[derive(Debug, Clone, Serialize)]
-pub struct AcceptedResult {
-    /// Public id.
-    pub id: String,
-    /// Whose readings err.
-    pub sensor: Sensor,
-    /// Physics in a line.
-    pub about: &'static str,
-    /// Whether it is an error of the unit, which the calibration holds; else something that it should read, or an error whose time since
-    /// power-on is unknown.
-    pub of_unit: bool,
-    /// Its coefficients.
-    pub coefficients: Vec<CoefficientResult>,
-    /// Held-out root mean square without it, beside the other effects; unit of the sensor's figures.
-    pub held_out_rms_before: f64,
-    /// The same with it.
-    pub held_out_rms_after: f64,
-    /// Held-out root mean square of the rates at rest without it, rad/s, where the figures are of turns.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub held_out_at_rest_before: Option<f64>,
-    /// The same with it.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub held_out_at_rest_after: Option<f64>,
-    /// How it was held out.
-    pub held_out: Split,
-    /// Probability of chance after the whole search.
-    pub chance: f64,
-    /// Candidates that would do nearly as well in its place.
-    pub alternatives: Vec<AlternativeResult>,
-    /// What it does to the second recording.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub second: Option<SecondEffectResult>,
-    /// Its nonlinear parameter.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub form: Option<FormResult>,
-    /// Of errors of a converter: how its codes stand behind the readings.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub converters: Vec<ConverterTable>,
-}
-
-/// A coefficient.
-#[derive(Debug, Clone, Serialize)]
-pub struct CoefficientResult {
-    /// Name within the effect.
-    pub name: String,
-    /// Value, in [`Self::unit`].
-    pub value: f64,
-    /// Standard deviation, whatever the nonlinear parameter is.
-    pub sigma: f64,
-    /// SI unit.
-    pub unit: String,
-    /// Size in data sheets; `None` for a product found from the data.
-    pub typical: Option<f64>,
-}
-
-/// A candidate that would do nearly as well.
-#[derive(Debug, Clone, Serialize)]
-pub struct AlternativeResult {
-    /// Public id.
-    pub id: String,
-    /// By how much its score is worse.
-    pub score_worse_by: f64,
-}
-
-/// What an effect does to the second recording.
-#[derive(Debug, Clone, Serialize)]
-pub struct SecondEffectResult {
-    /// Root mean square of the judged residuals without it.
-    pub rms_before: f64,
-    /// With it.
-    pub rms_after: f64,
-    /// Sum of the squares of the decorrelated residuals without it.
-    pub chi2_before: f64,
-    /// With it.
-    pub chi2_after: f64,
-    /// By how many standard deviations it should change the residuals.
-    pub expected_sigmas: f64,
-    /// Whether that is enough for the recording to say anything of it.
-    pub shows: bool,
-}
-
-/// A nonlinear parameter.
-#[derive(Debug, Clone, Serialize)]
-pub struct FormResult {
-    /// Name, with the unit.
-    pub name: &'static str,
-    /// Value.
-    pub value: f64,
-    /// Lower end of its 95 % interval; `None` where the smallest value that was tried is within.
-    pub lower: Option<f64>,
-    /// Upper end; `None` where the largest is within.
-    pub upper: Option<f64>,
-    /// Smallest value that was tried.
-    pub from: f64,
-    /// Largest.
-    pub to: f64,
 }
 
 /// An effect that was tried and not accepted.
@@ -245,9 +143,9 @@ pub struct SecondResult {
     /// Whether it is the recording that the calibration was fitted to, so that its figures prove nothing.
     pub fitted_to: bool,
     /// By the calibration without the effects.
-    pub before: VerifyResult,
+    pub before: Verification,
     /// By the calibration with them.
-    pub after: VerifyResult,
+    pub after: Verification,
 }
 
 /// Error figures of one sensor.
@@ -366,8 +264,8 @@ impl DiagnosisResult {
             second: second.map(|(name, [before, after])| SecondResult {
                 recording: name.into(),
                 fitted_to: before.same_recording,
-                before: VerifyResult::of(before),
-                after: VerifyResult::of(after),
+                before: before.clone(),
+                after: after.clone(),
             }),
         };
         for s in &d.sensors {
@@ -377,9 +275,7 @@ impl DiagnosisResult {
     }
 
     fn add(&mut self, sensor: Sensor, decision: &Decision, next: &Next) {
-        let accepted = decision.accepted.iter();
-        self.effects
-            .extend(accepted.map(|a| AcceptedResult::of(sensor, a)));
+        self.effects.extend(decision.accepted.iter().cloned());
         let rejected = decision.rejected.iter().map(|(id, reason)| RejectedResult {
             id: id.clone(),
             sensor,
@@ -459,101 +355,5 @@ fn figures(d: &Diagnosis, found: &SensorDiagnosis) -> SensorDiagnosisResult {
         dwells: dwells.list.len(),
         not_used: dwells.unused(found.sensor),
         picture: found.picture.clone(),
-    }
-}
-
-impl FormResult {
-    /// Its 95 % interval for people: `55.2 to 66.1`, `at most 12`.
-    pub fn interval(&self) -> String {
-        match [self.lower, self.upper].map(|end| end.map(significant)) {
-            [Some(lower), Some(upper)] => format!("{lower} to {upper}"),
-            [None, Some(upper)] => format!("at most {upper}"),
-            [Some(lower), None] => format!("at least {lower}"),
-            [None, None] => "any that was tried".into(),
-        }
-    }
-}
-
-impl AcceptedResult {
-    fn of(sensor: Sensor, a: &Accepted) -> Self {
-        let candidate = &a.chosen.candidate;
-        let typical = |k: &usize| match candidate.kind {
-            Kind::Effect(e) => e.coefficients.get(*k).map(|c| c.typical),
-            _ => None,
-        };
-        let coefficients = candidate.names().into_iter().zip(&candidate.active);
-        let coefficients =
-            coefficients
-                .enumerate()
-                .map(|(i, ((name, unit), k))| CoefficientResult {
-                    name,
-                    value: a.values[i],
-                    sigma: a.covariance[(i, i)].sqrt(),
-                    unit,
-                    typical: typical(k),
-                });
-        Self {
-            id: candidate.id(),
-            sensor,
-            about: candidate.about(),
-            of_unit: a.of_unit,
-            coefficients: coefficients.collect(),
-            held_out_rms_before: a.held_out[0],
-            held_out_rms_after: a.held_out[1],
-            held_out_at_rest_before: a.held_out_at_rest.map(|r| r[0]),
-            held_out_at_rest_after: a.held_out_at_rest.map(|r| r[1]),
-            held_out: a.split,
-            chance: a.chosen.p,
-            alternatives: a
-                .chosen
-                .alternatives
-                .iter()
-                .map(|(id, worse)| AlternativeResult {
-                    id: id.clone(),
-                    score_worse_by: *worse,
-                })
-                .collect(),
-            second: a.second.map(|s| SecondEffectResult {
-                rms_before: s.rms[0],
-                rms_after: s.rms[1],
-                chi2_before: s.chi2[0],
-                chi2_after: s.chi2[1],
-                expected_sigmas: s.expected,
-                shows: s.shows(),
-            }),
-            form: candidate.parameter().map(|f| FormResult {
-                name: f.name,
-                value: a.chosen.parameter,
-                lower: a.parameter.and_then(|p| p.lower),
-                upper: a.parameter.and_then(|p| p.upper),
-                from: f.from,
-                to: f.to,
-            }),
-            converters: ConverterTable::of(&candidate.codes),
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn an_interval_that_reaches_the_end_of_what_was_searched_is_open_there() {
-        let interval = |lower, upper| {
-            let form = FormResult {
-                name: "lag_s",
-                value: 60.0,
-                lower,
-                upper,
-                from: 5.0,
-                to: 600.0,
-            };
-            form.interval()
-        };
-        assert_eq!(interval(Some(55.0), Some(66.0)), "55.0 to 66.0");
-        assert_eq!(interval(None, Some(66.0)), "at most 66.0");
-        assert_eq!(interval(Some(55.0), None), "at least 55.0");
-        assert_eq!(interval(None, None), "any that was tried");
     }
 }

@@ -5,13 +5,15 @@ use std::collections::BTreeMap;
 use mimu_recording::{RawUnit, Reference};
 use serde::Serialize;
 
-use super::{TOOL, present};
+use super::TOOL;
 use crate::dwell::Dwell;
 use crate::fit::change::Change;
 use crate::fit::{Fit, Method, SensorFit, Split};
 use crate::prepared::Prepared;
-use crate::quantity::{AXES, Figure, PerSensor, Sensor, inverse_names, raw_unit, scale_unit};
-use crate::stillness;
+use crate::quantity::{
+    AXES, Figure, PerSensor, Sensor, inverse_names, present, raw_unit, scale_unit,
+};
+use crate::stillness::Detection;
 use crate::triad::{Angles, Estimate};
 
 /// Result of a fit.
@@ -55,26 +57,9 @@ pub struct FitResult {
     /// What errs by far more than the others predict, and was left out.
     pub left_out: Vec<LeftOutResult>,
     /// What that changes: every parameter fitted with everything, and as fitted.
-    pub left_out_changes: Vec<ChangeResult>,
+    pub left_out_changes: Vec<Change>,
     /// What a person should know.
     pub warnings: Vec<String>,
-}
-
-/// A parameter fitted with everything, and without what was left out.
-#[derive(Debug, Clone, Serialize)]
-pub struct ChangeResult {
-    /// Of which sensor.
-    pub sensor: Sensor,
-    /// Name of the parameter.
-    pub name: String,
-    /// With everything in the fit.
-    pub with_all: f64,
-    /// As fitted.
-    pub value: f64,
-    /// Standard deviation of it.
-    pub sigma: f64,
-    /// Unit of all three.
-    pub unit: String,
 }
 
 /// Times without samples.
@@ -84,23 +69,6 @@ pub struct Gaps {
     pub count: u64,
     /// How long in all, s.
     pub missing_s: f64,
-}
-
-/// How dwells were found.
-#[derive(Debug, Clone, Serialize)]
-pub struct Detection {
-    /// Window of the variance, s.
-    pub window_s: f64,
-    /// Left out at both ends, s.
-    pub guard_s: f64,
-    /// Shorter ones are not used, s.
-    pub shortest_s: f64,
-    /// Largest variance of the accelerometer, in units of `floor_raw` squared.
-    pub still_factor: f64,
-    /// The same of the gyro.
-    pub gyro_still_factor: f64,
-    /// Standard deviation of a sample in the quietest twentieth of the recording, raw.
-    pub floor_raw: [f64; 6],
 }
 
 /// A dwell, or a turn, that was left out because it errs by far more than the others predict.
@@ -293,24 +261,11 @@ impl FitResult {
             duplicates: condensed.duplicates,
             holdout_blocks: fit.options.holdout_blocks,
             sensors: PerSensor::from_fn(of),
-            detection: fit.prepared.dwells.detection.map(Detection::of),
+            detection: fit.prepared.dwells.detection,
             dwells: DwellResult::list(&fit.prepared),
             left_out: LeftOutResult::list(&fit.prepared),
-            left_out_changes: fit.changes.iter().map(ChangeResult::of).collect(),
+            left_out_changes: fit.changes.clone(),
             warnings: fit.warnings.iter().chain(of_sensors).cloned().collect(),
-        }
-    }
-}
-
-impl Detection {
-    fn of(d: stillness::Detection) -> Self {
-        Self {
-            window_s: d.window_s,
-            guard_s: d.guard_s,
-            shortest_s: d.shortest_s,
-            still_factor: d.still_factor,
-            gyro_still_factor: d.gyro_still_factor,
-            floor_raw: d.floor,
         }
     }
 }
@@ -432,19 +387,6 @@ fn excess_unit(fit: &Fit, found: &SensorFit, group: &str) -> String {
         // Axes of the forward form are in raw units, of the inverse form in SI.
         Figure::Input if fit.options.method == Method::InverseForm => si.into(),
         Figure::Input => raw_unit(fit.prepared.manifest.raw_unit, si),
-    }
-}
-
-impl ChangeResult {
-    fn of(change: &Change) -> Self {
-        Self {
-            sensor: change.sensor,
-            name: change.name.clone(),
-            with_all: change.with_all,
-            value: change.fitted.value,
-            sigma: change.fitted.sigma,
-            unit: change.unit.clone(),
-        }
     }
 }
 

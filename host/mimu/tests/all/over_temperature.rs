@@ -45,7 +45,7 @@ fn text_with(head: &str, nodes: &str) -> String {
 fn text() -> String {
     let nodes: String = NODES.map(node).concat();
     text_with(
-        "range_c = [-8.0, 58.5]\nlag_s = 61.2\ninterval_lag_s = [55.0, 67.0]",
+        "range_c = [-8.0, 58.5]\ndies.gyro = { lag_s = 61.2, interval_lag_s = [55.0, 67.0] }\ndies.accel = { lag_s = -12.5 }",
         &nodes,
     )
 }
@@ -169,7 +169,7 @@ fn what_cannot_be_applied_is_refused_and_a_bad_node_is_named_by_its_number() {
             &["interval_lag_s"],
         ),
         (
-            good.replace("\nlag_s = 61.2", ""),
+            good.replace("lag_s = 61.2, ", ""),
             &["interval_lag_s is there"],
         ),
         (good.replace("temp_c = 31.0", "temp_c = nan"), &["node 3"]),

@@ -1,7 +1,8 @@
 //! What still errs, and the calibration with it: found, offered, judged in a third set of poses, stored.
 
-use mimu::calibration::{Calibration, EffectTable};
+use mimu::calibration::Calibration;
 use mimu::diagnose::{Recordings, diagnose};
+use mimu::effects::fitted::FittedEffect;
 use mimu::fit::{Fit, Options};
 use mimu::next_experiment;
 use mimu::result::diagnosis::DiagnosisResult;
@@ -51,18 +52,16 @@ impl Whole<'_> {
             }
         };
         let accepted = diagnosis.sensors.iter().flat_map(|s| &s.decision.accepted);
-        let tables: Vec<EffectTable> = accepted
-            .filter(|a| a.of_unit)
-            .map(EffectTable::from)
-            .collect();
+        let of_unit = accepted.filter(|a| a.of_unit);
+        let found: Vec<FittedEffect> = of_unit.map(|a| a.effect.clone()).collect();
         // On a table a sensor without effects stays as it is: the fit before knows of the force of a board beside the axis.
         let mut fitted = diagnosis.after.clone();
         if other.manifest.reference == Reference::Table {
             mounted(&mut fitted, self.wizard.asked.mounting_deg);
             for sensor in &mut fitted.sensors {
-                let is = |t: &EffectTable| t.sensor == sensor.sensor.name();
+                let is = |e: &FittedEffect| e.sensor() == sensor.sensor;
                 if let (false, Some(plain)) =
-                    (tables.iter().any(is), plain.fitted.sensor(sensor.sensor))
+                    (found.iter().any(is), plain.fitted.sensor(sensor.sensor))
                 {
                     *sensor = plain.clone();
                 }
@@ -71,7 +70,7 @@ impl Whole<'_> {
         let created = self.wizard.units[k]
             .folder
             .created(Part::Confirmation, now)?;
-        let made = Calibration::of(&fitted, &tables, &created)?;
+        let made = Calibration::of(&fitted, &found, &created)?;
         let both = (
             mimu::verify::verify(other, &plain.calibration),
             mimu::verify::verify(other, &made),

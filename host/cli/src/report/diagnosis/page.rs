@@ -7,12 +7,13 @@ use maud::{Markup, html};
 
 use super::meaning;
 use super::text::{USUAL, by};
+use mimu::diagnose::decision::Accepted;
 use mimu::diagnose::decision::{FALSE_LEFTOVER, LEVERAGE};
 use mimu::diagnose::picture::{Against, Omnibus, Panel, Picture};
 use mimu::diagnose::search::{FALSE_FOUND, FALSE_LISTED};
 use mimu::quantity::{Figure, Sensor};
 use mimu::readable;
-use mimu::result::diagnosis::{AcceptedResult, DiagnosisResult, SensorDiagnosisResult};
+use mimu::result::diagnosis::{DiagnosisResult, SensorDiagnosisResult};
 use mimu_recording::Reference;
 use mimu_recording::error::{Error, Result};
 
@@ -132,7 +133,7 @@ fn verdict(d: &DiagnosisResult) -> Markup {
         @if unexplained { "." }
         @for u in &d.untestable { " The " (spoken(u.sensor)) ": " (u.reason) "." }
         @for (name, s) in d.sensors.present() {
-            @let ours: Vec<&AcceptedResult> = d.effects.iter().filter(|a| a.sensor == name).collect();
+            @let ours: Vec<&Accepted> = d.effects.iter().filter(|a| a.effect.sensor() == name).collect();
             @let shown = |value: f64| tables::figure_of(s, value);
             @if ours.is_empty() {
                 " Nothing is added to the " (spoken(name)) ": held-out error " (shown(s.held_out_rms_before)) " (in sample "
@@ -140,7 +141,7 @@ fn verdict(d: &DiagnosisResult) -> Markup {
             } @else {
                 " With "
                 @for (n, a) in ours.iter().enumerate() {
-                    @if n > 0 { " and " } code { (a.id) }
+                    @if n > 0 { " and " } code { (a.effect.id()) }
                 }
                 " taken out, the held-out error of the " (spoken(name)) " goes from " (shown(s.held_out_rms_before)) " to "
                 (shown(s.held_out_rms_after)) "; noise alone would leave " (shown(s.noise_floor)) "."
@@ -164,7 +165,11 @@ fn keys() -> Markup {
 
 fn sensor(d: &DiagnosisResult, s: &Shown) -> Markup {
     let picture = s.picture;
-    let ours: Vec<&AcceptedResult> = d.effects.iter().filter(|a| a.sensor == s.name).collect();
+    let ours: Vec<&Accepted> = d
+        .effects
+        .iter()
+        .filter(|a| a.effect.sensor() == s.name)
+        .collect();
     let after = !ours.is_empty();
     let [before, left] = &picture.omnibus;
     html! {
@@ -216,20 +221,20 @@ fn omnibus(when: &str, &Omnibus { chi2, dof, p }: &Omnibus) -> Markup {
     }
 }
 
-fn effect(d: &DiagnosisResult, s: &Shown, one: &AcceptedResult, panels: &[Panel]) -> Markup {
+fn effect(d: &DiagnosisResult, s: &Shown, one: &Accepted, panels: &[Panel]) -> Markup {
     let readable::Readable { factor, unit } = readable::error(s.figures.unit);
     let whole = panels.iter().any(|p| p.against == Against::Fitted);
     html! {
-        h3 { code { (one.id) } }
+        h3 { code { (one.effect.id()) } }
         p {
-            (sentence(one.about)) ". Held-out error " (number(one.held_out_rms_before, factor, &unit)) " without it, "
+            (sentence(one.effect.candidate.about())) ". Held-out error " (number(one.held_out_rms_before, factor, &unit)) " without it, "
             (number(one.held_out_rms_after, factor, &unit)) " with it, beside the others; "
             @if let (Some(before), Some(after)) = (one.held_out_at_rest_before, one.held_out_at_rest_after) {
                 @let rate = readable::error("rad/s");
                 "of the rates at rest " (number(before, rate.factor, &rate.unit)) " without it, "
                 (number(after, rate.factor, &rate.unit)) " with it; "
             }
-            (chance(one.chance))
+            (chance(one.chosen.p))
             " after the whole search."
             @if !one.of_unit { " No calibration holds it." }
         }
@@ -240,7 +245,7 @@ fn effect(d: &DiagnosisResult, s: &Shown, one: &AcceptedResult, panels: &[Panel]
                 "Left, what is left plus the part of the effect named (its other parts and the other effects taken out), against "
                 "what it depends on, less what the affine calibration takes up: the mean, and the best straight line where the variable is one that "
                 "it is linear in. " (key("fit", "M0 6H24")) "effect as fitted, with its 95 % band"
-                @if let Some(form) = &one.form { " (for the " code { (form.name) } " found)" }
+                @if let Some(form) = one.effect.form() { " (for the " code { (form.name) } " found)" }
                 ". Right, what is left, on the same scale. " (keys()) "."
                 @if whole {
                     " Where a row is a whole turn or the magnitude of gravity, the abscissa is what the fit says that the effect does to "

@@ -10,7 +10,7 @@ use crate::report::text::wrap;
 use effect::effect;
 pub(super) use experiments::by_experiment;
 use experiments::experiments;
-use mimu::calibration::ConverterTable;
+use mimu::effects::fitted::WrittenConverter;
 use mimu::quantity::{Sensor, plural, plus_minus, significant};
 use mimu::readable;
 use mimu::result::diagnosis::{
@@ -179,7 +179,7 @@ fn sensor(
     s: &SensorDiagnosisResult,
     all: bool,
 ) {
-    let effects = || d.effects.iter().filter(|a| a.sensor == name);
+    let effects = || d.effects.iter().filter(|a| a.effect.sensor() == name);
     let none = match effects().next() {
         Some(_) => "",
         None => ": no effect found",
@@ -236,7 +236,7 @@ fn residuals(out: &mut String, d: &DiagnosisResult, name: Sensor, all: bool) {
 }
 
 /// A converter in words.
-pub(super) fn converter(c: &ConverterTable) -> String {
+pub(super) fn converter(c: &WrittenConverter) -> String {
     format!(
         "converter of {}, raw: bit 0 turns every {} from {} on; errors are in units of bit 0",
         c.axes,

@@ -6,9 +6,7 @@ use mimu::calibration::Calibration;
 use mimu_recording::{Batch, RawUnit, Recording};
 
 use super::mimu;
-use super::unit::{
-    CUBIC, DWELLS, NOISE, RATE_HZ, SAG, THERMAL, fitted, forward, named, record, table,
-};
+use super::unit::{CUBIC, DWELLS, NOISE, RATE_HZ, SAG, THERMAL, fitted, forward, named, record};
 
 pub fn read(folder: &Path) -> (Recording, Batch) {
     let recording = Recording::open(folder).unwrap();
@@ -60,10 +58,7 @@ fn a_compensated_recording_is_the_input_of_the_bench_and_keeps_what_is_missing()
         named("accel_scale_cubic", &[CUBIC; 3]),
     ];
     let fit = fitted(&path("clean"));
-    for (name, tables) in [
-        ("cal.toml", &effects.each_ref().map(table)[..]),
-        ("affine.toml", &[]),
-    ] {
+    for (name, tables) in [("cal.toml", &effects[..]), ("affine.toml", &[])] {
         let calibration = Calibration::of(&fit, tables, "2026-01-01T00:00:00Z").unwrap();
         std::fs::write(path(name), calibration.to_toml()).unwrap();
     }

@@ -3,7 +3,8 @@
 use mimu::calibration::Calibration;
 use mimu::effects;
 use mimu::effects::candidate::{Candidate, Kind};
-use mimu::effects::removal::{Removed, remove};
+use mimu::effects::fitted::FittedEffect;
+use mimu::effects::removal::remove;
 use mimu::effects::{converter::Converter, readout::first_of};
 use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
@@ -13,11 +14,11 @@ use mimu_device::Image;
 use nalgebra::Vector3;
 
 use super::unit::{
-    BIT_0_V, WORTH_V, ZERO_V, fitted, prepared, record, removed, table, write_recording,
+    BIT_0_V, WORTH_V, ZERO_V, fitted, fitted_effect, prepared, record, write_recording,
 };
 
 /// Converters of the accelerometer, as the recording is made.
-fn converters() -> Removed {
+fn converters() -> FittedEffect {
     let effect = effects::by_id("accel_readout_code").unwrap();
     let mut candidate = Candidate::new(Sensor::Accel, Kind::Effect(effect));
     candidate.active.clear();
@@ -30,7 +31,7 @@ fn converters() -> Removed {
             values.push(worth / BIT_0_V);
         }
     }
-    removed(candidate, 0.0, &values)
+    fitted_effect(candidate, 0.0, &values)
 }
 
 #[test]
@@ -41,7 +42,7 @@ fn errors_by_the_code_are_taken_out_block_by_block_and_sample_by_sample() {
     record(&clean, false, false);
     write_recording(&coded, false, true, false);
     let fit = fitted(&clean);
-    let text = Calibration::of(&fit, &[table(&converters())], "2026-01-01T00:00:00Z")
+    let text = Calibration::of(&fit, &[converters()], "2026-01-01T00:00:00Z")
         .unwrap()
         .to_toml();
     let calibration = Calibration::parse(&text, "cal.toml").unwrap();
@@ -112,7 +113,7 @@ fn converters_that_make_no_sense_are_refused() {
     let path = folder.path().join("recording");
     record(&path, false, false);
     let fit = fitted(&path);
-    let text = Calibration::of(&fit, &[table(&converters())], "2026-01-01T00:00:00Z")
+    let text = Calibration::of(&fit, &[converters()], "2026-01-01T00:00:00Z")
         .unwrap()
         .to_toml();
     let of_y = "{ axes = \"y\", ";

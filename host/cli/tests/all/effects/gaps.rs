@@ -4,14 +4,15 @@ use mimu::blocks::Moments;
 use mimu::calibration::Calibration;
 use mimu::diagnose::{Recordings, diagnose};
 use mimu::dwell::Fault;
-use mimu::effects::removal::{Removed, remove, remove_within};
+use mimu::effects::fitted::FittedEffect;
+use mimu::effects::removal::{remove, remove_within};
 use mimu::fit::{Method, Options};
 use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
 use mimu::stillness::STILL_FACTOR;
 use mimu_recording::RawUnit;
 
-use super::unit::{SAG, fitted, named, prepared, record, table};
+use super::unit::{SAG, fitted, named, prepared, record};
 
 /// Of a warm-up.
 const TIME_CONSTANT_S: f64 = 1200.0;
@@ -21,19 +22,19 @@ fn unit(effects: &[(&str, f64, usize)]) -> (Prepared, Calibration) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("recording");
     record(&path, false, true);
-    let tables: Vec<_> = effects
+    let effects: Vec<_> = effects
         .iter()
         .map(|(id, value, count)| {
-            let mut removed: Removed = named(id, &vec![*value; *count]);
-            removed.parameter = match *id {
+            let mut effect: FittedEffect = named(id, &vec![*value; *count]);
+            effect.parameter = match *id {
                 "gyro_warm_up" => TIME_CONSTANT_S,
                 id if id.ends_with("lag") => 60.0,
                 _ => 0.0,
             };
-            table(&removed)
+            effect
         })
         .collect();
-    let text = Calibration::of(&fitted(&path), &tables, "2026-01-01T00:00:00Z")
+    let text = Calibration::of(&fitted(&path), &effects, "2026-01-01T00:00:00Z")
         .unwrap()
         .to_toml();
     (
@@ -42,7 +43,7 @@ fn unit(effects: &[(&str, f64, usize)]) -> (Prepared, Calibration) {
     )
 }
 
-fn removed(from: &Prepared, calibration: &Calibration) -> Prepared {
+fn fitted_effect(from: &Prepared, calibration: &Calibration) -> Prepared {
     let [gyro, accel] = Sensor::BOTH.map(|s| calibration.inverse(s).unwrap());
     remove(from, Some(&gyro), Some(&accel), calibration.effects()).unwrap()
 }
@@ -50,13 +51,13 @@ fn removed(from: &Prepared, calibration: &Calibration) -> Prepared {
 #[test]
 fn samples_that_are_missing_from_the_other_triad_do_not_make_an_error() {
     let (whole, calibration) = unit(&[("gyro_g_sensitivity", SAG, 9)]);
-    let expected = removed(&whole, &calibration);
+    let expected = fitted_effect(&whole, &calibration);
     let mut holes = whole.clone();
     let blocks = whole.dwells.list[5].blocks.clone();
     for at in blocks.start + 2..blocks.start + 5 {
         holes.condensed.blocks[at].raw[3..].fill(Moments::default());
     }
-    let after = removed(&holes, &calibration);
+    let after = fitted_effect(&holes, &calibration);
     for axis in 0..3 {
         // A dwell shows one force: other blocks of it differ by noise, 2.5 mm/s² a sample of 9.8 m/s².
         let off = |p: &Prepared| p.dwells.list[5].raw[axis].mean;
@@ -72,7 +73,7 @@ fn samples_that_are_missing_from_the_other_triad_do_not_make_an_error() {
     for mean in &mut hole.dwells.list[5].raw[3..] {
         mean.n = 0;
     }
-    let after = removed(&hole, &calibration);
+    let after = fitted_effect(&hole, &calibration);
     assert_eq!(after.dwells.list[5].gyro_fault, Some(Fault::Missing(3)));
     let said = after.dwells.warnings.join("\n");
     assert!(
@@ -93,7 +94,7 @@ fn a_lag_begins_at_the_first_temperature() {
     for block in &mut late.condensed.blocks[..30] {
         block.temp_c.mean = f64::NAN;
     }
-    let after = removed(&late, &calibration);
+    let after = fitted_effect(&late, &calibration);
     for (a, b) in after.dwells.list.iter().zip(&late.dwells.list) {
         assert_eq!(a.raw, b.raw);
     }
@@ -131,10 +132,10 @@ fn beyond_the_temperatures_of_the_calibration_an_effect_is_held_as_on_the_device
 fn what_goes_by_time_is_counted_from_power_on() {
     const WARM_UP: f64 = 1e-3;
     let (mut from, calibration) = unit(&[("gyro_warm_up", WARM_UP, 3)]);
-    let begun = removed(&from, &calibration);
+    let begun = fitted_effect(&from, &calibration);
     let first_s = from.condensed.blocks[0].start_s;
     from.manifest.power_on_s = Some(first_s - 600.0);
-    let on = removed(&from, &calibration);
+    let on = fitted_effect(&from, &calibration);
     let inverse = calibration.inverse(Sensor::Gyro).unwrap();
     for (a, b) in begun.dwells.list.iter().zip(&on.dwells.list) {
         let less =

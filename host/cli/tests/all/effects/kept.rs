@@ -7,7 +7,7 @@ use mimu::effects::readout::first_of;
 use mimu::quantity::Sensor;
 use mimu_device::{Image, calibration, contents};
 
-use super::unit::{BIT_0_V, CUBIC, SAG, fitted, named, record, removed, table};
+use super::unit::{BIT_0_V, CUBIC, SAG, fitted, fitted_effect, named, record};
 use super::{every_effect, mimu};
 
 const CREATED: &str = "2026-01-01T00:00:00Z";
@@ -35,13 +35,12 @@ fn every_effect_is_fetched_as_it_was_sent() {
         None,
         Some(Converter::of(BIT_0_V, -0.321)),
     ];
-    let own = removed(own, 0.0, &[1e-3, -2e-3]);
+    let own = fitted_effect(own, 0.0, &[1e-3, -2e-3]);
     let mut others = every_effect();
     others.retain(|e| e.candidate.id() != "accel_readout_code");
     others.insert(2, own);
     for effects in [every_effect(), others] {
-        let tables: Vec<_> = effects.iter().map(table).collect();
-        let made = Calibration::of(&fit, &tables, CREATED).unwrap();
+        let made = Calibration::of(&fit, &effects, CREATED).unwrap();
         let (sent, kept) = fetched(&made);
         let again = Image::new(&kept, "kept.toml").unwrap();
         let shown = contents(&sent.bytes).unwrap();
@@ -70,11 +69,7 @@ fn the_other_commands_take_what_was_fetched_and_say_what_they_lack() {
         ),
         named("accel_scale_cubic", &[CUBIC; 3]),
     ];
-    let made = Calibration::of(
-        &fitted(&path("clean")),
-        &effects.each_ref().map(table),
-        CREATED,
-    );
+    let made = Calibration::of(&fitted(&path("clean")), &effects, CREATED);
     let made = made.unwrap();
     let (_, kept) = fetched(&made);
     assert!(made.is_uncertain() && !kept.is_uncertain());

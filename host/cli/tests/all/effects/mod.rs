@@ -11,25 +11,26 @@ pub mod unit;
 
 use std::process::Command;
 
-use mimu::calibration::{Calibration, EffectTable};
+use mimu::calibration::Calibration;
 use mimu::effects;
 use mimu::effects::candidate::{Candidate, Kind};
 use mimu::effects::converter::Converter;
 use mimu::effects::effect::OnDevice;
+use mimu::effects::fitted::FittedEffect;
 use mimu::effects::quantity::Quantity;
 use mimu::effects::regressor::Product;
-use mimu::effects::removal::{Removed, remove};
+use mimu::effects::removal::remove;
 use mimu::quantity::Sensor;
 use mimu_core::compensation::Sample;
 use mimu_core::effects::{Effects, State};
 use mimu_device::Image;
 use nalgebra::Vector3;
 
-use unit::{BIT_0_V, CUBIC, SAG, THERMAL, fitted, named, record, removed, table};
+use unit::{BIT_0_V, CUBIC, SAG, THERMAL, fitted, fitted_effect, named, record};
 
 /// All that is known by name, some of it with some of its coefficients only, and three terms; ten times what data sheets say.
-fn every_effect() -> Vec<Removed> {
-    let mut all: Vec<Removed> = effects::all()
+fn every_effect() -> Vec<FittedEffect> {
+    let mut all: Vec<FittedEffect> = effects::all()
         .filter(|effect| effect.on_device() != OnDevice::Never)
         .enumerate()
         .map(|(n, effect)| {
@@ -51,11 +52,11 @@ fn every_effect() -> Vec<Removed> {
                 })
                 .collect();
             let form = effect.parameter.map_or(0.0, |p| 2.0 * p.from);
-            removed(candidate, form, &values)
+            fitted_effect(candidate, form, &values)
         })
         .collect();
     let term = |sensor, axis, v: &[Quantity], value| {
-        removed(
+        fitted_effect(
             Candidate::new(sensor, Kind::Term(axis, Product::term(v).unwrap())),
             0.0,
             &[value],
@@ -75,8 +76,7 @@ fn every_effect_comes_back_from_the_file_and_the_device_removes_what_the_pc_does
     record(&path, false, true);
     let fit = fitted(&path);
     let effects = every_effect();
-    let tables: Vec<EffectTable> = effects.iter().map(table).collect();
-    let text = Calibration::of(&fit, &tables, "2026-01-01T00:00:00Z")
+    let text = Calibration::of(&fit, &effects, "2026-01-01T00:00:00Z")
         .unwrap()
         .to_toml();
     let calibration = Calibration::parse(&text, "cal.toml").unwrap();
@@ -92,12 +92,11 @@ fn every_effect_comes_back_from_the_file_and_the_device_removes_what_the_pc_does
     }
 
     // Of a block the PC knows mean and scatter, from which bits follow another way.
-    let effects: Vec<Removed> = every_effect()
+    let effects: Vec<FittedEffect> = every_effect()
         .into_iter()
         .filter(|e| !e.candidate.reads_code())
         .collect();
-    let tables: Vec<EffectTable> = effects.iter().map(table).collect();
-    let text = Calibration::of(&fit, &tables, "2026-01-01T00:00:00Z")
+    let text = Calibration::of(&fit, &effects, "2026-01-01T00:00:00Z")
         .unwrap()
         .to_toml();
     let calibration = Calibration::parse(&text, "cal.toml").unwrap();
@@ -142,7 +141,7 @@ fn every_effect_goes_into_the_bytes_of_a_device() {
     // Of roots no sum is another, and a second look at a code never moves an error by just as much as it is.
     for effect in every_effect() {
         let id = effect.candidate.id();
-        let text = Calibration::of(&fit, &[table(&effect)], "2026-01-01T00:00:00Z")
+        let text = Calibration::of(&fit, std::slice::from_ref(&effect), "2026-01-01T00:00:00Z")
             .unwrap()
             .to_toml();
         let calibration = Calibration::parse(&text, "cal.toml").unwrap();
@@ -234,10 +233,9 @@ fn verifying_shows_the_error_with_the_effects_removed_and_left() {
     ];
     // The affine part is that of the unit without flaws, and the effects are its flaws: only noise can be left.
     let fit = fitted(&path("clean"));
-    let tables = effects.each_ref().map(table);
     std::fs::write(
         path("cal.toml"),
-        Calibration::of(&fit, &tables, "2026-01-01T00:00:00Z")
+        Calibration::of(&fit, &effects, "2026-01-01T00:00:00Z")
             .unwrap()
             .to_toml(),
     )

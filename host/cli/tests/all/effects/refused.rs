@@ -5,7 +5,7 @@ use mimu::effects;
 use mimu::effects::candidate::{Candidate, Kind};
 use mimu::quantity::Sensor;
 
-use super::unit::{fitted, named, record, removed, table};
+use super::unit::{fitted, fitted_effect, named, record};
 
 #[test]
 fn an_effect_that_was_edited_or_that_nobody_knows_is_refused_by_its_name() {
@@ -15,8 +15,8 @@ fn an_effect_that_was_edited_or_that_nobody_knows_is_refused_by_its_name() {
     let fit = fitted(&path);
     let effect = effects::by_id("gyro_warm_up").unwrap();
     let candidate = Candidate::new(Sensor::Gyro, Kind::Effect(effect));
-    let warm_up = table(&removed(candidate, 90.0, &[1e-3, 2e-3, 3e-3]));
-    let sag = table(&named("gyro_g_sensitivity", &[1e-5; 9]));
+    let warm_up = fitted_effect(candidate, 90.0, &[1e-3, 2e-3, 3e-3]);
+    let sag = named("gyro_g_sensitivity", &[1e-5; 9]);
     let text = Calibration::of(&fit, &[warm_up, sag], "2026-01-01T00:00:00Z")
         .unwrap()
         .to_toml();
@@ -129,7 +129,7 @@ fn more_effects_than_the_device_has_room_for_are_refused_by_name() {
         "accel_scale_cubic",
         "gyro_scale_quadratic",
     ]
-    .map(|id| table(&named(id, &[1e-7; 3])));
+    .map(|id| named(id, &[1e-7; 3]));
     let text = Calibration::of(&fitted(&path), &effects, "2026-01-01T00:00:00Z")
         .unwrap()
         .to_toml();

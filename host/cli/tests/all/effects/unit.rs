@@ -1,10 +1,9 @@
 //! The unit of these tests, a recording of it, and effects to give it.
 
-use mimu::calibration::EffectTable;
 use mimu::effects;
 use mimu::effects::candidate::{Candidate, Kind};
+use mimu::effects::fitted::FittedEffect;
 use mimu::effects::readout::TYPICAL;
-use mimu::effects::removal::Removed;
 use mimu::fit::{Fit, Method, Options, fit};
 use mimu::prepared::Prepared;
 use mimu::stillness::STILL_FACTOR;
@@ -161,25 +160,19 @@ pub fn fitted(folder: &Path) -> Fit {
     fit(prepared(folder), options).unwrap()
 }
 
-pub fn removed(candidate: Candidate, parameter: f64, values: &[f64]) -> Removed {
-    let values = values.to_vec();
-    Removed {
-        candidate,
-        parameter,
-        values,
+/// Known to within a hundredth.
+pub fn fitted_effect(candidate: Candidate, parameter: f64, values: &[f64]) -> FittedEffect {
+    FittedEffect {
+        sigmas: values.iter().map(|v| 0.01 * v.abs()).collect(),
+        ..FittedEffect::new(candidate, parameter, values.to_vec())
     }
 }
 
-pub fn named(id: &str, values: &[f64]) -> Removed {
+pub fn named(id: &str, values: &[f64]) -> FittedEffect {
     let effect = effects::by_id(id).unwrap();
-    removed(
+    fitted_effect(
         Candidate::new(effect.sensor, Kind::Effect(effect)),
         0.0,
         values,
     )
-}
-
-pub fn table(effect: &Removed) -> EffectTable {
-    let sigmas: Vec<f64> = effect.values.iter().map(|v| 0.01 * v.abs()).collect();
-    EffectTable::new(effect, &sigmas)
 }

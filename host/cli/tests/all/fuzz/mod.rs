@@ -24,7 +24,6 @@ use mimu::fit::{Fit, Method, Options, fit};
 use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
 use mimu::result::fit::FitResult;
-use mimu::result::verify::VerifyResult;
 use mimu::verify::verify;
 use mimu_cli::report;
 use mimu_recording::error::{Error, Result};
@@ -351,7 +350,7 @@ fn verify_mutated(seeds: &Seeds, recording: &Path, random: &mut Random) -> Resul
     };
     write_recording(recording, &manifest(reference), "samples.csv", &text);
     let prepared = Prepared::read(&Recording::open(recording)?, 10.0, |_| {})?;
-    let result = VerifyResult::of(&verify(&prepared, &calibration)?);
+    let result = verify(&prepared, &calibration)?;
     report::verify_text(&result);
     serde_json::to_string(&result).expect("a result is JSON");
     Ok(())

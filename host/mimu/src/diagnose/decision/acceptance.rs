@@ -9,7 +9,7 @@ use super::{LEVERAGE, SURVIVES, Second, held_out, rms, shares};
 use crate::diagnose::rows::Rows;
 use crate::diagnose::search::{Chosen, Search};
 use crate::diagnose::variance::Fitted;
-use crate::effects::removal::Removed;
+use crate::effects::fitted::FittedEffect;
 use crate::fit::Split;
 use crate::quantity::{p_value, significant};
 
@@ -95,15 +95,11 @@ impl<'a> Acceptance<'a> {
     /// What each of the `kept`, with these coefficients, does to the second recording. Of what is specific to a session that says nothing.
     pub fn elsewhere(&self, kept: &[Chosen], values: &[DVector<f64>]) -> Vec<Option<Second>> {
         let each = kept.iter().zip(values);
-        let given: Vec<Removed> = each
+        let given: Vec<FittedEffect> = each
             .filter(|(c, _)| !c.candidate.is_of_session())
             .map(|(c, values)| {
                 let (candidate, values) = c.candidate.lasting(values.as_slice());
-                Removed {
-                    candidate,
-                    parameter: c.parameter,
-                    values,
-                }
+                FittedEffect::new(candidate, c.parameter, values)
             })
             .collect();
         let mut found = self
@@ -178,7 +174,8 @@ impl<'a> Acceptance<'a> {
             ));
         }
         if let Some(second) = second.filter(Second::contradicts) {
-            let ([a, b], [c, d]) = (second.chi2, second.rms);
+            let [a, b] = [second.chi2_before, second.chi2_after];
+            let [c, d] = [second.rms_before, second.rms_after];
             return Some(format!(
                 "the error of the second recording does not go down: chi-square {a:.0} without, {b:.0} with; rms {} and {}",
                 said(c),
@@ -239,7 +236,7 @@ impl<'a> Acceptance<'a> {
         accept: &[String],
     ) -> Vec<Chosen> {
         let seconds = self.elsewhere(kept, &shares(self.search, kept, with));
-        let confirmed = seconds.iter().map(|s| s.is_some_and(|s| s.shows()));
+        let confirmed = seconds.iter().map(|s| s.is_some_and(|s| s.shows));
         let (taken, suggested): (Vec<_>, Vec<_>) =
             kept.drain(..).zip(confirmed).partition(|(one, confirmed)| {
                 let listed = one.candidate.is_listed();

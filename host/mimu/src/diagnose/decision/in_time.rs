@@ -6,7 +6,7 @@
 use nalgebra::DMatrix;
 
 use super::together::PLAUSIBLE;
-use crate::diagnose::search::{COEFFICIENT, CONFUSED, Chosen, Search, beside};
+use crate::diagnose::search::{Alternative, COEFFICIENT, CONFUSED, Chosen, Search, beside};
 use crate::diagnose::variance::Fitted;
 use crate::effects;
 use crate::effects::candidate::{Candidate, Kind};
@@ -21,17 +21,22 @@ pub(super) fn others_in_time(search: &Search, kept: &mut [Chosen], with: &Fitted
         }
         let ids: Vec<String> = kept.iter().map(|k| k.candidate.id()).collect();
         let listed = |e: &Effect| {
-            let known = kept[i].alternatives.iter().any(|a| a.0 == e.id);
+            let known = kept[i].alternatives.iter().any(|a| a.id == e.id);
             known || ids.iter().any(|id| id == e.id)
         };
         let rivals = effects::all().filter(|e| e.sensor == search.rows.sensor && !listed(e));
-        let found: Vec<(String, f64)> = rivals
-            .filter_map(|rival| Some((rival.id.into(), worse_with(search, kept, i, rival, with)?)))
-            .filter(|(_, worse)| *worse < CONFUSED)
+        let found: Vec<Alternative> = rivals
+            .filter_map(|rival| {
+                Some(Alternative {
+                    id: rival.id.into(),
+                    score_worse_by: worse_with(search, kept, i, rival, with)?,
+                })
+            })
+            .filter(|other| other.score_worse_by < CONFUSED)
             .collect();
         let all = &mut kept[i].alternatives;
         all.extend(found);
-        all.sort_by(|a, b| a.1.total_cmp(&b.1));
+        all.sort_by(|a, b| a.score_worse_by.total_cmp(&b.score_worse_by));
     }
 }
 

@@ -9,6 +9,7 @@ use nalgebra::{DMatrix, DVector};
 use super::model::Model;
 use crate::diagnose::search::{Chosen, Search, beside};
 use crate::diagnose::variance::{Components, Fitted};
+use crate::effects::fitted::Interval;
 use crate::triad::half_width_95;
 
 /// Steps of the refinement: each halves an error of some per cent many times over.
@@ -19,15 +20,6 @@ const SETTLED: f64 = 1e-4;
 const LONGEST: f64 = 0.3;
 /// Halvings of the stretch in which an end of an interval lies, of two sigmas at most.
 const HALVINGS: usize = 10;
-
-/// A 95 % interval of a nonlinear parameter by the profile of its likelihood, in the unit of the parameter.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Interval {
-    /// Lower end; `None` where the smallest value that is looked at is within the interval.
-    pub lower: Option<f64>,
-    /// Upper end; `None` where the largest is.
-    pub upper: Option<f64>,
-}
 
 /// What the nonlinear parameters of the accepted effects leave open.
 #[derive(Debug, Clone)]

@@ -1,41 +1,43 @@
 //! What effects do to a recording that they were not found in.
 
 use nalgebra::{DMatrix, DVector};
+use serde::Serialize;
 
 use super::hold_out::rms;
 use crate::diagnose::rows::Rows;
 use crate::diagnose::search::{Search, basis, beside};
 use crate::diagnose::variance::By;
-use crate::effects::removal::Removed;
+use crate::effects::fitted::FittedEffect;
 
 /// An effect that should change the residuals of a recording by fewer sigmas than this is neither borne out nor contradicted by it.
 const SHOWS: f64 = 3.0;
 
 /// One effect in another recording, with coefficients that this had no part in; the other effects are taken out.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Second {
+    /// Root mean square of the judged rows without it.
+    pub rms_before: f64,
+    /// With it.
+    pub rms_after: f64,
+    /// Sum of the squares of the decorrelated residuals without it.
+    pub chi2_before: f64,
+    /// With it.
+    pub chi2_after: f64,
     /// By how many sigmas it should change the residuals: the length of what the affine parameters cannot do.
-    pub expected: f64,
-    /// Sum of the squares of the decorrelated residuals without it and with it.
-    pub chi2: [f64; 2],
-    /// Root mean square of the judged rows without it and with it.
-    pub rms: [f64; 2],
+    pub expected_sigmas: f64,
+    /// Whether that is enough for the recording to say anything of it.
+    pub shows: bool,
 }
 
 impl Second {
-    /// Whether the recording can tell.
-    pub fn shows(&self) -> bool {
-        self.expected > SHOWS
-    }
-
     /// Whether the recording speaks against the effect.
     pub fn contradicts(&self) -> bool {
-        self.shows() && !(self.chi2[1] < self.chi2[0])
+        self.shows && !(self.chi2_after < self.chi2_before)
     }
 }
 
 /// Each of `effects` in `rows`. The affine parameters are the recording's own: what is judged is the effect alone.
-pub(super) fn second(rows: &Rows, effects: &[Removed]) -> Option<Vec<Second>> {
+pub(super) fn second(rows: &Rows, effects: &[FittedEffect]) -> Option<Vec<Second>> {
     let search = Search::new(rows, Vec::new());
     let columns: Vec<DMatrix<f64>> = effects
         .iter()
@@ -72,10 +74,14 @@ pub(super) fn second(rows: &Rows, effects: &[Removed]) -> Option<Vec<Second>> {
         let others = others.filter(|(j, e)| *j != i && finite(e));
         let y = others.fold(rows.y.clone(), |y, (_, e)| y - e);
         let (without, with) = (left(&y)?, left(&(&y - error))?);
+        let expected_sigmas = left(error)?.1;
         all.push(Second {
-            expected: left(error)?.1,
-            chi2: [without.1.powi(2), with.1.powi(2)],
-            rms: [rms(rows, &without.0), rms(rows, &with.0)],
+            rms_before: rms(rows, &without.0),
+            rms_after: rms(rows, &with.0),
+            chi2_before: without.1.powi(2),
+            chi2_after: with.1.powi(2),
+            expected_sigmas,
+            shows: expected_sigmas > SHOWS,
         });
     }
     Some(all)

@@ -5,7 +5,7 @@
 
 use nalgebra::DMatrix;
 
-use crate::diagnose::search::{COEFFICIENT, CONFUSED, Chosen, Search, beside};
+use crate::diagnose::search::{Alternative, COEFFICIENT, CONFUSED, Chosen, Search, beside};
 use crate::diagnose::variance::Fitted;
 use crate::effects;
 use crate::effects::alternatives::one_at_a_constant_input;
@@ -50,8 +50,12 @@ pub(super) fn together(search: &Search, kept: &mut [Chosen], with: &Fitted) -> V
             rival.id
         ));
         let others = &mut kept[i].alternatives;
-        others.retain(|o| o.0 != rival.id);
-        others.insert(0, (rival.id.into(), worse));
+        others.retain(|o| o.id != rival.id);
+        let rival = Alternative {
+            id: rival.id.into(),
+            score_worse_by: worse,
+        };
+        others.insert(0, rival);
     }
     notes
 }

@@ -164,7 +164,7 @@ pub(super) fn panels(
 }
 
 fn whole(one: &Accepted, across: &DMatrix<f64>, track: &Track) -> Panel {
-    let fitted = across * &one.values;
+    let fitted = across * DVector::from_column_slice(&one.effect.values);
     let mut curve: Vec<Curve> = track
         .rows
         .iter()
@@ -329,7 +329,7 @@ impl Drawn<'_> {
             })
             .collect();
         let less = |m: usize, x: f64, value: f64| value - lines[m].0 - lines[m].1 * x;
-        let value = |k: &usize| self.one.values[*k];
+        let value = |k: &usize| self.one.effect.values[*k];
         let count = self.members.len();
         let covariance = DMatrix::from_fn(count, count, |i, j| {
             self.one.conditional[(self.members[i], self.members[j])]

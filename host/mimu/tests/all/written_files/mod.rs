@@ -8,7 +8,7 @@ use mimu::quantity::Sensor;
 fn a_calibration_written_before_is_read_with_its_effects_and_written_again_without_a_loss() {
     let text = include_str!("calibration-0.1.toml");
     let read = Calibration::parse(text, "calibration-0.1.toml").unwrap();
-    assert_eq!(read.effect_tables[0].id, "gyro_g_sensitivity");
+    assert_eq!(read.effects()[0].id(), "gyro_g_sensitivity");
     assert_eq!(read.effects()[0].values[0], 0.00018432764334673672);
     let forward = read.table(Sensor::Accel).unwrap().forward.clone();
     assert_eq!(forward.P[1][1], 1640.2717802251002);
@@ -20,7 +20,7 @@ fn a_calibration_written_before_is_read_with_its_effects_and_written_again_witho
         assert_eq!((a.C, a.o, a.sigma_C), (b.C, b.o, b.sigma_C));
         assert_eq!(a.covariance, b.covariance);
     }
-    assert_eq!(read.effect_tables, again.effect_tables);
+    assert_eq!(read.effects(), again.effects());
 }
 
 #[test]

@@ -6,10 +6,11 @@ use super::{Shown, sentence};
 use crate::report::diagnosis::remarks;
 use crate::report::diagnosis::text::{by_experiment, by_score, converter};
 use crate::report::page::{number, spoken, written};
+use mimu::diagnose::decision::Accepted;
 use mimu::quantity::{Figure, Sensor, p_value, significant};
 use mimu::readable;
 use mimu::result::diagnosis::{
-    AcceptedResult, DiagnosisResult, LeftoverResult, SecondResult, SensorDiagnosisResult,
+    DiagnosisResult, LeftoverResult, SecondResult, SensorDiagnosisResult,
 };
 
 /// A line break that is HTML and XML.
@@ -59,7 +60,7 @@ pub(super) fn errors(sensors: &[Shown]) -> Markup {
 }
 
 /// Coefficients of an effect.
-pub fn coefficients(one: &AcceptedResult) -> Markup {
+pub fn coefficients(one: &Accepted) -> Markup {
     html! {
         div class="scroll" { table {
             thead { tr {
@@ -67,19 +68,20 @@ pub fn coefficients(one: &AcceptedResult) -> Markup {
                 th class="n" { "in data sheets" } th class="n" { "SI" } th { "SI unit" }
             } }
             tbody {
-                @for c in &one.coefficients {
+                @for c in one.effect.coefficients() {
+                    @let sigma = c.sigma.unwrap_or_default();
                     @let readable::Readable { factor, unit } = readable::coefficient(&c.unit);
                     tr {
                         td { (c.name) }
                         td class="n" { (number(c.value, factor, "")) }
-                        td class="n" { data value=(c.sigma) { (written(&significant(2.0 * c.sigma * factor))) } }
+                        td class="n" { data value=(sigma) { (written(&significant(2.0 * sigma * factor))) } }
                         td { (unit) }
                         td class="n" { @match c.typical { Some(t) => (number(t, factor, "")), None => "–" } }
                         td class="n dim" { (written(&format!("{:.3e}", c.value))) }
                         td class="dim" { (c.unit.replace("^2", "²")) }
                     }
                 }
-                @if let Some(form) = &one.form {
+                @if let Some(form) = one.effect.form() {
                     tr {
                         td { (form.name) }
                         td class="n" { (number(form.value, 1.0, "")) }
@@ -88,8 +90,8 @@ pub fn coefficients(one: &AcceptedResult) -> Markup {
                         td { } td { }
                     }
                 }
-                @for c in &one.converters {
-                    tr { td colspan="7" { (converter(c)) } }
+                @for c in one.effect.converters() {
+                    tr { td colspan="7" { (converter(&c)) } }
                 }
             }
         } }
@@ -97,13 +99,13 @@ pub fn coefficients(one: &AcceptedResult) -> Markup {
 }
 
 /// Candidates, and unlisted alternative models, that would do nearly as well in the place of an effect.
-pub(super) fn alternatives(d: &DiagnosisResult, s: &Shown, one: &AcceptedResult) -> Markup {
-    let undecided = || d.undecided.iter().filter(|u| u.id == one.id);
+pub(super) fn alternatives(d: &DiagnosisResult, s: &Shown, one: &Accepted) -> Markup {
+    let undecided = || d.undecided.iter().filter(|u| u.id == one.effect.id());
     html! {
         @for u in undecided() {
             p { strong { "Undecided. " } (sentence(u.law)) " explains it " (by_score(u.difference)) ". Distinguished by: " (u.experiment) "." }
         }
-        @if one.alternatives.is_empty() {
+        @if one.chosen.alternatives.is_empty() {
             @if undecided().next().is_none() && s.figures.notes.is_empty() {
                 p { "Nothing else that was tried would do nearly as well." }
             }
@@ -111,7 +113,7 @@ pub(super) fn alternatives(d: &DiagnosisResult, s: &Shown, one: &AcceptedResult)
             p { "In this recording it can be confused with:" }
             div class="scroll" { table {
                 thead { tr { th { "instead" } th class="n" { "worse by, in score" } th class="n" { "odds" } } }
-                tbody { @for other in &one.alternatives {
+                tbody { @for other in &one.chosen.alternatives {
                     tr {
                         td { code { (other.id) } }
                         td class="n" { (number(other.score_worse_by, 1.0, "")) }

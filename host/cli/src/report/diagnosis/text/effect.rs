@@ -4,11 +4,11 @@ use std::fmt::Write as _;
 
 use super::{by, converter, shown};
 use crate::report::text::{COLUMNS, wrap};
+use mimu::diagnose::decision::Accepted;
+use mimu::effects::fitted::WrittenCoefficient;
 use mimu::quantity::{p_value, plus_minus, significant};
 use mimu::readable::{self, Readable};
-use mimu::result::diagnosis::{
-    AcceptedResult, CoefficientResult, DiagnosisResult, SensorDiagnosisResult,
-};
+use mimu::result::diagnosis::{DiagnosisResult, SensorDiagnosisResult};
 
 /// Alternatives that are listed.
 const SHOWN: usize = 3;
@@ -20,36 +20,41 @@ pub(super) fn effect(
     out: &mut String,
     d: &DiagnosisResult,
     s: &SensorDiagnosisResult,
-    a: &AcceptedResult,
+    a: &Accepted,
     all: bool,
 ) {
-    wrap(out, &format!("  + {}: ", a.id), a.about);
+    wrap(
+        out,
+        &format!("  + {}: ", a.effect.id()),
+        a.effect.candidate.about(),
+    );
+    let coefficients = a.effect.coefficients();
     wrap(out, "    held out ", &errors(s, a));
     match all {
         true => {
-            for c in &a.coefficients {
+            for c in &coefficients {
                 let (value, unit) = coefficient(c);
                 let _ = writeln!(out, "    {:<12}{value:>19} {unit}", c.name);
             }
         }
-        false => compact(out, &a.coefficients),
+        false => compact(out, &coefficients),
     }
-    if let Some(form) = &a.form {
+    if let Some(form) = a.effect.form() {
         let (value, interval) = (significant(form.value), form.interval());
         let _ = writeln!(out, "    {} {value} (95 %: {interval})", form.name);
     }
-    for c in &a.converters {
-        wrap(out, "    ", &converter(c));
+    for c in a.effect.converters() {
+        wrap(out, "    ", &converter(&c));
     }
     alternatives(out, a);
-    for u in d.undecided.iter().filter(|u| u.id == a.id) {
+    for u in d.undecided.iter().filter(|u| u.id == a.effect.id()) {
         let score = by(u.difference);
         wrap(out, "    or, undecided: ", &format!("{} ({score})", u.law));
     }
 }
 
 /// `0.549 deg without it, 0.136 deg with it; p < 1e-6`, and the same at rest and on the second recording.
-fn errors(s: &SensorDiagnosisResult, a: &AcceptedResult) -> String {
+fn errors(s: &SensorDiagnosisResult, a: &Accepted) -> String {
     let both = |[without, with]: [String; 2]| format!("{without} without it, {with} with it");
     let mut text = both([a.held_out_rms_before, a.held_out_rms_after].map(|v| shown(s, v)));
     if let (Some(before), Some(after)) = (a.held_out_at_rest_before, a.held_out_at_rest_after) {
@@ -65,27 +70,27 @@ fn errors(s: &SensorDiagnosisResult, a: &AcceptedResult) -> String {
         Some(_) => text += "; the second recording does not excite it",
         None => {}
     }
-    format!("{text}; {}", p_value(a.chance))
+    format!("{text}; {}", p_value(a.chosen.p))
 }
 
 /// Value with its 95 % interval, and unit.
-fn coefficient(c: &CoefficientResult) -> (String, String) {
+fn coefficient(c: &WrittenCoefficient) -> (String, String) {
     let Readable { factor, unit } = readable::coefficient(&c.unit);
     // Twice the standard deviation: with dwells by the dozen Student's factor is within a tenth of it.
-    let value = plus_minus(c.value * factor, 2.0 * c.sigma * factor);
+    let value = plus_minus(c.value * factor, 2.0 * c.sigma.unwrap_or_default() * factor);
     (value, unit.into_owned())
 }
 
 /// Coefficients in rows: up to three of one unit on a line, a matrix row by row, others as many as a line holds.
-fn compact(out: &mut String, coefficients: &[CoefficientResult]) {
+fn compact(out: &mut String, coefficients: &[WrittenCoefficient]) {
     for of_unit in coefficients.chunk_by(|a, b| a.unit == b.unit) {
-        let first = |c: &CoefficientResult| c.name.chars().next();
+        let first = |c: &WrittenCoefficient| c.name.chars().next();
         let matrix = of_unit.len() > AXES && of_unit.iter().all(|c| c.name.chars().count() == 2);
-        let rows: Vec<&[CoefficientResult]> = match matrix {
+        let rows: Vec<&[WrittenCoefficient]> = match matrix {
             true => of_unit.chunk_by(|a, b| first(a) == first(b)).collect(),
             false => vec![of_unit],
         };
-        let cells = |row: &[CoefficientResult]| -> Vec<String> {
+        let cells = |row: &[WrittenCoefficient]| -> Vec<String> {
             let each = row.iter().map(|c| (c.name.as_str(), coefficient(c).0));
             each.map(|(name, value)| match value.starts_with('-') {
                 true => format!("{name} {value}"),
@@ -106,13 +111,16 @@ fn compact(out: &mut String, coefficients: &[CoefficientResult]) {
 }
 
 /// Candidates that would do nearly as well, on one line.
-fn alternatives(out: &mut String, a: &AcceptedResult) {
-    let listed = a.alternatives.iter().take(SHOWN);
+fn alternatives(out: &mut String, a: &Accepted) {
+    let listed = a.chosen.alternatives.iter().take(SHOWN);
     let mut words: Vec<String> = listed
         .map(|other| format!("{} ({})", other.id, by(other.score_worse_by)))
         .collect();
-    if a.alternatives.len() > SHOWN {
-        words.push(format!("one of {} more", a.alternatives.len() - SHOWN));
+    if a.chosen.alternatives.len() > SHOWN {
+        words.push(format!(
+            "one of {} more",
+            a.chosen.alternatives.len() - SHOWN
+        ));
     }
     if !words.is_empty() {
         wrap(out, "    or, by score: ", &words.join(", "));

@@ -1,6 +1,7 @@
 use super::*;
-use crate::calibration::{NotOnDevice, on_device};
+use crate::effects;
 use crate::effects::effect::{Effect, OnDevice as HowRemoved};
+use crate::effects::on_device::NotOnDevice;
 use crate::effects::quantity::{RATE_LAG_S, REFERENCE_C};
 use mimu_core::effects as of_core;
 
@@ -69,12 +70,8 @@ fn every_effect_that_a_calibration_holds_can_be_removed_by_the_device() {
     for effect in effects::all().filter(|e| e.on_device() != HowRemoved::Never) {
         let candidate = Candidate::new(effect.sensor, Kind::Effect(effect));
         let values = vec![1.0; candidate.active.len()];
-        let removed = Removed {
-            candidate,
-            parameter: 60.0,
-            values,
-        };
-        assert!(on_device::<f32>(&removed).is_ok(), "{}", effect.id);
+        let fitted = FittedEffect::new(candidate, 60.0, values);
+        assert!(fitted.on_device::<f32>().is_ok(), "{}", effect.id);
     }
 }
 
@@ -100,58 +97,48 @@ fn an_effect_that_the_device_lacks_is_refused() {
         (jump, NotOnDevice::Jump),
     ] {
         let candidate = Candidate::new(Sensor::Gyro, kind);
-        let removed = Removed {
-            candidate,
-            parameter: 0.0,
-            values: Vec::new(),
-        };
-        assert_eq!(on_device::<f32>(&removed), Err(why));
+        let fitted = FittedEffect::new(candidate, 0.0, Vec::new());
+        assert_eq!(fitted.on_device::<f32>(), Err(why));
     }
 }
 
 #[test]
 fn an_effect_that_is_found_again_adds_to_what_is_known() {
-    let table = |id: &str, value: f64, parameter: f64| {
+    let fitted = |id: &str, value: f64, parameter: f64| {
         let candidate = candidate(id).unwrap();
         let values = vec![value; candidate.active.len()];
-        let sigmas = vec![3e-6; values.len()];
-        let removed = Removed {
-            candidate,
-            parameter,
-            values,
-        };
-        EffectTable::new(&removed, &sigmas)
+        FittedEffect {
+            sigmas: vec![3e-6; values.len()],
+            ..FittedEffect::new(candidate, parameter, values)
+        }
     };
-    let mut all = vec![table("gyro_g_sensitivity", 1e-4, 0.0)];
-    all[0].coefficients.remove(0);
-    table("gyro_g_sensitivity", 2e-5, 0.0)
+    let mut all = vec![fitted("gyro_g_sensitivity", 1e-4, 0.0)];
+    all[0].candidate.active.remove(0);
+    all[0].values.remove(0);
+    all[0].sigmas.remove(0);
+    fitted("gyro_g_sensitivity", 2e-5, 0.0)
         .join(&mut all)
         .unwrap();
     assert_eq!(all.len(), 1);
+    let coefficients = all[0].coefficients();
     let of = |name: &str| {
-        let found = all[0].coefficients.iter().find(|c| c.name == name);
+        let found = coefficients.iter().find(|c| c.name == name);
         found.map(|c| (c.value, c.sigma.unwrap())).unwrap()
     };
     assert_eq!(of("xx"), (2e-5, 3e-6));
     let (value, sigma) = of("zy");
     assert!((value - 1.2e-4).abs() < 1e-18 && (sigma - 18_f64.sqrt() * 1e-6).abs() < 1e-18);
     // Of exponentials each has its own time.
-    table("gyro_warm_up", 1e-3, 60.0).join(&mut all).unwrap();
-    table("gyro_warm_up", 1e-3, 90.0).join(&mut all).unwrap();
+    fitted("gyro_warm_up", 1e-3, 60.0).join(&mut all).unwrap();
+    fitted("gyro_warm_up", 1e-3, 90.0).join(&mut all).unwrap();
     assert_eq!(all.len(), 3);
-    table("gyro_warm_up", 1e-3, 90.0).join(&mut all).unwrap();
-    assert_eq!(all[2].coefficients[0].value, 2e-3);
+    fitted("gyro_warm_up", 1e-3, 90.0).join(&mut all).unwrap();
+    assert_eq!(all[2].values[0], 2e-3);
     let coded = || {
         let plain = candidate("gyro_readout_code").unwrap();
         let candidate = plain.behind_one(Converter::of(1.6, 0.0));
         let values = vec![1e-4; candidate.active.len()];
-        let sigmas = values.clone();
-        let removed = Removed {
-            candidate,
-            parameter: 0.0,
-            values,
-        };
-        EffectTable::new(&removed, &sigmas)
+        FittedEffect::new(candidate, 0.0, values)
     };
     coded().join(&mut all).unwrap();
     assert!(
@@ -160,4 +147,44 @@ fn an_effect_that_is_found_again_adds_to_what_is_known() {
             .unwrap_err()
             .contains("an axis has one")
     );
+}
+
+#[test]
+fn an_interval_that_reaches_the_end_of_what_was_searched_is_open_there() {
+    let interval = |lower, upper| {
+        let lag = FittedEffect {
+            interval: Some(Interval { lower, upper }),
+            ..FittedEffect::new(candidate("gyro_thermal_lag").unwrap(), 60.0, vec![0.0; 3])
+        };
+        lag.form().unwrap().interval()
+    };
+    assert_eq!(interval(Some(55.0), Some(66.0)), "55.0 to 66.0");
+    assert_eq!(interval(None, Some(66.0)), "at most 66.0");
+    assert_eq!(interval(Some(55.0), None), "at least 55.0");
+    assert_eq!(interval(None, None), "any that was tried");
+}
+
+#[test]
+fn an_effect_in_a_file_is_the_one_that_was_fitted() {
+    let lag = FittedEffect {
+        interval: Some(Interval {
+            lower: Some(55.0),
+            upper: None,
+        }),
+        sigmas: vec![1e-6, 2e-6, 3e-6],
+        ..FittedEffect::new(
+            candidate("gyro_thermal_lag").unwrap(),
+            60.0,
+            vec![1e-3, 0.0, -2e-3],
+        )
+    };
+    let text = toml::to_string(&lag).unwrap();
+    let read: FittedEffect = toml::from_str(&text).unwrap();
+    assert_eq!(read, lag);
+    assert_eq!(read.interval, lag.interval);
+    // And the one that comes back from a device, but for what that does not keep.
+    let kept = FittedEffect::kept(&lag.on_device().unwrap()).unwrap();
+    assert_eq!(kept[0].candidate.active, [0, 2]);
+    assert_eq!(kept[0].values, [f64::from(1e-3_f32), f64::from(-2e-3_f32)]);
+    assert_eq!(kept[0].parameter, 60.0);
 }

@@ -1,0 +1,151 @@
+//! Effects in the words of the device, and back.
+
+use std::fmt;
+
+use mimu_core::RealField;
+use mimu_core::effects::{DeviceEffect, Refused, Variable};
+use mimu_core::wire::EFFECTS;
+use nalgebra::convert;
+
+use super::candidate::{Kind, OfConverter};
+use super::converter::Converter;
+use super::fitted::{FittedEffect, candidate};
+use super::quantity::Quantity;
+use super::readout;
+
+/// Why no device removes an effect.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum NotOnDevice {
+    /// None has its law.
+    NoLaw,
+    /// None has a factor of the product.
+    NoFactor,
+    /// It is over.
+    Jump,
+    /// One that has its law does not take its numbers.
+    Numbers,
+}
+
+impl fmt::Display for NotOnDevice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::NoLaw => "no device removes this effect",
+            Self::NoFactor => "no device knows a factor of it",
+            Self::Jump => "a bias that has jumped once says nothing of the time after it",
+            Self::Numbers => "its numbers make no sense to the device",
+        })
+    }
+}
+
+impl FittedEffect {
+    /// It as the device takes it, in its precision or a better one: of converters of the axes one for each.
+    ///
+    /// # Errors
+    /// Why no device removes it.
+    pub fn on_device<T: RealField + Copy>(&self) -> Result<Vec<DeviceEffect<T>>, NotOnDevice> {
+        let candidate = &self.candidate;
+        let sensor = candidate.sensor;
+        let numbers = |made: Result<_, Refused>| made.map_err(|_| NotOnDevice::Numbers);
+        match &candidate.kind {
+            Kind::Effect(effect) if !EFFECTS.contains(&effect.id) => Err(NotOnDevice::NoLaw),
+            Kind::Effect(_) if candidate.reads_code() => {
+                let of = |c: OfConverter| {
+                    let (weight, zero) = (convert(c.converter.weight), convert(c.converter.zero));
+                    let errors = c.errors.map(convert);
+                    numbers(DeviceEffect::code(sensor, c.axis, &errors, weight, zero))
+                };
+                let all = candidate.by_converter(&self.values);
+                all.into_iter().map(of).collect()
+            }
+            Kind::Effect(effect) => {
+                // Those of a recording stand last; no file has them, and the device takes none.
+                let mut coefficients = vec![T::zero(); effect.of_unit().count()];
+                for (k, value) in candidate.active.iter().zip(&self.values) {
+                    if let Some(slot) = coefficients.get_mut(*k) {
+                        *slot = convert(*value);
+                    }
+                }
+                let nonlinear = effect.parameter.map(|_| convert(self.parameter));
+                let named = DeviceEffect::named(effect.id, &coefficients, nonlinear);
+                Ok(vec![numbers(named)?])
+            }
+            Kind::Term(axis, product) => {
+                let value = self.values.first().copied().unwrap_or_default();
+                let mut variables = Vec::new();
+                for (quantity, power) in product.parts() {
+                    let variable = variable(quantity).ok_or(NotOnDevice::NoFactor)?;
+                    variables.extend(std::iter::repeat_n(variable, usize::from(power)));
+                }
+                let term = DeviceEffect::term(sensor, *axis, convert(value), &variables);
+                Ok(vec![numbers(term)?])
+            }
+            Kind::Jump { .. } => Err(NotOnDevice::Jump),
+        }
+    }
+
+    /// The effects that a device keeps; converters of the axes of a triad are parts of one.
+    ///
+    /// # Errors
+    /// The first that this program does not know.
+    pub fn kept(on_device: &[DeviceEffect<f32>]) -> Result<Vec<Self>, DeviceEffect<f32>> {
+        let mut all: Vec<Self> = Vec::new();
+        for one in on_device {
+            let effect = Self::of_device(one).ok_or(*one)?;
+            let codes = effect.candidate.reads_code();
+            let mut known = all.iter_mut();
+            match known.find(|e| codes && e.id() == effect.id()) {
+                Some(known) => {
+                    let axes = known.candidate.codes.iter_mut();
+                    for (code, more) in axes.zip(effect.candidate.codes) {
+                        *code = code.or(more);
+                    }
+                    known.candidate.active.extend(effect.candidate.active);
+                    known.values.extend(effect.values);
+                }
+                None => all.push(effect),
+            }
+        }
+        Ok(all)
+    }
+
+    fn of_device(one: &DeviceEffect<f32>) -> Option<Self> {
+        let mut candidate = candidate(&one.to_string())?;
+        let all = one.coefficients();
+        // What was not determined is zero there, and stays out of the file.
+        let any = all.iter().any(|c| *c != 0.0);
+        let first = match one.converter() {
+            Some(of) => {
+                let converter = Converter::of(f64::from(of.weight), f64::from(of.zero));
+                candidate.codes =
+                    [0, 1, 2].map(|i| of.axis.is_none_or(|a| a == i).then_some(converter));
+                of.axis.map_or(0, readout::first_of)
+            }
+            None => 0,
+        };
+        let whole = one.converter().is_some() || !any;
+        let (active, values): (Vec<usize>, Vec<f64>) = (first..)
+            .zip(all)
+            .filter(|(_, value)| whole || **value != 0.0)
+            .map(|(k, value)| (k, f64::from(*value)))
+            .unzip();
+        let known = active.iter().all(|k| candidate.active.contains(k));
+        candidate.active = active;
+        let parameter = match candidate.parameter() {
+            Some(_) => f64::from(one.nonlinear()?),
+            None => 0.0,
+        };
+        known.then(|| Self::new(candidate, parameter, values))
+    }
+}
+
+/// A variable of a term.
+fn variable(of: Quantity) -> Option<Variable> {
+    Some(match of {
+        Quantity::Rate(i) => [Variable::RateX, Variable::RateY, Variable::RateZ][i],
+        Quantity::Force(i) => [Variable::ForceX, Variable::ForceY, Variable::ForceZ][i],
+        Quantity::Temperature => Variable::Temperature,
+        Quantity::TemperatureRate => Variable::TemperatureRate,
+        Quantity::Time => Variable::Time,
+        _ => return None,
+    })
+}
