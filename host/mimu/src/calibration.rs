@@ -27,8 +27,8 @@ use crate::effects::fitted::FittedEffect;
 use crate::quantity::Sensor;
 use crate::toml_layout;
 use crate::triad::Covariance;
-use mimu_recording::error::{Error, Result};
-use mimu_recording::{Manifest, RawUnit, Reference, read_text};
+use mimu_recording::error::Result;
+use mimu_recording::{Manifest, RawUnit, Reference, parse_toml, read_text};
 
 /// Version of the layout of a calibration at one temperature.
 const FORMAT: &str = "mimu-calibration/1";
@@ -246,20 +246,7 @@ impl Calibration {
 
     /// Parses and checks the text of a calibration file; `place` is its path.
     pub fn parse(text: &str, place: &str) -> Result<Self> {
-        let calibration: Self = toml::from_str(text).map_err(|e| {
-            let message = e.message().trim();
-            // A missing key has the table that lacks it for its place.
-            let line = e.span().map_or(1, |s| {
-                let before = text.get(..s.start).unwrap_or(text);
-                1 + before.matches('\n').count()
-            });
-            let remedy = if message.starts_with("missing field") {
-                "the file is cut or was edited: copy it again, or fit the recording again"
-            } else {
-                "correct the line, or fit the recording again"
-            };
-            Error::new(format!("{place}, line {line}"), message, remedy)
-        })?;
+        let calibration: Self = parse_toml(text, place, Some("fit the recording again"))?;
         calibration.checked(place)
     }
 

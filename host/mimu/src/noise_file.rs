@@ -9,7 +9,7 @@ use crate::allan::variance::AllanModel;
 use crate::quantity::Sensor;
 use crate::toml_layout::to_toml;
 use mimu_recording::error::{Error, Result};
-use mimu_recording::{RAW_COLUMNS, read_text};
+use mimu_recording::{RAW_COLUMNS, parse_toml, read_text};
 
 /// Version of the noise file.
 pub const NOISE_FORMAT: &str = "mimu-noise/1";
@@ -178,16 +178,7 @@ impl NoiseFile {
 
     /// Parses and checks the text of a noise file; `place` is its path.
     pub fn parse(text: &str, place: &str) -> Result<Self> {
-        let mut file: Self = toml::from_str(text).map_err(|e| {
-            let line = e.span().map_or(1, |s| {
-                1 + text.get(..s.start).unwrap_or(text).matches('\n').count()
-            });
-            Error::new(
-                format!("{place}, line {line}"),
-                e.message().trim(),
-                "correct the line, or run mimu allan again",
-            )
-        })?;
+        let mut file: Self = parse_toml(text, place, Some("run mimu allan again"))?;
         if file.format != NOISE_FORMAT {
             return Err(Error::new(
                 place,

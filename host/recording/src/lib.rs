@@ -30,6 +30,7 @@ mod round_trip_tests;
 mod separator;
 mod staging;
 mod strict_file;
+mod toml_file;
 mod writer;
 
 pub use batch::Batch;
@@ -41,11 +42,11 @@ pub use import::{
     Inputs, Jitter, Offset, PoseMean, PoseMeans, Preset, PresetUse, Role, Rounds, Scale,
     SkippedLines, TimeSummary, import, is_bag,
 };
-pub use manifest::read_text;
 pub use manifest::{Format, MANIFEST_FILE, Manifest, Rails, RawUnit, Reference, Source};
 pub use no_temperature::NoTemperatures;
 pub use parents::Parents;
 pub use reader::{ReadSummary, Recording};
 pub use recorded::{Recorded, Restart};
 pub use separator::Separator;
+pub use toml_file::{parse_toml, read_text};
 pub use writer::{SampleFormat, Writer};

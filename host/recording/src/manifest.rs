@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::recorded::Recorded;
 use crate::error::{Error, Result};
+use crate::toml_file::{parse_toml, read_text};
 
 /// Name of the manifest in a recording's directory.
 pub const MANIFEST_FILE: &str = "recording.toml";
@@ -237,28 +238,7 @@ impl Manifest {
 
     /// Parses and checks the text of a manifest; `place` is its file.
     pub fn parse(text: &str, place: &str) -> Result<Manifest> {
-        let manifest: Manifest = toml::from_str(text).map_err(|error| {
-            let message = error.message().trim();
-            // A missing key has the whole file for its place, which is no line.
-            let place = match error.span() {
-                Some(span) if !message.starts_with("missing field") => {
-                    let before = text.get(..span.start).unwrap_or(text);
-                    let line = 1 + before.matches('\n').count();
-                    format!("{place}, line {line}")
-                }
-                _ => place.to_owned(),
-            };
-            let remedy = if message.starts_with("unknown field") {
-                "correct or remove the key"
-            } else if message.starts_with("missing field") {
-                "add the key"
-            } else if message.starts_with("unknown variant") {
-                "write one of the values that are expected"
-            } else {
-                "correct the line"
-            };
-            Error::new(place, message, remedy)
-        })?;
+        let manifest: Manifest = parse_toml(text, place, None)?;
         manifest.check(place)?;
         Ok(manifest)
     }
@@ -318,20 +298,6 @@ impl Manifest {
             )
         })
     }
-}
-
-/// Reads a file that must be UTF-8, and says in which line it is not.
-pub fn read_text(path: &Path) -> Result<String> {
-    let bytes = std::fs::read(path).map_err(|error| Error::io(path, &error))?;
-    String::from_utf8(bytes).map_err(|error| {
-        let before = &error.as_bytes()[..error.utf8_error().valid_up_to()];
-        let line = 1 + before.iter().filter(|&&byte| byte == b'\n').count();
-        Error::new(
-            format!("{}, line {line}", path.display()),
-            "this is not UTF-8 text",
-            "save the file as UTF-8",
-        )
-    })
 }
 
 /// Checks that `rate` (Hz) can be a sample rate; `place` names where it was given.

@@ -17,26 +17,6 @@ const LONGEST_S: f64 = 48.0 * 3600.0;
 const MOST_DWELLS: u64 = 100_000;
 /// Most samples, for the same reason: 48 h at 1 kHz are 173 million, and each is some hundred bytes on disk.
 const MOST_SAMPLES: f64 = 200e6;
-/// What people write for a key.
-const SYNONYMS: [(&str, &str); 16] = [
-    ("chamber_temp", "chamber_c"),
-    ("temp", "chamber_c"),
-    ("temperature", "chamber_c"),
-    ("duration", "dwell_s"),
-    ("time", "dwell_s"),
-    ("hold", "dwell_s"),
-    ("position", "up"),
-    ("direction", "up"),
-    ("heading", "heading_deg"),
-    ("yaw", "heading_deg"),
-    ("speed", "rate_dps"),
-    ("omega", "rate_dps"),
-    ("rate", "sample_rate_hz"),
-    ("fs", "sample_rate_hz"),
-    ("g", "gravity_mps2"),
-    ("lat", "latitude_deg"),
-];
-
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RawPlan {
@@ -65,7 +45,7 @@ fn unit() -> Spanned<String> {
 impl Plan {
     /// Reads a plan. An error is one line: the file, the line, what is wrong, what to do.
     pub fn parse(source: Source) -> Result<Self, String> {
-        let raw: RawPlan = source.parse(&SYNONYMS)?;
+        let raw: RawPlan = source.parse()?;
         let reader = Reader { source: &source };
         if raw.format.get_ref() != "mimu-plan/1" {
             return Err(source.error(

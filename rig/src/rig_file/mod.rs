@@ -30,16 +30,6 @@ pub use resolve::RigTruth;
 /// What the key `format` must be.
 pub const FORMAT: &str = "mimu-rig/1";
 
-/// Words that people use for keys.
-const SYNONYMS: [(&str, &str); 6] = [
-    ("scale", "sensitivity_raw_per_si"),
-    ("scale_factor", "sensitivity_raw_per_si"),
-    ("bias", "null_raw"),
-    ("offset", "null_raw"),
-    ("divider", "gyro_divider"),
-    ("accelerometer", "accel"),
-];
-
 /// A rig file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -81,7 +71,10 @@ pub struct RigFile {
 
 /// Sensors by the catalog: one for all axes, or one for each.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(untagged, expecting = "the name of a sensor, or a list of three")]
+#[serde(
+    untagged,
+    expecting = "expected the name of a sensor, or a list of three"
+)]
 pub enum Parts {
     /// Three alike.
     One(String),
@@ -281,11 +274,11 @@ impl RigFile {
 
     /// Checks a text. Errors: as [`RigFile::read`].
     pub fn parse(source: &Source) -> Result<Self, String> {
-        let file: Self = source.parse(&SYNONYMS)?;
+        let file: Self = source.parse()?;
         match file.check() {
             Ok(()) => Ok(file),
             Err(bad) => {
-                let lines: lines::Lines = source.parse(&[])?;
+                let lines: lines::Lines = source.parse()?;
                 Err(source.error(&lines.find(&bad.path), bad.problem, bad.remedy))
             }
         }

@@ -330,7 +330,7 @@ fn what_is_wrong_with_curves_and_thermometer_is_named_with_its_line() {
     for (text, complaint) in [
         (
             "[curves.gyro]\nbias_mg = [[0, 0, 0, 0]]",
-            "unknown key `bias_mg`",
+            "3: unknown field `bias_mg`, expected one of `bias_deg_per_h`",
         ),
         (
             "[curves.gyro]\nhysteresis_width_c = 0",

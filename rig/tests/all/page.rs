@@ -40,9 +40,13 @@ fn rows(page: &str, heading: &str) -> Vec<(Vec<String>, Vec<String>)> {
 /// The keys that the reader knows, by its own complaint of one that it does not.
 fn known(complaint: &str) -> BTreeSet<String> {
     let (_, list) = complaint
-        .split_once("known here: ")
+        .split_once(", expected ")
         .unwrap_or_else(|| panic!("{complaint}"));
-    list.split(", ").map(str::to_owned).collect()
+    list.split('`')
+        .skip(1)
+        .step_by(2)
+        .map(str::to_owned)
+        .collect()
 }
 
 #[test]

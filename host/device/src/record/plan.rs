@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 use serde::Deserialize;
 
 use mimu_recording::error::{Error, Result};
-use mimu_recording::read_text;
+use mimu_recording::{parse_toml, read_text};
 
 use super::turn::{Angles, TableAxis, Turn};
 
@@ -118,15 +118,8 @@ impl Plan {
     pub fn read(path: &Path) -> Result<Self> {
         let place = path.display().to_string();
         let text = read_text(path)?;
-        let plan: Self = toml::from_str(&text).map_err(|error| {
-            let before = error.span().and_then(|span| text.get(..span.start));
-            let line = 1 + before.map_or(0, |text| text.matches('\n').count());
-            Error::new(
-                format!("{place}, line {line}"),
-                error.message().trim(),
-                "correct the line, or have `mimu design -o` or `mimu thermal plan -o` write the plan",
-            )
-        })?;
+        let again = "have `mimu design -o` or `mimu thermal plan -o` write the plan";
+        let plan: Self = parse_toml(&text, &place, Some(again))?;
         if !(1..=MOST_DWELLS).contains(&(plan.rounds as usize)) {
             let problem = format!("rounds is {}", plan.rounds);
             let remedy = format!("write one or more, up to {MOST_DWELLS}");

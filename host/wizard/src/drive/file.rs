@@ -4,7 +4,7 @@ use std::path::Path;
 
 use mimu_device::record::TableAxis;
 use mimu_recording::error::{Error, Result};
-use mimu_recording::read_text;
+use mimu_recording::{parse_toml, read_text};
 use serde::Deserialize;
 
 use super::{ChamberLimits, Limits};
@@ -127,14 +127,7 @@ impl DriverFile {
     pub fn read(path: &Path) -> Result<Self> {
         let place = path.display().to_string();
         let text = read_text(path)?;
-        let file: Self = toml::from_str(&text).map_err(|error| {
-            let line = error
-                .span()
-                .map(|s| 1 + text[..s.start].matches('\n').count());
-            let place = line.map_or(place.clone(), |l| format!("{place}, line {l}"));
-            let remedy = "docs/wizard.md has all keys of a driver file";
-            Error::new(place, error.message().trim(), remedy)
-        })?;
+        let file: Self = parse_toml(&text, &place, None)?;
         let refuse = |problem: &str, remedy: &str| Err(Error::new(&place, problem, remedy));
         if file.format != "mimu-driver/1" {
             let problem = format!("format is {:?}", file.format);

@@ -1,0 +1,101 @@
+//! Files of TOML: what is wrong with one, by file, line and key.
+
+use std::path::Path;
+
+use serde::de::DeserializeOwned;
+
+use crate::error::{Error, Result};
+
+/// Reads a file that must be UTF-8, and says in which line it is not.
+pub fn read_text(path: &Path) -> Result<String> {
+    let bytes = std::fs::read(path).map_err(|error| Error::io(path, &error))?;
+    String::from_utf8(bytes).map_err(|error| {
+        let before = &error.as_bytes()[..error.utf8_error().valid_up_to()];
+        Error::new(
+            format!("{}, line {}", path.display(), line_after(before)),
+            "this is not UTF-8 text",
+            "save the file as UTF-8",
+        )
+    })
+}
+
+/// Parses the text of the file `place`. What is wrong is in the words of serde and of the parser, which name the keys and values that
+/// are possible. `again`: what makes the file anew, if a program wrote it.
+pub fn parse_toml<T: DeserializeOwned>(text: &str, place: &str, again: Option<&str>) -> Result<T> {
+    toml::from_str(text).map_err(|error| {
+        let message = error.message().trim().replace('\n', ", ");
+        let missing = message.starts_with("missing field");
+        let remedy = match (again, missing) {
+            (Some(again), true) => {
+                format!("the file is cut or was edited: copy it again, or {again}")
+            }
+            (Some(again), false) => format!("correct the line, or {again}"),
+            (None, true) => "add the key".to_owned(),
+            (None, false) => "correct the line".to_owned(),
+        };
+        // A key that is missing at the top has the whole file for its place.
+        let start = error.span().map(|span| span.start.min(text.len()));
+        let whole = missing && start == Some(0);
+        let place = match start.and_then(|start| text.get(..start)) {
+            Some(before) if !whole => {
+                let line = line_after(before.as_bytes());
+                let key = before.rsplit('\n').next().and_then(|l| l.split_once('='));
+                let key = key.map_or(String::new(), |(key, _)| format!(", {}", key.trim()));
+                format!("{place}, line {line}{key}")
+            }
+            _ => place.to_owned(),
+        };
+        Error::new(place, message, remedy)
+    })
+}
+
+/// Number of the line that what follows `before` is in.
+fn line_after(before: &[u8]) -> usize {
+    1 + before.iter().filter(|&&byte| byte == b'\n').count()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[derive(Debug, serde::Deserialize)]
+    #[serde(deny_unknown_fields)]
+    #[allow(dead_code)]
+    struct File {
+        rate_hz: f64,
+        part: Part,
+    }
+
+    #[derive(Debug, serde::Deserialize)]
+    #[serde(deny_unknown_fields)]
+    #[allow(dead_code)]
+    struct Part {
+        axis: [f64; 3],
+    }
+
+    #[test]
+    fn what_is_wrong_is_named_with_its_line_and_key_and_a_missing_key_with_its_table() {
+        let refused = |text: &str| {
+            let error = parse_toml::<File>(text, "a.toml", Some("make it again")).unwrap_err();
+            error.to_string()
+        };
+        for (text, begins, contains) in [
+            ("rate_hz = \"a\"\n", "a.toml, line 1, rate_hz: ", "f64"),
+            ("rate_hz = 1\nrate = 2\n", "a.toml, line 2: ", "`rate`"),
+            ("rate_hz = 1\n", "a.toml: ", "`part`"),
+            ("rate_hz = 1\n\n[part]\n", "a.toml, line 3: ", "`axis`"),
+            ("rate_hz = 1\nx", "a.toml, line 2: ", "no value"),
+            ("", "a.toml: ", "`rate_hz`"),
+        ] {
+            let line = refused(text);
+            assert!(
+                line.starts_with(begins) && line.contains(contains),
+                "{line}"
+            );
+            assert!(
+                line.ends_with("or make it again") && !line.contains('\n'),
+                "{line}"
+            );
+        }
+    }
+}
