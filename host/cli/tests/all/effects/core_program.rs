@@ -4,7 +4,7 @@ use mimu::calibration::Calibration;
 
 use super::applied::read;
 use super::mimu;
-use super::unit::{CUBIC, RATE_HZ, SAG, THERMAL, fitted, named, record, table};
+use super::unit::{CUBIC, RATE_HZ, SAG, THERMAL, fitted, named, record};
 
 #[rustfmt::skip]
 #[path = "../../../../../core/examples/stream/calibrate.rs"]
@@ -26,8 +26,7 @@ fn the_program_of_the_readme_of_core_gives_what_apply_gives() {
         named("accel_scale_cubic", &[CUBIC; 3]),
     ];
     let fit = fitted(&path("clean"));
-    let tables = effects.each_ref().map(table);
-    let calibration = Calibration::of(&fit, &tables, "2026-01-01T00:00:00Z").unwrap();
+    let calibration = Calibration::of(&fit, &effects, "2026-01-01T00:00:00Z").unwrap();
     std::fs::write(path("cal.toml"), calibration.to_toml()).unwrap();
     let (cal, core) = (text("cal.toml"), text("unit.mimc"));
     let (done, said) = mimu(&["export", "--calibration", &cal, "--core", &core]);
