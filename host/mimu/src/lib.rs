@@ -21,6 +21,7 @@
 //! | [`diagnose`]    | the effect behind a residual: found, added, proved on other data              |
 //! | [`design`]      | experiments: which attitudes and rates, how many, for how long                |
 //! | [`next_experiment`] | what to record next, where a diagnosis leaves something open              |
+//! | [`plan`]        | the file of an experiment, which a table or a person carries out              |
 //! | [`chamber`]     | the course of a chamber in a plan                                             |
 //! | [`allan`], [`survey`] | Allan deviation and noise model of a series; of the channels of a recording at rest |
 //! | [`spectrum`]    | lines that are no noise of the sensor, and the band in which it is white     |
@@ -90,6 +91,7 @@ pub mod next_experiment;
 mod no_temperature;
 pub mod noise;
 pub mod noise_file;
+pub mod plan;
 pub mod pose_means;
 pub mod prepared;
 pub mod quantity;

@@ -4,7 +4,7 @@ mod file;
 mod line;
 mod text_driver;
 
-use mimu_device::record::{TableAxis, Turn};
+use mimu::plan::{TableAxis, Turn};
 use mimu_recording::error::{Error, Result};
 use serde::Deserialize;
 

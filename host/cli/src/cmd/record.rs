@@ -9,8 +9,9 @@ use std::time::Duration;
 use crate::report;
 use clap::Args;
 use indicatif::ProgressBar;
+use mimu::plan::Plan;
 use mimu_device::Session;
-use mimu_device::record::{Known, Plan, RecordOptions, Standing, Steps, Wish, record};
+use mimu_device::record::{Known, RecordOptions, Standing, Steps, Wish, record};
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{Inputs, SampleFormat};
 

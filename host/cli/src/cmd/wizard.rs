@@ -7,10 +7,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use clap::{Args, ValueEnum};
+use mimu::plan::Plan;
 use mimu::quantity::{implausible_gravity, normal_gravity};
 use mimu::readable::STANDARD_GRAVITY;
 use mimu::result::diagnosis::DiagnosisResult;
-use mimu_device::record::Plan;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{Manifest, Parents, RawUnit};
 use mimu_wizard::device::DeviceSource;

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use mimu_recording::{Batch, Inputs};
 
-use super::plan::Planned;
+use mimu::plan::Planned;
 
 /// What is known of each dwell.
 #[derive(Debug)]

@@ -6,12 +6,10 @@
 mod clock;
 mod known;
 mod line;
-mod plan;
 mod procedure;
 mod reading;
 mod run;
 mod steps;
-mod turn;
 
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -21,11 +19,9 @@ use mimu_core::wire::Request;
 use serde::{Serialize, Serializer};
 
 pub use known::Known;
-pub use plan::{Plan, Planned};
 pub use procedure::Procedure;
 pub use reading::shortest;
 pub use steps::Steps;
-pub use turn::{TableAxis, Turn};
 
 use crate::flagged::Flagged;
 use crate::heard::LineCount;

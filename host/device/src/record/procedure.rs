@@ -1,9 +1,8 @@
 //! A plan over temperature in time: what the chamber is to be at, and when each round begins.
 
 use mimu::chamber;
+use mimu::plan::{Plan, Planned};
 use mimu_recording::error::{Error, Result};
-
-use super::plan::{Plan, Planned};
 
 /// Longest procedure, s: a plan that asks for more has a wrong unit in it.
 const LONGEST_S: f64 = 48.0 * 3600.0;
@@ -25,24 +24,22 @@ pub struct Procedure {
     pub round_s: Option<f64>,
 }
 
-impl Plan {
-    /// Its dwells with the temperatures of the chamber, and when each is due; `place` is its path.
-    pub fn procedure(&self, gravity_mps2: f64, place: &str) -> Result<Procedure> {
-        let dwells = self.dwells(gravity_mps2, place)?;
-        let rounds = self.rounds as usize;
-        Procedure {
+impl Procedure {
+    /// The dwells of a plan with the temperatures of the chamber, and when each is due; `place` is its path.
+    pub fn of(plan: &Plan, gravity_mps2: f64, place: &str) -> Result<Self> {
+        let dwells = plan.dwells(gravity_mps2, place)?;
+        let rounds = plan.rounds as usize;
+        Self {
             per_round: dwells.len() / rounds,
             dwells,
             rounds,
-            chamber_c: self.chamber_c.clone(),
-            lead_in_s: self.lead_in_s,
-            round_s: self.round_s,
+            chamber_c: plan.chamber_c.clone(),
+            lead_in_s: plan.lead_in_s,
+            round_s: plan.round_s,
         }
         .checked(place)
     }
-}
 
-impl Procedure {
     fn checked(self, place: &str) -> Result<Self> {
         let at = |key: &str| format!("{place}, {key}");
         if self.chamber_c.is_empty() {

@@ -10,7 +10,6 @@
 //! | [`tour`], [`budget`]          | order and time of a sequence; most out of so many minutes                |
 //! | [`schemes`]                   | published schemes                                                        |
 //! | [`problem`]                   | a model, what it can be measured with, and the best designs of it        |
-//! | [`plan`]                      | a design as the file that a table or a person carries out                |
 //!
 //! The criterion is fang (22), `det(F'F/n)`, of the parameters of all three sensors together. The gyro by hand,
 //! whose known input are the turns between dwells, is no design of dwells and not treated here.
@@ -36,7 +35,6 @@ pub mod information;
 pub mod judgement;
 pub mod lack_of_fit;
 pub mod model;
-pub mod plan;
 pub mod problem;
 pub mod reach;
 pub mod refinement;

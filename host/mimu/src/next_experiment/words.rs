@@ -2,7 +2,7 @@
 
 use super::recipe::{Course, Experiment, Inputs, SOAK_S};
 use super::{Answer, Setup};
-use crate::design::plan::{Sheet, sheet};
+use crate::plan::{Plan, Step};
 use crate::quantity::plural;
 
 impl Answer {
@@ -59,16 +59,14 @@ impl Answer {
                 100.0 * p.share
             );
         }
-        sheet(&Sheet {
-            about: &about,
-            device,
-            sample_rate_hz,
-            fixture: setup.fixture,
-            chamber_c: &self.experiment.chamber_c,
-            settings: &self.experiment.settings,
-            dwell_s: self.experiment.dwell_s,
-            left_there: true,
-        })
+        let done = &self.experiment;
+        // The same setting several times in a row is one step: the unit is left where it is.
+        let same = done.settings.chunk_by(|a, b| a == b);
+        let steps = same.map(|s| Step::of(&s[0], done.dwell_s).repeated(s.len() as u32));
+        let mut plan = Plan::new(setup.fixture, sample_rate_hz, steps.collect());
+        plan.device = device.map(str::to_owned);
+        let chamber_c = done.chamber_c.iter().map(|(t, c)| [*t, *c]);
+        plan.in_chamber(chamber_c).to_toml(&about)
     }
 }
 

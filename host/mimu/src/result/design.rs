@@ -9,12 +9,15 @@ use crate::design::Problem;
 use crate::design::budget::{Budget, DwellNoise, Spending};
 use crate::design::judgement::{HALF_95, Judgement};
 use crate::design::model::{Setting, Term};
-use crate::design::plan;
 use crate::design::reach::Fixture;
 use crate::design::schemes::{FANG_FILTERS, Scheme};
 use crate::design::tour::{Motion, Order};
+use crate::plan::{Plan, Step};
 use crate::quantity::{Sensor, minutes, significant};
 use mimu_recording::Reference;
+
+/// Sample rate of the recording that a plan asks for, Hz.
+const SAMPLE_RATE_HZ: f64 = 1000.0;
 
 /// What a design is judged under.
 #[derive(Debug, Clone)]
@@ -385,7 +388,9 @@ impl Design {
             minutes(self.time_s),
             significant(slew.to_degrees()),
         );
-        plan::to_toml(&about, self.fixture, &self.settings, self.dwell_s)
+        let settings = self.settings.iter();
+        let steps = settings.map(|s| Step::of(s, self.dwell_s)).collect();
+        Plan::new(self.fixture, SAMPLE_RATE_HZ, steps).to_toml(&about)
     }
 }
 

@@ -3,9 +3,9 @@
 use serde::Serialize;
 
 use super::TOOL;
-use crate::design::plan::round;
 use crate::next_experiment::recipe::Course;
 use crate::next_experiment::{Answer, Setup};
+use crate::plan::round;
 use crate::quantity::Sensor;
 use mimu_recording::Reference;
 

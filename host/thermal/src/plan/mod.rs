@@ -5,13 +5,13 @@
 
 mod prediction;
 mod procedure;
-mod sheet;
 
 pub use prediction::{At, SensorPrediction};
 pub use procedure::{Procedure, Schedule, Step};
-pub use sheet::to_toml;
 
 use mimu::design::budget::DwellNoise;
+use mimu::design::reach::Fixture;
+use mimu::plan::Plan;
 use mimu::quantity::{duration, significant};
 use mimu_recording::error::{Error, Result};
 use serde::Serialize;
@@ -107,6 +107,33 @@ pub fn plan(request: &Request) -> Result<Planned> {
         noise: request.noise,
         schedule,
     })
+}
+
+/// The plan `mimu-plan/1`, for a table in a chamber.
+pub fn to_toml(planned: &Planned, sample_rate_hz: f64) -> String {
+    let [from, to] = planned.range_c;
+    let schedule = &planned.schedule;
+    let steps = schedule.steps.iter().zip(&schedule.times_s);
+    let steps = steps.map(|(step, [from, to])| match *step {
+        Step::Dwell { up, rate_dps, stay } => {
+            mimu::plan::Step::dwell((!stay).then_some(up), rate_dps, to - from)
+        }
+        Step::Turn {
+            axis,
+            angle_deg,
+            rate_dps,
+            ..
+        } => mimu::plan::Step::turn(axis, angle_deg, rate_dps),
+    });
+    let round_s = (schedule.rounds > 1 && schedule.waits).then_some(schedule.round_s);
+    Plan::new(Fixture::ThreeAxis, sample_rate_hz, steps.collect())
+        .in_chamber(schedule.chamber_c.iter().copied())
+        .in_rounds(schedule.lead_in_s, schedule.rounds as u32, round_s)
+        .to_toml(&format!(
+            "Procedure {} from {from} to {to} °C, by mimu {}.",
+            planned.procedure.name(),
+            env!("CARGO_PKG_VERSION")
+        ))
 }
 
 /// One pose, one ramp, from power-on.

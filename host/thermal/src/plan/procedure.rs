@@ -4,6 +4,7 @@ use mimu::chamber;
 use mimu::design::model::Setting;
 use mimu::design::reach::Fixture;
 use mimu::design::tour::Motion;
+use mimu::plan::TableAxis;
 use mimu::quantity::duration;
 use mimu_recording::error::{Error, Result};
 use nalgebra::Vector3;
@@ -53,7 +54,7 @@ pub enum Step {
     /// Turn from rest to rest.
     Turn {
         /// `middle` or `inner`.
-        axis: &'static str,
+        axis: TableAxis,
         /// Degrees, right-hand rule about the table's axis.
         angle_deg: f64,
         /// deg/s.
@@ -265,14 +266,14 @@ fn niu(request: &Request) -> Round {
     let [x, y, z] = [Vector3::x(), Vector3::y(), Vector3::z()];
     let rate_dps = NIU_DPS.min(request.largest_dps);
     let cycle = [
-        (z, "middle", 90.0, x),
-        (y, "inner", 90.0, z),
-        (x, "middle", -90.0, y),
-        (z, "inner", -90.0, -z),
-        (z, "middle", -90.0, -x),
-        (-y, "inner", 90.0, z),
-        (-x, "middle", 90.0, -y),
-        (z, "inner", -90.0, -z),
+        (z, TableAxis::Middle, 90.0, x),
+        (y, TableAxis::Inner, 90.0, z),
+        (x, TableAxis::Middle, -90.0, y),
+        (z, TableAxis::Inner, -90.0, -z),
+        (z, TableAxis::Middle, -90.0, -x),
+        (-y, TableAxis::Inner, 90.0, z),
+        (-x, TableAxis::Middle, 90.0, -y),
+        (z, TableAxis::Inner, -90.0, -z),
     ];
     let (mut steps, mut times_s, mut t) = (Vec::new(), Vec::new(), 0.0);
     for (k, (up, axis, angle_deg, about)) in cycle.into_iter().enumerate() {

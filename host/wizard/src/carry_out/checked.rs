@@ -1,7 +1,8 @@
 //! Whether the unit undergoes what the table was told: a tilt axis that turns the other way, or an interlock that was open for an instant,
 //! would make known inputs of false ones.
 
-use mimu_device::record::{Planned, Standing};
+use mimu::plan::Planned;
+use mimu_device::record::Standing;
 use mimu_recording::error::Error;
 use nalgebra::Vector3;
 

@@ -5,7 +5,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use mimu_device::record::Turn;
+use mimu::plan::Turn;
 use mimu_recording::error::{Error, Result};
 
 use super::needs::Equipped;

@@ -1,6 +1,7 @@
 //! How a procedure stands, for a person.
 
-use mimu_device::record::{Planned, Procedure, Standing};
+use mimu::plan::Planned;
+use mimu_device::record::{Procedure, Standing};
 
 use super::sequence::Sequence;
 

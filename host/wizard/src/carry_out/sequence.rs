@@ -5,7 +5,8 @@
 
 use std::time::Instant;
 
-use mimu_device::record::{Planned, Procedure, Standing};
+use mimu::plan::Planned;
+use mimu_device::record::{Procedure, Standing};
 
 use super::equipment::Order;
 use crate::step::Step;

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use mimu_device::record::TableAxis;
+use mimu::plan::TableAxis;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{parse_toml, read_text};
 use serde::Deserialize;

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::time::Duration;
 
-use mimu_device::record::{TableAxis, Turn};
+use mimu::plan::{TableAxis, Turn};
 use mimu_recording::error::{Error, Result};
 use nalgebra::Vector3;
 

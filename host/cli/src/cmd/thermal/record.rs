@@ -5,8 +5,9 @@ use std::sync::atomic::Ordering;
 
 use clap::Args;
 use indicatif::ProgressBar;
+use mimu::plan::Plan;
 use mimu_device::Session;
-use mimu_device::record::{Plan, Procedure, RecordOptions, Steps};
+use mimu_device::record::{Procedure, RecordOptions, Steps};
 use mimu_recording::Growing;
 use mimu_recording::error::Result;
 use mimu_wizard::carry_out::{Equipped, Progress, carry_out};
@@ -49,7 +50,7 @@ pub(super) fn run(args: &RecordArgs) -> Result<()> {
     let plan = Plan::read(&args.plan)?;
     let gravity_mps2 = args.of.gravity_mps2(Some(&plan));
     let place = args.plan.display().to_string();
-    let procedure = plan.procedure(gravity_mps2, &place)?;
+    let procedure = Procedure::of(&plan, gravity_mps2, &place)?;
     let drivers = args
         .drivers
         .iter()

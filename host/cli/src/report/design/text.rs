@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use crate::report::text::{COLUMNS, wrap};
 use mimu::design::judgement::WEAK;
-use mimu::design::plan::round;
+use mimu::plan::round;
 use mimu::quantity::{minutes, plural, significant};
 use mimu::readable::{self, Readable};
 use mimu::result::design::{Comparison, Design, Noticed, Spent, Way};

@@ -1,6 +1,7 @@
 use std::sync::{Arc, Mutex};
 
-use mimu_device::record::{Plan, Procedure, TableAxis};
+use mimu::plan::{Plan, TableAxis};
+use mimu_device::record::Procedure;
 
 use super::*;
 use crate::drive::{Abilities, ChamberLimits, Limits};
@@ -92,7 +93,7 @@ fn procedure(body: &str) -> Procedure {
     let head = "format = \"mimu-plan/1\"\nsample_rate_hz = 1000.0\ncarrier = \"table\"\n";
     std::fs::write(&path, format!("{head}{body}")).unwrap();
     let plan = Plan::read(&path).unwrap();
-    plan.procedure(9.8, "plan.toml").unwrap()
+    Procedure::of(&plan, 9.8, "plan.toml").unwrap()
 }
 
 const REST: &str = "[[step]]\nup = [0.0, 0.0, 1.0]\ndwell_s = 10.0\n";

@@ -1,4 +1,4 @@
-use mimu_device::record::{Plan, TableAxis};
+use mimu::plan::{Plan, TableAxis};
 
 use super::*;
 
@@ -8,7 +8,7 @@ fn procedure(body: &str) -> Procedure {
     let head = "format = \"mimu-plan/1\"\nsample_rate_hz = 1000.0\ncarrier = \"table\"\n";
     std::fs::write(&path, format!("{head}{body}")).unwrap();
     let plan = Plan::read(&path).unwrap();
-    plan.procedure(9.8, "plan.toml").unwrap()
+    Procedure::of(&plan, 9.8, "plan.toml").unwrap()
 }
 
 /// What a table and a chamber that take `busy_s` for every motion are told, with the time, and when each dwell begins and ends.

@@ -1,85 +1,153 @@
-//! The plan of an experiment, `mimu-plan/1`, as far as a recording needs it: dwells with their inputs and lengths.
+//! The plan of an experiment, `mimu-plan/1`: what a table or a person carries out, step by step.
+//!
+//! One type writes and reads it. The bench reads it by itself: it is the check from outside.
+
+mod turn;
 
 use std::path::Path;
 use std::time::Duration;
 
 use nalgebra::Vector3;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{parse_toml, read_text};
 
-use super::turn::{Angles, TableAxis, Turn};
+use crate::design::model::Setting;
+use crate::design::reach::Fixture;
+use crate::toml_layout;
+use turn::Angles;
+pub use turn::{TableAxis, Turn};
 
+/// `format` of a plan.
+const FORMAT: &str = "mimu-plan/1";
 /// A plan of more is a mistake in it.
 const MOST_DWELLS: usize = 100_000;
 /// Directions whose cosine is as near to 1 are the same: a hundredth of a degree.
 const PARALLEL: f64 = 1.5e-8;
 
-/// A plan as `mimu design` and `mimu thermal plan` write it. What only the bench needs is read and left alone.
-#[derive(Debug, Clone, Deserialize)]
+/// A plan. What only the bench needs is read and left alone.
+#[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Plan {
     format: String,
     /// Name of the unit.
-    #[serde(default)]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub device: Option<String>,
-    #[serde(rename = "sample_rate_hz")]
-    _sample_rate_hz: f64,
-    #[serde(default, rename = "samples")]
-    _samples: Option<String>,
+    sample_rate_hz: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    samples: Option<String>,
     carrier: Carrier,
-    #[serde(default, rename = "steps")]
-    _steps: Option<bool>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    steps: Option<bool>,
     /// Degrees.
-    #[serde(default)]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub latitude_deg: Option<f64>,
     /// Local gravity, m/s².
-    #[serde(default)]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub gravity_mps2: Option<f64>,
-    #[serde(default)]
-    pub(super) chamber_c: Vec<[f64; 2]>,
-    #[serde(default)]
-    pub(super) lead_in_s: f64,
-    #[serde(default = "once")]
-    pub(super) rounds: u32,
-    #[serde(default)]
-    pub(super) round_s: Option<f64>,
-    step: Vec<Step>,
+    /// Course of the chamber, s and °C; empty where it does not matter.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub chamber_c: Vec<[f64; 2]>,
+    /// Time before the first dwell, s.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub lead_in_s: f64,
+    /// So often all steps are done.
+    #[serde(default = "once", skip_serializing_if = "is_once")]
+    pub rounds: u32,
+    /// From the beginning of a round to that of the next, s; without it they follow each other.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub round_s: Option<f64>,
+    /// What is done in a round.
+    pub step: Vec<Step>,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 enum Carrier {
     Table,
     Hands,
 }
 
-#[derive(Debug, Clone, Deserialize)]
+/// A dwell of a plan, or a turn of one axis of the table.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Step {
-    #[serde(default)]
+pub struct Step {
+    #[serde(skip_serializing_if = "Option::is_none")]
     up: Option<[f64; 3]>,
-    #[serde(default)]
+    #[serde(skip_serializing_if = "Option::is_none")]
     poses: Option<u32>,
-    #[serde(default, rename = "heading_deg")]
-    _heading_deg: f64,
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_zero")]
+    heading_deg: f64,
+    #[serde(default, skip_serializing_if = "is_zero")]
     rate_dps: f64,
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_zero")]
     spin_dps: f64,
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     stay: bool,
+    #[serde(skip_serializing_if = "Option::is_none")]
     turn_axis: Option<TableAxis>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     turn_deg: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     turn_dps: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     dwell_s: Option<f64>,
-    #[serde(default = "once")]
+    #[serde(default = "once", skip_serializing_if = "is_once")]
     repeat: u32,
 }
 
 fn once() -> u32 {
     1
+}
+
+fn is_once(count: &u32) -> bool {
+    *count == 1
+}
+
+fn is_zero(value: &f64) -> bool {
+    *value == 0.0
+}
+
+/// To a whole number of 1/`per`, without a negative zero.
+pub fn round(value: f64, per: f64) -> f64 {
+    (value * per).round() / per + 0.0
+}
+
+impl Step {
+    /// A dwell of `dwell_s` seconds with the body direction `up` upwards, turning at `rate_dps` about it. Without a direction it stays
+    /// where the turn before has ended.
+    pub fn dwell(up: Option<Vector3<f64>>, rate_dps: f64, dwell_s: f64) -> Self {
+        Self {
+            up: up.map(|up| up.map(|c| round(c, 1e9)).into()),
+            rate_dps: round(rate_dps, 1e6),
+            stay: up.is_none(),
+            dwell_s: Some(round(dwell_s, 1e3)),
+            repeat: 1,
+            ..Self::default()
+        }
+    }
+
+    /// A dwell at `setting`.
+    pub fn of(setting: &Setting, dwell_s: f64) -> Self {
+        Self::dwell(Some(setting.up), setting.rate.to_degrees(), dwell_s)
+    }
+
+    /// The same so many times without a move between them.
+    pub fn repeated(self, repeat: u32) -> Self {
+        Self { repeat, ..self }
+    }
+
+    /// A turn of one axis of the table.
+    pub fn turn(axis: TableAxis, angle_deg: f64, rate_dps: f64) -> Self {
+        Self {
+            turn_axis: Some(axis),
+            turn_deg: Some(angle_deg),
+            turn_dps: Some(rate_dps),
+            repeat: 1,
+            ..Self::default()
+        }
+    }
 }
 
 /// A dwell of a plan.
@@ -102,7 +170,7 @@ pub struct Planned {
 
 impl Planned {
     /// Its input, if it has taken this long.
-    pub(super) fn input_over(&self, duration_s: f64) -> [f64; 6] {
+    pub fn input_over(&self, duration_s: f64) -> [f64; 6] {
         let mut input = self.input;
         if let Some(turn) = &self.turn {
             for (cell, deg) in input.iter_mut().zip(turn.about_deg) {
@@ -114,6 +182,51 @@ impl Planned {
 }
 
 impl Plan {
+    /// A plan for what carries the unit.
+    pub fn new(fixture: Fixture, sample_rate_hz: f64, step: Vec<Step>) -> Self {
+        Self {
+            format: FORMAT.into(),
+            device: None,
+            sample_rate_hz: round(sample_rate_hz, 1e6),
+            samples: None,
+            carrier: match fixture {
+                Fixture::Hand => Carrier::Hands,
+                _ => Carrier::Table,
+            },
+            steps: None,
+            latitude_deg: None,
+            gravity_mps2: None,
+            chamber_c: Vec::new(),
+            lead_in_s: 0.0,
+            rounds: 1,
+            round_s: None,
+            step,
+        }
+    }
+
+    /// The same with a course of the chamber, s and °C.
+    pub fn in_chamber(mut self, points: impl IntoIterator<Item = [f64; 2]>) -> Self {
+        let points = points.into_iter();
+        self.chamber_c = points
+            .map(|[t, c]| [round(t, 1e3), round(c, 1e3)])
+            .collect();
+        self
+    }
+
+    /// The same with a time before the first dwell, s, and so many rounds; `round_s` from one to the next, if the table waits for it.
+    pub fn in_rounds(mut self, lead_in_s: f64, rounds: u32, round_s: Option<f64>) -> Self {
+        self.lead_in_s = round(lead_in_s, 1e3);
+        self.rounds = rounds;
+        self.round_s = round_s.map(|s| round(s, 1e3));
+        self
+    }
+
+    /// Text of the file; `about` is put in front as a comment, line by line.
+    pub fn to_toml(&self, about: &str) -> String {
+        let about: String = about.lines().map(|line| format!("# {line}\n")).collect();
+        toml_layout::to_toml(&about, self)
+    }
+
     /// Reads and checks a plan.
     pub fn read(path: &Path) -> Result<Self> {
         let place = path.display().to_string();
@@ -125,8 +238,8 @@ impl Plan {
             let remedy = format!("write one or more, up to {MOST_DWELLS}");
             return Err(Error::new(place, problem, remedy));
         }
-        if plan.format != "mimu-plan/1" {
-            let problem = format!("format is {:?}, and a plan is \"mimu-plan/1\"", plan.format);
+        if plan.format != FORMAT {
+            let problem = format!("format is {:?}, and a plan is {FORMAT:?}", plan.format);
             return Err(Error::new(place, problem, "give the plan of an experiment"));
         }
         Ok(plan)

@@ -1,10 +1,10 @@
 //! A turn of one axis of a table by an angle, as a step of a plan.
 
 use nalgebra::{Rotation3, Vector3};
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 /// Axes of a table: the outer one is the vertical, the inner one the body's z axis, and the middle one lies across both.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum TableAxis {
     /// The vertical.
