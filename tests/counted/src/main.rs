@@ -7,7 +7,6 @@
 
 use core::hint::black_box;
 
-use mimu_core::PerSensor;
 use mimu_core::compensation::{Affine, Compensation, Sample};
 use mimu_core::effects::{DeviceEffect, Directions, Effects, Refused, State, Variable};
 use mimu_core::kalman::Bank;
