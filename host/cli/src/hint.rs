@@ -1,5 +1,6 @@
 //! The flags of the command beside what an error of a library says to set otherwise.
 
+use mimu::warning::Warning;
 use mimu_recording::error::{Argument, Error};
 
 /// Flags of the import, which are a remedy after any command that reads a recording. Others are one only on the command that refused.
@@ -39,6 +40,14 @@ pub(crate) fn line(error: &Error, command: &clap::Command) -> String {
     match flags.is_empty() {
         true => error.to_string(),
         false => format!("{error} ({})", flags.join(", ")),
+    }
+}
+
+/// The warning in one line, with the flag that makes it go.
+pub(crate) fn of_warning(warning: &Warning) -> String {
+    match warning.left_out() {
+        Some(step) => format!("{warning} (--keep {step})"),
+        None => warning.to_string(),
     }
 }
 

@@ -83,6 +83,7 @@ pub mod die_temperature;
 pub mod dwell;
 pub mod effects;
 pub mod estimate;
+mod fault;
 pub mod fit;
 pub mod increment;
 pub mod next_experiment;
@@ -106,6 +107,7 @@ mod toml_layout;
 pub mod triad;
 mod unit_in_si;
 pub mod verify;
+pub mod warning;
 
 pub use calibration::Calibration;
 pub use fit::{Fit, Options, fit};

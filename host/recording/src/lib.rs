@@ -27,6 +27,7 @@ mod round_trip_tests;
 mod separator;
 mod staging;
 mod strict_file;
+mod warning;
 mod writer;
 
 pub use batch::Batch;
@@ -43,4 +44,5 @@ pub use manifest::{Format, MANIFEST_FILE, Manifest, Rails, RawUnit, Reference, S
 pub use reader::{ReadSummary, Recording};
 pub use recorded::{Recorded, Restart};
 pub use separator::Separator;
+pub use warning::Warning;
 pub use writer::{SampleFormat, Writer};

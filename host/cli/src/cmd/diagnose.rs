@@ -10,6 +10,7 @@ use mimu::fit::{Method, Options};
 use mimu::next_experiment;
 use mimu::result::diagnosis::DiagnosisResult;
 use mimu::verify::verify;
+use mimu::warning::Warning;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::result_file::stage;
 
@@ -142,7 +143,7 @@ pub fn run(args: &DiagnoseArgs) -> Result<()> {
         match (before, after) {
             (Ok(before), Ok(after)) => judged = Some((path.to_string(), [before, after])),
             (Err(refusal), _) | (_, Err(refusal)) => {
-                let warning = format!("{path} cannot judge the calibration: {refusal}");
+                let warning = Warning::NotJudged(Some(path.to_string()), refusal);
                 diagnosis.after.warnings.push(warning);
             }
         }
@@ -215,10 +216,8 @@ fn known(given: Option<&Calibration>, diagnosis: &mut Diagnosis) -> Vec<EffectTa
     let (kept, lost): (Vec<_>, Vec<_>) =
         pairs.partition(|(effect, _)| after.sensor(effect.candidate.sensor).is_some());
     for (effect, table) in lost {
-        after.warnings.push(format!(
-            "{} of the calibration is not in the new one, as the {} is not recorded",
-            table.id, effect.candidate.sensor
-        ));
+        let warning = Warning::EffectLost(table.id.clone(), effect.candidate.sensor);
+        after.warnings.push(warning);
     }
     kept.into_iter().map(|(_, table)| table.clone()).collect()
 }

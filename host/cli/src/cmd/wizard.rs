@@ -7,9 +7,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use clap::{Args, ValueEnum};
-use mimu::quantity::{implausible_gravity, normal_gravity};
+use mimu::quantity::normal_gravity;
 use mimu::readable::STANDARD_GRAVITY;
 use mimu::result::diagnosis::DiagnosisResult;
+use mimu::warning::Warning;
 use mimu_device::record::Plan;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{Manifest, RawUnit};
@@ -232,7 +233,7 @@ impl WizardArgs {
             }
         };
         if let (Some(gravity), Some(at)) = (gravity, latitude_deg)
-            && let Some(warning) = implausible_gravity(gravity, at)
+            && let Some(warning) = Warning::of_gravity(gravity, at)
         {
             eprintln!("warning: {warning}");
         }

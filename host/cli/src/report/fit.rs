@@ -8,6 +8,7 @@ use mimu::readable;
 use mimu::result::fit::{DwellResult, FitResult, Parameter, SensorFitResult};
 use mimu_recording::Reference;
 
+use crate::hint;
 use crate::report::text::warn;
 
 /// Result of `mimu fit`.
@@ -30,7 +31,7 @@ pub fn fit_text(fit: &FitResult) -> String {
     }
     if !fit.warnings.is_empty() {
         let _ = writeln!(out);
-        warn(&mut out, fit.warnings.iter());
+        warn(&mut out, fit.warnings.iter().map(hint::of_warning));
     }
     out
 }

@@ -10,6 +10,7 @@ use super::least_squares::{
 use super::{Estimated, Failure, Observation};
 use crate::quantity::AXES;
 use crate::triad::{Covariance, Forward, Part, Triad};
+use crate::warning::Warning;
 
 /// Two inputs are opposite if their sum is below this share of their size: a table's repeatability.
 const OPPOSITE_SHARE: f64 = 0.01;
@@ -373,9 +374,7 @@ pub fn opposite_rates(observations: &[Observation]) -> Result<Estimated, Failure
     let residual = &known - &reading * &c_transposed;
     let mut notes = Vec::new();
     if single > 0 {
-        notes.push(format!(
-            "{single} rates have no opposite and are not used by the inverse form"
-        ));
+        notes.push(Warning::NoOpposite(single));
     }
     let scatter_of = |values: Vec<f64>, variances: &[Matrix3<f64>], axis: usize, dof: f64| {
         let variances: Vec<f64> = variances

@@ -25,6 +25,7 @@ pub mod with_turns;
 use nalgebra::Vector3;
 
 use crate::triad::Triad;
+use crate::warning::Warning;
 use least_squares::Scatter;
 
 /// The mean of a dwell as an estimator sees it; or, where its input moves, another sum over the dwell, with weights that add to zero.
@@ -65,7 +66,7 @@ pub struct Estimated {
     /// Delays of the readings, where moving inputs show them.
     pub delays: Option<Delays>,
     /// What a person should know.
-    pub notes: Vec<String>,
+    pub notes: Vec<Warning>,
 }
 
 impl Estimated {

@@ -12,6 +12,7 @@ use super::least_squares::{
 };
 use super::{Delays, Estimated, Failure, Observation};
 use crate::quantity::AXES;
+use crate::warning::Warning;
 
 /// Steps of the iteration for the delay: the model is linear but for its product with the scale factor, and the third changes nothing.
 const STEPS: usize = 6;
@@ -132,7 +133,7 @@ pub fn least_squares(
         let [value, sigma] = delays;
         estimated.delays = Some(Delays { value, sigma });
     } else {
-        estimated.notes.push("a delay of the readings behind the reference is not told from a misalignment, and taken for none: turn both ways, or at several rates".into());
+        estimated.notes.push(Warning::NoDelay);
     }
     Ok(estimated)
 }

@@ -16,6 +16,7 @@ use super::least_squares::{Linearized, excess_variance, minimize};
 use super::turn::{Rest, Rotations, Turn, across, between, by_forces};
 use super::{Estimated, Failure, Observation};
 use crate::triad::{Covariance, Part, Triad};
+use crate::warning::Warning;
 
 /// Parameters: six of C and three of o of the accelerometer, then nine of C and three of o of the gyro.
 const ACCEL: usize = 9;
@@ -260,7 +261,7 @@ impl Together<'_> {
             scatter: vec![("magnitude of specific force".into(), magnitude)],
             condition,
             delays: None,
-            notes: vec!["the poses alone hardly determine it: the turns between them, which the gyro measures, are used as well".into()],
+            notes: vec![Warning::WithTurns],
         })
     }
 }

@@ -5,6 +5,7 @@ use mimu_recording::RawUnit;
 use crate::quantity::{AXES, Sensor, plus_minus, raw_unit, scale_unit};
 use crate::readable;
 use crate::triad::{Angles, Estimate, Triad};
+use crate::warning::Warning;
 
 /// A parameter fitted with everything, and without what was left out.
 #[derive(Debug, Clone, PartialEq)]
@@ -95,19 +96,12 @@ pub(super) fn changes(
 }
 
 /// The largest of the `changes` in words, at most three and those that leave the interval as fitted.
-pub(super) fn described(changes: &[Change]) -> Option<String> {
+pub(super) fn described(changes: &[Change]) -> Option<Warning> {
     let mut largest: Vec<&Change> = changes.iter().filter(|c| c.fitted.interval > 0.0).collect();
     largest.sort_by(|a, b| b.size().total_cmp(&a.size()));
     let sensor = largest.first()?.sensor;
     let moved = largest.iter().filter(|c| c.size() > 1.0).count();
-    let shown: Vec<String> = largest[..moved.clamp(1, 3)]
-        .iter()
-        .map(|c| c.text())
-        .collect();
-    Some(format!(
-        "{sensor}: what was left out changes {} of {} parameters by more than their intervals, most of all: {}",
-        moved,
-        changes.iter().filter(|c| c.fitted.interval > 0.0).count(),
-        shown.join("; ")
-    ))
+    let shown = &largest[..moved.clamp(1, 3)];
+    let shown = shown.iter().map(|c| c.text()).collect();
+    Some(Warning::LeftOutChanges(moved, largest.len(), shown).of(sensor))
 }

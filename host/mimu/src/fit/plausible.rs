@@ -9,9 +9,9 @@ use crate::estimate::Failure;
 use crate::prepared::Prepared;
 use crate::quantity::Figure;
 use crate::quantity::Sensor;
-use crate::quantity::plural;
 use crate::quantity::significant;
 use crate::unit_in_si::{restless, wrong_gain};
+use crate::warning::Warning;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{RAW_COLUMNS, RawUnit, Reference};
 
@@ -105,7 +105,7 @@ fn spread(prepared: &Prepared, fit: &SensorFit) -> f64 {
 }
 
 /// Refuses readings that do not follow their inputs. Those that do beside the temperature are fitted, with a warning.
-fn refuse_unrelated(prepared: &Prepared, fit: &SensorFit) -> Result<Option<String>> {
+fn refuse_unrelated(prepared: &Prepared, fit: &SensorFit) -> Result<Option<Warning>> {
     let spread = spread(prepared, fit);
     let share = fit.rms() / spread;
     if share <= FOLLOWS_NOTHING {
@@ -117,14 +117,8 @@ fn refuse_unrelated(prepared: &Prepared, fit: &SensorFit) -> Result<Option<Strin
         Figure::GravitySize | Figure::Direction => None,
     };
     if let Some(with) = with.filter(|w| w.rms / spread <= FOLLOWS_NOTHING) {
-        return Ok(Some(format!(
-            "{}: {} of the known inputs is left over by a model without temperature, and {} by one with it: the parameters are those at about {:.1} °C, \
-             the mean of the dwells, and their intervals hold what the temperature does; `mimu diagnose` finds what follows it",
-            fit.sensor,
-            percent(share),
-            percent(with.rms / spread),
-            with.mean_c
-        )));
+        let warning = Warning::FollowsTemperature(share, with.rms / spread, with.mean_c);
+        return Ok(Some(warning.of(fit.sensor)));
     }
     let against = match fit.figure {
         Figure::Input => "the known inputs",
@@ -166,7 +160,7 @@ fn name(prepared: &Prepared, residual: &Residual) -> String {
     label.cloned().unwrap_or_else(|| step.to_string())
 }
 
-fn outliers(prepared: &Prepared, fit: &SensorFit) -> Option<String> {
+fn outliers(prepared: &Prepared, fit: &SensorFit) -> Option<Warning> {
     let mut sorted = worst_first(fit);
     let rounding = EXACT * sorted.first()?.value.norm();
     sorted.retain(|r| r.value.norm() > rounding);
@@ -181,25 +175,15 @@ fn outliers(prepared: &Prepared, fit: &SensorFit) -> Option<String> {
     };
     let bad: Vec<_> = sorted.iter().filter(off).collect();
     let worst = bad.first()?;
-    let names: Vec<String> = bad.iter().take(8).map(|r| name(prepared, r)).collect();
-    let what = match fit.figure {
-        Figure::Direction => "turn to dwell",
-        _ => "dwell",
-    };
-    let more = if bad.len() > names.len() { ", ..." } else { "" };
-    Some(format!(
-        "{}: {} ({what} {}{more}): off by up to {} {}, {:.0} times the median; look for the cause, as it widens all intervals",
-        fit.sensor,
-        plural(bad.len() as u64, "outlier"),
-        names.join(", "),
-        significant(worst.value.norm()),
-        fit.figure.unit(fit.sensor),
-        worst.value.norm() / median
-    ))
+    let names = bad.iter().map(|r| name(prepared, r)).collect();
+    let (turns, largest) = (fit.figure == Figure::Direction, worst.value.norm());
+    let unit = fit.figure.unit(fit.sensor);
+    let warning = Warning::Outliers(turns, names, largest, unit, largest / median);
+    Some(warning.of(fit.sensor))
 }
 
 /// What claims to be in SI reads about what it measures.
-fn unit(prepared: &Prepared, fit: &SensorFit) -> Option<String> {
+fn unit(prepared: &Prepared, fit: &SensorFit) -> Option<Warning> {
     let matrix = &fit.estimated.triad.forward.matrix;
     let scale = matrix.row_iter().map(|r| r.norm()).sum::<f64>() / 3.0;
     if prepared.manifest.raw_unit != RawUnit::Si {
@@ -214,12 +198,12 @@ fn unit(prepared: &Prepared, fit: &SensorFit) -> Option<String> {
 }
 
 /// Rests of a gyro that are none.
-fn rests(fit: &SensorFit) -> Option<String> {
+fn rests(fit: &SensorFit) -> Option<Warning> {
     fit.static_rms.and_then(|(rms, _)| restless(rms))
 }
 
 /// How the axes lie to those that they are referred to.
-fn turned(prepared: &Prepared, fit: &SensorFit) -> Option<String> {
+fn turned(prepared: &Prepared, fit: &SensorFit) -> Option<Warning> {
     if fit.figure == Figure::GravitySize {
         return None; // its axes are the frame
     }
@@ -230,15 +214,8 @@ fn turned(prepared: &Prepared, fit: &SensorFit) -> Option<String> {
     if rotation.determinant() < 0.0 || angle.to_degrees() < TURNED_DEG {
         return None;
     }
-    let against = match prepared.manifest.reference {
-        Reference::Table => "those of the ref_ columns",
-        Reference::Gravity => "the accelerometer's",
-    };
-    Some(format!(
-        "{}: its axes are turned by {:.0} degrees against {against}: unless it is mounted so, columns are swapped or have the wrong sign",
-        fit.sensor,
-        angle.to_degrees()
-    ))
+    let table = prepared.manifest.reference == Reference::Table;
+    Some(Warning::Turned(angle, table).of(fit.sensor))
 }
 
 /// Errors across the known force over those along it from which on the force is not where the reference says.
@@ -248,7 +225,7 @@ const LEVEL: f64 = 3.5e-3;
 
 /// Known forces that point elsewhere than the reference says. A tilt leaves the size of a force and moves its direction, and so errs
 /// across it; a sensor's own errors lie along it as well.
-fn off_level(prepared: &Prepared, fit: &SensorFit) -> Option<String> {
+fn off_level(prepared: &Prepared, fit: &SensorFit) -> Option<Warning> {
     if fit.sensor != Sensor::Accel || fit.figure != Figure::Input {
         return None;
     }
@@ -266,10 +243,5 @@ fn off_level(prepared: &Prepared, fit: &SensorFit) -> Option<String> {
     }
     let angle = (angles / n).sqrt();
     let beyond = across > ACROSS * ACROSS * along.max(if floor.is_nan() { 0.0 } else { floor });
-    (beyond && angle > LEVEL).then(|| {
-        format!(
-            "accel: the errors lie across the known force and not along it, as if the dwells were off level by {} deg rms: level the faces, or leave the directions out (reference = \"gravity\")",
-            significant(angle.to_degrees())
-        )
-    })
+    (beyond && angle > LEVEL).then(|| Warning::OffLevel(angle).of(Sensor::Accel))
 }

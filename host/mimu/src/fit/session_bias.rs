@@ -10,6 +10,7 @@ use crate::prepared::{Prepared, si_covariance};
 use crate::quantity::AXES;
 use crate::quantity::Sensor;
 use crate::triad::{Covariance, Part, Triad};
+use crate::warning::Warning;
 use mimu_recording::Reference;
 
 /// Steps of the iteration for sizes: from a bias of a tenth of gravity the third changes nothing.
@@ -97,9 +98,6 @@ pub fn estimate(
         scatter,
         condition: 1.0,
         delays: None,
-        notes: vec![
-            "the matrix is given, and no interval holds its error; the biases are this recording's"
-                .into(),
-        ],
+        notes: vec![Warning::MatrixGiven(false)],
     })
 }

@@ -15,6 +15,7 @@ use crate::fit::Split;
 use crate::next_experiment::{Confused, Next, NotInPlan, SizedRecipe};
 use crate::quantity::{AXES, Figure, Sensor, significant};
 use crate::verify::Verification;
+use crate::warning::Warning;
 
 /// Result of a diagnosis.
 #[derive(Debug, Clone, Serialize)]
@@ -54,7 +55,7 @@ pub struct DiagnosisResult {
     /// What of the samples was left out.
     pub left_out: LeftOutResult,
     /// What a person should know.
-    pub warnings: Vec<String>,
+    pub warnings: Vec<Warning>,
     /// The calibration before and after on a recording that nothing was fitted to.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub second: Option<SecondResult>,

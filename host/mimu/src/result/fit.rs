@@ -13,6 +13,7 @@ use crate::prepared::Prepared;
 use crate::quantity::{AXES, Figure, Sensor, inverse_names, raw_unit, scale_unit};
 use crate::stillness;
 use crate::triad::{Angles, Estimate};
+use crate::warning::Warning;
 
 /// Result of a fit.
 #[derive(Debug, Clone, Serialize)]
@@ -56,7 +57,7 @@ pub struct FitResult {
     /// What that changes: every parameter fitted with everything, and as fitted.
     pub left_out_changes: Vec<ChangeResult>,
     /// What a person should know.
-    pub warnings: Vec<String>,
+    pub warnings: Vec<Warning>,
 }
 
 /// A parameter fitted with everything, and without what was left out.
@@ -186,7 +187,7 @@ pub struct SensorFitResult {
     /// Parts that were held out in turn.
     pub held_out_parts: usize,
     /// Why not in blocks, or why some parts were not held out.
-    pub not_held_out: Vec<String>,
+    pub not_held_out: Vec<Warning>,
     /// One for every dwell or turn that was used, and those within the dwells whose input moves.
     pub residuals: Vec<ResidualResult>,
     /// Compensated gyro dwell means without a table, rad/s; absent with one.

@@ -5,6 +5,7 @@ use serde::Serialize;
 use super::Sensors;
 use crate::quantity::{Figure, Sensor};
 use crate::verify::{SensorVerification, Verification};
+use crate::warning::Warning;
 
 /// Result of a verification.
 #[derive(Debug, Clone, Serialize)]
@@ -14,7 +15,7 @@ pub struct VerifyResult {
     /// Its figures.
     pub sensors: Sensors<SensorVerifyResult>,
     /// What a person should know.
-    pub warnings: Vec<String>,
+    pub warnings: Vec<Warning>,
 }
 
 /// Figures of one triad.

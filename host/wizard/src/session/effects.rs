@@ -5,6 +5,7 @@ use mimu::diagnose::{Recordings, diagnose};
 use mimu::fit::{Fit, Options};
 use mimu::next_experiment;
 use mimu::result::diagnosis::DiagnosisResult;
+use mimu::warning::Warning;
 use mimu_recording::Reference;
 use mimu_recording::error::Result;
 use mimu_recording::result_file::stage;
@@ -79,7 +80,8 @@ impl Whole<'_> {
         let judged = match both {
             (Ok(before), Ok(after)) => Some([before, after]),
             (Err(refusal), _) | (_, Err(refusal)) => {
-                diagnosis.after.warnings.push(refusal.to_string());
+                let warning = Warning::NotJudged(None, refusal);
+                diagnosis.after.warnings.push(warning);
                 None
             }
         };

@@ -16,6 +16,7 @@ use mimu::result::diagnosis::{AcceptedResult, DiagnosisResult, SensorDiagnosisRe
 use mimu_recording::Reference;
 use mimu_recording::error::{Error, Result};
 
+use crate::hint;
 use crate::report::page::{Made, number, page, spoken};
 use tables::chance;
 
@@ -287,7 +288,7 @@ fn recorded(d: &DiagnosisResult) -> Markup {
         @if d.warnings.is_empty() {
             p { "No warnings." }
         } @else {
-            ul { @for w in &d.warnings { li { (w) } } }
+            ul { @for w in &d.warnings { li { (hint::of_warning(w)) } } }
         }
     }
 }
