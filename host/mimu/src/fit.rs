@@ -23,6 +23,7 @@ use crate::warning::Warning;
 use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{RawUnit, Reference};
 
+use crate::observable::Observable;
 use by_gravity::fit_gravity;
 use known::fit_known;
 
@@ -212,12 +213,13 @@ fn finish(
     held_out: HoldOut,
 ) -> SensorFit {
     let mut warnings = estimated.notes.clone();
-    // Groups of one axis have its name before them.
-    let dof = |name: &str| {
-        let of_axis = estimated.scatter.iter().filter(|s| {
-            let rest = s.0.strip_prefix(name);
-            rest.is_some_and(|r| r.is_empty() || r.starts_with(" within"))
-        });
+    // Means over dwells and what moves within them determine an axis together.
+    let axis = |group: Observable| match group {
+        Observable::Within(axis) => Observable::Axis(axis),
+        other => other,
+    };
+    let dof = |group: Observable| {
+        let of_axis = estimated.scatter.iter().filter(|s| axis(s.0) == group);
         of_axis.map(|s| s.1.dof).sum::<f64>()
     };
     if estimated.scatter.iter().all(|(_, s)| s.dof < 0.5) {
@@ -225,7 +227,7 @@ fn finish(
     } else if estimated
         .scatter
         .iter()
-        .any(|(name, _)| dof(name.trim_end_matches(" within dwells")) < FEW_DOF)
+        .any(|(group, _)| dof(axis(*group)) < FEW_DOF)
     {
         warnings.push(Warning::FewResiduals);
     }

@@ -9,6 +9,8 @@
 //! | [`reading_step`] | the step that readings are multiples of                                       |
 //! | [`signed_low_byte`] | a firmware that takes the low byte of a reading for a signed number        |
 //! | [`noise`]       | how well a dwell mean is known                                                |
+//! | [`observable`]  | what observations that share their noise are of                               |
+//! | [`warning`]     | what a person should know of any of these, by kind                            |
 //! | [`prepared`]    | all of these for one recording                                                |
 //! | [`pose_means`]  | the same of a table of means, without samples                                 |
 //! | [`estimate`]    | the estimators                                                                |
@@ -89,6 +91,7 @@ pub mod increment;
 pub mod next_experiment;
 pub mod noise;
 pub mod noise_file;
+pub mod observable;
 pub mod pose_means;
 pub mod prepared;
 pub mod quantity;

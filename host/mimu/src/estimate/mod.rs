@@ -24,6 +24,7 @@ pub mod with_turns;
 
 use nalgebra::Vector3;
 
+use crate::observable::Observable;
 use crate::triad::Triad;
 use crate::warning::Warning;
 use least_squares::Scatter;
@@ -60,7 +61,7 @@ pub struct Estimated {
     /// The calibration.
     pub triad: Triad,
     /// Scatter by axis where the axes are fitted one by one, by group otherwise.
-    pub scatter: Vec<(String, Scatter)>,
+    pub scatter: Vec<(Observable, Scatter)>,
     /// Condition number of the scaled design.
     pub condition: f64,
     /// Delays of the readings, where moving inputs show them.

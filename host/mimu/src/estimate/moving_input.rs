@@ -11,7 +11,7 @@ use super::least_squares::{
     Errors, Group, Observability, POORLY_DETERMINED, Scatter, Solution, solve_groups,
 };
 use super::{Delays, Estimated, Failure, Observation};
-use crate::quantity::AXES;
+use crate::observable::Observable;
 use crate::warning::Warning;
 
 /// Steps of the iteration for the delay: the model is linear but for its product with the scale factor, and the third changes nothing.
@@ -121,7 +121,7 @@ pub fn least_squares(
             delays[0][axis] = delay;
             delays[1][axis] = solution.covariance[(4, 4)].sqrt();
         }
-        let names = ["", " within dwells"].map(|n| format!("{}{n}", AXES[axis]));
+        let names = [Observable::Axis(axis), Observable::Within(axis)];
         axes.push(OfAxis {
             parameters: solution.parameters.rows(0, 4).into_owned(),
             covariance: solution.covariance.view((0, 0), (4, 4)).into_owned(),

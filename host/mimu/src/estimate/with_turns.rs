@@ -15,6 +15,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, Vector3};
 use super::least_squares::{Linearized, excess_variance, minimize};
 use super::turn::{Rest, Rotations, Turn, across, between, by_forces};
 use super::{Estimated, Failure, Observation};
+use crate::observable::Observable;
 use crate::triad::{Covariance, Part, Triad};
 use crate::warning::Warning;
 
@@ -258,7 +259,7 @@ impl Together<'_> {
         magnitude.chi2 = first_chi2.unwrap_or(magnitude.chi2);
         Ok(Estimated {
             triad,
-            scatter: vec![("magnitude of specific force".into(), magnitude)],
+            scatter: vec![(Observable::Magnitude, magnitude)],
             condition,
             delays: None,
             notes: vec![Warning::WithTurns],

@@ -13,6 +13,7 @@ use crate::diagnose::{Diagnosis, SensorDiagnosis, Source, Untestable, Verdict};
 use crate::effects::candidate::Kind;
 use crate::fit::Split;
 use crate::next_experiment::{Confused, Next, NotInPlan, SizedRecipe};
+use crate::observable::Observable;
 use crate::quantity::{AXES, Figure, Sensor, significant};
 use crate::verify::Verification;
 use crate::warning::Warning;
@@ -408,14 +409,14 @@ impl DiagnosisResult {
         });
         self.undecided.extend(undecided);
         let leftover = decision.leftover.iter().map(|l| {
-            let figure = match l.stratum.starts_with("turns") {
-                true => Figure::Direction,
-                false => Figure::Input,
+            let figure = match l.stratum.0 {
+                Observable::Turns => Figure::Direction,
+                _ => Figure::Input,
             };
             LeftoverResult {
                 sensor: name,
                 axis: l.axis.map(|a| AXES[a]),
-                rows: l.stratum.clone(),
+                rows: l.stratum.to_string(),
                 against: l.against.clone(),
                 usual: l.usual,
                 strength: l.strength,

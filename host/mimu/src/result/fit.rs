@@ -9,6 +9,7 @@ use super::{Sensors, TOOL};
 use crate::dwell::Dwell;
 use crate::fit::change::Change;
 use crate::fit::{Fit, Method, SensorFit, Split};
+use crate::observable::Observable;
 use crate::prepared::Prepared;
 use crate::quantity::{AXES, Figure, Sensor, inverse_names, raw_unit, scale_unit};
 use crate::stillness;
@@ -371,11 +372,11 @@ impl SensorFitResult {
                 chi2: s.chi2,
                 dof: s.dof,
                 excess_sigma: s.excess.sqrt(),
-                unit: excess_unit(fit, found, group),
+                unit: excess_unit(fit, found, *group),
                 // What nobody knows explains nothing, and leaves nothing unexplained.
                 significant: s.is_significant() && fit.prepared.noise.is_known(found.sensor),
             };
-            (group.clone(), result)
+            (group.to_string(), result)
         });
         let residuals = found.residuals.iter().map(|r| ResidualResult {
             step: fit.prepared.dwells.list[r.dwell].step,
@@ -427,10 +428,10 @@ impl SensorFitResult {
 }
 
 /// Unit of the excess of a group of observations.
-fn excess_unit(fit: &Fit, found: &SensorFit, group: &str) -> String {
+fn excess_unit(fit: &Fit, found: &SensorFit, group: Observable) -> String {
     let si = found.sensor.unit();
     match found.figure {
-        Figure::Direction if group == "rest" => si.into(),
+        Figure::Direction if group == Observable::Rest => si.into(),
         Figure::Direction | Figure::GravitySize => found.figure.unit(found.sensor).into(),
         // Axes of the forward form are in raw units, of the inverse form in SI.
         Figure::Input if fit.options.method == Method::InverseForm => si.into(),
