@@ -15,6 +15,7 @@
 //! | [`pose_means`]  | the same of a table of means, without samples                                 |
 //! | [`estimate`]    | the estimators                                                                |
 //! | [`triad`]       | calibration of one triad: both directions, covariances, physical quantities   |
+//! | [`parameter`]   | the names and units of its parameters                                         |
 //! | [`mod@fit`]     | both triads, judged on what they have not seen; what cannot be right is refused |
 //! | [`calibration`], [`verify`] | the file, and judging it by another recording                     |
 //! | [`mod@apply`]   | the recording that it compensates                                             |
@@ -92,6 +93,7 @@ pub mod next_experiment;
 pub mod noise;
 pub mod noise_file;
 pub mod observable;
+pub mod parameter;
 pub mod pose_means;
 pub mod prepared;
 pub mod quantity;

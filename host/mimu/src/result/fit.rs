@@ -10,8 +10,9 @@ use crate::dwell::Dwell;
 use crate::fit::change::Change;
 use crate::fit::{Fit, Method, SensorFit, Split};
 use crate::observable::Observable;
+use crate::parameter::{Kind, TriadParameter, parameters};
 use crate::prepared::Prepared;
-use crate::quantity::{AXES, Figure, Sensor, inverse_names, raw_unit, scale_unit};
+use crate::quantity::{Figure, Sensor, raw_unit};
 use crate::stillness;
 use crate::triad::{Angles, Estimate};
 use crate::warning::Warning;
@@ -202,6 +203,9 @@ pub struct SensorFitResult {
 /// A parameter with its uncertainty.
 #[derive(Debug, Clone, Serialize)]
 pub struct Parameter {
+    /// Which.
+    #[serde(skip)]
+    pub of: TriadParameter,
     /// Name.
     pub name: String,
     /// Estimate.
@@ -388,7 +392,7 @@ impl SensorFitResult {
         let small = found.estimated.triad.physical(Angles::Small);
         Self {
             estimator: fit.estimator(found.sensor),
-            parameters: parameters(fit.prepared.manifest.raw_unit, found),
+            parameters: Parameter::list(fit, found),
             rms: found.rms(),
             held_out_rms: found.held_out_rms(),
             noise_floor: found.noise_floor(),
@@ -417,13 +421,26 @@ impl SensorFitResult {
         }
     }
 
-    /// The parameters `name_x`, `name_y`, `name_z`, or those of the pairs of axes.
-    pub fn triple(&self, name: &str) -> impl Iterator<Item = &Parameter> {
-        let ours = move |p: &&Parameter| {
-            let rest = p.name.strip_prefix(name);
-            rest.is_some_and(|r| r.starts_with('_'))
-        };
-        self.parameters.iter().filter(ours)
+    /// The parameters of a kind.
+    pub fn of_kind(&self, kind: Kind) -> impl Iterator<Item = &Parameter> {
+        self.parameters.iter().filter(move |p| p.of.0 == kind)
+    }
+}
+
+impl Parameter {
+    fn list(fit: &Fit, found: &SensorFit) -> Vec<Self> {
+        let raw = fit.prepared.manifest.raw_unit;
+        let all = parameters(&found.estimated.triad, found.sensor, raw).into_iter();
+        all.map(|(of, e, unit)| Self {
+            of,
+            name: of.to_string(),
+            value: e.value,
+            sigma: e.sigma,
+            lower: e.value - e.interval,
+            upper: e.value + e.interval,
+            unit,
+        })
+        .collect()
     }
 }
 
@@ -443,7 +460,7 @@ impl ChangeResult {
     fn of(change: &Change) -> Self {
         Self {
             sensor: change.sensor.name(),
-            name: change.name.clone(),
+            name: change.parameter.to_string(),
             with_all: change.with_all,
             value: change.fitted.value,
             sigma: change.fitted.sigma,
@@ -459,46 +476,4 @@ impl Triple {
             sigma: estimates.map(|e| e.sigma),
         }
     }
-}
-
-fn parameters(raw: RawUnit, found: &SensorFit) -> Vec<Parameter> {
-    let triad = &found.estimated.triad;
-    let si = found.sensor.unit();
-    let inverse_unit = match raw {
-        RawUnit::Si => "1".to_string(),
-        other => format!("({si})/{other}"),
-    };
-    let mut all = Vec::new();
-    let mut add = |name: String, e: Estimate, unit: &str| {
-        all.push(Parameter {
-            name,
-            value: e.value,
-            sigma: e.sigma,
-            lower: e.value - e.interval,
-            upper: e.value + e.interval,
-            unit: unit.into(),
-        });
-    };
-    let estimates = triad.inverse_estimates();
-    for (i, (name, estimate)) in inverse_names().into_iter().zip(estimates).enumerate() {
-        add(name, estimate, if i < 9 { &inverse_unit } else { si });
-    }
-    let physical = triad.physical(Angles::Exact);
-    let pairs = ["yz", "zy", "zx"];
-    for (name, axes, estimates, unit) in [
-        ("scale", AXES, physical.scale, scale_unit(raw, si)),
-        ("bias", AXES, physical.bias, raw_unit(raw, si)),
-        ("misalignment", AXES, physical.misalignment, "rad".into()),
-        (
-            "non_orthogonality",
-            pairs,
-            physical.non_orthogonality,
-            "rad".into(),
-        ),
-    ] {
-        for (axis, estimate) in axes.iter().zip(estimates) {
-            add(format!("{name}_{axis}"), estimate, &unit);
-        }
-    }
-    all
 }
