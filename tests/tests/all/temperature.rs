@@ -363,7 +363,11 @@ fn what_the_temperature_does_to_bias_and_scale_in_one_pose_is_named_together() {
         both.sort_unstable();
         assert_eq!(named, both, "{id}");
         let notes = &found.sensors.iter().find(|s| s.sensor == Sensor::Accel);
-        let notes = notes.expect("recorded").decision.notes.join("\n");
+        let notes = notes.expect("recorded").decision.notes.iter();
+        let notes = notes
+            .map(ToString::to_string)
+            .collect::<Vec<_>>()
+            .join("\n");
         assert!(
             notes.contains("does as well, as the input along the axis"),
             "{notes}"
@@ -408,7 +412,11 @@ fn a_warm_up_after_a_start_that_was_no_power_on_is_of_the_recording_alone() {
         let warm_up = accepted(&found).find(|a| a.chosen.candidate.id() == "gyro_warm_up");
         assert_eq!(warm_up.expect("found").of_unit, of_unit);
         let gyro = found.sensors.iter().find(|s| s.sensor == Sensor::Gyro);
-        let notes = gyro.expect("recorded").decision.notes.join("\n");
+        let notes = gyro.expect("recorded").decision.notes.iter();
+        let notes = notes
+            .map(ToString::to_string)
+            .collect::<Vec<_>>()
+            .join("\n");
         assert_eq!(
             notes.contains("time since power-on is unknown"),
             !of_unit,

@@ -8,6 +8,7 @@
 //! | [`rows`]      | what the affine model leaves of dwells and turns, as one linear problem          |
 //! | [`variance`]    | how that scatters: known noise, more of it, a bias that walks                    |
 //! | [`search`]    | which effects the rows ask for                                                   |
+//! | [`note`]      | what a person should know of the accepted ones                                   |
 //! | [`decision`]  | which of them are accepted, and what is left                                     |
 //! | `passes`      | all of this again with the affine model that strong effects leave                |
 //! | [`uncertainty`] | what the coefficients of effects leave open of what stands on them               |
@@ -16,6 +17,7 @@
 mod as_written;
 mod candidate;
 pub mod decision;
+pub mod note;
 mod passes;
 pub mod picture;
 pub mod rows;

@@ -7,6 +7,7 @@ use super::verify::VerifyResult;
 use super::{Sensors, TOOL};
 use crate::calibration::ConverterTable;
 use crate::diagnose::decision::{Accepted, Decision};
+use crate::diagnose::note::Note;
 use crate::diagnose::picture::Picture;
 use crate::diagnose::rows::Figure as Judged;
 use crate::diagnose::{Diagnosis, SensorDiagnosis, Source, Untestable, Verdict};
@@ -277,7 +278,7 @@ pub struct SensorDiagnosisResult {
     /// Share of the held-out mean square beyond these two that the effects take out; null without effects, or where nothing is beyond.
     pub explained: Option<f64>,
     /// What a person should know of the accepted effects.
-    pub notes: Vec<String>,
+    pub notes: Vec<Note>,
     /// Residuals that the model is fitted to.
     pub rows: usize,
     /// Affine parameters that they determine first.

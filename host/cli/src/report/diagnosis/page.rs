@@ -173,7 +173,7 @@ fn sensor(d: &DiagnosisResult, s: &Shown) -> Markup {
         @for (one, panels) in ours.iter().zip(&picture.effects) {
             (effect(d, s, one, panels))
         }
-        @for note in &s.figures.notes { p { strong { "Note. " } (note) "." } }
+        @for note in &s.figures.notes { p { strong { "Note. " } (note.to_string()) "." } }
         @if !after {
             p { "No effect is accepted; residuals are those of the affine calibration." }
         }

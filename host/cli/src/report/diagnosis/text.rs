@@ -188,11 +188,9 @@ fn sensor(out: &mut String, d: &DiagnosisResult, name: &str, s: &SensorDiagnosis
         effect(out, d, s, a, all);
     }
     for note in &s.notes {
-        // What was found comes before the first semicolon, what to do about it behind.
-        let (found, more) = note.split_once(';').unwrap_or((note, ""));
-        match all || more.is_empty() {
-            true => wrap(out, "  note: ", note),
-            false => wrap(out, "  note: ", &format!("{found} (--all)")),
+        match all || note.advice.is_empty() {
+            true => wrap(out, "  note: ", &note.to_string()),
+            false => wrap(out, "  note: ", &format!("{} (--all)", note.found)),
         }
     }
     residuals(out, d, name, all);
