@@ -77,6 +77,13 @@ fn flag(argument: Argument) -> Option<&'static str> {
         Argument::Preset => "--preset",
         Argument::Means => "--means",
         Argument::SkipBroken => "--skip-broken",
+        Argument::Base => "--base",
+        Argument::Estimator => "--estimator",
+        Argument::Range => "--range",
+        Argument::Curves => "--curves line",
+        Argument::SetPoints => "--points",
+        Argument::Soak => "--soak",
+        Argument::StepTimes => "--step-every",
         // An argument that this version of the command has no flag for.
         _ => return None,
     })

@@ -83,6 +83,20 @@ pub enum Argument {
     Means,
     /// How many rows that cannot be read are left out.
     SkipBroken,
+    /// The calibration at one temperature that curves are added to.
+    Base,
+    /// The estimator of curves over temperature.
+    Estimator,
+    /// Temperatures that a plan covers.
+    Range,
+    /// Shape of curves over temperature.
+    Curves,
+    /// Set points of a soak.
+    SetPoints,
+    /// Time at a set point.
+    Soak,
+    /// When the dwells of a recording begin and end.
+    StepTimes,
 }
 
 /// Result with [`Error`].
