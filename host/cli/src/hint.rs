@@ -1,5 +1,6 @@
 //! The flags of the command beside what an error of a library says to set otherwise.
 
+use mimu::warning::Warning;
 use mimu_recording::error::{Argument, Error};
 
 /// Flags of the import, which are a remedy after any command that reads a recording. Others are one only on the command that refused.
@@ -43,6 +44,14 @@ pub(crate) fn line(error: &Error, command: &clap::Command) -> String {
     }
 }
 
+/// The warning in one line, with the flag that makes it go.
+pub(crate) fn of_warning(warning: &Warning) -> String {
+    match warning.left_out() {
+        Some(step) => format!("{warning} (--keep {step})"),
+        None => warning.to_string(),
+    }
+}
+
 fn flag(argument: Argument) -> Option<&'static str> {
     Some(match argument {
         Argument::Columns => "--columns",
@@ -70,6 +79,13 @@ fn flag(argument: Argument) -> Option<&'static str> {
         Argument::Means => "--means",
         Argument::SkipBroken => "--skip-broken",
         Argument::SignedLowByte => "--signed-low-byte",
+        Argument::Base => "--base",
+        Argument::Estimator => "--estimator",
+        Argument::Range => "--range",
+        Argument::Curves => "--curves line",
+        Argument::SetPoints => "--points",
+        Argument::Soak => "--soak",
+        Argument::StepTimes => "--step-every",
         // An argument that this version of the command has no flag for.
         _ => return None,
     })

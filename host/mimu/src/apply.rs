@@ -12,11 +12,12 @@ use serde::Serialize;
 
 use crate::blocks::{Condensed, Rails};
 use crate::calibration::{Calibration, compensator};
-use crate::die_temperature::{WITHOUT_TEMPERATURE, outside};
+use crate::die_temperature::outside;
 use crate::effects::quantity::Need;
 use crate::quantity::{PerSensor, Sensor, present};
 use crate::rails::find;
 use crate::verify::check_unit;
+use crate::warning::Warning;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{Batch, Columns, Manifest, RawUnit, Recording, SampleFormat, Source, Writer};
 
@@ -44,7 +45,7 @@ pub struct Applied {
     /// Effects that were removed, by id.
     pub effects: Vec<String>,
     /// What a person should know.
-    pub warnings: Vec<String>,
+    pub warnings: Vec<Warning>,
 }
 
 /// Samples of a sensor that are empty in the compensated recording.
@@ -76,7 +77,7 @@ pub fn apply(
         let problem = "this is the recording to compensate, and its raw readings would be lost";
         return Err(Error::new(out.display(), problem, "choose another name"));
     }
-    let mut warnings: Vec<String> = check_unit(calibration, manifest, &place)?
+    let mut warnings: Vec<Warning> = check_unit(calibration, manifest, &place)?
         .into_iter()
         .collect();
     let columns = Columns {
@@ -102,9 +103,7 @@ pub fn apply(
     };
     for (sensor, (recorded, has)) in recorded.zip(has) {
         if recorded && !has {
-            warnings.push(format!(
-                "the calibration is not for the {sensor}: its columns are left out"
-            ));
+            warnings.push(Warning::NotCalibrated(sensor));
         }
     }
     // First pass: rails and the first temperature are only known at the end.
@@ -187,7 +186,7 @@ impl Batches {
         manifest: &Manifest,
         has: PerSensor<bool>,
         place: &str,
-        warnings: &mut Vec<String>,
+        warnings: &mut Vec<Warning>,
     ) -> Result<Self> {
         let blocks = &condensed.blocks;
         let first_temp_c = blocks.iter().map(|b| b.temp_c.mean).find(|t| t.is_finite());
@@ -222,7 +221,7 @@ impl Batches {
         let slow = slow.collect();
         let curves = calibration.curves();
         if curves.is_some() && first_temp_c.is_none() {
-            warnings.push(WITHOUT_TEMPERATURE.into());
+            warnings.push(Warning::NoTemperature);
         }
         let curves = curves.filter(|_| first_temp_c.is_some());
         let first_s = blocks.first().map_or(0.0, |block| block.start_s);

@@ -7,9 +7,10 @@
 
 use crate::increment::{Increment, Integrator};
 use crate::no_temperature;
-use crate::quantity::{Sensor, plural};
+use crate::quantity::Sensor;
 use crate::reading_step::StepFinder;
 use crate::signed_low_byte;
+use crate::warning::Warning;
 use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{Batch, Column, HeldReadings, NoTemperatures, RAW_COLUMNS, Recording};
 
@@ -254,7 +255,7 @@ pub struct Condensed {
     /// SHA-256 of the samples file, hexadecimal.
     pub sha256: String,
     /// What a person should know about this recording.
-    pub warnings: Vec<String>,
+    pub warnings: Vec<Warning>,
 }
 
 impl Condensed {
@@ -267,7 +268,8 @@ impl Condensed {
         let summary = recording.for_each_batch(progress, |batch| condenser.push(batch))?;
         let mut condensed = condenser.finish()?;
         condensed.sha256 = summary.sha256;
-        condensed.warnings.splice(0..0, summary.warnings);
+        let read = summary.warnings.into_iter().map(Warning::Reading);
+        condensed.warnings.splice(0..0, read);
         Ok(condensed)
     }
 
@@ -608,36 +610,22 @@ impl Condenser {
         }
         let out = &mut self.out;
         if off.abs() > 1e-3 {
-            out.warnings.push(format!(
-                "the time stamps run at {:.3} Hz, {:+.2} % off the stated {rate} Hz; the stamps are used",
-                1.0 / period, -100.0 * off
-            ));
+            out.warnings
+                .push(Warning::RateOff(1.0 / period, -100.0 * off, rate));
         }
         out.period_s = period;
         out.gaps = (steps.longer, steps.missing_s);
         if steps.longer > 0 {
             let (row, _) = steps.first_odd.unwrap_or((0, 0.0));
-            out.warnings.push(format!(
-                "{}, {:.3} s missing in all, the first before data row {}: no turn is integrated across",
-                plural(steps.longer, "gap"), steps.missing_s, row + 1
-            ));
+            let gaps = Warning::Gaps(steps.longer, steps.missing_s, row + 1);
+            out.warnings.push(gaps);
         }
         if out.duplicates > 0 {
-            out.warnings.push(format!(
-                "{} the same as the row before, time included: left out",
-                match out.duplicates {
-                    1 => "1 row is".into(),
-                    n => format!("{n} rows are"),
-                }
-            ));
+            out.warnings.push(Warning::Repeated(out.duplicates));
         }
         for (c, &missing) in out.missing.iter().enumerate() {
             if missing > 0 {
-                out.warnings.push(format!(
-                    "{} of {} empty or not a number: masked",
-                    plural(missing, "sample"),
-                    RAW_COLUMNS[c]
-                ));
+                out.warnings.push(Warning::Empty(missing, RAW_COLUMNS[c]));
             }
         }
         out.warnings
@@ -645,7 +633,7 @@ impl Condenser {
         for (sensor, held) in Sensor::BOTH.iter().zip(&self.held) {
             let held = held.found();
             out.warnings
-                .extend(held.map(|held| held.words(&sensor.to_string(), 1.0 / period)));
+                .extend(held.map(|held| Warning::Held(*sensor, held, 1.0 / period)));
         }
         if let Some(integrator) = &mut self.integrator {
             out.increments.extend(integrator.take());

@@ -27,6 +27,7 @@ use crate::effects::fitted::FittedEffect;
 use crate::quantity::Sensor;
 use crate::toml_layout;
 use crate::triad::Covariance;
+use crate::warning::Warning;
 use mimu_recording::error::Result;
 use mimu_recording::{Manifest, RawUnit, Reference, parse_toml, read_text};
 
@@ -301,17 +302,12 @@ impl Calibration {
     }
 
     /// Whether it is of the unit that was recorded: by its number where both have one, else by its name. If not, how they differ.
-    pub fn other_unit(&self, manifest: &Manifest) -> Option<String> {
+    pub fn other_unit(&self, manifest: &Manifest) -> Option<Warning> {
+        let (ours, theirs) = (self.device.clone(), manifest.device.clone());
         match (&self.unit_id, manifest.unit_id()) {
-            (Some(ours), Some(theirs)) => (!ours.eq_ignore_ascii_case(theirs)).then(|| {
-                format!("the calibration is of the unit {ours}, the recording of the unit {theirs}")
-            }),
-            _ => (self.device != manifest.device).then(|| {
-                format!(
-                    "the calibration is for {:?}, the recording of {:?}",
-                    self.device, manifest.device
-                )
-            }),
+            (Some(ours), Some(theirs)) => (!ours.eq_ignore_ascii_case(theirs))
+                .then(|| Warning::OtherUnit(ours.clone(), theirs.into())),
+            _ => (ours != theirs).then_some(Warning::OtherDevice(ours, theirs)),
         }
     }
 

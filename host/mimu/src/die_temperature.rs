@@ -9,10 +9,7 @@ use crate::blocks::Block;
 use crate::calibration::{Calibration, Curves};
 use crate::prepared::Prepared;
 use crate::quantity::{PerSensor, Sensor};
-
-/// Warning on a recording without a temperature.
-pub const WITHOUT_TEMPERATURE: &str =
-    "the recording has no temp_c: the calibration's one model is used, and not its curves";
+use crate::warning::Warning;
 
 /// Temperatures of the dies, °C, in the middle of each block: those of the thermometer behind the lag. Where it has no reading it is that of
 /// the block before, and before the first that one. `None` if it has none at all.
@@ -44,7 +41,7 @@ pub fn of_triads(blocks: &[Block], curves: &Curves) -> Option<PerSensor<Vec<f64>
 ///
 /// Curves are for the dies in their range, from the first degree on. A calibration at one temperature holds near it, and is
 /// left where the thermometer is more than 5 K outside what it was made from.
-pub fn outside(calibration: &Calibration, blocks: &[Block]) -> Option<String> {
+pub fn outside(calibration: &Calibration, blocks: &[Block]) -> Option<Warning> {
     let curves = calibration.curves();
     let (temperatures, [from, to], margin_c) = match &curves {
         Some(curves) => (of_triads(blocks, curves)?, curves.table().limits()?, 0.0),
@@ -72,16 +69,12 @@ pub fn outside(calibration: &Calibration, blocks: &[Block]) -> Option<String> {
     if count == 0 {
         return None;
     }
-    let what = match curves {
-        Some(_) => {
-            format!("beyond {BEYOND_C} K its curves are held, and before that they go on straight")
-        }
-        None => {
-            "it has no curves over temperature: fit one with recordings over temperature".into()
-        }
-    };
-    Some(format!(
-        "{count} of {all} samples are outside the {from:.1} to {to:.1} °C that the calibration was made from, by up to {farthest:.1} K: {what}"
+    let beyond = curves.is_some().then_some(BEYOND_C);
+    Some(Warning::OutOfRange(
+        [count, all],
+        [from, to],
+        farthest,
+        beyond,
     ))
 }
 

@@ -4,19 +4,21 @@
 //! judged sensor by sensor: a reading at a rail, a stuck channel or a unit in motion would ruin the
 //! mean without any trace in it.
 
-use std::fmt;
 use std::ops::Range;
 
 use crate::blocks::{Condensed, Level, Rails, Stretch, pool, quantile};
 use crate::course::{Course, Motion, motion};
-use crate::quantity::{Sensor, plural};
+pub use crate::fault::Fault;
+use crate::fault::SHORTEST_S;
+use crate::quantity::Sensor;
 use crate::rails::{self, longest_run_by_chance};
 use crate::ramp::ramps;
 use crate::rest::{self, Rest};
 use crate::slow_turns::{self, Reading};
-use crate::stillness::{self, Detection, Finding, SHORTEST_S, Steps, reference_spans};
+use crate::stillness::{self, Detection, Finding, Steps, reference_spans};
+use crate::warning::Warning;
 use mimu_recording::error::{Argument, Error, Result};
-use mimu_recording::{Manifest, RAW_COLUMNS, Reference};
+use mimu_recording::{Manifest, Reference};
 
 /// Variance of a given step over the median of all steps, at most; a fivefold standard deviation.
 const STEP_FACTOR: f64 = 25.0;
@@ -28,45 +30,6 @@ const SLOW: f64 = 0.175;
 /// Share of clipped samples from which on a mean is refused: below, it moves by less than a tenth
 /// of a standard deviation of one sample.
 const CLIPPED_SHARE: f64 = 0.01;
-
-/// Why a dwell is not used for a sensor.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Fault {
-    /// Shorter than [`SHORTEST_S`].
-    TooShort,
-    /// The variance is far above that of the other dwells, and no known input explains it.
-    NotStill,
-    /// The known input moves too fast for the blocks that samples are condensed to.
-    TooFast,
-    /// The unit turns evenly and does not rest.
-    Turning,
-    /// It errs by far more than the others predict.
-    Outlying,
-    /// It turns about an axis that the accelerometer may be beside of.
-    Spinning,
-    /// Samples of the channel (0..6) lie at a rail.
-    Saturated(usize),
-    /// The channel (0..6) repeats one value.
-    Stuck(usize),
-    /// The channel (0..6) has no samples.
-    Missing(usize),
-}
-
-impl fmt::Display for Fault {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match *self {
-            Self::TooShort => f.write_str("too short"),
-            Self::NotStill => f.write_str("not still"),
-            Self::TooFast => f.write_str("moved too fast"),
-            Self::Turning => f.write_str("turning"),
-            Self::Outlying => f.write_str("outlying"),
-            Self::Spinning => f.write_str("spinning"),
-            Self::Saturated(c) => write!(f, "{} saturated", RAW_COLUMNS[c]),
-            Self::Stuck(c) => write!(f, "{} stuck", RAW_COLUMNS[c]),
-            Self::Missing(c) => write!(f, "{} missing", RAW_COLUMNS[c]),
-        }
-    }
-}
 
 /// Mean of a raw channel over a dwell.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -220,7 +183,7 @@ pub struct Dwells {
     /// What a fit may not leave out.
     pub keep: Keep,
     /// What a person should know.
-    pub warnings: Vec<String>,
+    pub warnings: Vec<Warning>,
 }
 
 impl Dwells {
@@ -257,11 +220,8 @@ impl Dwells {
             if by_hand {
                 let (cut, blocks) = rest::walk_in(&mut ranges, condensed);
                 if cut > 0 {
-                    warnings.push(format!(
-                        "{} cut at the ends, by {:.1} s in all: the unit was not yet at rest there, or no longer",
-                        plural(cut, "dwell"),
-                        blocks as f64 * detection.block_s
-                    ));
+                    let in_all_s = blocks as f64 * detection.block_s;
+                    warnings.push(Warning::DwellsCut(cut, in_all_s));
                 }
             }
             (ranges, Some(detection))
@@ -463,7 +423,7 @@ fn leave_out_turning(list: &mut [Dwell], condensed: &Condensed) {
 }
 
 /// Marks the dwells that are no rest of the gyro, though they are poses of the accelerometer; what to say of them.
-fn mark_slow_turns(list: &mut [Dwell]) -> Option<String> {
+fn mark_slow_turns(list: &mut [Dwell]) -> Option<Warning> {
     let usable = |d: &&mut Dwell| Sensor::BOTH.iter().all(|s| d.fault(*s).is_none());
     let mut usable: Vec<&mut Dwell> = list.iter_mut().filter(usable).collect();
     let complete = usable.iter().all(|d| d.raw.iter().all(|m| m.n > 0));
@@ -484,14 +444,7 @@ fn mark_slow_turns(list: &mut [Dwell]) -> Option<String> {
         .filter(|d| d.turns_slowly)
         .map(|d| d.step.to_string())
         .collect();
-    let count = steps.len() as u64;
-    (count > 0).then(|| {
-        format!(
-            "{} ({}) not used as a rest of the gyro, only as a pose: what it reads there is explained neither by its bias in the others nor by g-sensitivity, as in a slow turn about the vertical",
-            plural(count, "dwell"),
-            steps.join(", ")
-        )
-    })
+    (!steps.is_empty()).then_some(Warning::SlowTurns(steps))
 }
 
 /// Finds the dwells whose known inputs move, and those where one moves too fast.
@@ -599,8 +552,8 @@ fn judge(
     }
 }
 
-fn warn(list: &[Dwell], manifest: &Manifest, warnings: &mut Vec<String>) {
-    let mut by_fault: Vec<(String, Vec<String>)> = Vec::new();
+fn warn(list: &[Dwell], manifest: &Manifest, warnings: &mut Vec<Warning>) {
+    let mut by_fault: Vec<((Fault, Option<Sensor>), Vec<String>)> = Vec::new();
     for dwell in list {
         for sensor in Sensor::BOTH {
             let Some(fault) = dwell.fault(sensor) else {
@@ -609,17 +562,9 @@ fn warn(list: &[Dwell], manifest: &Manifest, warnings: &mut Vec<String>) {
             if matches!(fault, Fault::TooShort | Fault::Turning) && sensor == Sensor::Accel {
                 continue; // said once, for both
             }
-            let key = match fault {
-                Fault::TooShort => format!("shorter than {SHORTEST_S} s"),
-                Fault::Turning => "the unit turns evenly and does not rest".into(),
-                Fault::NotStill => format!("not still enough for the {sensor}"),
-                Fault::TooFast => {
-                    format!(
-                        "the input of the {sensor} moves too far within a tenth of a second, by two fifths of its range"
-                    )
-                }
-                other => other.to_string(),
-            };
+            // Whether a unit is still, and its input slow enough, is judged sensor by sensor.
+            let by_sensor = matches!(fault, Fault::NotStill | Fault::TooFast);
+            let key = (fault, by_sensor.then_some(sensor));
             let name = manifest
                 .step_labels
                 .get(dwell.step as usize)
@@ -631,27 +576,14 @@ fn warn(list: &[Dwell], manifest: &Manifest, warnings: &mut Vec<String>) {
             }
         }
     }
-    for (fault, steps) in by_fault {
-        let count = steps.len();
-        let shown = steps[..count.min(8)].join(", ");
-        let more = if count > 8 { ", ..." } else { "" };
-        let (noun, verb) = if count == 1 {
-            ("dwell", "is")
-        } else {
-            ("dwells", "are")
-        };
-        warnings.push(format!(
-            "{count} {noun} ({shown}{more}) {verb} not used: {fault}"
-        ));
+    for ((fault, sensor), names) in by_fault {
+        warnings.push(Warning::DwellsNotUsed(names, fault, sensor));
     }
     let clipped: u64 = list
         .iter()
         .flat_map(|d| d.raw.iter().map(|m| m.clipped))
         .sum();
     if clipped > 0 {
-        warnings.push(format!(
-            "{} within dwells at a rail of the converter: masked",
-            plural(clipped, "sample")
-        ));
+        warnings.push(Warning::Clipped(clipped));
     }
 }

@@ -20,9 +20,11 @@ use crate::estimate::{Estimated, Observation};
 use crate::prepared::Prepared;
 use crate::quantity::{Figure, Sensor};
 use crate::stillness::STILL_FACTOR;
+use crate::warning::Warning;
 use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{RawUnit, Reference};
 
+use crate::observable::Observable;
 use by_gravity::fit_gravity;
 use known::fit_known;
 
@@ -98,7 +100,7 @@ pub struct Fit {
     /// What the dwells and turns that were left out change; empty where none was.
     pub changes: Vec<change::Change>,
     /// What a person should know of the recording.
-    pub warnings: Vec<String>,
+    pub warnings: Vec<Warning>,
 }
 
 impl Fit {
@@ -147,7 +149,7 @@ pub fn fit(mut prepared: Prepared, options: Options) -> Result<Fit> {
     };
     let mut warnings = prepared.condensed.warnings.clone();
     warnings.extend(prepared.dwells.warnings.iter().cloned());
-    warnings.extend(without_temperature(&prepared, &Sensor::BOTH));
+    warnings.extend(without_temperature(&prepared));
     let mut sensors = match prepared.manifest.reference {
         Reference::Table => fit_known(&prepared, options, &mut warnings)?,
         Reference::Gravity => fit_gravity(&prepared, options, &mut warnings)?,
@@ -184,9 +186,8 @@ pub fn fit(mut prepared: Prepared, options: Options) -> Result<Fit> {
 /// A bias of 0.1 deg/s per °C is ordinary for these sensors: five degrees are half a degree a second.
 const ISOTHERMAL_C: f64 = 5.0;
 
-/// That the models of `sensors` have no temperature in them, where the dwells differ in it by more than [`ISOTHERMAL_C`]. With both
-/// sensors it is said of the model as a whole.
-pub(crate) fn without_temperature(prepared: &Prepared, sensors: &[Sensor]) -> Option<String> {
+/// That no model has the temperature in it, where the dwells differ in it by more than [`ISOTHERMAL_C`].
+fn without_temperature(prepared: &Prepared) -> Option<Warning> {
     let temperatures = || {
         prepared
             .dwells
@@ -197,17 +198,7 @@ pub(crate) fn without_temperature(prepared: &Prepared, sensors: &[Sensor]) -> Op
     };
     let high = temperatures().fold(f64::NEG_INFINITY, f64::max);
     let low = temperatures().fold(f64::INFINITY, f64::min);
-    let whose = match sensors {
-        [] => return None,
-        [Sensor::Gyro] => "the gyro's model",
-        [Sensor::Accel] => "the accelerometer's model",
-        _ => "the model",
-    };
-    (high - low > ISOTHERMAL_C).then(|| {
-        format!(
-            "the dwells range from {low:.1} to {high:.1} °C, and {whose} has no temperature in it"
-        )
-    })
+    (high - low > ISOTHERMAL_C).then_some(Warning::WithoutTemperature(low, high, None))
 }
 
 /// Fewer degrees of freedom than this show no error of the model.
@@ -222,39 +213,33 @@ fn finish(
     static_rms: Option<(f64, Option<f64>)>,
     held_out: HoldOut,
 ) -> SensorFit {
-    let mut warnings = Vec::new();
-    warnings.extend(
-        estimated
-            .notes
-            .iter()
-            .map(|note| format!("{sensor}: {note}")),
-    );
-    // Groups of one axis have its name before them.
-    let dof = |name: &str| {
-        let of_axis = estimated.scatter.iter().filter(|s| {
-            let rest = s.0.strip_prefix(name);
-            rest.is_some_and(|r| r.is_empty() || r.starts_with(" within"))
-        });
+    let mut warnings = estimated.notes.clone();
+    // Means over dwells and what moves within them determine an axis together.
+    let axis = |group: Observable| match group {
+        Observable::Within(axis) => Observable::Axis(axis),
+        other => other,
+    };
+    let dof = |group: Observable| {
+        let of_axis = estimated.scatter.iter().filter(|s| axis(s.0) == group);
         of_axis.map(|s| s.1.dof).sum::<f64>()
     };
     if estimated.scatter.iter().all(|(_, s)| s.dof < 0.5) {
-        warnings.push(format!("{sensor}: as many parameters as residuals: nothing can be judged, neither the model nor the intervals, which hold the noise within dwells alone"));
+        warnings.push(Warning::NoResiduals);
     } else if estimated
         .scatter
         .iter()
-        .any(|(name, _)| dof(name.trim_end_matches(" within dwells")) < FEW_DOF)
+        .any(|(group, _)| dof(axis(*group)) < FEW_DOF)
     {
-        warnings.push(format!("{sensor}: hardly more dwells than parameters: nothing can contradict the model, and the intervals rest on the noise within dwells alone"));
+        warnings.push(Warning::FewResiduals);
     }
     if estimated.condition > POORLY_DETERMINED {
-        warnings.push(format!("{sensor}: the experiment determines some parameters poorly (condition {:.0}); their intervals say which", estimated.condition));
+        warnings.push(Warning::PoorlyDetermined(estimated.condition));
     }
     if estimated.triad.inverse.matrix.determinant() < 0.0 {
-        warnings.push(format!("{sensor}: the axes come out left-handed: one of them, of gyro or accelerometer, points the other way than its column says"));
+        warnings.push(Warning::LeftHanded);
     }
-    for reason in &held_out.reasons {
-        warnings.push(format!("{sensor}: {reason}"));
-    }
+    warnings.extend(held_out.reasons.iter().cloned());
+    let warnings = warnings.into_iter().map(|w| w.of(sensor)).collect();
     SensorFit {
         sensor,
         estimated,

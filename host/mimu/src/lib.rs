@@ -10,10 +10,13 @@
 //! | [`reading_step`] | the step that readings are multiples of                                       |
 //! | [`signed_low_byte`] | a firmware that takes the low byte of a reading for a signed number        |
 //! | [`noise`]       | how well a dwell mean is known                                                |
+//! | [`observable`]  | what observations that share their noise are of                               |
+//! | [`warning`]     | what a person should know of any of these, by kind                            |
 //! | [`prepared`]    | all of these for one recording                                                |
 //! | [`pose_means`]  | the same of a table of means, without samples                                 |
 //! | [`estimate`]    | the estimators                                                                |
 //! | [`triad`]       | calibration of one triad: both directions, covariances, physical quantities   |
+//! | [`parameter`]   | the names and units of its parameters                                         |
 //! | [`mod@fit`]     | both triads, judged on what they have not seen; what cannot be right is refused |
 //! | [`calibration`], [`verify`] | the file, and judging it by another recording                     |
 //! | [`mod@apply`]   | the recording that it compensates                                             |
@@ -85,12 +88,15 @@ pub mod die_temperature;
 pub mod dwell;
 pub mod effects;
 pub mod estimate;
+mod fault;
 pub mod fit;
 pub mod increment;
 pub mod next_experiment;
 mod no_temperature;
 pub mod noise;
 pub mod noise_file;
+pub mod observable;
+pub mod parameter;
 pub mod plan;
 pub mod pose_means;
 pub mod prepared;
@@ -110,6 +116,7 @@ mod toml_layout;
 pub mod triad;
 mod unit_in_si;
 pub mod verify;
+pub mod warning;
 
 pub use calibration::Calibration;
 pub use fit::{Fit, Options, fit};

@@ -3,6 +3,8 @@
 use mimu_core::table::is_temperature;
 use mimu_recording::NoTemperatures;
 
+use crate::warning::Warning;
+
 /// Leaves empty what is no temperature among `temp_c`, of the times `t_s`, and counts it.
 pub(crate) fn leave_empty(
     temp_c: &mut [f64],
@@ -19,8 +21,8 @@ pub(crate) fn leave_empty(
 }
 
 /// What a person should know of them.
-pub(crate) fn warning(found: &NoTemperatures) -> Option<String> {
-    Some(format!("temp_c: {}", found.warning()?))
+pub(crate) fn warning(found: &NoTemperatures) -> Option<Warning> {
+    (found.count > 0).then(|| Warning::NoTemperatures(found.clone()))
 }
 
 #[cfg(test)]
@@ -35,7 +37,7 @@ mod tests {
         assert!(temp_c[1].is_nan() && temp_c[2].is_nan() && temp_c[4].is_nan());
         assert_eq!([temp_c[0], temp_c[3], temp_c[5]], [20.0, -40.0, 85.0]);
         assert_eq!(
-            warning(&found).unwrap(),
+            warning(&found).unwrap().to_string(),
             "temp_c: 2 of 5 values are no temperatures in °C, the first is -7049 at 1.0 s: left empty"
         );
         assert_eq!(warning(&NoTemperatures::default()), None);

@@ -20,6 +20,7 @@ use crate::dwell::Dwell;
 use crate::noise_file::NoiseFile;
 use crate::quantity::Sensor;
 use crate::ramp::ramps;
+use crate::warning::Warning;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{Manifest, RAW_COLUMNS, RawUnit};
 
@@ -231,13 +232,11 @@ impl Noise {
         file: &NoiseFile,
         manifest: &Manifest,
         dwells: &[Dwell],
-        warnings: &mut Vec<String>,
+        warnings: &mut Vec<Warning>,
     ) -> Result<()> {
         if file.device != manifest.device {
-            warnings.push(format!(
-                "the noise file is of {:?}, the recording of {:?}",
-                file.device, manifest.device
-            ));
+            let (file, recording) = (file.device.clone(), manifest.device.clone());
+            warnings.push(Warning::NoiseOfAnother(file, recording));
         }
         let present = |c: &usize| dwells.iter().any(|d| d.raw[*c].n > 0);
         for c in (0..6).filter(present) {
@@ -285,11 +284,8 @@ impl Noise {
                 self.stated[c] = Some(stated);
             } else {
                 self.other[c] = Some(second);
-                warnings.push(format!(
-                    "{name}: the mean over a second is {} times as noisy within the dwells as {} says, so the noise within the dwells is used",
-                    crate::quantity::significant(ratio.sqrt()),
-                    file.place
-                ));
+                let warning = Warning::NoisierThanFile(ratio.sqrt(), file.place.clone());
+                warnings.push(warning.of_channel(c));
             }
         }
         Ok(())

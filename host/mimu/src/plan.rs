@@ -10,7 +10,7 @@ use std::time::Duration;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use mimu_recording::error::{Error, Result};
+use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{parse_toml, read_text};
 
 use crate::design::model::Setting;
@@ -394,8 +394,9 @@ impl Step {
         let turns_up = up.z.abs() < 1.0 - PARALLEL;
         if self.spin_dps != 0.0 && turns_up {
             let problem = "spin_dps turns the direction of gravity within the dwell, so that it has no one input";
-            let remedy = "record it with --step-every or --steps, and import it with ref_ columns";
-            return refuse(problem, remedy);
+            let remedy =
+                "record it without a plan, its steps marked, and import it with ref_ columns";
+            return refuse(problem, remedy).map_err(|e| e.about(Argument::StepTimes));
         }
         // A turn about the vertical is one about the body direction that points up.
         let rate = up * self.rate_dps + Vector3::z() * self.spin_dps;

@@ -8,6 +8,7 @@ use crate::dwell::{Dwell, Dwells, Fault, Keep, Mean};
 use crate::noise::Noise;
 use crate::prepared::Prepared;
 use crate::quantity::Sensor;
+use crate::warning::Warning;
 use mimu_recording::error::Result;
 use mimu_recording::{Column, PoseMean, PoseMeans, Reference};
 
@@ -147,32 +148,24 @@ fn knows_noise(pose: &PoseMean, sensor: Sensor) -> bool {
 }
 
 /// What a person should know of the table.
-fn warnings(list: &[Dwell], means: &PoseMeans, has_raw: &[bool; 6]) -> Vec<String> {
+fn warnings(list: &[Dwell], means: &PoseMeans, has_raw: &[bool; 6]) -> Vec<Warning> {
     let mut warnings = Vec::new();
     for sensor in Sensor::BOTH {
         let channels = || sensor.channels().filter(|&c| has_raw[c]);
         if channels().next().is_none() {
             continue;
         }
-        warnings.push(match means.poses.iter().all(|p| knows_noise(p, sensor)) {
-            false => format!(
-                "{sensor}: the table has no standard deviations: the scatter about the fit is the only noise, and what noise alone would leave is not known"
-            ),
-            true => format!(
-                "{sensor}: the noise of a mean is taken to be white, its standard deviation over the root of the number of samples; what else is in the means shows in the scatter about the fit"
-            ),
-        });
+        let noise = match means.poses.iter().all(|p| knows_noise(p, sensor)) {
+            false => Warning::MeansWithoutNoise,
+            true => Warning::WhiteMeans,
+        };
+        warnings.push(noise.of(sensor));
         let without = list.iter().filter(|d| d.fault(sensor).is_some()).count();
         if without > 0 {
-            warnings.push(format!(
-                "{sensor}: {without} of {} rows have no mean of one axis at least, and are not used for it",
-                list.len()
-            ));
+            warnings.push(Warning::MeansMissing(without, list.len()).of(sensor));
         }
         if sensor == Sensor::Gyro && means.manifest.reference == Reference::Gravity {
-            warnings.push(
-                "gyro: turns need samples, and this is a table of means: it is not calibrated; give it steps of known rate (ref_rate_ columns, reference = \"table\"), or record samples".into(),
-            );
+            warnings.push(Warning::MeansOfTurns.of(sensor));
         }
     }
     warnings

@@ -6,16 +6,17 @@ use nalgebra::{Matrix3, Vector3};
 use crate::blocks::Condensed;
 use crate::contrast::{Contrast, contrasts};
 use crate::course::Course;
-use crate::dwell::{Dwell, Dwells, Fault};
+use crate::dwell::{Dwell, Dwells, Fault, LeftOut};
 use crate::estimate::earth::Earth;
 use crate::estimate::turn::{Motion, Rest, Turn};
 use crate::estimate::{Failure, Observation};
 use crate::noise::Noise;
 use crate::noise_file::NoiseFile;
-use crate::quantity::{Sensor, implausible_gravity, significant};
+use crate::quantity::Sensor;
 use crate::rails::refuse_dead_channels;
 use crate::stillness::Finding;
 use crate::unit_in_si;
+use crate::warning::Warning;
 use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{Batch, Manifest, Recording, Reference};
 
@@ -100,7 +101,7 @@ impl Prepared {
         let mut dwells = Dwells::find(&condensed, &manifest, finding)
             .map_err(|e| e.map(|e| e.place = format!("{place}, {}", e.place)))?;
         let at = manifest.latitude_deg;
-        let gravity = at.and_then(|at| implausible_gravity(manifest.gravity_mps2, at));
+        let gravity = at.and_then(|at| Warning::of_gravity(manifest.gravity_mps2, at));
         dwells.warnings.extend(gravity);
         let in_si = unit_in_si::at_rest(&dwells.list, &manifest);
         dwells.warnings.extend(in_si);
@@ -314,7 +315,7 @@ impl Prepared {
     }
 
     /// Turns between usable dwells, with the directions of gravity by `accel`; also how many could not be used and why.
-    pub fn turns(&self, accel: &Affine<f64>) -> (Vec<Turn<'_>>, Vec<String>) {
+    pub fn turns(&self, accel: &Affine<f64>) -> (Vec<Turn<'_>>, Vec<Warning>) {
         let increments = &self.condensed.increments;
         let usable: Vec<usize> = (0..self.dwells.list.len())
             .filter(|&i| {
@@ -335,37 +336,29 @@ impl Prepared {
                 .left_out
                 .iter()
                 .find(|l| l.sensor == Sensor::Gyro && [l.from, l.to] == [pair[0], pair[1]]);
-            let why = if let Some(left_out) = outlying {
-                Some(format!(
-                    "it ends {} deg off what the other turns predict, {:.0} sigma of that prediction; `--keep {}` fits with it",
-                    significant(left_out.error.to_degrees()),
-                    left_out.sigmas,
-                    b.step
-                ))
-            } else if pieces.iter().any(|i| !i.whole) {
-                Some("samples are missing".to_string())
-            } else {
-                Sensor::Gyro.channels().find_map(|c| {
-                    let rails = self.dwells.rails[c];
-                    let axis = crate::quantity::AXES[c];
-                    if blocks.iter().any(|b| rails.touched_by(&b.raw[c])) {
-                        Some(format!("gyro_{axis} is at its rail"))
-                    } else {
-                        // Hands do not keep a code for a tenth of a second.
-                        let chance = self.dwells.longest_run[c];
-                        let stuck = |m: &crate::blocks::Moments| {
-                            m.m2 == 0.0 && m.n > 3 && f64::from(m.n) > chance
-                        };
-                        let stuck = blocks.iter().any(|b| stuck(&b.raw[c]));
-                        stuck.then(|| format!("gyro_{axis} is stuck"))
-                    }
-                })
-            };
-            if let Some(why) = why {
-                refused.push(format!(
-                    "the turn from dwell {} to {} is not used: {why}",
-                    a.step, b.step
-                ));
+            if let Some(left_out) = outlying {
+                let LeftOut { error, sigmas, .. } = *left_out;
+                refused.push(Warning::TurnLeftOut(a.step, b.step, error, sigmas));
+                continue;
+            }
+            if pieces.iter().any(|i| !i.whole) {
+                refused.push(Warning::TurnNotUsed(a.step, b.step, None));
+                continue;
+            }
+            let fault = Sensor::Gyro.channels().find_map(|c| {
+                let rails = self.dwells.rails[c];
+                if blocks.iter().any(|b| rails.touched_by(&b.raw[c])) {
+                    return Some(Fault::Saturated(c));
+                }
+                // Hands do not keep a code for a tenth of a second.
+                let chance = self.dwells.longest_run[c];
+                let stuck =
+                    |m: &crate::blocks::Moments| m.m2 == 0.0 && m.n > 3 && f64::from(m.n) > chance;
+                let stuck = blocks.iter().any(|b| stuck(&b.raw[c]));
+                stuck.then_some(Fault::Stuck(c))
+            });
+            if fault.is_some() {
+                refused.push(Warning::TurnNotUsed(a.step, b.step, fault));
                 continue;
             }
             let variance = |d: &crate::dwell::Dwell| {

@@ -166,57 +166,9 @@ pub fn normal_gravity(latitude_deg: f64) -> f64 {
         / (1.0 - 0.006_694_379_990_14 * sin2).sqrt()
 }
 
-/// What local gravity may differ from normal gravity at sea level by, m/s²: up to 5500 m of height take 0.017 away, and 400 m of depth add 0.001;
-/// anomalies of the Earth's field make 0.003 either way (they reach 0.005 on a few peaks and islands).
-const GRAVITY_OFF_MPS2: [f64; 2] = [-0.020, 0.005];
-
-/// A warning where gravity, m/s², cannot be that of the latitude, degrees. Nothing in a recording shows which of the two is wrong: every scale factor of
-/// an accelerometer calibrated by gravity is in proportion to it, and residuals stay as they are. The Earth's rate, which the latitude sets, differs by
-/// less than the bias of a gyro wanders.
-pub fn implausible_gravity(gravity_mps2: f64, latitude_deg: f64) -> Option<String> {
-    let normal = normal_gravity(latitude_deg);
-    let off = gravity_mps2 - normal;
-    let [least, most] = GRAVITY_OFF_MPS2;
-    (off < least || off > most).then(|| {
-        let ppm = (off / normal * 1e6).abs();
-        format!(
-            "gravity is {gravity_mps2} m/s², and {normal:.5} at sea level at latitude {latitude_deg}°: no height explains the difference, and if gravity \
-             is wrong, every scale factor of the accelerometer is by {ppm:.0} ppm: check both"
-        )
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// Measured values: Denver (EGM2008 and absolute gravimetry, 1609 m), La Paz (3640 m), Paris, and the two that a session took one for the other.
-    #[test]
-    fn gravity_of_high_places_is_plausible_and_that_of_another_latitude_is_not() {
-        for (gravity, latitude_deg) in [
-            (9.796, 39.74),
-            (9.774, -16.5),
-            (9.809, 48.85),
-            (9.780, 0.0),
-            (9.832, 90.0),
-        ] {
-            assert_eq!(
-                implausible_gravity(gravity, latitude_deg),
-                None,
-                "{gravity}"
-            );
-        }
-        // 45 degrees for 30.5, standard gravity in Singapore, and g in other units.
-        for (gravity, latitude_deg) in [(9.8062, 30.5), (9.80665, 1.35), (980.665, 45.0)] {
-            let warning = implausible_gravity(gravity, latitude_deg).unwrap();
-            assert!(warning.contains("ppm"), "{warning}");
-        }
-        assert!(
-            implausible_gravity(9.8062, 30.5)
-                .unwrap()
-                .contains("by 1282 ppm")
-        );
-    }
 
     #[test]
     fn three_digits_are_shown_and_no_whole_number_is_cut() {

@@ -1,7 +1,8 @@
 //! Channels that do not follow their input: at a rail of the converter, stuck, or dead.
 
 use crate::blocks::{Condensed, Moments, Rails, quantile};
-use crate::quantity::{plural, significant, unsigned_zero};
+use crate::quantity::{significant, unsigned_zero};
+use crate::warning::Warning;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{Manifest, RAW_COLUMNS};
 
@@ -122,25 +123,17 @@ fn count(moments: impl Iterator<Item = Moments>, value: f64) -> (u64, f64) {
 }
 
 /// Whether the extreme `value` of channel `c` is a rail of the converter: the remark that says so.
-fn converter_rail(condensed: &Condensed, c: usize, value: f64, name: &str) -> Option<String> {
+fn converter_rail(condensed: &Condensed, c: usize, value: f64, high: bool) -> Option<Warning> {
     let moments = condensed.blocks.iter().map(|b| b.raw[c]);
     let (all, longest) = count(moments.filter(|m| m.n > 0), value);
     let full_scale = full_scale_log_odds(value, condensed.reading_step[c]);
-    let channel = RAW_COLUMNS[c];
     if full_scale > RUN_LOG_ODDS {
-        return Some(format!(
-            "{channel}: {} at {value}, where a converter of 16 bits ends: taken for a rail",
-            plural(all, "sample")
-        ));
+        return Some(Warning::EndOfConverter(all, value).of_channel(c));
     }
     // Only the extreme is looked at, and not all runs of a recording, so that its length does not count.
     let chance = 1.0 + (RUN_LOG_ODDS - full_scale) / -share_of_repeats(condensed, c)?.ln();
-    (longest > chance).then(|| {
-        format!(
-            "{channel}: the {name} value {value} comes {longest} times in a row, chance explains {:.0}: taken for a rail",
-            chance.floor()
-        )
-    })
+    (longest > chance)
+        .then(|| Warning::RunAtEnd(high, value, longest, chance.floor()).of_channel(c))
 }
 
 /// Rails of the six channels: as declared, or where the largest or smallest
@@ -149,7 +142,7 @@ fn converter_rail(condensed: &Condensed, c: usize, value: f64, name: &str) -> Op
 pub(crate) fn find(
     condensed: &Condensed,
     manifest: &Manifest,
-    warnings: &mut Vec<String>,
+    warnings: &mut Vec<Warning>,
 ) -> [Rails; 6] {
     let mut rails = [Rails::default(); 6];
     for (c, rail) in rails.iter_mut().enumerate() {
@@ -173,19 +166,15 @@ pub(crate) fn find(
         if low == high {
             continue;
         }
-        let ends = [
-            (high, "highest", 1.0, &mut rail.high),
-            (low, "lowest", -1.0, &mut rail.low),
-        ];
-        for (value, name, sign, end) in ends {
-            if let Some(remark) = converter_rail(condensed, c, value, name) {
+        let ends = [(high, true, &mut rail.high), (low, false, &mut rail.low)];
+        for (value, is_high, end) in ends {
+            if let Some(remark) = converter_rail(condensed, c, value, is_high) {
                 warnings.push(remark);
                 *end = Some(value);
-            } else if let Some(inner) = calm_end(condensed, c, sign, [low, high]) {
-                warnings.push(format!(
-                    "{}: at its {name} values, from {inner} on, the noise is gone: taken for a rail of the sensor",
-                    RAW_COLUMNS[c]
-                ));
+            } else if let Some(inner) =
+                calm_end(condensed, c, if is_high { 1.0 } else { -1.0 }, [low, high])
+            {
+                warnings.push(Warning::CalmEnd(is_high, inner).of_channel(c));
                 *end = Some(inner);
             }
         }

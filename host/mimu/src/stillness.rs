@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use crate::blocks::{Block, Condensed, Level, Stretch, pool, quantile};
+use crate::fault::SHORTEST_S;
 use crate::quantity::Sensor;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{Manifest, Reference};
@@ -14,8 +15,6 @@ pub const WINDOW_S: f64 = 1.0;
 
 /// Left out at both ends of a dwell that was found, s: stillness begins and ends within a window.
 pub const GUARD_S: f64 = 0.2;
-/// A dwell that is shorter is flagged and not used, s.
-pub const SHORTEST_S: f64 = 1.0;
 
 /// Variance of a still window over the quietest, at most. Of six recordings by hand, all give the same number of dwells from
 /// 15 to 30 (38, and 22 five times); at 10 one has a fragment more, too short to be used; at 7 and 5 some are split.

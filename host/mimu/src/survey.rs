@@ -25,9 +25,10 @@ use crate::allan::units::Unit;
 use crate::allan::{Kind, Point, Spacing};
 use crate::calibration::Calibration;
 use crate::no_temperature;
-use crate::quantity::{Sensor, duration, significant};
+use crate::quantity::Sensor;
 use crate::spectrum::{SetAside, set_aside_after};
 use crate::unit_in_si::of_sizes;
+use crate::warning::Warning;
 use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{Column, NoTemperatures, RAW_COLUMNS, RawUnit, Recording};
 
@@ -91,11 +92,11 @@ pub struct Survey {
     /// The channels that the recording has, in the order of its columns.
     pub channels: Vec<Channel>,
     /// What a person should know.
-    pub warnings: Vec<String>,
+    pub warnings: Vec<Warning>,
 }
 
 /// What to do about a channel that never changes.
-const CHECK_WIRING: &str = "check its wiring, or that the right column was imported";
+pub(crate) const CHECK_WIRING: &str = "check its wiring, or that the right column was imported";
 
 /// Share of the Allan variance at the longest time from which on a ramp is what the curve shows there.
 const RAMP_SHARE: f64 = 0.5;
@@ -118,7 +119,8 @@ pub fn survey(
         .collect();
     let units = units(recording, calibration, &indices)?;
     let mut columns = Columns::open(recording, &indices, &progress)?;
-    let mut warnings = recording.warnings.clone();
+    let read = recording.warnings.iter().cloned();
+    let mut warnings: Vec<Warning> = read.map(Warning::Reading).collect();
     let stretch = Stretch::find(&mut columns, recording, options.part, &place, &mut warnings)?;
     let temp_c = match recording.columns.temp_c {
         true => {
@@ -166,10 +168,7 @@ pub fn survey(
                 Read::Values(values) => values,
                 Read::Dead(why) => {
                     next();
-                    warnings.push(format!(
-                        "{}: {why}: it has no noise, and a noise file does not have it; {CHECK_WIRING}",
-                        RAW_COLUMNS[i]
-                    ));
+                    warnings.push(Warning::Dead(why.clone()).of_channel(i));
                     channels.push(Channel::dead(i, units[done], why));
                     continue;
                 }
@@ -210,10 +209,7 @@ pub fn survey(
             };
             channel.judge_drift(hadamard, heat, &options, &mut warnings);
             if channel.spectrum.remains {
-                warnings.push(format!(
-                    "{}: lines that are not steady were set aside, and something still stands above the floor of the spectrum: the coefficients have some of it",
-                    channel.name
-                ));
+                warnings.push(Warning::UnsteadyLines.of_channel(i));
             }
             channel.spectrum = channel.spectrum.without_spectrum();
             channels.push(channel);
@@ -433,7 +429,7 @@ impl Channel {
         hadamard: impl FnOnce() -> Vec<Point>,
         heat: Option<(f64, f64)>,
         options: &Options,
-        warnings: &mut Vec<String>,
+        warnings: &mut Vec<Warning>,
     ) {
         let longest_s = self.curve.last().map_or(0.0, |p| p.tau_s);
         let ramp = self.model.as_ref().and_then(|model| {
@@ -441,20 +437,12 @@ impl Channel {
             Some((r / model.deviation(longest_s)).powi(2))
         });
         let ramp = ramp.filter(|share| *share > RAMP_SHARE);
-        match (heat, ramp) {
-            (Some((r, span_c)), _) => warnings.push(format!(
-                "{}: follows temp_c, which changes by {} °C (correlation {r:.2}): the long end of its curve is the chamber's and not the sensor's",
-                self.name,
-                significant(span_c)
-            )),
-            (None, Some(share)) => warnings.push(format!(
-                "{}: a drift makes {:.0} % of the variance at {}: the long end of its curve is warm-up or the chamber's, and not noise",
-                self.name,
-                100.0 * share,
-                duration(longest_s)
-            )),
+        let warning = match (heat, ramp) {
+            (Some((r, span_c)), _) => Warning::FollowsChamber(span_c, r),
+            (None, Some(share)) => Warning::Drifts(share, longest_s),
             (None, None) => return,
-        }
+        };
+        warnings.push(Warning::Channel(self.name, Box::new(warning)));
         if options.kind != Kind::Hadamard {
             self.hadamard = Some(hadamard());
         }

@@ -4,16 +4,13 @@ use mimu_recording::{Manifest, RawUnit, Reference};
 
 use crate::blocks::quantile;
 use crate::dwell::Dwell;
-use crate::quantity::{Figure, Sensor, significant};
+use crate::quantity::{Figure, Sensor};
+use crate::warning::Warning;
 
 /// Readings in SI with a gain beyond this, or below its inverse, have a wrong unit or time base: sensors are within ten per cent.
 const GAIN: f64 = 1.3;
 /// No gyro's bias is larger, rad/s: 40 deg/s, twice what the data sheet of an MPU-6050 allows.
 const LARGEST_BIAS: f64 = 0.7;
-
-fn degrees(rate: f64) -> String {
-    significant(rate.abs().to_degrees())
-}
 
 /// What to say of readings that are `scale` times their input, and are to be in SI; `by_turns` where a gyro is judged by the angles that it is
 /// integrated to.
@@ -22,20 +19,18 @@ pub(crate) fn wrong_gain(
     scale: f64,
     gravity_mps2: f64,
     figure: Figure,
-) -> Option<String> {
-    said_of(sensor, "the readings are", scale, gravity_mps2, figure)
+) -> Option<Warning> {
+    said_of(sensor, false, scale, gravity_mps2, figure)
 }
 
-/// Of readings at rest: with their biases, so that the scale factors of a fit differ from it.
-const AT_REST: &str = "at rest the readings, biases included, are about";
-
+/// At rest the readings have their biases, so that the scale factors of a fit differ from it.
 fn said_of(
     sensor: Sensor,
-    what: &str,
+    at_rest: bool,
     scale: f64,
     gravity_mps2: f64,
     figure: Figure,
-) -> Option<String> {
+) -> Option<Warning> {
     if (1.0 / GAIN..GAIN).contains(&scale) {
         return None;
     }
@@ -59,14 +54,11 @@ fn said_of(
         Sensor::Accel if near(gravity_mps2) => "they were multiplied by gravity twice",
         _ => "unit, or range setting of the part?",
     };
-    Some(format!(
-        "{sensor}: raw_unit = \"SI\", but {what} {} times the input: {cause}",
-        significant(scale)
-    ))
+    Some(Warning::NotSi(at_rest, scale, cause).of(sensor))
 }
 
 /// What to say of dwells at rest whose readings are to be in SI. Of inputs that are known a fit says it.
-pub(crate) fn at_rest(list: &[Dwell], manifest: &Manifest) -> Vec<String> {
+pub(crate) fn at_rest(list: &[Dwell], manifest: &Manifest) -> Vec<Warning> {
     if manifest.reference == Reference::Table {
         return Vec::new();
     }
@@ -80,7 +72,7 @@ pub(crate) fn at_rest(list: &[Dwell], manifest: &Manifest) -> Vec<String> {
 }
 
 /// What to say of readings of this size at rest, of gyro and accelerometer, that are to be in SI.
-pub(crate) fn of_sizes([rate, force]: [Option<f64>; 2], manifest: &Manifest) -> Vec<String> {
+pub(crate) fn of_sizes([rate, force]: [Option<f64>; 2], manifest: &Manifest) -> Vec<Warning> {
     if manifest.raw_unit != RawUnit::Si {
         return Vec::new();
     }
@@ -88,7 +80,7 @@ pub(crate) fn of_sizes([rate, force]: [Option<f64>; 2], manifest: &Manifest) -> 
     let force = force.and_then(|size| {
         said_of(
             Sensor::Accel,
-            AT_REST,
+            true,
             size / gravity,
             gravity,
             Figure::GravitySize,
@@ -97,16 +89,8 @@ pub(crate) fn of_sizes([rate, force]: [Option<f64>; 2], manifest: &Manifest) -> 
     let rate = rate.filter(|rate| *rate > LARGEST_BIAS);
     force
         .into_iter()
-        .chain(rate.map(turns_throughout))
+        .chain(rate.map(|rate| Warning::Turning(rate).of(Sensor::Gyro)))
         .collect()
-}
-
-/// What to say of a gyro that reads `rate`, rad/s, where it is to be at rest.
-fn turns_throughout(rate: f64) -> String {
-    format!(
-        "gyro: at rest it reads {} deg/s, and no bias is as large: the unit turns evenly, or the readings are in deg/s",
-        degrees(rate)
-    )
 }
 
 /// Scatter of the calibrated rate at rest, rad/s, that no bias and no g-sensitivity reaches: 2 deg/s.
@@ -114,12 +98,6 @@ const RESTLESS: f64 = 0.035;
 
 /// What to say of dwells whose calibrated rates are `rms` about rest. A fit by turns knows the scale factor, of readings in counts as well: how
 /// large a bias is it cannot judge, as the null of a converter is anywhere, but from dwell to dwell a bias stays what it is.
-pub(crate) fn restless(rms: f64) -> Option<String> {
-    (rms > RESTLESS).then(|| {
-        format!(
-            "gyro: from dwell to dwell the calibrated rate at rest differs by {} deg/s rms, as no bias does: in some that were taken for rest the \
-             unit turned evenly, about the vertical where the accelerometer shows nothing; leave these out",
-            degrees(rms)
-        )
-    })
+pub(crate) fn restless(rms: f64) -> Option<Warning> {
+    (rms > RESTLESS).then(|| Warning::Restless(rms).of(Sensor::Gyro))
 }

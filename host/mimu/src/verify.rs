@@ -5,16 +5,17 @@ use nalgebra::{Matrix3, Vector3};
 use serde::Serialize;
 
 use crate::calibration::Calibration;
-use crate::die_temperature::{WITHOUT_TEMPERATURE, at_one_temperature, outside};
+use crate::die_temperature::{at_one_temperature, outside};
 use crate::effects::removal::{removable, remove_within};
 use crate::estimate::turn::{Turn, direction_error};
 use crate::fit::as_came::{errors, exceeds};
 use crate::fit::refuse_wrong_gravity;
 use crate::prepared::{Prepared, si_covariance};
 use crate::quantity::Figure;
-use crate::quantity::{PerSensor, Sensor, plural, present};
+use crate::quantity::{PerSensor, Sensor, present};
 use crate::triad::Forward;
 use crate::unit_in_si::restless;
+use crate::warning::Warning;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{Manifest, RawUnit, Reference};
 
@@ -59,7 +60,7 @@ pub struct Verification {
     #[serde(serialize_with = "present")]
     pub sensors: PerSensor<Option<SensorVerification>>,
     /// What a person should know.
-    pub warnings: Vec<String>,
+    pub warnings: Vec<Warning>,
 }
 
 /// Judges `calibration` by a recording.
@@ -70,7 +71,7 @@ pub fn verify(prepared: &Prepared, calibration: &Calibration) -> Result<Verifica
     warnings.extend(check_unit(calibration, manifest, &prepared.place)?);
     let same_recording = calibration.recording.sha256.as_ref() == Some(&prepared.condensed.sha256);
     if same_recording {
-        warnings.push("this is the recording that the calibration was made from: the figures say nothing about new data".into());
+        warnings.push(Warning::SameRecording);
     }
     warnings.extend(outside(calibration, &prepared.condensed.blocks));
     if manifest.means && !calibration.effects().is_empty() {
@@ -86,7 +87,7 @@ pub fn verify(prepared: &Prepared, calibration: &Calibration) -> Result<Verifica
     let cleaned = cleaned.map(|cleaned| at_one(&cleaned).unwrap_or(cleaned));
     let moved = at_one(prepared);
     if curves.is_some() && moved.is_none() {
-        warnings.push(WITHOUT_TEMPERATURE.into());
+        warnings.push(Warning::NoTemperature);
     }
     let prepared = moved.as_ref().unwrap_or(prepared);
     let mut sensors = PerSensor::<Option<SensorVerification>>::default();
@@ -113,9 +114,7 @@ pub fn verify(prepared: &Prepared, calibration: &Calibration) -> Result<Verifica
             }
             (Some(affine), None) if cleaned.is_none() => affine,
             _ => {
-                warnings.push(format!(
-                    "{sensor}: the recording has nothing to judge it by"
-                ));
+                warnings.push(Warning::NothingToJudge.of(sensor));
                 continue;
             }
         };
@@ -143,31 +142,16 @@ pub fn verify(prepared: &Prepared, calibration: &Calibration) -> Result<Verifica
     let at_rest = sensors.present().filter_map(|(_, s)| s.static_rms);
     warnings.extend(at_rest.filter_map(restless));
     for (sensor, s) in sensors.present() {
-        let (other, what, question) = match s.rms_as_they_came {
-            Some(came) => (came, "the readings as they came", "this unit"),
-            None => (
-                s.rms_raw,
-                "its own mean scale factor and mean bias on all three axes and no misalignment",
-                "this unit, in this condition",
-            ),
-        };
+        let other = s.rms_as_they_came.unwrap_or(s.rms_raw);
         if !(s.rms > other) {
             continue;
         }
-        let noun = if s.figure == Figure::Direction {
-            "turn"
-        } else {
-            "dwell"
+        let as_came = s.rms_as_they_came.is_some();
+        let warning = match exceeds(s.rms, other, errors(s.figure, s.count)) {
+            true => Warning::Worse(as_came),
+            false => Warning::Undecided(s.count as u64, s.figure == Figure::Direction, as_came),
         };
-        warnings.push(match exceeds(s.rms, other, errors(s.figure, s.count)) {
-            true => {
-                format!("{sensor}: worse than with {what}: is it the calibration of {question}?")
-            }
-            false => format!(
-                "{sensor}: {} do not tell whether it is better than {what}: record more",
-                plural(s.count as u64, noun)
-            ),
-        });
+        warnings.push(warning.of(sensor));
     }
     Ok(Verification {
         format: "mimu-verify/1",
@@ -182,7 +166,7 @@ pub(crate) fn check_unit(
     calibration: &Calibration,
     manifest: &Manifest,
     place: &str,
-) -> Result<Option<String>> {
+) -> Result<Option<Warning>> {
     if calibration.recording.raw_unit != manifest.raw_unit {
         let problem = format!(
             "its raw unit is {}, the calibration is for {}",
@@ -219,7 +203,7 @@ fn judge(
     prepared: &Prepared,
     calibration: &Calibration,
     sensor: Sensor,
-) -> Option<(SensorVerification, Vec<String>)> {
+) -> Option<(SensorVerification, Vec<Warning>)> {
     let inverse = calibration.inverse(sensor)?;
     let mut warnings = Vec::new();
     let judged = match (prepared.manifest.reference, sensor) {
@@ -357,7 +341,7 @@ fn turns(
     prepared: &Prepared,
     gyro: &Affine<f64>,
     accel: &Affine<f64>,
-    warnings: &mut Vec<String>,
+    warnings: &mut Vec<Warning>,
 ) -> Option<SensorVerification> {
     let (by_calibration, refused) = prepared.turns(accel);
     warnings.extend(refused);

@@ -1,6 +1,7 @@
 //! The columns of a recording: their names, their order, and which of them a file has.
 
 use crate::error::{Error, Result};
+use crate::warning::Warning;
 
 /// Raw sensor columns, gyro before accelerometer, in the manifest's raw unit.
 pub const RAW_COLUMNS: [&str; 6] = [
@@ -105,7 +106,7 @@ pub(super) struct Layout {
     /// Which columns there are.
     pub columns: Columns,
     /// One sentence for each column that is ignored.
-    pub warnings: Vec<String>,
+    pub warnings: Vec<Warning>,
 }
 
 impl Layout {
@@ -128,7 +129,7 @@ impl Layout {
             let slot = Column::from_name(name);
             if slot.is_none() {
                 let name = super::cell::shorten(name.as_bytes());
-                warnings.push(format!("{place}: column {name} is unknown and is ignored"));
+                warnings.push(Warning::UnknownColumn(place.into(), name.clone()));
             }
             slots.push(slot);
         }
@@ -200,7 +201,7 @@ mod tests {
         assert!(layout.columns.accel && !layout.columns.gyro);
         assert_eq!(layout.slots[2], Some(Column::Raw(5)));
         assert_eq!(layout.warnings.len(), 1);
-        assert!(layout.warnings[0].contains("note"));
+        assert!(layout.warnings[0].to_string().contains("note"));
     }
 
     #[test]

@@ -85,6 +85,20 @@ pub enum Argument {
     SkipBroken,
     /// Of which columns a firmware took the low byte for a signed number.
     SignedLowByte,
+    /// The calibration at one temperature that curves are added to.
+    Base,
+    /// The estimator of curves over temperature.
+    Estimator,
+    /// Temperatures that a plan covers.
+    Range,
+    /// Shape of curves over temperature.
+    Curves,
+    /// Set points of a soak.
+    SetPoints,
+    /// Time at a set point.
+    Soak,
+    /// When the dwells of a recording begin and end.
+    StepTimes,
 }
 
 /// Result with [`Error`].

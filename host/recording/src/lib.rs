@@ -31,6 +31,7 @@ mod separator;
 mod staging;
 mod strict_file;
 mod toml_file;
+mod warning;
 mod writer;
 
 pub use batch::Batch;
@@ -49,4 +50,5 @@ pub use reader::{ReadSummary, Recording};
 pub use recorded::{Recorded, Restart};
 pub use separator::Separator;
 pub use toml_file::{parse_toml, read_text};
+pub use warning::Warning;
 pub use writer::{SampleFormat, Writer};

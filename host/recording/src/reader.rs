@@ -8,6 +8,7 @@ use super::csv_file::{CHUNK, CsvFile};
 use super::digest;
 use super::manifest::{MANIFEST_FILE, Manifest};
 use super::parquet_file::{ParquetFile, SLICE};
+use super::warning::Warning;
 use crate::error::{Error, Result};
 
 /// A recording whose manifest and header have been checked; the samples are read by
@@ -23,7 +24,7 @@ pub struct Recording {
     /// Which of the optional columns there are.
     pub columns: Columns,
     /// One sentence for each thing that was ignored.
-    pub warnings: Vec<String>,
+    pub warnings: Vec<Warning>,
     source: Samples,
 }
 
@@ -41,7 +42,7 @@ pub struct ReadSummary {
     /// SHA-256 of the samples file, as `sha256sum` prints it.
     pub sha256: String,
     /// One sentence for each thing that was ignored.
-    pub warnings: Vec<String>,
+    pub warnings: Vec<Warning>,
 }
 
 impl Recording {
@@ -93,14 +94,8 @@ impl Recording {
             (true, false) => {
                 let mut file = CsvFile::open(&csv)?;
                 if manifest.unfinished {
-                    let cut = match file.leave_out_cut_row()? {
-                        0 => "",
-                        _ => " but for its last row, which is cut",
-                    };
-                    warnings.push(format!(
-                        "{}: the recording was not ended (its program was killed, or still records); what is there is used{cut}",
-                        directory.display()
-                    ));
+                    let cut = file.leave_out_cut_row()? > 0;
+                    warnings.push(Warning::Unfinished(directory.to_owned(), cut));
                 }
                 (csv, Samples::Csv(file))
             }

@@ -9,7 +9,7 @@ use mimu::calibration::{Calibration, reference_node};
 use mimu::quantity::{PerSensor, Sensor};
 use mimu::triad::{Covariance, Part, Triad};
 use mimu_core::compensation::Affine;
-use mimu_recording::error::{Error, Result};
+use mimu_recording::error::{Argument, Error, Result};
 use nalgebra::Matrix3;
 
 use crate::curves::TriadCurves;
@@ -105,10 +105,12 @@ pub fn calibration(fit: &ThermalFit, base: &Calibration, created: &str) -> Resul
 /// Refuses a base that the curves cannot be added to; its temperature, °C.
 fn check(fit: &ThermalFit, base: &Calibration) -> Result<f64> {
     let first = &fit.sessions[0];
-    let refuse = |problem: String, remedy: &str| Err(Error::new("--base", problem, remedy));
+    let refuse = |problem: String, remedy: &str| {
+        Err(Error::new("base", problem, remedy).about(Argument::Base))
+    };
     if fit.joint.recorded().any(|c| !c.biases_only()) {
         let problem = "the recordings have known inputs, which determine all parameters".into();
-        return refuse(problem, "leave --base out");
+        return refuse(problem, "leave the base out");
     }
     let alike = match (&base.unit_id, &first.unit_id) {
         (Some(a), Some(b)) => a.eq_ignore_ascii_case(b),

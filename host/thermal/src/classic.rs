@@ -1,7 +1,7 @@
 //! Estimators that others use, for comparison: each takes the die to be as warm as the thermometer.
 
 use mimu::quantity::Sensor;
-use mimu_recording::error::{Error, Result};
+use mimu_recording::error::{Argument, Error, Result};
 use nalgebra::{Matrix4, Matrix4x3, Vector3};
 
 use crate::basis::Shape;
@@ -87,8 +87,9 @@ pub fn estimate(
         Error::undetermined(
             format!("{sensor}, estimator {}", classic.name()),
             format!("only {count} temperatures have all the poses and turns that it needs"),
-            "use --estimator joint, or repeat the whole scheme at five temperatures or more",
+            "use the joint estimator, or repeat the whole scheme at five temperatures or more",
         )
+        .about(Argument::Estimator)
     })
 }
 

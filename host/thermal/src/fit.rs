@@ -3,7 +3,7 @@
 use mimu::calibration::{Calibration, CurvesOfUnit, TriadOfCurves, reference_node};
 use mimu::quantity::{PerSensor, Sensor, significant};
 use mimu_recording::Reference;
-use mimu_recording::error::{Error, Result};
+use mimu_recording::error::{Argument, Error, Result};
 
 use crate::basis::{CURVATURE_SPAN, Shape};
 use crate::classic::{self, Classic};
@@ -192,8 +192,9 @@ fn of_literature(sessions: &[Session], classic: Classic) -> Result<Joint> {
     for sensor in Sensor::BOTH {
         if sessions.iter().any(|s| s.reference == Reference::Gravity) {
             let problem = format!("the estimator {} needs known inputs", classic.name());
-            let remedy = "use --estimator joint, or record with a table";
-            return Err(Error::new(&sessions[0].place, problem, remedy));
+            let remedy = "use the joint estimator, or record with a table";
+            let error = Error::new(&sessions[0].place, problem, remedy);
+            return Err(error.about(Argument::Estimator));
         }
         curves[sensor] = classic::estimate(sessions, sensor, classic)?;
     }

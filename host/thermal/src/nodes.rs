@@ -6,7 +6,7 @@ use mimu::quantity::{PerSensor, Sensor};
 use mimu::triad::Forward;
 use mimu_core::compensation::Affine;
 use mimu_core::die::LEAST_LAG_S;
-use mimu_recording::error::{Error, Result};
+use mimu_recording::error::{Argument, Error, Result};
 
 use crate::curves::TriadCurves;
 use crate::joint::Joint;
@@ -46,8 +46,9 @@ pub fn over_temperature(joint: &Joint) -> Result<OverTemperature> {
         return Err(Error::undetermined(
             "calibration",
             "only biases were estimated, and a calibration needs scale factors and misalignments too",
-            "give the unit's calibration at one temperature with --base, fit a recording with a table, or leave -o out",
-        ));
+            "give the unit's calibration at one temperature, fit a recording with a table, or write no calibration",
+        )
+        .about(Argument::Base));
     }
     let of = |sensor: Sensor, temp_c: f64| with_sigma(curves[sensor]?, temp_c);
     let has = curves.map(|c| c.is_some());

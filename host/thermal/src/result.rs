@@ -1,7 +1,8 @@
 //! `mimu-thermal/1`: what a fit over temperature found. SI and raw units throughout; what is not a number is null.
 
-use mimu::quantity::{AXES, PerSensor, Sensor, inverse_names, present, raw_unit, scale_unit};
-use mimu::triad::{Angles, Estimate};
+use mimu::parameter::{Kind, TriadParameter, parameters};
+use mimu::quantity::{PerSensor, Sensor, present, raw_unit};
+use mimu::triad::Estimate;
 use mimu_recording::RawUnit;
 use serde::Serialize;
 
@@ -116,6 +117,9 @@ impl DwellResult {
 /// A parameter over temperature.
 #[derive(Debug, Clone, Serialize)]
 pub struct CurveResult {
+    /// Which parameter.
+    #[serde(skip)]
+    pub of: TriadParameter,
     /// Sensor and name of the parameter, as a fit at one temperature calls it: `gyro_C_xx`, `accel_bias_z`.
     pub name: String,
     /// Sensor.
@@ -251,10 +255,11 @@ fn curves_of(curves: &TriadCurves, sensor: Sensor, raw: RawUnit) -> Vec<CurveRes
         .collect();
     let mut out: Vec<CurveResult> = Vec::new();
     for &temp_c in &temps {
-        for (k, (name, unit, e)) in at(curves, sensor, raw, temp_c).into_iter().enumerate() {
+        for (k, (of, e, unit)) in at(curves, sensor, raw, temp_c).into_iter().enumerate() {
             if out.len() <= k {
                 out.push(CurveResult {
-                    name: format!("{sensor}_{name}"),
+                    name: format!("{sensor}_{of}"),
+                    of,
                     sensor,
                     unit,
                     temp_c: Vec::new(),
@@ -273,51 +278,17 @@ fn curves_of(curves: &TriadCurves, sensor: Sensor, raw: RawUnit) -> Vec<CurveRes
     out
 }
 
-/// Parameters at one temperature: name, unit, estimate.
+/// Parameters at one temperature with their units.
 fn at(
     curves: &TriadCurves,
     sensor: Sensor,
     raw: RawUnit,
     temp_c: f64,
-) -> Vec<(String, String, Estimate)> {
-    let si = sensor.unit();
-    let Some(triad) = curves.triad(temp_c) else {
-        return biases(curves, sensor, raw, temp_c);
-    };
-    let inverse_unit = match raw {
-        RawUnit::Si => "1".to_string(),
-        other => format!("({si})/{other}"),
-    };
-    let mut all = Vec::new();
-    let inverse = inverse_names().into_iter().zip(triad.inverse_estimates());
-    for (k, (name, e)) in inverse.enumerate() {
-        all.push((
-            name,
-            if k < 9 {
-                inverse_unit.clone()
-            } else {
-                si.into()
-            },
-            e,
-        ));
+) -> Vec<(TriadParameter, Estimate, String)> {
+    match curves.triad(temp_c) {
+        Some(triad) => parameters(&triad, sensor, raw),
+        None => biases(curves, sensor, raw, temp_c),
     }
-    let physical = triad.physical(Angles::Exact);
-    for (name, axes, estimates, unit) in [
-        ("scale", AXES, physical.scale, scale_unit(raw, si)),
-        ("bias", AXES, physical.bias, raw_unit(raw, si)),
-        ("misalignment", AXES, physical.misalignment, "rad".into()),
-        (
-            "non_orthogonality",
-            ["yz", "zy", "zx"],
-            physical.non_orthogonality,
-            "rad".into(),
-        ),
-    ] {
-        for (axis, e) in axes.iter().zip(estimates) {
-            all.push((format!("{name}_{axis}"), unit.clone(), e));
-        }
-    }
-    all
 }
 
 /// Biases where nothing else is estimated; of the accelerometer with what gravity adds in the one pose.
@@ -326,12 +297,12 @@ fn biases(
     sensor: Sensor,
     raw: RawUnit,
     temp_c: f64,
-) -> Vec<(String, String, Estimate)> {
+) -> Vec<(TriadParameter, Estimate, String)> {
     let [model, _] = curves.forward(temp_c);
     let covariance = curves.covariance(temp_c);
-    let name = match sensor {
-        Sensor::Gyro => "bias",
-        Sensor::Accel => "bias_and_gravity",
+    let kind = match sensor {
+        Sensor::Gyro => Kind::Bias,
+        Sensor::Accel => Kind::BiasAndGravity,
     };
     (0..3)
         .map(|k| {
@@ -342,7 +313,7 @@ fn biases(
                 interval: 1.96 * sigma,
             };
             let unit = raw_unit(raw, sensor.unit());
-            (format!("{name}_{}", AXES[k]), unit, estimate)
+            (TriadParameter(kind, k), estimate, unit)
         })
         .collect()
 }

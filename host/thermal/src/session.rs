@@ -111,8 +111,8 @@ impl Session {
         }
         let condensed = &prepared.condensed;
         let thermometer = Thermometer::of(condensed, manifest.power_on_s, &prepared.place)?;
-        let mut warnings = condensed.warnings.clone();
-        warnings.extend(prepared.dwells.warnings.iter().cloned());
+        let found = condensed.warnings.iter().chain(&prepared.dwells.warnings);
+        let mut warnings: Vec<String> = found.map(ToString::to_string).collect();
         let rows = PerSensor::from_fn(|sensor| rows(prepared, sensor));
         let moved_s = match manifest.reference {
             Reference::Gravity => {

@@ -6,6 +6,7 @@ use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
 use mimu::stillness::STILL_FACTOR;
 use mimu::verify::{SensorVerification, verify};
+use mimu::warning::Warning;
 use mimu_recording::Recording;
 use mimu_recording::error::Result;
 use serde::Serialize;
@@ -111,7 +112,7 @@ pub struct Judged {
     /// Why it must not be stored.
     pub broken: Vec<String>,
     /// What a person should know.
-    pub warnings: Vec<String>,
+    pub warnings: Vec<Warning>,
 }
 
 impl Judged {

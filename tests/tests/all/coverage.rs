@@ -9,6 +9,7 @@ use mimu::estimate::{Estimated, Failure, Observation};
 use mimu::fit::{Method, Options, fit};
 use mimu::quantity::Sensor;
 use mimu::stillness::STILL_FACTOR;
+use mimu::warning::Warning;
 use mimu_recording::{
     Batch, Columns, Manifest, RawUnit, Recording, Reference, SampleFormat, Writer,
 };
@@ -255,7 +256,7 @@ fn a_saturated_dwell_is_found_and_left_out() {
         accel.rms(),
         accel.noise_floor()
     );
-    let told = |w: &String| w.contains("accel_z saturated");
+    let told = |w: &Warning| w.to_string().contains("accel_z saturated");
     assert!(fitted.warnings.iter().any(told), "{:?}", fitted.warnings);
 }
 

@@ -7,6 +7,7 @@ use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
 use mimu::result::diagnosis::DiagnosisResult;
 use mimu::stillness::STILL_FACTOR;
+use mimu::warning::Warning;
 use mimu_rig::random::Random;
 use mimu_rig::rig_file::RigFile;
 use mimu_tests::bench;
@@ -103,9 +104,9 @@ fn a_diagnosis_that_accepted_thermal_effects_does_not_say_that_the_model_has_no_
         DiagnosisResult::of(&diagnosis, &next, None)
     };
     let said = |result: &DiagnosisResult| {
-        let said = result.warnings.iter();
+        let said = result.warnings.iter().map(Warning::to_string);
         let said = said.filter(|w| w.contains("has no temperature in it"));
-        said.cloned().collect::<Vec<_>>()
+        said.collect::<Vec<_>>()
     };
     let both = of(&thermal(4));
     assert!(both.effects.len() >= 2);

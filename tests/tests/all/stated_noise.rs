@@ -6,6 +6,7 @@ use mimu::noise_file::NoiseFile;
 use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
 use mimu::stillness::STILL_FACTOR;
+use mimu::warning::Warning;
 use mimu_rig::random::Random;
 use mimu_tests::bench;
 
@@ -60,6 +61,7 @@ fn a_channel_whose_dwells_are_not_as_noisy_as_the_file_says_keeps_its_own_noise_
         .dwells
         .warnings
         .iter()
+        .map(Warning::to_string)
         .filter(|w| w.starts_with("gyro_x"))
         .collect();
     assert!(told.len() == 1 && told[0].contains("as noisy"), "{told:?}");

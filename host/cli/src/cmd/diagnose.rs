@@ -11,6 +11,7 @@ use mimu::fit::{Method, Options};
 use mimu::next_experiment;
 use mimu::result::diagnosis::DiagnosisResult;
 use mimu::verify::verify;
+use mimu::warning::Warning;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::result_file::stage;
 
@@ -143,7 +144,7 @@ pub fn run(args: &DiagnoseArgs) -> Result<()> {
         match (before, after) {
             (Ok(before), Ok(after)) => judged = Some((path.to_string(), [before, after])),
             (Err(refusal), _) | (_, Err(refusal)) => {
-                let warning = format!("{path} cannot judge the calibration: {refusal}");
+                let warning = Warning::NotJudged(Some(path.to_string()), refusal);
                 diagnosis.after.warnings.push(warning);
             }
         }
@@ -216,11 +217,8 @@ fn known(given: Option<&Calibration>, diagnosis: &mut Diagnosis) -> Vec<FittedEf
     let (kept, lost) = all.partition(|effect| after.sensor(effect.sensor()).is_some());
     let lost: Vec<FittedEffect> = lost;
     for effect in lost {
-        after.warnings.push(format!(
-            "{} of the calibration is not in the new one, as the {} is not recorded",
-            effect.id(),
-            effect.sensor()
-        ));
+        let warning = Warning::EffectLost(effect.id(), effect.sensor());
+        after.warnings.push(warning);
     }
     kept
 }

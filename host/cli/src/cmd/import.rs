@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
-use mimu::quantity::{implausible_gravity, normal_gravity};
+use mimu::quantity::normal_gravity;
+use mimu::warning::Warning;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::signed_low_byte::SignedLowByte;
 use mimu_recording::{
@@ -114,7 +115,9 @@ pub(crate) fn run(args: ImportArgs) -> Result<()> {
     let (gravity, assumed) = match (args.gravity, args.latitude) {
         (Some(gravity), latitude) => (
             gravity,
-            latitude.and_then(|at| implausible_gravity(gravity, at)),
+            latitude
+                .and_then(|at| Warning::of_gravity(gravity, at))
+                .map(|w| w.to_string()),
         ),
         (None, Some(latitude)) => (normal_gravity(latitude), None),
         (None, None) if args.reference == Reference::Table => (9.80665, None),

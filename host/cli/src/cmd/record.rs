@@ -18,7 +18,8 @@ use mimu_recording::{Inputs, SampleFormat};
 use crate::arguments::JsonArgs;
 use crate::cmd::device::{PortArgs, duration, interruption};
 use crate::output::{check_outputs, print, progress};
-use mimu::quantity::{implausible_gravity, normal_gravity};
+use mimu::quantity::normal_gravity;
+use mimu::warning::Warning;
 
 /// What every recording of a device has, whoever moves the unit.
 #[derive(Args)]
@@ -60,7 +61,7 @@ impl RecordingArgs {
         };
         match (self.gravity.or(of_plan), self.latitude_deg(plan)) {
             (Some(gravity), latitude) => {
-                let warning = latitude.and_then(|at| implausible_gravity(gravity, at));
+                let warning = latitude.and_then(|at| Warning::of_gravity(gravity, at));
                 if let Some(warning) = warning {
                     eprintln!("warning: {warning}");
                 }

@@ -8,9 +8,10 @@ use std::time::Duration;
 
 use clap::{Args, ValueEnum};
 use mimu::plan::Plan;
-use mimu::quantity::{implausible_gravity, normal_gravity};
+use mimu::quantity::normal_gravity;
 use mimu::readable::STANDARD_GRAVITY;
 use mimu::result::diagnosis::DiagnosisResult;
+use mimu::warning::Warning;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{Manifest, Parents, RawUnit};
 use mimu_wizard::device::DeviceSource;
@@ -232,7 +233,7 @@ impl WizardArgs {
             }
         };
         if let (Some(gravity), Some(at)) = (gravity, latitude_deg)
-            && let Some(warning) = implausible_gravity(gravity, at)
+            && let Some(warning) = Warning::of_gravity(gravity, at)
         {
             eprintln!("warning: {warning}");
         }

@@ -167,14 +167,14 @@ pub fn download_text(result: &DeviceResult<Contents>) -> String {
     }
     for node in &found.nodes {
         line!(out, "\nat {} °C", node.temp_c);
-        for (sensor, model) in [
-            ("gyro", &node.gyro),
-            ("accel", &node.accel),
-            ("gyro/K", &node.gyro_slope),
-            ("accel/K", &node.accel_slope),
+        for (sensor, model, is_slope) in [
+            ("gyro", &node.gyro, false),
+            ("accel", &node.accel, false),
+            ("gyro/K", &node.gyro_slope, true),
+            ("accel/K", &node.accel_slope, true),
         ] {
             let mut numbers = model.C.as_flattened().iter().chain(&model.o);
-            if sensor.ends_with("/K") && numbers.all(|x| *x == 0.0) {
+            if is_slope && numbers.all(|x| *x == 0.0) {
                 continue;
             }
             line!(out, "  {sensor:<6} {:>42}   {:>14}", "C", "o");

@@ -3,11 +3,13 @@
 use std::fmt::Write as _;
 
 use mimu::fit::Split;
+use mimu::parameter::Kind;
 use mimu::quantity::{Sensor, plural, plus_minus, significant};
 use mimu::readable;
 use mimu::result::fit::{DwellResult, FitResult, Parameter, SensorFitResult};
 use mimu_recording::Reference;
 
+use crate::hint;
 use crate::report::text::warn;
 
 /// Result of `mimu fit`.
@@ -30,7 +32,7 @@ pub fn fit_text(fit: &FitResult) -> String {
     }
     if !fit.warnings.is_empty() {
         let _ = writeln!(out);
-        warn(&mut out, fit.warnings.iter());
+        warn(&mut out, fit.warnings.iter().map(hint::of_warning));
     }
     out
 }
@@ -162,20 +164,18 @@ fn sensor_text(out: &mut String, fit: &FitResult, name: Sensor, sensor: &SensorF
 fn parameters_text(out: &mut String, fit: &FitResult, name: Sensor, sensor: &SensorFitResult) {
     // The accelerometer's own axes are the frame then.
     let by_choice = fit.reference == Reference::Gravity && name == Sensor::Accel;
-    let kinds = [
-        ("scale", "scale factor"),
-        ("bias", "bias"),
-        ("misalignment", "misalignment"),
-        ("non_orthogonality", "non-orthogonality yz, zy, zx"),
-    ];
     let mut rows = Vec::new();
-    for (key, label) in kinds {
-        let triple: Vec<&Parameter> = sensor.triple(key).collect();
-        let Some(first) = triple
-            .first()
-            .filter(|_| key != "misalignment" || !by_choice)
-        else {
+    for kind in Kind::PHYSICAL {
+        if kind == Kind::Misalignment && by_choice {
             continue;
+        }
+        let triple: Vec<&Parameter> = sensor.of_kind(kind).collect();
+        let Some(first) = triple.first() else {
+            continue;
+        };
+        let label = match kind {
+            Kind::NonOrthogonality => "non-orthogonality yz, zy, zx",
+            other => other.words(),
         };
         let shown = readable::parameter(&first.unit);
         let cell = |p: &&Parameter| {

@@ -1,6 +1,6 @@
 //! Lines and warnings, for all results that people read.
 
-use std::fmt::Write as _;
+use std::fmt::{Display, Write as _};
 
 /// Width that text keeps to, characters.
 pub(crate) const COLUMNS: usize = 98;
@@ -30,8 +30,8 @@ pub(super) fn wrap(out: &mut String, head: &str, text: &str) {
     let _ = writeln!(out, "{line}");
 }
 
-pub(crate) fn warn(out: &mut String, warnings: impl Iterator<Item = impl AsRef<str>>) {
+pub(crate) fn warn(out: &mut String, warnings: impl Iterator<Item = impl Display>) {
     for warning in warnings {
-        let _ = writeln!(out, "warning: {}", warning.as_ref());
+        let _ = writeln!(out, "warning: {warning}");
     }
 }

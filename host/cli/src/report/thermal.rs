@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use mimu::parameter::Kind;
 use mimu::quantity::{Sensor, plus_minus, significant};
 use mimu::readable;
 use mimu_thermal::compare::Comparison;
@@ -133,11 +134,7 @@ fn bins_text(out: &mut String, sensor: &SensorResult) {
 
 /// Whether a curve is one of `sensor`'s that people know: not of C and o.
 pub(super) fn physical(curve: &CurveResult, sensor: Sensor) -> bool {
-    let rest = curve
-        .name
-        .trim_start_matches(sensor.name())
-        .trim_start_matches('_');
-    curve.sensor == sensor && !rest.starts_with("C_") && !rest.starts_with("o_")
+    curve.sensor == sensor && curve.of.0 != Kind::Inverse
 }
 
 /// Physical parameters at some temperatures; JSON has the inverse model too, and more temperatures.
@@ -155,10 +152,7 @@ fn curves_text(out: &mut String, name: Sensor, result: &ThermalResult) {
     let _ = writeln!(out);
     for curve in curves {
         let unit = readable::parameter(&curve.unit);
-        let label = curve
-            .name
-            .trim_start_matches(name.name())
-            .trim_start_matches('_');
+        let label = curve.of;
         let _ = write!(out, "  {:<34}", format!("{label}, {}", unit.unit));
         for &k in &shown {
             let half = 0.5 * (curve.upper[k] - curve.lower[k]) * unit.factor;

@@ -148,7 +148,7 @@ fn curves(result: &ThermalResult, name: Sensor) -> Markup {
             tbody {
                 @for curve in found {
                     @let unit = readable::parameter(&curve.unit);
-                    @let label = curve.name.trim_start_matches(name.name()).trim_start_matches('_');
+                    @let label = curve.of.to_string();
                     tr {
                         td { (label) ", " (unit.unit) }
                         @for k in &shown {

@@ -6,6 +6,7 @@ use std::ops::Range;
 use maud::{Markup, html};
 
 use super::svg::{Frame, px, range};
+use mimu::parameter::Kind;
 use mimu::quantity::{AXES, Sensor};
 use mimu::readable;
 use mimu_thermal::result::{CurveResult, DwellResult, SensorResult, ThermalResult};
@@ -29,14 +30,6 @@ const MARKS: usize = 200;
 /// Colours of the three numbers of a kind.
 const CLASSES: [&str; 3] = ["a", "b", "c"];
 
-/// Kinds of numbers: how their names begin, heading, whether they are shown relative to themselves.
-const KINDS: [(&str, &str, bool); 4] = [
-    ("scale", "scale factor", true),
-    ("bias", "bias", false),
-    ("misalignment", "misalignment", false),
-    ("non_orthogonality", "non-orthogonality", false),
-];
-
 /// All of them: for each sensor a row of curves and one of errors; a single one where there are only biases.
 pub fn svg(result: &ThermalResult) -> String {
     let mut panels: Vec<(f64, f64, Markup)> = Vec::new();
@@ -46,7 +39,9 @@ pub fn svg(result: &ThermalResult) -> String {
         (Sensor::Accel, &result.sensors.accel),
     ] {
         let Some(found) = found else { continue };
-        let kinds = KINDS.iter().map(|kind| curves(result, sensor, kind));
+        let kinds = Kind::PHYSICAL
+            .map(|kind| curves(result, sensor, kind))
+            .into_iter();
         let of_curves: Vec<Markup> = kinds.flatten().collect();
         let mut next = of_curves.len();
         for (k, drawn) in of_curves.into_iter().enumerate() {
@@ -63,7 +58,7 @@ pub fn svg(result: &ThermalResult) -> String {
         }
         height += PANEL.1;
     }
-    let width = PANEL.0 * KINDS.len() as f64;
+    let width = PANEL.0 * Kind::PHYSICAL.len() as f64;
     let drawn = html! {
         svg class="curves" xmlns="http://www.w3.org/2000/svg" width=(width) height=(height) viewBox={ "0 0 " (width) " " (height) } {
             style { (STYLE) }
@@ -89,22 +84,14 @@ fn frame(result: &ThermalResult, y: Range<f64>) -> Frame {
 type Points = Vec<(f64, f64, f64, f64)>;
 
 /// One kind of numbers of a sensor, if it has them.
-fn curves(
-    result: &ThermalResult,
-    sensor: Sensor,
-    (begins, heading, relative): &(&str, &str, bool),
-) -> Option<Markup> {
-    let prefix = format!("{}_{begins}_", sensor.name());
+fn curves(result: &ThermalResult, sensor: Sensor, kind: Kind) -> Option<Markup> {
+    // The bias of the accelerometer in one pose has gravity in it.
+    let ours = |of: Kind| of == kind || (of == Kind::BiasAndGravity && kind == Kind::Bias);
     let found = result.curves.iter().filter(|c| c.sensor == sensor);
-    let found: Vec<&CurveResult> = found.filter(|c| c.name.starts_with(&prefix)).collect();
-    // In one pose: "bias_and_gravity_x".
-    let axis_of = |c: &CurveResult| c.name.rsplit('_').next().unwrap_or_default().to_owned();
+    let found: Vec<&CurveResult> = found.filter(|c| ours(c.of.0)).collect();
     let first = found.first()?;
-    let with_gravity = first.name.contains("_and_gravity_");
-    let heading = match with_gravity {
-        true => format!("{heading} and gravity"),
-        false => (*heading).to_owned(),
-    };
+    // Scale factors are shown relative to themselves.
+    let relative = kind == Kind::Scale;
     let unit = readable::parameter(&first.unit);
     let all: Vec<(String, Points)> = found
         .iter()
@@ -119,7 +106,7 @@ fn curves(
                 let [low, high] = [curve.lower[k], curve.upper[k]].map(change);
                 (curve.temp_c[k], change(curve.value[k]), low, high)
             });
-            (axis_of(curve), points.collect())
+            (curve.of.axis(), points.collect())
         })
         .collect();
     let frame = frame(
@@ -136,7 +123,7 @@ fn curves(
         .map(|(c, a)| (*c, a.0.as_str()))
         .collect();
     Some(html! {
-        (frame.axes(&format!("{} {heading}", sensor.name()), true))
+        (frame.axes(&format!("{sensor} {}", first.of.0.words()), true))
         @for (class, (_, points)) in CLASSES.iter().zip(&all) {
             @let band: Vec<_> = points.iter().map(|p| (p.0, p.2, p.3)).collect();
             (frame.band(&format!("{class} band"), &band))

@@ -16,6 +16,7 @@ use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
+use super::note::Note;
 use super::rows::Rows;
 use super::search::{Chosen, FALSE_LISTED, Found, MOST, Search, beside};
 use super::variance::Fitted;
@@ -115,7 +116,7 @@ pub struct Decision {
     /// Accepted effects whose physics the rows do not decide.
     pub undecided: Vec<Undecided>,
     /// What a person should know of the accepted effects.
-    pub notes: Vec<String>,
+    pub notes: Vec<Note>,
     /// Rows, and affine parameters that they had to determine first: what is left between them is all that can be judged by.
     pub rows: [usize; 2],
     /// Probability of chance that the rows before scatter as they do, by the known noise alone.
@@ -141,12 +142,12 @@ impl Decision {
             ids.push(accepted.chosen.candidate.id());
         }
         if !ids.is_empty() {
-            self.notes.push(format!(
-                "{}: the device had not been switched on but had started anew ({start}), so that the time since power-on is unknown; the \
-                 coefficients count from the start of the recording, are of this recording alone, and are in no calibration; switch it off \
-                 and on, and record at once",
+            let found = format!(
+                "{}: the device had not been switched on but had started anew ({start}), so that the time since power-on is unknown",
                 ids.join(", ")
-            ));
+            );
+            self.notes.push(Note::new(found, "the coefficients count from the start of the recording, are of this recording alone, and are in no calibration; switch it off \
+                 and on, and record at once"));
         }
     }
 
@@ -442,22 +443,24 @@ fn shares(search: &Search, chosen: &[Chosen], fit: &Fitted) -> Vec<DVector<f64>>
 }
 
 /// What a person should know of the chosen.
-fn notes(rows: &Rows, chosen: &[Chosen]) -> Vec<String> {
+fn notes(rows: &Rows, chosen: &[Chosen]) -> Vec<Note> {
     let mut notes = Vec::new();
     let inputs = chosen.iter().filter(|c| !c.candidate.is_error());
     notes.extend(inputs.map(|c| {
-        format!(
-            "{}: the unit is right to read it; the calibration is found without it, and nothing takes it out of readings",
-            c.candidate.id()
+        let found = format!("{}: the unit is right to read it", c.candidate.id());
+        Note::new(
+            found,
+            "the calibration is found without it, and nothing takes it out of readings",
         )
     }));
     let sessions = chosen.iter().filter(|c| c.candidate.is_of_session());
     notes.extend(sessions.map(|c| {
-        format!(
+        let found = format!(
             "{}: specific to this session, as nobody knows how far it goes on: no calibration holds it, and the biases are those of the \
              middle of the session",
             c.candidate.id()
-        )
+        );
+        Note::new(found, "")
     }));
     for candidate in chosen.iter().map(|c| &c.candidate) {
         if let Kind::Effect(effect) = &candidate.kind
@@ -467,12 +470,12 @@ fn notes(rows: &Rows, chosen: &[Chosen]) -> Vec<String> {
                 .inseparable
                 .iter()
                 .map(|k| effect.coefficients[*k].name);
-            notes.push(format!(
-                "{}: this recording does not tell {} from the bias and the other coefficients, and they are 0 in the file; it needs {}",
+            let found = format!(
+                "{}: this recording does not tell {} from the bias and the other coefficients, and they are 0 in the file",
                 effect.id,
-                names.collect::<Vec<_>>().join(", "),
-                effect.needs
-            ));
+                names.collect::<Vec<_>>().join(", ")
+            );
+            notes.push(Note::new(found, format!("it needs {}", effect.needs)));
         }
     }
     // Its level part goes by the heading, and on a table that shows one heading in each attitude by products of the force.
@@ -482,30 +485,33 @@ fn notes(rows: &Rows, chosen: &[Chosen]) -> Vec<String> {
         .filter(|c| matches!(&c.candidate.kind, Kind::Term(_, m) if only_force(m)));
     let level: Vec<String> = level.map(|c| c.candidate.id()).collect();
     if !level.is_empty() && chosen.iter().any(|c| !c.candidate.is_error()) {
-        notes.push(format!(
+        let found = format!(
             "{}: may be the level part of the Earth's rate, which goes by the heading and is another elsewhere: show each attitude at \
              several headings",
             level.join(", ")
-        ));
+        );
+        notes.push(Note::new(found, ""));
     }
     let heated = chosen.iter().filter(|c| c.candidate.without_self_heating);
     notes.extend(heated.map(|c| {
-        format!(
-            "{}: the thermometer warms up by itself in the first minute, and the sensor is on another die; the device has no other \
-             thermometer, and errs by that for so long after power-on",
+        let found = format!(
+            "{}: the thermometer warms up by itself in the first minute, and the sensor is on another die",
             c.candidate.id()
-        )
+        );
+        let advice = "the device has no other thermometer, and errs by that for so long after power-on";
+        Note::new(found, advice)
     }));
     let slow = chosen.iter().filter(|c| c.candidate.is_slow());
     let ids: Vec<String> = slow.map(|c| c.candidate.id()).collect();
     let Some(order) = rows.one_way().filter(|_| !ids.is_empty()) else {
         return notes;
     };
-    notes.push(format!(
+    let found = format!(
         "{}: the temperature only {} while time goes on (rank correlation {order:.2}), so that what follows temperature and what \
-         follows time look alike, and a lag of the die looks like a bias; let it come back within one recording",
+         follows time look alike, and a lag of the die looks like a bias",
         ids.join(", "),
         if order > 0.0 { "rises" } else { "falls" },
-    ));
+    );
+    notes.push(Note::new(found, "let it come back within one recording"));
     notes
 }

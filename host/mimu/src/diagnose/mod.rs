@@ -8,6 +8,7 @@
 //! | [`rows`]      | what the affine model leaves of dwells and turns, as one linear problem          |
 //! | [`variance`]    | how that scatters: known noise, more of it, a bias that walks                    |
 //! | [`search`]    | which effects the rows ask for                                                   |
+//! | [`note`]      | what a person should know of the accepted ones                                   |
 //! | [`decision`]  | which of them are accepted, and what is left                                     |
 //! | `passes`      | all of this again with the affine model that strong effects leave                |
 //! | [`uncertainty`] | what the coefficients of effects leave open of what stands on them               |
@@ -16,6 +17,7 @@
 mod as_written;
 mod candidate;
 pub mod decision;
+pub mod note;
 mod passes;
 pub mod picture;
 pub mod rows;
@@ -35,10 +37,11 @@ use crate::calibration::Calibration;
 use crate::effects::fitted::FittedEffect;
 use crate::effects::removal::{removable, remove_within};
 use crate::estimate::least_squares::POORLY_DETERMINED;
-use crate::fit::{Fit, Options, fit, fit_biases, without_temperature};
+use crate::fit::{Fit, Options, fit, fit_biases};
 use crate::prepared::Prepared;
 use crate::quantity::{Sensor, significant};
 use crate::triad::{Part, Triad};
+use crate::warning::Warning;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{RawUnit, Reference};
 
@@ -304,20 +307,17 @@ fn with_temperature(now: &mut Fit, sensors: &[SensorDiagnosis]) {
         accepted.any(|a| a.chosen.candidate.is_thermal())
     };
     let (with, without): (Vec<_>, Vec<_>) = sensors.iter().partition(thermal);
-    let plain = without_temperature(&now.prepared, &Sensor::BOTH);
-    if let (false, Some(plain)) = (with.is_empty(), plain) {
-        let count = now.warnings.len();
-        now.warnings.retain(|w| *w != plain);
-        if now.warnings.len() < count {
-            let without: Vec<Sensor> = without.iter().map(|s| s.sensor).collect();
-            now.warnings
-                .extend(without_temperature(&now.prepared, &without));
-        }
+    if with.is_empty() {
+        return;
     }
+    now.warnings.retain_mut(|warning| {
+        if let Warning::WithoutTemperature(.., whose) = warning {
+            *whose = without.first().map(|s| s.sensor);
+            return whose.is_some();
+        }
+        true
+    });
 }
-
-/// What a calibration that was fetched from a device leaves open.
-const UNCERTAIN: &str = "the calibration does not say how well it is known, as one that a device kept: its matrix is taken as exact, so that what it is off by may be found as an effect, and the intervals of a new calibration lack it";
 
 /// Diagnoses a unit.
 ///
@@ -422,7 +422,7 @@ pub fn diagnose(recordings: Recordings, options: Options) -> Result<Diagnosis> {
         }
     }
     if recordings.given.is_some_and(|given| !given.is_uncertain()) {
-        now.warnings.push(UNCERTAIN.into());
+        now.warnings.push(Warning::Uncertain);
     }
     sensors.reverse();
     with_temperature(&mut now, &sensors);

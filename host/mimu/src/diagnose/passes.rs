@@ -311,7 +311,7 @@ impl Passes<'_> {
         let noisier = ours.iter().enumerate().flat_map(|(k, s)| {
             let mut all = noisier(s, sensor);
             for one in all.iter_mut().filter(|_| ours.len() > 1) {
-                one.stratum = format!("{} of recording {}", one.stratum, k + 1);
+                one.stratum.1 = Some(k);
             }
             all
         });

@@ -15,6 +15,7 @@ use super::decision::{Decision, Model, part, rms};
 use super::rows::Rows;
 use super::search::{Chosen, Search};
 use crate::fit::Split;
+use crate::observable::Observable;
 use crate::quantity::Sensor;
 
 /// What residuals are of.
@@ -52,6 +53,9 @@ pub struct Track {
     rows: Vec<usize>,
     #[serde(skip)]
     axis: Option<usize>,
+    /// What they are of, whatever the recording.
+    #[serde(skip)]
+    pub group: Observable,
 }
 
 /// Error figures of a model.
@@ -209,7 +213,7 @@ fn tracks(rows: &Rows, sample: impl Fn(usize, f64) -> Sample) -> Vec<Track> {
             };
             all.push(Track {
                 name: match (directions, direction) {
-                    (1, _) => stratum.name.clone(),
+                    (1, _) => stratum.name.to_string(),
                     (_, 0) => format!("{}, first direction", stratum.name),
                     _ => format!("{}, second direction", stratum.name),
                 },
@@ -221,6 +225,7 @@ fn tracks(rows: &Rows, sample: impl Fn(usize, f64) -> Sample) -> Vec<Track> {
                 samples: of_it.iter().map(|r| sample(*r, sigma(*r))).collect(),
                 rows: of_it,
                 axis: stratum.axis,
+                group: stratum.name.0,
             });
         }
     }

@@ -33,6 +33,7 @@ use crate::estimate::earth::poses;
 pub use forces::ForceErrors;
 use terms::Quantities;
 
+use crate::observable::StratumName;
 use crate::prepared::Prepared;
 use crate::quantity;
 use crate::quantity::Sensor;
@@ -42,8 +43,8 @@ use crate::triad::Covariance;
 /// Rows that share their noise.
 #[derive(Debug, Clone)]
 pub struct Stratum {
-    /// Name: an axis, `turns`, `rest x`; with the number of the recording where there are several.
-    pub name: String,
+    /// What its rows are of.
+    pub name: StratumName,
     /// Axis, where all of its rows are of one.
     pub axis: Option<usize>,
     /// Index of its recording.

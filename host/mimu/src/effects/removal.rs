@@ -12,6 +12,7 @@ use crate::dwell::Fault;
 use crate::prepared::Prepared;
 use crate::quantity::Sensor;
 use crate::triad::directions;
+use crate::warning::Warning;
 use mimu_recording::Reference;
 use mimu_recording::error::{Error, Result};
 
@@ -305,11 +306,9 @@ fn leave_out_unknown(sensor: Sensor, effects: &[&FittedEffect], out: &mut Prepar
         };
         if slot.is_none() {
             *slot = Some(fault);
-            out.dwells.warnings.push(format!(
-                "dwell {}: not used for the {sensor}: {fault}, and {} cannot be removed without it",
-                dwell.step,
-                effect.candidate.id()
-            ));
+            let id = effect.candidate.id();
+            let warning = Warning::DwellWithEffect(dwell.step, sensor, fault, id);
+            out.dwells.warnings.push(warning);
         }
     }
 }

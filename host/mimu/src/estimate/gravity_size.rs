@@ -11,6 +11,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, SVector, Vector3};
 
 use super::least_squares::{Linearized, Observability, excess_variance, minimize};
 use super::{Estimated, Failure, Observation};
+use crate::observable::Observable;
 use crate::quantity::AXES;
 use crate::quantity::plural;
 use crate::triad::{Covariance, Part, Triad};
@@ -233,7 +234,7 @@ pub fn estimate(
     .ok_or_else(|| Failure::NoSolution("C is singular".into()))?;
     Ok(Estimated {
         triad,
-        scatter: vec![("magnitude of specific force".into(), scatter)],
+        scatter: vec![(Observable::Magnitude, scatter)],
         condition: shape.condition,
         delays: None,
         notes: Vec::new(),

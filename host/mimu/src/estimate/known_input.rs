@@ -8,8 +8,10 @@ use super::least_squares::{
     Errors, Observability, Scatter, excess_of, excess_variance, solve_with_excess,
 };
 use super::{Estimated, Failure, Observation};
+use crate::observable::Observable;
 use crate::quantity::AXES;
 use crate::triad::{Covariance, Forward, Part, Triad};
+use crate::warning::Warning;
 
 /// Two inputs are opposite if their sum is below this share of their size: a table's repeatability.
 const OPPOSITE_SHARE: f64 = 0.01;
@@ -116,7 +118,7 @@ pub fn least_squares(
         axes.push(OfAxis {
             parameters: solution.parameters,
             covariance: solution.covariance,
-            scatter: vec![(AXES[axis].to_string(), scatter)],
+            scatter: vec![(Observable::Axis(axis), scatter)],
         });
     }
     forward(&axes, span, observability.condition)
@@ -219,7 +221,7 @@ pub fn kalman(
                 return Ok(OfAxis {
                     parameters: mean,
                     covariance,
-                    scatter: vec![(AXES[axis].to_string(), scatter)],
+                    scatter: vec![(Observable::Axis(axis), scatter)],
                 });
             }
         }
@@ -235,7 +237,7 @@ pub(super) struct OfAxis {
     /// Their covariance.
     pub covariance: DMatrix<f64>,
     /// By group of observations; the variance of the parameters comes from all.
-    pub scatter: Vec<(String, Scatter)>,
+    pub scatter: Vec<(Observable, Scatter)>,
 }
 
 /// Puts `[b, P1, P2, P3]` of the three sensors (inputs in units of `span`) together.
@@ -373,9 +375,7 @@ pub fn opposite_rates(observations: &[Observation]) -> Result<Estimated, Failure
     let residual = &known - &reading * &c_transposed;
     let mut notes = Vec::new();
     if single > 0 {
-        notes.push(format!(
-            "{single} rates have no opposite and are not used by the inverse form"
-        ));
+        notes.push(Warning::NoOpposite(single));
     }
     let scatter_of = |values: Vec<f64>, variances: &[Matrix3<f64>], axis: usize, dof: f64| {
         let variances: Vec<f64> = variances
@@ -388,7 +388,7 @@ pub fn opposite_rates(observations: &[Observation]) -> Result<Estimated, Failure
         .map(|axis| {
             let values = residual.column(axis).iter().copied().collect();
             (
-                AXES[axis].to_string(),
+                Observable::Axis(axis),
                 scatter_of(values, &noise, axis, pairs.len() as f64 - 3.0),
             )
         })
@@ -408,7 +408,7 @@ pub fn opposite_rates(observations: &[Observation]) -> Result<Estimated, Failure
         rest_dof[axis] = dof;
         rest_noise[(axis, axis)] += excess / count;
         if of_rest.excess > 0.0 {
-            scatter.push((format!("{} at rest", AXES[axis]), of_rest));
+            scatter.push((Observable::AtRest(axis), of_rest));
         }
     }
     let covariance = rows_covariance(&pseudo, |p, r, s| {
@@ -464,7 +464,7 @@ pub fn opposite_rates(observations: &[Observation]) -> Result<Estimated, Failure
 fn by_row<const N: usize>(
     row_of: impl Fn(usize, usize) -> Option<usize>,
     covariance: &SMatrix<f64, N, N>,
-    scatter: &[(String, Scatter)],
+    scatter: &[(Observable, Scatter)],
 ) -> Vec<(SMatrix<f64, N, N>, f64)> {
     let of = |row: Option<usize>| {
         SMatrix::from_fn(|a, b| {
@@ -538,7 +538,7 @@ pub fn inverse_form(observations: &[Observation]) -> Result<Estimated, Failure> 
                 .map(|m| m[(axis, axis)].max(f64::MIN_POSITIVE))
                 .collect();
             (
-                AXES[axis].to_string(),
+                Observable::Axis(axis),
                 excess_variance(&r, &v, n as f64 - 4.0),
             )
         })
@@ -640,7 +640,7 @@ pub fn six_positions(observations: &[Observation]) -> Result<Estimated, Failure>
         let of_axis = excess_variance(&residuals, &variances, used.len() as f64 - 2.0);
         down.2 += of_axis.excess / ends[0].3;
         up.2 += of_axis.excess / ends[1].3;
-        scatter.push((AXES[axis].to_string(), of_axis));
+        scatter.push((Observable::Axis(axis), of_axis));
         // Bias at the middle of the two inputs, which is zero to the table's repeatability.
         covariance[(4 * axis, 4 * axis)] = (up.2 + down.2) / (width * width);
         covariance[(9 + axis, 9 + axis)] = 0.25 * (up.2 + down.2);

@@ -24,7 +24,9 @@ pub mod with_turns;
 
 use nalgebra::Vector3;
 
+use crate::observable::Observable;
 use crate::triad::Triad;
+use crate::warning::Warning;
 use least_squares::Scatter;
 
 /// The mean of a dwell as an estimator sees it; or, where its input moves, another sum over the dwell, with weights that add to zero.
@@ -59,13 +61,13 @@ pub struct Estimated {
     /// The calibration.
     pub triad: Triad,
     /// Scatter by axis where the axes are fitted one by one, by group otherwise.
-    pub scatter: Vec<(String, Scatter)>,
+    pub scatter: Vec<(Observable, Scatter)>,
     /// Condition number of the scaled design.
     pub condition: f64,
     /// Delays of the readings, where moving inputs show them.
     pub delays: Option<Delays>,
     /// What a person should know.
-    pub notes: Vec<String>,
+    pub notes: Vec<Warning>,
 }
 
 impl Estimated {

@@ -11,7 +11,8 @@ use super::least_squares::{
     Errors, Group, Observability, POORLY_DETERMINED, Scatter, Solution, solve_groups,
 };
 use super::{Delays, Estimated, Failure, Observation};
-use crate::quantity::AXES;
+use crate::observable::Observable;
+use crate::warning::Warning;
 
 /// Steps of the iteration for the delay: the model is linear but for its product with the scale factor, and the third changes nothing.
 const STEPS: usize = 6;
@@ -120,7 +121,7 @@ pub fn least_squares(
             delays[0][axis] = delay;
             delays[1][axis] = solution.covariance[(4, 4)].sqrt();
         }
-        let names = ["", " within dwells"].map(|n| format!("{}{n}", AXES[axis]));
+        let names = [Observable::Axis(axis), Observable::Within(axis)];
         axes.push(OfAxis {
             parameters: solution.parameters.rows(0, 4).into_owned(),
             covariance: solution.covariance.view((0, 0), (4, 4)).into_owned(),
@@ -132,7 +133,7 @@ pub fn least_squares(
         let [value, sigma] = delays;
         estimated.delays = Some(Delays { value, sigma });
     } else {
-        estimated.notes.push("a delay of the readings behind the reference is not told from a misalignment, and taken for none: turn both ways, or at several rates".into());
+        estimated.notes.push(Warning::NoDelay);
     }
     Ok(estimated)
 }

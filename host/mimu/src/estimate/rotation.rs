@@ -13,6 +13,7 @@ use super::chains::Chains;
 use super::least_squares::{Linearized, Observability, Scatter, excess_variance, minimize};
 use super::turn::{Motion, Rest, Rotations, Turn, across, between, by_forces};
 use super::{Estimated, Failure};
+use crate::observable::Observable;
 use crate::quantity::AXES;
 use crate::triad::{Covariance, Part, Triad};
 
@@ -315,10 +316,9 @@ pub fn estimate(
     let of_accelerometer = accel.inverse_parts();
     let shared = of_accelerometer.iter().map(|part| part.seen_by(&gain));
     let parts = own.chain(shared).map(|part| part.seen_by(&change));
-    let scatter: Vec<_> = ["turns", "rest"]
-        .iter()
+    let scatter = [Observable::Turns, Observable::Rest]
+        .into_iter()
         .zip(groups)
-        .map(|(n, g)| (n.to_string(), g))
         .collect();
     let triad = Triad::from_inverse(inverse, parts.collect()).ok_or_else(|| {
         Failure::NoSolution(

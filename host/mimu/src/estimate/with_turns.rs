@@ -15,7 +15,9 @@ use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, Vector3};
 use super::least_squares::{Linearized, excess_variance, minimize};
 use super::turn::{Rest, Rotations, Turn, across, between, by_forces};
 use super::{Estimated, Failure, Observation};
+use crate::observable::Observable;
 use crate::triad::{Covariance, Part, Triad};
+use crate::warning::Warning;
 
 /// Parameters: six of C and three of o of the accelerometer, then nine of C and three of o of the gyro.
 const ACCEL: usize = 9;
@@ -257,10 +259,10 @@ impl Together<'_> {
         magnitude.chi2 = first_chi2.unwrap_or(magnitude.chi2);
         Ok(Estimated {
             triad,
-            scatter: vec![("magnitude of specific force".into(), magnitude)],
+            scatter: vec![(Observable::Magnitude, magnitude)],
             condition,
             delays: None,
-            notes: vec!["the poses alone hardly determine it: the turns between them, which the gyro measures, are used as well".into()],
+            notes: vec![Warning::WithTurns],
         })
     }
 }

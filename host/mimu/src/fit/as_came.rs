@@ -10,7 +10,8 @@ use super::sensor::{SensorFit, rms};
 use crate::estimate::Observation;
 use crate::estimate::turn::{Turn, direction_error};
 use crate::prepared::Prepared;
-use crate::quantity::{Figure, significant};
+use crate::quantity::Figure;
+use crate::warning::Warning;
 use mimu_recording::RawUnit;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
@@ -56,25 +57,18 @@ fn in_si(prepared: &Prepared) -> bool {
 /// Warns of a calibration that does no better than the readings as they came.
 pub(super) fn compare(fit: &mut SensorFit) {
     let Some(came) = fit.as_came else { return };
-    let (calibrated, how) = match fit.held_out_rms() {
-        Some(held) => (held, "on data that it was not fitted to"),
-        None => (fit.rms(), "in sample"),
-    };
+    let held_out = fit.held_out_rms();
+    let calibrated = held_out.unwrap_or_else(|| fit.rms());
     if calibrated < came {
         return;
     }
     let (factor, unit) = fit.figure.readable(fit.sensor);
     let count = fit.residuals.len();
-    let verdict = match exceeds(calibrated, came, errors(fit.figure, count)) {
-        true => "this calibration is no better than none".to_string(),
-        false => format!("{count} errors do not tell whether this calibration is better than none"),
-    };
-    fit.warnings.push(format!(
-        "{}: the readings as they came err by {} {unit}, and calibrated by {} {unit} {how}: {verdict}",
-        fit.sensor,
-        significant(came * factor),
-        significant(calibrated * factor)
-    ));
+    let worse = exceeds(calibrated, came, errors(fit.figure, count));
+    let errors = [came, calibrated].map(|error| error * factor);
+    let undecided = (!worse).then_some(count);
+    let warning = Warning::NoBetter(errors, unit, held_out.is_some(), undecided);
+    fit.warnings.push(warning.of(fit.sensor));
 }
 
 /// Probability that what is said to be larger is so by chance.

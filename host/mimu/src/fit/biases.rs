@@ -10,11 +10,9 @@ use crate::prepared::{Prepared, si_covariance};
 use crate::quantity::Figure;
 use crate::quantity::Sensor;
 use crate::triad::{Covariance, Part, Triad};
+use crate::warning::Warning;
 use mimu_recording::Reference;
 use mimu_recording::error::{Error, Result};
-
-/// What a person should know of a fit to a matrix whose covariance is known.
-const GIVEN: &str = "the matrix is given, with its intervals; the biases are this recording's, and the intervals hold both";
 
 /// What the covariance of a given C, by rows, is of a model whose biases were found beside it: where the readings are on average, the error
 /// of the matrix is in the bias.
@@ -49,7 +47,7 @@ pub fn fit_biases(
         let observations = prepared.observations(sensor);
         if observations.is_empty() {
             let unused = prepared.dwells.unused(sensor);
-            warnings.push(format!("{sensor}: no dwell can be used{unused}"));
+            warnings.push(Warning::NoDwell(unused).of(sensor));
             continue;
         }
         refuse_wrong_gravity(&prepared, sensor, &observations)?;
@@ -62,7 +60,7 @@ pub fn fit_biases(
             if let Some(triad) = Triad::from_inverse(estimated.triad.inverse, parts) {
                 estimated.triad = triad;
             }
-            estimated.notes = vec![GIVEN.into()];
+            estimated.notes = vec![Warning::MatrixGiven(true)];
         }
         let inverse = estimated.triad.inverse;
         let reference = prepared.manifest.reference;

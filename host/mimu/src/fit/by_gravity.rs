@@ -13,13 +13,14 @@ use crate::estimate::{Estimated, Failure, Observation, gravity_size, rotation};
 use crate::prepared::Prepared;
 use crate::quantity::{Figure, Sensor};
 use crate::triad::{Triad, slope};
+use crate::warning::Warning;
 use mimu_recording::RawUnit;
 use mimu_recording::error::{Error, Result};
 
 pub(super) fn fit_gravity(
     prepared: &Prepared,
     options: Options,
-    warnings: &mut Vec<String>,
+    warnings: &mut Vec<Warning>,
 ) -> Result<Vec<SensorFit>> {
     let g = prepared.manifest.gravity_mps2;
     if !prepared.has(Sensor::Accel) {
@@ -269,7 +270,7 @@ fn fit_turns(
     prepared: &Prepared,
     accel: &Estimated,
     parts: &Parts,
-    warnings: &mut Vec<String>,
+    warnings: &mut Vec<Warning>,
 ) -> Result<Option<SensorFit>> {
     let g = prepared.manifest.gravity_mps2;
     let by_full = &accel.triad.inverse;
@@ -277,8 +278,7 @@ fn fit_turns(
     warnings.extend(refused);
     let rest = prepared.rest(by_full);
     if turns.is_empty() {
-        warnings
-            .push("gyro: no turn lies between two usable dwells, so it is not calibrated".into());
+        warnings.push(Warning::NoTurn.of(Sensor::Gyro));
         return Ok(None);
     }
     let motions = prepared.motions(by_full);
@@ -357,7 +357,7 @@ fn fit_turns(
     );
     fit.as_came = as_came::directions(prepared, &turns);
     if wide > 20f64.to_radians() {
-        fit.warnings.push(format!("gyro: after one turn gravity is {:.0} degrees from where it is predicted; samples are missing or clipped, or the gyro's columns are not the gyro's", wide.to_degrees()));
+        fit.warnings.push(Warning::WideTurn(wide).of(Sensor::Gyro));
     }
     Ok(Some(fit))
 }

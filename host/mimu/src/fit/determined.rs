@@ -10,9 +10,10 @@ use super::of_temperature::with_temperature;
 use super::sensor::SensorFit;
 use crate::estimate::Failure;
 use crate::prepared::Prepared;
-use crate::quantity::{AXES, Figure, plus_minus, significant};
+use crate::quantity::{AXES, Figure, Sensor, plus_minus};
 use crate::readable;
 use crate::triad::{Angles, Covariance, Triad, slope};
+use crate::warning::Warning;
 use mimu_recording::Reference;
 use mimu_recording::error::{Argument, Result};
 
@@ -123,15 +124,11 @@ const OPEN: f64 = 10.0;
 
 /// What to say of poses that were not held, if the calibration errs there by far more than where it was fitted. Six faces and eight edges,
 /// none of them between x and y, left the magnitude open by 35 mm/s² there: the file was worse than none on the corners.
-pub(super) fn unseen_poses(gravity: f64, triad: &Triad, typical: f64) -> Option<String> {
+pub(super) fn unseen_poses(gravity: f64, triad: &Triad, typical: f64) -> Option<Warning> {
     let open = open_poses(gravity, triad, OPEN * typical);
     let (_, worst) = open.first()?;
-    let [worst, typical] = [*worst, typical].map(|v| significant(1e3 * v));
-    let names: Vec<&str> = open.iter().map(|(name, _)| name.as_str()).collect();
-    Some(format!(
-        "accel: with {} up, near which no pose is, the calibration is open by {worst} mm/s² (one sigma), and in the poses held by {typical} mm/s²: add such poses before it is used there",
-        names.join(", ")
-    ))
+    let names = open.iter().map(|(name, _)| name.clone()).collect();
+    Some(Warning::UnseenPoses(names, *worst, typical).of(Sensor::Accel))
 }
 
 /// Faces and edges in which the magnitude of specific force has a standard deviation of more than `limit`, m/s², and that one; the worst
@@ -223,7 +220,8 @@ mod tests {
     fn edges_that_no_pose_was_near_are_named_if_the_magnitude_is_open_there() {
         let flat = |(name, _): &(String, Vector3<f64>)| name.contains('x') && name.contains('y');
         let poses = directions().into_iter().filter(|p| !flat(p)).map(|p| p.1);
-        let text = unseen_poses(9.8, &known_by(poses, 3e-3), 3e-3).unwrap();
+        let text = unseen_poses(9.8, &known_by(poses, 3e-3), 3e-3);
+        let text = text.unwrap().to_string();
         // Only the angle between x and y is open: one edge of the four tells it.
         assert!(
             text.contains("with +x+y up")

@@ -5,6 +5,7 @@ use serde::Serialize;
 
 use crate::estimate::Failure;
 use crate::quantity::{Figure, Sensor, significant};
+use crate::warning::Warning;
 
 /// How dwells are held out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -46,7 +47,7 @@ pub struct HoldOut {
     /// How many of them were held out.
     pub count: usize,
     /// Why not in blocks, or why some parts were not held out.
-    pub reasons: Vec<String>,
+    pub reasons: Vec<Warning>,
 }
 
 impl HoldOut {
@@ -68,27 +69,16 @@ pub(super) struct HeldOut<T> {
     /// One for each part.
     pub refits: Vec<Result<T, Failure>>,
     /// Why not in blocks, and why some parts are not held out.
-    pub reasons: Vec<String>,
+    pub reasons: Vec<Warning>,
 }
 
 /// Which parts cannot be held out, and why the first of them cannot.
-fn cannot<T>(name: &str, refits: &[Result<T, Failure>]) -> Option<String> {
-    let mut failed = Vec::new();
-    let mut first = None;
-    for (part, refit) in refits.iter().enumerate() {
-        if let Err(failure) = refit {
-            failed.push((part + 1).to_string());
-            first.get_or_insert_with(|| failure.problem());
-        }
-    }
-    let problem = first?;
-    Some(match &failed[..] {
-        [one] => format!("{name} {one} cannot be held out: without it {problem}"),
-        all => format!(
-            "{name}s {} cannot be held out: without the first of these {problem}",
-            all.join(", ")
-        ),
-    })
+fn cannot<T>(blocks: bool, refits: &[Result<T, Failure>]) -> Option<Warning> {
+    let failed = refits.iter().enumerate();
+    let failed = failed.filter_map(|(part, refit)| Some((part + 1, refit.as_ref().err()?)));
+    let (parts, failures): (Vec<usize>, Vec<&Failure>) = failed.unzip();
+    let problem = failures.first()?.problem();
+    Some(Warning::NotHeldOut(blocks, parts, problem))
 }
 
 impl<T: Send> HeldOut<T> {
@@ -103,7 +93,7 @@ impl<T: Send> HeldOut<T> {
             refits.collect()
         };
         let blocks = cut(Split::Blocks);
-        let Some(why) = cannot("block", &blocks) else {
+        let Some(why) = cannot(true, &blocks) else {
             return Self {
                 split: Split::Blocks,
                 refits: blocks,
@@ -113,10 +103,8 @@ impl<T: Send> HeldOut<T> {
         let failed = |refits: &[Result<T, Failure>]| refits.iter().filter(|r| r.is_err()).count();
         let interleaved = cut(Split::Interleaved);
         if failed(&interleaved) < failed(&blocks) {
-            let mut reasons = vec![format!(
-                "one dwell in {parts} is held out, and no blocks: {why}"
-            )];
-            reasons.extend(cannot("part", &interleaved));
+            let mut reasons = vec![Warning::Interleaved(parts, Box::new(why))];
+            reasons.extend(cannot(false, &interleaved));
             return Self {
                 split: Split::Interleaved,
                 refits: interleaved,

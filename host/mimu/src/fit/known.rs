@@ -7,14 +7,15 @@ use super::sensor::{Residual, SensorFit, typical};
 use super::{Method, Options, as_came, finish, lever_arm, refuse_wrong_gravity};
 use crate::estimate::{Observation, known_input, moving_input};
 use crate::prepared::{Prepared, si_covariance};
-use crate::quantity::{Figure, Sensor, plural};
+use crate::quantity::{Figure, Sensor};
 use crate::triad::slope;
+use crate::warning::Warning;
 use mimu_recording::error::{Argument, Error, Result};
 
 pub(super) fn fit_known(
     prepared: &Prepared,
     options: Options,
-    warnings: &mut Vec<String>,
+    warnings: &mut Vec<Warning>,
 ) -> Result<Vec<SensorFit>> {
     let mut sensors = Vec::new();
     let mut missing = Vec::new();
@@ -23,9 +24,7 @@ pub(super) fn fit_known(
         let observations = prepared.observations(sensor);
         if observations.is_empty() {
             let unused = prepared.dwells.unused(sensor);
-            missing.push(format!(
-                "{sensor}: no usable dwell has a known input{unused}, so it is not calibrated"
-            ));
+            missing.push(Warning::NoInput(unused).of(sensor));
             continue;
         }
         refuse_wrong_gravity(prepared, sensor, &observations)?;
@@ -76,9 +75,7 @@ pub(super) fn fit_known(
                         .iter()
                         .all(|o| o.input == observations[0].input) =>
             {
-                missing.push(format!(
-                    "{sensor}: all dwells have the same input, so it is not calibrated"
-                ));
+                missing.push(Warning::OneInput.of(sensor));
                 continue;
             }
             Err(failure) => {
@@ -106,15 +103,12 @@ pub(super) fn fit_known(
             .any(|o| prepared.dwells.list[o.dwell].turn)
             && sensor == Sensor::Gyro
         {
-            warnings.push("gyro: the turns are taken to be of exactly the given angle about exactly the given axis; what hands and table miss of that is in no interval".into());
+            warnings.push(Warning::ExactTurns.of(sensor));
         }
         if !within.is_empty() && options.method != Method::LeastSquares {
-            warnings.push(format!(
-                "{sensor}: {} {} an input that moves, of which {} uses the mean alone: least squares uses how the readings follow it",
-                plural(count_dwells(&within), "dwell"),
-                if count_dwells(&within) == 1 { "has" } else { "have" },
-                options.method.name()
-            ));
+            let count = count_dwells(&within);
+            let warning = Warning::MeansAlone(count, options.method.name());
+            warnings.push(warning.of(sensor));
         }
         let means = observations.iter().map(|o| (o, 1.0));
         let within_used = match options.method {
@@ -186,7 +180,11 @@ pub(super) fn fit_known(
     if sensors.is_empty() {
         let error = Error::new(
             &prepared.place,
-            missing.join(", "),
+            missing
+                .iter()
+                .map(Warning::to_string)
+                .collect::<Vec<_>>()
+                .join(", "),
             "give dwells of a second and more their inputs in the ref_ columns, or set reference = \"gravity\" where there is no table",
         );
         let judged = Sensor::BOTH.into_iter().filter(wanted);

@@ -6,7 +6,8 @@ use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::sensor::{Residual, SensorFit};
 use crate::prepared::Prepared;
-use crate::quantity::{Figure, Sensor, significant};
+use crate::quantity::{Figure, Sensor};
+use crate::warning::Warning;
 
 /// Errors across the known force over those along it, and over noise, from which on the force is not where the reference says.
 const ACROSS: f64 = 3.0;
@@ -26,7 +27,7 @@ struct Dwell<'a> {
 }
 
 /// What to say of an accelerometer whose faces were off level, whatever estimator found it.
-pub fn off_level(prepared: &Prepared, fit: &SensorFit) -> Option<String> {
+pub fn off_level(prepared: &Prepared, fit: &SensorFit) -> Option<Warning> {
     if fit.sensor != Sensor::Accel || fit.figure != Figure::Input {
         return None;
     }
@@ -39,12 +40,7 @@ pub fn off_level(prepared: &Prepared, fit: &SensorFit) -> Option<String> {
         .collect();
     let dwells = dwells?;
     let angle = beside_those_along(&dwells).or_else(|| no_error_along(&dwells))?;
-    (angle > LEVEL).then(|| {
-        format!(
-            "accel: the errors lie across the known force and not along it, as if the dwells were off level by {} deg rms: level the faces, or leave the directions out (reference = \"gravity\")",
-            significant(angle.to_degrees())
-        )
-    })
+    (angle > LEVEL).then(|| Warning::OffLevel(angle).of(Sensor::Accel))
 }
 
 /// Angle, rad, if the errors across the forces are far beyond those along them and the noise.

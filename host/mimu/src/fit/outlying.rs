@@ -15,8 +15,9 @@ use crate::dwell::{Dwells, Fault, LeftOut};
 use crate::estimate::turn::{Turn, direction_error};
 use crate::estimate::{Estimated, Observation, gravity_size, rotation};
 use crate::prepared::{Prepared, si_covariance};
-use crate::quantity::{AXES, Sensor, significant};
+use crate::quantity::{AXES, Sensor};
 use crate::triad::Triad;
+use crate::warning::Warning;
 use deletion::{Judged, Row, against_others, contradicted};
 
 /// Standard deviations, by the noise or by the scatter of the others where that is more, from which on something is outlying.
@@ -77,22 +78,13 @@ pub(super) fn leave_out(prepared: &mut Prepared) -> WithAll {
         if keep.keeps(step) {
             continue;
         }
-        let off = format!(
-            "its magnitude of specific force is {} mm/s² off what the other dwells predict",
-            significant(1e3 * judged.error)
-        );
         if !judged.can_be_spared() {
-            warnings.push(format!(
-                "dwell {step} is kept for the accelerometer, though {}: {}, so nothing says whether it is right; repeat its pose",
-                if judged.error.is_finite() { off } else { "it is suspect".into() },
-                needed(ACCEL_PARAMETERS[judged.grows.0], judged.grows.1)
-            ));
+            let (parameter, grows) = judged.grows;
+            let parameter = ACCEL_PARAMETERS[parameter];
+            warnings.push(Warning::DwellKept(step, judged.error, parameter, grows));
             continue;
         }
-        warnings.push(format!(
-            "dwell {step} is not used for the accelerometer: {off}, {:.0} sigma of that prediction; `--keep {step}` fits with it",
-            judged.sigmas
-        ));
+        warnings.push(Warning::DwellLeftOut(step, judged.error, judged.sigmas));
         list[index].accel_fault = Some(Fault::Outlying);
         left_out.push(LeftOut {
             sensor: Sensor::Accel,
@@ -131,17 +123,6 @@ const ACCEL_PARAMETERS: [&str; 9] = [
     "the bias of y",
     "the bias of z",
 ];
-
-/// What would become of a parameter without an observation.
-fn needed(parameter: &str, grows: f64) -> String {
-    match grows < 1e3 {
-        true => format!(
-            "without it the interval of {parameter} would be {} times as wide",
-            significant(grows)
-        ),
-        false => format!("nothing else determines {parameter}"),
-    }
-}
 
 fn fit_poses(prepared: &Prepared, poses: &[Observation], g: f64) -> Option<Estimated> {
     let first = gravity_size::first_guess(poses, g)?;
@@ -188,7 +169,7 @@ fn outlying_turns(
     prepared: &Prepared,
     accel: &Estimated,
     g: f64,
-) -> (Vec<LeftOut>, Option<Triad>, Vec<String>) {
+) -> (Vec<LeftOut>, Option<Triad>, Vec<Warning>) {
     let none = (Vec::new(), None, Vec::new());
     let model = &accel.triad.inverse;
     let (turns, _) = prepared.turns(model);
@@ -241,11 +222,11 @@ fn outlying_turns(
                 ),
                 _ => format!("the bias of gyro {}", AXES[parameter - 9]),
             };
-            warnings.push(format!(
-                "the turn from dwell {} to {} is kept, though it is suspect: {}; repeat it",
+            warnings.push(Warning::TurnKept(
                 step(turn.from),
                 step(turn.to),
-                needed(&name, grows)
+                name,
+                grows,
             ));
             continue;
         }

@@ -9,9 +9,9 @@ use super::sensor::{Residual, SensorFit};
 use crate::estimate::Failure;
 use crate::prepared::Prepared;
 use crate::quantity::Figure;
-use crate::quantity::plural;
 use crate::quantity::significant;
 use crate::unit_in_si::{restless, wrong_gain};
+use crate::warning::Warning;
 use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{RAW_COLUMNS, RawUnit, Reference};
 
@@ -106,7 +106,7 @@ fn spread(prepared: &Prepared, fit: &SensorFit) -> f64 {
 }
 
 /// Refuses readings that do not follow their inputs. Those that do beside the temperature are fitted, with a warning.
-fn refuse_unrelated(prepared: &Prepared, fit: &SensorFit) -> Result<Option<String>> {
+fn refuse_unrelated(prepared: &Prepared, fit: &SensorFit) -> Result<Option<Warning>> {
     let spread = spread(prepared, fit);
     let share = fit.rms() / spread;
     if share <= FOLLOWS_NOTHING {
@@ -118,14 +118,8 @@ fn refuse_unrelated(prepared: &Prepared, fit: &SensorFit) -> Result<Option<Strin
         Figure::GravitySize | Figure::Direction => None,
     };
     if let Some(with) = with.filter(|w| w.rms / spread <= FOLLOWS_NOTHING) {
-        return Ok(Some(format!(
-            "{}: {} of the known inputs is left over by a model without temperature, and {} by one with it: the parameters are those at about {:.1} °C, \
-             the mean of the dwells, and their intervals hold what the temperature does; `mimu diagnose` finds what follows it",
-            fit.sensor,
-            percent(share),
-            percent(with.rms / spread),
-            with.mean_c
-        )));
+        let warning = Warning::FollowsTemperature(share, with.rms / spread, with.mean_c);
+        return Ok(Some(warning.of(fit.sensor)));
     }
     let against = match fit.figure {
         Figure::Input => "the known inputs",
@@ -167,7 +161,7 @@ fn name(prepared: &Prepared, residual: &Residual) -> String {
     label.cloned().unwrap_or_else(|| step.to_string())
 }
 
-fn outliers(prepared: &Prepared, fit: &SensorFit) -> Option<String> {
+fn outliers(prepared: &Prepared, fit: &SensorFit) -> Option<Warning> {
     let mut sorted = worst_first(fit);
     let rounding = EXACT * sorted.first()?.value.norm();
     sorted.retain(|r| r.value.norm() > rounding);
@@ -182,25 +176,15 @@ fn outliers(prepared: &Prepared, fit: &SensorFit) -> Option<String> {
     };
     let bad: Vec<_> = sorted.iter().filter(off).collect();
     let worst = bad.first()?;
-    let names: Vec<String> = bad.iter().take(8).map(|r| name(prepared, r)).collect();
-    let what = match fit.figure {
-        Figure::Direction => "turn to dwell",
-        _ => "dwell",
-    };
-    let more = if bad.len() > names.len() { ", ..." } else { "" };
-    Some(format!(
-        "{}: {} ({what} {}{more}): off by up to {} {}, {:.0} times the median; look for the cause, as it widens all intervals",
-        fit.sensor,
-        plural(bad.len() as u64, "outlier"),
-        names.join(", "),
-        significant(worst.value.norm()),
-        fit.figure.unit(fit.sensor),
-        worst.value.norm() / median
-    ))
+    let names = bad.iter().map(|r| name(prepared, r)).collect();
+    let (turns, largest) = (fit.figure == Figure::Direction, worst.value.norm());
+    let unit = fit.figure.unit(fit.sensor);
+    let warning = Warning::Outliers(turns, names, largest, unit, largest / median);
+    Some(warning.of(fit.sensor))
 }
 
 /// What claims to be in SI reads about what it measures.
-fn unit(prepared: &Prepared, fit: &SensorFit) -> Option<String> {
+fn unit(prepared: &Prepared, fit: &SensorFit) -> Option<Warning> {
     let matrix = &fit.estimated.triad.forward.matrix;
     let scale = matrix.row_iter().map(|r| r.norm()).sum::<f64>() / 3.0;
     if prepared.manifest.raw_unit != RawUnit::Si {
@@ -215,12 +199,12 @@ fn unit(prepared: &Prepared, fit: &SensorFit) -> Option<String> {
 }
 
 /// Rests of a gyro that are none.
-fn rests(fit: &SensorFit) -> Option<String> {
+fn rests(fit: &SensorFit) -> Option<Warning> {
     fit.static_rms.and_then(|(rms, _)| restless(rms))
 }
 
 /// How the axes lie to those that they are referred to.
-fn turned(prepared: &Prepared, fit: &SensorFit) -> Option<String> {
+fn turned(prepared: &Prepared, fit: &SensorFit) -> Option<Warning> {
     if fit.figure == Figure::GravitySize {
         return None; // its axes are the frame
     }
@@ -231,13 +215,6 @@ fn turned(prepared: &Prepared, fit: &SensorFit) -> Option<String> {
     if rotation.determinant() < 0.0 || angle.to_degrees() < TURNED_DEG {
         return None;
     }
-    let against = match prepared.manifest.reference {
-        Reference::Table => "those of the ref_ columns",
-        Reference::Gravity => "the accelerometer's",
-    };
-    Some(format!(
-        "{}: its axes are turned by {:.0} degrees against {against}: unless it is mounted so, columns are swapped or have the wrong sign",
-        fit.sensor,
-        angle.to_degrees()
-    ))
+    let table = prepared.manifest.reference == Reference::Table;
+    Some(Warning::Turned(angle, table).of(fit.sensor))
 }

@@ -5,6 +5,7 @@ use nalgebra::Vector3;
 use super::hold_out::HoldOut;
 use crate::estimate::Estimated;
 use crate::quantity::{Figure, Sensor};
+use crate::warning::Warning;
 
 /// One residual: where it is, and how large in sample and held out.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -41,7 +42,7 @@ pub struct SensorFit {
     /// The error of the readings as they came, where they are in SI: what [`Self::rms`] is without a calibration.
     pub as_came: Option<f64>,
     /// What a person should know.
-    pub warnings: Vec<String>,
+    pub warnings: Vec<Warning>,
 }
 
 impl SensorFit {

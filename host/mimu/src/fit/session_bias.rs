@@ -6,10 +6,11 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use crate::estimate::least_squares::{Errors, Scatter, Solution, solve_with_excess};
 use crate::estimate::{Estimated, Failure};
+use crate::observable::Observable;
 use crate::prepared::{Prepared, si_covariance};
-use crate::quantity::AXES;
 use crate::quantity::Sensor;
 use crate::triad::{Covariance, Part, Triad};
+use crate::warning::Warning;
 use mimu_recording::Reference;
 
 /// Steps of the iteration for sizes: from a bias of a tenth of gravity the third changes nothing.
@@ -33,7 +34,7 @@ pub fn estimate(
     let by_size = prepared.manifest.reference == Reference::Gravity && sensor == Sensor::Accel;
     let mut offset = known.offset;
     let mut covariance = Covariance::zeros();
-    let mut scatter: Vec<(String, Scatter)> = Vec::new();
+    let mut scatter: Vec<(Observable, Scatter)> = Vec::new();
     if by_size {
         let g = prepared.manifest.gravity_mps2;
         let mut last: Option<(Solution, Scatter)> = None;
@@ -63,7 +64,7 @@ pub fn estimate(
         covariance
             .fixed_view_mut::<3, 3>(9, 9)
             .copy_from(&Matrix3::from_fn(|i, j| full[(i, j)]));
-        scatter.push(("magnitude of specific force".into(), found));
+        scatter.push((Observable::Magnitude, found));
     } else {
         for axis in 0..3 {
             let n = observations.len();
@@ -82,7 +83,7 @@ pub fn estimate(
                 solve_with_excess(&design, &y, &Errors::Independent(variances)).ok_or_else(none)?;
             offset[axis] = solution.parameters[0];
             covariance[(9 + axis, 9 + axis)] = solution.covariance[(0, 0)];
-            scatter.push((AXES[axis].into(), found));
+            scatter.push((Observable::Axis(axis), found));
         }
     }
     let dof = scatter.iter().map(|s| s.1.variance_dof());
@@ -97,9 +98,6 @@ pub fn estimate(
         scatter,
         condition: 1.0,
         delays: None,
-        notes: vec![
-            "the matrix is given, and no interval holds its error; the biases are this recording's"
-                .into(),
-        ],
+        notes: vec![Warning::MatrixGiven(false)],
     })
 }

@@ -1,5 +1,6 @@
 //! Means written here from `u = P a + b` and normal errors: the truth is that formula, and no code of the fit.
 
+use crate::warning::Warning;
 use mimu_recording::{Columns, Manifest, PoseMean, PoseMeans, RawUnit, Reference};
 use mimu_rig::random::Random;
 use nalgebra::{Matrix3, Vector3};
@@ -127,13 +128,19 @@ fn the_noise_of_a_mean_is_that_of_the_table_and_without_one_it_is_unknown_and_th
     let (floor, _, warnings) = noise_floor(true);
     // 20 counts over the root of 100, in m/s² of about 829 counts.
     assert!((floor / (2.0 / 829.0) - 1.0).abs() < 0.02, "{floor}");
-    assert!(warnings.iter().any(|w| w.contains("taken to be white")));
+    assert!(
+        warnings
+            .iter()
+            .any(|w| w.to_string().contains("taken to be white"))
+    );
     let (floor, excess, warnings) = noise_floor(false);
     // Not known, which is no zero.
     assert!(floor.is_nan(), "{floor}");
     assert!((0.5..2.0).contains(&(excess.sqrt() / 2.0)), "{excess}");
     assert!(
-        warnings.iter().any(|w| w.contains("the only noise")),
+        warnings
+            .iter()
+            .any(|w| w.to_string().contains("the only noise")),
         "{warnings:?}"
     );
 }
@@ -170,7 +177,7 @@ fn a_gyro_is_fitted_to_steps_of_known_rate_and_of_gravity_alone_is_refused_by_na
     let by_gravity = || Prepared::of_means(&with_gyro(false)).unwrap();
     let fitted = fit(by_gravity(), options()).unwrap();
     assert!(fitted.sensor(Sensor::Gyro).is_none() && fitted.sensor(Sensor::Accel).is_some());
-    let says = |w: &String| w.contains("gyro: turns need samples");
+    let says = |w: &Warning| w.to_string().contains("gyro: turns need samples");
     assert!(fitted.warnings.iter().any(says), "{:?}", fitted.warnings);
     let only = Options {
         only: Some(Sensor::Gyro),
@@ -186,6 +193,6 @@ fn rows_without_a_mean_are_counted_and_left_out() {
     means.poses[5].raw[4] = f64::NAN;
     let fitted = fit(Prepared::of_means(&means).unwrap(), options()).unwrap();
     assert_eq!(fitted.sensor(Sensor::Accel).unwrap().dwells, 23);
-    let says = |w: &String| w.contains("accel: 1 of 24 rows");
+    let says = |w: &Warning| w.to_string().contains("accel: 1 of 24 rows");
     assert!(fitted.warnings.iter().any(says), "{:?}", fitted.warnings);
 }

@@ -11,6 +11,7 @@ use crate::noise_file::{FileCoefficient, NOISE_FORMAT, NoiseChannel, NoiseFile};
 use crate::quantity::Sensor;
 use crate::spectrum::Line;
 use crate::survey::{Channel, Survey};
+use crate::warning::Warning;
 
 /// Why a channel has no coefficients at all.
 const TOO_SHORT: &str = "fewer than five octaves: record for longer";
@@ -180,8 +181,8 @@ impl AllanResult {
             _ => None,
         };
         let warnings = surveys.iter().flat_map(|survey| {
-            let named = |w: &String| match surveys.len() {
-                1 => w.clone(),
+            let named = |w: &Warning| match surveys.len() {
+                1 => w.to_string(),
                 _ => format!("{}: {w}", survey.recording),
             };
             survey.warnings.iter().map(named).collect::<Vec<_>>()
@@ -191,7 +192,7 @@ impl AllanResult {
             temp_c: survey.temp_c,
             sample_rate_hz: survey.sample_rate_hz,
             span_s: survey.span_s,
-            warnings: survey.warnings.clone(),
+            warnings: survey.warnings.iter().map(Warning::to_string).collect(),
         });
         let channels = surveys
             .iter()

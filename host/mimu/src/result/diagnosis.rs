@@ -5,13 +5,16 @@ use serde::Serialize;
 
 use super::TOOL;
 use crate::diagnose::decision::{Accepted, Decision};
+use crate::diagnose::note::Note;
 use crate::diagnose::picture::Picture;
 use crate::diagnose::rows::Figure as Judged;
 use crate::diagnose::{Diagnosis, SensorDiagnosis, Source, Untestable, Verdict};
 use crate::fit::Split;
 use crate::next_experiment::{Confused, Next, NotInPlan, SizedRecipe};
+use crate::observable::Observable;
 use crate::quantity::{AXES, Figure, PerSensor, Sensor, present};
 use crate::verify::Verification;
+use crate::warning::Warning;
 
 /// Result of a diagnosis.
 #[derive(Debug, Clone, Serialize)]
@@ -52,7 +55,7 @@ pub struct DiagnosisResult {
     /// What of the samples was left out.
     pub left_out: LeftOutResult,
     /// What a person should know.
-    pub warnings: Vec<String>,
+    pub warnings: Vec<Warning>,
     /// The calibration before and after on a recording that nothing was fitted to.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub second: Option<SecondResult>,
@@ -174,7 +177,7 @@ pub struct SensorDiagnosisResult {
     /// Share of the held-out mean square beyond these two that the effects take out; null without effects, or where nothing is beyond.
     pub explained: Option<f64>,
     /// What a person should know of the accepted effects.
-    pub notes: Vec<String>,
+    pub notes: Vec<Note>,
     /// Residuals that the model is fitted to.
     pub rows: usize,
     /// Affine parameters that they determine first.
@@ -300,14 +303,14 @@ impl DiagnosisResult {
         });
         self.undecided.extend(undecided);
         let leftover = decision.leftover.iter().map(|l| {
-            let figure = match l.stratum.starts_with("turns") {
-                true => Figure::Direction,
-                false => Figure::Input,
+            let figure = match l.stratum.0 {
+                Observable::Turns => Figure::Direction,
+                _ => Figure::Input,
             };
             LeftoverResult {
                 sensor,
                 axis: l.axis.map(|a| AXES[a]),
-                rows: l.stratum.clone(),
+                rows: l.stratum.to_string(),
                 against: l.against.clone(),
                 usual: l.usual,
                 strength: l.strength,

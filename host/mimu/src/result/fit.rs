@@ -9,12 +9,13 @@ use super::TOOL;
 use crate::dwell::Dwell;
 use crate::fit::change::Change;
 use crate::fit::{Fit, Method, SensorFit, Split};
+use crate::observable::Observable;
+use crate::parameter::{Kind, TriadParameter, parameters};
 use crate::prepared::Prepared;
-use crate::quantity::{
-    AXES, Figure, PerSensor, Sensor, inverse_names, present, raw_unit, scale_unit,
-};
+use crate::quantity::{Figure, PerSensor, Sensor, present, raw_unit};
 use crate::stillness::Detection;
 use crate::triad::{Angles, Estimate};
+use crate::warning::Warning;
 
 /// Result of a fit.
 #[derive(Debug, Clone, Serialize)]
@@ -59,7 +60,7 @@ pub struct FitResult {
     /// What that changes: every parameter fitted with everything, and as fitted.
     pub left_out_changes: Vec<Change>,
     /// What a person should know.
-    pub warnings: Vec<String>,
+    pub warnings: Vec<Warning>,
 }
 
 /// Times without samples.
@@ -155,7 +156,7 @@ pub struct SensorFitResult {
     /// Parts that were held out in turn.
     pub held_out_parts: usize,
     /// Why not in blocks, or why some parts were not held out.
-    pub not_held_out: Vec<String>,
+    pub not_held_out: Vec<Warning>,
     /// One for every dwell or turn that was used, and those within the dwells whose input moves.
     pub residuals: Vec<ResidualResult>,
     /// Compensated gyro dwell means without a table, rad/s; absent with one.
@@ -169,6 +170,9 @@ pub struct SensorFitResult {
 /// A parameter with its uncertainty.
 #[derive(Debug, Clone, Serialize)]
 pub struct Parameter {
+    /// Which.
+    #[serde(skip)]
+    pub of: TriadParameter,
     /// Name.
     pub name: String,
     /// Estimate.
@@ -323,11 +327,11 @@ impl SensorFitResult {
                 chi2: s.chi2,
                 dof: s.dof,
                 excess_sigma: s.excess.sqrt(),
-                unit: excess_unit(fit, found, group),
+                unit: excess_unit(fit, found, *group),
                 // What nobody knows explains nothing, and leaves nothing unexplained.
                 significant: s.is_significant() && fit.prepared.noise.is_known(found.sensor),
             };
-            (group.clone(), result)
+            (group.to_string(), result)
         });
         let residuals = found.residuals.iter().map(|r| ResidualResult {
             step: fit.prepared.dwells.list[r.dwell].step,
@@ -339,7 +343,7 @@ impl SensorFitResult {
         let small = found.estimated.triad.physical(Angles::Small);
         Self {
             estimator: fit.estimator(found.sensor),
-            parameters: parameters(fit.prepared.manifest.raw_unit, found),
+            parameters: Parameter::list(fit, found),
             rms: found.rms(),
             held_out_rms: found.held_out_rms(),
             noise_floor: found.noise_floor(),
@@ -368,21 +372,34 @@ impl SensorFitResult {
         }
     }
 
-    /// The parameters `name_x`, `name_y`, `name_z`, or those of the pairs of axes.
-    pub fn triple(&self, name: &str) -> impl Iterator<Item = &Parameter> {
-        let ours = move |p: &&Parameter| {
-            let rest = p.name.strip_prefix(name);
-            rest.is_some_and(|r| r.starts_with('_'))
-        };
-        self.parameters.iter().filter(ours)
+    /// The parameters of a kind.
+    pub fn of_kind(&self, kind: Kind) -> impl Iterator<Item = &Parameter> {
+        self.parameters.iter().filter(move |p| p.of.0 == kind)
+    }
+}
+
+impl Parameter {
+    fn list(fit: &Fit, found: &SensorFit) -> Vec<Self> {
+        let raw = fit.prepared.manifest.raw_unit;
+        let all = parameters(&found.estimated.triad, found.sensor, raw).into_iter();
+        all.map(|(of, e, unit)| Self {
+            of,
+            name: of.to_string(),
+            value: e.value,
+            sigma: e.sigma,
+            lower: e.value - e.interval,
+            upper: e.value + e.interval,
+            unit,
+        })
+        .collect()
     }
 }
 
 /// Unit of the excess of a group of observations.
-fn excess_unit(fit: &Fit, found: &SensorFit, group: &str) -> String {
+fn excess_unit(fit: &Fit, found: &SensorFit, group: Observable) -> String {
     let si = found.sensor.unit();
     match found.figure {
-        Figure::Direction if group == "rest" => si.into(),
+        Figure::Direction if group == Observable::Rest => si.into(),
         Figure::Direction | Figure::GravitySize => found.figure.unit(found.sensor).into(),
         // Axes of the forward form are in raw units, of the inverse form in SI.
         Figure::Input if fit.options.method == Method::InverseForm => si.into(),
@@ -397,46 +414,4 @@ impl Triple {
             sigma: estimates.map(|e| e.sigma),
         }
     }
-}
-
-fn parameters(raw: RawUnit, found: &SensorFit) -> Vec<Parameter> {
-    let triad = &found.estimated.triad;
-    let si = found.sensor.unit();
-    let inverse_unit = match raw {
-        RawUnit::Si => "1".to_string(),
-        other => format!("({si})/{other}"),
-    };
-    let mut all = Vec::new();
-    let mut add = |name: String, e: Estimate, unit: &str| {
-        all.push(Parameter {
-            name,
-            value: e.value,
-            sigma: e.sigma,
-            lower: e.value - e.interval,
-            upper: e.value + e.interval,
-            unit: unit.into(),
-        });
-    };
-    let estimates = triad.inverse_estimates();
-    for (i, (name, estimate)) in inverse_names().into_iter().zip(estimates).enumerate() {
-        add(name, estimate, if i < 9 { &inverse_unit } else { si });
-    }
-    let physical = triad.physical(Angles::Exact);
-    let pairs = ["yz", "zy", "zx"];
-    for (name, axes, estimates, unit) in [
-        ("scale", AXES, physical.scale, scale_unit(raw, si)),
-        ("bias", AXES, physical.bias, raw_unit(raw, si)),
-        ("misalignment", AXES, physical.misalignment, "rad".into()),
-        (
-            "non_orthogonality",
-            pairs,
-            physical.non_orthogonality,
-            "rad".into(),
-        ),
-    ] {
-        for (axis, estimate) in axes.iter().zip(estimates) {
-            add(format!("{name}_{axis}"), estimate, &unit);
-        }
-    }
-    all
 }

@@ -3,7 +3,8 @@
 use std::ops::Range;
 
 use super::columns::Columns;
-use crate::quantity::{duration, plural};
+use crate::quantity::plural;
+use crate::warning::Warning;
 use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{Column, Recording};
 
@@ -50,7 +51,7 @@ impl Stretch {
         recording: &Recording,
         part: Part,
         place: &str,
-        warnings: &mut Vec<String>,
+        warnings: &mut Vec<Warning>,
     ) -> Result<Self> {
         let rows = match part {
             Part::Step(step) => Some(dwell(columns, recording, step, place)?),
@@ -77,7 +78,7 @@ impl Stretch {
         first: usize,
         rate_hz: f64,
         place: &str,
-        warnings: &mut Vec<String>,
+        warnings: &mut Vec<Warning>,
     ) -> Result<Self> {
         let at = |i: usize| format!("{place}, data row {}, t_s", first + i + 1);
         if t.len() < FEWEST {
@@ -132,23 +133,18 @@ impl Stretch {
             return Err(Error::new(format!("{place}, t_s"), problem, remedy));
         }
         if off.abs() > RATE_OFF[1] {
-            warnings.push(format!(
-                "the time stamps run at {:.3} Hz, {:+.2} % off the stated {rate_hz} Hz; the stamps are used",
-                1.0 / period_s,
-                100.0 * off
-            ));
+            warnings.push(Warning::RateOff(1.0 / period_s, 100.0 * off, rate_hz));
         }
         let mut rows = 0..t.len();
         if let Some(i) = first_gap {
             let whole = longest(steps, |k| (t[k + 1] - t[k]) * rate_hz <= GAP_PERIODS);
             rows = whole.start..whole.end + 1;
-            warnings.push(format!(
-                "{}, the first of {} before data row {}; the longest stretch without is used: {} from {:.3} s",
-                plural(gaps as u64, "gap"),
-                duration(t[i] - t[i - 1]),
+            warnings.push(Warning::LongestStretch(
+                gaps as u64,
+                t[i] - t[i - 1],
                 first + i + 1,
-                duration(rows.len() as f64 * period_s),
-                t[rows.start]
+                rows.len() as f64 * period_s,
+                t[rows.start],
             ));
             if rows.len() < FEWEST {
                 return Err(Error::new(

@@ -2,8 +2,9 @@
 
 use super::stretch::{FEWEST, Part, Stretch, longest, segments};
 use crate::blocks::quantile;
-use crate::quantity::{duration, significant, unsigned_zero};
+use crate::quantity::{duration, unsigned_zero};
 use crate::stillness::{STILL_FACTOR, WINDOW_S};
+use crate::warning::Warning;
 use mimu_recording::RAW_COLUMNS;
 use mimu_recording::error::{Argument, Error, Result};
 
@@ -147,7 +148,7 @@ pub(super) fn refuse_motion(
     stretch: &Stretch,
     part: Part,
     place: &str,
-    warnings: &mut Vec<String>,
+    warnings: &mut Vec<Warning>,
 ) -> Result<()> {
     let windows = channels
         .iter()
@@ -163,12 +164,7 @@ pub(super) fn refuse_motion(
     let window_s = channels[0].1.window as f64 * stretch.period_s;
     let time = |k: usize| stretch.span_s[0] + k as f64 * window_s;
     let count = (0..windows).filter(|k| moves(*k)).count();
-    let problem = format!(
-        "the unit moves, or something shakes it, in {count} of {windows} windows of {}, {} % of the time, first at {:.1} s ({name})",
-        duration(window_s),
-        significant(100.0 * count as f64 / windows as f64),
-        time(first)
-    );
+    let problem = Warning::Moves([count, windows], window_s, time(first), name);
     if part != Part::Whole {
         warnings.push(problem);
         return Ok(());

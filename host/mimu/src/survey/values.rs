@@ -4,7 +4,7 @@ use super::masking::{Masked, mask};
 use super::stretch::{FEWEST, Part, Stretch, longest};
 use super::suitability::{Suitability, dead, suitability};
 use crate::allan::units::Unit;
-use crate::quantity::{duration, plural, significant};
+use crate::warning::Warning;
 use mimu_recording::RAW_COLUMNS;
 use mimu_recording::error::{Argument, Error, Result};
 
@@ -22,7 +22,7 @@ pub(super) struct Values {
     pub suitability: Suitability,
     pub masked: Option<Masked>,
     /// What a person should know.
-    pub warnings: Vec<String>,
+    pub warnings: Vec<Warning>,
 }
 
 impl Values {
@@ -52,12 +52,9 @@ impl Values {
                 )
                 .about(Argument::Stretch));
             }
-            warnings.push(format!(
-                "{}: empty cells, the first in data row {row}; the longest stretch without is used: {} from data row {}",
-                RAW_COLUMNS[i],
-                duration(whole.len() as f64 * period_s),
-                rows.start + whole.start + 1
-            ));
+            let length_s = whole.len() as f64 * period_s;
+            let used = rows.start + whole.start + 1;
+            warnings.push(Warning::EmptyCells(row, length_s, used).of_channel(i));
             from = whole.start;
             values.truncate(whole.end);
             values.drain(..from);
@@ -73,13 +70,9 @@ impl Values {
             _ => None,
         };
         warnings.extend(masked.map(|masked| {
-            format!(
-                "{}: {}, {} % of the time, are disturbed, first at {:.1} s: masked",
-                RAW_COLUMNS[i],
-                plural(masked.samples as u64, "sample"),
-                significant(100.0 * masked.share),
-                stretch.span_s[0] + from as f64 * period_s + masked.first_s
-            )
+            let first_s = stretch.span_s[0] + from as f64 * period_s + masked.first_s;
+            let samples = masked.samples as u64;
+            Warning::Disturbed(samples, masked.share, first_s).of_channel(i)
         }));
         if from > 0 {
             suitability.begin_later(from);

@@ -207,7 +207,7 @@ fn an_input_that_turns_by_a_right_angle_in_a_block_is_too_fast_for_the_one_senso
         assert_eq!(dwell.gyro_fault, None);
     }
     let warned = prepared.dwells.warnings.iter().any(|w| {
-        w.starts_with(
+        w.to_string().starts_with(
             "6 dwells (6, 7, 8, 9, 10, 11) are not used: the input of the accel moves too far",
         )
     });

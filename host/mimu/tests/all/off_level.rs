@@ -44,7 +44,8 @@ fn warnings(unit: &Unit, seed: u64, method: Method) -> Vec<String> {
         holdout_blocks: 0,
         ..Options::default()
     };
-    fit(prepared, options).unwrap().sensors[0].warnings.clone()
+    let fit = fit(prepared, options).unwrap();
+    fit.sensors[0].warnings.iter().map(ToString::to_string).collect()
 }
 
 const SAYS: [&str; 2] = [

@@ -116,7 +116,7 @@ fn unknown_columns_are_named_and_ignored_whatever_they_hold() {
     let (batch, summary) = read(text.as_bytes(), 1 << 10).unwrap();
     assert_eq!(batch.raw[2], [3.0, 6.0]);
     assert_eq!(summary.warnings.len(), 1);
-    assert!(summary.warnings[0].contains("note"));
+    assert!(summary.warnings[0].to_string().contains("note"));
 }
 
 #[test]

@@ -339,7 +339,7 @@ impl TextTable {
             let (problem, remedy) = match list {
                 None => (
                     "there is no header with the names of a recording's columns".to_owned(),
-                    "say what the columns are with --columns",
+                    "say what the columns are",
                 ),
                 Some(ColumnList::ByName(wanted)) => {
                     let missing = |(_, name): &&(Role, String)| !names.contains(name);
@@ -355,7 +355,7 @@ impl TextTable {
                     "name the columns that are wanted",
                 ),
             };
-            return Err(Error::new(path, problem, remedy));
+            return Err(Error::new(path, problem, remedy).about(Argument::Columns));
         }
         match misfit {
             Some(Misfit {

@@ -13,7 +13,7 @@ use mimu::design::budget::DwellNoise;
 use mimu::design::reach::Fixture;
 use mimu::plan::Plan;
 use mimu::quantity::{duration, significant};
-use mimu_recording::error::{Error, Result};
+use mimu_recording::error::{Argument, Error, Result};
 use serde::Serialize;
 
 use crate::basis::{CURVATURE_SPAN, SLOPE_SPAN, Shape};
@@ -147,7 +147,7 @@ const INSEPARABLE_AT_REST: [&str; 3] = [
 fn check_span(kelvin: f64, shape: Shape) -> Result<&'static str> {
     let refuse = |least: f64, what: &str, remedy: &str| {
         let problem = format!("{} K: {what} needs {least} K", significant(kelvin));
-        Err(Error::new("--range", problem, remedy))
+        Err(Error::new("range of temperatures", problem, remedy).about(Argument::Range))
     };
     if !(kelvin >= SLOPE_SPAN) {
         let what = "over less than that noise and drift pass for a slope over temperature, which";
@@ -157,11 +157,12 @@ fn check_span(kelvin: f64, shape: Shape) -> Result<&'static str> {
         Shape::Line | Shape::Constant => Ok("line"),
         _ if kelvin < CURVATURE_SPAN => {
             let what = "over less than that the slope passes for curvature, which";
-            refuse(
+            let error = refuse(
                 CURVATURE_SPAN,
                 what,
-                "widen the range, or take --curves line",
-            )
+                "widen the range, or take straight lines",
+            );
+            error.map_err(|e| e.about(Argument::Curves))
         }
         _ => Ok("cubic"),
     }

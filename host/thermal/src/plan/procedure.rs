@@ -6,7 +6,7 @@ use mimu::design::reach::Fixture;
 use mimu::design::tour::Motion;
 use mimu::plan::TableAxis;
 use mimu::quantity::duration;
-use mimu_recording::error::{Error, Result};
+use mimu_recording::error::{Argument, Error, Result};
 use nalgebra::Vector3;
 use serde::Serialize;
 
@@ -135,19 +135,20 @@ fn soak(request: &Request) -> Result<Schedule> {
     if n < needed {
         let problem = format!("{n} set points, and the curves have {needed} coefficients");
         let remedy = format!("take {needed} or more, one more to see whether the curves hold");
-        return Err(Error::new("--points", problem, remedy));
+        return Err(Error::new("set points", problem, remedy).about(Argument::SetPoints));
     }
     let round = faces_and_rates(request);
     if round.length_s > request.soak_s {
         return Err(Error::new(
-            "--soak",
+            "soak",
             format!(
                 "{} at a set point, and its dwells with the moves take {}",
                 duration(request.soak_s),
                 duration(round.length_s)
             ),
             "soak for longer, or take shorter dwells",
-        ));
+        )
+        .about(Argument::Soak));
     }
     let apart = (to - from) / (n - 1) as f64;
     let round_s = request.soak_s + apart / request.kelvin_per_min * 60.0;

@@ -134,5 +134,5 @@ fn a_base_that_the_curves_cannot_be_added_to_is_refused() {
     let known = base::calibration(&known, &base, CREATED)
         .unwrap_err()
         .to_string();
-    assert!(known.contains("leave --base out"), "{known}");
+    assert!(known.contains("leave the base out"), "{known}");
 }

@@ -137,10 +137,13 @@ fn spans_that_determine_no_such_curve_are_refused_with_the_reason() {
     );
     refused(
         &range(35.0, Shape::Cubic),
-        &["15.0 K", "needs 20 K", "--curves line"],
+        &["15.0 K", "needs 20 K", "straight lines"],
     );
     refused(&|r| r.set_points = 3, &["3 set points", "4 coefficients"]);
-    refused(&|r| r.soak_s = 300.0, &["--soak", "soak for longer"]);
+    refused(
+        &|r| r.soak_s = 300.0,
+        &["soak: 5.00 min", "soak for longer"],
+    );
     refused(&|r| r.soak_s = 20.0 * 3600.0, &["two days"]);
     let mut line = request(Procedure::Soak);
     range(35.0, Shape::Line)(&mut line);

@@ -6,6 +6,7 @@ use mimu::effects::fitted::FittedEffect;
 use mimu::fit::{Fit, Options};
 use mimu::next_experiment;
 use mimu::result::diagnosis::DiagnosisResult;
+use mimu::warning::Warning;
 use mimu_recording::Reference;
 use mimu_recording::error::Result;
 use mimu_recording::result_file::stage;
@@ -78,7 +79,8 @@ impl Whole<'_> {
         let judged = match both {
             (Ok(before), Ok(after)) => Some([before, after]),
             (Err(refusal), _) | (_, Err(refusal)) => {
-                diagnosis.after.warnings.push(refusal.to_string());
+                let warning = Warning::NotJudged(None, refusal);
+                diagnosis.after.warnings.push(warning);
                 None
             }
         };

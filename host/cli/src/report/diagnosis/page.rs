@@ -17,6 +17,7 @@ use mimu::result::diagnosis::{DiagnosisResult, SensorDiagnosisResult};
 use mimu_recording::Reference;
 use mimu_recording::error::{Error, Result};
 
+use crate::hint;
 use crate::report::page::{Made, number, page, spoken};
 use tables::chance;
 
@@ -177,7 +178,7 @@ fn sensor(d: &DiagnosisResult, s: &Shown) -> Markup {
         @for (one, panels) in ours.iter().zip(&picture.effects) {
             (effect(d, s, one, panels))
         }
-        @for note in &s.figures.notes { p { strong { "Note. " } (note) "." } }
+        @for note in &s.figures.notes { p { strong { "Note. " } (note.to_string()) "." } }
         @if !after {
             p { "No effect is accepted; residuals are those of the affine calibration." }
         }
@@ -292,7 +293,7 @@ fn recorded(d: &DiagnosisResult) -> Markup {
         @if d.warnings.is_empty() {
             p { "No warnings." }
         } @else {
-            ul { @for w in &d.warnings { li { (w) } } }
+            ul { @for w in &d.warnings { li { (hint::of_warning(w)) } } }
         }
     }
 }

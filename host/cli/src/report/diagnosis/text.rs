@@ -6,6 +6,7 @@ mod experiments;
 use std::fmt::Write as _;
 
 use super::{meaning, remarks};
+use crate::hint;
 use crate::report::text::wrap;
 use effect::effect;
 pub(super) use experiments::by_experiment;
@@ -16,6 +17,7 @@ use mimu::readable;
 use mimu::result::diagnosis::{
     DiagnosisResult, LeftoverResult, SecondResult, SensorDiagnosisResult,
 };
+use mimu::warning::Warning;
 
 /// Why its figures are not those of `mimu fit`.
 const FIGURES: &str = "The figures before are not quite those of `mimu fit`: residuals are weighted here by the variance components of \
@@ -192,11 +194,9 @@ fn sensor(
         effect(out, d, s, a, all);
     }
     for note in &s.notes {
-        // What was found comes before the first semicolon, what to do about it behind.
-        let (found, more) = note.split_once(';').unwrap_or((note, ""));
-        match all || more.is_empty() {
-            true => wrap(out, "  note: ", note),
-            false => wrap(out, "  note: ", &format!("{found} (--all)")),
+        match all || note.advice.is_empty() {
+            true => wrap(out, "  note: ", &note.to_string()),
+            false => wrap(out, "  note: ", &format!("{} (--all)", note.found)),
         }
     }
     residuals(out, d, name, all);
@@ -286,17 +286,18 @@ fn open(out: &mut String, d: &DiagnosisResult) {
 }
 
 /// Warnings. Without `all` the first of each kind, and how many there are.
-fn warnings(out: &mut String, warnings: &[String], all: bool) {
-    let mut kinds: Vec<(&String, u64)> = Vec::new();
+fn warnings(out: &mut String, warnings: &[Warning], all: bool) {
+    let mut kinds: Vec<(&Warning, u64)> = Vec::new();
     for warning in warnings {
-        match kinds.iter_mut().find(|(w, _)| kind(w) == kind(warning)) {
+        match kinds.iter_mut().find(|(w, _)| w.is_like(warning)) {
             Some((_, count)) if !all => *count += 1,
             _ => kinds.push((warning, 1)),
         }
     }
     for (warning, count) in kinds {
+        let warning = hint::of_warning(warning);
         match count {
-            1 => wrap(out, "warning: ", warning),
+            1 => wrap(out, "warning: ", &warning),
             n => wrap(
                 out,
                 "warning: ",
@@ -304,12 +305,6 @@ fn warnings(out: &mut String, warnings: &[String], all: bool) {
             ),
         }
     }
-}
-
-/// A warning without its numbers and names of channels.
-fn kind(warning: &str) -> Vec<&str> {
-    let special = |w: &&str| !w.contains('_') && !w.contains(|c: char| c.is_ascii_digit());
-    warning.split(' ').filter(special).collect()
 }
 
 /// What the plan of the next experiment does not show, by the reason.

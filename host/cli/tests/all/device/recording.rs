@@ -201,7 +201,7 @@ fn a_killed_recording_is_there_up_to_the_last_second() {
     let last = rows.t_s.last().unwrap() * 1000.0;
     assert!(last + 1000.0 > f64::from(sent), "{last} of {sent}");
     assert!(recording.manifest.unfinished);
-    let warning = recording.warnings.join("");
+    let warning = recording.warnings[0].to_string();
     assert!(warning.contains("not ended"), "{warning}");
 
     // A power failure may leave half a row, whose last number reads like a whole one.
@@ -210,7 +210,7 @@ fn a_killed_recording_is_there_up_to_the_last_second() {
     let cut = whole[..end].iter().rposition(|b| *b == b'\n').unwrap() + 1;
     std::fs::write(&samples, &whole[..end - 3]).unwrap();
     let (recording, fewer) = self::rows(&place, "rec");
-    assert!(recording.warnings.join("").contains("cut"));
+    assert!(recording.warnings[0].to_string().contains("cut"));
     check_rows(&fewer);
     let lines = whole[..cut].iter().filter(|b| **b == b'\n').count();
     assert_eq!(fewer.t_s.len(), lines - 1);

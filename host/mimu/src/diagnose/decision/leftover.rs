@@ -6,7 +6,7 @@ use crate::diagnose::rows::{Rows, Session};
 use crate::diagnose::search::{Chosen, Search};
 use crate::diagnose::variance::{By, Fitted, VarianceModel};
 use crate::effects::candidate::Candidate;
-use crate::quantity::AXES;
+use crate::observable::{Observable, StratumName};
 use crate::quantity::Sensor;
 use crate::quantity::significant;
 use crate::triad::directions;
@@ -21,8 +21,8 @@ pub const FALSE_LEFTOVER: f64 = 1e-3;
 /// Structure that is left.
 #[derive(Debug, Clone)]
 pub struct Leftover {
-    /// Stratum: an axis, `turns`.
-    pub stratum: String,
+    /// Stratum.
+    pub stratum: StratumName,
     /// Axis, if it is of one.
     pub axis: Option<usize>,
     /// What it goes with, if with anything.
@@ -42,7 +42,7 @@ impl Leftover {
         let range = ours.map_or(0..rows.y.len(), |s| s.rows.clone());
         let mean_square = change.rows(range.start, range.len()).norm_squared() / range.len() as f64;
         Self {
-            stratum: axis.map_or("", |a| AXES[a]).into(),
+            stratum: StratumName(Observable::Axis(axis.unwrap_or_default()), None),
             axis,
             against: term.id(),
             strength: mean_square.sqrt(),
@@ -101,7 +101,7 @@ pub(super) fn leftover(
             None => "no quantity recorded: the dwells do not repeat".into(),
         };
         left.push(Leftover {
-            stratum: stratum.name.clone(),
+            stratum: stratum.name,
             axis: stratum.axis,
             against,
             strength,
@@ -121,7 +121,7 @@ pub(in crate::diagnose) fn noisier(session: &Session, sensor: Sensor) -> Vec<Lef
         let channel = sensor.channels().start + axis;
         let (beyond, times) = session.prepared.noise.beyond_stated(channel)?;
         Some(Leftover {
-            stratum: format!("means of {} over a second", AXES[axis]),
+            stratum: StratumName(Observable::Second(axis), None),
             axis: Some(axis),
             against: format!(
                 "no quantity recorded: within the dwells it is {} times as noisy as the noise file says",

@@ -15,7 +15,7 @@ use crate::diagnose::search::{COEFFICIENT, Chosen, Search, beside, independent_o
 use crate::diagnose::variance::{By, Fitted};
 use crate::effects::quantity::Conditions;
 use crate::fit::Split;
-use crate::quantity::AXES;
+use crate::observable::{Observable, StratumName};
 
 /// Pieces that the range of the readings is divided into.
 const PIECES: [usize; 3] = [4, 16, 64];
@@ -161,7 +161,7 @@ fn of_axis(
     let columns = beside(&smooth, &steps);
     Some(OfReading {
         left: Leftover {
-            stratum: of_axis.map_or(AXES[axis].into(), |s| s.name.clone()),
+            stratum: of_axis.map_or(StratumName(Observable::Axis(axis), None), |s| s.name),
             axis: Some(axis),
             against: "reading".into(),
             strength: (explained.max(0.0) / stratum.rows.len() as f64).sqrt(),

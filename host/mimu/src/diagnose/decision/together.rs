@@ -5,6 +5,7 @@
 
 use nalgebra::DMatrix;
 
+use crate::diagnose::note::Note;
 use crate::diagnose::search::{Alternative, COEFFICIENT, CONFUSED, Chosen, Search, beside};
 use crate::diagnose::variance::Fitted;
 use crate::effects;
@@ -26,7 +27,7 @@ struct Part {
 
 /// Lists with each of the kept effects the one that is the same at a constant input, where the rows do not tell them apart; and notes that
 /// say so. `with` is the fit of all.
-pub(super) fn together(search: &Search, kept: &mut [Chosen], with: &Fitted) -> Vec<String> {
+pub(super) fn together(search: &Search, kept: &mut [Chosen], with: &Fitted) -> Vec<Note> {
     let mut notes = Vec::new();
     for i in 0..kept.len() {
         let id = kept[i].candidate.id();
@@ -43,12 +44,13 @@ pub(super) fn together(search: &Search, kept: &mut [Chosen], with: &Fitted) -> V
             continue;
         };
         let axes: Vec<&str> = parts.iter().map(|p| AXES[p.axis]).collect();
-        notes.push(format!(
-            "{id} ({}): {} does as well, as the input along the axis hardly changes in this recording; at other inputs the two differ, and the \
-             calibration holds the first",
+        let found = format!(
+            "{id} ({}): {} does as well, as the input along the axis hardly changes in this recording",
             axes.join(", "),
             rival.id
-        ));
+        );
+        let advice = "at other inputs the two differ, and the calibration holds the first";
+        notes.push(Note::new(found, advice));
         let others = &mut kept[i].alternatives;
         others.retain(|o| o.id != rival.id);
         let rival = Alternative {

@@ -12,6 +12,7 @@ use crate::estimate::Observation;
 use crate::estimate::chains::Chains;
 use crate::estimate::earth::poses;
 use crate::estimate::turn::sensitivity;
+use crate::observable::{Observable, StratumName};
 use crate::prepared::si_covariance;
 use crate::quantity::Sensor;
 
@@ -96,7 +97,7 @@ impl Builder<'_> {
         }
         let variances = prepared.size_variances(inverse, &observations);
         let strata = vec![Stratum {
-            name: "magnitude of gravity".into(),
+            name: StratumName(Observable::Magnitude, None),
             axis: None,
             session: 0,
             rows: 0..n,
@@ -125,7 +126,7 @@ impl Builder<'_> {
         }
         let shapes = lower_affine(&observations);
         let strata = vec![Stratum {
-            name: "force".into(),
+            name: StratumName(Observable::Force, None),
             axis: None,
             session: 0,
             rows: 0..n,
@@ -256,7 +257,7 @@ impl Builder<'_> {
         if m > 0 {
             let by_reference = forces.map(|f| f.of_turns(&by_force));
             strata.push(Stratum {
-                name: "turns".into(),
+                name: StratumName(Observable::Turns, None),
                 axis: None,
                 session: 0,
                 rows: 0..m,
@@ -304,7 +305,7 @@ impl Builder<'_> {
             };
             let known = DMatrix::from_fn(n, n, |i, j| noise(i, j) + of_earth(i, j));
             strata.push(Stratum {
-                name: format!("rest {}", crate::quantity::AXES[axis]),
+                name: StratumName(Observable::AtRest(axis), None),
                 axis: Some(axis),
                 session: 0,
                 rows: m + axis * n..m + (axis + 1) * n,

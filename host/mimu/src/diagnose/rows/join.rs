@@ -126,7 +126,7 @@ pub(super) fn join(sensor: Sensor, parts: Vec<(usize, Part)>, sessions: usize) -
         stratum.rows = from..rows.len();
         stratum.session = *session;
         if sessions > 1 {
-            stratum.name += &format!(" of recording {}", session + 1);
+            stratum.name.1 = Some(*session);
         }
         strata.push(stratum);
     }

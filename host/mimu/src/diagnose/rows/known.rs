@@ -9,7 +9,8 @@ use super::build::{Builder, Part};
 use super::{Figure, Row, Stratum};
 use crate::contrast::Contrast;
 use crate::estimate::Observation;
-use crate::quantity::{AXES, Sensor};
+use crate::observable::{Observable, StratumName};
+use crate::quantity::Sensor;
 use crate::triad::Forward;
 
 /// Derivatives by the parameters: bias and matrix row of each axis, then the delay of each where an input moves.
@@ -88,7 +89,7 @@ impl Builder<'_> {
                 _ => 0.0,
             });
             strata.push(Stratum {
-                name: AXES[axis].into(),
+                name: StratumName(Observable::Axis(axis), None),
                 axis: Some(axis),
                 session: 0,
                 rows: axis * n..(axis + 1) * n,
@@ -114,7 +115,7 @@ impl Builder<'_> {
             let variances = within.iter().map(|(_, o)| o.variance[axis] / s2);
             let known = DVector::from_iterator(within.len(), variances);
             strata.push(Stratum {
-                name: format!("{} within dwells", AXES[axis]),
+                name: StratumName(Observable::Within(axis), None),
                 // A row is no function of one quantity, and is not drawn as one.
                 axis: None,
                 session: 0,

@@ -6,6 +6,7 @@ use maud::{Markup, html};
 
 use crate::report::svg::{Frame, power_of_ten, px, range, times_ten};
 use mimu::diagnose::picture::{Against, Kind, Panel, Picture, Quantile, Track};
+use mimu::observable::Observable;
 use mimu::quantity::Figure;
 use mimu::quantity::Sensor;
 
@@ -117,14 +118,11 @@ pub fn in_time(sensor: Sensor, track: &Track, blocks_s: &[f64], after: bool) -> 
     )
 }
 
-/// Name of a track with the sensor: `gyro x`, `gyro rest x`, `turns, first direction`.
+/// Name of a track, of an axis with the sensor: `gyro x`, `gyro x at rest`, `turns, first direction`.
 fn title(sensor: Sensor, track: &Track) -> String {
-    match track.name.as_str() {
-        name @ ("x" | "y" | "z") => format!("{sensor} {name}"),
-        name => match name.strip_prefix("rest ") {
-            Some(axis) => format!("{sensor} {axis} at rest"),
-            None => name.into(),
-        },
+    match track.group {
+        Observable::Axis(_) | Observable::AtRest(_) => format!("{sensor} {}", track.name),
+        _ => track.name.clone(),
     }
 }
 

@@ -1,0 +1,54 @@
+//! What observations that share their noise are of.
+
+use std::fmt;
+
+use crate::quantity::AXES;
+
+/// What observations that share their noise are of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Observable {
+    /// Means of an axis (0..3) over dwells.
+    Axis(usize),
+    /// How an axis follows an input that moves within dwells.
+    Within(usize),
+    /// Means of an axis at rest, beside others.
+    AtRest(usize),
+    /// Means of an axis over a second.
+    Second(usize),
+    /// Directions of gravity after turns.
+    Turns,
+    /// Rates at rest.
+    Rest,
+    /// Magnitudes of specific force.
+    Magnitude,
+    /// Specific forces in poses that turns connect.
+    Force,
+}
+
+impl fmt::Display for Observable {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            Self::Axis(axis) => f.write_str(AXES[*axis]),
+            Self::Within(axis) => write!(f, "{} within dwells", AXES[*axis]),
+            Self::AtRest(axis) => write!(f, "{} at rest", AXES[*axis]),
+            Self::Second(axis) => write!(f, "means of {} over a second", AXES[*axis]),
+            Self::Turns => f.write_str("turns"),
+            Self::Rest => f.write_str("rest"),
+            Self::Magnitude => f.write_str("magnitude of specific force"),
+            Self::Force => f.write_str("force"),
+        }
+    }
+}
+
+/// A group, with the index of its recording where there are several.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct StratumName(pub Observable, pub Option<usize>);
+
+impl fmt::Display for StratumName {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self.1 {
+            None => write!(f, "{}", self.0),
+            Some(session) => write!(f, "{} of recording {}", self.0, session + 1),
+        }
+    }
+}

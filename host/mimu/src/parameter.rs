@@ -1,0 +1,115 @@
+//! The parameters of a triad: what each is of, its name and its unit.
+
+use std::fmt;
+
+use mimu_recording::RawUnit;
+use serde::{Serialize, Serializer};
+
+use crate::quantity::{AXES, Sensor, inverse_names, raw_unit, scale_unit};
+use crate::triad::{Angles, Estimate, Triad};
+
+/// Kind of a parameter of a triad.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// Element of the inverse model: of C by rows, then of o.
+    Inverse,
+    /// Scale factor.
+    Scale,
+    /// Bias.
+    Bias,
+    /// Bias with what gravity adds to it in the one pose of a recording.
+    BiasAndGravity,
+    /// Package misalignment.
+    Misalignment,
+    /// Non-orthogonality.
+    NonOrthogonality,
+}
+
+/// A parameter of a triad: its kind, and which of that kind.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct TriadParameter(pub Kind, pub usize);
+
+impl Kind {
+    /// The kinds that people know.
+    pub const PHYSICAL: [Self; 4] = [
+        Self::Scale,
+        Self::Bias,
+        Self::Misalignment,
+        Self::NonOrthogonality,
+    ];
+
+    /// In words.
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::Inverse => "inverse model",
+            Self::Scale => "scale factor",
+            Self::Bias => "bias",
+            Self::BiasAndGravity => "bias and gravity",
+            Self::Misalignment => "misalignment",
+            Self::NonOrthogonality => "non-orthogonality",
+        }
+    }
+}
+
+impl TriadParameter {
+    /// Axis, or the two axes that it is between; of the inverse model its name.
+    pub fn axis(self) -> String {
+        let Self(kind, k) = self;
+        match kind {
+            Kind::Inverse => inverse_names()[k].clone(),
+            Kind::NonOrthogonality => ["yz", "zy", "zx"][k].into(),
+            _ => AXES[k].into(),
+        }
+    }
+}
+
+/// Its name in files: `C_xy`, `scale_x`.
+impl fmt::Display for TriadParameter {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let name = match self.0 {
+            Kind::Inverse => return f.write_str(&self.axis()),
+            Kind::Scale => "scale",
+            Kind::Bias => "bias",
+            Kind::BiasAndGravity => "bias_and_gravity",
+            Kind::Misalignment => "misalignment",
+            Kind::NonOrthogonality => "non_orthogonality",
+        };
+        write!(f, "{name}_{}", self.axis())
+    }
+}
+
+impl Serialize for TriadParameter {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
+/// All parameters of a triad with their units, in the order of lists: the inverse model, then what people know.
+pub fn parameters(
+    triad: &Triad,
+    sensor: Sensor,
+    raw: RawUnit,
+) -> Vec<(TriadParameter, Estimate, String)> {
+    let si = sensor.unit();
+    let inverse_unit = match raw {
+        RawUnit::Si => "1".to_string(),
+        other => format!("({si})/{other}"),
+    };
+    let inverse = triad.inverse_estimates().into_iter().enumerate();
+    let inverse = inverse.map(|(k, estimate)| {
+        let unit = if k < 9 { &inverse_unit } else { si };
+        (TriadParameter(Kind::Inverse, k), estimate, unit.to_string())
+    });
+    let physical = triad.physical(Angles::Exact);
+    let physical = Kind::PHYSICAL.into_iter().flat_map(|kind| {
+        let (estimates, unit) = match kind {
+            Kind::Scale => (physical.scale, scale_unit(raw, si)),
+            Kind::Misalignment => (physical.misalignment, "rad".into()),
+            Kind::NonOrthogonality => (physical.non_orthogonality, "rad".into()),
+            _ => (physical.bias, raw_unit(raw, si)),
+        };
+        let each = estimates.into_iter().enumerate();
+        each.map(move |(k, estimate)| (TriadParameter(kind, k), estimate, unit.clone()))
+    });
+    inverse.chain(physical).collect()
+}

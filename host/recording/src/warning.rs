@@ -1,0 +1,33 @@
+//! What a person should know of a recording that is read, and the only place that puts it into words.
+
+use std::fmt;
+use std::path::PathBuf;
+
+/// What a person should know of a recording that is read.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Warning {
+    /// The folder of a recording that was not ended, and whether its last row is cut.
+    Unfinished(PathBuf, bool),
+    /// A file of samples, and a column of it that is ignored.
+    UnknownColumn(String, String),
+}
+
+impl fmt::Display for Warning {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            Self::Unfinished(folder, cut) => write!(
+                f,
+                "{}: the recording was not ended (its program was killed, or still records); what is there is used{}",
+                folder.display(),
+                if *cut {
+                    " but for its last row, which is cut"
+                } else {
+                    ""
+                }
+            ),
+            Self::UnknownColumn(place, name) => {
+                write!(f, "{place}: column {name} is unknown and is ignored")
+            }
+        }
+    }
+}
