@@ -24,6 +24,7 @@ mod code;
 mod directions;
 mod effect;
 mod law;
+mod listing;
 mod triad;
 
 use nalgebra::{RealField, Vector3, convert};

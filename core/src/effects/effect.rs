@@ -1,9 +1,6 @@
 //! One effect with its numbers: what a device stores, lists and removes.
 
-use core::fmt;
-
 use nalgebra::{RealField, convert};
-use serde::ser::{Serialize, SerializeStruct, Serializer};
 
 use super::code::{BITS, FARTHEST_ZERO};
 use super::law::{COEFFICIENTS, Evaluation, FACTORS, Fast, Law, Nonlinear, Slowly, term};
@@ -103,12 +100,12 @@ impl core::error::Error for Refused {}
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DeviceEffect<T: RealField> {
     pub(super) sensor: Sensor,
-    numbers: Numbers<T>,
+    pub(super) numbers: Numbers<T>,
 }
 
 /// The numbers of an effect by its kind.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Numbers<T: RealField> {
+pub(super) enum Numbers<T: RealField> {
     Named {
         law: &'static Law<T>,
         /// Those that the law has not are 0.
@@ -402,64 +399,7 @@ impl<T: RealField + Copy> DeviceEffect<T> {
     }
 }
 
-/// The public id: of a term in the form `term:accel_y~rate_x*force_y^2`.
-impl<T: RealField + Copy> fmt::Display for DeviceEffect<T> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let sensor = self.sensor;
-        match &self.numbers {
-            Numbers::Named { law, .. } => write!(f, "{sensor}_{}", law.name),
-            Numbers::Code { .. } => write!(f, "{sensor}_readout_code"),
-            Numbers::Term {
-                axis, variables, ..
-            } => {
-                write!(f, "term:{sensor}_{}", axis_name(usize::from(*axis)))?;
-                let mut sign = '~';
-                for same in variables.chunk_by(|a, b| a == b) {
-                    let [Some(variable), ..] = same else { continue };
-                    write!(f, "{sign}{}", variable.name())?;
-                    if same.len() > 1 {
-                        write!(f, "^{}", same.len())?;
-                    }
-                    sign = '*';
-                }
-                Ok(())
-            }
-        }
-    }
-}
-
-fn axis_name(axis: usize) -> &'static str {
+/// Name of an axis.
+pub(super) fn axis_name(axis: usize) -> &'static str {
     AXES.get(axis).copied().unwrap_or("?")
-}
-
-/// For people and programs: what is stored of it, each number as it is.
-impl<T: RealField + Copy + Serialize> Serialize for DeviceEffect<T> {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let mut all = serializer.serialize_struct("DeviceEffect", 4)?;
-        all.serialize_field("id", &Text(self))?;
-        all.serialize_field("coefficients", self.coefficients())?;
-        all.serialize_field("time_constant_s", &self.nonlinear())?;
-        all.serialize_field("converter", &self.converter())?;
-        all.end()
-    }
-}
-
-/// Raw in V, as on a device.
-impl<T: Serialize> Serialize for Converter<T> {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let mut all = serializer.serialize_struct("Converter", 3)?;
-        all.serialize_field("axes", self.axes())?;
-        all.serialize_field("weight_of_bit_0_v", &self.weight)?;
-        all.serialize_field("reading_of_code_0_v", &self.zero)?;
-        all.end()
-    }
-}
-
-/// As text.
-struct Text<T>(T);
-
-impl<T: fmt::Display> Serialize for Text<T> {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_str(&self.0)
-    }
 }

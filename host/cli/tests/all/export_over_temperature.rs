@@ -126,7 +126,7 @@ fn write_calibration(folder: &Path, over_temperature: bool) {
     if over_temperature {
         let _ = writeln!(
             text,
-            "[temperature]\nrange_c = {RANGE_C:?}\nlag_s = {LAG_S:?}"
+            "[temperature]\nrange_c = {RANGE_C:?}\ndies.gyro.lag_s = {LAG_S:?}\ndies.accel.lag_s = {LAG_S:?}"
         );
         for k in 0..9 {
             let temp_c = -20.0 + 10.0 * f64::from(k);
