@@ -1,10 +1,10 @@
 //! How many dwells a given sigma takes: designed poses against poses chosen by hand.
 
-use mimu::design::Problem;
-use mimu::design::model::{Model, Setting, Terms};
-use mimu::design::reach::Fixture;
-use mimu::design::schemes::Scheme;
 use mimu::estimate::Observation;
+use mimu::plan::design::Problem;
+use mimu::plan::design::model::{Model, Setting, Terms};
+use mimu::plan::design::reach::Fixture;
+use mimu::plan::design::schemes::Scheme;
 use mimu::quantity::Sensor;
 use mimu_recording::Reference;
 use mimu_rig::hands::{Hands, HandsTruth};

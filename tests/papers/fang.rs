@@ -1,11 +1,11 @@
 //! fang, section 5.1: its Table 3 and noise, with the six and nine positions and with our own.
 
-use mimu::design::Problem;
-use mimu::design::model::{Model, Setting, Terms};
-use mimu::design::reach::Fixture;
-use mimu::design::schemes::{FANG_FILTERS, Scheme};
 use mimu::estimate::known_input::{kalman, least_squares, six_positions};
 use mimu::estimate::{Estimated, Observation};
+use mimu::plan::design::Problem;
+use mimu::plan::design::model::{Model, Setting, Terms};
+use mimu::plan::design::reach::Fixture;
+use mimu::plan::design::schemes::{FANG_FILTERS, Scheme};
 use mimu::quantity::Sensor;
 use mimu::triad::{Angles, Forward, Physical};
 use mimu_core::kalman::Filter;

@@ -1,10 +1,10 @@
 //! The published schemes against the continuous optimum.
 
-use mimu::design::Problem;
-use mimu::design::judgement::Judgement;
-use mimu::design::model::{Model, Setting, Terms};
-use mimu::design::reach::{Fixture, Rates};
-use mimu::design::schemes::Scheme;
+use mimu::plan::design::Problem;
+use mimu::plan::design::judgement::Judgement;
+use mimu::plan::design::model::{Model, Setting, Terms};
+use mimu::plan::design::reach::{Fixture, Rates};
+use mimu::plan::design::schemes::Scheme;
 use mimu::quantity::Sensor;
 use mimu_recording::Reference;
 

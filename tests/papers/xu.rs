@@ -1,8 +1,8 @@
 //! xu: its schedules, Tables 1 and 2 as truth, and the scatter of its five repeats as noise.
 
-use mimu::design::schemes::Scheme;
 use mimu::estimate::known_input::{inverse_form, kalman, least_squares, opposite_rates};
 use mimu::estimate::{Estimated, Failure, Observation};
+use mimu::plan::design::schemes::Scheme;
 use mimu::quantity::Sensor;
 use mimu_core::compensation::Affine;
 use mimu_rig::ideal::Inverse;

@@ -2,9 +2,9 @@
 
 use std::fmt::Write as _;
 
-use mimu::noise_file::NoiseFile;
-use mimu::prepared::Prepared;
-use mimu::stillness::STILL_FACTOR;
+use mimu::noise::noise_file::NoiseFile;
+use mimu::signal::prepared::Prepared;
+use mimu::signal::stillness::STILL_FACTOR;
 use mimu_recording::Recording;
 use mimu_rig::located::Source;
 use mimu_rig::plan::Plan;

@@ -4,7 +4,7 @@ use std::sync::Mutex;
 
 use mimu::fit::{Fit, Method, Options, fit};
 use mimu::quantity::Sensor;
-use mimu::stillness::STILL_FACTOR;
+use mimu::signal::stillness::STILL_FACTOR;
 use mimu::triad::Triad;
 use mimu_rig::random::Random;
 use mimu_rig::rig_file::{RigFile, RigTruth};

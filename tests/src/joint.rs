@@ -3,13 +3,13 @@
 //! The judge knows the true motion from the bench and shares nothing with the diagnosis: the file is written and read as the command does it,
 //! another session is compensated by it sample by sample (`mimu apply`), and rate and force are compared with the true ones.
 
-use mimu::apply::apply;
 use mimu::calibration::Calibration;
+use mimu::calibration::apply::apply;
 use mimu::diagnose::{Recordings, diagnose};
 use mimu::effects::fitted::FittedEffect;
 use mimu::fit::fit;
-use mimu::prepared::Prepared;
-use mimu::stillness::STILL_FACTOR;
+use mimu::signal::prepared::Prepared;
+use mimu::signal::stillness::STILL_FACTOR;
 use mimu_recording::error::Result;
 use mimu_recording::{Recording, SampleFormat};
 use mimu_rig::located::Source;

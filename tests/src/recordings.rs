@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use mimu::fit::{Fit, Method, Options, fit};
-use mimu::prepared::Prepared;
-use mimu::stillness::STILL_FACTOR;
+use mimu::signal::prepared::Prepared;
+use mimu::signal::stillness::STILL_FACTOR;
 use mimu::triad::half_width_95;
 use mimu_core::compensation::Affine;
 use mimu_recording::error::Result;
@@ -318,7 +318,7 @@ pub fn verdict(fit: &Fit, accel: &Affine<f64>, gyro: &Affine<f64>) -> Result<Ver
         table.C = [0, 1, 2].map(|i| [0, 1, 2].map(|j| model.matrix[(i, j)]));
         table.o = model.offset.into();
     }
-    let verified = mimu::verify::verify(&fit.prepared, &calibration)?;
+    let verified = mimu::calibration::verify::verify(&fit.prepared, &calibration)?;
     let judged = verified.sensors.transpose();
     let judged = judged.expect("both sensors can be judged");
     let (accel, gyro) = (judged.accel, judged.gyro);

@@ -1,6 +1,6 @@
 //! Standard deviations that `mimu thermal plan --procedure ramp` promises, against the scatter of as many recordings of that plan.
 
-use mimu::design::budget::DwellNoise;
+use mimu::plan::design::budget::DwellNoise;
 use mimu::quantity::Sensor;
 use mimu_thermal::basis::Shape;
 use mimu_thermal::fit::{Estimator, Options, fit};

@@ -1,7 +1,7 @@
 //! Estimators of the literature and the joint one on the same recordings, beside the hours in the chamber.
 
-use mimu::prepared::Prepared;
-use mimu::stillness::STILL_FACTOR;
+use mimu::signal::prepared::Prepared;
+use mimu::signal::stillness::STILL_FACTOR;
 use mimu_recording::{Batch, Manifest};
 use mimu_thermal::classic::Classic;
 use mimu_thermal::fit::{Estimator, Options, fit};

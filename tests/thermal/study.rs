@@ -1,8 +1,8 @@
 //! Many runs of one experiment, and what is left of them.
 
-use mimu::prepared::Prepared;
 use mimu::quantity::{PerSensor, Sensor};
-use mimu::stillness::STILL_FACTOR;
+use mimu::signal::prepared::Prepared;
+use mimu::signal::stillness::STILL_FACTOR;
 use mimu_thermal::curves::TriadCurves;
 use mimu_thermal::joint::{Choice, Joint, estimate};
 use mimu_thermal::session::Session;

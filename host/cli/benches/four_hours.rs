@@ -8,7 +8,7 @@ use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use mimu::fit::{Method, Options, fit};
-use mimu::prepared::Prepared;
+use mimu::signal::prepared::Prepared;
 use mimu_recording::{
     Batch, ColumnList, Columns, ImportOptions, Manifest, RawUnit, Recording, Reference,
     SampleFormat, Writer, import,
@@ -110,7 +110,7 @@ fn by_hand(folder: &Path) {
     import(&options, &path, |_| ()).expect("the files are known to be good");
     let recording = Recording::open(&path).expect("just imported");
     let start = Instant::now();
-    let prepared = Prepared::read(&recording, mimu::stillness::STILL_FACTOR, |_| ())
+    let prepared = Prepared::read(&recording, mimu::signal::stillness::STILL_FACTOR, |_| ())
         .expect("known to be good");
     let reading = start.elapsed();
     let start = Instant::now();
@@ -118,7 +118,7 @@ fn by_hand(folder: &Path) {
         method: Method::LeastSquares,
         holdout_blocks: 4,
         only: None,
-        still_factor: mimu::stillness::STILL_FACTOR,
+        still_factor: mimu::signal::stillness::STILL_FACTOR,
     };
     fit(prepared, options).expect("known to be good");
     println!(

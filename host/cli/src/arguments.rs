@@ -3,11 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use mimu::dwell::Keep;
-use mimu::noise_file::NoiseFile;
-use mimu::prepared::Prepared;
+use mimu::noise::noise_file::NoiseFile;
 use mimu::quantity::Sensor;
-use mimu::stillness::{Finding, STILL_FACTOR, Steps};
+use mimu::signal::dwell::Keep;
+use mimu::signal::prepared::Prepared;
+use mimu::signal::stillness::{Finding, STILL_FACTOR, Steps};
 use mimu_recording::error::Result;
 
 #[derive(Args)]

@@ -5,7 +5,7 @@ pub mod autopilot;
 use std::fmt::Write as _;
 
 use mimu::allan::model::Term;
-use mimu::noise_file::{NoiseChannel, NoiseFile};
+use mimu::noise::noise_file::{NoiseChannel, NoiseFile};
 use mimu::quantity::Sensor;
 use mimu_recording::error::{Error, Result};
 

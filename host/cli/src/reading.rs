@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use mimu::prepared::Prepared;
-use mimu::stillness::Finding;
+use mimu::signal::prepared::Prepared;
+use mimu::signal::stillness::Finding;
 use mimu_recording::error::Result;
 use mimu_recording::{MANIFEST_FILE, PoseMeans, Recording};
 

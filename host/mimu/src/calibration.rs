@@ -1,5 +1,7 @@
 //! The calibration file: TOML that a program reads and a person can apply with a pocket calculator.
 
+pub mod apply;
+pub mod bias_cubic;
 mod check;
 mod effect;
 mod kept;
@@ -7,6 +9,8 @@ mod of_curves;
 mod of_fit;
 mod on_device;
 mod over_temperature;
+pub(crate) mod toml_layout;
+pub mod verify;
 
 pub use kept::Kept;
 pub use of_curves::{CurvesOfUnit, TriadOfCurves};
@@ -25,7 +29,6 @@ use serde::{Deserialize, Serialize};
 
 use crate::effects::fitted::FittedEffect;
 use crate::quantity::Sensor;
-use crate::toml_layout;
 use crate::triad::Covariance;
 use crate::warning::Warning;
 use mimu_recording::error::Result;

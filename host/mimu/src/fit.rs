@@ -14,12 +14,13 @@ mod outlying;
 pub mod plausible;
 mod sensor;
 pub mod session_bias;
+pub(crate) mod unit_in_si;
 
 use crate::estimate::least_squares::POORLY_DETERMINED;
 use crate::estimate::{Estimated, Observation};
-use crate::prepared::Prepared;
 use crate::quantity::{Figure, Sensor};
-use crate::stillness::STILL_FACTOR;
+use crate::signal::prepared::Prepared;
+use crate::signal::stillness::STILL_FACTOR;
 use crate::warning::Warning;
 use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{RawUnit, Reference};
@@ -52,7 +53,7 @@ pub struct Options {
     pub method: Method,
     /// Number of parts that are left out in turn, contiguous blocks where that leaves the rest determined; 0: none.
     pub holdout_blocks: usize,
-    /// See [`crate::stillness::STILL_FACTOR`].
+    /// See [`crate::signal::stillness::STILL_FACTOR`].
     pub still_factor: f64,
     /// Calibrate this triad only. Without a table the gyro needs the accelerometer, which is then calibrated as well.
     pub only: Option<Sensor>,

@@ -4,7 +4,9 @@
 //! of the dwell is what two successive means differ by (fang (8), section 3). What wanders more slowly than a dwell lasts only a
 //! longer record at rest can tell: its noise file, and [`wander`].
 
+pub mod noise_file;
 mod pool;
+pub mod survey;
 pub mod wander;
 
 use nalgebra::{DMatrix, Vector3};
@@ -14,12 +16,12 @@ use mimu_core::compensation::Affine;
 use self::pool::{Series, block_s, pooled, within};
 use self::wander::{Slow, Span};
 use crate::allan::variance::AllanModel;
-use crate::blocks::{Block, Condensed, Rails, quantile};
-use crate::course::Course;
-use crate::dwell::Dwell;
-use crate::noise_file::NoiseFile;
+use crate::noise::noise_file::NoiseFile;
 use crate::quantity::Sensor;
-use crate::ramp::ramps;
+use crate::signal::blocks::{Block, Condensed, Rails, quantile};
+use crate::signal::course::Course;
+use crate::signal::dwell::Dwell;
+use crate::signal::ramp::ramps;
 use crate::warning::Warning;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{Manifest, RAW_COLUMNS, RawUnit};

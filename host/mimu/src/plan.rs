@@ -2,6 +2,9 @@
 //!
 //! One type writes and reads it. The bench reads it by itself: it is the check from outside.
 
+pub mod chamber;
+pub mod design;
+pub mod next_experiment;
 mod turn;
 
 use std::path::Path;
@@ -13,9 +16,9 @@ use serde::{Deserialize, Serialize};
 use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{parse_toml, read_text};
 
-use crate::design::model::Setting;
-use crate::design::reach::Fixture;
-use crate::toml_layout;
+use crate::calibration::toml_layout;
+use crate::plan::design::model::Setting;
+use crate::plan::design::reach::Fixture;
 use turn::Angles;
 pub use turn::{TableAxis, Turn};
 

@@ -1,10 +1,10 @@
 //! One recording, from power-on to power-off, as rows: means of some seconds with their known input, and the thermometer.
 
 use mimu::allan::variance::AllanModel;
-use mimu::blocks::{Block, Condensed};
-use mimu::dwell::Dwell;
-use mimu::prepared::Prepared;
 use mimu::quantity::{PerSensor, Sensor, plural};
+use mimu::signal::blocks::{Block, Condensed};
+use mimu::signal::dwell::Dwell;
+use mimu::signal::prepared::Prepared;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{RawUnit, Reference};
 use nalgebra::Vector3;

@@ -1,7 +1,7 @@
 //! The thermometer over a whole recording: refused where it sticks, jumps or is missing, evenly spaced and smoothed.
 
-use mimu::blocks::{Block, Condensed};
 use mimu::quantity::{duration, significant};
+use mimu::signal::blocks::{Block, Condensed};
 use mimu_recording::NoTemperatures;
 use mimu_recording::error::{Argument, Error, Result};
 

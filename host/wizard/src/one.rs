@@ -5,7 +5,7 @@ mod rows;
 
 use mimu::fit::Fit;
 use mimu::quantity::Sensor;
-use mimu::stillness::GUARD_S;
+use mimu::signal::stillness::GUARD_S;
 use mimu_core::compensation::Affine;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{Batch, Columns, Manifest, Recorded};

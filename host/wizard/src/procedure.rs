@@ -1,11 +1,11 @@
 //! What is asked of a session, and which steps it takes: those to begin with, the next one by the information it brings, and those
 //! that verify.
 
-use mimu::design::information::Inverse;
-use mimu::design::model::{Model, Setting, Terms};
-use mimu::design::reach::{Fixture as Reached, Rates, Reach};
-use mimu::design::refinement::Region as _;
-use mimu::design::tour::randomised;
+use mimu::plan::design::information::Inverse;
+use mimu::plan::design::model::{Model, Setting, Terms};
+use mimu::plan::design::reach::{Fixture as Reached, Rates, Reach};
+use mimu::plan::design::refinement::Region as _;
+use mimu::plan::design::tour::randomised;
 use mimu::quantity::normal_gravity;
 use mimu_recording::Reference;
 use nalgebra::{Matrix3, Vector3};
@@ -321,7 +321,7 @@ pub fn next_step(asked: &Asked, done: &[Step], missed: Missed) -> Step {
     best.map_or(Step::at_rest(Vector3::z(), asked.dwell_s), |b| *b.1)
 }
 
-/// Rate below which a dwell on a table tells of the accelerometer, rad/s: see [`mimu::dwell::Dwell::spins`].
+/// Rate below which a dwell on a table tells of the accelerometer, rad/s: see [`mimu::signal::dwell::Dwell::spins`].
 const AT_REST: f64 = 0.175;
 /// What a pose that was not had yet is worth beside its information, in logarithms of a determinant: as much as one more of ten dwells.
 const NEW_POSE: f64 = 1.0;

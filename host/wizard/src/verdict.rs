@@ -1,11 +1,11 @@
 //! Whether a calibration keeps what it promises, judged by dwells that it was not made from.
 
 use mimu::calibration::Calibration;
+use mimu::calibration::verify::{SensorVerification, verify};
 use mimu::fit::Fit;
-use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
-use mimu::stillness::STILL_FACTOR;
-use mimu::verify::{SensorVerification, verify};
+use mimu::signal::prepared::Prepared;
+use mimu::signal::stillness::STILL_FACTOR;
 use mimu::warning::Warning;
 use mimu_recording::Recording;
 use mimu_recording::error::Result;

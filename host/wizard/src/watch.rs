@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use mimu::quantity::Sensor;
-use mimu::stillness::{STILL_FACTOR, WINDOW_S};
+use mimu::signal::stillness::{STILL_FACTOR, WINDOW_S};
 use mimu_core::compensation::Affine;
 use nalgebra::{Matrix3, Vector3};
 

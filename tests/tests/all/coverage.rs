@@ -1,14 +1,14 @@
 //! Errors and intervals of the estimators on units whose truth is known: a 95 % interval must contain it in 95 % of
 //! the cases, parameter by parameter.
 
-use mimu::blocks::Condensed;
 use mimu::estimate::known_input::{
     inverse_form, kalman, least_squares, opposite_rates, six_positions,
 };
 use mimu::estimate::{Estimated, Failure, Observation};
 use mimu::fit::{Method, Options, fit};
 use mimu::quantity::Sensor;
-use mimu::stillness::STILL_FACTOR;
+use mimu::signal::blocks::Condensed;
+use mimu::signal::stillness::STILL_FACTOR;
 use mimu::warning::Warning;
 use mimu_recording::{
     Batch, Columns, Manifest, RawUnit, Recording, Reference, SampleFormat, Writer,
@@ -299,7 +299,8 @@ fn noise_of_a_dwell_mean_is_that_of_correlated_noise() {
         .unwrap();
     let recording = Recording::open(&path).unwrap();
     let condensed = Condensed::read(&recording, false, |_| ()).unwrap();
-    let found = mimu::dwell::Dwells::find(&condensed, &recording.manifest, STILL_FACTOR).unwrap();
+    let found =
+        mimu::signal::dwell::Dwells::find(&condensed, &recording.manifest, STILL_FACTOR).unwrap();
     let noise = mimu::noise::Noise::within(&found.list, &condensed, &found.rails);
     let claimed = noise.of_mean(Sensor::Gyro, &found.list[0]).mean().sqrt();
     let means = found

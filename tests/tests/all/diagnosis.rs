@@ -4,7 +4,7 @@ use mimu::diagnose::search::Alternative;
 use mimu::diagnose::{Diagnosis, Verdict, diagnose};
 use mimu::fit::{Method, Options};
 use mimu::quantity::Sensor;
-use mimu::stillness::STILL_FACTOR;
+use mimu::signal::stillness::STILL_FACTOR;
 use mimu_rig::located::Source;
 use mimu_rig::plan::Plan;
 use mimu_tests::blind::{Case, case, is_right, plan, reported, unit};

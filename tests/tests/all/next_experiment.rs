@@ -3,9 +3,9 @@
 use mimu::diagnose::{Diagnosis, diagnose};
 use mimu::effects;
 use mimu::fit::{Method, Options};
-use mimu::next_experiment::prediction::Target;
-use mimu::next_experiment::{Next, Setup, next, smallest};
-use mimu::stillness::STILL_FACTOR;
+use mimu::plan::next_experiment::prediction::Target;
+use mimu::plan::next_experiment::{Next, Setup, next, smallest};
+use mimu::signal::stillness::STILL_FACTOR;
 use mimu_rig::random::Random;
 use mimu_rig::rig_file::{EffectFile, RigFile};
 use mimu_tests::bench;

@@ -3,10 +3,10 @@
 
 use mimu::diagnose::{Recordings, diagnose};
 use mimu::fit::{Method, Options, fit};
-use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
 use mimu::result::diagnosis::DiagnosisResult;
-use mimu::stillness::STILL_FACTOR;
+use mimu::signal::prepared::Prepared;
+use mimu::signal::stillness::STILL_FACTOR;
 use mimu::warning::Warning;
 use mimu_rig::random::Random;
 use mimu_rig::rig_file::RigFile;
@@ -100,7 +100,7 @@ fn a_diagnosis_that_accepted_thermal_effects_does_not_say_that_the_model_has_no_
     let of = |file: &RigFile| {
         let diagnosis = diagnose(Recordings::from(bench::recorded(&ramp, file, 4)), OPTIONS);
         let diagnosis = diagnosis.expect("a diagnosis");
-        let next = mimu::next_experiment::next(&diagnosis);
+        let next = mimu::plan::next_experiment::next(&diagnosis);
         DiagnosisResult::of(&diagnosis, &next, None)
     };
     let said = |result: &DiagnosisResult| {

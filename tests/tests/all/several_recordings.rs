@@ -4,9 +4,9 @@
 
 use mimu::diagnose::{Diagnosis, Recordings, Verdict, diagnose};
 use mimu::fit::{Method, Options};
-use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
-use mimu::stillness::STILL_FACTOR;
+use mimu::signal::prepared::Prepared;
+use mimu::signal::stillness::STILL_FACTOR;
 use mimu_recording::RawUnit;
 use mimu_rig::rig_file::RigFile;
 use mimu_tests::bench;

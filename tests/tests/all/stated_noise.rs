@@ -1,11 +1,11 @@
 //! The noise of the unit at rest in the hands of the other commands.
 
-use mimu::design::budget::DwellNoise;
 use mimu::fit::{Method, Options, fit};
-use mimu::noise_file::NoiseFile;
-use mimu::prepared::Prepared;
+use mimu::noise::noise_file::NoiseFile;
+use mimu::plan::design::budget::DwellNoise;
 use mimu::quantity::Sensor;
-use mimu::stillness::STILL_FACTOR;
+use mimu::signal::prepared::Prepared;
+use mimu::signal::stillness::STILL_FACTOR;
 use mimu::warning::Warning;
 use mimu_rig::random::Random;
 use mimu_tests::bench;

@@ -3,7 +3,7 @@
 use mimu::diagnose::{Verdict, diagnose};
 use mimu::fit::{Method, Options};
 use mimu::quantity::Sensor;
-use mimu::stillness::STILL_FACTOR;
+use mimu::signal::stillness::STILL_FACTOR;
 use mimu_rig::random::Random;
 use mimu_tests::bench;
 use mimu_tests::by_hand::{Grade, plan, unit};

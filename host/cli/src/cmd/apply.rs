@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use mimu::apply::apply;
 use mimu::calibration::Calibration;
+use mimu::calibration::apply::apply;
 use mimu_recording::error::Result;
 use mimu_recording::{MANIFEST_FILE, Recording, SampleFormat};
 

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand, ValueEnum};
 use mimu::calibration::Calibration;
-use mimu::stillness::{Finding, Steps};
+use mimu::signal::stillness::{Finding, Steps};
 use mimu_recording::error::Result;
 use mimu_recording::result_file::stage;
 use mimu_thermal::base;

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use mimu::calibration::Calibration;
-use mimu::verify::verify;
+use mimu::calibration::verify::verify;
 use mimu_recording::error::Result;
 
 use crate::arguments::{JsonArgs, NoiseArgs, StillArgs};

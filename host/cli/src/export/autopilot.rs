@@ -12,8 +12,8 @@
 
 use std::fmt::Write as _;
 
-use mimu::bias_cubic::{BiasCubics, KnownConversion, Remainder};
 use mimu::calibration::Calibration;
+use mimu::calibration::bias_cubic::{BiasCubics, KnownConversion, Remainder};
 use mimu::quantity::{AXES, Sensor};
 use mimu::readable;
 use mimu_recording::error::{Error, Result};

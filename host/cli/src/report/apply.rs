@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use mimu::apply::Applied;
+use mimu::calibration::apply::Applied;
 use mimu::quantity::plural;
 
 use crate::report::text::warn;

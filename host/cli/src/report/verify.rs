@@ -2,8 +2,8 @@
 
 use std::fmt::Write as _;
 
+use mimu::calibration::verify::Verification;
 use mimu::readable;
-use mimu::verify::Verification;
 
 use crate::report::text::warn;
 

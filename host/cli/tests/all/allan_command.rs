@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 use std::process::{Command, Output};
 
-use mimu::noise_file::NoiseFile;
+use mimu::noise::noise_file::NoiseFile;
 use mimu_rig::located::Source;
 use mimu_rig::noise::{Coefficients, Noise};
 use mimu_rig::plan::Plan;

@@ -1,6 +1,6 @@
 //! A plan over temperature in time: what the chamber is to be at, and when each round begins.
 
-use mimu::chamber;
+use mimu::plan::chamber;
 use mimu::plan::{Plan, Planned};
 use mimu_recording::error::{Error, Result};
 

@@ -2,9 +2,9 @@
 
 use nalgebra::Vector3;
 
-use crate::blocks::Moments;
 use crate::quantity::AXES;
 use crate::quantity::Sensor;
+use crate::signal::blocks::Moments;
 
 /// Temperature from which offsets count, °C.
 pub const REFERENCE_C: f64 = 25.0;

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::quantity::REFERENCE_C;
-use crate::blocks::Block;
+use crate::signal::blocks::Block;
 
 /// The temperature that an effect follows, where it is not the one recorded.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -8,7 +8,7 @@ use std::cell::RefCell;
 use mimu_core::compensation::Affine;
 use nalgebra::{Matrix3, SVector, Vector3};
 
-use crate::increment::Increment;
+use crate::signal::increment::Increment;
 
 /// One turn from dwell to dwell.
 #[derive(Debug, Clone, Copy)]

@@ -6,9 +6,9 @@
 
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
-use crate::dwell::Dwell;
 use crate::estimate::Observation;
 use crate::quantity::Sensor;
+use crate::signal::dwell::Dwell;
 
 /// What the mean readings over `dwells` share of that force, raw units squared, axis by axis: with an arm of `sigma_m` and the
 /// sensor's `forward` matrix, raw per m/s².

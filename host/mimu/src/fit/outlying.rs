@@ -10,12 +10,12 @@ use mimu_core::compensation::Affine;
 use nalgebra::{DMatrix, Vector3};
 
 use super::by_gravity::POOR_POSES;
-use crate::blocks::quantile;
-use crate::dwell::{Dwells, Fault, LeftOut};
 use crate::estimate::turn::{Turn, direction_error};
 use crate::estimate::{Estimated, Observation, gravity_size, rotation};
-use crate::prepared::{Prepared, si_covariance};
 use crate::quantity::{AXES, Sensor};
+use crate::signal::blocks::quantile;
+use crate::signal::dwell::{Dwells, Fault, LeftOut};
+use crate::signal::prepared::{Prepared, si_covariance};
 use crate::triad::Triad;
 use crate::warning::Warning;
 use deletion::{Judged, Row, against_others, contradicted};

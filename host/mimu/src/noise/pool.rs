@@ -2,9 +2,9 @@
 
 use super::ChannelNoise;
 use crate::allan::variance::AllanModel;
-use crate::blocks::{Block, Condensed};
-use crate::dwell::Dwell;
-use crate::ramp::ramps;
+use crate::signal::blocks::{Block, Condensed};
+use crate::signal::dwell::Dwell;
+use crate::signal::ramp::ramps;
 
 /// Noise of `value` of the blocks within `dwells`.
 pub(super) fn within<'a>(

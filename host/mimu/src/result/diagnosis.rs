@@ -4,16 +4,16 @@ use mimu_recording::Reference;
 use serde::Serialize;
 
 use super::TOOL;
+use crate::calibration::verify::Verification;
 use crate::diagnose::decision::{Accepted, Decision};
 use crate::diagnose::note::Note;
 use crate::diagnose::picture::Picture;
 use crate::diagnose::rows::Figure as Judged;
 use crate::diagnose::{Diagnosis, SensorDiagnosis, Source, Untestable, Verdict};
 use crate::fit::Split;
-use crate::next_experiment::{Confused, Next, NotInPlan, SizedRecipe};
 use crate::observable::Observable;
+use crate::plan::next_experiment::{Confused, Next, NotInPlan, SizedRecipe};
 use crate::quantity::{AXES, Figure, PerSensor, Sensor, present};
-use crate::verify::Verification;
 use crate::warning::Warning;
 
 /// Result of a diagnosis.

@@ -6,14 +6,14 @@ use mimu_recording::{RawUnit, Reference};
 use serde::Serialize;
 
 use super::TOOL;
-use crate::dwell::Dwell;
 use crate::fit::change::Change;
 use crate::fit::{Fit, Method, SensorFit, Split};
 use crate::observable::Observable;
 use crate::parameter::{Kind, TriadParameter, parameters};
-use crate::prepared::Prepared;
 use crate::quantity::{Figure, PerSensor, Sensor, present, raw_unit};
-use crate::stillness::Detection;
+use crate::signal::dwell::Dwell;
+use crate::signal::prepared::Prepared;
+use crate::signal::stillness::Detection;
 use crate::triad::{Angles, Estimate};
 use crate::warning::Warning;
 

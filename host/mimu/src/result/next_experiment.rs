@@ -3,8 +3,8 @@
 use serde::Serialize;
 
 use super::TOOL;
-use crate::next_experiment::recipe::Course;
-use crate::next_experiment::{Answer, Setup};
+use crate::plan::next_experiment::recipe::Course;
+use crate::plan::next_experiment::{Answer, Setup};
 use crate::plan::round;
 use crate::quantity::Sensor;
 use mimu_recording::Reference;

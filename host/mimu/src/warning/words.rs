@@ -5,9 +5,9 @@ use std::fmt;
 use mimu_recording::RAW_COLUMNS;
 
 use super::Warning;
-use crate::fault::{Fault, SHORTEST_S};
+use crate::noise::survey::CHECK_WIRING;
 use crate::quantity::{Sensor, duration, normal_gravity, plural, significant};
-use crate::survey::CHECK_WIRING;
+use crate::signal::fault::{Fault, SHORTEST_S};
 
 /// What would be open of `parameter` without a dwell or a turn.
 fn open(parameter: &str, grows: f64) -> String {

@@ -22,7 +22,7 @@ fn recorded(ups: &[[f64; 3]]) -> Prepared {
         }
     }
     let manifest = Manifest::new("unit", 100.0, G, RawUnit::Si, Reference::Gravity);
-    Prepared::of(manifest, &samples, mimu::stillness::STILL_FACTOR).expect("readable")
+    Prepared::of(manifest, &samples, mimu::signal::stillness::STILL_FACTOR).expect("readable")
 }
 
 /// Eighteen poses nearly along the axes: 3e-4 of a misalignment's slope is all that they show.

@@ -2,7 +2,7 @@
 //! intervals hold the truth.
 
 use mimu::quantity::Sensor;
-use mimu::stillness::STILL_FACTOR;
+use mimu::signal::stillness::STILL_FACTOR;
 use mimu::{Fit, Manifest, Options, Prepared, RawUnit, Reference, Samples, fit};
 
 const G: f64 = 9.8;

@@ -1,9 +1,9 @@
 //! Inputs that move within dwells, against physics written here: a platform that swings about a level axis.
 
 use mimu::diagnose::{Verdict, diagnose};
-use mimu::dwell::Fault;
 use mimu::quantity::Sensor;
-use mimu::stillness::STILL_FACTOR;
+use mimu::signal::dwell::Fault;
+use mimu::signal::stillness::STILL_FACTOR;
 use mimu::{Fit, Manifest, Options, Prepared, RawUnit, Reference, Samples, fit};
 
 const G: f64 = 9.8;

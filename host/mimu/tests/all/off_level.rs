@@ -1,7 +1,7 @@
 //! Six faces that were not level: least squares and six positions say so in the same words, and of level ones least squares says nothing.
 
 use mimu::fit::{Method, Options, fit};
-use mimu::stillness::STILL_FACTOR;
+use mimu::signal::stillness::STILL_FACTOR;
 use mimu::{Manifest, Prepared, RawUnit, Reference, Samples};
 use mimu_rig::random::Random;
 use nalgebra::{Matrix3, Rotation3, Vector3};
@@ -45,7 +45,11 @@ fn warnings(unit: &Unit, seed: u64, method: Method) -> Vec<String> {
         ..Options::default()
     };
     let fit = fit(prepared, options).unwrap();
-    fit.sensors[0].warnings.iter().map(ToString::to_string).collect()
+    fit.sensors[0]
+        .warnings
+        .iter()
+        .map(ToString::to_string)
+        .collect()
 }
 
 const SAYS: [&str; 2] = [

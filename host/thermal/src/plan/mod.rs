@@ -9,9 +9,9 @@ mod procedure;
 pub use prediction::{At, SensorPrediction};
 pub use procedure::{Procedure, Schedule, Step};
 
-use mimu::design::budget::DwellNoise;
-use mimu::design::reach::Fixture;
 use mimu::plan::Plan;
+use mimu::plan::design::budget::DwellNoise;
+use mimu::plan::design::reach::Fixture;
 use mimu::quantity::{duration, significant};
 use mimu_recording::error::{Argument, Error, Result};
 use serde::Serialize;

@@ -1,10 +1,10 @@
 //! What chamber and table do in each procedure, and when.
 
-use mimu::chamber;
-use mimu::design::model::Setting;
-use mimu::design::reach::Fixture;
-use mimu::design::tour::Motion;
 use mimu::plan::TableAxis;
+use mimu::plan::chamber;
+use mimu::plan::design::model::Setting;
+use mimu::plan::design::reach::Fixture;
+use mimu::plan::design::tour::Motion;
 use mimu::quantity::duration;
 use mimu_recording::error::{Argument, Error, Result};
 use nalgebra::Vector3;

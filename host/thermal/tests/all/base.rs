@@ -1,9 +1,9 @@
 //! Biases over temperature from rest, upon a calibration at one temperature.
 
 use mimu::calibration::Calibration;
-use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
-use mimu::stillness::STILL_FACTOR;
+use mimu::signal::prepared::Prepared;
+use mimu::signal::stillness::STILL_FACTOR;
 use mimu_thermal::base;
 use mimu_thermal::fit::{ThermalFit, fit};
 use nalgebra::Vector3;

@@ -13,8 +13,8 @@ mod simulation;
 mod soak;
 mod soaked;
 
-use mimu::prepared::Prepared;
-use mimu::stillness::STILL_FACTOR;
+use mimu::signal::prepared::Prepared;
+use mimu::signal::stillness::STILL_FACTOR;
 use mimu::{Manifest, Samples};
 use mimu_thermal::session::Session;
 

@@ -1,6 +1,6 @@
 //! What a planned procedure is predicted to determine, against what follows on paper.
 
-use mimu::design::budget::DwellNoise;
+use mimu::plan::design::budget::DwellNoise;
 use mimu::readable::STANDARD_GRAVITY as G;
 use mimu_thermal::basis::Shape;
 use mimu_thermal::plan::{Planned, Procedure, Request, plan};

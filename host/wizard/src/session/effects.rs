@@ -4,7 +4,7 @@ use mimu::calibration::Calibration;
 use mimu::diagnose::{Recordings, diagnose};
 use mimu::effects::fitted::FittedEffect;
 use mimu::fit::{Fit, Options};
-use mimu::next_experiment;
+use mimu::plan::next_experiment;
 use mimu::result::diagnosis::DiagnosisResult;
 use mimu::warning::Warning;
 use mimu_recording::Reference;
@@ -73,8 +73,8 @@ impl Whole<'_> {
             .created(Part::Confirmation, now)?;
         let made = Calibration::of(&fitted, &found, &created)?;
         let both = (
-            mimu::verify::verify(other, &plain.calibration),
-            mimu::verify::verify(other, &made),
+            mimu::calibration::verify::verify(other, &plain.calibration),
+            mimu::calibration::verify::verify(other, &made),
         );
         let judged = match both {
             (Ok(before), Ok(after)) => Some([before, after]),

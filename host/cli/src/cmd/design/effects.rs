@@ -3,17 +3,17 @@
 use std::path::Path;
 
 use crate::report;
-use mimu::design::budget::DwellNoise;
-use mimu::design::reach::{Fixture, RateList, Rates};
-use mimu::design::tour::Motion;
 use mimu::effects;
 use mimu::fit::{Fit, Method, Options, fit};
-use mimu::next_experiment::prediction::Target;
-use mimu::next_experiment::{CHAMBER_C, DWELL_S, RATE_DPS, SLEW, Setup, smallest};
-use mimu::noise_file::NoiseFile;
+use mimu::noise::noise_file::NoiseFile;
+use mimu::plan::design::budget::DwellNoise;
+use mimu::plan::design::reach::{Fixture, RateList, Rates};
+use mimu::plan::design::tour::Motion;
+use mimu::plan::next_experiment::prediction::Target;
+use mimu::plan::next_experiment::{CHAMBER_C, DWELL_S, RATE_DPS, SLEW, Setup, smallest};
 use mimu::quantity::Sensor;
 use mimu::result::next_experiment::NextExperiment;
-use mimu::stillness::STILL_FACTOR;
+use mimu::signal::stillness::STILL_FACTOR;
 use mimu_recording::Reference;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::result_file::stage;

@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use mimu::design::budget::DwellNoise;
-use mimu::noise_file::NoiseFile;
+use mimu::noise::noise_file::NoiseFile;
+use mimu::plan::design::budget::DwellNoise;
 use mimu::quantity::Sensor;
 use mimu_recording::error::Result;
 use mimu_recording::result_file::stage;

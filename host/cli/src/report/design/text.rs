@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use crate::report::text::{COLUMNS, wrap};
-use mimu::design::judgement::WEAK;
+use mimu::plan::design::judgement::WEAK;
 use mimu::plan::round;
 use mimu::quantity::{minutes, plural, significant};
 use mimu::readable::{self, Readable};

@@ -6,8 +6,8 @@ use mimu::effects::candidate::{Candidate, Kind};
 use mimu::effects::fitted::FittedEffect;
 use mimu::effects::removal::remove;
 use mimu::effects::{converter::Converter, readout::first_of};
-use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
+use mimu::signal::prepared::Prepared;
 use mimu_core::compensation::Sample;
 use mimu_core::effects::Effects;
 use mimu_device::Image;
@@ -66,7 +66,7 @@ fn errors_by_the_code_are_taken_out_block_by_block_and_sample_by_sample() {
         .skip(1)
         .map(|line| line.split(',').map(|v| v.parse().unwrap()).collect())
         .collect();
-    let mean = |block: &mimu::blocks::Block| Vector3::from_fn(|i, _| block.raw[3 + i].mean);
+    let mean = |block: &mimu::signal::blocks::Block| Vector3::from_fn(|i, _| block.raw[3 + i].mean);
     let blocks = |of: &Prepared| of.condensed.blocks.clone();
     // Of the truth, V: what was put in, and what is left of it by block and by sample.
     let [mut put, mut by_block, mut by_sample] = [(); 3].map(|()| Vec::new());

@@ -1,15 +1,15 @@
 //! Effects taken out of recordings that lack something: samples, a temperature, the time since power-on.
 
-use mimu::blocks::Moments;
 use mimu::calibration::Calibration;
 use mimu::diagnose::{Recordings, diagnose};
-use mimu::dwell::Fault;
 use mimu::effects::fitted::FittedEffect;
 use mimu::effects::removal::{remove, remove_within};
 use mimu::fit::{Method, Options};
-use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
-use mimu::stillness::STILL_FACTOR;
+use mimu::signal::blocks::Moments;
+use mimu::signal::dwell::Fault;
+use mimu::signal::prepared::Prepared;
+use mimu::signal::stillness::STILL_FACTOR;
 use mimu_recording::RawUnit;
 
 use super::unit::{SAG, fitted, named, prepared, record};

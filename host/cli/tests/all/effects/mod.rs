@@ -111,7 +111,7 @@ fn every_effect_comes_back_from_the_file_and_the_device_removes_what_the_pc_does
         let middle = 0.5 * (block.start_s + block.last_s);
         device.slow(&mut state, middle - t, block.temp_c.mean);
         t = middle;
-        let si = |block: &mimu::blocks::Block| {
+        let si = |block: &mimu::signal::blocks::Block| {
             let raw = |from: usize| Vector3::from_fn(|i, _| block.raw[from + i].mean);
             Sample {
                 gyro: gyro.apply(&raw(0)),

@@ -20,11 +20,11 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 use mimu::calibration::Calibration;
+use mimu::calibration::verify::verify;
 use mimu::fit::{Fit, Method, Options, fit};
-use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
 use mimu::result::fit::FitResult;
-use mimu::verify::verify;
+use mimu::signal::prepared::Prepared;
 use mimu_cli::report;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{

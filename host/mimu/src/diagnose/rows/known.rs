@@ -7,10 +7,10 @@ use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::build::{Builder, Part};
 use super::{Figure, Row, Stratum};
-use crate::contrast::Contrast;
 use crate::estimate::Observation;
 use crate::observable::{Observable, StratumName};
 use crate::quantity::Sensor;
+use crate::signal::contrast::Contrast;
 use crate::triad::Forward;
 
 /// Derivatives by the parameters: bias and matrix row of each axis, then the delay of each where an input moves.

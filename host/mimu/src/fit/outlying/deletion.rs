@@ -9,7 +9,7 @@
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-use crate::blocks::quantile;
+use crate::signal::blocks::quantile;
 
 /// Something judged: its error, the derivatives of that by the parameters, and the variance by noise.
 pub(super) struct Row {

@@ -7,9 +7,9 @@ mod schemes;
 mod sphere;
 mod time;
 
-use mimu::design::Problem;
-use mimu::design::model::{Model, Terms};
-use mimu::design::reach::{Fixture, RateList};
+use mimu::plan::design::Problem;
+use mimu::plan::design::model::{Model, Terms};
+use mimu::plan::design::reach::{Fixture, RateList};
 use mimu_recording::Reference;
 use nalgebra::Vector3;
 

@@ -1,12 +1,12 @@
 //! Recipes that show effects: what they predict, and that they are no larger than they have to be.
 
-use mimu::design::budget::DwellNoise;
-use mimu::design::reach::{Fixture, RateList, Rates};
-use mimu::design::tour::Motion;
 use mimu::effects;
-use mimu::next_experiment::prediction::{SEEN, Target};
-use mimu::next_experiment::recipe::{Course, Experiment, Inputs, RECIPES};
-use mimu::next_experiment::{Answer, CHAMBER_C, DWELL_S, RATE_DPS, SLEW, Setup, smallest};
+use mimu::plan::design::budget::DwellNoise;
+use mimu::plan::design::reach::{Fixture, RateList, Rates};
+use mimu::plan::design::tour::Motion;
+use mimu::plan::next_experiment::prediction::{SEEN, Target};
+use mimu::plan::next_experiment::recipe::{Course, Experiment, Inputs, RECIPES};
+use mimu::plan::next_experiment::{Answer, CHAMBER_C, DWELL_S, RATE_DPS, SLEW, Setup, smallest};
 use mimu::quantity::Sensor;
 use mimu_recording::Reference;
 use nalgebra::{DMatrix, DVector};

@@ -1,9 +1,9 @@
 //! Polynomials on the interval and the square: optima known for half a century.
 
-use mimu::design::continuous::optimum;
-use mimu::design::exchange;
-use mimu::design::information::Rows;
-use mimu::design::refinement::{Region, refine};
+use mimu::plan::design::continuous::optimum;
+use mimu::plan::design::exchange;
+use mimu::plan::design::information::Rows;
+use mimu::plan::design::refinement::{Region, refine};
 use nalgebra::DMatrix;
 
 use super::{brute_force, close};

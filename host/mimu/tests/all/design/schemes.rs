@@ -2,12 +2,12 @@
 
 use std::f64::consts::PI;
 
-use mimu::design::judgement::Judgement;
-use mimu::design::model::{GRAVITY, Model, Term, Terms};
-use mimu::design::reach::{Fixture, Rates};
-use mimu::design::schemes::{FANG_FILTERS, Scheme};
-use mimu::design::{Problem, lack_of_fit};
 use mimu::estimate::{Observation, gravity_size, known_input};
+use mimu::plan::design::judgement::Judgement;
+use mimu::plan::design::model::{GRAVITY, Model, Term, Terms};
+use mimu::plan::design::reach::{Fixture, Rates};
+use mimu::plan::design::schemes::{FANG_FILTERS, Scheme};
+use mimu::plan::design::{Problem, lack_of_fit};
 use mimu::quantity::Sensor;
 use mimu_recording::Reference;
 use nalgebra::Vector3;

@@ -2,12 +2,12 @@
 
 use std::f64::consts::PI;
 
-use mimu::design::Problem;
-use mimu::design::exchange;
-use mimu::design::information::Inverse;
-use mimu::design::model::{Model, Setting};
-use mimu::design::reach::Fixture;
-use mimu::design::refinement::Region as _;
+use mimu::plan::design::Problem;
+use mimu::plan::design::exchange;
+use mimu::plan::design::information::Inverse;
+use mimu::plan::design::model::{Model, Setting};
+use mimu::plan::design::reach::Fixture;
+use mimu::plan::design::refinement::Region as _;
 use mimu_recording::Reference;
 use nalgebra::DMatrix;
 

@@ -1,9 +1,9 @@
 //! Sequences and budgets of time.
 
-use mimu::design::budget::{DwellNoise, Session};
-use mimu::design::model::Setting;
-use mimu::design::reach::Fixture;
-use mimu::design::tour::{Motion, Order, randomised};
+use mimu::plan::design::budget::{DwellNoise, Session};
+use mimu::plan::design::model::Setting;
+use mimu::plan::design::reach::Fixture;
+use mimu::plan::design::tour::{Motion, Order, randomised};
 use mimu::quantity::Sensor;
 use mimu_recording::Reference;
 use nalgebra::DMatrix;

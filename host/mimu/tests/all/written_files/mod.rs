@@ -1,7 +1,7 @@
 //! Files that version 0.1 wrote by hand, before serde did: they are read, and what is written now is read back to the last bit.
 
 use mimu::calibration::Calibration;
-use mimu::noise_file::NoiseFile;
+use mimu::noise::noise_file::NoiseFile;
 use mimu::quantity::Sensor;
 
 #[test]

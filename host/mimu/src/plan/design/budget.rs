@@ -9,7 +9,7 @@ use super::refinement::Region as _;
 use super::tour::{Motion, Order, randomised};
 use crate::allan::model::FLOOR;
 use crate::allan::variance::AllanModel;
-use crate::noise_file::NoiseFile;
+use crate::noise::noise_file::NoiseFile;
 use crate::quantity::Sensor;
 use mimu_recording::error::{Error, Result};
 

@@ -2,9 +2,9 @@
 
 use mimu_recording::{Manifest, RawUnit, Reference};
 
-use crate::blocks::quantile;
-use crate::dwell::Dwell;
 use crate::quantity::{Figure, Sensor};
+use crate::signal::blocks::quantile;
+use crate::signal::dwell::Dwell;
 use crate::warning::Warning;
 
 /// Readings in SI with a gain beyond this, or below its inverse, have a wrong unit or time base: sensors are within ten per cent.

@@ -24,10 +24,10 @@ use crate::allan::model::{
 use crate::allan::units::Unit;
 use crate::allan::{Kind, Point, Spacing};
 use crate::calibration::Calibration;
-use crate::no_temperature;
+use crate::fit::unit_in_si::of_sizes;
 use crate::quantity::Sensor;
+use crate::signal::no_temperature;
 use crate::spectrum::{SetAside, set_aside_after};
-use crate::unit_in_si::of_sizes;
 use crate::warning::Warning;
 use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{Column, NoTemperatures, RAW_COLUMNS, RawUnit, Recording};

@@ -3,11 +3,11 @@
 //! A mean is what a dwell comes to, so a row is a dwell: its noise is what the table says of it, and nothing is judged that only samples
 //! show (stillness, rails, stuck channels). What goes by time is not known: turns, drifts, and how a bias wanders.
 
-use crate::blocks::{Block, Condensed, Level, Moments};
-use crate::dwell::{Dwell, Dwells, Fault, Keep, Mean};
 use crate::noise::Noise;
-use crate::prepared::Prepared;
 use crate::quantity::Sensor;
+use crate::signal::blocks::{Block, Condensed, Level, Moments};
+use crate::signal::dwell::{Dwell, Dwells, Fault, Keep, Mean};
+use crate::signal::prepared::Prepared;
 use crate::warning::Warning;
 use mimu_recording::error::Result;
 use mimu_recording::{Column, PoseMean, PoseMeans, Reference};

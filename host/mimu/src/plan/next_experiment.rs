@@ -6,7 +6,7 @@
 //! | [`prediction`] | the sigma that an experiment gives each coefficient of an effect                    |
 //! | [`words`]      | an experiment in a sentence, and as a plan                                          |
 //!
-//! It stands above [`crate::design`] and [`crate::diagnose`], which do not know each other. Regressors, typical sizes and ranges of
+//! It stands above [`crate::plan::design`] and [`crate::diagnose`], which do not know each other. Regressors, typical sizes and ranges of
 //! nonlinear parameters are those of the effects: one that is new there is known here.
 
 pub mod prediction;
@@ -16,17 +16,17 @@ pub mod words;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use crate::design::budget::DwellNoise;
-use crate::design::reach::{Fixture, RateList, Rates};
-use crate::design::tour::Motion;
 use crate::diagnose::Diagnosis;
 use crate::effects;
 use crate::effects::candidate::{Candidate, Kind};
 use crate::effects::regressor::Product;
 use crate::fit::Fit;
-use crate::prepared::si_covariance;
+use crate::plan::design::budget::DwellNoise;
+use crate::plan::design::reach::{Fixture, RateList, Rates};
+use crate::plan::design::tour::Motion;
 use crate::quantity::AXES;
 use crate::quantity::Sensor;
+use crate::signal::prepared::si_covariance;
 use mimu_recording::Reference;
 use prediction::{Prediction, Target, calibrates};
 use recipe::{Course, Experiment, RECIPES, Recipe};

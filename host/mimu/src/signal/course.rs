@@ -7,9 +7,9 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
-use crate::blocks::{Block, Condensed, Rails};
 use crate::quantity::Sensor;
-use crate::stillness::tolerance;
+use crate::signal::blocks::{Block, Condensed, Rails};
+use crate::signal::stillness::tolerance;
 
 /// With fewer blocks nothing is left of a regression on an input and its rate of change.
 const FEWEST_BLOCKS: usize = 12;

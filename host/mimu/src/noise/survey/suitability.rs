@@ -1,9 +1,9 @@
 //! Whether a channel is at rest and alive: only then is its Allan curve that of its noise.
 
 use super::stretch::{FEWEST, Part, Stretch, longest, segments};
-use crate::blocks::quantile;
 use crate::quantity::{duration, unsigned_zero};
-use crate::stillness::{STILL_FACTOR, WINDOW_S};
+use crate::signal::blocks::quantile;
+use crate::signal::stillness::{STILL_FACTOR, WINDOW_S};
 use crate::warning::Warning;
 use mimu_recording::RAW_COLUMNS;
 use mimu_recording::error::{Argument, Error, Result};

@@ -3,11 +3,11 @@
 use nalgebra::Vector3;
 
 use super::Setup;
-use crate::design::model::{GRAVITY, Setting};
-use crate::design::reach::{Fixture, Rates};
-use crate::design::tour::randomised;
 use crate::effects::quantity::{Conditions, REFERENCE_C, Reading};
 use crate::effects::temperature::lagged;
+use crate::plan::design::model::{GRAVITY, Setting};
+use crate::plan::design::reach::{Fixture, Rates};
+use crate::plan::design::tour::randomised;
 use crate::quantity::Sensor;
 use mimu_recording::Reference;
 

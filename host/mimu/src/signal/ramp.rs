@@ -1,6 +1,6 @@
 //! Whether the temperature ramps within a dwell.
 
-use crate::blocks::Block;
+use crate::signal::blocks::Block;
 
 /// Change of the temperature over a dwell, over its standard error, from which on it ramps.
 const RAMPS_SIGMAS: f64 = 5.0;

@@ -5,8 +5,8 @@
 
 use std::ops::Range;
 
-use crate::blocks::{Condensed, Stretch, pool, quantile};
 use crate::quantity::Sensor;
+use crate::signal::blocks::{Condensed, Stretch, pool, quantile};
 
 /// Blocks whose mean is compared with that of the middle: noise of a single block would hide a slow turn.
 const GROUP: usize = 3;

@@ -3,19 +3,19 @@
 use mimu_core::compensation::Affine;
 use nalgebra::{Matrix3, Vector3};
 
-use crate::blocks::Condensed;
-use crate::contrast::{Contrast, contrasts};
-use crate::course::Course;
-use crate::dwell::{Dwell, Dwells, Fault, LeftOut};
 use crate::estimate::earth::Earth;
 use crate::estimate::turn::{Motion, Rest, Turn};
 use crate::estimate::{Failure, Observation};
+use crate::fit::unit_in_si;
 use crate::noise::Noise;
-use crate::noise_file::NoiseFile;
+use crate::noise::noise_file::NoiseFile;
 use crate::quantity::Sensor;
-use crate::rails::refuse_dead_channels;
-use crate::stillness::Finding;
-use crate::unit_in_si;
+use crate::signal::blocks::Condensed;
+use crate::signal::contrast::{Contrast, contrasts};
+use crate::signal::course::Course;
+use crate::signal::dwell::{Dwell, Dwells, Fault, LeftOut};
+use crate::signal::rails::refuse_dead_channels;
+use crate::signal::stillness::Finding;
 use crate::warning::Warning;
 use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{Batch, Manifest, Recording, Reference};
@@ -51,7 +51,7 @@ impl Prepared {
         Self::of_condensed(manifest, condensed, finding.into(), place)
     }
 
-    /// Finds the dwells of `samples` in memory. `finding`: a factor alone is [`crate::stillness::STILL_FACTOR`] or another.
+    /// Finds the dwells of `samples` in memory. `finding`: a factor alone is [`crate::signal::stillness::STILL_FACTOR`] or another.
     ///
     /// Errors: those of a recording on disk; columns of different lengths; no samples.
     pub fn of(manifest: Manifest, samples: &Batch, finding: impl Into<Finding>) -> Result<Self> {
@@ -352,8 +352,9 @@ impl Prepared {
                 }
                 // Hands do not keep a code for a tenth of a second.
                 let chance = self.dwells.longest_run[c];
-                let stuck =
-                    |m: &crate::blocks::Moments| m.m2 == 0.0 && m.n > 3 && f64::from(m.n) > chance;
+                let stuck = |m: &crate::signal::blocks::Moments| {
+                    m.m2 == 0.0 && m.n > 3 && f64::from(m.n) > chance
+                };
                 let stuck = blocks.iter().any(|b| stuck(&b.raw[c]));
                 stuck.then_some(Fault::Stuck(c))
             });
@@ -361,7 +362,7 @@ impl Prepared {
                 refused.push(Warning::TurnNotUsed(a.step, b.step, fault));
                 continue;
             }
-            let variance = |d: &crate::dwell::Dwell| {
+            let variance = |d: &crate::signal::dwell::Dwell| {
                 let si = si_covariance(&accel.matrix, &self.noise.of_mean(Sensor::Accel, d));
                 si.trace() / 3.0
             };
@@ -465,7 +466,7 @@ pub fn si_covariance(matrix: &Matrix3<f64>, variance: &Vector3<f64>) -> Matrix3<
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::stillness::STILL_FACTOR;
+    use crate::signal::stillness::STILL_FACTOR;
     use mimu_recording::RawUnit;
 
     #[test]

@@ -6,16 +6,16 @@
 
 use std::ops::Range;
 
-use crate::blocks::{Condensed, Level, Rails, Stretch, pool, quantile};
-use crate::course::{Course, Motion, motion};
-pub use crate::fault::Fault;
-use crate::fault::SHORTEST_S;
 use crate::quantity::Sensor;
-use crate::rails::{self, longest_run_by_chance};
-use crate::ramp::ramps;
-use crate::rest::{self, Rest};
-use crate::slow_turns::{self, Reading};
-use crate::stillness::{self, Detection, Finding, Steps, reference_spans};
+use crate::signal::blocks::{Condensed, Level, Rails, Stretch, pool, quantile};
+use crate::signal::course::{Course, Motion, motion};
+pub use crate::signal::fault::Fault;
+use crate::signal::fault::SHORTEST_S;
+use crate::signal::rails::{self, longest_run_by_chance};
+use crate::signal::ramp::ramps;
+use crate::signal::rest::{self, Rest};
+use crate::signal::slow_turns::{self, Reading};
+use crate::signal::stillness::{self, Detection, Finding, Steps, reference_spans};
 use crate::warning::Warning;
 use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{Manifest, Reference};
@@ -372,7 +372,7 @@ fn dwell(condensed: &Condensed, step: i32, range: Range<usize>, rails: &[Rails; 
             clipped,
         };
     }
-    let average = |level: fn(&crate::blocks::Block, usize) -> Level, c: usize| {
+    let average = |level: fn(&crate::signal::blocks::Block, usize) -> Level, c: usize| {
         let first = level(&blocks[0], c).mean;
         let sum: f64 = blocks
             .iter()

@@ -2,13 +2,13 @@
 //!
 //! At rest a gyro reads its bias and, by its g-sensitivity, something that is linear in the force. What the other dwells predict of a dwell
 //! by such a model is compared with what it reads: the studentised deletion residual. The mean of three contiguous neighbours, by which
-//! even turns are found ([`crate::rest`]), holds the g-sensitivity in its scatter, and so lets turns of some tenths of a degree a second pass.
+//! even turns are found ([`crate::signal::rest`]), holds the g-sensitivity in its scatter, and so lets turns of some tenths of a degree a second pass.
 
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use crate::quantity::Sensor;
-use crate::rest::expected;
+use crate::signal::rest::expected;
 
 /// Bias, and the force along three axes.
 const PARAMETERS: usize = 4;

@@ -10,13 +10,13 @@ use mimu_core::stored::NODES;
 use nalgebra::{Matrix3, Vector3};
 use serde::Serialize;
 
-use crate::blocks::{Condensed, Rails};
+use crate::calibration::verify::check_unit;
 use crate::calibration::{Calibration, compensator};
-use crate::die_temperature::outside;
 use crate::effects::quantity::Need;
 use crate::quantity::{PerSensor, Sensor, present};
-use crate::rails::find;
-use crate::verify::check_unit;
+use crate::signal::blocks::{Condensed, Rails};
+use crate::signal::die_temperature::outside;
+use crate::signal::rails::find;
 use crate::warning::Warning;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{Batch, Columns, Manifest, RawUnit, Recording, SampleFormat, Source, Writer};

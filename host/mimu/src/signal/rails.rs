@@ -1,7 +1,7 @@
 //! Channels that do not follow their input: at a rail of the converter, stuck, or dead.
 
-use crate::blocks::{Condensed, Moments, Rails, quantile};
 use crate::quantity::{significant, unsigned_zero};
+use crate::signal::blocks::{Condensed, Moments, Rails, quantile};
 use crate::warning::Warning;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{Manifest, RAW_COLUMNS};

@@ -10,10 +10,10 @@
 
 use nalgebra::{DVector, Vector3};
 
-use crate::blocks::Condensed;
-use crate::course::Course;
-use crate::dwell::Dwell;
 use crate::quantity::Sensor;
+use crate::signal::blocks::Condensed;
+use crate::signal::course::Course;
+use crate::signal::dwell::Dwell;
 
 /// Most contrasts of a dwell. A tumble about two axes has more functions than that; those of the inputs themselves come first.
 const MOST: usize = 12;

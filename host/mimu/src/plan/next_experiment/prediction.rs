@@ -4,12 +4,12 @@ use nalgebra::{DVector, Vector3};
 
 use super::Setup;
 use super::recipe::Experiment;
-use crate::design::information::{Inverse, Rows};
-use crate::design::lack_of_fit::{ALIASED, extend, outside};
 use crate::effects;
 use crate::effects::candidate::{Candidate, Kind};
 use crate::effects::effect::{Effect, NonlinearParameter};
 use crate::effects::quantity::{Conditions, Reading};
+use crate::plan::design::information::{Inverse, Rows};
+use crate::plan::design::lack_of_fit::{ALIASED, extend, outside};
 use crate::quantity::Sensor;
 use crate::readable::STANDARD_GRAVITY;
 use mimu_recording::Reference;

@@ -5,11 +5,11 @@
 //! be known before a sample can be judged (where the rails are, what stillness means) is only known at the
 //! end, so a block also carries what is needed to take clipped samples out of its sums later.
 
-use crate::increment::{Increment, Integrator};
-use crate::no_temperature;
 use crate::quantity::Sensor;
-use crate::reading_step::StepFinder;
-use crate::signed_low_byte;
+use crate::signal::increment::{Increment, Integrator};
+use crate::signal::no_temperature;
+use crate::signal::reading_step::StepFinder;
+use crate::signal::signed_low_byte;
 use crate::warning::Warning;
 use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{Batch, Column, HeldReadings, NoTemperatures, RAW_COLUMNS, Recording};
@@ -234,7 +234,7 @@ pub struct Condensed {
     pub rows: u64,
     /// Step that the readings of each raw channel are multiples of, raw; `None` where they are not in steps.
     pub reading_step: [Option<f64>; 6],
-    /// Of each raw channel: pairs of samples that show a [low byte taken for a signed number](crate::signed_low_byte).
+    /// Of each raw channel: pairs of samples that show a [low byte taken for a signed number](crate::signal::signed_low_byte).
     pub signed_low_byte: [Option<u64>; 6],
     /// Which of the six raw channels the recording has.
     pub has_raw: [bool; 6],
