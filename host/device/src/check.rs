@@ -14,7 +14,7 @@ use super::session::Session;
 use mimu::calibration::Calibration;
 use mimu::quantity::Sensor;
 use mimu_recording::error::{Error, Result};
-use twin::Twin;
+use twin::HostReference;
 
 pub use twin::rounding;
 
@@ -85,7 +85,7 @@ pub fn check(
         return Err(Error::device(session.port(), problem, remedy));
     }
     let rate_hz = session.who().sample_rate_hz;
-    let mut twin = Twin::new(calibration, &image, rate_hz, powered_for_ms, place)?;
+    let mut twin = HostReference::new(calibration, &image, rate_hz, powered_for_ms, place)?;
     let wanted = (duration.as_secs_f64() * f64::from(session.who().sample_rate_hz)) as u64;
     let mut found = Checked {
         samples: 0,

@@ -6,8 +6,8 @@ use mimu_core::stored;
 use mimu_core::table::Node;
 use serde::Serialize;
 
+use super::identity::Hash;
 use super::origin;
-use super::who::Hash;
 use mimu::calibration::{Calibration, Kept};
 use mimu::quantity::{PerSensor, Sensor};
 use mimu_recording::error::{Error, Result};

@@ -7,13 +7,13 @@ use mimu_core::wire::{
 };
 use serde::Serialize;
 
-use super::who::{Who, beginning};
+use super::identity::{Identity, beginning};
 
 /// Answer to a call.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Answer {
     /// Who it is.
-    Greeting(Box<Who>),
+    Greeting(Box<Identity>),
     /// Done, and there is nothing to tell.
     Done,
     /// What has been counted.
@@ -52,7 +52,7 @@ pub struct Samples {
 #[derive(Debug, Clone, PartialEq)]
 pub enum Event {
     /// The device has just started.
-    Started(Box<Who>),
+    Started(Box<Identity>),
     /// Raw readings, V.
     Raw(Samples),
     /// Compensated samples, SI.
@@ -110,12 +110,12 @@ impl LineCount {
 /// Bytes in, messages out. Nothing that comes over the line makes it fail: what is not a whole frame, and what is not a message, is
 /// counted.
 #[derive(Debug, Default)]
-pub struct Ear {
+pub struct Receiver {
     decoder: Decoder,
     count: LineCount,
 }
 
-impl Ear {
+impl Receiver {
     /// Takes bytes; `hear` is given the messages that they end.
     pub fn take(&mut self, bytes: &[u8], mut hear: impl FnMut(Heard)) {
         for byte in bytes {
@@ -142,17 +142,17 @@ fn understood(frame: &Frame<'_>) -> Option<Heard> {
     let message = frame.message();
     if let Some((id, magic, version)) = beginning(frame.0)
         && !matches!(&message, Some(Message::Greeting { greeting, .. })
-            if super::who::check("", greeting.magic, greeting.protocol).is_ok())
+            if super::identity::check("", greeting.magic, greeting.protocol).is_ok())
     {
         return Some(Heard::Stranger(id, magic, version));
     }
     Some(match message? {
         // Nobody's call has the number 0: it has just started.
         Message::Greeting { id: 0, greeting } => {
-            Heard::Event(Event::Started(Box::new(Who::from(&greeting))))
+            Heard::Event(Event::Started(Box::new(Identity::from(&greeting))))
         }
         Message::Greeting { id, greeting } => {
-            Heard::Answer(id, Answer::Greeting(Box::new(Who::from(&greeting))))
+            Heard::Answer(id, Answer::Greeting(Box::new(Identity::from(&greeting))))
         }
         Message::Refused { id, refusal } => Heard::Answer(id, Answer::Refused(refusal)),
         Message::Reply { id, reply } => Heard::Answer(id, answer(reply)),

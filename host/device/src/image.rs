@@ -7,8 +7,8 @@ use mimu_core::table::Node;
 use mimu_core::wire::Capabilities;
 use nalgebra::{Matrix3, Vector3};
 
+use super::identity::{Hash, Identity};
 use super::origin;
-use super::who::{Hash, Who};
 use mimu::calibration::{Calibration, OverTemperature, reference_node};
 use mimu::effects::on_device::NotOnDevice;
 use mimu::quantity::{PerSensor, Sensor};
@@ -106,7 +106,7 @@ impl Image {
     }
 
     /// Refuses a calibration of another unit than that of this greeting.
-    pub fn check_unit(&self, who: &Who, place: &str) -> Result<()> {
+    pub fn check_unit(&self, who: &Identity, place: &str) -> Result<()> {
         let of = self.origin.unit_id.as_ref().map(origin::digits);
         match of.filter(|of| *of != who.unit_id) {
             None => Ok(()),
@@ -123,7 +123,12 @@ impl Image {
     }
 
     /// Refuses what the device of this greeting could not use, by the name of the effect: before anything is sent.
-    pub fn check_device(&self, calibration: &Calibration, who: &Who, place: &str) -> Result<()> {
+    pub fn check_device(
+        &self,
+        calibration: &Calibration,
+        who: &Identity,
+        place: &str,
+    ) -> Result<()> {
         let refuse = |at: String, problem: String| {
             let remedy = "flash newer firmware, or diagnose without it";
             Err(Error::new(at, problem, remedy))

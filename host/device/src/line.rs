@@ -5,9 +5,9 @@ use std::time::{Duration, Instant};
 
 use mimu_core::wire::{Call, MAX_FRAME, Request, encode};
 
-use super::heard::{Answer, Ear, Event, Heard};
+use super::heard::{Answer, Event, Heard, Receiver};
+use super::identity::check;
 use super::port::Port;
-use super::who::check;
 use mimu_recording::error::{Error, Result};
 
 /// Times that a call is made: a garbled frame is lost, either way, and every call may be repeated.
@@ -22,7 +22,7 @@ const WAITING: usize = 6000;
 #[derive(Debug)]
 pub(super) struct Line {
     pub port: Port,
-    pub ear: Ear,
+    pub ear: Receiver,
     pub waiting: VecDeque<Event>,
     pub overflowed: u64,
     /// How many of those that wait came before the last answer.
@@ -36,7 +36,7 @@ impl Line {
     pub fn new(port: Port) -> Self {
         Self {
             port,
-            ear: Ear::default(),
+            ear: Receiver::default(),
             waiting: VecDeque::new(),
             overflowed: 0,
             before_answer: 0,

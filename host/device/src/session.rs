@@ -5,10 +5,10 @@ use std::time::Duration;
 use mimu_core::wire::{Refusal, Request};
 
 use super::heard::{Answer, Event, LineCount};
+use super::identity::Identity;
 use super::line::{ATTEMPTS, Line};
 use super::origin;
 use super::port::{Port, ports};
-use super::who::Who;
 use mimu_recording::error::{Argument, Error, Result};
 
 /// Longest wait for an answer that needs no work: a frame takes 5 ms, and one of samples may be before it. With the times that a call
@@ -19,7 +19,7 @@ pub(super) const PATIENCE: Duration = Duration::from_millis(1500);
 #[derive(Debug)]
 pub struct Session {
     line: Line,
-    who: Who,
+    who: Identity,
 }
 
 impl Session {
@@ -81,7 +81,7 @@ impl Session {
     }
 
     /// Who it is, by its last greeting.
-    pub fn who(&self) -> &Who {
+    pub fn who(&self) -> &Identity {
         &self.who
     }
 
@@ -101,7 +101,7 @@ impl Session {
     }
 
     /// Greets again.
-    pub fn hello(&mut self) -> Result<&Who> {
+    pub fn hello(&mut self) -> Result<&Identity> {
         match self.call(Request::Hello, "to greet", PATIENCE)? {
             Answer::Greeting(who) => self.who = *who,
             _ => return Err(self.unexpected("to greet")),

@@ -7,11 +7,11 @@ use mimu_core::compensation::Sample;
 use mimu_core::stored::{self, Refused};
 use serde::Serialize;
 
+use super::identity::Hash;
 use super::image::Image;
 use super::session::Session;
 use super::stream::{Stream, Streamed, stream};
 use super::upload::{download, upload};
-use super::who::Hash;
 use mimu::quantity::{AXES, PerSensor, Sensor};
 use mimu_recording::error::{Error, Result};
 

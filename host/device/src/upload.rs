@@ -8,11 +8,11 @@ use mimu_core::wire::{CHUNK, Refusal, Request};
 use serde::Serialize;
 
 use super::heard::Answer;
+use super::identity::Hash;
 use super::image::Image;
 use super::origin;
 use super::session::{PATIENCE, Session, refused};
 use super::stream::{Stream, stream};
-use super::who::Hash;
 use mimu::calibration::Calibration;
 use mimu_recording::error::{Error, Result};
 

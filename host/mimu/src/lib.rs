@@ -12,7 +12,6 @@
 //! | [`effects`], [`diagnose`] | the effect behind a residual: found, added, proved on other data |
 //! | [`plan`] | experiments: [`plan::design`] chooses attitudes, rates and times, [`plan::next_experiment`] what to record next |
 //! | [`result`], [`warning`] | what the commands print and write as JSON |
-
 //!
 //! A recording from arrays, calibrated, and the calibration applied to a reading:
 //!

@@ -24,7 +24,7 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use crate::bank::ByDevice;
-use crate::procedure::Asked;
+use crate::procedure::SessionConfig;
 use crate::step::Step;
 
 /// Which recording.
@@ -135,7 +135,7 @@ pub struct Begun {
     /// Samples a second.
     pub rate_hz: f64,
     /// What was asked.
-    pub asked: Asked,
+    pub asked: SessionConfig,
 }
 
 /// The folder of a session.
@@ -321,7 +321,7 @@ impl Folder {
 
 /// A recording of the session while it grows: on the disk, and in memory for the fits in between.
 #[derive(Debug)]
-pub struct Taking {
+pub struct OpenRecording {
     part: Part,
     growing: Growing,
     manifest: Manifest,
@@ -329,7 +329,7 @@ pub struct Taking {
     pub samples: Batch,
 }
 
-impl Taking {
+impl OpenRecording {
     /// Begins a recording, or goes on after the last dwell of the journal.
     pub fn begin(
         folder: &Folder,

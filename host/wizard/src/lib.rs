@@ -11,7 +11,7 @@
 //! | [`watch`] | is the unit still, which way is up, how fast does it turn |
 //! | [`refit`] | the calibration so far, every parameter beside its target |
 //! | [`folder`] | the journal and the recordings, from which a killed session goes on |
-//! | [`one`] | one of the units: its dwells, had or thrown away |
+//! | [`unit_session`] | one of the units: its dwells, accepted or discarded |
 //! | [`axes`] | whether the axes are those that their names say |
 //! | [`bank`] | the device's own Kalman filters beside it |
 //! | [`drive`] | what turns and warms the unit: a person, or a table and a chamber that take text commands |
@@ -30,7 +30,6 @@ pub mod device;
 pub mod drive;
 pub mod event;
 pub mod folder;
-pub mod one;
 pub mod procedure;
 pub mod refit;
 pub mod regular;
@@ -42,6 +41,7 @@ pub mod step;
 pub mod store;
 pub mod text;
 pub mod text_line;
+pub mod unit_session;
 pub mod verdict;
 pub mod watch;
 pub mod wizard;

@@ -55,7 +55,7 @@ impl Fixture {
 
 /// What is asked of a session; kept with it, so that it goes on as it was begun.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Asked {
+pub struct SessionConfig {
     /// Columns and unit of a board that writes lines of text.
     #[serde(default)]
     pub text: Option<String>,
@@ -93,7 +93,7 @@ pub struct Asked {
     pub by_device: bool,
 }
 
-impl Asked {
+impl SessionConfig {
     /// What gravity is taken to be, and what that does: no reading shows that it is another.
     pub fn gravity_words(&self) -> String {
         let normal = self.latitude_deg.map(normal_gravity);
@@ -241,7 +241,7 @@ impl Turned {
 pub type Missed = [bool; 2];
 
 /// The step that brings most information beside `done`, for the sensors that need it.
-pub fn next_step(asked: &Asked, done: &[Step], missed: Missed) -> Step {
+pub fn next_step(asked: &SessionConfig, done: &[Step], missed: Missed) -> Step {
     let candidates = match asked.fixture {
         Fixture::Table => {
             let seed = done.len() as u64;
@@ -397,8 +397,8 @@ pub fn verification(
 mod tests {
     use super::*;
 
-    fn asked(fixture: Fixture) -> Asked {
-        Asked {
+    fn asked(fixture: Fixture) -> SessionConfig {
+        SessionConfig {
             text: None,
             fixture,
             gravity_mps2: 9.8,

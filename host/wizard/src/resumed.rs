@@ -4,10 +4,10 @@ use std::path::Path;
 
 use mimu_recording::error::{Error, Result};
 
-use crate::procedure::Asked;
+use crate::procedure::SessionConfig;
 
 /// What dwells were made by: another value would leave those that there are wrong.
-fn kept(asked: &Asked) -> [(&'static str, String); 7] {
+fn kept(asked: &SessionConfig) -> [(&'static str, String); 7] {
     let or_none = |given: Option<String>| given.unwrap_or_else(|| "none".into());
     let by = if asked.by_device { "device" } else { "pc" };
     [
@@ -27,10 +27,10 @@ fn kept(asked: &Asked) -> [(&'static str, String); 7] {
 /// What goes on in the folder at `place`: as it was `begun`, with what `now` may say otherwise (when to end, what to wait for).
 ///
 /// Errors: the dwells that there are were made by something else; each difference is named.
-pub fn resumed(begun: &Asked, now: &Asked, place: &Path) -> Result<Asked> {
+pub fn resumed(begun: &SessionConfig, now: &SessionConfig, place: &Path) -> Result<SessionConfig> {
     let failed = |e: serde_json::Error| Error::new(place.display(), e, "report this");
     // Numbers as the file gives them.
-    let now: Asked =
+    let now: SessionConfig =
         serde_json::from_str(&serde_json::to_string(now).map_err(failed)?).map_err(failed)?;
     let both = kept(begun).into_iter().zip(kept(&now));
     let mut differ: Vec<String> = both
@@ -48,7 +48,7 @@ pub fn resumed(begun: &Asked, now: &Asked, place: &Path) -> Result<Asked> {
         let remedy = "give what it was begun with, or another folder with -o";
         return Err(Error::new(place.display(), problem, remedy));
     }
-    Ok(Asked {
+    Ok(SessionConfig {
         by_targets: now.by_targets,
         most_dwells: now.most_dwells,
         patience_s: now.patience_s,
@@ -65,8 +65,8 @@ mod tests {
     use super::*;
     use crate::procedure::{Fixture, Targets, first_steps};
 
-    fn asked() -> Asked {
-        Asked {
+    fn asked() -> SessionConfig {
+        SessionConfig {
             text: None,
             fixture: Fixture::Hands,
             gravity_mps2: 9.71,
@@ -89,7 +89,7 @@ mod tests {
     #[test]
     fn what_dwells_were_made_by_is_refused_with_each_difference_and_the_rest_is_taken() {
         let place = Path::new("session");
-        let now = Asked {
+        let now = SessionConfig {
             gravity_mps2: 9.81,
             text: Some("ax,ay,az,gx,gy,gz in count".into()),
             ..asked()
@@ -102,13 +102,13 @@ mod tests {
             assert!(error.contains(says), "{error}");
         }
         assert!(!error.contains("--fixture"), "{error}");
-        let now = Asked {
+        let now = SessionConfig {
             steps: first_steps(Fixture::Hands, 4.0, 100.0, 1)[1..].to_vec(),
             ..asked()
         };
         let error = resumed(&asked(), &now, place).unwrap_err().to_string();
         assert!(error.contains("--seed"), "{error}");
-        let now = Asked {
+        let now = SessionConfig {
             most_dwells: 20,
             patience_s: 7.0,
             ..asked()

@@ -14,17 +14,17 @@ use crate::axes;
 use crate::drive::Driver;
 use crate::event::{Event, Question, View};
 use crate::folder::{Begun, Entry, Folder, Part};
-use crate::one::One;
-use crate::procedure::{Asked, Fixture};
+use crate::procedure::{Fixture, SessionConfig};
 use crate::refit::LEVER_ARM_M;
 use crate::resumed::resumed;
 use crate::source::Opener;
 use crate::station::Station;
+use crate::unit_session::UnitSession;
 use crate::verdict::{Judged, judge, prepared};
 use crate::wizard::{Ended, Wizard};
 
 /// A unit to calibrate: how it is opened, and where its folder is.
-pub struct Wanted {
+pub struct UnitSpec {
     /// Opens it.
     pub opener: Opener,
     /// Its folder.
@@ -78,8 +78,8 @@ pub struct UnitOutcome {
 
 /// Carries out a session; one that goes on is what it was begun with ([`resumed`]).
 pub fn run(
-    asked: Asked,
-    wanted: Vec<Wanted>,
+    asked: SessionConfig,
+    wanted: Vec<UnitSpec>,
     driver: Box<dyn Driver + '_>,
     view: &mut dyn View,
     page: Page<'_>,
@@ -90,13 +90,13 @@ pub fn run(
     if let Some(units) = finished.collect::<Result<Option<Vec<_>>>>()? {
         return Ok(Outcome::of(units, false));
     }
-    for Wanted { opener, folder } in wanted {
+    for UnitSpec { opener, folder } in wanted {
         let begun = Folder::begun(&folder)?;
         let (opened, station) = match &begun {
             Some(begun) => {
                 kept = resumed(&begun.asked, &kept, &folder)?;
                 let opened = Folder::open(&folder)?;
-                let next = One::first_tick(&opened, begun.rate_hz);
+                let next = UnitSession::first_tick(&opened, begun.rate_hz);
                 let station = Station::open(opener, next, Some(&begun.unit_id))?;
                 let dwells = opened.dwells(Part::Calibration).len();
                 view.tell(&Event::Resumed { dwells });
@@ -117,10 +117,10 @@ pub fn run(
             unit: station.unit.name.clone(),
             told: station.unit.told.clone(),
         });
-        units.push(One::new(station, opened, &kept));
+        units.push(UnitSession::new(station, opened, &kept));
     }
     let count = units.len();
-    let mut session = Whole {
+    let mut session = OpenSession {
         wizard: Wizard::new(kept, units, driver, view),
         outcomes: vec![UnitOutcome::default(); count],
         page,
@@ -146,7 +146,7 @@ impl Outcome {
 }
 
 /// What the session in a folder has come to, if it is finished: then nothing is done any more.
-fn finished(path: &Path, now: &Asked) -> Result<Option<UnitOutcome>> {
+fn finished(path: &Path, now: &SessionConfig) -> Result<Option<UnitOutcome>> {
     let Some(begun) = Folder::begun(path)? else {
         return Ok(None);
     };
@@ -179,7 +179,7 @@ fn finished(path: &Path, now: &Asked) -> Result<Option<UnitOutcome>> {
     }))
 }
 
-struct Whole<'a> {
+struct OpenSession<'a> {
     wizard: Wizard<'a>,
     outcomes: Vec<UnitOutcome>,
     page: Page<'a>,
@@ -217,7 +217,7 @@ macro_rules! or_cancelled {
 
 mod effects;
 
-impl Whole<'_> {
+impl OpenSession<'_> {
     fn carry_out(&mut self) -> Result<Ended> {
         let wizard = &mut self.wizard;
         let words = wizard.asked.gravity_words();

@@ -14,7 +14,7 @@ const AGAIN: Duration = Duration::from_millis(300);
 
 /// What a station has to say.
 #[derive(Debug)]
-pub enum News {
+pub enum StationEvent {
     /// Samples.
     Samples(Chunk),
     /// The device has restarted, and why.
@@ -35,7 +35,7 @@ type Errand = Box<dyn FnOnce(&mut Option<Box<dyn Source>>) + Send>;
 pub struct Station {
     /// Who it is.
     pub unit: Unit,
-    news: Receiver<News>,
+    news: Receiver<StationEvent>,
     errands: Option<Sender<Errand>>,
     thread: Option<JoinHandle<()>>,
 }
@@ -65,11 +65,11 @@ impl Station {
     }
 
     /// What has come; `None` if nothing has.
-    pub fn news(&mut self) -> Result<Option<News>> {
+    pub fn news(&mut self) -> Result<Option<StationEvent>> {
         match self.news.try_recv() {
-            Ok(News::Back(unit)) => {
+            Ok(StationEvent::Back(unit)) => {
                 self.unit = (*unit).clone();
-                Ok(Some(News::Back(unit)))
+                Ok(Some(StationEvent::Back(unit)))
             }
             Ok(news) => Ok(Some(news)),
             Err(TryRecvError::Empty) => Ok(None),
@@ -152,7 +152,7 @@ fn listen(
     opener: &mut Opener,
     id: &str,
     mut next: u64,
-    tell: &Sender<News>,
+    tell: &Sender<StationEvent>,
     to_do: &Receiver<Errand>,
 ) {
     let mut source = Some(source);
@@ -169,15 +169,15 @@ fn listen(
         let news = match &mut source {
             Some(open) => match open.next() {
                 Ok(Heard::Nothing) => continue,
-                Ok(Heard::Restarted(why)) => News::Restarted(why),
-                Ok(Heard::Note(words)) => News::Note(words),
+                Ok(Heard::Restarted(why)) => StationEvent::Restarted(why),
+                Ok(Heard::Note(words)) => StationEvent::Note(words),
                 Ok(Heard::Samples(chunk)) => {
                     next = chunk.tick + chunk.values.len() as u64;
-                    News::Samples(chunk)
+                    StationEvent::Samples(chunk)
                 }
                 Err(error) => {
                     source = None;
-                    News::Lost(error.to_string())
+                    StationEvent::Lost(error.to_string())
                 }
             },
             None => match opener(next) {
@@ -185,7 +185,7 @@ fn listen(
                     let unit = open.unit().clone();
                     source = Some(open);
                     told_other.clear();
-                    News::Back(Box::new(unit))
+                    StationEvent::Back(Box::new(unit))
                 }
                 Ok(open) => {
                     let found = open.unit().id.clone();
@@ -195,7 +195,7 @@ fn listen(
                         continue;
                     }
                     told_other.clone_from(&found);
-                    News::Other(other(&found, id).to_string())
+                    StationEvent::Other(other(&found, id).to_string())
                 }
                 Err(_) => {
                     std::thread::sleep(AGAIN);

@@ -8,9 +8,9 @@ use crate::axes;
 use crate::drive::Driver;
 use crate::event::{Event, Question, Standing, View, Wish};
 use crate::folder::{Entry, Part};
-use crate::one::{One, Round, WRONG_POSE};
-use crate::procedure::{Asked, Fixture, next_step};
+use crate::procedure::{Fixture, SessionConfig, next_step};
 use crate::step::Step;
+use crate::unit_session::{Round, UnitSession, WRONG_POSE};
 
 /// How often the standing is shown.
 const SHOWN: Duration = Duration::from_millis(100);
@@ -34,9 +34,9 @@ pub enum Ended {
 /// A session.
 pub struct Wizard<'a> {
     /// What is asked.
-    pub asked: Asked,
+    pub asked: SessionConfig,
     /// The units, all on one fixture.
-    pub units: Vec<One>,
+    pub units: Vec<UnitSession>,
     /// What turns them.
     pub driver: Box<dyn Driver + 'a>,
     /// Who is told.
@@ -65,8 +65,8 @@ enum Stepped {
 impl<'a> Wizard<'a> {
     /// Of these units.
     pub fn new(
-        asked: Asked,
-        units: Vec<One>,
+        asked: SessionConfig,
+        units: Vec<UnitSession>,
         driver: Box<dyn Driver + 'a>,
         view: &'a mut dyn View,
     ) -> Self {
@@ -137,7 +137,7 @@ impl<'a> Wizard<'a> {
         Ok(wish)
     }
 
-    fn had(&self, unit: &One) -> usize {
+    fn had(&self, unit: &UnitSession) -> usize {
         let part = match self.phase {
             "verification" => Part::Verification,
             "confirmation" => Part::Confirmation,
@@ -164,11 +164,11 @@ impl<'a> Wizard<'a> {
             if self.round(None, false)? == Some(Wish::Cancel) {
                 return Ok(Ended::Cancelled);
             }
-            let heard = self.units.iter().all(One::is_heard);
+            let heard = self.units.iter().all(UnitSession::is_heard);
             if !heard {
                 if since.elapsed() > SILENT {
                     let silent = self.units.iter().find(|u| !u.is_heard());
-                    let name = silent.map_or_else(String::new, One::name);
+                    let name = silent.map_or_else(String::new, UnitSession::name);
                     let (problem, remedy) = match silent.is_some_and(|u| u.standing.samples > 0) {
                         true => (
                             "it does not come to rest: no two seconds in a row read alike",
@@ -183,7 +183,7 @@ impl<'a> Wizard<'a> {
             let Some(limit) = self.asked.warm_c_per_min else {
                 return Ok(Ended::Done);
             };
-            let warm = |u: &One| u.trend().is_some_and(|t| t.abs() <= limit);
+            let warm = |u: &UnitSession| u.trend().is_some_and(|t| t.abs() <= limit);
             for unit in &mut self.units {
                 let waiting = match unit.trend() {
                     None => Some("its temperature is watched".to_string()),
@@ -362,7 +362,7 @@ impl<'a> Wizard<'a> {
                 Some(Wish::Cancel) => return Ok(Stepped::Cancelled),
                 Some(Wish::Skip) => return Ok(Stepped::Skipped),
                 Some(Wish::RedoLast) => {
-                    let last = self.units.iter().filter_map(One::last_number).max();
+                    let last = self.units.iter().filter_map(UnitSession::last_number).max();
                     if let Some(step) = last.map(|n| self.redo(n)).transpose()?.flatten() {
                         return Ok(Stepped::Redo(step));
                     }
@@ -377,7 +377,7 @@ impl<'a> Wizard<'a> {
             if self.units.iter().all(|u| u.done) {
                 return Ok(Stepped::Had);
             }
-            let wrong = |u: &One| {
+            let wrong = |u: &UnitSession| {
                 u.done
                     || u.standing
                         .waiting

@@ -17,8 +17,8 @@ use mimu_recording::{Manifest, Parents, RawUnit};
 use mimu_wizard::device::DeviceSource;
 use mimu_wizard::drive::{Driver, Person, TextDriver, Together};
 use mimu_wizard::event::View;
-use mimu_wizard::procedure::{Asked, Fixture, Targets, first_steps, verification};
-use mimu_wizard::session::{Wanted, run as carry_out};
+use mimu_wizard::procedure::{Fixture, SessionConfig, Targets, first_steps, verification};
+use mimu_wizard::session::{UnitSpec, run as carry_out};
 use mimu_wizard::source::{Opener, Source};
 use mimu_wizard::step::Step;
 use mimu_wizard::text::{Text, TextOpener};
@@ -213,7 +213,7 @@ impl WizardArgs {
         Ok(targets)
     }
 
-    fn asked(&self) -> Result<Asked> {
+    fn asked(&self) -> Result<SessionConfig> {
         let fixture = self.fixture.fixture();
         if self.by == By::Device && (fixture != Fixture::Table || self.text.text.is_some()) {
             let problem =
@@ -255,7 +255,7 @@ impl WizardArgs {
         );
         manifest.latitude_deg = latitude_deg;
         manifest.check("wizard")?;
-        Ok(Asked {
+        Ok(SessionConfig {
             text: self.text.words(),
             fixture,
             gravity_mps2,
@@ -276,7 +276,7 @@ impl WizardArgs {
     }
 
     /// The units: each with its port and its folder.
-    fn wanted(&self) -> Result<Vec<Wanted>> {
+    fn wanted(&self) -> Result<Vec<UnitSpec>> {
         let ports: Vec<Option<String>> = match (self.ports.as_slice(), &self.text.text) {
             ([], None) => vec![None],
             // Who writes lines of text cannot be asked who it is.
@@ -305,7 +305,7 @@ impl WizardArgs {
                     Ok(Box::new(source) as Box<dyn Source>)
                 }),
             };
-            Ok(Wanted { opener, folder })
+            Ok(UnitSpec { opener, folder })
         });
         units.collect()
     }

@@ -7,7 +7,7 @@ use mimu::quantity::{AXES, significant};
 use mimu_core::wire::Counters;
 use mimu_device::record::RecordSummary;
 use mimu_device::{
-    Contents, Counted, DeviceResult, LineCount, SelfTested, Streamed, Uploaded, Who,
+    Contents, Counted, DeviceResult, Identity, LineCount, SelfTested, Streamed, Uploaded,
 };
 
 /// Writing to a string does not fail.
@@ -16,7 +16,7 @@ macro_rules! line {
 }
 
 /// Result of `mimu device info`.
-pub fn info_text(result: &DeviceResult<&Who>) -> String {
+pub fn info_text(result: &DeviceResult<&Identity>) -> String {
     let (port, who) = (&result.port, result.found);
     let mut out = String::new();
     line!(out, "{port}: {}, firmware {}", who.board, who.firmware);

@@ -26,7 +26,7 @@ struct Running<T: RealField> {
 }
 
 /// The PC's side, twice: as the device computes, and in double precision from the file.
-pub(super) struct Twin {
+pub(super) struct HostReference {
     rate_hz: u32,
     single: Running<f32>,
     double: Running<f64>,
@@ -38,7 +38,7 @@ pub(super) struct Twin {
     next: Option<u32>,
 }
 
-impl Twin {
+impl HostReference {
     pub fn new(
         calibration: &Calibration,
         image: &Image,

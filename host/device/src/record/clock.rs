@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use crate::who::Started;
+use crate::identity::Started;
 
 /// Ticks of one sample period since the device began to sample: 64 bits, where its own numbers begin anew after 49 days; and over a
 /// restart, where they begin anew too.

@@ -25,9 +25,9 @@ pub use steps::Steps;
 
 use crate::flagged::Flagged;
 use crate::heard::LineCount;
+use crate::identity::{Started, unit_name};
 use crate::result::TOOL;
 use crate::session::Session;
-use crate::who::{Started, unit_name};
 use clock::Clock;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{

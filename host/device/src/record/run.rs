@@ -14,8 +14,8 @@ use super::reading::shortest;
 use super::steps::Steps;
 use super::{RecordOptions, Standing, Wish};
 use crate::heard::{Event, Samples};
+use crate::identity::Started;
 use crate::session::Session;
-use crate::who::Started;
 
 /// Silence after which the device is asked whether it is still there.
 const SILENCE: Duration = Duration::from_secs(2);

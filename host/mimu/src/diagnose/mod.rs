@@ -30,7 +30,7 @@ use mimu_core::compensation::Affine;
 use nalgebra::{Matrix3, Vector3};
 use passes::{Pass, Passes, session};
 use picture::Picture;
-use rows::{ForceErrors, Free, Rows};
+use rows::{ForceErrors, FreeParameters, Rows};
 use serde::Serialize;
 
 use crate::calibration::Calibration;
@@ -336,11 +336,11 @@ pub fn diagnose(recordings: Recordings, options: Options) -> Result<Diagnosis> {
     // Of readings in SI that were never turned nobody knows how well their matrix is known.
     let covariances = Sensor::BOTH.map(|s| recordings.given.and_then(|c| c.covariance(s)));
     let free = |sensor: Sensor| match (held, &covariances) {
-        (Some(_), [gyro, accel]) => Free::Bias(match sensor {
+        (Some(_), [gyro, accel]) => FreeParameters::Bias(match sensor {
             Sensor::Gyro => gyro.as_ref(),
             Sensor::Accel => accel.as_ref(),
         }),
-        (None, _) => Free::Affine,
+        (None, _) => FreeParameters::Affine,
     };
     let calibrate = |prepared: Prepared| match held {
         Some(matrices) => fit_biases(prepared, options, matrices, &covariances),

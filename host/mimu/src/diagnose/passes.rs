@@ -11,7 +11,7 @@ use nalgebra::Matrix3;
 
 use super::as_written::AsWritten;
 use super::decision::{Decision, decide, noisier};
-use super::rows::{Figure, ForceErrors, Free, Rows, Session};
+use super::rows::{Figure, ForceErrors, FreeParameters, Rows, Session};
 use super::search::Chosen;
 use crate::effects::fitted::FittedEffect;
 use crate::effects::removal::remove;
@@ -131,7 +131,7 @@ pub(super) struct Passes<'a> {
     pub found_in: usize,
     /// How the forces may err that turns are judged by.
     pub forces: Option<&'a ForceErrors>,
-    pub free: Free<'a>,
+    pub free: FreeParameters<'a>,
     /// See [`super::Recordings::accept`].
     pub accept: &'a [String],
     pub calibrate: &'a dyn Fn(Prepared) -> Result<Fit>,

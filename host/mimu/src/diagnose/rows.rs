@@ -97,7 +97,7 @@ impl Figure {
 
 /// Which affine parameters the recordings have to determine themselves.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Free<'a> {
+pub enum FreeParameters<'a> {
     /// Matrix and biases.
     Affine,
     /// The biases. The matrix is known, to within the covariance of its inverse affine model: C by rows, then o, of which the latter is
@@ -186,14 +186,14 @@ impl Rows {
     /// The rows of `sensor` in all of `sessions`, whose calibrations share one matrix.
     ///
     /// Figures are about recordings of the kind of the first. `None` if the first has no rows, or its calibration is singular.
-    pub fn of(sessions: &[Session], sensor: Sensor, free: Free) -> Option<Self> {
+    pub fn of(sessions: &[Session], sensor: Sensor, free: FreeParameters) -> Option<Self> {
         let parts: Vec<_> = sessions
             .iter()
             .enumerate()
             .filter_map(|(i, s)| Some((i, build::part(s, sensor, free)?)))
             .collect();
         let mut rows = join::join(sensor, parts, sessions.len())?;
-        if let Free::Bias(Some(covariance)) = free {
+        if let FreeParameters::Bias(Some(covariance)) = free {
             rows.leave_open(covariance.fixed_view::<9, 9>(0, 0).into_owned());
         }
         Some(rows)

@@ -13,7 +13,7 @@ use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::rows::Rows;
-use super::variance::{By, Fitted, VarianceModel};
+use super::variance::{Fitted, LikelihoodKind, VarianceModel};
 use crate::effects::candidate::{Candidate, Kind};
 use crate::effects::effect::Effect;
 use crate::effects::quantity::Conditions;
@@ -321,8 +321,11 @@ impl<'a> Search<'a> {
 
     /// The model with the chosen effects, with noise of its own.
     pub fn fit(&self, chosen: &[Chosen]) -> Option<Fitted> {
-        self.variance
-            .fit(&self.model(chosen), &self.variance.none(), By::Likelihood)
+        self.variance.fit(
+            &self.model(chosen),
+            &self.variance.none(),
+            LikelihoodKind::Likelihood,
+        )
     }
 
     /// Degrees of freedom that a model leaves.

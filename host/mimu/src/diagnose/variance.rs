@@ -41,7 +41,7 @@ pub struct Fitted {
 
 /// Which likelihood.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum By {
+pub enum LikelihoodKind {
     /// The likelihood itself, for tests: of two models the drop is then a function of F where the noise has one size.
     Likelihood,
     /// The restricted one, for the noise of one model: it knows what the coefficients have taken up.
@@ -314,10 +314,15 @@ impl<'a> VarianceModel<'a> {
     }
 
     /// The model with `columns`, with the components that make its likelihood largest, from `start` on; `by` says which.
-    pub fn fit(&self, columns: &DMatrix<f64>, start: &Components, by: By) -> Option<Fitted> {
+    pub fn fit(
+        &self,
+        columns: &DMatrix<f64>,
+        start: &Components,
+        by: LikelihoodKind,
+    ) -> Option<Fitted> {
         let cost = |f: &Fitted| match by {
-            By::Likelihood => f.deviance,
-            By::Restricted => f.restricted,
+            LikelihoodKind::Likelihood => f.deviance,
+            LikelihoodKind::Restricted => f.restricted,
         };
         let both = self.both(columns);
         let mut at = start.clone();

@@ -32,7 +32,7 @@ pub(super) enum Order {
     Set(f64),
 }
 
-enum News {
+enum EquipmentEvent {
     /// So many motions are done with.
     Done(usize),
     Chamber(f64),
@@ -42,7 +42,7 @@ enum News {
 /// Table and chamber, at rest when this is dropped.
 pub(super) struct Equipment {
     orders: Option<Sender<Order>>,
-    news: Receiver<News>,
+    news: Receiver<EquipmentEvent>,
     thread: Option<JoinHandle<Vec<Error>>>,
     /// Motions that were ordered, and are done with.
     motions: [usize; 2],
@@ -66,7 +66,7 @@ impl Equipment {
         let work = move || {
             if let Err(error) = hands.work(&to_do) {
                 // Nobody hears it only where the recording has ended too.
-                let _ = hands.tell.send(News::Failed(error));
+                let _ = hands.tell.send(EquipmentEvent::Failed(error));
             }
             hands.rest()
         };
@@ -93,9 +93,9 @@ impl Equipment {
     pub fn take_news(&mut self) -> Option<Error> {
         for news in self.news.try_iter() {
             match news {
-                News::Done(motions) => self.motions[1] = motions,
-                News::Chamber(temp_c) => self.chamber_c = Some(temp_c),
-                News::Failed(error) => return Some(error),
+                EquipmentEvent::Done(motions) => self.motions[1] = motions,
+                EquipmentEvent::Chamber(temp_c) => self.chamber_c = Some(temp_c),
+                EquipmentEvent::Failed(error) => return Some(error),
             }
         }
         None
@@ -139,7 +139,7 @@ impl Drop for Equipment {
 
 struct Hands {
     equipped: Equipped,
-    tell: Sender<News>,
+    tell: Sender<EquipmentEvent>,
     /// Whether anything was told: what nobody has touched is left as it was found.
     ordered: bool,
     motions: usize,
@@ -187,7 +187,7 @@ impl Hands {
         let (table, chamber) = (self.equipped.table, self.equipped.chamber);
         if self.moves && !self.of(table).map_or(Ok(false), |t| t.busy())? {
             self.moves = false;
-            let _ = self.tell.send(News::Done(self.motions));
+            let _ = self.tell.send(EquipmentEvent::Done(self.motions));
         }
         if self.held.elapsed() >= HELD {
             self.held = Instant::now();
@@ -201,7 +201,7 @@ impl Hands {
         if self.read.is_none_or(|read| read.elapsed() >= READ) {
             self.read = Some(Instant::now());
             if let Some(temp_c) = self.of(chamber).map_or(Ok(None), |c| c.chamber_c())? {
-                let _ = self.tell.send(News::Chamber(temp_c));
+                let _ = self.tell.send(EquipmentEvent::Chamber(temp_c));
             }
         }
         Ok(())

@@ -11,7 +11,7 @@ use mimu_recording::Reference;
 use mimu_recording::error::Result;
 use mimu_recording::result_file::stage;
 
-use super::{Plain, WITH_EFFECTS, Whole, mounted, now};
+use super::{OpenSession, Plain, WITH_EFFECTS, mounted, now};
 use crate::event::{Event, Question};
 use crate::folder::{Entry, Part};
 use crate::procedure::verification;
@@ -26,7 +26,7 @@ pub(super) struct Found {
     effects: Vec<String>,
 }
 
-impl Whole<'_> {
+impl OpenSession<'_> {
     /// What still errs, and the calibration with it, if that is anything that can be stored.
     pub(super) fn diagnose(&mut self, k: usize, plain: &Plain) -> Result<Option<Found>> {
         let other = &plain.other;

@@ -29,7 +29,7 @@ pub struct Replayed {
 /// Errors: the first frame, sample or report that is another.
 pub fn replay(trace: &Trace) -> Result<Replayed, String> {
     let stored = stored::decode(&trace.calibration).map_err(|e| format!("calibration: {e:?}"))?;
-    let mut twin = Twin {
+    let mut twin = HostReference {
         state: stored.compensator.state(1000.0),
         slow_at: None,
         powered_for_ms: 0,
@@ -104,7 +104,7 @@ fn same_bytes(message: &Message<'_>, bytes: &[u8]) -> Result<(), String> {
 }
 
 /// The device's side, in single precision.
-struct Twin {
+struct HostReference {
     stored: stored::Stored,
     state: State<f32, ROOM>,
     /// Number of the sample at which it was followed last.
@@ -119,7 +119,7 @@ struct Twin {
 /// less is left in the next.
 const SETTLED: usize = 8;
 
-impl Twin {
+impl HostReference {
     fn compare(
         &mut self,
         head: &BatchHead,

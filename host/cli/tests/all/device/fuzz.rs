@@ -15,7 +15,7 @@ use mimu_core::wire::{
 };
 use mimu_core::{PerSensor, Sensor};
 
-use mimu_device::{Answer, Ear, Event, Heard, contents};
+use mimu_device::{Answer, Event, Heard, Receiver, contents};
 use nalgebra::{Matrix3, Vector3};
 
 /// SplitMix64.
@@ -120,7 +120,7 @@ fn no_bytes_make_the_ear_fail_or_deaf() {
     let (mut heard, mut garbled) = (0_u64, 0_u64);
     for case in 0..cases {
         let mut random = Random(seed ^ case.wrapping_mul(0x2545_f491_4f6c_dd1d));
-        let mut ear = Ear::default();
+        let mut ear = Receiver::default();
         let mut bytes = Vec::new();
         for _ in 0..random.below(5) {
             let mut next = frames[random.below(frames.len())].clone();
@@ -128,7 +128,7 @@ fn no_bytes_make_the_ear_fail_or_deaf() {
             bytes.extend(next);
         }
         let mut end = None;
-        let mut take = |ear: &mut Ear, bytes: &[u8]| {
+        let mut take = |ear: &mut Receiver, bytes: &[u8]| {
             ear.take(bytes, |message| {
                 heard += 1;
                 if let Heard::Event(Event::Raw(samples)) = &message {

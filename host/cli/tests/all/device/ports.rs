@@ -5,7 +5,7 @@ use std::os::unix::process::CommandExt as _;
 use mimu_core::wire::{
     Decoder, Greeting, MAGIC, MAX_FRAME, Message, PROTOCOL, Slot, Start, Version, encode,
 };
-use mimu_device::{Answer, Ear, Heard, Started};
+use mimu_device::{Answer, Heard, Receiver, Started};
 
 use super::peer::{Peer, Script, Voice};
 use super::terminal::Terminal;
@@ -133,7 +133,7 @@ fn a_device_that_started_for_a_reason_of_a_later_version_is_talked_to_all_the_sa
     let shorter = &later[..later.len() - 4];
     for payload in [&later[..], shorter] {
         let mut heard = Vec::new();
-        let mut ear = Ear::default();
+        let mut ear = Receiver::default();
         ear.take(&framed(payload), |message| heard.push(message));
         let [Heard::Answer(3, Answer::Greeting(who))] = &heard[..] else {
             panic!("{heard:?}");

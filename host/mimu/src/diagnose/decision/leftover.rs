@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::diagnose::rows::{Rows, Session};
 use crate::diagnose::search::{Chosen, Search};
-use crate::diagnose::variance::{By, Fitted, VarianceModel};
+use crate::diagnose::variance::{Fitted, LikelihoodKind, VarianceModel};
 use crate::effects::candidate::Candidate;
 use crate::observable::{Observable, StratumName};
 use crate::quantity::Sensor;
@@ -61,7 +61,7 @@ pub(super) fn leftover(
     let rows = search.rows;
     let mut left = Vec::new();
     let variance = VarianceModel::new(rows, true);
-    let Some(last) = variance.fit(model, &last.components, By::Likelihood) else {
+    let Some(last) = variance.fit(model, &last.components, LikelihoodKind::Likelihood) else {
         return left;
     };
     for (s, stratum) in rows.strata.iter().enumerate() {

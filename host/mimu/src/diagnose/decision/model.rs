@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::hold_out::held_out;
 use crate::diagnose::search::{Chosen, Search};
-use crate::diagnose::variance::{By, Fitted};
+use crate::diagnose::variance::{Fitted, LikelihoodKind};
 use crate::fit::Split;
 
 /// Affine parameters and effects, fitted.
@@ -31,7 +31,7 @@ impl Model {
     ) -> Option<Self> {
         let columns = search.model(chosen);
         let variance = &search.variance;
-        let fitted = variance.fit(&columns, &tested.components, By::Restricted)?;
+        let fitted = variance.fit(&columns, &tested.components, LikelihoodKind::Restricted)?;
         let judged = match chosen.is_empty() {
             true => tested,
             false => &fitted,

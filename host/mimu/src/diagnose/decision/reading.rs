@@ -12,7 +12,7 @@ use super::hold_out::{held_out, rms};
 use super::leftover::{FALSE_LEFTOVER, Leftover};
 use crate::diagnose::rows::Rows;
 use crate::diagnose::search::{COEFFICIENT, Chosen, Search, beside, independent_of, unit_columns};
-use crate::diagnose::variance::{By, Fitted};
+use crate::diagnose::variance::{Fitted, LikelihoodKind};
 use crate::effects::quantity::Conditions;
 use crate::fit::Split;
 use crate::observable::{Observable, StratumName};
@@ -113,7 +113,11 @@ fn of_axis(
     split: Split,
 ) -> Option<OfReading> {
     let rows = search.rows;
-    let fit = |m: &DMatrix<f64>| search.variance.fit(m, &last.components, By::Likelihood);
+    let fit = |m: &DMatrix<f64>| {
+        search
+            .variance
+            .fit(m, &last.components, LikelihoodKind::Likelihood)
+    };
     let smooth = independent_of(&readings.smooth(axis), model);
     let null = beside(model, &smooth);
     let without = fit(&null)?;
@@ -224,7 +228,7 @@ pub(super) fn worse_with_steps(search: &Search, chosen: &[Chosen], one: usize) -
         );
         let fitted = search
             .variance
-            .fit(&with, &null.components, By::Likelihood)?;
+            .fit(&with, &null.components, LikelihoodKind::Likelihood)?;
         Some(null.deviance - fitted.deviance - cost(count))
     });
     let best = scores.max_by(f64::total_cmp)?;

@@ -6,7 +6,7 @@ use serde::Serialize;
 use super::hold_out::rms;
 use crate::diagnose::rows::Rows;
 use crate::diagnose::search::{Search, basis, beside};
-use crate::diagnose::variance::By;
+use crate::diagnose::variance::LikelihoodKind;
 use crate::effects::fitted::FittedEffect;
 
 /// An effect that should change the residuals of a recording by fewer sigmas than this is neither borne out nor contradicted by it.
@@ -49,7 +49,7 @@ pub(super) fn second(rows: &Rows, effects: &[FittedEffect]) -> Option<Vec<Second
         .filter(finite)
         .fold(search.basis.clone(), |m, c| beside(&m, c));
     let variance = &search.variance;
-    let noise = variance.fit(&basis(&all), &variance.none(), By::Likelihood)?;
+    let noise = variance.fit(&basis(&all), &variance.none(), LikelihoodKind::Likelihood)?;
     let whitener = variance.whitener(&noise.components)?;
     let white = whitener.whiten(&search.basis).svd(true, true);
     let errors: Vec<DVector<f64>> = columns

@@ -5,7 +5,7 @@ use std::ops::Range;
 use mimu_core::compensation::Affine;
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
-use super::{Figure, Free, Row, Session, Stratum};
+use super::{Figure, FreeParameters, Row, Session, Stratum};
 use crate::effects::quantity::{Conditions, Reading};
 use crate::effects::temperature::offsets;
 use crate::noise::wander::{Slow, Span};
@@ -58,7 +58,7 @@ pub(super) struct Builder<'a> {
 }
 
 /// The rows of `sensor` in a recording. `None` if there are none, or the calibration is singular.
-pub(super) fn part(session: &Session, sensor: Sensor, free: Free) -> Option<Part> {
+pub(super) fn part(session: &Session, sensor: Sensor, free: FreeParameters) -> Option<Part> {
     let inverse = session.model(sensor)?;
     let accel = session.accel.as_ref();
     let builder = Builder::of(session, sensor)?;
@@ -68,7 +68,7 @@ pub(super) fn part(session: &Session, sensor: Sensor, free: Free) -> Option<Part
         (Reference::Gravity, Sensor::Accel) => builder.sizes(&inverse),
         (Reference::Gravity, Sensor::Gyro) => builder.turns(&inverse, accel, session.forces),
     }?;
-    if let Free::Bias(_) = free {
+    if let FreeParameters::Bias(_) = free {
         part.nuisance = part.nuisance.select_columns(&part.biases);
         part.parameters = part.parameters.select_columns(&part.biases);
         part.biases = (0..part.biases.len()).collect();

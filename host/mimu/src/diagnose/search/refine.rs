@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 
 use super::{Columns, Search, beside, independent_of, price, unit_columns};
-use crate::diagnose::variance::{By, Components, Fitted};
+use crate::diagnose::variance::{Components, Fitted, LikelihoodKind};
 use crate::effects::candidate::Candidate;
 use crate::effects::effect::NonlinearParameter;
 
@@ -34,7 +34,10 @@ pub(super) struct With {
 impl Beside<'_> {
     fn fit(&self, columns: DMatrix<f64>, start: &Components) -> Option<With> {
         let both = beside(&self.model, &unit_columns(&columns));
-        let fitted = self.search.variance.fit(&both, start, By::Likelihood)?;
+        let fitted = self
+            .search
+            .variance
+            .fit(&both, start, LikelihoodKind::Likelihood)?;
         let own = fitted
             .coefficients
             .rows(self.model.ncols(), columns.ncols());

@@ -6,9 +6,9 @@ use mimu_recording::RawUnit;
 use mimu_recording::error::{Error, Result};
 use nalgebra::Vector3;
 
-use super::{One, Round};
+use super::{Round, UnitSession};
 use crate::event::Event;
-use crate::procedure::{Asked, Fixture, SAME_POSE_DEG};
+use crate::procedure::{Fixture, SAME_POSE_DEG, SessionConfig};
 use crate::step::{Step, words};
 use crate::watch::Seen;
 
@@ -26,12 +26,12 @@ const LOST_IN_A_ROW: u32 = 4;
 /// What the reason begins with where the pose is another than that which was asked for.
 pub const WRONG_POSE: &str = "wrong pose";
 
-impl One {
+impl UnitSession {
     /// Why no dwell can run now.
     pub(super) fn waits(
         &self,
         seen: &Seen,
-        asked: &Asked,
+        asked: &SessionConfig,
         step: &Step,
         busy: bool,
     ) -> Option<String> {
@@ -148,9 +148,9 @@ impl One {
     }
 }
 
-impl One {
+impl UnitSession {
     /// Refuses readings in SI that are none.
-    pub(super) fn check_unit(&self, seen: &Seen, asked: &Asked) -> Result<()> {
+    pub(super) fn check_unit(&self, seen: &Seen, asked: &SessionConfig) -> Result<()> {
         let size = Vector3::from_fn(|k, _| seen.mean[3 + k]).norm();
         let share = size / asked.gravity_mps2;
         if self.station.unit.raw_unit != RawUnit::Si || (1.0 / NEAR..NEAR).contains(&share) {

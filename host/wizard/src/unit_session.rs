@@ -17,11 +17,11 @@ use self::rows::{cut, known, shorten};
 use crate::axes;
 use crate::bank::DeviceBanks;
 use crate::event::{Event, UnitStanding};
-use crate::folder::{Entry, Folder, Part, Taking, append};
-use crate::procedure::{Asked, Fixture};
+use crate::folder::{Entry, Folder, OpenRecording, Part, append};
+use crate::procedure::{Fixture, SessionConfig};
 use crate::refit::{Progress, calibrate, progress};
 use crate::source::Chunk;
-use crate::station::{News, Station};
+use crate::station::{Station, StationEvent};
 use crate::step::Step;
 use crate::watch::{Seen, Watch, force, guessed};
 
@@ -63,7 +63,7 @@ impl Dwell {
 #[derive(Debug, Clone, Copy)]
 pub struct Round<'a> {
     /// What is asked of the session.
-    pub asked: &'a Asked,
+    pub asked: &'a SessionConfig,
     /// The step that is wanted now.
     pub step: Option<&'a Step>,
     /// Those to come.
@@ -75,13 +75,13 @@ pub struct Round<'a> {
 }
 
 /// One of the units.
-pub struct One {
+pub struct UnitSession {
     /// Its port.
     pub station: Station,
     /// Its folder.
     pub folder: Folder,
     /// The recording that grows.
-    pub taking: Option<Taking>,
+    pub taking: Option<OpenRecording>,
     /// The calibration so far, beside the targets.
     pub progress: Progress,
     /// How it stands.
@@ -112,9 +112,9 @@ pub struct One {
     pub banks: Option<DeviceBanks>,
 }
 
-impl One {
+impl UnitSession {
     /// A unit with its folder.
-    pub fn new(station: Station, folder: Folder, asked: &Asked) -> Self {
+    pub fn new(station: Station, folder: Folder, asked: &SessionConfig) -> Self {
         let unit = &station.unit;
         Self {
             watch: Watch::new(unit.rate_hz, asked.fixture != Fixture::Table),
@@ -146,7 +146,7 @@ impl One {
     }
 
     /// Begins a recording, or goes on with it.
-    pub fn begin(&mut self, part: Part, asked: &Asked) -> Result<()> {
+    pub fn begin(&mut self, part: Part, asked: &SessionConfig) -> Result<()> {
         let unit = &self.station.unit;
         let table = asked.fixture == Fixture::Table;
         let columns = Columns {
@@ -174,7 +174,7 @@ impl One {
             });
         }
         self.part = part;
-        self.taking = Some(Taking::begin(&self.folder, part, columns, manifest)?);
+        self.taking = Some(OpenRecording::begin(&self.folder, part, columns, manifest)?);
         // Those that do not count keep their numbers.
         let had = self.folder.entries().iter().filter_map(|e| match e {
             Entry::Dwell {
@@ -218,7 +218,7 @@ impl One {
         while let Some(news) = self.station.news()? {
             some = true;
             match news {
-                News::Samples(chunk) => {
+                StationEvent::Samples(chunk) => {
                     self.keep(&chunk);
                     if let Some(seen) = self.watch.take(&chunk) {
                         self.seen = Some(seen);
@@ -228,7 +228,7 @@ impl One {
                         }
                     }
                 }
-                News::Restarted(why) => {
+                StationEvent::Restarted(why) => {
                     let next = self.next.unwrap_or(0) as f64 / self.station.unit.rate_hz;
                     if let Some(taking) = &mut self.taking {
                         taking.restarted(next, why.clone());
@@ -238,18 +238,20 @@ impl One {
                         banks.lacks("the device has restarted, and they lack the dwells before");
                     }
                 }
-                News::Note(words) => tell.push(Event::Note {
+                StationEvent::Note(words) => tell.push(Event::Note {
                     words: format!("{}: {words}", self.name()),
                 }),
-                News::Lost(why) => self.interrupted(format!("the line is lost: {why}"), tell)?,
-                News::Other(why) => {
+                StationEvent::Lost(why) => {
+                    self.interrupted(format!("the line is lost: {why}"), tell)?
+                }
+                StationEvent::Other(why) => {
                     self.standing.waiting = Some(why.clone());
                     tell.push(Event::Interrupted {
                         unit: self.name(),
                         why,
                     });
                 }
-                News::Back(_) => self.interrupted("the line is back".into(), tell)?,
+                StationEvent::Back(_) => self.interrupted("the line is back".into(), tell)?,
             }
         }
         Ok(some)
@@ -297,7 +299,7 @@ impl One {
         }
     }
 
-    fn stand(&mut self, seen: &Seen, asked: &Asked, step: Option<&Step>) {
+    fn stand(&mut self, seen: &Seen, asked: &SessionConfig, step: Option<&Step>) {
         let nominal = self
             .nominal
             .unwrap_or_else(|| guessed(seen, asked.gravity_mps2));
@@ -318,7 +320,7 @@ impl One {
     }
 
     /// Up by the last second, of length 1.
-    fn up(&self, seen: &Seen, asked: &Asked) -> Vector3<f64> {
+    fn up(&self, seen: &Seen, asked: &SessionConfig) -> Vector3<f64> {
         let nominal = self
             .nominal
             .unwrap_or_else(|| guessed(seen, asked.gravity_mps2));
@@ -394,7 +396,7 @@ impl One {
     }
 
     /// Tells the device's filters what they sense from now on.
-    fn begin_banks(&mut self, step: &Step, asked: &Asked) {
+    fn begin_banks(&mut self, step: &Step, asked: &SessionConfig) {
         let (Some(banks), Some(noise)) = (&mut self.banks, self.watch.noise()) else {
             return;
         };
@@ -519,7 +521,7 @@ impl One {
     }
 
     /// Why the poses say that the accelerometer's axes are not those that their names say.
-    pub fn mirrored(&self, asked: &Asked) -> Option<String> {
+    pub fn mirrored(&self, asked: &SessionConfig) -> Option<String> {
         axes::mirrored(&self.folder.shown(self.part), asked.fixture.tolerance_deg())
     }
 
@@ -528,7 +530,7 @@ impl One {
         (self.done, self.moved, self.standing.waiting) = (false, false, None);
     }
 
-    fn check_temperature(&self, seen: &Seen, asked: &Asked) -> Result<()> {
+    fn check_temperature(&self, seen: &Seen, asked: &SessionConfig) -> Result<()> {
         let Some([first, _]) = self.folder.temperatures() else {
             return Ok(());
         };
@@ -545,7 +547,7 @@ impl One {
     }
 
     /// The calibration from what there is; its matrices tell up from now on.
-    pub fn refit(&mut self, asked: &Asked) -> Option<Fit> {
+    pub fn refit(&mut self, asked: &SessionConfig) -> Option<Fit> {
         let taking = self.taking.as_ref()?;
         let fitted = calibrate(taking.manifest(), &taking.samples, 0);
         self.progress = progress(&fitted, &asked.targets);

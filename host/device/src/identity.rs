@@ -14,7 +14,7 @@ use mimu_recording::error::{Error, Result};
 
 /// A [`Greeting`], kept: the result of `mimu device info`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Who {
+pub struct Identity {
     /// What it speaks.
     pub protocol: Version,
     /// Version of the firmware.
@@ -159,7 +159,7 @@ impl From<Start<'_>> for Started {
     }
 }
 
-impl From<&Greeting<'_>> for Who {
+impl From<&Greeting<'_>> for Identity {
     fn from(greeting: &Greeting<'_>) -> Self {
         Self {
             protocol: greeting.protocol,
@@ -202,7 +202,7 @@ impl From<&Greeting<'_>> for Who {
     }
 }
 
-impl Who {
+impl Identity {
     /// Names of what it can do.
     pub fn capability_names(&self) -> Vec<&'static str> {
         names(self.capabilities).collect()

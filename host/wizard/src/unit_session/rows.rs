@@ -3,11 +3,11 @@
 use mimu::estimate::earth::Earth;
 use mimu_recording::Batch;
 
-use crate::procedure::Asked;
+use crate::procedure::SessionConfig;
 use crate::step::Step;
 
 /// Known inputs of a step on a table: rates, deg/s, and specific forces, m/s².
-pub(super) fn known(step: &Step, asked: &Asked) -> [f64; 6] {
+pub(super) fn known(step: &Step, asked: &SessionConfig) -> [f64; 6] {
     let up = step.up();
     // Of the Earth's rate the table's heading leaves open all but what is along the vertical.
     let earth = asked
