@@ -12,7 +12,7 @@ ON_PC := --workspace --exclude mimu-counted --exclude mimu-no-panic
 # Of `make test`, and each also by itself: `make clippy`. Tests are linked before they run, so that both times are seen.
 STAGES := fmt clippy rustdoc images no-panic build-tests run-tests
 
-.PHONY: help test $(STAGES) nightly demo faults example papers blind bench budget device fuzz audit toolchain
+.PHONY: help test $(STAGES) nightly dist demo faults example papers blind bench budget device fuzz audit toolchain
 
 help: ## this list
 	@sed -n 's/^\([a-z]*\):.*## /  make \1\t/p' Makefile
@@ -32,8 +32,9 @@ test: toolchain ## formatting, lints, documentation, firmware, all tests but the
 	  took="$$took$$(printf '%-12s %4d s' $$stage $$(( $$(date +%s) - begun )))\n"; \
 	done; printf '\n%b' "$$took"
 
-# A fresh build compiles each crate once, so that nothing need be kept for compiling it again in parts.
-test $(STAGES) nightly: export CARGO_INCREMENTAL = 0
+# A fresh build compiles each crate once, so that nothing need be kept for compiling it again in parts. The demo and the faults use what the
+# tests have built: with another setting they would compile the workspace again.
+test $(STAGES) demo faults nightly: export CARGO_INCREMENTAL = 0
 
 fmt:
 	$(CARGO) fmt --all --check
@@ -61,6 +62,10 @@ build-tests:
 run-tests:
 	$(CARGO) test --locked $(ON_PC)
 
+dist: toolchain ## the command to hand out: target/dist/mimu, stripped
+	$(CARGO) build --locked --profile dist -p mimu-cli --bin mimu
+	@ls -l target/dist/mimu
+
 nightly: toolchain blind fuzz ## what takes hours: more seeds, ten minutes of samples, 300 supply cuts, coverage, blind, fuzz; prints its figures
 	$(FIRMWARE)
 	$(CARGO) test --locked --release $(ON_PC) -- --ignored --nocapture --test-threads=2
@@ -70,14 +75,14 @@ DEMO ?= target/demo-$(SEED)
 SEED ?= 1
 demo: toolchain ## an uncalibrated board on the virtual bench, to a verified one; SEED=n is another unit with another effect
 	@$(FIRMWARE) -q
-	@$(CARGO) build --locked --release -q -p mimu-cli -p mimu-board-tests --bin mimu --bin demo
+	@$(CARGO) build --locked -q -p mimu-cli -p mimu-board-tests --bin mimu --bin demo
 	@rm -rf $(DEMO)
-	@target/release/demo $(SEED) $(DEMO)
+	@target/debug/demo $(SEED) $(DEMO)
 
 faults: toolchain ## what can go wrong in a session of the wizard, done to it on purpose
 	@$(FIRMWARE) -q
-	$(CARGO) build --locked --release -p mimu-cli -p mimu-board-tests
-	target/release/faults
+	$(CARGO) build --locked -p mimu-cli -p mimu-board-tests --bins
+	target/debug/faults
 
 example: toolchain ## import and fit a recording: the best real one at hand, or the small one in tests/
 	$(CARGO) build --locked --release --bin mimu
