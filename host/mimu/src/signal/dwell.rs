@@ -553,7 +553,7 @@ fn judge(
 }
 
 fn warn(list: &[Dwell], manifest: &Manifest, warnings: &mut Vec<Warning>) {
-    let mut by_fault: Vec<((Fault, Option<Sensor>), Vec<String>)> = Vec::new();
+    let mut by_fault: Vec<(Fault, Option<Sensor>, Vec<String>)> = Vec::new();
     for dwell in list {
         for sensor in Sensor::BOTH {
             let Some(fault) = dwell.fault(sensor) else {
@@ -564,19 +564,22 @@ fn warn(list: &[Dwell], manifest: &Manifest, warnings: &mut Vec<Warning>) {
             }
             // Whether a unit is still, and its input slow enough, is judged sensor by sensor.
             let by_sensor = matches!(fault, Fault::NotStill | Fault::TooFast);
-            let key = (fault, by_sensor.then_some(sensor));
+            let whose = by_sensor.then_some(sensor);
             let name = manifest
                 .step_labels
                 .get(dwell.step as usize)
                 .cloned()
                 .unwrap_or_else(|| dwell.step.to_string());
-            match by_fault.iter_mut().find(|(k, _)| *k == key) {
-                Some((_, steps)) => steps.push(name),
-                None => by_fault.push((key, vec![name])),
+            match by_fault
+                .iter_mut()
+                .find(|(f, s, _)| (f, s) == (&fault, &whose))
+            {
+                Some((.., steps)) => steps.push(name),
+                None => by_fault.push((fault, whose, vec![name])),
             }
         }
     }
-    for ((fault, sensor), names) in by_fault {
+    for (fault, sensor, names) in by_fault {
         warnings.push(Warning::DwellsNotUsed(names, fault, sensor));
     }
     let clipped: u64 = list
