@@ -220,7 +220,7 @@ fn refusals_are_one_line_with_status_1_and_wrong_usage_has_status_2() {
         ("--scheme fang-nine --table faces", 1, "three-axis"),
         ("--compare --sensor gyro --table hand", 1, "turns"),
         ("-n 8 --rates 10", 1, "--sensor gyro"),
-        ("-n 8 -o missing/plan.toml", 1, "folder"),
+        ("-n 8 -o there/plan.toml", 1, "folder"),
         ("-n 8 -o folder", 1, "directory"),
         ("-n 8 --json folder", 1, "directory"),
         ("-n 8 --json missing/design.json", 1, "folder"),

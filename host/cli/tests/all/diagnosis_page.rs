@@ -314,7 +314,10 @@ fn where_the_diagnosis_is_refused_there_is_no_page() {
             &["diagnose", "r", "--verify", "nowhere", "--page", "p.html"],
             "nowhere",
         ),
-        (&["diagnose", "r", "--page", "no/p.html"], "no/p.html"),
+        (
+            &["diagnose", "r", "--page", "r/recording.toml/p.html"],
+            "r/recording.toml/p.html",
+        ),
         (
             &["diagnose", "r", "--page", "r/recording.toml"],
             "r/recording.toml",
