@@ -152,7 +152,7 @@ fn sensor_text(out: &mut String, fit: &FitResult, name: Sensor, sensor: &SensorF
         if scatter.significant {
             let _ = writeln!(
                 out,
-                "  noise does not explain the residual ({group}): {} more is there, and in the intervals",
+                "  the residual exceeds the noise ({group}) by {}; the intervals include this",
                 readable::error(&scatter.unit).write(scatter.excess_sigma)
             );
         }
