@@ -7,7 +7,7 @@ use std::time::Instant;
 use mimu::diagnose::diagnose;
 use mimu::fit::{Method, Options};
 use mimu::plan::next_experiment::next;
-use mimu::signal::prepared::Prepared;
+use mimu::prepared::Prepared;
 use mimu::signal::stillness::STILL_FACTOR;
 use mimu_recording::Recording;
 use mimu_rig::located::Source;

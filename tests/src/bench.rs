@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use mimu::noise::noise_file::NoiseFile;
-use mimu::signal::prepared::Prepared;
+use mimu::prepared::Prepared;
 use mimu::signal::stillness::STILL_FACTOR;
 use mimu_recording::Recording;
 use mimu_rig::located::Source;

@@ -5,8 +5,8 @@
 
 use mimu::diagnose::{Diagnosis, diagnose};
 use mimu::fit::{Fit, fit};
+use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
-use mimu::signal::prepared::Prepared;
 use mimu_rig::flaws::FlawsTruth;
 use mimu_rig::random::Random;
 use mimu_rig::rig_file::{AffineFile, Parts, RigFile};

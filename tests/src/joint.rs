@@ -8,7 +8,7 @@ use mimu::calibration::apply::apply;
 use mimu::diagnose::{Recordings, diagnose};
 use mimu::effects::fitted::FittedEffect;
 use mimu::fit::fit;
-use mimu::signal::prepared::Prepared;
+use mimu::prepared::Prepared;
 use mimu::signal::stillness::STILL_FACTOR;
 use mimu_recording::error::Result;
 use mimu_recording::{Recording, SampleFormat};

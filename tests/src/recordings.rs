@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use mimu::fit::{Fit, Method, Options, fit};
-use mimu::signal::prepared::Prepared;
+use mimu::prepared::Prepared;
 use mimu::signal::stillness::STILL_FACTOR;
 use mimu::triad::half_width_95;
 use mimu_core::compensation::Affine;

@@ -1,6 +1,6 @@
 //! Estimators of the literature and the joint one on the same recordings, beside the hours in the chamber.
 
-use mimu::signal::prepared::Prepared;
+use mimu::prepared::Prepared;
 use mimu::signal::stillness::STILL_FACTOR;
 use mimu_recording::{Batch, Manifest};
 use mimu_thermal::classic::Classic;

@@ -1,7 +1,7 @@
 //! Many runs of one experiment, and what is left of them.
 
+use mimu::prepared::Prepared;
 use mimu::quantity::{PerSensor, Sensor};
-use mimu::signal::prepared::Prepared;
 use mimu::signal::stillness::STILL_FACTOR;
 use mimu_thermal::curves::TriadCurves;
 use mimu_thermal::joint::{Choice, Joint, estimate};

@@ -8,7 +8,7 @@ use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use mimu::fit::{Method, Options, fit};
-use mimu::signal::prepared::Prepared;
+use mimu::prepared::Prepared;
 use mimu_recording::{
     Batch, ColumnList, Columns, ImportOptions, Manifest, RawUnit, Recording, Reference,
     SampleFormat, Writer, import,

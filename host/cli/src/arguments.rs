@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use mimu::noise::noise_file::NoiseFile;
+use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
 use mimu::signal::dwell::Keep;
-use mimu::signal::prepared::Prepared;
 use mimu::signal::stillness::{Finding, STILL_FACTOR, Steps};
 use mimu_recording::error::Result;
 

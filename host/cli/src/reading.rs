@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use mimu::signal::prepared::Prepared;
+use mimu::prepared::Prepared;
 use mimu::signal::stillness::Finding;
 use mimu_recording::error::Result;
 use mimu_recording::{MANIFEST_FILE, PoseMeans, Recording};

@@ -10,7 +10,7 @@ use nalgebra::{Matrix3, Vector3};
 use super::identity::{Hash, Identity};
 use super::origin;
 use mimu::calibration::{Calibration, OverTemperature, reference_node};
-use mimu::effects::on_device::NotOnDevice;
+use mimu::effects::fitted::NotOnDevice;
 use mimu::quantity::{PerSensor, Sensor};
 use mimu_recording::RawUnit;
 use mimu_recording::error::{Argument, Error, Result};

@@ -3,13 +3,13 @@
 pub mod apply;
 pub mod bias_cubic;
 mod check;
+pub mod die_temperature;
 mod effect;
 mod kept;
 mod of_curves;
 mod of_fit;
 mod on_device;
 mod over_temperature;
-pub(crate) mod toml_layout;
 pub mod verify;
 
 pub use kept::Kept;
@@ -268,7 +268,7 @@ impl Calibration {
             None => "",
             Some(_) => HEADER_OF_CURVES,
         };
-        toml_layout::to_toml(&format!("{HEADER}{effects}{curves}{keys}"), self)
+        crate::toml_layout::to_toml(&format!("{HEADER}{effects}{curves}{keys}"), self)
     }
 
     /// What the affine models lack.

@@ -14,12 +14,11 @@ mod outlying;
 pub mod plausible;
 mod sensor;
 pub mod session_bias;
-pub(crate) mod unit_in_si;
 
 use crate::estimate::least_squares::POORLY_DETERMINED;
 use crate::estimate::{Estimated, Observation};
+use crate::prepared::Prepared;
 use crate::quantity::{Figure, Sensor};
-use crate::signal::prepared::Prepared;
 use crate::signal::stillness::STILL_FACTOR;
 use crate::warning::Warning;
 use mimu_recording::error::{Argument, Error, Result};

@@ -3,8 +3,8 @@
 //! | in order of use | what |
 //! |---|---|
 //! | [`quantity`], [`readable`] | sensors, axes, SI units, and how numbers are written for people |
-//! | [`signal`] | from samples to dwells and turns: blocks, rails, stillness, dwells; [`signal::prepared`] is all of it for one recording |
-//! | [`noise`] | how well a dwell mean is known; [`noise::survey`] finds it from a recording at rest |
+//! | [`signal`] | from samples to dwells and turns: blocks, rails, stillness, dwells; [`prepared`] is all of it for one recording |
+//! | [`noise`] | how well a dwell mean is known; [`survey`] finds it from a recording at rest |
 //! | [`allan`], [`spectrum`] | Allan deviation and noise model of a series; spectral lines, and the band in which it is white |
 //! | [`estimate`], [`triad`] | the estimators, and what they estimate: both directions, covariances, physical quantities |
 //! | [`mod@fit`] | both triads, judged on what they have not seen; what cannot be right is refused |
@@ -59,16 +59,21 @@ pub mod calibration;
 pub mod diagnose;
 pub mod effects;
 pub mod estimate;
+mod fault;
 pub mod fit;
 pub mod noise;
 pub mod observable;
 pub mod parameter;
 pub mod plan;
+pub mod pose_means;
+pub mod prepared;
 pub mod quantity;
 pub mod readable;
 pub mod result;
 pub mod signal;
 pub mod spectrum;
+pub mod survey;
+mod toml_layout;
 pub mod triad;
 pub mod warning;
 
@@ -77,5 +82,5 @@ pub use fit::{Fit, Options, fit};
 pub use mimu_recording::error::Error;
 pub use mimu_recording::{Batch as Samples, Manifest, RawUnit, Recording, Reference};
 pub use nalgebra;
+pub use prepared::Prepared;
 pub use quantity::Sensor;
-pub use signal::prepared::Prepared;

@@ -6,7 +6,6 @@
 
 pub mod noise_file;
 mod pool;
-pub mod survey;
 pub mod wander;
 
 use nalgebra::{DMatrix, Vector3};

@@ -16,9 +16,9 @@ use serde::{Deserialize, Serialize};
 use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{parse_toml, read_text};
 
-use crate::calibration::toml_layout;
 use crate::plan::design::model::Setting;
 use crate::plan::design::reach::Fixture;
+use crate::toml_layout;
 use turn::Angles;
 pub use turn::{TableAxis, Turn};
 

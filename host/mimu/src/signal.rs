@@ -3,13 +3,9 @@
 pub mod blocks;
 pub(crate) mod contrast;
 pub(crate) mod course;
-pub mod die_temperature;
 pub mod dwell;
-pub mod fault;
 pub mod increment;
 pub(crate) mod no_temperature;
-pub mod pose_means;
-pub mod prepared;
 pub mod rails;
 pub(crate) mod ramp;
 pub mod reading_step;
@@ -17,3 +13,4 @@ pub mod rest;
 pub mod signed_low_byte;
 pub(crate) mod slow_turns;
 pub mod stillness;
+pub(crate) mod unit_in_si;

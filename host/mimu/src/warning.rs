@@ -2,14 +2,16 @@
 
 mod words;
 
+pub(crate) use words::CHECK_WIRING;
+
 use std::mem::discriminant;
 
 use mimu_recording::error::Error;
 use mimu_recording::{Held, NoTemperatures, RAW_COLUMNS};
 use serde::{Serialize, Serializer};
 
+use crate::fault::Fault;
 use crate::quantity::{Sensor, normal_gravity};
-use crate::signal::fault::Fault;
 
 /// What local gravity may differ from normal gravity at sea level by, m/s²: up to 5500 m of height take 0.017 away, and 400 m of depth add 0.001;
 /// anomalies of the Earth's field make 0.003 either way (they reach 0.005 on a few peaks and islands).

@@ -4,7 +4,7 @@ use mimu::quantity::{plural, significant};
 use mimu_recording::RawUnit;
 use nalgebra::Vector3;
 
-use crate::session::Row;
+use crate::row::Row;
 
 /// Rows on each side whose mean is a level: ten seconds.
 const LEVEL_ROWS: usize = 4;

@@ -8,7 +8,8 @@ use crate::basis::Shape;
 use crate::curves::TriadCurves;
 use crate::path::{fastest, stands};
 use crate::points::{Point, curves};
-use crate::session::{Row, Session};
+use crate::row::Row;
+use crate::session::Session;
 
 /// Width of the bins of the independent nodes, K.
 const NODE_K: f64 = 10.0;

@@ -11,7 +11,8 @@ use crate::joint::Joint;
 use crate::nodes::inverse;
 use crate::path::{direction, fastest};
 use crate::regression::{AxisNoise, Normal};
-use crate::session::{Row, Session};
+use crate::row::Row;
+use crate::session::Session;
 use crate::smoothness::{Penalties, fixed};
 use crate::thermometer::Die;
 

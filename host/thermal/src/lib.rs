@@ -43,6 +43,7 @@ pub mod points;
 pub mod profile;
 pub mod regression;
 pub mod result;
+pub mod row;
 pub mod session;
 pub mod smoothness;
 pub mod suitability;

@@ -1,16 +1,17 @@
 //! One recording, from power-on to power-off, as rows: means of some seconds with their known input, and the thermometer.
 
 use mimu::allan::variance::AllanModel;
+use mimu::prepared::Prepared;
 use mimu::quantity::{PerSensor, Sensor, plural};
 use mimu::signal::blocks::{Block, Condensed};
 use mimu::signal::dwell::Dwell;
-use mimu::signal::prepared::Prepared;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{RawUnit, Reference};
 use nalgebra::Vector3;
 
 use crate::bias_jumps::{self, BiasJump};
 use crate::excitation::tells_apart;
+use crate::row::Row;
 use crate::thermometer::Thermometer;
 
 /// Length of a row, s. At 5 K/min a die moves by 0.2 K in it, over which any curve is a line.
@@ -32,33 +33,6 @@ const TILTED: f64 = 0.1;
 const RATE: f64 = 0.02;
 /// Longest dwell with a moving input, s, that is taken as one mean.
 const LONGEST_MOVE_S: f64 = 60.0;
-
-/// Mean of a stretch within one dwell.
-#[derive(Debug, Clone, Copy)]
-pub struct Row {
-    /// Middle of the stretch, s.
-    pub middle_s: f64,
-    /// Number of samples.
-    pub samples: f64,
-    /// Raw reading.
-    pub raw: Vector3<f64>,
-    /// Known input, SI; not a number where it is unknown.
-    pub input: Vector3<f64>,
-    /// Number of the dwell.
-    pub step: i32,
-}
-
-impl Row {
-    /// Takes the samples of `other` in.
-    fn join(&mut self, other: &Self) {
-        let samples = self.samples + other.samples;
-        let share = other.samples / samples;
-        self.middle_s += share * (other.middle_s - self.middle_s);
-        self.raw += share * (other.raw - self.raw);
-        self.input += share * (other.input - self.input);
-        self.samples = samples;
-    }
-}
 
 /// A recording made ready for curves over temperature.
 #[derive(Debug, Clone)]

@@ -1,9 +1,9 @@
 //! The calibration so far, and how far each parameter is from its target.
 
 use mimu::fit::{Fit, Options, SensorFit, fit};
+use mimu::prepared::Prepared;
 use mimu::quantity::{AXES, Sensor};
 use mimu::readable::STANDARD_GRAVITY;
-use mimu::signal::prepared::Prepared;
 use mimu::signal::stillness::STILL_FACTOR;
 use mimu::triad::{Angles, Estimate};
 use mimu_recording::error::Result;

@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use mimu::calibration::Calibration;
 use mimu::fit::{Fit, Options, fit};
+use mimu::prepared::Prepared;
 use mimu::result::diagnosis::DiagnosisResult;
-use mimu::signal::prepared::Prepared;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::result_file::stage;
 use serde::Serialize;

@@ -3,8 +3,8 @@
 use mimu::calibration::Calibration;
 use mimu::calibration::verify::{SensorVerification, verify};
 use mimu::fit::Fit;
+use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
-use mimu::signal::prepared::Prepared;
 use mimu::signal::stillness::STILL_FACTOR;
 use mimu::warning::Warning;
 use mimu_recording::Recording;

@@ -1,9 +1,9 @@
 //! Sessions as people make them: thirteen poses, ten on a fixture, six faces; with a dwell that was knocked, or right and alone.
 
 use mimu::fit::{Fit, Method, Options, fit};
+use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
 use mimu::signal::dwell::Keep;
-use mimu::signal::prepared::Prepared;
 use mimu::signal::stillness::{Finding, STILL_FACTOR, Steps};
 use mimu::warning::Warning;
 use mimu_recording::error::Error;

@@ -1,9 +1,9 @@
 //! Flaws of real recordings, from the bench: each is found, and the calibration is as good as without it.
 
 use mimu::fit::{Fit, Options, fit};
+use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
 use mimu::signal::dwell::{Dwell, Fault};
-use mimu::signal::prepared::Prepared;
 use mimu::signal::stillness::STILL_FACTOR;
 use mimu::warning::Warning;
 use mimu_recording::{ImportOptions, RawUnit, Recording, Reference, import};

@@ -2,8 +2,8 @@
 
 use mimu::allan::Kind;
 use mimu::allan::model::Term;
-use mimu::noise::survey::{Options, Part, Survey, survey};
 use mimu::quantity::Sensor;
+use mimu::survey::{Options, Part, Survey, survey};
 use mimu_recording::Recording;
 use mimu_rig::located::Source;
 use mimu_rig::plan::Plan;

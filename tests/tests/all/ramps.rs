@@ -3,9 +3,9 @@
 
 use mimu::diagnose::{Recordings, diagnose};
 use mimu::fit::{Method, Options, fit};
+use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
 use mimu::result::diagnosis::DiagnosisResult;
-use mimu::signal::prepared::Prepared;
 use mimu::signal::stillness::STILL_FACTOR;
 use mimu::warning::Warning;
 use mimu_rig::random::Random;

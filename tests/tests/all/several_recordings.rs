@@ -4,8 +4,8 @@
 
 use mimu::diagnose::{Diagnosis, Recordings, Verdict, diagnose};
 use mimu::fit::{Method, Options};
+use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
-use mimu::signal::prepared::Prepared;
 use mimu::signal::stillness::STILL_FACTOR;
 use mimu_recording::RawUnit;
 use mimu_rig::rig_file::RigFile;

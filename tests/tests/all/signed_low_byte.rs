@@ -1,7 +1,7 @@
 //! A firmware on the bench that takes the low byte of a reading for a signed number: its readings are refused, and nobody else's.
 
 use mimu::fit::{Method, Options, fit};
-use mimu::signal::prepared::Prepared;
+use mimu::prepared::Prepared;
 use mimu::signal::stillness::STILL_FACTOR;
 use mimu_recording::error::Argument;
 use mimu_recording::{ImportOptions, Recording, import};

@@ -3,8 +3,8 @@
 use mimu::fit::{Method, Options, fit};
 use mimu::noise::noise_file::NoiseFile;
 use mimu::plan::design::budget::DwellNoise;
+use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
-use mimu::signal::prepared::Prepared;
 use mimu::signal::stillness::STILL_FACTOR;
 use mimu::warning::Warning;
 use mimu_rig::random::Random;

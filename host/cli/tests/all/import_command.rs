@@ -228,8 +228,5 @@ fn rests_between_turns_of_known_angle_show_the_noise_and_are_no_outliers() {
     let text = right(folder, "fit turns");
     // The three turns are fitted exactly, and the rests differ by their biases: neither is far from the others.
     assert!(!text.contains("times the median"), "{text}");
-    assert!(
-        text.contains("the residual exceeds the noise"),
-        "{text}"
-    );
+    assert!(text.contains("the residual exceeds the noise"), "{text}");
 }

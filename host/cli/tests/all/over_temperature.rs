@@ -7,7 +7,7 @@ use std::path::Path;
 
 use mimu::calibration::{Calibration, DieTable, NodeTable, OverTemperature, TemperatureNode};
 use mimu::fit::{Method, Options, fit};
-use mimu::signal::prepared::Prepared;
+use mimu::prepared::Prepared;
 use mimu::signal::stillness::STILL_FACTOR;
 use mimu_recording::{Batch, Recording};
 use nalgebra::{Matrix3, Vector3};

@@ -10,12 +10,12 @@ use mimu_core::stored::NODES;
 use nalgebra::{Matrix3, Vector3};
 use serde::Serialize;
 
+use crate::calibration::die_temperature::outside;
 use crate::calibration::verify::check_unit;
 use crate::calibration::{Calibration, compensator};
 use crate::effects::quantity::Need;
 use crate::quantity::{PerSensor, Sensor, present};
 use crate::signal::blocks::{Condensed, Rails};
-use crate::signal::die_temperature::outside;
 use crate::signal::rails::find;
 use crate::warning::Warning;
 use mimu_recording::error::{Error, Result};

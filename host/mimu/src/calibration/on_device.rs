@@ -10,7 +10,7 @@ use mimu_core::table::Table;
 use nalgebra::convert;
 
 use super::{Calibration, Curves};
-use crate::effects::on_device::NotOnDevice;
+use crate::effects::fitted::NotOnDevice;
 use crate::quantity::{PerSensor, Sensor};
 use mimu_recording::error::{Error, Result};
 

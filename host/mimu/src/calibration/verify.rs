@@ -5,15 +5,15 @@ use nalgebra::{Matrix3, Vector3};
 use serde::Serialize;
 
 use crate::calibration::Calibration;
+use crate::calibration::die_temperature::{at_one_temperature, outside};
 use crate::effects::removal::{removable, remove_within};
 use crate::estimate::turn::{Turn, direction_error};
 use crate::fit::as_came::{errors, exceeds};
 use crate::fit::refuse_wrong_gravity;
-use crate::fit::unit_in_si::restless;
+use crate::prepared::{Prepared, si_covariance};
 use crate::quantity::Figure;
 use crate::quantity::{PerSensor, Sensor, present};
-use crate::signal::die_temperature::{at_one_temperature, outside};
-use crate::signal::prepared::{Prepared, si_covariance};
+use crate::signal::unit_in_si::restless;
 use crate::triad::Forward;
 use crate::warning::Warning;
 use mimu_recording::error::{Error, Result};

@@ -9,9 +9,9 @@ use crate::calibration::verify::verify;
 use crate::effects::fitted::FittedEffect;
 use crate::effects::removal::remove;
 use crate::fit::Fit;
+use crate::prepared::Prepared;
 use crate::quantity::{Figure, Sensor};
 use crate::readable;
-use crate::signal::prepared::Prepared;
 
 /// Ratio of the errors with the effects and without from which on the file is worse: below it they differ by the noise of the recording.
 const WORSE: f64 = 1.02;

@@ -16,8 +16,8 @@ use super::search::Chosen;
 use crate::effects::fitted::FittedEffect;
 use crate::effects::removal::remove;
 use crate::fit::{Fit, session_bias};
+use crate::prepared::Prepared;
 use crate::quantity::Sensor;
-use crate::signal::prepared::Prepared;
 use mimu_recording::error::{Error, Result};
 
 /// How often the rows of a sensor are made at most.

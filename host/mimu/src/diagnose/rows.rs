@@ -4,7 +4,7 @@
 //! | reference, sensor | one row is                                                     | unit   |
 //! |-------------------|----------------------------------------------------------------|--------|
 //! | table             | a dwell and sensor axis: reading less prediction, over the scale factor | SI |
-//! |                   | where an input moves within a dwell: its [contrasts](crate::signal::prepared::Prepared::within_dwells) | SI |
+//! |                   | where an input moves within a dwell: its [contrasts](crate::prepared::Prepared::within_dwells) | SI |
 //! | gravity, accel    | a dwell: magnitude of the force minus gravity                        | m/s²   |
 //! | gravity, gyro     | a turn and direction across gravity: prediction error of gravity | rad  |
 //! |                   | a dwell and axis: rate at rest                                 | rad/s  |
@@ -34,10 +34,10 @@ pub use forces::ForceErrors;
 use terms::Quantities;
 
 use crate::observable::StratumName;
+use crate::prepared::Prepared;
 use crate::quantity;
 use crate::quantity::Sensor;
 use crate::quantity::significant;
-use crate::signal::prepared::Prepared;
 use crate::triad::Covariance;
 
 /// Rows that share their noise.

@@ -11,8 +11,8 @@ use crate::effects;
 use crate::effects::candidate::{Candidate, Kind};
 use crate::effects::effect::Effect;
 use crate::effects::quantity::Quantity;
+use crate::prepared::Prepared;
 use crate::quantity::Sensor;
-use crate::signal::prepared::Prepared;
 use crate::triad::{Covariance, Part};
 
 /// Singular values below this share of the largest are rounding.

@@ -1,5 +1,6 @@
 //! An effect with its numbers, from the decision on it to the calibration file, the result of a diagnosis and the device.
 
+mod on_device;
 mod written;
 
 use nalgebra::Vector3;
@@ -11,6 +12,7 @@ use super::quantity::{Conditions, Need};
 use crate::quantity::{Sensor, rounded};
 use written::WrittenEffect;
 
+pub use on_device::NotOnDevice;
 pub(crate) use written::candidate;
 pub use written::{WrittenCoefficient, WrittenConverter, WrittenParameter};
 

@@ -11,7 +11,6 @@
 //! | [`candidate`] | an effect, a product found from the data or a jump, with the choice of its coefficients |
 //! | [`temperature`] | the temperature that an effect follows |
 //! | [`fitted`] | an effect with its numbers: from the decision to the file, the result and the device |
-//! | [`on_device`] | the same in the words of the device, and back |
 //! | [`removal`] | taking effects out of readings |
 //!
 //! An effect is added by one entry in one of the lists, one arm in `core`, which removes it, and one truth in `rig`. What it is a function
@@ -23,7 +22,6 @@ pub mod candidate;
 pub mod converter;
 pub mod effect;
 pub mod fitted;
-pub mod on_device;
 pub mod quantity;
 pub mod readout;
 pub mod regressor;

@@ -8,8 +8,8 @@ use nalgebra::{DMatrix, Matrix3, Vector3};
 use super::sensor::Residual;
 use crate::effects::temperature::lagged;
 use crate::estimate::Observation;
+use crate::prepared::Prepared;
 use crate::quantity::Sensor;
-use crate::signal::prepared::Prepared;
 
 /// Constant, input, T, T² and T behind a lag: what a bias does. A scale factor that moves by 300 ppm/K moves by 3 % of the inputs in 100 K,
 /// and a plan that has all of its rates at one temperature does not show it.

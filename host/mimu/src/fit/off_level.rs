@@ -5,8 +5,8 @@
 use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::sensor::{Residual, SensorFit};
+use crate::prepared::Prepared;
 use crate::quantity::{Figure, Sensor};
-use crate::signal::prepared::Prepared;
 use crate::warning::Warning;
 
 /// Errors across the known force over those along it, and over noise, from which on the force is not where the reference says.

@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::allan::model::{FLOOR, Term};
 use crate::allan::variance::AllanModel;
-use crate::calibration::toml_layout::to_toml;
 use crate::quantity::Sensor;
+use crate::toml_layout::to_toml;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{RAW_COLUMNS, parse_toml, read_text};
 

@@ -8,9 +8,9 @@ use super::TOOL;
 use crate::allan::Point;
 use crate::allan::model::{NoiseModel, Term};
 use crate::noise::noise_file::{FileCoefficient, NOISE_FORMAT, NoiseChannel, NoiseFile};
-use crate::noise::survey::{Channel, Survey};
 use crate::quantity::Sensor;
 use crate::spectrum::Line;
+use crate::survey::{Channel, Survey};
 use crate::warning::Warning;
 
 /// Why a channel has no coefficients at all.

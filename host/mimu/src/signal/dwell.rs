@@ -6,11 +6,11 @@
 
 use std::ops::Range;
 
+pub use crate::fault::Fault;
+use crate::fault::SHORTEST_S;
 use crate::quantity::Sensor;
 use crate::signal::blocks::{Condensed, Level, Rails, Stretch, pool, quantile};
 use crate::signal::course::{Course, Motion, motion};
-pub use crate::signal::fault::Fault;
-use crate::signal::fault::SHORTEST_S;
 use crate::signal::rails::{self, longest_run_by_chance};
 use crate::signal::ramp::ramps;
 use crate::signal::rest::{self, Rest};

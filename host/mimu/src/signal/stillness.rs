@@ -2,9 +2,9 @@
 
 use serde::Serialize;
 
+use crate::fault::SHORTEST_S;
 use crate::quantity::Sensor;
 use crate::signal::blocks::{Block, Condensed, Level, Stretch, pool, quantile};
-use crate::signal::fault::SHORTEST_S;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{Manifest, Reference};
 

@@ -5,9 +5,8 @@ use std::fmt;
 use mimu_recording::RAW_COLUMNS;
 
 use super::Warning;
-use crate::noise::survey::CHECK_WIRING;
+use crate::fault::{Fault, SHORTEST_S};
 use crate::quantity::{Sensor, duration, normal_gravity, plural, significant};
-use crate::signal::fault::{Fault, SHORTEST_S};
 
 /// What would be open of `parameter` without a dwell or a turn.
 fn open(parameter: &str, grows: f64) -> String {
@@ -44,6 +43,9 @@ fn without(as_came: bool) -> &'static str {
 fn degrees(rad: f64) -> String {
     significant(rad.abs().to_degrees())
 }
+
+/// What to do about a channel that never changes.
+pub(crate) const CHECK_WIRING: &str = "check its wiring, or that the right column was imported";
 
 impl fmt::Display for Warning {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {

@@ -1,8 +1,8 @@
 //! Biases over temperature from rest, upon a calibration at one temperature.
 
 use mimu::calibration::Calibration;
+use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
-use mimu::signal::prepared::Prepared;
 use mimu::signal::stillness::STILL_FACTOR;
 use mimu_thermal::base;
 use mimu_thermal::fit::{ThermalFit, fit};

@@ -1,6 +1,6 @@
 //! Recordings at rest of a unit whose biases drift far: what of them is used, and what the report says of the rest.
 
-use mimu::signal::prepared::Prepared;
+use mimu::prepared::Prepared;
 use mimu::signal::stillness::{Finding, STILL_FACTOR, Steps};
 use mimu::{Manifest, RawUnit, Reference, Samples};
 use mimu_thermal::fit::{ThermalFit, fit};

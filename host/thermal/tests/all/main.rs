@@ -13,7 +13,7 @@ mod simulation;
 mod soak;
 mod soaked;
 
-use mimu::signal::prepared::Prepared;
+use mimu::prepared::Prepared;
 use mimu::signal::stillness::STILL_FACTOR;
 use mimu::{Manifest, Samples};
 use mimu_thermal::session::Session;

@@ -5,10 +5,10 @@ use mimu::diagnose::{Recordings, diagnose};
 use mimu::effects::fitted::FittedEffect;
 use mimu::effects::removal::{remove, remove_within};
 use mimu::fit::{Method, Options};
+use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
 use mimu::signal::blocks::Moments;
 use mimu::signal::dwell::Fault;
-use mimu::signal::prepared::Prepared;
 use mimu::signal::stillness::STILL_FACTOR;
 use mimu_recording::RawUnit;
 

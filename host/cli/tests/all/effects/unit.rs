@@ -5,7 +5,7 @@ use mimu::effects::candidate::{Candidate, Kind};
 use mimu::effects::fitted::FittedEffect;
 use mimu::effects::readout::TYPICAL;
 use mimu::fit::{Fit, Method, Options, fit};
-use mimu::signal::prepared::Prepared;
+use mimu::prepared::Prepared;
 use mimu::signal::stillness::STILL_FACTOR;
 use mimu_recording::Recording;
 use nalgebra::{Matrix3, Vector3};

@@ -22,9 +22,9 @@ use std::time::{Duration, Instant};
 use mimu::calibration::Calibration;
 use mimu::calibration::verify::verify;
 use mimu::fit::{Fit, Method, Options, fit};
+use mimu::prepared::Prepared;
 use mimu::quantity::Sensor;
 use mimu::result::fit::FitResult;
-use mimu::signal::prepared::Prepared;
 use mimu_cli::report;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::{

@@ -9,8 +9,8 @@ use super::{Figure, FreeParameters, Row, Session, Stratum};
 use crate::effects::quantity::{Conditions, Reading};
 use crate::effects::temperature::offsets;
 use crate::noise::wander::{Slow, Span};
+use crate::prepared::Prepared;
 use crate::quantity::Sensor;
-use crate::signal::prepared::Prepared;
 use crate::triad::directions;
 use mimu_recording::Reference;
 

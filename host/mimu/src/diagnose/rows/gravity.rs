@@ -13,8 +13,8 @@ use crate::estimate::chains::Chains;
 use crate::estimate::earth::poses;
 use crate::estimate::turn::sensitivity;
 use crate::observable::{Observable, StratumName};
+use crate::prepared::si_covariance;
 use crate::quantity::Sensor;
-use crate::signal::prepared::si_covariance;
 
 /// What the affine parameters of an accelerometer do to its forces.
 struct Shapes {

@@ -2,7 +2,7 @@ use super::*;
 use crate::effects;
 use crate::effects::converter::Converter;
 use crate::effects::effect::{Effect, OnDevice as HowRemoved};
-use crate::effects::on_device::NotOnDevice;
+use crate::effects::fitted::NotOnDevice;
 use crate::effects::quantity::{RATE_LAG_S, REFERENCE_C};
 use crate::effects::regressor::Product;
 use mimu_core::effects as of_core;

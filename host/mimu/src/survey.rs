@@ -24,11 +24,11 @@ use crate::allan::model::{
 use crate::allan::units::Unit;
 use crate::allan::{Kind, Point, Spacing};
 use crate::calibration::Calibration;
-use crate::fit::unit_in_si::of_sizes;
 use crate::quantity::Sensor;
 use crate::signal::no_temperature;
+use crate::signal::unit_in_si::of_sizes;
 use crate::spectrum::{SetAside, set_aside_after};
-use crate::warning::Warning;
+use crate::warning::{CHECK_WIRING, Warning};
 use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{Column, NoTemperatures, RAW_COLUMNS, RawUnit, Recording};
 
@@ -94,9 +94,6 @@ pub struct Survey {
     /// What a person should know.
     pub warnings: Vec<Warning>,
 }
-
-/// What to do about a channel that never changes.
-pub(crate) const CHECK_WIRING: &str = "check its wiring, or that the right column was imported";
 
 /// Share of the Allan variance at the longest time from which on a ramp is what the curve shows there.
 const RAMP_SHARE: f64 = 0.5;

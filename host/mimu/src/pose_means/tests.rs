@@ -6,8 +6,8 @@ use mimu_rig::random::Random;
 use nalgebra::{Matrix3, Vector3};
 
 use crate::fit::{Options, fit};
+use crate::prepared::Prepared;
 use crate::quantity::Sensor;
-use crate::signal::prepared::Prepared;
 
 const G: f64 = 9.81;
 /// Standard deviation of one sample, and how many make a mean.

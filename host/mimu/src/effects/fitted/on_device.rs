@@ -7,11 +7,11 @@ use mimu_core::effects::{DeviceEffect, Refused, Variable};
 use mimu_core::wire::EFFECTS;
 use nalgebra::convert;
 
-use super::candidate::{Kind, OfConverter};
-use super::converter::Converter;
-use super::fitted::{FittedEffect, candidate};
-use super::quantity::Quantity;
-use super::readout;
+use super::{FittedEffect, candidate};
+use crate::effects::candidate::{Kind, OfConverter};
+use crate::effects::converter::Converter;
+use crate::effects::quantity::Quantity;
+use crate::effects::readout;
 
 /// Why no device removes an effect.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -6,9 +6,9 @@ use mimu_core::die::{BEYOND_C, DieLag, State};
 use nalgebra::{Matrix3, Vector3};
 
 use crate::calibration::{Calibration, Curves};
+use crate::prepared::Prepared;
 use crate::quantity::{PerSensor, Sensor};
 use crate::signal::blocks::Block;
-use crate::signal::prepared::Prepared;
 use crate::warning::Warning;
 
 /// Temperatures of the dies, °C, in the middle of each block: those of the thermometer behind the lag. Where it has no reading it is that of

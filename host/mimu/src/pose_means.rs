@@ -4,10 +4,10 @@
 //! show (stillness, rails, stuck channels). What goes by time is not known: turns, drifts, and how a bias wanders.
 
 use crate::noise::Noise;
+use crate::prepared::Prepared;
 use crate::quantity::Sensor;
 use crate::signal::blocks::{Block, Condensed, Level, Moments};
 use crate::signal::dwell::{Dwell, Dwells, Fault, Keep, Mean};
-use crate::signal::prepared::Prepared;
 use crate::warning::Warning;
 use mimu_recording::error::Result;
 use mimu_recording::{Column, PoseMean, PoseMeans, Reference};

@@ -1,0 +1,30 @@
+//! What the curves are fitted to: means of stretches within a dwell.
+
+use nalgebra::Vector3;
+
+/// Mean of a stretch within one dwell.
+#[derive(Debug, Clone, Copy)]
+pub struct Row {
+    /// Middle of the stretch, s.
+    pub middle_s: f64,
+    /// Number of samples.
+    pub samples: f64,
+    /// Raw reading.
+    pub raw: Vector3<f64>,
+    /// Known input, SI; not a number where it is unknown.
+    pub input: Vector3<f64>,
+    /// Number of the dwell.
+    pub step: i32,
+}
+
+impl Row {
+    /// Takes the samples of `other` in.
+    pub(crate) fn join(&mut self, other: &Self) {
+        let samples = self.samples + other.samples;
+        let share = other.samples / samples;
+        self.middle_s += share * (other.middle_s - self.middle_s);
+        self.raw += share * (other.raw - self.raw);
+        self.input += share * (other.input - self.input);
+        self.samples = samples;
+    }
+}
