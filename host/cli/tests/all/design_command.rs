@@ -223,7 +223,7 @@ fn refusals_are_one_line_with_status_1_and_wrong_usage_has_status_2() {
         ("-n 8 -o there/plan.toml", 1, "folder"),
         ("-n 8 -o folder", 1, "directory"),
         ("-n 8 --json folder", 1, "directory"),
-        ("-n 8 --json missing/design.json", 1, "folder"),
+        ("-n 8 --json there/design.json", 1, "folder"),
         ("-n 8 -o one --json one", 1, "another name"),
         ("-n 3 -o there", 1, "at least 4"),
         ("--dwell 10", 2, "--compare"),
