@@ -12,7 +12,8 @@ use mimu_rig::rig_file::RigFile;
 use mimu_thermal::basis::Shape;
 use mimu_thermal::fit::{Estimator, Options, ThermalFit, fit};
 use mimu_thermal::regression::{AxisNoise, Normal, Problem};
-use mimu_thermal::session::{Row, Session};
+use mimu_thermal::row::Row;
+use mimu_thermal::session::Session;
 use nalgebra::{Matrix4, Matrix4x3, SVector};
 use rayon::prelude::*;
 
