@@ -10,7 +10,7 @@ pub const SHORTEST_S: f64 = 1.0;
 /// Why a dwell is not used for a sensor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Fault {
-    /// Shorter than [`SHORTEST_S`].
+    /// Shorter than a second.
     TooShort,
     /// The variance is far above that of the other dwells, and no known input explains it.
     NotStill,
