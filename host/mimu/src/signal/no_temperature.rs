@@ -6,7 +6,7 @@ use crate::warning::Warning;
 
 /// Temperatures that there are, °C: those of the import. Not the narrower ones of the device: a thermometer whose origin nobody recorded may read
 /// 379 °C throughout, and shows all the same what follows it.
-const RANGE_C: [f64; 2] = [-273.15, 1000.0];
+const RANGE_C: std::ops::RangeInclusive<f64> = -273.15..=1000.0;
 
 /// Leaves empty what is no temperature among `temp_c`, of the times `t_s`, and counts it.
 pub(crate) fn leave_empty(
@@ -16,8 +16,7 @@ pub(crate) fn leave_empty(
 ) {
     for (c, t_s) in temp_c.iter_mut().zip(t_s) {
         found.of += u64::from(c.is_finite());
-        let [least, most] = RANGE_C;
-        if *c < least || *c > most {
+        if c.is_finite() && !RANGE_C.contains(c) {
             found.add(*c, || format!("at {t_s:.1} s"));
             *c = f64::NAN;
         }
