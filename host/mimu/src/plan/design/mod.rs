@@ -15,7 +15,7 @@
 //! whose known input are the turns between dwells, is no design of dwells and not treated here.
 //!
 //! ```
-//! use mimu::design::{Problem, model::{Model, Terms}, reach::Fixture, schemes::Scheme};
+//! use mimu::plan::design::{Problem, model::{Model, Terms}, reach::Fixture, schemes::Scheme};
 //! use mimu::quantity::Sensor;
 //! use mimu_recording::Reference;
 //!
