@@ -101,7 +101,7 @@ impl NoiseArgs {
 #[derive(Args)]
 pub(crate) struct JsonArgs {
     /// Write the result as JSON (`-`: to standard output, in place of the text)
-    #[arg(long = "json", value_name = "PATH")]
+    #[arg(long = "json", value_name = "PATH", global = true)]
     pub(crate) path: Option<PathBuf>,
 }
 

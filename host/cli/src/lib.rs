@@ -8,11 +8,9 @@
 //! | [`report`] | results as JSON, text and page |
 //! | `views` | how a session of the wizard is shown while it runs |
 //! | `hint` | flags of the command beside what an error says to set otherwise |
-//! | `export` | noise coefficients and biases over temperature for other programs |
 
 mod arguments;
 mod cmd;
-mod export;
 mod hint;
 mod output;
 mod reading;
@@ -55,7 +53,7 @@ enum Command {
     Thermal(thermal::ThermalArgs),
     /// Noise of a unit at rest: Allan deviation, N, B, K, Q and R
     Allan(allan::AllanArgs),
-    /// Write noise coefficients, or biases over temperature, in the format of another program
+    /// Write a calibration, or noise, in the format of another program
     Export(cmd::export::ExportArgs),
     /// Record the raw stream of a device
     Record(record::RecordArgs),

@@ -183,7 +183,10 @@ fn kalibr_gets_the_worst_axis_and_for_a_walk_that_was_not_seen_its_bound_or_what
     let file = NoiseFile::read(&folder.path().join("noise.toml")).unwrap();
     let bounds = file.channel[..3].iter().map(|c| c.k_at_most.unwrap());
     let bound = bounds.fold(0.0, f64::max);
-    done(folder.path(), "export --kalibr imu.yaml --noise noise.toml");
+    done(
+        folder.path(),
+        "export kalibr -o imu.yaml --noise noise.toml",
+    );
     let yaml = std::fs::read_to_string(folder.path().join("imu.yaml")).unwrap();
     let walk = yaml
         .lines()
@@ -195,7 +198,7 @@ fn kalibr_gets_the_worst_axis_and_for_a_walk_that_was_not_seen_its_bound_or_what
     );
     done(
         folder.path(),
-        "export --kalibr imu.yaml --noise noise.toml --gyro-walk 1e-6 --rostopic /a",
+        "export kalibr -o imu.yaml --noise noise.toml --gyro-walk 1e-6 --rostopic /a",
     );
     let yaml = std::fs::read_to_string(folder.path().join("imu.yaml")).unwrap();
     let value = |key: &str| -> f64 {
@@ -521,7 +524,10 @@ fn a_swaying_building_is_set_aside_and_the_noise_beneath_is_exported() {
     );
     let svg = std::fs::read_to_string(folder.path().join("a.svg")).unwrap();
     assert!(svg.contains("accel_x, lines set aside") && svg.contains("0.560 Hz"));
-    done(folder.path(), "export --kalibr imu.yaml --noise noise.toml");
+    done(
+        folder.path(),
+        "export kalibr -o imu.yaml --noise noise.toml",
+    );
 }
 
 #[test]
@@ -615,7 +621,7 @@ fn readings_in_volts_become_si_by_the_calibration_of_the_unit() {
     }
     assert!(outside <= 1, "{outside} of six");
     one_noise_file_serves_all(folder.path());
-    let error = refused(folder.path(), "export --kalibr imu.yaml --noise cal.toml");
+    let error = refused(folder.path(), "export kalibr -o imu.yaml --noise cal.toml");
     assert!(error.contains("cal.toml, line"), "{error}");
 }
 
@@ -677,7 +683,7 @@ fn one_noise_file_serves_all(folder: &Path) {
         assert_eq!(raw, both, "{command}");
         assert_ne!(raw, done(folder, command), "{command}: the noise is used");
     }
-    let kalibr = "export --kalibr imu.yaml --gyro-walk 1e-6 --accel-walk 1e-6";
+    let kalibr = "export kalibr -o imu.yaml --gyro-walk 1e-6 --accel-walk 1e-6";
     let design = "design -n 12 --sensor accel";
     for command in [kalibr, design] {
         done(folder, &format!("{command} --noise both.toml"));

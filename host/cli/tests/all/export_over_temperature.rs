@@ -1,4 +1,4 @@
-//! `mimu export --px4` and `--ardupilot`: the files are evaluated by what the documentation of the two programs says that they do with
+//! `mimu export px4` and `ardupilot`: the files are evaluated by what the documentation of the two programs says that they do with
 //! their parameters, and compared with the unit that the calibration was written for.
 
 use std::collections::BTreeMap;
@@ -148,7 +148,7 @@ fn export(folder: &Path, arguments: &str) -> Output {
 fn exported(folder: &Path, arguments: &str) -> (BTreeMap<String, f64>, serde_json::Value) {
     write_calibration(folder, true);
     let nominal = "--calibration cal.toml --gyro-zero 2.5 --accel-zero 1.65 --json e.json";
-    let out = export(folder, &format!("{arguments} out.param {nominal}"));
+    let out = export(folder, &format!("{arguments} -o out.param {nominal}"));
     assert!(
         out.status.success(),
         "{}",
@@ -259,7 +259,7 @@ fn px4_subtracts_the_bias_of_the_unit_at_every_temperature() {
     let folder = tempfile::tempdir().unwrap();
     let (p, json) = exported(
         folder.path(),
-        "--imu 2 --gyro-id 2490378 --accel-id 2359306 --px4",
+        "px4 --imu 2 --gyro-id 2490378 --accel-id 2359306",
     );
     assert_eq!((p["TC_G_ENABLE"], p["TC_A_ENABLE"]), (1.0, 1.0));
     assert_eq!((p["TC_G1_ID"], p["TC_A1_ID"]), (2_490_378.0, 2_359_306.0));
@@ -269,13 +269,13 @@ fn px4_subtracts_the_bias_of_the_unit_at_every_temperature() {
     );
     assert_eq!(p.len(), 2 * (2 + 3 + 12));
     assert_biases_go(|k, t, v| px4(&p, ["TC_G1", "TC_A1"][k], t, v));
-    assert_eq!(json["program"], "px4");
+    assert_eq!(json["to"], "px4");
 }
 
 #[test]
 fn ardupilot_subtracts_the_bias_of_the_unit_at_every_temperature() {
     let folder = tempfile::tempdir().unwrap();
-    let (p, _) = exported(folder.path(), "--ardupilot");
+    let (p, _) = exported(folder.path(), "ardupilot");
     assert_eq!(p["INS_TCAL1_ENABLE"], 1.0);
     assert_eq!(p.len(), 3 + 2 * (9 + 1 + 3));
     assert_biases_go(|k, t, v| ardupilot(&p, [["GYR", "GYRO"], ["ACC", "ACC"]][k], t, v));
@@ -284,12 +284,11 @@ fn ardupilot_subtracts_the_bias_of_the_unit_at_every_temperature() {
 #[test]
 fn the_error_that_remains_is_that_of_scale_factors_cross_terms_and_lag() {
     let folder = tempfile::tempdir().unwrap();
-    let (_, json) = exported(folder.path(), "--px4");
+    let (_, json) = exported(folder.path(), "px4");
     let figure = |k: usize, source: &str, key: &str| -> f64 {
-        let all = json["sensors"][k]["remains"].as_array().unwrap();
-        let found = all
-            .iter()
-            .find(|r| r["source"].as_str().unwrap().starts_with(source));
+        let all = json["remaining"].as_array().unwrap();
+        let mut all = all.iter().filter(|r| r["sensor"] == ["gyro", "accel"][k]);
+        let found = all.find(|r| r["source"].as_str().unwrap().starts_with(source));
         found.unwrap()[key].as_f64().unwrap()
     };
     let near = |found: f64, known: f64| {
@@ -316,17 +315,15 @@ fn the_error_that_remains_is_that_of_scale_factors_cross_terms_and_lag() {
     let late = |t: f64| accel().bias_si(t)[1] - accel().bias_si(t - 2.0)[1];
     near(figure(1, "lag", "max"), late(60.0));
     let text = std::fs::read_to_string(folder.path().join("out.param")).unwrap();
-    assert!(
-        text.contains("# accel: error that remains")
-            && text.contains("lag of the dies, at 2 K/min")
-    );
+    assert!(text.contains("# Errors that remain") && text.contains("lag of the dies, at 2 K/min"));
 }
 
 #[test]
 fn q_ground_control_gets_five_columns_with_the_types() {
     let folder = tempfile::tempdir().unwrap();
     write_calibration(folder.path(), true);
-    let arguments = "--px4 a.params --qgc --calibration cal.toml --gyro-zero 2.5 --accel-zero 1.65";
+    let arguments =
+        "px4 -o a.params --qgc --calibration cal.toml --gyro-zero 2.5 --accel-zero 1.65";
     assert!(export(folder.path(), arguments).status.success());
     let text = std::fs::read_to_string(folder.path().join("a.params")).unwrap();
     let lines: Vec<&str> = text.lines().filter(|l| !l.starts_with('#')).collect();
@@ -338,7 +335,7 @@ fn q_ground_control_gets_five_columns_with_the_types() {
 #[test]
 fn pymavlink_reads_the_files() {
     let folder = tempfile::tempdir().unwrap();
-    for program in ["--px4", "--ardupilot"] {
+    for program in ["px4", "ardupilot"] {
         let (ours, _) = exported(folder.path(), program);
         let script = "import sys\ntry:\n from pymavlink import mavparm\nexcept ImportError:\n sys.exit(77)\n\
                       p = mavparm.MAVParmDict()\nassert p.load('out.param')\nfor k in p: print('=', k, repr(p[k]))";
@@ -387,13 +384,13 @@ fn what_cannot_be_exported_is_refused_with_what_to_do() {
         assert!(!folder.path().join("p.param").exists());
     };
     write_calibration(folder.path(), false);
-    refused("--px4 p.param", "mimu thermal fit");
+    refused("px4 -o p.param", "mimu thermal fit");
     write_calibration(folder.path(), true);
     // 1.65 V are 54 m/s², which INS_ACCOFFS does not take.
-    refused("--ardupilot p.param --gyro-zero 2.5", "--accel-zero");
+    refused("ardupilot -o p.param --gyro-zero 2.5", "--accel-zero");
     // Counts where the sensor gives volts.
     refused(
-        "--px4 p.param --gyro-si-per-raw 0.001",
+        "px4 -o p.param --gyro-si-per-raw 0.001",
         "state its conversion",
     );
 }

@@ -178,10 +178,10 @@ fn a_rest_ramp_upon_poses_at_room_temperature_halves_the_error_of_a_sweep_and_is
     assert!(with < 0.5 * without, "{without}, {with}");
     let exported = done(
         folder,
-        "export --calibration cal.toml --px4 thermal.params --gyro-id 1 --accel-id 2 --json -",
+        "export px4 --calibration cal.toml -o thermal.params --gyro-id 1 --accel-id 2 --json -",
     );
     let exported: Value = serde_json::from_str(&exported).unwrap();
-    assert_eq!(exported["program"], "px4");
+    assert_eq!(exported["to"], "px4");
     assert!(folder.join("thermal.params").exists());
     for sensor in exported["sensors"].as_array().unwrap() {
         let remains = |source: &str| {

@@ -29,7 +29,7 @@ fn the_program_of_the_readme_of_core_gives_what_apply_gives() {
     let calibration = Calibration::of(&fit, &effects, "2026-01-01T00:00:00Z").unwrap();
     std::fs::write(path("cal.toml"), calibration.to_toml()).unwrap();
     let (cal, core) = (text("cal.toml"), text("unit.mimc"));
-    let (done, said) = mimu(&["export", "--calibration", &cal, "--core", &core]);
+    let (done, said) = mimu(&["export", "core", "--calibration", &cal, "-o", &core]);
     assert!(done, "{said}");
     let (done, said) = mimu(&[
         "apply",

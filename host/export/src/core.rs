@@ -1,0 +1,24 @@
+//! The bytes that a device stores, for programs with `mimu-core` ([`mimu_core::stored`]).
+
+use mimu_device::Image;
+use mimu_recording::error::Result;
+
+use crate::{Export, Sources};
+
+/// The bytes of the calibration.
+///
+/// # Errors
+/// Those of [`Image::new`]: a triad is missing, readings are not in volts, or no device removes an effect.
+pub fn export(from: &Sources) -> Result<Export> {
+    let (calibration, place) = from.calibration()?;
+    let image = Image::new(calibration, place)?;
+    let mut export = Export::new("core");
+    export.notes.push(format!("hash {}", image.hash));
+    if !image.effects.is_empty() {
+        let effects = format!("effects: {}", image.effects.join(", "));
+        export.notes.push(effects);
+    }
+    export.notes.extend(image.warnings);
+    export.content = image.bytes;
+    Ok(export)
+}

@@ -1,0 +1,70 @@
+//! The comments at the head of every file: whose calibration it is, what to compute with it, and what it leaves.
+
+use mimu::calibration::Calibration;
+use mimu::noise::noise_file::NoiseFile;
+use mimu::quantity::Sensor;
+
+use crate::Export;
+
+/// Lines of a file that is made from a calibration, without comment signs.
+pub fn of_calibration(calibration: &Calibration, export: &Export) -> Vec<String> {
+    let date = calibration.created.as_deref().unwrap_or("an unknown date");
+    let mut lines = vec![format!(
+        "{}: {}, by mimu {}",
+        calibration.device,
+        what(export.to),
+        env!("CARGO_PKG_VERSION")
+    )];
+    let unit = match &calibration.unit_id {
+        Some(id) => format!("unit {id}, "),
+        None => String::new(),
+    };
+    lines.push(format!("{unit}calibrated {date}"));
+    for sensor in Sensor::BOTH {
+        if let Some(table) = calibration.table(sensor) {
+            lines.push(format!(
+                "{sensor}: readings in {}, output in {} in the frame {:?}",
+                table.raw_unit, table.unit, table.frame
+            ));
+        }
+    }
+    lines.extend(said(export));
+    lines
+}
+
+/// Lines of a file that is made from noise, without comment signs.
+pub fn of_noise(noise: &NoiseFile, export: &Export) -> Vec<String> {
+    let mut lines = vec![
+        format!(
+            "{}: {}, by mimu {}",
+            noise.device,
+            what(export.to),
+            env!("CARGO_PKG_VERSION")
+        ),
+        format!("from {:.0} s at rest", noise.duration_s),
+    ];
+    lines.extend(said(export));
+    lines
+}
+
+/// The lines below the first ones: for the file and for the terminal.
+pub fn said(export: &Export) -> Vec<String> {
+    let mut lines = export.formulas.clone();
+    lines.extend(export.notes.iter().cloned());
+    if !export.remaining.is_empty() {
+        lines.push("Errors that remain when a program uses this file:".into());
+        let each = export.remaining.iter();
+        lines.extend(each.map(|r| format!("  {}", r.line())));
+    }
+    lines
+}
+
+/// `lines` as comments that begin with `sign`.
+pub fn comments(sign: &str, lines: &[String]) -> String {
+    let line = |line: &String| format!("{sign} {line}").trim_end().to_string() + "\n";
+    lines.iter().map(line).collect()
+}
+
+fn what(to: &str) -> String {
+    format!("for {to}")
+}

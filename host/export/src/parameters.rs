@@ -1,0 +1,110 @@
+//! Parameters of autopilots, and how files hold them.
+
+use std::fmt::Write as _;
+
+use mimu::calibration::bias_cubic::KnownConversion;
+use mimu::quantity::{PerSensor, Sensor};
+use serde::Serialize;
+
+/// A parameter of an autopilot.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Parameter {
+    /// As the autopilot knows it.
+    pub name: String,
+    /// Value, in single precision unless whole.
+    pub value: f64,
+    /// MAVLink's type of it: 2 is INT8, 6 INT32, 9 REAL32.
+    #[serde(skip)]
+    kind: u8,
+}
+
+impl Parameter {
+    /// In single precision.
+    pub fn real(name: String, value: f64) -> Self {
+        let value = f64::from(value as f32);
+        Self {
+            name,
+            value,
+            kind: 9,
+        }
+    }
+
+    /// A whole number of 8 bits.
+    pub fn int8(name: String, value: i8) -> Self {
+        Self {
+            name,
+            value: value.into(),
+            kind: 2,
+        }
+    }
+
+    /// A whole number of 32 bits.
+    pub fn int32(name: String, value: i32) -> Self {
+        Self {
+            name,
+            value: value.into(),
+            kind: 6,
+        }
+    }
+
+    /// The shortest decimals, without an exponent, that are this number in single precision.
+    fn text(&self) -> String {
+        match self.kind {
+            9 => (self.value as f32).to_string(),
+            _ => self.value.to_string(),
+        }
+    }
+}
+
+/// What PX4 and ArduPilot both have to be told.
+#[derive(Debug, Clone)]
+#[cfg_attr(feature = "clap", derive(clap::Args))]
+pub struct Options {
+    /// Number of the inertial unit in the autopilot, from 1
+    #[cfg_attr(feature = "clap", arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=3)))]
+    pub imu: u8,
+    /// File for QGroundControl, five columns with tabs; without it NAME,VALUE for MAVProxy and Mission Planner
+    #[cfg_attr(feature = "clap", arg(long))]
+    pub qgc: bool,
+    /// rad/s per raw unit by which the driver converts; without it as the calibration does, and 1 for readings in SI
+    #[cfg_attr(feature = "clap", arg(long, value_name = "SI", value_parser = crate::options::positive))]
+    pub gyro_si_per_raw: Option<f64>,
+    /// m/s² per raw unit by which the driver converts; likewise
+    #[cfg_attr(feature = "clap", arg(long, value_name = "SI", value_parser = crate::options::positive))]
+    pub accel_si_per_raw: Option<f64>,
+    /// Raw reading that the driver takes for no rate; without it 0
+    #[cfg_attr(feature = "clap", arg(long, value_name = "RAW", allow_negative_numbers = true, value_parser = crate::options::finite))]
+    pub gyro_zero: Option<f64>,
+    /// Raw reading that the driver takes for no force; without it 0
+    #[cfg_attr(feature = "clap", arg(long, value_name = "RAW", allow_negative_numbers = true, value_parser = crate::options::finite))]
+    pub accel_zero: Option<f64>,
+}
+
+impl Options {
+    /// How the drivers convert, as far as a person knows it.
+    pub fn conversions(&self) -> PerSensor<KnownConversion> {
+        PerSensor::from_fn(|sensor| match sensor {
+            Sensor::Gyro => KnownConversion {
+                si_per_raw: self.gyro_si_per_raw,
+                zero_raw: self.gyro_zero,
+            },
+            Sensor::Accel => KnownConversion {
+                si_per_raw: self.accel_si_per_raw,
+                zero_raw: self.accel_zero,
+            },
+        })
+    }
+
+    /// `parameters` below `comments`, in the layout of the file.
+    pub fn text(&self, comments: &str, parameters: &[Parameter]) -> String {
+        let mut out = comments.to_owned();
+        for parameter in parameters {
+            let (name, value, kind) = (&parameter.name, parameter.text(), parameter.kind);
+            let _ = match self.qgc {
+                false => writeln!(out, "{name},{value}"),
+                true => writeln!(out, "1\t1\t{name}\t{value}\t{kind}"),
+            };
+        }
+        out
+    }
+}
