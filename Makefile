@@ -10,7 +10,7 @@ COUNTED := $(CARGO) build --locked -p mimu-counted --profile image --target $(TA
 ON_PC := --workspace --exclude mimu-counted --exclude mimu-no-panic
 
 # Of `make test`, and each also by itself: `make clippy`. Tests are linked before they run, so that both times are seen.
-STAGES := fmt clippy rustdoc images no-panic build-tests run-tests
+STAGES := fmt clippy rustdoc images no-panic build-tests run-tests interop
 
 .PHONY: help test $(STAGES) nightly dist demo faults example papers blind bench budget device fuzz audit toolchain
 
@@ -61,6 +61,11 @@ build-tests:
 
 run-tests:
 	$(CARGO) test --locked $(ON_PC)
+
+# What `run-tests` has built.
+interop:
+	$(CARGO) build --locked -q -p mimu-cli --bin mimu
+	./tests/interop/run.sh target/debug/mimu
 
 dist: toolchain ## the command to hand out: target/dist/mimu, stripped
 	$(CARGO) build --locked --profile dist -p mimu-cli --bin mimu

@@ -1,5 +1,5 @@
 //! Compensates a stream of readings: `cargo run -p mimu-core --example stream -- unit.mimc 100 < samples.csv`, whose columns are gyro x, y, z
-//! and accelerometer x, y, z in volts and the temperature in °C, at 100 samples a second. `mimu export --core unit.mimc` writes the bytes.
+//! and accelerometer x, y, z in volts and the temperature in °C, at 100 samples a second. `mimu export core -o unit.mimc` writes the bytes.
 
 #[rustfmt::skip] // As the README shows it.
 mod calibrate;

@@ -37,8 +37,8 @@ pub fn export(from: &Sources, options: &Options) -> Result<Export> {
         let note = "The range is cut to the -70 to 80 °C that ArduPilot has.";
         export.notes.push(note.into());
     }
-    let sensors = px4::cubics(calibration, options, range_c, REFERENCE_C, &mut export)?;
-    parameters_of(&sensors, options.imu, &mut export.parameters)?;
+    px4::cubics(calibration, options, range_c, REFERENCE_C, &mut export)?;
+    parameters_of(&export.cubics, options.imu, &mut export.parameters)?;
     let comments = heading::comments("#", &heading::of_calibration(calibration, &export));
     export.content = options.text(&comments, &export.parameters).into_bytes();
     Ok(export)

@@ -21,6 +21,7 @@ pub mod px4;
 pub mod remaining;
 
 use mimu::calibration::Calibration;
+use mimu::calibration::bias_cubic::BiasCubics;
 use mimu::noise::noise_file::NoiseFile;
 use mimu_recording::error::{Error, Result};
 use serde::Serialize;
@@ -68,6 +69,9 @@ pub struct Export {
     /// In the order of the file, where it consists of parameters.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub parameters: Vec<Parameter>,
+    /// Biases over temperature, where the format holds them as cubics.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub cubics: Vec<BiasCubics>,
     /// Bytes of the file.
     #[serde(skip)]
     pub content: Vec<u8>,
@@ -83,6 +87,7 @@ impl Export {
             notes: Vec::new(),
             remaining: Vec::new(),
             parameters: Vec::new(),
+            cubics: Vec::new(),
             content: Vec::new(),
         }
     }

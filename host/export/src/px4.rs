@@ -40,14 +40,14 @@ pub fn export(from: &Sources, options: &Options) -> Result<Export> {
     let mut export = Export::new("px4");
     export.notes = notes(options);
     let [from_c, to_c] = range_of_curves(calibration, place)?;
-    let cubics = cubics(
+    cubics(
         calibration,
         &options.common,
         [from_c, to_c],
         0.5 * (from_c + to_c),
         &mut export,
     )?;
-    for cubics in &cubics {
+    for cubics in &export.cubics {
         parameters_of(
             cubics,
             options.common.imu,
@@ -85,8 +85,7 @@ pub(crate) fn cubics(
     range_c: [f64; 2],
     reference_c: f64,
     export: &mut Export,
-) -> Result<Vec<BiasCubics>> {
-    let mut all = Vec::new();
+) -> Result<()> {
     let mut conversions = options.conversions();
     export.notes.push(
         "Axes are those of the recording, which have to be those of the sensor in the autopilot."
@@ -114,7 +113,7 @@ pub(crate) fn cubics(
             cubics.settled_c
         ));
         export.remaining.extend(remaining::of_cubics(&cubics));
-        all.push(cubics);
+        export.cubics.push(cubics);
     }
     let places = remaining::Places {
         cross_terms: true,
@@ -126,7 +125,7 @@ pub(crate) fn cubics(
     let ids: Vec<String> = calibration.effects().iter().map(|e| e.id()).collect();
     let of_effects = general.into_iter().filter(|r| ids.contains(&r.source));
     export.remaining.extend(of_effects);
-    Ok(all)
+    Ok(())
 }
 
 fn parameters_of(cubics: &BiasCubics, imu: u8, id: Option<u32>, out: &mut Vec<Parameter>) {

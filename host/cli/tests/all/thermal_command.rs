@@ -183,10 +183,12 @@ fn a_rest_ramp_upon_poses_at_room_temperature_halves_the_error_of_a_sweep_and_is
     let exported: Value = serde_json::from_str(&exported).unwrap();
     assert_eq!(exported["to"], "px4");
     assert!(folder.join("thermal.params").exists());
-    for sensor in exported["sensors"].as_array().unwrap() {
+    for cubics in exported["cubics"].as_array().unwrap() {
+        let sensor = cubics["sensor"].as_str().unwrap();
         let remains = |source: &str| {
-            let all = sensor["remains"].as_array().unwrap();
-            let found = all.iter().find(|r| r["source"] == source);
+            let all = exported["remaining"].as_array().unwrap();
+            let of_sensor = |r: &&Value| r["source"] == source && r["sensor"] == sensor;
+            let found = all.iter().find(of_sensor);
             found.unwrap_or_else(|| panic!("{source}: {all:?}")).clone()
         };
         // Nobody has seen a scale factor at another temperature.
@@ -198,20 +200,19 @@ fn a_rest_ramp_upon_poses_at_room_temperature_halves_the_error_of_a_sweep_and_is
         }
         assert!(remains("cross terms, constant")["rms"].as_f64().unwrap() > 0.0);
         let hysteresis = remains("hysteresis");
-        let name = sensor["sensor"].as_str().unwrap();
-        let largest = fitted["sensors"][name]["hysteresis"]
+        let largest = fitted["sensors"][sensor]["hysteresis"]
             .as_array()
             .unwrap()
             .iter();
         let largest = largest.map(|h| h["largest"].as_f64().unwrap().abs());
         // Readings in volts: what is left in SI is half of the difference by the program's scale factor, which is that of the calibration.
-        let factors = sensor["conversion"]["si_per_raw"].as_array().unwrap();
+        let factors = cubics["conversion"]["si_per_raw"].as_array().unwrap();
         let known = largest
             .zip(factors)
             .map(|(raw, f)| 0.5 * raw * f.as_f64().unwrap().abs());
         let known = known.fold(0.0, f64::max);
         let ratio = hysteresis["max"].as_f64().unwrap() / known;
-        assert!((ratio - 1.0).abs() < 0.05, "{name}: {ratio}");
+        assert!((ratio - 1.0).abs() < 0.05, "{sensor}: {ratio}");
     }
 
     let refused = mimu(folder, "thermal fit sweep --base room.toml -o never.toml");
