@@ -114,26 +114,28 @@ fn tables(cases: &[(u64, Case)]) {
     );
     for grade in Grade::ALL {
         for clean in [true, false] {
-            let of = cases
-                .iter()
-                .map(|c| &c.1)
-                .filter(|c| c.grade == grade && c.truth.is_empty() == clean);
-            // With the wrong effects in it, a model is another one.
-            let mut sums = [[0; 2]; 2];
-            for case in of.filter(|c| c.is_named_alone()) {
-                for (sum, inside) in sums.iter_mut().flatten().zip(case.inside.iter().flatten()) {
-                    *sum += inside;
-                }
-            }
-            let share = |[held, all]: [u32; 2]| {
-                format!("{:.1} %", 100.0 * f64::from(held) / f64::from(all))
-            };
             let what = if clean { "clean" } else { "effect named" };
-            println!(
-                "| {grade:?}, {what} | {} | {} |",
-                share(sums[0]),
-                share(sums[1])
-            );
+            let of = |c: &Case| c.grade == grade && c.truth.is_empty() == clean;
+            coverage(&format!("{grade:?}, {what}"), cases, of);
         }
     }
+    for id in SHOWN {
+        coverage(&format!("`{id}`"), cases, |c: &Case| c.truth == [id]);
+    }
+}
+
+/// How often intervals held the truth in those cases that `is_counted`, where the model has the right effects and no others.
+fn coverage(name: &str, cases: &[(u64, Case)], is_counted: impl Fn(&Case) -> bool) {
+    let mut sums = [[0; 2]; 2];
+    let each = cases.iter().map(|c| &c.1);
+    for case in each.filter(|c| is_counted(c) && c.is_named_alone()) {
+        for (sum, inside) in sums.iter_mut().flatten().zip(case.inside.iter().flatten()) {
+            *sum += inside;
+        }
+    }
+    let share = |[held, all]: [u32; 2]| match all {
+        0 => "-".into(),
+        _ => format!("{:.1} %", 100.0 * f64::from(held) / f64::from(all)),
+    };
+    println!("| {name} | {} | {} |", share(sums[0]), share(sums[1]));
 }

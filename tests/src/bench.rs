@@ -174,20 +174,44 @@ pub fn wander(plan: &str, file: &RigFile, seed: u64) -> [[f64; 3]; 2] {
         axes.instability_si = Some([0.0; 3]);
         axes.walk_si = Some([0.0; 3]);
     }
-    let run = |file| {
-        let truth = RigTruth::resolve(file, seed).expect("a rig");
-        samples(&plan, &truth, seed).expect("a run")
-    };
-    let (with, without) = (run(file), run(&still));
     let mut sums = [[0.0; 3]; 2];
-    let count = with.len() as f64;
-    for (a, b) in with.zip(without) {
-        for i in 0..3 {
-            sums[0][i] += (a.readings.gyro[i] - b.readings.gyro[i]) / count;
-            sums[1][i] += (a.readings.accel[i] - b.readings.accel[i]) / count;
+    let all = differences(&plan, [file, &still], seed);
+    for (_, difference) in &all {
+        for (sum, d) in sums.iter_mut().flatten().zip(difference.iter().flatten()) {
+            *sum += d / all.len() as f64;
         }
     }
     sums
+}
+
+/// What a unit reads at `at_s` beyond what it would read without an effect, which is a straight line of time: the effect is the one in
+/// `files[0]` that `files[1]` lacks. Raw.
+pub fn drifted(plan: &str, files: [&RigFile; 2], seed: u64, at_s: f64) -> [[f64; 3]; 2] {
+    let plan = Plan::parse(Source::new("plan", plan)).expect("a plan");
+    let all = differences(&plan, files, seed);
+    let (Some((from_s, first)), Some((to_s, last))) = (all.first(), all.last()) else {
+        return [[0.0; 3]; 2];
+    };
+    let share = (at_s - from_s) / (to_s - from_s);
+    let at = |k: usize, i: usize| first[k][i] + share * (last[k][i] - first[k][i]);
+    std::array::from_fn(|k| std::array::from_fn(|i| at(k, i)))
+}
+
+/// Time, and what the first of two units reads more than the second: gyro and accelerometer, raw. All else is the same bits.
+fn differences(plan: &Plan, files: [&RigFile; 2], seed: u64) -> Vec<(f64, [[f64; 3]; 2])> {
+    let truths = files.map(|file| RigTruth::resolve(file, seed).expect("a rig"));
+    let [with, without] = truths
+        .each_ref()
+        .map(|truth| samples(plan, truth, seed).expect("a run"));
+    let each = with.zip(without).map(|(a, b)| {
+        let less = |x: &[f64; 3], y: &[f64; 3]| std::array::from_fn(|i| x[i] - y[i]);
+        let (a_, b_) = (&a.readings, &b.readings);
+        (
+            a.stamp_s,
+            [less(&a_.gyro, &b_.gyro), less(&a_.accel, &b_.accel)],
+        )
+    });
+    each.collect()
 }
 
 /// Noise file with the true coefficients of a unit whose affine models are stated, in volts.

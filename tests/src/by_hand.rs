@@ -225,11 +225,21 @@ pub(crate) fn case_of(
     });
     let strength = strengths.fold(f64::INFINITY, f64::min);
     let wander = bench::wander(plan, file, seed);
+    // A bias that drifts is that of the middle of the dwells.
+    let mut drift = [[0.0; 3]; 2];
+    for k in (0..ids.len()).filter(|k| ids[*k].ends_with("_bias_drift")) {
+        let mut less = file.clone();
+        less.effect.remove(k);
+        let drifted = bench::drifted(plan, [file, &less], seed, with.middle_s());
+        for (sum, d) in drift.iter_mut().flatten().zip(drifted.iter().flatten()) {
+            *sum += d;
+        }
+    }
     let models = [&file.unit.gyro_affine, &file.unit.accel_affine];
     let truths = std::array::from_fn(|k| {
         let mut truth = bench::parameters(models[k].as_ref().expect("stated"));
         for i in 0..3 {
-            truth[9 + i] += wander[k][i];
+            truth[9 + i] += wander[k][i] + drift[k][i];
         }
         truth
     });
