@@ -55,6 +55,8 @@ enum Command {
     Allan(allan::AllanArgs),
     /// Write a calibration, or noise, in the format of another program
     Export(cmd::export::ExportArgs),
+    /// Everything that is known of a unit as one page, to keep: verdict, errors, calibration, effects, noise, recordings
+    Report(cmd::report::ReportArgs),
     /// Record the raw stream of a device
     Record(record::RecordArgs),
     /// Talk with a device: info, stream, upload, download, self-test, counters, check, kalman
@@ -76,6 +78,7 @@ pub fn run() -> ExitCode {
         Command::Thermal(args) => thermal::run(&args),
         Command::Allan(args) => allan::run(&args),
         Command::Export(args) => cmd::export::run(&args),
+        Command::Report(args) => cmd::report::run(&args),
         Command::Record(args) => record::run(&args),
         Command::Device(args) => device::run(&args),
     };

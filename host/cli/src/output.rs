@@ -60,8 +60,13 @@ pub(crate) fn print(
         (Some(_), None) => &pretty,
         _ => text,
     };
+    show(shown)
+}
+
+/// Prints text to standard output.
+pub(crate) fn show(text: &str) -> Result<()> {
     let mut out = std::io::stdout().lock();
-    match out.write_all(shown.as_bytes()).and_then(|()| out.flush()) {
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
         // `mimu fit ... | head` is no error.
         Err(e) if e.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
         other => other.map_err(|e| Error::io(Path::new("standard output"), &e)),

@@ -21,6 +21,7 @@ mod thermal_plan;
 pub(crate) mod thermal_plot;
 mod thermal_record;
 mod trim;
+mod unit;
 mod verify;
 mod wizard;
 
@@ -40,5 +41,6 @@ pub use thermal_page::thermal_page;
 pub use thermal_plan::thermal_plan_text;
 pub(crate) use thermal_record::{thermal_progress, thermal_record_text};
 pub use trim::trim_text;
+pub use unit::{UnitReport, unit_page};
 pub use verify::verify_text;
 pub(crate) use wizard::{wizard_lines, wizard_text};

@@ -9,6 +9,7 @@ pub(crate) mod export;
 pub(crate) mod fit;
 pub(crate) mod import;
 pub(crate) mod record;
+pub(crate) mod report;
 pub(crate) mod thermal;
 pub(crate) mod verify;
 pub(crate) mod wizard;

@@ -154,6 +154,38 @@ impl Frame {
         }
     }
 
+    /// The spans between two abscissas each, shaded.
+    pub fn spans(&self, class: &str, spans: &[(f64, f64)]) -> Markup {
+        let (top, height) = (self.down.start, self.down.end - self.down.start);
+        html! {
+            @for (from, to) in spans {
+                @let (from, to) = (self.at_x(*from), self.at_x(*to));
+                rect class=(class) x=(px(from)) y=(px(top)) width=(px(to - from)) height=(px(height)) {}
+            }
+        }
+    }
+
+    /// Class and name of each line, to the right of the heading.
+    pub fn legend(&self, entries: &[(&str, &str)]) -> Markup {
+        let widths = entries
+            .iter()
+            .map(|(_, name)| 30.0 + 6.6 * name.chars().count() as f64);
+        let mut left = self.across.end - widths.clone().sum::<f64>();
+        let lefts: Vec<f64> = widths
+            .map(|width| {
+                left += width;
+                left - width
+            })
+            .collect();
+        let y = self.down.start - 12.0;
+        html! {
+            @for ((class, name), left) in entries.iter().zip(lefts) {
+                path class=(class) d={ "M" (px(left + 6.0)) " " (px(y)) "h14" } {}
+                text class="tick" x=(px(left + 24.0)) y=(px(y + 3.5)) { (name) }
+            }
+        }
+    }
+
     fn path(
         &self,
         points: impl Iterator<Item = (f64, f64)>,
@@ -165,6 +197,62 @@ impl Frame {
         }
         d
     }
+}
+
+/// Room of one figure: pixels, and around its frame for numbers and names.
+#[derive(Debug, Clone, Copy)]
+pub struct Panel {
+    /// Width and height.
+    pub size: (f64, f64),
+    /// Left, right, top and bottom of the frame.
+    pub room: [f64; 4],
+}
+
+impl Panel {
+    /// A figure with a single frame, of which two stand side by side on a wide page.
+    pub const ONE: Self = Self {
+        size: (560.0, 232.0),
+        room: [70.0, 8.0, 26.0, 40.0],
+    };
+
+    /// The frame that fills it.
+    pub fn frame(&self, x: Range<f64>, y: Range<f64>) -> Frame {
+        let [left, right, top, bottom] = self.room;
+        Frame {
+            across: left..self.size.0 - right,
+            down: top..self.size.1 - bottom,
+            x,
+            y,
+        }
+    }
+
+    /// The whole of it; `label` is what it shows, for people who do not see it.
+    pub fn drawing(&self, label: &str, inside: &Markup) -> Markup {
+        html! {
+            svg role="img" aria-label=(label) viewBox={ "0 0 " (px(self.size.0)) " " (px(self.size.1)) }
+                xmlns="http://www.w3.org/2000/svg" { (inside) }
+        }
+    }
+}
+
+/// Powers of ten in the range, as the places and labels of a logarithmic axis; with 2 and 5 times them where these are few.
+pub fn decades(range: &Range<f64>) -> Vec<(f64, String)> {
+    let many = (range.end / range.start).log10() > 2.5;
+    let factors: &[i32] = if many { &[1] } else { &[1, 2, 5] };
+    let (low, high) = (
+        range.start.log10().floor() as i32,
+        range.end.log10().ceil() as i32,
+    );
+    let all = (low..=high).flat_map(|power| factors.iter().map(move |f| (*f, power)));
+    let each = all.filter_map(|(factor, power)| {
+        let value: f64 = format!("{factor}e{power}").parse().ok()?;
+        let label = match power {
+            -3..=4 => format!("{value}"),
+            _ => format!("{factor}·10{}", raised(&power.to_string())),
+        };
+        range.contains(&value).then_some((value.log10(), label))
+    });
+    each.collect()
 }
 
 /// Pixels to a tenth.

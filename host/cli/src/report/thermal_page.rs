@@ -1,6 +1,6 @@
 //! A fit over temperature as a page.
 
-use maud::{Markup, PreEscaped, html};
+use maud::{Markup, html};
 use mimu::quantity::{Sensor, plus_minus};
 use mimu::readable;
 use mimu_thermal::judge::{Bin, Hysteresis};
@@ -22,7 +22,7 @@ pub fn thermal_page(result: &ThermalResult, made: &Made) -> String {
         }
         h2 { "Curves" }
         figure {
-            div class="scroll" { (PreEscaped(thermal_plot::svg(result))) }
+            div class="figures" { (thermal_plot::panels(result)) }
             figcaption {
                 "What each parameter changes by from the middle of the range, with its 95 % interval. Below: errors of the dwells, rms while the \
                  temperature rises and falls, each axis over temperature, and over time; a dashed line is where the next recording begins."
@@ -79,9 +79,9 @@ fn errors(result: &ThermalResult) -> Markup {
                         td { (spoken(name)) }
                         (cell(sensor.rms)) (cell(sensor.held_out_rms)) (cell(sensor.noise_floor))
                         td {
-                            @if let Some(lag) = sensor.lag_s {
+                            @if let Some(lag) = sensor.lag_s { span class="whole" {
                                 (number(lag.value, 1.0, "s")) ", from " (number(lag.lower, 1.0, "")) " to " (number(lag.upper, 1.0, "s"))
-                            } @else { (sensor.lag_reason.as_deref().unwrap_or("none")) }
+                            } } @else { (sensor.lag_reason.as_deref().unwrap_or("none")) }
                         }
                     }
                 }

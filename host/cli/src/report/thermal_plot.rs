@@ -30,45 +30,68 @@ const MARKS: usize = 200;
 /// Colours of the three numbers of a kind.
 const CLASSES: [&str; 3] = ["a", "b", "c"];
 
-/// All of them: for each sensor a row of curves and one of errors; a single one where there are only biases.
-pub fn svg(result: &ThermalResult) -> String {
-    let mut panels: Vec<(f64, f64, Markup)> = Vec::new();
-    let mut height = 0.0;
-    for (sensor, found) in [
-        (Sensor::Gyro, &result.sensors.gyro),
-        (Sensor::Accel, &result.sensors.accel),
-    ] {
-        let Some(found) = found else { continue };
-        let kinds = Kind::PHYSICAL
-            .map(|kind| curves(result, sensor, kind))
-            .into_iter();
-        let of_curves: Vec<Markup> = kinds.flatten().collect();
-        let mut next = of_curves.len();
-        for (k, drawn) in of_curves.into_iter().enumerate() {
-            panels.push((PANEL.0 * k as f64, height, drawn));
-        }
+/// A panel: what it shows, for people who do not see it, and the drawing.
+struct Drawn(String, Markup);
+
+/// For each sensor a row of curves and one of errors; a single one where there are only biases.
+fn rows(result: &ThermalResult) -> Vec<Vec<Drawn>> {
+    let mut rows = Vec::new();
+    for (sensor, found) in result.sensors.present() {
+        let kinds = Kind::PHYSICAL.into_iter();
+        let of_curves = kinds.filter_map(|kind| {
+            let label = format!("{sensor}: {} over temperature", kind.words());
+            Some(Drawn(label, curves(result, sensor, kind)?))
+        });
+        let mut row: Vec<Drawn> = of_curves.collect();
         if !found.dwells.is_empty() {
-            if next > 1 {
-                (next, height) = (1, height + PANEL.1);
-                panels.push((0.0, height, errors(result, sensor, found)));
+            let label = |over: &str| format!("{sensor}: errors {over}");
+            if row.len() > 1 {
+                rows.push(std::mem::take(&mut row));
+                let drawn = errors(result, sensor, found);
+                row.push(Drawn(label("while heating and cooling"), drawn));
             }
-            let [at, over] = [next, next + 1].map(|k| PANEL.0 * k as f64);
-            panels.push((at, height, by_temperature(result, sensor, found)));
-            panels.push((over, height, by_time(sensor, found)));
+            let drawn = by_temperature(result, sensor, found);
+            row.push(Drawn(label("over temperature"), drawn));
+            row.push(Drawn(label("over time"), by_time(sensor, found)));
         }
-        height += PANEL.1;
+        rows.push(row);
     }
-    let width = PANEL.0 * Kind::PHYSICAL.len() as f64;
+    rows
+}
+
+/// All panels as one file.
+pub fn svg(result: &ThermalResult) -> String {
+    let rows = rows(result);
+    let (width, height) = (
+        PANEL.0 * Kind::PHYSICAL.len() as f64,
+        PANEL.1 * rows.len() as f64,
+    );
+    let mut placed: Vec<(f64, f64, &Markup)> = Vec::new();
+    for (k, row) in rows.iter().enumerate() {
+        for (column, Drawn(_, drawn)) in row.iter().enumerate() {
+            placed.push((PANEL.0 * column as f64, PANEL.1 * k as f64, drawn));
+        }
+    }
     let drawn = html! {
         svg class="curves" xmlns="http://www.w3.org/2000/svg" width=(width) height=(height) viewBox={ "0 0 " (width) " " (height) } {
             style { (STYLE) }
             rect width=(width) height=(height) fill="#fff" {}
-            @for (x, y, drawn) in &panels {
+            @for (x, y, drawn) in &placed {
                 g transform={ "translate(" (x) " " (y) ")" } { (drawn) }
             }
         }
     };
     drawn.into_string() + "\n"
+}
+
+/// The same panels one by one, in the colours of the page.
+pub fn panels(result: &ThermalResult) -> Markup {
+    html! {
+        @for Drawn(label, drawn) in rows(result).iter().flatten() {
+            svg class="curves" role="img" aria-label=(label) viewBox={ "0 0 " (PANEL.0) " " (PANEL.1) }
+                xmlns="http://www.w3.org/2000/svg" { (drawn) }
+        }
+    }
 }
 
 fn frame(result: &ThermalResult, y: Range<f64>) -> Frame {
@@ -131,7 +154,7 @@ fn curves(result: &ThermalResult, sensor: Sensor, kind: Kind) -> Option<Markup> 
         }
         (frame.x_name("die, °C", &frame))
         (frame.y_name(&format!("change from the middle, {of_unit}")))
-        (legend(&frame, &key))
+        (frame.legend(&key))
     })
 }
 
@@ -161,7 +184,7 @@ fn errors(result: &ThermalResult, sensor: Sensor, found: &SensorResult) -> Marku
         @for (class, points) in &lines { (frame.line(class, points.iter().copied())) }
         (frame.x_name("die, °C", &frame))
         (frame.y_name(&format!("rms over {}, {}", found.judged_by, unit.unit)))
-        (legend(&frame, &key))
+        (frame.legend(&key))
     }
 }
 
@@ -225,7 +248,7 @@ impl Marks {
             @for (axis, class) in CLASSES.iter().enumerate() {
                 (frame.dots(&format!("{class} dot"), self.all.iter().map(|m| (at(m), m.error[axis]))))
             }
-            (legend(frame, &key))
+            (frame.legend(&key))
         }
     }
 }
@@ -244,7 +267,7 @@ fn by_temperature(result: &ThermalResult, sensor: Sensor, found: &SensorResult) 
 fn by_time(sensor: Sensor, found: &SensorResult) -> Markup {
     let marks = Marks::of(found);
     let frame = Frame {
-        across: 78.0..2.0 * PANEL.0 - 12.0,
+        across: 78.0..PANEL.0 - 12.0,
         down: 34.0..PANEL.1 - 46.0,
         x: range(marks.all.iter().map(|m| m.hours)),
         y: marks.errors(),
@@ -257,24 +280,5 @@ fn by_time(sensor: Sensor, found: &SensorResult) -> Markup {
         (marks.draw(&frame, |m| m.hours))
         (frame.x_name("time, h", &frame))
         (frame.y_name(&marks.ordinate(found)))
-    }
-}
-
-/// Names of the lines, side by side above the frame's right end.
-fn legend(frame: &Frame, key: &[(&str, &str)]) -> Markup {
-    let wide = |name: &str| 26.0 + 7.5 * name.len() as f64;
-    let mut x = frame.across.end - key.iter().map(|k| wide(k.1)).sum::<f64>();
-    let y = frame.down.start - 12.0;
-    let placed = key.iter().map(|(class, name)| {
-        let at = x;
-        x += wide(name);
-        (at, class, name)
-    });
-    let placed: Vec<_> = placed.collect();
-    html! {
-        @for (x, class, name) in placed {
-            path class=(class) d={ "M" (px(x)) " " (px(y)) "h16" } {}
-            text class="tick" x=(px(x + 20.0)) y=(px(y + 4.0)) { (name) }
-        }
     }
 }

@@ -28,58 +28,119 @@ struct Shown<'a> {
     picture: &'a Picture,
 }
 
-/// The page of a diagnosis.
-pub fn diagnosis_page(d: &DiagnosisResult, made: &Made) -> Result<String> {
-    let sensors: Option<Vec<Shown>> = d
-        .sensors
-        .present()
-        .map(|(name, figures)| {
+/// The parts of a page that a diagnosis has something to say in.
+pub struct Sections<'a> {
+    d: &'a DiagnosisResult,
+    shown: Vec<Shown<'a>>,
+}
+
+impl<'a> Sections<'a> {
+    /// Of a diagnosis.
+    ///
+    /// # Errors
+    /// A model of it is singular, so that there is nothing to draw.
+    pub fn new(d: &'a DiagnosisResult, made: &Made) -> Result<Self> {
+        let shown = d.sensors.present().map(|(name, figures)| {
             let picture = figures.picture.as_ref()?;
             Some(Shown {
                 name,
                 figures,
                 picture,
             })
-        })
-        .collect();
-    let sensors = sensors.ok_or_else(|| {
-        Error::new(
-            &made.recording,
-            "a model of the page is singular",
-            "diagnose without --page, and report this",
-        )
-    })?;
+        });
+        let shown: Option<Vec<Shown>> = shown.collect();
+        let shown = shown.ok_or_else(|| {
+            Error::new(
+                &made.recording,
+                "a model of the page is singular",
+                "diagnose without --page, and report this",
+            )
+        })?;
+        Ok(Self { d, shown })
+    }
+
+    /// What is drawn of the accelerometer.
+    pub fn accel(&self) -> Option<&Picture> {
+        let accel = self.shown.iter().find(|s| s.name == Sensor::Accel);
+        accel.map(|s| s.picture)
+    }
+
+    /// The verdict, in a sentence for each sensor.
+    pub fn verdict(&self) -> Markup {
+        html! { p class={ "verdict " (self.d.verdict.name()) } { (verdict(self.d)) } }
+    }
+
+    /// Error before and after, on the recording and on a second one.
+    pub fn errors(&self) -> Markup {
+        html! {
+            (tables::errors(&self.shown))
+            @if let Some(second) = &self.d.second {
+                h2 { "A second recording" }
+                p { @if second.fitted_to {
+                    code { (second.recording) } " is the recording that was fitted to, and proves nothing."
+                } @else {
+                    "Of " code { (second.recording) } " nothing was used to find or to fit the effects."
+                } }
+                (tables::second(second))
+            }
+        }
+    }
+
+    /// What nothing explains, if there is anything.
+    pub fn leftover(&self) -> Markup {
+        html! {
+            @if !self.d.leftover.is_empty() {
+                h2 { "What is left" }
+                p { "Scatter beyond the known noise that no candidate explains:" }
+                (tables::leftover(self.d))
+                @if self.d.leftover.iter().any(|l| l.usual) {
+                    p { "*  " (USUAL) "." }
+                }
+            }
+        }
+    }
+
+    /// Effects and residuals of each sensor.
+    pub fn sensors(&self) -> Markup {
+        html! { @for s in &self.shown { (sensor(self.d, s)) } }
+    }
+
+    /// What was tried and not accepted, and what this recording could not show.
+    pub fn tried(&self) -> Markup {
+        html! {
+            h2 { "Tried and not accepted" }
+            (tables::rejected(self.d))
+            h2 { "Not seen at data-sheet size" }
+            p { "These effects were tried as well. At the size that data sheets give this recording would not show them, so that their absence means nothing." }
+            (tables::not_excited(self.d))
+            (confused(self.d))
+        }
+    }
+
+    /// What was masked, gaps, warnings.
+    pub fn recorded(&self) -> Markup {
+        recorded(self.d)
+    }
+
+    /// How it is decided.
+    pub fn method(&self) -> Markup {
+        method()
+    }
+}
+
+/// The page of a diagnosis.
+pub fn diagnosis_page(d: &DiagnosisResult, made: &Made) -> Result<String> {
+    let sections = Sections::new(d, made)?;
     let main = html! {
-                (head(d, made))
-                h2 { "Error before and after" }
-                (tables::errors(&sensors))
-                @if let Some(second) = &d.second {
-                    h2 { "A second recording" }
-                    p { @if second.fitted_to {
-                        code { (second.recording) } " is the recording that was fitted to, and proves nothing."
-                    } @else {
-                        "Of " code { (second.recording) } " nothing was used to find or to fit the effects."
-                    } }
-                    (tables::second(second))
-                }
-                @if !d.leftover.is_empty() {
-                    h2 { "What is left" }
-                    p { "Scatter beyond the known noise that no candidate explains:" }
-                    (tables::leftover(d))
-                    @if d.leftover.iter().any(|l| l.usual) {
-                        p { "*  " (USUAL) "." }
-                    }
-                }
-                @for s in &sensors { (sensor(d, s)) }
-                h2 { "Tried and not accepted" }
-                (tables::rejected(d))
-                h2 { "Not seen at data-sheet size" }
-                p { "These effects were tried as well. At the size that data sheets give this recording would not show them, so that their absence means nothing." }
-                (tables::not_excited(d))
-                (confused(d))
-                (recorded(d))
-                (method())
-                p class="dim" { (d.tool) ", " (made.created) ": " code { (made.command) } }
+        (head(d, made))
+        h2 { "Error before and after" }
+        (sections.errors())
+        (sections.leftover())
+        (sections.sensors())
+        (sections.tried())
+        (sections.recorded())
+        (sections.method())
+        p class="dim" { (d.tool) ", " (made.created) ": " code { (made.command) } }
     };
     let title = format!("Diagnosis of {}: {}", d.device, d.verdict.name());
     Ok(page(&title, &main))

@@ -1,0 +1,194 @@
+//! `mimu report`: arguments and what follows from them.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use mimu::calibration::Calibration;
+use mimu::calibration::verify::verify;
+use mimu::diagnose::{Diagnosis, Recordings, diagnose};
+use mimu::effects::fitted::FittedEffect;
+use mimu::fit::{Method, Options};
+use mimu::noise::noise_file::NoiseFile;
+use mimu::plan::next_experiment;
+use mimu::prepared::Prepared;
+use mimu::result::diagnosis::DiagnosisResult;
+use mimu_recording::error::{Error, Result};
+use mimu_recording::result_file::stage;
+
+use crate::arguments::{KeepArgs, NoiseArgs, StillArgs};
+use crate::cmd::diagnose::command_line;
+use crate::output::show;
+use crate::reading::read;
+use crate::report::{Made, UnitReport, unit_page};
+
+#[derive(Args)]
+#[command(
+    after_help = "Examples:\n  mimu report session -o unit.html\n  mimu report by-hand --verify another --noise noise.toml -o unit.html\n  mimu report --calibration over-temperature.toml --noise noise.toml -o unit.html"
+)]
+pub struct ReportArgs {
+    /// Folder of a session of the wizard, or recordings of one unit
+    #[arg(value_name = "SESSION|REC", required_unless_present = "calibration")]
+    folders: Vec<PathBuf>,
+    /// Other recordings of the unit, which nothing is fitted to
+    #[arg(long, value_name = "REC")]
+    verify: Vec<PathBuf>,
+    /// Calibration to show; without it that of the session, or the one that the recordings give
+    #[arg(long, value_name = "FILE")]
+    calibration: Option<PathBuf>,
+    /// Page to write
+    #[arg(short = 'o', long = "out", value_name = "FILE")]
+    out: PathBuf,
+    #[command(flatten)]
+    still: StillArgs,
+    #[command(flatten)]
+    keep: KeepArgs,
+    #[command(flatten)]
+    noise: NoiseArgs,
+}
+
+/// What a page is made from.
+struct Inputs {
+    recordings: Vec<PathBuf>,
+    verify: Vec<PathBuf>,
+    calibration: Option<PathBuf>,
+}
+
+impl Inputs {
+    /// Of the arguments; what a session consists of is in its folder.
+    fn of(args: &ReportArgs) -> Result<Self> {
+        let mut inputs = Self {
+            recordings: Vec::new(),
+            verify: args.verify.clone(),
+            calibration: args.calibration.clone(),
+        };
+        for folder in &args.folders {
+            if !folder.join("session.json").is_file() {
+                inputs.recordings.push(folder.clone());
+                continue;
+            }
+            let there = |name: &str| Some(folder.join(name)).filter(|path| path.exists());
+            let Some(calibration) = there("calibration") else {
+                return Err(Error::new(
+                    folder.display(),
+                    "this session has no recording yet",
+                    "go on with it: mimu wizard -o FOLDER",
+                ));
+            };
+            inputs.recordings.push(calibration);
+            inputs.verify.extend(there("verification"));
+            inputs.verify.extend(there("confirmation"));
+            let made = there("with-effects.toml").or_else(|| there("calibration.toml"));
+            inputs.calibration = inputs.calibration.or(made);
+        }
+        Ok(inputs)
+    }
+}
+
+pub fn run(args: &ReportArgs) -> Result<()> {
+    let inputs = Inputs::of(args)?;
+    let outputs = [Some(args.out.as_path())];
+    let others = [args.noise.file.as_deref(), inputs.calibration.as_deref()];
+    let open = |path: &PathBuf| -> Result<(String, Prepared)> {
+        let prepared = read(path, args.still.finding(), &outputs, &others)?;
+        let prepared = args.keep.apply(args.noise.state(prepared)?);
+        Ok((path.display().to_string(), prepared))
+    };
+    let recordings: Vec<_> = inputs.recordings.iter().map(open).collect::<Result<_>>()?;
+    let others: Vec<_> = inputs.verify.iter().map(open).collect::<Result<_>>()?;
+    let now = jiff::Timestamp::now().round(jiff::Unit::Second);
+    let now = now.unwrap_or_default().to_string();
+    let noise = args
+        .noise
+        .file
+        .as_deref()
+        .map(NoiseFile::read)
+        .transpose()?;
+    let found = match recordings.is_empty() {
+        true => None,
+        false => Some(diagnosed(&recordings, &others)?),
+    };
+    let calibration = match (&inputs.calibration, &found) {
+        (Some(path), _) => Calibration::read(path)?,
+        (None, Some((diagnosis, _))) => {
+            Calibration::of(&diagnosis.after, &effects(diagnosis)?, &now)?
+        }
+        // One of both is required.
+        (None, None) => return Ok(()),
+    };
+    let mut verified = Vec::new();
+    let mut not_judged = Vec::new();
+    for (name, prepared) in &others {
+        match verify(prepared, &calibration) {
+            Ok(result) => verified.push((name.clone(), result)),
+            Err(why) => not_judged.push(format!("{name}: {why}")),
+        }
+    }
+    let file = inputs.calibration.as_deref().map(Path::display);
+    let file = file.map(|path| path.to_string());
+    let unit = UnitReport {
+        diagnosis: found.as_ref().map(|(_, result)| result),
+        recordings: &recordings,
+        calibration: &calibration,
+        calibration_file: file.as_deref(),
+        verified: &verified,
+        not_judged: &not_judged,
+        noise: noise.as_ref(),
+    };
+    let names: Vec<&str> = recordings.iter().map(|r| r.0.as_str()).collect();
+    let made = Made {
+        recording: names.join(", "),
+        command: command_line(),
+        created: now,
+    };
+    stage(&args.out, unit_page(&unit, &made)?)?.publish()?;
+    let verdict = match unit.diagnosis {
+        Some(d) => format!("{}: {}\n", d.device, d.verdict.name()),
+        None => format!("{}\n", calibration.device),
+    };
+    show(&format!("{verdict}page: {}\n", args.out.display()))
+}
+
+/// The diagnosis of the recordings; an effect that the first of the others contradicts is not accepted.
+fn diagnosed(
+    recordings: &[(String, Prepared)],
+    others: &[(String, Prepared)],
+) -> Result<(Diagnosis, DiagnosisResult)> {
+    let mut all = recordings.iter().map(|r| r.1.clone());
+    let first = all.next().ok_or_else(|| {
+        Error::new(
+            "recordings",
+            "there are none",
+            "name the recording of the unit",
+        )
+    })?;
+    let recordings = Recordings {
+        first,
+        more: all.collect(),
+        second: others.first().map(|r| r.1.clone()),
+        given: None,
+        accept: Vec::new(),
+    };
+    let options = Options {
+        method: Method::LeastSquares,
+        holdout_blocks: 0,
+        still_factor: mimu::signal::stillness::STILL_FACTOR,
+        only: None,
+    };
+    let diagnosis = diagnose(recordings, options)?;
+    let next = next_experiment::next(&diagnosis);
+    let result = DiagnosisResult::of(&diagnosis, &next, None);
+    Ok((diagnosis, result))
+}
+
+/// The effects that a calibration holds.
+fn effects(diagnosis: &Diagnosis) -> Result<Vec<FittedEffect>> {
+    let mut all = Vec::new();
+    let accepted = diagnosis.sensors.iter().flat_map(|s| &s.decision.accepted);
+    for one in accepted.filter(|a| a.of_unit) {
+        one.effect
+            .lasting()
+            .join(&mut all)
+            .map_err(|problem| Error::new("effects", problem, "report this"))?;
+    }
+    Ok(all)
+}

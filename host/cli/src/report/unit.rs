@@ -1,0 +1,116 @@
+//! The page of a unit: everything that is known of it, in the order of a factory's certificate.
+
+mod curves;
+mod model;
+mod noise;
+mod poses;
+mod trace;
+
+use maud::{Markup, html};
+use mimu::calibration::Calibration;
+use mimu::calibration::verify::Verification;
+use mimu::noise::noise_file::NoiseFile;
+use mimu::prepared::Prepared;
+use mimu::result::diagnosis::DiagnosisResult;
+use mimu_recording::error::Result;
+
+use super::diagnosis::Sections;
+use super::page::{Made, page};
+
+/// What is known of a unit.
+pub struct UnitReport<'a> {
+    /// The diagnosis of the recordings, if there are any.
+    pub diagnosis: Option<&'a DiagnosisResult>,
+    /// The recordings, with their names.
+    pub recordings: &'a [(String, Prepared)],
+    /// The calibration that the page shows.
+    pub calibration: &'a Calibration,
+    /// Where that is from, if the page does not make it itself.
+    pub calibration_file: Option<&'a str>,
+    /// How it does on recordings that it was not made from, with their names.
+    pub verified: &'a [(String, Verification)],
+    /// Recordings that it could not be judged by, with the reason.
+    pub not_judged: &'a [String],
+    /// Noise at rest.
+    pub noise: Option<&'a NoiseFile>,
+}
+
+/// The page of a unit.
+///
+/// # Errors
+/// Those of [`Sections::new`].
+pub fn unit_page(unit: &UnitReport, made: &Made) -> Result<String> {
+    let found = unit.diagnosis.map(|d| Sections::new(d, made)).transpose()?;
+    let found = found.as_ref();
+    let calibration = unit.calibration;
+    let main = html! {
+        h1 { "Inertial unit " (calibration.device) }
+        @if let Some(found) = found { (found.verdict()) }
+        (identity(unit, made))
+        (contents(unit))
+        @if let Some(noise) = unit.noise {
+            h2 id="noise" { "Noise at rest" }
+            (noise::section(noise))
+        }
+        @if found.is_some() || !unit.verified.is_empty() || !unit.not_judged.is_empty() {
+            h2 id="errors" { "Error before and after" }
+            @if let Some(found) = found { (found.errors()) }
+            @if !unit.verified.is_empty() { (model::verified(unit.verified)) }
+            @for why in unit.not_judged { p { "Not judged: " (why) "." } }
+            @if let Some(found) = found { (found.leftover()) }
+        }
+        @if calibration.temperature.is_some() {
+            h2 id="temperature" { "Over temperature" }
+            (curves::section(calibration))
+        }
+        h2 id="calibration" { "Calibration" }
+        @if let Some(file) = unit.calibration_file { p { "From " code { (file) } "." } }
+        (model::section(calibration))
+        @if let Some(found) = found {
+            h2 id="effects" { "Effects and residuals" }
+            (found.sensors())
+            h2 id="recordings" { "Recordings" }
+            @for (name, prepared) in unit.recordings {
+                h3 { code { (name) } }
+                (poses::figure(prepared, calibration, found.accel()))
+                (trace::figure(prepared))
+            }
+            (found.recorded())
+            (found.tried())
+            (found.method())
+        }
+        p class="dim" { "mimu " (env!("CARGO_PKG_VERSION")) ", " (made.created) ": " code { (made.command) } }
+    };
+    let verdict = unit.diagnosis.map_or("calibration", |d| d.verdict.name());
+    Ok(page(&format!("{}: {verdict}", calibration.device), &main))
+}
+
+fn identity(unit: &UnitReport, made: &Made) -> Markup {
+    let calibration = unit.calibration;
+    html! {
+        dl {
+            dt { "Unit" } dd { (calibration.device) @if let Some(id) = &calibration.unit_id { ", number " code { (id) } } }
+            dt { "Reported" } dd { (made.created) }
+            @if let Some(created) = &calibration.created { dt { "Calibrated" } dd { (created) } }
+            @for source in unit.diagnosis.iter().flat_map(|d| &d.recordings) {
+                dt { "Recording" } dd { code { (source.place) } ", SHA-256 " code { (source.sha256) } }
+            }
+        }
+    }
+}
+
+fn contents(unit: &UnitReport) -> Markup {
+    let entry = |id: &str, name: &str| html! { li { a href={ "#" (id) } { (name) } } };
+    html! {
+        nav aria-label="Contents" { ul class="contents" {
+            @if unit.noise.is_some() { (entry("noise", "Noise at rest")) }
+            @if unit.diagnosis.is_some() || !unit.verified.is_empty() { (entry("errors", "Error before and after")) }
+            @if unit.calibration.temperature.is_some() { (entry("temperature", "Over temperature")) }
+            (entry("calibration", "Calibration"))
+            @if unit.diagnosis.is_some() {
+                (entry("effects", "Effects and residuals"))
+                (entry("recordings", "Recordings"))
+            }
+        } }
+    }
+}

@@ -1,0 +1,138 @@
+//! Tables of a calibration: scale factors, biases, alignment, and the matrix that a program applies.
+
+use maud::{Markup, html};
+use mimu::calibration::verify::Verification;
+use mimu::calibration::{Calibration, TriadTable};
+use mimu::quantity::{AXES, Sensor, plus_minus};
+use mimu::readable;
+use mimu_recording::RawUnit;
+
+use crate::report::page::{number, spoken, written};
+
+/// Both sensors' tables.
+pub fn section(calibration: &Calibration) -> Markup {
+    html! {
+        @for sensor in Sensor::BOTH {
+            @if let Some(table) = calibration.table(sensor) {
+                h3 class="sensor" { (spoken(sensor)) }
+                (physical(table))
+                (matrix(sensor, table))
+            }
+        }
+    }
+}
+
+/// Halves of 95 % intervals over standard deviations.
+fn widening(table: &TriadTable) -> f64 {
+    let ratio = |table: &TriadTable| Some(table.interval_o?[0] / table.sigma_o?[0]);
+    ratio(table).filter(|r| r.is_finite()).unwrap_or(1.96)
+}
+
+fn value(si: f64, half: Option<f64>, factor: f64) -> Markup {
+    html! {
+        data value=(si) {
+            @match half {
+                // What defines the frame is known exactly.
+                Some(0.0) => { (number(si, factor, "")) " (fixed)" }
+                Some(half) => (written(&plus_minus(si * factor, half * factor))),
+                None => (written(&mimu::quantity::significant(si * factor))),
+            }
+        }
+    }
+}
+
+fn physical(table: &TriadTable) -> Markup {
+    let p = &table.physical;
+    let raw = table.raw_unit.to_string();
+    let raw = if table.raw_unit == RawUnit::Si {
+        table.unit.clone()
+    } else {
+        raw
+    };
+    let gain = match table.raw_unit {
+        RawUnit::Si => readable::parameter(""),
+        _ => readable::parameter(&format!("{raw}/({})", table.unit)),
+    };
+    let bias = readable::parameter(&raw);
+    let k = widening(table);
+    let half = |sigmas: Option<[f64; 3]>, i: usize| sigmas.map(|s| k * s[i]);
+    let angles = ["yz", "zy", "zx"];
+    html! {
+        div class="scroll" { table {
+            caption { "Physical parameters with 95 % intervals" }
+            thead { tr { th { "parameter" } @for axis in AXES { th class="n" { (axis) } } } }
+            tbody {
+                tr {
+                    td { "scale factor" @if !gain.unit.is_empty() { ", " (gain.unit) } }
+                    @for i in 0..3 { td class="n" { (value(p.scale_factor[i], half(p.sigma_scale_factor, i), gain.factor)) } }
+                }
+                tr {
+                    td { "bias, " (bias.unit) }
+                    @for i in 0..3 { td class="n" { (value(p.bias[i], half(p.sigma_bias, i), bias.factor)) } }
+                }
+                tr {
+                    td { "misalignment, deg" }
+                    @for i in 0..3 { td class="n" { (value(p.misalignment_deg[i], half(p.sigma_misalignment_deg, i), 1.0)) } }
+                }
+                tr {
+                    td { "non-orthogonality " (angles.join(", ")) ", deg" }
+                    @for i in 0..3 { td class="n" { (value(p.non_orthogonality_deg[i], half(p.sigma_non_orthogonality_deg, i), 1.0)) } }
+                }
+            }
+        } }
+    }
+}
+
+/// As many as a device has.
+fn digits(value: f64) -> String {
+    match value == 0.0 {
+        true => "0".into(),
+        false => written(&format!("{value:.7e}")),
+    }
+}
+
+fn matrix(sensor: Sensor, table: &TriadTable) -> Markup {
+    let input = match sensor {
+        Sensor::Gyro => "rate",
+        Sensor::Accel => "specific force",
+    };
+    html! {
+        div class="scroll" { table {
+            caption {
+                "To apply it: " (input) " = C u + o, with u the reading in " (table.raw_unit.to_string()) "; " (table.direction) ", in " (table.unit)
+            }
+            thead { tr { th { "axis" } th class="n" { "C, x" } th class="n" { "C, y" } th class="n" { "C, z" } th class="n" { "o" } } }
+            tbody {
+                @for (i, axis) in AXES.iter().enumerate() {
+                    tr {
+                        td { (axis) }
+                        @for j in 0..3 { td class="n" { data value=(table.C[i][j]) { (digits(table.C[i][j])) } } }
+                        td class="n" { data value=(table.o[i]) { (digits(table.o[i])) } }
+                    }
+                }
+            }
+        } }
+    }
+}
+
+/// Errors on recordings that the calibration was not made from.
+pub fn verified(all: &[(String, Verification)]) -> Markup {
+    html! {
+        div class="scroll" { table {
+            caption { "Error of the calibration on other recordings, rms" }
+            thead { tr { th { "recording" } th { "sensor" } th class="n" { "error" } th class="n" { "noise alone" } } }
+            tbody {
+                @for (name, result) in all {
+                    @for (sensor, s) in result.sensors.present() {
+                        @let unit = readable::error(s.unit);
+                        tr {
+                            td { code { (name) } } td { (spoken(sensor)) }
+                            td class="n" { (number(s.rms, unit.factor, &unit.unit)) }
+                            td class="n" { (number(s.noise_floor, unit.factor, &unit.unit)) }
+                        }
+                    }
+                }
+            }
+        } }
+    }
+}
