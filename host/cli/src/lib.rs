@@ -7,10 +7,12 @@
 //! | `reading`, `output` | the recording in; text, JSON and files out |
 //! | [`report`] | results as JSON, text and page |
 //! | `views` | how a session of the wizard is shown while it runs |
+//! | `examples` | the examples at the end of every help |
 //! | `hint` | flags of the command beside what an error says to set otherwise |
 
 mod arguments;
 mod cmd;
+mod examples;
 mod hint;
 mod output;
 mod reading;
@@ -19,7 +21,7 @@ mod views;
 
 use std::process::ExitCode;
 
-use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
+use clap::{FromArgMatches, Parser, Subcommand};
 use cmd::{allan, apply, design, device, diagnose, fit, import, record, thermal, verify, wizard};
 
 /// Calibration of inertial units made of analog MEMS sensors.
@@ -45,6 +47,8 @@ enum Command {
     Verify(verify::VerifyArgs),
     /// Write a recording compensated by a calibration
     Apply(apply::ApplyArgs),
+    /// What changed between calibrations of one unit, beyond their intervals
+    Compare(cmd::compare::CompareArgs),
     /// Find the effect behind the residual of a calibrated unit
     Diagnose(diagnose::DiagnoseArgs),
     /// Design the experiment: which attitudes and rates, how many, for how long
@@ -65,7 +69,7 @@ enum Command {
 
 /// Parses the arguments of the process and runs the subcommand; prints an error in one line.
 pub fn run() -> ExitCode {
-    let matches = Cli::command().get_matches();
+    let matches = examples::command().get_matches();
     let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|e| e.exit());
     let done = match cli.command {
         Command::Wizard(args) => wizard::run(&args),
@@ -73,6 +77,7 @@ pub fn run() -> ExitCode {
         Command::Fit(args) => fit::run(&args),
         Command::Verify(args) => verify::run(&args),
         Command::Apply(args) => apply::run(&args),
+        Command::Compare(args) => cmd::compare::run(&args),
         Command::Diagnose(args) => diagnose::run(&args),
         Command::Design(args) => design::run(&args),
         Command::Thermal(args) => thermal::run(&args),
@@ -93,7 +98,7 @@ pub fn run() -> ExitCode {
 
 /// The subcommand that `matches` are of, with its flags.
 fn innermost(matches: &clap::ArgMatches) -> clap::Command {
-    let mut command = Cli::command();
+    let mut command = examples::command();
     let mut at = matches;
     while let Some((name, next)) = at.subcommand() {
         match command.find_subcommand(name) {
@@ -111,6 +116,6 @@ mod tests {
 
     #[test]
     fn arguments_are_consistent() {
-        Cli::command().debug_assert();
+        examples::command().debug_assert();
     }
 }

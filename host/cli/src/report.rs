@@ -6,6 +6,7 @@
 mod allan;
 pub mod allan_plot;
 mod apply;
+mod compare;
 mod comparison;
 mod design;
 mod device;
@@ -27,6 +28,7 @@ mod wizard;
 
 pub use allan::allan_text;
 pub use apply::apply_text;
+pub use compare::compare_text;
 pub use comparison::{check_text, kalman_text};
 pub use design::{comparison_text, design_text, next_text};
 pub use device::{

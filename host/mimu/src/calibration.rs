@@ -3,6 +3,7 @@
 pub mod apply;
 pub mod bias_cubic;
 mod check;
+pub mod comparison;
 pub mod die_temperature;
 mod effect;
 mod kept;

@@ -14,11 +14,7 @@ use crate::arguments::JsonArgs;
 use crate::output::{check_outputs, print};
 
 #[derive(Args)]
-#[command(
-    subcommand_value_name = "FORMAT",
-    subcommand_help_heading = "Formats",
-    after_help = "Examples:\n  mimu export c --calibration cal.toml -o calibration.h\n  mimu export kalibr --noise noise.toml -o imu.yaml\n  mimu export px4 --calibration cal.toml --qgc -o unit.params"
-)]
+#[command(subcommand_value_name = "FORMAT", subcommand_help_heading = "Formats")]
 pub struct ExportArgs {
     #[command(subcommand)]
     format: Format,

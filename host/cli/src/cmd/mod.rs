@@ -2,6 +2,7 @@
 
 pub(crate) mod allan;
 pub(crate) mod apply;
+pub(crate) mod compare;
 pub(crate) mod design;
 pub(crate) mod device;
 pub(crate) mod diagnose;

@@ -22,9 +22,6 @@ use crate::reading::read;
 use crate::report::{Made, UnitReport, unit_page};
 
 #[derive(Args)]
-#[command(
-    after_help = "Examples:\n  mimu report session -o unit.html\n  mimu report by-hand --verify another --noise noise.toml -o unit.html\n  mimu report --calibration over-temperature.toml --noise noise.toml -o unit.html"
-)]
 pub struct ReportArgs {
     /// Folder of a session of the wizard, or recordings of one unit
     #[arg(value_name = "SESSION|REC", required_unless_present = "calibration")]

@@ -2,6 +2,7 @@
 
 mod allan_model;
 mod allan_vectors;
+mod comparison;
 mod design;
 mod held_out;
 mod lever_arm;

@@ -1,0 +1,31 @@
+//! `mimu compare`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use mimu::calibration::Calibration;
+use mimu::calibration::comparison::compare;
+use mimu_recording::error::Result;
+
+use crate::arguments::JsonArgs;
+use crate::output::print;
+use crate::report::compare_text;
+
+#[derive(Args)]
+pub struct CompareArgs {
+    /// Calibrations of one unit, two or more
+    #[arg(required = true, num_args = 2.., value_name = "FILE")]
+    files: Vec<PathBuf>,
+    /// Print all parameters, and not only those that changed
+    #[arg(long)]
+    all: bool,
+    #[command(flatten)]
+    json: JsonArgs,
+}
+
+pub fn run(args: &CompareArgs) -> Result<()> {
+    let read = |path: &PathBuf| Ok((path.display().to_string(), Calibration::read(path)?));
+    let all: Vec<_> = args.files.iter().map(read).collect::<Result<_>>()?;
+    let result = compare(&all)?;
+    print(&args.json, &compare_text(&result, args.all), &result, None)
+}

@@ -1,0 +1,121 @@
+//! Examples at the end of the help of every subcommand, in one place: a test parses each of them.
+
+use clap::CommandFactory;
+
+use crate::Cli;
+
+/// Subcommand, and what a person types.
+const EXAMPLES: [(&str, &[&str]); 14] = [
+    (
+        "wizard",
+        &[
+            "mimu wizard -o session --port /dev/ttyACM0",
+            "mimu wizard -o session --fixture table --driver turntable.toml --rate 250 --latitude 48.1",
+        ],
+    ),
+    (
+        "import",
+        &[
+            "mimu import log.csv --columns t_s,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z,- --raw-unit count --gravity 9.81 --reference gravity -o rec",
+            "mimu import MT_00B4D6D1.txt --preset xsens --reference gravity --gravity 9.81 -o rec",
+        ],
+    ),
+    (
+        "fit",
+        &[
+            "mimu fit rec -o cal.toml",
+            "mimu fit rec --noise noise.toml --json -",
+        ],
+    ),
+    ("verify", &["mimu verify another --calibration cal.toml"]),
+    (
+        "apply",
+        &["mimu apply rec --calibration cal.toml -o compensated"],
+    ),
+    (
+        "compare",
+        &[
+            "mimu compare before.toml after.toml",
+            "mimu compare monday.toml tuesday.toml wednesday.toml --all",
+        ],
+    ),
+    (
+        "diagnose",
+        &[
+            "mimu diagnose rec --verify another --noise noise.toml -o cal.toml",
+            "mimu diagnose rec --page diagnosis.html --plan next.toml",
+        ],
+    ),
+    (
+        "design",
+        &[
+            "mimu design -n 12 --reference gravity --table hand",
+            "mimu design --budget 10 --sensor gyro -o plan.toml",
+        ],
+    ),
+    (
+        "thermal",
+        &[
+            "mimu thermal plan --procedure ramp --range -10..70 -o plan.toml",
+            "mimu thermal fit sweep --verify another -o cal.toml --page thermal.html",
+        ],
+    ),
+    (
+        "allan",
+        &["mimu allan at-rest --calibration cal.toml -o noise.toml --plot noise.svg"],
+    ),
+    (
+        "export",
+        &[
+            "mimu export kalibr --noise noise.toml -o imu.yaml",
+            "mimu export px4 --calibration cal.toml --qgc -o unit.params",
+        ],
+    ),
+    (
+        "report",
+        &[
+            "mimu report session -o unit.html",
+            "mimu report rec --verify another --noise noise.toml -o unit.html",
+        ],
+    ),
+    (
+        "record",
+        &["mimu record --port /dev/ttyACM0 --for 60s -o rec"],
+    ),
+    (
+        "device",
+        &[
+            "mimu device info --port /dev/ttyACM0",
+            "mimu device upload cal.toml --port /dev/ttyACM0",
+        ],
+    ),
+];
+
+/// The command with its examples.
+pub(crate) fn command() -> clap::Command {
+    let mut command = Cli::command();
+    for (name, lines) in EXAMPLES {
+        let text = format!("Examples:\n  {}", lines.join("\n  "));
+        command = command.mut_subcommand(name, |c| c.after_help(text));
+    }
+    command
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_subcommand_has_examples_that_it_takes() {
+        let command = command();
+        for subcommand in command.get_subcommands() {
+            let name = subcommand.get_name();
+            let found = EXAMPLES.iter().find(|(n, _)| *n == name);
+            let (_, lines) = found.unwrap_or_else(|| panic!("mimu {name} has no example"));
+            for line in *lines {
+                let parsed = command.clone().try_get_matches_from(line.split(' '));
+                assert!(parsed.is_ok(), "{line}: {}", parsed.unwrap_err());
+            }
+        }
+    }
+}

@@ -1,0 +1,253 @@
+//! What differs between calibrations of one unit: over time, over switch-ons, between methods.
+//!
+//! Each parameter is judged by the spread of its values against its own standard deviations: of n files, `Σ (v - mean)²/σ²` with weights
+//! `1/σ²` is chi-square of n - 1 degrees of freedom if nothing but the uncertainty of the fits makes them differ. Of the many parameters
+//! the least probable are judged first (Holm, 1979), so that in all 5 % of comparisons without a change name one.
+
+use serde::Serialize;
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+use super::Calibration;
+use crate::quantity::{AXES, Sensor};
+use mimu_recording::RawUnit;
+use mimu_recording::error::{Error, Result};
+
+/// Probability that any parameter is named as changed where none has.
+const FALSE_CHANGE: f64 = 0.05;
+const ANGLES: [&str; 3] = ["yz", "zy", "zx"];
+
+/// Calibrations side by side: `mimu-compare/1`.
+#[derive(Debug, Clone, Serialize)]
+pub struct Comparison {
+    /// `mimu-compare/1`.
+    pub format: &'static str,
+    /// Files, in the order of the values.
+    pub files: Vec<String>,
+    /// Parameters that all of them have.
+    pub parameters: Vec<ComparedParameter>,
+    /// What a person should know.
+    pub notes: Vec<String>,
+}
+
+/// One parameter in all files.
+#[derive(Debug, Clone, Serialize)]
+pub struct ComparedParameter {
+    /// The sensor.
+    pub sensor: Sensor,
+    /// `scale factor x`, or a coefficient of an effect.
+    pub name: String,
+    /// Unit of all the numbers.
+    pub unit: String,
+    /// Value in each file.
+    pub values: Vec<f64>,
+    /// Standard deviation in each file; `None` where a file has none.
+    pub sigmas: Option<Vec<f64>>,
+    /// Mean of the values.
+    pub mean: f64,
+    /// Standard deviation of the values between the files.
+    pub spread: f64,
+    /// Of it, what the uncertainty of the fits does not explain: the repeatability. `None` without standard deviations.
+    pub repeatability: Option<f64>,
+    /// Probability of such a spread by the uncertainty of the fits alone; `None` without standard deviations.
+    pub p: Option<f64>,
+    /// Whether it changed, all parameters considered.
+    pub changed: bool,
+}
+
+/// A value and its standard deviation, by sensor, name and unit.
+type Named = (Sensor, String, String, f64, Option<f64>);
+
+/// Compares calibrations; each with the file that it is from.
+///
+/// # Errors
+/// Fewer than two; readings in different units; no parameter that all have.
+pub fn compare(all: &[(String, Calibration)]) -> Result<Comparison> {
+    let [(first_file, first), others @ ..] = all else {
+        return Err(too_few());
+    };
+    if others.is_empty() {
+        return Err(too_few());
+    }
+    let mut notes = Vec::new();
+    for (file, other) in others {
+        let (ours, theirs) = (first.recording.raw_unit, other.recording.raw_unit);
+        if ours != theirs {
+            return Err(Error::new(
+                file,
+                format!("it is for readings in {theirs}, and {first_file} for readings in {ours}"),
+                "compare calibrations of the same readings",
+            ));
+        }
+        let same = match (&first.unit_id, &other.unit_id) {
+            (Some(a), Some(b)) => a.eq_ignore_ascii_case(b),
+            _ => first.device == other.device,
+        };
+        if !same {
+            notes.push(format!(
+                "{file} is of {:?}, and {first_file} of {:?}",
+                other.device, first.device
+            ));
+        }
+        if let (Some(a), Some(b)) = (first.recording.temp_c, other.recording.temp_c)
+            && (a - b).abs() > 5.0
+        {
+            notes.push(format!(
+                "{file} holds at {b:.1} °C, and {first_file} at {a:.1} °C: part of a change may be that of the temperature"
+            ));
+        }
+    }
+    let each: Vec<Vec<Named>> = all.iter().map(|(_, c)| parameters(c)).collect();
+    let mut parameters = Vec::new();
+    for (sensor, name, unit, ..) in &each[0] {
+        let of = |one: &Vec<Named>| -> Option<(f64, Option<f64>)> {
+            let found = one.iter().find(|p| p.0 == *sensor && p.1 == *name)?;
+            Some((found.3, found.4))
+        };
+        let Some(found) = each.iter().map(of).collect::<Option<Vec<_>>>() else {
+            notes.push(format!("{sensor} {name} is not in all of them"));
+            continue;
+        };
+        parameters.push(ComparedParameter::new(*sensor, name, unit, &found));
+    }
+    for (file, one) in all.iter().zip(&each).skip(1) {
+        let new = one
+            .iter()
+            .filter(|p| !each[0].iter().any(|q| q.0 == p.0 && q.1 == p.1));
+        notes.extend(new.map(|p| format!("{} {} is only in {}", p.0, p.1, file.0)));
+    }
+    if parameters.is_empty() {
+        let remedy = "compare calibrations of the same sensor";
+        return Err(Error::new(
+            first_file,
+            "the others have none of its parameters",
+            remedy,
+        ));
+    }
+    mark_changes(&mut parameters);
+    Ok(Comparison {
+        format: "mimu-compare/1",
+        files: all.iter().map(|(file, _)| file.clone()).collect(),
+        parameters,
+        notes,
+    })
+}
+
+fn too_few() -> Error {
+    Error::new(
+        "calibrations",
+        "there is only one",
+        "name two or more files",
+    )
+}
+
+impl ComparedParameter {
+    fn new(sensor: Sensor, name: &str, unit: &str, found: &[(f64, Option<f64>)]) -> Self {
+        let values: Vec<f64> = found.iter().map(|f| f.0).collect();
+        let n = values.len() as f64;
+        let mean = values.iter().sum::<f64>() / n;
+        let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0);
+        let sigmas: Option<Vec<f64>> = found.iter().map(|f| f.1).collect();
+        // What defines the frame has no standard deviation, and is the same everywhere.
+        let sigmas = sigmas.filter(|s| s.iter().all(|s| *s > 0.0));
+        let p = sigmas.as_ref().map(|sigmas| {
+            let weights = || sigmas.iter().map(|s| s.powi(-2));
+            let total: f64 = weights().sum();
+            let pooled = values
+                .iter()
+                .zip(weights())
+                .map(|(v, w)| v * w)
+                .sum::<f64>()
+                / total;
+            let each = values.iter().zip(weights());
+            let chi2: f64 = each.map(|(v, w)| w * (v - pooled).powi(2)).sum();
+            ChiSquared::new(n - 1.0).map_or(1.0, |d| d.sf(chi2))
+        });
+        let repeatability = sigmas.as_ref().map(|sigmas| {
+            let own = sigmas.iter().map(|s| s * s).sum::<f64>() / n;
+            (variance - own).max(0.0).sqrt()
+        });
+        Self {
+            sensor,
+            name: name.into(),
+            unit: unit.into(),
+            values,
+            sigmas,
+            mean,
+            spread: variance.sqrt(),
+            repeatability,
+            p,
+            changed: false,
+        }
+    }
+}
+
+fn mark_changes(parameters: &mut [ComparedParameter]) {
+    let judged = parameters.iter().enumerate();
+    let mut judged: Vec<(usize, f64)> = judged.filter_map(|(k, c)| Some((k, c.p?))).collect();
+    judged.sort_by(|a, b| a.1.total_cmp(&b.1));
+    let count = judged.len();
+    for (rank, (k, p)) in judged.into_iter().enumerate() {
+        if p > FALSE_CHANGE / (count - rank) as f64 {
+            break;
+        }
+        parameters[k].changed = true;
+    }
+}
+
+/// Physical parameters and coefficients of effects.
+fn parameters(calibration: &Calibration) -> Vec<Named> {
+    let mut all = Vec::new();
+    for sensor in Sensor::BOTH {
+        let Some(table) = calibration.table(sensor) else {
+            continue;
+        };
+        let p = &table.physical;
+        let raw = match table.raw_unit {
+            RawUnit::Si => table.unit.clone(),
+            unit => unit.to_string(),
+        };
+        let gain = match table.raw_unit {
+            RawUnit::Si => String::new(),
+            _ => format!("{raw}/({})", table.unit),
+        };
+        let deg = |values: [f64; 3]| values.map(f64::to_radians);
+        let kinds = [
+            (
+                "scale factor",
+                &AXES,
+                gain,
+                p.scale_factor,
+                p.sigma_scale_factor,
+            ),
+            ("bias", &AXES, raw, p.bias, p.sigma_bias),
+            (
+                "misalignment",
+                &AXES,
+                "rad".into(),
+                deg(p.misalignment_deg),
+                p.sigma_misalignment_deg.map(deg),
+            ),
+            (
+                "non-orthogonality",
+                &ANGLES,
+                "rad".into(),
+                deg(p.non_orthogonality_deg),
+                p.sigma_non_orthogonality_deg.map(deg),
+            ),
+        ];
+        for (kind, names, unit, values, sigmas) in kinds {
+            for i in 0..3 {
+                let name = format!("{kind} {}", names[i]);
+                let sigma = sigmas.map(|s| s[i]);
+                all.push((sensor, name, unit.clone(), values[i], sigma));
+            }
+        }
+    }
+    for effect in calibration.effects() {
+        for c in effect.coefficients() {
+            let name = format!("{} {}", effect.id(), c.name);
+            all.push((effect.sensor(), name, c.unit, c.value, c.sigma));
+        }
+    }
+    all
+}
