@@ -5,20 +5,28 @@
 //!
 //! | module | what |
 //! |---|---|
-//! | [`kalibr`], [`px4`], [`ardupilot`], [`core`] ... | one format each |
+//! | [`kalibr`], [`openvins`], [`px4`], [`core`] ... | one format each |
+//! | [`worst_axis`] | noise as programs take it that have one number for three axes |
+//! | [`driver`] | readings in SI as a driver gives them |
+//! | [`intrinsics`] | triangular matrices and rotations, for Kalibr and OpenVINS |
 //! | [`remaining`] | the errors that a format leaves because it has no place for a part of the calibration |
 //! | [`heading`] | the comments at the head of every file |
 //! | [`parameters`] | parameters of autopilots, and how files hold them |
 
 pub mod ardupilot;
 pub mod core;
+pub mod driver;
 pub mod heading;
+pub mod intrinsics;
 pub mod kalibr;
+pub mod openvins;
 #[cfg(feature = "clap")]
 mod options;
 pub mod parameters;
 pub mod px4;
 pub mod remaining;
+pub mod worst_axis;
+pub mod yaml;
 
 use mimu::calibration::Calibration;
 use mimu::calibration::bias_cubic::BiasCubics;
@@ -33,8 +41,11 @@ use crate::remaining::Remaining;
 #[derive(Debug, Clone)]
 #[cfg_attr(feature = "clap", derive(clap::Subcommand))]
 pub enum Format {
-    /// Noise for Kalibr: imu.yaml
+    /// Noise and intrinsics for Kalibr: imu.yaml
     Kalibr(kalibr::Options),
+    /// Noise and intrinsics for OpenVINS: kalibr_imu_chain.yaml
+    #[cfg_attr(feature = "clap", command(name = "openvins"))]
+    OpenVins(openvins::Options),
     /// Parameters of PX4: TC_*, biases over temperature
     Px4(px4::Options),
     /// Parameters of ArduPilot: INS_TCAL*, biases over temperature
@@ -131,6 +142,7 @@ impl Format {
     pub fn export(&self, from: &Sources) -> Result<Export> {
         match self {
             Self::Kalibr(options) => kalibr::export(from, options),
+            Self::OpenVins(options) => openvins::export(from, options),
             Self::Px4(options) => px4::export(from, options),
             Self::ArduPilot(options) => ardupilot::export(from, options),
             Self::Core => core::export(from),
