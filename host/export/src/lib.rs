@@ -16,15 +16,19 @@
 pub mod ardupilot;
 pub mod core;
 pub mod driver;
+pub mod fastlio;
 pub mod heading;
 pub mod intrinsics;
 pub mod kalibr;
+pub mod liosam;
 pub mod openvins;
 #[cfg(feature = "clap")]
 mod options;
+pub mod orbslam3;
 pub mod parameters;
 pub mod px4;
 pub mod remaining;
+pub mod vins;
 pub mod worst_axis;
 pub mod yaml;
 
@@ -46,6 +50,17 @@ pub enum Format {
     /// Noise and intrinsics for OpenVINS: kalibr_imu_chain.yaml
     #[cfg_attr(feature = "clap", command(name = "openvins"))]
     OpenVins(openvins::Options),
+    /// Noise for VINS-Fusion and VINS-Mono
+    Vins(vins::Options),
+    /// Noise for ORB-SLAM3
+    #[cfg_attr(feature = "clap", command(name = "orbslam3"))]
+    OrbSlam3(orbslam3::Options),
+    /// Noise for LIO-SAM
+    #[cfg_attr(feature = "clap", command(name = "liosam"))]
+    LioSam(liosam::Options),
+    /// Noise for FAST-LIO
+    #[cfg_attr(feature = "clap", command(name = "fastlio"))]
+    FastLio(fastlio::Options),
     /// Parameters of PX4: TC_*, biases over temperature
     Px4(px4::Options),
     /// Parameters of ArduPilot: INS_TCAL*, biases over temperature
@@ -143,6 +158,10 @@ impl Format {
         match self {
             Self::Kalibr(options) => kalibr::export(from, options),
             Self::OpenVins(options) => openvins::export(from, options),
+            Self::Vins(options) => vins::export(from, options),
+            Self::OrbSlam3(options) => orbslam3::export(from, options),
+            Self::LioSam(options) => liosam::export(from, options),
+            Self::FastLio(options) => fastlio::export(from, options),
             Self::Px4(options) => px4::export(from, options),
             Self::ArduPilot(options) => ardupilot::export(from, options),
             Self::Core => core::export(from),
