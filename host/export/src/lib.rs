@@ -8,6 +8,7 @@
 //! | [`kalibr`], [`openvins`], [`px4`], [`core`] ... | one format each |
 //! | [`worst_axis`] | noise as programs take it that have one number for three axes |
 //! | [`driver`] | readings in SI as a driver gives them |
+//! | [`misalignment`] | misalignment times sensitivity, for IMU-TK and Fusion |
 //! | [`intrinsics`] | triangular matrices and rotations, for Kalibr and OpenVINS |
 //! | [`remaining`] | the errors that a format leaves because it has no place for a part of the calibration |
 //! | [`heading`] | the comments at the head of every file |
@@ -17,10 +18,14 @@ pub mod ardupilot;
 pub mod core;
 pub mod driver;
 pub mod fastlio;
+pub mod fusion;
 pub mod heading;
+pub mod imu_calib;
+pub mod imu_tk;
 pub mod intrinsics;
 pub mod kalibr;
 pub mod liosam;
+pub mod misalignment;
 pub mod openvins;
 #[cfg(feature = "clap")]
 mod options;
@@ -61,6 +66,12 @@ pub enum Format {
     /// Noise for FAST-LIO
     #[cfg_attr(feature = "clap", command(name = "fastlio"))]
     FastLio(fastlio::Options),
+    /// Accelerometer for the ROS package imu_calib: imu_calib.yaml
+    ImuCalib(imu_calib::Options),
+    /// One triad for IMU-TK: acc.calib or gyro.calib
+    ImuTk(imu_tk::Options),
+    /// Both triads for Fusion of x-io: a header in C
+    Fusion,
     /// Parameters of PX4: TC_*, biases over temperature
     Px4(px4::Options),
     /// Parameters of ArduPilot: INS_TCAL*, biases over temperature
@@ -162,6 +173,9 @@ impl Format {
             Self::OrbSlam3(options) => orbslam3::export(from, options),
             Self::LioSam(options) => liosam::export(from, options),
             Self::FastLio(options) => fastlio::export(from, options),
+            Self::ImuCalib(options) => imu_calib::export(from, options),
+            Self::ImuTk(options) => imu_tk::export(from, options),
+            Self::Fusion => fusion::export(from),
             Self::Px4(options) => px4::export(from, options),
             Self::ArduPilot(options) => ardupilot::export(from, options),
             Self::Core => core::export(from),
