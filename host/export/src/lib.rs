@@ -32,6 +32,7 @@ mod options;
 pub mod orbslam3;
 pub mod parameters;
 pub mod px4;
+pub mod realsense;
 pub mod remaining;
 pub mod vins;
 pub mod worst_axis;
@@ -72,6 +73,9 @@ pub enum Format {
     ImuTk(imu_tk::Options),
     /// Both triads for Fusion of x-io: a header in C
     Fusion,
+    /// Both triads for a RealSense camera: bytes of its EEPROM, or calibration.json
+    #[cfg_attr(feature = "clap", command(name = "realsense"))]
+    RealSense(realsense::Options),
     /// Parameters of PX4: TC_*, biases over temperature
     Px4(px4::Options),
     /// Parameters of ArduPilot: INS_TCAL*, biases over temperature
@@ -176,6 +180,7 @@ impl Format {
             Self::ImuCalib(options) => imu_calib::export(from, options),
             Self::ImuTk(options) => imu_tk::export(from, options),
             Self::Fusion => fusion::export(from),
+            Self::RealSense(options) => realsense::export(from, options),
             Self::Px4(options) => px4::export(from, options),
             Self::ArduPilot(options) => ardupilot::export(from, options),
             Self::Core => core::export(from),
