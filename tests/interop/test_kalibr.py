@@ -19,15 +19,7 @@ def oblique(thermal_unit, tmp_path_factory):
     p_gyro = 0.344 * numpy.array([[0.98, 0.05, -0.02], [0.04, -1.01, 0.06], [-0.03, 0.08, 1.03]])
     p_accel = 0.0306 * numpy.array([[1.02, -0.07, 0.03], [0.06, 0.99, 0.01], [-0.02, 0.04, 0.97]])
     triads = {"gyro": (p_gyro, [2.51, 2.48, 2.53], "rad/s"), "accel": (p_accel, [1.66, 1.64, 1.67], "m/s^2")}
-    text = 'format = "mimu-calibration/1"\ndevice = "unit"\ncreated = "2026-01-02T03:04:05Z"\ntool = "test"\n[recording]\nraw_unit = "V"\n'
-    for sensor, (p, b, unit_name) in triads.items():
-        c = numpy.linalg.inv(p)
-        text += f'[{sensor}]\nformula = "x = C u + o"\ndirection = "raw to SI"\nraw_unit = "V"\nunit = "{unit_name}"\nframe = "body"\n'
-        text += f"C = {c.tolist()}\no = {(-c @ b).tolist()}\n"
-        text += f'[{sensor}.forward]\nformula = "u = P x + b"\ndirection = "SI to raw"\nP = {p.tolist()}\nb = {b}\n'
-        text += f'[{sensor}.physical]\nformula = ""\nscale_factor = {numpy.linalg.norm(p, axis=1).tolist()}\nbias = {b}\n'
-        text += "misalignment_deg = [0.0, 0.0, 0.0]\nnon_orthogonality_deg = [0.0, 0.0, 0.0]\n"
-    return variant(text, thermal_unit.folder / "recording", tmp_path_factory.mktemp("oblique"))
+    return variant(text_of(triads), thermal_unit.folder / "recording", tmp_path_factory.mktemp("oblique"))
 
 
 @pytest.fixture(scope="module")
@@ -41,6 +33,19 @@ def sagging(oblique, tmp_path_factory):
             name = "xyz"[i] + "xyz"[j]
             text += f'[[effect.coefficients]]\nname = "{name}"\nvalue = {value}\nsigma = 1e-6\nunit = "rad/s/(m/s^2)"\n'
     return variant(text, oblique.folder / "recording", tmp_path_factory.mktemp("sagging"))
+
+
+def text_of(triads):
+    """A calibration at one temperature by P, b and the unit of each triad, readings in volts; not written by mimu."""
+    text = 'format = "mimu-calibration/1"\ndevice = "unit"\ncreated = "2026-01-02T03:04:05Z"\ntool = "test"\n[recording]\nraw_unit = "V"\n'
+    for sensor, (p, b, unit_name) in triads.items():
+        c = numpy.linalg.inv(p)
+        text += f'[{sensor}]\nformula = "x = C u + o"\ndirection = "raw to SI"\nraw_unit = "V"\nunit = "{unit_name}"\nframe = "body"\n'
+        text += f"C = {c.tolist()}\no = {(-c @ b).tolist()}\n"
+        text += f'[{sensor}.forward]\nformula = "u = P x + b"\ndirection = "SI to raw"\nP = {p.tolist()}\nb = {b}\n'
+        text += f'[{sensor}.physical]\nformula = ""\nscale_factor = {numpy.linalg.norm(p, axis=1).tolist()}\nbias = {b}\n'
+        text += "misalignment_deg = [0.0, 0.0, 0.0]\nnon_orthogonality_deg = [0.0, 0.0, 0.0]\n"
+    return text
 
 
 def variant(calibration, recording, folder):
