@@ -1,6 +1,6 @@
 //! The two triads as a triangular matrix times a rotation each, with the gyro's g-sensitivity: what Kalibr and OpenVINS hold.
 //!
-//! Readings are those of a [driver](crate::driver): `y = P x + b`, SI to SI. `P = T R` with T triangular and R a rotation is a QR
+//! Readings are those of a [driver]: `y = P x + b`, SI to SI. `P = T R` with T triangular and R a rotation is a QR
 //! factorisation from the other side, so that nothing of P is lost: scale factors and non-orthogonality are in T, the misalignment of the
 //! package in R.
 
