@@ -4,7 +4,7 @@ use mimu::calibration::Calibration;
 use mimu::noise::noise_file::NoiseFile;
 use mimu::quantity::Sensor;
 
-use crate::Export;
+use crate::{Export, Sources};
 
 /// Lines of a file that is made from a calibration, without comment signs.
 pub fn of_calibration(calibration: &Calibration, export: &Export) -> Vec<String> {
@@ -45,6 +45,28 @@ pub fn of_noise(noise: &NoiseFile, export: &Export) -> Vec<String> {
     ];
     lines.extend(said(export));
     lines
+}
+
+/// How long the unit was recorded for its noise.
+pub fn noise_from(noise: &NoiseFile) -> String {
+    format!(
+        "noise of {} from {:.0} s at rest",
+        noise.device, noise.duration_s
+    )
+}
+
+/// At which temperature a calibration with curves holds, where a format has no place for curves.
+pub fn temperature(calibration: &Calibration) -> Option<String> {
+    calibration.temperature.as_ref()?;
+    let temp_c = calibration.recording.temp_c?;
+    Some(format!("The numbers are those at {temp_c:.1} °C."))
+}
+
+/// What to tell a person who gives a calibration to a program that has no place for one.
+pub fn needs_calibrated(from: &Sources) -> Option<String> {
+    from.calibration.map(|_| {
+        "The program has no place for a calibration: it needs calibrated readings, as `mimu apply` and the device make them.".into()
+    })
 }
 
 /// The lines below the first ones: for the file and for the terminal.

@@ -5,20 +5,38 @@
 //!
 //! | module | what |
 //! |---|---|
-//! | [`kalibr`], [`px4`], [`ardupilot`], [`core`] ... | one format each |
+//! | [`kalibr`], [`openvins`], [`px4`], [`core`] ... | one format each |
+//! | [`worst_axis`] | noise as programs take it that have one number for three axes |
+//! | [`driver`] | readings in SI as a driver gives them |
+//! | [`misalignment`] | misalignment times sensitivity, for IMU-TK and Fusion |
+//! | [`intrinsics`] | triangular matrices and rotations, for Kalibr and OpenVINS |
 //! | [`remaining`] | the errors that a format leaves because it has no place for a part of the calibration |
 //! | [`heading`] | the comments at the head of every file |
 //! | [`parameters`] | parameters of autopilots, and how files hold them |
 
 pub mod ardupilot;
 pub mod core;
+pub mod driver;
+pub mod fastlio;
+pub mod fusion;
 pub mod heading;
+pub mod imu_calib;
+pub mod imu_tk;
+pub mod intrinsics;
 pub mod kalibr;
+pub mod liosam;
+pub mod misalignment;
+pub mod openvins;
 #[cfg(feature = "clap")]
 mod options;
+pub mod orbslam3;
 pub mod parameters;
 pub mod px4;
+pub mod realsense;
 pub mod remaining;
+pub mod vins;
+pub mod worst_axis;
+pub mod yaml;
 
 use mimu::calibration::Calibration;
 use mimu::calibration::bias_cubic::BiasCubics;
@@ -33,8 +51,31 @@ use crate::remaining::Remaining;
 #[derive(Debug, Clone)]
 #[cfg_attr(feature = "clap", derive(clap::Subcommand))]
 pub enum Format {
-    /// Noise for Kalibr: imu.yaml
+    /// Noise and intrinsics for Kalibr: imu.yaml
     Kalibr(kalibr::Options),
+    /// Noise and intrinsics for OpenVINS: kalibr_imu_chain.yaml
+    #[cfg_attr(feature = "clap", command(name = "openvins"))]
+    OpenVins(openvins::Options),
+    /// Noise for VINS-Fusion and VINS-Mono
+    Vins(vins::Options),
+    /// Noise for ORB-SLAM3
+    #[cfg_attr(feature = "clap", command(name = "orbslam3"))]
+    OrbSlam3(orbslam3::Options),
+    /// Noise for LIO-SAM
+    #[cfg_attr(feature = "clap", command(name = "liosam"))]
+    LioSam(liosam::Options),
+    /// Noise for FAST-LIO
+    #[cfg_attr(feature = "clap", command(name = "fastlio"))]
+    FastLio(fastlio::Options),
+    /// Accelerometer for the ROS package imu_calib: imu_calib.yaml
+    ImuCalib(imu_calib::Options),
+    /// One triad for IMU-TK: acc.calib or gyro.calib
+    ImuTk(imu_tk::Options),
+    /// Both triads for Fusion of x-io: a header in C
+    Fusion,
+    /// Both triads for a RealSense camera: bytes of its EEPROM, or calibration.json
+    #[cfg_attr(feature = "clap", command(name = "realsense"))]
+    RealSense(realsense::Options),
     /// Parameters of PX4: TC_*, biases over temperature
     Px4(px4::Options),
     /// Parameters of ArduPilot: INS_TCAL*, biases over temperature
@@ -131,6 +172,15 @@ impl Format {
     pub fn export(&self, from: &Sources) -> Result<Export> {
         match self {
             Self::Kalibr(options) => kalibr::export(from, options),
+            Self::OpenVins(options) => openvins::export(from, options),
+            Self::Vins(options) => vins::export(from, options),
+            Self::OrbSlam3(options) => orbslam3::export(from, options),
+            Self::LioSam(options) => liosam::export(from, options),
+            Self::FastLio(options) => fastlio::export(from, options),
+            Self::ImuCalib(options) => imu_calib::export(from, options),
+            Self::ImuTk(options) => imu_tk::export(from, options),
+            Self::Fusion => fusion::export(from),
+            Self::RealSense(options) => realsense::export(from, options),
             Self::Px4(options) => px4::export(from, options),
             Self::ArduPilot(options) => ardupilot::export(from, options),
             Self::Core => core::export(from),

@@ -3,8 +3,10 @@
 use std::fmt::Write as _;
 
 use mimu::calibration::bias_cubic::KnownConversion;
-use mimu::quantity::{PerSensor, Sensor};
+use mimu::quantity::PerSensor;
 use serde::Serialize;
+
+use crate::driver;
 
 /// A parameter of an autopilot.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -66,33 +68,15 @@ pub struct Options {
     /// File for QGroundControl, five columns with tabs; without it NAME,VALUE for MAVProxy and Mission Planner
     #[cfg_attr(feature = "clap", arg(long))]
     pub qgc: bool,
-    /// rad/s per raw unit by which the driver converts; without it as the calibration does, and 1 for readings in SI
-    #[cfg_attr(feature = "clap", arg(long, value_name = "SI", value_parser = crate::options::positive))]
-    pub gyro_si_per_raw: Option<f64>,
-    /// m/s² per raw unit by which the driver converts; likewise
-    #[cfg_attr(feature = "clap", arg(long, value_name = "SI", value_parser = crate::options::positive))]
-    pub accel_si_per_raw: Option<f64>,
-    /// Raw reading that the driver takes for no rate; without it 0
-    #[cfg_attr(feature = "clap", arg(long, value_name = "RAW", allow_negative_numbers = true, value_parser = crate::options::finite))]
-    pub gyro_zero: Option<f64>,
-    /// Raw reading that the driver takes for no force; without it 0
-    #[cfg_attr(feature = "clap", arg(long, value_name = "RAW", allow_negative_numbers = true, value_parser = crate::options::finite))]
-    pub accel_zero: Option<f64>,
+    /// How the driver converts.
+    #[cfg_attr(feature = "clap", command(flatten))]
+    pub driver: driver::Options,
 }
 
 impl Options {
     /// How the drivers convert, as far as a person knows it.
     pub fn conversions(&self) -> PerSensor<KnownConversion> {
-        PerSensor::from_fn(|sensor| match sensor {
-            Sensor::Gyro => KnownConversion {
-                si_per_raw: self.gyro_si_per_raw,
-                zero_raw: self.gyro_zero,
-            },
-            Sensor::Accel => KnownConversion {
-                si_per_raw: self.accel_si_per_raw,
-                zero_raw: self.accel_zero,
-            },
-        })
+        self.driver.conversions()
     }
 
     /// `parameters` below `comments`, in the layout of the file.

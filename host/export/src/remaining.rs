@@ -75,6 +75,17 @@ impl Remaining {
         }
     }
 
+    /// Scale factors and cross terms of readings that a program takes as they are: `matrix` is from the input to them, SI to SI.
+    pub fn of_readings(sensor: Sensor, matrix: &Matrix3<f64>) -> Self {
+        let errors: Vec<_> = inputs(sensor).map(|x| matrix * x - x).collect();
+        Self::new(
+            sensor,
+            "scale factors and cross terms",
+            at_input(sensor),
+            &errors,
+        )
+    }
+
     /// In one line, in the units that people read.
     pub fn line(&self) -> String {
         let readable = readable::parameter(self.unit);

@@ -1,0 +1,154 @@
+//! Readings in SI as a driver gives them.
+//!
+//! Many programs get readings that a driver has already converted, axis by axis: `y_i = si_per_raw_i (u_i - zero_i)`. What they hold
+//! is then about y, while a calibration is about the raw readings u.
+
+use mimu::calibration::Calibration;
+use mimu::calibration::bias_cubic::{Conversion, KnownConversion};
+use mimu::quantity::{PerSensor, Sensor};
+use mimu::triad::Forward;
+use mimu_core::compensation::Affine;
+use mimu_recording::RawUnit;
+use mimu_recording::error::{Error, Result};
+use nalgebra::{Matrix3, Vector3};
+
+/// What a person knows of the driver.
+#[derive(Debug, Clone, Default)]
+#[cfg_attr(feature = "clap", derive(clap::Args))]
+pub struct Options {
+    /// rad/s per raw unit by which the driver converts; without it as the calibration does, and 1 for readings in SI
+    #[cfg_attr(feature = "clap", arg(long, value_name = "SI", value_parser = crate::options::positive))]
+    pub gyro_si_per_raw: Option<f64>,
+    /// m/s² per raw unit by which the driver converts; likewise
+    #[cfg_attr(feature = "clap", arg(long, value_name = "SI", value_parser = crate::options::positive))]
+    pub accel_si_per_raw: Option<f64>,
+    /// Raw reading that the driver takes for no rate; without it 0
+    #[cfg_attr(feature = "clap", arg(long, value_name = "RAW", allow_negative_numbers = true, value_parser = crate::options::finite))]
+    pub gyro_zero: Option<f64>,
+    /// Raw reading that the driver takes for no force; without it 0
+    #[cfg_attr(feature = "clap", arg(long, value_name = "RAW", allow_negative_numbers = true, value_parser = crate::options::finite))]
+    pub accel_zero: Option<f64>,
+}
+
+/// How a driver's readings of a triad depend on the input, and back.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Readings {
+    /// The triad.
+    pub sensor: Sensor,
+    /// From raw readings to the driver's.
+    pub conversion: Conversion,
+    /// From the input to the driver's readings, SI to SI.
+    pub forward: Forward,
+    /// From the driver's readings to the input, SI to SI.
+    pub inverse: Affine<f64>,
+}
+
+impl Options {
+    /// How the driver converts, as far as a person knows it.
+    pub fn conversions(&self) -> PerSensor<KnownConversion> {
+        PerSensor {
+            gyro: KnownConversion {
+                si_per_raw: self.gyro_si_per_raw,
+                zero_raw: self.gyro_zero,
+            },
+            accel: KnownConversion {
+                si_per_raw: self.accel_si_per_raw,
+                zero_raw: self.accel_zero,
+            },
+        }
+    }
+
+    /// Refuses options that nothing uses: without a calibration nobody knows what a driver's factor has to be.
+    ///
+    /// # Errors
+    /// There is an option.
+    pub fn unused(&self) -> Result<()> {
+        let given = [
+            ("--gyro-si-per-raw", self.gyro_si_per_raw),
+            ("--accel-si-per-raw", self.accel_si_per_raw),
+            ("--gyro-zero", self.gyro_zero),
+            ("--accel-zero", self.accel_zero),
+        ];
+        match given.iter().find(|(_, value)| value.is_some()) {
+            None => Ok(()),
+            Some((name, _)) => Err(Error::new(
+                *name,
+                "there is no calibration that it could be about",
+                "give --calibration too, or leave it out",
+            )),
+        }
+    }
+
+    /// The driver's readings of `sensor`. A factor that nobody has given is 1 for readings in SI, and else one over the scale factor
+    /// of the axis: the driver then converts as well as three factors can.
+    ///
+    /// # Errors
+    /// `sensor` is not calibrated; C is singular.
+    pub fn readings(
+        &self,
+        calibration: &Calibration,
+        place: &str,
+        sensor: Sensor,
+    ) -> Result<Readings> {
+        let model = calibration.inverse(sensor).ok_or_else(|| {
+            let problem = format!("the {sensor} is not calibrated");
+            Error::new(place, problem, "fit a recording that determines it")
+        })?;
+        let raw = Forward::of(&model).ok_or_else(|| {
+            Error::new(
+                place,
+                format!("C of the {sensor} is singular"),
+                "fit the recording again",
+            )
+        })?;
+        let known = self.conversions()[sensor];
+        let si = calibration.recording.raw_unit == RawUnit::Si;
+        let factors = Vector3::from_fn(|i, _| match known.si_per_raw {
+            Some(factor) => factor,
+            None if si => 1.0,
+            None => 1.0 / raw.matrix.row(i).norm(),
+        });
+        let zero = Vector3::repeat(known.zero_raw.unwrap_or(0.0));
+        let back = Matrix3::from_diagonal(&factors.map(f64::recip));
+        Ok(Readings {
+            sensor,
+            conversion: Conversion {
+                si_per_raw: factors.into(),
+                zero_raw: zero.into(),
+            },
+            forward: Forward {
+                matrix: Matrix3::from_diagonal(&factors) * raw.matrix,
+                bias: factors.component_mul(&(raw.bias - zero)),
+            },
+            inverse: Affine {
+                matrix: model.matrix * back,
+                offset: model.matrix * zero + model.offset,
+            },
+        })
+    }
+}
+
+impl Readings {
+    /// What the driver does, for the head of a file.
+    pub fn line(&self) -> String {
+        let [factors, zeros] = [self.conversion.si_per_raw, self.conversion.zero_raw];
+        let list = |values: [f64; 3]| values.map(|v| format!("{v:.6e}")).join(", ");
+        let (sensor, unit) = (self.sensor, self.sensor.unit());
+        if (factors, zeros) == ([1.0; 3], [0.0; 3]) {
+            return format!("{sensor}: the program's readings are those that were recorded.");
+        }
+        let raw = match zeros {
+            [0.0, 0.0, 0.0] => "raw".into(),
+            zeros => format!("(raw - [{}])", list(zeros)),
+        };
+        let factors = list(factors);
+        format!(
+            "{sensor}: readings of the program = [{factors}] {raw}, axis by axis, raw to {unit}: the driver has to convert like this."
+        )
+    }
+
+    /// Factors from noise at the input to noise in the driver's readings.
+    pub fn noise_gain(&self) -> [f64; 3] {
+        [0, 1, 2].map(|i| self.forward.matrix.row(i).norm())
+    }
+}

@@ -1,0 +1,207 @@
+//! Noise of the worst axis, for programs that have one number for three axes.
+//!
+//! Kalibr and those that were made after it take continuous-time densities: white noise of `density/√dt` a sample, which is N, and a bias
+//! that walks by `random_walk √dt` a sample, which is K (Kalibr wiki, "IMU noise model"). Others take what one sample has, by the rate of
+//! the messages.
+//!
+//! A random walk that the record does not show on some axis is the one given by hand or, without one, the upper end of its interval there:
+//! an estimator that takes a bias for steadier than it is will not follow it, one that takes it for less steady only follows it less
+//! smoothly.
+
+use mimu::allan::model::Term;
+use mimu::noise::noise_file::{NoiseChannel, NoiseFile};
+use mimu::quantity::{AXES, PerSensor, Sensor};
+use mimu::readable::STANDARD_GRAVITY;
+use mimu_recording::error::{Error, Result};
+
+use crate::{Sources, yaml};
+
+/// What a person decides about noise, whatever the program.
+#[derive(Debug, Clone, Default)]
+#[cfg_attr(feature = "clap", derive(clap::Args))]
+pub struct WalkOptions {
+    /// Random walk to state where the record shows none on some axis, rad/s²/√Hz
+    #[cfg_attr(feature = "clap", arg(long, value_name = "SI", value_parser = crate::options::positive))]
+    pub gyro_walk: Option<f64>,
+    /// The same for the accelerometer, m/s³/√Hz
+    #[cfg_attr(feature = "clap", arg(long, value_name = "SI", value_parser = crate::options::positive))]
+    pub accel_walk: Option<f64>,
+}
+
+/// The same, for programs that need the rate too.
+#[derive(Debug, Clone, Default)]
+#[cfg_attr(feature = "clap", derive(clap::Args))]
+pub struct NoiseOptions {
+    /// Messages a second; without it the rate of the recording
+    #[cfg_attr(feature = "clap", arg(long, value_name = "HZ", value_parser = crate::options::positive))]
+    pub update_rate: Option<f64>,
+    /// Random walks.
+    #[cfg_attr(feature = "clap", command(flatten))]
+    pub walks: WalkOptions,
+}
+
+/// Local gravity, for programs that take it beside the noise.
+#[derive(Debug, Clone, Default)]
+#[cfg_attr(feature = "clap", derive(clap::Args))]
+pub struct GravityOptions {
+    /// Local gravity, m/s²; without it that of the calibration, or else 9.80665
+    #[cfg_attr(feature = "clap", arg(long, value_name = "MPS2", value_parser = crate::options::positive))]
+    pub gravity: Option<f64>,
+}
+
+/// A coefficient of the worst axis.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Worst {
+    /// SI.
+    pub value: f64,
+    /// Axis and interval, or where else it is from.
+    pub comment: String,
+}
+
+/// White noise and random walk of a triad.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Densities {
+    /// N: rad/s/√Hz or m/s²/√Hz.
+    pub white: Worst,
+    /// K: rad/s²/√Hz or m/s³/√Hz.
+    pub walk: Worst,
+}
+
+impl NoiseOptions {
+    /// Messages a second.
+    pub fn rate_hz(&self, noise: &NoiseFile) -> f64 {
+        self.update_rate.unwrap_or(noise.sample_rate_hz)
+    }
+}
+
+impl GravityOptions {
+    /// m/s², and where it is from.
+    pub fn gravity(&self, from: &Sources) -> (f64, &'static str) {
+        let calibrated = from.calibration.and_then(|(c, _)| c.recording.gravity_mps2);
+        match (self.gravity, calibrated) {
+            (Some(given), _) => (given, "given by hand"),
+            (None, Some(calibrated)) => (calibrated, "where it was calibrated"),
+            (None, None) => (STANDARD_GRAVITY, "standard gravity"),
+        }
+    }
+}
+
+impl WalkOptions {
+    /// N and K of the worst axis of each sensor, times `gain` of the axis: 1 for noise of calibrated readings.
+    ///
+    /// # Errors
+    /// A sensor is missing or not in SI; N is missing on an axis; K is, and nothing bounds it.
+    pub fn densities(
+        &self,
+        noise: &NoiseFile,
+        gain: &PerSensor<[f64; 3]>,
+    ) -> Result<PerSensor<Densities>> {
+        let of = |sensor| -> Result<Densities> {
+            Ok(Densities {
+                white: worst(noise, sensor, Term::N, None, &gain[sensor])?,
+                walk: worst(noise, sensor, Term::K, self.given(sensor), &gain[sensor])?,
+            })
+        };
+        Ok(PerSensor {
+            accel: of(Sensor::Accel)?,
+            gyro: of(Sensor::Gyro)?,
+        })
+    }
+
+    /// [`Self::densities`] of calibrated readings.
+    ///
+    /// # Errors
+    /// The same.
+    pub fn calibrated(&self, noise: &NoiseFile) -> Result<PerSensor<Densities>> {
+        self.densities(noise, &PerSensor::both([1.0; 3]))
+    }
+
+    fn given(&self, sensor: Sensor) -> Option<f64> {
+        match sensor {
+            Sensor::Gyro => self.gyro_walk,
+            Sensor::Accel => self.accel_walk,
+        }
+    }
+}
+
+/// A line of YAML: a number that a program takes, its unit, and the density that it was made from.
+pub fn line(indent: &str, key: &str, value: f64, unit: &str, from: &Worst) -> String {
+    let value = yaml::scientific(value, 6);
+    format!("{indent}{key}: {value}  # {unit}, {}\n", from.comment)
+}
+
+/// The largest coefficient of `term` among the axes of `sensor`, and what to say of it.
+fn worst(
+    file: &NoiseFile,
+    sensor: Sensor,
+    term: Term,
+    fallback: Option<f64>,
+    gain: &[f64; 3],
+) -> Result<Worst> {
+    let (channels, place) = (file.of(sensor), &file.place);
+    let Some(first) = channels.first() else {
+        return Err(Error::new(
+            place,
+            format!("there is no channel of the {sensor}"),
+            "record both sensors: the file needs both",
+        ));
+    };
+    if let Err([found, remedy]) = first.model_in(sensor.unit()) {
+        let problem = format!("it is in {found} and not in {}", sensor.unit());
+        let place = format!("{place}, channel {}", first.name);
+        return Err(Error::new(place, problem, remedy));
+    }
+    let mut largest: Option<(f64, String)> = None;
+    let mut missing: Vec<(&NoiseChannel, &str)> = Vec::new();
+    let mut take = |value: f64, said: String| {
+        if largest.as_ref().is_none_or(|(v, _)| value > *v) {
+            largest = Some((value, said));
+        }
+    };
+    for channel in channels {
+        let (name, bound) = (&channel.name, channel.k_at_most);
+        let axis = AXES.iter().position(|axis| name.ends_with(axis));
+        let gain = axis.map_or(1.0, |axis| gain[axis]);
+        match (channel.get(term), bound) {
+            (Ok(c), _) => take(
+                gain * c.value,
+                format!("{name}: {:.2e} to {:.2e}", gain * c.lower, gain * c.upper),
+            ),
+            (Err(_), Some(bound)) if term == Term::K && fallback.is_none() => {
+                take(
+                    gain * bound,
+                    format!("{name}: not seen, the upper end of its interval"),
+                );
+            }
+            (Err(why), _) => missing.push((channel, why)),
+        }
+    }
+    let found = |value, comment| Ok(Worst { value, comment });
+    if let (Some((value, said)), true) = (&largest, missing.is_empty()) {
+        return found(*value, said.clone());
+    }
+    let names: Vec<&str> = missing.iter().map(|(c, _)| c.name.as_str()).collect();
+    if let Some(fallback) = fallback {
+        // The larger of the two: the axes that show it are no better for the others.
+        return match largest {
+            Some((value, said)) if value >= fallback => {
+                found(value, format!("{said}; not seen on {}", names.join(", ")))
+            }
+            _ => found(
+                fallback,
+                format!("given by hand: not seen on {}", names.join(", ")),
+            ),
+        };
+    }
+    let (channel, why) = missing[0];
+    let remedy = match (term, sensor) {
+        (Term::K, Sensor::Gyro) => "record for longer, or state one with --gyro-walk",
+        (Term::K, Sensor::Accel) => "record for longer, or state one with --accel-walk",
+        _ => "record again, at rest",
+    };
+    Err(Error::new(
+        format!("{place}, channel {}", channel.name),
+        format!("{} ({}): {why}", term.letter(), term.name()),
+        remedy,
+    ))
+}
