@@ -39,9 +39,9 @@ pub use columns::{Column, Columns, RAW_COLUMNS, REFERENCE_COLUMNS};
 pub use growing::Growing;
 pub use held::{Held, HeldReadings};
 pub use import::{
-    BrokenKind, BrokenLimit, BrokenRows, Chosen, ColumnList, Decimal, ImportOptions, ImportSummary,
-    Inputs, Jitter, Offset, PoseMean, PoseMeans, Preset, PresetUse, Role, Rounds, Scale,
-    SkippedLines, TimeSummary, import, is_bag,
+    BrokenKind, BrokenLimit, BrokenRows, Chosen, ColumnList, Decimal, Face, ImportOptions,
+    ImportSummary, Inputs, Jitter, Offset, PoseMean, PoseMeans, Preset, PresetUse, Role, Rounds,
+    RowFilter, Scale, SkippedLines, TimeSummary, import, is_bag,
 };
 pub use manifest::{Format, MANIFEST_FILE, Manifest, Rails, RawUnit, Reference, Source};
 pub use no_temperature::NoTemperatures;

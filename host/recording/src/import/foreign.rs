@@ -10,6 +10,7 @@ use super::parquet_table::ParquetTable;
 use super::plausibility::Plausibility;
 use super::ros::{ImuTopic, is_bag};
 use super::row::Row;
+use super::row_filter::RowFilter;
 use super::step_labels::StepLabels;
 use super::text_table::{Cells, TextTable};
 use super::time::{Clock, Decimal, Times};
@@ -27,6 +28,8 @@ pub(super) struct HowToRead<'a> {
     pub scales: &'a [Scale],
     pub offsets: &'a [Offset],
     pub signed_low_bytes: &'a [SignedLowByte],
+    /// Which rows are wanted.
+    pub filters: &'a [RowFilter],
     /// Topic of a bag.
     pub topic: Option<&'a str>,
     /// Sample rate, where it was given or is known.
@@ -102,8 +105,8 @@ impl ForeignFile {
         }
         let table = match parquet {
             _ if is_bag(path) => Table::Bag(ImuTopic::open(path, how.topic)?),
-            true => Table::Parquet(ParquetTable::open(path, how.list)?),
-            false => Table::Text(TextTable::open(path, how.list, how.separator)?),
+            true => Table::Parquet(ParquetTable::open(path, how.list, how.filters)?),
+            false => Table::Text(TextTable::open(path, how.list, how.separator, how.filters)?),
         };
         let roles = match &table {
             Table::Text(table) => table.roles(),
@@ -213,6 +216,15 @@ impl ForeignFile {
         }
     }
 
+    /// Rows that were left out as they are not those that were asked for, so far.
+    pub fn not_chosen(&self) -> u64 {
+        match &self.table {
+            Table::Text(table) => table.left_out(),
+            Table::Parquet(table) => table.filters.left_out,
+            Table::Bag(_) => 0,
+        }
+    }
+
     /// Bytes of 0 around its lines, so far.
     pub fn zero_bytes(&self) -> u64 {
         match &self.table {
@@ -262,6 +274,11 @@ impl ForeignFile {
                 Ok(true) => self.broken.rows += 1,
                 Ok(false) => {
                     self.broken.check()?;
+                    match &self.table {
+                        Table::Text(table) => table.check_filters()?,
+                        Table::Parquet(table) => table.filters.check(&self.path)?,
+                        Table::Bag(_) => {}
+                    }
                     return Ok(false);
                 }
                 Err(Unreadable::Row(broken)) => {

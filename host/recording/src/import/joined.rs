@@ -105,15 +105,11 @@ impl JoinedFiles {
                     .flat_map(|follower| follower.file.columns()),
             )
             .collect();
-        let mut inputs = options
-            .inputs
-            .as_deref()
-            .map(StepInputs::read)
-            .transpose()?;
+        let mut inputs = StepInputs::of(options)?;
         let mut names: Vec<&str> = vec![Column::Time.name()];
         let kept = |column: &&Column| !matches!(column, Column::Raw(c) if left_out[c / 3]);
         names.extend(order.iter().filter(kept).map(|column| column.name()));
-        if first.has_step() || options.sequence {
+        if first.has_step() || options.is_sequence() {
             names.push(Column::Step.name());
         }
         let given = inputs.as_ref().map_or([false; 6], StepInputs::columns);
@@ -123,7 +119,7 @@ impl JoinedFiles {
         names.extend(given);
         // The same rules as for a recording's header: nothing twice, all axes of a sensor.
         let columns = Layout::from_names(&names, "import, all columns together")?.columns;
-        if inputs.is_some() && !first.has_step() && !options.sequence {
+        if inputs.is_some() && !first.has_step() && !options.is_sequence() {
             let problem = "a table of inputs is given, and no column is step";
             return Err(Error::new(
                 "import",

@@ -4,6 +4,7 @@ mod assignment;
 mod binary;
 mod broken;
 mod counter;
+mod faces;
 mod first_pass;
 mod foreign;
 mod inputs;
@@ -18,6 +19,7 @@ mod preset;
 mod resample;
 mod ros;
 mod row;
+mod row_filter;
 mod sequence;
 mod step_inputs;
 mod step_labels;
@@ -32,11 +34,13 @@ use std::path::Path;
 
 pub use assignment::{ColumnList, Offset, Role, Scale};
 pub use broken::{BrokenKind, BrokenLimit, BrokenRows};
+pub use faces::Face;
 pub use inputs::Inputs;
 pub use options::ImportOptions;
 pub use pose_means::{PoseMean, PoseMeans};
 pub use preset::{Chosen, Preset, PresetUse};
 pub use ros::is_bag;
+pub use row_filter::RowFilter;
 pub use summary::{ImportSummary, SkippedLines};
 pub use time::{Decimal, Jitter, Rounds, TimeSummary};
 
@@ -59,7 +63,7 @@ pub fn import(
     if options.means {
         return pose_means::import_means(options, out);
     }
-    if options.sequence {
+    if options.is_sequence() {
         return sequence::import_sequence(options, out, progress);
     }
     // Only when all rows have been read it is known that a sensor has nothing but zeros. That is rare, and worth a second time.

@@ -4,8 +4,10 @@ use std::path::{Path, PathBuf};
 
 use super::assignment::{ColumnList, Offset, Scale};
 use super::broken::BrokenLimit;
+use super::faces::Face;
 use super::foreign::HowToRead;
 use super::preset::{Chosen, PresetUse};
+use super::row_filter::RowFilter;
 use super::time::Decimal;
 use crate::error::{Argument, Error, Result};
 use crate::manifest::{RawUnit, Reference, check_gravity, check_rate};
@@ -48,6 +50,10 @@ pub struct ImportOptions {
     pub inputs: Option<PathBuf>,
     /// Whether the files follow one another, each a step with the name of its file, in place of being joined on their times.
     pub sequence: bool,
+    /// Face of the unit that was up in each file, which makes them a sequence; empty where the files are none of faces.
+    pub faces: Vec<Face>,
+    /// Which rows of text and Parquet files are read: those that all of these fit.
+    pub filters: Vec<RowFilter>,
     /// How many rows that cannot be read may be left out.
     pub skip_broken: BrokenLimit,
     /// Whether the rows are means over a pose or a step each, and no samples.
@@ -87,6 +93,8 @@ impl ImportOptions {
             latitude_deg: None,
             inputs: None,
             sequence: false,
+            faces: Vec::new(),
+            filters: Vec::new(),
             skip_broken: BrokenLimit::None,
             means: false,
             preset: None,
@@ -117,17 +125,43 @@ impl ImportOptions {
         if files == 0 {
             return refuse("no file is given".to_owned(), "name the files to import");
         }
-        let one_for_all = self.sequence && lists == 1;
+        let one_for_all = self.is_sequence() && lists == 1;
         if lists != 0 && lists != files && !one_for_all {
             return refuse(
                 format!("there are {files} files and {lists} lists of columns"),
                 "give one list of columns for each file, in their order",
             );
         }
+        if !self.faces.is_empty() && self.faces.len() != files {
+            return refuse(
+                format!("there are {files} files and {} faces", self.faces.len()),
+                "give one file for each face",
+            );
+        }
+        if let Some((_, face)) = (1..)
+            .zip(&self.faces)
+            .find(|(i, f)| self.faces[*i..].contains(f))
+        {
+            let problem = format!("the face {face} is given twice");
+            return refuse(
+                problem,
+                "give one file for each face, or name files with --sequence",
+            );
+        }
+        if !self.faces.is_empty() && self.inputs.is_some() {
+            let problem = "the faces say what the inputs are, and a table of inputs is given";
+            return refuse(problem.to_owned(), "give one of the two");
+        }
         if self.means && !self.signed_low_bytes.is_empty() {
             return refuse(
                 "a low byte is mended sample by sample, and these are means".to_owned(),
                 "import the samples that they were made of",
+            );
+        }
+        if self.means && !self.filters.is_empty() {
+            return refuse(
+                "rows are chosen by a column, and these are means".to_owned(),
+                "give a table with the rows that are wanted",
             );
         }
         if let Some(rate) = self.rate_hz {
@@ -148,10 +182,21 @@ impl ImportOptions {
         Ok(())
     }
 
+    /// Whether the files follow one another.
+    pub(super) fn is_sequence(&self) -> bool {
+        self.sequence || !self.faces.is_empty()
+    }
+
     /// The options as arguments of `mimu import`, for the manifest. File names only: where the
     /// files were on somebody's machine helps nobody and may not be meant to be passed on.
     pub(super) fn arguments(&self) -> Vec<String> {
         let mut arguments: Vec<String> = self.files.iter().map(|file| file_name(file)).collect();
+        if !self.faces.is_empty() {
+            for (argument, face) in arguments.iter_mut().zip(&self.faces) {
+                *argument = format!("{face}={argument}");
+            }
+            arguments.insert(0, "--faces".to_owned());
+        }
         if self.means {
             arguments.push("--means".to_owned());
         }
@@ -196,6 +241,9 @@ impl ImportOptions {
             arguments.push(name.to_owned());
             arguments.push(value);
         };
+        for filter in &self.filters {
+            option("--where", filter.to_string());
+        }
         if let Some(topic) = &self.topic {
             option("--topic", topic.clone());
         }
@@ -218,6 +266,7 @@ impl ImportOptions {
             scales: &self.scales,
             offsets: &self.offsets,
             signed_low_bytes: &self.signed_low_bytes,
+            filters: &self.filters,
             topic: self.topic.as_deref(),
             rate_hz: self.rate_hz,
             time_unit: self.time_unit,

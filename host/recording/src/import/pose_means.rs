@@ -105,7 +105,7 @@ impl Table {
         let refuse = |problem: String, remedy: &str| {
             Err(Error::new(path.display(), problem, remedy).about(Argument::Columns))
         };
-        let mut table = TextTable::open(path, list, separator)?;
+        let mut table = TextTable::open(path, list, separator, &[])?;
         let roles = table.roles();
         let has = |role: Role| roles.contains(&role);
         let timed = [Role::Column(Column::Time), Role::Sample];
@@ -315,6 +315,7 @@ pub(super) fn import_means(options: &ImportOptions, out: &Path) -> Result<Import
         dropped_outside: 0,
         dropped_in_gaps: 0,
         interpolated: 0,
+        not_chosen: 0,
         padding: 0,
         broken_rows: Vec::new(),
         empty_cells: raw.map(|c| empty(c).count() as u64).sum(),

@@ -319,7 +319,7 @@ impl Layout {
         let more = format!("{},{}", self.columns, self.optional);
         if !self.optional.is_empty()
             && let Ok(more) = more.parse()
-            && TextTable::open(path, Some(&more), separator).is_ok()
+            && TextTable::open(path, Some(&more), separator, &[]).is_ok()
         {
             return self.timed(path, more, separator);
         }
@@ -332,7 +332,7 @@ impl Layout {
         list: ColumnList,
         separator: Option<Separator>,
     ) -> Result<ColumnList> {
-        let mut table = TextTable::open(path, Some(&list), separator)?;
+        let mut table = TextTable::open(path, Some(&list), separator, &[])?;
         let mut cells = Cells::default();
         let row = match table.next(&mut cells) {
             // Whoever reads all rows says so.

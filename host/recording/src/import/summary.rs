@@ -45,6 +45,8 @@ pub struct ImportSummary {
     pub dropped_in_gaps: u64,
     /// Rows with values interpolated from another file.
     pub interpolated: u64,
+    /// Rows left out as they are not those that were asked for.
+    pub not_chosen: u64,
     /// Rows left out as padding, as all of their readings are 0.
     pub padding: u64,
     /// Rows that could not be read and were left out, of each file that has some.
@@ -62,6 +64,7 @@ impl ImportSummary {
         self.warnings
             .extend(file.seen.warnings(&place, file.rate_hz()));
         self.padding += file.seen.padding;
+        self.not_chosen += file.not_chosen();
         for (sensor, rows) in ["gyro", "accel"].iter().zip(file.seen.dead()) {
             self.warnings.extend(rows.map(|rows| {
                 format!(

@@ -12,6 +12,7 @@ mod broken;
 mod means;
 mod plausibility;
 mod presets;
+mod rows;
 mod sequence;
 mod sources;
 mod stamps;
