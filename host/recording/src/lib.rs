@@ -41,7 +41,7 @@ pub use held::{Held, HeldReadings};
 pub use import::{
     BrokenKind, BrokenLimit, BrokenRows, Chosen, ColumnList, Decimal, Face, ImportOptions,
     ImportSummary, Inputs, Jitter, Offset, PoseMean, PoseMeans, Preset, PresetUse, Role, Rounds,
-    RowFilter, Scale, SkippedLines, TimeSummary, import, is_bag,
+    RowFilter, Scale, SkippedLines, TimeSummary, import, is_log,
 };
 pub use manifest::{Format, MANIFEST_FILE, Manifest, Rails, RawUnit, Reference, Source};
 pub use no_temperature::NoTemperatures;

@@ -10,7 +10,7 @@ use mimu_recording::error::{Error, Result};
 use mimu_recording::signed_low_byte::SignedLowByte;
 use mimu_recording::{
     BrokenLimit, ColumnList, Decimal, Face, ImportOptions, Offset, Preset, RawUnit, Reference,
-    RowFilter, SampleFormat, Scale, Separator, import, is_bag,
+    RowFilter, SampleFormat, Scale, Separator, import, is_log,
 };
 
 use crate::arguments::JsonArgs;
@@ -171,11 +171,11 @@ pub(crate) fn run(args: ImportArgs) -> Result<()> {
         (None, false) => None,
         (named, _) => Preset::choose(*named, &files, args.separator)?,
     };
-    let bags = files.iter().all(|file| is_bag(file));
+    let logs = files.iter().all(|file| is_log(file));
     let raw_unit = args
         .raw_unit
         .or(chosen.as_ref().and_then(|chosen| chosen.raw_unit))
-        .or(bags.then_some(RawUnit::Si))
+        .or(logs.then_some(RawUnit::Si))
         .ok_or_else(|| {
             let remedy = "give --raw-unit: V, count or SI (rad/s and m/s²)";
             Error::new("import", "the unit of the readings is not known", remedy)

@@ -6,9 +6,9 @@ use super::SkippedLines;
 use super::assignment::{ColumnList, Offset, Role, Scale};
 use super::broken::{BrokenLimit, BrokenTally, Fault, Unreadable};
 use super::counter::{Counter, StampCounter};
+use super::log::{self, Choice, Readings, is_log};
 use super::parquet_table::ParquetTable;
 use super::plausibility::Plausibility;
-use super::ros::{ImuTopic, is_bag};
 use super::row::Row;
 use super::row_filter::RowFilter;
 use super::step_labels::StepLabels;
@@ -30,8 +30,10 @@ pub(super) struct HowToRead<'a> {
     pub signed_low_bytes: &'a [SignedLowByte],
     /// Which rows are wanted.
     pub filters: &'a [RowFilter],
-    /// Topic of a bag.
-    pub topic: Option<&'a str>,
+    /// Which sensor of a log is wanted.
+    pub choice: Choice<'a>,
+    /// Which of the readings of a log, counted from 0.
+    pub part: usize,
     /// Sample rate, where it was given or is known.
     pub rate_hz: Option<f64>,
     /// Unit of the time stamps, where it was given.
@@ -45,6 +47,8 @@ pub(super) struct HowToRead<'a> {
 pub(super) struct ForeignFile {
     path: PathBuf,
     table: Table,
+    /// How many parts the file has: those of a log whose sensors have clocks of their own.
+    pub parts: usize,
     cells: Cells,
     source: TimeSource,
     counter: Counter,
@@ -65,7 +69,7 @@ pub(super) struct ForeignFile {
 enum Table {
     Text(TextTable),
     Parquet(ParquetTable),
-    Bag(ImuTopic),
+    Log(Readings),
 }
 
 /// A cell that becomes a value of a row.
@@ -97,21 +101,31 @@ impl ForeignFile {
         let parquet = path
             .extension()
             .is_some_and(|e| e.eq_ignore_ascii_case("parquet"));
-        if is_bag(path) && how.list.is_some() {
-            let problem = "a list of columns is given for a bag, whose messages have their own";
+        let mut parts = 1;
+        if is_log(path) && how.list.is_some() {
+            let problem = "a list of columns is given for a log, whose messages have their own";
             return Err(
                 Error::new(path.display(), problem, "leave it out").about(Argument::Columns)
             );
         }
+        if is_log(path) && !how.filters.is_empty() {
+            let problem = "rows are chosen by a column, and the messages of a log have none";
+            let remedy = "leave it out, and choose the topic or the instance";
+            return Err(Error::new(path.display(), problem, remedy).about(Argument::Where));
+        }
         let table = match parquet {
-            _ if is_bag(path) => Table::Bag(ImuTopic::open(path, how.topic)?),
+            _ if is_log(path) => {
+                let mut all = log::read(path, how.choice)?;
+                parts = all.len();
+                Table::Log(all.swap_remove(how.part))
+            }
             true => Table::Parquet(ParquetTable::open(path, how.list, how.filters)?),
             false => Table::Text(TextTable::open(path, how.list, how.separator, how.filters)?),
         };
         let roles = match &table {
             Table::Text(table) => table.roles(),
             Table::Parquet(table) => table.roles(),
-            Table::Bag(topic) => topic.roles(),
+            Table::Log(readings) => readings.roles(),
         };
         let of_means = |role: &&Role| matches!(role, Role::Deviation(_) | Role::Averaged(_));
         if let Some(role) = roles.iter().find(of_means) {
@@ -162,6 +176,7 @@ impl ForeignFile {
             values,
             has_step: at(Role::Column(Column::Step)).is_some(),
             table,
+            parts,
             cells: Cells::default(),
             source,
             counter: Counter::default(),
@@ -212,7 +227,7 @@ impl ForeignFile {
     pub fn skipped(&self) -> SkippedLines {
         match &self.table {
             Table::Text(table) => table.skipped,
-            Table::Parquet(_) | Table::Bag(_) => SkippedLines::default(),
+            Table::Parquet(_) | Table::Log(_) => SkippedLines::default(),
         }
     }
 
@@ -221,7 +236,7 @@ impl ForeignFile {
         match &self.table {
             Table::Text(table) => table.left_out(),
             Table::Parquet(table) => table.filters.left_out,
-            Table::Bag(_) => 0,
+            Table::Log(_) => 0,
         }
     }
 
@@ -229,7 +244,7 @@ impl ForeignFile {
     pub fn zero_bytes(&self) -> u64 {
         match &self.table {
             Table::Text(table) => table.zero_bytes,
-            Table::Parquet(_) | Table::Bag(_) => 0,
+            Table::Parquet(_) | Table::Log(_) => 0,
         }
     }
 
@@ -238,7 +253,15 @@ impl ForeignFile {
         match &self.table {
             Table::Text(table) => &table.warnings,
             Table::Parquet(table) => &table.warnings,
-            Table::Bag(_) => &[],
+            Table::Log(readings) => &readings.warnings,
+        }
+    }
+
+    /// What was read of a log, and what was done to it.
+    pub fn notes(&self) -> &[String] {
+        match &self.table {
+            Table::Log(readings) => &readings.notes,
+            Table::Text(_) | Table::Parquet(_) => &[],
         }
     }
 
@@ -257,7 +280,7 @@ impl ForeignFile {
         match &self.table {
             Table::Text(table) => table.progress(),
             Table::Parquet(table) => table.progress(),
-            Table::Bag(topic) => topic.progress(),
+            Table::Log(readings) => readings.progress(),
         }
     }
 
@@ -277,7 +300,7 @@ impl ForeignFile {
                     match &self.table {
                         Table::Text(table) => table.check_filters()?,
                         Table::Parquet(table) => table.filters.check(&self.path)?,
-                        Table::Bag(_) => {}
+                        Table::Log(_) => {}
                     }
                     return Ok(false);
                 }
@@ -314,7 +337,7 @@ impl ForeignFile {
         let number = match &mut self.table {
             Table::Text(table) => table.next(&mut self.cells)?,
             Table::Parquet(table) => table.next(&mut self.cells)?,
-            Table::Bag(topic) => topic.next(&mut self.cells),
+            Table::Log(readings) => readings.next(&mut self.cells),
         };
         let Some(number) = number else {
             return Ok(false);

@@ -1,5 +1,6 @@
 //! Several files as one recording: each row of the first with what the others have at that time.
 
+use std::collections::VecDeque;
 use std::path::Path;
 
 use super::first_pass;
@@ -76,12 +77,24 @@ impl JoinedFiles {
         let polled = first_times.as_ref().filter(|t| t.summary.polled.is_some());
         let resampler = polled.map(|times| Resampler::new(times.period_s()));
         let mut followers = Vec::new();
-        for (index, path) in options.files.iter().enumerate().skip(1) {
+        let others = (1..options.files.len()).map(|index| (index, 0));
+        let mut waiting: VecDeque<(usize, usize)> = (1..first.parts)
+            .map(|part| (0, part))
+            .chain(others)
+            .collect();
+        while let Some((index, part)) = waiting.pop_front() {
+            let path = &options.files[index];
             let how = HowToRead {
                 rate_hz: options.rate_hz.or(Some(rate_hz)),
+                part,
                 ..options.how(index)
             };
             let mut file = ForeignFile::open(path, &how)?;
+            if part == 0 {
+                (1..file.parts)
+                    .rev()
+                    .for_each(|part| waiting.push_front((index, part)));
+            }
             if file.has_step() {
                 let problem = "the column step is not in the first file";
                 let remedy = "name the file with the steps first";

@@ -6,6 +6,7 @@ use super::assignment::{ColumnList, Offset, Scale};
 use super::broken::BrokenLimit;
 use super::faces::Face;
 use super::foreign::HowToRead;
+use super::log::Choice;
 use super::preset::{Chosen, PresetUse};
 use super::row_filter::RowFilter;
 use super::time::Decimal;
@@ -40,8 +41,10 @@ pub struct ImportOptions {
     pub offsets: Vec<Offset>,
     /// Columns of which a firmware took the low byte for a signed number, in whole counts: mended before any factor.
     pub signed_low_bytes: Vec<SignedLowByte>,
-    /// Topic of bags; without it, the only one with messages of an inertial unit.
+    /// Topic of a log; without it, the only one with messages of an inertial unit.
     pub topic: Option<String>,
+    /// Which of several sensors of a topic of a log; without it, the only one.
+    pub instance: Option<u32>,
     /// Name of the unit; without it, the name of the recording.
     pub device: Option<String>,
     /// Latitude in degrees.
@@ -89,6 +92,7 @@ impl ImportOptions {
             offsets: Vec::new(),
             signed_low_bytes: Vec::new(),
             topic: None,
+            instance: None,
             device: None,
             latitude_deg: None,
             inputs: None,
@@ -247,6 +251,9 @@ impl ImportOptions {
         if let Some(topic) = &self.topic {
             option("--topic", topic.clone());
         }
+        if let Some(instance) = self.instance {
+            option("--instance", instance.to_string());
+        }
         if let Some(device) = &self.device {
             option("--device", device.clone());
         }
@@ -267,7 +274,11 @@ impl ImportOptions {
             offsets: &self.offsets,
             signed_low_bytes: &self.signed_low_bytes,
             filters: &self.filters,
-            topic: self.topic.as_deref(),
+            choice: Choice {
+                topic: self.topic.as_deref(),
+                instance: self.instance,
+            },
+            part: 0,
             rate_hz: self.rate_hz,
             time_unit: self.time_unit,
             skip_broken: self.skip_broken,

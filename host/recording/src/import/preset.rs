@@ -13,7 +13,7 @@ use serde::Serialize;
 
 use super::assignment::{ColumnList, Scale};
 use super::broken::Unreadable;
-use super::ros::is_bag;
+use super::log::is_log;
 use super::text_table::{Cells, TextTable};
 use crate::cell::shorten;
 use crate::error::{Argument, Error, Result};
@@ -224,8 +224,8 @@ impl Preset {
             let error = Error::new(path.display(), problem, remedy);
             Err(Unfit::Other(error.about(Argument::Columns)))
         };
-        if is_bag(path) {
-            let problem = "a preset is given for a bag, whose messages have their own columns";
+        if is_log(path) {
+            let problem = "a preset is given for a log, whose messages have their own columns";
             return Err(Error::new(path.display(), problem, "leave it out").into());
         }
         let name = path.file_name().unwrap_or_default().to_string_lossy();

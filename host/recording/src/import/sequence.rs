@@ -180,6 +180,7 @@ fn labels(options: &ImportOptions) -> Result<Vec<String>> {
 /// Adds what was seen of a file to what was seen of those before.
 fn add(all: &mut ImportSummary, one: ImportSummary) {
     all.time.extend(one.time);
+    all.notes.extend(one.notes);
     all.warnings.extend(one.warnings);
     all.skipped.header += one.skipped.header;
     all.skipped.comment += one.skipped.comment;

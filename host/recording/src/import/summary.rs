@@ -53,6 +53,8 @@ pub struct ImportSummary {
     pub broken_rows: Vec<BrokenRows>,
     /// Raw cells that are empty.
     pub empty_cells: u64,
+    /// What was read of logs, and what was undone of their own calibration.
+    pub notes: Vec<String>,
     /// One sentence for each thing that a person should know.
     pub warnings: Vec<String>,
 }
@@ -61,6 +63,8 @@ impl ImportSummary {
     /// Takes in what was skipped in `file` and what is to be said of it.
     pub(super) fn add(&mut self, file: &ForeignFile) {
         let place = file_name(file.path());
+        let notes = file.notes().iter().map(|note| format!("{place}: {note}"));
+        self.notes.extend(notes);
         self.warnings
             .extend(file.seen.warnings(&place, file.rate_hz()));
         self.padding += file.seen.padding;
