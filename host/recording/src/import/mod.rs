@@ -13,6 +13,7 @@ mod join;
 mod joined;
 mod log;
 mod options;
+#[cfg(feature = "parquet")]
 mod parquet_table;
 mod place;
 mod plausibility;
@@ -20,20 +21,31 @@ mod pose_means;
 mod preset;
 mod px4;
 mod resample;
+#[cfg(feature = "bags")]
 mod ros;
 mod rotation;
 mod row;
 mod row_filter;
 mod sequence;
+#[cfg(feature = "bags")]
 mod sqlite;
 mod step_inputs;
 mod step_labels;
 mod summary;
-#[cfg(test)]
+#[cfg(all(test, feature = "parquet"))]
 mod tests;
 mod text_table;
 mod time;
 mod two_sources;
+#[cfg(not(feature = "bags"))]
+mod without_bags;
+#[cfg(not(feature = "parquet"))]
+mod without_parquet;
+
+#[cfg(not(feature = "bags"))]
+use without_bags as ros;
+#[cfg(not(feature = "parquet"))]
+use without_parquet as parquet_table;
 
 use std::path::Path;
 

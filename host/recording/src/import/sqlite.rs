@@ -325,7 +325,10 @@ mod tests {
     /// The string of 9000 letters that `rosbags` has written takes three pages; CDR puts 8 bytes before it and a 0 behind it.
     #[test]
     fn a_blob_that_is_longer_than_a_page_is_put_together() {
-        let bag = concat!(env!("CARGO_MANIFEST_DIR"), "/src/import/ros/fixtures/imu.db3");
+        let bag = concat!(
+            env!("CARGO_MANIFEST_DIR"),
+            "/src/import/ros/fixtures/imu.db3"
+        );
         let database = Database::open(Path::new(bag)).unwrap();
         let tables = database.tables().unwrap();
         let messages = &tables["messages"];
