@@ -28,6 +28,7 @@ mod parents;
 mod parquet_file;
 #[cfg(feature = "parquet")]
 mod parquet_writer;
+mod raw_channels;
 mod reader;
 mod recorded;
 #[cfg(all(test, feature = "parquet"))]
@@ -54,7 +55,7 @@ pub use held::{Held, HeldReadings};
 pub use import::{
     BrokenKind, BrokenLimit, BrokenRows, Chosen, ColumnList, Decimal, Face, ImportOptions,
     ImportSummary, Inputs, Jitter, Offset, PoseMean, PoseMeans, Preset, PresetUse, Role, Rounds,
-    RowFilter, Scale, SkippedLines, TimeSummary, import, is_log,
+    RowFilter, Scale, SkippedLines, TimeSummary, TwosComplement, Zero, import, is_log,
 };
 pub use manifest::{Format, MANIFEST_FILE, Manifest, Rails, RawUnit, Reference, Source};
 pub use no_temperature::NoTemperatures;

@@ -10,7 +10,7 @@ use mimu_recording::error::{Error, Result};
 use mimu_recording::signed_low_byte::SignedLowByte;
 use mimu_recording::{
     BrokenLimit, ColumnList, Decimal, Face, ImportOptions, Offset, Preset, RawUnit, Reference,
-    RowFilter, SampleFormat, Scale, Separator, import, is_log,
+    RowFilter, SampleFormat, Scale, Separator, TwosComplement, Zero, import, is_log,
 };
 
 use crate::arguments::JsonArgs;
@@ -19,8 +19,8 @@ use crate::report;
 
 #[derive(Args)]
 pub(crate) struct ImportArgs {
-    /// Text files (any separator), Parquet, ROS 1 bags or MCAP, or the folder of a preset; the later ones are joined onto the
-    /// times of the first
+    /// Text files (any separator), Parquet, bags of ROS 1 (.bag) and ROS 2 (.db3, .mcap), logs of PX4 (.ulg) and ArduPilot (.bin), or
+    /// the folder of a preset; the later ones are joined onto the times of the first
     #[arg(required_unless_present = "faces")]
     files: Vec<PathBuf>,
     /// Columns of a file from the left (`t_s,accel_x,-`; `-` skips one), or by the names in its header
@@ -53,6 +53,9 @@ pub(crate) struct ImportArgs {
     /// With --faces: the file with z down
     #[arg(short = 'z', value_name = "FILE", requires = "faces")]
     z_down: Vec<PathBuf>,
+    /// Rows after a pause of more than so many seconds are a new step, as where nothing was recorded between the poses
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, conflicts_with_all = ["means", "sequence", "faces"])]
+    step_gap: Option<f64>,
     /// Only the rows in which a column has this value, as one of several sensors in a file: `channel=3`; repeated, all must hold
     #[arg(long = "where", value_name = "COLUMN=VALUE", conflicts_with = "means")]
     filters: Vec<RowFilter>,
@@ -66,12 +69,16 @@ pub(crate) struct ImportArgs {
     /// Local gravity, m/s²; without it, normal gravity at sea level of --latitude, or 9.80665 and a warning
     #[arg(long, allow_negative_numbers = true)]
     gravity: Option<f64>,
-    /// Unit of the raw columns, after --scale: V, count or SI (rad/s and m/s²); bags and most presets have SI without it
+    /// Unit of the raw columns, after --scale: V, count or SI (rad/s and m/s²); bags, logs and most presets have SI without it
     #[arg(long, value_name = "UNIT")]
     raw_unit: Option<RawUnit>,
-    /// Topic of a bag with sensor_msgs/Imu; without it, the only one
+    /// Topic of a bag with sensor_msgs/Imu, of a PX4 log (sensor_gyro, sensor_combined) or message of an ArduPilot log (IMU, GYR, IMT);
+    /// without it, the only or the best one
     #[arg(long)]
     topic: Option<String>,
+    /// Which sensor of a log of PX4 or ArduPilot, from 0; without it, the only one
+    #[arg(long, value_name = "N")]
+    instance: Option<u32>,
     /// What is known of the input: table (ref_ columns or --inputs) or gravity (its size, at rest)
     #[arg(long)]
     reference: Reference,
@@ -86,6 +93,12 @@ pub(crate) struct ImportArgs {
     /// `(high << 8) + (int8_t)low` reads 256 counts low where the low byte is 128 or more. The readings have to be whole counts.
     #[arg(long, value_name = "COLUMN", conflicts_with = "means")]
     signed_low_byte: Vec<SignedLowByte>,
+    /// Raw columns of unsigned codes in two's complement, with their bits: `accel=12`
+    #[arg(long, value_name = "COLUMN=BITS", conflicts_with = "means")]
+    twos_complement: Vec<TwosComplement>,
+    /// Code that raw columns have at an input of 0, subtracted before --scale: `gyro=2048`
+    #[arg(long, value_name = "COLUMN=CODE", conflicts_with = "means")]
+    zero: Vec<Zero>,
     /// Name of the unit; without it, the name of the recording
     #[arg(long)]
     device: Option<String>,
@@ -182,6 +195,10 @@ pub(crate) fn run(args: ImportArgs) -> Result<()> {
         })?;
     let options = ImportOptions {
         topic: args.topic,
+        instance: args.instance,
+        twos_complements: args.twos_complement,
+        zeros: args.zero,
+        step_gap_s: args.step_gap,
         columns: args.columns,
         separator: args.separator,
         rate_hz: args.rate_hz,

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use super::SkippedLines;
 use super::assignment::{ColumnList, Offset, Role, Scale};
 use super::broken::{BrokenLimit, BrokenTally, Fault, Unreadable};
+use super::codes::{Conversion, TwosComplement, Zero};
 use super::counter::{Counter, StampCounter};
 use super::log::{self, Choice, Readings, is_log};
 use super::parquet_table::ParquetTable;
@@ -14,11 +15,11 @@ use super::row_filter::RowFilter;
 use super::step_labels::StepLabels;
 use super::text_table::{Cells, TextTable};
 use super::time::{Clock, Decimal, Times};
-use crate::cell::{Refusal, is_reading, no_reading, no_time};
+use crate::cell::{is_reading, no_reading, no_time};
 use crate::columns::Column;
 use crate::error::{Argument, Error, Result};
 use crate::separator::Separator;
-use crate::signed_low_byte::{SignedLowByte, undone};
+use crate::signed_low_byte::SignedLowByte;
 
 /// How to read a foreign file.
 #[derive(Debug, Clone)]
@@ -28,6 +29,8 @@ pub(super) struct HowToRead<'a> {
     pub scales: &'a [Scale],
     pub offsets: &'a [Offset],
     pub signed_low_bytes: &'a [SignedLowByte],
+    pub twos_complements: &'a [TwosComplement],
+    pub zeros: &'a [Zero],
     /// Which rows are wanted.
     pub filters: &'a [RowFilter],
     /// Which sensor of a log is wanted.
@@ -40,6 +43,19 @@ pub(super) struct HowToRead<'a> {
     pub time_unit: Option<Decimal>,
     /// How many broken rows may be left out.
     pub skip_broken: BrokenLimit,
+}
+
+impl HowToRead<'_> {
+    /// What is done to the cells of `column`.
+    fn conversion(&self, column: Column) -> Conversion {
+        Conversion {
+            twos_complement: TwosComplement::bits(self.twos_complements, column),
+            signed_low_byte: self.signed_low_bytes.iter().any(|s| s.applies_to(column)),
+            zero: Zero::of(self.zeros, column),
+            factor: Scale::product(self.scales, column),
+            offset: Offset::sum(self.offsets, column),
+        }
+    }
 }
 
 /// A foreign file, positioned at its next row.
@@ -78,10 +94,7 @@ struct Cell {
     /// Position among the cells.
     at: usize,
     column: Column,
-    factor: f64,
-    offset: f64,
-    /// Whether a firmware took its low byte for a signed number.
-    signed_low_byte: bool,
+    conversion: Conversion,
 }
 
 /// Where the time of a row comes from.
@@ -164,9 +177,7 @@ impl ForeignFile {
                 Role::Column(column) => Some(Cell {
                     at: cell,
                     column: *column,
-                    factor: Scale::product(how.scales, *column),
-                    offset: Offset::sum(how.offsets, *column),
-                    signed_low_byte: how.signed_low_bytes.iter().any(|s| s.applies_to(*column)),
+                    conversion: how.conversion(*column),
                 }),
             });
         let values: Vec<Cell> = numbers.collect();
@@ -363,32 +374,11 @@ impl ForeignFile {
         }
         row.values.clear();
         for cell in &self.values {
-            let (number_in_file, factor) = (self.cells.numbers[cell.at], cell.factor);
-            let reading = match cell.signed_low_byte {
-                true if number_in_file.is_finite() && number_in_file.fract() != 0.0 => {
-                    let place = format!("{}, column {}", at(&self.path), cell.column.name());
-                    let refusal = Refusal {
-                        problem: format!(
-                            "{number_in_file} has a fraction, and two bytes make whole counts"
-                        ),
-                        remedy: "give the log as it was recorded, without factors or means",
-                    };
-                    return Err(Unreadable::row(number, Fault::Reading, place, refusal));
-                }
-                true => undone(number_in_file),
-                false => number_in_file,
-            };
-            let value = reading * factor + cell.offset;
-            if !is_reading(value) {
+            let number_in_file = self.cells.numbers[cell.at];
+            let value = cell.conversion.reading(number_in_file).map_err(|refusal| {
                 let place = format!("{}, column {}", at(&self.path), cell.column.name());
-                let refusal = Refusal {
-                    problem: format!(
-                        "{number_in_file:e} times {factor:e} is too large for a reading"
-                    ),
-                    remedy: "correct the cell or the factor",
-                };
-                return Err(Unreadable::row(number, Fault::Reading, place, refusal));
-            }
+                Unreadable::row(number, Fault::Reading, place, refusal)
+            })?;
             row.values.push(value);
         }
         row.step = -1;

@@ -42,6 +42,8 @@ pub(super) struct JoinedFiles {
     resampler: Option<Resampler>,
     /// Where the first file stands in a sequence of them.
     pub place: Option<Place>,
+    /// Pause that parts two steps, s.
+    step_gap_s: Option<f64>,
     followers: Vec<Follower>,
     pub rate_hz: f64,
     pub columns: Columns,
@@ -122,7 +124,15 @@ impl JoinedFiles {
         let mut names: Vec<&str> = vec![Column::Time.name()];
         let kept = |column: &&Column| !matches!(column, Column::Raw(c) if left_out[c / 3]);
         names.extend(order.iter().filter(kept).map(|column| column.name()));
-        if first.has_step() || options.is_sequence() {
+        let by_pauses = options.step_gap_s.is_some();
+        if by_pauses && first.has_step() {
+            let problem = "it has a column step, and steps are to be parted by pauses";
+            let remedy = "skip the column, or leave out the pause";
+            return Err(
+                Error::new(first.path().display(), problem, remedy).about(Argument::Columns)
+            );
+        }
+        if first.has_step() || options.is_sequence() || by_pauses {
             names.push(Column::Step.name());
         }
         let given = inputs.as_ref().map_or([false; 6], StepInputs::columns);
@@ -132,7 +142,15 @@ impl JoinedFiles {
         names.extend(given);
         // The same rules as for a recording's header: nothing twice, all axes of a sensor.
         let columns = Layout::from_names(&names, "import, all columns together")?.columns;
-        if inputs.is_some() && !first.has_step() && !options.is_sequence() {
+        if by_pauses && inputs.as_ref().is_some_and(StepInputs::has_turns) {
+            let problem = "the table of inputs has angles, and turns are not parted by pauses";
+            return Err(Error::new(
+                "import",
+                problem,
+                "name the column with the steps",
+            ));
+        }
+        if inputs.is_some() && !first.has_step() && !options.is_sequence() && !by_pauses {
             let problem = "a table of inputs is given, and no column is step";
             return Err(Error::new(
                 "import",
@@ -175,6 +193,7 @@ impl JoinedFiles {
             first,
             resampler,
             place: None,
+            step_gap_s: options.step_gap_s,
             followers,
         })
     }
@@ -200,8 +219,13 @@ impl JoinedFiles {
         let mut values = Vec::new();
         let mut batch = Batch::default();
         let mut last_t_s = f64::NEG_INFINITY;
+        let mut step = 0;
         while resample::next(&mut self.first, self.resampler.as_mut(), &mut row)? {
             check_order(&self.first, &row, last_t_s)?;
+            if let Some(gap_s) = self.step_gap_s {
+                step += i32::from(row.t_s - last_t_s > gap_s && last_t_s.is_finite());
+                row.step = step;
+            }
             last_t_s = row.t_s;
             if let Some(place) = &mut self.place {
                 place.put(&mut row);

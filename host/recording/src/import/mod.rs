@@ -4,6 +4,7 @@ mod ardupilot;
 mod assignment;
 mod binary;
 mod broken;
+mod codes;
 mod counter;
 mod faces;
 mod first_pass;
@@ -51,6 +52,7 @@ use std::path::Path;
 
 pub use assignment::{ColumnList, Offset, Role, Scale};
 pub use broken::{BrokenKind, BrokenLimit, BrokenRows};
+pub use codes::{TwosComplement, Zero};
 pub use faces::Face;
 pub use inputs::Inputs;
 pub use log::is_log;

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::assignment::{ColumnList, Offset, Scale};
 use super::broken::BrokenLimit;
+use super::codes::{TwosComplement, Zero};
 use super::faces::Face;
 use super::foreign::HowToRead;
 use super::log::Choice;
@@ -41,6 +42,10 @@ pub struct ImportOptions {
     pub offsets: Vec<Offset>,
     /// Columns of which a firmware took the low byte for a signed number, in whole counts: mended before any factor.
     pub signed_low_bytes: Vec<SignedLowByte>,
+    /// Columns of unsigned codes in two's complement.
+    pub twos_complements: Vec<TwosComplement>,
+    /// Codes at an input of 0, subtracted before any factor; several for the same column add up.
+    pub zeros: Vec<Zero>,
     /// Topic of a log; without it, the only one with messages of an inertial unit.
     pub topic: Option<String>,
     /// Which of several sensors of a topic of a log; without it, the only one.
@@ -55,6 +60,8 @@ pub struct ImportOptions {
     pub sequence: bool,
     /// Face of the unit that was up in each file, which makes them a sequence; empty where the files are none of faces.
     pub faces: Vec<Face>,
+    /// Rows after a pause of more than this, s, are a new step; `None` where the steps are in a column, or are to be found.
+    pub step_gap_s: Option<f64>,
     /// Which rows of text and Parquet files are read: those that all of these fit.
     pub filters: Vec<RowFilter>,
     /// How many rows that cannot be read may be left out.
@@ -91,6 +98,8 @@ impl ImportOptions {
             scales: Vec::new(),
             offsets: Vec::new(),
             signed_low_bytes: Vec::new(),
+            twos_complements: Vec::new(),
+            zeros: Vec::new(),
             topic: None,
             instance: None,
             device: None,
@@ -98,6 +107,7 @@ impl ImportOptions {
             inputs: None,
             sequence: false,
             faces: Vec::new(),
+            step_gap_s: None,
             filters: Vec::new(),
             skip_broken: BrokenLimit::None,
             means: false,
@@ -142,6 +152,18 @@ impl ImportOptions {
                 "give one file for each face",
             );
         }
+        if let Some(gap) = self.step_gap_s
+            && !(gap > 0.0 && gap.is_finite())
+        {
+            return refuse(
+                format!("{gap} s is no pause"),
+                "write the seconds that part two steps",
+            );
+        }
+        if self.step_gap_s.is_some() && (self.is_sequence() || self.means) {
+            let problem = "steps are parted by pauses, and the files or rows are steps already";
+            return refuse(problem.to_owned(), "leave out one of the two");
+        }
         if let Some((_, face)) = (1..)
             .zip(&self.faces)
             .find(|(i, f)| self.faces[*i..].contains(f))
@@ -160,6 +182,12 @@ impl ImportOptions {
             return refuse(
                 "a low byte is mended sample by sample, and these are means".to_owned(),
                 "import the samples that they were made of",
+            );
+        }
+        if self.means && !(self.twos_complements.is_empty() && self.zeros.is_empty()) {
+            return refuse(
+                "codes are read sample by sample, and these are means".to_owned(),
+                "import the samples, or give the means as readings",
             );
         }
         if self.means && !self.filters.is_empty() {
@@ -235,6 +263,12 @@ impl ImportOptions {
         for offset in &self.offsets {
             option("--offset", offset.to_string());
         }
+        for codes in &self.twos_complements {
+            option("--twos-complement", codes.to_string());
+        }
+        for zero in &self.zeros {
+            option("--zero", zero.to_string());
+        }
         for column in &self.signed_low_bytes {
             option("--signed-low-byte", column.to_string());
         }
@@ -245,6 +279,9 @@ impl ImportOptions {
             arguments.push(name.to_owned());
             arguments.push(value);
         };
+        if let Some(gap) = self.step_gap_s {
+            option("--step-gap", gap.to_string());
+        }
         for filter in &self.filters {
             option("--where", filter.to_string());
         }
@@ -273,6 +310,8 @@ impl ImportOptions {
             scales: &self.scales,
             offsets: &self.offsets,
             signed_low_bytes: &self.signed_low_bytes,
+            twos_complements: &self.twos_complements,
+            zeros: &self.zeros,
             filters: &self.filters,
             choice: Choice {
                 topic: self.topic.as_deref(),

@@ -153,6 +153,11 @@ impl Preset {
                 false => files.push(path.clone()),
             }
         }
+        if let (Some([problem, remedy]), [first, _, ..], false) =
+            (self.apart, &files[..], recognise)
+        {
+            return Err(Error::new(first.display(), problem, remedy).into());
+        }
         let mut chosen = Chosen {
             used: PresetUse {
                 name: self.name,

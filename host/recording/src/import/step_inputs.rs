@@ -46,6 +46,11 @@ impl StepInputs {
         self.table.columns
     }
 
+    /// Whether the table has an angle.
+    pub fn has_turns(&self) -> bool {
+        self.table.has_turns
+    }
+
     /// Numbers of the steps met so far that are turns.
     pub fn turns(&self) -> impl Iterator<Item = i32> + '_ {
         self.table.turns.iter().copied()

@@ -9,7 +9,9 @@ use super::*;
 use crate::error::Argument;
 
 mod broken;
+mod logs;
 mod means;
+mod pauses;
 mod plausibility;
 mod presets;
 mod rows;
