@@ -173,10 +173,19 @@ impl Log {
         }
         // The others are interpolated at the times of the first.
         found.sort_by_key(|(_, samples)| std::cmp::Reverse(samples.stamps_ns.len()));
-        Ok(found
+        let mut all: Vec<Readings> = found
             .into_iter()
             .map(|(kind, samples)| samples.readings(kind, instance))
-            .collect())
+            .collect();
+        let thermal = format!("INS_TCAL{}_ENABLE", instance + 1);
+        if self.parameters.get(&thermal) == Some(&1.0)
+            && let Some(first) = all.first_mut()
+        {
+            first.warnings.push(format!(
+                "instance {instance}: ArduPilot's calibration over temperature is on ({thermal}), and is not undone"
+            ));
+        }
+        Ok(all)
     }
 }
 
