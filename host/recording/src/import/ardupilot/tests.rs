@@ -61,7 +61,7 @@ fn a_sensor_with_messages_at_its_own_rate_is_read_by_them() {
     assert_eq!((gyro.len(), accel.len()), (48, 48));
     assert_eq!(
         [gyro[3].0, accel[3].0],
-        [13_750_000, 13_850_000].map(Stamp::from)
+        [13_750_000, 14_150_000].map(Stamp::from)
     );
     close(&gyro[7].1, &[0.5, -3.0 / 8.0, 1.0]);
     close(&accel[7].1, &[0.75, 2.0, -8.0]);
