@@ -9,7 +9,7 @@ mod records;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use super::log::{Choice, Readings};
+use super::readings::{Choice, Readings};
 use super::rotation::{Correction, orientation};
 use crate::columns::Column;
 use crate::error::{Argument, Error, Result};

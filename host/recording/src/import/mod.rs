@@ -21,6 +21,7 @@ mod plausibility;
 mod pose_means;
 mod preset;
 mod px4;
+mod readings;
 mod resample;
 #[cfg(feature = "bags")]
 mod ros;

@@ -5,6 +5,7 @@
 //! `CAL_GYROn_` of the sensor with that device id, and R the mounting of the board (`src/lib/sensor_calibration` of PX4-Autopilot).
 
 mod calibration;
+mod topics;
 
 use std::collections::BTreeMap;
 use std::io::Read;
@@ -14,10 +15,11 @@ use px4_ulog::stream_parser::file_reader::{Message, SimpleCallbackResult};
 use px4_ulog::stream_parser::model::{Completeness, DataMessage, ParameterMessage};
 use px4_ulog::stream_parser::read_file_with_simple_callback;
 
-use super::log::{Choice, Readings};
+use super::readings::{Choice, Readings, guarded};
 use crate::columns::Column;
 use crate::error::{Argument, Error, Result};
 use calibration::{Parameters, Sensor};
+use topics::{Combined, Topic, u32_in};
 
 /// What a log begins with, and the bytes of its header.
 const SIGNATURE: &[u8] = b"ULog\x01\x12\x35";
@@ -33,26 +35,6 @@ const FIFO: [&str; 2] = ["sensor_gyro_fifo", "sensor_accel_fifo"];
 /// The default profile of the logger writes the raw topics once a second, and `sensor_combined` at 200 Hz. Where nobody chooses, the raw topics
 /// are taken unless they have this many times fewer samples.
 const SPARSE: usize = 4;
-
-/// Samples of one instance of a topic.
-#[derive(Default)]
-struct Topic {
-    stamps_ns: Vec<i64>,
-    values: Vec<[f64; 3]>,
-    temp_c: Vec<f64>,
-    /// Ids of the sensor as they follow one another, each with its first sample.
-    devices: Vec<(usize, u32)>,
-    /// Whether its readings are calibrated, as those of PX4 before 1.11 are, which have no `timestamp_sample`.
-    calibrated: bool,
-}
-
-/// Samples of `sensor_combined`.
-#[derive(Default)]
-struct Combined {
-    stamps_ns: Vec<i64>,
-    gyro: Vec<[f64; 3]>,
-    accel: Vec<[f64; 3]>,
-}
 
 /// What a log has of inertial sensors.
 #[derive(Default)]
@@ -85,12 +67,14 @@ pub(super) fn read(path: &Path, choice: Choice<'_>) -> Result<Vec<Readings>> {
     if beginning.len() < HEADER as usize || !beginning.starts_with(SIGNATURE) {
         return Err(other());
     }
-    let mut log = Log::default();
-    let ended = read_file_with_simple_callback(place, &mut |message| {
-        log.take(message);
-        SimpleCallbackResult::KeepReading
-    });
-    let ended = ended.map_err(|_| other())?;
+    let (log, ended) = guarded(path, || {
+        let mut log = Log::default();
+        let ended = read_file_with_simple_callback(place, &mut |message| {
+            log.take(message);
+            SimpleCallbackResult::KeepReading
+        });
+        Ok((log, ended.map_err(|_| other())?))
+    })?;
     let mut all = log.chosen(path, choice)?;
     if let Some(first) = all.first_mut() {
         first.warnings.extend(log.of_the_logger(&ended));
@@ -243,8 +227,14 @@ impl Log {
                     .chain(temperature.then_some(Column::Temperature))
                     .collect(),
             );
+            // Drivers that calibrate do so on the board's axes.
             let undone = match topic.calibrated {
-                true => Some(topic.undone(Sensor::ALL[*sensor], &self.parameters)),
+                true => Some(self.parameters.undo(
+                    Sensor::ALL[*sensor],
+                    &topic.devices,
+                    &topic.values,
+                    false,
+                )),
                 false => None,
             };
             for (row, stamp) in topic.stamps_ns.iter().enumerate() {
@@ -364,98 +354,6 @@ impl Log {
         }
         warnings
     }
-}
-
-impl Topic {
-    fn named(&self) -> String {
-        self.devices
-            .first()
-            .map_or("no device id".into(), |(_, id)| format!("device {id}"))
-    }
-
-    fn begin(&mut self, data: &DataMessage<'_>) {
-        if let Some(id) = u32_in(data, "device_id")
-            && self.devices.last().is_none_or(|(_, before)| *before != id)
-        {
-            self.devices.push((self.values.len(), id));
-        }
-    }
-
-    fn take(&mut self, data: &DataMessage<'_>) -> Option<()> {
-        let sampled = u64_in(data, "timestamp_sample");
-        let stamp_ns = nanoseconds(sampled.or_else(|| u64_in(data, "timestamp"))?)?;
-        let values = [f32_in(data, "x")?, f32_in(data, "y")?, f32_in(data, "z")?];
-        self.begin(data);
-        self.calibrated |= sampled.is_none();
-        self.stamps_ns.push(stamp_ns);
-        self.values.push(values);
-        self.temp_c
-            .push(f32_in(data, "temperature").unwrap_or(f64::NAN));
-        Some(())
-    }
-
-    /// A batch of the sensor's own buffer, of which the last sample is of the time of the message.
-    fn take_fifo(&mut self, data: &DataMessage<'_>) -> Option<()> {
-        let last_ns = nanoseconds(u64_in(data, "timestamp_sample")?)?;
-        let (step_us, scale) = (f32_in(data, "dt")?, f32_in(data, "scale")?);
-        let count = usize::from(field::<u8>(data, "samples")?);
-        self.begin(data);
-        for i in 0..count {
-            let count_of =
-                |axis: &str| Some(f64::from(field::<i16>(data, &format!("{axis}[{i}]"))?));
-            let counts = [count_of("x")?, count_of("y")?, count_of("z")?];
-            let before_ns = (count - 1 - i) as f64 * step_us * 1e3;
-            self.stamps_ns.push(last_ns - before_ns.round() as i64);
-            self.values.push(counts.map(|value| value * scale));
-            self.temp_c.push(f64::NAN);
-        }
-        Some(())
-    }
-
-    /// The readings of a driver that calibrates, before that. Drivers do so on the board's axes.
-    fn undone(&self, sensor: Sensor, parameters: &Parameters) -> calibration::Undone {
-        parameters.undo(sensor, &self.devices, &self.values, false)
-    }
-}
-
-impl Combined {
-    fn take(&mut self, data: &DataMessage<'_>) -> Option<()> {
-        let stamp_ns = nanoseconds(u64_in(data, "timestamp")?)?;
-        let three = |name: &str| -> Option<[f64; 3]> {
-            let axis = |i: usize| f32_in(data, &format!("{name}[{i}]"));
-            Some([axis(0)?, axis(1)?, axis(2)?])
-        };
-        let (gyro, accel) = (three("gyro_rad")?, three("accelerometer_m_s2")?);
-        self.stamps_ns.push(stamp_ns);
-        self.gyro.push(gyro);
-        self.accel.push(accel);
-        Some(())
-    }
-}
-
-fn field<T: px4_ulog::stream_parser::ParseableFieldType>(
-    data: &DataMessage<'_>,
-    name: &str,
-) -> Option<T> {
-    let parser = data.flattened_format.get_field_parser::<T>(name).ok()?;
-    Some(parser.parse(data.data))
-}
-
-fn u64_in(data: &DataMessage<'_>, name: &str) -> Option<u64> {
-    field(data, name)
-}
-
-fn u32_in(data: &DataMessage<'_>, name: &str) -> Option<u32> {
-    field(data, name)
-}
-
-fn f32_in(data: &DataMessage<'_>, name: &str) -> Option<f64> {
-    field::<f32>(data, name).map(f64::from)
-}
-
-/// Of microseconds; `None` where no clock counts as far.
-fn nanoseconds(microseconds: u64) -> Option<i64> {
-    i64::try_from(microseconds).ok()?.checked_mul(1000)
 }
 
 #[cfg(test)]

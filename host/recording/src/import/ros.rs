@@ -7,7 +7,7 @@ use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
-use super::log::{Choice, Readings};
+use super::readings::{Choice, Readings, guarded};
 use super::sqlite::Database;
 use crate::error::{Argument, Error, Result};
 
@@ -149,6 +149,10 @@ fn damaged(path: &Path, error: &dyn std::fmt::Display) -> Error {
 
 /// Reads a bag of ROS 1.
 pub(super) fn read_bag(path: &Path, choice: Choice<'_>) -> Result<Vec<Readings>> {
+    chosen(path, guarded(path, || messages_of_bag(path))?, choice)
+}
+
+fn messages_of_bag(path: &Path) -> Result<Found> {
     use rosbag::{ChunkRecord, IndexRecord, MessageRecord, RosBag};
     let damaged = |error: rosbag::Error| damaged(path, &error);
     File::open(path).map_err(|error| Error::io(path, &error))?;
@@ -171,7 +175,7 @@ pub(super) fn read_bag(path: &Path, choice: Choice<'_>) -> Result<Vec<Readings>>
         }
     }
     merge(&mut found);
-    chosen(path, found, choice)
+    Ok(found)
 }
 
 /// Makes one topic of all connections to it: each node that publishes has one of its own.
@@ -193,6 +197,10 @@ fn merge(found: &mut Found) {
 
 /// Reads an MCAP file.
 pub(super) fn read_mcap(path: &Path, choice: Choice<'_>) -> Result<Vec<Readings>> {
+    chosen(path, guarded(path, || messages_of_mcap(path))?, choice)
+}
+
+fn messages_of_mcap(path: &Path) -> Result<Found> {
     use mcap::records::Record;
     use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
     let io = |error: std::io::Error| Error::io(path, &error);
@@ -228,7 +236,7 @@ pub(super) fn read_mcap(path: &Path, choice: Choice<'_>) -> Result<Vec<Readings>
         }
     }
     merge(&mut found);
-    chosen(path, found, choice)
+    Ok(found)
 }
 
 /// Reads a bag of ROS 2 in an SQLite file.
@@ -242,16 +250,13 @@ pub(super) fn read_db3(path: &Path, choice: Choice<'_>) -> Result<Vec<Readings>>
         let remedy = "open it once, with ros2 bag info or sqlite3, which takes them in";
         return Err(Error::new(path.display(), problem, remedy));
     }
-    let database = std::fs::File::open(path).map_err(|error| Error::io(path, &error));
-    database?;
-    let mut found = Found::default();
-    match messages_of(path, &mut found) {
-        Ok(()) => chosen(path, found, choice),
-        Err(problem) => Err(damaged(path, &problem)),
-    }
+    File::open(path).map_err(|error| Error::io(path, &error))?;
+    let found = messages_of_database(path).map_err(|problem| damaged(path, &problem))?;
+    chosen(path, found, choice)
 }
 
-fn messages_of(path: &Path, found: &mut Found) -> std::result::Result<(), String> {
+fn messages_of_database(path: &Path) -> std::result::Result<Found, String> {
+    let mut found = Found::default();
     let database = Database::open(path)?;
     let tables = database.tables()?;
     let table = |name: &str| {
@@ -282,8 +287,8 @@ fn messages_of(path: &Path, found: &mut Found) -> std::result::Result<(), String
         }
         Ok(())
     })?;
-    merge(found);
-    Ok(())
+    merge(&mut found);
+    Ok(found)
 }
 
 /// Takes numbers from the bytes of a message.

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::log::{Choice, Readings};
+use super::readings::{Choice, Readings};
 use crate::error::{Error, Result};
 
 pub(super) fn read_bag(path: &Path, _: Choice<'_>) -> Result<Vec<Readings>> {

@@ -5,7 +5,6 @@
 
 use std::path::PathBuf;
 
-use super::super::log;
 use super::super::text_table::Cells;
 use super::super::time::Stamp;
 use super::*;
@@ -15,7 +14,7 @@ fn fixture() -> PathBuf {
 }
 
 fn open(path: &Path, topic: Option<&str>, instance: Option<u32>) -> Result<Vec<Readings>> {
-    log::read(path, Choice { topic, instance })
+    read(path, Choice { topic, instance })
 }
 
 fn rows(readings: &mut Readings) -> Vec<(Stamp, Vec<f64>)> {

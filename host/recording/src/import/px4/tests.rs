@@ -3,7 +3,6 @@
 
 use std::path::PathBuf;
 
-use super::super::log;
 use super::super::text_table::Cells;
 use super::super::time::Stamp;
 use super::*;
@@ -21,7 +20,7 @@ fn real(name: &str) -> Option<PathBuf> {
 }
 
 fn open(path: &Path, topic: Option<&str>, instance: Option<u32>) -> Result<Vec<Readings>> {
-    log::read(path, Choice { topic, instance })
+    read(path, Choice { topic, instance })
 }
 
 /// Stamps, ns, and values of all rows.

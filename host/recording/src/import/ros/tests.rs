@@ -5,7 +5,6 @@
 
 use std::path::PathBuf;
 
-use super::super::log;
 use super::super::text_table::Cells;
 use super::super::time::Stamp;
 use super::*;
@@ -16,13 +15,15 @@ fn fixture(name: &str) -> PathBuf {
 }
 
 fn open(path: &Path, topic: Option<&str>) -> Result<Vec<Readings>> {
-    log::read(
-        path,
-        Choice {
-            topic,
-            instance: None,
-        },
-    )
+    let choice = Choice {
+        topic,
+        instance: None,
+    };
+    match path.extension().and_then(|ending| ending.to_str()) {
+        Some("bag") => read_bag(path, choice),
+        Some("mcap") => read_mcap(path, choice),
+        _ => read_db3(path, choice),
+    }
 }
 
 fn check(name: &str, topic: Option<&str>) {
