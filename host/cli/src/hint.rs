@@ -4,14 +4,16 @@ use mimu::warning::Warning;
 use mimu_recording::error::{Argument, Error};
 
 /// Flags of the import, which are a remedy after any command that reads a recording. Others are one only on the command that refused.
-const OF_THE_IMPORT: [&str; 11] = [
+const OF_THE_IMPORT: [&str; 13] = [
     "--columns",
     "--rate-hz",
     "--time-unit",
     "--scale",
     "--offset",
     "--reference",
+    "--where",
     "--topic",
+    "--instance",
     "--preset",
     "--means",
     "--skip-broken",
@@ -75,6 +77,8 @@ fn flag(argument: Argument) -> Option<&'static str> {
         Argument::Port => "--port",
         Argument::OtherUnit => "--other-unit",
         Argument::Topic => "--topic",
+        Argument::Where => "--where",
+        Argument::Instance => "--instance",
         Argument::Preset => "--preset",
         Argument::Means => "--means",
         Argument::SkipBroken => "--skip-broken",

@@ -77,6 +77,10 @@ pub enum Argument {
     OtherUnit,
     /// Topic of a bag.
     Topic,
+    /// Which of several sensors in a log.
+    Instance,
+    /// Which rows of a foreign file are read.
+    Where,
     /// Whose layout a foreign file has.
     Preset,
     /// Whether rows are means, and no samples.

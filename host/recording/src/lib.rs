@@ -3,6 +3,9 @@
 //! A recording is a directory with `recording.toml` ([`Manifest`]) and `samples.csv` or
 //! `samples.parquet`. Four hours at 1 kHz are ordinary, so nothing here holds a whole file:
 //! [`Recording::for_each_batch`] hands rows over in order, a few thousand at a time.
+//!
+//! The features `parquet` and `bags` are on by default. Without them neither Parquet nor the readers of ROS bags and MCAP are compiled, recordings are
+//! CSV, and such files are refused.
 
 pub mod error;
 pub mod result_file;
@@ -21,27 +24,38 @@ mod in_order;
 mod manifest;
 mod no_temperature;
 mod parents;
+#[cfg(feature = "parquet")]
 mod parquet_file;
+#[cfg(feature = "parquet")]
 mod parquet_writer;
+mod raw_channels;
 mod reader;
 mod recorded;
-#[cfg(test)]
+#[cfg(all(test, feature = "parquet"))]
 mod round_trip_tests;
 mod separator;
 mod staging;
+#[cfg(feature = "parquet")]
 mod strict_file;
 mod toml_file;
 mod warning;
+#[cfg(not(feature = "parquet"))]
+mod without_parquet;
 mod writer;
+
+#[cfg(not(feature = "parquet"))]
+use without_parquet as parquet_file;
+#[cfg(not(feature = "parquet"))]
+use without_parquet as parquet_writer;
 
 pub use batch::Batch;
 pub use columns::{Column, Columns, RAW_COLUMNS, REFERENCE_COLUMNS};
 pub use growing::Growing;
 pub use held::{Held, HeldReadings};
 pub use import::{
-    BrokenKind, BrokenLimit, BrokenRows, Chosen, ColumnList, Decimal, ImportOptions, ImportSummary,
-    Inputs, Jitter, Offset, PoseMean, PoseMeans, Preset, PresetUse, Role, Rounds, Scale,
-    SkippedLines, TimeSummary, import, is_bag,
+    BrokenKind, BrokenLimit, BrokenRows, Chosen, ColumnList, Decimal, Face, ImportOptions,
+    ImportSummary, Inputs, Jitter, Offset, PoseMean, PoseMeans, Preset, PresetUse, Role, Rounds,
+    RowFilter, Scale, SkippedLines, TimeSummary, TwosComplement, Zero, import, is_log,
 };
 pub use manifest::{Format, MANIFEST_FILE, Manifest, Rails, RawUnit, Reference, Source};
 pub use no_temperature::NoTemperatures;

@@ -1,7 +1,8 @@
 //! Two bytes of a reading of which a firmware took the low one for a signed number, `(high << 8) + (int8_t)low`.
 
-use crate::columns::{Column, RAW_COLUMNS};
+use crate::columns::Column;
 use crate::error::{Error, Result};
+use crate::raw_channels::RawChannels;
 
 /// Values of a byte.
 const BYTE: f64 = 256.0;
@@ -23,17 +24,12 @@ pub fn undone(reading: f64) -> f64 {
 
 /// Raw channels that an import mends.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct SignedLowByte {
-    /// `gyro`, `accel` or the name of a raw column.
-    target: String,
-}
+pub struct SignedLowByte(RawChannels);
 
 impl SignedLowByte {
     /// Whether it is the fault of `column`.
     pub(crate) fn applies_to(&self, column: Column) -> bool {
-        let name = column.name();
-        matches!(column, Column::Raw(_))
-            && (name == self.target || name.split('_').next() == Some(&self.target))
+        self.0.have(column)
     }
 }
 
@@ -41,22 +37,17 @@ impl std::str::FromStr for SignedLowByte {
     type Err = Error;
 
     fn from_str(text: &str) -> Result<Self> {
-        match text == "gyro" || text == "accel" || RAW_COLUMNS.contains(&text) {
-            true => Ok(Self {
-                target: text.to_owned(),
-            }),
-            false => Err(Error::new(
-                "signed low byte",
-                format!("{} is no raw column", crate::cell::shorten(text.as_bytes())),
-                "write gyro, accel or a single column such as gyro_x",
-            )),
-        }
+        let channels = RawChannels::named(text).map_err(|problem| {
+            let remedy = "write gyro, accel or a single column such as gyro_x";
+            Error::new("signed low byte", problem, remedy)
+        })?;
+        Ok(Self(channels))
     }
 }
 
 impl std::fmt::Display for SignedLowByte {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(&self.target)
+        self.0.fmt(f)
     }
 }
 

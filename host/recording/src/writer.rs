@@ -15,9 +15,10 @@ use crate::error::{Error, Result};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum SampleFormat {
     /// `samples.parquet`: a third of the size of CSV, and read several times as fast.
-    #[default]
+    #[cfg_attr(feature = "parquet", default)]
     Parquet,
     /// `samples.csv`: for people and for small recordings.
+    #[cfg_attr(not(feature = "parquet"), default)]
     Csv,
 }
 

@@ -9,8 +9,8 @@ use mimu::warning::Warning;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::signed_low_byte::SignedLowByte;
 use mimu_recording::{
-    BrokenLimit, ColumnList, Decimal, ImportOptions, Offset, Preset, RawUnit, Reference,
-    SampleFormat, Scale, Separator, import, is_bag,
+    BrokenLimit, ColumnList, Decimal, Face, ImportOptions, Offset, Preset, RawUnit, Reference,
+    RowFilter, SampleFormat, Scale, Separator, TwosComplement, Zero, import, is_log,
 };
 
 use crate::arguments::JsonArgs;
@@ -19,9 +19,9 @@ use crate::report;
 
 #[derive(Args)]
 pub(crate) struct ImportArgs {
-    /// Text files (any separator), Parquet, ROS 1 bags or MCAP, or the folder of a preset; the later ones are joined onto the
-    /// times of the first
-    #[arg(required = true)]
+    /// Text files (any separator), Parquet, bags of ROS 1 (.bag) and ROS 2 (.db3, .mcap), logs of PX4 (.ulg) and ArduPilot (.bin), or
+    /// the folder of a preset; the later ones are joined onto the times of the first
+    #[arg(required_unless_present = "faces")]
     files: Vec<PathBuf>,
     /// Columns of a file from the left (`t_s,accel_x,-`; `-` skips one), or by the names in its header
     /// (`gyro_x=wx,t_s=time`); once for each file
@@ -40,6 +40,25 @@ pub(crate) struct ImportArgs {
     /// The files follow one another, as those of six faces: each is a step with the name of its file, and one list of columns serves all
     #[arg(long, conflicts_with = "means")]
     sequence: bool,
+    /// One file for each face, with the axis that was up: `--faces +x=a.csv -x=b.csv +y=c.csv -y=d.csv +z=e.csv -z=f.csv`; with
+    /// --reference table the specific forces follow
+    #[arg(long, conflicts_with_all = ["means", "sequence", "inputs"])]
+    faces: bool,
+    /// With --faces: the file with x down
+    #[arg(short = 'x', value_name = "FILE", requires = "faces")]
+    x_down: Vec<PathBuf>,
+    /// With --faces: the file with y down
+    #[arg(short = 'y', value_name = "FILE", requires = "faces")]
+    y_down: Vec<PathBuf>,
+    /// With --faces: the file with z down
+    #[arg(short = 'z', value_name = "FILE", requires = "faces")]
+    z_down: Vec<PathBuf>,
+    /// Rows after a pause of more than so many seconds are a new step, as where nothing was recorded between the poses
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, conflicts_with_all = ["means", "sequence", "faces"])]
+    step_gap: Option<f64>,
+    /// Only the rows in which a column has this value, as one of several sensors in a file: `channel=3`; repeated, all must hold
+    #[arg(long = "where", value_name = "COLUMN=VALUE", conflicts_with = "means")]
+    filters: Vec<RowFilter>,
     /// Sample rate, Hz, of files without a time column. Of others it is the rate of their time stamps, which this one checks;
     /// it decides where stamps in bursts can be read in two ways
     #[arg(long, allow_negative_numbers = true)]
@@ -50,12 +69,16 @@ pub(crate) struct ImportArgs {
     /// Local gravity, m/s²; without it, normal gravity at sea level of --latitude, or 9.80665 and a warning
     #[arg(long, allow_negative_numbers = true)]
     gravity: Option<f64>,
-    /// Unit of the raw columns, after --scale: V, count or SI (rad/s and m/s²); bags and most presets have SI without it
+    /// Unit of the raw columns, after --scale: V, count or SI (rad/s and m/s²); bags, logs and most presets have SI without it
     #[arg(long, value_name = "UNIT")]
     raw_unit: Option<RawUnit>,
-    /// Topic of a bag with sensor_msgs/Imu; without it, the only one
+    /// Topic of a bag with sensor_msgs/Imu, of a PX4 log (sensor_gyro, sensor_combined) or message of an ArduPilot log (IMU, GYR, IMT);
+    /// without it, the only or the best one
     #[arg(long)]
     topic: Option<String>,
+    /// Which sensor of a log of PX4 or ArduPilot, from 0; without it, the only one
+    #[arg(long, value_name = "N")]
+    instance: Option<u32>,
     /// What is known of the input: table (ref_ columns or --inputs) or gravity (its size, at rest)
     #[arg(long)]
     reference: Reference,
@@ -70,6 +93,12 @@ pub(crate) struct ImportArgs {
     /// `(high << 8) + (int8_t)low` reads 256 counts low where the low byte is 128 or more. The readings have to be whole counts.
     #[arg(long, value_name = "COLUMN", conflicts_with = "means")]
     signed_low_byte: Vec<SignedLowByte>,
+    /// Raw columns of unsigned codes in two's complement, with their bits: `accel=12`
+    #[arg(long, value_name = "COLUMN=BITS", conflicts_with = "means")]
+    twos_complement: Vec<TwosComplement>,
+    /// Code that raw columns have at an input of 0, subtracted before --scale: `gyro=2048`
+    #[arg(long, value_name = "COLUMN=CODE", conflicts_with = "means")]
+    zero: Vec<Zero>,
     /// Name of the unit; without it, the name of the recording
     #[arg(long)]
     device: Option<String>,
@@ -111,7 +140,35 @@ fn presets() -> impl TypedValueParser<Value = Preset> {
 /// Sample rates below this are more likely a wrong unit of time.
 const SLOW_HZ: f64 = 5.0;
 
+/// The files of `args` with their faces, where it names them: `+x=a.csv` among the files, `-x=b.csv` as an option.
+fn faces(args: &ImportArgs) -> Result<(Vec<PathBuf>, Vec<Face>)> {
+    if !args.faces {
+        return Ok((args.files.clone(), Vec::new()));
+    }
+    let mut both = Vec::new();
+    for file in &args.files {
+        let text = file.to_string_lossy();
+        let (face, path) = text.split_once('=').ok_or_else(|| {
+            let problem = "no axis is given that was up while it was recorded";
+            Error::new(file.display(), problem, format!("write it like +x={text}"))
+        })?;
+        both.push((face.parse::<Face>()?, PathBuf::from(path)));
+    }
+    for (face, files) in [
+        ("-x", &args.x_down),
+        ("-y", &args.y_down),
+        ("-z", &args.z_down),
+    ] {
+        for file in files {
+            both.push((face.parse()?, file.clone()));
+        }
+    }
+    both.sort_by_key(|(face, _)| *face);
+    Ok(both.into_iter().map(|(face, path)| (path, face)).unzip())
+}
+
 pub(crate) fn run(args: ImportArgs) -> Result<()> {
+    let (files, faces) = faces(&args)?;
     let (gravity, assumed) = match (args.gravity, args.latitude) {
         (Some(gravity), latitude) => (
             gravity,
@@ -125,19 +182,23 @@ pub(crate) fn run(args: ImportArgs) -> Result<()> {
     };
     let chosen = match (&args.preset, args.columns.is_empty()) {
         (None, false) => None,
-        (named, _) => Preset::choose(*named, &args.files, args.separator)?,
+        (named, _) => Preset::choose(*named, &files, args.separator)?,
     };
-    let bags = args.files.iter().all(|file| is_bag(file));
+    let logs = files.iter().all(|file| is_log(file));
     let raw_unit = args
         .raw_unit
         .or(chosen.as_ref().and_then(|chosen| chosen.raw_unit))
-        .or(bags.then_some(RawUnit::Si))
+        .or(logs.then_some(RawUnit::Si))
         .ok_or_else(|| {
             let remedy = "give --raw-unit: V, count or SI (rad/s and m/s²)";
             Error::new("import", "the unit of the readings is not known", remedy)
         })?;
     let options = ImportOptions {
         topic: args.topic,
+        instance: args.instance,
+        twos_complements: args.twos_complement,
+        zeros: args.zero,
+        step_gap_s: args.step_gap,
         columns: args.columns,
         separator: args.separator,
         rate_hz: args.rate_hz,
@@ -150,10 +211,12 @@ pub(crate) fn run(args: ImportArgs) -> Result<()> {
         inputs: args.inputs,
         means: args.means,
         sequence: args.sequence,
+        faces,
+        filters: args.filters,
         skip_broken: args.skip_broken.unwrap_or_default(),
         format: args.format,
         replace: args.replace,
-        ..ImportOptions::new(args.files, gravity, raw_unit, args.reference)
+        ..ImportOptions::new(files, gravity, raw_unit, args.reference)
     };
     let options = match chosen {
         Some(chosen) => options.with_preset(chosen),

@@ -39,6 +39,9 @@ pub fn import_text(summary: &ImportSummary) -> String {
     for time in &summary.time {
         let _ = writeln!(out, "  {}: {}", time.file, time_text(time));
     }
+    for note in &summary.notes {
+        let _ = writeln!(out, "  {note}");
+    }
     let skipped = summary.skipped;
     let counts = [
         (skipped.header, "header line", "skipped"),
@@ -59,6 +62,7 @@ pub fn import_text(summary: &ImportSummary) -> String {
             "row",
             "interpolated from another file",
         ),
+        (summary.not_chosen, "row", "left out: not chosen by --where"),
         (summary.padding, "row", "left out: all readings are 0"),
         (summary.empty_cells, "raw cell", "empty"),
     ];

@@ -230,3 +230,155 @@ fn rests_between_turns_of_known_angle_show_the_noise_and_are_no_outliers() {
     assert!(!text.contains("times the median"), "{text}");
     assert!(text.contains("the residual exceeds the noise"), "{text}");
 }
+
+/// The readings of a unit on a face: factors 1.02, 0.98 and 1.01 and biases of 0.1, -0.2 and 0.05 m/s², the noise of `noise`.
+fn face(axis: usize, sign: f64, noise: &mut impl FnMut() -> f64) -> String {
+    let mut force = [0.1, -0.2, 0.05];
+    force[axis] += sign * 9.81 * [1.02, 0.98, 1.01][axis];
+    let mut text = String::from("t,gx,gy,gz,ax,ay,az\n");
+    for i in 0..400 {
+        let [x, y, z] = force.map(|f| f + 0.01 * noise());
+        let rates = [0.01, -0.02, 0.005].map(|rate| rate + 0.001 * noise());
+        let [gx, gy, gz] = rates;
+        writeln!(
+            text,
+            "{:.2},{gx},{gy},{gz},{x},{y},{z}",
+            0.01 * f64::from(i)
+        )
+        .unwrap();
+    }
+    text
+}
+
+#[test]
+fn a_file_for_each_face_calibrates_the_accelerometer_and_says_why_there_is_no_gyro() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let mut noise = noise();
+    for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
+        for (sign, up) in [(1.0, "up"), (-1.0, "down")] {
+            let text = face(axis, sign, &mut noise);
+            std::fs::write(folder.join(format!("{name}_{up}.csv")), text).unwrap();
+        }
+    }
+    let columns = "--columns t_s=t,gyro_x=gx,gyro_y=gy,gyro_z=gz,accel_x=ax,accel_y=ay,accel_z=az --raw-unit SI --gravity 9.81";
+    let faces =
+        "--faces +x=x_up.csv -x=x_down.csv +y=y_up.csv -y=y_down.csv +z=z_up.csv -z=z_down.csv";
+    let text = right(
+        folder,
+        &format!("import {faces} {columns} --reference table -o six"),
+    );
+    assert!(
+        text.contains("no scale factor of the gyro follows"),
+        "{text}"
+    );
+    assert!(!text.contains("no file is of the faces"), "{text}");
+    let json = right(folder, "fit six --json -");
+    let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+    let sensors: Vec<&String> = json["sensors"].as_object().unwrap().keys().collect();
+    assert_eq!(sensors, ["accel"]);
+    let text = right(folder, "fit six");
+    let factors = text
+        .lines()
+        .find(|line| line.contains("scale factor"))
+        .unwrap();
+    for (found, truth) in factors
+        .split_whitespace()
+        .filter(|w| w.contains('.'))
+        .step_by(2)
+        .zip([1.02, 0.98, 1.01])
+    {
+        // 400 samples of 0.01 m/s² on each face: 0.0005 / 9.81 in a factor.
+        assert!(
+            (found.parse::<f64>().unwrap() - truth).abs() < 3e-4,
+            "{factors}"
+        );
+    }
+    assert!(
+        text.contains("warning: gyro: no usable dwell has a known input, so it is not calibrated"),
+        "{text}"
+    );
+
+    let text = right(
+        folder,
+        &format!(
+            "import --faces +x=x_up.csv -x=x_down.csv -z=z_down.csv {columns} --reference table -o three"
+        ),
+    );
+    assert!(
+        text.contains("no file is of the faces +y, -y, +z"),
+        "{text}"
+    );
+    let text = right(
+        folder,
+        &format!("import {faces} {columns} --reference gravity -o by_gravity"),
+    );
+    assert!(text.contains("six faces do not determine"), "{text}");
+    let error = refused(folder, "fit by_gravity");
+    assert!(
+        error.contains("at least 9 different ones are needed"),
+        "{error}"
+    );
+    let error = refused(
+        folder,
+        &format!("import --faces x_up.csv {columns} --reference table -o bad"),
+    );
+    assert!(error.contains("write it like +x=x_up.csv"), "{error}");
+    let error = refused(
+        folder,
+        &format!("import --faces +w=x_up.csv {columns} --reference table -o bad"),
+    );
+    assert!(error.contains("is no face"), "{error}");
+}
+
+#[test]
+fn flags_that_an_import_needs_are_named_where_it_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let fixture = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../recording/src/import/ardupilot/fixtures/two-sensors.bin"
+    );
+    std::fs::copy(fixture, folder.join("flight.bin")).unwrap();
+    let gravity = "--reference gravity --gravity 9.81 -o";
+    let error = refused(folder, &format!("import flight.bin {gravity} a"));
+    assert!(
+        error.contains("IMU instance 1") && error.contains("--instance"),
+        "{error}"
+    );
+    // Its unit is known, and what was undone is said.
+    let text = right(
+        folder,
+        &format!("import flight.bin --instance 0 --topic IMU {gravity} a"),
+    );
+    assert!(
+        text.contains("ArduPilot's calibration undone: gyro offset"),
+        "{text}"
+    );
+    let rows: String = (0..60)
+        .map(|i| format!("{},{},1,2,{i}\n", i % 3, 10 * (i / 3)))
+        .collect();
+    std::fs::write(
+        folder.join("three.csv"),
+        format!("channel,ms,a,b,c\n{rows}"),
+    )
+    .unwrap();
+    let list = "--columns t_s=ms,accel_x=a,accel_y=b,accel_z=c --raw-unit count";
+    let text = right(
+        folder,
+        &format!("import three.csv --where channel=1 {list} {gravity} b"),
+    );
+    assert!(
+        text.contains("20 rows at 100 Hz")
+            && text.contains("40 rows left out: not chosen by --where"),
+        "{text}"
+    );
+    let error = refused(
+        folder,
+        &format!("import three.csv --where channel=9 {list} {gravity} c"),
+    );
+    assert!(
+        error.contains("the column has \"0\", \"1\", \"2\"") && error.contains("(--where)"),
+        "{error}"
+    );
+}

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::assignment::{ColumnList, Scale};
 use super::foreign::{ForeignFile, HowToRead};
-use super::ros::is_bag;
+use super::log::is_log;
 use super::row::Row;
 use super::time::{Known, Stamps, Times};
 use crate::columns::Column;
@@ -59,7 +59,7 @@ fn read(path: &Path, how: &HowToRead<'_>) -> Result<Stamps> {
 impl HowToRead<'_> {
     /// Seconds in the unit of the stamps, where somebody has said so or the names are those of a recording.
     fn time_factor(&self, path: &Path) -> Option<f64> {
-        let own = match (is_bag(path), self.list) {
+        let own = match (is_log(path), self.list) {
             (true, _) => Some(1e-9),
             (false, None) => Some(1.0),
             (false, Some(_)) => None,

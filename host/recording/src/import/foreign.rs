@@ -5,19 +5,22 @@ use std::path::{Path, PathBuf};
 use super::SkippedLines;
 use super::assignment::{ColumnList, Offset, Role, Scale};
 use super::broken::{BrokenLimit, BrokenTally, Fault, Unreadable};
+use super::codes::{Conversion, TwosComplement, Zero};
 use super::counter::{Counter, StampCounter};
+use super::log::{self, is_log};
 use super::parquet_table::ParquetTable;
 use super::plausibility::Plausibility;
-use super::ros::{ImuTopic, is_bag};
+use super::readings::{Choice, Readings};
 use super::row::Row;
+use super::row_filter::RowFilter;
 use super::step_labels::StepLabels;
 use super::text_table::{Cells, TextTable};
 use super::time::{Clock, Decimal, Times};
-use crate::cell::{Refusal, is_reading, no_reading, no_time};
+use crate::cell::{is_reading, no_reading, no_time};
 use crate::columns::Column;
 use crate::error::{Argument, Error, Result};
 use crate::separator::Separator;
-use crate::signed_low_byte::{SignedLowByte, undone};
+use crate::signed_low_byte::SignedLowByte;
 
 /// How to read a foreign file.
 #[derive(Debug, Clone)]
@@ -27,8 +30,14 @@ pub(super) struct HowToRead<'a> {
     pub scales: &'a [Scale],
     pub offsets: &'a [Offset],
     pub signed_low_bytes: &'a [SignedLowByte],
-    /// Topic of a bag.
-    pub topic: Option<&'a str>,
+    pub twos_complements: &'a [TwosComplement],
+    pub zeros: &'a [Zero],
+    /// Which rows are wanted.
+    pub filters: &'a [RowFilter],
+    /// Which sensor of a log is wanted.
+    pub choice: Choice<'a>,
+    /// Which of the readings of a log, counted from 0.
+    pub part: usize,
     /// Sample rate, where it was given or is known.
     pub rate_hz: Option<f64>,
     /// Unit of the time stamps, where it was given.
@@ -37,11 +46,26 @@ pub(super) struct HowToRead<'a> {
     pub skip_broken: BrokenLimit,
 }
 
+impl HowToRead<'_> {
+    /// What is done to the cells of `column`.
+    fn conversion(&self, column: Column) -> Conversion {
+        Conversion {
+            twos_complement: TwosComplement::bits(self.twos_complements, column),
+            signed_low_byte: self.signed_low_bytes.iter().any(|s| s.applies_to(column)),
+            zero: Zero::of(self.zeros, column),
+            factor: Scale::product(self.scales, column),
+            offset: Offset::sum(self.offsets, column),
+        }
+    }
+}
+
 /// A foreign file, positioned at its next row.
 #[derive(Debug)]
 pub(super) struct ForeignFile {
     path: PathBuf,
     table: Table,
+    /// How many parts the file has: those of a log whose sensors have clocks of their own.
+    pub parts: usize,
     cells: Cells,
     source: TimeSource,
     counter: Counter,
@@ -62,7 +86,7 @@ pub(super) struct ForeignFile {
 enum Table {
     Text(TextTable),
     Parquet(ParquetTable),
-    Bag(ImuTopic),
+    Log(Readings),
 }
 
 /// A cell that becomes a value of a row.
@@ -71,10 +95,7 @@ struct Cell {
     /// Position among the cells.
     at: usize,
     column: Column,
-    factor: f64,
-    offset: f64,
-    /// Whether a firmware took its low byte for a signed number.
-    signed_low_byte: bool,
+    conversion: Conversion,
 }
 
 /// Where the time of a row comes from.
@@ -94,21 +115,31 @@ impl ForeignFile {
         let parquet = path
             .extension()
             .is_some_and(|e| e.eq_ignore_ascii_case("parquet"));
-        if is_bag(path) && how.list.is_some() {
-            let problem = "a list of columns is given for a bag, whose messages have their own";
+        let mut parts = 1;
+        if is_log(path) && how.list.is_some() {
+            let problem = "a list of columns is given for a log, whose messages have their own";
             return Err(
                 Error::new(path.display(), problem, "leave it out").about(Argument::Columns)
             );
         }
+        if is_log(path) && !how.filters.is_empty() {
+            let problem = "rows are chosen by a column, and the messages of a log have none";
+            let remedy = "leave it out, and choose the topic or the instance";
+            return Err(Error::new(path.display(), problem, remedy).about(Argument::Where));
+        }
         let table = match parquet {
-            _ if is_bag(path) => Table::Bag(ImuTopic::open(path, how.topic)?),
-            true => Table::Parquet(ParquetTable::open(path, how.list)?),
-            false => Table::Text(TextTable::open(path, how.list, how.separator)?),
+            _ if is_log(path) => {
+                let mut all = log::read(path, how.choice)?;
+                parts = all.len();
+                Table::Log(all.swap_remove(how.part))
+            }
+            true => Table::Parquet(ParquetTable::open(path, how.list, how.filters)?),
+            false => Table::Text(TextTable::open(path, how.list, how.separator, how.filters)?),
         };
         let roles = match &table {
             Table::Text(table) => table.roles(),
             Table::Parquet(table) => table.roles(),
-            Table::Bag(topic) => topic.roles(),
+            Table::Log(readings) => readings.roles(),
         };
         let of_means = |role: &&Role| matches!(role, Role::Deviation(_) | Role::Averaged(_));
         if let Some(role) = roles.iter().find(of_means) {
@@ -147,9 +178,7 @@ impl ForeignFile {
                 Role::Column(column) => Some(Cell {
                     at: cell,
                     column: *column,
-                    factor: Scale::product(how.scales, *column),
-                    offset: Offset::sum(how.offsets, *column),
-                    signed_low_byte: how.signed_low_bytes.iter().any(|s| s.applies_to(*column)),
+                    conversion: how.conversion(*column),
                 }),
             });
         let values: Vec<Cell> = numbers.collect();
@@ -159,6 +188,7 @@ impl ForeignFile {
             values,
             has_step: at(Role::Column(Column::Step)).is_some(),
             table,
+            parts,
             cells: Cells::default(),
             source,
             counter: Counter::default(),
@@ -209,7 +239,16 @@ impl ForeignFile {
     pub fn skipped(&self) -> SkippedLines {
         match &self.table {
             Table::Text(table) => table.skipped,
-            Table::Parquet(_) | Table::Bag(_) => SkippedLines::default(),
+            Table::Parquet(_) | Table::Log(_) => SkippedLines::default(),
+        }
+    }
+
+    /// Rows that were left out as they are not those that were asked for, so far.
+    pub fn not_chosen(&self) -> u64 {
+        match &self.table {
+            Table::Text(table) => table.left_out(),
+            Table::Parquet(table) => table.filters.left_out,
+            Table::Log(_) => 0,
         }
     }
 
@@ -217,7 +256,7 @@ impl ForeignFile {
     pub fn zero_bytes(&self) -> u64 {
         match &self.table {
             Table::Text(table) => table.zero_bytes,
-            Table::Parquet(_) | Table::Bag(_) => 0,
+            Table::Parquet(_) | Table::Log(_) => 0,
         }
     }
 
@@ -226,7 +265,15 @@ impl ForeignFile {
         match &self.table {
             Table::Text(table) => &table.warnings,
             Table::Parquet(table) => &table.warnings,
-            Table::Bag(_) => &[],
+            Table::Log(readings) => &readings.warnings,
+        }
+    }
+
+    /// What was read of a log, and what was done to it.
+    pub fn notes(&self) -> &[String] {
+        match &self.table {
+            Table::Log(readings) => &readings.notes,
+            Table::Text(_) | Table::Parquet(_) => &[],
         }
     }
 
@@ -245,7 +292,7 @@ impl ForeignFile {
         match &self.table {
             Table::Text(table) => table.progress(),
             Table::Parquet(table) => table.progress(),
-            Table::Bag(topic) => topic.progress(),
+            Table::Log(readings) => readings.progress(),
         }
     }
 
@@ -262,6 +309,11 @@ impl ForeignFile {
                 Ok(true) => self.broken.rows += 1,
                 Ok(false) => {
                     self.broken.check()?;
+                    match &self.table {
+                        Table::Text(table) => table.check_filters()?,
+                        Table::Parquet(table) => table.filters.check(&self.path)?,
+                        Table::Log(_) => {}
+                    }
                     return Ok(false);
                 }
                 Err(Unreadable::Row(broken)) => {
@@ -297,7 +349,7 @@ impl ForeignFile {
         let number = match &mut self.table {
             Table::Text(table) => table.next(&mut self.cells)?,
             Table::Parquet(table) => table.next(&mut self.cells)?,
-            Table::Bag(topic) => topic.next(&mut self.cells),
+            Table::Log(readings) => readings.next(&mut self.cells),
         };
         let Some(number) = number else {
             return Ok(false);
@@ -323,32 +375,11 @@ impl ForeignFile {
         }
         row.values.clear();
         for cell in &self.values {
-            let (number_in_file, factor) = (self.cells.numbers[cell.at], cell.factor);
-            let reading = match cell.signed_low_byte {
-                true if number_in_file.is_finite() && number_in_file.fract() != 0.0 => {
-                    let place = format!("{}, column {}", at(&self.path), cell.column.name());
-                    let refusal = Refusal {
-                        problem: format!(
-                            "{number_in_file} has a fraction, and two bytes make whole counts"
-                        ),
-                        remedy: "give the log as it was recorded, without factors or means",
-                    };
-                    return Err(Unreadable::row(number, Fault::Reading, place, refusal));
-                }
-                true => undone(number_in_file),
-                false => number_in_file,
-            };
-            let value = reading * factor + cell.offset;
-            if !is_reading(value) {
+            let number_in_file = self.cells.numbers[cell.at];
+            let value = cell.conversion.reading(number_in_file).map_err(|refusal| {
                 let place = format!("{}, column {}", at(&self.path), cell.column.name());
-                let refusal = Refusal {
-                    problem: format!(
-                        "{number_in_file:e} times {factor:e} is too large for a reading"
-                    ),
-                    remedy: "correct the cell or the factor",
-                };
-                return Err(Unreadable::row(number, Fault::Reading, place, refusal));
-            }
+                Unreadable::row(number, Fault::Reading, place, refusal)
+            })?;
             row.values.push(value);
         }
         row.step = -1;

@@ -3,6 +3,7 @@
 use std::collections::{BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 
+use super::faces::Face;
 use super::step_labels::StepLabels;
 use crate::cell::{self, shorten};
 use crate::columns::REFERENCE_COLUMNS;
@@ -54,6 +55,26 @@ impl Inputs {
         let bytes = std::fs::read(path).map_err(io)?;
         super::binary::refuse_binary(path, &bytes[..bytes.len().min(4096)])?;
         Self::parse(&bytes, path)
+    }
+
+    /// Those of steps that are named by the face that is up.
+    pub(super) fn of_faces(faces: &[Face], gravity_mps2: f64) -> Inputs {
+        let step = |(row, face): (u64, &Face)| {
+            let step = Step {
+                row,
+                input: face.inputs(gravity_mps2),
+                turn_deg: [f64::NAN; 3],
+                used: false,
+            };
+            (face.to_string(), step)
+        };
+        Inputs {
+            path: PathBuf::from("faces"),
+            columns: [false, false, false, true, true, true],
+            has_turns: false,
+            turns: BTreeSet::new(),
+            steps: (1..).zip(faces).map(step).collect(),
+        }
     }
 
     fn parse(bytes: &[u8], path: &Path) -> Result<Inputs> {

@@ -1,5 +1,6 @@
 //! Several files as one recording: each row of the first with what the others have at that time.
 
+use std::collections::VecDeque;
 use std::path::Path;
 
 use super::first_pass;
@@ -41,6 +42,8 @@ pub(super) struct JoinedFiles {
     resampler: Option<Resampler>,
     /// Where the first file stands in a sequence of them.
     pub place: Option<Place>,
+    /// Pause that parts two steps, s.
+    step_gap_s: Option<f64>,
     followers: Vec<Follower>,
     pub rate_hz: f64,
     pub columns: Columns,
@@ -76,12 +79,24 @@ impl JoinedFiles {
         let polled = first_times.as_ref().filter(|t| t.summary.polled.is_some());
         let resampler = polled.map(|times| Resampler::new(times.period_s()));
         let mut followers = Vec::new();
-        for (index, path) in options.files.iter().enumerate().skip(1) {
+        let others = (1..options.files.len()).map(|index| (index, 0));
+        let mut waiting: VecDeque<(usize, usize)> = (1..first.parts)
+            .map(|part| (0, part))
+            .chain(others)
+            .collect();
+        while let Some((index, part)) = waiting.pop_front() {
+            let path = &options.files[index];
             let how = HowToRead {
                 rate_hz: options.rate_hz.or(Some(rate_hz)),
+                part,
                 ..options.how(index)
             };
             let mut file = ForeignFile::open(path, &how)?;
+            if part == 0 {
+                (1..file.parts)
+                    .rev()
+                    .for_each(|part| waiting.push_front((index, part)));
+            }
             if file.has_step() {
                 let problem = "the column step is not in the first file";
                 let remedy = "name the file with the steps first";
@@ -105,15 +120,19 @@ impl JoinedFiles {
                     .flat_map(|follower| follower.file.columns()),
             )
             .collect();
-        let mut inputs = options
-            .inputs
-            .as_deref()
-            .map(StepInputs::read)
-            .transpose()?;
+        let mut inputs = StepInputs::of(options)?;
         let mut names: Vec<&str> = vec![Column::Time.name()];
         let kept = |column: &&Column| !matches!(column, Column::Raw(c) if left_out[c / 3]);
         names.extend(order.iter().filter(kept).map(|column| column.name()));
-        if first.has_step() || options.sequence {
+        let by_pauses = options.step_gap_s.is_some();
+        if by_pauses && first.has_step() {
+            let problem = "it has a column step, and steps are to be parted by pauses";
+            let remedy = "skip the column, or leave out the pause";
+            return Err(
+                Error::new(first.path().display(), problem, remedy).about(Argument::Columns)
+            );
+        }
+        if first.has_step() || options.is_sequence() || by_pauses {
             names.push(Column::Step.name());
         }
         let given = inputs.as_ref().map_or([false; 6], StepInputs::columns);
@@ -123,7 +142,15 @@ impl JoinedFiles {
         names.extend(given);
         // The same rules as for a recording's header: nothing twice, all axes of a sensor.
         let columns = Layout::from_names(&names, "import, all columns together")?.columns;
-        if inputs.is_some() && !first.has_step() && !options.sequence {
+        if by_pauses && inputs.as_ref().is_some_and(StepInputs::has_turns) {
+            let problem = "the table of inputs has angles, and turns are not parted by pauses";
+            return Err(Error::new(
+                "import",
+                problem,
+                "name the column with the steps",
+            ));
+        }
+        if inputs.is_some() && !first.has_step() && !options.is_sequence() && !by_pauses {
             let problem = "a table of inputs is given, and no column is step";
             return Err(Error::new(
                 "import",
@@ -166,6 +193,7 @@ impl JoinedFiles {
             first,
             resampler,
             place: None,
+            step_gap_s: options.step_gap_s,
             followers,
         })
     }
@@ -191,8 +219,13 @@ impl JoinedFiles {
         let mut values = Vec::new();
         let mut batch = Batch::default();
         let mut last_t_s = f64::NEG_INFINITY;
+        let mut step = 0;
         while resample::next(&mut self.first, self.resampler.as_mut(), &mut row)? {
             check_order(&self.first, &row, last_t_s)?;
+            if let Some(gap_s) = self.step_gap_s {
+                step += i32::from(row.t_s - last_t_s > gap_s && last_t_s.is_finite());
+                row.step = step;
+            }
             last_t_s = row.t_s;
             if let Some(place) = &mut self.place {
                 place.put(&mut row);

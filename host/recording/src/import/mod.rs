@@ -1,42 +1,66 @@
 //! Import of foreign files: text of any common shape, and Parquet.
 
+mod ardupilot;
 mod assignment;
 mod binary;
 mod broken;
+mod codes;
 mod counter;
+mod faces;
 mod first_pass;
 mod foreign;
 mod inputs;
 mod join;
 mod joined;
+mod log;
 mod options;
+#[cfg(feature = "parquet")]
 mod parquet_table;
 mod place;
 mod plausibility;
 mod pose_means;
 mod preset;
+mod px4;
+mod readings;
 mod resample;
+#[cfg(feature = "bags")]
 mod ros;
+mod rotation;
 mod row;
+mod row_filter;
 mod sequence;
+#[cfg(feature = "bags")]
+mod sqlite;
 mod step_inputs;
 mod step_labels;
 mod summary;
-#[cfg(test)]
+#[cfg(all(test, feature = "parquet"))]
 mod tests;
 mod text_table;
 mod time;
 mod two_sources;
+#[cfg(not(feature = "bags"))]
+mod without_bags;
+#[cfg(not(feature = "parquet"))]
+mod without_parquet;
+
+#[cfg(not(feature = "bags"))]
+use without_bags as ros;
+#[cfg(not(feature = "parquet"))]
+use without_parquet as parquet_table;
 
 use std::path::Path;
 
 pub use assignment::{ColumnList, Offset, Role, Scale};
 pub use broken::{BrokenKind, BrokenLimit, BrokenRows};
+pub use codes::{TwosComplement, Zero};
+pub use faces::Face;
 pub use inputs::Inputs;
+pub use log::is_log;
 pub use options::ImportOptions;
 pub use pose_means::{PoseMean, PoseMeans};
 pub use preset::{Chosen, Preset, PresetUse};
-pub use ros::is_bag;
+pub use row_filter::RowFilter;
 pub use summary::{ImportSummary, SkippedLines};
 pub use time::{Decimal, Jitter, Rounds, TimeSummary};
 
@@ -59,7 +83,7 @@ pub fn import(
     if options.means {
         return pose_means::import_means(options, out);
     }
-    if options.sequence {
+    if options.is_sequence() {
         return sequence::import_sequence(options, out, progress);
     }
     // Only when all rows have been read it is known that a sensor has nothing but zeros. That is rare, and worth a second time.

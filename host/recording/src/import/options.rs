@@ -4,8 +4,12 @@ use std::path::{Path, PathBuf};
 
 use super::assignment::{ColumnList, Offset, Scale};
 use super::broken::BrokenLimit;
+use super::codes::{TwosComplement, Zero};
+use super::faces::Face;
 use super::foreign::HowToRead;
 use super::preset::{Chosen, PresetUse};
+use super::readings::Choice;
+use super::row_filter::RowFilter;
 use super::time::Decimal;
 use crate::error::{Argument, Error, Result};
 use crate::manifest::{RawUnit, Reference, check_gravity, check_rate};
@@ -38,8 +42,14 @@ pub struct ImportOptions {
     pub offsets: Vec<Offset>,
     /// Columns of which a firmware took the low byte for a signed number, in whole counts: mended before any factor.
     pub signed_low_bytes: Vec<SignedLowByte>,
-    /// Topic of bags; without it, the only one with messages of an inertial unit.
+    /// Columns of unsigned codes in two's complement.
+    pub twos_complements: Vec<TwosComplement>,
+    /// Codes at an input of 0, subtracted before any factor; several for the same column add up.
+    pub zeros: Vec<Zero>,
+    /// Topic of a log; without it, the only one with messages of an inertial unit.
     pub topic: Option<String>,
+    /// Which of several sensors of a topic of a log; without it, the only one.
+    pub instance: Option<u32>,
     /// Name of the unit; without it, the name of the recording.
     pub device: Option<String>,
     /// Latitude in degrees.
@@ -48,6 +58,12 @@ pub struct ImportOptions {
     pub inputs: Option<PathBuf>,
     /// Whether the files follow one another, each a step with the name of its file, in place of being joined on their times.
     pub sequence: bool,
+    /// Face of the unit that was up in each file, which makes them a sequence; empty where the files are none of faces.
+    pub faces: Vec<Face>,
+    /// Rows after a pause of more than this, s, are a new step; `None` where the steps are in a column, or are to be found.
+    pub step_gap_s: Option<f64>,
+    /// Which rows of text and Parquet files are read: those that all of these fit.
+    pub filters: Vec<RowFilter>,
     /// How many rows that cannot be read may be left out.
     pub skip_broken: BrokenLimit,
     /// Whether the rows are means over a pose or a step each, and no samples.
@@ -82,11 +98,17 @@ impl ImportOptions {
             scales: Vec::new(),
             offsets: Vec::new(),
             signed_low_bytes: Vec::new(),
+            twos_complements: Vec::new(),
+            zeros: Vec::new(),
             topic: None,
+            instance: None,
             device: None,
             latitude_deg: None,
             inputs: None,
             sequence: false,
+            faces: Vec::new(),
+            step_gap_s: None,
+            filters: Vec::new(),
             skip_broken: BrokenLimit::None,
             means: false,
             preset: None,
@@ -117,17 +139,61 @@ impl ImportOptions {
         if files == 0 {
             return refuse("no file is given".to_owned(), "name the files to import");
         }
-        let one_for_all = self.sequence && lists == 1;
+        let one_for_all = self.is_sequence() && lists == 1;
         if lists != 0 && lists != files && !one_for_all {
             return refuse(
                 format!("there are {files} files and {lists} lists of columns"),
                 "give one list of columns for each file, in their order",
             );
         }
+        if !self.faces.is_empty() && self.faces.len() != files {
+            return refuse(
+                format!("there are {files} files and {} faces", self.faces.len()),
+                "give one file for each face",
+            );
+        }
+        if let Some(gap) = self.step_gap_s
+            && !(gap > 0.0 && gap.is_finite())
+        {
+            return refuse(
+                format!("{gap} s is no pause"),
+                "write the seconds that part two steps",
+            );
+        }
+        if self.step_gap_s.is_some() && (self.is_sequence() || self.means) {
+            let problem = "steps are parted by pauses, and the files or rows are steps already";
+            return refuse(problem.to_owned(), "leave out one of the two");
+        }
+        if let Some((_, face)) = (1..)
+            .zip(&self.faces)
+            .find(|(i, f)| self.faces[*i..].contains(f))
+        {
+            let problem = format!("the face {face} is given twice");
+            return refuse(
+                problem,
+                "give one file for each face, or name files with --sequence",
+            );
+        }
+        if !self.faces.is_empty() && self.inputs.is_some() {
+            let problem = "the faces say what the inputs are, and a table of inputs is given";
+            return refuse(problem.to_owned(), "give one of the two");
+        }
         if self.means && !self.signed_low_bytes.is_empty() {
             return refuse(
                 "a low byte is mended sample by sample, and these are means".to_owned(),
                 "import the samples that they were made of",
+            );
+        }
+        if self.means && !(self.twos_complements.is_empty() && self.zeros.is_empty()) {
+            return refuse(
+                "codes are read sample by sample, and these are means".to_owned(),
+                "import the samples, or give the means as readings",
+            );
+        }
+        if self.means && !self.filters.is_empty() {
+            return refuse(
+                "rows are chosen by a column, and these are means".to_owned(),
+                "give a table with the rows that are wanted",
             );
         }
         if let Some(rate) = self.rate_hz {
@@ -148,10 +214,21 @@ impl ImportOptions {
         Ok(())
     }
 
+    /// Whether the files follow one another.
+    pub(super) fn is_sequence(&self) -> bool {
+        self.sequence || !self.faces.is_empty()
+    }
+
     /// The options as arguments of `mimu import`, for the manifest. File names only: where the
     /// files were on somebody's machine helps nobody and may not be meant to be passed on.
     pub(super) fn arguments(&self) -> Vec<String> {
         let mut arguments: Vec<String> = self.files.iter().map(|file| file_name(file)).collect();
+        if !self.faces.is_empty() {
+            for (argument, face) in arguments.iter_mut().zip(&self.faces) {
+                *argument = format!("{face}={argument}");
+            }
+            arguments.insert(0, "--faces".to_owned());
+        }
         if self.means {
             arguments.push("--means".to_owned());
         }
@@ -186,6 +263,12 @@ impl ImportOptions {
         for offset in &self.offsets {
             option("--offset", offset.to_string());
         }
+        for codes in &self.twos_complements {
+            option("--twos-complement", codes.to_string());
+        }
+        for zero in &self.zeros {
+            option("--zero", zero.to_string());
+        }
         for column in &self.signed_low_bytes {
             option("--signed-low-byte", column.to_string());
         }
@@ -196,8 +279,17 @@ impl ImportOptions {
             arguments.push(name.to_owned());
             arguments.push(value);
         };
+        if let Some(gap) = self.step_gap_s {
+            option("--step-gap", gap.to_string());
+        }
+        for filter in &self.filters {
+            option("--where", filter.to_string());
+        }
         if let Some(topic) = &self.topic {
             option("--topic", topic.clone());
+        }
+        if let Some(instance) = self.instance {
+            option("--instance", instance.to_string());
         }
         if let Some(device) = &self.device {
             option("--device", device.clone());
@@ -218,7 +310,14 @@ impl ImportOptions {
             scales: &self.scales,
             offsets: &self.offsets,
             signed_low_bytes: &self.signed_low_bytes,
-            topic: self.topic.as_deref(),
+            twos_complements: &self.twos_complements,
+            zeros: &self.zeros,
+            filters: &self.filters,
+            choice: Choice {
+                topic: self.topic.as_deref(),
+                instance: self.instance,
+            },
+            part: 0,
             rate_hz: self.rate_hz,
             time_unit: self.time_unit,
             skip_broken: self.skip_broken,

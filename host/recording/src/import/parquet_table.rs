@@ -1,14 +1,16 @@
 //! Rows of a foreign Parquet file.
 
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 use parquet::data_type::ByteArray;
 
 use super::assignment::{ColumnList, Role};
 use super::broken::{Fault, Unreadable};
+use super::row_filter::{RowFilter, RowFilters};
 use super::text_table::Cells;
 use super::time::Stamp;
-use crate::cell::{is_reading, no_reading};
+use crate::cell::{is_reading, no_reading, shorten};
 use crate::columns::Column;
 use crate::csv_writer::write_number;
 use crate::error::{Argument, Error, Result};
@@ -23,6 +25,9 @@ pub(super) struct ParquetTable {
     path: PathBuf,
     rows: u64,
     columns: Vec<Source>,
+    /// The columns of the filters, which may be wanted as well.
+    filtered: Vec<Source>,
+    pub filters: RowFilters,
     /// Rows of the slice that have been handed out, and those that it has.
     at: usize,
     filled: usize,
@@ -31,7 +36,8 @@ pub(super) struct ParquetTable {
 }
 
 struct Source {
-    role: Role,
+    /// `None` of a column that only chooses rows.
+    role: Option<Role>,
     name: String,
     leaf: Leaf,
     cursor: Cursor,
@@ -39,6 +45,28 @@ struct Source {
     texts: Vec<ByteArray>,
     /// Time stamps that are whole numbers, which a double may not hold.
     wholes: Vec<Option<i64>>,
+}
+
+impl Source {
+    fn new(file: &ParquetFile, role: Option<Role>, name: String, leaf: Leaf) -> Self {
+        Self {
+            role,
+            name,
+            leaf,
+            cursor: Cursor::new(file, leaf),
+            values: Vec::new(),
+            texts: Vec::new(),
+            wholes: Vec::new(),
+        }
+    }
+
+    /// What the row `at` of the slice holds, as text.
+    fn text(&self, at: usize) -> Cow<'_, str> {
+        match self.leaf.is_text() {
+            true => String::from_utf8_lossy(self.texts[at].data()),
+            false => Cow::Owned(self.values[at].to_string()),
+        }
+    }
 }
 
 impl std::fmt::Debug for ParquetTable {
@@ -50,8 +78,12 @@ impl std::fmt::Debug for ParquetTable {
 }
 
 impl ParquetTable {
-    /// Opens the file; without `list` its columns must have the names of a recording's.
-    pub fn open(path: &Path, list: Option<&ColumnList>) -> Result<ParquetTable> {
+    /// Opens the file; without `list` its columns must have the names of a recording's. Rows that are not as `filters` say are passed over.
+    pub fn open(
+        path: &Path,
+        list: Option<&ColumnList>,
+        filters: &[RowFilter],
+    ) -> Result<ParquetTable> {
         let file = ParquetFile::open(path)?;
         let names = file.names();
         let mut warnings = Vec::new();
@@ -103,15 +135,7 @@ impl ParquetTable {
                     "write it as DOUBLE, FLOAT, INT32 or INT64",
                 ));
             }
-            columns.push(Source {
-                role,
-                name,
-                leaf,
-                cursor: Cursor::new(&file, leaf),
-                values: Vec::new(),
-                texts: Vec::new(),
-                wholes: Vec::new(),
-            });
+            columns.push(Source::new(&file, Some(role), name, leaf));
         }
         if columns.is_empty() {
             return Err(Error::new(
@@ -121,10 +145,24 @@ impl ParquetTable {
             )
             .about(Argument::Columns));
         }
+        let filtered = filters.iter().map(|filter| {
+            let at = filter.position(&names).or(filter.number());
+            let name = at.and_then(|at| names.get(at)).ok_or_else(|| {
+                let name = shorten(filter.column().as_bytes());
+                let problem = format!("there is no column {name}");
+                let remedy = format!("choose one of {}", names.join(", "));
+                Error::new(path.display(), problem, remedy).about(Argument::Where)
+            })?;
+            let leaf = file.leaf(name)?;
+            Ok(Source::new(&file, None, name.clone(), leaf))
+        });
+        let filtered = filtered.collect::<Result<_>>()?;
         Ok(ParquetTable {
             path: path.to_owned(),
             rows: file.rows(),
             columns,
+            filtered,
+            filters: RowFilters::new(filters),
             at: 0,
             filled: 0,
             row: 0,
@@ -134,7 +172,10 @@ impl ParquetTable {
 
     /// Roles in the order of [`Cells::numbers`].
     pub fn roles(&self) -> Vec<Role> {
-        self.columns.iter().map(|column| column.role).collect()
+        self.columns
+            .iter()
+            .filter_map(|column| column.role)
+            .collect()
     }
 
     /// Share of the file that has been read.
@@ -144,19 +185,25 @@ impl ParquetTable {
 
     /// Reads the next row into `cells` and returns its number from 1, or `None` at the end.
     pub fn next(&mut self, cells: &mut Cells) -> std::result::Result<Option<u64>, Unreadable> {
-        if self.row == self.rows {
-            return Ok(None);
-        }
-        if self.at == self.filled {
-            self.fill()?;
-        }
+        let at = loop {
+            if self.row == self.rows {
+                return Ok(None);
+            }
+            if self.at == self.filled {
+                self.fill()?;
+            }
+            let at = self.at;
+            self.at += 1;
+            self.row += 1;
+            let chosen = self.filtered.iter().map(|column| column.text(at));
+            if self.filtered.is_empty() || self.filters.keep(chosen) {
+                break at;
+            }
+        };
         cells.numbers.clear();
         cells.step.clear();
-        let at = self.at;
-        self.at += 1;
-        self.row += 1;
         for column in &self.columns {
-            let step = column.role == Role::Column(Column::Step);
+            let step = column.role == Some(Role::Column(Column::Step));
             if column.leaf.is_text() {
                 cells.step.extend_from_slice(column.texts[at].data());
                 cells.numbers.push(f64::NAN);
@@ -169,7 +216,7 @@ impl ParquetTable {
                 let refusal = no_reading(value, &format!("{value:e}"));
                 return Err(Unreadable::row(row, Fault::Reading, place, refusal));
             }
-            if column.role == Role::Column(Column::Time) {
+            if column.role == Some(Role::Column(Column::Time)) {
                 let whole = column.wholes.get(at).copied().flatten();
                 cells.stamp = whole.map_or_else(|| Stamp::from(value), Stamp::from);
             }
@@ -183,14 +230,14 @@ impl ParquetTable {
 
     fn fill(&mut self) -> Result<()> {
         let count = (self.rows - self.row).min(SLICE as u64) as usize;
-        for column in &mut self.columns {
+        for column in self.columns.iter_mut().chain(&mut self.filtered) {
             column.values.clear();
             column.texts.clear();
             column.wholes.clear();
             // The decoders have panicked on damaged files before; a damaged file is no bug of ours.
             let decode = std::panic::AssertUnwindSafe(|| match column.leaf.is_text() {
                 true => column.cursor.read_text(count, &mut column.texts),
-                false if column.role == Role::Column(Column::Time) => {
+                false if column.role == Some(Role::Column(Column::Time)) => {
                     let (values, wholes) = (&mut column.values, &mut column.wholes);
                     column.cursor.read_whole(count, values, wholes)
                 }

@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 
 use super::assignment::{ColumnList, Offset, Role, Scale};
 use super::broken::Unreadable;
+use super::log::is_log;
 use super::options::{ImportOptions, file_name};
 use super::plausibility::no_temperature;
-use super::ros::is_bag;
 use super::text_table::{Cells, TextTable};
 use super::{ImportSummary, SkippedLines};
 use crate::cell::is_reading;
@@ -105,7 +105,7 @@ impl Table {
         let refuse = |problem: String, remedy: &str| {
             Err(Error::new(path.display(), problem, remedy).about(Argument::Columns))
         };
-        let mut table = TextTable::open(path, list, separator)?;
+        let mut table = TextTable::open(path, list, separator, &[])?;
         let roles = table.roles();
         let has = |role: Role| roles.contains(&role);
         let timed = [Role::Column(Column::Time), Role::Sample];
@@ -261,7 +261,7 @@ pub(super) fn import_means(options: &ImportOptions, out: &Path) -> Result<Import
         let remedy = "write the known inputs into the table: ref_rate_x_dps, ref_force_x_mps2 and the others";
         return refuse("a table of inputs is given beside a table of means", remedy);
     }
-    if is_bag(path)
+    if is_log(path)
         || path
             .extension()
             .is_some_and(|e| e.eq_ignore_ascii_case("parquet"))
@@ -315,9 +315,11 @@ pub(super) fn import_means(options: &ImportOptions, out: &Path) -> Result<Import
         dropped_outside: 0,
         dropped_in_gaps: 0,
         interpolated: 0,
+        not_chosen: 0,
         padding: 0,
         broken_rows: Vec::new(),
         empty_cells: raw.map(|c| empty(c).count() as u64).sum(),
+        notes: Vec::new(),
         warnings,
     })
 }

@@ -13,7 +13,7 @@ use serde::Serialize;
 
 use super::assignment::{ColumnList, Scale};
 use super::broken::Unreadable;
-use super::ros::is_bag;
+use super::log::is_log;
 use super::text_table::{Cells, TextTable};
 use crate::cell::shorten;
 use crate::error::{Argument, Error, Result};
@@ -153,6 +153,11 @@ impl Preset {
                 false => files.push(path.clone()),
             }
         }
+        if let (Some([problem, remedy]), [first, _, ..], false) =
+            (self.apart, &files[..], recognise)
+        {
+            return Err(Error::new(first.display(), problem, remedy).into());
+        }
         let mut chosen = Chosen {
             used: PresetUse {
                 name: self.name,
@@ -224,8 +229,8 @@ impl Preset {
             let error = Error::new(path.display(), problem, remedy);
             Err(Unfit::Other(error.about(Argument::Columns)))
         };
-        if is_bag(path) {
-            let problem = "a preset is given for a bag, whose messages have their own columns";
+        if is_log(path) {
+            let problem = "a preset is given for a log, whose messages have their own columns";
             return Err(Error::new(path.display(), problem, "leave it out").into());
         }
         let name = path.file_name().unwrap_or_default().to_string_lossy();
@@ -319,7 +324,7 @@ impl Layout {
         let more = format!("{},{}", self.columns, self.optional);
         if !self.optional.is_empty()
             && let Ok(more) = more.parse()
-            && TextTable::open(path, Some(&more), separator).is_ok()
+            && TextTable::open(path, Some(&more), separator, &[]).is_ok()
         {
             return self.timed(path, more, separator);
         }
@@ -332,7 +337,7 @@ impl Layout {
         list: ColumnList,
         separator: Option<Separator>,
     ) -> Result<ColumnList> {
-        let mut table = TextTable::open(path, Some(&list), separator)?;
+        let mut table = TextTable::open(path, Some(&list), separator, &[])?;
         let mut cells = Cells::default();
         let row = match table.next(&mut cells) {
             // Whoever reads all rows says so.

@@ -1,4 +1,4 @@
-//! Messages `sensor_msgs/Imu` of ROS bags (version 2.0) and MCAP files.
+//! Messages `sensor_msgs/Imu` of ROS 1 bags (version 2.0), of ROS 2 bags in SQLite files, and of MCAP files.
 //!
 //! Their time is that of the header, which the driver has set, and not that at which they were received.
 
@@ -7,12 +7,9 @@ use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
-use super::assignment::Role;
-use super::text_table::Cells;
-use super::time::Stamp;
-use crate::columns::Column;
+use super::readings::{Choice, Readings, guarded};
+use super::sqlite::Database;
 use crate::error::{Argument, Error, Result};
-use crate::in_order::broke_down;
 
 /// Bytes that are read at a time.
 const PIECE: usize = 1 << 18;
@@ -20,30 +17,12 @@ const PIECE: usize = 1 << 18;
 /// Longest record or chunk of an MCAP file, bytes. A damaged length would be taken from memory first.
 const LONGEST_RECORD: usize = 1 << 30;
 
-/// Whether a file is one of these, by its name.
-pub fn is_bag(path: &Path) -> bool {
-    let ending = path
-        .extension()
-        .and_then(|e| e.to_str())
-        .unwrap_or_default();
-    ["bag", "mcap"]
-        .iter()
-        .any(|e| ending.eq_ignore_ascii_case(e))
-}
-
 /// One message.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Imu {
     stamp_ns: i64,
     /// Angular velocity, rad/s; linear acceleration, m/s².
     values: [f64; 6],
-}
-
-/// The messages of one topic, 56 bytes each, positioned at the next.
-#[derive(Debug)]
-pub(super) struct ImuTopic {
-    messages: Vec<Imu>,
-    next: usize,
 }
 
 /// How a message is laid out.
@@ -109,54 +88,23 @@ impl Found {
     }
 }
 
-impl ImuTopic {
-    /// Reads the messages of `topic`, which may be left out where there is one only.
-    pub fn open(path: &Path, topic: Option<&str>) -> Result<ImuTopic> {
-        let mcap = path
-            .extension()
-            .is_some_and(|e| e.eq_ignore_ascii_case("mcap"));
-        // The readers panic on some damaged files; a damaged file is no bug of ours.
-        let read = std::panic::catch_unwind(|| match mcap {
-            true => read_mcap(path),
-            false => read_bag(path),
-        });
-        let mut found = read.map_err(|_| broke_down(&path.display().to_string()))??;
-        let number = choose(path, &found.topics, topic)?;
-        if let Some(message) = found.broken {
-            let problem = format!("{message} is cut or is no sensor_msgs/Imu");
-            return Err(Error::new(path.display(), problem, "record it again"));
-        }
-        Ok(ImuTopic {
-            messages: found.messages.remove(&number).unwrap_or_default(),
-            next: 0,
-        })
+/// The messages of the topic that is wanted, which may be left out where there is one only.
+fn chosen(path: &Path, mut found: Found, choice: Choice<'_>) -> Result<Vec<Readings>> {
+    if choice.instance.is_some() {
+        let problem = "an instance is given, and topics have none";
+        let remedy = "leave it out, and choose the topic";
+        return Err(Error::new(path.display(), problem, remedy).about(Argument::Topic));
     }
-
-    /// Roles in the order of [`Cells::numbers`].
-    pub fn roles(&self) -> Vec<Role> {
-        let raw = (0..6).map(|i| Role::Column(Column::Raw(i)));
-        [Role::Column(Column::Time)]
-            .into_iter()
-            .chain(raw)
-            .collect()
+    let number = choose(path, &found.topics, choice.topic)?;
+    if let Some(message) = found.broken {
+        let problem = format!("{message} is cut or is no sensor_msgs/Imu");
+        return Err(Error::new(path.display(), problem, "record it again"));
     }
-
-    /// Share of the messages that has been handed out.
-    pub fn progress(&self) -> f64 {
-        self.next as f64 / self.messages.len().max(1) as f64
+    let mut readings = Readings::of_unit();
+    for imu in found.messages.remove(&number).unwrap_or_default() {
+        readings.push(imu.stamp_ns, imu.values);
     }
-
-    /// Puts the next message into `cells` and returns its number from 1, or `None` at the end.
-    pub fn next(&mut self, cells: &mut Cells) -> Option<u64> {
-        let imu = self.messages.get(self.next)?;
-        self.next += 1;
-        cells.stamp = Stamp::from(imu.stamp_ns);
-        cells.step.clear();
-        cells.numbers.clear();
-        cells.numbers.push(imu.stamp_ns as f64);
-        cells.numbers.extend(imu.values);
-        Some(self.next as u64)
-    }
+    Ok(vec![readings])
 }
 
 /// The number of the topic to read.
@@ -199,7 +147,12 @@ fn damaged(path: &Path, error: &dyn std::fmt::Display) -> Error {
     )
 }
 
-fn read_bag(path: &Path) -> Result<Found> {
+/// Reads a bag of ROS 1.
+pub(super) fn read_bag(path: &Path, choice: Choice<'_>) -> Result<Vec<Readings>> {
+    chosen(path, guarded(path, || messages_of_bag(path))?, choice)
+}
+
+fn messages_of_bag(path: &Path) -> Result<Found> {
     use rosbag::{ChunkRecord, IndexRecord, MessageRecord, RosBag};
     let damaged = |error: rosbag::Error| damaged(path, &error);
     File::open(path).map_err(|error| Error::io(path, &error))?;
@@ -242,7 +195,12 @@ fn merge(found: &mut Found) {
     }
 }
 
-fn read_mcap(path: &Path) -> Result<Found> {
+/// Reads an MCAP file.
+pub(super) fn read_mcap(path: &Path, choice: Choice<'_>) -> Result<Vec<Readings>> {
+    chosen(path, guarded(path, || messages_of_mcap(path))?, choice)
+}
+
+fn messages_of_mcap(path: &Path) -> Result<Found> {
     use mcap::records::Record;
     use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
     let io = |error: std::io::Error| Error::io(path, &error);
@@ -277,6 +235,58 @@ fn read_mcap(path: &Path) -> Result<Found> {
             }
         }
     }
+    merge(&mut found);
+    Ok(found)
+}
+
+/// Reads a bag of ROS 2 in an SQLite file.
+pub(super) fn read_db3(path: &Path, choice: Choice<'_>) -> Result<Vec<Readings>> {
+    // A database that was not closed has its last messages beside it.
+    let mut beside = path.as_os_str().to_owned();
+    beside.push("-wal");
+    if std::fs::metadata(&beside).is_ok_and(|beside| beside.len() > 0) {
+        let problem =
+            "the bag was not closed: messages are in the file beside it that ends in -wal";
+        let remedy = "open it once, with ros2 bag info or sqlite3, which takes them in";
+        return Err(Error::new(path.display(), problem, remedy));
+    }
+    File::open(path).map_err(|error| Error::io(path, &error))?;
+    let found = messages_of_database(path).map_err(|problem| damaged(path, &problem))?;
+    chosen(path, found, choice)
+}
+
+fn messages_of_database(path: &Path) -> std::result::Result<Found, String> {
+    let mut found = Found::default();
+    let database = Database::open(path)?;
+    let tables = database.tables()?;
+    let table = |name: &str| {
+        tables
+            .get(name)
+            .ok_or_else(|| format!("it has no table {name}"))
+    };
+    let (topics, messages) = (table("topics")?, table("messages")?);
+    let columns = ["id", "name", "type", "serialization_format"].map(|name| topics.column(name));
+    let [id, name, kind, encoding] = columns;
+    let (id, name, kind, encoding) = (id?, name?, kind?, encoding?);
+    database.each_row(topics, |row| {
+        let topic = Topic::new(&row.text(name)?, &row.text(kind)?, &row.text(encoding)?);
+        let number = u32::try_from(row.integer(id)?).map_err(|_| "a topic has no number")?;
+        found.topics.insert(number, topic);
+        Ok(())
+    })?;
+    let (topic, data) = (messages.column("topic_id")?, messages.column("data")?);
+    database.each_row(messages, |row| {
+        let number = u32::try_from(row.integer(topic)?).map_err(|_| "a message has no topic")?;
+        // The images of a bag are not even read.
+        if found
+            .topics
+            .get(&number)
+            .is_some_and(|topic| topic.layout.is_some())
+        {
+            found.message(number, &row.bytes(data)?);
+        }
+        Ok(())
+    })?;
     merge(&mut found);
     Ok(found)
 }

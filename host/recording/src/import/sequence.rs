@@ -6,6 +6,7 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
+use super::faces::Face;
 use super::joined::JoinedFiles;
 use super::options::file_name;
 use super::place::Place;
@@ -15,7 +16,7 @@ use super::{ImportOptions, ImportSummary};
 use crate::columns::Columns;
 use crate::digest;
 use crate::error::{Argument, Error, Result};
-use crate::manifest::{Manifest, Source};
+use crate::manifest::{Manifest, Reference, Source};
 use crate::writer::Writer;
 
 /// Rates of two files may differ by this share: a loop that is paced by its own work is not as fast each time.
@@ -65,6 +66,10 @@ pub(super) fn import_sequence(
                 let writer = Writer::create(out, import.columns, options.format, options.replace)?;
                 let mut summary = import.summary.clone();
                 (summary.time, summary.warnings) = (Vec::new(), options.preset_warnings.clone());
+                if !options.faces.is_empty() {
+                    let gyro = import.columns.gyro;
+                    summary.warnings.extend(of_faces(options, gyro));
+                }
                 open.insert((writer, manifest, summary, import.columns))
             }
         };
@@ -128,6 +133,25 @@ pub(super) fn import_sequence(
     Ok(summary)
 }
 
+/// What six faces do not show.
+fn of_faces(options: &ImportOptions, gyro: bool) -> Vec<String> {
+    let mut warnings: Vec<String> = Face::missing(&options.faces).into_iter().collect();
+    if options.reference == Reference::Gravity {
+        warnings.push(
+            "with gravity as the reference only the magnitude of the specific force is known, and six faces do not determine the nine \
+             parameters of an accelerometer: with --reference table the faces are its known inputs"
+                .into(),
+        );
+    }
+    if gyro {
+        warnings.push(
+            "gyro: the files show rests and not the turns between them, so no scale factor of the gyro follows from this recording"
+                .into(),
+        );
+    }
+    warnings
+}
+
 fn source(path: &Path) -> Result<Source> {
     Ok(Source {
         file: file_name(path),
@@ -135,8 +159,11 @@ fn source(path: &Path) -> Result<Source> {
     })
 }
 
-/// Labels of the steps: the names of the files, without what they end with.
+/// Labels of the steps: the faces, or the names of the files without what they end with.
 fn labels(options: &ImportOptions) -> Result<Vec<String>> {
+    if !options.faces.is_empty() {
+        return Ok(options.faces.iter().map(Face::to_string).collect());
+    }
     let stem = |path: &std::path::PathBuf| {
         let stem = path.file_stem().unwrap_or(path.as_os_str());
         stem.to_string_lossy().into_owned()
@@ -153,6 +180,7 @@ fn labels(options: &ImportOptions) -> Result<Vec<String>> {
 /// Adds what was seen of a file to what was seen of those before.
 fn add(all: &mut ImportSummary, one: ImportSummary) {
     all.time.extend(one.time);
+    all.notes.extend(one.notes);
     all.warnings.extend(one.warnings);
     all.skipped.header += one.skipped.header;
     all.skipped.comment += one.skipped.comment;
@@ -160,5 +188,6 @@ fn add(all: &mut ImportSummary, one: ImportSummary) {
     all.broken_rows.extend(one.broken_rows);
     all.interpolated += one.interpolated;
     all.padding += one.padding;
+    all.not_chosen += one.not_chosen;
     all.empty_cells += one.empty_cells;
 }

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use super::foreign::{ForeignFile, HowToRead};
 use super::inputs::Inputs;
+use super::options::ImportOptions;
 use super::resample::{self, Resampler};
 use super::row::Row;
 use super::step_labels::StepLabels;
@@ -12,6 +13,7 @@ use super::time::Times;
 use crate::batch::Batch;
 use crate::cell::shorten;
 use crate::error::Result;
+use crate::manifest::Reference;
 
 /// A table of inputs, and what the steps of the file have needed of it.
 pub(super) struct StepInputs {
@@ -23,18 +25,30 @@ pub(super) struct StepInputs {
 }
 
 impl StepInputs {
-    /// Of the table at `path`.
-    pub fn read(path: &Path) -> Result<Self> {
-        Ok(Self {
-            table: Inputs::read(path)?,
+    /// Of the faces or of the table of `options`, if they give inputs. Faces give them only where they are to be the reference: with gravity
+    /// nothing is known of them but its magnitude.
+    pub fn of(options: &ImportOptions) -> Result<Option<Self>> {
+        let table = match &options.inputs {
+            _ if !options.faces.is_empty() => (options.reference == Reference::Table)
+                .then(|| Inputs::of_faces(&options.faces, options.gravity_mps2)),
+            Some(path) => Some(Inputs::read(path)?),
+            None => None,
+        };
+        Ok(table.map(|table| Self {
+            table,
             rows: HashMap::new(),
             known: HashMap::new(),
-        })
+        }))
     }
 
     /// Which of the `ref_` columns the table fills.
     pub fn columns(&self) -> [bool; 6] {
         self.table.columns
+    }
+
+    /// Whether the table has an angle.
+    pub fn has_turns(&self) -> bool {
+        self.table.has_turns
     }
 
     /// Numbers of the steps met so far that are turns.

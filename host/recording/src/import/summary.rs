@@ -45,12 +45,16 @@ pub struct ImportSummary {
     pub dropped_in_gaps: u64,
     /// Rows with values interpolated from another file.
     pub interpolated: u64,
+    /// Rows left out as they are not those that were asked for.
+    pub not_chosen: u64,
     /// Rows left out as padding, as all of their readings are 0.
     pub padding: u64,
     /// Rows that could not be read and were left out, of each file that has some.
     pub broken_rows: Vec<BrokenRows>,
     /// Raw cells that are empty.
     pub empty_cells: u64,
+    /// What was read of logs, and what was undone of their own calibration.
+    pub notes: Vec<String>,
     /// One sentence for each thing that a person should know.
     pub warnings: Vec<String>,
 }
@@ -59,9 +63,12 @@ impl ImportSummary {
     /// Takes in what was skipped in `file` and what is to be said of it.
     pub(super) fn add(&mut self, file: &ForeignFile) {
         let place = file_name(file.path());
+        let notes = file.notes().iter().map(|note| format!("{place}: {note}"));
+        self.notes.extend(notes);
         self.warnings
             .extend(file.seen.warnings(&place, file.rate_hz()));
         self.padding += file.seen.padding;
+        self.not_chosen += file.not_chosen();
         for (sensor, rows) in ["gyro", "accel"].iter().zip(file.seen.dead()) {
             self.warnings.extend(rows.map(|rows| {
                 format!(

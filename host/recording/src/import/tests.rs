@@ -9,9 +9,12 @@ use super::*;
 use crate::error::Argument;
 
 mod broken;
+mod logs;
 mod means;
+mod pauses;
 mod plausibility;
 mod presets;
+mod rows;
 mod sequence;
 mod sources;
 mod stamps;

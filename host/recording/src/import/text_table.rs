@@ -8,6 +8,7 @@ use super::SkippedLines;
 use super::assignment::{ColumnList, Role};
 use super::binary::{refuse_binary, without_zeros};
 use super::broken::{Fault, Unreadable};
+use super::row_filter::{RowFilter, RowFilters};
 use super::time::Stamp;
 use crate::cell::{self, Refusal, shorten};
 use crate::columns::Column;
@@ -42,6 +43,9 @@ pub(super) struct TextTable {
     wanted: Vec<(usize, Role)>,
     /// Cells that a row must have; more of them must be empty.
     width: usize,
+    filters: RowFilters,
+    /// Position of the cell of each filter.
+    filtered: Vec<usize>,
     line: Vec<u8>,
     line_number: u64,
     /// Line of the first row.
@@ -81,11 +85,12 @@ fn kind(line: &[u8]) -> Kind {
 
 impl TextTable {
     /// Opens the file and finds its header and its first row; without `list` the names in the
-    /// header must be those of a recording.
+    /// header must be those of a recording. Rows that are not as `filters` say are passed over.
     pub fn open(
         path: &Path,
         list: Option<&ColumnList>,
         separator: Option<Separator>,
+        filters: &[RowFilter],
     ) -> Result<TextTable> {
         let io = |error: std::io::Error| Error::io(path, &error);
         let mut file = File::open(path).map_err(io)?;
@@ -118,6 +123,8 @@ impl TextTable {
             separator,
             wanted: Vec::new(),
             width: 0,
+            filters: RowFilters::new(filters),
+            filtered: Vec::new(),
             line: Vec::new(),
             line_number: 0,
             first_row: 0,
@@ -129,6 +136,8 @@ impl TextTable {
             warnings: Vec::new(),
         };
         table.find_rows(&lines, list)?;
+        let position = |filter| table.position(filter, &lines);
+        table.filtered = filters.iter().map(position).collect::<Result<_>>()?;
         let (_, file) = table.reader.into_inner().into_inner();
         let start = Cursor::new(head).chain(file);
         table.reader = BufReader::with_capacity(1 << 18, start);
@@ -189,6 +198,9 @@ impl TextTable {
                         self.skipped.blank += 1;
                         continue;
                     }
+                    if !self.chosen() {
+                        continue;
+                    }
                     if let Some(refusal) = self.misfit(&self.record, ended) {
                         let place = self.place(number);
                         return Err(Unreadable::row(number, Fault::Width, place, refusal));
@@ -198,6 +210,44 @@ impl TextTable {
                 }
             }
         }
+    }
+
+    /// Rows that were left out as they are not as the filters say.
+    pub fn left_out(&self) -> u64 {
+        self.filters.left_out
+    }
+
+    /// At the end: refuses a value that no row had.
+    pub fn check_filters(&self) -> Result<()> {
+        self.filters.check(&self.path)
+    }
+
+    /// Whether the filters keep the row; one that is too short for them is looked at, as it is broken.
+    fn chosen(&mut self) -> bool {
+        if self.filtered.iter().any(|at| *at >= self.record.len()) {
+            return true;
+        }
+        let cells = self.filtered.iter().map(|at| &self.record[*at]);
+        self.filters.keep(cells.map(String::from_utf8_lossy))
+    }
+
+    /// Position of the column of `filter`: by its name in one of the first lines, or else by its number from the left.
+    fn position(&self, filter: &RowFilter, lines: &[&[u8]]) -> Result<usize> {
+        let mut record = csv::ByteRecord::new();
+        let mut named = lines.iter().filter_map(|line| {
+            let from = line
+                .iter()
+                .position(|b| !matches!(b, b'#' | b'%' | b' ' | b'\t'));
+            self.separator
+                .split(&line[from.unwrap_or(line.len())..], &mut record);
+            filter.position(&texts(&record))
+        });
+        named.next().or(filter.number()).ok_or_else(|| {
+            let name = shorten(filter.column().as_bytes());
+            let problem = format!("there is no header that has the column {name}");
+            let remedy = "check the name; without a header, give the number of the column from the left: 1=3";
+            Error::new(self.path.display(), problem, remedy).about(Argument::Where)
+        })
     }
 
     /// Leaves out the bytes of 0 around the line, and the carriage return at its end.

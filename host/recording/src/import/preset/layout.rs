@@ -15,6 +15,8 @@ pub struct Preset {
     pub(super) layouts: &'static [Layout],
     /// Files that a folder may hold, the best set first; the faster sensor first in each.
     pub(super) in_folder: &'static [&'static [&'static str]],
+    /// Why its files are not joined, and what to do, where they have no time in common.
+    pub(super) apart: Option<[&'static str; 2]>,
     /// What a file beside the readings says where two presets share their headers.
     pub(super) beside: Option<Beside>,
 }

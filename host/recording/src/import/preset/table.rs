@@ -46,7 +46,7 @@ const XSENS: Layout = Layout {
 };
 
 /// All of them.
-pub(super) const PRESETS: [Preset; 6] = [
+pub(super) const PRESETS: [Preset; 7] = [
     // The header of every imu0/data.csv of the EuRoC sequences and of those laid out like them (TUM VI, MRPT, OpenVINS);
     // Burri et al., The EuRoC micro aerial vehicle datasets, IJRR 2016. Stamps since 1970; sensor.yaml beside it says nothing of units.
     Preset {
@@ -61,6 +61,7 @@ pub(super) const PRESETS: [Preset; 6] = [
             )
         }],
         in_folder: &[&["data.csv"], &["imu0/data.csv"], &["mav0/imu0/data.csv"]],
+        apart: None,
         beside: None,
     },
     // github.com/tszheichoi/awesome-sensor-logger at b10f5c5: README.md (Metadata.csv), UNITS.md, COORDINATES.md, CROSSPLATFORM.md.
@@ -79,6 +80,7 @@ pub(super) const PRESETS: [Preset; 6] = [
             without_gravity("Gravity.csv"),
         ],
         in_folder: &LOGGED_FOLDER,
+        apart: None,
         beside: Some(Beside {
             file: "Metadata.csv",
             values: &AS_ANDROID,
@@ -102,6 +104,7 @@ pub(super) const PRESETS: [Preset; 6] = [
             without_gravity("Gravity.csv"),
         ],
         in_folder: &LOGGED_FOLDER,
+        apart: None,
         beside: Some(Beside {
             file: "Metadata.csv",
             values: &AS_ANDROID,
@@ -144,6 +147,7 @@ pub(super) const PRESETS: [Preset; 6] = [
             &["Raw Data.csv"],
             &["Accelerometer.csv"],
         ],
+        apart: None,
         beside: None,
     },
     // Text exports of MT Manager: lines with // above the names, one of which has the rate. Units by the MTw user manual (table of
@@ -165,6 +169,7 @@ pub(super) const PRESETS: [Preset; 6] = [
             },
         ],
         in_folder: &[],
+        apart: None,
         beside: None,
     },
     // github.com/Kyle-ak/imu_tk at 7780270: bin/test_data and importAsciiData in src/io_utils.cpp. Raw counts or SI, as one likes.
@@ -183,6 +188,33 @@ pub(super) const PRESETS: [Preset; 6] = [
             },
         ],
         in_folder: &[],
+        apart: None,
+        beside: None,
+    },
+    // github.com/IntelRealSense/librealsense at 0f85e5c: np.savetxt in tools/rs-imu-calibration/rs-imu-calibration.py, and frame.get_timestamp, in ms. The
+    // correction of the device is switched off there, and its axes are those of the camera: x right, y down, z forward. The six directions follow one
+    // another in the file of the accelerometer; that of the gyro is emptied before each, and has the last one only.
+    Preset {
+        name: "realsense",
+        title: "Intel RealSense D435i: accel_*.txt or gyro_*.txt of rs-imu-calibration.py",
+        raw_unit: Some(RawUnit::Si),
+        layouts: &[
+            Layout {
+                file: FileName::Has("accel"),
+                scales: &["t_s=1e-3"],
+                ..Layout::of("t_s,accel_x,accel_y,accel_z")
+            },
+            Layout {
+                file: FileName::Has("gyro"),
+                scales: &["t_s=1e-3"],
+                ..Layout::of("t_s,gyro_x,gyro_y,gyro_z")
+            },
+        ],
+        in_folder: &[],
+        apart: Some([
+            "the gyro of rs-imu-calibration.py was recorded in the last of the six directions only, and joined to it the accelerometer has no other either",
+            "import each file by itself",
+        ]),
         beside: None,
     },
 ];

@@ -1,9 +1,12 @@
 //! Bags that the Python package `rosbags` 0.11.9 has written: 24 messages with header stamps 5 ms apart from 1700000000.123456789 s on,
 //! received some 3 to 4.4 ms later; angular velocity (0.5 + i, -0.25 i, 3), linear acceleration (100 + i, 200, -9.5), frame `imu`. `imu.bag` is
-//! compressed with LZ4 and has a second topic, `/imu/raw`, with two messages; both have one more, of strings.
+//! compressed with LZ4 and has a second topic, `/imu/raw`, with two messages; both have one more, of strings. `imu.db3` has the three topics of `imu.bag`; its string of 9000
+//! characters takes pages of its own.
 
 use std::path::PathBuf;
 
+use super::super::text_table::Cells;
+use super::super::time::Stamp;
 use super::*;
 
 fn fixture(name: &str) -> PathBuf {
@@ -11,8 +14,20 @@ fn fixture(name: &str) -> PathBuf {
     folder.join(name)
 }
 
+fn open(path: &Path, topic: Option<&str>) -> Result<Vec<Readings>> {
+    let choice = Choice {
+        topic,
+        instance: None,
+    };
+    match path.extension().and_then(|ending| ending.to_str()) {
+        Some("bag") => read_bag(path, choice),
+        Some("mcap") => read_mcap(path, choice),
+        _ => read_db3(path, choice),
+    }
+}
+
 fn check(name: &str, topic: Option<&str>) {
-    let mut messages = ImuTopic::open(&fixture(name), topic).unwrap();
+    let mut messages = open(&fixture(name), topic).unwrap().remove(0);
     let mut cells = Cells::default();
     for i in 0..24 {
         assert_eq!(messages.next(&mut cells), Some(i + 1));
@@ -30,18 +45,15 @@ fn check(name: &str, topic: Option<&str>) {
 }
 
 #[test]
-fn the_messages_of_a_bag_and_of_an_mcap_file_are_those_that_were_written() {
+fn the_messages_of_a_bag_of_ros_1_and_of_ros_2_and_of_an_mcap_file_are_those_that_were_written() {
     check("imu.bag", Some("/imu/data"));
     check("imu.mcap", None);
+    check("imu.db3", Some("/imu/data"));
 }
 
 #[test]
 fn topics_are_listed_where_several_fit_or_none_does() {
-    let refused = |name: &str, topic| {
-        ImuTopic::open(&fixture(name), topic)
-            .unwrap_err()
-            .to_string()
-    };
+    let refused = |name: &str, topic| open(&fixture(name), topic).unwrap_err().to_string();
     let several = refused("imu.bag", None);
     assert!(
         several.contains("/imu/data") && several.contains("/imu/raw"),
@@ -58,19 +70,38 @@ fn topics_are_listed_where_several_fit_or_none_does() {
 #[test]
 fn a_cut_or_damaged_file_is_refused_and_does_not_panic() {
     let folder = tempfile::tempdir().unwrap();
-    for name in ["imu.bag", "imu.mcap"] {
+    for name in ["imu.bag", "imu.mcap", "imu.db3"] {
         let whole = std::fs::read(fixture(name)).unwrap();
         let path = folder.path().join(name);
-        for end in (0..whole.len()).step_by(101) {
+        for end in (0..whole.len()).step_by(whole.len() / 120 | 1) {
             std::fs::write(&path, &whole[..end]).unwrap();
-            let error = ImuTopic::open(&path, Some("/imu")).unwrap_err().to_string();
+            let error = open(&path, Some("/imu")).unwrap_err().to_string();
             assert!(error.contains(name), "{error}");
         }
-        for at in (0..whole.len()).step_by(13) {
+        for at in (0..whole.len()).step_by(whole.len() / 900 | 1) {
             let mut damaged = whole.clone();
             damaged[at] ^= 0x55;
             std::fs::write(&path, damaged).unwrap();
-            let _ = ImuTopic::open(&path, Some("/imu"));
+            let _ = open(&path, Some("/imu"));
         }
     }
+}
+
+#[test]
+fn a_bag_that_was_not_closed_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("imu.db3");
+    std::fs::copy(fixture("imu.db3"), &path).unwrap();
+    std::fs::write(folder.path().join("imu.db3-wal"), [0; 32]).unwrap();
+    let error = open(&path, Some("/imu/data")).unwrap_err().to_string();
+    assert!(error.contains("-wal"), "{error}");
+    let other = folder.path().join("other.db3");
+    std::fs::write(&other, "a,b\n1,2\n").unwrap();
+    let error = open(&other, None).unwrap_err().to_string();
+    assert!(error.contains("no SQLite file"), "{error}");
+    let several = open(&fixture("imu.db3"), None).unwrap_err().to_string();
+    assert!(
+        several.contains("/imu/raw") && !several.contains("/chatter"),
+        "{several}"
+    );
 }

@@ -74,3 +74,80 @@ fn files_that_are_no_sequence_are_refused() {
         .to_vec();
     assert!(bench.refused(&options).contains("two files are named z_up"));
 }
+
+fn faces(names: &[&str]) -> Vec<Face> {
+    names.iter().map(|name| name.parse().unwrap()).collect()
+}
+
+#[test]
+fn a_file_for_each_face_has_the_specific_force_of_the_axis_that_was_up() {
+    let bench = Bench::new(&[
+        ("a.csv", &pose(0, 800)),
+        ("b.csv", &pose(0, -800)),
+        ("c.csv", &pose(0, 10)),
+    ]);
+    let mut options = bench.options(&["a.csv", "b.csv", "c.csv"], &[LIST]);
+    options.faces = faces(&["+z", "-z", "-y"]);
+    options.reference = Reference::Table;
+    let (summary, batch, manifest) = bench.import(&options).unwrap();
+    assert_eq!(manifest.step_labels, ["+z", "-z", "-y"]);
+    // Nobody knows how it was turned from face to face: neither a rate nor a turn may be fitted to.
+    assert!(manifest.turn_steps.is_empty());
+    assert!(batch.reference[..3].iter().all(Vec::is_empty));
+    assert!(batch.t_s[20] - batch.t_s[19] > 9.0);
+    let force = |row: usize| [3, 4, 5].map(|i| batch.reference[i][row]);
+    assert_eq!(force(0), [0.0, 0.0, 9.81]);
+    assert_eq!(force(20), [0.0, 0.0, -9.81]);
+    assert_eq!(force(59), [0.0, -9.81, 0.0]);
+    let said = |words: &str| summary.warnings.iter().any(|w| w.contains(words));
+    assert!(
+        said("+x, -x, +y:") && said("no scale factor of the gyro"),
+        "{summary:?}"
+    );
+    let with = manifest.imported_with.join(" ");
+    assert!(
+        with.starts_with("--faces +z=a.csv -z=b.csv -y=c.csv --columns"),
+        "{with}"
+    );
+}
+
+#[test]
+fn faces_with_gravity_as_the_reference_have_no_known_inputs_and_say_so() {
+    let bench = Bench::new(&[("a.csv", &pose(0, 800)), ("b.csv", &pose(0, -800))]);
+    let mut options = bench.options(&["a.csv", "b.csv"], &[LIST]);
+    options.faces = faces(&["+z", "-z"]);
+    let (summary, batch, _) = bench.import(&options).unwrap();
+    assert!(batch.reference.iter().all(Vec::is_empty));
+    assert!(
+        summary
+            .warnings
+            .iter()
+            .any(|w| w.contains("--reference table")),
+        "{summary:?}"
+    );
+}
+
+#[test]
+fn faces_that_contradict_each_other_are_refused() {
+    let bench = Bench::new(&[
+        ("a.csv", &pose(0, 800)),
+        ("b.csv", &pose(0, -800)),
+        ("inputs", ""),
+    ]);
+    let mut options = bench.options(&["a.csv", "b.csv"], &[LIST]);
+    options.faces = faces(&["+z", "+z"]);
+    assert!(
+        bench
+            .refused(&options)
+            .contains("the face +z is given twice")
+    );
+    options.faces = faces(&["+z"]);
+    assert!(bench.refused(&options).contains("2 files and 1 faces"));
+    options.faces = faces(&["+z", "-z"]);
+    options.inputs = Some(bench.path("inputs"));
+    assert!(
+        bench
+            .refused(&options)
+            .contains("a table of inputs is given")
+    );
+}

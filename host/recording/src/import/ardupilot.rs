@@ -1,0 +1,334 @@
+//! Logs of ArduPilot (DataFlash, `.bin`), with ArduPilot's own calibration undone.
+//!
+//! `IMU` has the readings of one sensor `I` at the rate of the main loop or below, `GYR` and `ACC` at the sensor's own. Both are calibrated and on the
+//! vehicle's axes: `R ((raw - INS_ACCOFFS) INS_ACCSCAL)` and `R (raw - INS_GYROFFS)`, with R by `AHRS_ORIENTATION`
+//! (`_rotate_and_correct_accel` of AP_InertialSensor_Backend). `IMT` has what a sensor has gathered in an interval, of the same readings.
+
+mod records;
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use super::readings::{Choice, Readings};
+use super::rotation::{Correction, orientation};
+use crate::columns::Column;
+use crate::error::{Argument, Error, Result};
+use records::{Record, Records};
+
+/// Messages that are read, the best first. `IMT` only where there is no other.
+const MESSAGES: [&str; 4] = ["IMU", "GYR", "ACC", "IMT"];
+
+/// Readings of one sensor in messages of one kind.
+#[derive(Default)]
+struct Samples {
+    stamps_ns: Vec<i64>,
+    gyro: Vec<[f64; 3]>,
+    accel: Vec<[f64; 3]>,
+    temp_c: Vec<f64>,
+    /// Whether the parameters of its calibration were known at all, and have changed.
+    uncorrected: bool,
+    changes: u64,
+    last: Option<[Correction; 2]>,
+}
+
+#[derive(Default)]
+struct Log {
+    /// By message and number of the sensor, from 0.
+    samples: BTreeMap<(&'static str, u32), Samples>,
+    parameters: BTreeMap<String, f64>,
+    /// Whether parameters have changed since the corrections were made of them.
+    stale: bool,
+    corrections: BTreeMap<u32, Option<[Correction; 2]>>,
+}
+
+/// Reads a log.
+pub(super) fn read(path: &Path, choice: Choice<'_>) -> Result<Vec<Readings>> {
+    let bytes = std::fs::read(path).map_err(|error| Error::io(path, &error))?;
+    let mut records = Records::new(&bytes);
+    let mut log = Log::default();
+    while let Some(record) = records.next() {
+        log.take(&record);
+    }
+    if records.formats() == 0 {
+        let problem = "this is no DataFlash log: it has no FMT record";
+        return Err(Error::new(
+            path.display(),
+            problem,
+            "give the .bin file of ArduPilot",
+        ));
+    }
+    let mut all = log.chosen(path, choice)?;
+    if records.skipped > 0
+        && let Some(first) = all.first_mut()
+    {
+        first.warnings.push(format!(
+            "{} bytes belong to no record, as of a log that is cut or damaged, and were passed over",
+            records.skipped
+        ));
+    }
+    Ok(all)
+}
+
+impl Log {
+    fn take(&mut self, record: &Record<'_>) {
+        if record.name() == "PARM" {
+            if let (Some(name), Some(value)) = (record.text("Name"), record.number("Value")) {
+                let about = name.starts_with("INS") || name == "AHRS_ORIENTATION";
+                self.stale |= about && self.parameters.insert(name, value) != Some(value);
+            }
+            return;
+        }
+        // Before instances there was IMU2, ACC3 and so on.
+        let name = record.name();
+        let (kind, number) = match name.strip_suffix(['1', '2', '3']) {
+            Some(kind) => (kind, name[kind.len()..].parse().ok()),
+            None => (name, None),
+        };
+        let Some(kind) = MESSAGES.into_iter().find(|message| *message == kind) else {
+            return;
+        };
+        let instance = record.number("I").map(|i| i as u32);
+        let instance = instance
+            .or(number.map(|n: u32| n.saturating_sub(1)))
+            .unwrap_or(0);
+        if self.stale {
+            self.corrections.clear();
+            self.stale = false;
+        }
+        let parameters = &self.parameters;
+        let correction = self
+            .corrections
+            .entry(instance)
+            .or_insert_with(|| corrections(parameters, instance));
+        let samples = self.samples.entry((kind, instance)).or_default();
+        samples.take(kind, record, correction.as_ref());
+    }
+
+    /// What there is to choose from.
+    fn listed(&self) -> String {
+        let one = |((kind, instance), samples): (&(&str, u32), &Samples)| {
+            format!(
+                "{kind} instance {instance} ({} messages)",
+                samples.stamps_ns.len()
+            )
+        };
+        match self.samples.is_empty() {
+            true => "no messages of inertial sensors".into(),
+            false => self.samples.iter().map(one).collect::<Vec<_>>().join(", "),
+        }
+    }
+
+    fn chosen(&self, path: &Path, choice: Choice<'_>) -> Result<Vec<Readings>> {
+        let refuse = |problem: String, remedy: &str| {
+            let error = Error::new(path.display(), problem, remedy);
+            Err(error.about(Argument::Topic).about(Argument::Instance))
+        };
+        let of_instance = |instance: u32| -> Vec<&'static str> {
+            let kinds = self.samples.keys().filter(|(_, i)| *i == instance);
+            kinds.map(|(kind, _)| *kind).collect()
+        };
+        let mut instances: Vec<u32> = self.samples.keys().map(|(_, i)| *i).collect();
+        instances.sort_unstable();
+        instances.dedup();
+        let instance = match (choice.instance, instances.as_slice()) {
+            (None, [only]) => *only,
+            (Some(wanted), all) if all.contains(&wanted) => wanted,
+            (Some(wanted), _) => {
+                let problem = format!(
+                    "there is no instance {wanted}; there are: {}",
+                    self.listed()
+                );
+                return refuse(problem, "choose one of these");
+            }
+            (None, []) => {
+                let problem = format!("the log has {}", self.listed());
+                return refuse(problem, "log them: LOG_BITMASK with IMU");
+            }
+            (None, _) => {
+                let problem = format!("the log has several sensors: {}", self.listed());
+                return refuse(problem, "choose one of the instances");
+            }
+        };
+        let there = of_instance(instance);
+        let both_fast = there.contains(&"GYR") && there.contains(&"ACC");
+        let kinds: &[&str] = match choice.topic {
+            None if both_fast => &["GYR", "ACC"],
+            Some("GYR" | "ACC") => &["GYR", "ACC"],
+            None if there.contains(&"IMU") => &["IMU"],
+            Some("IMU") => &["IMU"],
+            None | Some("IMT") => &["IMT"],
+            Some(_) => &[],
+        };
+        let mut found: Vec<(&str, &Samples)> = kinds
+            .iter()
+            .filter_map(|kind| Some((*kind, self.samples.get(&(*kind, instance))?)))
+            .collect();
+        if found.is_empty() {
+            let what = choice.topic.unwrap_or("IMU");
+            let problem = format!(
+                "there is no {what} of instance {instance}; there are: {}",
+                self.listed()
+            );
+            return refuse(problem, "choose one of these");
+        }
+        // The others are interpolated at the times of the first.
+        found.sort_by_key(|(_, samples)| std::cmp::Reverse(samples.stamps_ns.len()));
+        let mut all: Vec<Readings> = found
+            .into_iter()
+            .map(|(kind, samples)| samples.readings(kind, instance))
+            .collect();
+        let thermal = format!("INS_TCAL{}_ENABLE", instance + 1);
+        if self.parameters.get(&thermal) == Some(&1.0)
+            && let Some(first) = all.first_mut()
+        {
+            first.warnings.push(format!(
+                "instance {instance}: ArduPilot's calibration over temperature is on ({thermal}), and is not undone"
+            ));
+        }
+        Ok(all)
+    }
+}
+
+impl Samples {
+    fn take(
+        &mut self,
+        kind: &str,
+        record: &Record<'_>,
+        correction: Option<&[Correction; 2]>,
+    ) -> Option<()> {
+        let three = |names: [&str; 3]| -> Option<[f64; 3]> {
+            Some([
+                record.number(names[0])?,
+                record.number(names[1])?,
+                record.number(names[2])?,
+            ])
+        };
+        let raw = |sensor: usize, reading: [f64; 3]| match correction {
+            Some(both) => both[sensor].undo(reading),
+            None => reading,
+        };
+        let time = record
+            .number("SampleUS")
+            .or_else(|| record.number("TimeUS"))?;
+        let (gyro, accel) = match kind {
+            "GYR" => (Some(three(["GyrX", "GyrY", "GyrZ"])?), None),
+            "ACC" => (None, Some(three(["AccX", "AccY", "AccZ"])?)),
+            "IMT" => {
+                let per = |interval: &str, names| {
+                    let interval = record.number(interval).filter(|seconds| *seconds > 0.0)?;
+                    Some(three(names)?.map(|gathered| gathered / interval))
+                };
+                (
+                    Some(per("DelaT", ["DelAX", "DelAY", "DelAZ"])?),
+                    Some(per("DelvT", ["DelVX", "DelVY", "DelVZ"])?),
+                )
+            }
+            _ => (
+                Some(three(["GyrX", "GyrY", "GyrZ"])?),
+                Some(three(["AccX", "AccY", "AccZ"])?),
+            ),
+        };
+        if let Some(correction) = correction {
+            let changed = self
+                .last
+                .as_ref()
+                .is_some_and(|before| before != correction);
+            self.changes += u64::from(changed);
+            if changed || self.last.is_none() {
+                self.last = Some(correction.clone());
+            }
+        }
+        self.uncorrected |= correction.is_none();
+        self.stamps_ns.push((time * 1e3).round() as i64);
+        self.gyro.extend(gyro.map(|reading| raw(0, reading)));
+        self.accel.extend(accel.map(|reading| raw(1, reading)));
+        self.temp_c.push(record.number("T").unwrap_or(f64::NAN));
+        Some(())
+    }
+
+    fn readings(&self, kind: &str, instance: u32) -> Readings {
+        let sensors = [&self.gyro, &self.accel];
+        let has = |sensor: usize| !sensors[sensor].is_empty();
+        let columns = (0..6).filter(|c| has(c / 3)).map(Column::Raw);
+        // A sensor without a thermometer says 0.
+        let temperature = self.temp_c.iter().any(|t| t.is_finite() && *t != 0.0);
+        let mut readings = Readings::of(
+            columns
+                .chain(temperature.then_some(Column::Temperature))
+                .collect(),
+        );
+        for (row, stamp) in self.stamps_ns.iter().enumerate() {
+            let raw = sensors
+                .into_iter()
+                .filter_map(|sensor| sensor.get(row))
+                .flatten()
+                .copied();
+            readings.push(*stamp, raw.chain(temperature.then(|| self.temp_c[row])));
+        }
+        let done = match (&self.last, self.uncorrected) {
+            (Some([gyro, accel]), false) => format!(
+                "ArduPilot's calibration undone: gyro offset {}, accelerometer offset {} and scale factor {}",
+                listed(gyro.offset),
+                listed(accel.offset),
+                listed(accel.scale)
+            ),
+            _ => "after ArduPilot's calibration".into(),
+        };
+        readings.notes.push(format!(
+            "{} messages {kind} of instance {instance}, {done}",
+            self.stamps_ns.len()
+        ));
+        if self.uncorrected {
+            readings.warnings.push(format!(
+                "instance {instance}: the log lacks parameters of its calibration (INS_, AHRS_ORIENTATION), or the mounting is not known here: readings are as ArduPilot has calibrated them"
+            ));
+        }
+        if self.changes > 0 {
+            readings.warnings.push(format!(
+                "instance {instance}: the calibration changes {} times during the log; each reading is undone by the one of its time",
+                self.changes
+            ));
+        }
+        readings
+    }
+}
+
+/// What was done to gyro and accelerometer number `instance`; `None` where the log does not say.
+fn corrections(parameters: &BTreeMap<String, f64>, instance: u32) -> Option<[Correction; 2]> {
+    // The first three sensors have their number within the name, those of later versions before it.
+    let (before, within) = match instance {
+        0 => ("INS".to_owned(), String::new()),
+        1 | 2 => ("INS".to_owned(), (instance + 1).to_string()),
+        _ => (format!("INS{}", instance + 1), String::new()),
+    };
+    let three = |what: &str| -> Option<[f64; 3]> {
+        let get = |axis: &str| parameters.get(&format!("{before}_{what}_{axis}")).copied();
+        Some([get("X")?, get("Y")?, get("Z")?])
+    };
+    let mounting = parameters.get("AHRS_ORIENTATION").copied().unwrap_or(0.0);
+    let rotation = orientation(mounting)?;
+    let scale = three(&format!("ACC{within}SCAL"))?;
+    if scale.contains(&0.0) {
+        return None;
+    }
+    let accel = three(&format!("ACC{within}OFFS"))?;
+    Some([
+        Correction {
+            rotation,
+            offset: three(&format!("GYR{within}OFFS"))?,
+            scale: [1.0; 3],
+        },
+        Correction {
+            rotation,
+            offset: accel,
+            scale,
+        },
+    ])
+}
+
+fn listed(three: [f64; 3]) -> String {
+    three.map(|value| format!("{value:.6}")).join(" ")
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,182 @@
+//! Logs of ArduPilot. `two-sensors.bin` was written by a Python program with `struct`, from the description of the format, and reads in pymavlink 2.4.50 as it
+//! was meant: a board rolled over (AHRS_ORIENTATION 8), two sensors of known raw readings that were calibrated and turned before they were written.
+//! Sensor i reads (r / 4, 1 + i, -8) m/s² and (0.5, -r / 8, i) rad/s in row r of 24, 2.5 ms apart from 10 ms on. In row 12 the offset of the first
+//! gyro changes from 0.0625 to 1 rad/s.
+
+use std::path::PathBuf;
+
+use super::super::text_table::Cells;
+use super::super::time::Stamp;
+use super::*;
+
+fn fixture() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("src/import/ardupilot/fixtures/two-sensors.bin")
+}
+
+fn open(path: &Path, topic: Option<&str>, instance: Option<u32>) -> Result<Vec<Readings>> {
+    read(path, Choice { topic, instance })
+}
+
+fn rows(readings: &mut Readings) -> Vec<(Stamp, Vec<f64>)> {
+    let mut cells = Cells::default();
+    let mut rows = Vec::new();
+    while readings.next(&mut cells).is_some() {
+        rows.push((cells.stamp, cells.numbers[1..].to_vec()));
+    }
+    rows
+}
+
+fn close(found: &[f64], expected: &[f64]) {
+    assert_eq!(found.len(), expected.len(), "{found:?}");
+    let off = found.iter().zip(expected).map(|(a, b)| (a - b).abs());
+    // Single precision in the file, and a factor of 2 or 1 / 0.5 to undo.
+    assert!(off.fold(0.0, f64::max) < 1e-5, "{found:?} {expected:?}");
+}
+
+#[test]
+fn calibration_and_mounting_are_undone_by_the_parameters_of_the_time_of_each_reading() {
+    let mut all = open(&fixture(), Some("IMU"), Some(0)).unwrap();
+    assert_eq!(all.len(), 1);
+    let notes = &all[0].notes[0];
+    assert!(
+        notes.contains("24 messages IMU of instance 0, ArduPilot's calibration undone")
+            && notes.contains("scale factor 1.250000 0.500000 2.000000"),
+        "{notes}"
+    );
+    let warned = all[0].warnings.join(" ");
+    assert!(warned.contains("changes 1 times"), "{warned}");
+    for (r, (stamp, values)) in rows(&mut all[0]).into_iter().enumerate() {
+        assert_eq!(stamp, Stamp::from(10_000_000 + 2_500_000 * r as i64));
+        let r = r as f64;
+        close(&values, &[0.5, -r / 8.0, 0.0, r / 4.0, 1.0, -8.0, 40.5]);
+    }
+}
+
+#[test]
+fn a_sensor_with_messages_at_its_own_rate_is_read_by_them() {
+    let mut all = open(&fixture(), None, Some(1)).unwrap();
+    assert_eq!(all.len(), 2);
+    let (gyro, accel) = (rows(&mut all[0]), rows(&mut all[1]));
+    assert_eq!((gyro.len(), accel.len()), (48, 48));
+    assert_eq!(
+        [gyro[3].0, accel[3].0],
+        [13_750_000, 14_150_000].map(Stamp::from)
+    );
+    close(&gyro[7].1, &[0.5, -3.0 / 8.0, 1.0]);
+    close(&accel[7].1, &[0.75, 2.0, -8.0]);
+    // Every second of its messages IMU is there.
+    assert_eq!(
+        rows(&mut open(&fixture(), Some("IMU"), Some(1)).unwrap()[0]).len(),
+        12
+    );
+}
+
+#[test]
+fn what_was_gathered_in_an_interval_becomes_its_mean() {
+    let mut all = open(&fixture(), Some("IMT"), Some(0)).unwrap();
+    let rows = rows(&mut all[0]);
+    close(&rows[4].1, &[0.5, -0.5, 0.0, 1.0, 1.0, -8.0]);
+}
+
+#[test]
+fn what_is_not_there_is_refused_with_what_is() {
+    let refused = |topic, instance| open(&fixture(), topic, instance).unwrap_err().to_string();
+    let error = refused(None, None);
+    assert!(
+        error.contains("several sensors") && error.contains("GYR instance 1 (48 messages)"),
+        "{error}"
+    );
+    assert!(refused(None, Some(4)).contains("no instance 4"));
+    assert!(refused(Some("BARO"), Some(0)).contains("no BARO of instance 0"));
+    assert!(refused(Some("GYR"), Some(0)).contains("no GYR of instance 0"));
+}
+
+/// The log without the records of one kind, found by their three first bytes and length.
+fn without(number: u8, length: usize, keep: impl Fn(&[u8]) -> bool) -> Vec<u8> {
+    let whole = std::fs::read(fixture()).unwrap();
+    let mut left = Vec::new();
+    let mut at = 0;
+    while at < whole.len() {
+        if whole[at..].starts_with(&[0xA3, 0x95, number]) && !keep(&whole[at..at + length]) {
+            at += length;
+        } else {
+            left.push(whole[at]);
+            at += 1;
+        }
+    }
+    left
+}
+
+#[test]
+fn of_a_log_without_its_parameters_nothing_is_undone_and_this_is_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("log.bin");
+    // 3 bytes, time, name, two floats.
+    std::fs::write(
+        &path,
+        without(64, 35, |record| !record[11..].starts_with(b"INS_ACCSCAL_Y")),
+    )
+    .unwrap();
+    let mut all = open(&path, Some("IMU"), Some(0)).unwrap();
+    assert!(
+        all[0].notes[0].contains("after ArduPilot's calibration"),
+        "{:?}",
+        all[0].notes
+    );
+    assert!(
+        all[0].warnings[0].contains("lacks parameters"),
+        "{:?}",
+        all[0].warnings
+    );
+    // As pymavlink reads it.
+    close(
+        &rows(&mut all[0])[0].1,
+        &[0.4375, 0.125, -0.03125, -0.15625, -0.625, 17.0, 40.5],
+    );
+    // The second sensor has its own.
+    assert!(
+        open(&path, Some("IMU"), Some(1)).unwrap()[0]
+            .warnings
+            .is_empty()
+    );
+}
+
+#[test]
+fn a_cut_or_damaged_log_is_read_as_far_as_it_is_whole_and_does_not_panic() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("log.bin");
+    let whole = std::fs::read(fixture()).unwrap();
+    for end in (0..whole.len()).step_by(7) {
+        std::fs::write(&path, &whole[..end]).unwrap();
+        match open(&path, None, Some(0)) {
+            Ok(all) => assert!(all[0].len() <= 24),
+            Err(error) => assert!(error.to_string().contains("log.bin"), "{error}"),
+        }
+    }
+    for at in (0..whole.len()).step_by(7) {
+        let mut damaged = whole.clone();
+        damaged[at] ^= 0x55;
+        std::fs::write(&path, damaged).unwrap();
+        let _ = open(&path, None, Some(0));
+    }
+    // A record of another kind was written over the middle: what is behind it is found again.
+    let mut damaged = whole.clone();
+    let at = whole.len() / 2;
+    damaged[at..at + 60].fill(0xA3);
+    std::fs::write(&path, damaged).unwrap();
+    let all = open(&path, Some("IMU"), Some(1)).unwrap();
+    assert!(all[0].len() >= 9, "{}", all[0].len());
+    assert!(
+        all[0]
+            .warnings
+            .iter()
+            .any(|w| w.contains("belong to no record")),
+        "{:?}",
+        all[0].warnings
+    );
+    for other in [&b"ms,x,y\n"[..], b"", &[0; 4000]] {
+        std::fs::write(&path, other).unwrap();
+        let error = open(&path, None, None).unwrap_err().to_string();
+        assert!(error.contains("no DataFlash log"), "{error}");
+    }
+}

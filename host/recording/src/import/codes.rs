@@ -1,0 +1,201 @@
+//! From the cell of a file to a reading: codes of a converter first, then the factor and what is added.
+
+use std::fmt;
+use std::str::FromStr;
+
+use crate::cell::{Refusal, is_reading, shorten};
+use crate::columns::Column;
+use crate::error::{Error, Result};
+use crate::raw_channels::RawChannels;
+use crate::signed_low_byte::undone;
+
+/// Raw columns of unsigned codes in two's complement, as in `accel=12`: the upper half of the codes are negative readings.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct TwosComplement {
+    channels: RawChannels,
+    bits: u32,
+}
+
+impl TwosComplement {
+    /// Bits of `column`, if it is of such codes.
+    pub(super) fn bits(all: &[TwosComplement], column: Column) -> Option<u32> {
+        let own = all.iter().find(|codes| codes.channels.have(column));
+        own.map(|codes| codes.bits)
+    }
+}
+
+impl FromStr for TwosComplement {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        let parts = text.split_once('=');
+        let channels = parts.and_then(|(name, _)| RawChannels::named(name.trim()).ok());
+        let bits = parts.and_then(|(_, bits)| bits.trim().parse::<u32>().ok());
+        match (channels, bits.filter(|bits| (2..=32).contains(bits))) {
+            (Some(channels), Some(bits)) => Ok(Self { channels, bits }),
+            _ => Err(Error::new(
+                "two's complement",
+                format!(
+                    "{} is no raw column and 2 to 32 bits",
+                    shorten(text.as_bytes())
+                ),
+                "write it like accel=12, for gyro, accel or a single column such as gyro_x",
+            )),
+        }
+    }
+}
+
+impl fmt::Display for TwosComplement {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}={}", self.channels, self.bits)
+    }
+}
+
+/// The code that raw columns have at an input of 0, as in `gyro=2048`: subtracted before the factor.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Zero {
+    channels: RawChannels,
+    code: f64,
+}
+
+impl Zero {
+    /// Code at 0 of `column`.
+    pub(super) fn of(all: &[Zero], column: Column) -> f64 {
+        let own = all.iter().filter(|zero| zero.channels.have(column));
+        own.map(|zero| zero.code).sum()
+    }
+}
+
+impl FromStr for Zero {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        let parts = text.split_once('=');
+        let channels = parts.and_then(|(name, _)| RawChannels::named(name.trim()).ok());
+        let code = parts.and_then(|(_, code)| code.trim().parse::<f64>().ok());
+        match (channels, code.filter(|code| code.is_finite())) {
+            (Some(channels), Some(code)) => Ok(Self { channels, code }),
+            _ => Err(Error::new(
+                "zero",
+                format!("{} is no raw column and a code", shorten(text.as_bytes())),
+                "write it like gyro=2048, for gyro, accel or a single column such as gyro_x",
+            )),
+        }
+    }
+}
+
+impl fmt::Display for Zero {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}={}", self.channels, self.code)
+    }
+}
+
+/// What is done to the cells of a column, in the order of the fields.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Conversion {
+    pub twos_complement: Option<u32>,
+    /// Whether a firmware took its low byte for a signed number.
+    pub signed_low_byte: bool,
+    pub zero: f64,
+    pub factor: f64,
+    pub offset: f64,
+}
+
+impl Conversion {
+    /// The reading that a cell with `number` has; not a number where the cell is empty.
+    pub fn reading(&self, number: f64) -> std::result::Result<f64, Refusal> {
+        let mut code = number;
+        if let Some(bits) = self.twos_complement {
+            code = signed(number, bits)?;
+        }
+        if self.signed_low_byte {
+            if code.is_finite() && code.fract() != 0.0 {
+                return Err(Refusal {
+                    problem: format!("{code} has a fraction, and two bytes make whole counts"),
+                    remedy: "give the log as it was recorded, without factors or means",
+                });
+            }
+            code = undone(code);
+        }
+        let value = (code - self.zero) * self.factor + self.offset;
+        match is_reading(value) {
+            true => Ok(value),
+            false => Err(Refusal {
+                problem: format!(
+                    "{number:e} times {:e} is too large for a reading",
+                    self.factor
+                ),
+                remedy: "correct the cell or the factor",
+            }),
+        }
+    }
+}
+
+/// The number that an unsigned code of so many bits is in two's complement.
+fn signed(code: f64, bits: u32) -> std::result::Result<f64, Refusal> {
+    if code.is_nan() {
+        return Ok(code);
+    }
+    let codes = f64::from(bits).exp2();
+    if code.fract() != 0.0 || !(0.0..codes).contains(&code) {
+        return Err(Refusal {
+            problem: format!(
+                "{code} is no code of {bits} bits, which are whole and from 0 to {}",
+                codes - 1.0
+            ),
+            remedy: "give another number of bits, or none if the codes have signs already",
+        });
+    }
+    Ok(match code >= 0.5 * codes {
+        true => code - codes,
+        false => code,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_code_of_twelve_bits_is_the_number_that_a_sign_extension_makes_of_it() {
+        for code in 0..1_u16 << 12 {
+            let extended = ((code << 4) as i16) >> 4;
+            assert_eq!(signed(f64::from(code), 12).ok(), Some(f64::from(extended)));
+        }
+        assert!(signed(f64::NAN, 12).is_ok_and(f64::is_nan));
+        for wrong in [-1.0, 4096.0, 0.5] {
+            let refusal = signed(wrong, 12).unwrap_err();
+            assert!(refusal.problem.contains("4095"), "{}", refusal.problem);
+        }
+        assert_eq!(signed(4_294_967_295.0, 32).ok(), Some(-1.0));
+    }
+
+    #[test]
+    fn codes_are_shifted_before_the_factor_and_readings_after_it() {
+        let conversion = Conversion {
+            twos_complement: None,
+            signed_low_byte: false,
+            zero: 2048.0,
+            factor: 0.5,
+            offset: 7.0,
+        };
+        assert_eq!(conversion.reading(2050.0).ok(), Some(8.0));
+        let zeros: Vec<Zero> = ["gyro=512", "accel_z=-3"]
+            .map(|text| text.parse().unwrap())
+            .into();
+        let of = |c| Zero::of(&zeros, Column::Raw(c));
+        assert_eq!([of(1), of(4), of(5)], [512.0, 0.0, -3.0]);
+    }
+
+    #[test]
+    fn what_names_no_channels_or_no_number_is_refused() {
+        for text in ["12", "accel", "accel=1", "accel=33", "temp_c=12", "accel=x"] {
+            assert!(text.parse::<TwosComplement>().is_err(), "{text}");
+        }
+        for text in ["12", "gyro", "gyro=inf", "t_s=1", "gyro=x"] {
+            assert!(text.parse::<Zero>().is_err(), "{text}");
+        }
+        let both: TwosComplement = "gyro=16".parse().unwrap();
+        assert_eq!(both.to_string(), "gyro=16");
+    }
+}

@@ -1,0 +1,75 @@
+//! Logs that say themselves what they hold: bags of ROS, logs of PX4 and of ArduPilot.
+//!
+//! Another format is a module with a `read` and a line in [`FORMATS`].
+
+use std::path::Path;
+
+use super::readings::{Choice, Readings};
+use super::{ardupilot, px4, ros};
+use crate::error::{Argument, Error, Result};
+
+/// A format: how its files are named, and who reads them.
+struct LogFormat {
+    endings: &'static [&'static str],
+    read: fn(&Path, Choice<'_>) -> Result<Vec<Readings>>,
+}
+
+const FORMATS: [LogFormat; 5] = [
+    LogFormat {
+        endings: &["bag"],
+        read: ros::read_bag,
+    },
+    LogFormat {
+        endings: &["mcap"],
+        read: ros::read_mcap,
+    },
+    LogFormat {
+        endings: &["db3"],
+        read: ros::read_db3,
+    },
+    LogFormat {
+        endings: &["ulg"],
+        read: px4::read,
+    },
+    LogFormat {
+        endings: &["bin"],
+        read: ardupilot::read,
+    },
+];
+
+fn format(path: &Path) -> Option<&'static LogFormat> {
+    let ending = path.extension()?.to_str()?;
+    let has = |format: &&LogFormat| {
+        format
+            .endings
+            .iter()
+            .any(|e| e.eq_ignore_ascii_case(ending))
+    };
+    FORMATS.iter().find(has)
+}
+
+/// Whether a file is such a log, by its name. Its readings are in rad/s and m/s², its stamps in ns.
+pub fn is_log(path: &Path) -> bool {
+    format(path).is_some()
+}
+
+/// The readings of a log: one for the whole unit, or one for each sensor where they have clocks of their own, the faster one first.
+pub(super) fn read(path: &Path, choice: Choice<'_>) -> Result<Vec<Readings>> {
+    let Some(format) = format(path) else {
+        return Err(Error::new(
+            path.display(),
+            "this is no log",
+            "name its columns",
+        ));
+    };
+    let all = (format.read)(path, choice)?;
+    if all.iter().all(|readings| readings.len() == 0) {
+        let problem = "there is no message of an inertial unit in what was chosen";
+        return Err(
+            Error::new(path.display(), problem, "choose another topic or file")
+                .about(Argument::Topic)
+                .about(Argument::Instance),
+        );
+    }
+    Ok(all)
+}

@@ -1,0 +1,360 @@
+//! Logs of PX4 (ULog): the raw topics of each sensor, or `sensor_combined` with PX4's own calibration undone.
+//!
+//! `sensor_accel`, `sensor_gyro` and their FIFO topics have the readings of the driver, on the board's axes, before calibration.
+//! `sensor_combined` has the calibrated readings of the sensors that PX4 has chosen: `R ((raw - offset) scale)` with the parameters `CAL_ACCn_` and
+//! `CAL_GYROn_` of the sensor with that device id, and R the mounting of the board (`src/lib/sensor_calibration` of PX4-Autopilot).
+
+mod calibration;
+mod topics;
+
+use std::collections::BTreeMap;
+use std::io::Read;
+use std::path::Path;
+
+use px4_ulog::stream_parser::file_reader::{Message, SimpleCallbackResult};
+use px4_ulog::stream_parser::model::{Completeness, DataMessage, ParameterMessage};
+use px4_ulog::stream_parser::read_file_with_simple_callback;
+
+use super::readings::{Choice, Readings, guarded};
+use crate::columns::Column;
+use crate::error::{Argument, Error, Result};
+use calibration::{Parameters, Sensor};
+use topics::{Combined, Topic, u32_in};
+
+/// What a log begins with, and the bytes of its header.
+const SIGNATURE: &[u8] = b"ULog\x01\x12\x35";
+const HEADER: u64 = 16;
+
+/// The topics that are read.
+const COMBINED: &str = "sensor_combined";
+const SELECTION: &str = "sensor_selection";
+/// Topics of one sensor each: gyro and accelerometer.
+const RAW: [&str; 2] = ["sensor_gyro", "sensor_accel"];
+const FIFO: [&str; 2] = ["sensor_gyro_fifo", "sensor_accel_fifo"];
+
+/// The default profile of the logger writes the raw topics once a second, and `sensor_combined` at 200 Hz. Where nobody chooses, the raw topics
+/// are taken unless they have this many times fewer samples.
+const SPARSE: usize = 4;
+
+/// What a log has of inertial sensors.
+#[derive(Default)]
+struct Log {
+    /// By name and instance.
+    topics: BTreeMap<(&'static str, u32), Topic>,
+    combined: Combined,
+    /// Ids of the gyro and the accelerometer in use, each with the first sample of `sensor_combined` that they are of.
+    selected: Vec<(usize, [u32; 2])>,
+    parameters: Parameters,
+    dropouts: u64,
+    dropouts_ms: u64,
+    broken: u64,
+}
+
+/// Reads a log.
+pub(super) fn read(path: &Path, choice: Choice<'_>) -> Result<Vec<Readings>> {
+    let place = path.to_str().ok_or_else(|| {
+        let problem = "the name of the file is not UTF-8";
+        Error::new(path.display(), problem, "rename it")
+    })?;
+    let mut beginning = Vec::new();
+    let file = std::fs::File::open(path).map_err(|error| Error::io(path, &error))?;
+    let read = file.take(HEADER).read_to_end(&mut beginning);
+    read.map_err(|error| Error::io(path, &error))?;
+    let other = || {
+        let problem = "this is no ULog, or it ends before its definitions do";
+        Error::new(path.display(), problem, "copy it from the vehicle again")
+    };
+    if beginning.len() < HEADER as usize || !beginning.starts_with(SIGNATURE) {
+        return Err(other());
+    }
+    let (log, ended) = guarded(path, || {
+        let mut log = Log::default();
+        let ended = read_file_with_simple_callback(place, &mut |message| {
+            log.take(message);
+            SimpleCallbackResult::KeepReading
+        });
+        Ok((log, ended.map_err(|_| other())?))
+    })?;
+    let mut all = log.chosen(path, choice)?;
+    if let Some(first) = all.first_mut() {
+        first.warnings.extend(log.of_the_logger(&ended));
+    }
+    Ok(all)
+}
+
+impl Log {
+    fn take(&mut self, message: &Message<'_>) {
+        match message {
+            Message::ParameterMessage(ParameterMessage::Float(name, value, _)) => {
+                self.parameters
+                    .set(self.combined.stamps_ns.len(), name, f64::from(*value));
+            }
+            Message::ParameterMessage(ParameterMessage::Int32(name, value, _)) => {
+                self.parameters
+                    .set(self.combined.stamps_ns.len(), name, f64::from(*value));
+            }
+            Message::DropoutMessage(dropout) => {
+                self.dropouts += 1;
+                self.dropouts_ms += u64::from(dropout.duration_ms);
+            }
+            Message::Data(data) => {
+                let taken = match data.flattened_format.message_name() {
+                    COMBINED => self.combined.take(data),
+                    SELECTION => self.select(data),
+                    name => match RAW.into_iter().chain(FIFO).find(|raw| *raw == name) {
+                        Some(raw) => {
+                            let instance = u32::from(data.multi_id.value());
+                            let topic = self.topics.entry((raw, instance)).or_default();
+                            match FIFO.contains(&raw) {
+                                true => topic.take_fifo(data),
+                                false => topic.take(data),
+                            }
+                        }
+                        None => Some(()),
+                    },
+                };
+                self.broken += u64::from(taken.is_none());
+            }
+            _ => {}
+        }
+    }
+
+    fn select(&mut self, data: &DataMessage<'_>) -> Option<()> {
+        let ids = [
+            u32_in(data, "gyro_device_id")?,
+            u32_in(data, "accel_device_id")?,
+        ];
+        if self
+            .selected
+            .last()
+            .is_none_or(|(_, before)| *before != ids)
+        {
+            self.selected.push((self.combined.stamps_ns.len(), ids));
+        }
+        Some(())
+    }
+
+    /// The readings that `choice` is of.
+    fn chosen(&self, path: &Path, choice: Choice<'_>) -> Result<Vec<Readings>> {
+        let has = |names: [&str; 2]| self.topics.keys().any(|(name, _)| names.contains(name));
+        let combined = self.combined.stamps_ns.len();
+        let raw = self
+            .topics
+            .iter()
+            .filter(|((name, _), _)| RAW.contains(name));
+        let raw = raw.map(|(_, topic)| topic.values.len()).max().unwrap_or(0);
+        let of_raw = match choice.topic {
+            None if has(FIFO) => FIFO,
+            None if choice.instance.is_none() && combined > SPARSE * raw => {
+                return self.combined_readings(path, raw > 0);
+            }
+            None => RAW,
+            Some(COMBINED) if combined > 0 && choice.instance.is_none() => {
+                return self.combined_readings(path, false);
+            }
+            Some(topic) if FIFO.contains(&topic) => FIFO,
+            Some(topic) if RAW.contains(&topic) => RAW,
+            Some(_) => ["", ""],
+        };
+        if !has(of_raw) {
+            let what = choice.topic.unwrap_or("sensor of its own");
+            let problem = format!(
+                "there is no {what} in the log; there are: {}",
+                self.listed()
+            );
+            let remedy = "choose one of these, or log the raw sensors (SDLOG_PROFILE)";
+            let error = Error::new(path.display(), problem, remedy);
+            return Err(error.about(Argument::Topic).about(Argument::Instance));
+        }
+        self.raw_readings(path, of_raw, choice.instance)
+    }
+
+    /// What there is to choose from.
+    fn listed(&self) -> String {
+        let raw = self.topics.iter().map(|((name, instance), topic)| {
+            format!("{name} instance {instance} ({})", topic.named())
+        });
+        let combined = (!self.combined.stamps_ns.is_empty()).then(|| COMBINED.to_owned());
+        let all: Vec<String> = raw.chain(combined).collect();
+        match all.is_empty() {
+            true => "no messages of inertial sensors".into(),
+            false => all.join(", "),
+        }
+    }
+
+    /// The topics of gyro and accelerometer, of one instance.
+    fn raw_readings(
+        &self,
+        path: &Path,
+        names: [&'static str; 2],
+        instance: Option<u32>,
+    ) -> Result<Vec<Readings>> {
+        let mut instances: Vec<u32> = self
+            .topics
+            .keys()
+            .filter(|(name, _)| names.contains(name))
+            .map(|(_, i)| *i)
+            .collect();
+        instances.sort_unstable();
+        instances.dedup();
+        let instance = match (instance, instances.as_slice()) {
+            (None, [only]) => *only,
+            (Some(wanted), all) if all.contains(&wanted) => wanted,
+            (wanted, _) => {
+                let problem = match wanted {
+                    Some(wanted) => format!(
+                        "there is no instance {wanted}; there are: {}",
+                        self.listed()
+                    ),
+                    None => format!("the log has several sensors: {}", self.listed()),
+                };
+                let error = Error::new(path.display(), problem, "choose one of the instances");
+                return Err(error.about(Argument::Instance));
+            }
+        };
+        let mut both: Vec<(usize, &'static str, &Topic)> = (0..)
+            .zip(names)
+            .filter_map(|(sensor, name)| Some((sensor, name, self.topics.get(&(name, instance))?)))
+            .collect();
+        // The others are interpolated at the times of the first.
+        both.sort_by_key(|(_, _, topic)| std::cmp::Reverse(topic.values.len()));
+        let mut all = Vec::new();
+        for (sensor, name, topic) in &both {
+            let temperature = all.is_empty() && topic.temp_c.iter().any(|t| t.is_finite());
+            let columns = (0..3).map(|axis| Column::Raw(3 * sensor + axis));
+            let mut readings = Readings::of(
+                columns
+                    .chain(temperature.then_some(Column::Temperature))
+                    .collect(),
+            );
+            // Drivers that calibrate do so on the board's axes.
+            let undone = match topic.calibrated {
+                true => Some(self.parameters.undo(
+                    Sensor::ALL[*sensor],
+                    &topic.devices,
+                    &topic.values,
+                    false,
+                )),
+                false => None,
+            };
+            for (row, stamp) in topic.stamps_ns.iter().enumerate() {
+                let values = undone
+                    .as_ref()
+                    .map_or(topic.values[row], |undone| undone.values[row]);
+                readings.push(
+                    *stamp,
+                    values
+                        .into_iter()
+                        .chain(temperature.then(|| topic.temp_c[row])),
+                );
+            }
+            let is = match &undone {
+                Some(undone) => undone.said.clone(),
+                None => "before PX4's calibration".into(),
+            };
+            readings.notes.push(format!(
+                "{} samples of {name} instance {instance} ({}), {is}",
+                topic.values.len(),
+                topic.named()
+            ));
+            if topic.devices.len() > 1 {
+                readings.warnings.push(format!("{name} instance {instance} changes its device during the log: import a log of one device"));
+            }
+            all.push(readings);
+        }
+        // The lower 16 bits of an id are the bus and the address on it.
+        if let [(_, _, a), (_, _, b)] = both.as_slice()
+            && let (Some((_, a)), Some((_, b))) = (a.devices.first(), b.devices.first())
+            && a & 0xffff != b & 0xffff
+        {
+            all[0].warnings.push(format!(
+                "gyro and accelerometer of instance {instance} are on different devices"
+            ));
+        }
+        Ok(all)
+    }
+
+    /// The readings of `sensor_combined`; `sparse`: the raw topics are there, with too few samples.
+    fn combined_readings(&self, path: &Path, sparse: bool) -> Result<Vec<Readings>> {
+        if self.combined.stamps_ns.is_empty() {
+            let problem = "there are no messages of inertial sensors in the log";
+            return Err(Error::new(path.display(), problem, "choose another log"));
+        }
+        let ids = |sensor: Sensor| -> Vec<(usize, u32)> {
+            let selected = self
+                .selected
+                .iter()
+                .map(|(from, ids)| (*from, ids[sensor as usize]));
+            match self.selected.is_empty() {
+                // Older logs do not say: where there is one calibrated sensor only, it is that.
+                true => self
+                    .parameters
+                    .only_id(sensor)
+                    .map(|id| (0, id))
+                    .into_iter()
+                    .collect(),
+                false => selected.collect(),
+            }
+        };
+        let gyro =
+            self.parameters
+                .undo(Sensor::Gyro, &ids(Sensor::Gyro), &self.combined.gyro, true);
+        let accel = self.parameters.undo(
+            Sensor::Accel,
+            &ids(Sensor::Accel),
+            &self.combined.accel,
+            true,
+        );
+        let mut readings = Readings::of_unit();
+        for (row, stamp) in self.combined.stamps_ns.iter().enumerate() {
+            readings.push(
+                *stamp,
+                gyro.values[row].into_iter().chain(accel.values[row]),
+            );
+        }
+        let why = match sparse {
+            true => ", as the topics of the single sensors have too few samples (SDLOG_PROFILE)",
+            false => "",
+        };
+        readings
+            .notes
+            .push(format!("{} samples of {COMBINED}{why}", readings.len()));
+        for (name, undone) in [("gyro", gyro), ("accel", accel)] {
+            readings.notes.push(format!("{name}: {}", undone.said));
+            readings
+                .warnings
+                .extend(undone.warnings.iter().map(|w| format!("{name}: {w}")));
+        }
+        Ok(vec![readings])
+    }
+
+    /// What the logger has lost, and how the file ended.
+    fn of_the_logger(&self, ended: &Completeness) -> Vec<String> {
+        let mut warnings = Vec::new();
+        if self.dropouts > 0 {
+            warnings.push(format!(
+                "the logger has lost data {} times, {} ms in all: what is missing of the readings is a gap",
+                self.dropouts, self.dropouts_ms
+            ));
+        }
+        match ended {
+            Completeness::Complete => {}
+            Completeness::Truncated => warnings.push(
+                "the log is cut in the middle of a record: what is before it was read".into(),
+            ),
+            Completeness::MalformedRecord(what) => warnings.push(format!(
+                "a record of the log is damaged, and what is before it was read ({what})"
+            )),
+        }
+        if self.broken > 0 {
+            warnings.push(format!(
+                "{} messages lack a field of their topic, and were left out",
+                self.broken
+            ));
+        }
+        warnings
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,241 @@
+//! PX4's own calibration as its log has it, and readings without it.
+
+use std::collections::BTreeMap;
+
+use super::super::rotation::{Correction, Rotation, from_euler, orientation, product};
+
+/// Sensors that PX4 keeps a calibration of, of each kind.
+const MOST_SENSORS: usize = 4;
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Sensor {
+    Gyro,
+    Accel,
+}
+
+impl Sensor {
+    pub const ALL: [Sensor; 2] = [Sensor::Gyro, Sensor::Accel];
+
+    /// What its parameters begin with.
+    fn prefix(self) -> &'static str {
+        match self {
+            Sensor::Gyro => "CAL_GYRO",
+            Sensor::Accel => "CAL_ACC",
+        }
+    }
+
+    /// The switch of its compensation over temperature.
+    fn thermal(self) -> &'static str {
+        match self {
+            Sensor::Gyro => "TC_G_ENABLE",
+            Sensor::Accel => "TC_A_ENABLE",
+        }
+    }
+}
+
+/// Parameters by name.
+type Values = BTreeMap<String, f64>;
+
+/// The parameters of calibration and mounting, as they change.
+#[derive(Debug, Default)]
+pub(super) struct Parameters {
+    /// From which sample on they hold.
+    epochs: Vec<(usize, Values)>,
+}
+
+/// Readings without PX4's calibration, or with it where it cannot be undone.
+pub(super) struct Undone {
+    pub values: Vec<[f64; 3]>,
+    /// What was done, for people.
+    pub said: String,
+    pub warnings: Vec<String>,
+}
+
+impl Parameters {
+    /// A parameter has this value from sample `row` on.
+    pub fn set(&mut self, row: usize, name: &str, value: f64) {
+        const ABOUT: [&str; 5] = [
+            "CAL_ACC",
+            "CAL_GYRO",
+            "SENS_BOARD_",
+            "TC_A_ENABLE",
+            "TC_G_ENABLE",
+        ];
+        if !ABOUT.iter().any(|beginning| name.starts_with(beginning)) {
+            return;
+        }
+        let mut values = self
+            .epochs
+            .last()
+            .map_or_else(Values::new, |(_, values)| values.clone());
+        if values.insert(name.to_owned(), value) == Some(value) {
+            return;
+        }
+        match self.epochs.last_mut() {
+            Some((from, last)) if *from == row => *last = values,
+            _ => self.epochs.push((row, values)),
+        }
+    }
+
+    /// The id of the only sensor that is calibrated, if there is one only.
+    pub fn only_id(&self, sensor: Sensor) -> Option<u32> {
+        let (_, values) = self.epochs.last()?;
+        let id = |n: usize| values.get(&format!("{}{n}_ID", sensor.prefix())).copied();
+        let mut ids = (0..MOST_SENSORS).filter_map(id).filter(|id| *id != 0.0);
+        let only = ids.next()?;
+        ids.next().is_none().then(|| device_id(only))
+    }
+
+    /// The `readings` of `sensor` before calibration; `devices` has its ids, each with its first reading, the first one's being all before it as
+    /// well. `mounted`: whether the readings are on the vehicle's axes, or still on the board's.
+    pub fn undo(
+        &self,
+        sensor: Sensor,
+        devices: &[(usize, u32)],
+        readings: &[[f64; 3]],
+        mounted: bool,
+    ) -> Undone {
+        let as_they_are = |why: String| Undone {
+            values: readings.to_vec(),
+            said: "after PX4's calibration".into(),
+            warnings: vec![format!(
+                "{why}: the readings are as PX4 has calibrated them"
+            )],
+        };
+        if devices.is_empty() {
+            return as_they_are("the log does not say which device its calibration is of".into());
+        }
+        if self.epochs.is_empty() {
+            return as_they_are("the log has no parameters".into());
+        }
+        let mut starts: Vec<usize> = devices.iter().map(|(from, _)| *from).collect();
+        starts.extend(self.epochs.iter().map(|(from, _)| *from));
+        starts.push(0);
+        starts.sort_unstable();
+        starts.dedup();
+        starts.retain(|from| *from < readings.len().max(1));
+        let mut values = Vec::with_capacity(readings.len());
+        let mut said: Vec<String> = Vec::new();
+        for (i, &from) in starts.iter().enumerate() {
+            let to = starts.get(i + 1).copied().unwrap_or(readings.len());
+            let device = devices
+                .iter()
+                .rev()
+                .find(|(first, _)| *first <= from)
+                .unwrap_or(&devices[0])
+                .1;
+            let epoch = self
+                .epochs
+                .iter()
+                .rev()
+                .find(|(first, _)| *first <= from)
+                .unwrap_or(&self.epochs[0]);
+            let (correction, name) = match correction(sensor, device, &epoch.1, mounted) {
+                Ok(found) => found,
+                Err(why) => return as_they_are(why),
+            };
+            values.extend(
+                readings[from..to]
+                    .iter()
+                    .map(|reading| correction.undo(*reading)),
+            );
+            if said.last() != Some(&name) {
+                said.push(name);
+            }
+        }
+        let mut warnings = Vec::new();
+        if said.len() > 1 {
+            let changes = said.len() - 1;
+            warnings.push(format!("the sensor in use or its calibration changes {changes} times during the log: import a log of one sensor"));
+        }
+        if self
+            .epochs
+            .iter()
+            .any(|(_, values)| values.get(sensor.thermal()) == Some(&1.0))
+        {
+            warnings.push(format!(
+                "PX4's compensation over temperature is on ({}), and is not undone",
+                sensor.thermal()
+            ));
+        }
+        Undone {
+            values,
+            said: said.join(", then "),
+            warnings,
+        }
+    }
+}
+
+/// Ids are logged with a sign by some versions.
+fn device_id(parameter: f64) -> u32 {
+    (parameter as i64 & 0xffff_ffff) as u32
+}
+
+/// What PX4 has done to the readings of the sensor of id `device`, and its name for people; or why that is not known.
+fn correction(
+    sensor: Sensor,
+    device: u32,
+    values: &Values,
+    mounted: bool,
+) -> Result<(Correction, String), String> {
+    let prefix = sensor.prefix();
+    let is_own = |n: &usize| {
+        values
+            .get(&format!("{prefix}{n}_ID"))
+            .is_some_and(|id| device_id(*id) == device)
+    };
+    let own = (0..MOST_SENSORS).find(is_own);
+    let get = |key: &str, default: f64| {
+        own.and_then(|n| values.get(&format!("{prefix}{n}_{key}")).copied())
+            .unwrap_or(default)
+    };
+    let three = |what: &str, default: f64| {
+        ["X", "Y", "Z"].map(|axis| get(&format!("{axis}{what}"), default))
+    };
+    let (offset, scale) = (three("OFF", 0.0), three("SCALE", 1.0));
+    if scale.contains(&0.0) {
+        return Err(format!(
+            "{prefix}{}_XSCALE or another of its factors is 0",
+            own.unwrap_or(0)
+        ));
+    }
+    // A sensor beside the board has an orientation of its own; -1 is the board's.
+    let rotation = match (mounted, get("ROT", -1.0)) {
+        (false, _) => orientation(0.0),
+        (true, own) if own >= 0.0 => orientation(own),
+        (true, _) => board(values),
+    };
+    let Some(rotation) = rotation else {
+        return Err(
+            "the mounting of the board (SENS_BOARD_ROT, CAL_..._ROT) is not known here".into(),
+        );
+    };
+    let name = match own {
+        Some(n) => format!(
+            "{prefix}{n} of device {device} undone: offset {}, scale factor {}",
+            listed(offset),
+            listed(scale)
+        ),
+        None => format!("device {device}, which PX4 has no calibration of"),
+    };
+    Ok((
+        Correction {
+            rotation,
+            offset,
+            scale,
+        },
+        name,
+    ))
+}
+
+fn listed(three: [f64; 3]) -> String {
+    three.map(|value| format!("{value:.6}")).join(" ")
+}
+
+/// From the axes of the board to those of the vehicle.
+fn board(values: &Values) -> Option<Rotation> {
+    let get = |name: &str| values.get(name).copied().unwrap_or(0.0);
+    let mounting = orientation(get("SENS_BOARD_ROT"))?;
+    let fine = ["X", "Y", "Z"].map(|axis| get(&format!("SENS_BOARD_{axis}_OFF")));
+    Some(product(&from_euler(fine), &mounting))
+}

@@ -1,0 +1,112 @@
+//! The topics of a log that have readings, sample by sample.
+
+use px4_ulog::stream_parser::ParseableFieldType;
+use px4_ulog::stream_parser::model::DataMessage;
+
+/// Samples of one instance of a topic.
+#[derive(Default)]
+pub(super) struct Topic {
+    pub stamps_ns: Vec<i64>,
+    pub values: Vec<[f64; 3]>,
+    pub temp_c: Vec<f64>,
+    /// Ids of the sensor as they follow one another, each with its first sample.
+    pub devices: Vec<(usize, u32)>,
+    /// Whether its readings are calibrated, as those of PX4 before 1.11 are, which have no `timestamp_sample`.
+    pub calibrated: bool,
+}
+
+/// Samples of `sensor_combined`.
+#[derive(Default)]
+pub(super) struct Combined {
+    pub stamps_ns: Vec<i64>,
+    pub gyro: Vec<[f64; 3]>,
+    pub accel: Vec<[f64; 3]>,
+}
+
+impl Topic {
+    /// Its sensor, for people.
+    pub fn named(&self) -> String {
+        self.devices
+            .first()
+            .map_or("no device id".into(), |(_, id)| format!("device {id}"))
+    }
+
+    fn begin(&mut self, data: &DataMessage<'_>) {
+        if let Some(id) = u32_in(data, "device_id")
+            && self.devices.last().is_none_or(|(_, before)| *before != id)
+        {
+            self.devices.push((self.values.len(), id));
+        }
+    }
+
+    /// Takes a message of the topic; `None` if it lacks a field.
+    pub fn take(&mut self, data: &DataMessage<'_>) -> Option<()> {
+        let sampled = u64_in(data, "timestamp_sample");
+        let stamp_ns = nanoseconds(sampled.or_else(|| u64_in(data, "timestamp"))?)?;
+        let values = [f32_in(data, "x")?, f32_in(data, "y")?, f32_in(data, "z")?];
+        self.begin(data);
+        self.calibrated |= sampled.is_none();
+        self.stamps_ns.push(stamp_ns);
+        self.values.push(values);
+        self.temp_c
+            .push(f32_in(data, "temperature").unwrap_or(f64::NAN));
+        Some(())
+    }
+
+    /// Takes a batch of the sensor's own buffer, of which the last sample is of the time of the message.
+    pub fn take_fifo(&mut self, data: &DataMessage<'_>) -> Option<()> {
+        let last_ns = nanoseconds(u64_in(data, "timestamp_sample")?)?;
+        let (step_us, scale) = (f32_in(data, "dt")?, f32_in(data, "scale")?);
+        let count = usize::from(field::<u8>(data, "samples")?);
+        self.begin(data);
+        for i in 0..count {
+            let count_of =
+                |axis: &str| Some(f64::from(field::<i16>(data, &format!("{axis}[{i}]"))?));
+            let counts = [count_of("x")?, count_of("y")?, count_of("z")?];
+            let before_ns = (count - 1 - i) as f64 * step_us * 1e3;
+            self.stamps_ns.push(last_ns - before_ns.round() as i64);
+            self.values.push(counts.map(|value| value * scale));
+            self.temp_c.push(f64::NAN);
+        }
+        Some(())
+    }
+}
+
+impl Combined {
+    /// Takes a message of the topic; `None` if it lacks a field.
+    pub fn take(&mut self, data: &DataMessage<'_>) -> Option<()> {
+        let stamp_ns = nanoseconds(u64_in(data, "timestamp")?)?;
+        let three = |name: &str| -> Option<[f64; 3]> {
+            let axis = |i: usize| f32_in(data, &format!("{name}[{i}]"));
+            Some([axis(0)?, axis(1)?, axis(2)?])
+        };
+        let (gyro, accel) = (three("gyro_rad")?, three("accelerometer_m_s2")?);
+        self.stamps_ns.push(stamp_ns);
+        self.gyro.push(gyro);
+        self.accel.push(accel);
+        Some(())
+    }
+}
+
+fn field<T: ParseableFieldType>(data: &DataMessage<'_>, name: &str) -> Option<T> {
+    let parser = data.flattened_format.get_field_parser::<T>(name).ok()?;
+    Some(parser.parse(data.data))
+}
+
+fn u64_in(data: &DataMessage<'_>, name: &str) -> Option<u64> {
+    field(data, name)
+}
+
+/// A whole number in field `name`, as of ids.
+pub(super) fn u32_in(data: &DataMessage<'_>, name: &str) -> Option<u32> {
+    field(data, name)
+}
+
+fn f32_in(data: &DataMessage<'_>, name: &str) -> Option<f64> {
+    field::<f32>(data, name).map(f64::from)
+}
+
+/// Of microseconds; `None` where no clock counts as far.
+fn nanoseconds(microseconds: u64) -> Option<i64> {
+    i64::try_from(microseconds).ok()?.checked_mul(1000)
+}

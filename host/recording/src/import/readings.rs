@@ -1,0 +1,94 @@
+//! What the readers of logs have read, as rows.
+
+use std::panic::{UnwindSafe, catch_unwind};
+use std::path::Path;
+
+use super::assignment::Role;
+use super::text_table::Cells;
+use super::time::Stamp;
+use crate::columns::Column;
+use crate::error::Result;
+use crate::in_order::broke_down;
+
+/// Which of the sensors in a log is wanted.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Choice<'a> {
+    /// Name of the topic or message; the format decides without it.
+    pub topic: Option<&'a str>,
+    /// Number of the sensor among those of one topic.
+    pub instance: Option<u32>,
+}
+
+/// Readings of one clock: those of a whole unit, or of one of its two sensors.
+#[derive(Debug, Default)]
+pub(super) struct Readings {
+    /// What each value of a row is.
+    columns: Vec<Column>,
+    stamps_ns: Vec<i64>,
+    /// Row by row.
+    values: Vec<f64>,
+    next: usize,
+    /// What was read, and what was done to it.
+    pub notes: Vec<String>,
+    pub warnings: Vec<String>,
+}
+
+impl Readings {
+    /// Of these columns, in the order of the values, without rows yet.
+    pub fn of(columns: Vec<Column>) -> Self {
+        Self {
+            columns,
+            ..Self::default()
+        }
+    }
+
+    /// Of both sensors.
+    pub fn of_unit() -> Self {
+        Self::of((0..6).map(Column::Raw).collect())
+    }
+
+    /// Appends a row; one value for each column.
+    pub fn push(&mut self, stamp_ns: i64, values: impl IntoIterator<Item = f64>) {
+        self.stamps_ns.push(stamp_ns);
+        self.values.extend(values);
+    }
+
+    /// Number of rows.
+    pub fn len(&self) -> usize {
+        self.stamps_ns.len()
+    }
+
+    /// Roles in the order of [`Cells::numbers`].
+    pub fn roles(&self) -> Vec<Role> {
+        let time = std::iter::once(Column::Time);
+        time.chain(self.columns.iter().copied())
+            .map(Role::Column)
+            .collect()
+    }
+
+    /// Share of the rows that has been handed out.
+    pub fn progress(&self) -> f64 {
+        self.next as f64 / self.len().max(1) as f64
+    }
+
+    /// Puts the next row into `cells` and returns its number from 1, or `None` at the end.
+    pub fn next(&mut self, cells: &mut Cells) -> Option<u64> {
+        let stamp_ns = *self.stamps_ns.get(self.next)?;
+        let width = self.columns.len();
+        cells.stamp = Stamp::from(stamp_ns);
+        cells.step.clear();
+        cells.numbers.clear();
+        cells.numbers.push(stamp_ns as f64);
+        let from = self.next * width;
+        cells
+            .numbers
+            .extend_from_slice(&self.values[from..from + width]);
+        self.next += 1;
+        Some(self.next as u64)
+    }
+}
+
+/// What `read` makes of the file at `path`. Crates that read logs panic on some damaged files, and a damaged file is no bug of ours.
+pub(super) fn guarded<T>(path: &Path, read: impl FnOnce() -> Result<T> + UnwindSafe) -> Result<T> {
+    catch_unwind(read).map_err(|_| broke_down(&path.display().to_string()))?
+}

@@ -1,0 +1,148 @@
+//! Rows that are chosen by what a column holds, as one of several sensors in a file.
+
+use std::collections::BTreeSet;
+use std::fmt;
+use std::path::Path;
+use std::str::FromStr;
+
+use crate::cell::shorten;
+use crate::error::{Argument, Error, Result};
+
+/// Different values of a column that are listed where the one that was asked for is not among them.
+const MOST_LISTED: usize = 20;
+
+/// The rows in which a column has a value, as in `channel=3`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct RowFilter {
+    column: String,
+    value: String,
+}
+
+impl RowFilter {
+    /// Name of the column in the header, or its number from the left.
+    pub(super) fn column(&self) -> &str {
+        &self.column
+    }
+
+    /// Where `names` has the column. Of names that are no header at all, its number from the left counts.
+    pub(super) fn position(&self, names: &[String]) -> Option<usize> {
+        names.iter().position(|name| *name == self.column)
+    }
+
+    /// Position of the column by its number from the left, which counts from 1.
+    pub(super) fn number(&self) -> Option<usize> {
+        self.column.parse::<usize>().ok()?.checked_sub(1)
+    }
+
+    /// As text they may differ: 3, 3.0 and 03 are one channel.
+    fn holds(&self, cell: &str) -> bool {
+        let number = |text: &str| text.parse::<f64>().ok();
+        cell == self.value || number(cell).is_some_and(|n| number(&self.value) == Some(n))
+    }
+}
+
+impl FromStr for RowFilter {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        match text.split_once('=') {
+            Some((column, value)) if !column.trim().is_empty() && !value.trim().is_empty() => {
+                Ok(RowFilter {
+                    column: column.trim().to_owned(),
+                    value: value.trim().to_owned(),
+                })
+            }
+            _ => Err(Error::new(
+                "choice of rows",
+                format!("{} is no column and a value", shorten(text.as_bytes())),
+                "write it like channel=3",
+            )),
+        }
+    }
+}
+
+impl fmt::Display for RowFilter {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}={}", self.column, self.value)
+    }
+}
+
+/// Filters at work on the rows of a file.
+#[derive(Debug, Default)]
+pub(super) struct RowFilters {
+    filters: Vec<Tally>,
+    kept: u64,
+    /// Rows that were left out.
+    pub left_out: u64,
+}
+
+#[derive(Debug)]
+struct Tally {
+    filter: RowFilter,
+    found: bool,
+    /// Values that were met, some of them.
+    met: BTreeSet<String>,
+}
+
+impl RowFilters {
+    /// Of these filters, no row having been seen.
+    pub fn new(filters: &[RowFilter]) -> Self {
+        let tally = |filter: &RowFilter| Tally {
+            filter: filter.clone(),
+            found: false,
+            met: BTreeSet::new(),
+        };
+        Self {
+            filters: filters.iter().map(tally).collect(),
+            ..Self::default()
+        }
+    }
+
+    /// Whether a row is kept in which the columns of the filters hold `cells`, in their order.
+    pub fn keep<'a>(&mut self, cells: impl Iterator<Item = std::borrow::Cow<'a, str>>) -> bool {
+        let mut all = true;
+        for (tally, cell) in self.filters.iter_mut().zip(cells) {
+            let cell = cell.trim();
+            let holds = tally.filter.holds(cell);
+            tally.found |= holds;
+            all &= holds;
+            if !tally.found && tally.met.len() <= MOST_LISTED && !tally.met.contains(cell) {
+                tally.met.insert(cell.to_owned());
+            }
+        }
+        match all {
+            true => self.kept += 1,
+            false => self.left_out += 1,
+        }
+        all
+    }
+
+    /// At the end of `path`: refuses a value that no row had.
+    pub fn check(&self, path: &Path) -> Result<()> {
+        let refuse = |problem: String, remedy: &str| {
+            Err(Error::new(path.display(), problem, remedy).about(Argument::Where))
+        };
+        if let Some(Tally { filter, met, .. }) = self.filters.iter().find(|tally| !tally.found) {
+            let listed = met.iter().take(MOST_LISTED);
+            let listed: Vec<String> = listed.map(|value| shorten(value.as_bytes())).collect();
+            let more = if met.len() > MOST_LISTED {
+                " and others"
+            } else {
+                ""
+            };
+            let problem = format!(
+                "no row has {filter}; the column has {}{more}",
+                listed.join(", ")
+            );
+            return refuse(problem, "choose one of these values");
+        }
+        if !self.filters.is_empty() && self.kept == 0 {
+            let all: Vec<String> = self.filters.iter().map(|t| t.filter.to_string()).collect();
+            return refuse(
+                format!("no row has {} at once", all.join(" and ")),
+                "choose values that occur together",
+            );
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,142 @@
+//! Steps that pauses part, as where a program writes the poses one after another and nothing between.
+
+use super::*;
+
+/// What rs-imu-calibration.py writes with `np.savetxt(..., delimiter=',', fmt='%s')`: milliseconds since 1970 and three numbers, 40 samples at 200 Hz of
+/// each of its six directions, 6 s apart.
+fn directions() -> String {
+    let forces = [
+        [0.0, -9.8, 0.0],
+        [9.8, 0.0, 0.0],
+        [0.0, 9.8, 0.0],
+        [-9.8, 0.0, 0.0],
+        [0.0, 0.0, -9.8],
+        [0.0, 0.0, 9.8],
+    ];
+    let mut text = String::new();
+    for (k, [x, y, z]) in (0..).zip(forces) {
+        for i in 0..40 {
+            let ms = 1_548_242_178_612.25 + 6200.0 * f64::from(k) + 5.0 * f64::from(i);
+            text += &format!("{ms},{},{y:?},{z:?}\n", x + 0.001 * f64::from(i % 2));
+        }
+    }
+    text
+}
+
+fn realsense(bench: &Bench, files: &[&str]) -> Result<ImportOptions> {
+    let paths: Vec<PathBuf> = files.iter().map(|name| bench.path(name)).collect();
+    let chosen = Preset::choose(Some("realsense".parse().unwrap()), &paths, None)?.unwrap();
+    let mut options = bench.options(files, &[]);
+    options.raw_unit = chosen.raw_unit.unwrap();
+    Ok(options.with_preset(chosen))
+}
+
+#[test]
+fn the_six_directions_of_a_realsense_camera_are_steps_with_known_inputs() {
+    let inputs = "step,ref_force_x_mps2,ref_force_y_mps2,ref_force_z_mps2\n0,0,-9.81,0\n1,9.81,0,0\n2,0,9.81,0\n3,-9.81,0,0\n4,0,0,-9.81\n5,0,0,9.81\n";
+    let bench = Bench::new(&[("accel_cam.txt", &directions()), ("inputs", inputs)]);
+    let mut options = realsense(&bench, &["accel_cam.txt"]).unwrap();
+    options.step_gap_s = Some(1.0);
+    options.reference = Reference::Table;
+    options.inputs = Some(bench.path("inputs"));
+    let (summary, batch, manifest) = bench.import(&options).unwrap();
+    assert_eq!((summary.rows, summary.sample_rate_hz), (240, 200.0));
+    assert_eq!(batch.step, (0..240).map(|i| i / 40).collect::<Vec<i32>>());
+    assert_eq!(
+        [batch.reference[4][0], batch.reference[5][239]],
+        [-9.81, 9.81]
+    );
+    assert!((batch.t_s[40] - batch.t_s[0] - 6.2).abs() < 1e-9);
+    assert_eq!(manifest.raw_unit, RawUnit::Si);
+    assert!(
+        manifest
+            .imported_with
+            .windows(2)
+            .any(|w| w == ["--step-gap", "1"])
+    );
+    // Nobody has given a step: they are to be found.
+    options.step_gap_s = None;
+    assert!(bench.refused(&options).contains("no column is step"));
+}
+
+#[test]
+fn the_two_files_of_a_realsense_camera_are_not_joined() {
+    let bench = Bench::new(&[
+        ("accel_cam.txt", &directions()),
+        ("gyro_cam.txt", &directions()),
+    ]);
+    let error = realsense(&bench, &["gyro_cam.txt", "accel_cam.txt"])
+        .unwrap_err()
+        .to_string();
+    assert!(error.contains("last of the six directions"), "{error}");
+    let (summary, batch, _) = bench
+        .import(&realsense(&bench, &["gyro_cam.txt"]).unwrap())
+        .unwrap();
+    assert_eq!(
+        (summary.rows, batch.raw[0].len(), batch.raw[3].len()),
+        (240, 240, 0)
+    );
+}
+
+#[test]
+fn pauses_that_contradict_other_steps_are_refused() {
+    let bench = Bench::new(&[
+        (
+            "a",
+            "t_s,step,accel_x,accel_y,accel_z\n0,1,1,2,3\n0.01,1,1,2,3\n0.02,1,1,2,4\n",
+        ),
+        ("turns", "step,turn_x_deg\n0,360\n"),
+    ]);
+    let mut options = bench.options(&["a"], &[]);
+    options.step_gap_s = Some(1.0);
+    assert!(bench.refused(&options).contains("it has a column step"));
+    options.columns = vec![
+        "t_s=t_s,accel_x=accel_x,accel_y=accel_y,accel_z=accel_z"
+            .parse()
+            .unwrap(),
+    ];
+    options.time_unit = Some("s".parse().unwrap());
+    options.inputs = Some(bench.path("turns"));
+    assert!(
+        bench
+            .refused(&options)
+            .contains("turns are not parted by pauses")
+    );
+    options.inputs = None;
+    options.sequence = true;
+    assert!(bench.refused(&options).contains("steps already"));
+    options.sequence = false;
+    options.step_gap_s = Some(-1.0);
+    assert!(bench.refused(&options).contains("-1 s is no pause"));
+}
+
+#[test]
+fn codes_become_readings_in_the_order_of_the_converter() {
+    let text = "t_s,accel_x,accel_y,accel_z\n0,4095,2048,100\n0.01,4094,2047,100\n0.02,1,0,100\n";
+    let bench = Bench::new(&[
+        ("a", text),
+        (
+            "b",
+            "t_s,accel_x,accel_y,accel_z\n0,4096,0,100\n0.01,1,1,1\n0.02,1,2,1\n",
+        ),
+    ]);
+    let mut options = bench.options(&["a"], &[]);
+    options.twos_complements = vec!["accel=12".parse().unwrap()];
+    options.zeros = vec!["accel_z=60".parse().unwrap()];
+    options.scales = vec!["accel=0.5".parse().unwrap()];
+    let (_, batch, manifest) = bench.import(&options).unwrap();
+    assert_eq!(batch.raw[3], [-0.5, -1.0, 0.5]);
+    assert_eq!(batch.raw[4], [-1024.0, 1023.5, 0.0]);
+    assert_eq!(batch.raw[5], [20.0; 3]);
+    let with = manifest.imported_with.join(" ");
+    assert!(
+        with.contains("--twos-complement accel=12 --zero accel_z=60"),
+        "{with}"
+    );
+    options.files = vec![bench.path("b")];
+    let error = bench.refused(&options);
+    assert!(
+        error.contains("row 2, column accel_x") && error.contains("from 0 to 4095"),
+        "{error}"
+    );
+}

@@ -1,0 +1,119 @@
+//! Rows that are chosen by what a column holds.
+
+use super::*;
+
+/// Three sensors in turn, 10 ms apart each; the third measures on two ranges.
+fn three_sensors(header: &str) -> String {
+    let row = |i: u64| {
+        let (time, channel) = (10 * (i / 3), i % 3 + 1);
+        format!(
+            "{channel},{time},{},{},{},{}\n",
+            if i < 30 { "low" } else { "high" },
+            channel,
+            2 * channel,
+            i
+        )
+    };
+    format!("{header}{}", (0..60).map(row).collect::<String>())
+}
+
+const LIST: &str = "t_s=ms,accel_x=a,accel_y=b,accel_z=c";
+
+fn chosen(text: &str, columns: &str, filters: &[&str]) -> Result<(ImportSummary, Batch, Manifest)> {
+    let bench = Bench::new(&[("a.csv", text)]);
+    let mut options = bench.options(&["a.csv"], &[columns]);
+    options.filters = filters.iter().map(|text| text.parse().unwrap()).collect();
+    bench.import(&options)
+}
+
+#[test]
+fn each_of_the_sensors_in_one_file_is_a_recording() {
+    let text = three_sensors("channel,ms,range,a,b,c\n");
+    for channel in 1..=3 {
+        let filter = format!("channel={channel}");
+        let (summary, batch, manifest) = chosen(&text, LIST, &[&filter]).unwrap();
+        assert_eq!((summary.rows, summary.not_chosen), (20, 40));
+        assert_eq!(summary.sample_rate_hz, 100.0);
+        assert!(batch.raw[3].iter().all(|a| *a == f64::from(channel)));
+        assert_eq!(batch.raw[5][1], f64::from(channel - 1 + 3));
+        assert!(
+            manifest
+                .imported_with
+                .windows(2)
+                .any(|w| w == ["--where".to_owned(), filter.clone()])
+        );
+    }
+}
+
+#[test]
+fn several_choices_hold_at_once_and_numbers_are_compared_as_numbers() {
+    let text = three_sensors("channel,ms,range,a,b,c\n");
+    let (summary, batch, _) = chosen(&text, LIST, &["channel=02.0", "range=high"]).unwrap();
+    assert_eq!(summary.rows, 10);
+    assert_eq!(batch.raw[5][0], 31.0);
+    // A file without names: the columns go by their numbers.
+    let list = "-,t_s,-,accel_x,accel_y,accel_z";
+    let bench = Bench::new(&[("a.csv", &three_sensors(""))]);
+    let mut options = bench.options(&["a.csv"], &[list]);
+    options.filters = vec!["1=3".parse().unwrap()];
+    options.time_unit = Some("ms".parse().unwrap());
+    assert_eq!(bench.import(&options).unwrap().1.raw[3], [3.0; 20]);
+}
+
+#[test]
+fn a_broken_row_of_another_sensor_is_none_of_this_one() {
+    let text = three_sensors("channel,ms,range,a,b,c\n").replace("2,10,low,2", "2,10,low,broken");
+    assert_eq!(chosen(&text, LIST, &["channel=1"]).unwrap().0.rows, 20);
+    let error = chosen(&text, LIST, &["channel=2"]).unwrap_err().to_string();
+    assert!(error.contains("broken"), "{error}");
+}
+
+#[test]
+fn a_value_that_never_occurs_is_refused_with_those_that_do() {
+    let text = three_sensors("channel,ms,range,a,b,c\n");
+    let refused = |filters: &[&str]| chosen(&text, LIST, filters).unwrap_err().to_string();
+    let error = refused(&["channel=7"]);
+    assert!(
+        error.contains("channel=7") && error.contains("\"1\", \"2\", \"3\""),
+        "{error}"
+    );
+    let error = refused(&["sensor=7"]);
+    assert!(error.contains("\"sensor\""), "{error}");
+    // `c` counts on: each row has another value, of which some are listed.
+    let error = refused(&["c=-1"]);
+    assert!(error.contains("and others") && error.len() < 400, "{error}");
+    for wrong in ["channel", "=3", "channel="] {
+        assert!(wrong.parse::<RowFilter>().is_err(), "{wrong}");
+    }
+    let early = three_sensors("channel,ms,range,a,b,c\n").replace("3,60,low", "3,60,odd");
+    let error = chosen(&early, LIST, &["channel=1", "range=odd"])
+        .unwrap_err()
+        .to_string();
+    assert!(error.contains("channel=1 and range=odd at once"), "{error}");
+}
+
+#[test]
+fn rows_of_a_parquet_file_are_chosen_alike() {
+    let bench = Bench::new(&[("a.csv", &three_sensors("channel,ms,range,a,b,c\n"))]);
+    let mut options = bench.options(
+        &["a.csv"],
+        &["step=range,t_s=ms,temp_c=channel,accel_x=a,accel_y=b,accel_z=c"],
+    );
+    options.time_unit = Some("ms".parse().unwrap());
+    options.filters = vec!["channel=3".parse().unwrap()];
+    bench.import(&options).unwrap();
+    std::fs::copy(bench.path("out/samples.parquet"), bench.path("b.parquet")).unwrap();
+    let mut options = bench.options(
+        &["b.parquet"],
+        &["t_s=t_s,accel_x=accel_x,accel_y=accel_y,accel_z=accel_z"],
+    );
+    options.time_unit = Some("s".parse().unwrap());
+    options.filters = vec!["step=1".parse().unwrap()];
+    let (summary, batch, _) = bench.import(&options).unwrap();
+    assert_eq!((summary.rows, summary.not_chosen), (10, 10));
+    assert_eq!(batch.raw[5][0], 32.0);
+    options.filters = vec!["step=4".parse().unwrap()];
+    assert!(bench.refused(&options).contains("\"0\", \"1\""));
+    options.filters = vec!["range=4".parse().unwrap()];
+    assert!(bench.refused(&options).contains("accel_x"));
+}
