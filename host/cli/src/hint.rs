@@ -2,6 +2,7 @@
 
 use mimu::warning::Warning;
 use mimu_recording::error::{Argument, Error};
+use mimu_wizard::waiting::Waiting;
 
 /// Flags of the import, which are a remedy after any command that reads a recording. Others are one only on the command that refused.
 const OF_THE_IMPORT: [&str; 11] = [
@@ -23,8 +24,13 @@ const OF_THE_IMPORT: [&str; 11] = [
 pub(crate) fn line(error: &Error, command: &clap::Command) -> String {
     let arguments = &error.refused().arguments;
     let named = |flag: &'static str| {
-        let long = flag.split([',', ' ']).next()?.trim_start_matches('-');
-        let has = command.get_arguments().any(|a| a.get_long() == Some(long));
+        let first = flag.split([',', ' ']).next()?;
+        let has = command
+            .get_arguments()
+            .any(|a| match first.strip_prefix("--") {
+                Some(long) => a.get_long() == Some(long),
+                None => a.get_short() == first.chars().nth(1),
+            });
         match has {
             true => Some(flag.to_string()),
             false if OF_THE_IMPORT.contains(&flag) => Some(format!("mimu import {flag}")),
@@ -49,6 +55,14 @@ pub(crate) fn of_warning(warning: &Warning) -> String {
     match warning.left_out() {
         Some(step) => format!("{warning} (--keep {step})"),
         None => warning.to_string(),
+    }
+}
+
+/// Why a unit of the wizard waits, with the flag that it is about.
+pub(crate) fn of_waiting(why: &Waiting) -> String {
+    match why {
+        Waiting::Exchanged => format!("{why} (--text)"),
+        _ => why.to_string(),
     }
 }
 
@@ -86,6 +100,20 @@ fn flag(argument: Argument) -> Option<&'static str> {
         Argument::SetPoints => "--points",
         Argument::Soak => "--soak",
         Argument::StepTimes => "--step-every",
+        Argument::RawUnit => "--raw-unit",
+        Argument::TextColumns => "--text",
+        Argument::Baud => "--baud",
+        Argument::Driver => "--driver",
+        Argument::Fixture => "--fixture",
+        Argument::Gravity => "--gravity",
+        Argument::Latitude => "--latitude",
+        Argument::DwellLength => "--dwell",
+        Argument::LargestRate => "--rate",
+        Argument::Plan => "--plan",
+        Argument::Seed => "--seed",
+        Argument::Drift => "--drift",
+        Argument::EstimatedBy => "--by",
+        Argument::Output => "-o",
         // An argument that this version of the command has no flag for.
         _ => return None,
     })
@@ -107,11 +135,22 @@ mod tests {
             line(&error, &command(&["rate-hz", "still"])),
             "log.csv: the rate is not known; give it (--rate-hz)"
         );
+        let short = Error::new("out", "it is not empty", "give another").about(Argument::Output);
+        let has = clap::Command::new("wizard").arg(clap::Arg::new("output").short('o'));
+        let said = "out: it is not empty; give another (-o)";
+        assert_eq!(line(&short, &has), said);
         let other = Error::new("log.csv", "it is empty", "record again");
         assert_eq!(
             line(&other, &command(&["rate-hz"])),
             "log.csv: it is empty; record again"
         );
+    }
+
+    #[test]
+    fn columns_that_seem_exchanged_name_the_flag_that_orders_them() {
+        let said = of_waiting(&Waiting::Exchanged);
+        assert!(said.ends_with("exchanged? (--text)"), "{said}");
+        assert_eq!(of_waiting(&Waiting::TableMoves), "the table moves");
     }
 
     #[test]

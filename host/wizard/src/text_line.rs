@@ -4,7 +4,7 @@
 //! or one for each number (`ax:1,ay:2`, the Arduino plotter's way), and words of greeting before. MotionCal's boards write `Raw:` with
 //! nine integers and, in turns with it, `Uni:` with nine of the same in SI.
 
-use mimu_recording::error::{Error, Result};
+use mimu_recording::error::{Argument, Error, Result};
 
 /// Longest line, bytes; a board that writes none of them as long as this with ten numbers.
 const LONGEST: usize = 400;
@@ -45,7 +45,7 @@ impl Columns {
     pub fn parse(names: &str) -> Result<Self> {
         let refused = |problem: String| {
             let remedy = "name ax, ay, az, gx, gy and gz in the order of the line, also t_us, t_ms or t_s, temp_c, and `-` for what is not needed";
-            Error::new(format!("--text {names:?}"), problem, remedy)
+            Error::new(format!("columns {names:?}"), problem, remedy).about(Argument::TextColumns)
         };
         let mut columns = Vec::new();
         for name in names.split(',').map(str::trim) {

@@ -12,7 +12,7 @@ use mimu_recording::error::Result;
 use mimu_recording::result_file::stage;
 
 use super::{OpenSession, Plain, WITH_EFFECTS, mounted, now};
-use crate::event::{Event, Question};
+use crate::event::{Event, Phase, Question};
 use crate::folder::{Entry, Part};
 use crate::procedure::verification;
 use crate::step::Step;
@@ -144,7 +144,7 @@ impl OpenSession<'_> {
             steps.len(),
             names.join(", ")
         );
-        self.wizard.begin_phase("confirmation", words);
+        self.wizard.begin_phase(Phase::Confirmation, words);
         or_cancelled!(self.wizard.dwells(Part::Confirmation, &steps));
         self.finish()?;
         for ((k, found), plain) in (0..).zip(found).zip(plain) {
