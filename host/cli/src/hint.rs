@@ -1,5 +1,6 @@
 //! The flags of the command beside what an error of a library says to set otherwise.
 
+use mimu::diagnose::rejected::{Reason, Rejected};
 use mimu::warning::Warning;
 use mimu_recording::error::{Argument, Error};
 use mimu_wizard::waiting::Waiting;
@@ -66,6 +67,15 @@ pub(crate) fn of_waiting(why: &Waiting) -> String {
     }
 }
 
+/// Why an effect was rejected, with the flags by which it would not be.
+pub(crate) fn of_rejected(rejected: &Rejected) -> String {
+    let Rejected { id, reason, .. } = rejected;
+    match reason {
+        Reason::Suggestion(_) => format!("{reason} (--verify, --accept {id})"),
+        _ => reason.to_string(),
+    }
+}
+
 fn flag(argument: Argument) -> Option<&'static str> {
     Some(match argument {
         Argument::Columns => "--columns",
@@ -121,6 +131,8 @@ fn flag(argument: Argument) -> Option<&'static str> {
 
 #[cfg(test)]
 mod tests {
+    use mimu::quantity::Sensor;
+
     use super::*;
 
     #[test]
@@ -144,6 +156,20 @@ mod tests {
             line(&other, &command(&["rate-hz"])),
             "log.csv: it is empty; record again"
         );
+    }
+
+    #[test]
+    fn a_suggestion_names_the_flags_that_confirm_it() {
+        let rejected = |reason| Rejected {
+            id: "term:accel_x~rate_y*force_z".into(),
+            sensor: Sensor::Accel,
+            reason,
+        };
+        let said = of_rejected(&rejected(Reason::Suggestion(1e-9)));
+        let flags = "or your word (--verify, --accept term:accel_x~rate_y*force_z)";
+        assert!(said.ends_with(flags), "{said}");
+        let said = of_rejected(&rejected(Reason::OneDwell(0.83)));
+        assert_eq!(said, "it rests to 83 % on one dwell");
     }
 
     #[test]

@@ -20,6 +20,7 @@ pub mod decision;
 pub mod note;
 mod passes;
 pub mod picture;
+pub mod rejected;
 pub mod rows;
 pub mod search;
 pub mod uncertainty;

@@ -146,10 +146,10 @@ impl NoiseChannel {
         };
         let remedy = match (is_si(&self.unit), &self.raw_unit) {
             (true, None) if !is_si(unit) => {
-                "run mimu allan again on the raw recording, with --calibration: the file then has the scale factor"
+                "run mimu allan again on the raw recording, with a calibration: the file then has the scale factor"
             }
             (false, _) if is_si(unit) => {
-                "run mimu allan again with --calibration: one file then serves for raw readings and for SI"
+                "run mimu allan again with a calibration: one file then serves for raw readings and for SI"
             }
             _ => "run mimu allan on a recording of this unit with the same raw unit",
         };
@@ -204,7 +204,7 @@ impl NoiseFile {
                 return Err(Error::new(
                     format!("{place}, channel {}, scale_factor", channel.name),
                     "raw_unit and scale_factor stand together, and a scale factor is a number other than 0",
-                    "run mimu allan again with --calibration",
+                    "run mimu allan again with a calibration",
                 ));
             }
             for term in Term::ALL {

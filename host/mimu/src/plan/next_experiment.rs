@@ -13,12 +13,15 @@ pub mod prediction;
 pub mod recipe;
 pub mod words;
 
+use std::fmt;
+
 use rayon::prelude::*;
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 use crate::diagnose::Diagnosis;
 use crate::effects;
 use crate::effects::candidate::{Candidate, Kind};
+use crate::effects::effect::Effect;
 use crate::effects::regressor::Product;
 use crate::fit::Fit;
 use crate::plan::design::budget::DwellNoise;
@@ -61,22 +64,44 @@ pub struct NotInPlan {
     /// Effect, or two with `or` between them.
     pub id: String,
     /// Why not.
-    pub reason: &'static str,
+    pub reason: NotShown,
 }
 
-/// It can be shown, but not with what this recording was made with.
-const TURNTABLE: &str = "this needs a turntable";
-/// Nothing of the table of recipes determines it.
-const NO_RECIPE: &str = "no recipe shows it";
+/// Why a plan does not show something. JSON has the sentence.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum NotShown {
+    /// Nothing of the table of recipes determines it.
+    NoRecipe,
+    /// It can be shown, but not with what this recording was made with.
+    Turntable,
+}
 
-/// An effect whose typical size the recording would not have shown, with what would.
-#[derive(Debug, Clone, PartialEq)]
+impl fmt::Display for NotShown {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::NoRecipe => "no recipe shows it",
+            Self::Turntable => "this needs a turntable",
+        })
+    }
+}
+
+impl Serialize for NotShown {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
+/// An effect whose typical size the recording would not have shown, with what would: that it was not found means nothing.
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NotExcited {
     /// Public id.
-    pub id: String,
-    /// The experiment in words.
+    pub id: &'static str,
+    /// Whose readings would err.
+    pub sensor: Sensor,
+    /// What would show it, in words.
     pub experiment: String,
     /// The recipe behind the words; `None` where no recipe shows the effect as well as wanted, so that the words are about it alone.
+    #[serde(skip)]
     pub recipe: Option<SizedRecipe>,
 }
 
@@ -281,18 +306,17 @@ fn by_id(id: &str) -> Option<Candidate> {
 pub fn next(diagnosis: &Diagnosis) -> Next {
     let setup = Setup::of(&diagnosis.after, None);
     let sensors = diagnosis.sensors.iter();
-    let open: Vec<&(String, String)> = sensors.flat_map(|s| &s.decision.not_excited).collect();
-    let shown = open.par_iter().map(|(id, needs)| {
-        let target = effects::by_id(id).map(Target::listed);
-        let shown = target
-            .as_ref()
-            .and_then(|t| recommended(diagnosis, &setup, t));
-        let planned = planned(id, shown.as_ref(), target);
+    let open = sensors.flat_map(|s| s.decision.not_excited.iter().copied());
+    let open: Vec<&'static Effect> = open.collect();
+    let shown = open.par_iter().map(|effect| {
+        let target = Target::listed(effect);
+        let shown = recommended(diagnosis, &setup, &target);
+        let planned = planned(effect.id, shown.as_ref(), Some(target));
         let (experiment, recipe) =
-            shown.map_or_else(|| (needs.clone(), None), |s| (s.words, s.recipe));
-        let id = id.clone();
+            shown.map_or_else(|| (effect.needs.into(), None), |s| (s.words, s.recipe));
         let not_excited = NotExcited {
-            id,
+            id: effect.id,
+            sensor: effect.sensor,
             experiment,
             recipe,
         };
@@ -325,8 +349,8 @@ fn planned(
 ) -> Result<Target, NotInPlan> {
     let reason = match (shown, target) {
         (Some(shown), Some(target)) if shown.same_kind => return Ok(target),
-        (Some(shown), _) if !shown.same_kind => TURNTABLE,
-        _ => NO_RECIPE,
+        (Some(shown), _) if !shown.same_kind => NotShown::Turntable,
+        _ => NotShown::NoRecipe,
     };
     let id = id.into();
     Err(NotInPlan { id, reason })
