@@ -3,6 +3,7 @@
 use mimu::diagnose::rejected::{Reason, Rejected};
 use mimu::warning::Warning;
 use mimu_recording::error::{Argument, Error};
+use mimu_thermal::warning::Warning as OverTemperature;
 use mimu_wizard::waiting::Waiting;
 
 /// Flags of the import, which are a remedy after any command that reads a recording. Others are one only on the command that refused.
@@ -64,6 +65,14 @@ pub(crate) fn of_waiting(why: &Waiting) -> String {
     match why {
         Waiting::Exchanged => format!("{why} (--text)"),
         _ => why.to_string(),
+    }
+}
+
+/// The warning of a fit over temperature in one line, with the flag that makes it go.
+pub(crate) fn of_thermal(warning: &OverTemperature) -> String {
+    match warning {
+        OverTemperature::WithoutNoise => format!("{warning} (--noise)"),
+        _ => warning.to_string(),
     }
 }
 
