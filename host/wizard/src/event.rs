@@ -3,6 +3,7 @@
 
 use std::fmt;
 
+use mimu::diagnose::Verdict;
 use serde::{Serialize, Serializer};
 
 use crate::folder::Part;
@@ -122,8 +123,8 @@ pub enum Event {
     Diagnosed {
         /// Which unit.
         unit: String,
-        /// `clean`, `explained` or `unexplained`.
-        verdict: &'static str,
+        /// What it amounts to.
+        verdict: Verdict,
         /// The effects, each with its strength.
         effects: Vec<String>,
         /// The page.

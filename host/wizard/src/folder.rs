@@ -16,6 +16,7 @@ use std::fs::{self, File, OpenOptions};
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
+use mimu::diagnose::Verdict;
 use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{
     Batch, Columns, Growing, MANIFEST_FILE, Manifest, Recording, Restart, SampleFormat,
@@ -108,7 +109,7 @@ pub enum Entry {
     /// What still errs was looked for.
     Diagnosed {
         /// What it amounts to.
-        verdict: String,
+        verdict: Verdict,
         /// The effects.
         effects: Vec<String>,
     },

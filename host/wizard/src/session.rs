@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use mimu::calibration::Calibration;
+use mimu::diagnose::Verdict;
 use mimu::fit::{Fit, Options, fit};
 use mimu::prepared::Prepared;
 use mimu::result::diagnosis::DiagnosisResult;
@@ -63,7 +64,7 @@ pub struct UnitOutcome {
     /// The affine calibration, in poses that were not used.
     pub verified: Option<Judged>,
     /// Verdict of the diagnosis.
-    pub verdict: Option<String>,
+    pub verdict: Option<Verdict>,
     /// Effects that were found.
     pub effects: Vec<String>,
     /// The calibration with the effects, in a third set of poses.
@@ -161,7 +162,7 @@ fn finished(path: &Path, now: &SessionConfig) -> Result<Option<UnitOutcome>> {
             .map(|p| p.display().to_string())
     };
     let found = folder.entries().iter().rev().find_map(|e| match e {
-        Entry::Diagnosed { verdict, effects } => Some((verdict.clone(), effects.clone())),
+        Entry::Diagnosed { verdict, effects } => Some((*verdict, effects.clone())),
         _ => None,
     });
     let (verdict, effects) = found.unzip();

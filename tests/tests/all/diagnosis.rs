@@ -3,6 +3,7 @@
 use mimu::diagnose::decision::Against;
 use mimu::diagnose::search::Alternative;
 use mimu::diagnose::{Diagnosis, Verdict, diagnose};
+use mimu::effects;
 use mimu::fit::{Method, Options};
 use mimu::quantity::Sensor;
 use mimu::signal::stillness::STILL_FACTOR;
@@ -128,10 +129,8 @@ fn a_quiet_gyro_reads_the_earth_and_nothing_takes_that_from_it() {
         .iter_mut()
         .flat_map(|s| &mut s.decision.accepted)
     {
-        let other = Alternative {
-            id: "gyro_g_sensitivity".into(),
-            score_worse_by: -1.0,
-        };
+        let other = effects::by_id("gyro_g_sensitivity").unwrap();
+        let other = Alternative::from((other, -1.0));
         accepted.chosen.alternatives.push(other);
     }
     let found = reported(found);

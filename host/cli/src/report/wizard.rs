@@ -61,7 +61,7 @@ pub(crate) fn wizard_lines(event: &Event) -> Vec<String> {
                 false => format!("found: {}", effects.join(", ")),
             };
             vec![
-                format!("verdict: {verdict}; {found}"),
+                format!("verdict: {}; {found}", verdict.name()),
                 format!("page: {page}"),
             ]
         }
@@ -171,7 +171,7 @@ fn unit_text(unit: &UnitOutcome, text: &mut String) {
             [] => "no effect".into(),
             effects => effects.join(", "),
         };
-        let _ = writeln!(text, "diagnosis: {verdict}, {effects}");
+        let _ = writeln!(text, "diagnosis: {}, {effects}", verdict.name());
     }
     match &unit.stored {
         Some(file) => {

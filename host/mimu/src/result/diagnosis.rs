@@ -43,7 +43,7 @@ pub struct DiagnosisResult {
     pub not_excited: Vec<NotExcited>,
     /// Candidates that the recordings do not tell apart.
     pub confused: Vec<Confused>,
-    /// What of `not_excited` and `confused` the plan of the next experiment (`--plan`) does not show.
+    /// What of `not_excited` and `confused` the plan of the next experiment does not show.
     pub not_in_plan: Vec<NotInPlan>,
     /// Error figures.
     #[serde(serialize_with = "present")]

@@ -92,12 +92,12 @@ impl OpenSession<'_> {
         stage(&page, (self.page)(&result, &folder)?)?.publish()?;
         let effects: Vec<String> = made.effects().iter().map(|e| e.candidate.id()).collect();
         let outcome = &mut self.outcomes[k];
-        let verdict = diagnosis.verdict.name();
-        outcome.verdict = Some(verdict.into());
+        let verdict = diagnosis.verdict;
+        outcome.verdict = Some(verdict);
         outcome.effects.clone_from(&effects);
         outcome.page = Some(page.display().to_string());
         let diagnosed = Entry::Diagnosed {
-            verdict: verdict.into(),
+            verdict,
             effects: effects.clone(),
         };
         self.wizard.units[k].folder.add(diagnosed)?;
