@@ -26,6 +26,10 @@ const OF_THE_IMPORT: [&str; 11] = [
 pub(crate) fn line(error: &Error, command: &clap::Command) -> String {
     let arguments = &error.refused().arguments;
     let named = |flag: &'static str| {
+        // A remedy in another command whatever the one at hand is.
+        if flag.starts_with("mimu ") {
+            return Some(flag.to_string());
+        }
         let first = flag.split([',', ' ']).next()?;
         let has = command
             .get_arguments()
@@ -133,6 +137,7 @@ fn flag(argument: Argument) -> Option<&'static str> {
         Argument::Drift => "--drift",
         Argument::EstimatedBy => "--by",
         Argument::Output => "-o",
+        Argument::CalibrationOfNoise => "mimu allan --calibration",
         // An argument that this version of the command has no flag for.
         _ => return None,
     })

@@ -127,6 +127,8 @@ pub enum Argument {
     EstimatedBy,
     /// Folder that is written.
     Output,
+    /// The calibration that a noise file is made with.
+    CalibrationOfNoise,
 }
 
 /// Result with [`Error`].
