@@ -317,7 +317,7 @@ pub fn case_on(plan: &str, ids: &[&str], seed: u64) -> Case {
             .sensors
             .iter()
             .flat_map(|s| s.decision.rejected.clone())
-            .map(|r| format!("{}: {}", r.0, r.1))
+            .map(|r| format!("{}: {}", r.id, r.reason))
             .collect(),
         left: found
             .sensors

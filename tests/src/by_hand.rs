@@ -273,7 +273,7 @@ pub(crate) fn case_of(
             )
         });
         let undecided = s.decision.undecided.iter();
-        left.chain(undecided.map(|u| format!("{}: {} {:.1}", u.id, u.law, u.worse)))
+        left.chain(undecided.map(|u| format!("{}: {} {:.1}", u.id, u.law, u.difference)))
     });
     let accepted = diagnosis.sensors.iter().flat_map(|s| &s.decision.accepted);
     let found = accepted.map(|a| {

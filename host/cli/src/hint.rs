@@ -1,7 +1,10 @@
 //! The flags of the command beside what an error of a library says to set otherwise.
 
+use mimu::diagnose::rejected::{Reason, Rejected};
 use mimu::warning::Warning;
 use mimu_recording::error::{Argument, Error};
+use mimu_thermal::warning::Warning as OverTemperature;
+use mimu_wizard::waiting::Waiting;
 
 /// Flags of the import, which are a remedy after any command that reads a recording. Others are one only on the command that refused.
 const OF_THE_IMPORT: [&str; 13] = [
@@ -25,8 +28,17 @@ const OF_THE_IMPORT: [&str; 13] = [
 pub(crate) fn line(error: &Error, command: &clap::Command) -> String {
     let arguments = &error.refused().arguments;
     let named = |flag: &'static str| {
-        let long = flag.split([',', ' ']).next()?.trim_start_matches('-');
-        let has = command.get_arguments().any(|a| a.get_long() == Some(long));
+        // A remedy in another command whatever the one at hand is.
+        if flag.starts_with("mimu ") {
+            return Some(flag.to_string());
+        }
+        let first = flag.split([',', ' ']).next()?;
+        let has = command
+            .get_arguments()
+            .any(|a| match first.strip_prefix("--") {
+                Some(long) => a.get_long() == Some(long),
+                None => a.get_short() == first.chars().nth(1),
+            });
         match has {
             true => Some(flag.to_string()),
             false if OF_THE_IMPORT.contains(&flag) => Some(format!("mimu import {flag}")),
@@ -51,6 +63,31 @@ pub(crate) fn of_warning(warning: &Warning) -> String {
     match warning.left_out() {
         Some(step) => format!("{warning} (--keep {step})"),
         None => warning.to_string(),
+    }
+}
+
+/// Why a unit of the wizard waits, with the flag that it is about.
+pub(crate) fn of_waiting(why: &Waiting) -> String {
+    match why {
+        Waiting::Exchanged => format!("{why} (--text)"),
+        _ => why.to_string(),
+    }
+}
+
+/// The warning of a fit over temperature in one line, with the flag that makes it go.
+pub(crate) fn of_thermal(warning: &OverTemperature) -> String {
+    match warning {
+        OverTemperature::WithoutNoise => format!("{warning} (--noise)"),
+        _ => warning.to_string(),
+    }
+}
+
+/// Why an effect was rejected, with the flags by which it would not be.
+pub(crate) fn of_rejected(rejected: &Rejected) -> String {
+    let Rejected { id, reason, .. } = rejected;
+    match reason {
+        Reason::Suggestion(_) => format!("{reason} (--verify, --accept {id})"),
+        _ => reason.to_string(),
     }
 }
 
@@ -90,6 +127,21 @@ fn flag(argument: Argument) -> Option<&'static str> {
         Argument::SetPoints => "--points",
         Argument::Soak => "--soak",
         Argument::StepTimes => "--step-every",
+        Argument::RawUnit => "--raw-unit",
+        Argument::TextColumns => "--text",
+        Argument::Baud => "--baud",
+        Argument::Driver => "--driver",
+        Argument::Fixture => "--fixture",
+        Argument::Gravity => "--gravity",
+        Argument::Latitude => "--latitude",
+        Argument::DwellLength => "--dwell",
+        Argument::LargestRate => "--rate",
+        Argument::Plan => "--plan",
+        Argument::Seed => "--seed",
+        Argument::Drift => "--drift",
+        Argument::EstimatedBy => "--by",
+        Argument::Output => "-o",
+        Argument::CalibrationOfNoise => "mimu allan --calibration",
         // An argument that this version of the command has no flag for.
         _ => return None,
     })
@@ -97,6 +149,8 @@ fn flag(argument: Argument) -> Option<&'static str> {
 
 #[cfg(test)]
 mod tests {
+    use mimu::quantity::Sensor;
+
     use super::*;
 
     #[test]
@@ -111,11 +165,36 @@ mod tests {
             line(&error, &command(&["rate-hz", "still"])),
             "log.csv: the rate is not known; give it (--rate-hz)"
         );
+        let short = Error::new("out", "it is not empty", "give another").about(Argument::Output);
+        let has = clap::Command::new("wizard").arg(clap::Arg::new("output").short('o'));
+        let said = "out: it is not empty; give another (-o)";
+        assert_eq!(line(&short, &has), said);
         let other = Error::new("log.csv", "it is empty", "record again");
         assert_eq!(
             line(&other, &command(&["rate-hz"])),
             "log.csv: it is empty; record again"
         );
+    }
+
+    #[test]
+    fn a_suggestion_names_the_flags_that_confirm_it() {
+        let rejected = |reason| Rejected {
+            id: "term:accel_x~rate_y*force_z".into(),
+            sensor: Sensor::Accel,
+            reason,
+        };
+        let said = of_rejected(&rejected(Reason::Suggestion(1e-9)));
+        let flags = "or your word (--verify, --accept term:accel_x~rate_y*force_z)";
+        assert!(said.ends_with(flags), "{said}");
+        let said = of_rejected(&rejected(Reason::OneDwell(0.83)));
+        assert_eq!(said, "it rests to 83 % on one dwell");
+    }
+
+    #[test]
+    fn columns_that_seem_exchanged_name_the_flag_that_orders_them() {
+        let said = of_waiting(&Waiting::Exchanged);
+        assert!(said.ends_with("exchanged? (--text)"), "{said}");
+        assert_eq!(of_waiting(&Waiting::TableMoves), "the table moves");
     }
 
     #[test]

@@ -146,10 +146,9 @@ fn worst(
             "record both sensors: the file needs both",
         ));
     };
-    if let Err([found, remedy]) = first.model_in(sensor.unit()) {
-        let problem = format!("it is in {found} and not in {}", sensor.unit());
-        let place = format!("{place}, channel {}", first.name);
-        return Err(Error::new(place, problem, remedy));
+    if let Err(other) = first.model_in(sensor.unit()) {
+        let problem = format!("it is in {} and not in {}", other.found, sensor.unit());
+        return Err(other.refused(format!("{place}, channel {}", first.name), problem));
     }
     let mut largest: Option<(f64, String)> = None;
     let mut missing: Vec<(&NoiseChannel, &str)> = Vec::new();

@@ -253,9 +253,10 @@ impl Noise {
                     }
                     _ => raw.as_str(),
                 };
-                let model = channel.model_in(unit).map_err(|[found, remedy]| {
-                    let problem = format!("it is in {found}, and the readings are in {unit}");
-                    Error::new(format!("{}, channel {name}", file.place), problem, remedy)
+                let model = channel.model_in(unit).map_err(|other| {
+                    let problem =
+                        format!("it is in {}, and the readings are in {unit}", other.found);
+                    other.refused(format!("{}, channel {name}", file.place), problem)
                 })?;
                 nodes.push((channel.temp_c.unwrap_or(f64::NAN), model));
             }

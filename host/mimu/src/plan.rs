@@ -234,7 +234,7 @@ impl Plan {
     pub fn read(path: &Path) -> Result<Self> {
         let place = path.display().to_string();
         let text = read_text(path)?;
-        let again = "have `mimu design -o` or `mimu thermal plan -o` write the plan";
+        let again = "have `mimu design` or `mimu thermal plan` write the plan";
         let plan: Self = parse_toml(&text, &place, Some(again))?;
         if !(1..=MOST_DWELLS).contains(&(plan.rounds as usize)) {
             let problem = format!("rounds is {}", plan.rounds);

@@ -103,6 +103,36 @@ pub enum Argument {
     Soak,
     /// When the dwells of a recording begin and end.
     StepTimes,
+    /// Unit of the readings.
+    RawUnit,
+    /// Names of the numbers in a line of text.
+    TextColumns,
+    /// Bits a second of a serial port.
+    Baud,
+    /// What turns or warms the unit.
+    Driver,
+    /// What carries the unit.
+    Fixture,
+    /// Local gravity.
+    Gravity,
+    /// Latitude.
+    Latitude,
+    /// Length of a dwell.
+    DwellLength,
+    /// Largest rate of a table.
+    LargestRate,
+    /// The plan that dwells are taken from.
+    Plan,
+    /// Order of the planned dwells.
+    Seed,
+    /// Largest change of temperature during a session.
+    Drift,
+    /// Whether the PC or the device estimates the calibration.
+    EstimatedBy,
+    /// Folder that is written.
+    Output,
+    /// The calibration that a noise file is made with.
+    CalibrationOfNoise,
 }
 
 /// Result with [`Error`].

@@ -1,7 +1,5 @@
 //! Jumps of a gyro's bias while the unit lies where it lies: a die under stress lets go. They are no moves of the unit, and no row is left out for them.
 
-use mimu::quantity::{plural, significant};
-use mimu_recording::RawUnit;
 use nalgebra::Vector3;
 
 use crate::row::Row;
@@ -14,8 +12,6 @@ const JUMP_SIGMAS: f64 = 10.0;
 const JUMP_TRENDS: f64 = 1.0;
 /// From a median absolute deviation to a standard deviation.
 const OF_MEDIAN: f64 = 1.4826;
-/// Jumps that a warning names.
-const NAMED: usize = 3;
 
 /// A jump of the bias.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -81,29 +77,4 @@ pub(crate) fn find(rows: &[Row], moved_s: &[f64]) -> Vec<BiasJump> {
         }
     }
     jumps.into_iter().map(|(_, _, jump)| jump).collect()
-}
-
-/// What a person should know of them.
-pub(crate) fn warning(jumps: &[BiasJump], raw_unit: RawUnit) -> Option<String> {
-    if jumps.is_empty() {
-        return None;
-    }
-    let size = |jump: &BiasJump| {
-        let size = jump.change.amax();
-        match raw_unit {
-            RawUnit::Si => format!("{} deg/s", significant(size.to_degrees())),
-            other => format!("{} {other}", significant(size)),
-        }
-    };
-    let named = jumps.iter().take(NAMED);
-    let each: Vec<String> = named
-        .map(|jump| format!("by {} at {:.0} s", size(jump), jump.at_s))
-        .collect();
-    let more = if jumps.len() > NAMED { ", ..." } else { "" };
-    Some(format!(
-        "the gyro's bias jumps {}, {}{more}, while gravity stays within a tenth of where it was: no move of the unit does that, so the readings before and \
-         after are kept, the curves go between them, and the intervals hold the jumps as they hold the wander of a bias",
-        plural(jumps.len() as u64, "time"),
-        each.join(", ")
-    ))
 }

@@ -6,6 +6,8 @@ use mimu::triad::Forward;
 use mimu_recording::error::{Error, Result};
 use serde::Serialize;
 
+use crate::warning::Warning;
+
 /// Temperatures at which they are compared.
 const COUNT: usize = 33;
 
@@ -21,7 +23,7 @@ pub struct Comparison {
     /// Differences by parameter.
     pub curves: Vec<Difference>,
     /// What a person should know.
-    pub warnings: Vec<String>,
+    pub warnings: Vec<Warning>,
 }
 
 /// Second calibration minus the first in one parameter.
@@ -79,10 +81,7 @@ pub fn compare(a: &Calibration, b: &Calibration) -> Result<Comparison> {
     }
     let mut warnings = Vec::new();
     if a.device != b.device {
-        warnings.push(format!(
-            "they are of two units, {:?} and {:?}",
-            a.device, b.device
-        ));
+        warnings.push(Warning::TwoUnits(a.device.clone(), b.device.clone()));
     }
     let curves = Sensor::BOTH
         .into_iter()

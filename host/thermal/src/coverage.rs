@@ -9,6 +9,7 @@ use mimu_recording::error::{Argument, Error, Result};
 use serde::Serialize;
 
 use crate::session::Session;
+use crate::warning::Warning;
 
 /// Width of the temperatures that count as one, K.
 const BIN_K: f64 = 1.0;
@@ -88,7 +89,7 @@ impl Coverage {
 
 /// Refuses recordings at rest of which too little is used; a warning for each sensor where much is left out. With a table, what is between
 /// its poses is left out by design.
-pub fn check(sessions: &[Session], warnings: &mut Vec<String>) -> Result<()> {
+pub fn check(sessions: &[Session], warnings: &mut Vec<Warning>) -> Result<()> {
     if sessions.iter().all(|s| s.reference == Reference::Table) {
         return Ok(());
     }
@@ -112,10 +113,7 @@ pub fn check(sessions: &[Session], warnings: &mut Vec<String>) -> Result<()> {
             );
         }
         if samples.min(temperatures) < MOST {
-            warnings.push(format!(
-                "the {sensor} uses {}: the rest is not found to be at rest, or is clipped",
-                coverage.words()
-            ));
+            warnings.push(Warning::Coverage(sensor, coverage));
         }
     }
     Ok(())

@@ -1,9 +1,10 @@
 //! `mimu thermal fit` from memory: curves by one of the estimators, judged.
 
 use mimu::calibration::{Calibration, CurvesOfUnit, TriadOfCurves, reference_node};
-use mimu::quantity::{PerSensor, Sensor, significant};
+use mimu::quantity::{PerSensor, Sensor};
 use mimu_recording::Reference;
 use mimu_recording::error::{Argument, Error, Result};
+use serde::Serialize;
 
 use crate::basis::{CURVATURE_SPAN, Shape};
 use crate::classic::{self, Classic};
@@ -16,10 +17,7 @@ use crate::path::is_one_way;
 use crate::profile::Profile;
 use crate::session::Session;
 use crate::thermometer::{Die, Start};
-
-/// Warning on a fit without the noise at rest.
-const WITHOUT_NOISE: &str = "intervals of the biases hold the wander that the recordings show, and nothing of what is slower: a record of the unit at rest for \
-                             hours shows it (mimu allan -o noise.toml, and --noise noise.toml here)";
+use crate::warning::Warning;
 
 /// How the curves are estimated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -59,7 +57,8 @@ pub struct Options {
 const MISFIT: f64 = 10.0;
 
 /// Whether the recording distinguishes lag and slope, and the curves describe the readings.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Verdict {
     /// Heating and cooling, or plateaus, tell them apart.
     Fitted,
@@ -109,7 +108,7 @@ pub struct ThermalFit {
     /// Figures of the triads: SI, raw where only biases are estimated.
     pub judged: PerSensor<Option<Judged>>,
     /// What a person should know.
-    pub warnings: Vec<String>,
+    pub warnings: Vec<Warning>,
 }
 
 /// Fits `sessions`; `verify` are recordings that are only compensated, whole sweeps or soaks.
@@ -117,7 +116,7 @@ pub struct ThermalFit {
 /// # Errors
 /// Those of [`estimate`]; a range that was not covered.
 pub fn fit(sessions: Vec<Session>, verify: &[Session], options: Options) -> Result<ThermalFit> {
-    let mut warnings: Vec<String> = sessions
+    let mut warnings: Vec<Warning> = sessions
         .iter()
         .chain(verify)
         .flat_map(|s| s.warnings.iter().cloned())
@@ -138,7 +137,7 @@ pub fn fit(sessions: Vec<Session>, verify: &[Session], options: Options) -> Resu
     warnings.extend(joint.warnings.iter().cloned());
     let estimated = !matches!(options.estimator, Estimator::Classic(_));
     if estimated && sessions.iter().all(|s| s.stated == [None; 6]) {
-        warnings.push(WITHOUT_NOISE.into());
+        warnings.push(Warning::WithoutNoise);
     }
     check_range(&joint, options.range_c)?;
     let judged = PerSensor::from_fn(|sensor| judge(&sessions, verify, &joint, sensor));
@@ -162,7 +161,7 @@ pub fn fit(sessions: Vec<Session>, verify: &[Session], options: Options) -> Resu
 }
 
 /// The joint estimate; where the temperature goes one way only, curvature has to prove itself by extrapolation.
-fn smooth(sessions: &[Session], options: Options, warnings: &mut Vec<String>) -> Result<Joint> {
+fn smooth(sessions: &[Session], options: Options, warnings: &mut Vec<Warning>) -> Result<Joint> {
     let choice = |shape| Choice {
         shape,
         lag_s: options.lag_s,
@@ -179,11 +178,7 @@ fn smooth(sessions: &[Session], options: Options, warnings: &mut Vec<String>) ->
     if curve <= line {
         return Ok(joint);
     }
-    warnings.push(format!(
-        "curvature refused: fitted to the first two thirds, curves miss the last third {} times as far as straight lines do, and a drift \
-         in time is not told from curvature where the temperature goes one way only",
-        significant(curve / line)
-    ));
+    warnings.push(Warning::CurvatureRefused(curve / line));
     estimate(sessions, choice(Shape::Line))
 }
 

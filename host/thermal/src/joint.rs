@@ -1,6 +1,6 @@
 //! The joint estimate of all curves and of the lag.
 
-use mimu::quantity::{PerSensor, Sensor, significant};
+use mimu::quantity::{PerSensor, Sensor};
 use mimu_recording::error::{Error, Result};
 
 use crate::basis::Shape;
@@ -12,6 +12,7 @@ use crate::regression::AxisNoise;
 use crate::session::Session;
 use crate::suitability::{Spans, check_alike, check_speed};
 use crate::thermometer::{Die, Start};
+use crate::warning::Warning;
 
 /// A best lag farther than this, s, from that which the smoothness was found at has it found anew.
 const SETTLED_S: f64 = 0.5;
@@ -61,7 +62,7 @@ pub struct Joint {
     /// How each session began.
     pub starts: Vec<Start>,
     /// What a person should know.
-    pub warnings: Vec<String>,
+    pub warnings: Vec<Warning>,
 }
 
 impl Joint {
@@ -111,10 +112,7 @@ pub fn estimate(sessions: &[Session], choice: Choice) -> Result<Joint> {
         (other, _) => other,
     };
     if shape != choice.shape {
-        warnings.push(format!(
-            "the recordings span {} K: curves are straight lines, as curvature needs 20 K",
-            significant(span)
-        ));
+        warnings.push(Warning::StraightLines(span));
     }
     let evaluator = |sensor| Evaluator::new(sessions, sensor, shape);
     let mut triads = [evaluator(Sensor::Gyro)?, evaluator(Sensor::Accel)?];

@@ -4,12 +4,12 @@ use std::cmp::Ordering;
 
 use mimu::quantity::Sensor;
 use nalgebra::Vector3;
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 use crate::curves::TriadCurves;
 use crate::joint::Joint;
 use crate::nodes::inverse;
-use crate::path::{direction, fastest};
+use crate::path::{Way, direction, fastest};
 use crate::regression::{AxisNoise, Normal};
 use crate::row::Row;
 use crate::session::Session;
@@ -26,20 +26,27 @@ const FOLDS: usize = 4;
 const PIECES: usize = 10;
 
 /// Error of one dwell.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Serialize)]
 pub struct DwellError {
-    /// Number of its recording among those that are judged, from 0.
+    /// Number of its recording, from 0: of those that verify where there are any, else of those that were fitted.
     pub recording: usize,
     /// Its middle, s of its recording.
     pub middle_s: f64,
-    /// Compensated mean minus known input, SI.
-    pub error: Vector3<f64>,
     /// Mean temperature of the die, °C.
     pub die_c: f64,
-    /// 1 where the temperature rises, -1 where it falls, 0 where it stands.
-    pub way: i32,
+    /// What the temperature does.
+    #[serde(rename = "temperature")]
+    pub way: Way,
+    /// Compensated mean minus known input, x, y, z, SI.
+    #[serde(serialize_with = "three")]
+    pub error: Vector3<f64>,
     /// Variance that noise alone gives the error of an axis, SI².
+    #[serde(skip)]
     pub floor: f64,
+}
+
+fn three<S: Serializer>(error: &Vector3<f64>, to: S) -> Result<S::Ok, S::Error> {
+    <[f64; 3]>::from(*error).serialize(to)
 }
 
 /// A recording that curves are judged by.
@@ -166,15 +173,15 @@ pub fn bins(errors: &[DwellError]) -> Vec<Bin> {
     let last = errors.iter().map(bin).max().unwrap_or(first);
     let each = (first..=last).filter_map(|k| {
         let own: Vec<DwellError> = errors.iter().copied().filter(|e| bin(e) == k).collect();
-        let way = |w: i32| {
+        let way = |w: Way| {
             let of: Vec<DwellError> = own.iter().copied().filter(|e| e.way == w).collect();
             (!of.is_empty()).then(|| rms(&of)[0])
         };
         (!own.is_empty()).then(|| Bin {
             from_c: k as f64 * BIN_K,
             to_c: (k + 1) as f64 * BIN_K,
-            heating: way(1),
-            cooling: way(-1),
+            heating: way(Way::Heating),
+            cooling: way(Way::Cooling),
             noise_floor: rms(&own)[1],
             dwells: own.len(),
         })
@@ -215,7 +222,7 @@ pub fn hysteresis(errors: &[DwellError], curves: &TriadCurves) -> Option<Vec<Hys
     // Middle of a bin, difference, and its variance by noise.
     let mut bins: Vec<(f64, Vector3<f64>, f64)> = Vec::new();
     for key in keys {
-        let mean = |way: i32| {
+        let mean = |way: Way| {
             let own = errors.iter().filter(|e| bin(e) == key && e.way == way);
             let own: Vec<&DwellError> = own.collect();
             let count = own.len() as f64;
@@ -223,7 +230,7 @@ pub fn hysteresis(errors: &[DwellError], curves: &TriadCurves) -> Option<Vec<Hys
             let floor = own.iter().map(|e| e.floor).sum::<f64>() / (count * count);
             (count > 0.0).then_some((mean, floor))
         };
-        if let (Some((up, a)), Some((down, b))) = (mean(1), mean(-1)) {
+        if let (Some((up, a)), Some((down, b))) = (mean(Way::Heating), mean(Way::Cooling)) {
             bins.push(((key as f64 + 0.5) * BIN_K, up - down, a + b));
         }
     }

@@ -21,6 +21,7 @@
 //! | [`mod@compare`] | two calibrations, curve by curve |
 //! | [`plan`] | procedures in chamber and table, and how well the curves are known afterwards |
 //! | [`result`] | what was found, which JSON is |
+//! | [`warning`] | what a person should know of it |
 
 pub mod base;
 pub mod basis;
@@ -48,3 +49,4 @@ pub mod session;
 pub mod smoothness;
 pub mod suitability;
 pub mod thermometer;
+pub mod warning;

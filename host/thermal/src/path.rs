@@ -1,5 +1,7 @@
 //! What a recording does with the temperature: one way, or there and back.
 
+use serde::Serialize;
+
 use crate::session::Session;
 use crate::thermometer::Die;
 
@@ -45,12 +47,24 @@ pub fn stands(session: &Session, fastest: f64, t_s: f64) -> bool {
     slopes[0].min(slopes[1]) < STANDS * fastest
 }
 
-/// Whether a recording heats or cools at `t_s` with the slope that is usual for it: 1, -1, or 0 where the temperature stands.
-pub fn direction(session: &Session, fastest: f64, t_s: f64) -> i32 {
+/// What a temperature does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Way {
+    /// It falls.
+    Cooling,
+    /// It hardly changes.
+    Standing,
+    /// It rises.
+    Heating,
+}
+
+/// What the temperature of a recording does at `t_s`, by the slope that is usual for it.
+pub fn direction(session: &Session, fastest: f64, t_s: f64) -> Way {
     match slope(session, t_s) {
-        slope if slope.abs() < STANDS * fastest => 0,
-        slope if slope > 0.0 => 1,
-        _ => -1,
+        slope if slope.abs() < STANDS * fastest => Way::Standing,
+        slope if slope > 0.0 => Way::Heating,
+        _ => Way::Cooling,
     }
 }
 
@@ -79,10 +93,10 @@ fn one_way(session: &Session, die: &Die) -> bool {
         let t_s = from + k as f64 * EVERY_S;
         let share = (die.at(t_s) - low) / (high - low).max(1e-9);
         let bin = ((share * BINS as f64) as usize).min(BINS - 1);
-        let way = direction(session, fastest, t_s) + 1;
-        seen[bin][way.clamp(0, 2) as usize] = true;
+        seen[bin][direction(session, fastest, t_s) as usize] = true;
     }
     let share =
         |of: fn(&[bool; 3]) -> bool| seen.iter().filter(|s| of(s)).count() as f64 / BINS as f64;
-    share(|s| s[0] && s[2]) < BOTH_WAYS && share(|s| s[1]) < SOAKED
+    let both = |s: &[bool; 3]| s[Way::Cooling as usize] && s[Way::Heating as usize];
+    share(both) < BOTH_WAYS && share(|s| s[Way::Standing as usize]) < SOAKED
 }

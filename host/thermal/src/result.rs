@@ -8,9 +8,10 @@ use serde::Serialize;
 
 use crate::coverage::Coverage;
 use crate::curves::TriadCurves;
-use crate::fit::{ThermalFit, range};
+use crate::fit::{ThermalFit, Verdict, range};
 use crate::judge::{Bin, DwellError, Hysteresis, rms};
 use crate::profile::{Lag, RANGE};
+use crate::warning::Warning;
 
 /// Temperatures that a curve is given at.
 const COUNT: usize = 33;
@@ -28,8 +29,8 @@ pub struct ThermalResult {
     pub recordings: Vec<RecordingResult>,
     /// How it was estimated.
     pub estimator: &'static str,
-    /// `fitted`; `one-way` where the recording cannot distinguish lag and slope; `misfit` where the errors of the dwells are far beyond noise.
-    pub verdict: &'static str,
+    /// Whether it distinguishes lag and slope, and describes the readings.
+    pub verdict: Verdict,
     /// Lowest and highest temperature of the dies, °C.
     pub range_c: [f64; 2],
     /// Figures of the triads.
@@ -38,7 +39,7 @@ pub struct ThermalResult {
     /// All parameters over the temperature of the die.
     pub curves: Vec<CurveResult>,
     /// What a person should know.
-    pub warnings: Vec<String>,
+    pub warnings: Vec<Warning>,
 }
 
 /// A recording that was fitted.
@@ -78,40 +79,9 @@ pub struct SensorResult {
     /// Errors by temperature, of the held-out data where there are any.
     pub bins: Vec<Bin>,
     /// The dwells behind these errors, in the order of time.
-    pub dwells: Vec<DwellResult>,
+    pub dwells: Vec<DwellError>,
     /// What heating and cooling differ by after the lag; null where they share no temperature.
     pub hysteresis: Option<Vec<Hysteresis>>,
-}
-
-/// Error of one dwell.
-#[derive(Debug, Clone, Serialize)]
-pub struct DwellResult {
-    /// Number of its recording, from 0: of those that verify where there are any, else of those that were fitted.
-    pub recording: usize,
-    /// Its middle, s of its recording.
-    pub middle_s: f64,
-    /// Mean temperature of the die, °C.
-    pub die_c: f64,
-    /// `heating`, `cooling`, or `standing` where the temperature hardly changes.
-    pub temperature: &'static str,
-    /// Compensated mean minus known input, x, y, z, SI.
-    pub error: [f64; 3],
-}
-
-impl DwellResult {
-    fn of(dwell: &DwellError) -> Self {
-        Self {
-            recording: dwell.recording,
-            middle_s: dwell.middle_s,
-            die_c: dwell.die_c,
-            temperature: match dwell.way {
-                1 => "heating",
-                -1 => "cooling",
-                _ => "standing",
-            },
-            error: dwell.error.into(),
-        }
-    }
 }
 
 /// A parameter over temperature.
@@ -151,7 +121,7 @@ impl ThermalResult {
             device: fit.sessions[0].device.clone(),
             recordings: recordings(fit),
             estimator: fit.options.estimator.name(),
-            verdict: fit.verdict.name(),
+            verdict: fit.verdict,
             range_c: range(&fit.joint),
             sensors: PerSensor::from_fn(of),
             curves: curves.collect(),
@@ -209,7 +179,7 @@ impl SensorResult {
             ),
             judged_by: if curves.biases_only() { "pieces" } else { "dwells" },
             bins: judged.map(|j| j.bins.clone()).unwrap_or_default(),
-            dwells: judged.map_or(Vec::new(), |j| j.shown().iter().map(DwellResult::of).collect()),
+            dwells: judged.map_or(Vec::new(), |j| j.shown().to_vec()),
             hysteresis: judged.and_then(|j| j.hysteresis.clone()),
         })
     }

@@ -2,7 +2,7 @@
 
 use mimu::allan::variance::AllanModel;
 use mimu::prepared::Prepared;
-use mimu::quantity::{PerSensor, Sensor, plural};
+use mimu::quantity::{PerSensor, Sensor};
 use mimu::signal::blocks::{Block, Condensed};
 use mimu::signal::dwell::Dwell;
 use mimu_recording::error::{Error, Result};
@@ -13,6 +13,7 @@ use crate::bias_jumps::{self, BiasJump};
 use crate::excitation::tells_apart;
 use crate::row::Row;
 use crate::thermometer::Thermometer;
+use crate::warning::Warning;
 
 /// Length of a row, s. At 5 K/min a die moves by 0.2 K in it, over which any curve is a line.
 const ROW_S: f64 = 2.5;
@@ -68,7 +69,7 @@ pub struct Session {
     /// Why samples are not in the rows, in words.
     pub unused: String,
     /// What a person should know.
-    pub warnings: Vec<String>,
+    pub warnings: Vec<Warning>,
 }
 
 impl Session {
@@ -86,7 +87,7 @@ impl Session {
         let condensed = &prepared.condensed;
         let thermometer = Thermometer::of(condensed, manifest.power_on_s, &prepared.place)?;
         let found = condensed.warnings.iter().chain(&prepared.dwells.warnings);
-        let mut warnings: Vec<String> = found.map(ToString::to_string).collect();
+        let mut warnings: Vec<Warning> = found.cloned().map(Warning::Recording).collect();
         let rows = PerSensor::from_fn(|sensor| rows(prepared, sensor));
         let moved_s = match manifest.reference {
             Reference::Gravity => {
@@ -103,8 +104,12 @@ impl Session {
             Reference::Gravity => bias_jumps::find(&rows[Sensor::Gyro], &moved_s[0]),
             _ => Vec::new(),
         };
-        warnings.extend(moves_warning(&moved_s));
-        warnings.extend(bias_jumps::warning(&bias_jumps, manifest.raw_unit));
+        if let Some(first_s) = moved_s[1].first() {
+            warnings.push(Warning::Moved(moved_s.each_ref().map(Vec::len), *first_s));
+        }
+        if !bias_jumps.is_empty() {
+            warnings.push(Warning::BiasJumps(bias_jumps.clone(), manifest.raw_unit));
+        }
         Ok(Self {
             place: prepared.place.clone(),
             device: manifest.device.clone(),
@@ -169,21 +174,6 @@ fn moves(rows: &[Row]) -> Vec<Move> {
             share: (p[1].raw - p[0].raw).norm() / p[0].raw.norm(),
         })
         .collect()
-}
-
-fn moves_warning([turned_s, moved_s]: &[Vec<f64>; 2]) -> Option<String> {
-    let first = moved_s.first()?;
-    let times = plural(moved_s.len() as u64, "time");
-    let offsets = match (turned_s.len(), moved_s.len()) {
-        (0, _) => "three bias offsets of the accelerometer".to_string(),
-        (turned, moved) if turned == moved => "six bias offsets of its own".to_string(),
-        (turned, _) => format!(
-            "bias offsets of the accelerometer, and {turned} of them bias offsets of the gyro as well"
-        ),
-    };
-    Some(format!(
-        "the unit was moved {times}, first at {first:.0} s: each pose has {offsets}, as gravity adds to them"
-    ))
 }
 
 /// Why samples of `prepared` are in no row.

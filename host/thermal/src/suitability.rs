@@ -7,6 +7,7 @@ use crate::basis::SLOPE_SPAN;
 use crate::path::fastest;
 use crate::profile::Lag;
 use crate::session::Session;
+use crate::warning::Warning;
 
 /// The die may lag behind by this share of the range at most; beyond, a first-order lag that is a tenth off shifts curves by kelvins.
 const BEHIND_SHARE: f64 = 0.25;
@@ -116,7 +117,7 @@ impl Spans {
     }
 
     /// Refuses recordings in which no session shows a slope: by what the column has, what of it is used, and what a single session has.
-    pub fn check(&self, sessions: &[Session], warnings: &mut Vec<String>) -> Result<()> {
+    pub fn check(&self, sessions: &[Session], warnings: &mut Vec<Warning>) -> Result<()> {
         let words = |[low, high]: [f64; 2]| match low <= high {
             true => format!("{} K ({low:.1} to {high:.1} °C)", significant(high - low)),
             false => "nothing".to_string(),
@@ -134,12 +135,7 @@ impl Spans {
         let shows = |[low, high]: [f64; 2]| high - low >= SLOPE_SPAN;
         let needs = format!("a slope needs {SLOPE_SPAN} K, curvature 20 K");
         let (problem, remedy, declare) = if shows(widest) {
-            for [low, high] in self.gaps() {
-                warnings.push(format!(
-                    "no recording crosses {low:.1} to {high:.1} °C: what the biases do in between is drawn from one power-on to another, \
-                     and the intervals hold nothing of how well they repeat"
-                ));
-            }
+            warnings.extend(self.gaps().into_iter().map(Warning::NotCrossed));
             return Ok(());
         } else if shows(used) {
             (

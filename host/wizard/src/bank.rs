@@ -5,7 +5,7 @@ use mimu::quantity::{AXES, PerSensor, Sensor};
 use mimu::triad::{Forward, Triad};
 use mimu_core::wire::{KalmanState, Prior, Request};
 use mimu_device::{Answer, Session};
-use mimu_recording::error::{Error, Result};
+use mimu_recording::error::{Argument, Error, Result};
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 use std::time::Duration;
@@ -190,8 +190,8 @@ impl ByDevice {
             let triad = inverse.and_then(|c| Triad::from_inverse(c, before.inverse_parts()));
             let Some(triad) = triad else {
                 let problem = format!("the device's estimate of the {} is singular", sensor.sensor);
-                let remedy = "take the PC's: run it again without --by device";
-                return Err(Error::new(unit, problem, remedy));
+                let remedy = "run it again, and have the PC estimate the calibration";
+                return Err(Error::new(unit, problem, remedy).about(Argument::EstimatedBy));
             };
             let both = before.forward_estimates().into_iter();
             let names = AXES
@@ -211,8 +211,8 @@ impl ByDevice {
             let problem = format!(
                 "the device's Kalman filters and the PC's fit of the same dwells are {apart:.1} standard deviations apart in {name}"
             );
-            let remedy = "run it again without --by device, and report this";
-            return Err(Error::new(unit, problem, remedy));
+            let remedy = "run it again, have the PC estimate the calibration, and report this";
+            return Err(Error::new(unit, problem, remedy).about(Argument::EstimatedBy));
         }
         Ok(format!(
             "the calibration is the device's own estimate; from the PC's it is {apart:.2} standard deviations away at most ({name})"

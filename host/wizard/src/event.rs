@@ -1,12 +1,16 @@
 //! What a session says: events that count, once each, and how it stands, many times a second. Both are plain data, so that a full
 //! screen, lines of text and JSON lines are views of the same.
 
-use serde::Serialize;
+use std::fmt;
+
+use mimu::diagnose::Verdict;
+use serde::{Serialize, Serializer};
 
 use crate::folder::Part;
 use crate::refit::Progress;
 use crate::step::Step;
 use crate::verdict::Judged;
+use crate::waiting::{Interruption, Waiting};
 
 /// Something that has happened.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -35,8 +39,8 @@ pub enum Event {
     },
     /// A phase begins.
     Phase {
-        /// `warm-up`, `calibration`, `verification`, `store`, `diagnosis`.
-        phase: &'static str,
+        /// Which.
+        phase: Phase,
         /// In a sentence.
         words: String,
     },
@@ -58,7 +62,7 @@ pub enum Event {
         /// Which unit.
         unit: String,
         /// Why.
-        why: String,
+        why: Waiting,
     },
     /// A dwell was had.
     Dwell {
@@ -78,7 +82,7 @@ pub enum Event {
         /// Which unit.
         unit: String,
         /// Why.
-        why: String,
+        why: Waiting,
     },
     /// A dwell is to be had again.
     Redo {
@@ -97,7 +101,7 @@ pub enum Event {
         /// Which unit.
         unit: String,
         /// What happened.
-        why: String,
+        why: Interruption,
     },
     /// The calibration, judged by the verification.
     Verified {
@@ -119,8 +123,8 @@ pub enum Event {
     Diagnosed {
         /// Which unit.
         unit: String,
-        /// `clean`, `explained` or `unexplained`.
-        verdict: &'static str,
+        /// What it amounts to.
+        verdict: Verdict,
         /// The effects, each with its strength.
         effects: Vec<String>,
         /// The page.
@@ -164,6 +168,57 @@ impl Event {
     }
 }
 
+/// What a session does at a time.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Phase {
+    /// The units are opened.
+    #[default]
+    Start,
+    /// The units come to rest and to a steady temperature.
+    WarmUp,
+    /// Dwells that the calibration is made from.
+    Calibration,
+    /// Dwells that it is judged by.
+    Verification,
+    /// The calibration goes into the device.
+    Store,
+    /// What still errs is looked for.
+    Diagnosis,
+    /// Dwells that the calibration with effects is judged by.
+    Confirmation,
+}
+
+impl Phase {
+    /// The recording that its dwells are counted in.
+    pub fn part(self) -> Part {
+        match self {
+            Self::Verification => Part::Verification,
+            Self::Confirmation => Part::Confirmation,
+            _ => Part::Calibration,
+        }
+    }
+}
+
+impl fmt::Display for Phase {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Start => "start",
+            Self::WarmUp => "warm-up",
+            Self::Calibration => "calibration",
+            Self::Verification => "verification",
+            Self::Store => "store",
+            Self::Diagnosis => "diagnosis",
+            Self::Confirmation => "confirmation",
+        })
+    }
+}
+
+impl Serialize for Phase {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
 /// How a unit stands.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct UnitStanding {
@@ -192,7 +247,7 @@ pub struct UnitStanding {
     /// Samples that are missing.
     pub lost: u64,
     /// Why it waits; `None` while a dwell runs.
-    pub waiting: Option<String>,
+    pub waiting: Option<Waiting>,
     /// Seconds of the dwell that are left.
     pub left_s: Option<f64>,
 }
@@ -201,7 +256,7 @@ pub struct UnitStanding {
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Standing {
     /// What is done now.
-    pub phase: &'static str,
+    pub phase: Phase,
     /// The step.
     pub step: Option<Step>,
     /// Dwells so far, and as planned.

@@ -16,7 +16,8 @@ use std::fs::{self, File, OpenOptions};
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
-use mimu_recording::error::{Error, Result};
+use mimu::diagnose::Verdict;
+use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{
     Batch, Columns, Growing, MANIFEST_FILE, Manifest, Recording, Restart, SampleFormat,
 };
@@ -108,7 +109,7 @@ pub enum Entry {
     /// What still errs was looked for.
     Diagnosed {
         /// What it amounts to.
-        verdict: String,
+        verdict: Verdict,
         /// The effects.
         effects: Vec<String>,
     },
@@ -159,8 +160,8 @@ impl Folder {
         }
         let text = mimu_recording::read_text(&file)?;
         let begun: Begun = serde_json::from_str(&text).map_err(|e| {
-            let remedy = "give another folder with -o, or remove this one";
-            Error::new(file.display(), e, remedy)
+            let remedy = "give another folder, or remove this one";
+            Error::new(file.display(), e, remedy).about(Argument::Output)
         })?;
         Ok(Some(begun))
     }
@@ -169,11 +170,8 @@ impl Folder {
     pub fn create(path: &Path, begun: &Begun) -> Result<Self> {
         if path.exists() && fs::read_dir(path).is_ok_and(|mut d| d.next().is_some()) {
             let problem = "the folder is not empty, and holds no session";
-            return Err(Error::new(
-                path.display(),
-                problem,
-                "give another folder with -o",
-            ));
+            let error = Error::new(path.display(), problem, "give another folder");
+            return Err(error.about(Argument::Output));
         }
         let _parents = mimu_recording::Parents::create(path)?;
         fs::create_dir_all(path).map_err(|e| Error::io(path, &e))?;

@@ -8,6 +8,7 @@
 //! | [`source`], [`device`] | where samples come from |
 //! | [`text`], [`text_line`], [`regular`] | a board of another maker: its port, its lines, and their times as a regular rate |
 //! | [`station`] | a port with a thread of its own, opened again when it was gone |
+//! | [`waiting`] | why no dwell runs |
 //! | [`watch`] | is the unit still, which way is up, how fast does it turn |
 //! | [`refit`] | the calibration so far, every parameter beside its target |
 //! | [`folder`] | the journal and the recordings, from which a killed session goes on |
@@ -43,5 +44,6 @@ pub mod text;
 pub mod text_line;
 pub mod unit_session;
 pub mod verdict;
+pub mod waiting;
 pub mod watch;
 pub mod wizard;

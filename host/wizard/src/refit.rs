@@ -12,11 +12,34 @@ use serde::Serialize;
 
 use crate::procedure::{Missed, Targets};
 
+/// Parameters of which the worst of three counts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Parameter {
+    /// Biases.
+    Bias,
+    /// Scale factors.
+    Scale,
+    /// Angles of the axes.
+    Angles,
+}
+
+impl Parameter {
+    /// As in JSON.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Bias => "bias",
+            Self::Scale => "scale",
+            Self::Angles => "angles",
+        }
+    }
+}
+
 /// A parameter beside its target.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Aim {
-    /// `scale`, `bias` or `angles`, the worst of three.
-    pub parameter: &'static str,
+    /// Which.
+    pub parameter: Parameter,
     /// Axis of the worst.
     pub axis: &'static str,
     /// Half of its 95 % interval.
@@ -133,14 +156,20 @@ fn aims(fitted: &SensorFit, targets: &Targets) -> Aims {
         sensor: fitted.sensor,
         aims: vec![
             aim(
-                "bias",
+                Parameter::Bias,
                 each(physical.bias, scale),
                 bias_unit.1,
                 bias,
                 bias_unit.0,
             ),
-            aim("scale", each(physical.scale, scale), 1e6, ratio, "ppm"),
-            aim("angles", angles, 1e6, angle, "µrad"),
+            aim(
+                Parameter::Scale,
+                each(physical.scale, scale),
+                1e6,
+                ratio,
+                "ppm",
+            ),
+            aim(Parameter::Angles, angles, 1e6, angle, "µrad"),
         ],
     }
 }

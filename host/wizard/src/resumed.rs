@@ -2,25 +2,42 @@
 
 use std::path::Path;
 
-use mimu_recording::error::{Error, Result};
+use mimu_recording::error::{Argument, Error, Result};
 
 use crate::procedure::SessionConfig;
 
 /// What dwells were made by: another value would leave those that there are wrong.
-fn kept(asked: &SessionConfig) -> [(&'static str, String); 7] {
+fn kept(asked: &SessionConfig) -> [(Argument, &'static str, String); 7] {
     let or_none = |given: Option<String>| given.unwrap_or_else(|| "none".into());
     let by = if asked.by_device { "device" } else { "pc" };
     [
-        ("--fixture", asked.fixture.name().into()),
-        ("gravity", format!("{} m/s²", asked.gravity_mps2)),
+        (Argument::Fixture, "fixture", asked.fixture.name().into()),
         (
-            "--latitude",
+            Argument::Gravity,
+            "gravity",
+            format!("{} m/s²", asked.gravity_mps2),
+        ),
+        (
+            Argument::Latitude,
+            "latitude",
             or_none(asked.latitude_deg.map(|l| l.to_string())),
         ),
-        ("--dwell", format!("{} s", asked.dwell_s)),
-        ("--rate", format!("{} deg/s", asked.largest_rate_dps)),
-        ("--by", by.into()),
-        ("--text", or_none(asked.text.clone())),
+        (
+            Argument::DwellLength,
+            "length of a dwell",
+            format!("{} s", asked.dwell_s),
+        ),
+        (
+            Argument::LargestRate,
+            "largest rate",
+            format!("{} deg/s", asked.largest_rate_dps),
+        ),
+        (Argument::EstimatedBy, "estimator", by.into()),
+        (
+            Argument::TextColumns,
+            "line of the board",
+            or_none(asked.text.clone()),
+        ),
     ]
 }
 
@@ -33,20 +50,25 @@ pub fn resumed(begun: &SessionConfig, now: &SessionConfig, place: &Path) -> Resu
     let now: SessionConfig =
         serde_json::from_str(&serde_json::to_string(now).map_err(failed)?).map_err(failed)?;
     let both = kept(begun).into_iter().zip(kept(&now));
-    let mut differ: Vec<String> = both
+    let (mut arguments, mut differ): (Vec<Argument>, Vec<String>) = both
         .filter(|(begun, now)| begun != now)
-        .map(|((name, begun), (_, now))| format!("{name} was {begun} and is {now}"))
-        .collect();
+        .map(|((argument, name, begun), (.., now))| {
+            (argument, format!("{name} was {begun} and is {now}"))
+        })
+        .unzip();
     if differ.is_empty() && begun.steps != now.steps {
-        differ.push("the planned poses are others (--plan, --seed)".into());
+        differ.push("the planned poses are others".into());
+        arguments.extend([Argument::Plan, Argument::Seed]);
     }
     if !differ.is_empty() {
         let problem = format!(
             "the session was begun with something else: {}",
             differ.join(", ")
         );
-        let remedy = "give what it was begun with, or another folder with -o";
-        return Err(Error::new(place.display(), problem, remedy));
+        let remedy = "give what it was begun with, or another folder";
+        arguments.push(Argument::Output);
+        let error = Error::new(place.display(), problem, remedy);
+        return Err(arguments.into_iter().fold(error, Error::about));
     }
     Ok(SessionConfig {
         by_targets: now.by_targets,
@@ -94,20 +116,24 @@ mod tests {
             text: Some("ax,ay,az,gx,gy,gz in count".into()),
             ..asked()
         };
-        let error = resumed(&asked(), &now, place).unwrap_err().to_string();
+        let error = resumed(&asked(), &now, place).unwrap_err();
+        let (line, arguments) = (error.to_string(), &error.refused().arguments);
         for says in [
             "gravity was 9.71 m/s² and is 9.81 m/s²",
-            "--text was none and is ax,ay,az,gx,gy,gz in count",
+            "line of the board was none and is ax,ay,az,gx,gy,gz in count",
         ] {
-            assert!(error.contains(says), "{error}");
+            assert!(line.contains(says), "{line}");
         }
-        assert!(!error.contains("--fixture"), "{error}");
+        assert!(!line.contains("fixture"), "{line}");
+        let wanted = [Argument::Gravity, Argument::TextColumns, Argument::Output];
+        assert_eq!(*arguments, wanted);
         let now = SessionConfig {
             steps: first_steps(Fixture::Hands, 4.0, 100.0, 1)[1..].to_vec(),
             ..asked()
         };
-        let error = resumed(&asked(), &now, place).unwrap_err().to_string();
-        assert!(error.contains("--seed"), "{error}");
+        let error = resumed(&asked(), &now, place).unwrap_err();
+        let wanted = [Argument::Plan, Argument::Seed, Argument::Output];
+        assert_eq!(error.refused().arguments, wanted);
         let now = SessionConfig {
             most_dwells: 20,
             patience_s: 7.0,

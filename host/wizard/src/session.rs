@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use mimu::calibration::Calibration;
+use mimu::diagnose::Verdict;
 use mimu::fit::{Fit, Options, fit};
 use mimu::prepared::Prepared;
 use mimu::result::diagnosis::DiagnosisResult;
@@ -12,7 +13,7 @@ use serde::Serialize;
 
 use crate::axes;
 use crate::drive::Driver;
-use crate::event::{Event, Question, View};
+use crate::event::{Event, Phase, Question, View};
 use crate::folder::{Begun, Entry, Folder, Part};
 use crate::procedure::{Fixture, SessionConfig};
 use crate::refit::LEVER_ARM_M;
@@ -63,7 +64,7 @@ pub struct UnitOutcome {
     /// The affine calibration, in poses that were not used.
     pub verified: Option<Judged>,
     /// Verdict of the diagnosis.
-    pub verdict: Option<String>,
+    pub verdict: Option<Verdict>,
     /// Effects that were found.
     pub effects: Vec<String>,
     /// The calibration with the effects, in a third set of poses.
@@ -161,7 +162,7 @@ fn finished(path: &Path, now: &SessionConfig) -> Result<Option<UnitOutcome>> {
             .map(|p| p.display().to_string())
     };
     let found = folder.entries().iter().rev().find_map(|e| match e {
-        Entry::Diagnosed { verdict, effects } => Some((verdict.clone(), effects.clone())),
+        Entry::Diagnosed { verdict, effects } => Some((*verdict, effects.clone())),
         _ => None,
     });
     let (verdict, effects) = found.unzip();
@@ -174,7 +175,7 @@ fn finished(path: &Path, now: &SessionConfig) -> Result<Option<UnitOutcome>> {
         effects: effects.unwrap_or_default(),
         stored: existing(WITH_EFFECTS).or(existing(PLAIN)),
         page: existing("diagnosis.html"),
-        notes: vec!["the session was finished before, and nothing was done now; another begins with another -o".into()],
+        notes: vec!["the session was finished before, and nothing was done now; another begins in another folder".into()],
         ..UnitOutcome::default()
     }))
 }
@@ -229,11 +230,14 @@ impl OpenSession<'_> {
             ),
             None => "until it is known how quiet the unit can be; leave it still".into(),
         };
-        wizard.begin_phase("warm-up", words);
+        wizard.begin_phase(Phase::WarmUp, words);
         or_cancelled!(wizard.warm_up());
         or_cancelled!(wizard.look_at_devices());
         let steps = wizard.asked.steps.clone();
-        wizard.begin_phase("calibration", format!("{} dwells are planned", steps.len()));
+        wizard.begin_phase(
+            Phase::Calibration,
+            format!("{} dwells are planned", steps.len()),
+        );
         or_cancelled!(wizard.dwells(Part::Calibration, &steps));
         self.finish()?;
         let by_table = self.wizard.asked.fixture == Fixture::Table;
@@ -259,11 +263,11 @@ impl OpenSession<'_> {
         let wizard = &mut self.wizard;
         let steps = wizard.asked.verification.clone();
         let words = format!("{} poses that were not used", steps.len());
-        wizard.begin_phase("verification", words);
+        wizard.begin_phase(Phase::Verification, words);
         or_cancelled!(wizard.dwells(Part::Verification, &steps));
         self.finish()?;
         self.wizard
-            .begin_phase("store", "what was verified is stored".into());
+            .begin_phase(Phase::Store, "what was verified is stored".into());
         let mut plain = Vec::new();
         for (k, fitted) in fits.into_iter().enumerate() {
             let created = self.wizard.units[k]
@@ -289,7 +293,7 @@ impl OpenSession<'_> {
             });
         }
         self.wizard
-            .begin_phase("diagnosis", "what still errs".into());
+            .begin_phase(Phase::Diagnosis, "what still errs".into());
         let mut found = Vec::new();
         for (k, plain) in plain.iter().enumerate() {
             found.push(self.diagnose(k, plain)?);

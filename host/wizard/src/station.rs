@@ -5,7 +5,7 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 use mimu_device::Session;
-use mimu_recording::error::{Error, Result};
+use mimu_recording::error::{Argument, Error, Result};
 
 use crate::source::{Chunk, Heard, Opener, Source, Unit};
 
@@ -22,9 +22,9 @@ pub enum StationEvent {
     /// Something that a person should know.
     Note(String),
     /// The line is lost, and why.
-    Lost(String),
+    Lost(Error),
     /// Another unit is at the port.
-    Other(String),
+    Other(Error),
     /// The line is back.
     Back(Box<Unit>),
 }
@@ -143,8 +143,9 @@ fn other(found: &str, wanted: &str) -> Error {
     Error::device(
         "port",
         format!("unit {found} is there, and the session is of unit {wanted}"),
-        format!("plug unit {wanted} in, or begin another session with -o"),
+        format!("plug unit {wanted} in, or begin another session in another folder"),
     )
+    .about(Argument::Output)
 }
 
 fn listen(
@@ -177,7 +178,7 @@ fn listen(
                 }
                 Err(error) => {
                     source = None;
-                    StationEvent::Lost(error.to_string())
+                    StationEvent::Lost(error)
                 }
             },
             None => match opener(next) {
@@ -195,7 +196,7 @@ fn listen(
                         continue;
                     }
                     told_other.clone_from(&found);
-                    StationEvent::Other(other(&found, id).to_string())
+                    StationEvent::Other(other(&found, id))
                 }
                 Err(_) => {
                     std::thread::sleep(AGAIN);

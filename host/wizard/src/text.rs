@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use mimu_core::compensation::Affine;
 use mimu_device::Session;
 use mimu_recording::RawUnit;
-use mimu_recording::error::{Error, Result};
+use mimu_recording::error::{Argument, Error, Result};
 use nalgebra::{Matrix3, Vector3};
 
 use crate::regular::{Regular, Timed};
@@ -223,8 +223,9 @@ impl TextSource {
             return Error::device(
                 &self.port,
                 "no line of text has come within 5 s",
-                "check that the board writes to this port, and --baud",
-            );
+                "check that the board writes to this port, and its bits a second",
+            )
+            .about(Argument::Baud);
         }
         let shown: Vec<String> = seen.iter().map(|l| format!("{l:?}")).collect();
         let problem = format!(
@@ -232,8 +233,10 @@ impl TextSource {
             self.lines.description(),
             shown.join(", ")
         );
-        let remedy = "name the columns in their order with --text, `-` for one that is not needed; where the lines are garbage, give --baud";
+        let remedy = "name the columns in their order, `-` for one that is not needed; where the lines are garbage, give the board's bits a second";
         Error::device(&self.port, problem, remedy)
+            .about(Argument::TextColumns)
+            .about(Argument::Baud)
     }
 
     /// Reads once, and puts what is known of it now into `ready`.

@@ -4,7 +4,8 @@
 //! or one for each number (`ax:1,ay:2`, the Arduino plotter's way), and words of greeting before. MotionCal's boards write `Raw:` with
 //! nine integers and, in turns with it, `Uni:` with nine of the same in SI.
 
-use mimu_recording::error::{Error, Result};
+use mimu_recording::error::{Argument, Error, Result};
+use mimu_recording::{Column, Decimal};
 
 /// Longest line, bytes; a board that writes none of them as long as this with ten numbers.
 const LONGEST: usize = 400;
@@ -13,87 +14,94 @@ const LARGEST: f64 = BITS;
 /// So many lines that are not data are kept to be shown.
 const SHOWN: usize = 3;
 
-/// What a number of a line is.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Column {
-    /// Gyro x, y, z, accelerometer x, y, z.
-    Channel(usize),
-    /// The board's clock; seconds in one of its units, and where it begins anew, s.
-    Clock { unit_s: f64, wraps_s: f64 },
-    /// °C.
-    Temperature,
-    /// Not needed.
-    Skipped,
-}
-
 /// The columns of a line.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Columns {
     names: String,
-    columns: Vec<Column>,
+    /// `None` is not needed.
+    columns: Vec<Option<Column>>,
+    /// Unit of the board's clock, where it has one.
+    clock: Option<Decimal>,
 }
 
+/// What sketches call the raw columns of a recording.
 const CHANNELS: [&str; 6] = ["gx", "gy", "gz", "ax", "ay", "az"];
+/// Units in which sketches write their clock, in `t_us`, `t_ms` and `t_s`.
+const CLOCKS: [Decimal; 3] = [Decimal::Microsecond, Decimal::Millisecond, Decimal::Second];
 /// What sketches count in 32 bits.
 const BITS: f64 = 4_294_967_296.0;
 
+/// Length of a unit of time, s.
+fn seconds(unit: Decimal) -> f64 {
+    1.0 / unit.per_second() as f64
+}
+
+/// Time after which a clock in this unit begins anew, s.
+fn wraps_s(unit: Decimal) -> f64 {
+    match unit {
+        Decimal::Second => f64::INFINITY,
+        _ => BITS * seconds(unit),
+    }
+}
+
 impl Columns {
-    /// From names with commas between them: `ax`, `ay`, `az`, `gx`, `gy`, `gz`, at most one of `t_us`, `t_ms` and `t_s`, `temp_c`, and
-    /// `-` for what is not needed.
+    /// From names with commas between them: `ax`, `ay`, `az`, `gx`, `gy`, `gz`, which a recording calls `accel_x` to `gyro_z`, at most one of
+    /// `t_us`, `t_ms` and `t_s`, `temp_c`, and `-` for what is not needed.
     ///
     /// Errors: a name that there is not, or is there twice; a missing axis.
     pub fn parse(names: &str) -> Result<Self> {
         let refused = |problem: String| {
             let remedy = "name ax, ay, az, gx, gy and gz in the order of the line, also t_us, t_ms or t_s, temp_c, and `-` for what is not needed";
-            Error::new(format!("--text {names:?}"), problem, remedy)
+            Error::new(format!("columns {names:?}"), problem, remedy).about(Argument::TextColumns)
         };
-        let mut columns = Vec::new();
+        let (mut columns, mut clock) = (Vec::new(), None);
         for name in names.split(',').map(str::trim) {
-            let clock = |unit_s: f64, wraps_s: f64| Column::Clock { unit_s, wraps_s };
+            let of_clock = |unit: &Decimal| name.strip_prefix("t_") == Some(unit.symbol());
             let channel = CHANNELS.iter().position(|c| *c == name);
-            let column = match (name, channel) {
-                (_, Some(channel)) => Column::Channel(channel),
-                ("t_us", _) => clock(1e-6, 1e-6 * BITS),
-                ("t_ms", _) => clock(1e-3, 1e-3 * BITS),
-                ("t_s", _) => clock(1.0, f64::INFINITY),
-                ("temp_c", _) => Column::Temperature,
-                ("-", _) => Column::Skipped,
-                _ => return Err(refused(format!("there is no column {name:?}"))),
+            let column = match (name, CLOCKS.into_iter().find(of_clock)) {
+                ("-", _) => None,
+                (_, Some(unit)) => {
+                    clock.get_or_insert(unit);
+                    Some(Column::Time)
+                }
+                _ => {
+                    let known = channel.map(Column::Raw).or(Column::from_name(name));
+                    let known = known.filter(|c| matches!(c, Column::Raw(_) | Column::Temperature));
+                    let none = || refused(format!("there is no column {name:?}"));
+                    Some(known.ok_or_else(none)?)
+                }
             };
-            let alike = |other: &Column| match (other, column) {
-                (Column::Clock { .. }, Column::Clock { .. }) => true,
-                (other, column) => *other == column && column != Column::Skipped,
-            };
-            if columns.iter().any(alike) {
+            if column.is_some() && columns.contains(&column) {
                 return Err(refused(format!("{name} is there a second time")));
             }
             columns.push(column);
         }
         for (k, name) in CHANNELS.iter().enumerate() {
-            if !columns.contains(&Column::Channel(k)) {
+            if !columns.contains(&Some(Column::Raw(k))) {
                 return Err(refused(format!("there is no {name}")));
             }
         }
         Ok(Self {
             names: names.into(),
             columns,
+            clock,
         })
     }
 
     /// `Raw:` of MotionCal: accelerometer, gyro, and a magnetometer, which is not needed.
     fn motion_cal() -> Self {
-        let mut columns: Vec<Column> = [3, 4, 5, 0, 1, 2].map(Column::Channel).to_vec();
-        columns.extend([Column::Skipped; 3]);
+        let mut columns = [3, 4, 5, 0, 1, 2].map(|c| Some(Column::Raw(c))).to_vec();
+        columns.extend([None; 3]);
         Self {
             names: "Raw:ax,ay,az,gx,gy,gz,mx,my,mz".into(),
             columns,
+            clock: None,
         }
     }
 
     /// Whether the board has a clock of its own.
     pub fn has_clock(&self) -> bool {
-        let is_clock = |c: &Column| matches!(c, Column::Clock { .. });
-        self.columns.iter().any(is_clock)
+        self.clock.is_some()
     }
 }
 
@@ -209,13 +217,14 @@ impl Lines {
             t_s: None,
         };
         for (column, number) in self.columns.columns.iter().zip(numbers) {
-            match column {
-                Column::Channel(_) | Column::Temperature if number.abs() > LARGEST => return None,
-                Column::Channel(c) => reading.raw[*c] = *number,
-                Column::Temperature => reading.temp_c = *number,
-                Column::Skipped => {}
-                Column::Clock { unit_s, wraps_s } => {
-                    let t_s = number * unit_s;
+            match (column, self.columns.clock) {
+                (Some(Column::Raw(_) | Column::Temperature), _) if number.abs() > LARGEST => {
+                    return None;
+                }
+                (Some(Column::Raw(c)), _) => reading.raw[*c] = *number,
+                (Some(Column::Temperature), _) => reading.temp_c = *number,
+                (Some(Column::Time), Some(unit)) => {
+                    let (t_s, wraps_s) = (number * seconds(unit), wraps_s(unit));
                     // 32 bits of microseconds are full after 71 minutes. A clock that goes back elsewhere has been set to 0.
                     let near = 10.0;
                     let last = self.last_clock.unwrap_or(t_s);
@@ -225,6 +234,7 @@ impl Lines {
                     self.last_clock = Some(t_s);
                     reading.t_s = Some(t_s + self.wrapped_s);
                 }
+                _ => {}
             }
         }
         Some(reading)
@@ -281,17 +291,12 @@ impl Lines {
 
     /// What the clock column would be, if time by it were to go `factor` times more slowly.
     pub fn clock_in_words(&self, factor: f64) -> String {
-        let unit = self.columns.columns.iter().find_map(|c| match c {
-            Column::Clock { unit_s, .. } => Some(unit_s / factor),
-            _ => None,
-        });
-        let unit = unit.unwrap_or(f64::NAN);
-        let known = [("t_us", 1e-6), ("t_ms", 1e-3), ("t_s", 1.0)];
-        let near = |is: &&(&str, f64)| (0.2..5.0).contains(&(is.1 / unit));
-        known.iter().find(near).map_or_else(
-            || format!("in units of {} s", mimu::quantity::significant(unit)),
-            |(name, _)| (*name).into(),
-        )
+        let unit_s = self.columns.clock.map_or(f64::NAN, seconds) / factor;
+        let near = |unit: &Decimal| (0.2..5.0).contains(&(seconds(*unit) / unit_s));
+        match CLOCKS.into_iter().find(near) {
+            Some(unit) => format!("t_{}", unit.symbol()),
+            None => format!("in units of {} s", mimu::quantity::significant(unit_s)),
+        }
     }
 
     /// What a line of data is.
@@ -404,6 +409,16 @@ mod tests {
         assert_eq!(readings[0].t_s, Some(1.5));
         assert_eq!(readings[0].temp_c, 25.5);
         assert_eq!(readings[0].raw, [4.0, 5.0, 6.0, 1.0, 2.0, 3.0]);
+    }
+
+    #[test]
+    fn columns_may_have_the_names_of_a_recording() {
+        let names = "accel_x,accel_y,accel_z,gyro_x,gyro_y,gyro_z,temp_c";
+        let (readings, _) = read(names, "1,2,3,4,5,6,25.5\n");
+        assert_eq!(readings[0].raw, [4.0, 5.0, 6.0, 1.0, 2.0, 3.0]);
+        assert_eq!(readings[0].temp_c, 25.5);
+        let error = Columns::parse("ax,ay,az,gx,gy,gz,accel_x").unwrap_err();
+        assert!(error.to_string().contains("accel_x is there a second time"));
     }
 
     #[test]

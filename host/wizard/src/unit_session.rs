@@ -7,11 +7,10 @@ use mimu::fit::Fit;
 use mimu::quantity::Sensor;
 use mimu::signal::stillness::GUARD_S;
 use mimu_core::compensation::Affine;
-use mimu_recording::error::{Error, Result};
+use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{Batch, Columns, Manifest, Recorded};
 use nalgebra::Vector3;
 
-pub use self::conditions::WRONG_POSE;
 use self::conditions::{Turns, motion_limits, rate_limit_dps};
 use self::rows::{cut, known, shorten};
 use crate::axes;
@@ -19,10 +18,11 @@ use crate::bank::DeviceBanks;
 use crate::event::{Event, UnitStanding};
 use crate::folder::{Entry, Folder, OpenRecording, Part, append};
 use crate::procedure::{Fixture, SessionConfig};
-use crate::refit::{Progress, calibrate, progress};
+use crate::refit::{Parameter, Progress, calibrate, progress};
 use crate::source::Chunk;
 use crate::station::{Station, StationEvent};
 use crate::step::Step;
+use crate::waiting::{Interruption, Waiting};
 use crate::watch::{Seen, Watch, force, guessed};
 
 /// Part of the second before that belongs to a dwell already: it was as still.
@@ -233,7 +233,7 @@ impl UnitSession {
                     if let Some(taking) = &mut self.taking {
                         taking.restarted(next, why.clone());
                     }
-                    self.interrupted(format!("the device has restarted: {why}"), tell)?;
+                    self.interrupted(Interruption::Restarted(why), tell)?;
                     if let Some(banks) = &mut self.banks {
                         banks.lacks("the device has restarted, and they lack the dwells before");
                     }
@@ -241,27 +241,29 @@ impl UnitSession {
                 StationEvent::Note(words) => tell.push(Event::Note {
                     words: format!("{}: {words}", self.name()),
                 }),
-                StationEvent::Lost(why) => {
-                    self.interrupted(format!("the line is lost: {why}"), tell)?
-                }
+                StationEvent::Lost(why) => self.interrupted(Interruption::Lost(why), tell)?,
                 StationEvent::Other(why) => {
-                    self.standing.waiting = Some(why.clone());
+                    let why = Interruption::OtherUnit(why);
+                    self.standing.waiting = Some(Waiting::Interrupted(why.clone()));
                     tell.push(Event::Interrupted {
                         unit: self.name(),
                         why,
                     });
                 }
-                StationEvent::Back(_) => self.interrupted("the line is back".into(), tell)?,
+                StationEvent::Back(_) => self.interrupted(Interruption::Back, tell)?,
             }
         }
         Ok(some)
     }
 
-    fn interrupted(&mut self, why: String, tell: &mut Vec<Event>) -> Result<()> {
-        self.throw(&why, tell)?;
+    fn interrupted(&mut self, why: Interruption, tell: &mut Vec<Event>) -> Result<()> {
+        let waiting = Waiting::Interrupted(why.clone());
+        self.throw(&waiting, tell)?;
         self.watch.interrupted();
-        self.standing.waiting = Some(why.clone());
-        self.folder.add(Entry::Interrupted { why: why.clone() })?;
+        self.standing.waiting = Some(waiting);
+        self.folder.add(Entry::Interrupted {
+            why: why.to_string(),
+        })?;
         tell.push(Event::Interrupted {
             unit: self.name(),
             why,
@@ -354,11 +356,9 @@ impl UnitSession {
             (Err(why), _) => {
                 self.throw(&why, tell)?;
                 if self.standing.waiting.as_ref() != Some(&why) {
-                    // The first words say it; what the numbers in them do, the standing shows.
-                    let same = self.standing.waiting.as_ref().is_some_and(|w| {
-                        w.split_whitespace().next() == why.split_whitespace().next()
-                    });
-                    if !same {
+                    // What its numbers do, the standing shows.
+                    let told = self.standing.waiting.as_ref();
+                    if !told.is_some_and(|told| told.is_like(&why)) {
                         tell.push(Event::Waiting {
                             unit: self.name(),
                             why: why.clone(),
@@ -409,7 +409,7 @@ impl UnitSession {
     }
 
     /// Throws the dwell that runs away.
-    fn throw(&mut self, why: &str, tell: &mut Vec<Event>) -> Result<()> {
+    fn throw(&mut self, why: &Waiting, tell: &mut Vec<Event>) -> Result<()> {
         self.standing.left_s = None;
         let Some(dwell) = self.dwell.take() else {
             return Ok(());
@@ -422,11 +422,11 @@ impl UnitSession {
         if lasted as f64 > (BEFORE_S + BEGUN_S) * rate_hz {
             self.folder.add(Entry::Thrown {
                 step: dwell.step,
-                why: why.into(),
+                why: why.to_string(),
             })?;
             tell.push(Event::Thrown {
                 unit: self.name(),
-                why: why.into(),
+                why: why.clone(),
             });
         }
         Ok(())
@@ -540,8 +540,8 @@ impl UnitSession {
                 "the temperature has moved from {first:.1} to {:.1} °C since the first dwell, and a calibration holds at one",
                 seen.temp_c
             );
-            let remedy = "let the unit come to a steady temperature, and begin anew in another folder; or allow more with --drift";
-            return Err(Error::new(self.name(), problem, remedy));
+            let remedy = "let the unit come to a steady temperature, and begin anew in another folder; or allow more";
+            return Err(Error::new(self.name(), problem, remedy).about(Argument::Drift));
         }
         Ok(())
     }
@@ -569,7 +569,7 @@ impl UnitSession {
             .iter()
             .all(|s| s.aims.iter().all(|a| a.half_width < KNOWN * a.target));
         let turned = self.progress.sensors.iter().flat_map(|s| &s.aims);
-        let mut angles = turned.filter(|a| a.parameter == "angles");
+        let mut angles = turned.filter(|a| a.parameter == Parameter::Angles);
         let known_angles = angles.all(|a| a.half_width < AXES_KNOWN);
         let apart = known_angles.then(|| axes::frames_apart(&fitted)).flatten();
         self.hopeless = apart.map(|why| Error::device(self.name(), why, axes::REMEDY));

@@ -4,7 +4,7 @@ use mimu::calibration::Calibration;
 use mimu::calibration::verify::{SensorVerification, verify};
 use mimu::fit::Fit;
 use mimu::prepared::Prepared;
-use mimu::quantity::Sensor;
+use mimu::quantity::{Figure, Sensor};
 use mimu::signal::stillness::STILL_FACTOR;
 use mimu::warning::Warning;
 use mimu_recording::Recording;
@@ -27,7 +27,7 @@ pub struct SensorJudged {
     /// Which.
     pub sensor: Sensor,
     /// What they are about.
-    pub figure: &'static str,
+    pub figure: Figure,
     /// Of all of them.
     pub unit: &'static str,
     /// What a data sheet would leave: one scale factor and one bias for all axes.
@@ -48,7 +48,7 @@ impl SensorJudged {
     fn of(sensor: Sensor, found: &SensorVerification, promised: Option<f64>) -> Self {
         Self {
             sensor,
-            figure: found.figure.description(),
+            figure: found.figure,
             unit: found.unit,
             before: found.rms_raw,
             affine: found.rms_affine.unwrap_or(found.rms),
@@ -66,7 +66,7 @@ impl SensorJudged {
             return Some(format!(
                 "{}: {} errs by {} {} with the calibration and by {} without",
                 self.sensor,
-                self.figure,
+                self.figure.description(),
                 mimu::quantity::significant(self.after),
                 self.unit,
                 mimu::quantity::significant(self.before)
@@ -76,7 +76,7 @@ impl SensorJudged {
             format!(
                 "{}: {} errs by {} {} in poses that were not used, and {} were promised",
                 self.sensor,
-                self.figure,
+                self.figure.description(),
                 mimu::quantity::significant(self.after),
                 self.unit,
                 mimu::quantity::significant(promised)
@@ -94,7 +94,7 @@ impl SensorJudged {
             format!(
                 "{}: {} errs by {} {} in poses that were not used, {:.1} times the noise, where a data sheet leaves {}",
                 self.sensor,
-                self.figure,
+                self.figure.description(),
                 shown(self.after),
                 self.unit,
                 self.after / self.floor,
@@ -190,7 +190,7 @@ mod tests {
     fn judged(gyro: f64, accel: f64, promised: f64) -> Judged {
         let of = |sensor, after, floor, before| SensorJudged {
             sensor,
-            figure: "error",
+            figure: Figure::Input,
             unit: "SI",
             before,
             affine: after,

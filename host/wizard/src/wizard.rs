@@ -6,11 +6,12 @@ use mimu_recording::error::{Error, Result};
 
 use crate::axes;
 use crate::drive::Driver;
-use crate::event::{Event, Question, Standing, View, Wish};
+use crate::event::{Event, Phase, Question, Standing, View, Wish};
 use crate::folder::{Entry, Part};
 use crate::procedure::{Fixture, SessionConfig, next_step};
 use crate::step::Step;
-use crate::unit_session::{Round, UnitSession, WRONG_POSE};
+use crate::unit_session::{Round, UnitSession};
+use crate::waiting::Waiting;
 
 /// How often the standing is shown.
 const SHOWN: Duration = Duration::from_millis(100);
@@ -42,7 +43,7 @@ pub struct Wizard<'a> {
     /// Who is told.
     pub view: &'a mut dyn View,
     /// The phase, for the standing.
-    pub phase: &'static str,
+    pub phase: Phase,
     shown: Instant,
     queue: Vec<Step>,
     /// Those in whose place a person had another pose: they come after the others.
@@ -75,7 +76,7 @@ impl<'a> Wizard<'a> {
             units,
             driver,
             view,
-            phase: "start",
+            phase: Phase::Start,
             shown: Instant::now(),
             queue: Vec::new(),
             later: Vec::new(),
@@ -92,7 +93,7 @@ impl<'a> Wizard<'a> {
     }
 
     /// Begins a phase.
-    pub fn begin_phase(&mut self, phase: &'static str, words: String) {
+    pub fn begin_phase(&mut self, phase: Phase, words: String) {
         self.phase = phase;
         self.tell(Event::Phase { phase, words });
     }
@@ -138,12 +139,7 @@ impl<'a> Wizard<'a> {
     }
 
     fn had(&self, unit: &UnitSession) -> usize {
-        let part = match self.phase {
-            "verification" => Part::Verification,
-            "confirmation" => Part::Confirmation,
-            _ => Part::Calibration,
-        };
-        unit.folder.dwells(part).len()
+        unit.folder.dwells(self.phase.part()).len()
     }
 
     /// Waits until all units are heard and, where that is asked, warm.
@@ -186,10 +182,8 @@ impl<'a> Wizard<'a> {
             let warm = |u: &UnitSession| u.trend().is_some_and(|t| t.abs() <= limit);
             for unit in &mut self.units {
                 let waiting = match unit.trend() {
-                    None => Some("its temperature is watched".to_string()),
-                    Some(t) if t.abs() > limit => {
-                        Some(format!("warming up: {t:+.2} °C/min, {limit} is the limit"))
-                    }
+                    None => Some(Waiting::TrendUnknown),
+                    Some(t) if t.abs() > limit => Some(Waiting::Warming(t, limit)),
                     Some(_) => None,
                 };
                 unit.standing.waiting = waiting;
@@ -378,11 +372,7 @@ impl<'a> Wizard<'a> {
                 return Ok(Stepped::Had);
             }
             let wrong = |u: &UnitSession| {
-                u.done
-                    || u.standing
-                        .waiting
-                        .as_ref()
-                        .is_some_and(|w| w.starts_with(WRONG_POSE))
+                u.done || matches!(u.standing.waiting, Some(Waiting::WrongPose(..)))
             };
             if busy || !self.units.iter().all(wrong) {
                 stood = Instant::now();
@@ -391,11 +381,14 @@ impl<'a> Wizard<'a> {
                 since.elapsed().as_secs_f64() > self.asked.patience_s || stood.elapsed() > WRONG;
             if out_of_patience && !self.driver.is_person() {
                 let why = self.units.iter().filter(|u| !u.done);
-                let why = why.filter_map(|u| u.standing.waiting.clone()).next();
+                let why = why.filter_map(|u| u.standing.waiting.as_ref()).next();
                 let problem = format!(
                     "the step {:?} does not come about: {}",
                     step.words(),
-                    why.unwrap_or_else(|| "the dwell is broken off again and again".into())
+                    why.map_or_else(
+                        || "the dwell is broken off again and again".into(),
+                        Waiting::to_string
+                    )
                 );
                 let remedy = match stood.elapsed() > WRONG {
                     true => {

@@ -1,7 +1,9 @@
 //! Diagnosis of units whose truth is known, and of recordings by other people. All of the first is `make blind`.
 
+use mimu::diagnose::decision::Against;
 use mimu::diagnose::search::Alternative;
 use mimu::diagnose::{Diagnosis, Verdict, diagnose};
+use mimu::effects;
 use mimu::fit::{Method, Options};
 use mimu::quantity::Sensor;
 use mimu::signal::stillness::STILL_FACTOR;
@@ -127,10 +129,8 @@ fn a_quiet_gyro_reads_the_earth_and_nothing_takes_that_from_it() {
         .iter_mut()
         .flat_map(|s| &mut s.decision.accepted)
     {
-        let other = Alternative {
-            id: "gyro_g_sensitivity".into(),
-            score_worse_by: -1.0,
-        };
+        let other = effects::by_id("gyro_g_sensitivity").unwrap();
+        let other = Alternative::from((other, -1.0));
         accepted.chosen.alternatives.push(other);
     }
     let found = reported(found);
@@ -163,9 +163,9 @@ fn a_step_at_a_reading_is_left_over_against_the_reading_or_named_an_error_by_the
         let found = diagnose(recorded.with_noise(&noise).unwrap().into(), options()).unwrap();
         let ids: Vec<String> = found.effects.iter().map(|e| e.candidate.id()).collect();
         let left = found.sensors.iter().flat_map(|s| &s.decision.leftover);
-        let against: Vec<&str> = left.map(|l| l.against.as_str()).collect();
+        let against: Vec<_> = left.map(|l| &l.against).collect();
         println!("seed {seed}: {ids:?}, left {against:?}");
-        by_reading += u32::from(against.contains(&"reading"));
+        by_reading += u32::from(against.contains(&&Against::Reading));
         let named = ids.iter().all(|id| is_right(id, "gyro_missing_codes"));
         assert!(
             named || found.verdict == Verdict::Unexplained,

@@ -1,6 +1,7 @@
 //! What a fit and a diagnosis say of recordings whose temperature ramps: the noise floor, the warning, and what is found. The truth is the
 //! bench's.
 
+use mimu::diagnose::rejected::{Reason, Rejected};
 use mimu::diagnose::{Recordings, diagnose};
 use mimu::fit::{Method, Options, fit};
 use mimu::prepared::Prepared;
@@ -164,8 +165,10 @@ fn what_is_found_from_the_data_does_not_keep_out_a_lag_and_what_is_significant_i
         "{accepted:?} {:?}",
         decision.rejected
     );
-    let bare = |(id, why): &&(String, String)| {
-        !id.starts_with("term:") && why.starts_with("p < 1e-6") && !why.contains("but ")
+    let bare = |r: &&Rejected| {
+        let significant =
+            matches!(&r.reason, Reason::NotChosen(n) if n.p < 1e-6 && n.why.is_none());
+        !r.id.starts_with("term:") && significant
     };
     let without: Vec<_> = decision.rejected.iter().filter(bare).collect();
     assert!(without.is_empty(), "{without:?}");

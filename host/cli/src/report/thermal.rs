@@ -6,8 +6,10 @@ use mimu::parameter::Kind;
 use mimu::quantity::{Sensor, plus_minus, significant};
 use mimu::readable;
 use mimu_thermal::compare::Comparison;
+use mimu_thermal::fit::Verdict;
 use mimu_thermal::result::{CurveResult, SensorResult, ThermalResult};
 
+use crate::hint;
 use crate::report::text::{warn, wrap};
 
 /// Temperatures at which curves are shown.
@@ -36,13 +38,12 @@ pub fn thermal_text(result: &ThermalResult) -> String {
             "s"
         },
         result.estimator,
-        result.verdict
+        result.verdict.name()
     );
-    if result.verdict == "one-way" {
-        wrap(&mut out, "", VERDICT_ONE_WAY);
-    }
-    if result.verdict == "misfit" {
-        wrap(&mut out, "", VERDICT_MISFIT);
+    match result.verdict {
+        Verdict::Fitted => {}
+        Verdict::OneWay => wrap(&mut out, "", VERDICT_ONE_WAY),
+        Verdict::Misfit => wrap(&mut out, "", VERDICT_MISFIT),
     }
     for (name, sensor) in result.sensors.present() {
         let _ = writeln!(out);
@@ -51,7 +52,7 @@ pub fn thermal_text(result: &ThermalResult) -> String {
     }
     if !result.warnings.is_empty() {
         let _ = writeln!(out);
-        warn(&mut out, result.warnings.iter());
+        warn(&mut out, result.warnings.iter().map(hint::of_thermal));
     }
     out
 }

@@ -3,8 +3,11 @@
 use maud::{Markup, html};
 use mimu::quantity::{Sensor, plus_minus};
 use mimu::readable;
+use mimu_thermal::fit::Verdict;
 use mimu_thermal::judge::{Bin, Hysteresis};
 use mimu_thermal::result::{CurveResult, SensorResult, ThermalResult};
+
+use crate::hint;
 
 use super::page::{Made, number, page, spoken, written};
 use super::thermal::{SHOWN, VERDICT_MISFIT, VERDICT_ONE_WAY, physical};
@@ -36,11 +39,15 @@ pub fn thermal_page(result: &ThermalResult, made: &Made) -> String {
         }
         @if !result.warnings.is_empty() {
             h2 { "To know" }
-            ul { @for warning in &result.warnings { li { (warning) } } }
+            ul { @for warning in &result.warnings { li { (hint::of_thermal(warning)) } } }
         }
         p class="dim" { (result.tool) ", " (made.created) ": " code { (made.command) } }
     };
-    let title = format!("{} over temperature: {}", result.device, result.verdict);
+    let title = format!(
+        "{} over temperature: {}",
+        result.device,
+        result.verdict.name()
+    );
     page(&title, &main)
 }
 
@@ -48,11 +55,13 @@ fn head(result: &ThermalResult, made: &Made) -> Markup {
     let [from, to] = result.range_c;
     html! {
         h1 { (result.device) " over temperature" }
-        p class={ "verdict " @if result.verdict == "fitted" { "explained" } @else { "unexplained" } } {
-            strong { (result.verdict) } ": dies at " (written(&format!("{from:.1}"))) " to " (written(&format!("{to:.1}"))) " °C. "
-            @if result.verdict == "fitted" { "Heating and cooling, or plateaus, tell the lag of the dies from the slopes of the curves." }
-            @else if result.verdict == "misfit" { (VERDICT_MISFIT) }
-            @else { (VERDICT_ONE_WAY) }
+        p class={ "verdict " @if result.verdict == Verdict::Fitted { "explained" } @else { "unexplained" } } {
+            strong { (result.verdict.name()) } ": dies at " (written(&format!("{from:.1}"))) " to " (written(&format!("{to:.1}"))) " °C. "
+            @match result.verdict {
+                Verdict::Fitted => { "Heating and cooling, or plateaus, tell the lag of the dies from the slopes of the curves." }
+                Verdict::Misfit => { (VERDICT_MISFIT) }
+                Verdict::OneWay => { (VERDICT_ONE_WAY) }
+            }
         }
         dl {
             @for recording in &result.recordings {

@@ -9,7 +9,8 @@ use super::svg::{Frame, px, range};
 use mimu::parameter::Kind;
 use mimu::quantity::{AXES, Sensor};
 use mimu::readable;
-use mimu_thermal::result::{CurveResult, DwellResult, SensorResult, ThermalResult};
+use mimu_thermal::judge::DwellError;
+use mimu_thermal::result::{CurveResult, SensorResult, ThermalResult};
 
 /// Width and height of one panel, pixels.
 const PANEL: (f64, f64) = (400.0, 330.0);
@@ -215,8 +216,7 @@ impl Marks {
             }
             for dwells in recording.chunks(each) {
                 let n = dwells.len() as f64;
-                let mean =
-                    |of: &dyn Fn(&DwellResult) -> f64| dwells.iter().map(of).sum::<f64>() / n;
+                let mean = |of: &dyn Fn(&DwellError) -> f64| dwells.iter().map(of).sum::<f64>() / n;
                 all.push(Mark {
                     hours: start + mean(&|d| d.middle_s) / 3600.0,
                     die_c: mean(&|d| d.die_c),

@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use mimu::calibration::verify::Verification;
+use mimu::quantity::Figure;
 use mimu::readable;
 
 use crate::report::text::warn;
@@ -22,7 +23,10 @@ pub fn verify_text(verification: &Verification) -> String {
                 true => figure.write(v),
                 false => "unknown".into(),
             });
-        let noun = if s.unit == "rad" { "turns" } else { "dwells" };
+        let noun = match s.figure {
+            Figure::Direction => "turns",
+            Figure::Input | Figure::GravitySize => "dwells",
+        };
         let over = format!("{} {noun}", s.count);
         let _ = writeln!(
             out,

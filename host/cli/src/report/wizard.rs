@@ -2,12 +2,14 @@
 
 use std::fmt::Write as _;
 
-use mimu::quantity::{Figure, minutes, plural, significant};
+use mimu::quantity::{minutes, plural, significant};
 use mimu_wizard::event::Event;
 use mimu_wizard::folder::Part;
 use mimu_wizard::refit::Progress;
 use mimu_wizard::session::{Outcome, UnitOutcome};
 use mimu_wizard::verdict::{Judged, SensorJudged};
+
+use crate::hint;
 
 /// An event as lines of text; none for what only a program wants.
 pub(crate) fn wizard_lines(event: &Event) -> Vec<String> {
@@ -34,12 +36,15 @@ pub(crate) fn wizard_lines(event: &Event) -> Vec<String> {
             words,
             ..
         } => vec![format!("[{}/{planned}] {words}", done + 1)],
-        Event::Waiting { why, .. } => vec![format!("    waiting: {why}")],
+        Event::Waiting { why, .. } => vec![format!("    waiting: {}", hint::of_waiting(why))],
         Event::Dwell { part, number, .. } => match part {
             Part::Calibration => Vec::new(),
             _ => vec![format!("    dwell {number} done")],
         },
-        Event::Thrown { why, .. } => vec![format!("    thrown away, once more: {why}")],
+        Event::Thrown { why, .. } => vec![format!(
+            "    thrown away, once more: {}",
+            hint::of_waiting(why)
+        )],
         Event::Redo { number } => vec![format!("    dwell {number} is to be had again")],
         Event::Progress { progress, .. } => vec![format!("    {}", progress_line(progress))],
         Event::Interrupted { why, .. } => vec![format!("    {why}")],
@@ -56,7 +61,7 @@ pub(crate) fn wizard_lines(event: &Event) -> Vec<String> {
                 false => format!("found: {}", effects.join(", ")),
             };
             vec![
-                format!("verdict: {verdict}; {found}"),
+                format!("verdict: {}; {found}", verdict.name()),
                 format!("page: {page}"),
             ]
         }
@@ -86,7 +91,7 @@ pub(crate) fn progress_line(progress: &Progress) -> String {
             let _ = write!(
                 text,
                 " {} ±{}{mark}",
-                aim.parameter,
+                aim.parameter.name(),
                 significant(aim.half_width)
             );
         }
@@ -108,12 +113,12 @@ fn judged_lines(judged: &Judged) -> Vec<String> {
 }
 
 fn judged_line(of: &SensorJudged) -> String {
-    let (factor, unit) = figure(of).readable(of.sensor);
+    let (factor, unit) = of.figure.readable(of.sensor);
     let shown = |si: f64| significant(si * factor);
     let mut text = format!(
         "{:5} error of {} in poses that were not used: ",
         of.sensor.name(),
-        of.figure
+        of.figure.description()
     );
     let _ = write!(text, "data sheet {}, ", shown(of.before));
     if of.affine != of.after {
@@ -133,12 +138,6 @@ fn judged_line(of: &SensorJudged) -> String {
         of.after / of.floor
     );
     text
-}
-
-fn figure(of: &SensorJudged) -> Figure {
-    let all = [Figure::Input, Figure::GravitySize, Figure::Direction];
-    let found = all.into_iter().find(|f| f.description() == of.figure);
-    found.unwrap_or(Figure::Input)
 }
 
 /// What a session has come to.
@@ -172,7 +171,7 @@ fn unit_text(unit: &UnitOutcome, text: &mut String) {
             [] => "no effect".into(),
             effects => effects.join(", "),
         };
-        let _ = writeln!(text, "diagnosis: {verdict}, {effects}");
+        let _ = writeln!(text, "diagnosis: {}, {effects}", verdict.name());
     }
     match &unit.stored {
         Some(file) => {

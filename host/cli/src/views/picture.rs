@@ -6,7 +6,7 @@ mod table;
 mod unit;
 
 use mimu::quantity::minutes;
-use mimu_wizard::event::Standing;
+use mimu_wizard::event::{Phase, Standing};
 use mimu_wizard::refit::Progress;
 use mimu_wizard::step::sketch;
 use ratatui::Frame;
@@ -135,10 +135,7 @@ fn distance(progress: &Progress) -> f64 {
 }
 
 fn draw_head(frame: &mut Frame, area: Rect, standing: &Standing) {
-    let title = match standing.phase {
-        "" => " mimu wizard ".to_string(),
-        phase => format!(" mimu wizard: {phase} "),
-    };
+    let title = format!(" mimu wizard: {} ", standing.phase);
     let block = Block::bordered().title(title.bold());
     let inner = block.inner(area);
     frame.render_widget(block, area);
@@ -170,9 +167,9 @@ fn draw_step(frame: &mut Frame, area: Rect, standing: &Standing) {
     let lines = match &standing.step {
         None => {
             let words = match standing.phase {
-                "warm-up" => "leave it still",
-                "store" => "the calibration goes into the device",
-                "diagnosis" => "nothing: what still errs is looked for",
+                Phase::WarmUp => "leave it still",
+                Phase::Store => "the calibration goes into the device",
+                Phase::Diagnosis => "nothing: what still errs is looked for",
                 _ => "nothing now",
             };
             wrapped(words, wide)

@@ -144,7 +144,7 @@ impl View for Screen {
             write_event(out.as_mut(), event);
         }
         if let Event::Phase { phase, .. } = event {
-            (self.standing.phase, self.standing.step) = (phase, None);
+            (self.standing.phase, self.standing.step) = (*phase, None);
         }
         if let Event::Dwell { number, words, .. } = event {
             self.log.push(format!("dwell {number}: {words}"));

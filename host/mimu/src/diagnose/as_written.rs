@@ -4,6 +4,7 @@
 //! a file does not: an effect of which the affine part is wrong by a hundred times passes the one and not the other.
 
 use super::decision::{Accepted, Decision};
+use super::rejected::{ErrorRms, Reason, Rejected};
 use crate::calibration::Calibration;
 use crate::calibration::verify::verify;
 use crate::effects::fitted::FittedEffect;
@@ -11,7 +12,6 @@ use crate::effects::removal::remove;
 use crate::fit::Fit;
 use crate::prepared::Prepared;
 use crate::quantity::{Figure, Sensor};
-use crate::readable;
 
 /// Ratio of the errors with the effects and without from which on the file is worse: below it they differ by the noise of the recording.
 const WORSE: f64 = 1.02;
@@ -42,7 +42,7 @@ impl AsWritten<'_> {
 
     /// The effect that makes the file worse for another recording, and the reason; `after` is the fit of the first without the effects of
     /// `decision`.
-    pub fn worst(&self, after: &Fit, decision: &Decision) -> Option<(String, String)> {
+    pub fn worst(&self, after: &Fit, decision: &Decision) -> Option<Rejected> {
         let lasting: Vec<&Accepted> = decision.accepted.iter().filter(|a| a.of_unit).collect();
         let effects = |of: &[&Accepted]| -> Vec<FittedEffect> {
             of.iter().map(|a| a.effect.clone()).collect()
@@ -68,11 +68,15 @@ impl AsWritten<'_> {
         };
         let each = (0..lasting.len()).map(|k| (k, without(k).unwrap_or(f64::INFINITY)));
         let (culprit, _) = each.min_by(|a, b| a.1.total_cmp(&b.1))?;
-        let [before, after] = both.map(|rms| readable::error(figure.unit(self.sensor)).write(rms));
-        let why = format!(
-            "the calibration file with it would err more on {}: {before} without effects, {after} with them",
-            recording.place
-        );
-        Some((lasting[culprit].chosen.candidate.id(), why))
+        let errors = both.map(|rms| ErrorRms {
+            figure,
+            sensor: self.sensor,
+            rms,
+        });
+        Some(Rejected {
+            id: lasting[culprit].chosen.candidate.id(),
+            sensor: self.sensor,
+            reason: Reason::FileErrsMore(recording.place.clone(), errors),
+        })
     }
 }

@@ -17,16 +17,17 @@ use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::note::Note;
+use super::rejected::{ErrorRms, NotChosen, Passed, Reason, Rejected};
 use super::rows::Rows;
 use super::search::{Chosen, FALSE_LISTED, Found, MOST, Search, beside};
 use super::variance::Fitted;
-use crate::effects::candidate::Kind;
+use crate::effects::candidate::{Candidate, Kind};
+use crate::effects::effect::Effect;
 use crate::effects::fitted::FittedEffect;
 use crate::effects::quantity::Quantity;
 use crate::effects::regressor::Product;
 
 use crate::fit::Split;
-use crate::quantity::p_value;
 use acceptance::Acceptance;
 use in_time::others_in_time;
 use leftover::leftover;
@@ -38,7 +39,7 @@ use undecided::undecided;
 
 use hold_out::rms_at_rest;
 pub(super) use hold_out::{held_out, part, rms};
-pub use leftover::{FALSE_LEFTOVER, Leftover};
+pub use leftover::{Against, FALSE_LEFTOVER, Leftover};
 pub use model::Model;
 pub use nonlinear::Nonlinear;
 pub use second::Second;
@@ -91,9 +92,9 @@ pub struct Decision {
     /// Accepted effects.
     pub accepted: Vec<Accepted>,
     /// Effects that were found and not accepted, with the reason; and the best of those that were not found.
-    pub rejected: Vec<(String, String)>,
-    /// Effects that the experiment could not show, with what would.
-    pub not_excited: Vec<(String, String)>,
+    pub rejected: Vec<Rejected>,
+    /// Effects that the experiment could not show.
+    pub not_excited: Vec<&'static Effect>,
     /// Structure that is left.
     pub leftover: Vec<Leftover>,
     /// The affine model, and that with the accepted effects.
@@ -164,11 +165,11 @@ pub fn decide(
     rows: &Rows,
     dwell_ends: &[(usize, f64)],
     unseen: Option<&Rows>,
-    without: &[(String, String)],
+    without: &[Rejected],
     accept: &[String],
 ) -> Option<Decision> {
     let (mut all, mut not_excited) = candidates(rows, dwell_ends);
-    all.retain(|c| !without.iter().any(|(id, _)| *id == c.id()));
+    all.retain(|c| !without.iter().any(|w| w.id == c.id()));
     let search = Search::new(rows, all);
     let null = search.fit(&[])?;
     let known = search
@@ -181,7 +182,11 @@ pub fn decide(
         fit: mut with,
         superfluous,
     } = search.run()?;
-    let said = |value: f64| rows.figure.said(rows.sensor, value);
+    let rejection = |candidate: &Candidate, reason| Rejected {
+        id: candidate.id(),
+        sensor: rows.sensor,
+        reason,
+    };
     let mut rejected = without.to_vec();
     let mut kept: Vec<Chosen> = Vec::new();
     let mut jumps = Vec::new();
@@ -215,13 +220,13 @@ pub fn decide(
             // More dwells may prove it: it is asked for in the next experiment.
             if let Kind::Effect(effect) = &candidate.kind
                 && failed.too_few_dwells
-                && !not_excited.iter().any(|n| n.0 == effect.id)
+                && !not_excited.iter().any(|n| n.id == effect.id)
             {
-                not_excited.push((effect.id.into(), effect.needs.into()));
+                not_excited.push(effect);
             }
             failures.push(candidate.id());
-            rejected.retain(|r| r.0 != candidate.id());
-            rejected.push((candidate.id(), failed.why));
+            rejected.retain(|r| r.id != candidate.id());
+            rejected.push(rejection(&candidate, failed.why));
             with = search.fit(&kept)?;
         }
         passed = ids(&kept);
@@ -237,7 +242,7 @@ pub fn decide(
             let id = c.id();
             let times = failures.iter().filter(|f| **f == id).count();
             let beside_others = times == 1 && failures.last() != Some(&id);
-            let tried = without.iter().any(|w| w.0 == id) || times > 0;
+            let tried = without.iter().any(|w| w.id == id) || times > 0;
             c.is_listed() && (!tried || beside_others)
         })?;
         if ids(&more.chosen) == ids(&kept) {
@@ -245,7 +250,7 @@ pub fn decide(
         }
         (kept, with) = (more.chosen, more.fit);
     }
-    rejected.retain(|r| kept.iter().all(|k| k.candidate.id() != r.0));
+    rejected.retain(|r| kept.iter().all(|k| k.candidate.id() != r.id));
     nonlinear::refine(&search, &mut kept, &mut with);
     others_in_time(&search, &mut kept, &with);
     let one_at_these_inputs = together(&search, &mut kept, &with);
@@ -309,19 +314,14 @@ pub fn decide(
         true => with.clone(),
         false => search.fit(&with_jumps)?,
     };
-    rejected.extend(suggested.iter().map(|one| {
-        let why = format!(
-            "{}, and it lowers the held-out error, but no physics asks for it: a suggestion. A second recording that shows it confirms it \
-             (--verify), or your word (--accept {})",
-            p_value(one.p),
-            one.candidate.id()
-        );
-        (one.candidate.id(), why)
-    }));
+    rejected.extend(
+        suggested
+            .iter()
+            .map(|one| rejection(&one.candidate, Reason::Suggestion(one.p))),
+    );
     for one in search.others(&with_jumps, &all) {
         let id = one.candidate.id();
-        let told = |all: &[(String, String)]| all.iter().any(|r| r.0 == id);
-        if told(&rejected) || told(&not_excited) {
+        if rejected.iter().any(|r| r.id == id) || not_excited.iter().any(|n| n.id == id) {
             continue;
         }
         let mut more = kept.clone();
@@ -339,18 +339,18 @@ pub fn decide(
             rms(rows, &(&rows.y - search.model(&kept) * &with.coefficients)),
             judge.held_rms(&kept, &with, usual),
         );
-        let chance = not_taken(&one, &kept, &superfluous);
-        let figures = match (held, now) {
-            (Some((sample, held)), (before, Some(out))) => format!(
-                "; in sample {} to {}, held out {} to {}",
-                said(before),
-                said(sample),
-                said(out),
-                said(held)
-            ),
-            _ => String::new(),
+        let errors = match (held, now) {
+            (Some((sample, held)), (before, Some(out))) => {
+                Some([[before, sample], [out, held]].map(|of| of.map(|v| ErrorRms::of(rows, v))))
+            }
+            _ => None,
         };
-        rejected.push((id, chance + &figures));
+        let reason = Reason::NotChosen(NotChosen {
+            p: one.p,
+            why: passed_over(&one, &kept, &superfluous),
+            errors,
+        });
+        rejected.push(rejection(&one.candidate, reason));
     }
     let of_readings = of_readings(&search, model, last, split);
     // What scatters beside them.
@@ -387,7 +387,7 @@ pub fn decide(
         accepted,
         not_excited: {
             let accepted = |id: &str| kept.iter().any(|k| k.candidate.id() == id);
-            not_excited.retain(|n| !accepted(&n.0));
+            not_excited.retain(|n| !accepted(n.id));
             not_excited
         },
         rejected,
@@ -399,21 +399,15 @@ pub fn decide(
     })
 }
 
-/// Why a named effect that is not among the `kept` is not: it may be chance, or have lost to others, whatever its probability is now.
-fn not_taken(one: &Chosen, kept: &[Chosen], superfluous: &[String]) -> String {
+/// Why a named effect that is significant is not among the `kept`: it lost to others. `None` where it is not significant.
+fn passed_over(one: &Chosen, kept: &[Chosen], superfluous: &[String]) -> Option<Passed> {
     let listed = kept.iter().filter(|k| k.candidate.is_listed()).count();
-    let why = match one.p {
-        p if p > 0.5 => return "no better than chance".into(),
-        p if p > FALSE_LISTED => return p_value(p),
-        _ if superfluous.contains(&one.candidate.id()) => {
-            "it was found, and given up when others explained the same".into()
-        }
-        _ if listed >= MOST => {
-            format!("{listed} effects of the sensor were found before it, and no more are sought")
-        }
-        _ => "beside all that was sought at first it was not significant".to_string(),
-    };
-    format!("{}, but {why}", p_value(one.p))
+    match one.p {
+        p if p > FALSE_LISTED => None,
+        _ if superfluous.contains(&one.candidate.id()) => Some(Passed::GivenUp),
+        _ if listed >= MOST => Some(Passed::Enough(listed)),
+        _ => Some(Passed::NotAtFirst),
+    }
 }
 
 /// Known variances of the judged rows, summed: by noise, and by errors of the reference.

@@ -20,6 +20,7 @@ pub mod decision;
 pub mod note;
 mod passes;
 pub mod picture;
+pub mod rejected;
 pub mod rows;
 pub mod search;
 pub mod uncertainty;
@@ -31,7 +32,7 @@ use nalgebra::{Matrix3, Vector3};
 use passes::{Pass, Passes, session};
 use picture::Picture;
 use rows::{ForceErrors, FreeParameters, Rows};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::calibration::Calibration;
 use crate::effects::fitted::FittedEffect;
@@ -46,7 +47,7 @@ use mimu_recording::error::{Error, Result};
 use mimu_recording::{RawUnit, Reference};
 
 /// What a diagnosis says.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Verdict {
     /// Noise explains what the affine model leaves.

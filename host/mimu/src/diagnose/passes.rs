@@ -11,6 +11,7 @@ use nalgebra::Matrix3;
 
 use super::as_written::AsWritten;
 use super::decision::{Decision, decide, noisier};
+use super::rejected::{Reason, Rejected};
 use super::rows::{Figure, ForceErrors, FreeParameters, Rows, Session};
 use super::search::Chosen;
 use crate::effects::fitted::FittedEffect;
@@ -169,17 +170,24 @@ impl Passes<'_> {
         }
     }
 
+    fn rejected(&self, id: String, reason: Reason) -> Rejected {
+        Rejected {
+            id,
+            sensor: self.sensor,
+            reason,
+        }
+    }
+
     /// The same with some effects not tried, each with the reason. Where the others bent the affine model, or cannot be taken out, each
     /// effect of many coefficients is left away for once, and what predicts best is taken.
-    fn best_without(&self, without: &[(String, String)]) -> Result<Pass> {
+    fn best_without(&self, without: &[Rejected]) -> Result<Pass> {
         let (mut best, strong) = self.settled(without)?;
         let complex = best.decision.accepted.iter();
         let complex = complex.filter(|a| strong && a.effect.values.len() > SIMPLE);
         let ids: Vec<String> = complex.map(|a| a.chosen.candidate.id()).collect();
         for id in ids {
-            let why = "another effect predicts better, with the calibration that it leaves".into();
             let mut without = without.to_vec();
-            without.push((id, why));
+            without.push(self.rejected(id, Reason::OtherPredictsBetter));
             let (other, _) = self.settled(&without)?;
             let refused = matches!(best.after, Some(Err(_)));
             if matches!(other.after, Some(Ok(_))) && (refused || !best.stands_before(&other)) {
@@ -190,7 +198,7 @@ impl Passes<'_> {
     }
 
     /// Passes until the affine model stays; and whether the first one bent it, or led to readings that cannot be calibrated.
-    fn settled(&self, without: &[(String, String)]) -> Result<(Pass, bool)> {
+    fn settled(&self, without: &[Rejected]) -> Result<(Pass, bool)> {
         let sensor = self.sensor;
         let fits = Sensor::BOTH.map(|s| self.now.sensor(s));
         let mut models = fits.map(|f| Some(f?.estimated.triad.inverse));
@@ -250,7 +258,7 @@ impl Passes<'_> {
         &self,
         models: [Option<Affine<f64>>; 2],
         about: &[FittedEffect],
-        without: &[(String, String)],
+        without: &[Rejected],
     ) -> Result<Pass> {
         let sensor = self.sensor;
         let head = Session {
@@ -265,7 +273,7 @@ impl Passes<'_> {
         let unseen = self.rows(unseen, &models, about);
         let all: Vec<&Prepared> = ours.iter().map(|s| s.prepared).collect();
         let ends = dwell_ends(&all);
-        let decide = |without: &[(String, String)]| {
+        let decide = |without: &[Rejected]| {
             decide(&rows, &ends, unseen.as_ref(), without, self.accept)
                 .ok_or_else(|| self.singular())
         };
@@ -293,17 +301,19 @@ impl Passes<'_> {
         // Bits of a code that are nearly one another's sum, and coefficients of a size that no sensor has, can lead the readings away: such an
         // effect is no explanation, and no reason to refuse the recording either.
         let mut without = without.to_vec();
-        while let Some(Err(error)) = &after {
+        while let Some(Err(error)) = after {
             let accepted = decision.accepted.iter().map(|a| &a.chosen);
             let strangest = accepted.max_by(|a, b| {
                 let of = |c: &Chosen| (c.candidate.reads_code(), c.unlikely);
                 let (a, b) = (of(a), of(b));
                 a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))
             });
-            let Some(strangest) = strangest else { break };
-            let problem = &error.refused().problem;
-            let why = format!("readings without it cannot be calibrated: {problem}");
-            without.push((strangest.candidate.id(), why));
+            let Some(strangest) = strangest else {
+                after = Some(Err(error));
+                break;
+            };
+            let id = strangest.candidate.id();
+            without.push(self.rejected(id, Reason::NotCalibrated(error)));
             decision = decide(&without)?;
             found = effects_of(&decision);
             after = (!found.is_empty()).then(|| clean(&found));

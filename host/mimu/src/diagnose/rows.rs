@@ -37,7 +37,6 @@ use crate::observable::StratumName;
 use crate::prepared::Prepared;
 use crate::quantity;
 use crate::quantity::Sensor;
-use crate::quantity::significant;
 use crate::triad::Covariance;
 
 /// Rows that share their noise.
@@ -79,18 +78,12 @@ pub enum Figure {
     Rest,
 }
 
-impl Figure {
-    /// A value as a person reads it.
-    pub fn said(self, sensor: Sensor, value: f64) -> String {
-        let figure = match self {
-            Self::Input | Self::Rest => quantity::Figure::Input,
-            Self::Size => quantity::Figure::GravitySize,
-            Self::Direction => quantity::Figure::Direction,
-        };
-        let (factor, unit) = figure.readable(sensor);
-        match value.is_finite() {
-            true => format!("{} {unit}", significant(value * factor)),
-            false => "nothing that can be told".into(),
+impl From<Figure> for quantity::Figure {
+    fn from(figure: Figure) -> Self {
+        match figure {
+            Figure::Input | Figure::Rest => Self::Input,
+            Figure::Size => Self::GravitySize,
+            Figure::Direction => Self::Direction,
         }
     }
 }

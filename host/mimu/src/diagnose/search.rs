@@ -56,12 +56,36 @@ pub struct Chosen {
 }
 
 /// A candidate that would do nearly as well in the place of another.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, Serialize)]
 pub struct Alternative {
     /// Public id.
     pub id: String,
+    /// What it is.
+    #[serde(skip)]
+    pub kind: Kind,
     /// By how much its score is worse.
     pub score_worse_by: f64,
+}
+
+impl Alternative {
+    /// A candidate whose score is worse by `score_worse_by`.
+    pub fn of(candidate: &Candidate, score_worse_by: f64) -> Self {
+        Self {
+            id: candidate.id(),
+            kind: candidate.kind.clone(),
+            score_worse_by,
+        }
+    }
+}
+
+impl From<(&'static Effect, f64)> for Alternative {
+    fn from((effect, score_worse_by): (&'static Effect, f64)) -> Self {
+        Self {
+            id: effect.id.into(),
+            kind: Kind::Effect(effect),
+            score_worse_by,
+        }
+    }
 }
 
 /// What a search led to.
@@ -513,10 +537,7 @@ impl<'a> Search<'a> {
                 .iter()
                 .filter(|c| c.candidate.id() != best.candidate.id())
                 .filter(|c| score(&best) - score(c) < CONFUSED && significant(c))
-                .map(|c| Alternative {
-                    id: c.candidate.id(),
-                    score_worse_by: score(&best) - score(c),
-                })
+                .map(|c| Alternative::of(&c.candidate, score(&best) - score(c)))
                 .collect();
             chosen.push(best);
             let before: Vec<String> = chosen.iter().map(|c| c.candidate.id()).collect();
@@ -564,10 +585,7 @@ impl<'a> Search<'a> {
             let Some(mut rival) = rival else { continue };
             let gain = score(&rival) - score(&one);
             if gain > EXCHANGED && best.as_ref().is_none_or(|b| gain > b.0) {
-                rival.alternatives = vec![Alternative {
-                    id: one.candidate.id(),
-                    score_worse_by: gain,
-                }];
+                rival.alternatives = vec![Alternative::of(&one.candidate, gain)];
                 best = Some((gain, k, rival));
             }
         }

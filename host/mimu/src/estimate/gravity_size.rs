@@ -96,7 +96,8 @@ pub fn estimate(
             add: format!(
                 "{} can be used, and without a table at least {PARAMETERS} different ones are needed: add poses, each axis up and down and between",
                 plural(n as u64, "still pose")
-            ),
+            )
+            .into(),
         });
     }
     if let Some(axis) = flat(observations) {
@@ -105,7 +106,8 @@ pub fn estimate(
             parameters: format!("what the sensor {axis} measures"),
             add: format!(
                 "all poses lie in one plane across {axis}: add poses with {axis} up, down and slanted, and check that the column accel_{axis} is what it says"
-            ),
+            )
+            .into(),
         });
     }
     let sphere = Sphere::through(observations)
@@ -317,6 +319,6 @@ fn undetermined(shape: &Observability) -> Failure {
     };
     Failure::Undetermined {
         parameters: names.join(", "),
-        add,
+        add: add.into(),
     }
 }

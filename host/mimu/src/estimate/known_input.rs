@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, Vector3};
 use super::least_squares::{
     Errors, Observability, Scatter, excess_of, excess_variance, solve_with_excess,
 };
-use super::{Estimated, Failure, Observation};
+use super::{Addition, Estimated, Failure, Observation};
 use crate::observable::Observable;
 use crate::quantity::AXES;
 use crate::triad::{Covariance, Forward, Part, Triad};
@@ -64,15 +64,15 @@ pub(super) fn complete(found: Observability, dwells: usize) -> Result<Observabil
     }
     let axes = inputs.join(", ");
     let add = if dwells < 4 {
-        format!(
+        Addition::Words(format!(
             "only {dwells} dwells can be used, and 4 parameters a sensor need at least 4 different inputs"
-        )
+        ))
     } else if bias {
-        format!(
+        Addition::Words(format!(
             "no difference between bias and a constant input along {axes}: add dwells with the opposite input, or none, along {axes}"
-        )
+        ))
     } else {
-        format!("add dwells with inputs along {axes}, in both directions")
+        Addition::Inputs(axes)
     };
     Err(Failure::Undetermined {
         parameters: parameters.join(", "),
@@ -617,7 +617,8 @@ pub fn six_positions(observations: &[Observation]) -> Result<Estimated, Failure>
                 add: format!(
                     "add dwells with {0} along +{0} and -{0}, or use least squares",
                     AXES[axis]
-                ),
+                )
+                .into(),
             });
         }
         let [mut down, mut up] = ends.map(|e| (e.0 / e.3, e.1 / e.3, e.2 / (e.3 * e.3)));

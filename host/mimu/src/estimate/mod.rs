@@ -25,6 +25,7 @@ pub mod with_turns;
 use nalgebra::Vector3;
 
 use crate::observable::Observable;
+use crate::quantity::Sensor;
 use crate::triad::Triad;
 use crate::warning::Warning;
 use least_squares::Scatter;
@@ -93,10 +94,47 @@ pub enum Failure {
         /// Names of the parameters.
         parameters: String,
         /// What to add to the experiment.
-        add: String,
+        add: Addition,
     },
     /// The iteration did not converge or the result is singular: what was seen.
     NoSolution(String),
+}
+
+/// What has to be added to an experiment.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Addition {
+    /// Dwells with inputs along these axes.
+    Inputs(String),
+    /// What these words say.
+    Words(String),
+}
+
+impl Addition {
+    /// What to add for `sensor`, as a sentence fragment. A level pose has a force along an axis and no rate about it.
+    pub fn words(self, sensor: Sensor) -> String {
+        let inputs = match sensor {
+            Sensor::Gyro => "rates",
+            Sensor::Accel => "forces",
+        };
+        match self {
+            Self::Inputs(axes) => {
+                format!("add dwells with {inputs} along {axes}, in both directions")
+            }
+            Self::Words(words) => words,
+        }
+    }
+}
+
+impl From<String> for Addition {
+    fn from(words: String) -> Self {
+        Self::Words(words)
+    }
+}
+
+impl From<&str> for Addition {
+    fn from(words: &str) -> Self {
+        Self::Words(words.into())
+    }
 }
 
 impl Failure {
@@ -111,11 +149,11 @@ impl Failure {
     }
 
     /// As an error about `sensor`.
-    pub fn into_error(self, sensor: crate::quantity::Sensor) -> mimu_recording::error::Error {
+    pub fn into_error(self, sensor: Sensor) -> mimu_recording::error::Error {
         let problem = self.problem();
         match self {
             Self::Undetermined { add, .. } => {
-                mimu_recording::error::Error::undetermined(sensor, problem, add)
+                mimu_recording::error::Error::undetermined(sensor, problem, add.words(sensor))
             }
             Self::NoSolution(_) => mimu_recording::error::Error::new(
                 sensor,

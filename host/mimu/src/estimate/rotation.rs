@@ -74,7 +74,8 @@ pub fn estimate(
             add: format!(
                 "{} turns between dwells can be used, and at least 5 about different axes are needed: turn the unit about each axis, resting between",
                 turns.len()
-            ),
+            )
+            .into(),
         });
     }
     let at_rest = rest.iter().map(|o| o.raw).sum::<Vector3<f64>>() / rest.len() as f64;

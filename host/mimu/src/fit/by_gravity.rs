@@ -244,14 +244,15 @@ impl ByPoses<'_> {
         match failure {
             Failure::Undetermined { parameters, add } => Failure::Undetermined {
                 parameters,
-                add: format!("{add} (no pose has {faces} up)"),
+                add: format!("{} (no pose has {faces} up)", add.words(Sensor::Accel)).into(),
             },
             // A fit that runs away from a cap of poses has nothing wrong with its columns.
             Failure::NoSolution(_) => Failure::Undetermined {
                 parameters: "scale factors and biases of the accelerometer".into(),
                 add: format!(
                     "add poses with {faces} up, which no pose shows, and between; if such poses were recorded, look for wrong columns"
-                ),
+                )
+                .into(),
             },
         }
     }

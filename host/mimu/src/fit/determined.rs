@@ -8,7 +8,7 @@ use nalgebra::Vector3;
 
 use super::of_temperature::with_temperature;
 use super::sensor::SensorFit;
-use crate::estimate::Failure;
+use crate::estimate::{Addition, Failure};
 use crate::prepared::Prepared;
 use crate::quantity::{AXES, Figure, Sensor, plus_minus};
 use crate::readable;
@@ -72,16 +72,16 @@ pub(super) fn check(prepared: &Prepared, fit: &SensorFit, accel: Option<&Triad>)
     }
     let poses = accel.and_then(|accel| missing_poses(prepared, accel));
     let add = match (fit.figure, poses) {
-        (Figure::GravitySize, Some(poses)) => poses,
+        (Figure::GravitySize, Some(poses)) => poses.into(),
         (Figure::GravitySize, None) => {
             "add poses, each axis up and down and between, and hold each still".into()
         }
         // What the accelerometer errs by, whose directions the turns are judged by, is in the intervals of the gyro.
         (Figure::Direction, Some(poses)) => {
-            format!("{poses}: the accelerometer says where gravity is after each turn")
+            format!("{poses}: the accelerometer says where gravity is after each turn").into()
         }
         (Figure::Direction, None) => "add turns about every axis, with that axis level and slanted, between dwells that are held still".into(),
-        (Figure::Input, _) => "add dwells with inputs along every axis, in both directions".into(),
+        (Figure::Input, _) => Addition::Inputs("every axis".into()),
     };
     let parameters = open.join(", ");
     let failure = Failure::Undetermined { parameters, add };

@@ -79,13 +79,7 @@ pub(super) fn fit_known(
                 continue;
             }
             Err(failure) => {
-                // A level pose has a force along an axis and no rate about it: of which the dwells are missing has to be said.
-                let kind = match sensor {
-                    Sensor::Gyro => "with rates",
-                    Sensor::Accel => "with forces",
-                };
-                let error = prepared.refused(failure, sensor);
-                let mut error = error.map(|e| e.remedy = e.remedy.replace("with inputs", kind));
+                let mut error = prepared.refused(failure, sensor);
                 if options.method != Method::LeastSquares {
                     error = error.about(Argument::Method);
                 }

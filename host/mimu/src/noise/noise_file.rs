@@ -1,5 +1,6 @@
 //! The noise file `mimu-noise/1`: what `mimu allan` found, for the commands that rest on it.
 
+use std::fmt;
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
@@ -8,7 +9,7 @@ use crate::allan::model::{FLOOR, Term};
 use crate::allan::variance::AllanModel;
 use crate::quantity::Sensor;
 use crate::toml_layout::to_toml;
-use mimu_recording::error::{Error, Result};
+use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{RAW_COLUMNS, parse_toml, read_text};
 
 /// Version of the noise file.
@@ -123,8 +124,8 @@ impl NoiseChannel {
 impl NoiseChannel {
     /// [`Self::model`] in `unit` squared, be it the unit of the readings or of what a calibration made of them.
     ///
-    /// Errors: the unit that it is in, and what to do.
-    pub fn model_in(&self, unit: &str) -> std::result::Result<AllanModel, [String; 2]> {
+    /// Errors: it is in another unit.
+    pub fn model_in(&self, unit: &str) -> std::result::Result<AllanModel, OtherUnit> {
         let model = self.model();
         if unit == self.unit {
             return Ok(model);
@@ -144,16 +145,42 @@ impl NoiseChannel {
             Some(raw) => format!("{}, of readings in {raw}", self.unit),
             None => self.unit.clone(),
         };
-        let remedy = match (is_si(&self.unit), &self.raw_unit) {
-            (true, None) if !is_si(unit) => {
-                "run mimu allan again on the raw recording, with --calibration: the file then has the scale factor"
-            }
-            (false, _) if is_si(unit) => {
-                "run mimu allan again with --calibration: one file then serves for raw readings and for SI"
-            }
-            _ => "run mimu allan on a recording of this unit with the same raw unit",
+        let (remedy, argument) = match (is_si(&self.unit), &self.raw_unit) {
+            (true, None) if !is_si(unit) => (
+                "run mimu allan again on the raw recording, with a calibration: the file then has the scale factor",
+                Some(Argument::CalibrationOfNoise),
+            ),
+            (false, _) if is_si(unit) => (
+                "run mimu allan again with a calibration: one file then serves for raw readings and for SI",
+                Some(Argument::CalibrationOfNoise),
+            ),
+            _ => (
+                "run mimu allan on a recording of this unit with the same raw unit",
+                None,
+            ),
         };
-        Err([found, remedy.into()])
+        Err(OtherUnit {
+            found,
+            remedy,
+            argument,
+        })
+    }
+}
+
+/// A noise in another unit than the one that is wanted.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct OtherUnit {
+    /// The unit that it is in.
+    pub found: String,
+    remedy: &'static str,
+    argument: Option<Argument>,
+}
+
+impl OtherUnit {
+    /// As an error at `place`.
+    pub fn refused(self, place: impl fmt::Display, problem: impl fmt::Display) -> Error {
+        let error = Error::new(place, problem, self.remedy);
+        self.argument.into_iter().fold(error, Error::about)
     }
 }
 
@@ -204,8 +231,9 @@ impl NoiseFile {
                 return Err(Error::new(
                     format!("{place}, channel {}, scale_factor", channel.name),
                     "raw_unit and scale_factor stand together, and a scale factor is a number other than 0",
-                    "run mimu allan again with --calibration",
-                ));
+                    "run mimu allan again with a calibration",
+                )
+                .about(Argument::CalibrationOfNoise));
             }
             for term in Term::ALL {
                 let Ok(c) = channel.get(term) else { continue };

@@ -13,19 +13,21 @@ pub mod prediction;
 pub mod recipe;
 pub mod words;
 
+use std::fmt;
+
 use rayon::prelude::*;
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 use crate::diagnose::Diagnosis;
-use crate::effects;
+use crate::diagnose::search::Alternative;
 use crate::effects::candidate::{Candidate, Kind};
-use crate::effects::regressor::Product;
+use crate::effects::effect::Effect;
+use crate::effects::fitted::FittedEffect;
 use crate::fit::Fit;
 use crate::plan::design::budget::DwellNoise;
 use crate::plan::design::reach::{Fixture, RateList, Rates};
 use crate::plan::design::tour::Motion;
 use crate::prepared::si_covariance;
-use crate::quantity::AXES;
 use crate::quantity::Sensor;
 use mimu_recording::Reference;
 use prediction::{Prediction, Target, calibrates};
@@ -61,22 +63,44 @@ pub struct NotInPlan {
     /// Effect, or two with `or` between them.
     pub id: String,
     /// Why not.
-    pub reason: &'static str,
+    pub reason: NotShown,
 }
 
-/// It can be shown, but not with what this recording was made with.
-const TURNTABLE: &str = "this needs a turntable";
-/// Nothing of the table of recipes determines it.
-const NO_RECIPE: &str = "no recipe shows it";
+/// Why a plan does not show something. JSON has the sentence.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum NotShown {
+    /// Nothing of the table of recipes determines it.
+    NoRecipe,
+    /// It can be shown, but not with what this recording was made with.
+    Turntable,
+}
 
-/// An effect whose typical size the recording would not have shown, with what would.
-#[derive(Debug, Clone, PartialEq)]
+impl fmt::Display for NotShown {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::NoRecipe => "no recipe shows it",
+            Self::Turntable => "this needs a turntable",
+        })
+    }
+}
+
+impl Serialize for NotShown {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
+/// An effect whose typical size the recording would not have shown, with what would: that it was not found means nothing.
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NotExcited {
     /// Public id.
-    pub id: String,
-    /// The experiment in words.
+    pub id: &'static str,
+    /// Whose readings would err.
+    pub sensor: Sensor,
+    /// What would show it, in words.
     pub experiment: String,
     /// The recipe behind the words; `None` where no recipe shows the effect as well as wanted, so that the words are about it alone.
+    #[serde(skip)]
     pub recipe: Option<SizedRecipe>,
 }
 
@@ -264,35 +288,21 @@ fn noise(fit: &Fit, sensor: Sensor) -> DwellNoise {
     }
 }
 
-/// The candidate of this name; `None` of a jump, which is of one recording only.
-fn by_id(id: &str) -> Option<Candidate> {
-    if let Some(effect) = effects::by_id(id) {
-        return Some(Candidate::new(effect.sensor, Kind::Effect(effect)));
-    }
-    let (channel, product) = id.strip_prefix("term:")?.split_once('~')?;
-    let (sensor, axis) = channel.split_once('_')?;
-    let sensor = Sensor::BOTH.into_iter().find(|s| s.name() == sensor)?;
-    let axis = AXES.iter().position(|a| *a == axis)?;
-    let term = Product::terms().into_iter().find(|p| p.name() == product)?;
-    Some(Candidate::new(sensor, Kind::Term(axis, term)))
-}
-
 /// The experiments that show what `diagnosis` leaves open.
 pub fn next(diagnosis: &Diagnosis) -> Next {
     let setup = Setup::of(&diagnosis.after, None);
     let sensors = diagnosis.sensors.iter();
-    let open: Vec<&(String, String)> = sensors.flat_map(|s| &s.decision.not_excited).collect();
-    let shown = open.par_iter().map(|(id, needs)| {
-        let target = effects::by_id(id).map(Target::listed);
-        let shown = target
-            .as_ref()
-            .and_then(|t| recommended(diagnosis, &setup, t));
-        let planned = planned(id, shown.as_ref(), target);
+    let open = sensors.flat_map(|s| s.decision.not_excited.iter().copied());
+    let open: Vec<&'static Effect> = open.collect();
+    let shown = open.par_iter().map(|effect| {
+        let target = Target::listed(effect);
+        let shown = recommended(diagnosis, &setup, &target);
+        let planned = planned(effect.id, shown.as_ref(), Some(target));
         let (experiment, recipe) =
-            shown.map_or_else(|| (needs.clone(), None), |s| (s.words, s.recipe));
-        let id = id.clone();
+            shown.map_or_else(|| (effect.needs.into(), None), |s| (s.words, s.recipe));
         let not_excited = NotExcited {
-            id,
+            id: effect.id,
+            sensor: effect.sensor,
             experiment,
             recipe,
         };
@@ -325,8 +335,8 @@ fn planned(
 ) -> Result<Target, NotInPlan> {
     let reason = match (shown, target) {
         (Some(shown), Some(target)) if shown.same_kind => return Ok(target),
-        (Some(shown), _) if !shown.same_kind => TURNTABLE,
-        _ => NO_RECIPE,
+        (Some(shown), _) if !shown.same_kind => NotShown::Turntable,
+        _ => NotShown::NoRecipe,
     };
     let id = id.into();
     Err(NotInPlan { id, reason })
@@ -369,61 +379,55 @@ fn recommended(diagnosis: &Diagnosis, setup: &Setup, target: &Target) -> Option<
     })
 }
 
-/// An accepted effect and another that would do nearly as well.
-struct Pair {
-    /// The accepted one, with the coefficients found.
-    found: Candidate,
-    values: Vec<f64>,
-    id: String,
-    /// The other; `None` if it is a jump.
-    other: Option<Candidate>,
-    difference: f64,
+/// An accepted effect, with the coefficients found, and another that would do nearly as well.
+struct Pair<'a> {
+    found: &'a FittedEffect,
+    other: &'a Alternative,
 }
 
-fn pairs(diagnosis: &Diagnosis) -> Vec<Pair> {
+fn pairs(diagnosis: &Diagnosis) -> Vec<Pair<'_>> {
     let accepted = diagnosis.sensors.iter().flat_map(|s| &s.decision.accepted);
     let each = accepted.flat_map(|a| {
         let alternatives = a.chosen.alternatives.iter().take(ALTERNATIVES);
-        alternatives.map(|other| Pair {
-            found: a.effect.candidate.clone(),
-            values: a.effect.values.clone(),
-            id: other.id.clone(),
-            other: by_id(&other.id),
-            difference: other.score_worse_by,
-        })
+        let found = &a.effect;
+        alternatives.map(move |other| Pair { found, other })
     });
     each.collect()
 }
 
-impl Pair {
+impl Pair<'_> {
     fn told_apart(
         &self,
         diagnosis: &Diagnosis,
         setup: &Setup,
     ) -> (Confused, Result<Target, NotInPlan>) {
-        let target = self.other.clone().map(|other| Target {
-            candidate: self.found.clone(),
-            sizes: self.values.clone(),
+        let Self { found, other } = self;
+        let candidate = &found.candidate;
+        // A jump is of one recording only.
+        let jump = matches!(other.kind, Kind::Jump { .. });
+        let target = (!jump).then(|| Target {
+            candidate: candidate.clone(),
+            sizes: found.values.clone(),
             each: false,
-            rivals: vec![other],
+            rivals: vec![Candidate::new(candidate.sensor, other.kind.clone())],
         });
         let shown = target
             .as_ref()
             .and_then(|t| recommended(diagnosis, setup, t));
-        let ids = [self.found.id(), self.id.clone()];
+        let ids = [candidate.id(), other.id.clone()];
         let planned = planned(&ids.join(" or "), shown.as_ref(), target);
         let experiment = shown.map(|s| s.words).unwrap_or_else(|| {
             // Of the two, what no dwell is planned for.
-            let words = match (&self.found.kind, effects::by_id(&self.id)) {
-                (_, Some(effect)) => effect.needs,
-                (Kind::Effect(found), None) if self.other.is_some() => found.needs,
+            let words = match (&candidate.kind, &other.kind) {
+                (_, Kind::Effect(effect)) => effect.needs,
+                (Kind::Effect(found), Kind::Term(..)) => found.needs,
                 _ => "Make the same recording again: a jump does not come back where it was.",
             };
             words.to_string()
         });
         let confused = Confused {
             ids,
-            difference: self.difference,
+            difference: other.score_worse_by,
             experiment,
         };
         (confused, planned)

@@ -5,15 +5,15 @@ use serde::Serialize;
 
 use super::TOOL;
 use crate::calibration::verify::Verification;
-use crate::diagnose::decision::{Accepted, Decision};
+use crate::diagnose::decision::{Accepted, Decision, Leftover, Undecided};
 use crate::diagnose::note::Note;
 use crate::diagnose::picture::Picture;
+use crate::diagnose::rejected::Rejected;
 use crate::diagnose::rows::Figure as Judged;
 use crate::diagnose::{Diagnosis, SensorDiagnosis, Source, Untestable, Verdict};
 use crate::fit::Split;
-use crate::observable::Observable;
-use crate::plan::next_experiment::{Confused, Next, NotInPlan, SizedRecipe};
-use crate::quantity::{AXES, Figure, PerSensor, Sensor, present};
+use crate::plan::next_experiment::{Confused, Next, NotExcited, NotInPlan};
+use crate::quantity::{Figure, PerSensor, Sensor, present};
 use crate::warning::Warning;
 
 /// Result of a diagnosis.
@@ -38,20 +38,20 @@ pub struct DiagnosisResult {
     /// Accepted effects.
     pub effects: Vec<Accepted>,
     /// Effects that were tried and not accepted.
-    pub rejected: Vec<RejectedResult>,
+    pub rejected: Vec<Rejected>,
     /// Effects that the recordings could not show.
-    pub not_excited: Vec<NotExcitedResult>,
+    pub not_excited: Vec<NotExcited>,
     /// Candidates that the recordings do not tell apart.
     pub confused: Vec<Confused>,
-    /// What of `not_excited` and `confused` the plan of the next experiment (`--plan`) does not show.
+    /// What of `not_excited` and `confused` the plan of the next experiment does not show.
     pub not_in_plan: Vec<NotInPlan>,
     /// Error figures.
     #[serde(serialize_with = "present")]
     pub sensors: PerSensor<Option<SensorDiagnosisResult>>,
     /// Accepted effects whose physics the recordings do not decide.
-    pub undecided: Vec<UndecidedResult>,
+    pub undecided: Vec<Undecided>,
     /// Scatter beyond the known noise that nothing explains.
-    pub leftover: Vec<LeftoverResult>,
+    pub leftover: Vec<Leftover>,
     /// What of the samples was left out.
     pub left_out: LeftOutResult,
     /// What a person should know.
@@ -59,68 +59,6 @@ pub struct DiagnosisResult {
     /// The calibration before and after on a recording that nothing was fitted to.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub second: Option<SecondResult>,
-}
-
-/// An effect that was tried and not accepted.
-#[derive(Debug, Clone, Serialize)]
-pub struct RejectedResult {
-    /// Public id.
-    pub id: String,
-    /// Whose readings would err.
-    pub sensor: Sensor,
-    /// Why not.
-    pub reason: String,
-}
-
-/// An effect whose typical size the recordings would not have shown: that it was not found means nothing.
-#[derive(Debug, Clone, Serialize)]
-pub struct NotExcitedResult {
-    /// Public id.
-    pub id: String,
-    /// Whose readings would err.
-    pub sensor: Sensor,
-    /// What would show it.
-    pub experiment: String,
-    /// The recipe behind the words.
-    #[serde(skip)]
-    pub recipe: Option<SizedRecipe>,
-}
-
-/// An accepted effect whose physics the recordings do not decide.
-#[derive(Debug, Clone, Serialize)]
-pub struct UndecidedResult {
-    /// Public id of the effect.
-    pub id: String,
-    /// Whose readings err.
-    pub sensor: Sensor,
-    /// The unlisted alternative model.
-    pub law: &'static str,
-    /// By how much its score is worse; negative where it is better.
-    pub difference: f64,
-    /// What would tell them apart.
-    pub experiment: &'static str,
-}
-
-/// Scatter beyond the known noise that nothing explains.
-#[derive(Debug, Clone, Serialize)]
-pub struct LeftoverResult {
-    /// Whose.
-    pub sensor: Sensor,
-    /// Axis, if it is of one.
-    pub axis: Option<&'static str>,
-    /// Which residuals: an axis, turns.
-    pub rows: String,
-    /// What it goes with.
-    pub against: String,
-    /// Whether the biases of usual sensors do as much, so that no verdict rests on it.
-    pub usual: bool,
-    /// Root mean square beyond the noise, in [`Self::unit`].
-    pub strength: f64,
-    /// SI unit.
-    pub unit: &'static str,
-    /// What the residuals are.
-    #[serde(skip)]
-    pub figure: Figure,
 }
 
 /// What of the samples was left out.
@@ -250,7 +188,7 @@ impl DiagnosisResult {
             untestable: d.untestable.iter().map(UntestableResult::from).collect(),
             effects: Vec::new(),
             rejected: Vec::new(),
-            not_excited: Vec::new(),
+            not_excited: next.not_excited.clone(),
             confused: next.confused.clone(),
             not_in_plan: next.not_in_plan.clone(),
             sensors: PerSensor::from_fn(of_sensor),
@@ -272,57 +210,20 @@ impl DiagnosisResult {
             }),
         };
         for s in &d.sensors {
-            result.add(s.sensor, &s.decision, next);
+            result.add(&s.decision);
         }
         result
     }
 
-    fn add(&mut self, sensor: Sensor, decision: &Decision, next: &Next) {
+    fn add(&mut self, decision: &Decision) {
         self.effects.extend(decision.accepted.iter().cloned());
-        let rejected = decision.rejected.iter().map(|(id, reason)| RejectedResult {
-            id: id.clone(),
-            sensor,
-            reason: reason.clone(),
-        });
-        self.rejected.extend(rejected);
-        let ours = |id: &str| decision.not_excited.iter().any(|n| n.0 == id);
-        let not_excited = next.not_excited.iter().filter(|n| ours(&n.id));
-        let not_excited = not_excited.map(|n| NotExcitedResult {
-            id: n.id.clone(),
-            sensor,
-            experiment: n.experiment.clone(),
-            recipe: n.recipe,
-        });
-        self.not_excited.extend(not_excited);
-        let undecided = decision.undecided.iter().map(|u| UndecidedResult {
-            id: u.id.clone(),
-            sensor,
-            law: u.law,
-            difference: u.worse,
-            experiment: u.settled_by,
-        });
-        self.undecided.extend(undecided);
-        let leftover = decision.leftover.iter().map(|l| {
-            let figure = match l.stratum.0 {
-                Observable::Turns => Figure::Direction,
-                _ => Figure::Input,
-            };
-            LeftoverResult {
-                sensor,
-                axis: l.axis.map(|a| AXES[a]),
-                rows: l.stratum.to_string(),
-                against: l.against.clone(),
-                usual: l.usual,
-                strength: l.strength,
-                unit: figure.unit(sensor),
-                figure,
-            }
-        });
-        self.leftover.extend(leftover);
+        self.rejected.extend(decision.rejected.iter().cloned());
+        self.undecided.extend(decision.undecided.iter().cloned());
+        self.leftover.extend(decision.leftover.iter().cloned());
     }
 
     /// Left over beyond what usual sensors do by themselves.
-    pub fn unexplained(&self) -> impl Iterator<Item = &LeftoverResult> {
+    pub fn unexplained(&self) -> impl Iterator<Item = &Leftover> {
         self.leftover.iter().filter(|l| !l.usual)
     }
 }

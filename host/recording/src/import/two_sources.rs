@@ -100,7 +100,7 @@ impl TwoSources {
         known.then(|| {
             format!(
                 "{place}: the specific force is about {usual:.3} in most rows, where gravity is {gravity_mps2} m/s²: unit or scale? Readings in g \
-                 need the factor accel=9.80665, in mg accel=0.00980665 (--scale), counts another unit (--raw-unit)"
+                 need the factor accel=9.80665, in mg accel=0.00980665; counts need another raw unit"
             )
         })
     }

@@ -1,8 +1,9 @@
 //! Recordings at rest without a table: biases of the gyro, and what one pose shows of the accelerometer.
 
 use mimu::{Manifest, RawUnit, Reference, Samples};
-use mimu_thermal::fit::{Estimator, Options, fit};
+use mimu_thermal::fit::{Estimator, Options, Verdict, fit};
 use mimu_thermal::result::ThermalResult;
+use mimu_thermal::warning::Warning;
 use nalgebra::Vector3;
 
 use crate::session;
@@ -49,7 +50,7 @@ fn there_and_back_shows_the_biases_of_the_gyro_and_names_what_is_inseparable() {
     let recording = at_rest(&Experiment::ramp(60.0, true), 3);
     let found = fit(vec![session(recording).unwrap()], &[], JOINT).unwrap();
     let result = ThermalResult::of(&found);
-    assert_eq!(result.verdict, "fitted");
+    assert_eq!(result.verdict, Verdict::Fitted);
     let lag = result.sensors.gyro.as_ref().unwrap().lag_s.unwrap();
     assert!(lag.lower < 66.0 && lag.upper > 54.0, "{lag:?}");
     let accel = result.sensors.accel.as_ref().unwrap();
@@ -106,7 +107,7 @@ fn a_cold_start_goes_one_way() {
     };
     let found = fit(vec![session(at_rest(&cold, 4)).unwrap()], &[], JOINT).unwrap();
     let result = ThermalResult::of(&found);
-    assert_eq!(result.verdict, "one-way");
+    assert_eq!(result.verdict, Verdict::OneWay);
     assert!(
         result
             .sensors
@@ -167,7 +168,8 @@ fn jumps_of_a_gyros_bias_at_rest_are_named_and_their_samples_kept_in_intervals_t
             assert_eq!(recorded.moved_s[1].is_empty(), nudge == 0.0);
             let found = fit(vec![recorded], &[], JOINT).unwrap();
             let result = ThermalResult::of(&found);
-            let said = |w: &String| {
+            let said = |w: &Warning| {
+                let w = w.to_string();
                 w.contains("the gyro's bias jumps 2 times, by ") && w.contains(" V at 430 s")
             };
             assert!(result.warnings.iter().any(said), "{:?}", result.warnings);
@@ -242,12 +244,12 @@ fn a_cubesats_gyro_cooled_one_way_has_straight_lines() {
         "{} to {} °C: {:?}",
         result.range_c[0], result.range_c[1], result.warnings
     );
-    assert_eq!(result.verdict, "one-way");
+    assert_eq!(result.verdict, Verdict::OneWay);
     assert!(
         result
             .warnings
             .iter()
-            .any(|w| w.contains("curvature needs 20 K"))
+            .any(|w| matches!(w, Warning::StraightLines(_)))
     );
     for name in ["gyro_bias_x", "gyro_bias_y", "gyro_bias_z"] {
         let curve = result.curve(name).unwrap();

@@ -3,9 +3,10 @@
 use mimu::prepared::Prepared;
 use mimu::signal::stillness::{Finding, STILL_FACTOR, Steps};
 use mimu::{Manifest, RawUnit, Reference, Samples};
-use mimu_thermal::fit::{ThermalFit, fit};
+use mimu_thermal::fit::{ThermalFit, Verdict, fit};
 use mimu_thermal::result::ThermalResult;
 use mimu_thermal::session::Session;
+use mimu_thermal::warning::Warning;
 
 use crate::at_rest::JOINT;
 use crate::simulation::Random;
@@ -114,7 +115,7 @@ fn a_bias_that_drifts_with_the_temperature_is_no_even_turn() {
         assert!(used.used_c[0] < -16.0 && used.used_c[1] > 72.5, "{used:?}");
     }
     assert!(result.range_c[0] < -16.0, "{:?}", result.range_c);
-    assert_eq!(result.verdict, "fitted");
+    assert_eq!(result.verdict, Verdict::Fitted);
     assert_biases(&result);
 }
 
@@ -129,7 +130,7 @@ fn bursts_of_less_than_a_second_are_used_like_longer_ones() {
     let result = ThermalResult::of(&desk.fitted(2, Steps::AsRecorded).unwrap());
     let used = result.sensors.gyro.as_ref().unwrap().used.unwrap();
     assert!(used.samples > 0.98 && used.temperatures > 0.98, "{used:?}");
-    assert_eq!(result.verdict, "fitted");
+    assert_eq!(result.verdict, Verdict::Fitted);
     assert_biases(&result);
 }
 
@@ -157,7 +158,8 @@ fn a_turn_that_the_accelerometer_sees_is_still_left_out_while_the_temperature_ra
     let result = ThermalResult::of(&desk.fitted(3, Steps::AsRecorded).unwrap());
     let used = result.sensors.gyro.as_ref().unwrap().used.unwrap();
     assert!((0.5..0.76).contains(&used.samples), "{used:?}");
-    assert!(result.warnings.iter().any(|w| w.contains("of the samples")));
+    let covers = |w: &Warning| matches!(w, Warning::Coverage(..));
+    assert!(result.warnings.iter().any(covers));
     // Sixty rests in two poses that gravity adds biases to: the curves are known to what their intervals say, and a turn of 2.4 deg/s in one
     // row of a rest would be far beyond.
     let curve = result.curve("gyro_bias_x").unwrap();
@@ -237,7 +239,7 @@ fn errors_far_beyond_the_noise_are_no_fit() {
     };
     let found = desk.fitted(6, Steps::AtRest).unwrap();
     let result = ThermalResult::of(&found);
-    assert_eq!(result.verdict, "misfit");
+    assert_eq!(result.verdict, Verdict::Misfit);
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! What a procedure needs, and whether the drivers have it: everything is refused here, before anything moves.
 
 use mimu_device::record::Procedure;
-use mimu_recording::error::{Error, Result};
+use mimu_recording::error::{Argument, Error, Result};
 
 use crate::drive::{Abilities, Driver};
 
@@ -41,8 +41,8 @@ impl Equipped {
             None if procedure.is_at_rest() => {}
             None => {
                 let problem = given("moves the unit, which takes a table (`move`)");
-                let remedy = "give the driver file of a table: --driver";
-                return Err(Error::new(place, problem, remedy));
+                let remedy = "give the driver file of a table";
+                return Err(Error::new(place, problem, remedy).about(Argument::Driver));
             }
         }
         match chamber.map(|k| &abilities[k]) {
@@ -50,8 +50,8 @@ impl Equipped {
             None if drivers.is_empty() => {}
             None => {
                 let problem = given("has temperatures, which take a chamber ([chamber])");
-                let remedy = "give the driver file of a chamber: --driver";
-                return Err(Error::new(place, problem, remedy));
+                let remedy = "give the driver file of a chamber";
+                return Err(Error::new(place, problem, remedy).about(Argument::Driver));
             }
         }
         let chamber_c = match chamber {

@@ -12,7 +12,7 @@ use mimu_recording::error::Result;
 use mimu_recording::result_file::stage;
 
 use super::{OpenSession, Plain, WITH_EFFECTS, mounted, now};
-use crate::event::{Event, Question};
+use crate::event::{Event, Phase, Question};
 use crate::folder::{Entry, Part};
 use crate::procedure::verification;
 use crate::step::Step;
@@ -92,12 +92,12 @@ impl OpenSession<'_> {
         stage(&page, (self.page)(&result, &folder)?)?.publish()?;
         let effects: Vec<String> = made.effects().iter().map(|e| e.candidate.id()).collect();
         let outcome = &mut self.outcomes[k];
-        let verdict = diagnosis.verdict.name();
-        outcome.verdict = Some(verdict.into());
+        let verdict = diagnosis.verdict;
+        outcome.verdict = Some(verdict);
         outcome.effects.clone_from(&effects);
         outcome.page = Some(page.display().to_string());
         let diagnosed = Entry::Diagnosed {
-            verdict: verdict.into(),
+            verdict,
             effects: effects.clone(),
         };
         self.wizard.units[k].folder.add(diagnosed)?;
@@ -144,7 +144,7 @@ impl OpenSession<'_> {
             steps.len(),
             names.join(", ")
         );
-        self.wizard.begin_phase("confirmation", words);
+        self.wizard.begin_phase(Phase::Confirmation, words);
         or_cancelled!(self.wizard.dwells(Part::Confirmation, &steps));
         self.finish()?;
         for ((k, found), plain) in (0..).zip(found).zip(plain) {

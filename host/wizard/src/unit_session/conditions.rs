@@ -3,13 +3,14 @@
 
 use mimu::quantity::{Sensor, significant};
 use mimu_recording::RawUnit;
-use mimu_recording::error::{Error, Result};
+use mimu_recording::error::{Argument, Error, Result};
 use nalgebra::Vector3;
 
 use super::{Round, UnitSession};
 use crate::event::Event;
 use crate::procedure::{Fixture, SAME_POSE_DEG, SessionConfig};
-use crate::step::{Step, words};
+use crate::step::Step;
+use crate::waiting::Waiting;
 use crate::watch::Seen;
 
 /// Share of the samples of a second that may be missing where only means matter, and where turns are integrated as well.
@@ -23,8 +24,6 @@ const RATE_DPS: f64 = 2.0;
 const NEAR: f64 = 1.6;
 /// So many turns in a row, and more than half of all, without their samples are no chance: the gyro is not calibrated so.
 const LOST_IN_A_ROW: u32 = 4;
-/// What the reason begins with where the pose is another than that which was asked for.
-pub const WRONG_POSE: &str = "wrong pose";
 
 impl UnitSession {
     /// Why no dwell can run now.
@@ -34,38 +33,31 @@ impl UnitSession {
         asked: &SessionConfig,
         step: &Step,
         busy: bool,
-    ) -> Option<String> {
+    ) -> Option<Waiting> {
         let rate_hz = self.station.unit.rate_hz;
         let share = LOST_SHARE[usize::from(asked.fixture != Fixture::Table)];
         if busy {
-            return Some("the table moves".into());
+            return Some(Waiting::TableMoves);
         }
         if let Some(c) = seen.stuck {
-            let column = mimu_recording::RAW_COLUMNS[c];
-            return Some(format!("{column} repeats one value: check its wiring"));
+            return Some(Waiting::Stuck(c));
         }
         if seen.missing as f64 > share * rate_hz {
-            return Some(format!(
-                "samples are lost, {} of the last {:.0}: check the cable",
-                seen.missing, rate_hz
-            ));
+            return Some(Waiting::SamplesLost(seen.missing, rate_hz));
         }
         if seen.saturated {
-            return Some("a reading is at the end of its range".into());
+            return Some(Waiting::Saturated);
         }
         if seen.exchanged && !self.station.unit.is_device {
-            return Some("the gyro's readings follow the pose and the accelerometer's do not: are ax,ay,az and gx,gy,gz exchanged in --text?".into());
+            return Some(Waiting::Exchanged);
         }
-        let turning = step.rate_dps != 0.0;
         let limits = motion_limits(step.rate_dps);
         for sensor in Sensor::BOTH {
             let motion = seen.motion[sensor as usize];
             if motion > limits[sensor as usize] {
-                return Some(match turning {
-                    true => {
-                        format!("the rate is not steady ({sensor} {motion:.1} times the limit)")
-                    }
-                    false => format!("it moves ({sensor} {motion:.1} times the limit)"),
+                return Some(match step.rate_dps {
+                    0.0 => Waiting::Moves(sensor, motion),
+                    _ => Waiting::Unsteady(sensor, motion),
                 });
             }
         }
@@ -73,27 +65,14 @@ impl UnitSession {
     }
 
     /// Why its rate is not that of the step.
-    pub(super) fn turns_otherwise(&self, seen: &Seen, step: &Step) -> Option<String> {
-        let turning = step.rate_dps != 0.0;
-        if let Some(nominal) = &self.nominal {
-            let rate = self.watch.rate(seen, &nominal[0]);
-            let wanted = step.rate();
-            let off = (rate - wanted).norm().to_degrees();
-            if off > rate_limit_dps(step.rate_dps) {
-                let is = rate.dot(&step.up()).to_degrees();
-                return Some(match (turning, is * step.rate_dps < 0.0) {
-                    (true, true) => format!(
-                        "it turns the other way: {is:+.0} deg/s, {:+.0} wanted",
-                        step.rate_dps
-                    ),
-                    (true, false) => {
-                        format!("it turns at {is:+.1} deg/s, {:+.1} wanted", step.rate_dps)
-                    }
-                    (false, _) => format!("it turns at {off:.1} deg/s"),
-                });
-            }
-        }
-        None
+    pub(super) fn turns_otherwise(&self, seen: &Seen, step: &Step) -> Option<Waiting> {
+        let nominal = self.nominal.as_ref()?;
+        let rate = self.watch.rate(seen, &nominal[0]);
+        let off = (rate - step.rate()).norm().to_degrees();
+        (off > rate_limit_dps(step.rate_dps)).then(|| match step.rate_dps {
+            0.0 => Waiting::Turns(off),
+            wanted => Waiting::OtherRate(rate.dot(&step.up()).to_degrees(), wanted),
+        })
     }
 
     /// The step that this pose is: the one that is wanted or, where a person turns the unit and no dwell runs yet, one of those to come.
@@ -103,7 +82,7 @@ impl UnitSession {
         round: &Round<'_>,
         step: &Step,
         begins: bool,
-    ) -> std::result::Result<Step, String> {
+    ) -> std::result::Result<Step, Waiting> {
         let asked = round.asked;
         let off = |s: &Step| up.angle(&s.up()).to_degrees();
         let limit = asked.fixture.tolerance_deg();
@@ -134,16 +113,9 @@ impl UnitSession {
                 return Ok(as_it_is(step));
             }
         }
-        let lies = words(up);
         Err(match again {
-            true => format!(
-                "pose had already ({lies}): turn it on, to {}",
-                words(&step.up())
-            ),
-            false => format!(
-                "{WRONG_POSE}: {lies}, {:.0} degrees off what is wanted",
-                off(step)
-            ),
+            true => Waiting::RepeatedPose(*up, step.up()),
+            false => Waiting::WrongPose(*up, off(step)),
         })
     }
 }
@@ -165,8 +137,8 @@ impl UnitSession {
             significant(size),
             asked.gravity_mps2
         );
-        let remedy = "give --raw-unit count, which takes readings in any unit";
-        Err(Error::device(self.name(), problem, remedy))
+        let remedy = "take the readings as counts, which may be in any unit";
+        Err(Error::device(self.name(), problem, remedy).about(Argument::RawUnit))
     }
 
     /// Counts turns whose samples are not whole, which do nothing for the gyro; `missing`: of the one before the dwell that was had.
@@ -195,8 +167,8 @@ impl UnitSession {
             significant(100.0 * share)
         );
         let remedy =
-            "have the board write fewer or shorter lines, or raise its --baud; check the cable";
-        Err(Error::device(self.name(), problem, remedy))
+            "have the board write fewer or shorter lines, or more bits a second; check the cable";
+        Err(Error::device(self.name(), problem, remedy).about(Argument::Baud))
     }
 }
 

@@ -11,12 +11,12 @@ use crate::report::text::wrap;
 use effect::effect;
 pub(super) use experiments::by_experiment;
 use experiments::experiments;
+use mimu::diagnose::decision::Leftover;
 use mimu::effects::fitted::WrittenConverter;
+use mimu::plan::next_experiment::NotShown;
 use mimu::quantity::{Sensor, plural, plus_minus, significant};
 use mimu::readable;
-use mimu::result::diagnosis::{
-    DiagnosisResult, LeftoverResult, SecondResult, SensorDiagnosisResult,
-};
+use mimu::result::diagnosis::{DiagnosisResult, SecondResult, SensorDiagnosisResult};
 use mimu::warning::Warning;
 
 /// Why its figures are not those of `mimu fit`.
@@ -202,16 +202,16 @@ fn sensor(
     residuals(out, d, name, all);
     if all {
         for r in d.rejected.iter().filter(|r| r.sensor == name) {
-            wrap(out, &format!("  - {}: ", r.id), &r.reason);
+            wrap(out, &format!("  - {}: ", r.id), &hint::of_rejected(r));
         }
     }
 }
 
 /// What remains beyond the noise. Without `all` residuals that correlate with the same quantity are together, and the first few listed.
 fn residuals(out: &mut String, d: &DiagnosisResult, name: Sensor, all: bool) {
-    let mut groups: Vec<Vec<&LeftoverResult>> = Vec::new();
+    let mut groups: Vec<Vec<&Leftover>> = Vec::new();
     for l in d.leftover.iter().filter(|l| l.sensor == name) {
-        let same = |g: &&mut Vec<&LeftoverResult>| g[0].against == l.against && g[0].unit == l.unit;
+        let same = |g: &&mut Vec<&Leftover>| g[0].against == l.against && g[0].unit() == l.unit();
         match groups.iter_mut().find(same) {
             Some(group) if !all => group.push(l),
             _ => groups.push(vec![l]),
@@ -219,12 +219,12 @@ fn residuals(out: &mut String, d: &DiagnosisResult, name: Sensor, all: bool) {
     }
     let listed = if all { groups.len() } else { LISTED };
     for group in groups.iter().take(listed) {
-        let rows: Vec<&str> = group.iter().map(|l| l.rows.as_str()).collect();
+        let rows: Vec<String> = group.iter().map(|l| l.stratum.to_string()).collect();
         let largest = group.iter().map(|l| l.strength).fold(0.0, f64::max);
         let up_to = if group.len() > 1 { "up to " } else { "" };
         let text = format!(
             "{up_to}{} rms beyond the noise; correlates with {}",
-            readable::error(group[0].unit).write(largest),
+            readable::error(group[0].unit()).write(largest),
             group[0].against
         );
         wrap(out, &format!("  residual, {}: ", rows.join(", ")), &text);
@@ -310,7 +310,7 @@ fn warnings(out: &mut String, warnings: &[Warning], all: bool) {
 /// What the plan of the next experiment does not show, by the reason.
 pub fn not_in_plan_text(d: &DiagnosisResult) -> String {
     let mut out = String::new();
-    let mut reasons: Vec<&str> = d.not_in_plan.iter().map(|n| n.reason).collect();
+    let mut reasons: Vec<NotShown> = d.not_in_plan.iter().map(|n| n.reason).collect();
     reasons.sort_unstable();
     reasons.dedup();
     for reason in reasons {

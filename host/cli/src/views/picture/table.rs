@@ -41,7 +41,7 @@ pub(super) fn draw_table(
 fn aim_line(sensor: &'static str, aim: &Aim) -> Line<'static> {
     let figure = format!(
         "{sensor:5} {:6} {} {:>6} {:>5} {:5} ",
-        aim.parameter,
+        aim.parameter.name(),
         aim.axis,
         short(aim.half_width),
         significant_or_whole(aim.target),

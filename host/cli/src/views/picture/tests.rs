@@ -6,8 +6,9 @@ use std::path::Path;
 
 use mimu::quantity::Sensor;
 use mimu_wizard::event::UnitStanding;
-use mimu_wizard::refit::{Aim, Aims};
+use mimu_wizard::refit::{Aim, Aims, Parameter};
 use mimu_wizard::step::Step;
+use mimu_wizard::waiting::{Interruption, Waiting};
 use nalgebra::Vector3;
 use ratatui::Terminal;
 use ratatui::backend::TestBackend;
@@ -54,7 +55,7 @@ fn aims(sensor: Sensor, half_widths: [f64; 3]) -> Aims {
         Sensor::Accel => ([1.0, 1000.0, 1000.0], "mg"),
     };
     let aim = |k: usize| Aim {
-        parameter: ["bias", "scale", "angles"][k],
+        parameter: [Parameter::Bias, Parameter::Scale, Parameter::Angles][k],
         axis: ["x", "z", "y"][k],
         half_width: half_widths[k],
         target: targets[k],
@@ -95,7 +96,7 @@ fn unit(name: &str) -> UnitStanding {
 fn standing(units: Vec<UnitStanding>) -> Standing {
     let progress = progress([0.0312, 2410.0, 1530.0], [0.412, 806.0, 1220.0]);
     Standing {
-        phase: "calibration",
+        phase: Phase::Calibration,
         step: Some(Step::at_rest(Vector3::new(1.0, 0.0, -1.0), 4.0)),
         dwells: [11, 12],
         thrown: 2,
@@ -151,7 +152,7 @@ fn what_keeps_a_table_from_a_dwell_is_said_in_words_and_not_by_colour_alone() {
     one.rate_dps = Some(61.3);
     one.rate_limit_dps = 22.0;
     (one.tilt_deg, one.lost, one.left_s) = (Some(32.0), 1204, None);
-    one.waiting = Some("it turns at +61.3 deg/s, +100.0 wanted".into());
+    one.waiting = Some(Waiting::OtherRate(61.3, 100.0));
     let mut standing = standing(vec![one]);
     standing.step = Some(Step {
         up: [0.0, -1.0, 0.0],
@@ -172,7 +173,7 @@ fn before_the_first_sample_there_is_a_screen_already() {
         ..UnitStanding::default()
     };
     let mut standing = Standing {
-        phase: "start",
+        phase: Phase::Start,
         units: vec![one.clone()],
         ..Standing::default()
     };
@@ -180,9 +181,9 @@ fn before_the_first_sample_there_is_a_screen_already() {
 
     one = unit("mimu-1f3a5c7e");
     (one.tilt_deg, one.left_s, one.trend_c_per_min) = (None, None, Some(1.72));
-    one.waiting = Some("warming up: +1.72 °C/min, 0.5 is the limit".into());
+    one.waiting = Some(Waiting::Warming(1.72, 0.5));
     standing.units = vec![one];
-    standing.phase = "warm-up";
+    standing.phase = Phase::WarmUp;
     standing.progress = vec![Progress {
         sensors: Vec::new(),
         not_yet: Some("accel: 3 poses at rest, and 9 are needed".into()),
@@ -204,7 +205,7 @@ fn a_question_lies_above_all_else_with_its_answers() {
 #[test]
 fn several_units_have_two_lines_each_where_there_is_no_room_and_those_that_wait_come_first() {
     let mut units: Vec<UnitStanding> = (1..=3).map(|k| unit(&format!("mimu-000{k}"))).collect();
-    units[2].waiting = Some("it moves (accel 1.8 times the limit)".into());
+    units[2].waiting = Some(Waiting::Moves(Sensor::Accel, 1.8));
     units[2].left_s = None;
     let mut three = standing(units);
     three.progress[1].sensors[0].aims[0].half_width = 1.5;
@@ -219,7 +220,7 @@ fn several_units_have_two_lines_each_where_there_is_no_room_and_those_that_wait_
 #[test]
 fn four_units_stand_side_by_side_on_a_large_screen() {
     let mut units: Vec<UnitStanding> = (1..=4).map(|k| unit(&format!("mimu-000{k}"))).collect();
-    units[2].waiting = Some("it moves (accel 1.8 times the limit)".into());
+    units[2].waiting = Some(Waiting::Moves(Sensor::Accel, 1.8));
     (units[2].motion, units[2].left_s) = (Some([0.4, 1.8]), None);
     let (standing, log) = (standing(units), log());
     is_as_in("four-units", &shown(&standing, &log), [200, 60]);
@@ -236,7 +237,9 @@ fn no_size_of_a_terminal_and_no_figure_is_a_panic() {
     let mut odd = unit("a name of a unit that is longer than all that there is room for, by far");
     odd.motion = Some([f64::NAN, f64::INFINITY]);
     (odd.temp_c, odd.left_s) = (Some(-273.15), Some(-1e9));
-    odd.waiting = Some("w".repeat(300));
+    odd.waiting = Some(Waiting::Interrupted(Interruption::Restarted(
+        "w".repeat(300),
+    )));
     let mut standing = standing(vec![odd; 20]);
     standing.progress[0].sensors[0].aims[0].half_width = f64::INFINITY;
     standing.progress[0].sensors[0].aims[1].half_width = f64::NAN;

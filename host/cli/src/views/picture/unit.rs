@@ -1,11 +1,13 @@
 //! How a unit stands: each figure beside its limit, why it waits, and how much of a dwell is left.
 
-use mimu_wizard::event::{Standing, UnitStanding};
+use mimu_wizard::event::{Phase, Standing, UnitStanding};
 use ratatui::Frame;
 use ratatui::layout::Rect;
 use ratatui::style::Stylize as _;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Paragraph;
+
+use crate::hint;
 
 use super::shapes::{clipped, filled, framed, grouped, sign, wrapped};
 
@@ -39,14 +41,14 @@ pub(super) fn draw_unit(frame: &mut Frame, area: Rect, unit: &UnitStanding, stan
         None => Line::raw(format!("rate   {is:+.1} deg/s")),
     });
     lines.push(rate.unwrap_or_else(|| Line::raw("rate   not known yet")));
-    lines.push(temperature_line(unit, standing.phase == "warm-up"));
+    lines.push(temperature_line(unit, standing.phase == Phase::WarmUp));
     lines.push(Line::raw(format!(
         "samples {}, {} lost",
         grouped(unit.samples),
         grouped(unit.lost)
     )));
     if let Some(why) = &unit.waiting {
-        let words = wrapped(&format!("waits: {why}"), wide);
+        let words = wrapped(&format!("waits: {}", hint::of_waiting(why)), wide);
         lines.extend(words.into_iter().map(|l| Line::raw(l).yellow()));
     }
     if let (Some(left), Some(step)) = (unit.left_s, standing.step) {
@@ -73,7 +75,7 @@ pub(super) fn draw_units(frame: &mut Frame, area: Rect, units: &[UnitStanding]) 
     let mut lines = Vec::new();
     for unit in &order[..fit] {
         let state = match (&unit.waiting, unit.left_s) {
-            (Some(why), _) => format!("waits: {why}"),
+            (Some(why), _) => format!("waits: {}", hint::of_waiting(why)),
             (None, Some(left)) => format!("measures, {left:.1} s left"),
             (None, None) => String::new(),
         };

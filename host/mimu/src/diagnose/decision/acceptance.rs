@@ -6,12 +6,12 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 use super::hold_out::{chance_without_a_dwell, held_out_by_part, leverage, parts_helped};
 use super::second::second;
 use super::{LEVERAGE, SURVIVES, Second, held_out, rms, shares};
+use crate::diagnose::rejected::{ErrorRms, Reason};
 use crate::diagnose::rows::Rows;
 use crate::diagnose::search::{Chosen, Search};
 use crate::diagnose::variance::Fitted;
 use crate::effects::fitted::FittedEffect;
 use crate::fit::Split;
-use crate::quantity::{p_value, significant};
 
 /// Mean square of the residual over that of the noise below which a model fits the noise, ...
 const BELOW_NOISE: f64 = 0.25;
@@ -32,7 +32,7 @@ pub(super) struct Failed {
     /// Its place among them.
     pub at: usize,
     /// The reason.
-    pub why: String,
+    pub why: Reason,
     /// Whether more dwells might prove it.
     pub too_few_dwells: bool,
 }
@@ -132,9 +132,7 @@ impl<'a> Acceptance<'a> {
             let both = [self.held(&rest, &without, split), with_all.clone()];
             let too_few_dwells = weights[at] > LEVERAGE || both[1].is_none();
             let why = match weights[at] {
-                share if share > LEVERAGE => {
-                    Some(format!("it rests to {:.0} % on one dwell", 100.0 * share))
-                }
+                share if share > LEVERAGE => Some(Reason::OneDwell(share)),
                 _ => self
                     .not_held_out(&both, (split, with), &kept[at], seconds[at])
                     .or_else(|| self.below_noise([&rest, kept]))
@@ -158,8 +156,8 @@ impl<'a> Acceptance<'a> {
         (split, with): (Split, &Fitted),
         one: &Chosen,
         second: Option<Second>,
-    ) -> Option<String> {
-        let said = |value: f64| self.rows.figure.said(self.rows.sensor, value);
+    ) -> Option<Reason> {
+        let error = |rms: f64| ErrorRms::of(self.rows, rms);
         let variances = self.search.variance.variances(&with.components);
         let sums = both.each_ref().map(|h| {
             let of = |r| held_out_by_part(self.rows, split, r, &variances);
@@ -168,32 +166,25 @@ impl<'a> Acceptance<'a> {
         if let ([Some(a), Some(b)], [Some(left), Some(right)]) = (&sums, both)
             && !(b.iter().sum::<f64>() < a.iter().sum())
         {
-            let [left, right] = [left, right].map(|r| said(rms(self.rows, r)));
-            return Some(format!(
-                "the held-out error does not go down: {left} without, {right} with"
-            ));
+            let errors = [left, right].map(|r| error(rms(self.rows, r)));
+            return Some(Reason::HeldOut(errors));
         }
         if let Some(second) = second.filter(Second::contradicts) {
-            let [a, b] = [second.chi2_before, second.chi2_after];
-            let [c, d] = [second.rms_before, second.rms_after];
-            return Some(format!(
-                "the error of the second recording does not go down: chi-square {a:.0} without, {b:.0} with; rms {} and {}",
-                said(c),
-                said(d)
-            ));
+            let errors = [second.rms_before, second.rms_after].map(error);
+            let chi2 = [second.chi2_before, second.chi2_after];
+            return Some(Reason::SecondRecording(chi2, errors));
         }
         if let [Some(a), Some(b)] = &sums {
             let [helped, hurt] = parts_helped([a, b], one.columns.ncols());
-            return (hurt >= 2 && hurt >= helped).then(|| {
-                format!("the held-out error goes down in {helped} of the parts, and up in {hurt}")
-            });
+            return (hurt >= 2 && hurt >= helped).then_some(Reason::Parts(helped, hurt));
         }
-        let undetermined = "what is left when a block is held out does not determine it";
-        both[1].is_none().then(|| undetermined.into())
+        both[1]
+            .is_none()
+            .then_some(Reason::UndeterminedWithoutBlock)
     }
 
     /// Why the second of the `models` fits noise: what it leaves is far less than the known noise, and what the first leaves is not.
-    fn below_noise(&self, models: [&[Chosen]; 2]) -> Option<String> {
+    fn below_noise(&self, models: [&[Chosen]; 2]) -> Option<Reason> {
         let variance = &self.search.variance;
         let [without, with] = models.map(|chosen| {
             let columns = self.search.model(chosen);
@@ -205,10 +196,8 @@ impl<'a> Acceptance<'a> {
             ))
         });
         let ((before, _), (after, by_chance)) = (without?, with?);
-        (after < BELOW_NOISE * before.min(1.0) && by_chance < FITS_NOISE).then(|| {
-            let [before, after] = [before, after].map(|c| significant(c.sqrt()));
-            format!("it fits the noise: the residual is {before} times the noise without it, and {after} times with it")
-        })
+        let fits = after < BELOW_NOISE * before.min(1.0) && by_chance < FITS_NOISE;
+        fits.then(|| Reason::FitsNoise([before, after].map(f64::sqrt)))
     }
 
     /// Why `one`, which the second of the `models` has and the first has not, is no more significant without the dwell that speaks most for it.
@@ -217,15 +206,10 @@ impl<'a> Acceptance<'a> {
         models: [&[Chosen]; 2],
         one: &Chosen,
         with: &Fitted,
-    ) -> Option<String> {
+    ) -> Option<Reason> {
         let [rest, kept] = models.map(|m| self.search.model(m));
         let p = chance_without_a_dwell(self.search, one, [&rest, &kept], with)?;
-        (p > SURVIVES).then(|| {
-            format!(
-                "it does not survive the loss of one dwell and of those in its pose: without them, {}",
-                p_value(p)
-            )
-        })
+        (p > SURVIVES).then_some(Reason::LostWithDwell(p))
     }
 
     /// Takes out of the `kept` what no physics asks for, the second recording does not show and nobody accepts: suggestions.

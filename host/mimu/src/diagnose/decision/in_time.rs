@@ -27,10 +27,10 @@ pub(super) fn others_in_time(search: &Search, kept: &mut [Chosen], with: &Fitted
         let rivals = effects::all().filter(|e| e.sensor == search.rows.sensor && !listed(e));
         let found: Vec<Alternative> = rivals
             .filter_map(|rival| {
-                Some(Alternative {
-                    id: rival.id.into(),
-                    score_worse_by: worse_with(search, kept, i, rival, with)?,
-                })
+                Some(Alternative::from((
+                    rival,
+                    worse_with(search, kept, i, rival, with)?,
+                )))
             })
             .filter(|other| other.score_worse_by < CONFUSED)
             .collect();

@@ -1,14 +1,17 @@
 //! Structure that nothing explains.
 
+use std::fmt;
+
 use nalgebra::{DMatrix, DVector};
+use serde::ser::SerializeStruct;
+use serde::{Serialize, Serializer};
 
 use crate::diagnose::rows::{Rows, Session};
 use crate::diagnose::search::{Chosen, Search};
 use crate::diagnose::variance::{Fitted, LikelihoodKind, VarianceModel};
 use crate::effects::candidate::Candidate;
 use crate::observable::{Observable, StratumName};
-use crate::quantity::Sensor;
-use crate::quantity::significant;
+use crate::quantity::{AXES, Figure, Sensor, significant};
 use crate::triad::directions;
 
 /// A bias that wanders by this many times the noise of a dwell mean is no usual one, and the verdict says so even where nobody has
@@ -18,23 +21,83 @@ const WANDERS: f64 = 4.0;
 /// Probability that the rows of a clean sensor scatter so much that structure is told of.
 pub const FALSE_LEFTOVER: f64 = 1e-3;
 
-/// Structure that is left.
+/// Structure that is left: scatter beyond the known noise that nothing explains.
 #[derive(Debug, Clone)]
 pub struct Leftover {
+    /// Whose.
+    pub sensor: Sensor,
     /// Stratum.
     pub stratum: StratumName,
     /// Axis, if it is of one.
     pub axis: Option<usize>,
-    /// What it goes with, if with anything.
-    pub against: String,
-    /// Root mean square beyond the noise, unit of the rows.
+    /// What it correlates with.
+    pub against: Against,
+    /// Root mean square beyond the noise, in [`Self::unit`].
     pub strength: f64,
     /// Whether the biases of usual sensors do as much by themselves, and nobody has recorded what this one does at rest: told, but no
     /// verdict rests on it.
     pub usual: bool,
 }
 
+/// What residuals correlate with.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Against {
+    /// A product or a jump that is reported and not removed, by its id.
+    Effect(String),
+    /// The reading.
+    Reading,
+    /// Time.
+    Time,
+    /// Nothing that was recorded: the dwells do not repeat.
+    Nothing,
+    /// Nothing that was recorded: within the dwells the channel is so many times as noisy as the noise file says.
+    Noisier(f64),
+}
+
+impl fmt::Display for Against {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Effect(id) => f.write_str(id),
+            Self::Reading => f.write_str("reading"),
+            Self::Time => f.write_str("time: the bias wanders"),
+            Self::Nothing => f.write_str("no quantity recorded: the dwells do not repeat"),
+            Self::Noisier(times) => write!(
+                f,
+                "no quantity recorded: within the dwells it is {} times as noisy as the noise file says",
+                significant(*times)
+            ),
+        }
+    }
+}
+
+impl Serialize for Leftover {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut out = serializer.serialize_struct("Leftover", 7)?;
+        out.serialize_field("sensor", &self.sensor)?;
+        out.serialize_field("axis", &self.axis.map(|axis| AXES[axis]))?;
+        out.serialize_field("rows", &self.stratum.to_string())?;
+        out.serialize_field("against", &self.against.to_string())?;
+        out.serialize_field("usual", &self.usual)?;
+        out.serialize_field("strength", &self.strength)?;
+        out.serialize_field("unit", self.unit())?;
+        out.end()
+    }
+}
+
 impl Leftover {
+    /// What the residuals are.
+    pub fn figure(&self) -> Figure {
+        match self.stratum.0 {
+            Observable::Turns => Figure::Direction,
+            _ => Figure::Input,
+        }
+    }
+
+    /// SI unit of the strength.
+    pub fn unit(&self) -> &'static str {
+        self.figure().unit(self.sensor)
+    }
+
     /// What a term that is not taken would take out of the rows.
     pub(super) fn suggested(term: &Candidate, rows: &Rows, change: &DVector<f64>) -> Self {
         let axis = term.axes().first().copied();
@@ -42,9 +105,10 @@ impl Leftover {
         let range = ours.map_or(0..rows.y.len(), |s| s.rows.clone());
         let mean_square = change.rows(range.start, range.len()).norm_squared() / range.len() as f64;
         Self {
+            sensor: rows.sensor,
             stratum: StratumName(Observable::Axis(axis.unwrap_or_default()), None),
             axis,
-            against: term.id(),
+            against: Against::Effect(term.id()),
             strength: mean_square.sqrt(),
             usual: false,
         }
@@ -96,11 +160,12 @@ pub(super) fn leftover(
             continue;
         }
         let against = match jump {
-            Some(jump) => jump.candidate.id(),
-            None if random_walk * unit > extra_white => "time: the bias wanders".into(),
-            None => "no quantity recorded: the dwells do not repeat".into(),
+            Some(jump) => Against::Effect(jump.candidate.id()),
+            None if random_walk * unit > extra_white => Against::Time,
+            None => Against::Nothing,
         };
         left.push(Leftover {
+            sensor: rows.sensor,
             stratum: stratum.name,
             axis: stratum.axis,
             against,
@@ -121,12 +186,10 @@ pub(in crate::diagnose) fn noisier(session: &Session, sensor: Sensor) -> Vec<Lef
         let channel = sensor.channels().start + axis;
         let (beyond, times) = session.prepared.noise.beyond_stated(channel)?;
         Some(Leftover {
+            sensor,
             stratum: StratumName(Observable::Second(axis), None),
             axis: Some(axis),
-            against: format!(
-                "no quantity recorded: within the dwells it is {} times as noisy as the noise file says",
-                significant(times)
-            ),
+            against: Against::Noisier(times),
             strength: beyond / scale[axis],
             usual: false,
         })

@@ -6,7 +6,7 @@
 use nalgebra::DMatrix;
 
 use crate::diagnose::note::Note;
-use crate::diagnose::search::{Alternative, COEFFICIENT, CONFUSED, Chosen, Search, beside};
+use crate::diagnose::search::{COEFFICIENT, CONFUSED, Chosen, Search, beside};
 use crate::diagnose::variance::Fitted;
 use crate::effects;
 use crate::effects::alternatives::one_at_a_constant_input;
@@ -53,11 +53,7 @@ pub(super) fn together(search: &Search, kept: &mut [Chosen], with: &Fitted) -> V
         notes.push(Note::new(found, advice));
         let others = &mut kept[i].alternatives;
         others.retain(|o| o.id != rival.id);
-        let rival = Alternative {
-            id: rival.id.into(),
-            score_worse_by: worse,
-        };
-        others.insert(0, rival);
+        others.insert(0, (rival, worse).into());
     }
     notes
 }

@@ -7,6 +7,7 @@ use crate::diagnose::rows::Rows;
 use crate::diagnose::search::{EXCITED, LARGEST, SEPARATE, Search};
 use crate::effects;
 use crate::effects::candidate::{Candidate, Kind};
+use crate::effects::effect::Effect;
 use crate::effects::regressor::{Product, Regressor};
 
 /// Share of what a product could be at most below which it is made of rounding.
@@ -19,7 +20,7 @@ const ROUNDING: f64 = 1e-9;
 pub(super) fn candidates(
     rows: &Rows,
     dwell_ends: &[(usize, f64)],
-) -> (Vec<Candidate>, Vec<(String, String)>) {
+) -> (Vec<Candidate>, Vec<&'static Effect>) {
     let sensor = rows.sensor;
     let mut all = Vec::new();
     let mut not_excited = Vec::new();
@@ -40,7 +41,7 @@ pub(super) fn candidates(
     };
     let mut listed: Vec<(usize, Regressor)> = Vec::new();
     for effect in effects::all().filter(|e| e.sensor == sensor) {
-        let mut not_seen = || not_excited.push((effect.id.into(), effect.needs.into()));
+        let mut not_seen = || not_excited.push(effect);
         let Some(mut candidate) = Candidate::effect_in(effect, rows) else {
             not_seen();
             continue;

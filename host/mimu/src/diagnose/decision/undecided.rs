@@ -1,20 +1,25 @@
 //! Effects whose physics the rows do not decide.
 
+use serde::Serialize;
+
 use super::reading::worse_with_steps;
 use crate::diagnose::search::{Chosen, Search};
 use crate::effects::alternatives::alternatives;
+use crate::quantity::Sensor;
 
-/// An accepted effect that a law on no list explains the rows as well as.
-#[derive(Debug, Clone)]
+/// An accepted effect whose physics the recordings do not decide: a law on no list explains the rows as well.
+#[derive(Debug, Clone, Serialize)]
 pub struct Undecided {
-    /// Id of the effect.
+    /// Public id of the effect.
     pub id: String,
-    /// The law.
+    /// Whose readings err.
+    pub sensor: Sensor,
+    /// The unlisted alternative model.
     pub law: &'static str,
     /// By how much the law is worse, in score, the deviance with what coefficients cost; negative where it is better.
-    pub worse: f64,
+    pub difference: f64,
     /// What would tell them apart.
-    pub settled_by: &'static str,
+    pub experiment: &'static str,
 }
 
 /// Score by which an effect has to be better than a law that is on no list, for the verdict to name it: odds of one to twenty.
@@ -22,6 +27,7 @@ const DECIDED: f64 = 6.0;
 
 /// Which of the kept effects a law that is on no list does as well as.
 pub(super) fn undecided(search: &Search, kept: &[Chosen]) -> Vec<Undecided> {
+    let sensor = search.rows.sensor;
     let mut all = Vec::new();
     for (i, one) in kept.iter().enumerate() {
         let mut rest = kept.to_vec();
@@ -29,23 +35,25 @@ pub(super) fn undecided(search: &Search, kept: &[Chosen]) -> Vec<Undecided> {
         let id = one.candidate.id();
         for rival in alternatives(&id) {
             let worse = search.worse_with(&rival.law, one, &rest);
-            if let Some(worse) = worse.filter(|w| *w < DECIDED) {
+            if let Some(difference) = worse.filter(|w| *w < DECIDED) {
                 all.push(Undecided {
                     id: id.clone(),
+                    sensor,
                     law: rival.law.about,
-                    worse,
-                    settled_by: rival.settled_by,
+                    difference,
+                    experiment: rival.settled_by,
                 });
             }
         }
         if one.candidate.is_nonlinearity()
-            && let Some(worse) = worse_with_steps(search, kept, i).filter(|w| *w < DECIDED)
+            && let Some(difference) = worse_with_steps(search, kept, i).filter(|w| *w < DECIDED)
         {
             all.push(Undecided {
                 id,
+                sensor,
                 law: "steps at some readings of an axis, as codes that never come,",
-                worse,
-                settled_by: "inputs a few noises apart, where the error changes: a step changes it at once",
+                difference,
+                experiment: "inputs a few noises apart, where the error changes: a step changes it at once",
             });
         }
     }

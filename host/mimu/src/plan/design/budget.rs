@@ -64,13 +64,9 @@ impl DwellNoise {
             ));
         }
         for channel in channels {
-            let model = channel.model_in(sensor.unit()).map_err(|[found, remedy]| {
-                let problem = format!("it is in {found} and not in {}", sensor.unit());
-                Error::new(
-                    format!("{}, channel {}", file.place, channel.name),
-                    problem,
-                    remedy,
-                )
+            let model = channel.model_in(sensor.unit()).map_err(|other| {
+                let problem = format!("it is in {} and not in {}", other.found, sensor.unit());
+                other.refused(format!("{}, channel {}", file.place, channel.name), problem)
             })?;
             let AllanModel {
                 white,

@@ -3,15 +3,14 @@
 use maud::{Markup, PreEscaped, html};
 
 use super::{Shown, sentence};
+use crate::hint;
 use crate::report::diagnosis::remarks;
 use crate::report::diagnosis::text::{by_experiment, by_score, converter};
 use crate::report::page::{number, spoken, written};
-use mimu::diagnose::decision::Accepted;
+use mimu::diagnose::decision::{Accepted, Leftover};
 use mimu::quantity::{Figure, Sensor, p_value, significant};
 use mimu::readable;
-use mimu::result::diagnosis::{
-    DiagnosisResult, LeftoverResult, SecondResult, SensorDiagnosisResult,
-};
+use mimu::result::diagnosis::{DiagnosisResult, SecondResult, SensorDiagnosisResult};
 
 /// A line break that is HTML and XML.
 const BR: PreEscaped<&str> = PreEscaped("<br/>");
@@ -125,8 +124,8 @@ pub(super) fn alternatives(d: &DiagnosisResult, s: &Shown, one: &Accepted) -> Ma
     }
 }
 
-fn strength(left: &LeftoverResult) -> Markup {
-    let figure = readable::error(left.unit);
+fn strength(left: &Leftover) -> Markup {
+    let figure = readable::error(left.unit());
     number(left.strength, figure.factor, &figure.unit)
 }
 
@@ -137,7 +136,7 @@ pub fn leftover(d: &DiagnosisResult) -> Markup {
             thead { tr { th { "residual" } th class="n" { "rms beyond the noise" } th { "correlates with" } } }
             tbody { @for left in &d.leftover {
                 tr {
-                    td { (spoken(left.sensor)) " " (left.rows) }
+                    td { (spoken(left.sensor)) " " (left.stratum) }
                     td class="n" { (strength(left)) }
                     td { (left.against) @if left.usual { " *" } }
                 }
@@ -148,19 +147,19 @@ pub fn leftover(d: &DiagnosisResult) -> Markup {
 
 /// What is left of a sensor, in words: where, and the largest; what it goes with stands in the table.
 pub fn leftover_words(d: &DiagnosisResult, sensor: Sensor) -> Markup {
-    let all: Vec<&LeftoverResult> = d.unexplained().filter(|l| l.sensor == sensor).collect();
+    let all: Vec<&Leftover> = d.unexplained().filter(|l| l.sensor == sensor).collect();
     // Turns are in another unit than the rest.
-    let of_unit = |turns: bool| -> Vec<&LeftoverResult> {
+    let of_unit = |turns: bool| -> Vec<&Leftover> {
         let ours = all.iter().copied();
-        ours.filter(|l| (l.figure == Figure::Direction) == turns)
+        ours.filter(|l| (l.figure() == Figure::Direction) == turns)
             .collect()
     };
     let parts = [true, false].map(of_unit);
-    let parts: Vec<&Vec<&LeftoverResult>> = parts.iter().filter(|p| !p.is_empty()).collect();
+    let parts: Vec<&Vec<&Leftover>> = parts.iter().filter(|p| !p.is_empty()).collect();
     html! {
         @for (n, part) in parts.iter().enumerate() {
             @if n > 0 { ", " }
-            @let names: Vec<&str> = part.iter().map(|l| l.rows.as_str()).collect();
+            @let names: Vec<String> = part.iter().map(|l| l.stratum.to_string()).collect();
             @let largest = part.iter().fold(part[0], |a, b| if b.strength > a.strength { b } else { a });
             (spoken(sensor)) " " (names.join(", ")) @if part.len() > 1 { " by up to " } @else { " by " }
             (strength(largest)) " rms"
@@ -199,7 +198,7 @@ pub fn rejected(d: &DiagnosisResult) -> Markup {
             div class="scroll" { table class="long" {
                 thead { tr { th { "effect" } th { "why not" } } }
                 tbody { @for r in &d.rejected {
-                    tr { td { code { (r.id) } } td { (r.reason) } }
+                    tr { td { code { (r.id) } } td { (hint::of_rejected(r)) } }
                 } }
             } }
         }

@@ -4,7 +4,8 @@ use std::fmt::Write as _;
 
 use super::by;
 use crate::report::text::wrap;
-use mimu::result::diagnosis::{DiagnosisResult, NotExcitedResult};
+use mimu::plan::next_experiment::NotExcited;
+use mimu::result::diagnosis::DiagnosisResult;
 
 /// All experiments.
 pub(super) fn experiments(out: &mut String, d: &DiagnosisResult) {
@@ -24,22 +25,22 @@ pub(super) fn experiments(out: &mut String, d: &DiagnosisResult) {
 }
 
 /// Effects that were not excited, by recipe. Of one recipe the largest size shows them all.
-fn by_recipe(d: &DiagnosisResult) -> Vec<(&NotExcitedResult, Vec<&str>)> {
-    let mut all: Vec<(&NotExcitedResult, Vec<&str>)> = Vec::new();
+fn by_recipe(d: &DiagnosisResult) -> Vec<(&NotExcited, Vec<&str>)> {
+    let mut all: Vec<(&NotExcited, Vec<&str>)> = Vec::new();
     for n in &d.not_excited {
-        let same = |other: &NotExcitedResult| match (n.recipe, other.recipe) {
+        let same = |other: &NotExcited| match (n.recipe, other.recipe) {
             (Some(a), Some(b)) => (a.recipe, a.fixture) == (b.recipe, b.fixture),
             _ => n.experiment == other.experiment,
         };
-        let size = |n: &NotExcitedResult| n.recipe.map_or(0.0, |r| r.size);
+        let size = |n: &NotExcited| n.recipe.map_or(0.0, |r| r.size);
         match all.iter_mut().find(|(other, _)| same(other)) {
             Some((largest, ids)) => {
-                ids.push(&n.id);
+                ids.push(n.id);
                 if size(n) > size(largest) {
                     *largest = n;
                 }
             }
-            None => all.push((n, vec![&n.id])),
+            None => all.push((n, vec![n.id])),
         }
     }
     all
@@ -50,8 +51,8 @@ pub(in crate::report::diagnosis) fn by_experiment(d: &DiagnosisResult) -> Vec<(&
     let mut all: Vec<(&str, Vec<&str>)> = Vec::new();
     for n in &d.not_excited {
         match all.iter_mut().find(|(e, _)| *e == n.experiment) {
-            Some((_, ids)) => ids.push(&n.id),
-            None => all.push((&n.experiment, vec![&n.id])),
+            Some((_, ids)) => ids.push(n.id),
+            None => all.push((&n.experiment, vec![n.id])),
         }
     }
     all

@@ -1,0 +1,192 @@
+//! Effects that were tried and not accepted, with the reason by kind; only readers get the sentence.
+
+use std::fmt;
+
+use mimu_recording::error::Error;
+use serde::{Serialize, Serializer};
+
+use super::rows::Rows;
+use crate::quantity::{Figure, Sensor, p_value, significant};
+
+/// An effect that was tried and not accepted.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Rejected {
+    /// Public id.
+    pub id: String,
+    /// Whose readings would err.
+    pub sensor: Sensor,
+    /// Why not.
+    pub reason: Reason,
+}
+
+/// Why an effect is not accepted. JSON has the sentence. Pairs are without it and with it.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Reason {
+    /// It rests on one dwell, to this share.
+    OneDwell(f64),
+    /// The held-out error does not go down.
+    HeldOut([ErrorRms; 2]),
+    /// The error of the second recording does not go down: chi-squares, and rms.
+    SecondRecording([f64; 2], [ErrorRms; 2]),
+    /// Parts that were held out whose error goes down, and those whose error goes up.
+    Parts(usize, usize),
+    /// Without a block the rest does not determine it.
+    UndeterminedWithoutBlock,
+    /// The residual is so many times the noise, so that it fits the noise.
+    FitsNoise([f64; 2]),
+    /// The probability of chance without one dwell and those in its pose.
+    LostWithDwell(f64),
+    /// The probability of chance of one that holds out, but has no known physics, and that no second recording and no person confirms.
+    Suggestion(f64),
+    /// It was not chosen in the search.
+    NotChosen(NotChosen),
+    /// The calibration file with it errs more on this recording.
+    FileErrsMore(String, [ErrorRms; 2]),
+    /// Without it another effect predicts better.
+    OtherPredictsBetter,
+    /// Readings without it cannot be calibrated.
+    NotCalibrated(Error),
+}
+
+/// An effect that the search did not choose, or gave up.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NotChosen {
+    /// Probability of chance, beside those that were chosen.
+    pub p: f64,
+    /// Why not, though it is significant now; `None` where it is not.
+    pub why: Option<Passed>,
+    /// Errors in sample and held out, where both are known.
+    pub errors: Option<[[ErrorRms; 2]; 2]>,
+}
+
+/// Why an effect that is significant was not chosen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Passed {
+    /// Others explained the same, and it was given up.
+    GivenUp,
+    /// So many effects were found before it, and no more are sought.
+    Enough(usize),
+    /// It was not significant beside what was sought at first.
+    NotAtFirst,
+}
+
+/// An error of a sensor, rms.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ErrorRms {
+    /// What it is about.
+    pub figure: Figure,
+    /// Whose.
+    pub sensor: Sensor,
+    /// Value, unit of the figure.
+    pub rms: f64,
+}
+
+/// Probability of chance from which on an effect is none.
+const CHANCE: f64 = 0.5;
+
+impl fmt::Display for Reason {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::OneDwell(share) => write!(f, "it rests to {:.0} % on one dwell", 100.0 * share),
+            Self::HeldOut([without, with]) => write!(
+                f,
+                "the held-out error does not go down: {without} without, {with} with"
+            ),
+            Self::SecondRecording([a, b], [without, with]) => write!(
+                f,
+                "the error of the second recording does not go down: chi-square {a:.0} without, {b:.0} with; rms {without} and {with}"
+            ),
+            Self::Parts(helped, hurt) => write!(
+                f,
+                "the held-out error goes down in {helped} of the parts, and up in {hurt}"
+            ),
+            Self::UndeterminedWithoutBlock => {
+                f.write_str("what is left when a block is held out does not determine it")
+            }
+            Self::FitsNoise(times) => {
+                let [without, with] = times.map(significant);
+                write!(
+                    f,
+                    "it fits the noise: the residual is {without} times the noise without it, and {with} times with it"
+                )
+            }
+            Self::LostWithDwell(p) => write!(
+                f,
+                "it does not survive the loss of one dwell and of those in its pose: without them, {}",
+                p_value(*p)
+            ),
+            Self::Suggestion(p) => write!(
+                f,
+                "{}, and it lowers the held-out error, but no physics asks for it: a suggestion. A second recording that shows it confirms it, \
+                 or your word",
+                p_value(*p)
+            ),
+            Self::NotChosen(one) => write!(f, "{one}"),
+            Self::FileErrsMore(recording, [without, with]) => write!(
+                f,
+                "the calibration file with it would err more on {recording}: {without} without effects, {with} with them"
+            ),
+            Self::OtherPredictsBetter => {
+                f.write_str("another effect predicts better, with the calibration that it leaves")
+            }
+            Self::NotCalibrated(error) => write!(
+                f,
+                "readings without it cannot be calibrated: {}",
+                error.refused().problem
+            ),
+        }
+    }
+}
+
+impl Serialize for Reason {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
+impl fmt::Display for NotChosen {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.p > CHANCE {
+            true => f.write_str("no better than chance")?,
+            false => f.write_str(&p_value(self.p))?,
+        }
+        match self.why {
+            Some(Passed::GivenUp) => {
+                f.write_str(", but it was found, and given up when others explained the same")?;
+            }
+            Some(Passed::Enough(count)) => write!(
+                f,
+                ", but {count} effects of the sensor were found before it, and no more are sought"
+            )?,
+            Some(Passed::NotAtFirst) => {
+                f.write_str(", but beside all that was sought at first it was not significant")?;
+            }
+            None => {}
+        }
+        match &self.errors {
+            Some([[a, b], [c, d]]) => write!(f, "; in sample {a} to {b}, held out {c} to {d}"),
+            None => Ok(()),
+        }
+    }
+}
+
+impl ErrorRms {
+    /// Of the judged `rows`.
+    pub(super) fn of(rows: &Rows, rms: f64) -> Self {
+        Self {
+            figure: rows.figure.into(),
+            sensor: rows.sensor,
+            rms,
+        }
+    }
+}
+
+impl fmt::Display for ErrorRms {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (factor, unit) = self.figure.readable(self.sensor);
+        match self.rms.is_finite() {
+            true => write!(f, "{} {unit}", significant(self.rms * factor)),
+            false => f.write_str("nothing that can be told"),
+        }
+    }
+}

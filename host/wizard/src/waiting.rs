@@ -1,0 +1,164 @@
+//! Why no dwell runs, by kind: a session decides by the kind, and only readers get the sentence.
+
+use std::fmt;
+use std::mem::discriminant;
+
+use mimu::quantity::Sensor;
+use mimu_recording::RAW_COLUMNS;
+use mimu_recording::error::Error;
+use nalgebra::Vector3;
+use serde::{Serialize, Serializer};
+
+use crate::step::words;
+
+/// Why a unit waits. JSON has the sentence.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Waiting {
+    /// The stream of samples was interrupted.
+    Interrupted(Interruption),
+    /// It is not known yet how fast the temperature changes.
+    TrendUnknown,
+    /// The temperature changes faster than the limit, both in °C/min.
+    Warming(f64, f64),
+    /// The table has not arrived.
+    TableMoves,
+    /// A raw column, by its index, repeats one value.
+    Stuck(usize),
+    /// Samples that are missing, of so many in the last second.
+    SamplesLost(u64, f64),
+    /// A reading is at the end of its range.
+    Saturated,
+    /// The gyro reads the pose and the accelerometer does not.
+    Exchanged,
+    /// A sensor is so many times noisier than rest allows.
+    Moves(Sensor, f64),
+    /// Rate where none is wanted, deg/s.
+    Turns(f64),
+    /// A sensor is so many times noisier than a steady rate allows.
+    Unsteady(Sensor, f64),
+    /// Rate about the vertical, and the one that is wanted, deg/s.
+    OtherRate(f64, f64),
+    /// What is up is not what was asked for: its direction, and degrees between the two.
+    WrongPose(Vector3<f64>, f64),
+    /// What is up was up in an earlier dwell: its direction, and the one that is wanted.
+    RepeatedPose(Vector3<f64>, Vector3<f64>),
+}
+
+impl Waiting {
+    /// Whether `other` is the same reason, though its numbers may differ: then it is told once.
+    pub fn is_like(&self, other: &Self) -> bool {
+        // In a person's hands a unit does both by turns, several times a second.
+        let in_hands = |why: &Self| matches!(why, Self::Moves(..) | Self::Turns(_));
+        discriminant(self) == discriminant(other) || in_hands(self) && in_hands(other)
+    }
+}
+
+impl fmt::Display for Waiting {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Interrupted(why) => write!(f, "{why}"),
+            Self::TrendUnknown => f.write_str("its temperature is watched"),
+            Self::Warming(trend, limit) => {
+                write!(
+                    f,
+                    "warming up: {trend:+.2} °C/min, {limit} is the limit"
+                )
+            }
+            Self::TableMoves => f.write_str("the table moves"),
+            Self::Stuck(c) => write!(f, "{} repeats one value: check its wiring", RAW_COLUMNS[*c]),
+            Self::SamplesLost(missing, of) => write!(
+                f,
+                "samples are lost, {missing} of the last {of:.0}: check the cable"
+            ),
+            Self::Saturated => f.write_str("a reading is at the end of its range"),
+            Self::Exchanged => f.write_str("the gyro's readings follow the pose and the accelerometer's do not: are the columns ax,ay,az and gx,gy,gz exchanged?"),
+            Self::Moves(sensor, times) => write!(f, "it moves ({sensor} {times:.1} times the limit)"),
+            Self::Turns(dps) => write!(f, "it turns at {dps:.1} deg/s"),
+            Self::Unsteady(sensor, times) => {
+                write!(f, "the rate is not steady ({sensor} {times:.1} times the limit)")
+            }
+            Self::OtherRate(is, wanted) if is * wanted < 0.0 => write!(
+                f,
+                "it turns the other way: {is:+.0} deg/s, {wanted:+.0} wanted"
+            ),
+            Self::OtherRate(is, wanted) => {
+                write!(f, "it turns at {is:+.1} deg/s, {wanted:+.1} wanted")
+            }
+            Self::WrongPose(up, off_deg) => write!(
+                f,
+                "wrong pose: {}, {off_deg:.0} degrees off what is wanted",
+                words(up)
+            ),
+            Self::RepeatedPose(up, wanted) => write!(
+                f,
+                "pose had already ({}): turn it on, to {}",
+                words(up),
+                words(wanted)
+            ),
+        }
+    }
+}
+
+impl Serialize for Waiting {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
+/// What interrupts the stream of samples. JSON has the sentence.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Interruption {
+    /// The device has restarted, for this reason.
+    Restarted(String),
+    /// The port is gone.
+    Lost(Error),
+    /// Another unit is at the port.
+    OtherUnit(Error),
+    /// The port is open again.
+    Back,
+}
+
+impl fmt::Display for Interruption {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Restarted(why) => write!(f, "the device has restarted: {why}"),
+            Self::Lost(why) => write!(f, "the line is lost: {why}"),
+            Self::OtherUnit(why) => write!(f, "{why}"),
+            Self::Back => f.write_str("the line is back"),
+        }
+    }
+}
+
+impl Serialize for Interruption {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_reason_with_other_numbers_is_the_same_and_one_that_begins_with_the_same_word_is_not() {
+        let moves = Waiting::Moves(Sensor::Accel, 3.2);
+        assert!(moves.is_like(&Waiting::Moves(Sensor::Gyro, 1.1)));
+        assert!(moves.is_like(&Waiting::Turns(20.0)));
+        let unsteady = Waiting::Unsteady(Sensor::Gyro, 1.1);
+        for other in [
+            Waiting::TableMoves,
+            Waiting::Exchanged,
+            Waiting::Interrupted(Interruption::Back),
+        ] {
+            assert!(!unsteady.is_like(&other), "{other}");
+        }
+    }
+
+    #[test]
+    fn a_rate_with_the_other_sign_turns_the_other_way() {
+        let other = Waiting::OtherRate(-98.0, 100.0).to_string();
+        assert_eq!(other, "it turns the other way: -98 deg/s, +100 wanted");
+        let slow = Waiting::OtherRate(61.3, 100.0).to_string();
+        assert_eq!(slow, "it turns at +61.3 deg/s, +100.0 wanted");
+    }
+}
