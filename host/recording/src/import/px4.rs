@@ -333,7 +333,7 @@ impl Log {
         let mut warnings = Vec::new();
         if self.dropouts > 0 {
             warnings.push(format!(
-                "the logger has lost data {} times, {} ms in all: what is missing of the readings is a gap",
+                "dropouts of the logger: {}, {} ms in all; what is missing of the readings is a gap",
                 self.dropouts, self.dropouts_ms
             ));
         }
