@@ -11,6 +11,7 @@
 //! | [`parameters`] | parameters of autopilots, and how files hold them |
 
 pub mod ardupilot;
+pub mod c;
 pub mod core;
 pub mod heading;
 pub mod kalibr;
@@ -33,6 +34,8 @@ use crate::remaining::Remaining;
 #[derive(Debug, Clone)]
 #[cfg_attr(feature = "clap", derive(clap::Subcommand))]
 pub enum Format {
+    /// A C99 header: constants, and functions that make SI of raw readings
+    C(c::Options),
     /// Noise for Kalibr: imu.yaml
     Kalibr(kalibr::Options),
     /// Parameters of PX4: TC_*, biases over temperature
@@ -130,6 +133,7 @@ impl Format {
     /// A source is missing; the calibration or the noise has no place in the format, as each module says.
     pub fn export(&self, from: &Sources) -> Result<Export> {
         match self {
+            Self::C(options) => c::export(from, options),
             Self::Kalibr(options) => kalibr::export(from, options),
             Self::Px4(options) => px4::export(from, options),
             Self::ArduPilot(options) => ardupilot::export(from, options),
