@@ -14,12 +14,18 @@ pub mod ardupilot;
 pub mod c;
 pub mod core;
 pub mod heading;
+pub mod json;
 pub mod kalibr;
+pub mod mcap;
+mod one_temperature;
 #[cfg(feature = "clap")]
 mod options;
 pub mod parameters;
 pub mod px4;
 pub mod remaining;
+pub mod rust;
+
+use std::path::PathBuf;
 
 use mimu::calibration::Calibration;
 use mimu::calibration::bias_cubic::BiasCubics;
@@ -38,13 +44,19 @@ pub enum Format {
     C(c::Options),
     /// Noise for Kalibr: imu.yaml
     Kalibr(kalibr::Options),
-    /// Parameters of PX4: TC_*, biases over temperature
+    /// Parameters of PX4: TC_* over temperature, CAL_* at one
     Px4(px4::Options),
-    /// Parameters of ArduPilot: INS_TCAL*, biases over temperature
+    /// Parameters of ArduPilot: INS_TCAL* over temperature, INS_ACCOFFS, INS_ACCSCAL and INS_GYROFFS at one
     #[cfg_attr(feature = "clap", command(name = "ardupilot"))]
     ArduPilot(ardupilot::Options),
+    /// JSON with everything that the calibration file has, and a schema
+    Json,
+    /// MCAP for Foxglove: samples raw and compensated, and poses on the sphere of gravity
+    Mcap(mcap::Options),
     /// The bytes that a device stores, for programs with mimu-core
     Core,
+    /// Constants and a function for Rust programs with mimu-core
+    Rust,
 }
 
 /// What an export is made from.
@@ -127,6 +139,16 @@ impl Sources<'_> {
 }
 
 impl Format {
+    /// Files that it reads beside its [`Sources`]: no result may take their place.
+    pub fn inputs(&self) -> Vec<PathBuf> {
+        match self {
+            Self::Mcap(options) => ["recording.toml", "samples.csv", "samples.parquet"]
+                .map(|name| options.recording.join(name))
+                .into(),
+            _ => Vec::new(),
+        }
+    }
+
     /// The file of this format.
     ///
     /// # Errors
@@ -138,6 +160,9 @@ impl Format {
             Self::Px4(options) => px4::export(from, options),
             Self::ArduPilot(options) => ardupilot::export(from, options),
             Self::Core => core::export(from),
+            Self::Json => json::export(from),
+            Self::Mcap(options) => mcap::export(from, options),
+            Self::Rust => rust::export(from),
         }
     }
 }
