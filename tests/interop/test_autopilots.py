@@ -84,7 +84,7 @@ def assert_input_comes_back(correct, head):
         assert (f"{sensor}: scale factors, at" in head) == (not scales)
         if not scales:
             shown = f"{numpy.degrees(worst['scale']):.2f}"
-            line = next(line for line in head.splitlines() if "gyro: scale factors" in line)
+            line = next(line for line in head.splitlines() if "gyro: scale factors, at" in line)
             assert shown[:4] in line, (shown, line)
 
 
