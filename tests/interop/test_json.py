@@ -6,6 +6,7 @@ import re
 import jsonschema
 import numpy
 from conftest import triad
+from test_c import unit_with_effects  # noqa: F401, a fixture
 
 DOCS = pathlib.Path(__file__).parent.parent.parent / "docs"
 SCHEMA = json.loads((DOCS / "calibration.schema.json").read_text())
@@ -49,6 +50,17 @@ def test_it_holds_curves(thermal_unit):
     assert len(file["temperature"]["node"]) == 9
     # What is known of the errors is there in words and in numbers.
     assert len(file["remaining"]) == len(result["remaining"]) == sum(line.startswith("  ") for line in file["about"])
+
+
+def test_it_holds_effects(unit_with_effects):  # noqa: F811
+    file, _ = exported(unit_with_effects)
+    effects = unit_with_effects.calibration["effect"]
+    assert len(file["effect"]) == len(effects) == 12
+    for ours, theirs in zip(file["effect"], effects, strict=True):
+        assert ours["id"] == theirs["id"]
+        by_name = {c["name"]: (c["value"], c["unit"]) for c in ours["coefficients"]}
+        assert by_name == {c["name"]: (c["value"], c["unit"]) for c in theirs["coefficients"]}
+        assert ours.get("form") is None or ours["form"]["value"] == theirs["form"]["value"]
 
 
 def test_the_schema_refuses_what_is_no_calibration(unit):
