@@ -80,7 +80,7 @@ pub fn export(from: &Sources, options: &Options) -> Result<Export> {
                 let number = raw.first_row + row as u64;
                 let force = Sensor::Accel.channels().map(|c| cell(clean, c, row));
                 dwells.add(number, force);
-                if number % u64::from(options.every) == 0 {
+                if number.is_multiple_of(u64::from(options.every)) {
                     let t_s = raw.t_s[row];
                     file.write(RAW, t_s, &sample(raw, row, t_s, Some(&unit)))?;
                     file.write(COMPENSATED, t_s, &sample(clean, row, t_s, None))?;
