@@ -3,11 +3,18 @@
 //! ArduPilot subtracts from each axis of the readings, before its own scale factors, `c(T) - c(CALTEMP)` and then OFFS, where
 //! `c = 1e-6 (k1 d + k2 d² + k3 d³)` with `d = T - 35 °C`, T held within TMIN to TMAX, which are within -70 to 80 °C. Source: Copter
 //! documentation, "IMU Temperature Calibration"; parameter list, INS_TCAL1_*.
+//!
+//! A calibration at one temperature becomes INS_ACCOFFS, INS_ACCSCAL and INS_GYROFFS (of the other units INS_ACC2OFFS, INS_ACC2SCAL,
+//! INS_GYR2OFFS and so on): ArduPilot computes `(accel - offset) * scale` and `gyro - offset`, behind the rotation of the sensor and before
+//! that of the board. Source: libraries/AP_InertialSensor/AP_InertialSensor_Backend.cpp, `_rotate_and_correct_accel` and `_gyro`;
+//! AP_InertialSensor.cpp for names and ranges.
 
+use mimu::calibration::Calibration;
 use mimu::calibration::bias_cubic::BiasCubics;
-use mimu::quantity::{AXES, Sensor};
-use mimu_recording::error::{Error, Result};
+use mimu::quantity::Sensor;
+use mimu_recording::error::Result;
 
+use crate::one_temperature::{self, LETTERS, within};
 use crate::parameters::Parameter;
 use crate::{Export, Sources, heading, parameters, px4};
 
@@ -19,29 +26,95 @@ const FACTOR: f64 = 1e6;
 const RANGE_C: [f64; 2] = [-70.0, 80.0];
 /// Largest offset that ArduPilot documents for an accelerometer, m/s².
 const MOST_OFFSET: f64 = 3.5;
+/// Scale factors that it documents for one.
+const SCALES: [f64; 2] = [0.8, 1.2];
 
 /// What a person knows of the autopilot.
 pub type Options = parameters::Options;
 
-/// Biases over temperature.
+/// Biases over temperature, or offsets and scale factors at one.
 ///
 /// # Errors
-/// There is no calibration, or it has no curves; those of [`BiasCubics::of`]; an offset beyond what ArduPilot takes.
+/// There is no calibration; those of [`BiasCubics::of`] or of `Conversion::of`; an offset or a scale factor beyond what ArduPilot takes.
 pub fn export(from: &Sources, options: &Options) -> Result<Export> {
-    let (calibration, place) = from.calibration()?;
-    let [from_c, to_c] = px4::range_of_curves(calibration, place)?;
-    let range_c = [from_c.max(RANGE_C[0]), to_c.min(RANGE_C[1])];
+    let (calibration, _) = from.calibration()?;
     let mut export = Export::new("ardupilot");
     export.notes.push("ArduPilot measures gyro offsets again at every start (INS_GYR_CAL), at the temperature of that start.".into());
-    if range_c != [from_c, to_c] {
-        let note = "The range is cut to the -70 to 80 °C that ArduPilot has.";
-        export.notes.push(note.into());
+    export.notes.push("It takes an accelerometer for calibrated only if INS_ACC_ID is its device id: give --accel-id, or calibrate there once and then load this file.".into());
+    for (sensor, id) in options.ids() {
+        let name = format!("INS_{}{}_ID", short(sensor), number(options.imu));
+        export
+            .parameters
+            .extend(id.map(|id| Parameter::int32(name, id)));
     }
-    px4::cubics(calibration, options, range_c, REFERENCE_C, &mut export)?;
-    parameters_of(&export.cubics, options.imu, &mut export.parameters)?;
+    match &calibration.temperature {
+        Some(over) => {
+            let [from_c, to_c] = over.range_c;
+            let range_c = [from_c.max(RANGE_C[0]), to_c.min(RANGE_C[1])];
+            if range_c != [from_c, to_c] {
+                let note = "The range is cut to the -70 to 80 °C that ArduPilot has.";
+                export.notes.push(note.into());
+            }
+            px4::cubics(calibration, options, range_c, REFERENCE_C, &mut export)?;
+            parameters_of(&export.cubics, options.imu, &mut export.parameters)?;
+        }
+        None => at_one_temperature(calibration, options, &mut export)?,
+    }
     let comments = heading::comments("#", &heading::of_calibration(calibration, &export));
     export.content = options.text(&comments, &export.parameters).into_bytes();
     Ok(export)
+}
+
+/// A sensor in names.
+fn short(sensor: Sensor) -> &'static str {
+    match sensor {
+        Sensor::Gyro => "GYR",
+        Sensor::Accel => "ACC",
+    }
+}
+
+/// A unit in names: the first one has no number.
+fn number(imu: u8) -> String {
+    match imu {
+        1 => String::new(),
+        imu => imu.to_string(),
+    }
+}
+
+fn at_one_temperature(
+    calibration: &Calibration,
+    options: &Options,
+    export: &mut Export,
+) -> Result<()> {
+    let imu = options.imu;
+    export.notes.push(format!("ArduPilot subtracts INS_TCAL{imu}_* too: set INS_TCAL{imu}_ENABLE to 0, unless they are of a calibration without these offsets."));
+    for of in one_temperature::offsets(calibration, options, export)? {
+        for (axis, letter) in LETTERS.iter().enumerate() {
+            let offset = offset_parameter(of.sensor, axis, imu, of.offset[axis])?;
+            export.parameters.push(offset);
+            if of.sensor == Sensor::Accel {
+                let name = format!("INS_ACC{}SCAL_{letter}", number(imu));
+                let remedy = "state with --accel-si-per-raw by what the driver converts";
+                within(of.sensor, axis, (&name, of.scale[axis], ""), SCALES, remedy)?;
+                export
+                    .parameters
+                    .push(Parameter::real(name, of.scale[axis]));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// An offset, SI.
+fn offset_parameter(sensor: Sensor, axis: usize, imu: u8, offset: f64) -> Result<Parameter> {
+    let (short, number) = (short(sensor), number(imu));
+    let name = format!("INS_{short}{number}OFFS_{}", LETTERS[axis]);
+    if sensor == Sensor::Accel {
+        let range = [-MOST_OFFSET, MOST_OFFSET];
+        let remedy = "state with --accel-zero which raw reading the driver takes for no input";
+        within(sensor, axis, (&name, offset, " m/s²"), range, remedy)?;
+    }
+    Ok(Parameter::real(name, offset))
 }
 
 fn parameters_of(sensors: &[BiasCubics], imu: u8, out: &mut Vec<Parameter>) -> Result<()> {
@@ -53,37 +126,20 @@ fn parameters_of(sensors: &[BiasCubics], imu: u8, out: &mut Vec<Parameter>) -> R
     out.push(Parameter::real(format!("{prefix}_TMIN"), first.range_c[0]));
     out.push(Parameter::real(format!("{prefix}_TMAX"), first.range_c[1]));
     for cubics in sensors {
-        let (short, long) = match cubics.sensor {
-            Sensor::Gyro => ("GYR", "GYRO"),
-            Sensor::Accel => ("ACC", "ACC"),
-        };
+        let short = short(cubics.sensor);
         for power in 1..4 {
-            for (axis, letter) in ["X", "Y", "Z"].iter().enumerate() {
+            for (axis, letter) in LETTERS.iter().enumerate() {
                 let name = format!("{prefix}_{short}{power}_{letter}");
                 let scaled = FACTOR * cubics.coefficients[axis][power];
                 out.push(Parameter::real(name, scaled));
             }
         }
-        // Of the first unit PARAMETERS have no number; CALTEMP has one always.
-        let offsets = match imu {
-            1 => format!("INS_{long}OFFS"),
-            imu => format!("INS_{short}{imu}OFFS"),
-        };
+        // CALTEMP has a number always, and offsets have none of the first unit.
         let name = format!("INS_{short}{imu}_CALTEMP");
         out.push(Parameter::real(name, cubics.settled_c));
         let settled = cubics.at(cubics.settled_c);
-        for (axis, letter) in ["X", "Y", "Z"].iter().enumerate() {
-            let offset = settled[axis];
-            if cubics.sensor == Sensor::Accel && offset.abs() > MOST_OFFSET {
-                return Err(Error::new(
-                    format!("accel, axis {}", AXES[axis]),
-                    format!(
-                        "its bias is {offset:.2} m/s², and {offsets}_{letter} is from -3.5 to 3.5"
-                    ),
-                    "state with --accel-zero which raw reading the driver takes for no input",
-                ));
-            }
-            out.push(Parameter::real(format!("{offsets}_{letter}"), offset));
+        for axis in 0..3 {
+            out.push(offset_parameter(cubics.sensor, axis, imu, settled[axis])?);
         }
     }
     Ok(())

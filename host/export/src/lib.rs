@@ -15,6 +15,7 @@
 //! | [`parameters`] | parameters of autopilots, and how files hold them |
 
 pub mod ardupilot;
+pub mod c;
 pub mod core;
 pub mod driver;
 pub mod fastlio;
@@ -23,9 +24,12 @@ pub mod heading;
 pub mod imu_calib;
 pub mod imu_tk;
 pub mod intrinsics;
+pub mod json;
 pub mod kalibr;
 pub mod liosam;
+pub mod mcap;
 pub mod misalignment;
+mod one_temperature;
 pub mod openvins;
 #[cfg(feature = "clap")]
 mod options;
@@ -34,9 +38,12 @@ pub mod parameters;
 pub mod px4;
 pub mod realsense;
 pub mod remaining;
+pub mod rust;
 pub mod vins;
 pub mod worst_axis;
 pub mod yaml;
+
+use std::path::PathBuf;
 
 use mimu::calibration::Calibration;
 use mimu::calibration::bias_cubic::BiasCubics;
@@ -51,6 +58,12 @@ use crate::remaining::Remaining;
 #[derive(Debug, Clone)]
 #[cfg_attr(feature = "clap", derive(clap::Subcommand))]
 pub enum Format {
+    /// A C99 header: constants, and functions that make SI of raw readings
+    C(c::Options),
+    /// Constants and a function for Rust programs with mimu-core
+    Rust,
+    /// JSON with everything that the calibration file has, and a schema
+    Json,
     /// Noise and intrinsics for Kalibr: imu.yaml
     Kalibr(kalibr::Options),
     /// Noise and intrinsics for OpenVINS: kalibr_imu_chain.yaml
@@ -76,11 +89,13 @@ pub enum Format {
     /// Both triads for a RealSense camera: bytes of its EEPROM, or calibration.json
     #[cfg_attr(feature = "clap", command(name = "realsense"))]
     RealSense(realsense::Options),
-    /// Parameters of PX4: TC_*, biases over temperature
+    /// Parameters of PX4: TC_* over temperature, CAL_* at one
     Px4(px4::Options),
-    /// Parameters of ArduPilot: INS_TCAL*, biases over temperature
+    /// Parameters of ArduPilot: INS_TCAL* over temperature, INS_ACCOFFS, INS_ACCSCAL and INS_GYROFFS at one
     #[cfg_attr(feature = "clap", command(name = "ardupilot"))]
     ArduPilot(ardupilot::Options),
+    /// MCAP for Foxglove: samples raw and compensated, and poses on the sphere of gravity
+    Mcap(mcap::Options),
     /// The bytes that a device stores, for programs with mimu-core
     Core,
 }
@@ -165,12 +180,23 @@ impl Sources<'_> {
 }
 
 impl Format {
+    /// Files that it reads beside its [`Sources`]: no result may take their place.
+    pub fn inputs(&self) -> Vec<PathBuf> {
+        match self {
+            Self::Mcap(options) => ["recording.toml", "samples.csv", "samples.parquet"]
+                .map(|name| options.recording.join(name))
+                .into(),
+            _ => Vec::new(),
+        }
+    }
+
     /// The file of this format.
     ///
     /// # Errors
     /// A source is missing; the calibration or the noise has no place in the format, as each module says.
     pub fn export(&self, from: &Sources) -> Result<Export> {
         match self {
+            Self::C(options) => c::export(from, options),
             Self::Kalibr(options) => kalibr::export(from, options),
             Self::OpenVins(options) => openvins::export(from, options),
             Self::Vins(options) => vins::export(from, options),
@@ -184,6 +210,9 @@ impl Format {
             Self::Px4(options) => px4::export(from, options),
             Self::ArduPilot(options) => ardupilot::export(from, options),
             Self::Core => core::export(from),
+            Self::Json => json::export(from),
+            Self::Mcap(options) => mcap::export(from, options),
+            Self::Rust => rust::export(from),
         }
     }
 }

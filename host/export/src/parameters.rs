@@ -65,6 +65,12 @@ pub struct Options {
     /// Number of the inertial unit in the autopilot, from 1
     #[cfg_attr(feature = "clap", arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=3)))]
     pub imu: u8,
+    /// Device id of the gyro in the autopilot (CAL_GYROn_ID, INS_GYR_ID)
+    #[cfg_attr(feature = "clap", arg(long, value_name = "ID"))]
+    pub gyro_id: Option<u32>,
+    /// Device id of the accelerometer in the autopilot (CAL_ACCn_ID, INS_ACC_ID)
+    #[cfg_attr(feature = "clap", arg(long, value_name = "ID"))]
+    pub accel_id: Option<u32>,
     /// File for QGroundControl, five columns with tabs; without it NAME,VALUE for MAVProxy and Mission Planner
     #[cfg_attr(feature = "clap", arg(long))]
     pub qgc: bool,
@@ -77,6 +83,11 @@ impl Options {
     /// How the drivers convert, as far as a person knows it.
     pub fn conversions(&self) -> PerSensor<KnownConversion> {
         self.driver.conversions()
+    }
+
+    /// Device ids, as far as a person knows them. Autopilots keep them in signed parameters, bit by bit.
+    pub fn ids(&self) -> PerSensor<Option<i32>> {
+        PerSensor::from([self.gyro_id, self.accel_id]).map(|id| id.map(|id| id as i32))
     }
 
     /// `parameters` below `comments`, in the layout of the file.

@@ -3,79 +3,111 @@
 //! PX4 subtracts from each axis of the readings, before its own scale factors, a cubic of the temperature that its thermometer shows:
 //! `X0 + X1 d + X2 d² + X3 d³` with `d = T - TREF`, held outside TMIN to TMAX. Source: PX4 User Guide, "Thermal Calibration and
 //! Compensation"; parameter reference, TC_*.
+//!
+//! A calibration at one temperature becomes CAL_ACCn_XOFF, CAL_ACCn_XSCALE and CAL_GYROn_XOFF, n from 0: PX4 computes
+//! `(data - thermal_offset - offset) * scale` of an accelerometer and `data - thermal_offset - offset` of a gyro, which has no scale there.
+//! Source: src/lib/sensor_calibration/Accelerometer.hpp and Gyroscope.hpp, `Correct`; src/modules/sensors/module.yaml.
 
 use mimu::calibration::Calibration;
 use mimu::calibration::bias_cubic::BiasCubics;
-use mimu::quantity::{PerSensor, Sensor};
-use mimu_recording::error::{Error, Result};
+use mimu::quantity::Sensor;
+use mimu_recording::error::Result;
 
+use crate::one_temperature::{self, LETTERS, Offsets, within};
 use crate::parameters::Parameter;
 use crate::{Export, Sources, heading, parameters, remaining};
 
 /// What a person knows of the autopilot.
-#[derive(Debug, Clone)]
-#[cfg_attr(feature = "clap", derive(clap::Args))]
-pub struct Options {
-    /// What ArduPilot has too.
-    #[cfg_attr(feature = "clap", command(flatten))]
-    pub common: parameters::Options,
-    /// Device id of the gyro in PX4 (CAL_GYROn_ID)
-    #[cfg_attr(feature = "clap", arg(long, value_name = "ID"))]
-    pub gyro_id: Option<u32>,
-    /// Device id of the accelerometer in PX4 (CAL_ACCn_ID)
-    #[cfg_attr(feature = "clap", arg(long, value_name = "ID"))]
-    pub accel_id: Option<u32>,
-}
+pub type Options = parameters::Options;
 
-/// Biases over temperature.
+/// Scale that PX4 takes of an accelerometer.
+const SCALES: [f64; 2] = [0.1, 3.0];
+
+/// Biases over temperature, or offsets and scale factors at one.
 ///
 /// # Errors
-/// There is no calibration, or it has no curves; those of [`BiasCubics::of`].
+/// There is no calibration; those of [`BiasCubics::of`] or of `Conversion::of`; a scale factor beyond what PX4 takes.
 pub fn export(from: &Sources, options: &Options) -> Result<Export> {
-    let (calibration, place) = from.calibration()?;
-    let ids = PerSensor {
-        gyro: options.gyro_id,
-        accel: options.accel_id,
-    };
+    let (calibration, _) = from.calibration()?;
     let mut export = Export::new("px4");
-    export.notes = notes(options);
-    let [from_c, to_c] = range_of_curves(calibration, place)?;
-    cubics(
-        calibration,
-        &options.common,
-        [from_c, to_c],
-        0.5 * (from_c + to_c),
-        &mut export,
-    )?;
-    for cubics in &export.cubics {
-        parameters_of(
-            cubics,
-            options.common.imu,
-            ids[cubics.sensor],
-            &mut export.parameters,
-        );
+    if options.gyro_id.is_none() || options.accel_id.is_none() {
+        let n = options.imu - 1;
+        let [gyro, accel] = match calibration.temperature {
+            Some(_) => ["TC_G", "TC_A"],
+            None => ["CAL_GYRO", "CAL_ACC"],
+        };
+        export.notes.push(format!(
+            "Set {gyro}{n}_ID and {accel}{n}_ID to the sensors' device ids where they are missing here: PX4 finds a table by its id only."
+        ));
+    }
+    match &calibration.temperature {
+        Some(over) => over_temperature(calibration, options, over.range_c, &mut export)?,
+        None => at_one_temperature(calibration, options, &mut export)?,
+    }
+    if !options.qgc {
+        export.notes.push("MAVProxy's `param load` skips changes of less than 1e-6, such as X2 and X3: load this file by another program, or write it for QGroundControl.".into());
     }
     let comments = heading::comments("#", &heading::of_calibration(calibration, &export));
-    export.content = options
-        .common
-        .text(&comments, &export.parameters)
-        .into_bytes();
+    export.content = options.text(&comments, &export.parameters).into_bytes();
     Ok(export)
 }
 
-/// Temperatures of the curves, °C.
-///
-/// # Errors
-/// There are none.
-pub(crate) fn range_of_curves(calibration: &Calibration, place: &str) -> Result<[f64; 2]> {
-    let over = calibration.temperature.as_ref().ok_or_else(|| {
-        Error::new(
-            place,
-            "it holds for one temperature: there are no curves",
-            "fit recordings over temperature with `mimu thermal fit`",
-        )
-    })?;
-    Ok(over.range_c)
+fn over_temperature(
+    calibration: &Calibration,
+    options: &Options,
+    [from_c, to_c]: [f64; 2],
+    export: &mut Export,
+) -> Result<()> {
+    export.notes.push("X0 contains the whole bias. PX4 also subtracts the offsets CAL_GYRO and CAL_ACC: set these to 0, or calibrate there again.".into());
+    let middle_c = 0.5 * (from_c + to_c);
+    cubics(calibration, options, [from_c, to_c], middle_c, export)?;
+    let ids = options.ids();
+    for cubics in &export.cubics {
+        let id = ids[cubics.sensor];
+        parameters_of(cubics, options.imu, id, &mut export.parameters);
+    }
+    Ok(())
+}
+
+fn at_one_temperature(
+    calibration: &Calibration,
+    options: &Options,
+    export: &mut Export,
+) -> Result<()> {
+    export.notes.push(
+        "PX4 subtracts TC_* too: set TC_G_ENABLE and TC_A_ENABLE to 0, unless they are of a calibration without these offsets.".into(),
+    );
+    let ids = options.ids();
+    let n = options.imu - 1;
+    for Offsets {
+        sensor,
+        offset,
+        scale,
+    } in one_temperature::offsets(calibration, options, export)?
+    {
+        let prefix = match sensor {
+            Sensor::Gyro => format!("CAL_GYRO{n}"),
+            Sensor::Accel => format!("CAL_ACC{n}"),
+        };
+        let out = &mut export.parameters;
+        out.extend(ids[sensor].map(|id| Parameter::int32(format!("{prefix}_ID"), id)));
+        for (axis, letter) in LETTERS.iter().enumerate() {
+            out.push(Parameter::real(
+                format!("{prefix}_{letter}OFF"),
+                offset[axis],
+            ));
+        }
+        if sensor == Sensor::Gyro {
+            continue;
+        }
+        for (axis, letter) in LETTERS.iter().enumerate() {
+            let name = format!("{prefix}_{letter}SCALE");
+            let remedy = "state with --accel-si-per-raw by what the driver converts";
+            within(sensor, axis, (&name, scale[axis], ""), SCALES, remedy)?;
+            out.push(Parameter::real(name, scale[axis]));
+        }
+    }
+    Ok(())
 }
 
 /// The biases of each sensor as cubics; what they leave goes to `export`.
@@ -128,17 +160,14 @@ pub(crate) fn cubics(
     Ok(())
 }
 
-fn parameters_of(cubics: &BiasCubics, imu: u8, id: Option<u32>, out: &mut Vec<Parameter>) {
+fn parameters_of(cubics: &BiasCubics, imu: u8, id: Option<i32>, out: &mut Vec<Parameter>) {
     let letter = match cubics.sensor {
         Sensor::Gyro => 'G',
         Sensor::Accel => 'A',
     };
     let prefix = format!("TC_{letter}{}", imu - 1);
     out.push(Parameter::int32(format!("TC_{letter}_ENABLE"), 1));
-    if let Some(id) = id {
-        // PX4 keeps the id in a signed parameter, bit by bit.
-        out.push(Parameter::int32(format!("{prefix}_ID"), id as i32));
-    }
+    out.extend(id.map(|id| Parameter::int32(format!("{prefix}_ID"), id)));
     let limits = [
         ("TMIN", cubics.range_c[0]),
         ("TMAX", cubics.range_c[1]),
@@ -152,19 +181,4 @@ fn parameters_of(cubics: &BiasCubics, imu: u8, id: Option<u32>, out: &mut Vec<Pa
         };
         out.extend([0, 1, 2].map(of));
     }
-}
-
-fn notes(options: &Options) -> Vec<String> {
-    let mut notes = Vec::new();
-    if options.gyro_id.is_none() || options.accel_id.is_none() {
-        let n = options.common.imu - 1;
-        notes.push(format!(
-            "Set TC_G{n}_ID and TC_A{n}_ID to the sensors' device ids where they are missing here: PX4 finds a table by its id only."
-        ));
-    }
-    notes.push("X0 contains the whole bias. PX4 also subtracts the offsets CAL_GYRO and CAL_ACC: set these to 0, or calibrate there again.".into());
-    if !options.common.qgc {
-        notes.push("MAVProxy's `param load` skips changes of less than 1e-6, such as X2 and X3: load this file by another program, or write it for QGroundControl.".into());
-    }
-    notes
 }

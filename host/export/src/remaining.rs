@@ -24,9 +24,10 @@ const INPUTS: usize = 97;
 const AFTER_S: [f64; 2] = [0.0, 3600.0];
 
 /// An error that a format leaves.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, schemars::JsonSchema)]
 pub struct Remaining {
     /// Triad whose output errs.
+    #[schemars(with = "String", extend("enum" = ["gyro", "accel"]))]
     pub sensor: Sensor,
     /// Where it comes from.
     pub source: String,
@@ -180,6 +181,13 @@ fn interval(calibration: &Calibration, sensor: Sensor, model: &Affine<f64>) -> R
         })
     });
     Remaining::new(sensor, SOURCE, at_input(sensor), &half.collect::<Vec<_>>())
+}
+
+/// The format has no place for scale factors: a reading changes by `gain` with the input of its axis, and has to by 1.
+pub fn scale_factors(sensor: Sensor, gain: &Vector3<f64>) -> Remaining {
+    let errors = inputs(sensor).map(|x| gain.component_mul(&x) - x);
+    let errors: Vec<_> = errors.collect();
+    Remaining::new(sensor, "scale factors", at_input(sensor), &errors)
 }
 
 /// The format has only a factor and an offset of each axis: what the axes read of inputs across them stays.

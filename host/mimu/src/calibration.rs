@@ -72,6 +72,7 @@ const HEADER_OF_KEPT: &str = "\
 
 /// A calibration as a file holds it.
 #[derive(Debug, Clone, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Calibration {
     /// `mimu-calibration/1`, or `/2` if and only if there is a [temperature](Self::temperature).
@@ -107,6 +108,7 @@ pub struct Calibration {
 
 /// The recording that a calibration was made from.
 #[derive(Debug, Clone, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Origin {
     /// SHA-256 of its samples file.
@@ -114,8 +116,10 @@ pub struct Origin {
     pub sha256: Option<String>,
     /// What was known of its input; a device does not keep it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "schema", schemars(with = "Option<String>"))]
     pub reference: Option<Reference>,
     /// Unit of its raw columns.
+    #[cfg_attr(feature = "schema", schemars(with = "String", extend("enum" = ["V", "count", "SI"])))]
     pub raw_unit: RawUnit,
     /// Local gravity, m/s²; a device does not keep it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -131,6 +135,7 @@ pub struct Origin {
 /// One triad in a calibration file. Standard deviations, intervals, covariance and error figures are there all together, or not at all, as
 /// in a calibration that was fetched from a device, which keeps none.
 #[derive(Debug, Clone, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 #[allow(non_snake_case)] // C, P: the letters of the formulas, in the file as in the papers
 pub struct TriadTable {
@@ -139,6 +144,7 @@ pub struct TriadTable {
     /// `raw to SI`.
     pub direction: String,
     /// Unit of u.
+    #[cfg_attr(feature = "schema", schemars(with = "String", extend("enum" = ["V", "count", "SI"])))]
     pub raw_unit: RawUnit,
     /// Unit of x.
     pub unit: String,
@@ -177,6 +183,7 @@ pub struct TriadTable {
 
 /// Error figures of the fit.
 #[derive(Debug, Clone, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Judged {
     /// How it was estimated.
@@ -201,6 +208,7 @@ pub struct Judged {
 
 /// Forward model, SI to raw.
 #[derive(Debug, Clone, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 #[allow(non_snake_case)]
 pub struct ForwardTable {
@@ -216,6 +224,7 @@ pub struct ForwardTable {
 
 /// Physical quantities with their standard deviations.
 #[derive(Debug, Clone, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct PhysicalTable {
     /// How `P` is made of them.

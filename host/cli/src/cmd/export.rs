@@ -47,7 +47,9 @@ pub fn run(args: &ExportArgs) -> Result<()> {
         .as_deref()
         .ok_or_else(|| Error::new("-o", "it is missing", "say which file to write: -o FILE"))?;
     let sources = [args.calibration.as_deref(), args.noise.as_deref()];
-    let inputs: Vec<_> = sources.into_iter().flatten().collect();
+    let own = args.format.inputs();
+    let own = own.iter().map(PathBuf::as_path);
+    let inputs: Vec<_> = sources.into_iter().flatten().chain(own).collect();
     check_outputs(&[Some(path), args.json.file()], &inputs)?;
     let named = args.calibration.as_deref().map(|p| p.display().to_string());
     let calibration = args.calibration.as_deref().map(Calibration::read);

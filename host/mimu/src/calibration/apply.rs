@@ -69,63 +69,27 @@ pub fn apply(
     replace: bool,
     progress: impl Fn(f64),
 ) -> Result<Applied> {
-    let place = recording.samples.display().to_string();
-    let manifest = &recording.manifest;
     if let (Ok(from), Ok(to)) = (recording.directory.canonicalize(), out.canonicalize())
         && from.starts_with(&to)
     {
         let problem = "this is the recording to compensate, and its raw readings would be lost";
         return Err(Error::new(out.display(), problem, "choose another name"));
     }
-    let mut warnings: Vec<Warning> = check_unit(calibration, manifest, &place)?
-        .into_iter()
-        .collect();
-    let columns = Columns {
-        gyro: recording.columns.gyro && calibration.gyro.is_some(),
-        accel: recording.columns.accel && calibration.accel.is_some(),
-        ..recording.columns
-    };
-    let has = PerSensor {
-        gyro: columns.gyro,
-        accel: columns.accel,
-    };
-    if has == PerSensor::both(false) {
-        let problem = "it has no sensor that the calibration is for";
-        return Err(Error::new(
-            place,
-            problem,
-            "calibrate the sensor that it has",
-        ));
-    }
-    let recorded = PerSensor {
-        gyro: recording.columns.gyro,
-        accel: recording.columns.accel,
-    };
-    for (sensor, (recorded, has)) in recorded.zip(has) {
-        if recorded && !has {
-            warnings.push(Warning::NotCalibrated(sensor));
-        }
-    }
-    // First pass: rails and the first temperature are only known at the end.
-    let condensed = Condensed::read(recording, false, |share| progress(0.5 * share))?;
-    warnings.extend(condensed.warnings.iter().cloned());
-    warnings.extend(outside(calibration, &condensed.blocks));
-    let mut batches = Batches::new(
-        calibration,
-        &condensed,
-        manifest,
-        has,
-        &place,
-        &mut warnings,
-    )?;
-    let mut writer = Writer::create(out, columns, format, replace)?;
-    recording.for_each_batch(
+    let mut compensated = Compensated::new(recording, calibration, |share| progress(0.5 * share))?;
+    let mut writer = Writer::create(out, compensated.columns, format, replace)?;
+    compensated.for_each(
         |share| progress(0.5 + 0.5 * share),
-        |batch| writer.write(&batches.batch(batch)),
+        |_, clean| writer.write(clean),
     )?;
+    let Compensated {
+        condensed,
+        batches,
+        warnings,
+        ..
+    } = compensated;
     let rows = writer.rows();
-    let written = writer.finish(&compensated(manifest, recording, &condensed.sha256))?;
-    let counts = batches.counts;
+    let written = writer.finish(&compensated_manifest(recording, &condensed.sha256))?;
+    let (counts, has) = (batches.counts, batches.has);
     Ok(Applied {
         format: "mimu-apply/1",
         recording: written.display().to_string(),
@@ -138,9 +102,101 @@ pub fn apply(
     })
 }
 
+/// A recording with its compensation, to be run through once.
+pub struct Compensated<'a> {
+    recording: &'a Recording,
+    columns: Columns,
+    condensed: Condensed,
+    batches: Batches,
+    warnings: Vec<Warning>,
+}
+
+impl<'a> Compensated<'a> {
+    /// Of `recording` by `calibration`; `progress` is told the share of a first pass, for rails and temperatures.
+    ///
+    /// # Errors
+    /// Those of [`apply`], but for its output.
+    pub fn new(
+        recording: &'a Recording,
+        calibration: &Calibration,
+        progress: impl Fn(f64),
+    ) -> Result<Self> {
+        let place = recording.samples.display().to_string();
+        let manifest = &recording.manifest;
+        let mut warnings: Vec<Warning> = check_unit(calibration, manifest, &place)?
+            .into_iter()
+            .collect();
+        let columns = Columns {
+            gyro: recording.columns.gyro && calibration.gyro.is_some(),
+            accel: recording.columns.accel && calibration.accel.is_some(),
+            ..recording.columns
+        };
+        let has = PerSensor {
+            gyro: columns.gyro,
+            accel: columns.accel,
+        };
+        if has == PerSensor::both(false) {
+            let problem = "it has no sensor that the calibration is for";
+            return Err(Error::new(
+                place,
+                problem,
+                "calibrate the sensor that it has",
+            ));
+        }
+        let recorded = PerSensor {
+            gyro: recording.columns.gyro,
+            accel: recording.columns.accel,
+        };
+        for (sensor, (recorded, has)) in recorded.zip(has) {
+            if recorded && !has {
+                warnings.push(Warning::NotCalibrated(sensor));
+            }
+        }
+        // First pass: rails and the first temperature are only known at the end.
+        let condensed = Condensed::read(recording, false, progress)?;
+        warnings.extend(condensed.warnings.iter().cloned());
+        warnings.extend(outside(calibration, &condensed.blocks));
+        let batches = Batches::new(
+            calibration,
+            &condensed,
+            manifest,
+            has,
+            &place,
+            &mut warnings,
+        )?;
+        Ok(Self {
+            recording,
+            columns,
+            condensed,
+            batches,
+            warnings,
+        })
+    }
+
+    /// What a person should know.
+    pub fn warnings(&self) -> &[Warning] {
+        &self.warnings
+    }
+
+    /// Each batch of raw samples, and the same samples compensated.
+    ///
+    /// # Errors
+    /// The recording cannot be read; those of `consume`.
+    pub fn for_each(
+        &mut self,
+        progress: impl Fn(f64),
+        mut consume: impl FnMut(&Batch, &Batch) -> Result<()>,
+    ) -> Result<()> {
+        let batches = &mut self.batches;
+        let each = |batch: &Batch| consume(batch, &batches.batch(batch));
+        self.recording.for_each_batch(progress, each)?;
+        Ok(())
+    }
+}
+
 /// The manifest of the compensated recording: rails are those of raw readings, and go.
-fn compensated(manifest: &Manifest, recording: &Recording, sha256: &str) -> Manifest {
-    let mut out = manifest.clone();
+fn compensated_manifest(recording: &Recording, sha256: &str) -> Manifest {
+    let mut out = recording.manifest.clone();
     out.raw_unit = RawUnit::Si;
     out.rails = None;
     out.unfinished = false;

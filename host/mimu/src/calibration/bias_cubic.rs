@@ -105,7 +105,7 @@ impl BiasCubics {
             _ => 0.5 * (from + to),
         };
         let at = |temp_c: f64| forward(&curves, sensor, temp_c);
-        let conversion = conversion(calibration, sensor, known, &at(settled_c)?)?;
+        let conversion = Conversion::of(calibration, sensor, known, &at(settled_c)?)?;
         let temperatures =
             || (0..POINTS).map(|k| from + (to - from) * k as f64 / (POINTS - 1) as f64);
         let models: Vec<Forward> = temperatures().map(at).collect::<Result<_>>()?;
@@ -211,8 +211,50 @@ impl Remainder {
 }
 
 impl Conversion {
+    /// What is not known follows from the unit of the readings, or else from the model `settled` where the program is calibrated.
+    ///
+    /// # Errors
+    /// Readings that are not those of the sensor's own axes, which an offset and a factor for each axis cannot correct.
+    pub fn of(
+        calibration: &Calibration,
+        sensor: Sensor,
+        known: &KnownConversion,
+        settled: &Forward,
+    ) -> Result<Self> {
+        let si = calibration.recording.raw_unit == RawUnit::Si;
+        let conversion = Self {
+            si_per_raw: [0, 1, 2].map(|i| match known.si_per_raw {
+                Some(factor) => factor,
+                None if si => 1.0,
+                None => 1.0 / settled.matrix[(i, i)],
+            }),
+            zero_raw: [known.zero_raw.unwrap_or(0.0); 3],
+        };
+        for (i, axis) in AXES.iter().enumerate() {
+            let row = settled.matrix.row(i);
+            let along = row[i] * conversion.si_per_raw[i];
+            let across = (row.norm_squared() - row[i] * row[i]).sqrt() / row.norm();
+            if !(across <= MOST_ACROSS && (0.5..=2.0).contains(&along)) {
+                return Err(Error::new(
+                    format!("{sensor}, axis {axis}"),
+                    format!(
+                        "a reading changes by {along:.3} along its own axis and by {across:.3} of its sensitivity across, and has to by 1 and 0"
+                    ),
+                    "permute the columns as the program has its axes, or state its conversion",
+                ));
+            }
+        }
+        Ok(conversion)
+    }
+
+    /// By how much a reading changes with the input of its axis: 1 where the conversion is right.
+    pub fn gain(&self, model: &Forward) -> Vector3<f64> {
+        let factor = Vector3::from(self.si_per_raw);
+        model.matrix.diagonal().component_mul(&factor)
+    }
+
     /// Bias of the readings, SI.
-    fn bias(&self, model: &Forward) -> Vector3<f64> {
+    pub fn bias(&self, model: &Forward) -> Vector3<f64> {
         let off = model.bias - Vector3::from(self.zero_raw);
         off.component_mul(&Vector3::from(self.si_per_raw))
     }
@@ -225,39 +267,6 @@ fn forward(curves: &Curves, sensor: Sensor, temp_c: f64) -> Result<Forward> {
         let problem = format!("C is singular at {temp_c:.1} °C");
         Error::new(sensor, problem, "fit the recordings over temperature again")
     })
-}
-
-/// What is not known follows from the unit of the readings, or else from the model where the program is calibrated.
-fn conversion(
-    calibration: &Calibration,
-    sensor: Sensor,
-    known: &KnownConversion,
-    settled: &Forward,
-) -> Result<Conversion> {
-    let si = calibration.recording.raw_unit == RawUnit::Si;
-    let conversion = Conversion {
-        si_per_raw: [0, 1, 2].map(|i| match known.si_per_raw {
-            Some(factor) => factor,
-            None if si => 1.0,
-            None => 1.0 / settled.matrix[(i, i)],
-        }),
-        zero_raw: [known.zero_raw.unwrap_or(0.0); 3],
-    };
-    for (i, axis) in AXES.iter().enumerate() {
-        let row = settled.matrix.row(i);
-        let along = row[i] * conversion.si_per_raw[i];
-        let across = (row.norm_squared() - row[i] * row[i]).sqrt() / row.norm();
-        if !(across <= MOST_ACROSS && (0.5..=2.0).contains(&along)) {
-            return Err(Error::new(
-                format!("{sensor}, axis {axis}"),
-                format!(
-                    "a reading changes by {along:.3} along its own axis and by {across:.3} of its sensitivity across, and has to by 1 and 0"
-                ),
-                "permute the columns as the program has its axes, or state its conversion",
-            ));
-        }
-    }
-    Ok(conversion)
 }
 
 /// Coefficients, about `reference_c`, of the cubic nearest to `values` at even distances over `range_c`, in single precision.

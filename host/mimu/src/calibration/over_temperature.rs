@@ -16,6 +16,7 @@ use mimu_recording::error::{Error, Result};
 
 /// `[temperature]` of a calibration file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct OverTemperature {
     /// Dies' temperatures in the recordings that it was fitted to, °C.
@@ -25,6 +26,7 @@ pub struct OverTemperature {
     pub biases_only: bool,
     /// What is known of the dies of each triad.
     #[serde(default, skip_serializing_if = "nothing")]
+    #[cfg_attr(feature = "schema", schemars(with = "Dies"))]
     pub dies: PerSensor<DieTable>,
     /// One to sixteen, the coldest first.
     #[serde(rename = "node", default)]
@@ -33,6 +35,7 @@ pub struct OverTemperature {
 
 /// What is known of the dies of a triad: nothing, by default.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct DieTable {
     /// Lag behind the thermometer, s; negative: they lead. `None`: not determined, and none is applied.
@@ -47,12 +50,24 @@ pub struct DieTable {
     pub hysteresis: Option<[[f64; 3]; 2]>,
 }
 
+/// [`PerSensor`], of a crate that has no schemas.
+#[cfg(feature = "schema")]
+#[derive(schemars::JsonSchema)]
+#[allow(dead_code)] // only its schema is used
+struct Dies {
+    /// Of the gyro.
+    gyro: DieTable,
+    /// Of the accelerometer.
+    accel: DieTable,
+}
+
 fn nothing(dies: &PerSensor<DieTable>) -> bool {
     *dies == PerSensor::default()
 }
 
 /// Inverse models at one temperature of the dies.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct TemperatureNode {
     /// °C.
@@ -67,6 +82,7 @@ pub struct TemperatureNode {
 
 /// Inverse model `x = C u + o` of a triad at a node, raw to SI, and its derivatives by the temperature.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 #[allow(non_snake_case)] // C: the letter of the formula, in the file as in the papers
 pub struct NodeTable {

@@ -20,6 +20,7 @@ pub use written::{WrittenCoefficient, WrittenConverter, WrittenParameter};
 ///
 /// In files it is a table of named numbers with their units.
 #[derive(Debug, Clone, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(into = "WrittenEffect", try_from = "WrittenEffect")]
 pub struct FittedEffect {
     /// Which, with the coefficients that are not zero.

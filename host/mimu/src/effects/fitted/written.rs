@@ -16,11 +16,13 @@ const DIRECTION: &str = "raw to SI";
 
 /// An effect as it is written.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub(super) struct WrittenEffect {
     /// Public id.
     id: String,
     /// Triad whose readings err.
+    #[cfg_attr(feature = "schema", schemars(with = "String", extend("enum" = ["gyro", "accel"])))]
     sensor: Sensor,
     /// Physics in a line.
     about: String,
@@ -40,6 +42,7 @@ pub(super) struct WrittenEffect {
 
 /// A nonlinear parameter as it is written.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct WrittenParameter {
     /// Name, with the unit.
@@ -62,6 +65,7 @@ pub struct WrittenParameter {
 
 /// How the codes of a converter stand behind readings, as it is written.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct WrittenConverter {
     /// Axes whose readings it gives: x, y or z, or xyz.
@@ -76,6 +80,7 @@ pub struct WrittenConverter {
 
 /// A coefficient as it is written.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct WrittenCoefficient {
     /// Name within the effect.

@@ -70,7 +70,10 @@ fn the_raw_topics_of_an_instance_are_what_pyulog_reads() {
         "{notes:?}"
     );
     let warned = all[0].warnings.join(" ");
-    assert!(warned.contains("dropouts of the logger: 1, 30 ms"), "{warned}");
+    assert!(
+        warned.contains("dropouts of the logger: 1, 30 ms"),
+        "{warned}"
+    );
 }
 
 /// The unit lies still. Board mounted by yaw 180 and trimmed by 0.76 and -2.94 deg; NumPy undoes `R ((raw - offset) scale)` of the numbers of pyulog.

@@ -1,0 +1,208 @@
+//! Effects in the header: their regressors as expressions in C.
+
+mod removal;
+
+use mimu::calibration::Calibration;
+use mimu::effects::fitted::FittedEffect;
+use mimu::effects::quantity::Quantity;
+use mimu::effects::regressor::{Product, Regressor};
+use mimu::quantity::{PerSensor, Sensor};
+use mimu_core::die::BEYOND_C;
+use mimu_core::effects::{DeviceEffect, Directions, RATE_LAG_S};
+use mimu_recording::error::{Error, Result};
+
+use super::number;
+
+/// The effects of a calibration.
+pub(super) struct Effects {
+    /// Ids of those that are in the header.
+    pub written: Vec<String>,
+    /// And of those that are not.
+    pub left_out: Vec<String>,
+    /// Lags of the temperatures that they need, s.
+    pub lags_s: Vec<f64>,
+    /// Sums of the three axes.
+    errors: PerSensor<[Vec<String>; 3]>,
+    codes: PerSensor<[Option<usize>; 3]>,
+    converters: Vec<DeviceEffect<f64>>,
+    directions: PerSensor<Option<Directions<f64>>>,
+    quantities: Vec<Quantity>,
+    /// Temperatures that they see, °C.
+    seen_c: Option<[f64; 2]>,
+}
+
+impl Effects {
+    pub fn of(calibration: &Calibration) -> Result<Self> {
+        let direction = |sensor| {
+            let model = calibration.inverse(sensor)?;
+            Directions::of(&model.matrix)
+        };
+        let mut all = Self {
+            written: Vec::new(),
+            left_out: Vec::new(),
+            lags_s: Vec::new(),
+            errors: PerSensor::default(),
+            codes: PerSensor::default(),
+            converters: Vec::new(),
+            directions: PerSensor::from_fn(direction),
+            quantities: Vec::new(),
+            seen_c: calibration
+                .limits()
+                .map(|[from, to]| [from - BEYOND_C, to + BEYOND_C]),
+        };
+        for effect in calibration.effects() {
+            if all.directions[effect.sensor()].is_none() {
+                let place = format!(
+                    "calibration of {:?}, [{}]",
+                    calibration.device,
+                    effect.sensor()
+                );
+                return Err(Error::new(
+                    place,
+                    "C is singular",
+                    "fit the recording again",
+                ));
+            }
+            let done = match effect.candidate.reads_code() {
+                true => all.add_codes(effect),
+                false => all.add(effect),
+            };
+            match done {
+                Some(()) => all.written.push(effect.id()),
+                None => all.left_out.push(effect.id()),
+            }
+        }
+        all.quantities.sort_unstable();
+        all.quantities.dedup();
+        Ok(all)
+    }
+
+    /// Whether nothing is removed from compensated samples.
+    pub fn is_empty(&self) -> bool {
+        Sensor::BOTH
+            .into_iter()
+            .all(|sensor| self.is_none_of(sensor))
+    }
+
+    fn is_none_of(&self, sensor: Sensor) -> bool {
+        self.errors[sensor].iter().all(Vec::is_empty)
+    }
+
+    /// Whether some follow temperature or time.
+    pub fn is_slow(&self) -> bool {
+        self.quantities.iter().any(|q| q.is_slow())
+    }
+
+    pub fn reads_code(&self) -> bool {
+        !self.converters.is_empty()
+    }
+
+    fn has(&self, of: impl Fn(&Quantity) -> bool) -> bool {
+        self.quantities.iter().any(of)
+    }
+
+    fn is_thermal(&self) -> bool {
+        self.has(|q| q.is_thermal())
+    }
+
+    fn has_time(&self) -> bool {
+        self.has(|q| *q == Quantity::Time)
+    }
+
+    fn turns(&self) -> bool {
+        self.has(|q| matches!(q, Quantity::AngularAcceleration(_)))
+    }
+
+    fn add(&mut self, effect: &FittedEffect) -> Option<()> {
+        let candidate = &effect.candidate;
+        let slots = candidate.slots();
+        let regressors = candidate.slot_regressors();
+        let mut terms = Vec::new();
+        for ((coefficient, axis), regressor) in slots.iter().zip(&regressors) {
+            let value = effect.values.get(*coefficient)?;
+            let written = self.regressor(regressor, effect.parameter, *axis)?;
+            terms.push((*axis, format!("{} * {written}", number(*value))));
+        }
+        for (axis, term) in terms {
+            self.errors[effect.sensor()][axis].push(term);
+        }
+        self.quantities
+            .extend(regressors.iter().flat_map(Regressor::quantities));
+        Some(())
+    }
+
+    fn add_codes(&mut self, effect: &FittedEffect) -> Option<()> {
+        for part in effect.on_device::<f64>().ok()? {
+            let converter = part.converter()?;
+            let at = self.converters.len();
+            self.converters.push(part);
+            for (axis, code) in self.codes[effect.sensor()].iter_mut().enumerate() {
+                if converter.axis.is_none_or(|only| only == axis) {
+                    *code = Some(at);
+                }
+            }
+        }
+        Some(())
+    }
+
+    fn regressor(&mut self, of: &Regressor, parameter: f64, axis: usize) -> Option<String> {
+        let mut quantity = |q: Quantity| self.quantity(q, parameter, axis);
+        Some(match of {
+            Regressor::Product(product) => written(product, &mut quantity)?,
+            Regressor::Sum(a, b) => {
+                let (a, b) = (written(a, &mut quantity)?, written(b, &mut quantity)?);
+                format!("({a} + {b})")
+            }
+            Regressor::Absolute(q) => format!("fabsf({})", quantity(*q)?),
+            Regressor::Decay(q) => format!("expf(-{} / {})", quantity(*q)?, number(parameter)),
+            Regressor::Logarithm(q) => {
+                format!("log1pf({} / {})", quantity(*q)?, number(parameter))
+            }
+            Regressor::Bit(_) => return None,
+        })
+    }
+
+    /// A quantity as a function of errors has it; `None` where a stream of samples does not have it.
+    fn quantity(&mut self, of: Quantity, parameter: f64, axis: usize) -> Option<String> {
+        Some(match of {
+            Quantity::Rate(i) => format!("rate[{i}]"),
+            Quantity::Force(i) => format!("force[{i}]"),
+            Quantity::Input => format!("own[{axis}]"),
+            Quantity::InputAlong(i) => format!("own[{i}]"),
+            Quantity::AngularAcceleration(i) => format!("s->angular_acceleration[{i}]"),
+            Quantity::Temperature => "s->offset_c".into(),
+            Quantity::TemperatureRate => {
+                let lag = self.lag(RATE_LAG_S);
+                format!("(s->lag_{lag} / {})", number(-RATE_LAG_S))
+            }
+            Quantity::TemperatureLag => format!("s->lag_{}", self.lag(parameter)),
+            Quantity::Time => "(float)s->time_s".into(),
+            Quantity::RateMagnitude => {
+                "sqrtf(rate[0] * rate[0] + rate[1] * rate[1] + rate[2] * rate[2])".into()
+            }
+            Quantity::SessionTime | Quantity::RecordingTime | Quantity::Up => return None,
+        })
+    }
+
+    /// Number of the temperature behind this lag, s.
+    fn lag(&mut self, lag_s: f64) -> usize {
+        let known = self.lags_s.iter().position(|known| *known == lag_s);
+        known.unwrap_or_else(|| {
+            self.lags_s.push(lag_s);
+            self.lags_s.len() - 1
+        })
+    }
+}
+
+fn written(
+    product: &Product,
+    quantity: &mut impl FnMut(Quantity) -> Option<String>,
+) -> Option<String> {
+    let mut factors = Vec::new();
+    for (q, power) in product.parts() {
+        let factor = quantity(q)?;
+        factors.extend(std::iter::repeat_n(factor, usize::from(power)));
+    }
+    let sign = if product.sign < 0.0 { "-" } else { "" };
+    Some(format!("{sign}{}", factors.join(" * ")))
+}

@@ -1,0 +1,66 @@
+//! JSON with everything that a calibration file has, under the same names, and a schema of it.
+//!
+//! Nothing is left out, so that a program needs no other file: C, o, P and b, the physical quantities, standard deviations, intervals,
+//! covariance, effects and curves. Units are in the names, or beside as `unit` and `raw_unit`.
+
+use mimu::calibration::Calibration;
+use mimu_recording::error::{Error, Result};
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use crate::remaining::{self, Places, Remaining};
+use crate::{Export, Sources, heading};
+
+/// The file.
+#[derive(Serialize, JsonSchema)]
+#[schemars(title = "Calibration of an inertial unit, by `mimu export json`")]
+struct CalibrationJson<'a> {
+    /// What a person has to know, line by line.
+    about: Vec<String>,
+    #[serde(flatten)]
+    calibration: &'a Calibration,
+    /// Errors that remain, as far as they are known.
+    remaining: Vec<Remaining>,
+}
+
+/// Text of the file.
+///
+/// # Errors
+/// There is no calibration; an effect that this build cannot evaluate.
+pub fn export(from: &Sources) -> Result<Export> {
+    let (calibration, place) = from.calibration()?;
+    let mut export = Export::new("json");
+    export
+        .formulas
+        .push("x = C u + o, raw to SI, and u = P x + b, SI to raw; C and P by rows.".into());
+    if calibration.temperature.is_some() {
+        export.formulas.push("Over temperature a number p and its slope s are (1+2w)(1-w)^2 p0 + w^2(3-2w) p1 + h w(1-w)^2 s0 - h w^2(1-w) s1 between two nodes, h apart, w from 0 to 1.".into());
+    }
+    let places = Places {
+        cross_terms: true,
+        temperature: true,
+        effects: true,
+    };
+    export.remaining = remaining::of(calibration, places)?;
+    let file = CalibrationJson {
+        about: heading::of_calibration(calibration, &export),
+        calibration,
+        remaining: export.remaining.clone(),
+    };
+    let text = serde_json::to_string_pretty(&file).map_err(|e| {
+        let problem = format!("it cannot be written as JSON: {e}");
+        Error::new(place, problem, "fit the recording again")
+    })?;
+    export.content = (text + "\n").into_bytes();
+    Ok(export)
+}
+
+/// The schema of the file, as text: `docs/calibration.schema.json`.
+pub fn schema() -> String {
+    let settings = schemars::generate::SchemaSettings::draft2020_12().for_serialize();
+    let schema = settings
+        .into_generator()
+        .into_root_schema_for::<CalibrationJson>();
+    // A value that was just made has only keys that are text.
+    serde_json::to_string_pretty(&schema).unwrap_or_default() + "\n"
+}

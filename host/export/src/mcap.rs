@@ -1,0 +1,247 @@
+//! An MCAP file for Foxglove: samples of a recording raw and compensated, and its poses on the sphere of gravity with what they err by.
+//!
+//! Everything is JSON, which Foxglove plots and every reader of MCAP decodes. The alternative, sensor_msgs/Imu of ROS 2, has no place for
+//! raw readings and spends 216 of its 320 bytes on covariances that are the same in each message.
+//!
+//! | topic | schema | what |
+//! |---|---|---|
+//! | `/raw` | `mimu.Raw` | readings as they were recorded |
+//! | `/compensated` | `mimu.Compensated` | the same sample as `mimu apply` writes it: rad/s and m/s² |
+//! | `/dwells` | `foxglove.SceneUpdate` | each dwell of the accelerometer: a point on the sphere, and its residual as an arrow |
+//!
+//! A dwell's force is the mean of its compensated samples, in units of gravity. Its residual is that minus the known force, or, where only
+//! gravity is known, minus the force of that size in the same direction; arrows are enlarged by one factor, which is in the metadata.
+
+mod scene;
+
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+use std::io::Cursor;
+use std::path::PathBuf;
+
+use mcap::records::MessageHeader;
+use mcap::write::Metadata;
+use mcap::{McapError, WriteOptions, Writer};
+use mimu::calibration::apply::Compensated;
+use mimu::prepared::Prepared;
+use mimu::quantity::Sensor;
+use mimu::signal::stillness::STILL_FACTOR;
+use mimu_recording::error::{Error, Result};
+use mimu_recording::{Batch, Recording};
+use serde_json::{Map, Value, json};
+
+use crate::remaining::{self, Places};
+use crate::{Export, Sources, heading};
+use scene::Dwells;
+
+/// What the person has decided about the file.
+#[derive(Debug, Clone)]
+#[cfg_attr(feature = "clap", derive(clap::Args))]
+pub struct Options {
+    /// Recording to compensate
+    #[cfg_attr(feature = "clap", arg(long, value_name = "REC"))]
+    pub recording: PathBuf,
+    /// Write every Nth sample only; each takes some 300 bytes
+    #[cfg_attr(feature = "clap", arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..)))]
+    pub every: u32,
+}
+
+/// Bytes of the file.
+///
+/// # Errors
+/// There is no calibration; the recording cannot be read; those of `mimu apply`.
+pub fn export(from: &Sources, options: &Options) -> Result<Export> {
+    let (calibration, _) = from.calibration()?;
+    let recording = Recording::open(&options.recording)?;
+    let place = recording.samples.display().to_string();
+    let prepared = Prepared::read(&recording, STILL_FACTOR, |_| ())?;
+    let mut export = Export::new("mcap");
+    export.formulas.push(
+        "x = C u + o, raw to SI, and what else the calibration holds: as `mimu apply` computes it."
+            .into(),
+    );
+    let places = Places {
+        cross_terms: true,
+        temperature: true,
+        effects: true,
+    };
+    export.remaining = remaining::of(calibration, places)?;
+    let mut compensated = Compensated::new(&recording, calibration, |_| ())?;
+    export
+        .notes
+        .extend(compensated.warnings().iter().map(ToString::to_string));
+    let mut file = File::new(&place)?;
+    let mut dwells = Dwells::of(&prepared);
+    let unit = calibration.recording.raw_unit.to_string();
+    compensated.for_each(
+        |_| (),
+        |raw, clean| {
+            for row in 0..raw.len() {
+                let number = raw.first_row + row as u64;
+                let force = Sensor::Accel.channels().map(|c| cell(clean, c, row));
+                dwells.add(number, force);
+                if number.is_multiple_of(u64::from(options.every)) {
+                    let t_s = raw.t_s[row];
+                    file.write(RAW, t_s, &sample(raw, row, t_s, Some(&unit)))?;
+                    file.write(COMPENSATED, t_s, &sample(clean, row, t_s, None))?;
+                }
+            }
+            Ok(())
+        },
+    )?;
+    match calibration.accel.is_some() && recording.columns.accel {
+        true => {
+            let (messages, note) = dwells.scenes(&prepared);
+            export.notes.extend(note);
+            for (t_s, message) in messages {
+                file.write(DWELLS, t_s, &message)?;
+            }
+        }
+        false => export.notes.push(
+            "There is no scene: it shows the accelerometer, and it is not calibrated.".into(),
+        ),
+    }
+    let head = heading::of_calibration(calibration, &export);
+    export.content = file.finish(&head)?;
+    Ok(export)
+}
+
+/// Topic, schema's name, and schema.
+type Topic = (&'static str, &'static str, fn() -> Value);
+
+const TOPICS: [Topic; 3] = [
+    ("/raw", "mimu.Raw", || sample_schema("raw readings", true)),
+    ("/compensated", "mimu.Compensated", || {
+        sample_schema("rad/s and m/s^2, body frame", false)
+    }),
+    ("/dwells", "foxglove.SceneUpdate", scene::schema),
+];
+const RAW: usize = 0;
+const COMPENSATED: usize = 1;
+const DWELLS: usize = 2;
+
+/// The file in memory: it appears whole or not at all.
+struct File {
+    writer: Writer<Cursor<Vec<u8>>>,
+    channels: [u16; 3],
+    sequence: u32,
+    place: String,
+}
+
+impl File {
+    fn new(place: &str) -> Result<Self> {
+        let options = WriteOptions::new().compression(None).library("mimu");
+        let make = || -> std::result::Result<_, McapError> {
+            let mut writer = options.create(Cursor::new(Vec::new()))?;
+            let mut channels = [0; 3];
+            for ((topic, name, schema), channel) in TOPICS.iter().zip(&mut channels) {
+                let text = schema().to_string();
+                let id = writer.add_schema(name, "jsonschema", text.as_bytes())?;
+                *channel = writer.add_channel(id, topic, "json", &BTreeMap::new())?;
+            }
+            Ok((writer, channels))
+        };
+        let (writer, channels) = make().map_err(|e| refused(place, &e))?;
+        Ok(Self {
+            writer,
+            channels,
+            sequence: 0,
+            place: place.into(),
+        })
+    }
+
+    fn write(&mut self, topic: usize, t_s: f64, message: &Value) -> Result<()> {
+        let log_time = nanoseconds(t_s);
+        let header = MessageHeader {
+            channel_id: self.channels[topic],
+            sequence: self.sequence,
+            log_time,
+            publish_time: log_time,
+        };
+        self.sequence = self.sequence.wrapping_add(1);
+        let text = message.to_string();
+        let written = self.writer.write_to_known_channel(&header, text.as_bytes());
+        written.map_err(|e| refused(&self.place, &e))
+    }
+
+    fn finish(mut self, head: &[String]) -> Result<Vec<u8>> {
+        let lines = head.iter().enumerate();
+        let metadata = Metadata {
+            name: "mimu".into(),
+            metadata: lines
+                .map(|(k, line)| (format!("{k:02}"), line.clone()))
+                .collect(),
+        };
+        let place = self.place;
+        let written = self.writer.write_metadata(&metadata);
+        written.map_err(|e| refused(&place, &e))?;
+        self.writer.finish().map_err(|e| refused(&place, &e))?;
+        Ok(self.writer.into_inner().into_inner())
+    }
+}
+
+fn refused(place: &str, error: &McapError) -> Error {
+    let problem = format!("it cannot be written as MCAP: {error}");
+    Error::new(place, problem, "write fewer samples with --every")
+}
+
+/// Time since the stamps' zero, ns. MCAP has none before it.
+fn nanoseconds(t_s: f64) -> u64 {
+    // Saturates.
+    (t_s * 1e9).round() as u64
+}
+
+/// As Foxglove has it.
+fn time(t_s: f64) -> Value {
+    let ns = nanoseconds(t_s);
+    json!({"sec": ns / 1_000_000_000, "nsec": ns % 1_000_000_000})
+}
+
+fn cell(batch: &Batch, channel: usize, row: usize) -> f64 {
+    batch.raw[channel].get(row).copied().unwrap_or(f64::NAN)
+}
+
+/// A sample; what has no reading is null.
+fn sample(batch: &Batch, row: usize, t_s: f64, unit: Option<&str>) -> Value {
+    let mut all = Map::new();
+    all.insert("timestamp".into(), time(t_s));
+    for sensor in Sensor::BOTH {
+        let from = sensor.channels().start;
+        if batch.raw[from].is_empty() {
+            continue;
+        }
+        let [x, y, z] = [0, 1, 2].map(|i| cell(batch, from + i, row));
+        let name: Cow<str> = match (unit, sensor) {
+            (Some(_), sensor) => sensor.name().into(),
+            (None, Sensor::Gyro) => "angular_velocity".into(),
+            (None, Sensor::Accel) => "linear_acceleration".into(),
+        };
+        all.insert(name.into(), json!({"x": x, "y": y, "z": z}));
+    }
+    if let Some(temp_c) = batch.temp_c.get(row) {
+        all.insert("temp_c".into(), json!(temp_c));
+    }
+    if let Some(unit) = unit {
+        all.insert("unit".into(), json!(unit));
+    }
+    Value::Object(all)
+}
+
+fn sample_schema(description: &str, raw: bool) -> Value {
+    let axis = json!({"type": ["number", "null"]});
+    let triad = json!({"type": "object", "properties": {"x": axis, "y": axis, "z": axis}});
+    let mut properties = json!({
+        "timestamp": scene::time_schema(),
+        "temp_c": {"type": ["number", "null"], "description": "Thermometer, degrees Celsius"},
+    });
+    let [gyro, accel] = match raw {
+        true => ["gyro", "accel"],
+        false => ["angular_velocity", "linear_acceleration"],
+    };
+    properties[gyro] = triad.clone();
+    properties[accel] = triad;
+    if raw {
+        properties["unit"] = json!({"type": "string", "description": "Unit of the readings"});
+    }
+    json!({"type": "object", "description": description, "properties": properties})
+}

@@ -1,0 +1,116 @@
+//! A made-up unit over temperature with effects of every kind, readings in volts.
+
+use std::fmt::Write as _;
+
+use mimu::calibration::Calibration;
+use nalgebra::{Matrix3, Vector3};
+
+const EFFECTS: [(&str, &str, &str); 5] = [
+    (
+        "gyro_g_sensitivity",
+        "",
+        r#"{ name = "xz", value = 4e-4, unit = "rad/s/(m/s^2)" }"#,
+    ),
+    (
+        "accel_scale_cubic",
+        "",
+        r#"{ name = "y", value = 4e-5, unit = "1/(m/s^2)^2" }"#,
+    ),
+    (
+        "gyro_thermal_lag",
+        r#"form = { name = "lag_s", value = 90.0 }"#,
+        r#"{ name = "z", value = 2e-3, unit = "rad/s/K" }"#,
+    ),
+    (
+        "term:gyro_y~rate_x*force_z^2",
+        "",
+        r#"{ name = "y", value = 1e-4, unit = "rad/s/((rad/s)*(m/s^2)*(m/s^2))" }"#,
+    ),
+    (
+        "accel_readout_code",
+        r#"converters = [{ axes = "x", weight_of_bit_0_raw = 1.65, reading_of_code_0_raw = 0.0, reading_of_code_0_within_raw = 0.0 }]"#,
+        r#"{ name = "x bit 0", value = 1e-4, unit = "1" }, { name = "x bit -3", value = -2e-4, unit = "1" }"#,
+    ),
+];
+
+fn rows(m: &Matrix3<f64>) -> String {
+    let row = |i: usize| format!("[{:e}, {:e}, {:e}]", m[(i, 0)], m[(i, 1)], m[(i, 2)]);
+    format!("[{}, {}, {}]", row(0), row(1), row(2))
+}
+
+/// P and b, SI to raw.
+fn forward(sensor: &str, temp_c: f64) -> (Matrix3<f64>, Vector3<f64>) {
+    let across = Matrix3::new(0.0, 0.01, -0.004, 0.002, 0.0, 0.006, -0.003, 0.005, 0.0);
+    let (gain, zero, per_k) = match sensor {
+        "gyro" => (0.344, 2.5, 4e-4),
+        _ => (0.0306, 1.65, -1.5e-4),
+    };
+    let scale = 1.0 + per_k * (temp_c - 20.0);
+    let bias = Vector3::new(0.01, -0.02, 0.03) * (temp_c - 20.0) / 40.0;
+    (
+        (Matrix3::identity() * scale + across) * gain,
+        bias * gain + Vector3::repeat(zero),
+    )
+}
+
+fn inverse(sensor: &str, temp_c: f64) -> (Matrix3<f64>, Vector3<f64>) {
+    let (p, b) = forward(sensor, temp_c);
+    let c = p.try_inverse().unwrap();
+    (c, -(c * b))
+}
+
+/// Without its curves and its effects it is a unit at one temperature.
+pub fn calibration(over_temperature: bool) -> Calibration {
+    let version = if over_temperature { 2 } else { 1 };
+    let mut text = format!(
+        "format = \"mimu-calibration/{version}\"\ndevice = \"unit\"\ncreated = \"2026-01-02T03:04:05Z\"\ntool = \"test\"\n[recording]\nraw_unit = \"V\"\ntemp_c = 20.0\n"
+    );
+    for (sensor, unit) in [("gyro", "rad/s"), ("accel", "m/s^2")] {
+        let ((c, o), (p, b)) = (inverse(sensor, 20.0), forward(sensor, 20.0));
+        let _ = writeln!(
+            text,
+            "[{sensor}]\nformula = \"x = C u + o\"\ndirection = \"raw to SI\"\nraw_unit = \"V\"\nunit = \"{unit}\"\nframe = \"body\"\n\
+             C = {}\no = {:?}\n[{sensor}.forward]\nformula = \"u = P x + b\"\ndirection = \"SI to raw\"\nP = {}\nb = {:?}\n\
+             [{sensor}.physical]\nformula = \"\"\nscale_factor = [1.0, 1.0, 1.0]\nbias = [0.0, 0.0, 0.0]\n\
+             misalignment_deg = [0.0, 0.0, 0.0]\nnon_orthogonality_deg = [0.0, 0.0, 0.0]",
+            rows(&c),
+            o.as_slice(),
+            rows(&p),
+            b.as_slice()
+        );
+    }
+    if over_temperature {
+        text += "[temperature]\nrange_c = [-20.0, 60.0]\ndies.gyro.lag_s = 60.0\ndies.accel.lag_s = -20.0\n";
+        for temp_c in [-20.0, 10.0, 30.0, 60.0] {
+            let _ = writeln!(text, "[[temperature.node]]\ntemp_c = {temp_c:?}");
+            for sensor in ["gyro", "accel"] {
+                let (c, o) = inverse(sensor, temp_c);
+                let h = 1e-3;
+                let ((ca, oa), (cb, ob)) =
+                    (inverse(sensor, temp_c - h), inverse(sensor, temp_c + h));
+                let slope_o = (ob - oa) / (2.0 * h);
+                let _ = writeln!(
+                    text,
+                    "[temperature.node.{sensor}]\nC = {}\no = {:?}\nslope_C = {}\nslope_o = {:?}",
+                    rows(&c),
+                    o.as_slice(),
+                    rows(&((cb - ca) / (2.0 * h))),
+                    slope_o.as_slice()
+                );
+            }
+        }
+        for (id, more, coefficients) in EFFECTS {
+            let sensor = if id.contains("gyro_") {
+                "gyro"
+            } else {
+                "accel"
+            };
+            let _ = writeln!(
+                text,
+                "[[effect]]\nid = \"{id}\"\nsensor = \"{sensor}\"\nabout = \"\"\nformula = \"x = C (u - S e) + o, e_i = sum of coefficient * regressor\"\n\
+                 direction = \"raw to SI\"\n{more}\ncoefficients = [{coefficients}]"
+            );
+        }
+    }
+    Calibration::parse(&text, "test").unwrap()
+}
