@@ -8,13 +8,14 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Crates, as folders from the root of the repository.
-const CRATES: [&str; 10] = [
+const CRATES: [&str; 11] = [
     "core",
     "firmware",
     "host/recording",
     "host/mimu",
     "host/thermal",
     "host/device",
+    "host/export",
     "host/wizard",
     "host/cli",
     "rig",
