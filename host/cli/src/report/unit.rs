@@ -38,7 +38,7 @@ pub struct UnitReport<'a> {
 /// The page of a unit.
 ///
 /// # Errors
-/// Those of [`Sections::new`].
+/// A model of the diagnosis is singular, so that there is nothing to draw.
 pub fn unit_page(unit: &UnitReport, made: &Made) -> Result<String> {
     let found = unit.diagnosis.map(|d| Sections::new(d, made)).transpose()?;
     let found = found.as_ref();
