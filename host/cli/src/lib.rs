@@ -40,7 +40,7 @@ enum Command {
     /// From an uncalibrated board to a verified one: says what to do, watches, fits, stores and verifies
     Wizard(wizard::WizardArgs),
     /// Make a recording of foreign files
-    Import(import::ImportArgs),
+    Import(Box<import::ImportArgs>),
     /// Calibrate the gyro and the accelerometer of a recording
     Fit(fit::FitArgs),
     /// Judge a calibration by another recording
@@ -73,7 +73,7 @@ pub fn run() -> ExitCode {
     let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|e| e.exit());
     let done = match cli.command {
         Command::Wizard(args) => wizard::run(&args),
-        Command::Import(args) => import::run(args),
+        Command::Import(args) => import::run(*args),
         Command::Fit(args) => fit::run(&args),
         Command::Verify(args) => verify::run(&args),
         Command::Apply(args) => apply::run(&args),

@@ -16,7 +16,8 @@ const CLASSES: [&str; 3] = ["axis-x", "axis-y", "axis-z"];
 /// The table and the curves.
 pub fn section(noise: &NoiseFile) -> Markup {
     html! {
-        p { "From " (number(noise.duration_s, 1.0 / 3600.0, "h")) " at rest at " (number(noise.sample_rate_hz, 1.0, "Hz")) "." }
+        @let (by, unit) = if noise.duration_s < 7200.0 { (60.0, "min") } else { (3600.0, "h") };
+        p { "From " (number(noise.duration_s, 1.0 / by, unit)) " at rest at " (number(noise.sample_rate_hz, 1.0, "Hz")) ", of the unit " (noise.device) "." }
         @for sensor in Sensor::BOTH {
             @let channels = noise.of(sensor);
             @if !channels.is_empty() { (coefficients(sensor, &channels, noise.confidence)) }
@@ -47,15 +48,14 @@ fn coefficients(sensor: Sensor, channels: &[&NoiseChannel], confidence: f64) -> 
                     tr {
                         td { (channel.name) @if let Some(t) = channel.temp_c { ", " (number(t, 1.0, "°C")) } }
                         @for term in terms {
-                            td class="n" {
-                                @match channel.get(term) {
-                                    Ok(c) => {
-                                        @let unit = readable::noise(&c.unit).remove(0);
-                                        (number(c.value, unit.factor, "")) " (" (number(c.lower, unit.factor, "")) " to "
-                                        (number(c.upper, unit.factor, "")) ") " (unit.unit)
-                                    }
-                                    Err(why) => span class="dim" { (why) },
-                                }
+                            @match channel.get(term) {
+                                Ok(c) => td class="n" {
+                                    @let unit = readable::noise(&c.unit).remove(0);
+                                    (number(c.value, unit.factor, "")) " (" (number(c.lower, unit.factor, "")) " to "
+                                    (number(c.upper, unit.factor, "")) ") " (unit.unit)
+                                },
+                                // What would show it is in the noise file.
+                                Err(why) => td { span class="dim" { (why.split(';').next().unwrap_or(why)) } },
                             }
                         }
                     }
