@@ -6,9 +6,9 @@
 use mimu::quantity::Sensor;
 use mimu_recording::Reference;
 use mimu_recording::error::{Argument, Error, Result};
-use serde::Serialize;
 
 use crate::session::Session;
+use crate::used::Used;
 use crate::warning::Warning;
 
 /// Width of the temperatures that count as one, K.
@@ -19,72 +19,40 @@ const FEWEST_TEMPERATURES: f64 = 0.7;
 /// Below this share a person is to know.
 const MOST: f64 = 0.9;
 
-/// What of the recordings a sensor's curves rest on.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Coverage {
-    /// Share of the samples.
-    pub samples: f64,
-    /// Share of the temperatures of the thermometer, in steps of a kelvin.
-    pub temperatures: f64,
-    /// Lowest and highest temperature of the thermometer at what is used, °C.
-    pub used_c: [f64; 2],
-    /// Lowest and highest temperature of the thermometer, °C.
-    pub recorded_c: [f64; 2],
-}
-
-impl Coverage {
-    /// Of `sensor` in `sessions`; `None` if they have no rows of it.
-    pub fn of(sessions: &[Session], sensor: Sensor) -> Option<Self> {
-        let bin = |t: f64| (t / BIN_K).floor() as i64;
-        let (mut recorded, mut used) = (Vec::new(), Vec::new());
-        let (mut all, mut taken) = (0.0, 0.0);
-        let none = [f64::INFINITY, f64::NEG_INFINITY];
-        let (mut recorded_c, mut used_c) = (none, none);
-        let widen = |range: &mut [f64; 2], t: f64| *range = [range[0].min(t), range[1].max(t)];
-        for session in sessions {
-            let rows = &session.rows[sensor];
-            let thermometer = &session.thermometer;
-            all += session.samples;
-            taken += rows.iter().map(|r| r.samples).sum::<f64>();
-            for row in rows {
-                let (t, _) = thermometer.at(row.middle_s);
-                used.push(bin(t));
-                widen(&mut used_c, t);
-            }
-            for second in 0..=thermometer.duration_s() as u64 {
-                let (t, _) = thermometer.at(thermometer.start_s() + second as f64);
-                recorded.push(bin(t));
-                widen(&mut recorded_c, t);
-            }
+/// What the curves of `sensor` rest on in `sessions`; `None` if they have no rows of it.
+pub fn of(sessions: &[Session], sensor: Sensor) -> Option<Used> {
+    let bin = |t: f64| (t / BIN_K).floor() as i64;
+    let (mut recorded, mut used) = (Vec::new(), Vec::new());
+    let (mut all, mut taken) = (0.0, 0.0);
+    let none = [f64::INFINITY, f64::NEG_INFINITY];
+    let (mut recorded_c, mut used_c) = (none, none);
+    let widen = |range: &mut [f64; 2], t: f64| *range = [range[0].min(t), range[1].max(t)];
+    for session in sessions {
+        let rows = &session.rows[sensor];
+        let thermometer = &session.thermometer;
+        all += session.samples;
+        taken += rows.iter().map(|r| r.samples).sum::<f64>();
+        for row in rows {
+            let (t, _) = thermometer.at(row.middle_s);
+            used.push(bin(t));
+            widen(&mut used_c, t);
         }
-        for bins in [&mut recorded, &mut used] {
-            bins.sort_unstable();
-            bins.dedup();
+        for second in 0..=thermometer.duration_s() as u64 {
+            let (t, _) = thermometer.at(thermometer.start_s() + second as f64);
+            recorded.push(bin(t));
+            widen(&mut recorded_c, t);
         }
-        (!used.is_empty()).then(|| Self {
-            samples: taken / all,
-            temperatures: used.len() as f64 / recorded.len() as f64,
-            used_c,
-            recorded_c,
-        })
     }
-
-    /// In one line.
-    pub fn words(&self) -> String {
-        let percent = |share: f64| match share {
-            // What is nearly all is not all.
-            share if share < 1.0 => (100.0 * share).min(99.9),
-            _ => 100.0,
-        };
-        format!(
-            "{:.1} % of the samples, {:.1} to {:.1} °C of {:.1} to {:.1} °C",
-            percent(self.samples),
-            self.used_c[0],
-            self.used_c[1],
-            self.recorded_c[0],
-            self.recorded_c[1]
-        )
+    for bins in [&mut recorded, &mut used] {
+        bins.sort_unstable();
+        bins.dedup();
     }
+    (!used.is_empty()).then(|| Used {
+        samples: taken / all,
+        temperatures: used.len() as f64 / recorded.len() as f64,
+        used_c,
+        recorded_c,
+    })
 }
 
 /// Refuses recordings at rest of which too little is used; a warning for each sensor where much is left out. With a table, what is between
@@ -94,18 +62,18 @@ pub fn check(sessions: &[Session], warnings: &mut Vec<Warning>) -> Result<()> {
         return Ok(());
     }
     for sensor in Sensor::BOTH {
-        let Some(coverage) = Coverage::of(sessions, sensor) else {
+        let Some(used) = of(sessions, sensor) else {
             continue;
         };
-        let Coverage {
+        let Used {
             samples,
             temperatures,
             ..
-        } = coverage;
+        } = used;
         if samples < FEWEST_SAMPLES || temperatures < FEWEST_TEMPERATURES {
             let problem = format!(
                 "of the {sensor} only {} are found to be at rest",
-                coverage.words()
+                used.words()
             );
             let remedy = "record the unit at rest, or declare that it was";
             return Err(
@@ -113,7 +81,7 @@ pub fn check(sessions: &[Session], warnings: &mut Vec<Warning>) -> Result<()> {
             );
         }
         if samples.min(temperatures) < MOST {
-            warnings.push(Warning::Coverage(sensor, coverage));
+            warnings.push(Warning::Coverage(sensor, used));
         }
     }
     Ok(())

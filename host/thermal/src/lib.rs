@@ -5,7 +5,7 @@
 //! | [`thermometer`] | the thermometer of a recording, and the temperature of a die that follows it |
 //! | [`excitation`] | whether inputs tell all parameters apart |
 //! | [`session`] | a recording as means of some seconds with their known input |
-//! | [`coverage`] | how much of the recordings these are |
+//! | [`coverage`], [`used`] | how much of the recordings these are |
 //! | [`basis`] | the functions of temperature that a curve is a sum of |
 //! | [`regression`] | the readings of a triad as a linear regression |
 //! | [`smoothness`], [`noise`] | its variance components: how smooth the curves are, how the readings are disturbed |
@@ -49,4 +49,5 @@ pub mod session;
 pub mod smoothness;
 pub mod suitability;
 pub mod thermometer;
+pub mod used;
 pub mod warning;

@@ -6,11 +6,12 @@ use mimu::triad::Estimate;
 use mimu_recording::RawUnit;
 use serde::Serialize;
 
-use crate::coverage::Coverage;
+use crate::coverage;
 use crate::curves::TriadCurves;
 use crate::fit::{ThermalFit, Verdict, range};
 use crate::judge::{Bin, DwellError, Hysteresis, rms};
 use crate::profile::{Lag, RANGE};
+use crate::used::Used;
 use crate::warning::Warning;
 
 /// Temperatures that a curve is given at.
@@ -59,7 +60,7 @@ pub struct SensorResult {
     /// Unit of the figures: SI, that of the readings where only biases are estimated.
     pub unit: String,
     /// What of the recordings is used.
-    pub used: Option<Coverage>,
+    pub used: Option<Used>,
     /// Compensated dwell means minus known input, over dwells and axes, rms; null where the input is not known.
     pub rms: Option<f64>,
     /// The same of data that were held out; null where none were.
@@ -167,7 +168,7 @@ impl SensorResult {
                 true => raw_unit(fit.sessions[0].raw_unit, sensor.unit()),
                 false => sensor.unit().into(),
             },
-            used: Coverage::of(&fit.sessions, sensor),
+            used: coverage::of(&fit.sessions, sensor),
             rms: figures.map(|f| f[0]),
             held_out_rms: held_out.map(|h| rms(h)[0]),
             held_out_rms_without_session_bias: judged.and_then(|j| j.without_session_bias),

@@ -7,7 +7,7 @@ use mimu_recording::RawUnit;
 use serde::{Serialize, Serializer};
 
 use crate::bias_jumps::BiasJump;
-use crate::coverage::Coverage;
+use crate::used::Used;
 
 /// Jumps of a bias that are named at most.
 const NAMED: usize = 3;
@@ -22,7 +22,7 @@ pub enum Warning {
     /// Jumps of the gyro's bias, and the unit of the readings.
     BiasJumps(Vec<BiasJump>, RawUnit),
     /// How much of the recordings a sensor's curves rest on.
-    Coverage(Sensor, Coverage),
+    Coverage(Sensor, Used),
     /// Temperatures that no recording crosses, °C.
     NotCrossed([f64; 2]),
     /// Temperatures, K, that are too few for curvature.
@@ -77,10 +77,10 @@ impl fmt::Display for Warning {
                     each.join(", ")
                 )
             }
-            Self::Coverage(sensor, coverage) => write!(
+            Self::Coverage(sensor, used) => write!(
                 f,
                 "the {sensor} uses {}: the rest is not found to be at rest, or is clipped",
-                coverage.words()
+                used.words()
             ),
             Self::NotCrossed([low, high]) => write!(
                 f,

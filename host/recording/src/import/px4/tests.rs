@@ -269,7 +269,7 @@ fn an_instance_is_asked_for_where_there_are_several_and_the_instances_are_listed
         all[0]
             .warnings
             .iter()
-            .any(|w| w.contains("1 times, 250 ms")),
+            .any(|w| w.contains("logger: 1, 250 ms")),
         "{:?}",
         all[0].warnings
     );

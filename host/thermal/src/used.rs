@@ -1,0 +1,35 @@
+//! What of the recordings a sensor's curves rest on, in numbers and in words.
+
+use serde::Serialize;
+
+/// What of the recordings a sensor's curves rest on.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Used {
+    /// Share of the samples.
+    pub samples: f64,
+    /// Share of the temperatures of the thermometer, in steps of a kelvin.
+    pub temperatures: f64,
+    /// Lowest and highest temperature of the thermometer at what is used, °C.
+    pub used_c: [f64; 2],
+    /// Lowest and highest temperature of the thermometer, °C.
+    pub recorded_c: [f64; 2],
+}
+
+impl Used {
+    /// In one line.
+    pub fn words(&self) -> String {
+        let percent = |share: f64| match share {
+            // What is nearly all is not all.
+            share if share < 1.0 => (100.0 * share).min(99.9),
+            _ => 100.0,
+        };
+        format!(
+            "{:.1} % of the samples, {:.1} to {:.1} °C of {:.1} to {:.1} °C",
+            percent(self.samples),
+            self.used_c[0],
+            self.used_c[1],
+            self.recorded_c[0],
+            self.recorded_c[1]
+        )
+    }
+}
