@@ -18,9 +18,9 @@ def write(folder):
     """Writes it; its path."""
     text = f'format = "mimu-noise/1"\ndevice = "unit"\nsample_rate_hz = {RATE_HZ}\nduration_s = 7200.0\nconfidence = 0.95\n'
     for name, (n, k) in CHANNELS.items():
-        white, walk = ("rad/s", "rad/s") if name.startswith("gyro") else ("m/s^2", "m/s^2")
-        text += f'[[channel]]\nname = "{name}"\nunit = "{white}"\nsamples = 1440000\n'
-        for key, value, unit in [("n", n, f"{white}/√Hz"), ("k", k, f"{walk}/s/√Hz")]:
+        si = "rad/s" if name.startswith("gyro") else "m/s^2"
+        text += f'[[channel]]\nname = "{name}"\nunit = "{si}"\nsamples = 1440000\n'
+        for key, value, unit in [("n", n, f"{si}/sqrt(Hz)"), ("k", k, f"{si}/sqrt(s)")]:
             text += f'[channel.{key}]\nvalue = {value}\nsigma = {value / 50}\nlower = {value * 0.96}\nupper = {value * 1.04}\nunit = "{unit}"\n'
     path = folder / "noise.toml"
     path.write_text(text)

@@ -41,7 +41,7 @@ fn coefficients(sensor: Sensor, channels: &[&NoiseChannel], confidence: f64) -> 
             caption { (spoken(sensor)) ": noise coefficients with " (format!("{:.0}", 100.0 * confidence)) " % intervals" }
             thead { tr {
                 th { "channel" }
-                @for term in terms { th class="n" { (term.letter()) ", " (term.name()) } }
+                @for term in terms { th class="n" { (term.letter()) ", " (term.name()) (unit_of(channels, term)) } }
             } }
             tbody {
                 @for channel in channels {
@@ -52,7 +52,7 @@ fn coefficients(sensor: Sensor, channels: &[&NoiseChannel], confidence: f64) -> 
                                 Ok(c) => td class="n" {
                                     @let unit = readable::noise(&c.unit).remove(0);
                                     (number(c.value, unit.factor, "")) " (" (number(c.lower, unit.factor, "")) " to "
-                                    (number(c.upper, unit.factor, "")) ") " (unit.unit)
+                                    (number(c.upper, unit.factor, "")) ")"
                                 },
                                 // What would show it is in the noise file.
                                 Err(why) => td { span class="dim" { (why.split(';').next().unwrap_or(why)) } },
@@ -63,6 +63,14 @@ fn coefficients(sensor: Sensor, channels: &[&NoiseChannel], confidence: f64) -> 
             }
         } }
     }
+}
+
+/// Unit of a column, behind a comma; all channels of a sensor have the same.
+fn unit_of(channels: &[&NoiseChannel], term: Term) -> String {
+    let known = channels.iter().find_map(|c| c.get(term).ok());
+    known.map_or_else(String::new, |c| {
+        format!(", {}", readable::noise(&c.unit)[0].unit)
+    })
 }
 
 fn deviation(channel: &NoiseChannel, tau_s: f64) -> f64 {
