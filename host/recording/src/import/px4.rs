@@ -248,6 +248,10 @@ impl Log {
                         .chain(temperature.then(|| topic.temp_c[row])),
                 );
             }
+            if let Some(undone) = &undone {
+                let all = undone.warnings.iter();
+                (readings.warnings).extend(all.map(|w| format!("{name} instance {instance}: {w}")));
+            }
             let is = match &undone {
                 Some(undone) => undone.said.clone(),
                 None => "before PX4's calibration".into(),

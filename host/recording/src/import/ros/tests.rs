@@ -73,12 +73,12 @@ fn a_cut_or_damaged_file_is_refused_and_does_not_panic() {
     for name in ["imu.bag", "imu.mcap", "imu.db3"] {
         let whole = std::fs::read(fixture(name)).unwrap();
         let path = folder.path().join(name);
-        for end in (0..whole.len()).step_by(whole.len() / 120 | 1) {
+        for end in (0..whole.len()).step_by((whole.len() / 120) | 1) {
             std::fs::write(&path, &whole[..end]).unwrap();
             let error = open(&path, Some("/imu")).unwrap_err().to_string();
             assert!(error.contains(name), "{error}");
         }
-        for at in (0..whole.len()).step_by(whole.len() / 900 | 1) {
+        for at in (0..whole.len()).step_by((whole.len() / 900) | 1) {
             let mut damaged = whole.clone();
             damaged[at] ^= 0x55;
             std::fs::write(&path, damaged).unwrap();
