@@ -41,7 +41,7 @@ pub struct Options {
     /// Recording to compensate
     #[cfg_attr(feature = "clap", arg(long, value_name = "REC"))]
     pub recording: PathBuf,
-    /// Write every Nth sample only; each takes some 300 bytes
+    /// Write every Nth sample only; each takes some 480 bytes
     #[cfg_attr(feature = "clap", arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..)))]
     pub every: u32,
 }
