@@ -35,7 +35,7 @@ pub type Options = parameters::Options;
 /// Biases over temperature, or offsets and scale factors at one.
 ///
 /// # Errors
-/// There is no calibration; those of [`BiasCubics::of`] or of `Conversion::of`; an offset or a scale factor beyond what ArduPilot takes.
+/// The calibration is missing; those of [`BiasCubics::of`] or of `Conversion::of`; an offset or a scale factor beyond what ArduPilot takes.
 pub fn export(from: &Sources, options: &Options) -> Result<Export> {
     let (calibration, _) = from.calibration()?;
     let mut export = Export::new("ardupilot");

@@ -38,7 +38,7 @@ pub struct Options {
 /// Text of the header.
 ///
 /// # Errors
-/// There is no calibration; the prefix is no name in C; an effect that no device removes.
+/// The calibration is missing; the prefix is no name in C; an effect that no device removes.
 pub fn export(from: &Sources, options: &Options) -> Result<Export> {
     let (calibration, _) = from.calibration()?;
     let prefix = options.prefix.as_str();

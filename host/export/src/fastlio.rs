@@ -25,7 +25,7 @@ pub struct Options {
 /// The keys of the inertial unit.
 ///
 /// # Errors
-/// There is no noise; those of [`crate::worst_axis::WalkOptions::densities`].
+/// The noise is missing; those of [`crate::worst_axis::WalkOptions::densities`].
 pub fn export(from: &Sources, options: &Options) -> Result<Export> {
     let noise = from.noise()?;
     let densities = options.noise.walks.calibrated(noise)?;

@@ -19,7 +19,7 @@ use crate::{Export, Sources, heading};
 /// Text of the header.
 ///
 /// # Errors
-/// There is no calibration; those of [`Misalignment::of`].
+/// The calibration is missing; those of [`Misalignment::of`].
 pub fn export(from: &Sources) -> Result<Export> {
     let (calibration, place) = from.calibration()?;
     let mut export = Export::new("fusion");

@@ -16,7 +16,7 @@ pub type Options = driver::Options;
 /// Text of `imu_calib.yaml`.
 ///
 /// # Errors
-/// There is no calibration of an accelerometer; C is singular.
+/// The calibration is missing of an accelerometer; C is singular.
 pub fn export(from: &Sources, options: &Options) -> Result<Export> {
     let (calibration, place) = from.calibration()?;
     let readings = options.readings(calibration, place, Sensor::Accel)?;

@@ -37,7 +37,7 @@ pub struct Options {
 /// Text of the file.
 ///
 /// # Errors
-/// There is no calibration of the triad; those of [`Misalignment::of`].
+/// The calibration is missing of the triad; those of [`Misalignment::of`].
 pub fn export(from: &Sources, options: &Options) -> Result<Export> {
     let (calibration, place) = from.calibration()?;
     let sensor = match options.sensor {

@@ -26,7 +26,7 @@ struct CalibrationJson<'a> {
 /// Text of the file.
 ///
 /// # Errors
-/// There is no calibration; an effect that this build cannot evaluate.
+/// The calibration is missing; an effect that this build cannot evaluate.
 pub fn export(from: &Sources) -> Result<Export> {
     let (calibration, place) = from.calibration()?;
     let mut export = Export::new("json");

@@ -50,7 +50,7 @@ pub struct Options {
 /// Text of `imu.yaml`.
 ///
 /// # Errors
-/// There is no noise; those of [`crate::worst_axis::WalkOptions::densities`] and of [`Intrinsics::of`].
+/// The noise is missing; those of [`crate::worst_axis::WalkOptions::densities`] and of [`Intrinsics::of`].
 pub fn export(from: &Sources, options: &Options) -> Result<Export> {
     let noise = from.noise()?;
     let mut export = Export::new("kalibr");

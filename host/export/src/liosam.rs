@@ -29,7 +29,7 @@ pub struct Options {
 /// The keys of the inertial unit.
 ///
 /// # Errors
-/// There is no noise; those of [`WalkOptions::densities`].
+/// The noise is missing; those of [`WalkOptions::densities`].
 pub fn export(from: &Sources, options: &Options) -> Result<Export> {
     let noise = from.noise()?;
     let densities = options.walks.calibrated(noise)?;

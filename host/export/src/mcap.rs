@@ -49,7 +49,7 @@ pub struct Options {
 /// Bytes of the file.
 ///
 /// # Errors
-/// There is no calibration; the recording cannot be read; those of `mimu apply`.
+/// The calibration is missing; the recording cannot be read; those of `mimu apply`.
 pub fn export(from: &Sources, options: &Options) -> Result<Export> {
     let (calibration, _) = from.calibration()?;
     let recording = Recording::open(&options.recording)?;

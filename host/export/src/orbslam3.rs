@@ -18,7 +18,7 @@ pub type Options = NoiseOptions;
 /// The keys of the inertial unit.
 ///
 /// # Errors
-/// There is no noise; those of [`crate::worst_axis::WalkOptions::densities`].
+/// The noise is missing; those of [`crate::worst_axis::WalkOptions::densities`].
 pub fn export(from: &Sources, options: &Options) -> Result<Export> {
     let noise = from.noise()?;
     let densities = options.walks.calibrated(noise)?;

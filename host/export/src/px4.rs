@@ -26,7 +26,7 @@ const SCALES: [f64; 2] = [0.1, 3.0];
 /// Biases over temperature, or offsets and scale factors at one.
 ///
 /// # Errors
-/// There is no calibration; those of [`BiasCubics::of`] or of `Conversion::of`; a scale factor beyond what PX4 takes.
+/// The calibration is missing; those of [`BiasCubics::of`] or of `Conversion::of`; a scale factor beyond what PX4 takes.
 pub fn export(from: &Sources, options: &Options) -> Result<Export> {
     let (calibration, _) = from.calibration()?;
     let mut export = Export::new("px4");

@@ -51,7 +51,7 @@ pub struct Options {
 /// The bytes, or the text.
 ///
 /// # Errors
-/// There is no calibration, or it lacks a triad; C is singular.
+/// The calibration is missing, or it lacks a triad; C is singular.
 pub fn export(from: &Sources, options: &Options) -> Result<Export> {
     let (calibration, place) = from.calibration()?;
     let of = |sensor| options.driver.readings(calibration, place, sensor);

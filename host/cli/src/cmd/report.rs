@@ -102,7 +102,7 @@ pub fn run(args: &ReportArgs) -> Result<()> {
         .transpose()?;
     let found = match recordings.is_empty() {
         true => None,
-        false => Some(diagnosed(&recordings, &others)?),
+        false => Some(diagnosed(&recordings, &others, args.still.factor)?),
     };
     let calibration = match (&inputs.calibration, &found) {
         (Some(path), _) => Calibration::read(path)?,
@@ -149,6 +149,7 @@ pub fn run(args: &ReportArgs) -> Result<()> {
 fn diagnosed(
     recordings: &[(String, Prepared)],
     others: &[(String, Prepared)],
+    still_factor: f64,
 ) -> Result<(Diagnosis, DiagnosisResult)> {
     let mut all = recordings.iter().map(|r| r.1.clone());
     let first = all.next().ok_or_else(|| {
@@ -168,7 +169,7 @@ fn diagnosed(
     let options = Options {
         method: Method::LeastSquares,
         holdout_blocks: 0,
-        still_factor: mimu::signal::stillness::STILL_FACTOR,
+        still_factor,
         only: None,
     };
     let diagnosis = diagnose(recordings, options)?;
