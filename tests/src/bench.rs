@@ -186,15 +186,21 @@ pub fn wander(plan: &str, file: &RigFile, seed: u64) -> [[f64; 3]; 2] {
 
 /// What a unit reads at `at_s` beyond what it would read without an effect, which is a straight line of time: the effect is the one in
 /// `files[0]` that `files[1]` lacks. Raw.
+///
+/// By the line through all samples: a converter rounds each, and the first and the last alone gave half a count for a fifth of one.
 pub fn drifted(plan: &str, files: [&RigFile; 2], seed: u64, at_s: f64) -> [[f64; 3]; 2] {
     let plan = Plan::parse(Source::new("plan", plan)).expect("a plan");
     let all = differences(&plan, files, seed);
-    let (Some((from_s, first)), Some((to_s, last))) = (all.first(), all.last()) else {
-        return [[0.0; 3]; 2];
-    };
-    let share = (at_s - from_s) / (to_s - from_s);
-    let at = |k: usize, i: usize| first[k][i] + share * (last[k][i] - first[k][i]);
-    std::array::from_fn(|k| std::array::from_fn(|i| at(k, i)))
+    let n = all.len() as f64;
+    let mean_s = all.iter().map(|d| d.0).sum::<f64>() / n;
+    let spread = all.iter().map(|d| (d.0 - mean_s).powi(2)).sum::<f64>();
+    std::array::from_fn(|k| {
+        std::array::from_fn(|i| {
+            let mean = all.iter().map(|d| d.1[k][i]).sum::<f64>() / n;
+            let along = all.iter().map(|d| (d.0 - mean_s) * d.1[k][i]).sum::<f64>();
+            mean + along / spread * (at_s - mean_s)
+        })
+    })
 }
 
 /// Time, and what the first of two units reads more than the second: gyro and accelerometer, raw. All else is the same bits.
