@@ -9,10 +9,14 @@ COUNTED := $(CARGO) build --locked -p mimu-counted --profile image --target $(TA
 # All whose tests run on the PC.
 ON_PC := --workspace --exclude mimu-counted --exclude mimu-no-panic
 
+MDBOOK := 0.5.4
+LOWEST := $(shell sed -n 's/^rust-version = "\(.*\)"/\1/p' Cargo.toml)
+PUBLISHED := mimu-core mimu-recording mimu mimu-thermal mimu-device mimu-export mimu-wizard mimu-cli
+
 # Of `make test`, and each also by itself: `make clippy`. Tests are linked before they run, so that both times are seen.
 STAGES := fmt clippy rustdoc images no-panic build-tests run-tests interop
 
-.PHONY: help test $(STAGES) nightly dist demo faults example papers blind bench budget device fuzz audit toolchain
+.PHONY: help test $(STAGES) nightly dist book msrv package demo faults example papers blind bench budget device fuzz audit toolchain
 
 help: ## this list
 	@sed -n 's/^\([a-z]*\):.*## /  make \1\t/p' Makefile
@@ -68,9 +72,23 @@ interop:
 	$(CARGO) build --locked -q -p mimu-cli --bin mimu
 	./tests/interop/run.sh target/debug/mimu
 
-dist: toolchain ## the command to hand out: target/dist/mimu, stripped
-	$(CARGO) build --locked --profile dist -p mimu-cli --bin mimu
-	@ls -l target/dist/mimu
+DIST_TARGET ?= x86_64-unknown-linux-gnu
+dist: toolchain ## an archive for any Linux since glibc 2.28: command, manual, completions, udev rule; DIST_TARGET=aarch64-unknown-linux-gnu is another
+	@rustup target add --toolchain $(TOOLCHAIN) $(DIST_TARGET)
+	./packaging/dist.sh "$(CARGO)" $(DIST_TARGET)
+
+book: toolchain ## the documentation as a site, target/book, with search; its links are checked
+	@test "$$(target/tools/bin/mdbook --version 2>/dev/null)" = "mdbook v$(MDBOOK)" \
+	  || $(CARGO) install --locked --root target/tools --no-default-features --features search --version $(MDBOOK) mdbook
+	python3 docs/book.py target/tools/bin/mdbook target/book
+
+# The lowest Rust that builds the crates for PCs: that of nalgebra. The emulator needs the newest, and only tests need the emulator.
+msrv: ## the command compiles with the Rust that Cargo.toml says is enough
+	rustup toolchain install $(LOWEST) --profile minimal
+	cargo +$(LOWEST) check --locked -p mimu-cli
+
+package: toolchain ## every crate that is published, as its archive, built from it
+	$(CARGO) package --locked $(PUBLISHED:%=-p %)
 
 nightly: toolchain blind fuzz ## what takes hours: more seeds, ten minutes of samples, 300 supply cuts, coverage, blind, fuzz; prints its figures
 	$(FIRMWARE)

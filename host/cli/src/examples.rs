@@ -5,7 +5,7 @@ use clap::CommandFactory;
 use crate::Cli;
 
 /// Subcommand, and what a person types.
-const EXAMPLES: [(&str, &[&str]); 14] = [
+const EXAMPLES: [(&str, &[&str]); 16] = [
     (
         "wizard",
         &[
@@ -89,6 +89,8 @@ const EXAMPLES: [(&str, &[&str]); 14] = [
             "mimu device upload cal.toml --port /dev/ttyACM0",
         ],
     ),
+    ("completions", &["mimu completions bash"]),
+    ("man", &["mimu man -o man1"]),
 ];
 
 /// The command with its examples.

@@ -65,6 +65,10 @@ enum Command {
     Record(record::RecordArgs),
     /// Talk with a device: info, stream, upload, download, self-test, counters, check, kalman
     Device(device::DeviceArgs),
+    /// Print a script with which a shell completes subcommands, flags and values
+    Completions(cmd::completions::CompletionsArgs),
+    /// Write the manual: one page for each subcommand
+    Man(cmd::man::ManArgs),
 }
 
 /// Parses the arguments of the process and runs the subcommand; prints an error in one line.
@@ -86,6 +90,8 @@ pub fn run() -> ExitCode {
         Command::Report(args) => cmd::report::run(&args),
         Command::Record(args) => record::run(&args),
         Command::Device(args) => device::run(&args),
+        Command::Completions(args) => cmd::completions::run(&args),
+        Command::Man(args) => cmd::man::run(&args),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

@@ -3,12 +3,14 @@
 pub(crate) mod allan;
 pub(crate) mod apply;
 pub(crate) mod compare;
+pub(crate) mod completions;
 pub(crate) mod design;
 pub(crate) mod device;
 pub(crate) mod diagnose;
 pub(crate) mod export;
 pub(crate) mod fit;
 pub(crate) mod import;
+pub(crate) mod man;
 pub(crate) mod record;
 pub(crate) mod report;
 pub(crate) mod thermal;

@@ -1,0 +1,21 @@
+//! `mimu completions`.
+
+use clap::Args;
+use clap_complete::Shell;
+use mimu_recording::error::Result;
+
+use crate::examples;
+use crate::output::show;
+
+#[derive(Args)]
+pub struct CompletionsArgs {
+    /// Shell that reads the script
+    shell: Shell,
+}
+
+pub fn run(args: &CompletionsArgs) -> Result<()> {
+    // Into memory first: the generator panics where the reader of a pipe is gone.
+    let mut script = Vec::new();
+    clap_complete::generate(args.shell, &mut examples::command(), "mimu", &mut script);
+    show(&String::from_utf8_lossy(&script))
+}

@@ -1,0 +1,42 @@
+//! `mimu man`.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use clap_mangen::Man;
+use mimu_recording::error::{Error, Result};
+use mimu_recording::result_file::{Staged, stage};
+
+use crate::examples;
+
+#[derive(Args)]
+pub struct ManArgs {
+    /// Folder for the pages, `mimu.1`, `mimu-fit.1` and so on; made if it is not there
+    #[arg(short, long, value_name = "FOLDER")]
+    output: PathBuf,
+}
+
+pub fn run(args: &ManArgs) -> Result<()> {
+    let folder = &args.output;
+    std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, &e))?;
+    let mut command = examples::command();
+    // Gives the subcommands the names that a person types.
+    command.build();
+    let mut pages = Vec::new();
+    add(&command, folder, &mut pages)?;
+    pages.into_iter().try_for_each(Staged::publish)
+}
+
+/// The page of `command`, and those of its subcommands.
+fn add(command: &clap::Command, folder: &Path, pages: &mut Vec<Staged>) -> Result<()> {
+    let name = command.get_display_name().unwrap_or(command.get_name());
+    let path = folder.join(format!("{name}.1"));
+    let mut page = Vec::new();
+    Man::new(command.clone())
+        .manual("mimu")
+        .render(&mut page)
+        .map_err(|e| Error::io(&path, &e))?;
+    pages.push(stage(&path, page)?);
+    let below = command.get_subcommands().filter(|c| c.get_name() != "help");
+    below.into_iter().try_for_each(|c| add(c, folder, pages))
+}
