@@ -10,6 +10,7 @@ mod effects;
 mod export_over_temperature;
 mod fuzz;
 mod import_command;
+mod manual;
 mod over_temperature;
 mod pocket_calculator;
 mod readme;
