@@ -18,6 +18,10 @@ pub struct ManArgs {
 
 pub fn run(args: &ManArgs) -> Result<()> {
     let folder = &args.output;
+    if folder.exists() && !folder.is_dir() {
+        let problem = "a file is where the folder of the pages should be";
+        return Err(Error::new(folder.display(), problem, "name a folder"));
+    }
     std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, &e))?;
     let mut command = examples::command();
     // Gives the subcommands the names that a person types.
