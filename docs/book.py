@@ -15,8 +15,8 @@ import urllib.parse
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parent
 LINK = re.compile(r"(\]\()([^)\s#]+)((?:#[^)\s]*)?\))")
-# Pages of the site that stand beside docs/ in the repository.
-TOP = ["README.md", "CONTRIBUTING.md", "CHANGELOG.md"]
+# Pages of the site that stand beside docs/ in the repository. mdBook would make a README.md to index.html and let links to it lead to README.html.
+TOP = {"README.md": "index.md", "CONTRIBUTING.md": "CONTRIBUTING.md", "CHANGELOG.md": "CHANGELOG.md"}
 
 
 def main(mdbook, output):
@@ -24,7 +24,7 @@ def main(mdbook, output):
     source = output.with_name(output.name + "-source")
     for folder in (output, source):
         shutil.rmtree(folder, ignore_errors=True)
-    pages = {ROOT / name: source / "src" / name for name in TOP}
+    pages = {ROOT / name: source / "src" / page for name, page in TOP.items()}
     for path in HERE.rglob("*"):
         if path.is_file() and path.suffix != ".py":
             pages[path] = source / "src" / path.relative_to(HERE)
@@ -34,7 +34,6 @@ def main(mdbook, output):
             page.write_text(rewritten(origin, page, pages, source / "src"))
         else:
             shutil.copy(origin, page)
-    # mdBook makes README.md the first page, index.html.
     (source / "book.toml").write_text(
         '[book]\ntitle = "mimu"\nlanguage = "en"\nsrc = "src"\n'
         f'[build]\nbuild-dir = "{output}"\ncreate-missing = false\n'
