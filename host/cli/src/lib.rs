@@ -122,6 +122,17 @@ mod tests {
 
     #[test]
     fn arguments_are_consistent() {
+        let mut command = examples::command();
+        command.build();
+        conflicts_with_what_is_there(&command);
         examples::command().debug_assert();
+    }
+
+    /// `debug_assert` lets a conflict with an argument pass that does not exist; then nothing is refused, and completions for zsh cannot be made.
+    fn conflicts_with_what_is_there(command: &clap::Command) {
+        for argument in command.get_arguments() {
+            command.get_arg_conflicts_with(argument);
+        }
+        command.get_subcommands().for_each(conflicts_with_what_is_there);
     }
 }

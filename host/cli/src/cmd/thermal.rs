@@ -66,7 +66,7 @@ struct FitArgs {
     #[command(flatten)]
     still: StillArgs,
     /// The unit lay still throughout, whatever its biases do: no turning is looked for, and no sample is left out for it
-    #[arg(long, conflicts_with_all = ["steps", "still"])]
+    #[arg(long, conflicts_with_all = ["steps", "factor"])]
     at_rest: bool,
     /// Calibration file to write
     #[arg(short, value_name = "FILE")]
