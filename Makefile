@@ -2,6 +2,8 @@
 
 TOOLCHAIN := $(shell sed -n 's/^channel = "\(.*\)"/\1/p' rust-toolchain.toml)
 TARGET := thumbv7em-none-eabihf
+# Of the page.
+WEB_TARGET := wasm32-wasip1
 CARGO := cargo +$(TOOLCHAIN)
 # One by one: built together, the second would be given the vector table that the first brings.
 FIRMWARE := $(CARGO) build --locked -p mimu-firmware --profile image --target $(TARGET)
@@ -12,7 +14,7 @@ ON_PC := --workspace --exclude mimu-counted --exclude mimu-no-panic
 # Of `make test`, and each also by itself: `make clippy`. Tests are linked before they run, so that both times are seen.
 STAGES := fmt clippy rustdoc images no-panic build-tests run-tests interop
 
-.PHONY: help test $(STAGES) nightly dist demo faults example papers blind bench budget device fuzz audit toolchain
+.PHONY: help test $(STAGES) nightly dist web demo faults example papers blind bench budget device fuzz audit toolchain
 
 help: ## this list
 	@sed -n 's/^\([a-z]*\):.*## /  make \1\t/p' Makefile
@@ -21,9 +23,10 @@ help: ## this list
 toolchain:
 	@rustup toolchain list | grep -q '^$(TOOLCHAIN)' \
 	  && rustup target list --toolchain $(TOOLCHAIN) --installed | grep -q $(TARGET) \
+	  && rustup target list --toolchain $(TOOLCHAIN) --installed | grep -q $(WEB_TARGET) \
 	  && rustup component list --toolchain $(TOOLCHAIN) --installed | grep -q clippy \
 	  && rustup component list --toolchain $(TOOLCHAIN) --installed | grep -q rustfmt \
-	  || rustup toolchain install $(TOOLCHAIN) --profile minimal -c rustfmt -c clippy -t $(TARGET)
+	  || rustup toolchain install $(TOOLCHAIN) --profile minimal -c rustfmt -c clippy -t $(TARGET) -t $(WEB_TARGET)
 
 test: toolchain ## formatting, lints, documentation, firmware, all tests but the nightly ones
 	@set -e; took=; for stage in $(STAGES); do \
@@ -71,6 +74,9 @@ interop:
 dist: toolchain ## the command to hand out: target/dist/mimu, stripped
 	$(CARGO) build --locked --profile dist -p mimu-cli --bin mimu
 	@ls -l target/dist/mimu
+
+web: toolchain ## the page that calibrates in the browser: static files in target/web, to put on any server
+	./web/build.sh $(CARGO)
 
 nightly: toolchain blind fuzz ## what takes hours: more seeds, ten minutes of samples, 300 supply cuts, coverage, blind, fuzz; prints its figures
 	$(FIRMWARE)
