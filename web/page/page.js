@@ -7,8 +7,8 @@ import { sphere } from "./sphere.js";
 
 const $ = (id) => document.getElementById(id);
 
-/** The files that were dropped last, what was found in them, and what was computed. */
-const state = { files: [], looked: null, program: null, calibration: null, began: 0 };
+/** The files that were dropped last, what was found in them, and what was computed of these and of those before: the text of each file. */
+const state = { files: [], looked: null, program: null, calibration: null, noise: null, from: {} };
 
 function made(name, properties, ...children) {
   const element = Object.assign(document.createElement(name), properties);
@@ -77,7 +77,6 @@ async function open(files) {
   if (files.length === 0) return;
   cancel();
   state.files = named(files);
-  state.began = performance.now();
   $("result").hidden = $("work").hidden = true;
   await guarded(async () => {
     $("columns").hidden = true;
@@ -96,7 +95,7 @@ function cancel() {
   state.program = null;
 }
 
-/** A step of the work, as a line in the list. */
+/** A step of the work, as a line in the list with its time and the memory that it took. */
 async function step(title, work) {
   const line = made("li", { textContent: title });
   $("steps").append(line);
@@ -105,7 +104,7 @@ async function step(title, work) {
   try {
     const result = await work();
     line.className = "done";
-    line.append(`: ${((performance.now() - begun) / 1000).toFixed(1)} s`);
+    line.append(`: ${((performance.now() - begun) / 1000).toFixed(1)} s, ${Math.ceil(result.memory / 1e6)} MB`);
     return result;
   } catch (error) {
     line.className = "refused";
@@ -114,17 +113,16 @@ async function step(title, work) {
   }
 }
 
-async function calibrate() {
+/** Clears what was shown, and does `steps`. */
+async function compute(steps) {
   $("result").hidden = true;
-  $("steps").replaceChildren();
-  $("work").hidden = false;
-  $("progress").hidden = false;
+  $("work").hidden = $("progress").hidden = false;
   $("work-title").focus();
-  for (const id of ["errors", "warnings", "trace", "sphere", "kept", "next", "exported", "verdict"]) $(id).replaceChildren();
-  $("report-part").hidden = $("away").hidden = $("pictures").hidden = $("verdict").hidden = true;
+  for (const id of ["steps", "errors", "warnings", "allan", "trace", "sphere", "kept", "next", "exported", "verdict"]) $(id).replaceChildren();
+  for (const id of ["report-part", "away", "pictures", "verdict"]) $(id).hidden = true;
   await guarded(async () => {
     try {
-      await steps();
+      await steps(await program());
     } finally {
       $("progress").hidden = true;
       status("");
@@ -132,41 +130,64 @@ async function calibrate() {
   });
 }
 
-async function steps() {
-  const mimu = await program();
-  const more = cut($("more-fit").value);
+/** Imports the dropped files as the form says. */
+async function imported(mimu) {
   const names = state.files.map(({ name }) => name);
   await step("Import", () => mimu.run(...importArguments(state.looked, names)));
   warn((await mimu.json("import.json")).warnings);
+}
+
+async function calibrate(mimu) {
+  await imported(mimu);
+  const more = cut($("more-fit").value);
   // The readings are shown even if they cannot be fitted: there one sees why.
-  let fitted;
-  const fit = step("Calibration", () => mimu.run("fit", "rec", "-o", "cal.toml", "--json", "fit.json", ...more)).then(
-    (done) => (fitted = done),
-    (why) => why,
-  );
-  const why = await fit;
-  if (why instanceof Cancelled) throw why;
-  const view = await step("Readings and poses", () => mimu.run("view", "rec", ...(fitted ? ["cal.toml"] : [])));
+  const fitted = await step("Calibration", () => mimu.run("fit", "rec", "-o", "cal.toml", "--json", "fit.json", ...more)).catch(refusal);
+  const shown = fitted instanceof Refused ? [] : ["cal.toml"];
+  const view = await step("Readings and poses", () => mimu.run("view", "rec", ...shown));
   picture(JSON.parse(view.stdout));
   $("result").hidden = false;
-  if (!fitted) throw why;
-  state.calibration = "cal.toml";
+  if (fitted instanceof Refused) throw fitted;
+  state.calibration = await mimu.text("cal.toml");
+  state.from["calibration.toml"] = state.files[0].name;
   warn((await mimu.json("fit.json")).warnings);
-  const said = made("details", {}, made("summary", { textContent: "What mimu fit prints" }), made("div", { className: "scroll", tabIndex: 0 }, made("pre", { textContent: fitted.stdout })));
-  $("errors").replaceChildren(said);
+  $("errors").replaceChildren(printed("mimu fit", fitted));
   const shared = more.filter((_, k) => more[k] !== "--only" && more[k - 1] !== "--only");
-  const found = await step("Diagnosis", () =>
-    mimu.run("diagnose", "rec", "-o", "calibration.toml", "--json", "diagnosis.json", "--page", "report.html", ...shared),
-  ).catch((error) => error);
-  if (found instanceof Error && !(found instanceof Refused)) throw found;
-  if (!(found instanceof Error)) {
-    state.calibration = "calibration.toml";
+  const page = ["-o", "calibration.toml", "--json", "diagnosis.json", "--page", "report.html"];
+  const found = await step("Diagnosis", () => mimu.run("diagnose", "rec", ...page, ...shared)).catch(refusal);
+  if (!(found instanceof Refused)) {
+    state.calibration = await mimu.text("calibration.toml");
     warn((await mimu.json("diagnosis.json")).warnings);
     await report(await mimu.text("report.html"));
   }
-  await keep(mimu);
-  $("result-title").focus();
-  if (found instanceof Error) throw found;
+  await keep(mimu, ["fit.json", "diagnosis.json", "report.html"]);
+  if (found instanceof Refused) throw found;
+}
+
+async function noise(mimu) {
+  await imported(mimu);
+  const by = state.calibration ? ["--calibration", "before.toml"] : [];
+  if (state.calibration) await mimu.write("before.toml", state.calibration);
+  const files = ["-o", "noise.toml", "--json", "allan.json", "--plot", "allan.svg"];
+  const done = await step("Allan deviation", () => mimu.run("allan", "rec", ...files, ...by));
+  state.noise = await mimu.text("noise.toml");
+  state.from["noise.toml"] = state.files[0].name;
+  warn((await mimu.json("allan.json")).warnings);
+  const plot = new DOMParser().parseFromString(await mimu.text("allan.svg"), "image/svg+xml").documentElement;
+  $("allan").replaceChildren(document.importNode(plot, true), printed("mimu allan", done));
+  $("result").hidden = false;
+  await keep(mimu, ["allan.json", "allan.svg"]);
+}
+
+/** What the command prints, to be opened. */
+function printed(command, done) {
+  const text = made("div", { className: "scroll", tabIndex: 0 }, made("pre", { textContent: done.stdout }));
+  return made("details", {}, made("summary", { textContent: `What ${command} prints` }), text);
+}
+
+/** A refusal as a result; another error goes on. */
+function refusal(error) {
+  if (error instanceof Refused) return error;
+  throw error;
 }
 
 function warn(warnings) {
@@ -218,16 +239,13 @@ function save(name, bytes) {
   setTimeout(() => URL.revokeObjectURL(link.href), 60000);
 }
 
-async function keep(mimu) {
-  $("away").hidden = false;
+/** Offers the files that were made of this recording, and the formats that can be made of what is known of the unit. */
+async function keep(mimu, files) {
   const recording = await mimu.read("rec");
-  const all = [
-    [state.calibration, "calibration.toml"],
-    ["fit.json", "fit.json"],
-    ["diagnosis.json", "diagnosis.json"],
-    ["report.html", "report.html"],
-    ...[...recording.keys()].map((name) => [`rec/${name}`, name]),
-  ];
+  const ours = { "calibration.toml": state.calibration, "noise.toml": state.noise };
+  for (const [name, text] of Object.entries(ours)) if (text) await mimu.write(name, text);
+  const all = [...Object.keys(ours), ...files].map((name) => [name, name]);
+  all.push(...[...recording.keys()].map((name) => [`rec/${name}`, name]));
   for (const [from, name] of all) {
     const bytes = await mimu.read(from);
     if (!bytes) continue;
@@ -235,14 +253,24 @@ async function keep(mimu) {
     button.addEventListener("click", () => guarded(async () => save(name, await mimu.read(from))));
     $("kept").append(button);
   }
+  const option = ({ name, file, of }, k) => made("option", { value: k, textContent: `${name} (${file})`, disabled: !state[of] });
+  $("format").replaceChildren(...FORMATS.map(option));
+  $("format").value = FORMATS.findIndex(({ of }) => state[of]);
+  const from = Object.entries(state.from).map(([file, of]) => `${file} is from ${of}.`);
+  if (!state.noise) from.push("Formats of estimators (Kalibr, OpenVINS ...) are made from noise: drop a recording at rest, and press “Noise of a unit at rest”.");
+  $("made-from").textContent = from.join(" ");
+  $("away").hidden = false;
+  $("result-title").focus();
 }
 
 async function takeAway() {
   const { file, args } = FORMATS[$("format").value];
   $("exported").replaceChildren();
   await guarded(async () => {
-    const done = await state.program.run("export", ...args, "--calibration", state.calibration, "-o", file);
-    save(file, await state.program.read(file));
+    const mimu = state.program;
+    const from = ["calibration", "noise"].filter((of) => state[of]).flatMap((of) => [`--${of}`, `${of}.toml`]);
+    const done = await mimu.run("export", ...args, ...from, "-o", file);
+    save(file, await mimu.read(file));
     $("exported").replaceChildren(made("span", { className: "said", textContent: done.stdout.trim() }));
   });
 }
@@ -258,11 +286,10 @@ async function example() {
     );
     await open(files);
     $("gravity").value = "9.80665";
-    await calibrate();
+    await compute(calibrate);
   });
 }
 
-FORMATS.forEach(({ name, file }, k) => $("format").append(made("option", { value: k, textContent: `${name} (${file})` })));
 $("file").addEventListener("change", () => open($("file").files));
 $("file").addEventListener("click", () => ($("file").value = ""));
 $("example").addEventListener("click", example);
@@ -273,8 +300,9 @@ $("cancel").addEventListener("click", () => {
 });
 $("columns").addEventListener("submit", (event) => {
   event.preventDefault();
-  calibrate();
+  compute(calibrate);
 });
+$("noise").addEventListener("click", () => compute(noise));
 addEventListener("dragover", (event) => {
   event.preventDefault();
   $("drop").classList.add("over");

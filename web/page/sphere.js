@@ -19,14 +19,15 @@ function place([x, y, z]) {
 }
 
 /** The drawing of `view`: its map of gains, its poses and the next one. */
-export function sphere({ poses, map, next }) {
+export function sphere({ poses, map, cell, next }) {
   const label = `${poses.length} poses on the sphere of directions` + (next ? `; most would be added by ${next.words}` : "");
   const svg = element("svg", { viewBox: "0 0 440 236", role: "img", "aria-label": label, class: "sphere-of-poses" });
   const most = Math.max(...map.map((at) => at[3]), 1e-12);
+  const side = RADIUS * cell;
   for (const at of map) {
-    const [cx, cy] = place(at);
-    // The spots overlap a little, so that they read as a surface.
-    if (Math.abs(at[2]) > 0.02) svg.append(element("circle", { cx, cy, r: 7, class: "gain", "fill-opacity": ((0.55 * at[3]) / most).toFixed(3) }));
+    const [x, y] = place(at);
+    // A little larger than its cell, so that no gaps are seen between them.
+    svg.append(element("rect", { x: x - side / 2, y: y - side / 2, width: side + 0.3, height: side + 0.3, class: "gain", "fill-opacity": ((0.6 * at[3]) / most).toFixed(3) }));
   }
   MIDDLE.forEach((x, k) => {
     svg.append(

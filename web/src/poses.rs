@@ -14,8 +14,10 @@ use serde::Serialize;
 pub struct Poses {
     /// Directions that were up in the dwells at rest, in the body frame.
     poses: Vec<[f64; 3]>,
-    /// Directions, each with the share by which one more dwell with it up would lower the geometric mean of the parameters' sigmas.
+    /// Directions on a grid over both hemispheres, each with the share by which one more dwell with it up would lower the geometric mean of the parameters' sigmas.
     map: Vec<[f64; 4]>,
+    /// Size of a cell of the grid over the radius of a hemisphere.
+    cell: f64,
     /// The face, edge or corner that would add most.
     next: Option<Next>,
 }
@@ -27,8 +29,8 @@ struct Next {
     gain: f64,
 }
 
-/// Every how manyeth direction of the grid is on the map: 500, 9° apart.
-const EVERY: usize = 5;
+/// Cells of the map across a hemisphere.
+const CELLS: i32 = 26;
 
 /// Of the dwells that the accelerometer's fit may use. Without a calibration the directions are not known.
 pub fn of(prepared: &Prepared, calibration: Option<&Calibration>) -> Poses {
@@ -56,17 +58,28 @@ pub fn of(prepared: &Prepared, calibration: Option<&Calibration>) -> Poses {
     let best = plain.iter().map(|s| (s.up, gain(s.up)));
     // Of equal ones the first: faces stand before edges and corners.
     let best = best.reduce(|a, b| if b.1 > a.1 * 1.001 { b } else { a });
-    let grid = reach.candidates();
-    let grid = grid[plain.len()..].iter().step_by(EVERY).map(|s| s.up);
     Poses {
         poses: ups.iter().map(|up| (*up).into()).collect(),
-        map: grid.map(|up| [up.x, up.y, up.z, gain(up)]).collect(),
+        cell: 2.0 / f64::from(CELLS),
+        map: cells().map(|up| [up.x, up.y, up.z, gain(up)]).collect(),
         next: best.filter(|(_, gain)| *gain > 0.0).map(|(up, gain)| Next {
             up: up.into(),
             words: mimu_wizard::step::words(&up),
             gain,
         }),
     }
+}
+
+/// Middles of the cells of both hemispheres, in which equal areas are equal.
+fn cells() -> impl Iterator<Item = Vector3<f64>> {
+    let middles = || (0..CELLS).map(|k| f64::from(2 * k + 1 - CELLS) / f64::from(CELLS));
+    let flat = middles().flat_map(move |x| middles().map(move |y| (x, y, x * x + y * y)));
+    let inside = flat.filter(|(.., square)| *square < 1.0);
+    inside.flat_map(|(x, y, square)| {
+        let z = 1.0 - square;
+        let across = (1.0 - z * z).sqrt() / square.sqrt();
+        [z, -z].map(|z| Vector3::new(x * across, y * across, z))
+    })
 }
 
 /// The share of a direction, after dwells with `ups` up; `None` if those do not determine all parameters.
@@ -115,6 +128,15 @@ mod tests {
         ups.extend([-Vector3::z(); 4]);
         let gain = gains(&reach, &ups).unwrap();
         assert!(gain(Vector3::z()) > 2.0 * gain(-Vector3::z()));
+    }
+
+    #[test]
+    fn cells_are_directions_and_cover_both_hemispheres() {
+        assert!(cells().all(|up| (up.norm() - 1.0).abs() < 1e-12));
+        let count = |below: bool| cells().filter(|up| (up.z < 0.0) == below).count() as f64;
+        let expected = std::f64::consts::FRAC_PI_4 * f64::from(CELLS * CELLS);
+        assert!((count(true) / expected - 1.0).abs() < 0.05);
+        assert_eq!(count(true), count(false));
     }
 
     #[test]
