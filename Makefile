@@ -14,10 +14,10 @@ ON_PC := --workspace --exclude mimu-counted --exclude mimu-no-panic
 # Of `make test`, and each also by itself: `make clippy`. Tests are linked before they run, so that both times are seen.
 STAGES := fmt clippy rustdoc images no-panic build-tests run-tests interop
 
-.PHONY: help test $(STAGES) nightly dist web demo faults example papers blind bench budget device fuzz audit toolchain
+.PHONY: help test $(STAGES) nightly dist web web-tests demo faults example papers blind bench budget device fuzz audit toolchain
 
 help: ## this list
-	@sed -n 's/^\([a-z]*\):.*## /  make \1\t/p' Makefile
+	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' Makefile
 
 # Automatic installation may be switched off, so it is asked for. The list makes a second run offline and quick.
 toolchain:
@@ -78,7 +78,12 @@ dist: toolchain ## the command to hand out: target/dist/mimu, stripped
 web: toolchain ## the page that calibrates in the browser: static files in target/web, to put on any server
 	./web/build.sh $(CARGO)
 
-nightly: toolchain blind fuzz ## what takes hours: more seeds, ten minutes of samples, 300 supply cuts, coverage, blind, fuzz; prints its figures
+# Compiling the page takes four minutes of processor time, so that `make test` has its program on the PC only.
+web-tests: web ## the page in Chromium, if there is one, against the command
+	$(CARGO) build --locked -q -p mimu-cli --bin mimu
+	./tests/interop/run.sh target/debug/mimu -k test_web -s
+
+nightly: toolchain blind fuzz web-tests ## what takes hours: more seeds, ten minutes of samples, 300 supply cuts, coverage, blind, fuzz; prints its figures
 	$(FIRMWARE)
 	$(CARGO) test --locked --release $(ON_PC) -- --ignored --nocapture --test-threads=2
 

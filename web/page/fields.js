@@ -4,7 +4,7 @@ const ROLES = [
   ["-", "not used"],
   ["t_s", "time"],
   ["sample", "sample number"],
-  ...["gyro", "accel"].flatMap((sensor) => ["x", "y", "z"].map((axis) => [`${sensor}_${axis}`, `${sensor === "gyro" ? "gyro" : "accelerometer"} ${axis}`])),
+  ...["gyro", "accel"].flatMap((sensor) => ["x", "y", "z"].map((axis) => [`${sensor}_${axis}`, `${sensor} ${axis}`])),
   ["temp_c", "temperature, °C"],
   ["step", "step (number of the pose)"],
   ...["x", "y", "z"].map((axis) => [`ref_rate_${axis}_dps`, `known rate ${axis}, deg/s`]),

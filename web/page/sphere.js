@@ -22,19 +22,25 @@ function place([x, y, z]) {
 export function sphere({ poses, map, cell, next }) {
   const label = `${poses.length} poses on the sphere of directions` + (next ? `; most would be added by ${next.words}` : "");
   const svg = element("svg", { viewBox: "0 0 440 236", role: "img", "aria-label": label, class: "sphere-of-poses" });
-  const most = Math.max(...map.map((at) => at[3]), 1e-12);
+  // From the least to the most: what is even has no shade.
+  const gains = map.map((at) => at[3]);
+  const least = Math.min(...gains), range = Math.max(Math.max(...gains) - least, 1e-12);
+  const clip = element("clipPath", { id: "hemispheres" });
+  clip.append(...MIDDLE.map((cx) => element("circle", { cx, cy: ACROSS, r: RADIUS })));
+  const cells = element("g", { "clip-path": "url(#hemispheres)", "shape-rendering": "crispEdges" });
   const side = RADIUS * cell;
   for (const at of map) {
     const [x, y] = place(at);
-    // A little larger than its cell, so that no gaps are seen between them.
-    svg.append(element("rect", { x: x - side / 2, y: y - side / 2, width: side + 0.3, height: side + 0.3, class: "gain", "fill-opacity": ((0.6 * at[3]) / most).toFixed(3) }));
+    const share = (0.75 * (at[3] - least)) / range;
+    cells.append(element("rect", { x: x - side / 2, y: y - side / 2, width: side, height: side, class: "gain", "fill-opacity": share.toFixed(3) }));
   }
+  svg.append(clip, cells);
   MIDDLE.forEach((x, k) => {
     svg.append(
       element("circle", { class: "sphere", cx: x, cy: ACROSS, r: RADIUS }),
       element("path", { class: "grid", d: `M${x - RADIUS} ${ACROSS}h${2 * RADIUS}M${x} ${ACROSS - RADIUS}v${2 * RADIUS}` }),
       element("text", { class: "heading", x: x - RADIUS, y: 16 }, ["z up", "z down"][k]),
-      element("text", { class: "tick", x: x + RADIUS - 3, y: ACROSS - 5, "text-anchor": "end" }, "+x"),
+      element("text", { class: "tick", x: x + RADIUS + 4, y: ACROSS + 4 }, "+x"),
       element("text", { class: "tick", x, y: ACROSS - RADIUS - 5, "text-anchor": "middle" }, "+y"),
     );
   });

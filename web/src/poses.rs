@@ -30,7 +30,7 @@ struct Next {
 }
 
 /// Cells of the map across a hemisphere.
-const CELLS: i32 = 26;
+const CELLS: i32 = 36;
 
 /// Of the dwells that the accelerometer's fit may use. Without a calibration the directions are not known.
 pub fn of(prepared: &Prepared, calibration: Option<&Calibration>) -> Poses {
