@@ -16,14 +16,14 @@ if ! cmp -s "$here/requirements.txt" "$venv/requirements.txt"; then
 fi
 export MIMU_WEB_PYTHON=$venv/bin/python ZIG_GLOBAL_CACHE_DIR=$venv/cache ZIG_LOCAL_CACHE_DIR=$venv/cache
 export CC_wasm32_wasip1=$here/cc.sh AR_wasm32_wasip1=$here/ar.sh
-"$@" build --locked -p mimu-web --profile web --target wasm32-wasip1
+"$@" build --locked -p mimu-web --profile page --target wasm32-wasip1
 
 rm -rf "$out"
 mkdir -p "$out/example"
 cp "$here"/page/* "$out"
 cp "$here/../tests/example"/{accel,gyro}.txt "$out/example"
 cp "$here/../host/cli/src/report/page/style.css" "$out/report.css"
-cp "$target/wasm32-wasip1/web/mimu-web.wasm" "$out/mimu.wasm"
+cp "$target/wasm32-wasip1/page/mimu-web.wasm" "$out/mimu.wasm"
 cd "$out"
 version=$(sed -n 's/^version = "\(.*\)"/\1/p' "$here/../Cargo.toml" | head -1)
 sed -i "s/MIMU_VERSION/$version/" index.html

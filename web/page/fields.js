@@ -57,12 +57,12 @@ export function show(looked) {
   field("files").replaceChildren(...lists);
   const { preset, files } = looked;
   const guessed = files.some((file) => file.by_readings);
-  field("taken").textContent = preset
-    ? `Recognised by its header: ${preset.title}.`
-    : guessed
-      ? "The file has no names of columns, so they were guessed from the readings. Check them."
-      : files.every((file) => file.log)
-        ? ""
+  field("taken").textContent = files.every((file) => file.log)
+    ? ""
+    : preset
+      ? `Recognised by its header: ${preset.title}.`
+      : guessed
+        ? "The file has no names of columns, so they were guessed from the readings. Check them."
         : "By the names in the file. Correct what is wrong.";
   const say = (id, value) => (field(id).value = value);
   const of = (key) => files.map((file) => file[key]).find(Boolean);
@@ -80,6 +80,9 @@ export function show(looked) {
     field("gyro-unit-field").hidden = log || !has("gyro_");
     field("time-unit-field").hidden = log || !has("t_s");
     field("rate-field").hidden = log;
+    const timeless = !log && !has("t_s");
+    field("rate").required = timeless;
+    field("rate").placeholder = timeless ? "needed: no column is the time" : "from the time stamps";
     field("topic-field").hidden = !log;
     field("several-field").hidden = files.length < 2;
     if (has("ref_")) say("reference", "table");

@@ -84,21 +84,18 @@ fn meaning(name: &str) -> Meaning {
     let words = words(name);
     let all = words.concat();
     let has = |parts: &[&str]| parts.iter().any(|part| all.contains(part));
-    // `gx`, `accelX`, `Gyr_Y`, `angular_velocity.z`, `Gyroscope x (rad/s)`
+    // `gx`, `accelX`, `Gyr_Y`, `angular_velocity.z`, `gyrox rad/s`: a word of its own, or the end of the sensor's.
     let axis = || {
-        let last = words.iter().rev().find_map(|word| match word.as_str() {
-            "x" => Some(0),
-            "y" => Some(1),
-            "z" => Some(2),
-            _ => None,
-        });
-        last.or_else(|| {
-            "xyz".find(
-                all.trim_end_matches(|c: char| c.is_ascii_digit())
-                    .chars()
-                    .last()?,
-            )
-        })
+        let of_word = |word: &String| {
+            let bare = word.trim_end_matches(|c: char| c.is_ascii_digit());
+            let (at, last) = bare.char_indices().next_back()?;
+            let stem = &bare[..at];
+            let sensor = ["gyr", "acc", "vel", "rot", "omega"]
+                .iter()
+                .any(|name| stem.contains(name));
+            "xyz".find(last).filter(|_| stem.len() < 2 || sensor)
+        };
+        words.iter().rev().find_map(of_word)
     };
     if has(&["mag", "lin", "quat", "orient", "euler", "grav"]) && !has(&["linear_acc", "linearacc"])
     {
@@ -138,6 +135,20 @@ pub fn guess(file: &str, names: &[String], rows: &[Vec<f64>]) -> Guess {
         true => by_readings(file, width, rows),
         false => by_names(names),
     };
+    // Codes of a thermometer are no °C, and are worth less than nothing.
+    let implausible = |at: usize| {
+        let values = rows.iter().filter_map(|row| row.get(at));
+        let mut finite = values.filter(|t| t.is_finite());
+        finite.any(|t| !(-60.0..150.0).contains(t))
+    };
+    let at = guess.roles.iter().position(|role| *role == "temp_c");
+    if let Some(at) = at.filter(|at| implausible(*at)) {
+        guess.roles[at] = "-";
+        let named = |k: &usize| meaning(&names[*k]) == Meaning::Temperature;
+        if let Some(other) = (0..names.len()).filter(named).find(|k| !implausible(*k)) {
+            guess.roles[other] = "temp_c";
+        }
+    }
     let named = |wanted: &[&str]| -> Vec<&String> {
         let all = names.iter().zip(&guess.roles);
         all.filter(|(_, role)| wanted.contains(*role))
@@ -319,6 +330,13 @@ mod tests {
             roles(&["time", "magX", "magY", "magZ", "temperature"]),
             ["t_s", "-", "-", "-", "temp_c"]
         );
+    }
+
+    #[test]
+    fn the_codes_of_a_thermometer_are_not_taken_for_degrees() {
+        let names = ["time", "dTemp", "Temp", "gyrox rad/s"].map(String::from);
+        let found = guess("log.csv", &names, &[vec![0.0, -8884.0, 31.2, 0.0]]);
+        assert_eq!(found.roles, ["t_s", "-", "temp_c", "gyro_x"]);
     }
 
     #[test]

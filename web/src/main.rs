@@ -93,7 +93,10 @@ fn of_columns(paths: &[PathBuf]) -> Result<Dropped> {
             .collect();
         look.rows.truncate(SHOWN);
         let file = path.file_name().unwrap_or_default().to_string_lossy();
-        let mut guess = columns::guess(&file, &look.names, &rows);
+        let mut guess = match look.log {
+            true => columns::Guess::default(),
+            false => columns::guess(&file, &look.names, &rows),
+        };
         if let Some(list) = chosen.as_ref().and_then(|chosen| chosen.columns.get(k)) {
             guess.roles = roles(list, &look.names);
         }
