@@ -1,6 +1,6 @@
 """The page of `make web` in a browser: its results are the command's, it says what it refuses, it can be cancelled, and it works offline.
 
-Needs Chromium on the PATH and the page in target/web; without either these tests are skipped.
+Needs Chromium on the PATH, and the folder of the page in MIMU_PAGE (`make web-tests`); without either these tests are skipped.
 """
 import functools
 import http.server
@@ -18,11 +18,10 @@ from conftest import EXAMPLE, run
 from test_pages import CLIPPED, FAINT
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-ROOT = pathlib.Path(__file__).parent.parent.parent
-PAGE = pathlib.Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target")) / "web"
+PAGE = os.environ.get("MIMU_PAGE")
 pytestmark = [
     pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium on the PATH"),
-    pytest.mark.skipif(not (PAGE / "mimu.wasm").exists(), reason="there is no page: make web"),
+    pytest.mark.skipif(PAGE is None, reason="no page is given: make web-tests"),
 ]
 # Of a computation on a machine that does something else as well, ms.
 PATIENCE = 300_000

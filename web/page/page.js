@@ -31,10 +31,12 @@ function withFields(text) {
   });
 }
 
-function refuse(line) {
+/** Shows the line of a refusal where the person is looking, below `place`; an empty one takes it away. */
+function refuse(line, place = $("drop").parentElement) {
+  place.after($("error"));
   $("error").replaceChildren(...withFields(line));
   $("error").hidden = !line;
-  if (line) $("error").scrollIntoView({ block: "nearest" });
+  if (line) $("error").focus();
 }
 
 function status(text, share) {
@@ -62,13 +64,13 @@ function named(files) {
 }
 
 /** What may fail runs in here: its line is shown, and the page goes on. */
-async function guarded(work) {
-  refuse("");
+async function guarded(work, place) {
+  refuse("", place);
   try {
     await work();
   } catch (error) {
     if (error instanceof Cancelled) return;
-    refuse(error instanceof Refused ? error.message : `this page has a fault (${error?.message ?? error}); load it again, and report it if it comes back`);
+    refuse(error instanceof Refused ? error.message : `this page has a fault (${error?.message ?? error}); load it again, and report it if it comes back`, place);
     if (!(error instanceof Refused)) console.error(error);
   }
 }
@@ -127,7 +129,7 @@ async function compute(steps) {
       $("progress").hidden = true;
       status("");
     }
-  });
+  }, $("work"));
 }
 
 /** Imports the dropped files as the form says. */
@@ -143,7 +145,9 @@ async function calibrate(mimu) {
   // The readings are shown even if they cannot be fitted: there one sees why.
   const fitted = await step("Calibration", () => mimu.run("fit", "rec", "-o", "cal.toml", "--json", "fit.json", ...more)).catch(refusal);
   const shown = fitted instanceof Refused ? [] : ["cal.toml"];
-  const view = await step("Readings and poses", () => mimu.run("view", "rec", ...shown));
+  const view = await step("Readings and poses", () => mimu.run("view", "rec", ...shown)).catch((why) => {
+    throw fitted instanceof Refused ? fitted : why;
+  });
   picture(JSON.parse(view.stdout));
   $("result").hidden = false;
   if (fitted instanceof Refused) throw fitted;
@@ -272,7 +276,7 @@ async function takeAway() {
     const done = await mimu.run("export", ...args, ...from, "-o", file);
     save(file, await mimu.read(file));
     $("exported").replaceChildren(made("span", { className: "said", textContent: done.stdout.trim() }));
-  });
+  }, $("exported"));
 }
 
 async function example() {
