@@ -8,7 +8,7 @@ import { sphere } from "./sphere.js";
 const $ = (id) => document.getElementById(id);
 
 /** The files that were dropped last, what was found in them, and what was computed of these and of those before: the text of each file. */
-const state = { files: [], looked: null, program: null, calibration: null, noise: null, from: {} };
+const state = { files: [], looked: null, program: null, calibration: null, noise: null, from: {}, example: false };
 
 function made(name, properties, ...children) {
   const element = Object.assign(document.createElement(name), properties);
@@ -79,6 +79,9 @@ async function open(files) {
   if (files.length === 0) return;
   cancel();
   state.files = named(files);
+  // Where the example was recorded says nothing of where this was.
+  if (state.example) $("gravity").value = "";
+  state.example = false;
   $("result").hidden = $("work").hidden = true;
   await guarded(async () => {
     $("columns").hidden = true;
@@ -290,6 +293,7 @@ async function example() {
     );
     await open(files);
     $("gravity").value = "9.80665";
+    state.example = true;
     await compute(calibrate);
   });
 }

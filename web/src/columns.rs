@@ -120,7 +120,7 @@ fn meaning(name: &str) -> Meaning {
 fn unit(names: &[&String], units: &[(&'static str, &[&str])]) -> Option<&'static str> {
     let says = |spellings: &[&str]| {
         let any = |name: &&String| spellings.iter().any(|s| name.to_lowercase().contains(s));
-        !names.is_empty() && names.iter().all(|name| any(name))
+        !names.is_empty() && names.iter().all(any)
     };
     units
         .iter()

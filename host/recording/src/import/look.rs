@@ -101,7 +101,7 @@ fn of_lines(lines: &[&[u8]], separator: Option<Separator>) -> Option<Look> {
         let row = cells(line);
         !comment(line) && row.len() > 1 && 2 * numbers(&row) > row.len()
     };
-    let first = lines.iter().position(|line| is_row(&line))?;
+    let first = lines.iter().position(is_row)?;
     let width = cells(lines[first]).len();
     let above = lines[..first].iter().rev().map(|line| cells(&plain(line)));
     let mut headers = above.filter(|row| row.len() == width && numbers(row) == 0);
