@@ -158,6 +158,10 @@ def test_an_export_is_the_file_of_the_command(page, tmp_path):
     run("export", "c", "--calibration", "calibration.toml", "-o", "mimu.h", cwd=tmp_path)
     assert pathlib.Path(download.value.path()).read_text() == (tmp_path / "mimu.h").read_text()
     assert "deg/s" in page.inner_text("#exported")
+    # Where the example was recorded says nothing of where the next log was.
+    assert page.input_value("#gravity") == "9.80665"
+    page.set_input_files("#file", EXAMPLE / "accel.txt")
+    assert page.input_value("#gravity") == ""
 
 
 def test_columns_are_taken_by_their_names_and_can_be_corrected(page, tmp_path):
