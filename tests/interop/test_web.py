@@ -205,6 +205,19 @@ def test_a_parquet_file_is_read(page, tmp_path):
     same(ours, theirs, "fit of Parquet")
 
 
+def test_a_file_can_be_dropped_anywhere_on_the_page(page):
+    drop = """text => {
+        const data = new DataTransfer();
+        data.items.add(new File([text], 'log.csv'));
+        for (const type of ['dragover', 'drop']) document.querySelector('h1').dispatchEvent(new DragEvent(type, {dataTransfer: data, bubbles: true, cancelable: true}));
+    }"""
+    page.evaluate(drop, "time,gx,gy,gz,ax,ay,az\n" + "".join(f"{0.01 * k},1,2,3,0,0,{16384 + k}\n" for k in range(20)))
+    page.wait_for_selector("#columns:not([hidden])")
+    assert page.inner_text("#files legend") == "log.csv"
+    assert page.input_value("#role-0-6") == "accel_z"
+    assert page.input_value("#accel-unit") == "count"
+
+
 @pytest.mark.parametrize(
     ("name", "content", "words"),
     [
