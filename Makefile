@@ -2,6 +2,8 @@
 
 TOOLCHAIN := $(shell sed -n 's/^channel = "\(.*\)"/\1/p' rust-toolchain.toml)
 TARGET := thumbv7em-none-eabihf
+# Of the page.
+WEB_TARGET := wasm32-wasip1
 CARGO := cargo +$(TOOLCHAIN)
 # One by one: built together, the second would be given the vector table that the first brings.
 FIRMWARE := $(CARGO) build --locked -p mimu-firmware --profile image --target $(TARGET)
@@ -16,18 +18,19 @@ PUBLISHED := mimu-core mimu-recording mimu mimu-thermal mimu-device mimu-export 
 # Of `make test`, and each also by itself: `make clippy`. Tests are linked before they run, so that both times are seen.
 STAGES := fmt clippy rustdoc images no-panic build-tests run-tests interop
 
-.PHONY: help test $(STAGES) nightly dist book msrv package demo faults example papers blind bench budget device fuzz audit toolchain
+.PHONY: help test $(STAGES) nightly dist book msrv package web web-tests demo faults example papers blind bench budget device fuzz audit toolchain
 
 help: ## this list
-	@sed -n 's/^\([a-z]*\):.*## /  make \1\t/p' Makefile
+	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' Makefile
 
 # Automatic installation may be switched off, so it is asked for. The list makes a second run offline and quick.
 toolchain:
 	@rustup toolchain list | grep -q '^$(TOOLCHAIN)' \
 	  && rustup target list --toolchain $(TOOLCHAIN) --installed | grep -q $(TARGET) \
+	  && rustup target list --toolchain $(TOOLCHAIN) --installed | grep -q $(WEB_TARGET) \
 	  && rustup component list --toolchain $(TOOLCHAIN) --installed | grep -q clippy \
 	  && rustup component list --toolchain $(TOOLCHAIN) --installed | grep -q rustfmt \
-	  || rustup toolchain install $(TOOLCHAIN) --profile minimal -c rustfmt -c clippy -t $(TARGET)
+	  || rustup toolchain install $(TOOLCHAIN) --profile minimal -c rustfmt -c clippy -t $(TARGET) -t $(WEB_TARGET)
 
 test: toolchain ## formatting, lints, documentation, firmware, all tests but the nightly ones
 	@set -e; took=; for stage in $(STAGES); do \
@@ -46,6 +49,7 @@ fmt:
 clippy:
 	$(CARGO) clippy --locked --all-targets -- -D warnings
 	$(CARGO) clippy --locked -p mimu-recording --no-default-features -- -D warnings
+	$(CARGO) clippy --locked -p mimu-recording --no-default-features --target $(WEB_TARGET) -- -D warnings
 	$(CARGO) clippy --locked -p mimu-firmware -p mimu-counted -p mimu-no-panic --profile image --target $(TARGET) -- -D warnings
 	$(CARGO) clippy --locked -p mimu-firmware --profile image --features usb --target $(TARGET) -- -D warnings
 
@@ -90,7 +94,15 @@ msrv: ## the command compiles with the Rust that Cargo.toml says is enough
 package: toolchain ## every crate that is published, as its archive, built from it
 	$(CARGO) package --locked $(PUBLISHED:%=-p %)
 
-nightly: toolchain blind fuzz ## what takes hours: more seeds, ten minutes of samples, 300 supply cuts, coverage, blind, fuzz; prints its figures
+web: toolchain ## the page that calibrates in the browser: static files in target/web, to put on any server
+	./web/build.sh $(CARGO)
+
+# Compiling the page takes four minutes of processor time, so that `make test` has its program on the PC only.
+web-tests: web ## the page in Chromium, if there is one, against the command
+	$(CARGO) build --locked -q -p mimu-cli --bin mimu
+	MIMU_PAGE=$(CURDIR)/target/web ./tests/interop/run.sh target/debug/mimu -k test_web -s
+
+nightly: toolchain blind fuzz web-tests ## what takes hours: more seeds, ten minutes of samples, 300 supply cuts, coverage, blind, fuzz; prints its figures
 	$(FIRMWARE)
 	$(CARGO) test --locked --release $(ON_PC) -- --ignored --nocapture --test-threads=2
 

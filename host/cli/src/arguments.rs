@@ -111,7 +111,8 @@ impl JsonArgs {
         self.path.as_deref().filter(|path| *path != Path::new("-"))
     }
 
-    /// Whether it takes the place of the text.
+    /// Whether it takes the place of the text; the wizard asks.
+    #[cfg(not(target_family = "wasm"))]
     pub(crate) fn is_standard_output(&self) -> bool {
         self.path.is_some() && self.file().is_none()
     }

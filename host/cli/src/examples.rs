@@ -97,6 +97,10 @@ const EXAMPLES: [(&str, &[&str]); 16] = [
 pub(crate) fn command() -> clap::Command {
     let mut command = Cli::command();
     for (name, lines) in EXAMPLES {
+        // Where there is no port there are fewer commands.
+        if command.find_subcommand(name).is_none() {
+            continue;
+        }
         let text = format!("Examples:\n  {}", lines.join("\n  "));
         command = command.mut_subcommand(name, |c| c.after_help(text));
     }

@@ -17,12 +17,15 @@ mod hint;
 mod output;
 mod reading;
 pub mod report;
+#[cfg(not(target_family = "wasm"))]
 mod views;
 
 use std::process::ExitCode;
 
 use clap::{FromArgMatches, Parser, Subcommand};
-use cmd::{allan, apply, design, device, diagnose, fit, import, record, thermal, verify, wizard};
+use cmd::{allan, apply, design, diagnose, fit, import, thermal, verify};
+#[cfg(not(target_family = "wasm"))]
+use cmd::{device, record, wizard};
 
 /// Calibration of inertial units made of analog MEMS sensors.
 ///
@@ -37,6 +40,7 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
+    #[cfg(not(target_family = "wasm"))]
     /// From an uncalibrated board to a verified one: says what to do, watches, fits, stores and verifies
     Wizard(wizard::WizardArgs),
     /// Make a recording of foreign files
@@ -61,8 +65,10 @@ enum Command {
     Export(cmd::export::ExportArgs),
     /// Everything that is known of a unit as one page, to keep: verdict, errors, calibration, effects, noise, recordings
     Report(cmd::report::ReportArgs),
+    #[cfg(not(target_family = "wasm"))]
     /// Record the raw stream of a device
     Record(record::RecordArgs),
+    #[cfg(not(target_family = "wasm"))]
     /// Talk with a device: info, stream, upload, download, self-test, counters, check, kalman
     Device(device::DeviceArgs),
     /// Print a script with which a shell completes subcommands, flags and values
@@ -76,6 +82,7 @@ pub fn run() -> ExitCode {
     let matches = examples::command().get_matches();
     let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|e| e.exit());
     let done = match cli.command {
+        #[cfg(not(target_family = "wasm"))]
         Command::Wizard(args) => wizard::run(&args),
         Command::Import(args) => import::run(*args),
         Command::Fit(args) => fit::run(&args),
@@ -88,7 +95,9 @@ pub fn run() -> ExitCode {
         Command::Allan(args) => allan::run(&args),
         Command::Export(args) => cmd::export::run(&args),
         Command::Report(args) => cmd::report::run(&args),
+        #[cfg(not(target_family = "wasm"))]
         Command::Record(args) => record::run(&args),
+        #[cfg(not(target_family = "wasm"))]
         Command::Device(args) => device::run(&args),
         Command::Completions(args) => cmd::completions::run(&args),
         Command::Man(args) => cmd::man::run(&args),

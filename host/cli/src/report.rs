@@ -20,10 +20,12 @@ mod thermal;
 mod thermal_page;
 mod thermal_plan;
 pub(crate) mod thermal_plot;
+#[cfg(not(target_family = "wasm"))]
 mod thermal_record;
 mod trim;
 mod unit;
 mod verify;
+#[cfg(not(target_family = "wasm"))]
 mod wizard;
 
 pub use allan::allan_text;
@@ -41,8 +43,10 @@ pub use page::Made;
 pub use thermal::{thermal_comparison_text, thermal_text};
 pub use thermal_page::thermal_page;
 pub use thermal_plan::thermal_plan_text;
+#[cfg(not(target_family = "wasm"))]
 pub(crate) use thermal_record::{thermal_progress, thermal_record_text};
 pub use trim::trim_text;
-pub use unit::{UnitReport, unit_page};
+pub use unit::{UnitReport, trace_figure, unit_page};
 pub use verify::verify_text;
+#[cfg(not(target_family = "wasm"))]
 pub(crate) use wizard::{wizard_lines, wizard_text};

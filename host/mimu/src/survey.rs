@@ -3,15 +3,14 @@
 //! One channel at a time: three hours at 1 kHz are 86 MB a channel, and the spectrum takes more beside them than the curves do. The next is
 //! read while the curves are computed.
 
+mod ahead;
 mod columns;
 mod masking;
 mod stretch;
 mod suitability;
 mod values;
 
-use std::sync::mpsc::{channel, sync_channel};
-use std::thread;
-
+use self::ahead::ahead;
 use self::columns::Columns;
 pub use self::masking::Masked;
 pub use self::stretch::Part;
@@ -133,93 +132,64 @@ pub fn survey(
     let mut channels = Vec::new();
     let mut judged = Vec::new();
     let mut estimators: Vec<(usize, Estimator)> = Vec::new();
-    let (sender, receiver) = sync_channel(0);
-    let (ask, asked) = channel();
-    thread::scope(|scope| -> Result<()> {
-        let (indices, units, place, stretch) = (&indices, &units, &place, &stretch);
-        let reader = scope.spawn(move || {
-            for (i, unit) in indices.iter().zip(units) {
-                if asked.recv().is_err() {
-                    break;
-                }
-                let read = columns
-                    .take(Column::Raw(*i))
-                    .and_then(|values| Values::of(values, stretch, options.part, *i, *unit, place));
-                // Refused only when the receiver has given up.
-                if sender.send(read).is_err() {
-                    break;
-                }
+    let read = |done: usize| {
+        let (i, unit) = (indices[done], units[done]);
+        let values = columns.take(Column::Raw(i))?;
+        Values::of(values, &stretch, options.part, i, unit, &place)
+    };
+    ahead(&place, indices.len(), read, |done, read, next| {
+        let i = indices[done];
+        let values = match read? {
+            Read::Values(values) => values,
+            Read::Dead(why) => {
+                next();
+                warnings.push(Warning::Dead(why.clone()).of_channel(i));
+                channels.push(Channel::dead(i, units[done], why));
+                return Ok(());
             }
-        });
-        // Refused only when the reader has broken down, which its end tells.
-        let next = || {
-            let _ = ask.send(());
         };
-        next();
-        for (done, &i) in indices.iter().enumerate() {
-            let values = match receiver.recv() {
-                Ok(read) => read?,
-                Err(_) => break,
-            };
-            let values = match values {
-                Read::Values(values) => values,
-                Read::Dead(why) => {
-                    next();
-                    warnings.push(Warning::Dead(why.clone()).of_channel(i));
-                    channels.push(Channel::dead(i, units[done], why));
-                    continue;
-                }
-            };
-            warnings.extend(values.warnings);
-            let samples = values.rates.len();
-            if !estimators.iter().any(|(n, _)| *n == samples) {
-                let new = Estimator::new(samples, stretch.period_s, options.confidence);
-                estimators.push((samples, new));
-            }
-            let estimator = estimators.iter().find(|(n, _)| *n == samples);
-            let heat = temp_c
-                .as_ref()
-                .and_then(|t| t.against(&values.suitability.levels));
-            judged.push((i, values.suitability));
-            let mut rates = values.rates;
-            let dt_s = stretch.period_s;
-            // Kept are its curves, and not the integral, which is as long as the series.
-            let mut as_it_is = None;
-            let spectrum = set_aside_after(&mut rates, dt_s, options.confidence, |rates| {
-                as_it_is = Some(AsItIs::of(rates, dt_s, &options));
-            });
-            let without_lines = Integrated::new(rates, dt_s)?;
-            next();
-            let mut channel = Channel::of(i, units[done], samples);
-            channel.masked = values.masked;
-            channel.spectrum = spectrum;
-            let as_it_is = as_it_is.transpose()?;
-            channel.analyse(
-                as_it_is.as_ref(),
-                &without_lines,
-                estimator.map(|(_, e)| e),
-                &options,
-            );
-            let hadamard = || match as_it_is {
-                Some(curves) => curves.hadamard,
-                None => hadamard(&without_lines, &options),
-            };
-            channel.judge_drift(hadamard, heat, &options, &mut warnings);
-            if channel.spectrum.remains {
-                warnings.push(Warning::UnsteadyLines.of_channel(i));
-            }
-            channel.spectrum = channel.spectrum.without_spectrum();
-            channels.push(channel);
-            progress(0.1 + 0.9 * (done + 1) as f64 / indices.len() as f64);
+        warnings.extend(values.warnings);
+        let samples = values.rates.len();
+        if !estimators.iter().any(|(n, _)| *n == samples) {
+            let new = Estimator::new(samples, stretch.period_s, options.confidence);
+            estimators.push((samples, new));
         }
-        drop((receiver, ask));
-        reader.join().map_err(|_| {
-            Error::new(
-                place,
-                "the reader broke down on the contents",
-                "write the file again from its source",
-            )
-        })
+        let estimator = estimators.iter().find(|(n, _)| *n == samples);
+        let heat = temp_c
+            .as_ref()
+            .and_then(|t| t.against(&values.suitability.levels));
+        judged.push((i, values.suitability));
+        let mut rates = values.rates;
+        let dt_s = stretch.period_s;
+        // Kept are its curves, and not the integral, which is as long as the series.
+        let mut as_it_is = None;
+        let spectrum = set_aside_after(&mut rates, dt_s, options.confidence, |rates| {
+            as_it_is = Some(AsItIs::of(rates, dt_s, &options));
+        });
+        let without_lines = Integrated::new(rates, dt_s)?;
+        next();
+        let mut channel = Channel::of(i, units[done], samples);
+        channel.masked = values.masked;
+        channel.spectrum = spectrum;
+        let as_it_is = as_it_is.transpose()?;
+        channel.analyse(
+            as_it_is.as_ref(),
+            &without_lines,
+            estimator.map(|(_, e)| e),
+            &options,
+        );
+        let hadamard = || match as_it_is {
+            Some(curves) => curves.hadamard,
+            None => hadamard(&without_lines, &options),
+        };
+        channel.judge_drift(hadamard, heat, &options, &mut warnings);
+        if channel.spectrum.remains {
+            warnings.push(Warning::UnsteadyLines.of_channel(i));
+        }
+        channel.spectrum = channel.spectrum.without_spectrum();
+        channels.push(channel);
+        progress(0.1 + 0.9 * (done + 1) as f64 / indices.len() as f64);
+        Ok(())
     })?;
     if let Some(why) = channels.first().and_then(|c| c.dead.as_ref())
         && judged.is_empty()

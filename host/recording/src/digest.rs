@@ -4,6 +4,7 @@ use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
+#[cfg(not(target_family = "wasm"))]
 use std::thread;
 
 use sha2::{Digest, Sha256};
@@ -15,6 +16,7 @@ use crate::error::{Error, Result};
 ///
 /// The file is read twice, the second time from the page cache. The alternative, to pass the
 /// chunks of the readers on in file order, would make the slowest of the two hold up the other.
+#[cfg(not(target_family = "wasm"))]
 pub(super) fn beside<T>(path: &Path, work: impl FnOnce() -> Result<T>) -> Result<(T, String)> {
     /// Tells the hashing thread to stop when the reading ends in an error, or panics.
     struct Stop<'a>(&'a AtomicBool, bool);
@@ -38,6 +40,12 @@ pub(super) fn beside<T>(path: &Path, work: impl FnOnce() -> Result<T>) -> Result
             Err(_) => Err(super::in_order::broke_down(&path.display().to_string())),
         }
     })
+}
+
+/// The same where there are no threads: one after the other.
+#[cfg(target_family = "wasm")]
+pub(super) fn beside<T>(path: &Path, work: impl FnOnce() -> Result<T>) -> Result<(T, String)> {
+    Ok((work()?, sha256(path)?))
 }
 
 /// Digest of a file in hexadecimal.

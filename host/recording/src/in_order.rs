@@ -1,11 +1,13 @@
 //! Work in parallel, results in order, memory bounded.
 
+#[cfg(not(target_family = "wasm"))]
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread;
 
 use crate::error::{Error, Result};
 
 /// Results that may wait in each worker's channel: one to take while the next is being made.
+#[cfg(not(target_family = "wasm"))]
 const WAITING: usize = 2;
 
 /// Threads worth starting.
@@ -21,6 +23,7 @@ pub(super) fn worker_count() -> usize {
 ///
 /// Worker w makes w, w + workers, w + 2 workers and so on, with a state of its own that `start(w)`
 /// builds. An error of `take` stops everything. `place` names the file for the case that a worker panics.
+#[cfg(not(target_family = "wasm"))]
 pub(super) fn in_order<T, W, S>(
     place: &str,
     count: u64,
@@ -82,6 +85,24 @@ where
         }
         outcome
     })
+}
+
+/// The same where there are no threads: each result is made when it is wanted.
+#[cfg(target_family = "wasm")]
+pub(super) fn in_order<T, W, S>(
+    _: &str,
+    count: u64,
+    workers: usize,
+    start: S,
+    mut take: impl FnMut(u64, T) -> Result<()>,
+) -> Result<()>
+where
+    W: FnMut(u64) -> T,
+    S: Fn(usize) -> W,
+{
+    let mut works: Vec<W> = (0..workers.max(1)).map(start).collect();
+    let each = works.len() as u64;
+    (0..count).try_for_each(|index| take(index, works[(index % each) as usize](index)))
 }
 
 /// What to say when the code that reads a file panicked.

@@ -54,8 +54,9 @@ pub use growing::Growing;
 pub use held::{Held, HeldReadings};
 pub use import::{
     BrokenKind, BrokenLimit, BrokenRows, Chosen, ColumnList, Decimal, Face, ImportOptions,
-    ImportSummary, Inputs, Jitter, Offset, PoseMean, PoseMeans, Preset, PresetUse, Role, Rounds,
-    RowFilter, Scale, SkippedLines, TimeSummary, TwosComplement, Zero, import, is_log,
+    ImportSummary, Inputs, Jitter, Look, Offset, PoseMean, PoseMeans, Preset, PresetUse, Role,
+    Rounds, RowFilter, Scale, SkippedLines, TimeSummary, TwosComplement, Zero, import, is_log,
+    look,
 };
 pub use manifest::{Format, MANIFEST_FILE, Manifest, Rails, RawUnit, Reference, Source};
 pub use no_temperature::NoTemperatures;

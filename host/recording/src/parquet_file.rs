@@ -4,7 +4,6 @@
 //! row group, which could not be divided at all, and with a thread for each row group the memory
 //! grows with the row group, of whatever size its writer chose.
 
-use std::fs::File;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -61,7 +60,7 @@ impl ParquetFile {
     /// Reads the footer.
     pub fn open(path: &Path) -> Result<ParquetFile> {
         let place = path.display().to_string();
-        let file = File::open(path).map_err(|error| Error::io(path, &error))?;
+        let file = StrictFile::open(path).map_err(|error| Error::io(path, &error))?;
         // The decoder of the footer has panicked on damaged files before.
         let metadata = catch_unwind(AssertUnwindSafe(|| {
             ParquetMetaDataReader::new().parse_and_finish(&file)
@@ -469,7 +468,7 @@ impl Cursor {
             Some(file) => file.clone(),
             // A handle of its own: the position of a shared one would move under the other threads.
             None => {
-                let file = Arc::new(StrictFile(File::open(&self.source.path)?));
+                let file = Arc::new(StrictFile::open(&self.source.path)?);
                 self.file.insert(file).clone()
             }
         };

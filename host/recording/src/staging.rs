@@ -144,10 +144,15 @@ fn sibling(target: &Path, purpose: &str) -> Result<PathBuf> {
         ));
     };
     let parent = folder(target);
+    // WebAssembly has one process, and its number cannot be asked for.
+    let process = match cfg!(target_family = "wasm") {
+        true => 0,
+        false => std::process::id(),
+    };
     for attempt in 0..1000 {
         let mut hidden = std::ffi::OsString::from(".");
         hidden.push(name);
-        hidden.push(format!(".{purpose}-{}-{attempt}", std::process::id()));
+        hidden.push(format!(".{purpose}-{process}-{attempt}"));
         let path = parent.join(hidden);
         match fs::create_dir(&path) {
             Ok(()) => return Ok(path),

@@ -2,28 +2,48 @@
 
 use std::fs::File;
 use std::io::{BufReader, Error, ErrorKind, Read, Seek, SeekFrom};
+use std::path::Path;
+use std::sync::Arc;
 
 use bytes::Bytes;
 use parquet::errors::Result;
 use parquet::file::reader::{ChunkReader, Length};
 
-/// A file for the page reader of `parquet`.
+/// A file for the readers of `parquet`.
 ///
 /// That crate skips what it does not know in the header of a page without noticing the end of the file (60.1,
 /// `ThriftReadInputProtocol::skip_bytes`): one flipped bit that makes a list of 2³¹ numbers of it, and a file of ten
 /// kilobytes is read for half an hour.
+///
+/// Its own readers of a file duplicate the handle, which WebAssembly's system cannot. One handle serves here, on one thread.
 #[derive(Debug)]
-pub(super) struct StrictFile(pub File);
+pub(super) struct StrictFile(Arc<File>);
+
+impl StrictFile {
+    /// Opens it.
+    pub fn open(path: &Path) -> std::io::Result<Self> {
+        Ok(Self(Arc::new(File::open(path)?)))
+    }
+}
 
 /// See [`StrictFile`].
 #[derive(Debug)]
-pub(super) struct EndIsError(File);
+pub(super) struct EndIsError {
+    file: Arc<File>,
+    /// Where the next read begins: another reader may have moved the handle.
+    at: u64,
+}
 
 impl Read for EndIsError {
     fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
-        match self.0.read(buffer)? {
+        let mut file = &*self.file;
+        file.seek(SeekFrom::Start(self.at))?;
+        match file.read(buffer)? {
             0 if !buffer.is_empty() => Err(Error::from(ErrorKind::UnexpectedEof)),
-            length => Ok(length),
+            length => {
+                self.at += length as u64;
+                Ok(length)
+            }
         }
     }
 }
@@ -38,12 +58,19 @@ impl ChunkReader for StrictFile {
     type T = BufReader<EndIsError>;
 
     fn get_read(&self, start: u64) -> Result<Self::T> {
-        let mut file = self.0.try_clone()?;
-        file.seek(SeekFrom::Start(start))?;
-        Ok(BufReader::new(EndIsError(file)))
+        let file = self.0.clone();
+        Ok(BufReader::new(EndIsError { file, at: start }))
     }
 
     fn get_bytes(&self, start: u64, length: usize) -> Result<Bytes> {
-        self.0.get_bytes(start, length)
+        let mut bytes = Vec::with_capacity(length);
+        let file = self.0.clone();
+        let read = EndIsError { file, at: start }
+            .take(length as u64)
+            .read_to_end(&mut bytes)?;
+        match read == length {
+            true => Ok(bytes.into()),
+            false => Err(Error::from(ErrorKind::UnexpectedEof).into()),
+        }
     }
 }

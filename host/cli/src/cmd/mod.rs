@@ -5,14 +5,17 @@ pub(crate) mod apply;
 pub(crate) mod compare;
 pub(crate) mod completions;
 pub(crate) mod design;
+#[cfg(not(target_family = "wasm"))]
 pub(crate) mod device;
 pub(crate) mod diagnose;
 pub(crate) mod export;
 pub(crate) mod fit;
 pub(crate) mod import;
 pub(crate) mod man;
+#[cfg(not(target_family = "wasm"))]
 pub(crate) mod record;
 pub(crate) mod report;
 pub(crate) mod thermal;
 pub(crate) mod verify;
+#[cfg(not(target_family = "wasm"))]
 pub(crate) mod wizard;

@@ -1,6 +1,7 @@
 //! `mimu thermal`.
 
 mod plan;
+#[cfg(not(target_family = "wasm"))]
 mod record;
 
 use std::path::PathBuf;
@@ -37,6 +38,7 @@ enum ThermalCommand {
     Compare(CompareArgs),
     /// Plan a procedure: how long it takes, and how well the curves are known afterwards
     Plan(plan::PlanArgs),
+    #[cfg(not(target_family = "wasm"))]
     /// Carry a plan out: lead the chamber, move the table, and record the device
     Record(record::RecordArgs),
 }
@@ -141,6 +143,7 @@ pub(crate) fn run(args: &ThermalArgs) -> Result<()> {
         ThermalCommand::Fit(args) => run_fit(args),
         ThermalCommand::Compare(args) => run_compare(args),
         ThermalCommand::Plan(args) => plan::run(args),
+        #[cfg(not(target_family = "wasm"))]
         ThermalCommand::Record(args) => record::run(args),
     }
 }

@@ -85,6 +85,11 @@ pub fn unit_page(unit: &UnitReport, made: &Made) -> Result<String> {
     Ok(page(&format!("{}: {verdict}", calibration.device), &main))
 }
 
+/// The raw readings of a recording over time, with its dwells, as a part of a page.
+pub fn trace_figure(prepared: &Prepared) -> String {
+    trace::figure(prepared).into_string()
+}
+
 fn identity(unit: &UnitReport, made: &Made) -> Markup {
     let calibration = unit.calibration;
     html! {

@@ -13,6 +13,7 @@ mod inputs;
 mod join;
 mod joined;
 mod log;
+mod look;
 mod options;
 #[cfg(feature = "parquet")]
 mod parquet_table;
@@ -57,6 +58,7 @@ pub use codes::{TwosComplement, Zero};
 pub use faces::Face;
 pub use inputs::Inputs;
 pub use log::is_log;
+pub use look::{Look, look};
 pub use options::ImportOptions;
 pub use pose_means::{PoseMean, PoseMeans};
 pub use preset::{Chosen, Preset, PresetUse};

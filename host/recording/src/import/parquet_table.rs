@@ -60,6 +60,28 @@ impl Source {
         }
     }
 
+    /// Decodes the next `count` rows in place of those before.
+    fn fill(&mut self, path: &Path, count: usize) -> Result<()> {
+        self.values.clear();
+        self.texts.clear();
+        self.wholes.clear();
+        // The decoders have panicked on damaged files before; a damaged file is no bug of ours.
+        let decode = std::panic::AssertUnwindSafe(|| match self.leaf.is_text() {
+            true => self.cursor.read_text(count, &mut self.texts),
+            false if self.role == Some(Role::Column(Column::Time)) => {
+                let (values, wholes) = (&mut self.values, &mut self.wholes);
+                self.cursor.read_whole(count, values, wholes)
+            }
+            false => self.cursor.read(count, &mut self.values),
+        });
+        let decoded = std::panic::catch_unwind(decode)
+            .map_err(|_| broke_down(&path.display().to_string()))?;
+        decoded.map_err(|problem| {
+            let place = format!("{}, column {}", path.display(), self.name);
+            Error::new(place, problem, "write the file again from its source")
+        })
+    }
+
     /// What the row `at` of the slice holds, as text.
     fn text(&self, at: usize) -> Cow<'_, str> {
         match self.leaf.is_text() {
@@ -75,6 +97,23 @@ impl std::fmt::Debug for ParquetTable {
             .field("path", &self.path)
             .finish_non_exhaustive()
     }
+}
+
+/// Names of all columns and the first rows, cell by cell; what is no number stays empty.
+pub(super) fn first_rows(path: &Path, most: usize) -> Result<(Vec<String>, Vec<Vec<String>>)> {
+    let file = ParquetFile::open(path)?;
+    let names = file.names();
+    let count = file.rows().min(most as u64) as usize;
+    let mut rows = vec![vec![String::new(); names.len()]; count];
+    for (at, name) in names.iter().enumerate() {
+        let Ok(leaf) = file.leaf(name) else { continue };
+        let mut source = Source::new(&file, None, name.clone(), leaf);
+        source.fill(path, count)?;
+        for (k, row) in rows.iter_mut().enumerate() {
+            row[at] = source.text(k).into_owned();
+        }
+    }
+    Ok((names, rows))
 }
 
 impl ParquetTable {
@@ -231,24 +270,7 @@ impl ParquetTable {
     fn fill(&mut self) -> Result<()> {
         let count = (self.rows - self.row).min(SLICE as u64) as usize;
         for column in self.columns.iter_mut().chain(&mut self.filtered) {
-            column.values.clear();
-            column.texts.clear();
-            column.wholes.clear();
-            // The decoders have panicked on damaged files before; a damaged file is no bug of ours.
-            let decode = std::panic::AssertUnwindSafe(|| match column.leaf.is_text() {
-                true => column.cursor.read_text(count, &mut column.texts),
-                false if column.role == Some(Role::Column(Column::Time)) => {
-                    let (values, wholes) = (&mut column.values, &mut column.wholes);
-                    column.cursor.read_whole(count, values, wholes)
-                }
-                false => column.cursor.read(count, &mut column.values),
-            });
-            let decoded = std::panic::catch_unwind(decode)
-                .map_err(|_| broke_down(&self.path.display().to_string()))?;
-            decoded.map_err(|problem| {
-                let place = format!("{}, column {}", self.path.display(), column.name);
-                Error::new(place, problem, "write the file again from its source")
-            })?;
+            column.fill(&self.path, count)?;
         }
         self.at = 0;
         self.filled = count;

@@ -152,6 +152,15 @@ pub(super) fn read_bag(path: &Path, choice: Choice<'_>) -> Result<Vec<Readings>>
     chosen(path, guarded(path, || messages_of_bag(path))?, choice)
 }
 
+/// Without the reader of bags, which maps the file into memory.
+#[cfg(target_family = "wasm")]
+fn messages_of_bag(path: &Path) -> Result<Found> {
+    let problem = "bags of ROS 1 are not read in a browser";
+    let remedy = "import it with the command mimu, or make an MCAP file of it (mcap convert)";
+    Err(Error::new(path.display(), problem, remedy))
+}
+
+#[cfg(not(target_family = "wasm"))]
 fn messages_of_bag(path: &Path) -> Result<Found> {
     use rosbag::{ChunkRecord, IndexRecord, MessageRecord, RosBag};
     let damaged = |error: rosbag::Error| damaged(path, &error);
@@ -204,7 +213,14 @@ fn messages_of_mcap(path: &Path) -> Result<Found> {
     use mcap::records::Record;
     use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
     let io = |error: std::io::Error| Error::io(path, &error);
-    let damaged = |error: mcap::McapError| damaged(path, &error);
+    let damaged = |error: mcap::McapError| match error {
+        mcap::McapError::UnsupportedCompression(codec) => Error::new(
+            path.display(),
+            format!("its chunks are compressed with {codec}, which this program does not read"),
+            "write it again with zstd (mcap compress --compression zstd)",
+        ),
+        error => damaged(path, &error),
+    };
     let mut file = File::open(path).map_err(io)?;
     let options = LinearReaderOptions::default().with_record_length_limit(LONGEST_RECORD);
     let mut reader = LinearReader::new_with_options(options);

@@ -1,0 +1,61 @@
+//! One thing read while the one before is worked on.
+
+#[cfg(not(target_family = "wasm"))]
+use std::sync::mpsc::{channel, sync_channel};
+#[cfg(not(target_family = "wasm"))]
+use std::thread;
+
+#[cfg(not(target_family = "wasm"))]
+use mimu_recording::error::Error;
+use mimu_recording::error::Result;
+
+/// Hands `read(0)`, `read(1)`, ... to `take`, `count` of them, each with a way to have the next read beside the work: it is called when there is
+/// memory for it, once for each. `place` names the file for the case that the reader panics.
+#[cfg(not(target_family = "wasm"))]
+pub(super) fn ahead<T: Send>(
+    place: &str,
+    count: usize,
+    mut read: impl FnMut(usize) -> T + Send,
+    mut take: impl FnMut(usize, T, &dyn Fn()) -> Result<()>,
+) -> Result<()> {
+    let (sender, receiver) = sync_channel(0);
+    let (ask, asked) = channel();
+    thread::scope(|scope| {
+        let reader = scope.spawn(move || {
+            for k in 0..count {
+                // Either is refused only when the receiver has given up.
+                if asked.recv().is_err() || sender.send(read(k)).is_err() {
+                    break;
+                }
+            }
+        });
+        // Refused only when the reader has broken down, which its end tells.
+        let next = || {
+            let _ = ask.send(());
+        };
+        next();
+        for k in 0..count {
+            let Ok(one) = receiver.recv() else { break };
+            take(k, one, &next)?;
+        }
+        drop((receiver, ask));
+        reader.join().map_err(|_| {
+            Error::new(
+                place,
+                "the reader broke down on the contents",
+                "write the file again from its source",
+            )
+        })
+    })
+}
+
+/// The same where there are no threads.
+#[cfg(target_family = "wasm")]
+pub(super) fn ahead<T>(
+    _: &str,
+    count: usize,
+    mut read: impl FnMut(usize) -> T,
+    mut take: impl FnMut(usize, T, &dyn Fn()) -> Result<()>,
+) -> Result<()> {
+    (0..count).try_for_each(|k| take(k, read(k), &|| ()))
+}

@@ -1,0 +1,145 @@
+//! The beginning of a foreign file, for a person to say what its columns are.
+
+use std::io::Read as _;
+use std::path::Path;
+
+use serde::Serialize;
+
+use super::binary::{refuse_binary, without_zeros};
+use super::log::is_log;
+use super::parquet_table;
+use crate::cell;
+use crate::csv_file::BOM;
+use crate::error::{Error, Result};
+use crate::separator::Separator;
+
+/// Bytes at the start that are looked at.
+const HEAD: u64 = 1 << 18;
+/// Most rows that are shown.
+const ROWS: usize = 200;
+
+/// What stands at the beginning of a foreign file.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct Look {
+    /// Whether it is a log, whose messages have their own columns; then nothing else is here.
+    pub log: bool,
+    /// Names of the columns; empty where no line has them.
+    pub names: Vec<String>,
+    /// The first rows, cell by cell, as they are written.
+    pub rows: Vec<Vec<String>>,
+}
+
+/// Looks at the beginning of a file; `separator` as in an import.
+///
+/// # Errors
+/// The file cannot be read, is of another kind, or no line of it holds numbers.
+pub fn look(path: &Path, separator: Option<Separator>) -> Result<Look> {
+    let ending = path.extension().unwrap_or_default();
+    if is_log(path) {
+        return Ok(Look {
+            log: true,
+            ..Look::default()
+        });
+    }
+    if ending.eq_ignore_ascii_case("parquet") {
+        let (names, rows) = parquet_table::first_rows(path, ROWS)?;
+        return Ok(Look {
+            log: false,
+            names,
+            rows,
+        });
+    }
+    let io = |error: std::io::Error| Error::io(path, &error);
+    let file = std::fs::File::open(path).map_err(io)?;
+    let mut head = Vec::new();
+    file.take(HEAD).read_to_end(&mut head).map_err(io)?;
+    refuse_binary(path, &head)?;
+    let head = head.strip_prefix(BOM).unwrap_or(&head);
+    let mut lines: Vec<&[u8]> = head.split(|b| *b == b'\n').map(without_zeros).collect();
+    // The last one may be cut.
+    if head.len() as u64 >= HEAD - BOM.len() as u64 {
+        lines.pop();
+    }
+    of_lines(&lines, separator).ok_or_else(|| {
+        let problem = "no line of it is a row of numbers";
+        let remedy =
+            "give a text file with one sample a line, Parquet, or a log with its usual ending";
+        Error::new(path.display(), problem, remedy)
+    })
+}
+
+fn of_lines(lines: &[&[u8]], separator: Option<Separator>) -> Option<Look> {
+    // Names may stand behind the sign of a comment.
+    let plain = |line: &[u8]| {
+        let from = line
+            .iter()
+            .position(|b| !matches!(b, b'#' | b'%' | b' ' | b'\t'));
+        line[from.unwrap_or(line.len())..].to_vec()
+    };
+    let comment = |line: &[u8]| matches!(line.trim_ascii().first(), Some(b'#' | b'%'));
+    let shown: Vec<&[u8]> = lines
+        .iter()
+        .filter(|line| !line.trim_ascii().is_empty() && !comment(line))
+        .copied()
+        .collect();
+    let separator = separator.unwrap_or_else(|| Separator::detect(&shown));
+    let cells = |line: &[u8]| {
+        let mut record = csv::ByteRecord::new();
+        separator.split(line, &mut record);
+        let text = |cell: &[u8]| String::from_utf8_lossy(cell).into_owned();
+        record.iter().map(text).collect::<Vec<String>>()
+    };
+    let number = |cell: &String| {
+        let point = match separator {
+            Separator::Comma => cell.clone(),
+            _ => cell.replacen(',', ".", 1),
+        };
+        cell::number(point.as_bytes()).is_ok_and(f64::is_finite)
+    };
+    let numbers = |row: &[String]| row.iter().filter(|cell| number(cell)).count();
+    let is_row = |line: &&[u8]| {
+        let row = cells(line);
+        !comment(line) && row.len() > 1 && 2 * numbers(&row) > row.len()
+    };
+    let first = lines.iter().position(is_row)?;
+    let width = cells(lines[first]).len();
+    let above = lines[..first].iter().rev().map(|line| cells(&plain(line)));
+    let mut headers = above.filter(|row| row.len() == width && numbers(row) == 0);
+    let rows = lines[first..].iter().filter(|line| is_row(line));
+    Some(Look {
+        log: false,
+        names: headers.next().unwrap_or_default(),
+        rows: rows.take(ROWS).map(|line| cells(line)).collect(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn of(text: &str) -> Look {
+        let lines: Vec<&[u8]> = text.lines().map(str::as_bytes).collect();
+        of_lines(&lines, None).unwrap()
+    }
+
+    #[test]
+    fn names_stand_in_the_last_line_of_words_above_the_first_row() {
+        let look = of("log of today\nt;wx;ax\n0,01;2;3\n0,02;4;5\n");
+        assert_eq!(look.names, ["t", "wx", "ax"]);
+        assert_eq!(look.rows, [["0,01", "2", "3"], ["0,02", "4", "5"]]);
+        assert_eq!(of("# t wx ax\n0 1 2\n1 1 2\n").names, ["t", "wx", "ax"]);
+        assert!(of("1\t2\n3\t4\n").names.is_empty());
+    }
+
+    #[test]
+    fn a_file_without_numbers_is_refused_in_a_line() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("letter.txt");
+        std::fs::write(&path, "Dear Sir,\nyours, faithfully\n").unwrap();
+        let line = look(&path, None).unwrap_err().to_string();
+        assert!(
+            line.contains("letter.txt: no line of it is a row of numbers"),
+            "{line}"
+        );
+    }
+}

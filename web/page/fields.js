@@ -1,0 +1,131 @@
+// From what is chosen in the form to the arguments of `mimu import`.
+
+const ROLES = [
+  ["-", "not used"],
+  ["t_s", "time"],
+  ["sample", "sample number"],
+  ...["gyro", "accel"].flatMap((sensor) => ["x", "y", "z"].map((axis) => [`${sensor}_${axis}`, `${sensor} ${axis}`])),
+  ["temp_c", "temperature, °C"],
+  ["step", "step (number of the pose)"],
+  ...["x", "y", "z"].map((axis) => [`ref_rate_${axis}_dps`, `known rate ${axis}, deg/s`]),
+  ...["x", "y", "z"].map((axis) => [`ref_force_${axis}_mps2`, `known specific force ${axis}, m/s²`]),
+];
+
+/** Factors to SI; what is not here is for the fit to find. */
+const TO_SI = {
+  accel: { "m/s²": 1, g: 9.80665, mg: 0.00980665 },
+  gyro: { "rad/s": 1, "deg/s": Math.PI / 180, "mdeg/s": Math.PI / 180000 },
+};
+
+/** Field that an argument of the command is set by. */
+export const FIELD_OF = {
+  "--columns": "files", "--rate-hz": "rate", "--time-unit": "time-unit", "--gravity": "gravity", "--latitude": "latitude", "--topic": "topic",
+  "--raw-unit": "accel-unit", "--reference": "reference", "--skip-broken": "broken", "--instance": "more-import", "--where": "more-import",
+  "--scale": "more-import", "--offset": "more-import", "--signed-low-byte": "more-import", "--preset": "more-import", "--still": "more-fit",
+  "--steps": "more-fit", "--only": "more-fit", "--keep": "more-fit",
+};
+
+const field = (id) => document.getElementById(id);
+
+function made(name, properties, ...children) {
+  const element = Object.assign(document.createElement(name), properties);
+  element.append(...children);
+  return element;
+}
+
+/** Shows the columns of `looked`, the answer of `columns`, each with the role that it was taken for. */
+export function show(looked) {
+  const lists = looked.files.map((file, k) => {
+    const columns = file.roles.map((role, at) => {
+      const name = file.names[at] ?? `column ${at + 1}`;
+      const select = made("select", { id: `role-${k}-${at}` }, ...ROLES.map(([value, text]) => made("option", { value, textContent: text })));
+      select.value = ROLES.some(([value]) => value === role) ? role : "-";
+      const cells = made("span", { className: "cells", textContent: file.rows.map((row) => row[at] ?? "").join("  ") });
+      const label = made("label", {}, made("span", { className: "label", textContent: name }), cells, select);
+      const item = made("li", { className: "column" }, label);
+      const mark = () => item.classList.toggle("unused", select.value === "-");
+      select.addEventListener("change", () => (mark(), follow()));
+      mark();
+      return item;
+    });
+    const legend = made("legend", { textContent: file.file });
+    const content = file.log
+      ? made("p", { textContent: "A log says itself what it holds. Its own calibration is undone, and what could not be undone is a warning." })
+      : made("ul", { className: "column-list" }, ...columns);
+    return made("fieldset", { className: "file" }, legend, content);
+  });
+  field("files").replaceChildren(...lists);
+  const { preset, files } = looked;
+  const guessed = files.some((file) => file.by_readings);
+  field("taken").textContent = files.every((file) => file.log)
+    ? ""
+    : preset
+      ? `Recognised by its header: ${preset.title}.`
+      : guessed
+        ? "The file has no names of columns, so they were guessed from the readings. Check them."
+        : "By the names in the file. Correct what is wrong.";
+  const say = (id, value) => (field(id).value = value);
+  const of = (key) => files.map((file) => file[key]).find(Boolean);
+  const si = preset?.raw_unit === "SI";
+  say("accel-unit", si ? "m/s²" : (of("accel_unit") ?? "count"));
+  say("gyro-unit", si ? "rad/s" : (of("gyro_unit") ?? "count"));
+  say("time-unit", preset ? "" : (of("time_unit") ?? ""));
+  follow();
+
+  function follow() {
+    const roles = chosen();
+    const has = (start) => roles.flat().some((role) => role.startsWith(start));
+    const log = files.some((file) => file.log);
+    field("accel-unit-field").hidden = log || !has("accel_");
+    field("gyro-unit-field").hidden = log || !has("gyro_");
+    field("time-unit-field").hidden = log || !has("t_s");
+    field("rate-field").hidden = log;
+    const timeless = !log && !has("t_s");
+    field("rate").required = timeless;
+    field("rate").placeholder = timeless ? "needed: no column is the time" : "from the time stamps";
+    field("topic-field").hidden = !log;
+    field("several-field").hidden = files.length < 2;
+    if (has("ref_")) say("reference", "table");
+  }
+}
+
+/** Role of each column of each file. */
+function chosen() {
+  return [...document.querySelectorAll("#files .file")].map((file) => [...file.querySelectorAll("select")].map((select) => select.value));
+}
+
+/** Cut at blanks, as a shell does; quotes keep them. */
+export function cut(text) {
+  return [...text.matchAll(/"([^"]*)"|'([^']*)'|(\S+)/g)].map((m) => m[1] ?? m[2] ?? m[3]);
+}
+
+/** Arguments of `mimu import` for the files of `looked`. */
+export function importArguments(looked, names) {
+  const args = ["import", ...names];
+  const add = (flag, value) => value && args.push(flag, value);
+  const roles = chosen();
+  const log = looked.files.some((file) => file.log);
+  if (!log) {
+    const { preset } = looked;
+    const as = preset && roles.every((list, k) => list.every((role, at) => role === looked.files[k].roles[at]));
+    if (as) args.push("--preset", preset.name);
+    else roles.forEach((list) => args.push("--columns", list.join(",")));
+    if (preset && !as) preset.scales.forEach((scale) => args.push("--scale", scale));
+    const present = ["accel", "gyro"].filter((sensor) => roles.flat().some((role) => role.startsWith(sensor)));
+    const units = present.map((sensor) => field(`${sensor}-unit`).value);
+    const si = present.every((sensor, k) => units[k] in TO_SI[sensor]);
+    if (si) {
+      present.forEach((sensor, k) => TO_SI[sensor][units[k]] !== 1 && args.push("--scale", `${sensor}=${TO_SI[sensor][units[k]]}`));
+      args.push("--raw-unit", "SI");
+    } else args.push("--raw-unit", units.every((unit) => unit === "V") ? "V" : "count");
+    add("--time-unit", field("time-unit").value);
+    add("--rate-hz", field("rate").value.trim().replace(",", "."));
+  } else add("--topic", field("topic").value.trim());
+  add("--gravity", field("gravity").value.trim().replace(",", "."));
+  add("--latitude", field("latitude").value.trim().replace(",", "."));
+  args.push("--reference", field("reference").value);
+  if (names.length > 1 && field("several").value) args.push(`--${field("several").value}`);
+  if (field("broken").value) args.push(`--skip-broken=${field("broken").value}`);
+  const device = names[0].replace(/\.[^.]*$/, "");
+  return [...args, "--device", device, ...cut(field("more-import").value), "-o", "rec", "--replace", "--json", "import.json"];
+}

@@ -1,0 +1,325 @@
+// The page: from dropped files to a calibration, one step after the other.
+
+import { FORMATS } from "./exports.js";
+import { FIELD_OF, cut, importArguments, show } from "./fields.js";
+import { Cancelled, Program, Refused, load } from "./program.js";
+import { sphere } from "./sphere.js";
+
+const $ = (id) => document.getElementById(id);
+
+/** The files that were dropped last, what was found in them, and what was computed of these and of those before: the text of each file. */
+const state = { files: [], looked: null, program: null, calibration: null, noise: null, from: {}, example: false };
+
+function made(name, properties, ...children) {
+  const element = Object.assign(document.createElement(name), properties);
+  element.append(...children);
+  return element;
+}
+
+/** Text in which the arguments of the command lead to the field that sets them. */
+function withFields(text) {
+  return text.split(/(--[a-z-]+)/).map((part) => {
+    const id = FIELD_OF[part];
+    if (!id) return part;
+    const button = made("button", { type: "button", className: "field-link", textContent: part });
+    button.addEventListener("click", () => {
+      const target = id === "files" ? $("files").querySelector("select") : $(id);
+      target?.closest("details")?.setAttribute("open", "");
+      (target ?? $("columns-title")).focus();
+    });
+    return button;
+  });
+}
+
+/** Shows the line of a refusal where the person is looking, below `place`; an empty one takes it away. */
+function refuse(line, place = $("drop").parentElement) {
+  place.after($("error"));
+  $("error").replaceChildren(...withFields(line));
+  $("error").hidden = !line;
+  if (line) $("error").focus();
+}
+
+function status(text, share) {
+  $("status").textContent = text;
+  if (share === undefined) $("bar").removeAttribute("value");
+  else $("bar").value = share;
+}
+
+/** The program, with the dropped files in its folder. */
+async function program() {
+  state.program ??= new Program(({ file, share }) => status(`reading ${file}: ${Math.round(100 * share)} %`, share));
+  await state.program.files(state.files);
+  return state.program;
+}
+
+/** Names under which the files stand in the folder: no two alike, none that reads like an argument. */
+function named(files) {
+  const taken = new Set();
+  return [...files].map((file) => {
+    let name = file.name.replace(/^-+/, "").replace(/[/\\]/g, "_") || "log";
+    while (taken.has(name)) name = `another-${name}`;
+    taken.add(name);
+    return { name, file };
+  });
+}
+
+/** What may fail runs in here: its line is shown, and the page goes on. */
+async function guarded(work, place) {
+  refuse("", place);
+  try {
+    await work();
+  } catch (error) {
+    if (error instanceof Cancelled) return;
+    refuse(error instanceof Refused ? error.message : `this page has a fault (${error?.message ?? error}); load it again, and report it if it comes back`, place);
+    if (!(error instanceof Refused)) console.error(error);
+  }
+}
+
+async function open(files) {
+  if (files.length === 0) return;
+  cancel();
+  state.files = named(files);
+  // Where the example was recorded says nothing of where this was.
+  if (state.example) $("gravity").value = "";
+  state.example = false;
+  $("result").hidden = $("work").hidden = true;
+  await guarded(async () => {
+    $("columns").hidden = true;
+    const mimu = await program();
+    const done = await mimu.run("columns", ...state.files.map(({ name }) => name));
+    state.looked = JSON.parse(done.stdout);
+    show(state.looked);
+    $("columns").hidden = false;
+    $("columns-title").focus();
+  });
+}
+
+/** Ends what is being computed. */
+function cancel() {
+  state.program?.end();
+  state.program = null;
+}
+
+/** A step of the work, as a line in the list with its time and the memory that it took. */
+async function step(title, work) {
+  const line = made("li", { textContent: title });
+  $("steps").append(line);
+  status(`${title} …`);
+  const begun = performance.now();
+  try {
+    const result = await work();
+    line.className = "done";
+    line.append(`: ${((performance.now() - begun) / 1000).toFixed(1)} s, ${Math.ceil(result.memory / 1e6)} MB`);
+    return result;
+  } catch (error) {
+    line.className = "refused";
+    line.append(error instanceof Cancelled ? ": cancelled" : ": refused");
+    throw error;
+  }
+}
+
+/** Clears what was shown, and does `steps`. */
+async function compute(steps) {
+  $("result").hidden = true;
+  $("work").hidden = $("progress").hidden = false;
+  $("work-title").focus();
+  for (const id of ["steps", "errors", "warnings", "allan", "trace", "sphere", "kept", "next", "exported", "verdict"]) $(id).replaceChildren();
+  for (const id of ["report-part", "away", "pictures", "verdict"]) $(id).hidden = true;
+  await guarded(async () => {
+    try {
+      await steps(await program());
+    } finally {
+      $("progress").hidden = true;
+      status("");
+    }
+  }, $("work"));
+}
+
+/** Imports the dropped files as the form says. */
+async function imported(mimu) {
+  const names = state.files.map(({ name }) => name);
+  await step("Import", () => mimu.run(...importArguments(state.looked, names)));
+  warn((await mimu.json("import.json")).warnings);
+}
+
+async function calibrate(mimu) {
+  await imported(mimu);
+  const more = cut($("more-fit").value);
+  // The readings are shown even if they cannot be fitted: there one sees why.
+  const fitted = await step("Calibration", () => mimu.run("fit", "rec", "-o", "cal.toml", "--json", "fit.json", ...more)).catch(refusal);
+  const shown = fitted instanceof Refused ? [] : ["cal.toml"];
+  const view = await step("Readings and poses", () => mimu.run("view", "rec", ...shown)).catch((why) => {
+    throw fitted instanceof Refused ? fitted : why;
+  });
+  picture(JSON.parse(view.stdout));
+  $("result").hidden = false;
+  if (fitted instanceof Refused) throw fitted;
+  state.calibration = await mimu.text("cal.toml");
+  state.from["calibration.toml"] = state.files[0].name;
+  warn((await mimu.json("fit.json")).warnings);
+  $("errors").replaceChildren(printed("mimu fit", fitted));
+  const shared = more.filter((_, k) => more[k] !== "--only" && more[k - 1] !== "--only");
+  const page = ["-o", "calibration.toml", "--json", "diagnosis.json", "--page", "report.html"];
+  const found = await step("Diagnosis", () => mimu.run("diagnose", "rec", ...page, ...shared)).catch(refusal);
+  if (!(found instanceof Refused)) {
+    state.calibration = await mimu.text("calibration.toml");
+    warn((await mimu.json("diagnosis.json")).warnings);
+    await report(await mimu.text("report.html"));
+  }
+  await keep(mimu, ["fit.json", "diagnosis.json", "report.html"]);
+  if (found instanceof Refused) throw found;
+}
+
+async function noise(mimu) {
+  await imported(mimu);
+  const by = state.calibration ? ["--calibration", "before.toml"] : [];
+  if (state.calibration) await mimu.write("before.toml", state.calibration);
+  const files = ["-o", "noise.toml", "--json", "allan.json", "--plot", "allan.svg"];
+  const done = await step("Allan deviation", () => mimu.run("allan", "rec", ...files, ...by));
+  state.noise = await mimu.text("noise.toml");
+  state.from["noise.toml"] = state.files[0].name;
+  warn((await mimu.json("allan.json")).warnings);
+  const plot = new DOMParser().parseFromString(await mimu.text("allan.svg"), "image/svg+xml").documentElement;
+  $("allan").replaceChildren(document.importNode(plot, true), printed("mimu allan", done));
+  $("result").hidden = false;
+  await keep(mimu, ["allan.json", "allan.svg"]);
+}
+
+/** What the command prints, to be opened. */
+function printed(command, done) {
+  const text = made("div", { className: "scroll", tabIndex: 0 }, made("pre", { textContent: done.stdout }));
+  return made("details", {}, made("summary", { textContent: `What ${command} prints` }), text);
+}
+
+/** A refusal as a result; another error goes on. */
+function refusal(error) {
+  if (error instanceof Refused) return error;
+  throw error;
+}
+
+function warn(warnings) {
+  const known = new Set([...$("warnings").children].map((line) => line.textContent));
+  for (const warning of warnings ?? []) {
+    const text = typeof warning === "string" ? warning : warning.message ?? JSON.stringify(warning);
+    if (!known.has(text)) $("warnings").append(made("li", {}, ...withFields(text)));
+  }
+}
+
+function picture(view) {
+  $("pictures").hidden = false;
+  // The program's own drawing; it escapes what it is handed.
+  $("trace").innerHTML = view.trace;
+  $("poses-part").hidden = view.poses.length === 0;
+  if (view.poses.length === 0) return;
+  $("sphere").replaceChildren(sphere(view));
+  const gain = view.next && Math.round(100 * view.next.gain);
+  const most = view.next
+    ? `Shaded: how much one more dwell with that direction up would add. Most: ${view.next.words}, which would lower the sigmas of the accelerometer's parameters by ${gain < 1 ? "less than 1" : gain} % in the mean.`
+    : "These poses do not determine all parameters of the accelerometer, so that no single one can be said to add most.";
+  $("next").textContent = `${view.poses.length} poses: the direction that is up, in the body frame. Equal areas. ${most}`;
+}
+
+/** Shows the report, and its verdict and errors above. */
+async function report(html) {
+  const parsed = new DOMParser().parseFromString(html, "text/html");
+  const verdict = parsed.querySelector(".verdict");
+  $("verdict").className = verdict.className;
+  $("verdict").replaceChildren(...document.importNode(verdict, true).childNodes);
+  $("verdict").hidden = false;
+  const errors = parsed.querySelector("table");
+  if (errors) $("errors").prepend(document.importNode(errors, true));
+  $("report-part").hidden = false;
+  await new Promise((loaded) => {
+    $("report").onload = () => {
+      const inside = $("report").contentDocument.documentElement;
+      new ResizeObserver(() => ($("report").style.height = `${inside.scrollHeight + 4}px`)).observe(inside);
+      loaded();
+    };
+    $("report").srcdoc = html;
+  });
+}
+
+/** Hands a file to the browser's downloads. */
+function save(name, bytes) {
+  const link = made("a", { href: URL.createObjectURL(new Blob([bytes])), download: name });
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 60000);
+}
+
+/** Offers the files that were made of this recording, and the formats that can be made of what is known of the unit. */
+async function keep(mimu, files) {
+  const recording = await mimu.read("rec");
+  const ours = { "calibration.toml": state.calibration, "noise.toml": state.noise };
+  for (const [name, text] of Object.entries(ours)) if (text) await mimu.write(name, text);
+  const all = [...Object.keys(ours), ...files].map((name) => [name, name]);
+  all.push(...[...recording.keys()].map((name) => [`rec/${name}`, name]));
+  for (const [from, name] of all) {
+    const bytes = await mimu.read(from);
+    if (!bytes) continue;
+    const button = made("button", { type: "button", textContent: name });
+    button.addEventListener("click", () => guarded(async () => save(name, await mimu.read(from))));
+    $("kept").append(button);
+  }
+  const option = ({ name, file, of }, k) => made("option", { value: k, textContent: `${name} (${file})`, disabled: !state[of] });
+  $("format").replaceChildren(...FORMATS.map(option));
+  $("format").value = FORMATS.findIndex(({ of }) => state[of]);
+  const from = Object.entries(state.from).map(([file, of]) => `${file} is from ${of}.`);
+  if (!state.noise) from.push("Formats of estimators (Kalibr, OpenVINS ...) are made from noise: drop a recording at rest, and press “Noise of a unit at rest”.");
+  $("made-from").textContent = from.join(" ");
+  $("away").hidden = false;
+  $("result-title").focus();
+}
+
+async function takeAway() {
+  const { file, args } = FORMATS[$("format").value];
+  $("exported").replaceChildren();
+  await guarded(async () => {
+    const mimu = state.program;
+    const from = ["calibration", "noise"].filter((of) => state[of]).flatMap((of) => [`--${of}`, `${of}.toml`]);
+    const done = await mimu.run("export", ...args, ...from, "-o", file);
+    save(file, await mimu.read(file));
+    $("exported").replaceChildren(made("span", { className: "said", textContent: done.stdout.trim() }));
+  }, $("exported"));
+}
+
+async function example() {
+  await guarded(async () => {
+    const files = await Promise.all(
+      ["accel.txt", "gyro.txt"].map(async (name) => {
+        const response = await fetch(`example/${name}`);
+        if (!response.ok) throw new Refused(`example/${name}: the server answers ${response.status}; put all files of the page in one folder`);
+        return new File([await response.blob()], name);
+      }),
+    );
+    await open(files);
+    $("gravity").value = "9.80665";
+    state.example = true;
+    await compute(calibrate);
+  });
+}
+
+$("file").addEventListener("change", () => open($("file").files));
+$("file").addEventListener("click", () => ($("file").value = ""));
+$("example").addEventListener("click", example);
+$("export").addEventListener("click", takeAway);
+$("cancel").addEventListener("click", () => {
+  cancel();
+  $("columns-title").focus();
+});
+$("columns").addEventListener("submit", (event) => {
+  event.preventDefault();
+  compute(calibrate);
+});
+$("noise").addEventListener("click", () => compute(noise));
+addEventListener("dragover", (event) => {
+  event.preventDefault();
+  $("drop").classList.add("over");
+});
+addEventListener("dragleave", (event) => event.relatedTarget ?? $("drop").classList.remove("over"));
+addEventListener("drop", (event) => {
+  event.preventDefault();
+  $("drop").classList.remove("over");
+  open(event.dataTransfer.files);
+});
+load().catch((error) => refuse(error.message));
+if ("serviceWorker" in navigator && isSecureContext) navigator.serviceWorker.register("sw.js").catch(() => {});

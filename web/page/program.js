@@ -1,0 +1,88 @@
+// The program in its worker, as promises.
+
+/** The program has refused: its one line. */
+export class Refused extends Error {}
+
+/** The person has cancelled. */
+export class Cancelled extends Error {}
+
+let compiled;
+
+/** Compiles the program once; workers that follow one another share it. */
+export function load() {
+  compiled ??= (async () => {
+    const response = await fetch("mimu.wasm");
+    if (!response.ok) throw new Refused(`mimu.wasm: the server answers ${response.status}; put all files of the page in one folder`);
+    // Servers that do not know the type of the file cannot stream it.
+    const streams = response.headers.get("content-type")?.startsWith("application/wasm");
+    return streams ? WebAssembly.compileStreaming(response) : WebAssembly.compile(await response.arrayBuffer());
+  })();
+  compiled.catch(() => (compiled = undefined));
+  return compiled;
+}
+
+/** One worker, with files of its own. */
+export class Program {
+  constructor(onProgress = () => {}) {
+    this.waiting = new Map();
+    this.next = 0;
+    this.worker = new Worker("worker.js", { type: "module" });
+    this.worker.onmessage = ({ data }) => {
+      if (data.progress) return onProgress(data.progress);
+      const { resolve, reject } = this.waiting.get(data.id);
+      this.waiting.delete(data.id);
+      if (data.failed === undefined) resolve(data.answer);
+      else reject(new Refused(data.failed));
+    };
+    this.worker.onerror = (event) => this.end(new Refused(`the worker does not start (${event.message ?? "no reason is given"}); load the page again`));
+    this.ready = load().then((module) => this.ask("module", { module }));
+    this.ready.catch(() => {});
+  }
+
+  ask(what, message, transfer = []) {
+    return new Promise((resolve, reject) => {
+      if (this.ended) return reject(this.ended);
+      const id = this.next++;
+      this.waiting.set(id, { resolve, reject });
+      this.worker.postMessage({ id, do: what, ...message }, transfer);
+    });
+  }
+
+  async files(files) {
+    await this.ready;
+    return this.ask("files", { files });
+  }
+
+  write(name, text) {
+    return this.ask("write", { name, text });
+  }
+
+  read(name) {
+    return this.ask("read", { name });
+  }
+
+  /** Runs `mimu` with these arguments; its output, or `Refused` with its line. */
+  async run(...args) {
+    await this.ready;
+    const done = await this.ask("run", { args });
+    if (done.status !== 0) throw new Refused(done.stderr.trim().split("\n").at(-1).replace(/^mimu: /, ""));
+    return done;
+  }
+
+  async text(name) {
+    const bytes = await this.read(name);
+    return bytes && new TextDecoder().decode(bytes);
+  }
+
+  async json(name) {
+    return JSON.parse(await this.text(name));
+  }
+
+  /** Ends the worker, whatever it is at. */
+  end(why = new Cancelled("cancelled")) {
+    this.ended = why;
+    this.worker.terminate();
+    for (const { reject } of this.waiting.values()) reject(why);
+    this.waiting.clear();
+  }
+}

@@ -1,0 +1,390 @@
+//! What the columns of a dropped file are taken for. The person corrects it in the page.
+//!
+//! Names decide, by the words in which loggers write them. Where there are none, the first column that only grows is the time, and of two
+//! triads the one that reads more is the accelerometer's, as gravity is large beside the rate of a unit at rest. That may be wrong of readings
+//! with a large bias, so the page asks to check it.
+
+use serde::Serialize;
+
+/// Units in which a triad may be written, with the factor to SI; none where it is for the fit to find.
+const GYRO_UNITS: [(&str, &[&str]); 3] = [
+    (
+        "deg/s",
+        &["deg/s", "dps", "°/s", "deg_s", "degps", "degpersec"],
+    ),
+    ("mdeg/s", &["mdps", "mdeg/s"]),
+    ("rad/s", &["rad/s", "radps", "rads", "rad_s"]),
+];
+const ACCEL_UNITS: [(&str, &[&str]); 3] = [
+    ("mg", &["(mg)", "[mg]", "_mg"]),
+    (
+        "m/s²",
+        &["m/s2", "m/s^2", "m/s²", "mps2", "ms2", "m_s2", "m.s-2"],
+    ),
+    ("g", &["(g)", "[g]", "_g"]),
+];
+const TIME_UNITS: [(&str, &[&str]); 4] = [
+    ("ms", &["ms", "milli"]),
+    ("us", &["us", "µs", "micro"]),
+    ("ns", &["ns", "nano"]),
+    ("s", &["(s)", "[s]", "_s", "sec"]),
+];
+
+/// A guess for one file.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct Guess {
+    /// Role of each column, `-` where it is not used.
+    pub roles: Vec<&'static str>,
+    /// Unit of the gyro and of the accelerometer, if their names or sizes say it.
+    pub gyro_unit: Option<&'static str>,
+    /// See [`Self::gyro_unit`].
+    pub accel_unit: Option<&'static str>,
+    /// Unit of the time stamps, if the name of their column says it.
+    pub time_unit: Option<&'static str>,
+    /// Whether the roles follow from the readings alone.
+    pub by_readings: bool,
+}
+
+const GYRO: [&str; 3] = ["gyro_x", "gyro_y", "gyro_z"];
+const ACCEL: [&str; 3] = ["accel_x", "accel_y", "accel_z"];
+
+/// What a name says.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Meaning {
+    Time,
+    Gyro(usize),
+    Accel(usize),
+    Temperature,
+    Step,
+    Other,
+}
+
+/// A name without its unit, in lower case, cut into words.
+fn words(name: &str) -> Vec<String> {
+    let bare = name.split(['(', '[']).next().unwrap_or_default();
+    let mut words = Vec::new();
+    let mut word = String::new();
+    let mut before = ' ';
+    for c in bare.chars() {
+        let cut = c.is_uppercase() && before.is_lowercase();
+        if !c.is_alphanumeric() || cut {
+            words.push(std::mem::take(&mut word));
+        }
+        if c.is_alphanumeric() {
+            word.extend(c.to_lowercase());
+        }
+        before = c;
+    }
+    words.push(word);
+    words.retain(|word| !word.is_empty());
+    words
+}
+
+fn meaning(name: &str) -> Meaning {
+    let words = words(name);
+    let all = words.concat();
+    let has = |parts: &[&str]| parts.iter().any(|part| all.contains(part));
+    // `gx`, `accelX`, `Gyr_Y`, `angular_velocity.z`, `gyrox rad/s`: a word of its own, or the end of the sensor's.
+    let axis = || {
+        let of_word = |word: &String| {
+            let bare = word.trim_end_matches(|c: char| c.is_ascii_digit());
+            let (at, last) = bare.char_indices().next_back()?;
+            let stem = &bare[..at];
+            let sensor = ["gyr", "acc", "vel", "rot", "omega"]
+                .iter()
+                .any(|name| stem.contains(name));
+            "xyz".find(last).filter(|_| stem.len() < 2 || sensor)
+        };
+        words.iter().rev().find_map(of_word)
+    };
+    if has(&["mag", "lin", "quat", "orient", "euler", "grav"]) && !has(&["linear_acc", "linearacc"])
+    {
+        return Meaning::Other;
+    }
+    match axis() {
+        Some(axis) if has(&["gyr", "angularvel", "angvel", "rot", "omega"]) => Meaning::Gyro(axis),
+        Some(axis) if has(&["acc", "specificforce"]) => Meaning::Accel(axis),
+        Some(axis) if matches!(all.as_str(), "gx" | "gy" | "gz" | "wx" | "wy" | "wz") => {
+            Meaning::Gyro(axis)
+        }
+        Some(axis) if matches!(all.as_str(), "ax" | "ay" | "az" | "fx" | "fy" | "fz") => {
+            Meaning::Accel(axis)
+        }
+        _ if has(&["temp"]) => Meaning::Temperature,
+        _ if has(&["time", "stamp", "sec"]) || all == "t" || all == "ts" => Meaning::Time,
+        _ if all == "step" || all == "pose" => Meaning::Step,
+        _ => Meaning::Other,
+    }
+}
+
+fn unit(names: &[&String], units: &[(&'static str, &[&str])]) -> Option<&'static str> {
+    let says = |spellings: &[&str]| {
+        let any = |name: &&String| spellings.iter().any(|s| name.to_lowercase().contains(s));
+        !names.is_empty() && names.iter().all(any)
+    };
+    units
+        .iter()
+        .find(|(_, spellings)| says(spellings))
+        .map(|(unit, _)| *unit)
+}
+
+/// What the columns of the file called `file` with these names and first rows are.
+pub fn guess(file: &str, names: &[String], rows: &[Vec<f64>]) -> Guess {
+    let width = rows.first().map_or(names.len(), Vec::len);
+    let mut guess = match names.is_empty() {
+        true => by_readings(file, width, rows),
+        false => by_names(names),
+    };
+    // Codes of a thermometer are no °C, and are worth less than nothing.
+    let implausible = |at: usize| {
+        let values = rows.iter().filter_map(|row| row.get(at));
+        let mut finite = values.filter(|t| t.is_finite());
+        finite.any(|t| !(-60.0..150.0).contains(t))
+    };
+    let at = guess.roles.iter().position(|role| *role == "temp_c");
+    if let Some(at) = at.filter(|at| implausible(*at)) {
+        guess.roles[at] = "-";
+        let named = |k: &usize| meaning(&names[*k]) == Meaning::Temperature;
+        if let Some(other) = (0..names.len()).filter(named).find(|k| !implausible(*k)) {
+            guess.roles[other] = "temp_c";
+        }
+    }
+    let named = |wanted: &[&str]| -> Vec<&String> {
+        let all = names.iter().zip(&guess.roles);
+        all.filter(|(_, role)| wanted.contains(*role))
+            .map(|(name, _)| name)
+            .collect()
+    };
+    let found = [
+        unit(&named(&GYRO), &GYRO_UNITS),
+        unit(&named(&ACCEL), &ACCEL_UNITS),
+        unit(&named(&["t_s"]), &TIME_UNITS),
+    ];
+    [guess.gyro_unit, guess.accel_unit, guess.time_unit] = found;
+    if guess.accel_unit.is_none() {
+        guess.accel_unit = by_size(&guess.roles, rows);
+    }
+    guess
+}
+
+fn by_names(names: &[String]) -> Guess {
+    let mut roles: Vec<&'static str> = Vec::new();
+    for name in names {
+        let exact = mimu_recording::RAW_COLUMNS
+            .iter()
+            .chain(&["t_s", "temp_c", "step", "sample"]);
+        let role = match (exact.into_iter().find(|role| *role == name), meaning(name)) {
+            (Some(role), _) => *role,
+            (None, Meaning::Time) => "t_s",
+            (None, Meaning::Gyro(axis)) => GYRO[axis],
+            (None, Meaning::Accel(axis)) => ACCEL[axis],
+            (None, Meaning::Temperature) => "temp_c",
+            (None, Meaning::Step) => "step",
+            (None, Meaning::Other) => "-",
+        };
+        // The first of two sensors, or of two clocks.
+        roles.push(if roles.contains(&role) { "-" } else { role });
+    }
+    Guess {
+        roles,
+        ..Guess::default()
+    }
+}
+
+/// Without names: the time, and the first two triads.
+fn by_readings(file: &str, width: usize, rows: &[Vec<f64>]) -> Guess {
+    let column = |at: usize| {
+        rows.iter()
+            .map(move |row| row.get(at).copied().unwrap_or(f64::NAN))
+    };
+    let grows = |at: usize| {
+        let values: Vec<f64> = column(at).collect();
+        values.len() > 2 && values.is_sorted() && values[0] < values[values.len() - 1]
+    };
+    let mut roles = vec!["-"; width];
+    let time = (0..width).find(|&at| grows(at));
+    let first = time.map_or(0, |at| at + 1);
+    if let Some(at) = time {
+        roles[at] = "t_s";
+    }
+    // One gravity is large beside the noise of a unit at rest, and a rate of zero is not.
+    let size = |from: usize| -> f64 {
+        let mean = |at| column(at).sum::<f64>() / rows.len().max(1) as f64;
+        (from..from + 3)
+            .map(|at| mean(at).powi(2))
+            .sum::<f64>()
+            .sqrt()
+    };
+    match width.saturating_sub(first) {
+        0..3 => {}
+        3..6 if file.to_lowercase().contains("gyr") => {
+            roles[first..first + 3].copy_from_slice(&GYRO)
+        }
+        3..6 => roles[first..first + 3].copy_from_slice(&ACCEL),
+        _ => {
+            let gyro_first = size(first) <= size(first + 3);
+            let (a, b) = if gyro_first {
+                (GYRO, ACCEL)
+            } else {
+                (ACCEL, GYRO)
+            };
+            roles[first..first + 3].copy_from_slice(&a);
+            roles[first + 3..first + 6].copy_from_slice(&b);
+        }
+    }
+    Guess {
+        roles,
+        by_readings: true,
+        ..Guess::default()
+    }
+}
+
+/// Unit of an accelerometer by the median magnitude of what it reads: one gravity.
+fn by_size(roles: &[&'static str], rows: &[Vec<f64>]) -> Option<&'static str> {
+    let at: Vec<usize> = ACCEL
+        .iter()
+        .filter_map(|axis| roles.iter().position(|role| role == axis))
+        .collect();
+    if at.len() < 3 {
+        return None;
+    }
+    let mut sizes: Vec<f64> = rows
+        .iter()
+        .map(|row| {
+            at.iter()
+                .map(|k| row.get(*k).map_or(f64::NAN, |v| v * v))
+                .sum::<f64>()
+                .sqrt()
+        })
+        .filter(|size| size.is_finite())
+        .collect();
+    sizes.sort_by(f64::total_cmp);
+    match *sizes.get(sizes.len() / 2)? {
+        9.3..10.3 => Some("m/s²"),
+        0.93..1.07 => Some("g"),
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn roles(names: &[&str]) -> Vec<&'static str> {
+        let names: Vec<String> = names.iter().map(|n| n.to_string()).collect();
+        guess("log.csv", &names, &[]).roles
+    }
+
+    const ALL: [&str; 7] = [
+        "t_s", "gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z",
+    ];
+
+    #[test]
+    fn the_names_of_well_known_loggers_are_understood() {
+        for names in [
+            [
+                "t_s", "gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z",
+            ],
+            ["time", "gx", "gy", "gz", "ax", "ay", "az"],
+            [
+                "Timestamp",
+                "GyroX",
+                "GyroY",
+                "GyroZ",
+                "AccX",
+                "AccY",
+                "AccZ",
+            ],
+            ["t", "wx", "wy", "wz", "fx", "fy", "fz"],
+            [
+                "Time (s)",
+                "Gyroscope x (rad/s)",
+                "Gyroscope y (rad/s)",
+                "Gyroscope z (rad/s)",
+                "Acceleration x (m/s^2)",
+                "Acceleration y (m/s^2)",
+                "Acceleration z (m/s^2)",
+            ],
+            [
+                "timestamp_us",
+                "angular_velocity.x",
+                "angular_velocity.y",
+                "angular_velocity.z",
+                "linear_acceleration.x",
+                "linear_acceleration.y",
+                "linear_acceleration.z",
+            ],
+            [
+                "SampleTimeFine",
+                "Gyr_X",
+                "Gyr_Y",
+                "Gyr_Z",
+                "Acc_X",
+                "Acc_Y",
+                "Acc_Z",
+            ],
+        ] {
+            assert_eq!(roles(&names), ALL, "{names:?}");
+        }
+        assert_eq!(
+            roles(&["time", "magX", "magY", "magZ", "temperature"]),
+            ["t_s", "-", "-", "-", "temp_c"]
+        );
+    }
+
+    #[test]
+    fn the_codes_of_a_thermometer_are_not_taken_for_degrees() {
+        let names = ["time", "dTemp", "Temp", "gyrox rad/s"].map(String::from);
+        let found = guess("log.csv", &names, &[vec![0.0, -8884.0, 31.2, 0.0]]);
+        assert_eq!(found.roles, ["t_s", "-", "temp_c", "gyro_x"]);
+    }
+
+    #[test]
+    fn units_are_read_from_names_or_from_one_gravity() {
+        let names = [
+            "Time (ms)",
+            "Gyroscope x (deg/s)",
+            "Gyroscope y (deg/s)",
+            "Gyroscope z (deg/s)",
+            "ax",
+            "ay",
+            "az",
+        ];
+        let names: Vec<String> = names.iter().map(|n| n.to_string()).collect();
+        let found = guess(
+            "log.csv",
+            &names,
+            &[vec![0.0, 0.0, 0.0, 0.0, 0.0, 0.6, 0.8]],
+        );
+        assert_eq!(
+            [found.gyro_unit, found.accel_unit, found.time_unit],
+            [Some("deg/s"), Some("g"), Some("ms")]
+        );
+        let counts = guess(
+            "log.csv",
+            &names,
+            &[vec![0.0, 0.0, 0.0, 0.0, 300.0, 0.0, 16384.0]],
+        );
+        assert_eq!(counts.accel_unit, None);
+    }
+
+    #[test]
+    fn without_names_the_triad_that_shows_gravity_is_the_accelerometer() {
+        let rows: Vec<Vec<f64>> = (0..20)
+            .map(|k| vec![0.01 * f64::from(k), 0.1, 0.2, 9.8, 0.01, -0.02, 0.01])
+            .collect();
+        let found = guess("log.csv", &[], &rows);
+        assert_eq!(
+            found.roles,
+            [
+                "t_s", "accel_x", "accel_y", "accel_z", "gyro_x", "gyro_y", "gyro_z"
+            ]
+        );
+        assert!(found.by_readings);
+        let alone: Vec<Vec<f64>> = rows.iter().map(|row| row[..4].to_vec()).collect();
+        assert_eq!(
+            guess("my_Gyro.txt", &[], &alone).roles,
+            ["t_s", "gyro_x", "gyro_y", "gyro_z"]
+        );
+    }
+}

@@ -1,0 +1,167 @@
+//! The program of the page: the command, and beside it what only a page asks.
+//!
+//! | arguments | what it prints, as JSON |
+//! |---|---|
+//! | `columns FILE ...` | the columns of dropped files, and what each is taken for |
+//! | `view REC [CALIBRATION]` | the readings with the dwells, the poses, and which pose would add most |
+//! | any other | what `mimu` prints |
+
+mod columns;
+mod poses;
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use mimu::calibration::Calibration;
+use mimu::prepared::Prepared;
+use mimu::signal::stillness::{Finding, STILL_FACTOR, Steps};
+use mimu_recording::error::{Error, Result};
+use mimu_recording::{ColumnList, Look, Preset, Recording, look};
+use serde::Serialize;
+
+/// Rows of a file that the page shows.
+const SHOWN: usize = 4;
+
+fn main() -> ExitCode {
+    let args: Vec<String> = std::env::args().collect();
+    let paths: Vec<PathBuf> = args.iter().skip(2).map(PathBuf::from).collect();
+    let answer = match (args.get(1).map(String::as_str), paths.as_slice()) {
+        (Some("columns"), [_, ..]) => of_columns(&paths).and_then(json),
+        (Some("view"), [recording]) => view(recording, None).and_then(json),
+        (Some("view"), [recording, calibration]) => {
+            view(recording, Some(calibration)).and_then(json)
+        }
+        _ => return mimu_cli::run(),
+    };
+    match answer {
+        Ok(text) => {
+            println!("{text}");
+            ExitCode::SUCCESS
+        }
+        Err(error) => {
+            eprintln!("mimu: {error}");
+            ExitCode::from(1)
+        }
+    }
+}
+
+fn json(answer: impl Serialize) -> Result<String> {
+    serde_json::to_string(&answer)
+        .map_err(|error| Error::new("page", error, "report this: the answer cannot be written"))
+}
+
+/// What the page shows of dropped files.
+#[derive(Serialize)]
+struct Dropped {
+    /// The maker's layout that all of them have.
+    preset: Option<Recognised>,
+    files: Vec<DroppedFile>,
+}
+
+#[derive(Serialize)]
+struct Recognised {
+    name: &'static str,
+    title: &'static str,
+    /// Unit of the readings, where the maker has only one.
+    raw_unit: Option<String>,
+    /// Factors as `mimu import --scale` takes them.
+    scales: Vec<String>,
+}
+
+#[derive(Serialize)]
+struct DroppedFile {
+    file: String,
+    #[serde(flatten)]
+    look: Look,
+    #[serde(flatten)]
+    guess: columns::Guess,
+}
+
+fn of_columns(paths: &[PathBuf]) -> Result<Dropped> {
+    let chosen = match paths.iter().any(|path| mimu_recording::is_log(path)) {
+        true => None,
+        false => Preset::choose(None, paths, None)?,
+    };
+    let mut files = Vec::new();
+    for (k, path) in paths.iter().enumerate() {
+        let mut look = look(path, None)?;
+        let number = |cell: &String| cell.replacen(',', ".", 1).parse().unwrap_or(f64::NAN);
+        let rows: Vec<Vec<f64>> = look
+            .rows
+            .iter()
+            .map(|row| row.iter().map(number).collect())
+            .collect();
+        look.rows.truncate(SHOWN);
+        let file = path.file_name().unwrap_or_default().to_string_lossy();
+        let mut guess = match look.log {
+            true => columns::Guess::default(),
+            false => columns::guess(&file, &look.names, &rows),
+        };
+        if let Some(list) = chosen.as_ref().and_then(|chosen| chosen.columns.get(k)) {
+            guess.roles = roles(list, &look.names);
+        }
+        files.push(DroppedFile {
+            file: file.into_owned(),
+            look,
+            guess,
+        });
+    }
+    let preset = chosen.map(|chosen| Recognised {
+        name: chosen.used.name,
+        title: chosen.used.title,
+        raw_unit: chosen.raw_unit.map(|unit| unit.to_string()),
+        scales: chosen
+            .scales
+            .iter()
+            .map(|scale| scale.to_string())
+            .collect(),
+    });
+    Ok(Dropped { preset, files })
+}
+
+/// Role of each column that a preset has chosen.
+fn roles(list: &ColumnList, names: &[String]) -> Vec<&'static str> {
+    match list {
+        ColumnList::ByPosition(items) => {
+            let role = |role: &Option<mimu_recording::Role>| role.map_or("-", |role| role.name());
+            items.iter().map(role).collect()
+        }
+        ColumnList::ByName(items) => {
+            let role = |name: &String| items.iter().find(|(_, of)| of == name);
+            names
+                .iter()
+                .map(|name| role(name).map_or("-", |(role, _)| role.name()))
+                .collect()
+        }
+    }
+}
+
+/// What the page shows of a recording.
+#[derive(Serialize)]
+struct View {
+    duration_s: f64,
+    /// The readings over time with the dwells, as in the report.
+    trace: String,
+    dwells: usize,
+    #[serde(flatten)]
+    poses: poses::Poses,
+}
+
+fn view(recording: &Path, calibration: Option<&PathBuf>) -> Result<View> {
+    let calibration = calibration
+        .map(|path| Calibration::read(path))
+        .transpose()?;
+    let finding = Finding {
+        still_factor: STILL_FACTOR,
+        steps: Steps::AsRecorded,
+    };
+    let prepared = Prepared::read(&Recording::open(recording)?, finding, |_| {})?;
+    let blocks = &prepared.condensed.blocks;
+    let times = blocks.first().zip(blocks.last());
+    Ok(View {
+        duration_s: times.map_or(0.0, |(first, last)| last.start_s - first.start_s),
+        trace: mimu_cli::report::trace_figure(&prepared),
+        dwells: prepared.dwells.list.len(),
+        poses: poses::of(&prepared, calibration.as_ref()),
+    })
+}

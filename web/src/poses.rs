@@ -1,0 +1,148 @@
+//! The poses of a recording, and what each further pose would add to what is known of the accelerometer.
+
+use mimu::calibration::Calibration;
+use mimu::plan::design::information::{Inverse, Rows};
+use mimu::plan::design::model::{Model, Setting, Terms};
+use mimu::plan::design::reach::{Fixture, Rates, Reach};
+use mimu::prepared::Prepared;
+use mimu::quantity::Sensor;
+use nalgebra::Vector3;
+use serde::Serialize;
+
+/// The poses, and the map of what another would add.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct Poses {
+    /// Directions that were up in the dwells at rest, in the body frame.
+    poses: Vec<[f64; 3]>,
+    /// Directions on a grid over both hemispheres, each with the share by which one more dwell with it up would lower the geometric mean of the parameters' sigmas.
+    map: Vec<[f64; 4]>,
+    /// Size of a cell of the grid over the radius of a hemisphere.
+    cell: f64,
+    /// The face, edge or corner that would add most.
+    next: Option<Next>,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+struct Next {
+    up: [f64; 3],
+    words: String,
+    gain: f64,
+}
+
+/// Cells of the map across a hemisphere.
+const CELLS: i32 = 36;
+
+/// Of the dwells that the accelerometer's fit may use. Without a calibration the directions are not known.
+pub fn of(prepared: &Prepared, calibration: Option<&Calibration>) -> Poses {
+    let Some(model) = calibration.and_then(|c| c.inverse(Sensor::Accel)) else {
+        return Poses::default();
+    };
+    let used = prepared
+        .dwells
+        .list
+        .iter()
+        .filter(|d| d.accel_fault.is_none());
+    let ups: Vec<Vector3<f64>> = used
+        .map(|dwell| model.apply(&dwell.raw_mean(Sensor::Accel)))
+        .filter(|force| force.norm().is_finite() && force.norm() > 0.0)
+        .map(|force| force.normalize())
+        .collect();
+    let reach = Reach {
+        model: Model::accel(prepared.manifest.reference, &Terms::default()),
+        fixture: Fixture::Hand,
+        rates: Rates::Any,
+    };
+    let gains = gains(&reach, &ups);
+    let plain = reach.plain();
+    let gain = |up: Vector3<f64>| gains.as_ref().map_or(0.0, |gain| gain(up));
+    let best = plain.iter().map(|s| (s.up, gain(s.up)));
+    // Of equal ones the first: faces stand before edges and corners.
+    let best = best.reduce(|a, b| if b.1 > a.1 * 1.001 { b } else { a });
+    Poses {
+        poses: ups.iter().map(|up| (*up).into()).collect(),
+        cell: 2.0 / f64::from(CELLS),
+        map: cells().map(|up| [up.x, up.y, up.z, gain(up)]).collect(),
+        next: best.filter(|(_, gain)| *gain > 0.0).map(|(up, gain)| Next {
+            up: up.into(),
+            words: mimu_wizard::step::words(&up),
+            gain,
+        }),
+    }
+}
+
+/// Middles of the cells of both hemispheres, in which equal areas are equal.
+fn cells() -> impl Iterator<Item = Vector3<f64>> {
+    let middles = || (0..CELLS).map(|k| f64::from(2 * k + 1 - CELLS) / f64::from(CELLS));
+    let flat = middles().flat_map(move |x| middles().map(move |y| (x, y, x * x + y * y)));
+    let inside = flat.filter(|(.., square)| *square < 1.0);
+    inside.flat_map(|(x, y, square)| {
+        let z = 1.0 - square;
+        let across = (1.0 - z * z).sqrt() / square.sqrt();
+        [z, -z].map(|z| Vector3::new(x * across, y * across, z))
+    })
+}
+
+/// The share of a direction, after dwells with `ups` up; `None` if those do not determine all parameters.
+fn gains(reach: &Reach, ups: &[Vector3<f64>]) -> Option<impl Fn(Vector3<f64>) -> f64> {
+    let regressions = reach.model.distinct_regressions();
+    let row = move |up: Vector3<f64>| {
+        let mut row = Vec::new();
+        for regression in 0..regressions {
+            reach
+                .model
+                .regressors(regression, &Setting::at_rest(up), &mut row);
+        }
+        row
+    };
+    let widths: Vec<usize> = (0..regressions)
+        .map(|r| reach.model.parameters(r).len())
+        .collect();
+    let mut rows = Rows::new(&widths);
+    for up in ups {
+        rows.push(&row(*up));
+    }
+    let inverse = Inverse::of(&rows, (0..rows.len()).map(|i| (i, 1.0)))?;
+    // Each dwell multiplies the determinant of the information by 1 + f' M⁻¹ f; a sigma is a 2p-th root of its inverse.
+    let parameters = rows.parameters() as f64;
+    Some(move |up| 1.0 - (1.0 + inverse.variance(&row(up))).powf(-0.5 / parameters))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use mimu_recording::Reference;
+
+    fn reach() -> Reach {
+        Reach {
+            model: Model::accel(Reference::Gravity, &Terms::default()),
+            fixture: Fixture::Hand,
+            rates: Rates::Any,
+        }
+    }
+
+    #[test]
+    fn a_direction_that_no_pose_has_shown_adds_more_than_one_that_several_have() {
+        let reach = reach();
+        let mut ups: Vec<Vector3<f64>> = reach.plain().iter().map(|s| s.up).collect();
+        ups.retain(|up| up.z < 0.9);
+        ups.extend([-Vector3::z(); 4]);
+        let gain = gains(&reach, &ups).unwrap();
+        assert!(gain(Vector3::z()) > 2.0 * gain(-Vector3::z()));
+    }
+
+    #[test]
+    fn cells_are_directions_and_cover_both_hemispheres() {
+        assert!(cells().all(|up| (up.norm() - 1.0).abs() < 1e-12));
+        let count = |below: bool| cells().filter(|up| (up.z < 0.0) == below).count() as f64;
+        let expected = std::f64::consts::FRAC_PI_4 * f64::from(CELLS * CELLS);
+        assert!((count(true) / expected - 1.0).abs() < 0.05);
+        assert_eq!(count(true), count(false));
+    }
+
+    #[test]
+    fn six_faces_do_not_determine_nine_parameters_by_the_size_of_gravity() {
+        let faces = [Vector3::x(), Vector3::y(), Vector3::z()];
+        let ups: Vec<Vector3<f64>> = faces.iter().flat_map(|up| [*up, -up]).collect();
+        assert!(gains(&reach(), &ups).is_none());
+    }
+}
