@@ -5,6 +5,7 @@
 
 mod columns;
 mod masking;
+mod several;
 mod stretch;
 mod suitability;
 mod values;
@@ -14,6 +15,7 @@ use std::thread;
 
 use self::columns::Columns;
 pub use self::masking::Masked;
+pub use self::several::survey_all;
 pub use self::stretch::Part;
 use self::stretch::{Stretch, temperature};
 use self::values::{Read, Values};
