@@ -6,13 +6,13 @@ CARGO := cargo +$(TOOLCHAIN)
 # One by one: built together, the second would be given the vector table that the first brings.
 FIRMWARE := $(CARGO) build --locked -p mimu-firmware --profile image --target $(TARGET)
 COUNTED := $(CARGO) build --locked -p mimu-counted --profile image --target $(TARGET)
-# All whose tests run on the PC.
-ON_PC := --workspace --exclude mimu-counted --exclude mimu-no-panic
+# All whose tests run on the PC. The extension module for Python is tested from there.
+ON_PC := --workspace --exclude mimu-counted --exclude mimu-no-panic --exclude mimu-python
 
 # Of `make test`, and each also by itself: `make clippy`. Tests are linked before they run, so that both times are seen.
-STAGES := fmt clippy rustdoc images no-panic build-tests run-tests interop
+STAGES := fmt clippy rustdoc images no-panic build-tests run-tests interop python
 
-.PHONY: help test $(STAGES) nightly dist demo faults example papers blind bench budget device fuzz audit toolchain
+.PHONY: help test $(STAGES) nightly dist wheel demo faults example papers blind bench budget device fuzz audit toolchain
 
 help: ## this list
 	@sed -n 's/^\([a-z]*\):.*## /  make \1\t/p' Makefile
@@ -42,6 +42,7 @@ fmt:
 clippy:
 	$(CARGO) clippy --locked --all-targets -- -D warnings
 	$(CARGO) clippy --locked -p mimu-recording --no-default-features -- -D warnings
+	$(CARGO) clippy --locked -p mimu-python -- -D warnings
 	$(CARGO) clippy --locked -p mimu-firmware -p mimu-counted -p mimu-no-panic --profile image --target $(TARGET) -- -D warnings
 	$(CARGO) clippy --locked -p mimu-firmware --profile image --features usb --target $(TARGET) -- -D warnings
 
@@ -63,10 +64,18 @@ build-tests:
 run-tests:
 	$(CARGO) test --locked $(ON_PC)
 
-# What `run-tests` has built.
+# With the features that the extension module asks of shared crates, so that `python` uses what is compiled here.
 interop:
-	$(CARGO) build --locked -q -p mimu-cli --bin mimu
+	$(CARGO) build --locked -q -p mimu-cli -p mimu-python --bin mimu
 	./tests/interop/run.sh target/debug/mimu
+
+python: toolchain ## the Python package: builds the wheel and runs its tests
+	RUSTUP_TOOLCHAIN=$(TOOLCHAIN) ./python/tests/run.sh
+
+wheel: toolchain ## the wheel to hand out: target/wheels, with the command
+	@python3 -m venv target/python-build && target/python-build/bin/pip install -q --disable-pip-version-check maturin==1.16.0
+	RUSTUP_TOOLCHAIN=$(TOOLCHAIN) target/python-build/bin/maturin build --locked --manifest-path python/Cargo.toml --out target/wheels
+	@ls -l target/wheels
 
 dist: toolchain ## the command to hand out: target/dist/mimu, stripped
 	$(CARGO) build --locked --profile dist -p mimu-cli --bin mimu

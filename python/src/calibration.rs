@@ -10,14 +10,15 @@ use mimu_cli::report::fragment;
 use mimu_core::compensation::Affine;
 use mimu_export::{Sources, json as as_json};
 use mimu_recording::error::{Error, Result};
+use mimu_recording::result_file::stage;
 use numpy::ndarray::{Array2, ArrayView2, Zip};
-use numpy::{IntoPyArray, PyArray2, PyArrayMethods};
-use pyo3::exceptions::PyValueError;
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
+use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 
 use crate::error::raised;
 use crate::recording::{Recording, triad};
-use crate::work::computed;
+use crate::work::{computed, loaded};
 
 /// Compensated readings of gyro and accelerometer.
 type Both<'py> = (
@@ -71,11 +72,12 @@ impl Calibration {
 
     /// Matrix and offset of a sensor, x = C u + o, raw to SI: at a temperature of the dies, or that of the calibration.
     #[pyo3(signature = (sensor, die_temp_c=None))]
-    fn inverse(
+    fn inverse<'py>(
         &self,
+        py: Python<'py>,
         sensor: &str,
         die_temp_c: Option<f64>,
-    ) -> PyResult<([[f64; 3]; 3], [f64; 3])> {
+    ) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<f64>>)> {
         let sensor = named(sensor)?;
         let model = match die_temp_c {
             Some(at) => self.model.inverse_at(sensor, at),
@@ -83,13 +85,78 @@ impl Calibration {
         };
         let model = model
             .ok_or_else(|| PyValueError::new_err(format!("the calibration has no {sensor}")))?;
-        let rows = std::array::from_fn(|i| std::array::from_fn(|j| model.matrix[(i, j)]));
-        Ok((rows, model.offset.into()))
+        let matrix = Array2::from_shape_fn((3, 3), |at| model.matrix[at]);
+        let offset = PyArray1::from_slice(py, model.offset.as_slice());
+        Ok((matrix.into_pyarray(py), offset))
     }
 
-    /// x = C u + o of readings in arrays.
+    /// Gyro and accelerometer compensated: rad/s and m/s², a row for each sample.
+    ///
+    /// Of arrays it is C u + o of each row. Of a recording it is what `mimu apply` writes: with effects and curves over temperature, and not
+    /// a number where a sensor has no reading or is at its rail.
     #[pyo3(signature = (gyro=None, accel=None))]
-    fn apply_arrays<'py>(
+    fn apply<'py>(
+        &self,
+        py: Python<'py>,
+        gyro: Option<&Bound<'py, PyAny>>,
+        accel: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Both<'py>> {
+        match gyro.and_then(|gyro| gyro.cast::<Recording>().ok()) {
+            Some(recording) if accel.is_none() => self.apply_to_recording(py, recording.get()),
+            Some(_) => Err(PyTypeError::new_err(
+                "a recording has both sensors: leave accel out",
+            )),
+            None => self.apply_to_arrays(py, gyro, accel),
+        }
+    }
+
+    /// Everything that it holds, as `mimu export json` writes it.
+    fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let from = Sources {
+            calibration: Some((&self.model, &self.name)),
+            noise: None,
+        };
+        let made = as_json::export(&from).map_err(|error| raised(py, &error))?;
+        loaded(py, &String::from_utf8_lossy(&made.content))
+    }
+
+    /// The calibration file, as the command writes it.
+    fn to_toml(&self) -> String {
+        self.model.to_toml()
+    }
+
+    /// Writes the calibration file, whole or not at all.
+    fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        let model = self.model.clone();
+        computed(py, move || stage(&path, model.to_toml())?.publish())
+    }
+
+    fn __repr__(&self) -> String {
+        let effects = self.effects().join(", ");
+        let with = if effects.is_empty() {
+            "no effects"
+        } else {
+            &effects
+        };
+        let curves = if self.over_temperature() {
+            ", over temperature"
+        } else {
+            ""
+        };
+        format!(
+            "<mimu.Calibration of {:?}: {} to SI, {with}{curves}>",
+            self.model.device,
+            self.unit()
+        )
+    }
+
+    fn _repr_html_(&self) -> String {
+        fragment::of_calibration(&self.model)
+    }
+}
+
+impl Calibration {
+    fn apply_to_arrays<'py>(
         &self,
         py: Python<'py>,
         gyro: Option<&Bound<'py, PyAny>>,
@@ -125,8 +192,11 @@ impl Calibration {
         Ok((one(Sensor::Gyro, gyro)?, one(Sensor::Accel, accel)?))
     }
 
-    /// What `mimu apply` writes of a recording: with effects and curves, and not a number where a sensor is at its rail or has no reading.
-    fn apply_recording<'py>(&self, py: Python<'py>, recording: &Recording) -> PyResult<Both<'py>> {
+    fn apply_to_recording<'py>(
+        &self,
+        py: Python<'py>,
+        recording: &Recording,
+    ) -> PyResult<Both<'py>> {
         let (source, model) = (recording.source.clone(), self.model.clone());
         let clean = computed(py, move || {
             let samples = source.samples()?;
@@ -148,44 +218,6 @@ impl Calibration {
         })?;
         let [gyro, accel] = clean.map(|values| values.map(|v| v.into_pyarray(py)));
         Ok((gyro, accel))
-    }
-
-    /// JSON of it, as `mimu export json` writes it.
-    fn json(&self, py: Python<'_>) -> PyResult<String> {
-        let from = Sources {
-            calibration: Some((&self.model, &self.name)),
-            noise: None,
-        };
-        let made = as_json::export(&from).map_err(|error| raised(py, &error))?;
-        Ok(String::from_utf8_lossy(&made.content).into_owned())
-    }
-
-    /// The calibration file, as the command writes it.
-    fn to_toml(&self) -> String {
-        self.model.to_toml()
-    }
-
-    fn __repr__(&self) -> String {
-        let effects = self.effects().join(", ");
-        let with = if effects.is_empty() {
-            "no effects"
-        } else {
-            &effects
-        };
-        let curves = if self.over_temperature() {
-            ", over temperature"
-        } else {
-            ""
-        };
-        format!(
-            "<mimu.Calibration of {:?}: {} to SI, {with}{curves}>",
-            self.model.device,
-            self.unit()
-        )
-    }
-
-    fn _repr_html_(&self) -> String {
-        fragment::of_calibration(&self.model)
     }
 }
 

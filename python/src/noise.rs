@@ -4,9 +4,10 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use mimu::noise::noise_file::NoiseFile;
+use mimu_recording::result_file::stage;
 use pyo3::prelude::*;
 
-use crate::work::{computed, json};
+use crate::work::{computed, json, loaded};
 
 /// Noise of a unit at rest.
 #[pyclass(frozen, module = "mimu")]
@@ -22,9 +23,15 @@ impl Noise {
         &self.file.device
     }
 
-    /// JSON of the noise file.
-    fn json(&self) -> PyResult<String> {
-        json(self.file.as_ref())
+    /// Everything that the noise file holds.
+    fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        loaded(py, &json(self.file.as_ref())?)
+    }
+
+    /// Writes the noise file, whole or not at all.
+    fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        let file = self.file.clone();
+        computed(py, move || stage(&path, file.to_toml())?.publish())
     }
 
     /// The noise file, as the command writes it.

@@ -24,7 +24,7 @@ use tempfile::TempDir;
 
 use crate::error::{raised, refused};
 use crate::preparation::Preparation;
-use crate::work::{computed, done, json};
+use crate::work::{computed, done, json, loaded};
 
 /// Gravity where nobody says it, m/s².
 const STANDARD_GRAVITY: f64 = 9.80665;
@@ -402,9 +402,11 @@ impl Recording {
         self.warnings.clone()
     }
 
-    /// JSON of the import; None of others.
-    fn import_json(&self) -> Option<&str> {
-        self.imported.as_deref()
+    /// What was found in the files that it was read from, as `mimu import --json` writes it; None of others.
+    #[getter]
+    fn imported<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
+        let json = self.imported.as_deref();
+        json.map(|json| loaded(py, json)).transpose()
     }
 
     /// Writes it as a folder that the command reads, or another program: recording.toml beside samples.parquet or samples.csv.

@@ -72,3 +72,8 @@ pub(crate) fn json(result: &impl serde::Serialize) -> PyResult<String> {
     serde_json::to_string(result)
         .map_err(|error| PyRuntimeError::new_err(format!("the result cannot be written: {error}")))
 }
+
+/// JSON as Python has it.
+pub(crate) fn loaded<'py>(py: Python<'py>, json: &str) -> PyResult<Bound<'py, PyAny>> {
+    py.import("json")?.call_method1("loads", (json,))
+}
