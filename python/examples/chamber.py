@@ -68,6 +68,7 @@ def session(seed: int = 1) -> Session:
     for i, outside in enumerate(temp):
         level += share * (outside - level)
         die_c[i] = level
+    thermometer = temp + random.normal(scale=0.02, size=len(t))
     number = (t // (DWELL_S + MOVE_S)).astype(int)
     dwells = number.max() + 1
     up = random.normal(size=(dwells, 3))
@@ -85,4 +86,4 @@ def session(seed: int = 1) -> Session:
     unknown = ~held
     force[unknown], rate_dps[unknown] = np.nan, np.nan
     step = np.where(held, number, -1).astype(float)
-    return Session(t, gyro, accel, temp, step, rate_dps, force, die_c)
+    return Session(t, gyro, accel, thermometer, step, rate_dps, force, die_c)

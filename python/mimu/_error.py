@@ -11,6 +11,8 @@ class Error(ValueError):
     ``file``, ``row`` and ``column`` are what ``place`` names, or None.
     """
 
+    __module__ = "mimu"
+
     def __init__(
         self,
         message: str,

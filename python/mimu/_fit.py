@@ -96,16 +96,13 @@ class SensorFit:
 
     @staticmethod
     def _of(data: dict[str, Any]) -> SensorFit:
-        parameters = [typed(Parameter, p) for p in data["parameters"]]
-        first = parameters[:12]
-        value, sigma = (np.array([getattr(p, key) for p in first]) for key in ("value", "sigma"))
-        own = dict(
-            C=value[:9].reshape(3, 3), o=value[9:], sigma=sigma[:9].reshape(3, 3), sigma_o=sigma[9:],
-            parameters={p.name: p for p in parameters},
-        )
-        rest = ("estimator", "held_out_rms", "rms", "unit", "figure", "dwells", "condition", "static_rms", "static_held_out_rms")
-        floor = data["noise_floor"]
-        return SensorFit(**own, **{key: data.get(key) for key in rest}, noise_floor=float("nan") if floor is None else floor)
+        # The twelve of C, by rows, and o come first.
+        value, sigma = (np.array([p[key] for p in data["parameters"][:12]], dtype=float) for key in ("value", "sigma"))
+        own = {
+            "C": value[:9].reshape(3, 3), "o": value[9:], "sigma": sigma[:9].reshape(3, 3), "sigma_o": sigma[9:],
+            "parameters": {p["name"]: p for p in data["parameters"]},
+        }
+        return typed(SensorFit, {**data, **own})
 
 
 class Fit(Result):

@@ -590,7 +590,8 @@ pub(crate) fn read(
             }
         };
         let to = ["-o".into(), directory.clone().into_os_string()];
-        let summary = called::import(arguments.into_iter().chain(to).collect())?;
+        // Before the files, which may be all that follows `--`.
+        let summary = called::import(to.into_iter().chain(arguments).collect())?;
         Ok((Source::open(&directory)?, summary, folder))
     };
     let (source, summary, folder) = done(py, work, refused)?;
