@@ -133,8 +133,9 @@ def test_exports_are_those_of_the_command(by_hand: mimu.Recording, at_rest: mimu
     noise = mimu.allan(at_rest).noise
     noise.save(tmp_path / "noise.toml")
     for name, options, flags in [
-        ("c", {}, []), ("rust", {}, []), ("json", {}, []), ("core", {}, []), ("px4", {"qgc": True}, ["--qgc"]), ("ardupilot", {}, []),
-        ("fusion", {}, []), ("imu-calib", {}, []),
+        ("c", {}, []), ("rust", {}, []), ("json", {}, []), ("core", {}, []), ("px4", {"qgc": True}, ["--qgc"]), 
+        ("ardupilot", {"accel_zero": 1.35, "gyro_zero": 2.04}, ["--accel-zero=1.35", "--gyro-zero=2.04"]),
+        ("fusion", {}, []), ("imu-calib", {}, []), ("imu-tk", {"sensor": "gyro"}, ["--sensor=gyro"]), ("realsense", {}, []),
     ]:
         made = mimu.export(name, calibration=calibration, **options)
         done = run("export", name, *flags, "--calibration", tmp_path / "cal.toml", "-o", tmp_path / name)

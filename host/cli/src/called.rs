@@ -87,6 +87,6 @@ fn usage(error: clap::Error) -> Refusal {
         .map(str::trim)
         .filter(|line| !line.is_empty())
         .collect();
-    let said = said.join("; ");
+    let said = said.join("; ").replace(":; ", ": ");
     Refusal::Usage(said.strip_prefix("error: ").unwrap_or(&said).to_owned())
 }
