@@ -26,6 +26,9 @@ type Both<'py> = (
     Option<Bound<'py, PyArray2<f64>>>,
 );
 
+/// C and o of one triad.
+type MatrixAndOffset<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<f64>>);
+
 /// A calibration of a unit.
 #[pyclass(frozen, module = "mimu")]
 pub(crate) struct Calibration {
@@ -77,7 +80,7 @@ impl Calibration {
         py: Python<'py>,
         sensor: &str,
         die_temp_c: Option<f64>,
-    ) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<f64>>)> {
+    ) -> PyResult<MatrixAndOffset<'py>> {
         let sensor = named(sensor)?;
         let model = match die_temp_c {
             Some(at) => self.model.inverse_at(sensor, at),
