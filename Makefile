@@ -8,17 +8,17 @@ CARGO := cargo +$(TOOLCHAIN)
 # One by one: built together, the second would be given the vector table that the first brings.
 FIRMWARE := $(CARGO) build --locked -p mimu-firmware --profile image --target $(TARGET)
 COUNTED := $(CARGO) build --locked -p mimu-counted --profile image --target $(TARGET)
-# All whose tests run on the PC.
-ON_PC := --workspace --exclude mimu-counted --exclude mimu-no-panic
+# All whose tests run on the PC. The extension module for Python is tested from there.
+ON_PC := --workspace --exclude mimu-counted --exclude mimu-no-panic --exclude mimu-python
 
 MDBOOK := 0.5.4
 LOWEST := $(shell sed -n 's/^rust-version = "\(.*\)"/\1/p' Cargo.toml)
 PUBLISHED := mimu-core mimu-recording mimu mimu-thermal mimu-device mimu-export mimu-wizard mimu-cli
 
 # Of `make test`, and each also by itself: `make clippy`. Tests are linked before they run, so that both times are seen.
-STAGES := fmt clippy rustdoc images no-panic build-tests run-tests interop
+STAGES := fmt clippy rustdoc images no-panic build-tests run-tests interop python
 
-.PHONY: help test $(STAGES) nightly dist book msrv package web web-tests demo faults example papers blind bench budget device fuzz audit toolchain
+.PHONY: help test $(STAGES) nightly dist book msrv package wheel web web-tests demo faults example papers blind bench budget device fuzz audit toolchain
 
 help: ## this list
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' Makefile
@@ -50,6 +50,7 @@ clippy:
 	$(CARGO) clippy --locked --all-targets -- -D warnings
 	$(CARGO) clippy --locked -p mimu-recording --no-default-features -- -D warnings
 	$(CARGO) clippy --locked -p mimu-recording --no-default-features --target $(WEB_TARGET) -- -D warnings
+	$(CARGO) clippy --locked -p mimu-python -- -D warnings
 	$(CARGO) clippy --locked -p mimu-firmware -p mimu-counted -p mimu-no-panic --profile image --target $(TARGET) -- -D warnings
 	$(CARGO) clippy --locked -p mimu-firmware --profile image --features usb --target $(TARGET) -- -D warnings
 
@@ -71,15 +72,23 @@ build-tests:
 run-tests:
 	$(CARGO) test --locked $(ON_PC)
 
-# What `run-tests` has built.
+# With the features that the extension module asks of shared crates, so that `python` uses what is compiled here.
 interop:
-	$(CARGO) build --locked -q -p mimu-cli --bin mimu
+	$(CARGO) build --locked -q -p mimu-cli -p mimu-python --bin mimu
 	./tests/interop/run.sh target/debug/mimu
 
 DIST_TARGET ?= x86_64-unknown-linux-gnu
 dist: toolchain ## an archive for any Linux since glibc 2.28: command, manual, completions, udev rule; DIST_TARGET=aarch64-unknown-linux-gnu is another
 	@rustup target add --toolchain $(TOOLCHAIN) $(DIST_TARGET)
 	./packaging/dist.sh "$(CARGO)" $(DIST_TARGET)
+
+python: toolchain ## the Python package: builds the wheel and runs its tests
+	RUSTUP_TOOLCHAIN=$(TOOLCHAIN) ./python/tests/run.sh
+
+wheel: toolchain ## the wheel to hand out: target/wheels, with the command
+	@python3 -m venv target/python-build && target/python-build/bin/pip install -q --disable-pip-version-check maturin==1.16.0
+	RUSTUP_TOOLCHAIN=$(TOOLCHAIN) target/python-build/bin/maturin build --locked --manifest-path python/Cargo.toml --out target/wheels
+	@ls -l target/wheels
 
 book: toolchain ## the documentation as a site, target/book, with search; its links are checked
 	@test "$$(target/tools/bin/mdbook --version 2>/dev/null)" = "mdbook v$(MDBOOK)" \

@@ -3,6 +3,7 @@
 //! | module | what |
 //! |---|---|
 //! | `cmd` | the subcommands: arguments, and what is done with them |
+//! | [`called`] | those that are nothing but options, as another program calls them |
 //! | `arguments` | arguments that several share |
 //! | `reading`, `output` | the recording in; text, JSON and files out |
 //! | [`report`] | results as JSON, text and page |
@@ -11,6 +12,7 @@
 //! | `hint` | flags of the command beside what an error says to set otherwise |
 
 mod arguments;
+pub mod called;
 mod cmd;
 mod examples;
 mod hint;
@@ -20,7 +22,9 @@ pub mod report;
 #[cfg(not(target_family = "wasm"))]
 mod views;
 
-use std::process::ExitCode;
+use std::ffi::OsString;
+
+pub use output::now;
 
 use clap::{FromArgMatches, Parser, Subcommand};
 use cmd::{allan, apply, design, diagnose, fit, import, thermal, verify};
@@ -77,24 +81,35 @@ enum Command {
     Man(cmd::man::ManArgs),
 }
 
-/// Parses the arguments of the process and runs the subcommand; prints an error in one line.
-pub fn run() -> ExitCode {
-    let matches = examples::command().get_matches();
-    let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|e| e.exit());
+/// Runs the subcommand of `arguments`, of which the first is the program; prints an error in one line. Returns the exit status.
+pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
+    let arguments: Vec<OsString> = arguments.into_iter().collect();
+    let parsed = examples::command()
+        .try_get_matches_from(&arguments)
+        .and_then(|matches| Ok((Cli::from_arg_matches(&matches)?, matches)));
+    let (cli, matches) = match parsed {
+        Ok(both) => both,
+        Err(error) => {
+            // Help and version are such errors too. If they cannot be printed, the status says so.
+            let printed = error.print();
+            return printed.map_or(1, |()| u8::try_from(error.exit_code()).unwrap_or(2));
+        }
+    };
+    let typed = command_line(&arguments);
     let done = match cli.command {
         #[cfg(not(target_family = "wasm"))]
-        Command::Wizard(args) => wizard::run(&args),
+        Command::Wizard(args) => wizard::run(&args, &typed),
         Command::Import(args) => import::run(*args),
         Command::Fit(args) => fit::run(&args),
         Command::Verify(args) => verify::run(&args),
         Command::Apply(args) => apply::run(&args),
         Command::Compare(args) => cmd::compare::run(&args),
-        Command::Diagnose(args) => diagnose::run(&args),
+        Command::Diagnose(args) => diagnose::run(&args, &typed),
         Command::Design(args) => design::run(&args),
-        Command::Thermal(args) => thermal::run(&args),
+        Command::Thermal(args) => thermal::run(&args, &typed),
         Command::Allan(args) => allan::run(&args),
         Command::Export(args) => cmd::export::run(&args),
-        Command::Report(args) => cmd::report::run(&args),
+        Command::Report(args) => cmd::report::run(&args, &typed),
         #[cfg(not(target_family = "wasm"))]
         Command::Record(args) => record::run(&args),
         #[cfg(not(target_family = "wasm"))]
@@ -103,12 +118,22 @@ pub fn run() -> ExitCode {
         Command::Man(args) => cmd::man::run(&args),
     };
     match done {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(()) => 0,
         Err(error) => {
             eprintln!("mimu: {}", hint::line(&error, &innermost(&matches)));
-            ExitCode::from(1)
+            1
         }
     }
+}
+
+/// The command as it was typed, without the path of the program.
+fn command_line(arguments: &[OsString]) -> String {
+    let shown = arguments.iter().skip(1).map(|a| match a.to_string_lossy() {
+        a if a.contains([' ', '\'', '"']) => format!("{a:?}"),
+        a => a.into_owned(),
+    });
+    let all: Vec<String> = std::iter::once("mimu".to_string()).chain(shown).collect();
+    all.join(" ")
 }
 
 /// The subcommand that `matches` are of, with its flags.

@@ -1,5 +1,5 @@
 //! The command `mimu`.
 
 fn main() -> std::process::ExitCode {
-    mimu_cli::run()
+    mimu_cli::run(std::env::args_os()).into()
 }

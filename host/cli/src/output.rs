@@ -32,6 +32,12 @@ pub(crate) fn check_outputs(outputs: &[Option<&Path>], inputs: &[&Path]) -> Resu
     Ok(())
 }
 
+/// The time, RFC 3339, in whole seconds.
+pub fn now() -> String {
+    let now = jiff::Timestamp::now().round(jiff::Unit::Second);
+    now.unwrap_or_default().to_string()
+}
+
 /// Progress in thousandths, on a terminal only.
 pub(crate) fn progress(what: &'static str) -> ProgressBar {
     let bar = ProgressBar::new(1000).with_message(what);

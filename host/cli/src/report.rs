@@ -12,6 +12,7 @@ mod design;
 mod device;
 mod diagnosis;
 mod fit;
+pub mod fragment;
 mod import;
 mod page;
 mod svg;

@@ -9,7 +9,7 @@
 //! | [`estimate`], [`triad`] | the estimators, and what they estimate: both directions, covariances, physical quantities |
 //! | [`mod@fit`] | both triads, judged on what they have not seen; what cannot be right is refused |
 //! | [`calibration`] | the file; [`calibration::verify`] judges it by another recording, [`calibration::apply`] compensates one |
-//! | [`effects`], [`diagnose`] | the effect behind a residual: found, added, proved on other data |
+//! | [`effects`], [`diagnose`], [`mod@diagnosed`] | the effect behind a residual: found, added, proved on other data |
 //! | [`plan`] | experiments: [`plan::design`] chooses attitudes, rates and times, [`plan::next_experiment`] what to record next |
 //! | [`result`], [`warning`] | what the commands print and write as JSON |
 //!
@@ -57,6 +57,7 @@
 pub mod allan;
 pub mod calibration;
 pub mod diagnose;
+pub mod diagnosed;
 pub mod effects;
 pub mod estimate;
 mod fault;

@@ -6,6 +6,7 @@
 mod ahead;
 mod columns;
 mod masking;
+mod several;
 mod stretch;
 mod suitability;
 mod values;
@@ -13,6 +14,7 @@ mod values;
 use self::ahead::ahead;
 use self::columns::Columns;
 pub use self::masking::Masked;
+pub use self::several::survey_all;
 pub use self::stretch::Part;
 use self::stretch::{Stretch, temperature};
 use self::values::{Read, Values};

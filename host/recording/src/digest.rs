@@ -65,11 +65,16 @@ fn sha256_until(path: &Path, stop: &AtomicBool) -> Result<String> {
             Err(error) => return Err(Error::io(path, &error)),
         }
     }
+    Ok(hex(&state.finalize()))
+}
+
+/// Bytes in hexadecimal.
+pub(super) fn hex(bytes: &[u8]) -> String {
     let hex = |byte: &u8| {
         let digit = |nibble: u8| char::from(b"0123456789abcdef"[usize::from(nibble)]);
         [digit(byte >> 4), digit(byte & 15)]
     };
-    Ok(state.finalize().iter().flat_map(hex).collect())
+    bytes.iter().flat_map(hex).collect()
 }
 
 #[cfg(test)]

@@ -20,6 +20,7 @@ mod digest;
 mod growing;
 mod held;
 mod import;
+mod in_memory;
 mod in_order;
 mod manifest;
 mod no_temperature;
@@ -58,6 +59,7 @@ pub use import::{
     Rounds, RowFilter, Scale, SkippedLines, TimeSummary, TwosComplement, Zero, import, is_log,
     look,
 };
+pub use in_memory::{InMemory, usual_rate_hz};
 pub use manifest::{Format, MANIFEST_FILE, Manifest, Rails, RawUnit, Reference, Source};
 pub use no_temperature::NoTemperatures;
 pub use parents::Parents;

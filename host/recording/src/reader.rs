@@ -1,11 +1,13 @@
 //! A recording on disk, read in a stream.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use super::batch::Batch;
 use super::columns::{Column, Columns, Layout};
 use super::csv_file::{CHUNK, CsvFile};
 use super::digest;
+use super::in_memory::{self, InMemory};
 use super::manifest::{MANIFEST_FILE, Manifest};
 use super::parquet_file::{ParquetFile, SLICE};
 use super::warning::Warning;
@@ -19,7 +21,7 @@ pub struct Recording {
     pub manifest: Manifest,
     /// Directory that it is in.
     pub directory: PathBuf,
-    /// `samples.csv` or `samples.parquet` in that directory.
+    /// `samples.csv` or `samples.parquet` in that directory; in memory, the name of the device as the directory is.
     pub samples: PathBuf,
     /// Which of the optional columns there are.
     pub columns: Columns,
@@ -32,6 +34,7 @@ pub struct Recording {
 enum Samples {
     Csv(CsvFile),
     Parquet(ParquetFile, Layout),
+    InMemory(Arc<dyn InMemory>),
 }
 
 /// What a reading has found.
@@ -39,7 +42,7 @@ enum Samples {
 pub struct ReadSummary {
     /// Rows read.
     pub rows: u64,
-    /// SHA-256 of the samples file, as `sha256sum` prints it.
+    /// SHA-256 of the samples file, as `sha256sum` prints it; of samples in memory that of their numbers.
     pub sha256: String,
     /// One sentence for each thing that was ignored.
     pub warnings: Vec<Warning>,
@@ -76,7 +79,7 @@ impl Recording {
         let csv = directory.join("samples.csv");
         let parquet = directory.join("samples.parquet");
         let mut warnings = Vec::new();
-        let (samples, source) = match (csv.exists(), parquet.exists()) {
+        let (samples, layout, source) = match (csv.exists(), parquet.exists()) {
             (true, true) => {
                 return Err(Error::new(
                     directory.display(),
@@ -97,7 +100,7 @@ impl Recording {
                     let cut = file.leave_out_cut_row()? > 0;
                     warnings.push(Warning::Unfinished(directory.to_owned(), cut));
                 }
-                (csv, Samples::Csv(file))
+                (csv, file.layout.clone(), Samples::Csv(file))
             }
             (false, true) => {
                 let file = ParquetFile::open(&parquet)?;
@@ -112,28 +115,52 @@ impl Recording {
                         ));
                     }
                 }
-                (parquet, Samples::Parquet(file, layout))
+                (parquet, layout.clone(), Samples::Parquet(file, layout))
             }
-        };
-        let layout = match &source {
-            Samples::Csv(file) => &file.layout,
-            Samples::Parquet(_, layout) => layout,
         };
         Ok(Recording {
             manifest,
             directory: directory.to_owned(),
             samples,
             columns: layout.columns,
-            warnings: [warnings, layout.warnings.clone()].concat(),
+            warnings: [warnings, layout.warnings].concat(),
             source,
         })
     }
 
-    /// Number of rows, where the file says it without being read: Parquet does.
+    /// The recording of samples that another program holds. Messages call it by the name of its device.
+    ///
+    /// # Errors
+    /// The manifest is not one of samples; there are no rows, or neither sensor.
+    pub fn in_memory(manifest: Manifest, samples: Arc<dyn InMemory>) -> Result<Recording> {
+        manifest.check("recording in memory")?;
+        let place = PathBuf::from(&manifest.device);
+        let columns = samples.columns();
+        let refuse = |problem, remedy| Err(Error::new(place.display(), problem, remedy));
+        if samples.rows() == 0 {
+            let remedy = "give each sample its time and readings";
+            return refuse("there are no samples", remedy);
+        }
+        if !(columns.gyro || columns.accel) {
+            let remedy = "give those of the gyro, of the accelerometer, or both";
+            return refuse("it has the readings of neither sensor", remedy);
+        }
+        Ok(Recording {
+            manifest,
+            directory: place.clone(),
+            samples: place,
+            columns,
+            warnings: Vec::new(),
+            source: Samples::InMemory(samples),
+        })
+    }
+
+    /// Number of rows, where it is known without reading: CSV does not say it.
     pub fn rows(&self) -> Option<u64> {
         match &self.source {
             Samples::Csv(_) => None,
             Samples::Parquet(file, _) => Some(file.rows()),
+            Samples::InMemory(samples) => Some(samples.rows() as u64),
         }
     }
 
@@ -150,9 +177,9 @@ impl Recording {
         self.in_pieces(CHUNK, SLICE, progress, consume)
     }
 
-    /// Whether one column can be read without the others: Parquet.
+    /// Whether one column can be read without the others: all but CSV.
     pub fn is_columnar(&self) -> bool {
-        matches!(self.source, Samples::Parquet(..))
+        !matches!(self.source, Samples::Csv(..))
     }
 
     /// Some columns that the recording has, whole, steps as numbers. Of a CSV file every column is parsed.
@@ -161,8 +188,19 @@ impl Recording {
         columns: &[Column],
         progress: impl Fn(f64),
     ) -> Result<Vec<Vec<f64>>> {
-        if let Samples::Parquet(file, _) = &self.source {
-            return columns.iter().map(|column| file.column(*column)).collect();
+        match &self.source {
+            Samples::Csv(_) => {}
+            Samples::Parquet(file, _) => {
+                return columns.iter().map(|column| file.column(*column)).collect();
+            }
+            Samples::InMemory(samples) => {
+                let column = |column: &Column| {
+                    let mut values = Vec::with_capacity(samples.rows());
+                    samples.append(*column, 0..samples.rows(), &mut values)?;
+                    Ok(values)
+                };
+                return columns.iter().map(column).collect();
+            }
         }
         let mut all: Vec<Vec<f64>> = vec![Vec::new(); columns.len()];
         self.for_each_batch(progress, |batch| {
@@ -185,10 +223,17 @@ impl Recording {
         progress: impl Fn(f64),
         consume: impl FnMut(&Batch) -> Result<()>,
     ) -> Result<ReadSummary> {
-        let (rows, sha256) = digest::beside(&self.samples, || match &self.source {
-            Samples::Csv(file) => file.for_each_batch(chunk, progress, consume),
-            Samples::Parquet(file, layout) => file.for_each_batch(layout, slice, progress, consume),
-        })?;
+        let (rows, sha256) = match &self.source {
+            Samples::Csv(file) => digest::beside(&self.samples, || {
+                file.for_each_batch(chunk, progress, consume)
+            }),
+            Samples::Parquet(file, layout) => digest::beside(&self.samples, || {
+                file.for_each_batch(layout, slice, progress, consume)
+            }),
+            Samples::InMemory(samples) => {
+                in_memory::for_each_batch(samples.as_ref(), progress, consume)
+            }
+        }?;
         Ok(ReadSummary {
             rows,
             sha256,

@@ -8,7 +8,7 @@ use clap::{Args, ValueEnum};
 use mimu::allan::Kind;
 use mimu::calibration::Calibration;
 use mimu::result::allan::AllanResult;
-use mimu::survey::{Options, Part, Survey, survey};
+use mimu::survey::{Options, Part, survey_all};
 use mimu_recording::error::{Error, Result};
 use mimu_recording::result_file::stage;
 use mimu_recording::{MANIFEST_FILE, Recording};
@@ -103,17 +103,6 @@ pub fn run(args: &AllanArgs) -> Result<()> {
         .iter()
         .map(|r| Recording::open(r))
         .collect::<Result<_>>()?;
-    for (i, recording) in recordings.iter().enumerate().skip(1) {
-        refuse_another_unit(&recordings[0], recording)?;
-        let same = |r: &Recording| r.samples.canonicalize().ok();
-        if recordings[..i].iter().any(|r| same(r) == same(recording)) {
-            return Err(Error::new(
-                recording.directory.display(),
-                "the recording is given twice",
-                "leave one out",
-            ));
-        }
-    }
     let manifests: Vec<PathBuf> = args
         .recordings
         .iter()
@@ -148,24 +137,11 @@ pub fn run(args: &AllanArgs) -> Result<()> {
         confidence: args.confidence,
     };
     let bar = progress("reading and averaging");
-    let all = recordings.len() as f64;
-    let surveys: Result<Vec<Survey>> = (0..)
-        .zip(&recordings)
-        .map(|(done, recording)| {
-            survey(recording, calibration.as_ref(), options, |share| {
-                bar.set_position(((f64::from(done) + share) / all * 1000.0) as u64);
-            })
-        })
-        .collect();
+    let surveys = survey_all(&recordings, calibration.as_ref(), options, |share| {
+        bar.set_position((share * 1000.0) as u64);
+    });
     bar.finish_and_clear();
     let surveys = surveys?;
-    if let (Some(unknown), 2..) = (surveys.iter().find(|s| s.temp_c.is_none()), surveys.len()) {
-        return Err(Error::new(
-            &unknown.recording,
-            "it has no temp_c, which tells the noise of several recordings apart",
-            "record the temperature, or give one recording at a time",
-        ));
-    }
     let result = AllanResult::of(&surveys);
     let mut text = report::allan_text(&result);
     let mut staged = Vec::new();
@@ -178,39 +154,4 @@ pub fn run(args: &AllanArgs) -> Result<()> {
         text.push_str(&format!("\nplot: {}\n", path.display()));
     }
     print(&args.json, &text, &result, staged)
-}
-
-/// Refuses a recording whose channels cannot stand in one file with those of the first.
-fn refuse_another_unit(first: &Recording, other: &Recording) -> Result<()> {
-    let (one, two) = (&first.manifest, &other.manifest);
-    let place = |recording: &Recording| recording.samples.display().to_string();
-    let (what, here, there) = if one.device != two.device {
-        (
-            "device",
-            format!("{:?}", two.device),
-            format!("{:?}", one.device),
-        )
-    } else if one.raw_unit != two.raw_unit {
-        (
-            "raw_unit",
-            two.raw_unit.to_string(),
-            one.raw_unit.to_string(),
-        )
-    } else if one.sample_rate_hz != two.sample_rate_hz {
-        (
-            "sample_rate_hz",
-            two.sample_rate_hz.to_string(),
-            one.sample_rate_hz.to_string(),
-        )
-    } else {
-        return Ok(());
-    };
-    Err(Error::new(
-        place(other),
-        format!(
-            "its {what} is {here}, and that of {} is {there}",
-            place(first)
-        ),
-        "give recordings of one unit, made alike",
-    ))
 }

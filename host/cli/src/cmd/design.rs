@@ -196,7 +196,7 @@ impl DesignArgs {
         }
     }
 
-    fn motion(&self) -> Motion {
+    pub(crate) fn motion(&self) -> Motion {
         let usual = Motion::of(self.fixture());
         Motion {
             slew: self.slew.map_or(usual.slew, f64::to_radians),
@@ -358,6 +358,28 @@ impl DesignArgs {
         Ok(design.within(session.time_s, &session.noise, &budget))
     }
 
+    /// The design that is asked for, of one.
+    pub(crate) fn designed(&self) -> Result<Design> {
+        match (self.scheme, self.budget, self.n) {
+            (Some(scheme), ..) => {
+                let scheme = match scheme {
+                    SchemeArg::SixFace => Scheme::SixFace,
+                    SchemeArg::FangNine => Scheme::FangNine,
+                    SchemeArg::Xu33 => Scheme::Xu33,
+                    SchemeArg::XuRates => Scheme::XuRates,
+                    SchemeArg::Niu8 => Scheme::Niu8,
+                };
+                self.scheme(&self.problem(scheme.rate_span(), Rates::Any)?, scheme)
+            }
+            (_, Some(minutes), _) => self.within(&self.own_problem()?, minutes),
+            (_, _, n) => {
+                let n = usize::from(n.unwrap_or_default());
+                let title = format!("best of {n} dwells found (seed {})", self.seed);
+                self.best(&self.own_problem()?, n, title)
+            }
+        }
+    }
+
     /// Every scheme for the sensor, each followed by the best design of as many dwells; and the schemes that are not
     /// within the table's reach.
     fn compare(&self) -> Result<Comparison> {
@@ -402,24 +424,7 @@ pub fn run(args: &DesignArgs) -> Result<()> {
         let text = report::comparison_text(&comparison);
         return print(&args.json, &text, &comparison, None);
     }
-    let designed = match (args.scheme, args.budget, args.n) {
-        (Some(scheme), ..) => {
-            let scheme = match scheme {
-                SchemeArg::SixFace => Scheme::SixFace,
-                SchemeArg::FangNine => Scheme::FangNine,
-                SchemeArg::Xu33 => Scheme::Xu33,
-                SchemeArg::XuRates => Scheme::XuRates,
-                SchemeArg::Niu8 => Scheme::Niu8,
-            };
-            args.scheme(&args.problem(scheme.rate_span(), Rates::Any)?, scheme)?
-        }
-        (_, Some(minutes), _) => args.within(&args.own_problem()?, minutes)?,
-        (_, _, n) => {
-            let n = usize::from(n.unwrap_or_default());
-            let title = format!("best of {n} dwells found (seed {})", args.seed);
-            args.best(&args.own_problem()?, n, title)?
-        }
-    };
+    let designed = args.designed()?;
     let mut text = report::design_text(&designed);
     let mut plan = None;
     if let Some(path) = &args.output {

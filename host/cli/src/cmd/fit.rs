@@ -11,7 +11,7 @@ use mimu_recording::error::{Error, Result};
 use mimu_recording::result_file::stage;
 
 use crate::arguments::{JsonArgs, KeepArgs, NoiseArgs, SensorArg, StillArgs};
-use crate::output::print;
+use crate::output::{now, print};
 use crate::reading::read_samples_or_means;
 use crate::report;
 
@@ -101,10 +101,7 @@ pub(crate) fn run(args: &FitArgs) -> Result<()> {
     }
     let mut calibration = None;
     if let Some(path) = &args.output {
-        let now = jiff::Timestamp::now()
-            .round(jiff::Unit::Second)
-            .unwrap_or_default();
-        let made = Calibration::of(&fitted, &[], &now.to_string())?;
+        let made = Calibration::of(&fitted, &[], &now())?;
         calibration = Some(stage(path, made.to_toml())?);
         text.push_str(&format!("\ncalibration: {}\n", path.display()));
     }

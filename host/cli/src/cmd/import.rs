@@ -9,8 +9,8 @@ use mimu::warning::Warning;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::signed_low_byte::SignedLowByte;
 use mimu_recording::{
-    BrokenLimit, ColumnList, Decimal, Face, ImportOptions, Offset, Preset, RawUnit, Reference,
-    RowFilter, SampleFormat, Scale, Separator, TwosComplement, Zero, import, is_log,
+    BrokenLimit, ColumnList, Decimal, Face, ImportOptions, ImportSummary, Offset, Preset, RawUnit,
+    Reference, RowFilter, SampleFormat, Scale, Separator, TwosComplement, Zero, import, is_log,
 };
 
 use crate::arguments::JsonArgs;
@@ -168,6 +168,15 @@ fn faces(args: &ImportArgs) -> Result<(Vec<PathBuf>, Vec<Face>)> {
 }
 
 pub(crate) fn run(args: ImportArgs) -> Result<()> {
+    let json = JsonArgs {
+        path: args.json.path.clone(),
+    };
+    let summary = imported(args)?;
+    print(&json, &report::import_text(&summary), &summary, None)
+}
+
+/// Makes the recording.
+pub(crate) fn imported(args: ImportArgs) -> Result<ImportSummary> {
     let (files, faces) = faces(&args)?;
     let (gravity, assumed) = match (args.gravity, args.latitude) {
         (Some(gravity), latitude) => (
@@ -244,5 +253,5 @@ pub(crate) fn run(args: ImportArgs) -> Result<()> {
             summary.sample_rate_hz
         ));
     }
-    print(&args.json, &report::import_text(&summary), &summary, None)
+    Ok(summary)
 }

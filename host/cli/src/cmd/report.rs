@@ -5,19 +5,15 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use mimu::calibration::Calibration;
 use mimu::calibration::verify::verify;
-use mimu::diagnose::{Diagnosis, Recordings, diagnose};
-use mimu::effects::fitted::FittedEffect;
-use mimu::fit::{Method, Options};
+use mimu::diagnose::Recordings;
+use mimu::diagnosed::{Diagnosed, diagnosed};
 use mimu::noise::noise_file::NoiseFile;
-use mimu::plan::next_experiment;
 use mimu::prepared::Prepared;
-use mimu::result::diagnosis::DiagnosisResult;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::result_file::stage;
 
 use crate::arguments::{KeepArgs, NoiseArgs, StillArgs};
-use crate::cmd::diagnose::command_line;
-use crate::output::show;
+use crate::output::{now, show};
 use crate::reading::read;
 use crate::report::{Made, UnitReport, unit_page};
 
@@ -81,7 +77,7 @@ impl Inputs {
     }
 }
 
-pub fn run(args: &ReportArgs) -> Result<()> {
+pub fn run(args: &ReportArgs, command_line: &str) -> Result<()> {
     let inputs = Inputs::of(args)?;
     let outputs = [Some(args.out.as_path())];
     let others = [args.noise.file.as_deref(), inputs.calibration.as_deref()];
@@ -92,8 +88,7 @@ pub fn run(args: &ReportArgs) -> Result<()> {
     };
     let recordings: Vec<_> = inputs.recordings.iter().map(open).collect::<Result<_>>()?;
     let others: Vec<_> = inputs.verify.iter().map(open).collect::<Result<_>>()?;
-    let now = jiff::Timestamp::now().round(jiff::Unit::Second);
-    let now = now.unwrap_or_default().to_string();
+    let now = now();
     let noise = args
         .noise
         .file
@@ -102,13 +97,11 @@ pub fn run(args: &ReportArgs) -> Result<()> {
         .transpose()?;
     let found = match recordings.is_empty() {
         true => None,
-        false => Some(diagnosed(&recordings, &others, args.still.factor)?),
+        false => Some(found(&recordings, &others, args.still.factor, &now)?),
     };
     let calibration = match (&inputs.calibration, &found) {
         (Some(path), _) => Calibration::read(path)?,
-        (None, Some((diagnosis, _))) => {
-            Calibration::of(&diagnosis.after, &effects(diagnosis)?, &now)?
-        }
+        (None, Some(found)) => found.calibration(&now)?,
         // One of both is required.
         (None, None) => return Ok(()),
     };
@@ -123,7 +116,7 @@ pub fn run(args: &ReportArgs) -> Result<()> {
     let file = inputs.calibration.as_deref().map(Path::display);
     let file = file.map(|path| path.to_string());
     let unit = UnitReport {
-        diagnosis: found.as_ref().map(|(_, result)| result),
+        diagnosis: found.as_ref().map(|found| &found.result),
         recordings: &recordings,
         calibration: &calibration,
         calibration_file: file.as_deref(),
@@ -134,7 +127,7 @@ pub fn run(args: &ReportArgs) -> Result<()> {
     let names: Vec<&str> = recordings.iter().map(|r| r.0.as_str()).collect();
     let made = Made {
         recording: names.join(", "),
-        command: command_line(),
+        command: command_line.to_owned(),
         created: now,
     };
     stage(&args.out, unit_page(&unit, &made)?)?.publish()?;
@@ -146,11 +139,12 @@ pub fn run(args: &ReportArgs) -> Result<()> {
 }
 
 /// The diagnosis of the recordings; an effect that the first of the others contradicts is not accepted.
-fn diagnosed(
+fn found(
     recordings: &[(String, Prepared)],
     others: &[(String, Prepared)],
     still_factor: f64,
-) -> Result<(Diagnosis, DiagnosisResult)> {
+    created: &str,
+) -> Result<Diagnosed> {
     let mut all = recordings.iter().map(|r| r.1.clone());
     let first = all.next().ok_or_else(|| {
         Error::new(
@@ -166,27 +160,5 @@ fn diagnosed(
         given: None,
         accept: Vec::new(),
     };
-    let options = Options {
-        method: Method::LeastSquares,
-        holdout_blocks: 0,
-        still_factor,
-        only: None,
-    };
-    let diagnosis = diagnose(recordings, options)?;
-    let next = next_experiment::next(&diagnosis);
-    let result = DiagnosisResult::of(&diagnosis, &next, None);
-    Ok((diagnosis, result))
-}
-
-/// The effects that a calibration holds.
-fn effects(diagnosis: &Diagnosis) -> Result<Vec<FittedEffect>> {
-    let mut all = Vec::new();
-    let accepted = diagnosis.sensors.iter().flat_map(|s| &s.decision.accepted);
-    for one in accepted.filter(|a| a.of_unit) {
-        one.effect
-            .lasting()
-            .join(&mut all)
-            .map_err(|problem| Error::new("effects", problem, "report this"))?;
-    }
-    Ok(all)
+    diagnosed(recordings, still_factor, [None, None], created)
 }

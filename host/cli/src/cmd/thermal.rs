@@ -19,8 +19,7 @@ use mimu_thermal::result::ThermalResult;
 use mimu_thermal::session::Session;
 
 use crate::arguments::{JsonArgs, NoiseArgs, StillArgs};
-use crate::cmd::diagnose::command_line;
-use crate::output::{check_outputs, print};
+use crate::output::{check_outputs, now, print};
 use crate::reading::read;
 use crate::report::{self, Made, thermal_plot};
 
@@ -138,9 +137,9 @@ fn range(text: &str) -> std::result::Result<[f64; 2], String> {
     }
 }
 
-pub(crate) fn run(args: &ThermalArgs) -> Result<()> {
+pub(crate) fn run(args: &ThermalArgs, command_line: &str) -> Result<()> {
     match &args.command {
-        ThermalCommand::Fit(args) => run_fit(args),
+        ThermalCommand::Fit(args) => run_fit(args, command_line),
         ThermalCommand::Compare(args) => run_compare(args),
         ThermalCommand::Plan(args) => plan::run(args),
         #[cfg(not(target_family = "wasm"))]
@@ -148,7 +147,7 @@ pub(crate) fn run(args: &ThermalArgs) -> Result<()> {
     }
 }
 
-fn run_fit(args: &FitArgs) -> Result<()> {
+fn run_fit(args: &FitArgs, command_line: &str) -> Result<()> {
     let outputs = [
         args.output.as_deref(),
         args.plot.as_deref(),
@@ -179,10 +178,7 @@ fn run_fit(args: &FitArgs) -> Result<()> {
     let result = ThermalResult::of(&fitted);
     let mut text = report::thermal_text(&result);
     let mut staged = Vec::new();
-    let now = jiff::Timestamp::now()
-        .round(jiff::Unit::Second)
-        .unwrap_or_default()
-        .to_string();
+    let now = now();
     if let Some(path) = &args.output {
         let made = match &base {
             None => fitted.calibration(&now)?,
@@ -199,7 +195,7 @@ fn run_fit(args: &FitArgs) -> Result<()> {
         let named = args.recordings.iter().map(|r| r.display().to_string());
         let made = Made {
             recording: named.collect::<Vec<_>>().join(", "),
-            command: command_line(),
+            command: command_line.to_owned(),
             created: now,
         };
         staged.push(stage(path, report::thermal_page(&result, &made))?);

@@ -27,7 +27,7 @@ use mimu_wizard::text_line::Columns;
 use crate::arguments::JsonArgs;
 use crate::cmd::design::number;
 use crate::cmd::device::interruption;
-use crate::output::{check_outputs, print};
+use crate::output::{check_outputs, now, print};
 use crate::report::{self, Made};
 use crate::views::answers::{Beforehand, Typed};
 use crate::views::lines::Lines;
@@ -373,7 +373,7 @@ fn end_in_time(stop: Arc<AtomicBool>, ends: Duration, on_screen: bool) -> Result
     Ok(())
 }
 
-pub(crate) fn run(args: &WizardArgs) -> Result<()> {
+pub(crate) fn run(args: &WizardArgs, command_line: &str) -> Result<()> {
     check_outputs(&[args.json.file()], &[])?;
     let asked = args.asked()?;
     let wanted = args.wanted()?;
@@ -431,11 +431,8 @@ pub(crate) fn run(args: &WizardArgs) -> Result<()> {
     let page = |found: &DiagnosisResult, folder: &Path| {
         let made = Made {
             recording: folder.join("calibration").display().to_string(),
-            command: crate::cmd::diagnose::command_line(),
-            created: jiff::Timestamp::now()
-                .round(jiff::Unit::Second)
-                .unwrap_or_default()
-                .to_string(),
+            command: command_line.to_owned(),
+            created: now(),
         };
         report::diagnosis_page(found, &made)
     };

@@ -3,7 +3,7 @@
 mod page;
 mod text;
 
-pub use page::{Sections, diagnosis_page};
+pub use page::{Sections, body, diagnosis_page};
 pub use text::{Detail, diagnosis_text, not_in_plan_text};
 
 use mimu::diagnose::Verdict;

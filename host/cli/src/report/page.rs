@@ -18,7 +18,7 @@ pub struct Made {
     pub created: String,
 }
 
-const STYLE: &str = include_str!("page/style.css");
+pub(super) const STYLE: &str = include_str!("page/style.css");
 /// Elements without an end, closed as XML wants it.
 const META: &str = r#"<meta charset="utf-8"/><meta name="viewport" content="width=device-width, initial-scale=1"/>"#;
 

@@ -15,7 +15,14 @@ use super::thermal_plot;
 
 /// The page of a fit.
 pub fn thermal_page(result: &ThermalResult, made: &Made) -> String {
-    let main = html! {
+    let (device, verdict) = (&result.device, result.verdict.name());
+    let title = format!("{device} over temperature: {verdict}");
+    page(&title, &body(result, made))
+}
+
+/// What is in the page.
+pub(super) fn body(result: &ThermalResult, made: &Made) -> Markup {
+    html! {
         (head(result, made))
         h2 { "Errors and lag" }
         (errors(result))
@@ -42,13 +49,7 @@ pub fn thermal_page(result: &ThermalResult, made: &Made) -> String {
             ul { @for warning in &result.warnings { li { (hint::of_thermal(warning)) } } }
         }
         p class="dim" { (result.tool) ", " (made.created) ": " code { (made.command) } }
-    };
-    let title = format!(
-        "{} over temperature: {}",
-        result.device,
-        result.verdict.name()
-    );
-    page(&title, &main)
+    }
 }
 
 fn head(result: &ThermalResult, made: &Made) -> Markup {

@@ -1,10 +1,10 @@
 //! The page of a unit: everything that is known of it, in the order of a factory's certificate.
 
-mod curves;
-mod model;
-mod noise;
-mod poses;
-mod trace;
+pub(super) mod curves;
+pub(super) mod model;
+pub(super) mod noise;
+pub(super) mod poses;
+pub(super) mod trace;
 
 use maud::{Markup, html};
 use mimu::calibration::Calibration;

@@ -130,8 +130,17 @@ impl<'a> Sections<'a> {
 
 /// The page of a diagnosis.
 pub fn diagnosis_page(d: &DiagnosisResult, made: &Made) -> Result<String> {
+    let title = format!("Diagnosis of {}: {}", d.device, d.verdict.name());
+    Ok(page(&title, &body(d, made)?))
+}
+
+/// What is in the page.
+///
+/// # Errors
+/// See [`Sections::new`].
+pub fn body(d: &DiagnosisResult, made: &Made) -> Result<Markup> {
     let sections = Sections::new(d, made)?;
-    let main = html! {
+    Ok(html! {
         (head(d, made))
         h2 { "Error before and after" }
         (sections.errors())
@@ -141,9 +150,7 @@ pub fn diagnosis_page(d: &DiagnosisResult, made: &Made) -> Result<String> {
         (sections.recorded())
         (sections.method())
         p class="dim" { (d.tool) ", " (made.created) ": " code { (made.command) } }
-    };
-    let title = format!("Diagnosis of {}: {}", d.device, d.verdict.name());
-    Ok(page(&title, &main))
+    })
 }
 
 fn head(d: &DiagnosisResult, made: &Made) -> Markup {

@@ -1,0 +1,92 @@
+//! Subcommands that are nothing but options, as another program calls them: by the same arguments, so that no option, default or check of
+//! them exists twice.
+
+use std::ffi::OsString;
+
+use clap::{Args, CommandFactory, Parser};
+use mimu::result::design::Design;
+use mimu_export::{Export, Format, Sources};
+use mimu_recording::ImportSummary;
+use mimu_recording::error::Error;
+
+use crate::Cli;
+use crate::cmd::design::DesignArgs;
+use crate::cmd::import::{ImportArgs, imported};
+
+/// Why a call did nothing.
+#[derive(Debug)]
+pub enum Refusal {
+    /// There are no such arguments.
+    Usage(String),
+    /// The data, as the command says it.
+    Data(Error),
+}
+
+impl From<Error> for Refusal {
+    fn from(error: Error) -> Self {
+        Self::Data(error)
+    }
+}
+
+/// Makes a recording by the arguments of `mimu import`.
+///
+/// # Errors
+/// See [`Refusal`].
+pub fn import(arguments: Vec<OsString>) -> Result<ImportSummary, Refusal> {
+    Ok(imported(parsed::<ImportArgs>("import", arguments)?)?)
+}
+
+/// The design by the arguments of `mimu design`, and its plan as TOML.
+///
+/// # Errors
+/// See [`Refusal`].
+pub fn design(arguments: Vec<OsString>) -> Result<(Design, String), Refusal> {
+    let args = parsed::<DesignArgs>("design", arguments)?;
+    let designed = args.designed()?;
+    let plan = designed.plan(args.motion().slew);
+    Ok((designed, plan))
+}
+
+/// What `mimu export` writes, by its arguments from the name of the format on.
+///
+/// # Errors
+/// See [`Refusal`].
+pub fn export(arguments: Vec<OsString>, from: &Sources) -> Result<Export, Refusal> {
+    #[derive(Parser)]
+    struct To {
+        #[command(subcommand)]
+        format: Format,
+    }
+    let arguments = std::iter::once("export".into()).chain(arguments);
+    let to = To::try_parse_from(arguments).map_err(usage)?;
+    Ok(to.format.export(from)?)
+}
+
+/// Names of the options of `subcommand`, such as `rate-hz` and `n`.
+pub fn options(subcommand: &str) -> Vec<String> {
+    let command = Cli::command();
+    let found = command.find_subcommand(subcommand);
+    let arguments = found.into_iter().flat_map(clap::Command::get_arguments);
+    let long = |a: &clap::Arg| a.get_long().map(str::to_owned);
+    let named = |a| long(a).or_else(|| a.get_short().map(String::from));
+    arguments.filter_map(named).collect()
+}
+
+fn parsed<A: Args>(name: &'static str, arguments: Vec<OsString>) -> Result<A, Refusal> {
+    let command = A::augment_args(clap::Command::new(name));
+    let arguments = std::iter::once(name.into()).chain(arguments);
+    let matches = command.try_get_matches_from(arguments).map_err(usage)?;
+    A::from_arg_matches(&matches).map_err(usage)
+}
+
+/// What clap says of wrong arguments, in one line.
+fn usage(error: clap::Error) -> Refusal {
+    let text = error.render().to_string();
+    let said = text.lines().take_while(|line| !line.starts_with("Usage:"));
+    let said: Vec<&str> = said
+        .map(str::trim)
+        .filter(|line| !line.is_empty())
+        .collect();
+    let said = said.join("; ").replace(":; ", ": ");
+    Refusal::Usage(said.strip_prefix("error: ").unwrap_or(&said).to_owned())
+}

@@ -1,0 +1,175 @@
+//! Results as a piece of HTML within another page, as a notebook shows them: the tables and plots of the pages, with their style for this
+//! piece only.
+
+use std::fmt::Write as _;
+
+use maud::{Markup, PreEscaped, html};
+use mimu::calibration::Calibration;
+use mimu::calibration::verify::Verification;
+use mimu::fit::Fit;
+use mimu::readable;
+use mimu::result::allan::AllanResult;
+use mimu::result::design::Design;
+use mimu::result::diagnosis::DiagnosisResult;
+use mimu::result::fit::FitResult;
+use mimu_recording::error::Result;
+use mimu_thermal::result::ThermalResult;
+
+use super::page::{Made, STYLE, number, spoken};
+use super::{allan_plot, design_text, diagnosis, thermal_page, unit};
+use crate::hint;
+
+/// A fit: errors, parameters, poses and readings.
+pub fn of_fit(fit: &Fit, result: &FitResult, calibration: &Calibration) -> String {
+    let prepared = &fit.prepared;
+    fragment(&html! {
+        h1 { "Calibration of " (result.device) }
+        div class="scroll" { table {
+            caption { "Root mean square error; the held-out one is of dwells that the fit has not seen" }
+            thead { tr {
+                th { "sensor" } th class="n" { "held out" } th class="n" { "in sample" } th class="n" { "noise alone" }
+                th class="n" { "dwells" } th { "error of" }
+            } }
+            tbody {
+                @for (sensor, s) in result.sensors.present() {
+                    @let unit = readable::error(s.unit);
+                    @let cell = |v: f64| html! { td class="n" { (number(v, unit.factor, &unit.unit)) } };
+                    tr {
+                        td { (spoken(sensor)) }
+                        (cell(s.held_out_rms.unwrap_or(f64::NAN))) (cell(s.rms)) (cell(s.noise_floor))
+                        td class="n" { (s.dwells) } td { (s.figure.description()) }
+                    }
+                }
+            }
+        } }
+        (unit::model::section(calibration))
+        (unit::poses::figure(prepared, calibration, None))
+        (unit::trace::figure(prepared))
+        @if !result.warnings.is_empty() {
+            h2 { "To know" }
+            ul { @for warning in &result.warnings { li { (hint::of_warning(warning)) } } }
+        }
+    })
+}
+
+/// A diagnosis, as its page has it.
+///
+/// # Errors
+/// A model of it is singular, so that there is nothing to draw.
+pub fn of_diagnosis(result: &DiagnosisResult, made: &Made) -> Result<String> {
+    Ok(fragment(&diagnosis::body(result, made)?))
+}
+
+/// Noise: coefficients and curves.
+pub fn of_allan(result: &AllanResult) -> String {
+    fragment(&html! {
+        h1 { "Noise of " (result.device.as_deref().unwrap_or("a unit")) }
+        @if let Some(noise) = result.noise_file() { (unit::noise::section(&noise)) }
+        // A drawing of its own, with a style of its own, which would hold for the whole page in another place than an image.
+        @if result.recordings.len() == 1 {
+            img alt="Allan deviation with its fitted model" style="max-width:100%" src=(data_url(&allan_plot::svg(result))) {}
+        }
+        @if !result.warnings.is_empty() { ul { @for warning in &result.warnings { li { (warning) } } } }
+    })
+}
+
+/// A fit over temperature, as its page has it.
+pub fn of_thermal(result: &ThermalResult, made: &Made) -> String {
+    fragment(&thermal_page::body(result, made))
+}
+
+/// A design, as the command prints it.
+pub fn of_design(design: &Design) -> String {
+    fragment(&html! { pre { (design_text(design)) } })
+}
+
+/// A verification by the recording `name`.
+pub fn of_verification(name: &str, verification: &Verification) -> String {
+    let one = [(name.to_owned(), verification.clone())];
+    fragment(&html! {
+        (unit::model::verified(&one))
+        @if !verification.warnings.is_empty() {
+            ul { @for warning in &verification.warnings { li { (warning.to_string()) } } }
+        }
+    })
+}
+
+/// A calibration: its parameters, and its curves over temperature.
+pub fn of_calibration(calibration: &Calibration) -> String {
+    fragment(&html! {
+        h1 { "Calibration of " (calibration.device) }
+        (unit::model::section(calibration))
+        @if calibration.temperature.is_some() {
+            h2 { "Over temperature" }
+            (unit::curves::section(calibration))
+        }
+    })
+}
+
+/// Terms and what is known of them.
+pub fn of_terms(title: &str, terms: &[(&str, String)]) -> String {
+    fragment(&html! {
+        h3 { (title) }
+        dl { @for (term, known) in terms { dt { (term) } dd { (known) } } }
+    })
+}
+
+/// `main` with the style of a page, which touches nothing beside it.
+fn fragment(main: &Markup) -> String {
+    // A style sheet within a rule holds for the element of that rule and what is in it: a page's root and body are that element here.
+    let style = STYLE.replace(":root{", "&{").replace("\nbody{", "\n&{");
+    let all = html! {
+        div class="mimu" {
+            style { (PreEscaped(format!(".mimu{{{style}\npadding:1rem 1.5rem}}"))) }
+            (main)
+        }
+    };
+    all.into_string()
+}
+
+/// A drawing as the address of an image.
+fn data_url(svg: &str) -> String {
+    let mut url = String::from("data:image/svg+xml,");
+    for byte in svg.bytes() {
+        match byte {
+            b'%' | b'#' | b'"' | b'<' | b'>' | 0..=b' ' | 0x7f.. => {
+                let _ = write!(url, "%{byte:02X}");
+            }
+            plain => url.push(char::from(plain)),
+        }
+    }
+    url
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_style_of_a_piece_holds_for_nothing_beside_it() {
+        let piece = of_terms("log", &[("rate", "50 Hz".into())]);
+        let style = piece.split("<style>").nth(1).unwrap();
+        let style = style.split("</style>").next().unwrap();
+        assert!(style.starts_with(".mimu{") && style.ends_with('}'));
+        assert!(
+            !style.contains(":root") && !style.contains("body{"),
+            "{style}"
+        );
+        let open = style.matches('{').count();
+        assert_eq!(open, style.matches('}').count());
+        // The outermost rule is closed by the last brace only.
+        let mut depth = 0;
+        for (i, c) in style.char_indices() {
+            depth += i32::from(c == '{') - i32::from(c == '}');
+            assert!(depth > 0 || i == style.len() - 1, "{}", &style[..i]);
+        }
+    }
+
+    #[test]
+    fn a_drawing_is_an_address_without_what_would_end_it() {
+        assert_eq!(
+            data_url("<a b=\"1\">é#"),
+            "data:image/svg+xml,%3Ca%20b=%221%22%3E%C3%A9%23"
+        );
+    }
+}

@@ -1,0 +1,118 @@
+//! A diagnosis carried through: judged on another recording, with the effects that a calibration then holds and what to record next.
+
+use mimu_recording::error::{Error, Result};
+
+use crate::calibration::Calibration;
+use crate::calibration::verify::verify;
+use crate::diagnose::{Diagnosis, Recordings, diagnose};
+use crate::effects::fitted::FittedEffect;
+use crate::fit::{Method, Options};
+use crate::plan::next_experiment::{self, Next};
+use crate::result::diagnosis::DiagnosisResult;
+use crate::warning::Warning;
+
+/// A diagnosis, and what follows from it.
+pub struct Diagnosed {
+    /// What was found.
+    pub diagnosis: Diagnosis,
+    /// The effects that the unit has: those of the calibration that was given, and those that were found.
+    pub effects: Vec<FittedEffect>,
+    /// The experiments that would show what the recordings could not.
+    pub next: Next,
+    /// All of it, as JSON has it.
+    pub result: DiagnosisResult,
+    unit_id: Option<String>,
+}
+
+/// Finds the effects in `recordings`, and judges the calibration without and with them by the second recording, whose name is `second`.
+/// `given` is the name of the calibration that the recordings are diagnosed with; `created` is the time, RFC 3339.
+///
+/// # Errors
+/// Those of [`diagnose`]; a given calibration with curves over temperature, or with an effect that was found anew.
+pub fn diagnosed(
+    recordings: Recordings,
+    still_factor: f64,
+    [second, given_name]: [Option<&str>; 2],
+    created: &str,
+) -> Result<Diagnosed> {
+    let options = Options {
+        method: Method::LeastSquares,
+        holdout_blocks: 0,
+        still_factor,
+        only: None,
+    };
+    let given = recordings.given;
+    let given_name = given_name.unwrap_or_default();
+    if given.is_some_and(|given| given.temperature.is_some()) {
+        return Err(Error::new(
+            format!("{given_name}, [temperature]"),
+            "a diagnosis goes by one model for all temperatures, and the curves would be left out",
+            "compensate the recording first (`mimu apply`), and diagnose that",
+        ));
+    }
+    let other = recordings.second.clone();
+    let mut diagnosis = diagnose(recordings, options)?;
+    let known = known(given, &mut diagnosis);
+    let found = diagnosis.sensors.iter().flat_map(|s| &s.decision.accepted);
+    let found = found.filter(|a| a.of_unit).map(|a| a.effect.lasting());
+    let mut effects = known.clone();
+    for effect in found {
+        effect.join(&mut effects).map_err(|problem| {
+            let remedy = "diagnose with a calibration without it";
+            Error::new(given_name, problem, remedy)
+        })?;
+    }
+    let mut judged = None;
+    if let (Some(other), Some(name)) = (other, second) {
+        let by = |fit, effects: &[FittedEffect]| {
+            verify(&other, &Calibration::of(fit, effects, created)?)
+        };
+        let before = by(&diagnosis.before, &known);
+        let after = by(&diagnosis.after, &effects);
+        match (before, after) {
+            (Ok(before), Ok(after)) => judged = Some([before, after]),
+            (Err(refusal), _) | (_, Err(refusal)) => {
+                let warning = Warning::NotJudged(Some(name.to_owned()), refusal);
+                diagnosis.after.warnings.push(warning);
+            }
+        }
+    }
+    let next = next_experiment::next(&diagnosis);
+    let judged = second.zip(judged.as_ref());
+    Ok(Diagnosed {
+        result: DiagnosisResult::of(&diagnosis, &next, judged),
+        diagnosis,
+        effects,
+        next,
+        unit_id: given.and_then(|given| given.unit_id.clone()),
+    })
+}
+
+impl Diagnosed {
+    /// The calibration with the effects, made at `created` (RFC 3339).
+    ///
+    /// # Errors
+    /// Those of [`Calibration::of`].
+    pub fn calibration(&self, created: &str) -> Result<Calibration> {
+        let mut made = Calibration::of(&self.diagnosis.after, &self.effects, created)?;
+        // An imported recording does not know the unit's number; that it is of the same unit was checked.
+        made.unit_id = made.unit_id.or(self.unit_id.clone());
+        Ok(made)
+    }
+}
+
+/// The effects that the unit is known to have. Those of a sensor that the recordings lack have no matrix in the new file.
+fn known(given: Option<&Calibration>, diagnosis: &mut Diagnosis) -> Vec<FittedEffect> {
+    let Some(given) = given else {
+        return Vec::new();
+    };
+    let after = &mut diagnosis.after;
+    let all = given.effects().iter().cloned();
+    let (kept, lost): (Vec<FittedEffect>, Vec<FittedEffect>) =
+        all.partition(|effect| after.sensor(effect.sensor()).is_some());
+    for effect in lost {
+        let warning = Warning::EffectLost(effect.id(), effect.sensor());
+        after.warnings.push(warning);
+    }
+    kept
+}

@@ -1,0 +1,33 @@
+"""Calibration of inertial units.
+
+    import mimu
+
+    rec = mimu.Recording(t, gyro, accel, unit="count", gravity=9.81)   # arrays; or mimu.read("log.csv", ...)
+    fit = mimu.fit(rec)
+    fit.accel.C, fit.accel.sigma, fit.held_out
+    rate, force = fit.apply(gyro, accel)                               # rad/s, m/s²
+
+Readings are in V, counts or SI (``unit``). Results are SI but where a name says otherwise (``_dps``, ``_c``). Errors are
+:class:`mimu.Error`. Ctrl-C interrupts every call. The wheel brings the command ``mimu`` as well.
+"""
+
+from importlib.metadata import version as _version
+
+from mimu import thermal
+from mimu._allan import Allan, Channel, NoiseCoefficient, allan
+from mimu._design import Design, ParameterSigma, design
+from mimu._diagnosis import Coefficient, Diagnosis, Effect, Leftover, NotExcited, Rejected, SensorDiagnosis, diagnose
+from mimu._error import Error
+from mimu._files import Export, SensorVerification, Verification, export, load, load_noise, verify
+from mimu._fit import Dwell, Figures, Fit, Parameter, SensorFit, fit
+from mimu._mimu import Calibration, Noise, Recording
+from mimu._recording import read
+
+__version__ = _version("mimu")
+
+__all__ = [
+    "Allan", "Calibration", "Channel", "Coefficient", "Design", "Diagnosis", "Dwell", "Effect", "Error", "Export", "Figures", "Fit",
+    "Leftover", "Noise", "NoiseCoefficient", "NotExcited", "Parameter", "ParameterSigma", "Recording", "Rejected", "SensorDiagnosis",
+    "SensorFit", "SensorVerification", "Verification", "allan", "design", "diagnose", "export", "fit", "load",
+    "load_noise", "read", "thermal", "verify",
+]

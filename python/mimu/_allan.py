@@ -1,0 +1,115 @@
+"""Noise of a unit at rest."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from mimu import _mimu
+from mimu._mimu import Calibration, Noise, Recording
+from mimu._result import Array, Result, typed
+
+
+@dataclass(frozen=True)
+class NoiseCoefficient:
+    """A coefficient of the noise model with its interval."""
+
+    value: float
+    sigma: float
+    lower: float
+    upper: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class Channel:
+    """Noise of one channel; deviations are in ``unit``."""
+
+    name: str
+    recording: str
+    temp_c: float | None
+    unit: str
+    #: Samples that it was computed from.
+    samples: int
+    #: Averaging times, deviations and the ends of their intervals.
+    tau_s: Array
+    adev: Array
+    lower: Array
+    upper: Array
+    #: White noise, bias instability, rate random walk, quantization and rate ramp; None with the reason in ``reasons``.
+    n: NoiseCoefficient | None
+    b: NoiseCoefficient | None
+    k: NoiseCoefficient | None
+    q: NoiseCoefficient | None
+    r: NoiseCoefficient | None
+    #: By the letter of a coefficient, why it is not there.
+    reasons: dict[str, str]
+    #: Averaging time from which on none is better by more than 5 %.
+    useful_average_s: float | None
+
+
+class Allan(Result):
+    """Allan deviation and noise model of a unit at rest."""
+
+    _native: _mimu.Allan
+
+    channels: list[Channel]
+    #: What a person should know.
+    warnings: list[str]
+    device: str
+
+    def __init__(self, native: _mimu.Allan) -> None:
+        super().__init__(native)
+        data = self.to_dict()
+        self.channels = [typed(Channel, channel) for channel in data["channels"]]
+        self.warnings = data["warnings"]
+        self.device = data["device"]
+
+    def __getitem__(self, name: str) -> Channel:
+        """The first channel of this name: ``gyro_x`` to ``accel_z``."""
+        for channel in self.channels:
+            if channel.name == name:
+                return channel
+        raise KeyError(name)
+
+    @property
+    def noise(self) -> Noise:
+        """What :func:`mimu.fit` and others take as ``noise``."""
+        return self._native.noise()
+
+    def to_toml(self) -> str:
+        """The noise file that ``mimu allan -o`` writes."""
+        return self.noise.to_toml()
+
+    def svg(self) -> str:
+        """The plot that ``mimu allan --plot`` writes."""
+        return self._native.svg()
+
+    def __str__(self) -> str:
+        return self._native.text()
+
+    def __repr__(self) -> str:
+        return f"<mimu.Allan of {self.device!r}: {', '.join(channel.name for channel in self.channels)}>"
+
+
+def allan(
+    *recordings: Recording,
+    from_s: float | None = None,
+    to_s: float | None = None,
+    step: int | None = None,
+    kind: Literal["allan", "modified", "hadamard"] = "allan",
+    per_decade: int = 10,
+    confidence: float = 0.95,
+    calibration: Calibration | None = None,
+) -> Allan:
+    """Allan deviation and noise model of a unit at rest, as ``mimu allan`` computes them.
+
+    Several recordings are of one unit, each at its own temperature. ``from_s`` and ``to_s``, or a ``step``, choose a stretch. With a
+    ``calibration`` readings in V or counts become SI.
+    """
+    return Allan(
+        _mimu.allan(
+            list(recordings), from_s=from_s, to_s=to_s, step=step, kind=kind, per_decade=per_decade, confidence=confidence,
+            calibration=calibration,
+        )
+    )

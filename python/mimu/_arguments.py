@@ -1,0 +1,30 @@
+"""Keywords as the arguments of the command."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+
+def arguments(options: Mapping[str, Any]) -> list[str]:
+    """``rate_hz=50`` as ``--rate-hz=50``; lists are repeated, of a mapping each item is ``KEY=VALUE``; None and False are left out."""
+    out: list[str] = []
+    for key, value in options.items():
+        flag = f"-{key}" if len(key) == 1 else "--" + key.rstrip("_").replace("_", "-")
+        if value is None or value is False:
+            continue
+        if value is True:
+            out.append(flag)
+        elif isinstance(value, Mapping):
+            out += [f"{flag}={k}={_text(v)}" for k, v in value.items()]
+        elif isinstance(value, Sequence) and not isinstance(value, str):
+            out += [f"{flag}={_text(item)}" for item in value]
+        else:
+            out.append(f"{flag}={_text(value)}")
+    return out
+
+
+def _text(value: Any) -> str:
+    # The shortest text that is read as the same number.
+    return repr(float(value)) if isinstance(value, float) else os.fspath(value) if isinstance(value, os.PathLike) else str(value)

@@ -1,0 +1,152 @@
+"""The effect behind a residual."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from mimu import _mimu
+from mimu._fit import Keep, Steps, _keep
+from mimu._mimu import Calibration, Noise, Recording
+from mimu._result import Result, typed
+
+
+@dataclass(frozen=True)
+class Coefficient:
+    """A coefficient of an effect."""
+
+    name: str
+    value: float
+    sigma: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class Effect:
+    """An effect that was found."""
+
+    id: str
+    sensor: str
+    coefficients: list[Coefficient]
+    #: Errors without it and with it, in the unit of its sensor.
+    held_out_rms_before: float
+    held_out_rms_after: float
+
+
+@dataclass(frozen=True)
+class Rejected:
+    """An effect that was tried and not accepted."""
+
+    id: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class NotExcited:
+    """An effect that the recording could not show, and the experiment that would."""
+
+    id: str
+    experiment: str
+
+
+@dataclass(frozen=True)
+class Leftover:
+    """Scatter beyond the known noise that nothing explains."""
+
+    sensor: str
+    axis: str
+    against: str
+    strength: float
+
+
+@dataclass(frozen=True)
+class SensorDiagnosis:
+    """Errors of a sensor without the effects and with them, root mean square."""
+
+    unit: str
+    figure: str
+    rms_before: float
+    rms_after: float
+    held_out_rms_before: float
+    held_out_rms_after: float
+    noise_floor: float
+
+
+class Diagnosis(Result):
+    """What is behind the residual of a unit."""
+
+    _native: _mimu.Diagnosis
+
+    #: ``"clean"``, ``"explained"``, ``"unexplained"`` or ``"untestable"``.
+    verdict: str
+    effects: list[Effect]
+    rejected: list[Rejected]
+    not_excited: list[NotExcited]
+    leftover: list[Leftover]
+    sensors: dict[str, SensorDiagnosis]
+    #: What a person should know.
+    warnings: list[str]
+    device: str
+
+    def __init__(self, native: _mimu.Diagnosis) -> None:
+        super().__init__(native)
+        data = self.to_dict()
+        self.verdict = data["verdict"]
+        self.effects = [typed(Effect, effect) for effect in data["effects"]]
+        self.rejected = [typed(Rejected, effect) for effect in data["rejected"]]
+        self.not_excited = [typed(NotExcited, effect) for effect in data["not_excited"]]
+        self.leftover = [typed(Leftover, item) for item in data["leftover"]]
+        self.sensors = {name: typed(SensorDiagnosis, sensor) for name, sensor in data["sensors"].items()}
+        self.warnings = data["warnings"]
+        self.device = data["device"]
+
+    @property
+    def calibration(self) -> Calibration:
+        """The calibration, with the effects that the unit has."""
+        return self._native.calibration()
+
+    def to_toml(self) -> str:
+        """The calibration file that ``mimu diagnose -o`` writes."""
+        return self.calibration.to_toml()
+
+    def text(self, *, everything: bool = False) -> str:
+        """What ``mimu diagnose`` prints; ``everything`` as with ``--all --next``."""
+        return self._native.text(everything)
+
+    def __str__(self) -> str:
+        return self.text()
+
+    def __repr__(self) -> str:
+        found = ", ".join(effect.id for effect in self.effects) or "no effect"
+        return f"<mimu.Diagnosis of {self.device!r}: {self.verdict}, {found}>"
+
+
+def diagnose(
+    recordings: Recording | Sequence[Recording],
+    *,
+    verify: Recording | Sequence[Recording] | None = None,
+    calibration: Calibration | None = None,
+    accept: Sequence[str] = (),
+    still: float | None = None,
+    steps: Steps | None = None,
+    keep: Keep | None = None,
+    noise: Noise | None = None,
+) -> Diagnosis:
+    """Finds the effect behind the residual of a unit, as ``mimu diagnose`` does.
+
+    ``recordings``: one, or more of the same unit; the calibration is that of the first. ``verify`` is another recording, which nothing is
+    found in: an effect that it contradicts is not accepted. ``calibration`` keeps its matrices, for a unit that is never turned. ``accept``
+    takes terms by name that nothing but these recordings speaks for. The others are those of :func:`mimu.fit`.
+    """
+    first = [recordings] if isinstance(recordings, Recording) else list(recordings)
+    others = [] if verify is None else [verify] if isinstance(verify, Recording) else list(verify)
+    if len(others) > 1:
+        raise TypeError("verify: a diagnosis is judged by one other recording; judge its calibration by more with mimu.verify")
+    return Diagnosis(
+        _mimu.diagnose(
+            first, verify=others[0] if others else None, calibration=calibration, accept=list(accept), still=still, steps=steps,
+            keep=_keep(keep), noise=noise,
+        )
+    )
+
+

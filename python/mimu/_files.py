@@ -1,0 +1,124 @@
+"""Calibration and noise files, verification, exports."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from typing import Any, Literal, cast
+
+from mimu import _mimu
+from mimu._arguments import arguments
+from mimu._fit import Steps
+from mimu._mimu import Calibration, Noise, Recording
+from mimu._recording import Path
+from mimu._result import Result, typed
+
+
+def load(path: Path) -> Calibration:
+    """Reads a calibration file, as ``mimu fit -o``, ``mimu diagnose -o`` and ``mimu thermal fit -o`` write it."""
+    return _mimu.load_calibration(path)
+
+
+def load_noise(path: Path) -> Noise:
+    """Reads a noise file, as ``mimu allan -o`` writes it."""
+    return _mimu.load_noise(path)
+
+
+@dataclass(frozen=True)
+class SensorVerification:
+    """Errors of one triad, root mean square but for ``max``."""
+
+    #: With one scale factor and bias for all axes, and no misalignment.
+    rms_raw: float
+    rms: float
+    max: float
+    #: What noise alone would give.
+    noise_floor: float
+    unit: str
+    figure: str
+    #: Dwells or turns judged.
+    count: int
+    #: Of gyros whose input is not known: errors at rest, rad/s.
+    static_rms: float | None
+
+
+class Verification(Result):
+    """A calibration judged by another recording."""
+
+    _native: _mimu.Verification
+
+    sensors: dict[str, SensorVerification]
+    #: What a person should know.
+    warnings: list[str]
+
+    def __init__(self, native: _mimu.Verification) -> None:
+        super().__init__(native)
+        data = self.to_dict()
+        self.sensors = {name: typed(SensorVerification, sensor) for name, sensor in data["sensors"].items()}
+        self.warnings = data["warnings"]
+
+    def __str__(self) -> str:
+        return self._native.text()
+
+    def __repr__(self) -> str:
+        return "<mimu.Verification: " + ", ".join(f"{name} {s.rms:.4g} {s.unit}" for name, s in self.sensors.items()) + ">"
+
+
+def verify(
+    recording: Recording,
+    calibration: Calibration,
+    *,
+    still: float | None = None,
+    steps: Steps | None = None,
+    noise: Noise | None = None,
+) -> Verification:
+    """Judges a calibration by another recording, as ``mimu verify`` does."""
+    return Verification(_mimu.verify(recording, calibration, still=still, steps=steps, noise=noise))
+
+
+Format = Literal[
+    "c", "rust", "json", "kalibr", "openvins", "vins", "orbslam3", "liosam", "fastlio", "imu-calib", "imu-tk", "fusion", "realsense",
+    "px4", "ardupilot", "mcap", "core",
+]
+
+
+class Export:
+    """A file for another program."""
+
+    #: Bytes of the file.
+    content: bytes
+    #: What the program computes with it.
+    formulas: list[str]
+    #: What a person has to know or to do.
+    notes: list[str]
+
+    def __init__(self, native: _mimu.Export) -> None:
+        self._native = native
+        self.content = native.content()
+        data = self.to_dict()
+        self.formulas = data["formulas"]
+        self.notes = data["notes"]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Formulas, notes and the errors that remain because the format has no place for a part of the calibration."""
+        return cast(dict[str, Any], json.loads(self._native.json()))
+
+    def save(self, path: Path) -> None:
+        """Writes the file."""
+        with open(path, "wb") as file:
+            file.write(self.content)
+
+    def __str__(self) -> str:
+        return self.content.decode(errors="replace")
+
+    def __repr__(self) -> str:
+        return f"<mimu.Export to {self.to_dict()['to']}: {len(self.content)} bytes>"
+
+
+def export(format: Format, *, calibration: Calibration | None = None, noise: Noise | None = None, **options: Any) -> Export:
+    """A calibration, or noise, in the format of another program: every one of ``mimu export``, with its options as keywords.
+
+    ``mimu.export("px4", calibration=fit.calibration, qgc=True).save("unit.params")``. What is not in the file is in ``notes`` and in
+    ``to_dict()["remaining"]``. ``mimu export FORMAT --help`` lists the options.
+    """
+    return Export(_mimu.export([format, *arguments(options)], calibration=calibration, noise=noise))

@@ -1,0 +1,62 @@
+"""What all results share: the JSON of the command as typed objects."""
+
+from __future__ import annotations
+
+import json
+import types
+from dataclasses import fields, is_dataclass
+from typing import Any, Protocol, TypeVar, Union, cast, get_args, get_origin, get_type_hints
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+T = TypeVar("T")
+
+
+class Native(Protocol):
+    """A result of the compiled part."""
+
+    def json(self) -> str: ...
+    def html(self) -> str: ...
+
+
+class Result:
+    """A result of mimu. Attributes have their units in their names, or in ``unit`` beside them."""
+
+    def __init__(self, native: Native) -> None:
+        self._native = native
+        self._json = native.json()
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything that was found: the JSON that the command writes. What is not a number is None."""
+        return cast(dict[str, Any], json.loads(self._json))
+
+    def _repr_html_(self) -> str:
+        """Tables and plots for a notebook: a piece of HTML that needs nothing else."""
+        return self._native.html()
+
+
+def typed(cls: type[T], data: Any) -> T:
+    """``data`` of a JSON as a ``cls``."""
+    return cast(T, _value(cls, data))
+
+
+def _value(hint: Any, data: Any) -> Any:
+    origin, args = get_origin(hint), get_args(hint)
+    if origin in (Union, types.UnionType):
+        # Of the unions here one side is None.
+        (inner,) = (a for a in args if a is not type(None))
+        return None if data is None else _value(inner, data)
+    if origin is np.ndarray:
+        return np.array(data if data is not None else [], dtype=np.float64)
+    if origin is list:
+        return [_value(args[0], item) for item in data or []]
+    if origin is dict:
+        return {key: _value(args[1], item) for key, item in (data or {}).items()}
+    if hint is float:
+        return float("nan") if data is None else float(data)
+    if isinstance(hint, type) and is_dataclass(hint):
+        hints = get_type_hints(hint)
+        return hint(**{f.name: _value(hints[f.name], data.get(f.name)) for f in fields(hint) if f.init})
+    return data

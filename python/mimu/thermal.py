@@ -1,0 +1,120 @@
+"""Curves over temperature."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from mimu import _mimu
+from mimu._fit import Steps
+from mimu._mimu import Calibration, Noise, Recording
+from mimu._result import Array, Result, typed
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A parameter over the temperature of the die, with its 95 % band."""
+
+    name: str
+    sensor: str
+    #: Of value and bounds.
+    unit: str
+    temp_c: Array
+    value: Array
+    lower: Array
+    upper: Array
+
+
+@dataclass(frozen=True)
+class Lag:
+    """Time constant of the die behind the thermometer, s, with its 95 % interval."""
+
+    value: float
+    lower: float
+    upper: float
+
+
+@dataclass(frozen=True)
+class SensorThermal:
+    """Figures of one triad."""
+
+    #: Of the errors.
+    unit: str
+    rms: float | None
+    held_out_rms: float | None
+    noise_floor: float | None
+    #: None with its reason.
+    lag_s: Lag | None
+    lag_reason: str | None
+
+
+class ThermalFit(Result):
+    """All parameters over temperature, and the lag of the dies behind the thermometer."""
+
+    _native: _mimu.ThermalFit
+
+    #: ``"fitted"``, ``"one-way"`` or ``"misfit"``.
+    verdict: str
+    #: Lowest and highest temperature of the dies, degrees Celsius.
+    range_c: tuple[float, float]
+    sensors: dict[str, SensorThermal]
+    #: By sensor and parameter: ``gyro_bias_x``, ``accel_C_xx``.
+    curves: dict[str, Curve]
+    #: What a person should know.
+    warnings: list[str]
+    device: str
+
+    def __init__(self, native: _mimu.ThermalFit) -> None:
+        super().__init__(native)
+        data = self.to_dict()
+        self.verdict = data["verdict"]
+        self.range_c = (data["range_c"][0], data["range_c"][1])
+        self.sensors = {name: typed(SensorThermal, sensor) for name, sensor in data["sensors"].items()}
+        self.curves = {curve["name"]: typed(Curve, curve) for curve in data["curves"]}
+        self.warnings = data["warnings"]
+        self.device = data["device"]
+
+    @property
+    def calibration(self) -> Calibration:
+        """The calibration with its curves."""
+        return self._native.calibration()
+
+    def to_toml(self) -> str:
+        """The calibration file that ``mimu thermal fit -o`` writes."""
+        return self.calibration.to_toml()
+
+    def __str__(self) -> str:
+        return self._native.text()
+
+    def __repr__(self) -> str:
+        return f"<mimu.thermal.ThermalFit of {self.device!r}: {self.verdict}, {self.range_c[0]:.1f} to {self.range_c[1]:.1f} °C>"
+
+
+def fit(
+    recordings: Recording | Sequence[Recording],
+    *,
+    verify: Recording | Sequence[Recording] = (),
+    estimator: Literal["joint", "cubic", "nodes", "ramp-niu", "soak", "soak-fang"] = "joint",
+    lag_s: float | None = None,
+    range_c: tuple[float, float] | None = None,
+    base: Calibration | None = None,
+    noise: Noise | None = None,
+    still: float | None = None,
+    steps: Steps | None = None,
+    at_rest: bool = False,
+) -> ThermalFit:
+    """Estimates all parameters over temperature, as ``mimu thermal fit`` does.
+
+    ``recordings``: of one unit, one for each time that the power came. ``verify`` are only judged by. ``lag_s`` is the lag of the dies where
+    it is known. ``range_c`` are temperatures that the curves have to cover. ``base`` is the calibration at one temperature that the biases
+    of recordings at rest are added to; ``at_rest`` says that the unit lay still throughout.
+    """
+    first = [recordings] if isinstance(recordings, Recording) else list(recordings)
+    others = [verify] if isinstance(verify, Recording) else list(verify)
+    return ThermalFit(
+        _mimu.thermal_fit(
+            first, verify=others, estimator=estimator, lag_s=lag_s, range_c=range_c, base=base, noise=noise, still=still,
+            steps="at rest" if at_rest else steps,
+        )
+    )

@@ -1,0 +1,271 @@
+//! A calibration: its models, and what it does to readings.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use mimu::calibration::Calibration as Model;
+use mimu::calibration::apply::Compensated;
+use mimu::quantity::{PerSensor, Sensor};
+use mimu_cli::report::fragment;
+use mimu_core::compensation::Affine;
+use mimu_export::{Sources, json as as_json};
+use mimu_recording::error::{Error, Result};
+use mimu_recording::result_file::stage;
+use numpy::ndarray::{Array2, ArrayView2, Zip};
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
+use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::prelude::*;
+
+use crate::error::raised;
+use crate::recording::{Recording, triad};
+use crate::work::{computed, loaded};
+
+/// Compensated readings of gyro and accelerometer.
+type Both<'py> = (
+    Option<Bound<'py, PyArray2<f64>>>,
+    Option<Bound<'py, PyArray2<f64>>>,
+);
+
+/// C and o of one triad.
+type MatrixAndOffset<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<f64>>);
+
+/// A calibration of a unit.
+#[pyclass(frozen, module = "mimu")]
+pub(crate) struct Calibration {
+    pub(crate) model: Arc<Model>,
+    /// File that it is from, or the name of what made it.
+    pub(crate) name: String,
+}
+
+#[pymethods]
+impl Calibration {
+    /// Name of the unit that it is for.
+    #[getter]
+    fn device(&self) -> &str {
+        &self.model.device
+    }
+
+    /// Unit of the readings that it is for: V, count or SI.
+    #[getter]
+    fn unit(&self) -> String {
+        self.model.recording.raw_unit.to_string()
+    }
+
+    /// Ids of the effects that it removes.
+    #[getter]
+    fn effects(&self) -> Vec<String> {
+        self.model
+            .effects()
+            .iter()
+            .map(|e| e.candidate.id())
+            .collect()
+    }
+
+    /// Lowest and highest temperature that it is for, degrees Celsius; None where they are not known.
+    #[getter]
+    fn range_c(&self) -> Option<[f64; 2]> {
+        self.model.limits()
+    }
+
+    /// Whether it has curves over temperature.
+    #[getter]
+    fn over_temperature(&self) -> bool {
+        self.model.temperature.is_some()
+    }
+
+    /// Matrix and offset of a sensor, x = C u + o, raw to SI: at a temperature of the dies, or that of the calibration.
+    #[pyo3(signature = (sensor, die_temp_c=None))]
+    fn inverse<'py>(
+        &self,
+        py: Python<'py>,
+        sensor: &str,
+        die_temp_c: Option<f64>,
+    ) -> PyResult<MatrixAndOffset<'py>> {
+        let sensor = named(sensor)?;
+        let model = match die_temp_c {
+            Some(at) => self.model.inverse_at(sensor, at),
+            None => self.model.inverse(sensor),
+        };
+        let model = model
+            .ok_or_else(|| PyValueError::new_err(format!("the calibration has no {sensor}")))?;
+        let matrix = Array2::from_shape_fn((3, 3), |at| model.matrix[at]);
+        let offset = PyArray1::from_slice(py, model.offset.as_slice());
+        Ok((matrix.into_pyarray(py), offset))
+    }
+
+    /// Gyro and accelerometer compensated: rad/s and m/s², a row for each sample.
+    ///
+    /// Of arrays it is C u + o of each row. Of a recording it is what `mimu apply` writes: with effects and curves over temperature, and not
+    /// a number where a sensor has no reading or is at its rail.
+    #[pyo3(signature = (gyro=None, accel=None))]
+    fn apply<'py>(
+        &self,
+        py: Python<'py>,
+        gyro: Option<&Bound<'py, PyAny>>,
+        accel: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Both<'py>> {
+        match gyro.and_then(|gyro| gyro.cast::<Recording>().ok()) {
+            Some(recording) if accel.is_none() => self.apply_to_recording(py, recording.get()),
+            Some(_) => Err(PyTypeError::new_err(
+                "a recording has both sensors: leave accel out",
+            )),
+            None => self.apply_to_arrays(py, gyro, accel),
+        }
+    }
+
+    /// Everything that it holds, as `mimu export json` writes it.
+    fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let from = Sources {
+            calibration: Some((&self.model, &self.name)),
+            noise: None,
+        };
+        let made = as_json::export(&from).map_err(|error| raised(py, &error))?;
+        loaded(py, &String::from_utf8_lossy(&made.content))
+    }
+
+    /// The calibration file, as the command writes it.
+    fn to_toml(&self) -> String {
+        self.model.to_toml()
+    }
+
+    /// Writes the calibration file, whole or not at all.
+    fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        let model = self.model.clone();
+        computed(py, move || stage(&path, model.to_toml())?.publish())
+    }
+
+    fn __repr__(&self) -> String {
+        let effects = self.effects().join(", ");
+        let with = if effects.is_empty() {
+            "no effects"
+        } else {
+            &effects
+        };
+        let curves = if self.over_temperature() {
+            ", over temperature"
+        } else {
+            ""
+        };
+        format!(
+            "<mimu.Calibration of {:?}: {} to SI, {with}{curves}>",
+            self.model.device,
+            self.unit()
+        )
+    }
+
+    fn _repr_html_(&self) -> String {
+        fragment::of_calibration(&self.model)
+    }
+}
+
+impl Calibration {
+    fn apply_to_arrays<'py>(
+        &self,
+        py: Python<'py>,
+        gyro: Option<&Bound<'py, PyAny>>,
+        accel: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Both<'py>> {
+        let more = match (self.model.temperature.is_some(), self.model.effects()) {
+            (true, _) => Some("it has curves over temperature"),
+            (false, [_, ..]) => {
+                Some("it has effects, which depend on other readings, time or temperature")
+            }
+            _ => None,
+        };
+        if let Some(problem) = more {
+            let remedy = "give a mimu.Recording in place of arrays";
+            return Err(raised(py, &Error::new(&self.name, problem, remedy)));
+        }
+        let one = |sensor: Sensor, readings: Option<&Bound<'py, PyAny>>| -> PyResult<_> {
+            let Some(readings) = readings else {
+                return Ok(None);
+            };
+            let model = self.model.inverse(sensor).ok_or_else(|| {
+                let problem = format!("it has no {sensor}");
+                raised(
+                    py,
+                    &Error::new(&self.name, problem, "leave these readings out"),
+                )
+            })?;
+            let readings = triad(readings, &sensor.to_string(), None)?.readonly();
+            let view = readings.as_array();
+            let done = py.detach(|| compensated(&model, &view));
+            Ok(Some(done.into_pyarray(py)))
+        };
+        Ok((one(Sensor::Gyro, gyro)?, one(Sensor::Accel, accel)?))
+    }
+
+    fn apply_to_recording<'py>(
+        &self,
+        py: Python<'py>,
+        recording: &Recording,
+    ) -> PyResult<Both<'py>> {
+        let (source, model) = (recording.source.clone(), self.model.clone());
+        let clean = computed(py, move || {
+            let samples = source.samples()?;
+            let mut run = Compensated::new(samples, &model, |_| {})?;
+            let mut clean: PerSensor<Vec<f64>> = PerSensor::default();
+            run.for_each(
+                |_| {},
+                |_, batch| {
+                    for sensor in Sensor::BOTH {
+                        let columns = &batch.raw[sensor.channels()];
+                        let rows = 0..columns[0].len();
+                        clean[sensor]
+                            .extend(rows.flat_map(|row| [0, 1, 2].map(|axis| columns[axis][row])));
+                    }
+                    Ok(())
+                },
+            )?;
+            shaped(clean)
+        })?;
+        let [gyro, accel] = clean.map(|values| values.map(|v| v.into_pyarray(py)));
+        Ok((gyro, accel))
+    }
+}
+
+/// The sensor of a name.
+pub(crate) fn named(sensor: &str) -> PyResult<Sensor> {
+    match sensor {
+        "gyro" => Ok(Sensor::Gyro),
+        "accel" => Ok(Sensor::Accel),
+        _ => Err(PyValueError::new_err(format!(
+            "{sensor:?} is no sensor: write gyro or accel"
+        ))),
+    }
+}
+
+fn compensated(model: &Affine<f64>, readings: &ArrayView2<f64>) -> Array2<f64> {
+    let mut done = Array2::zeros(readings.raw_dim());
+    let each = Zip::from(done.rows_mut()).and(readings.rows());
+    each.for_each(|mut x, u| {
+        let clean = model.matrix * mimu::nalgebra::Vector3::new(u[0], u[1], u[2]) + model.offset;
+        x.iter_mut()
+            .zip(clean.iter())
+            .for_each(|(x, clean)| *x = *clean);
+    });
+    done
+}
+
+/// Rows of three, of the sensors that there are.
+fn shaped(clean: PerSensor<Vec<f64>>) -> Result<[Option<Array2<f64>>; 2]> {
+    let PerSensor { gyro, accel } = clean;
+    let one = |values: Vec<f64>| {
+        let rows = values.len() / 3;
+        let shaped = Array2::from_shape_vec((rows, 3), values);
+        let broken = |error| Error::new("compensated samples", error, "report this");
+        (rows > 0).then_some(shaped).transpose().map_err(broken)
+    };
+    Ok([one(gyro)?, one(accel)?])
+}
+
+/// Reads a calibration file.
+#[pyfunction]
+pub(crate) fn load_calibration(py: Python<'_>, path: PathBuf) -> PyResult<Calibration> {
+    let name = path.display().to_string();
+    let model = computed(py, move || Model::read(&path))?;
+    Ok(Calibration {
+        model: Arc::new(model),
+        name,
+    })
+}

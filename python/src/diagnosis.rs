@@ -1,0 +1,107 @@
+//! The effect behind a residual.
+
+use std::sync::Arc;
+
+use mimu::diagnose::Recordings;
+use mimu::diagnosed::{Diagnosed, diagnosed};
+use mimu_cli::report::{self, Detail, Made, fragment};
+use mimu_recording::error::Result;
+use pyo3::prelude::*;
+
+use crate::calibration::Calibration;
+use crate::error::raised;
+use crate::noise::Noise;
+use crate::preparation::{Kept, Preparation};
+use crate::recording::{Recording, Source, sources};
+use crate::work::{computed, json};
+
+/// A diagnosis of recordings.
+#[pyclass(frozen, module = "mimu._mimu")]
+pub(crate) struct Diagnosis {
+    done: Diagnosed,
+    created: String,
+}
+
+#[pymethods]
+impl Diagnosis {
+    /// JSON of the result, as `mimu diagnose --json` writes it.
+    fn json(&self) -> PyResult<String> {
+        json(&self.done.result)
+    }
+
+    /// The text that `mimu diagnose` prints; with `everything`, that of `--all --next`.
+    fn text(&self, everything: bool) -> String {
+        let detail = Detail {
+            all: everything,
+            next: everything,
+        };
+        report::diagnosis_text(&self.done.result, detail)
+    }
+
+    /// The page, as a piece of one.
+    fn html(&self, py: Python<'_>) -> PyResult<String> {
+        let result = &self.done.result;
+        let places: Vec<&str> = result.recordings.iter().map(|r| r.place.as_str()).collect();
+        let made = Made {
+            recording: places.join(", "),
+            command: "mimu.diagnose".into(),
+            created: self.created.clone(),
+        };
+        fragment::of_diagnosis(result, &made).map_err(|error| raised(py, &error))
+    }
+
+    /// The calibration, with the effects that the unit has.
+    fn calibration(&self, py: Python<'_>) -> PyResult<Calibration> {
+        let made = self.done.calibration(&self.created);
+        Ok(Calibration {
+            model: Arc::new(made.map_err(|error| raised(py, &error))?),
+            name: format!("diagnosis of {}", self.done.result.device),
+        })
+    }
+}
+
+/// Finds the effect behind the residual of a unit.
+#[pyfunction]
+#[pyo3(signature = (recordings, *, verify, calibration, accept, still, steps, keep, noise))]
+#[expect(clippy::too_many_arguments)]
+pub(crate) fn diagnose(
+    py: Python<'_>,
+    recordings: Vec<PyRef<'_, Recording>>,
+    verify: Option<&Recording>,
+    calibration: Option<&Calibration>,
+    accept: Vec<String>,
+    still: Option<f64>,
+    steps: Option<&str>,
+    keep: Option<Kept>,
+    noise: Option<&Noise>,
+) -> PyResult<Diagnosis> {
+    let by = Preparation::of(still, steps, keep, noise)?;
+    let sources = sources(&recordings, "recordings")?;
+    let second = verify.map(|recording| recording.source.clone());
+    let given = calibration.map(|c| (c.model.clone(), c.name.clone()));
+    computed(py, move || {
+        let open = |source: &Source| {
+            source.samples()?;
+            source.prepared(&by)
+        };
+        let mut all: Vec<_> = sources.iter().map(open).collect::<Result<_>>()?;
+        let second = second.as_ref().map(open).transpose()?;
+        let name = second
+            .as_ref()
+            .map(|prepared| prepared.manifest.device.clone());
+        let recordings = Recordings {
+            first: all.remove(0),
+            more: all,
+            second,
+            given: given.as_ref().map(|(model, _)| model.as_ref()),
+            accept,
+        };
+        let names = [
+            name.as_deref(),
+            given.as_ref().map(|(_, name)| name.as_str()),
+        ];
+        let created = mimu_cli::now();
+        let done = diagnosed(recordings, by.still_factor, names, &created)?;
+        Ok(Diagnosis { done, created })
+    })
+}

@@ -1,0 +1,75 @@
+//! Errors as Python has them: `mimu.Error` with the parts of the line that the command prints.
+
+use mimu_cli::called::Refusal;
+use mimu_recording::error::Error;
+use pyo3::exceptions::PyTypeError;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+/// Where an error is, as `PLACE` of its line has it: `FILE, row 7, column gyro_x`.
+#[derive(Default)]
+struct Place<'a> {
+    file: Option<&'a str>,
+    row: Option<u64>,
+    column: Option<&'a str>,
+}
+
+impl<'a> Place<'a> {
+    fn of(place: &'a str) -> Self {
+        let mut parts = place.split(", ");
+        let mut found = Self {
+            file: parts.next().filter(|file| !file.is_empty()),
+            ..Self::default()
+        };
+        for part in parts {
+            match part.split_once(' ') {
+                Some(("row", number)) => found.row = number.parse().ok(),
+                // Rows without the header, where the others are lines of an editor.
+                Some(("data", number)) => {
+                    found.row = number.strip_prefix("row ").and_then(|n| n.parse().ok());
+                }
+                Some(("column", name)) => found.column = Some(name),
+                _ if part == "t_s" => found.column = Some(part),
+                _ => {}
+            }
+        }
+        found
+    }
+}
+
+/// The exception of a refusal of the library.
+pub(crate) fn raised(py: Python<'_>, error: &Error) -> PyErr {
+    let made = || -> PyResult<PyErr> {
+        let refused = error.refused();
+        let place = Place::of(&refused.place);
+        let parts = PyDict::new(py);
+        parts.set_item("kind", kind(error))?;
+        parts.set_item("place", &refused.place)?;
+        parts.set_item("problem", &refused.problem)?;
+        parts.set_item("remedy", &refused.remedy)?;
+        parts.set_item("file", place.file)?;
+        parts.set_item("row", place.row)?;
+        parts.set_item("column", place.column)?;
+        let class = py.import("mimu._error")?.getattr("Error")?;
+        let exception = class.call((error.to_string(),), Some(&parts))?;
+        Ok(PyErr::from_value(exception))
+    };
+    made().unwrap_or_else(|other| other)
+}
+
+fn kind(error: &Error) -> &'static str {
+    match error {
+        Error::Io(..) => "io",
+        Error::Undetermined(_) => "undetermined",
+        Error::Device(_) => "device",
+        _ => "invalid",
+    }
+}
+
+/// The exception of a call that did nothing.
+pub(crate) fn refused(py: Python<'_>, refusal: &Refusal) -> PyErr {
+    match refusal {
+        Refusal::Data(error) => raised(py, error),
+        Refusal::Usage(problem) => PyTypeError::new_err(problem.clone()),
+    }
+}

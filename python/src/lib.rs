@@ -1,0 +1,58 @@
+//! The extension module of the Python package `mimu`.
+//!
+//! What is here converts: arrays and options in, results out. Everything that is computed is in the libraries, and what a result consists
+//! of is in the package's Python files, as the JSON of the command has it.
+//!
+//! | module | what |
+//! |---|---|
+//! | [`recording`] | a recording of arrays or on disk |
+//! | [`preparation`] | how its dwells are found, and its noise |
+//! | [`fit`], [`diagnosis`], [`allan`], [`thermal`], [`design`], [`verification`] | one result each |
+//! | [`calibration`], [`noise`], [`export`] | the files |
+//! | [`error`] | errors as Python has them |
+//! | [`work`] | work that others can run beside, and Ctrl-C interrupts |
+//! | [`command`] | the command itself |
+
+mod allan;
+mod calibration;
+mod command;
+mod design;
+mod diagnosis;
+mod error;
+mod export;
+mod fit;
+mod noise;
+mod preparation;
+mod recording;
+mod thermal;
+mod verification;
+mod work;
+
+use pyo3::prelude::*;
+
+/// The compiled part of mimu; use the package `mimu`.
+#[pymodule]
+mod _mimu {
+    #[pymodule_export]
+    use super::allan::{Allan, allan};
+    #[pymodule_export]
+    use super::calibration::{Calibration, load_calibration};
+    #[pymodule_export]
+    use super::command::{options, run};
+    #[pymodule_export]
+    use super::design::{Design, design};
+    #[pymodule_export]
+    use super::diagnosis::{Diagnosis, diagnose};
+    #[pymodule_export]
+    use super::export::{Export, export};
+    #[pymodule_export]
+    use super::fit::{Fit, fit};
+    #[pymodule_export]
+    use super::noise::{Noise, load_noise};
+    #[pymodule_export]
+    use super::recording::{Recording, open, read};
+    #[pymodule_export]
+    use super::thermal::{ThermalFit, thermal_fit};
+    #[pymodule_export]
+    use super::verification::{Verification, verify};
+}

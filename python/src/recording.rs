@@ -1,0 +1,615 @@
+//! A recording: arrays that Python holds, or a folder on disk.
+
+use std::ffi::OsString;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use mimu::prepared::Prepared;
+use mimu::quantity::normal_gravity;
+use mimu::warning::Warning;
+use mimu_cli::called;
+use mimu_cli::report::fragment;
+use mimu_recording::error::{Argument, Error, Result};
+use mimu_recording::{
+    Column, Columns, InMemory, Manifest, PoseMeans, RawUnit, Reference, SampleFormat, Writer,
+    usual_rate_hz,
+};
+use numpy::ndarray::{Array2, ArrayView1, s};
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
+use pyo3::exceptions::PyTypeError;
+use pyo3::prelude::*;
+use pyo3::types::IntoPyDict;
+use tempfile::TempDir;
+
+use crate::error::{raised, refused};
+use crate::preparation::Preparation;
+use crate::work::{computed, done, json, loaded};
+
+/// Gravity where nobody says it, m/s².
+const STANDARD_GRAVITY: f64 = 9.80665;
+
+/// A recording of a unit.
+#[pyclass(frozen, module = "mimu")]
+pub(crate) struct Recording {
+    pub(crate) source: Source,
+    arrays: Option<Arc<Arrays>>,
+    /// What the import has done, as JSON.
+    imported: Option<String>,
+    warnings: Vec<String>,
+    /// Kept as long as the recording is used.
+    folder: Option<Arc<TempDir>>,
+}
+
+/// Where the samples are.
+#[derive(Clone)]
+pub(crate) enum Source {
+    Samples(Arc<mimu_recording::Recording>),
+    Means(Arc<PoseMeans>),
+}
+
+impl Source {
+    fn open(directory: &Path) -> Result<Self> {
+        Ok(match PoseMeans::file(directory) {
+            Some(_) => Self::Means(Arc::new(PoseMeans::open(directory)?)),
+            None => Self::Samples(Arc::new(mimu_recording::Recording::open(directory)?)),
+        })
+    }
+
+    /// The recording made ready for estimation.
+    pub(crate) fn prepared(&self, by: &Preparation) -> Result<Prepared> {
+        let prepared = match self {
+            Self::Samples(recording) => Prepared::read(recording, by.finding(), |_| {})?,
+            Self::Means(means) => Prepared::of_means(means)?,
+        };
+        by.complete(prepared)
+    }
+
+    /// The samples.
+    ///
+    /// # Errors
+    /// There are means only.
+    pub(crate) fn samples(&self) -> Result<&Arc<mimu_recording::Recording>> {
+        match self {
+            Self::Samples(recording) => Ok(recording),
+            Self::Means(means) => Err(Error::new(
+                &means.manifest.device,
+                "it holds the means of poses, and this needs samples",
+                "give the recording of samples that they were made of",
+            )),
+        }
+    }
+
+    fn manifest(&self) -> &Manifest {
+        match self {
+            Self::Samples(recording) => &recording.manifest,
+            Self::Means(means) => &means.manifest,
+        }
+    }
+}
+
+/// The arrays of a recording, as Python has them.
+#[derive(Debug)]
+struct Arrays {
+    t: Py<PyArray1<f64>>,
+    step: Option<Py<PyArray1<f64>>>,
+    temp: Option<Py<PyArray1<f64>>>,
+    gyro: Option<Py<PyArray2<f64>>>,
+    accel: Option<Py<PyArray2<f64>>>,
+    rate_dps: Option<Py<PyArray2<f64>>>,
+    force_mps2: Option<Py<PyArray2<f64>>>,
+    rows: usize,
+}
+
+impl InMemory for Arrays {
+    fn rows(&self) -> usize {
+        self.rows
+    }
+
+    fn columns(&self) -> Columns {
+        let [rate, force] = [self.rate_dps.is_some(), self.force_mps2.is_some()];
+        Columns {
+            step: self.step.is_some(),
+            temp_c: self.temp.is_some(),
+            gyro: self.gyro.is_some(),
+            accel: self.accel.is_some(),
+            reference: [rate, rate, rate, force, force, force],
+        }
+    }
+
+    /// Under the interpreter's lock, so that Python cannot write into an array meanwhile: for a piece of 65,536 rows at a time.
+    fn append(&self, column: Column, rows: Range<usize>, values: &mut Vec<f64>) -> Result<()> {
+        let changed = || {
+            let problem = "the array was given another size, or is being written to";
+            Error::new(
+                column.name(),
+                problem,
+                "leave it as it is until the work is done",
+            )
+        };
+        Python::attach(|py| {
+            let mut extend = |view: ArrayView1<f64>| values.extend(view.iter());
+            let (array, axis) = match column {
+                Column::Time | Column::Step | Column::Temperature => {
+                    let array = match column {
+                        Column::Time => Some(&self.t),
+                        Column::Step => self.step.as_ref(),
+                        _ => self.temp.as_ref(),
+                    };
+                    let Some(array) = array else { return Ok(()) };
+                    let array = array.bind(py).try_readonly().map_err(|_| changed())?;
+                    let view = array.as_array();
+                    if view.len() < rows.end {
+                        return Err(changed());
+                    }
+                    extend(view.slice(s![rows]));
+                    return Ok(());
+                }
+                Column::Raw(i) => (if i < 3 { &self.gyro } else { &self.accel }, i % 3),
+                Column::Reference(i) => (
+                    if i < 3 {
+                        &self.rate_dps
+                    } else {
+                        &self.force_mps2
+                    },
+                    i % 3,
+                ),
+            };
+            let Some(array) = array else { return Ok(()) };
+            let array = array.bind(py).try_readonly().map_err(|_| changed())?;
+            let view = array.as_array();
+            if view.nrows() < rows.end || view.ncols() != 3 {
+                return Err(changed());
+            }
+            extend(view.slice(s![rows, axis]));
+            Ok(())
+        })
+    }
+}
+
+/// `value` as an array of doubles, the same one where it is one already.
+fn doubles<'py>(value: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+    let py = value.py();
+    let kwargs = [("dtype", "float64")].into_py_dict(py)?;
+    py.import("numpy")?
+        .call_method("asarray", (value,), Some(&kwargs))
+}
+
+fn shape(array: &Bound<'_, PyAny>) -> String {
+    array
+        .getattr("shape")
+        .map_or_else(|_| "?".into(), |s| s.to_string())
+}
+
+/// A number for each sample.
+fn column<'py>(
+    value: &Bound<'py, PyAny>,
+    name: &str,
+    rows: Option<usize>,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let array = doubles(value)?;
+    let fits = |a: &Bound<'py, PyArray1<f64>>| rows.is_none_or(|rows| a.len() == rows);
+    match array.cast::<PyArray1<f64>>() {
+        Ok(column) if fits(column) => Ok(column.clone()),
+        _ => {
+            let all = rows.map_or("n".into(), |rows| rows.to_string());
+            let problem = format!("its shape is {}, and ({all},) is wanted", shape(&array));
+            let error = Error::new(name, problem, "give a number for each sample");
+            Err(raised(value.py(), &error))
+        }
+    }
+}
+
+/// Three numbers for each sample.
+pub(crate) fn triad<'py>(
+    value: &Bound<'py, PyAny>,
+    name: &str,
+    rows: Option<usize>,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let array = doubles(value)?;
+    let fits = |a: &Bound<'py, PyArray2<f64>>| {
+        a.shape()[1] == 3 && rows.is_none_or(|rows| a.shape()[0] == rows)
+    };
+    match array.cast::<PyArray2<f64>>() {
+        Ok(triad) if fits(triad) => Ok(triad.clone()),
+        _ => {
+            let all = rows.map_or("n".into(), |rows| rows.to_string());
+            let problem = format!("its shape is {}, and ({all}, 3) is wanted", shape(&array));
+            let error = Error::new(name, problem, "give x, y and z of each sample in a row");
+            Err(raised(value.py(), &error))
+        }
+    }
+}
+
+/// A unit of readings, or what is known of the input, by its name.
+fn parsed<T: std::str::FromStr<Err = Error>>(py: Python<'_>, name: &str) -> PyResult<T> {
+    name.parse().map_err(|error| raised(py, &error))
+}
+
+#[pymethods]
+impl Recording {
+    #[new]
+    #[pyo3(signature = (t, gyro=None, accel=None, temp=None, *, unit, gravity=None, reference="gravity", rate_hz=None,
+        step=None, ref_rate_dps=None, ref_force_mps2=None, device="unit", latitude_deg=None, power_on_s=None))]
+    #[expect(clippy::too_many_arguments)]
+    fn new(
+        py: Python<'_>,
+        t: Option<&Bound<'_, PyAny>>,
+        gyro: Option<&Bound<'_, PyAny>>,
+        accel: Option<&Bound<'_, PyAny>>,
+        temp: Option<&Bound<'_, PyAny>>,
+        unit: &str,
+        gravity: Option<f64>,
+        reference: &str,
+        rate_hz: Option<f64>,
+        step: Option<&Bound<'_, PyAny>>,
+        ref_rate_dps: Option<&Bound<'_, PyAny>>,
+        ref_force_mps2: Option<&Bound<'_, PyAny>>,
+        device: &str,
+        latitude_deg: Option<f64>,
+        power_on_s: Option<f64>,
+    ) -> PyResult<Self> {
+        let (unit, reference): (RawUnit, Reference) = (parsed(py, unit)?, parsed(py, reference)?);
+        let first = |value: Option<&Bound<'_, PyAny>>| value.and_then(|v| v.len().ok());
+        let t = match (t, rate_hz, first(gyro).or(first(accel))) {
+            (Some(t), ..) => column(t, "t", None)?,
+            (None, Some(rate), Some(rows)) => {
+                let times = (0..rows).map(|row| row as f64 / rate);
+                PyArray1::from_iter(py, times)
+            }
+            _ => {
+                let problem = "there are neither times nor a sample rate";
+                let remedy = "give the times in seconds as t, or rate_hz";
+                let error = Error::new("t", problem, remedy).about(Argument::SampleRate);
+                return Err(raised(py, &error));
+            }
+        };
+        let rows = t.len();
+        let of_triad = |value: Option<&Bound<'_, PyAny>>, name| {
+            value
+                .map(|v| Ok::<_, PyErr>(triad(v, name, Some(rows))?.unbind()))
+                .transpose()
+        };
+        let of_column = |value: Option<&Bound<'_, PyAny>>, name| {
+            value
+                .map(|v| Ok::<_, PyErr>(column(v, name, Some(rows))?.unbind()))
+                .transpose()
+        };
+        let rate_hz = match rate_hz {
+            Some(rate) => rate,
+            None => usual_rate_hz(&t.to_vec()?).map_err(|error| raised(py, &error))?,
+        };
+        let (gravity_mps2, warning) = gravity_at(gravity, latitude_deg, reference);
+        let mut manifest = Manifest::new(device, rate_hz, gravity_mps2, unit, reference);
+        manifest.latitude_deg = latitude_deg;
+        manifest.power_on_s = power_on_s;
+        let arrays = Arc::new(Arrays {
+            step: of_column(step, "step")?,
+            temp: of_column(temp, "temp")?,
+            gyro: of_triad(gyro, "gyro")?,
+            accel: of_triad(accel, "accel")?,
+            rate_dps: of_triad(ref_rate_dps, "ref_rate_dps")?,
+            force_mps2: of_triad(ref_force_mps2, "ref_force_mps2")?,
+            rows,
+            t: t.unbind(),
+        });
+        let made = mimu_recording::Recording::in_memory(manifest, arrays.clone());
+        let made = made.map_err(|error| raised(py, &error))?;
+        Ok(Self {
+            source: Source::Samples(Arc::new(made)),
+            arrays: Some(arrays),
+            imported: None,
+            warnings: warning.into_iter().collect(),
+            folder: None,
+        })
+    }
+
+    /// Times of the samples, s.
+    #[getter]
+    fn t<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        match &self.arrays {
+            Some(arrays) => Ok(arrays.t.bind(py).clone()),
+            None => Ok(self.read(py, &[Column::Time])?.remove(0).into_pyarray(py)),
+        }
+    }
+
+    /// Readings of the gyro, a row for each sample, in `unit`; None without a gyro.
+    #[getter]
+    fn gyro<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
+        self.triad(py, Column::Raw, 0, |arrays| &arrays.gyro)
+    }
+
+    /// Readings of the accelerometer, a row for each sample, in `unit`; None without one.
+    #[getter]
+    fn accel<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
+        self.triad(py, Column::Raw, 3, |arrays| &arrays.accel)
+    }
+
+    /// Temperatures, degrees Celsius; None without a thermometer.
+    #[getter]
+    fn temp_c<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray1<f64>>>> {
+        self.column(py, Column::Temperature, |arrays| &arrays.temp)
+    }
+
+    /// Number of the dwell of each sample, -1 in transit; None where the dwells are found by stillness.
+    #[getter]
+    fn step<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray1<f64>>>> {
+        self.column(py, Column::Step, |arrays| &arrays.step)
+    }
+
+    /// Known rates, deg/s; None without any.
+    #[getter]
+    fn ref_rate_dps<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
+        self.triad(py, Column::Reference, 0, |arrays| &arrays.rate_dps)
+    }
+
+    /// Known specific forces, m/s²; None without any.
+    #[getter]
+    fn ref_force_mps2<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
+        self.triad(py, Column::Reference, 3, |arrays| &arrays.force_mps2)
+    }
+
+    /// Name of the unit.
+    #[getter]
+    fn device(&self) -> &str {
+        &self.source.manifest().device
+    }
+
+    /// Local gravity, m/s².
+    #[getter]
+    fn gravity_mps2(&self) -> f64 {
+        self.source.manifest().gravity_mps2
+    }
+
+    /// Unit of the readings: V, count or SI.
+    #[getter]
+    fn unit(&self) -> String {
+        self.source.manifest().raw_unit.to_string()
+    }
+
+    /// What is known of the true input: table or gravity.
+    #[getter]
+    fn reference(&self) -> String {
+        self.source.manifest().reference.to_string()
+    }
+
+    /// Samples a second.
+    #[getter]
+    fn rate_hz(&self) -> f64 {
+        self.source.manifest().sample_rate_hz
+    }
+
+    /// Whether it holds the means of poses, and no samples.
+    #[getter]
+    fn means(&self) -> bool {
+        matches!(self.source, Source::Means(_))
+    }
+
+    /// Folder of a recording on disk; None of arrays, and of a file that was read without an output.
+    #[getter]
+    fn directory(&self) -> Option<PathBuf> {
+        match &self.source {
+            Source::Samples(samples) if self.arrays.is_none() && self.folder.is_none() => {
+                Some(samples.directory.clone())
+            }
+            _ => None,
+        }
+    }
+
+    /// What a person should know of how it was made.
+    #[getter]
+    fn warnings(&self) -> Vec<String> {
+        self.warnings.clone()
+    }
+
+    /// What was found in the files that it was read from, as `mimu import --json` writes it; None of others.
+    #[getter]
+    fn imported<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
+        let json = self.imported.as_deref();
+        json.map(|json| loaded(py, json)).transpose()
+    }
+
+    /// Writes it as a folder that the command reads, or another program: recording.toml beside samples.parquet or samples.csv.
+    #[pyo3(signature = (directory, *, format="parquet", replace=false))]
+    fn save(
+        &self,
+        py: Python<'_>,
+        directory: PathBuf,
+        format: &str,
+        replace: bool,
+    ) -> PyResult<PathBuf> {
+        let format: SampleFormat = parsed(py, format)?;
+        let source = self.source.clone();
+        computed(py, move || {
+            let samples = source.samples()?;
+            let mut writer = Writer::create(&directory, samples.columns, format, replace)?;
+            samples.for_each_batch(|_| {}, |batch| writer.write(batch))?;
+            writer.finish(&samples.manifest)
+        })
+    }
+
+    fn __len__(&self, py: Python<'_>) -> PyResult<usize> {
+        match (&self.source, &self.arrays) {
+            (_, Some(arrays)) => Ok(arrays.rows),
+            (Source::Means(_), _) => Ok(0),
+            (Source::Samples(samples), _) => match samples.rows() {
+                Some(rows) => Ok(rows as usize),
+                None => Ok(self.read(py, &[Column::Time])?[0].len()),
+            },
+        }
+    }
+
+    fn __repr__(&self) -> String {
+        let Manifest {
+            device,
+            sample_rate_hz,
+            gravity_mps2,
+            raw_unit,
+            reference,
+            ..
+        } = self.source.manifest();
+        format!(
+            "<mimu.Recording {device:?}: {} at {sample_rate_hz:.6} Hz in {raw_unit}, gravity {gravity_mps2} m/s², reference {reference}>",
+            self.sensors()
+        )
+    }
+
+    fn _repr_html_(&self) -> String {
+        let manifest = self.source.manifest();
+        let mut terms = vec![
+            ("sensors", self.sensors()),
+            ("unit", manifest.raw_unit.to_string()),
+            ("sample rate", format!("{:.6} Hz", manifest.sample_rate_hz)),
+            ("gravity", format!("{} m/s²", manifest.gravity_mps2)),
+            ("reference", manifest.reference.to_string()),
+        ];
+        terms.extend(self.warnings.iter().map(|w| ("warning", w.clone())));
+        fragment::of_terms(&format!("Recording of {}", manifest.device), &terms)
+    }
+}
+
+impl Recording {
+    fn sensors(&self) -> String {
+        let columns = match &self.source {
+            Source::Means(_) => return "means of poses".into(),
+            Source::Samples(samples) => samples.columns,
+        };
+        match (columns.gyro, columns.accel) {
+            (true, true) => "gyro and accelerometer",
+            (true, false) => "gyro",
+            _ => "accelerometer",
+        }
+        .into()
+    }
+
+    /// Columns of a recording on disk.
+    fn read(&self, py: Python<'_>, columns: &[Column]) -> PyResult<Vec<Vec<f64>>> {
+        let (source, columns) = (self.source.clone(), columns.to_vec());
+        computed(py, move || source.samples()?.read_columns(&columns, |_| {}))
+    }
+
+    fn column<'py>(
+        &self,
+        py: Python<'py>,
+        column: Column,
+        of: impl Fn(&Arrays) -> &Option<Py<PyArray1<f64>>>,
+    ) -> PyResult<Option<Bound<'py, PyArray1<f64>>>> {
+        if let Some(arrays) = &self.arrays {
+            return Ok(of(arrays).as_ref().map(|array| array.bind(py).clone()));
+        }
+        let samples = self.source.samples().map_err(|error| raised(py, &error))?;
+        match samples.columns.has(column) {
+            true => Ok(Some(self.read(py, &[column])?.remove(0).into_pyarray(py))),
+            false => Ok(None),
+        }
+    }
+
+    fn triad<'py>(
+        &self,
+        py: Python<'py>,
+        column: impl Fn(usize) -> Column,
+        first: usize,
+        of: impl Fn(&Arrays) -> &Option<Py<PyArray2<f64>>>,
+    ) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
+        if let Some(arrays) = &self.arrays {
+            return Ok(of(arrays).as_ref().map(|array| array.bind(py).clone()));
+        }
+        let samples = self.source.samples().map_err(|error| raised(py, &error))?;
+        let columns = [0, 1, 2].map(|axis| column(first + axis));
+        // A known input may be known of some axes.
+        if !columns.iter().any(|column| samples.columns.has(*column)) {
+            return Ok(None);
+        }
+        let there: Vec<Column> = columns
+            .iter()
+            .copied()
+            .filter(|c| samples.columns.has(*c))
+            .collect();
+        let values = self.read(py, &there)?;
+        let mut triad = Array2::from_elem((values[0].len(), 3), f64::NAN);
+        for (column, values) in there.iter().zip(&values) {
+            let axis = columns.iter().position(|c| c == column).unwrap_or_default();
+            triad
+                .slice_mut(s![.., axis])
+                .assign(&ArrayView1::from(values));
+        }
+        Ok(Some(triad.into_pyarray(py)))
+    }
+}
+
+/// Local gravity, m/s², and what is to be said of it where nobody gave it.
+fn gravity_at(
+    given: Option<f64>,
+    latitude: Option<f64>,
+    reference: Reference,
+) -> (f64, Option<String>) {
+    match (given, latitude) {
+        (Some(gravity), Some(at)) => {
+            (gravity, Warning::of_gravity(gravity, at).map(|w| w.to_string()))
+        }
+        (Some(gravity), None) => (gravity, None),
+        (None, Some(at)) => (normal_gravity(at), None),
+        (None, None) => (
+            STANDARD_GRAVITY,
+            (reference == Reference::Gravity).then(|| {
+                "gravity is taken to be 9.80665 m/s², and every scale factor of the accelerometer is in error as it is: give gravity or latitude_deg"
+                    .to_owned()
+            }),
+        ),
+    }
+}
+
+/// Opens a recording on disk.
+#[pyfunction]
+pub(crate) fn open(py: Python<'_>, directory: PathBuf) -> PyResult<Recording> {
+    let source = computed(py, move || Source::open(&directory))?;
+    Ok(Recording {
+        source,
+        arrays: None,
+        imported: None,
+        warnings: Vec::new(),
+        folder: None,
+    })
+}
+
+/// Imports files by the arguments of `mimu import`, to `output` or to a temporary folder that goes with the recording.
+#[pyfunction]
+#[pyo3(signature = (arguments, output=None))]
+pub(crate) fn read(
+    py: Python<'_>,
+    arguments: Vec<OsString>,
+    output: Option<PathBuf>,
+) -> PyResult<Recording> {
+    let work = move || {
+        let (directory, folder) = match output {
+            Some(directory) => (directory, None),
+            None => {
+                let made = TempDir::with_prefix("mimu-");
+                let folder = made.map_err(|e| Error::io(&std::env::temp_dir(), &e))?;
+                (folder.path().join("recording"), Some(Arc::new(folder)))
+            }
+        };
+        let to = ["-o".into(), directory.clone().into_os_string()];
+        // Before the files, which may be all that follows `--`.
+        let summary = called::import(to.into_iter().chain(arguments).collect())?;
+        Ok((Source::open(&directory)?, summary, folder))
+    };
+    let (source, summary, folder) = done(py, work, refused)?;
+    Ok(Recording {
+        source,
+        arrays: None,
+        imported: Some(json(&summary)?),
+        warnings: summary.warnings,
+        folder,
+    })
+}
+
+/// Refuses what is no recording, by the name of the argument.
+pub(crate) fn sources(recordings: &[PyRef<'_, Recording>], name: &str) -> PyResult<Vec<Source>> {
+    if recordings.is_empty() {
+        return Err(PyTypeError::new_err(format!(
+            "{name}: give one recording at least"
+        )));
+    }
+    Ok(recordings.iter().map(|r| r.source.clone()).collect())
+}

@@ -1,0 +1,85 @@
+"""Arrays in and out."""
+
+from __future__ import annotations
+
+import tracemalloc
+from types import ModuleType
+
+import mimu
+import numpy as np
+import pytest
+
+
+def test_arrays_of_doubles_are_the_same_arrays_within_a_recording() -> None:
+    log = np.random.default_rng(1).normal(size=(500, 8))
+    # Columns of a table: their rows are 64 bytes apart.
+    t, gyro, accel, temp = np.arange(500) / 50.0, log[:, 0:3], log[:, 3:6], log[:, 6]
+    rec = mimu.Recording(t, gyro, accel, temp, unit="count", gravity=9.81)
+    assert rec.t is t and rec.gyro is gyro and rec.accel is accel and rec.temp_c is temp
+    assert np.shares_memory(rec.gyro, log)
+    assert rec.rate_hz == pytest.approx(50.0) and len(rec) == 500 and rec.step is None
+
+
+def test_other_numbers_are_converted() -> None:
+    counts = np.arange(600, dtype=np.int16).reshape(200, 3)
+    rec = mimu.Recording(np.arange(200) / 10.0, counts, counts[::-1].tolist(), unit="count", gravity=9.81)
+    assert rec.gyro is not None and rec.accel is not None
+    assert rec.gyro.dtype == np.float64 and np.array_equal(rec.gyro, counts)
+    assert np.array_equal(rec.accel, counts[::-1])
+
+
+def test_any_layout_is_read_as_the_same_numbers(arrays: mimu.Recording) -> None:
+    expected = mimu.fit(arrays).to_dict()
+    fortran = {name: np.asfortranarray(getattr(arrays, name)) for name in ("gyro", "accel")}
+    backwards = {name: np.ascontiguousarray(getattr(arrays, name)[::-1])[::-1] for name in ("gyro", "accel")}
+    for layout in (fortran, backwards):
+        rec = mimu.Recording(arrays.t, **layout, unit="count", gravity=9.80665, rate_hz=arrays.rate_hz, device=arrays.device)
+        assert mimu.fit(rec).to_dict() == expected
+
+
+def test_a_fit_copies_no_array_whole(chamber: ModuleType) -> None:
+    # numpy's own memory is traced, and that of the compiled part is not: what is looked for is a copy that Python is made to hold.
+    rec = mimu.Recording(**chamber.session().keywords())
+    tracemalloc.start()
+    mimu.fit(rec)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < rec.gyro.nbytes, f"{peak} bytes at the highest"
+
+
+def test_compensated_arrays_follow_the_formula(arrays: mimu.Recording) -> None:
+    fit = mimu.fit(arrays)
+    gyro, accel = fit.apply(arrays.gyro, arrays.accel)
+    for clean, raw, sensor in ((gyro, arrays.gyro, fit.gyro), (accel, arrays.accel, fit.accel)):
+        np.testing.assert_allclose(clean, raw @ sensor.C.T + sensor.o, rtol=1e-12, atol=1e-12)
+    assert fit.apply(accel=arrays.accel)[0] is None
+    at_rest = np.linalg.norm(accel[:50], axis=1).mean()
+    assert at_rest == pytest.approx(9.80665, abs=0.05)
+
+
+def test_the_truth_of_a_unit_in_a_chamber_is_found(chamber: ModuleType) -> None:
+    session = chamber.session(seed=2)
+    fit = mimu.thermal.fit(mimu.Recording(**session.keywords()))
+    assert fit.verdict == "fitted"
+    lag = fit.sensors["gyro"].lag_s
+    assert lag is not None and lag.lower < chamber.LAG_S < lag.upper
+    for axis, name in enumerate("xyz"):
+        curve = fit.curves[f"gyro_bias_{name}"]
+        truth = chamber.gyro_bias(curve.temp_c)[:, axis]
+        half = 0.5 * (curve.upper - curve.lower)
+        # 33 temperatures of a smooth curve, which err together: three intervals hold each of them.
+        assert np.all(np.abs(curve.value - truth) < 3 * half), name
+    clean = fit.calibration.apply(mimu.Recording(**session.keywords()))
+    for values, known in zip(clean, (np.radians(session.ref_rate_dps), session.ref_force_mps2), strict=True):
+        error = (values - known)[session.step >= 0]
+        assert np.abs(np.nanmean(error, axis=0)).max() < 2e-3
+
+
+def test_a_calibration_over_temperature_refuses_bare_arrays(chamber: ModuleType) -> None:
+    session = chamber.session()
+    calibration = mimu.thermal.fit(mimu.Recording(**session.keywords())).calibration
+    assert calibration.over_temperature and calibration.range_c[0] < -15 and calibration.range_c[1] > 55
+    with pytest.raises(mimu.Error, match="curves over temperature; give a mimu.Recording"):
+        calibration.apply(session.gyro, session.accel)
+    warm, cold = (calibration.inverse("gyro", at)[1] for at in (50.0, -10.0))
+    assert not np.array_equal(warm, cold)

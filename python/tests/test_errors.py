@@ -1,0 +1,94 @@
+"""What is refused, and what of it a program can read."""
+
+from __future__ import annotations
+
+import pickle
+from pathlib import Path
+
+import mimu
+import numpy as np
+import pytest
+
+
+def test_a_cell_that_is_no_number_is_named_with_file_row_and_column(tmp_path: Path) -> None:
+    log = tmp_path / "log.csv"
+    rows = [f"{k / 50},{k},2,3,4,5,6" for k in range(100)]
+    rows[41] = rows[41].replace(",4,5,6", ",four,5,6")
+    log.write_text("t_s,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z\n" + "\n".join(rows) + "\n")
+    with pytest.raises(mimu.Error) as caught:
+        mimu.read(log, raw_unit="count", gravity=9.81)
+    error = caught.value
+    assert (error.file, error.row, error.column) == (str(log), 43, "accel_x")
+    assert error.kind == "invalid" and "four" in error.problem and error.remedy
+    assert str(error) == f"{error.place}: {error.problem}; {error.remedy}"
+
+
+def test_a_file_that_is_not_there_is_of_the_operating_system(tmp_path: Path) -> None:
+    with pytest.raises(mimu.Error) as caught:
+        mimu.load(tmp_path / "none.toml")
+    assert caught.value.kind == "io" and caught.value.file == str(tmp_path / "none.toml")
+    assert caught.value.row is None and caught.value.column is None
+
+
+def test_a_time_that_goes_back_is_named_with_its_row() -> None:
+    t = np.arange(300) / 50.0
+    t[200] = 1.0
+    values = np.random.default_rng(1).normal(size=(300, 3))
+    with pytest.raises(mimu.Error, match="time goes back") as caught:
+        mimu.fit(mimu.Recording(t, values, values, unit="count", gravity=9.81, device="log"))
+    assert (caught.value.file, caught.value.row, caught.value.column) == ("log", 201, "t_s")
+
+
+def test_an_experiment_that_does_not_determine_the_unit_is_of_its_own_kind() -> None:
+    random = np.random.default_rng(1)
+    still = random.normal(size=(3000, 6)) * 0.5 + [1, 2, 3, 10, 20, 800]
+    with pytest.raises(mimu.Error) as caught:
+        mimu.fit(mimu.Recording(None, still[:, :3], still[:, 3:], unit="count", gravity=9.81, rate_hz=50.0))
+    assert caught.value.kind == "undetermined" and isinstance(caught.value, ValueError)
+
+
+@pytest.mark.parametrize(
+    ("keywords", "says"),
+    [
+        ({"gyro": np.zeros((10, 2))}, r"gyro: its shape is \(10, 2\), and \(10, 3\) is wanted"),
+        ({"accel": np.zeros((9, 3))}, r"accel: its shape is \(9, 3\), and \(10, 3\) is wanted"),
+        ({"gyro": np.zeros((10, 3)), "temp": np.zeros(7)}, r"temp: its shape is \(7,\), and \(10,\) is wanted"),
+        ({"gyro": np.zeros((10, 3)), "gravity": 1.0}, "looks like g"),
+        ({"gyro": np.zeros((10, 3)), "unit": "mV"}, "write V, count or SI"),
+        ({"gyro": np.zeros((10, 3)), "t": np.zeros(10)}, "the times do not say"),
+        ({}, "readings of neither sensor"),
+    ],
+)
+def test_arrays_that_do_not_fit_are_named(keywords: dict[str, object], says: str) -> None:
+    given = {"t": np.arange(10) / 10.0, "unit": "count", "gravity": 9.81, **keywords}
+    with pytest.raises(mimu.Error, match=says):
+        mimu.Recording(**given)
+
+
+def test_options_that_there_are_not_are_errors_of_type_or_value(arrays: mimu.Recording, tmp_path: Path) -> None:
+    calibration = mimu.fit(arrays).calibration
+    with pytest.raises(TypeError, match="qgroundcontrol"):
+        mimu.export("px4", calibration=calibration, qgroundcontrol=True)
+    with pytest.raises(TypeError, match="cannot be used with"):
+        mimu.design(n=3, scheme="six-face")
+    with pytest.raises(ValueError, match='method="best": write least-squares'):
+        mimu.fit(arrays, method="best")
+    with pytest.raises(mimu.Error, match="reference is"):
+        mimu.fit(arrays, method="kalman")
+    with pytest.raises(TypeError, match="one other recording"):
+        mimu.diagnose(arrays, verify=[arrays, arrays])
+
+
+def test_an_error_comes_through_a_pickle_whole(tmp_path: Path) -> None:
+    with pytest.raises(mimu.Error) as caught:
+        mimu.load(tmp_path / "none.toml")
+    error, back = caught.value, pickle.loads(pickle.dumps(caught.value))
+    assert str(back) == str(error) and vars(back) == vars(error)
+
+
+def test_gravity_that_nobody_gave_is_warned_of() -> None:
+    values = np.ones((10, 3))
+    rec = mimu.Recording(np.arange(10) / 10, values, unit="count")
+    assert rec.gravity_mps2 == 9.80665 and "give gravity or latitude_deg" in rec.warnings[0]
+    at = mimu.Recording(np.arange(10) / 10, values, unit="count", latitude_deg=48.1)
+    assert 9.80 < at.gravity_mps2 < 9.82 and at.warnings == []

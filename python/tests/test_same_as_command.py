@@ -1,0 +1,148 @@
+"""Numbers are those of the command to the last digit, as both are read from the same JSON."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import mimu
+import numpy as np
+from conftest import EXAMPLE, json_of, run
+
+
+def without(data: dict[str, Any], *keys: str) -> dict[str, Any]:
+    """``data`` but for what names the place of a recording."""
+    return {key: value for key, value in data.items() if key not in keys}
+
+
+def test_an_import_reports_and_reads_what_the_command_does(folder: Path) -> None:
+    files = (EXAMPLE / "accel.txt", EXAMPLE / "gyro.txt")
+    columns = ["t_s,accel_x,accel_y,accel_z", "t_s,gyro_x,gyro_y,gyro_z"]
+    read = mimu.read(*files, columns=columns, gravity=9.80665, raw_unit="count", reference="gravity")
+    command = json_of(
+        "import", *files, *(f"--columns={c}" for c in columns), "--gravity=9.80665", "--raw-unit=count", "--reference=gravity", "-o",
+        folder.with_name("again"),
+    )
+    assert without(read.imported, "recording") == without(command, "recording")
+    by_command = mimu.read(folder)
+    for name in ("t", "gyro", "accel"):
+        assert np.array_equal(getattr(read, name), getattr(by_command, name)), name
+    assert len(read) == command["rows"]
+
+
+def test_a_fit_is_that_of_the_command(folder: Path, by_hand: mimu.Recording) -> None:
+    assert mimu.fit(by_hand).to_dict() == json_of("fit", folder)
+    other = mimu.fit(by_hand, holdout=0, only="accel", still=20.0, keep="all").to_dict()
+    assert other == json_of("fit", folder, "--holdout=0", "--only=accel", "--still=20", "--keep=all")
+
+
+def test_a_fit_of_arrays_is_that_of_the_same_numbers_in_a_file(folder: Path, arrays: mimu.Recording) -> None:
+    # The digest of arrays is that of their numbers, and that of a file is that of its bytes.
+    assert without(mimu.fit(arrays).to_dict(), "sha256") == without(json_of("fit", folder), "sha256")
+
+
+def test_text_and_calibration_are_those_of_the_command(folder: Path, by_hand: mimu.Recording, tmp_path: Path) -> None:
+    fit = mimu.fit(by_hand)
+    printed = run("fit", folder, "-o", tmp_path / "cal.toml").stdout
+    assert printed.startswith(str(fit))
+    dated = ("created = ",)
+    lines = [line for line in fit.to_toml().splitlines() if not line.startswith(dated)]
+    assert lines == [line for line in (tmp_path / "cal.toml").read_text().splitlines() if not line.startswith(dated)]
+
+
+def test_attributes_are_the_numbers_of_the_json(by_hand: mimu.Recording) -> None:
+    fit = mimu.fit(by_hand)
+    data = fit.to_dict()["sensors"]["accel"]
+    values = {p["name"]: p for p in data["parameters"]}
+    assert fit.accel is not None
+    for i, a in enumerate("xyz"):
+        assert fit.accel.o[i] == values[f"o_{a}"]["value"]
+        for j, b in enumerate("xyz"):
+            assert fit.accel.C[i, j] == values[f"C_{a}{b}"]["value"]
+            assert fit.accel.sigma[i, j] == values[f"C_{a}{b}"]["sigma"]
+    assert fit.accel.parameters["bias_x"].unit == values["bias_x"]["unit"] == "count"
+    assert fit.held_out["accel"].held_out_rms == data["held_out_rms"]
+    assert [d.step for d in fit.dwells] == [d["step"] for d in fit.to_dict()["dwells"]]
+
+
+def test_a_diagnosis_is_that_of_the_command(folder: Path, by_hand: mimu.Recording) -> None:
+    found = mimu.diagnose(by_hand, verify=[by_hand])
+    command = json_of("diagnose", folder, "--verify", folder)
+    # The command names the other recording by its path.
+    for one in (here := found.to_dict(), command):
+        assert one["second"].pop("recording").endswith("by-hand")
+    assert here == command
+    assert found.verdict == command["verdict"]
+    assert [effect.id for effect in found.effects] == [effect["id"] for effect in command["effects"]]
+
+
+def test_noise_is_that_of_the_command(at_rest: mimu.Recording, tmp_path: Path) -> None:
+    path = at_rest.save(tmp_path / "rest")
+    noise = mimu.allan(mimu.read(path))
+    command = json_of("allan", path, "-o", tmp_path / "noise.toml")
+    assert noise.to_dict() == command
+    assert noise.to_toml() == (tmp_path / "noise.toml").read_text()
+    assert np.array_equal(noise["gyro_x"].adev, command["channels"][0]["adev"])
+    # Of arrays without a file, but for the name of the recording.
+    memory = mimu.allan(at_rest).to_dict()
+    for here, there in zip(memory["channels"], command["channels"], strict=True):
+        assert without(here, "recording") == without(there, "recording")
+
+
+def test_curves_over_temperature_are_those_of_the_command(chamber: ModuleType, tmp_path: Path) -> None:
+    recording = mimu.Recording(**chamber.session().keywords())
+    path = recording.save(tmp_path / "sweep")
+    of_file = mimu.thermal.fit([mimu.read(path)])
+    assert of_file.to_dict() == json_of("thermal", "fit", path)
+    of_arrays = mimu.thermal.fit(recording)
+    assert without(of_arrays.to_dict(), "recordings") == without(of_file.to_dict(), "recordings")
+
+
+def test_a_design_is_that_of_the_command() -> None:
+    design = mimu.design(n=12, reference="gravity")
+    assert design.to_dict() == json_of("design", "-n", 12, "--reference", "gravity")
+    assert design.positions.shape == (12, 3)
+    gyro = mimu.design(scheme="xu-rates", sensor="gyro", dwell=12.5)
+    assert gyro.to_dict() == json_of("design", "--scheme", "xu-rates", "--sensor", "gyro", "--dwell", 12.5)
+    assert gyro.rates_dps is not None and len(gyro.rates_dps) == len(gyro.positions)
+
+
+def test_a_verification_is_that_of_the_command(folder: Path, by_hand: mimu.Recording, tmp_path: Path) -> None:
+    mimu.fit(by_hand).calibration.save(tmp_path / "cal.toml")
+    judged = mimu.verify(by_hand, mimu.load(tmp_path / "cal.toml"))
+    assert judged.to_dict() == json_of("verify", folder, "--calibration", tmp_path / "cal.toml")
+
+
+def test_readings_are_compensated_as_by_the_command(folder: Path, by_hand: mimu.Recording, tmp_path: Path) -> None:
+    fit = mimu.fit(by_hand)
+    fit.calibration.save(tmp_path / "cal.toml")
+    done = run("apply", folder, "--calibration", tmp_path / "cal.toml", "-o", tmp_path / "clean")
+    assert done.returncode == 0, done.stderr
+    clean = mimu.read(tmp_path / "clean")
+    gyro, accel = fit.apply(by_hand)
+    assert np.array_equal(gyro, clean.gyro, equal_nan=True) and np.array_equal(accel, clean.accel, equal_nan=True)
+
+
+def test_exports_are_those_of_the_command(by_hand: mimu.Recording, at_rest: mimu.Recording, tmp_path: Path) -> None:
+    # In volts, which the formats for the device of mimu want.
+    volts = {"gyro": by_hand.gyro / 1000, "accel": by_hand.accel / 1000, "unit": "V", "gravity": by_hand.gravity_mps2}
+    mimu.fit(mimu.Recording(by_hand.t, rate_hz=by_hand.rate_hz, **volts)).calibration.save(tmp_path / "cal.toml")
+    # The file says which calibration it is made from.
+    calibration = mimu.load(tmp_path / "cal.toml")
+    noise = mimu.allan(at_rest).noise
+    noise.save(tmp_path / "noise.toml")
+    for name, options, flags in [
+        ("c", {}, []), ("rust", {}, []), ("json", {}, []), ("core", {}, []), ("px4", {"qgc": True}, ["--qgc"]), 
+        ("ardupilot", {"accel_zero": 1.35, "gyro_zero": 2.04}, ["--accel-zero=1.35", "--gyro-zero=2.04"]),
+        ("fusion", {}, []), ("imu-calib", {}, []), ("imu-tk", {"sensor": "gyro"}, ["--sensor=gyro"]), ("realsense", {}, []),
+    ]:
+        made = mimu.export(name, calibration=calibration, **options)
+        done = run("export", name, *flags, "--calibration", tmp_path / "cal.toml", "-o", tmp_path / name)
+        assert done.returncode == 0, f"{name}: {done.stderr}"
+        assert made.content == (tmp_path / name).read_bytes(), name
+    for name in ("kalibr", "vins", "orbslam3", "liosam", "fastlio"):
+        made = mimu.export(name, noise=mimu.load_noise(tmp_path / "noise.toml"))
+        done = run("export", name, "--noise", tmp_path / "noise.toml", "-o", tmp_path / name)
+        assert done.returncode == 0, f"{name}: {done.stderr}"
+        assert made.content == (tmp_path / name).read_bytes(), name
