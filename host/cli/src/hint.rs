@@ -7,13 +7,15 @@ use mimu_thermal::warning::Warning as OverTemperature;
 use mimu_wizard::waiting::Waiting;
 
 /// Flags of the import, which are a remedy after any command that reads a recording. Others are one only on the command that refused.
-const OF_THE_IMPORT: [&str; 13] = [
+const OF_THE_IMPORT: [&str; 15] = [
     "--columns",
     "--rate-hz",
     "--time-unit",
     "--scale",
     "--offset",
     "--reference",
+    "--rate-dps",
+    "--rate-error",
     "--where",
     "--topic",
     "--instance",
@@ -99,6 +101,8 @@ fn flag(argument: Argument) -> Option<&'static str> {
         Argument::Scale => "--scale",
         Argument::Offset => "--offset",
         Argument::Reference => "--reference",
+        Argument::TurntableRates => "--rate-dps",
+        Argument::TurntableRateError => "--rate-error",
         Argument::Device => "--device",
         Argument::StepsGiven => "--steps given",
         Argument::StepsFound => "--steps found",

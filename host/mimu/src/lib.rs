@@ -75,6 +75,7 @@ pub mod spectrum;
 pub mod survey;
 mod toml_layout;
 pub mod triad;
+pub mod turntable;
 pub mod warning;
 
 pub use calibration::Calibration;

@@ -69,6 +69,10 @@ pub enum Argument {
     Table,
     /// Sensor that an experiment is designed for.
     Sensor,
+    /// Magnitudes of a turntable's rates.
+    TurntableRates,
+    /// How well they are known.
+    TurntableRateError,
     /// Whether what exists is replaced.
     Replace,
     /// Serial port.

@@ -14,6 +14,7 @@ mod ramps;
 mod real_ferraris;
 mod real_mikoff;
 mod real_xsens;
+mod record_player;
 mod several_recordings;
 mod signed_low_byte;
 mod stated_noise;

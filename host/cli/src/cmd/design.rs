@@ -192,7 +192,9 @@ impl DesignArgs {
             (Some(TableArg::ThreeAxis), _) | (None, Reference::Table) => Fixture::ThreeAxis,
             (Some(TableArg::TwoAxis), _) => Fixture::TwoAxis,
             (Some(TableArg::Faces), _) => Fixture::Faces,
-            (Some(TableArg::Hand), _) | (None, Reference::Gravity) => Fixture::Hand,
+            (Some(TableArg::Hand), _) | (None, Reference::Gravity | Reference::TurntableRate) => {
+                Fixture::Hand
+            }
         }
     }
 
@@ -257,6 +259,11 @@ impl DesignArgs {
             (Sensor::Gyro, Reference::Table) => {
                 Problem::gyro(Model::gyro(&self.model, span), self.fixture(), rates)
             }
+            (Sensor::Gyro, Reference::TurntableRate) => Err(Error::new(
+                "gyro, --reference turntable-rate",
+                "orientations on a record player are not designed here",
+                "design poses by gravity (--sensor accel --reference gravity --table hand): the same orientations serve a gyro",
+            )),
             (Sensor::Gyro, Reference::Gravity) => Err(Error::new(
                 "gyro, --reference gravity",
                 "by hand a gyro's known input are the turns between dwells, which are not designed here",

@@ -82,10 +82,13 @@ pub(crate) fn run(args: &FitArgs) -> Result<()> {
     let inputs = [args.noise.file.as_deref()];
     let prepared = read_samples_or_means(&args.recording, args.still.finding(), &outputs, &inputs)?;
     let prepared = args.keep.apply(args.noise.state(prepared)?);
-    if args.method.is_some() && prepared.manifest.reference == Reference::Gravity {
+    if args.method.is_some() && prepared.manifest.reference != Reference::Table {
         return Err(Error::new(
             args.recording.display(),
-            "--method chooses between estimators for known inputs, and reference is \"gravity\"",
+            format!(
+                "--method chooses between estimators for known inputs, and reference is \"{}\"",
+                prepared.manifest.reference
+            ),
             "leave --method out, or give the steps their inputs (reference = \"table\")",
         ));
     }

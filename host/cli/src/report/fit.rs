@@ -162,8 +162,12 @@ fn sensor_text(out: &mut String, fit: &FitResult, name: Sensor, sensor: &SensorF
 
 /// The physical quantities by axis.
 fn parameters_text(out: &mut String, fit: &FitResult, name: Sensor, sensor: &SensorFitResult) {
-    // The accelerometer's own axes are the frame then.
-    let by_choice = fit.reference == Reference::Gravity && name == Sensor::Accel;
+    // A triad's own axes are the frame where only a magnitude is known.
+    let by_choice = match fit.reference {
+        Reference::Table => false,
+        Reference::Gravity => name == Sensor::Accel,
+        Reference::TurntableRate => true,
+    };
     let mut rows = Vec::new();
     for kind in Kind::PHYSICAL {
         if kind == Kind::Misalignment && by_choice {

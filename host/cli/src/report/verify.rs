@@ -25,7 +25,7 @@ pub fn verify_text(verification: &Verification) -> String {
             });
         let noun = match s.figure {
             Figure::Direction => "turns",
-            Figure::Input | Figure::GravitySize => "dwells",
+            Figure::Input | Figure::GravitySize | Figure::RateSize => "dwells",
         };
         let over = format!("{} {noun}", s.count);
         let _ = writeln!(

@@ -295,9 +295,10 @@ impl LeftOutResult {
 impl DwellResult {
     /// All dwells of a recording, used or not.
     pub fn list(prepared: &Prepared) -> Vec<Self> {
-        let labels = &prepared.manifest.step_labels;
         let dwells = prepared.dwells.list.iter();
-        dwells.map(|d| Self::of(d, labels)).collect()
+        dwells
+            .map(|d| Self::of(d, &prepared.manifest.step_labels))
+            .collect()
     }
 
     fn of(dwell: &Dwell, labels: &[String]) -> Self {
@@ -400,7 +401,9 @@ fn excess_unit(fit: &Fit, found: &SensorFit, group: Observable) -> String {
     let si = found.sensor.unit();
     match found.figure {
         Figure::Direction if group == Observable::Rest => si.into(),
-        Figure::Direction | Figure::GravitySize => found.figure.unit(found.sensor).into(),
+        Figure::Direction | Figure::GravitySize | Figure::RateSize => {
+            found.figure.unit(found.sensor).into()
+        }
         // Axes of the forward form are in raw units, of the inverse form in SI.
         Figure::Input if fit.options.method == Method::InverseForm => si.into(),
         Figure::Input => raw_unit(fit.prepared.manifest.raw_unit, si),

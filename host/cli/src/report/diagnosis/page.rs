@@ -150,6 +150,7 @@ fn head(d: &DiagnosisResult, made: &Made) -> Markup {
     let known = match d.reference {
         Reference::Table => "known from the table",
         Reference::Gravity => "only gravity is known",
+        Reference::TurntableRate => "only the magnitude of the rate is known",
     };
     let counts: Vec<String> = d
         .sensors
