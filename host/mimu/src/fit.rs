@@ -29,6 +29,7 @@ use mimu_recording::{RawUnit, Reference};
 use crate::observable::Observable;
 use by_gravity::fit_gravity;
 use by_rate::fit_rates;
+pub(crate) use determined::faces_not_up;
 use known::fit_known;
 
 pub use biases::fit_biases;
@@ -157,12 +158,11 @@ pub fn fit(mut prepared: Prepared, options: Options) -> Result<Fit> {
         Reference::TurntableRate => Some(RatedDwells::of(&prepared)?),
         Reference::Table | Reference::Gravity => None,
     };
-    if let Some(rated) = &rated {
-        rated.keep_accel_at_rest(&mut prepared);
-    }
+    let at_none = rated.as_ref().and_then(|r| r.set_aside(&mut prepared));
     let mut warnings = prepared.condensed.warnings.clone();
     warnings.extend(prepared.dwells.warnings.iter().cloned());
     warnings.extend(without_temperature(&prepared));
+    warnings.extend(at_none);
     let mut sensors = match (prepared.manifest.reference, &rated) {
         (_, Some(rated)) => fit_rates(&prepared, rated, options, &mut warnings)?,
         (Reference::Table, None) => fit_known(&prepared, options, &mut warnings)?,

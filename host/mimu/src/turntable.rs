@@ -11,6 +11,7 @@ use crate::estimate::{Observation, magnitude};
 use crate::prepared::Prepared;
 use crate::quantity::{Sensor, significant};
 use crate::signal::dwell::Fault;
+use crate::warning::Warning;
 use mimu_recording::error::{Argument, Error, Result};
 use mimu_recording::{RawUnit, Turntable};
 
@@ -23,6 +24,21 @@ const UNLIKE: f64 = 0.12;
 const OTHER_RATE: f64 = 0.1;
 /// Scale factors of readings in SI, over one, among which the dwells are assigned: wider than any part, so that a wrong rate is seen in the fit.
 const SCALE_IN_SI: [f64; 2] = [0.5, 2.0];
+
+/// Distance from the nearest rate and from rest, over the largest rate, from which on a dwell is at none of them: a table that turns on slowly, or
+/// a hand that turns it.
+const AT_NONE: f64 = 0.17;
+/// Share of the dwells that may be at none of the rates: with more of them the rates are not those that were given.
+const MOST_AT_NONE: f64 = 0.34;
+
+/// At what a dwell turned.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Class {
+    Rest,
+    /// By index.
+    Rate(usize),
+    Other,
+}
 
 /// The usable dwells of the gyro by their rates.
 #[derive(Debug, Clone)]
@@ -37,6 +53,8 @@ pub struct RatedDwells {
     pub rate_of: Vec<usize>,
     /// Dwells at rest, where nothing but the Earth turns the gyro.
     pub rests: Vec<Rest>,
+    /// Indices of the dwells that turned at another rate.
+    pub others: Vec<usize>,
 }
 
 impl RatedDwells {
@@ -55,28 +73,28 @@ impl RatedDwells {
         rates.sort_by(f64::total_cmp);
         let observations = prepared.observations(Sensor::Gyro);
         let given = given(prepared, turntable, &observations)?;
-        let level = |dps: f64| rates.iter().position(|r| *r == dps.to_radians());
-        let classes: Vec<Option<usize>> = match given.iter().all(Option::is_some) {
-            true => given.iter().map(|dps| level(dps.unwrap_or(0.0))).collect(),
-            false => {
-                let fixed: Vec<Option<Option<usize>>> =
-                    given.iter().map(|dps| dps.map(level)).collect();
-                let in_si = prepared.manifest.raw_unit == RawUnit::Si;
-                assigned(&observations, &rates, &fixed, in_si)
-                    .ok_or_else(|| unclear(prepared, &rates))?
-            }
+        let class = |dps: f64| match rates.iter().position(|r| *r == dps.to_radians()) {
+            Some(k) => Class::Rate(k),
+            None => Class::Rest,
         };
-        let mut turning = Vec::new();
-        let mut rate_of = Vec::new();
-        let mut rests = Vec::new();
+        let given: Vec<Option<Class>> = given.into_iter().map(|dps| dps.map(class)).collect();
+        let in_si = prepared.manifest.raw_unit == RawUnit::Si;
+        let classes = match given.iter().copied().collect::<Option<Vec<Class>>>() {
+            Some(all) => all,
+            None => assigned(&observations, &rates, &given, in_si)
+                .ok_or_else(|| unclear(prepared, &rates))?,
+        };
+        let (mut turning, mut rate_of) = (Vec::new(), Vec::new());
+        let (mut rests, mut others) = (Vec::new(), Vec::new());
         for (o, class) in observations.into_iter().zip(classes) {
             match class {
-                Some(rate) => {
+                Class::Rate(rate) => {
                     turning.push(o);
                     rate_of.push(rate);
                 }
+                Class::Other => others.push(o.dwell),
                 // The Earth's rate lies anywhere in the frame of a gyro whose axes are not known yet.
-                None => rests.push(Rest {
+                Class::Rest => rests.push(Rest {
                     dwell: o.dwell,
                     raw: o.raw,
                     variance: o.variance,
@@ -93,6 +111,7 @@ impl RatedDwells {
             turning,
             rate_of,
             rests,
+            others,
         })
     }
 
@@ -101,12 +120,21 @@ impl RatedDwells {
         self.rate_of.iter().map(|r| self.rates[*r])
     }
 
-    /// Sets the turning dwells aside for the accelerometer: beside the axis it feels a centripetal force there that nothing says.
-    pub fn keep_accel_at_rest(&self, prepared: &mut Prepared) {
-        for o in &self.turning {
-            let dwell = &mut prepared.dwells.list[o.dwell];
+    /// Sets the turning dwells aside for the accelerometer, which beside the axis feels a centripetal force there that nothing says, and those at another
+    /// rate for both sensors; what to say of these.
+    pub fn set_aside(&self, prepared: &mut Prepared) -> Option<Warning> {
+        let turning = self.turning.iter().map(|o| o.dwell);
+        for dwell in turning.chain(self.others.iter().copied()) {
+            let dwell = &mut prepared.dwells.list[dwell];
             dwell.accel_fault.get_or_insert(Fault::Spinning);
         }
+        for dwell in &self.others {
+            prepared.dwells.list[*dwell].gyro_fault = Some(Fault::OtherRate);
+        }
+        let step = |dwell: &usize| prepared.dwells.list[*dwell].step;
+        let steps = self.others.iter().map(step);
+        let names: Vec<String> = steps.map(|s| prepared.manifest.step_name(s)).collect();
+        (!names.is_empty()).then_some(Warning::DwellsNotUsed(names, Fault::OtherRate, None))
     }
 
     /// Refuses a dwell that turns at another rate than its own by a fit of all; `fitted` are their magnitudes, rad/s.
@@ -182,23 +210,30 @@ fn unclear(prepared: &Prepared, rates: &[f64]) -> Error {
     Error::new(format!("{}, gyro", prepared.place), problem, remedy).about(Argument::TurntableRates)
 }
 
-/// The rate of each of the readings `raw`, `None` at rest, where the readings show it; `fixed` are those that are given.
+/// At what each of the `observations` turned, where the readings show it; `given` are those that are known.
 ///
 /// Each reading is tried as the bias, and each distance from it as each of the rates; where there is one rate only, the readings may also all be at
 /// it, about the centre of their sphere. What fits best is taken.
 fn assigned(
     observations: &[Observation],
     rates: &[f64],
-    fixed: &[Option<Option<usize>>],
+    given: &[Option<Class>],
     in_si: bool,
-) -> Option<Vec<Option<usize>>> {
+) -> Option<Vec<Class>> {
     let largest = rates.last()?;
-    let off = |share: f64, class: Option<usize>| share - class.map_or(0.0, |k| rates[k] / largest);
-    let nearest = |share: f64| {
-        let classes = (0..rates.len()).map(Some).chain([None]);
-        classes.min_by(|a, b| off(share, *a).abs().total_cmp(&off(share, *b).abs()))
+    let n = observations.len() as f64;
+    let off = |share: f64, class: Class| match class {
+        Class::Rest => share,
+        Class::Rate(k) => (share - rates[k] / largest).abs(),
+        Class::Other => AT_NONE,
     };
-    let mut best: Option<(f64, Vec<Option<usize>>)> = None;
+    let nearest = |share: f64| {
+        let known = (0..rates.len())
+            .map(Class::Rate)
+            .chain([Class::Rest, Class::Other]);
+        known.min_by(|a, b| off(share, *a).total_cmp(&off(share, *b)))
+    };
+    let mut best: Option<(f64, Vec<Class>)> = None;
     for Observation { raw: centre, .. } in observations {
         let distances = observations.iter().map(|o| (o.raw - centre).norm());
         let distances: Vec<f64> = distances.collect();
@@ -212,55 +247,49 @@ fn assigned(
                 continue;
             }
             let share = |d: &f64| d / (scale * largest);
-            let classes: Vec<Option<usize>> = distances
-                .iter()
-                .zip(fixed)
-                .map(|(d, fixed)| fixed.unwrap_or_else(|| nearest(share(d)).flatten()))
+            let classes = distances.iter().zip(given);
+            let classes: Vec<Class> = classes
+                .filter_map(|(d, given)| given.or_else(|| nearest(share(d))))
                 .collect();
-            let occurs = |k: usize| classes.contains(&Some(k));
-            if !(0..rates.len()).all(occurs) {
+            let occurs = |k: usize| classes.contains(&Class::Rate(k));
+            let others = classes.iter().filter(|c| **c == Class::Other).count() as f64;
+            if !(0..rates.len()).all(occurs) || others > MOST_AT_NONE * n {
                 continue;
             }
-            let cost: f64 = distances
-                .iter()
-                .zip(&classes)
-                .map(|(d, class)| off(share(d), *class).powi(2))
-                .sum();
+            let errors = distances.iter().zip(&classes);
+            let cost: f64 = errors.map(|(d, class)| off(share(d), *class).powi(2)).sum();
             if best.as_ref().is_none_or(|b| cost < b.0) {
                 best = Some((cost, classes));
             }
         }
     }
-    let rms = |cost: f64| (cost / observations.len() as f64).sqrt();
+    let rms = |cost: f64| (cost / n).sqrt();
     if let Some((_, classes)) = best.filter(|b| rms(b.0) < UNLIKE) {
         return Some(classes);
     }
-    let at_one = rates.len() == 1 && fixed.iter().all(|f| f.is_none_or(|class| class.is_some()));
+    let at_one = rates.len() == 1 && given.iter().all(|g| g.is_none_or(|c| c != Class::Rest));
     let sphere = magnitude::first_guess(observations, *largest).filter(|_| at_one)?;
     let off = observations
         .iter()
         .map(|o| sphere.apply(&o.raw).norm() / largest - 1.0);
     let cost: f64 = off.map(|off| off * off).sum();
-    (rms(cost) < UNLIKE).then(|| vec![Some(0); observations.len()])
+    (rms(cost) < UNLIKE).then(|| vec![Class::Rate(0); observations.len()])
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// Readings of rates (an index, or rest) in these directions, by a gyro whose scale factors differ by 10 % and whose bias is 2048 counts.
-    fn readings(of: &[(Option<usize>, [f64; 3])], rates: &[f64]) -> Vec<Observation> {
+    /// Readings at these rates, deg/s, in these directions, by a gyro whose scale factors differ by 10 % and whose bias is 2048 counts.
+    fn readings(of: &[(f64, [f64; 3])]) -> Vec<Observation> {
         let scale = Vector3::new(95.0, 100.0, 105.0);
-        let reading = |(rate, along): &(Option<usize>, [f64; 3])| {
-            let rate = rate.map_or(0.0, |k| rates[k]);
-            let along = Vector3::from(*along).normalize();
-            Observation {
-                dwell: 0,
-                raw: scale.component_mul(&(along * rate)) + Vector3::repeat(2048.0),
-                variance: Vector3::zeros(),
-                input: Vector3::repeat(f64::NAN),
-                change: Vector3::zeros(),
-            }
+        let reading = |(dps, along): &(f64, [f64; 3])| Observation {
+            dwell: 0,
+            raw: scale.component_mul(&(Vector3::from(*along).normalize() * dps.to_radians()))
+                + Vector3::repeat(2048.0),
+            variance: Vector3::zeros(),
+            input: Vector3::repeat(f64::NAN),
+            change: Vector3::zeros(),
         };
         of.iter().map(reading).collect()
     }
@@ -276,47 +305,37 @@ mod tests {
         [0.0, 1.0, -1.0],
     ];
 
+    /// At what dwells with these rates, deg/s, in each direction turned, where 200 and 270 deg/s, or the first of them, are known.
+    fn found(dps: &[f64], known: usize) -> Option<Vec<Class>> {
+        let rates = [200f64.to_radians(), 270f64.to_radians()];
+        let all = DIRECTIONS.iter();
+        let of: Vec<_> = all
+            .flat_map(|along| dps.iter().map(|r| (*r, *along)))
+            .collect();
+        assigned(
+            &readings(&of),
+            &rates[..known],
+            &vec![None; of.len()],
+            false,
+        )
+    }
+
     #[test]
     fn readings_show_which_dwells_are_at_rest_and_which_at_which_rate() {
-        let rates = [200f64.to_radians(), 270f64.to_radians()];
-        let mut of: Vec<(Option<usize>, [f64; 3])> = Vec::new();
-        for along in DIRECTIONS {
-            of.extend([(None, along), (Some(0), along), (Some(1), along)]);
-        }
-        let truth: Vec<Option<usize>> = of.iter().map(|o| o.0).collect();
-        let free = vec![None; of.len()];
-        let raw = readings(&of, &rates);
-        assert_eq!(assigned(&raw, &rates, &free, false), Some(truth));
-        // Three rests among the turns of one rate.
-        let one = [rates[0]];
-        let mut few: Vec<_> = DIRECTIONS.map(|along| (Some(0), along)).into();
-        few.extend([(None, [1.0; 3]); 3]);
-        let truth: Vec<Option<usize>> = few.iter().map(|o| o.0).collect();
-        let raw = readings(&few, &one);
+        let cycle = [Class::Rest, Class::Rate(0), Class::Rate(1)];
+        assert_eq!(found(&[0.0, 200.0, 270.0], 2), Some(cycle.repeat(8)));
+        assert_eq!(found(&[0.0, 200.0], 1), Some(cycle[..2].repeat(8)));
+        // A table that slows down to 60 deg/s before it turns on.
+        let with_other = [Class::Rest, Class::Rate(0), Class::Other, Class::Rate(1)];
         assert_eq!(
-            assigned(&raw, &one, &vec![None; few.len()], false),
-            Some(truth)
+            found(&[0.0, 200.0, 60.0, 270.0], 2),
+            Some(with_other.repeat(8))
         );
     }
 
     #[test]
     fn turns_at_one_rate_without_rests_are_all_at_that_rate_and_of_two_rates_nothing_shows_which() {
-        let rates = [200f64.to_radians(), 270f64.to_radians()];
-        let of: Vec<_> = DIRECTIONS.map(|along| (Some(0), along)).into();
-        let raw = readings(&of, &rates);
-        let free = vec![None; of.len()];
-        let all = vec![Some(0); of.len()];
-        assert_eq!(assigned(&raw, &rates[..1], &free, false), Some(all));
-        assert_eq!(assigned(&raw, &rates, &free, false), None);
-        // Rests and two rates, of which one is given.
-        let mut three: Vec<(Option<usize>, [f64; 3])> = Vec::new();
-        for along in DIRECTIONS {
-            three.extend([(None, along), (Some(0), along), (Some(1), along)]);
-        }
-        let raw = readings(&three, &rates);
-        assert_eq!(
-            assigned(&raw, &rates[..1], &vec![None; raw.len()], false),
-            None
-        );
+        assert_eq!(found(&[200.0], 1), Some(vec![Class::Rate(0); 8]));
+        assert_eq!(found(&[200.0], 2), None);
     }
 }

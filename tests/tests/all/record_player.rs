@@ -76,7 +76,7 @@ fn dwells_that_nobody_numbered_are_found_and_given_their_rates() {
     };
     let prepared = Prepared::read(&recording, found, |_| ()).expect("readable");
     let rated = RatedDwells::of(&prepared).expect("rated");
-    // A rest after the turns and one in the next orientation are two where the unit was handled for long enough.
+    // The bench's table turns on at 60 deg/s between its rates, and stands still for a while after them.
     assert!(rated.rests.len() >= 14, "{}", rated.rests.len());
     for rate in 0..2 {
         assert_eq!(rated.rate_of.iter().filter(|r| **r == rate).count(), 14);

@@ -96,7 +96,7 @@ pub fn verify(prepared: &Prepared, calibration: &Calibration) -> Result<Verifica
     let at_rest = match manifest.reference {
         Reference::TurntableRate => {
             let mut at_rest = prepared.clone();
-            RatedDwells::of(prepared)?.keep_accel_at_rest(&mut at_rest);
+            warnings.extend(RatedDwells::of(prepared)?.set_aside(&mut at_rest));
             Some(at_rest)
         }
         Reference::Table | Reference::Gravity => None,

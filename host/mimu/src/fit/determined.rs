@@ -176,7 +176,7 @@ fn directions() -> Vec<(String, Vector3<f64>)> {
 }
 
 /// The faces that no pose has up, to within 45 degrees, by a first guess of the accelerometer: `-x, +z`. `None` where all have been.
-pub(super) fn faces_not_up(guess: &Affine<f64>, raw: &[Vector3<f64>]) -> Option<String> {
+pub(crate) fn faces_not_up(guess: &Affine<f64>, raw: &[Vector3<f64>]) -> Option<String> {
     let faces = directions().into_iter().take(6);
     let unseen = faces.filter(|(_, face)| {
         let near = |u: &&Vector3<f64>| guess.apply(u).normalize().dot(face) > 0.7;
