@@ -15,7 +15,7 @@ mod fit;
 mod import;
 mod page;
 mod svg;
-mod text;
+pub(crate) mod text;
 mod thermal;
 mod thermal_page;
 mod thermal_plan;

@@ -69,6 +69,7 @@ pub mod pose_means;
 pub mod prepared;
 pub mod quantity;
 pub mod readable;
+pub mod recording_problem;
 pub mod result;
 pub mod signal;
 pub mod spectrum;

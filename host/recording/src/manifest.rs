@@ -209,6 +209,12 @@ impl Manifest {
         Some(recorded.unit_id.as_str()).filter(|id| id.bytes().any(|digit| digit != b'0'))
     }
 
+    /// Whether it was joined from files that follow one another, a step each.
+    pub fn is_joined(&self) -> bool {
+        let by = ["--sequence", "--faces"];
+        self.imported_with.iter().any(|a| by.contains(&a.as_str()))
+    }
+
     /// Name of a step: its label, or its number.
     pub fn step_name(&self, step: i32) -> String {
         let label = usize::try_from(step)

@@ -19,6 +19,7 @@ use crate::arguments::{KeepArgs, NoiseArgs, StillArgs};
 use crate::cmd::diagnose::command_line;
 use crate::output::show;
 use crate::reading::read;
+use crate::report::text::problems;
 use crate::report::{Made, UnitReport, unit_page};
 
 #[derive(Args)]
@@ -139,7 +140,11 @@ pub fn run(args: &ReportArgs) -> Result<()> {
     };
     stage(&args.out, unit_page(&unit, &made)?)?.publish()?;
     let verdict = match unit.diagnosis {
-        Some(d) => format!("{}: {}\n", d.device, d.verdict.name()),
+        Some(d) => {
+            let mut out = String::new();
+            problems(&mut out, &d.recording_problems, false);
+            out + &format!("{}: {}\n", d.device, d.verdict.name())
+        }
         None => format!("{}\n", calibration.device),
     };
     show(&format!("{verdict}page: {}\n", args.out.display()))

@@ -65,9 +65,9 @@ impl<'a> Sections<'a> {
         accel.map(|s| s.picture)
     }
 
-    /// The verdict, in a sentence for each sensor.
+    /// The verdict, in a sentence for each sensor, after what is wrong with the recording.
     pub fn verdict(&self) -> Markup {
-        html! { p class={ "verdict " (self.d.verdict.name()) } { (verdict(self.d)) } }
+        first(self.d)
     }
 
     /// Error before and after, on the recording and on a second one.
@@ -146,6 +146,17 @@ pub fn diagnosis_page(d: &DiagnosisResult, made: &Made) -> Result<String> {
     Ok(page(&title, &main))
 }
 
+/// What is wrong with the recording, and the verdict.
+fn first(d: &DiagnosisResult) -> Markup {
+    html! {
+        @if !d.recording_problems.is_empty() {
+            h2 { "Wrong with this recording" }
+            ul { @for problem in &d.recording_problems { li data-problem=(problem.id()) { (problem) } } }
+        }
+        p class={ "verdict " (d.verdict.name()) } { (verdict(d)) }
+    }
+}
+
 fn head(d: &DiagnosisResult, made: &Made) -> Markup {
     let known = match d.reference {
         Reference::Table => "known from the table",
@@ -166,7 +177,7 @@ fn head(d: &DiagnosisResult, made: &Made) -> Markup {
         .collect();
     html! {
         h1 { "Diagnosis of " (d.device) }
-        p class={ "verdict " (d.verdict.name()) } { (verdict(d)) }
+        (first(d))
         dl {
             dt { "Recording" } dd { code { (made.recording) } }
             @for source in &d.recordings {
