@@ -21,7 +21,7 @@ use mimu_recording::error::{Error, Result};
 use mimu_recording::result_file::stage;
 use nalgebra::Vector3;
 
-use crate::arguments::{JsonArgs, SensorArg};
+use crate::arguments::{JsonArgs, SensorArg, VerboseArgs};
 use crate::output::{check_outputs, print};
 
 #[derive(Args)]
@@ -103,6 +103,8 @@ pub struct DesignArgs {
     /// Plan to write, for a table or a person to carry out
     #[arg(short, value_name = "FILE", conflicts_with = "compare")]
     output: Option<PathBuf>,
+    #[command(flatten)]
+    verbose: VerboseArgs,
     #[command(flatten)]
     json: JsonArgs,
 }
@@ -427,7 +429,7 @@ pub fn run(args: &DesignArgs) -> Result<()> {
             args.best(&args.own_problem()?, n, title)?
         }
     };
-    let mut text = report::design_text(&designed);
+    let mut text = report::design_text(&designed, args.verbose.verbose);
     let mut plan = None;
     if let Some(path) = &args.output {
         plan = Some(stage(path, designed.plan(args.motion().slew))?);

@@ -15,7 +15,7 @@ use mimu::warning::Warning;
 use mimu_recording::error::{Error, Result};
 use mimu_recording::result_file::stage;
 
-use crate::arguments::{JsonArgs, KeepArgs, NoiseArgs, StillArgs};
+use crate::arguments::{JsonArgs, KeepArgs, NoiseArgs, StillArgs, VerboseArgs};
 use crate::output::print;
 use crate::reading::read;
 
@@ -45,9 +45,6 @@ pub struct DiagnoseArgs {
     /// Plan of the next experiment to write: what this recording could not show, and what it could not tell apart
     #[arg(long, value_name = "FILE")]
     plan: Option<PathBuf>,
-    /// Print everything: each coefficient, the reason of every rejected effect, all residuals, notes and experiments
-    #[arg(long)]
-    all: bool,
     /// Print the experiments that would show what this recording could not show, and distinguish what it could not
     #[arg(long)]
     next: bool,
@@ -57,6 +54,8 @@ pub struct DiagnoseArgs {
     keep: KeepArgs,
     #[command(flatten)]
     noise: NoiseArgs,
+    #[command(flatten)]
+    verbose: VerboseArgs,
     #[command(flatten)]
     json: JsonArgs,
 }
@@ -196,7 +195,7 @@ pub fn run(args: &DiagnoseArgs) -> Result<()> {
         }
     }
     let detail = report::Detail {
-        all: args.all,
+        all: args.verbose.verbose,
         next: args.next,
     };
     print(

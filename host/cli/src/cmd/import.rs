@@ -31,7 +31,7 @@ pub(crate) struct ImportArgs {
     /// ref_force_x_mps2.., and sample, an index from which the time follows with --rate-hz.
     #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
     columns: Vec<ColumnList>,
-    /// Whose files they are, which says columns, units and signs where they are not given; without it, by the header
+    /// Maker or program whose layout the files have: columns, units and signs; found by the header without it
     #[arg(long, value_name = "NAME", value_parser = presets())]
     preset: Option<Preset>,
     /// The rows are means over a pose or a rate each, and no samples: mean readings, and as far as known standard deviations of a

@@ -17,7 +17,7 @@ use mimu_thermal::fit::{Estimator, Options, fit};
 use mimu_thermal::result::ThermalResult;
 use mimu_thermal::session::Session;
 
-use crate::arguments::{JsonArgs, NoiseArgs, StillArgs};
+use crate::arguments::{JsonArgs, NoiseArgs, StillArgs, VerboseArgs};
 use crate::cmd::diagnose::command_line;
 use crate::output::{check_outputs, print};
 use crate::reading::read;
@@ -77,6 +77,8 @@ struct FitArgs {
     /// The same with all figures as one HTML page
     #[arg(long, value_name = "FILE")]
     page: Option<PathBuf>,
+    #[command(flatten)]
+    verbose: VerboseArgs,
     #[command(flatten)]
     json: JsonArgs,
 }
@@ -174,7 +176,7 @@ fn run_fit(args: &FitArgs) -> Result<()> {
     };
     let fitted = fit(sessions, &verify, options)?;
     let result = ThermalResult::of(&fitted);
-    let mut text = report::thermal_text(&result);
+    let mut text = report::thermal_text(&result, args.verbose.verbose);
     let mut staged = Vec::new();
     let now = jiff::Timestamp::now()
         .round(jiff::Unit::Second)
