@@ -11,7 +11,7 @@ use mimu::warning::Warning;
 use mimu_recording::Reference;
 
 use crate::hint;
-use crate::report::text::{counted, kinds, problems, warn, warn_within, wrap};
+use crate::report::text::{counted, kinds, problems, warn, warn_within};
 
 /// Result of `mimu fit`: a summary, or with `verbose` everything.
 pub fn fit_text(fit: &FitResult, verbose: bool) -> String {
@@ -54,7 +54,7 @@ pub fn fit_text(fit: &FitResult, verbose: bool) -> String {
             let kinds = kinds(others, Warning::is_like);
             let shown = kinds.map(|(warning, more)| counted(hint::of_warning(warning), more));
             warn_within(&mut out, shown, 1);
-            wrap(&mut out, "next: ", &next(fit));
+            let _ = writeln!(out, "next: {}", next(fit));
         }
     }
     out

@@ -44,22 +44,18 @@ pub(crate) const SUMMARY: usize = 25;
 /// Lines of a summary that what is wrong with the recording takes at most.
 const OF_PROBLEMS: usize = 7;
 
-/// What is wrong with a recording, a line each; without `verbose` only so many.
+/// What is wrong with a recording, a line each, which is not wrapped so that programs find it; without `verbose` only so many.
 pub(crate) fn problems(out: &mut String, problems: &[RecordingProblem], verbose: bool) {
     if problems.is_empty() {
         return;
     }
     let _ = writeln!(out, "wrong with this recording:");
-    let mut lines = 1;
-    for (k, problem) in problems.iter().enumerate() {
-        let mut text = String::new();
-        wrap(&mut text, "  - ", &problem.to_string());
-        lines += text.lines().count();
-        if lines > OF_PROBLEMS && !verbose {
-            let _ = writeln!(out, "  - and {} more (--verbose)", problems.len() - k);
-            break;
-        }
-        out.push_str(&text);
+    let shown = if verbose { problems.len() } else { OF_PROBLEMS };
+    for problem in problems.iter().take(shown) {
+        let _ = writeln!(out, "  - {problem}");
+    }
+    if problems.len() > shown {
+        let _ = writeln!(out, "  - and {} more (--verbose)", problems.len() - shown);
     }
 }
 
@@ -86,22 +82,17 @@ pub(crate) fn counted(warning: String, more: usize) -> String {
     }
 }
 
-/// As many warnings as a summary that is to have `after` more lines has room for, and how many more there are.
+/// As many warnings, a line each, as a summary that is to have `after` more lines has room for, and how many more there are.
 pub(crate) fn warn_within(out: &mut String, warnings: impl Iterator<Item = String>, after: usize) {
     let warnings: Vec<String> = warnings.collect();
-    for (k, warning) in warnings.iter().enumerate() {
-        let mut text = String::new();
-        wrap(&mut text, "warning: ", warning);
-        let rest = usize::from(k + 1 < warnings.len());
-        if out.lines().count() + text.lines().count() + rest + after > SUMMARY {
-            let left = plural((warnings.len() - k) as u64, "warning");
-            let _ = writeln!(
-                out,
-                "warning: {left}{} (--verbose)",
-                if k > 0 { " more" } else { "" }
-            );
-            return;
-        }
-        out.push_str(&text);
+    let room = SUMMARY.saturating_sub(out.lines().count() + after);
+    let shown = match warnings.len() <= room {
+        true => warnings.len(),
+        false => room.saturating_sub(1),
+    };
+    warn(out, warnings.iter().take(shown));
+    let left = (warnings.len() - shown) as u64;
+    if left > 0 {
+        let _ = writeln!(out, "warning: {} (--verbose)", plural(left, "more warning"));
     }
 }
