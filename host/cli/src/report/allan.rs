@@ -102,7 +102,15 @@ fn sensor_text(
         let shown = if verbose { units.len() } else { 1 };
         for unit in units.into_iter().take(shown) {
             let cells = channels.iter().map(|c| match c.get(term) {
-                Ok(k) => interval(k.value, k.lower, k.upper, &unit),
+                Ok(k) if verbose => interval(k.value, k.lower, k.upper, &unit),
+                // Three of them fit in 100 columns.
+                Ok(k) => {
+                    let [low, high] = [k.lower, k.upper].map(|end| 100.0 * (end / k.value - 1.0));
+                    format!(
+                        "{} {low:+.1} {high:+.1} %",
+                        significant(k.value * unit.factor)
+                    )
+                }
                 Err(_) => "-".into(),
             });
             rows.push((format!("{}, {}", term.letter(), unit.unit), cells.collect()));

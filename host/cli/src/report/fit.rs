@@ -108,10 +108,10 @@ fn errors_text(out: &mut String, fit: &FitResult) {
         .sensors
         .present()
         .any(|(_, s)| s.as_they_came_rms.is_some());
-    let last = if came { "as it came" } else { "" };
+    let last = if came { "  as it came" } else { "" };
     let _ = writeln!(
         out,
-        "{:<18}{:>11}{:>11}{:>11}{last:>12}",
+        "{:<18}{:>11}{:>11}{:>11}{last}",
         "rms error", "held out", "in sample", "noise"
     );
     for (name, s) in fit.sensors.present() {
@@ -124,9 +124,10 @@ fn errors_text(out: &mut String, fit: &FitResult) {
             (true, came) => shown(came),
             (false, _) => String::new(),
         };
+        let width = if came { 12 } else { 0 };
         let _ = writeln!(
             out,
-            "{:<18}{:>11}{:>11}{:>11}{last:>12}  {}",
+            "{:<18}{:>11}{:>11}{:>11}{last:>width$}  {}",
             format!("{name}, {}", unit.unit),
             shown(s.held_out_rms),
             shown(Some(s.rms)),
