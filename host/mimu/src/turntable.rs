@@ -28,8 +28,9 @@ const SCALE_IN_SI: [f64; 2] = [0.5, 2.0];
 /// Distance from the nearest rate and from rest, over the largest rate, from which on a dwell is at none of them: a table that turns on slowly, or
 /// a hand that turns it.
 const AT_NONE: f64 = 0.17;
-/// Share of the dwells that may be at none of the rates: with more of them the rates are not those that were given.
-const MOST_AT_NONE: f64 = 0.34;
+/// How many dwells may be at none of the rates, for each that is at one. With more of them the rates are not those that were given: of a unit that turned at
+/// 200 and 270 deg/s, as often at either, and of which 200 was given, either half is at it as well as the other.
+const MOST_AT_NONE: f64 = 0.6;
 
 /// At what a dwell turned.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -252,8 +253,10 @@ fn assigned(
                 .filter_map(|(d, given)| given.or_else(|| nearest(share(d))))
                 .collect();
             let occurs = |k: usize| classes.contains(&Class::Rate(k));
-            let others = classes.iter().filter(|c| **c == Class::Other).count() as f64;
-            if !(0..rates.len()).all(occurs) || others > MOST_AT_NONE * n {
+            let count = |of: fn(&Class) -> bool| classes.iter().filter(|c| of(c)).count() as f64;
+            let others = count(|c| *c == Class::Other);
+            let turning = count(|c| matches!(c, Class::Rate(_)));
+            if !(0..rates.len()).all(occurs) || others > MOST_AT_NONE * turning {
                 continue;
             }
             let errors = distances.iter().zip(&classes);
@@ -337,5 +340,8 @@ mod tests {
     fn turns_at_one_rate_without_rests_are_all_at_that_rate_and_of_two_rates_nothing_shows_which() {
         assert_eq!(found(&[200.0], 1), Some(vec![Class::Rate(0); 8]));
         assert_eq!(found(&[200.0], 2), None);
+        // As often at a rate that was not given as at the one that was.
+        assert_eq!(found(&[0.0, 200.0, 270.0], 1), None);
+        assert_eq!(found(&[0.0, 0.0, 200.0, 270.0], 1), None);
     }
 }

@@ -38,7 +38,8 @@ pub fn fit_text(fit: &FitResult, verbose: bool) -> String {
         errors_text(&mut out, fit);
         for (name, sensor) in fit.sensors.present() {
             let _ = writeln!(out);
-            parameters_text(&mut out, fit, name, sensor, name.name());
+            let head = format!("{name}, ± of 95 %");
+            parameters_text(&mut out, fit, name, sensor, &head);
         }
     }
     let others = fit.warnings.iter().filter(|w| !w.is_of_recording());
@@ -281,7 +282,7 @@ fn sensor_text(out: &mut String, fit: &FitResult, name: Sensor, sensor: &SensorF
             );
         }
     }
-    parameters_text(out, fit, name, sensor, "");
+    parameters_text(out, fit, name, sensor, "  ± of 95 %");
 }
 
 /// The physical quantities by axis, under `head`.
@@ -326,7 +327,7 @@ fn parameters_text(
     let width = 2 + cells.map(|c| c.chars().count()).max().unwrap_or(0);
     let _ = writeln!(
         out,
-        "{head:<36}{:>width$}{:>width$}{:>width$}   95 %",
+        "{head:<36}{:>width$}{:>width$}{:>width$}",
         "x", "y", "z"
     );
     for (label, cells) in &rows {
