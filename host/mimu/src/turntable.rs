@@ -266,17 +266,18 @@ fn assigned(
             }
         }
     }
-    let rms = |cost: f64| (cost / n).sqrt();
-    if let Some((_, classes)) = best.filter(|b| rms(b.0) < UNLIKE) {
-        return Some(classes);
-    }
     let at_one = rates.len() == 1 && given.iter().all(|g| g.is_none_or(|c| c != Class::Rest));
-    let sphere = magnitude::first_guess(observations, *largest).filter(|_| at_one)?;
-    let off = observations
-        .iter()
-        .map(|o| sphere.apply(&o.raw).norm() / largest - 1.0);
-    let cost: f64 = off.map(|off| off * off).sum();
-    (rms(cost) < UNLIKE).then(|| vec![Class::Rate(0); observations.len()])
+    let sphere = magnitude::first_guess(observations, *largest).filter(|_| at_one);
+    if let Some(sphere) = sphere {
+        let off = observations.iter();
+        let off = off.map(|o| sphere.apply(&o.raw).norm() / largest - 1.0);
+        let cost: f64 = off.map(|off| off * off).sum();
+        if best.as_ref().is_none_or(|b| cost < b.0) {
+            best = Some((cost, vec![Class::Rate(0); observations.len()]));
+        }
+    }
+    let (cost, classes) = best?;
+    ((cost / n).sqrt() < UNLIKE).then_some(classes)
 }
 
 #[cfg(test)]
