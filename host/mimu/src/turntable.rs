@@ -17,17 +17,21 @@ use mimu_recording::{RawUnit, Turntable};
 
 /// Half of a 95 % interval of a normal variable, in sigmas.
 const NORMAL_95: f64 = 1.959_963_984_540_054;
-/// Root mean square of distances off the nearest rate, over the largest rate, from which on the readings show no rates. Scale factors of 10 % apart
-/// make 0.05 of it.
-const UNLIKE: f64 = 0.12;
+/// Standard deviations by which readings are expected off: at rest, over the largest rate, where a bias wanders; at a rate, over it, by scale factors
+/// that differ from axis to axis.
+const REST_SIGMA: f64 = 0.02;
+const RATE_SIGMA: f64 = 0.06;
+/// Squared sigmas that a dwell at none of the rates counts.
+const AT_NONE: f64 = 9.0;
+/// Mean of the squared sigmas from which on the readings show no rates.
+const UNLIKE: f64 = 4.0;
+/// Fewest dwells that are taken for rests: one alone may as well be a turn, as those about perpendicular axes are at two distances from it.
+const FEWEST_RESTS: f64 = 2.0;
 /// Share of its rate by which a dwell may be off in a fit of all: beyond, it turned at another rate. 33 1/3 and 45 rpm are 26 % apart.
 const OTHER_RATE: f64 = 0.1;
 /// Scale factors of readings in SI, over one, among which the dwells are assigned: wider than any part, so that a wrong rate is seen in the fit.
 const SCALE_IN_SI: [f64; 2] = [0.5, 2.0];
 
-/// Distance from the nearest rate and from rest, over the largest rate, from which on a dwell is at none of them: a table that turns on slowly, or
-/// a hand that turns it.
-const AT_NONE: f64 = 0.17;
 /// How many dwells may be at none of the rates, for each that is at one. With more of them the rates are not those that were given: of a unit that turned at
 /// 200 and 270 deg/s, as often at either, and of which 200 was given, either half is at it as well as the other.
 const MOST_AT_NONE: f64 = 0.6;
@@ -224,8 +228,9 @@ fn assigned(
     let largest = rates.last()?;
     let n = observations.len() as f64;
     let off = |share: f64, class: Class| match class {
-        Class::Rest => share,
-        Class::Rate(k) => (share - rates[k] / largest).abs(),
+        Class::Rest => (share / REST_SIGMA).powi(2),
+        Class::Rate(k) => ((share * largest / rates[k] - 1.0) / RATE_SIGMA).powi(2),
+        // A table that turns on slowly, or a hand that turns it.
         Class::Other => AT_NONE,
     };
     let nearest = |share: f64| {
@@ -256,11 +261,12 @@ fn assigned(
             let count = |of: fn(&Class) -> bool| classes.iter().filter(|c| of(c)).count() as f64;
             let others = count(|c| *c == Class::Other);
             let turning = count(|c| matches!(c, Class::Rate(_)));
-            if !(0..rates.len()).all(occurs) || others > MOST_AT_NONE * turning {
+            let few = count(|c| *c == Class::Rest) < FEWEST_RESTS;
+            if few || !(0..rates.len()).all(occurs) || others > MOST_AT_NONE * turning {
                 continue;
             }
             let errors = distances.iter().zip(&classes);
-            let cost: f64 = errors.map(|(d, class)| off(share(d), *class).powi(2)).sum();
+            let cost: f64 = errors.map(|(d, class)| off(share(d), *class)).sum();
             if best.as_ref().is_none_or(|b| cost < b.0) {
                 best = Some((cost, classes));
             }
@@ -269,15 +275,15 @@ fn assigned(
     let at_one = rates.len() == 1 && given.iter().all(|g| g.is_none_or(|c| c != Class::Rest));
     let sphere = magnitude::first_guess(observations, *largest).filter(|_| at_one);
     if let Some(sphere) = sphere {
-        let off = observations.iter();
-        let off = off.map(|o| sphere.apply(&o.raw).norm() / largest - 1.0);
-        let cost: f64 = off.map(|off| off * off).sum();
+        let shares = observations.iter();
+        let shares = shares.map(|o| sphere.apply(&o.raw).norm() / largest);
+        let cost: f64 = shares.map(|share| off(share, Class::Rate(0))).sum();
         if best.as_ref().is_none_or(|b| cost < b.0) {
             best = Some((cost, vec![Class::Rate(0); observations.len()]));
         }
     }
     let (cost, classes) = best?;
-    ((cost / n).sqrt() < UNLIKE).then_some(classes)
+    (cost < UNLIKE * n).then_some(classes)
 }
 
 #[cfg(test)]
